@@ -14,7 +14,7 @@ use tautline::law::{
     DisplacementKeys, DisplacementLaw, EdgeTensionKeys, EdgeTensionLaw, LaplacianKeys, LaplacianLaw, Law, LawContext,
 };
 use tautline::observation::Observation;
-use tautline::space::KeptPairs;
+use tautline::space::VerletList;
 use tautline::swarm::{Rows, Swarm};
 
 /// Returns vehicles on a sphere about 2 m apart, and a formation in which they are about 1 m apart.
@@ -93,7 +93,7 @@ fn displacement(criterion: &mut Criterion) {
             let context = LawContext::new(&graph, &formation, DELTA_M, 0.1);
             let mut law = DisplacementLaw::new(&context, DisplacementKeys::default()).expect("a law");
             let range_m = law.capabilities().sensing_range_m.expect("it senses");
-            let (mut near, mut control) = (KeptPairs::default(), Rows::zeros(count));
+            let (mut near, mut control) = (VerletList::default(), Rows::zeros(count));
             group.bench_function(name, |bencher| {
                 bencher.iter(|| {
                     near.update(black_box(&swarm.positions_m), range_m);

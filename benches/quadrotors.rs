@@ -11,7 +11,7 @@ use tautline::formation::Formation;
 use tautline::law::{EdgeTensionKeys, LawSpec};
 use tautline::plant::{Path, rapier};
 use tautline::scenario::{DEFAULT_ATTITUDE_HZ, Scenario};
-use tautline::sim::{self, Parts};
+use tautline::sim::{self, Components};
 use tautline::swarm::{Rows, Swarm};
 use tautline::vehicle::{self, Airframe, MODELS, Quadrotor};
 
@@ -39,7 +39,7 @@ fn flights(criterion: &mut Criterion) {
         group.sample_size(10);
         group.bench_function(BenchmarkId::from_parameter("whole"), |bencher| {
             bencher.iter_batched(
-                || Parts::of(&scenario).expect("a law"),
+                || Components::of(&scenario).expect("a law"),
                 |parts| pool.install(|| sim::fly(&scenario, parts, &mut (), &mut |_| ControlFlow::Continue(()))),
                 BatchSize::LargeInput,
             );

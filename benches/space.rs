@@ -5,7 +5,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
-use tautline::space::NearPairs;
+use tautline::space::CellList;
 use tautline::swarm::{Rows, separation};
 
 /// Range \[m\]; evenly spread points are about 1 m apart.
@@ -36,7 +36,7 @@ fn near_pairs(criterion: &mut Criterion) {
         group.sample_size(10);
         for (name, axes) in [("plane", 2), ("volume", 3)] {
             let positions_m = spread(count, axes);
-            let (mut near, mut found) = (NearPairs::default(), Vec::new());
+            let (mut near, mut found) = (CellList::default(), Vec::new());
             group.bench_function(format!("cells {name}"), |bencher| {
                 bencher.iter(|| near.update(black_box(&positions_m), RANGE_M));
             });

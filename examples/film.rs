@@ -11,7 +11,7 @@ use tautline::flight_log::FlightLog;
 use tautline::render::scene::Extent;
 use tautline::render::{AdapterChoice, Film, FilmFormat, Renderer, Scene, Timeline, View};
 use tautline::scenario::{Override, Scenario, Source};
-use tautline::sim::{self, Parts};
+use tautline::sim::{self, Components};
 
 const FPS: u32 = 25;
 /// Seconds of the flight in a second of the film.
@@ -21,7 +21,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let shorter = Override::parse("time.duration_s=60")?;
     let scenario = Scenario::read(&Source::resolve("circle")?, &[shorter])?;
     let mut log = FlightLog::of(&scenario);
-    sim::fly(&scenario, Parts::of(&scenario)?, &mut log, &mut |_step| ControlFlow::Continue(()))?;
+    sim::fly(&scenario, Components::of(&scenario)?, &mut log, &mut |_step| ControlFlow::Continue(()))?;
     let timeline = Timeline::flown(&scenario, Arc::new(log));
 
     let path = Path::new("circle.gif");

@@ -11,7 +11,7 @@ use std::ops::ControlFlow;
 use tautline::law::{Law, LawError};
 use tautline::observation::Observation;
 use tautline::scenario::{Scenario, Source};
-use tautline::sim::{self, Parts};
+use tautline::sim::{self, Components};
 use tautline::swarm::{Rows, row, set_row};
 
 /// `u_i = -(p_i - h_i) - 2 v_i + 4 sum_j (p_i - p_j) / |p_i - p_j|^4`
@@ -39,7 +39,7 @@ impl Law for SpringsAndRepulsion {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let scenario = Scenario::read(&Source::resolve("pentagon")?, &[])?;
-    let parts = Parts::under(&scenario, Box::new(SpringsAndRepulsion));
+    let parts = Components::under(&scenario, Box::new(SpringsAndRepulsion));
     let flight = sim::fly(&scenario, parts, &mut (), &mut |_step| ControlFlow::Continue(()))?;
     println!("{}: {:?}", flight.law, flight.audit.status);
     if let Some(closest) = flight.audit.closest {

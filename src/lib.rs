@@ -14,12 +14,12 @@
 //! use std::ops::ControlFlow;
 //!
 //! use tautline::scenario::{Override, Scenario, Source};
-//! use tautline::sim::{self, Parts};
+//! use tautline::sim::{self, Components};
 //! use tautline::audit;
 //!
 //! let shorter = Override::parse("time.duration_s=5")?;
 //! let scenario = Scenario::read(&Source::resolve("pentagon")?, &[shorter])?;
-//! let parts = Parts::of(&scenario)?;
+//! let parts = Components::of(&scenario)?;
 //! let flight = sim::fly(&scenario, parts, &mut (), &mut |_step| ControlFlow::Continue(()))?;
 //! assert_eq!(flight.audit.status, audit::Status::Clear);
 //! # Ok::<(), Box<dyn std::error::Error>>(())

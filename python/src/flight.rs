@@ -13,7 +13,7 @@ use tautline::record::{Event, RecordError, Sample, Sink};
 use tautline::report::Report;
 use tautline::request::{OwnRecording, flight_page, run_audit};
 use tautline::run::run_with;
-use tautline::sim::{Breakdown, Ending, Parts, SimError};
+use tautline::sim::{Breakdown, Components, Ending, SimError};
 
 use crate::audit::FlightFindings;
 use crate::errors::{IntoException as _, internal_error, wrong_input};
@@ -146,8 +146,8 @@ pub(crate) fn fly(
             None => Preflight::of(scenario)?,
         };
         let parts = match law {
-            Some(law) => Parts::under(scenario, Box::new(law)),
-            None => Parts::of(scenario)?,
+            Some(law) => Components::under(scenario, Box::new(law)),
+            None => Components::of(scenario)?,
         };
         let recording = record.as_deref().map(|path| {
             let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);

@@ -7,7 +7,7 @@ use numpy::PyArray2;
 use numpy::PyUntypedArrayMethods as _;
 use numpy::ndarray::Ix2;
 use pyo3::prelude::*;
-use tautline::sim::{self, Ending, Parts, SimError};
+use tautline::sim::{self, Components, Ending, SimError};
 use tautline::swarm::{Pair, first_row_not_finite};
 
 use crate::errors::{IntoException as _, wrong_input};
@@ -74,8 +74,8 @@ impl Simulation {
         let is_of_python = law.is_some();
         let begin = || -> Result<_, SimError> {
             let parts = match law {
-                Some(law) => Parts::under(scenario, Box::new(law)),
-                None => Parts::of(scenario)?,
+                Some(law) => Components::under(scenario, Box::new(law)),
+                None => Components::of(scenario)?,
             };
             sim::Simulation::with(scenario, parts)
         };

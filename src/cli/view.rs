@@ -15,7 +15,7 @@ use tautline_recordings::read::{Format, ReadOptions};
 use tautline_render::{LiveUpdate, Theme, Timeline, show};
 use tautline_report::request::{Failure, ScenarioRequest};
 use tautline_sim::scenario::Scenario;
-use tautline_sim::sim::{self, Parts};
+use tautline_sim::sim::{self, Components};
 
 /// Samples of a running flight that wait for the window.
 const WAITING: usize = 256;
@@ -76,7 +76,7 @@ pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
 
 /// Starts a flight in its own thread. The thread waits for a slower window, and ends when the window is closed.
 fn take_off(scenario: Scenario) -> Result<Receiver<LiveUpdate>, Failure> {
-    let parts = Parts::of(&scenario)?;
+    let parts = Components::of(&scenario)?;
     let (sender, receiver) = sync_channel(WAITING);
     std::thread::spawn(move || {
         let mut sink = LiveSink(sender);

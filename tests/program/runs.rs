@@ -158,7 +158,11 @@ fn the_baseline_violates_and_the_line_reaches_no_formation() {
 
     let collinear = run(folder.path(), &["pentagon-collinear", "--force"]);
     assert_eq!(collinear.exit, BAD);
-    assert!(collinear.out.starts_with("REFUSED BY CHECK: start-on-line; not reached: largest edge error "), "{}", collinear.out);
+    assert!(
+        collinear.out.starts_with("REFUSED BY CHECK: start-on-line; not reached: largest edge error "),
+        "{}",
+        collinear.out
+    );
     assert!(collinear.out.contains("The start lies on a line"), "{}", collinear.out);
     let report = json(&fs::read_to_string(folder.path().join("out/report.json")).expect("a report"));
     assert!(report["verdict"]["reasons"].to_string().contains("on a line"), "{report}");
@@ -180,7 +184,11 @@ fn colliding_hulls_end_the_judged_flight_and_points_pass_through() {
         "{}",
         solid.err
     );
-    assert!(report["verdict"]["reasons"].to_string().contains("After the first collision the motion is not governed by the law"));
+    assert!(
+        report["verdict"]["reasons"]
+            .to_string()
+            .contains("After the first collision the motion is not governed by the law")
+    );
     let page = fs::read_to_string(folder.path().join("out/report.html")).expect("a page");
     assert!(page.contains("Hulls that hit") && page.contains("hulls hit, "), "a table, and marks in the figure");
     let (_, events) = McapRecording::open(&folder.path().join("out/run.mcap"))

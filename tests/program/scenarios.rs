@@ -106,7 +106,8 @@ fn an_unreached_formation_has_a_reason_and_advice_on_time() {
         let sets = sets.iter().flat_map(|set| ["--set", set]);
         let arguments: Vec<_> = RUN.into_iter().chain(["pentagon", "--force"]).chain(sets).collect();
         let Ran { out, err, .. } = ran(folder.path(), &arguments);
-        let headline = err.lines().find(|line| line.to_lowercase().contains("not reached: ")).expect("not reached").to_owned();
+        let headline =
+            err.lines().find(|line| line.to_lowercase().contains("not reached: ")).expect("not reached").to_owned();
         (json(&out)["formation"].clone(), headline)
     };
     let (line, said) = fly(&["start.positions_m=[[3,0],[9,0],[6,0],[0,0],[12,0]]"]);

@@ -156,7 +156,8 @@ fn the_page_of_an_audit_shows_the_smallest_distance_and_an_inset() {
         fs::read_to_string(folder.path().join("a.html")).expect("a page")
     };
     let near = page(1.5);
-    let figure = near.split("<svg xmlns").find(|figure| figure.contains("Smallest separation of all pairs")).expect("a figure");
+    let figure =
+        near.split("<svg xmlns").find(|figure| figure.contains("Smallest separation of all pairs")).expect("a figure");
     assert!(figure.contains("closest 1.500000 m at 50.000 s, limit 1.0 m"), "{figure}");
     // The smallest separation of all pairs: 8 m except around the pass.
     let lines = figure.split("<polyline ").filter_map(|line| line.split('>').next());

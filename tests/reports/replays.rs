@@ -96,7 +96,8 @@ fn a_replay_draws_and_jumps_to_the_findings_of_the_audit() {
     );
     assert_eq!(found["closest"]["clock"], at.as_str());
     assert!(
-        text(&found["closest"]["state"]).starts_with("violation: 4 and 5 come to 1.532 m (limit 2.000) · closest so far"),
+        text(&found["closest"]["state"])
+            .starts_with("violation: 4 and 5 come to 1.532 m (limit 2.000) · closest so far"),
         "{found}"
     );
     assert!(found["reds"].as_u64() > Some(20), "vehicles in violation are red: {found}");

@@ -10,7 +10,7 @@ use tautline_core::record::{Sink, StateHash, record_beside};
 use tautline_sim::metrics::Metrics;
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::Scenario;
-use tautline_sim::sim::{self, Ending, Parts, SimError};
+use tautline_sim::sim::{self, Components, Ending, SimError};
 
 /// Flies a scenario to its end, passes its samples and events to `sink`, and returns the report.
 ///
@@ -36,7 +36,7 @@ pub fn run_while(
     sink: &mut (dyn Sink + Send),
     carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Report, SimError> {
-    Ok(run_with(scenario, preflight, Parts::of(scenario)?, sink, carry_on)?.0)
+    Ok(run_with(scenario, preflight, Components::of(scenario)?, sink, carry_on)?.0)
 }
 
 /// Flies a scenario like [`run_while`], with parts that may differ from those of the scenario, such as another law.
@@ -47,7 +47,7 @@ pub fn run_while(
 pub fn run_with(
     scenario: &Scenario,
     preflight: &Preflight,
-    parts: Parts,
+    parts: Components,
     sink: &mut (dyn Sink + Send),
     carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<(Report, Ending), SimError> {

@@ -31,13 +31,13 @@ use tautline_core::record::Channel;
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm};
 use tautline_laws::law::{Law, LawError};
 use tautline_laws::observation::Observation;
-use tautline_laws::space::NearPairs;
+use tautline_laws::space::CellList;
 
 /// Law with exact knowledge of the present state.
 struct Exact<'a> {
     law: &'a mut dyn Law,
     scenario: &'a Scenario,
-    near: NearPairs,
+    near: CellList,
 }
 
 impl Feedback for Exact<'_> {
@@ -137,7 +137,7 @@ pub fn solve(
     if let Some(entry) = (0..times_s.len()).find(|entry| !in_order(entry)) {
         return Err(IdealError::Times { entry });
     }
-    let mut feedback = Exact { law, scenario, near: NearPairs::default() };
+    let mut feedback = Exact { law, scenario, near: CellList::default() };
     let mut air = Air::of(scenario);
     let end_s = times_s.last().copied().unwrap_or_default();
     if let Some(air) = &mut air {

@@ -7,7 +7,7 @@ use tautline_core::record::{Event, RecordError, Sample, Sink, StateHash, sha256_
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::formation::Formation;
 use tautline_sim::scenario::Scenario;
-use tautline_sim::sim::{self, Parts};
+use tautline_sim::sim::{self, Components};
 
 /// Hash of the states, and separations and energies as text that keeps all bits.
 #[derive(Default)]
@@ -33,7 +33,7 @@ impl Sink for Record {
 fn hashes(scenario: &Scenario) -> [String; 2] {
     scenario.validate().expect("a valid scenario");
     let mut record = Record::default();
-    let parts = Parts::of(scenario).expect("a law");
+    let parts = Components::of(scenario).expect("a law");
     sim::fly(scenario, parts, &mut record, &mut |_| ControlFlow::Continue(())).expect("a flight");
     [record.states.finish(), sha256_hex(&record.others)]
 }

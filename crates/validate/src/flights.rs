@@ -12,7 +12,7 @@ use tautline_laws::graph::Graph;
 use tautline_laws::law::Law;
 use tautline_sim::continuous::{self, Solution, Tolerances};
 use tautline_sim::scenario::{PlantSpec, Scenario, Source, Space, offset, random, scatter};
-use tautline_sim::sim::{self, Ending, Flight, Parts};
+use tautline_sim::sim::{self, Components, Ending, Flight};
 
 /// Returns a built-in scenario.
 pub(super) fn builtin(name: &str) -> Result<Scenario, MeasureError> {
@@ -86,7 +86,7 @@ pub(super) fn engine_to_any_end(
     observe: impl FnMut(&Sample<'_>),
 ) -> Result<Flight, MeasureError> {
     let go_on = &mut |_| ControlFlow::Continue(());
-    Ok(sim::fly(scenario, Parts::under(scenario, law), &mut SampleSink(observe), go_on)?)
+    Ok(sim::fly(scenario, Components::under(scenario, law), &mut SampleSink(observe), go_on)?)
 }
 
 /// Returns the scenario in Rapier with another step \[s\], every step recorded, without refinement.

@@ -7,7 +7,7 @@ use tautline_core::swarm::{Swarm, mean_row, row, set_row};
 use tautline_laws::graph::Graph;
 use tautline_laws::law::{DisplacementKeys, LawSpec, Linear};
 use tautline_sim::scenario::{PlantSpec, Scenario};
-use tautline_sim::sim::{self, Ending, Parts};
+use tautline_sim::sim::{self, Components, Ending};
 
 /// Number of units of work.
 pub(super) const WORK: u64 = 3 * GRAPHS.len() as u64 + 2;
@@ -123,7 +123,8 @@ impl Sink for DisturbanceSink<'_> {
 fn growth_per_s(scenario: &Scenario, counts_common: bool) -> Result<f64, MeasureError> {
     scenario.validate()?;
     let mut sink = DisturbanceSink { scenario, counts_common, sizes: Vec::new() };
-    let flight = sim::fly(scenario, Parts::of(scenario)?, &mut sink, &mut |_| std::ops::ControlFlow::Continue(()))?;
+    let flight =
+        sim::fly(scenario, Components::of(scenario)?, &mut sink, &mut |_| std::ops::ControlFlow::Continue(()))?;
     if flight.ending != Ending::Completed {
         return Ok(f64::INFINITY);
     }

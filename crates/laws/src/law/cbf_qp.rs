@@ -4,7 +4,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::certificate::{Certificate, Void};
+use super::certificate::{Certificate, VoidReason};
 use super::consensus::{check_observation, check_range};
 use super::error::{LawError, ParameterError};
 use super::half_spaces::{HalfSpace, HalfSpaces};
@@ -193,7 +193,7 @@ impl Law for CbfQpLaw {
     }
 
     fn certificate(&self, _start: &Observation<'_>, _ahead: &[&Formation]) -> Certificate {
-        Certificate::void(Void::CommandLimited)
+        Certificate::void(VoidReason::CommandLimited)
     }
 
     fn capabilities(&self) -> Capabilities {

@@ -18,7 +18,7 @@ pub struct Certificate {
     /// graph this is no certificate, because unlinked pairs may come closer.
     pub linked_m: Option<f64>,
     /// Every reason why the certificate is void.
-    pub void: Vec<Void>,
+    pub void: Vec<VoidReason>,
     /// Bounds per leg, in order, for a mission of several formations; `certified_m` is the least of them.
     pub legs: Vec<LegBound>,
 }
@@ -36,7 +36,7 @@ pub struct LegBound {
 
 /// Reason why a certificate is void.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-pub enum Void {
+pub enum VoidReason {
     /// The law does not push vehicles apart.
     #[error("The law has no barrier: it does not keep vehicles apart.")]
     NoBarrier,
@@ -128,7 +128,7 @@ pub enum Void {
 impl Certificate {
     /// Returns a void certificate with one reason.
     #[must_use]
-    pub fn void(reason: Void) -> Self {
+    pub fn void(reason: VoidReason) -> Self {
         Self { void: vec![reason], ..Self::default() }
     }
 
@@ -160,7 +160,7 @@ impl Certificate {
 
     /// Adds a reason, and removes all bounds, if `breaks` is true.
     #[must_use]
-    pub fn void_where(mut self, breaks: bool, reason: Void) -> Self {
+    pub fn void_where(mut self, breaks: bool, reason: VoidReason) -> Self {
         if breaks && !self.void.contains(&reason) {
             (self.certified_m, self.certified_until_s, self.certified_room_m) = (None, None, None);
             self.legs.clear();
@@ -170,7 +170,7 @@ impl Certificate {
     }
 }
 
-impl Void {
+impl VoidReason {
     /// Stable code for files, such as `graph-not-complete`.
     #[must_use]
     pub fn code(&self) -> &'static str {
@@ -215,7 +215,7 @@ mod tests {
         let promised = |certified_m: Option<f64>| Certificate {
             certified_m,
             energy_initial: Some(1.0),
-            void: if certified_m.is_some() { Vec::new() } else { vec![Void::NoBarrier] },
+            void: if certified_m.is_some() { Vec::new() } else { vec![VoidReason::NoBarrier] },
             ..Certificate::default()
         };
         for (before, later, expected) in [
@@ -235,32 +235,32 @@ mod tests {
     fn every_void_reason_has_a_unique_code_and_a_sentence() {
         let collision = LawError::Collision { pair: Pair::new(0, 1), separation_m: 1.5, delta_m: 2.0 };
         let reasons = [
-            Void::NoBarrier,
-            Void::GraphNotComplete,
-            Void::VelocityUndamped,
-            Void::CommandLimited,
-            Void::TargetChanges,
-            Void::InexactLink,
-            Void::KnownLate,
-            Void::KnownWrongly,
-            Void::HeardLate,
-            Void::MessagesLost,
-            Void::AccelerationLimited,
-            Void::AccelerationLate,
-            Void::VehicleFails,
-            Void::CommandsFromOutside,
-            Void::CommandsHeld,
-            Void::Windblown,
-            Void::WindUnbounded,
-            Void::LeaderBlown,
-            Void::NotAPoint,
-            Void::ReferenceNotFed,
-            Void::ObstaclesUnknown,
-            Void::CarriedPastObstacles,
-            Void::StepsTooLong,
-            Void::Unresolved,
-            Void::StartRefused(collision),
-            Void::StartRefused(LawError::NotFinite { vehicle: 2 }),
+            VoidReason::NoBarrier,
+            VoidReason::GraphNotComplete,
+            VoidReason::VelocityUndamped,
+            VoidReason::CommandLimited,
+            VoidReason::TargetChanges,
+            VoidReason::InexactLink,
+            VoidReason::KnownLate,
+            VoidReason::KnownWrongly,
+            VoidReason::HeardLate,
+            VoidReason::MessagesLost,
+            VoidReason::AccelerationLimited,
+            VoidReason::AccelerationLate,
+            VoidReason::VehicleFails,
+            VoidReason::CommandsFromOutside,
+            VoidReason::CommandsHeld,
+            VoidReason::Windblown,
+            VoidReason::WindUnbounded,
+            VoidReason::LeaderBlown,
+            VoidReason::NotAPoint,
+            VoidReason::ReferenceNotFed,
+            VoidReason::ObstaclesUnknown,
+            VoidReason::CarriedPastObstacles,
+            VoidReason::StepsTooLong,
+            VoidReason::Unresolved,
+            VoidReason::StartRefused(collision),
+            VoidReason::StartRefused(LawError::NotFinite { vehicle: 2 }),
         ];
         let codes = reasons.map(|reason| reason.code());
         let expected = [

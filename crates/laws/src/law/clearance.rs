@@ -48,25 +48,29 @@ impl ClearanceTension {
         for vehicle in 0..positions_m.nrows() {
             let position_m = row(positions_m, vehicle);
             for (obstacle, solid) in obstacles.iter().enumerate() {
-                let (room_m, outward) = solid.room_m(position_m);
-                if room_m >= self.tension.rest_m() {
+                let (clearance_margin_m, outward) = solid.clearance_margin_m(position_m);
+                if clearance_margin_m >= self.tension.rest_m() {
                     continue;
                 }
-                if room_m <= 0.0 {
+                if clearance_margin_m <= 0.0 {
                     let clearance_m = solid.clearance_m;
-                    let distance_m = room_m + clearance_m;
+                    let distance_m = clearance_margin_m + clearance_m;
                     return Err(LawError::Obstacle { vehicle, obstacle, distance_m, clearance_m });
                 }
-                pushed(vehicle, outward * -self.tension.derivative(room_m));
-                potential += self.tension.value(room_m);
+                pushed(vehicle, outward * -self.tension.derivative(clearance_margin_m));
+                potential += self.tension.value(clearance_margin_m);
             }
         }
         Ok(potential)
     }
 
     /// Returns V'' at a margin \[1/s^2\]; 0 out of range.
-    pub(super) fn rate_squared(&self, room_m: f64) -> f64 {
-        if room_m < self.tension.rest_m() { self.tension.second_derivative(room_m) } else { 0.0 }
+    pub(super) fn rate_squared(&self, clearance_margin_m: f64) -> f64 {
+        if clearance_margin_m < self.tension.rest_m() {
+            self.tension.second_derivative(clearance_margin_m)
+        } else {
+            0.0
+        }
     }
 
     /// Returns the smallest margin that an energy \[m^2/s^2\] allows \[m\].
@@ -87,13 +91,13 @@ pub(super) fn slot_room_m(context: &LawContext<'_>) -> Result<f64, ParameterErro
     for formation in std::iter::once(context.formation).chain(later) {
         for vehicle in 0..formation.count() {
             for (obstacle, solid) in context.obstacles.iter().enumerate() {
-                let (room_m, _) = solid.room_m(row(&formation.slots_m, vehicle) + place_m);
-                if room_m <= 0.0 {
+                let (clearance_margin_m, _) = solid.clearance_margin_m(row(&formation.slots_m, vehicle) + place_m);
+                if clearance_margin_m <= 0.0 {
                     let clearance_m = solid.clearance_m;
-                    let distance_m = room_m + clearance_m;
+                    let distance_m = clearance_margin_m + clearance_m;
                     return Err(ParameterError::ObstacleOverSlot { vehicle, obstacle, distance_m, clearance_m });
                 }
-                least_m = least_m.min(room_m);
+                least_m = least_m.min(clearance_margin_m);
             }
         }
     }

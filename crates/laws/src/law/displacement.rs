@@ -4,7 +4,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::certificate::{Certificate, LegBound, Void};
+use super::certificate::{Certificate, LegBound, VoidReason};
 use super::clearance::{ClearanceTension, slot_room_m};
 use super::consensus::{add_pushes, check_count, check_range, check_state, check_tables};
 use super::energy::PotentialCache;
@@ -18,7 +18,7 @@ use super::tension::{EdgeTension, TensionError};
 use crate::formation::Formation;
 use crate::graph::Pinning;
 use crate::observation::Observation;
-use crate::space::{Metric, NearPairs, Obstacle};
+use crate::space::{CellList, Metric, Obstacle};
 use crate::target::{Guidance, ReferenceMotion, Settling, Target};
 use tautline_core::swarm::{Pair, Rows, row, set_row};
 
@@ -113,7 +113,7 @@ pub struct DisplacementLaw {
     /// Whether `r'' - a22 r'` is fed forward to the followers.
     has_feed_forward: bool,
     /// Reasons that void the certificate from any start.
-    voids: Vec<Void>,
+    voids: Vec<VoidReason>,
     /// Bound on the energy under wind, if there is wind.
     energy_bound: Option<EnergyBound>,
     /// Least eigenvalue of the pinned Laplacian, and an upper bound on its largest.
@@ -228,7 +228,7 @@ impl DisplacementLaw {
             Some(clearance) => clearance.potential(obstacles, positions_m)?,
             None => 0.0,
         };
-        let mut near = NearPairs::default();
+        let mut near = CellList::default();
         near.update(positions_m, self.metric.longest_m(self.tension.rest_m()));
         let of_pair = |&(i, j): &(usize, usize)| {
             let pushed = self.push(i, j, row(positions_m, i) - row(positions_m, j));
@@ -401,7 +401,7 @@ impl Law for DisplacementLaw {
         Rates {
             fastest_per_s: at.nearest_m.map(|nearest_m| self.fastest_per_s(nearest_m)),
             obstacles_per_s2: (self.clearance.zip(at.obstacle_room_m))
-                .map_or(0.0, |(clearance, room_m)| clearance.rate_squared(room_m)),
+                .map_or(0.0, |(clearance, clearance_margin_m)| clearance.rate_squared(clearance_margin_m)),
             velocity_margin: Some(VelocityMargin {
                 per_s: damping_per_s - at.a22_per_s,
                 terms_per_s: damping_per_s + at.a22_per_s.abs(),
@@ -417,7 +417,7 @@ impl DisplacementLaw {
     fn certificate_through(&self, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
         let energy = match self.try_energy(start) {
             Ok(energy) => energy,
-            Err(fault) => return Certificate::void(Void::StartRefused(fault)),
+            Err(fault) => return Certificate::void(VoidReason::StartRefused(fault)),
         };
         let BoundedEnergy { energy: most, until_s } = self.bounded(energy, start, ahead);
         let legs = self.bounds(most, start.target.formation, ahead);
@@ -434,7 +434,7 @@ impl DisplacementLaw {
             legs,
             ..Certificate::default()
         }
-        .void_where(closes_in, Void::TargetChanges);
+        .void_where(closes_in, VoidReason::TargetChanges);
         self.voids.iter().fold(promised, |promised, &void| promised.void_where(true, void))
     }
 
@@ -478,7 +478,7 @@ impl DisplacementLaw {
 /// - the reference moves among fixed obstacles,
 /// - a22 > 0 among obstacles, where absolute velocities count,
 /// - the wind's contribution has no bound, or the wind moves a leader.
-fn voids(context: &LawContext<'_>) -> Vec<Void> {
+fn voids(context: &LawContext<'_>) -> Vec<VoidReason> {
     let &LawContext { guidance, obstacles, a22_per_s, exposure, .. } = context;
     let is_unfed = |of: &Guidance| !of.feed_forward && !needs_no_feed(&of.motion, a22_per_s);
     let is_carried = guidance.is_some_and(|of| !of.motion.is_at_rest());
@@ -486,14 +486,14 @@ fn voids(context: &LawContext<'_>) -> Vec<Void> {
     let is_turbulent = exposure.is_some_and(|exposure| exposure.wind.turbulence.is_some());
     let is_led = guidance.is_some_and(|of| matches!(of.known_by, Pinning::Leader(_)));
     let reasons = [
-        (guidance.is_some_and(is_unfed), Void::ReferenceNotFed),
-        (!obstacles.is_empty() && is_carried, Void::CarriedPastObstacles),
-        (!obstacles.is_empty() && is_driven, Void::VelocityUndamped),
+        (guidance.is_some_and(is_unfed), VoidReason::ReferenceNotFed),
+        (!obstacles.is_empty() && is_carried, VoidReason::CarriedPastObstacles),
+        (!obstacles.is_empty() && is_driven, VoidReason::VelocityUndamped),
         (
             is_turbulent && (frame(context) == Frame::Ground || exposure.is_some_and(|b| !b.wind.shared)),
-            Void::WindUnbounded,
+            VoidReason::WindUnbounded,
         ),
-        (is_led && exposure.is_some(), Void::LeaderBlown),
+        (is_led && exposure.is_some(), VoidReason::LeaderBlown),
     ];
     reasons.into_iter().filter(|(holds, _)| *holds).map(|(_, void)| void).collect()
 }

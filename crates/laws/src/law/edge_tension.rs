@@ -3,7 +3,7 @@
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use super::certificate::{Certificate, Void};
+use super::certificate::{Certificate, VoidReason};
 use super::consensus::{
     add_heard, add_laplacian_product, check_count, check_observation, check_range, check_rows, check_state,
     consensus_margin, of_table, relative_kinetic_energy,
@@ -282,13 +282,13 @@ impl Law for EdgeTensionLaw {
         let energy = self.try_energy(start.own);
         let mut void = Vec::new();
         if !self.graph.is_complete() {
-            void.push(Void::GraphNotComplete);
+            void.push(VoidReason::GraphNotComplete);
         }
         if let Err(fault) = energy {
-            void.push(Void::StartRefused(fault));
+            void.push(VoidReason::StartRefused(fault));
         }
         if self.is_unbounded {
-            void.push(Void::WindUnbounded);
+            void.push(VoidReason::WindUnbounded);
         }
         let energy_initial = energy.ok();
         let promised = energy_initial.zip(self.tightest).filter(|_| void.is_empty());

@@ -134,7 +134,7 @@ impl LawError {
             }
             Self::Obstacle { vehicle, obstacle, distance_m: known_m, clearance_m } => {
                 let Some(solid) = obstacles.get(obstacle) else { return self };
-                let true_m = solid.room_m(place(vehicle)).0 + solid.clearance_m;
+                let true_m = solid.clearance_margin_m(place(vehicle)).0 + solid.clearance_m;
                 if differs(known_m, true_m) {
                     Self::KnownObstacle { vehicle, obstacle, known_m, true_m, clearance_m }
                 } else {

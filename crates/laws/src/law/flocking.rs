@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::certificate::{Certificate, Void};
+use super::certificate::{Certificate, VoidReason};
 use super::consensus::{check_count, check_observation, check_range};
 use super::error::{LawError, ParameterError};
 use super::interface::LawContext;
@@ -194,7 +194,7 @@ impl Law for FlockingLaw {
     }
 
     fn certificate(&self, _start: &Observation<'_>, _ahead: &[&Formation]) -> Certificate {
-        Certificate::void(Void::CommandLimited)
+        Certificate::void(VoidReason::CommandLimited)
     }
 
     fn capabilities(&self) -> Capabilities {

@@ -3,7 +3,7 @@
 use dyn_clone::DynClone;
 use nalgebra::Vector3;
 
-use super::certificate::{Certificate, Void};
+use super::certificate::{Certificate, VoidReason};
 use super::error::{LawError, ParameterError};
 use super::modes::Linear;
 use crate::formation::{Formation, Freedom};
@@ -59,7 +59,7 @@ pub trait Law: DynClone + Send {
     /// times. Each change is immediate or moves slots along straight lines. Other laws may ignore `ahead`:
     /// [`certificate_through`] voids their certificate.
     fn certificate(&self, _start: &Observation<'_>, _ahead: &[&Formation]) -> Certificate {
-        Certificate::void(Void::NoBarrier)
+        Certificate::void(VoidReason::NoBarrier)
     }
 
     /// Returns bounds on the rates of the closed loop.
@@ -80,7 +80,7 @@ dyn_clone::clone_trait_object!(Law);
 #[must_use]
 pub fn certificate_through(law: &dyn Law, start: &Observation<'_>, ahead: &[&Formation]) -> Certificate {
     let is_ignored = !ahead.is_empty() && !law.capabilities().certifies_target_changes;
-    law.certificate(start, ahead).void_where(is_ignored, Void::TargetChanges)
+    law.certificate(start, ahead).void_where(is_ignored, VoidReason::TargetChanges)
 }
 
 /// Needs, limits, controlled quantities and assumptions of a law.

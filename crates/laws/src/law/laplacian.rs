@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::certificate::{Certificate, Void};
+use super::certificate::{Certificate, VoidReason};
 use super::consensus::{
     add_heard, add_laplacian_product, check_observation, check_range, check_state, consensus_margin, of_errors_m,
     of_table, relative_kinetic_energy, sum_of_squares_about_mean,
@@ -124,7 +124,7 @@ impl Law for LaplacianLaw {
     }
 
     fn certificate(&self, start: &Observation<'_>, _ahead: &[&Formation]) -> Certificate {
-        Certificate { energy_initial: self.energy(start), ..Certificate::void(Void::NoBarrier) }
+        Certificate { energy_initial: self.energy(start), ..Certificate::void(VoidReason::NoBarrier) }
     }
 
     fn linear(&self, _formation: &Formation) -> Option<Linear> {

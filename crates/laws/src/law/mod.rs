@@ -25,7 +25,7 @@ mod spec;
 mod tension;
 
 pub use cbf_qp::{CbfQpKeys, CbfQpLaw};
-pub use certificate::{Certificate, LegBound, Void};
+pub use certificate::{Certificate, LegBound, VoidReason};
 pub use displacement::{DisplacementKeys, DisplacementLaw};
 pub use edge_tension::{EdgeTensionKeys, EdgeTensionLaw};
 pub use error::{LawError, ParameterError};

@@ -17,7 +17,7 @@ use nalgebra::Complex;
 use super::tension::EdgeTension;
 use crate::formation::Formation;
 use crate::graph::Graph;
-use crate::space::NearPairs;
+use crate::space::CellList;
 
 /// Linearized motion about the slots under a law.
 #[derive(Clone, Debug, PartialEq)]
@@ -257,7 +257,7 @@ const SAME: f64 = 1e-6;
 /// times the largest Laplacian eigenvalue of the graph of nearest slots. `None` for fewer than two vehicles.
 pub(super) fn stiffest_contact_mode(free: Mode, tension: &EdgeTension, formation: &Formation) -> Option<Mode> {
     let (_, nearest_m) = formation.min_distance()?;
-    let mut near = NearPairs::default();
+    let mut near = CellList::default();
     near.update(&formation.slots_m, nearest_m * (1.0 + SAME));
     let nearest = Graph::from_edges(formation.count(), near.pairs()).ok()?;
     let pushes_per_s2 = tension.second_derivative(tension.rest_m()) * nearest.largest_eigenvalue();

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::certificate::{Certificate, Void};
+use super::certificate::{Certificate, VoidReason};
 use super::consensus::{
     add_heard, add_laplacian_product, add_pushes, check_count, check_observation, check_range, check_state, of_errors_m,
 };
@@ -226,12 +226,12 @@ impl Law for PotentialLaw {
     fn certificate(&self, start: &Observation<'_>, _ahead: &[&Formation]) -> Certificate {
         let mut void = Vec::new();
         if self.keys.c_per_s < self.a22_per_s {
-            void.push(Void::VelocityUndamped);
+            void.push(VoidReason::VelocityUndamped);
         }
         if self.keys.max_accel_m_s2.is_some() {
-            void.push(Void::CommandLimited);
+            void.push(VoidReason::CommandLimited);
         }
-        let energy = self.try_energy(start).map_err(|fault| void.push(Void::StartRefused(fault))).ok();
+        let energy = self.try_energy(start).map_err(|fault| void.push(VoidReason::StartRefused(fault))).ok();
         let certified_m = energy.filter(|_| void.is_empty() && start.own.count() > 1).map(|energy| {
             // U(l) = E(0) for the clearance rho.
             let steep = (2.0 * energy / self.keys.eta_m4_per_s2).sqrt();

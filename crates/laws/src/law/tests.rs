@@ -4,7 +4,7 @@ use super::*;
 use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::observation::{Held, Observation, Others};
-use crate::space::NearPairs;
+use crate::space::CellList;
 use crate::target::{CurrentTarget, Leg};
 use tautline_core::swarm::{Rows, Swarm};
 
@@ -26,7 +26,7 @@ fn built(spec: &LawSpec, links: &Graph, formation: &Formation) -> Box<dyn Law> {
 }
 
 fn command(law: &mut dyn Law, at: &Observation<'_>) -> Rows {
-    let mut near = NearPairs::default();
+    let mut near = CellList::default();
     near.update(&at.own.positions_m, law.capabilities().sensing_range_m.unwrap_or(0.0));
     let mut command = Rows::zeros(COUNT);
     law.command(&Observation { near: near.pairs(), ..*at }, &mut command).expect("a command");

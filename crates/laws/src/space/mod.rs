@@ -1,7 +1,7 @@
 //! Geometry in space: search of near pairs, scaled lengths and the shapes of obstacles.
 //!
-//! - [`NearPairs`] finds all near pairs of a table.
-//! - [`KeptPairs`] reuses them while points move little.
+//! - [`CellList`] finds all near pairs of a table.
+//! - [`VerletList`] reuses them while points move little.
 //! - [`closest_pair`] finds the nearest pair.
 //! - [`Spaced`] accepts points one by one that keep a minimum distance.
 //! - [`Shape`] gives the distance of a point from a solid.
@@ -16,7 +16,7 @@ mod spaced;
 
 pub use metric::Metric;
 pub(crate) use near::NearLists;
-pub use near::{KeptPairs, NearPairs};
+pub use near::{CellList, VerletList};
 pub use shape::Shape;
 pub use spaced::{Spaced, closest_pair};
 
@@ -41,7 +41,7 @@ impl Obstacle {
     /// Returns the clearance margin of a point \[m\], its distance from the surface less the clearance, and the
     /// gradient of the margin, a unit vector ([`Shape::signed_distance_m`]).
     #[must_use]
-    pub fn room_m(&self, point_m: Vector3<f64>) -> (f64, Vector3<f64>) {
+    pub fn clearance_margin_m(&self, point_m: Vector3<f64>) -> (f64, Vector3<f64>) {
         let (distance_m, normal) = self.shape.signed_distance_m(point_m - self.place_m);
         (distance_m - self.clearance_m, normal)
     }
@@ -53,7 +53,7 @@ impl Obstacle {
 pub fn least_room(obstacles: &[Obstacle], positions_m: &Rows) -> Option<(f64, usize, usize)> {
     let rooms = (0..positions_m.nrows()).flat_map(|i| {
         let point_m = row(positions_m, i);
-        obstacles.iter().enumerate().map(move |(k, obstacle)| (obstacle.room_m(point_m).0, i, k))
+        obstacles.iter().enumerate().map(move |(k, obstacle)| (obstacle.clearance_margin_m(point_m).0, i, k))
     });
     rooms.min_by(|a, b| a.0.total_cmp(&b.0))
 }

@@ -26,7 +26,7 @@ const LATER_ROWS: [u64; 4] = [ALONG_Y, ALONG_Z - ALONG_Y, ALONG_Z, ALONG_Z + ALO
 /// contiguous runs, which move on with the point. A search takes O(N log N + pairs) for spread-out points, and
 /// allocates nothing once its lists have grown.
 #[derive(Clone, Debug, Default)]
-pub struct NearPairs {
+pub struct CellList {
     cells: Vec<(u64, usize)>,
     points: Vec<Vector3<f64>>,
     found: Vec<(usize, usize)>,
@@ -35,7 +35,7 @@ pub struct NearPairs {
     pairs: Vec<(usize, usize)>,
 }
 
-impl NearPairs {
+impl CellList {
     /// Returns the pairs `(i, j)` of the last search, i < j, in ascending order.
     #[must_use]
     pub fn pairs(&self) -> &[(usize, usize)] {
@@ -137,20 +137,20 @@ const SIDE_BY_SIDE: usize = 128;
 /// The search is repeated only if a point has moved so far that a pair could be missing, so most updates take O(N).
 /// Allocates nothing once the lists have grown.
 #[derive(Clone, Debug)]
-pub struct KeptPairs {
-    near: NearPairs,
+pub struct VerletList {
+    near: CellList,
     /// Positions of the last search, and its range \[m\].
     searched_m: Rows,
     range_m: f64,
 }
 
-impl Default for KeptPairs {
+impl Default for VerletList {
     fn default() -> Self {
-        Self { near: NearPairs::default(), searched_m: Rows::zeros(0), range_m: f64::NAN }
+        Self { near: CellList::default(), searched_m: Rows::zeros(0), range_m: f64::NAN }
     }
 }
 
-impl KeptPairs {
+impl VerletList {
     /// Returns the pairs `(i, j)`, i < j, in ascending order: all within the range, and some slightly farther apart.
     #[must_use]
     pub fn pairs(&self) -> &[(usize, usize)] {
@@ -262,7 +262,7 @@ mod tests {
             range_m in prop_oneof![0.0..3.0, prop::sample::select(RANGES_M.to_vec())],
             far in prop::sample::select(vec![0.0, 1e3, -1e9]),
         ) {
-            let mut near = NearPairs::default();
+            let mut near = CellList::default();
             for points in tables {
                 let points: Vec<f64> = points.iter().flat_map(|&[x, y, z]| [x + far, y, z]).collect();
                 let positions_m = Rows::from_row_slice(&points);
@@ -282,7 +282,7 @@ mod tests {
                 [x, y, depth * z]
             };
             let positions_m = Rows::from_row_slice(&(0..count).flat_map(place).collect::<Vec<_>>());
-            let mut near = NearPairs::default();
+            let mut near = CellList::default();
             for range_m in [1.5, 2.5, 5.0] {
                 near.update(&positions_m, range_m);
                 let expected = all_pairs(&positions_m, range_m);
@@ -299,7 +299,7 @@ mod tests {
             steps in prop::collection::vec((prop::collection::vec(-1.0..1.0_f64, 90), 0.01..0.6_f64), 1..12),
             ranges_m in prop::collection::vec(prop::sample::select(vec![0.5, 1.5, 1.5, 1.5]), 12),
         ) {
-            let mut kept = KeptPairs::default();
+            let mut kept = VerletList::default();
             let mut positions_m = Rows::from_column_slice(&start);
             for ((step, scale), range_m) in steps.into_iter().zip(ranges_m) {
                 positions_m += Rows::from_column_slice(&step) * scale;
@@ -317,7 +317,7 @@ mod tests {
 
     #[test]
     fn the_search_repeats_after_large_moves_and_for_nan() {
-        let mut kept = KeptPairs::default();
+        let mut kept = VerletList::default();
         let mut positions_m = Rows::from_row_slice(&[0.0, 0.0, 0.0, 1.2, 0.0, 0.0]);
         kept.update(&positions_m, 1.0);
         assert_eq!(kept.pairs(), [(0, 1)], "it is within the skin");

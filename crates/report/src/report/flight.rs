@@ -12,7 +12,7 @@ use super::verdict::{Fails, Verdict, at_rest, energy_rises};
 use tautline_audit::{self as audit, Status};
 use tautline_core::record::{DeadlockRecovery, Reassignment};
 use tautline_core::swarm::{ClosestApproach, Pair};
-use tautline_laws::law::{Certificate, Void};
+use tautline_laws::law::{Certificate, VoidReason};
 use tautline_sim::link::Traffic;
 use tautline_sim::metrics::{LegSummary, Strain, Summary};
 use tautline_sim::preflight::Preflight;
@@ -411,8 +411,14 @@ impl FlightResult<'_> {
     /// Returns whether the energy is proved never to grow: relative velocities are damped in still air, and the
     /// certificate is void only for reasons that leave the energy bound intact.
     pub(super) fn energy_falls(&self) -> bool {
-        let holds = |void: &Void| {
-            matches!(void, Void::NoBarrier | Void::GraphNotComplete | Void::StepsTooLong | Void::Unresolved)
+        let holds = |void: &VoidReason| {
+            matches!(
+                void,
+                VoidReason::NoBarrier
+                    | VoidReason::GraphNotComplete
+                    | VoidReason::StepsTooLong
+                    | VoidReason::Unresolved
+            )
         };
         self.scenario.wind.is_still()
             && self.preflight.velocity_margin_per_s.is_some_and(|margin_per_s| margin_per_s >= 0.0)

@@ -103,15 +103,17 @@ impl Obstacles {
 
     /// Returns the smallest distance beyond a clearance in a few words.
     pub(super) fn room(&self) -> Option<String> {
-        self.tightest().map(|(room_m, _)| format!("{} m beyond every obstacle's clearance", at_least(room_m, 3)))
+        self.tightest().map(|(clearance_margin_m, _)| {
+            format!("{} m beyond every obstacle's clearance", at_least(clearance_margin_m, 3))
+        })
     }
 
     /// Returns the certified distance beyond every clearance \[m\] and the approach that breaks it by more than the
     /// error of integration.
     fn certified_and_tightest(&self) -> Option<(f64, &ObstacleApproach)> {
         let certified_m = self.certified_room_m?;
-        let (room_m, tightest) = self.tightest()?;
-        (room_m < certified_m * (1.0 - INTEGRATION)).then_some((certified_m, tightest))
+        let (clearance_margin_m, tightest) = self.tightest()?;
+        (clearance_margin_m < certified_m * (1.0 - INTEGRATION)).then_some((certified_m, tightest))
     }
 
     /// The approach that breaks the certificate, in a few words.
@@ -160,7 +162,9 @@ impl Obstacles {
             [vehicle.to_string(), obstacle.clone(), metres(*clearance_m), shown(*min_m), seconds(*min_at_s)]
         };
         let certified = match self.certified_room_m {
-            Some(room_m) => format!("closest approaches; certified {} m beyond every clearance", at_least(room_m, 6)),
+            Some(clearance_margin_m) => {
+                format!("closest approaches; certified {} m beyond every clearance", at_least(clearance_margin_m, 6))
+            }
             None => "closest approaches; nothing is certified".to_owned(),
         };
         let violations = self.violations.iter().map(|violation| {
@@ -192,7 +196,7 @@ impl Obstacles {
             )
         });
         let certified = match self.certified_room_m {
-            Some(room_m) => format!("certified {} m beyond it", at_least(room_m, 6)),
+            Some(clearance_margin_m) => format!("certified {} m beyond it", at_least(clearance_margin_m, 6)),
             None => "not certified".to_owned(),
         };
         let violations = counted(self.violations.len() as u64, "violation", "violations");

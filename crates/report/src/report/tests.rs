@@ -8,7 +8,7 @@ use super::*;
 use tautline_audit::{AuditOutcome, Auditor, ClearanceAuditor, ClearanceOutcome, Obstacle, Shape};
 use tautline_core::record::EnergyRise;
 use tautline_core::swarm::{Pair, Rows};
-use tautline_laws::law::{Certificate, LawError, LegBound, Void};
+use tautline_laws::law::{Certificate, LawError, LegBound, VoidReason};
 use tautline_laws::space;
 use tautline_laws::target::Arrival;
 use tautline_sim::metrics::{LegSummary, Summary};
@@ -72,7 +72,7 @@ impl Case {
             certified_m: Some(2.055_307),
             energy_initial: Some(3.656),
             void: vec![],
-            ..Certificate::void(Void::NoBarrier)
+            ..Certificate::void(VoidReason::NoBarrier)
         };
         Self {
             audit: passing(2.4607),
@@ -289,7 +289,7 @@ fn clear_run_that_reached_its_formation_passes() {
 
 #[test]
 fn violation_names_pair_distance_and_time() {
-    let case = Case { audit: passing(1.5327), certificate: Certificate::void(Void::NoBarrier), ..Case::good() };
+    let case = Case { audit: passing(1.5327), certificate: Certificate::void(VoidReason::NoBarrier), ..Case::good() };
     assert_eq!(case.reason(), "Vehicles 1 and 2 came to 1.532 m at 0.50 s; the safety distance is 2.000 m.");
     assert_eq!(case.report().headline(), "VIOLATION: vehicles 1 and 2 came to 1.532 m (delta 2.000 m) at 0.50 s");
     let violation = &case.report().audit.violations[0];
@@ -306,7 +306,7 @@ fn tiny_violation_differs_from_delta_as_printed() {
 fn rounding_does_not_break_a_certificate() {
     // A swarm that starts in its own formation certifies its own distances.
     let void = Vec::new();
-    let certificate = Certificate { certified_m: Some(3.0), void, ..Certificate::void(Void::NoBarrier) };
+    let certificate = Certificate { certified_m: Some(3.0), void, ..Certificate::void(VoidReason::NoBarrier) };
     let case = Case { audit: passing(2.999_999_88), certificate: certificate.clone(), ..Case::good() };
     assert!(
         case.report().verdict.pass && case.report().headline().starts_with("CLEAR: "),
@@ -442,9 +442,9 @@ fn void_certificate_gives_its_reasons() {
     let report = Case::good().report();
     assert_eq!((report.separation.certified_m, report.separation.certificate_void.len()), (Some(2.055_307), 0));
     assert!(report.text().contains("certified 2.055307 m"));
-    let report = Case { certificate: Certificate::void(Void::NoBarrier), ..Case::good() }.report();
+    let report = Case { certificate: Certificate::void(VoidReason::NoBarrier), ..Case::good() }.report();
     assert_eq!(report.separation.certified_m, None);
-    assert_eq!(report.separation.certificate_void, [Void::NoBarrier.to_string()]);
+    assert_eq!(report.separation.certificate_void, [VoidReason::NoBarrier.to_string()]);
     assert!(report.text().contains("not certified"));
 }
 

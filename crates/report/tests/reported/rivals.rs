@@ -4,9 +4,9 @@ use tautline_audit::{Status, swept_separation_m};
 use tautline_core::swarm::{Rows, Swarm, mean_row, row, separation};
 use tautline_laws::formation::Formation;
 use tautline_laws::graph::Graph;
-use tautline_laws::law::{CbfQpKeys, FlockingKeys, LawContext, LawSpec, OrcaKeys, OrcaLaw, PotentialKeys, Void};
+use tautline_laws::law::{CbfQpKeys, FlockingKeys, LawContext, LawSpec, OrcaKeys, OrcaLaw, PotentialKeys, VoidReason};
 use tautline_laws::observation::Observation;
-use tautline_laws::space::NearPairs;
+use tautline_laws::space::CellList;
 use tautline_report::run::run;
 use tautline_sim::scenario::{PlantSpec, Scenario};
 use tautline_sim::sim::{Ending, Flight};
@@ -62,7 +62,7 @@ fn cross(count: usize, radius_m: f64, longest_s: f64) -> Crossing {
     let (links, formation) = (Graph::complete(count), Formation::points(-&swarm.positions_m));
     let context = LawContext::new(&links, &formation, CIRCLE_DELTA_M, 0.0);
     let mut law = OrcaLaw::new(&context, circle_keys()).expect("a law");
-    let (mut near, mut velocities) = (NearPairs::default(), Rows::zeros(count));
+    let (mut near, mut velocities) = (CellList::default(), Rows::zeros(count));
     let is_there = |positions_m: &Rows, i: usize| {
         (row(positions_m, i) - row(&formation.slots_m, i)).norm() <= 0.5 * CIRCLE_DELTA_M
     };
@@ -141,7 +141,7 @@ fn barrier_functions_and_orca_deadlock_on_a_symmetric_swap_only() {
         let stuck = swap(law.clone(), 0.0);
         let (flight, _) = fly(&stuck);
         assert_eq!((&flight.ending, flight.audit.status), (&Ending::Completed, Status::Clear), "{law:?}");
-        assert_eq!(flight.certificate.void, [Void::CommandLimited]);
+        assert_eq!(flight.certificate.void, [VoidReason::CommandLimited]);
         let (closest_m, missing_m) = (closest_m(&flight), missing_m(&stuck, &flight));
         assert!(closest_m > 1.0 && closest_m < 1.02 && missing_m > 5.4, "{law:?}: {closest_m} {missing_m}");
         assert!(flight.last.velocities_m_s.amax() < 1e-5, "{law:?}");
@@ -197,7 +197,7 @@ fn bounded_forces_stop_limited_speeds_only() {
     ] {
         let flight = meeting(law.clone(), speed_m_s);
         assert_eq!(flight.audit.status, expected, "{law:?} at {speed_m_s} m/s");
-        assert_eq!((flight.certificate.certified_m, flight.certificate.void[0]), (None, Void::CommandLimited));
+        assert_eq!((flight.certificate.certified_m, flight.certificate.void[0]), (None, VoidReason::CommandLimited));
     }
     let unbounded = meeting(potential(None), 10.0);
     assert_eq!(unbounded.audit.status, Status::Clear);

@@ -4,7 +4,7 @@ use crate::flight::{Log, builtin, duel, fly, read};
 use tautline_audit::Status;
 use tautline_core::record::Event;
 use tautline_core::swarm::Pair;
-use tautline_laws::law::{LaplacianKeys, LawError, LawSpec, Void};
+use tautline_laws::law::{LaplacianKeys, LawError, LawSpec, VoidReason};
 use tautline_report::run;
 use tautline_sim::scenario::{Scenario, TimeSpec};
 use tautline_sim::sim::Ending;
@@ -108,7 +108,7 @@ fn overlong_steps_void_the_certificate_and_do_not_pass() {
     let stiff = builtin("pentagon", &["law.alpha=997335080"]);
     let (flight, _) = fly(&stiff);
     assert!(flight.overlong_steps > 0, "the law needs shorter steps than the halvings give");
-    assert_eq!((flight.certificate.certified_m, &flight.certificate.void[..]), (None, &[Void::StepsTooLong][..]));
+    assert_eq!((flight.certificate.certified_m, &flight.certificate.void[..]), (None, &[VoidReason::StepsTooLong][..]));
     let report = run::run(&stiff, &mut ()).expect("a report");
     assert_eq!(report.run.overlong_steps, flight.overlong_steps);
     assert!(!report.verdict.pass && !report.breaks_certificate());

@@ -7,7 +7,7 @@ use super::sensing::SAME_S;
 use super::{ImperfectionSpec, is_off};
 use crate::scenario::{Scenario, ScenarioError};
 use tautline_core::swarm::{Rows, row, set_row};
-use tautline_laws::law::Void;
+use tautline_laws::law::VoidReason;
 
 /// Conversion of commands into accelerations: without limit and lag unless given.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
@@ -38,9 +38,11 @@ impl ImperfectionSpec for ActuationSpec {
             .at_keys(["actuation.lag_s", "plant.kind"]))
     }
 
-    fn voids(&self) -> Vec<Void> {
-        let voids =
-            [(self.max_accel_m_s2.is_some(), Void::AccelerationLimited), (self.lag_s > 0.0, Void::AccelerationLate)];
+    fn voids(&self) -> Vec<VoidReason> {
+        let voids = [
+            (self.max_accel_m_s2.is_some(), VoidReason::AccelerationLimited),
+            (self.lag_s > 0.0, VoidReason::AccelerationLate),
+        ];
         voids.into_iter().filter_map(|(is, void)| is.then_some(void)).collect()
     }
 }

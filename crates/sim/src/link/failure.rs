@@ -9,7 +9,7 @@ use super::sensing::SAME_S;
 use crate::scenario::{Scenario, ScenarioError};
 use crate::vehicle::RotorFailure;
 use tautline_core::swarm::{Rows, row, set_row};
-use tautline_laws::law::Void;
+use tautline_laws::law::VoidReason;
 
 /// A failure of a part of a vehicle, which lasts to the end of the flight.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
@@ -99,8 +99,9 @@ impl ImperfectionSpec for Vec<Failure> {
         Ok(())
     }
 
-    fn voids(&self) -> Vec<Void> {
-        let void = |failure: &Failure| if failure.is_silent() { Void::MessagesLost } else { Void::VehicleFails };
+    fn voids(&self) -> Vec<VoidReason> {
+        let void =
+            |failure: &Failure| if failure.is_silent() { VoidReason::MessagesLost } else { VoidReason::VehicleFails };
         self.iter().map(void).collect()
     }
 }

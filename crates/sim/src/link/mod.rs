@@ -19,7 +19,7 @@ mod sensing;
 pub use actuation::ActuationSpec;
 pub use failure::{Failure, FailureKind};
 pub use history::History;
-pub use network::{LinkFailure, Missing, NearBy, NetworkSpec};
+pub use network::{LinkFailure, NearBy, NetworkSpec, StalePolicy};
 pub use sensing::SensingSpec;
 
 use actuation::Actuation;
@@ -32,7 +32,7 @@ use serde::{Deserialize, Serialize};
 use crate::scenario::{Scenario, ScenarioError};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm, row};
-use tautline_laws::law::Void;
+use tautline_laws::law::VoidReason;
 use tautline_laws::observation::{Neighbour, Others, Picture};
 
 /// A table of the scenario that describes an imperfection.
@@ -52,7 +52,7 @@ pub trait ImperfectionSpec {
     fn check(&self, scenario: &Scenario) -> Result<(), ScenarioError>;
 
     /// Returns the reasons why no certificate holds with the imperfection.
-    fn voids(&self) -> Vec<Void>;
+    fn voids(&self) -> Vec<VoidReason>;
 }
 
 impl Scenario {
@@ -230,7 +230,7 @@ struct World {
     network: Network,
     actuation: Actuation,
     failing: Failing,
-    missing: Missing,
+    missing: StalePolicy,
     near: NearBy,
     /// Whether all vehicles use each sender's knowledge of its own state, without communication effects.
     is_shared: bool,
@@ -267,7 +267,7 @@ impl World {
 
     /// Extrapolates a received state to the time of the receiver's own measurement, unless states are held.
     fn carried(&self, heard: Neighbour) -> Neighbour {
-        if self.missing == Missing::Hold {
+        if self.missing == StalePolicy::Hold {
             return heard;
         }
         let own_age_s = self.time_s - self.sensing.measured_s(self.time_s);

@@ -11,7 +11,7 @@ use super::{ImperfectionSpec, Traffic, is_default, is_off, latency};
 use crate::scenario::{MAX_MEMORY_BYTES, Scenario, ScenarioError};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm, row};
-use tautline_laws::law::Void;
+use tautline_laws::law::VoidReason;
 use tautline_laws::observation::Neighbour;
 
 /// Messages between vehicles over links: without loss and delay, in continuous time unless given.
@@ -41,8 +41,8 @@ pub struct NetworkSpec {
     pub rate_hz: Option<f64>,
     /// Estimate of the present state of another vehicle from its last message.
     #[serde(skip_serializing_if = "is_default")]
-    #[schemars(extend("default" = Missing::default()))]
-    pub missing: Missing,
+    #[schemars(extend("default" = StalePolicy::default()))]
+    pub missing: StalePolicy,
     /// How a vehicle knows near vehicles, with or without a link.
     #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = NearBy::default()))]
@@ -55,7 +55,7 @@ pub struct NetworkSpec {
 /// Estimate of the present state of another vehicle from its last message.
 #[derive(Clone, Copy, Debug, Default, Deserialize, Eq, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Missing {
+pub enum StalePolicy {
     /// The state in the last message.
     #[default]
     Hold,
@@ -99,7 +99,7 @@ impl NetworkSpec {
 
 impl ImperfectionSpec for NetworkSpec {
     fn is_exact(&self) -> bool {
-        Self { missing: Missing::Hold, near: NearBy::Seen, loss_burst: None, ..self.clone() } == Self::default()
+        Self { missing: StalePolicy::Hold, near: NearBy::Seen, loss_burst: None, ..self.clone() } == Self::default()
     }
 
     fn is_random(&self) -> bool {
@@ -126,9 +126,9 @@ impl ImperfectionSpec for NetworkSpec {
         scenario.check_message_memory()
     }
 
-    fn voids(&self) -> Vec<Void> {
+    fn voids(&self) -> Vec<VoidReason> {
         let is_late = self.latency_s > 0.0 || self.rate_hz.is_some();
-        let voids = [(is_late, Void::HeardLate), (self.loses(), Void::MessagesLost)];
+        let voids = [(is_late, VoidReason::HeardLate), (self.loses(), VoidReason::MessagesLost)];
         voids.into_iter().filter_map(|(is, void)| is.then_some(void)).collect()
     }
 }

@@ -9,7 +9,7 @@ use super::noise::{Noise, Source};
 use super::{ImperfectionSpec, is_off, latency};
 use crate::scenario::{Scenario, ScenarioError, Space};
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
-use tautline_laws::law::Void;
+use tautline_laws::law::VoidReason;
 use tautline_laws::observation::Neighbour;
 
 /// Measurements of the vehicles: exact, without latency and in continuous time unless given.
@@ -89,9 +89,9 @@ impl ImperfectionSpec for SensingSpec {
         latency("sensing.near_latency_s", near, near_latency_s.unwrap_or(0.0), scenario.time.duration_s).map(|_| ())
     }
 
-    fn voids(&self) -> Vec<Void> {
+    fn voids(&self) -> Vec<VoidReason> {
         let is_late = self.latency_s > 0.0 || self.near_s() > 0.0 || self.rate_hz.is_some();
-        let voids = [(is_late, Void::KnownLate), (self.is_noisy(), Void::KnownWrongly)];
+        let voids = [(is_late, VoidReason::KnownLate), (self.is_noisy(), VoidReason::KnownWrongly)];
         voids.into_iter().filter_map(|(is, void)| is.then_some(void)).collect()
     }
 }

@@ -15,7 +15,7 @@ use crate::vehicle::Quadrotor;
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_core::text::at_least;
 use tautline_laws::formation::affine_dimension;
-use tautline_laws::law::{Controls, Law, LegBound, ParameterError, RateQuery, VelocityMargin, Void};
+use tautline_laws::law::{Controls, Law, LegBound, ParameterError, RateQuery, VelocityMargin, VoidReason};
 use tautline_laws::space::{closest_pair, least_room};
 
 pub use margins::{Bound, Near, PredictedMargin};
@@ -188,7 +188,8 @@ impl Preflight {
             certified_m: certificate.certified_m,
             certified_until_s: certificate.certified_until_s,
             certified_room_m: certificate.certified_room_m,
-            start_room_m: least_room(&scenario.obstacles, &scenario.start.positions_m).map(|(room_m, ..)| room_m),
+            start_room_m: least_room(&scenario.obstacles, &scenario.start.positions_m)
+                .map(|(clearance_margin_m, ..)| clearance_margin_m),
             legs: certificate
                 .legs
                 .iter()
@@ -229,7 +230,7 @@ impl Preflight {
         }
         let undamped = relative_velocity_unstable(rates.velocity_margin);
         if scenario.wind.is_still()
-            && certificate.void == [Void::GraphNotComplete]
+            && certificate.void == [VoidReason::GraphNotComplete]
             && found.velocity_margin_per_s.is_some()
             && undamped.is_none()
         {

@@ -147,7 +147,10 @@ impl Preflight {
         let mut rows =
             vec![("stability".to_owned(), self.stability_line()), ("certificate".to_owned(), self.certificate_line())];
         rows.extend(self.vehicle.iter().map(|quadrotor| ("vehicle".to_owned(), vehicle_line(quadrotor))));
-        rows.extend(self.start_room_m.map(|room_m| ("obstacles".to_owned(), self.obstacles_line(room_m))));
+        rows.extend(
+            self.start_room_m
+                .map(|clearance_margin_m| ("obstacles".to_owned(), self.obstacles_line(clearance_margin_m))),
+        );
         rows.extend(self.legs.iter().enumerate().map(|(leg, promise)| (format!("leg {}", leg + 1), leg_line(promise))));
         let rest = [
             ("needs", self.needs_line()),
@@ -197,7 +200,9 @@ impl Preflight {
 
     fn obstacles_line(&self, start_room_m: f64) -> String {
         let certified = match self.certified_room_m {
-            Some(room_m) => format!("certified {} m beyond every clearance", at_least(room_m, 6)),
+            Some(clearance_margin_m) => {
+                format!("certified {} m beyond every clearance", at_least(clearance_margin_m, 6))
+            }
             None => "not certified".to_owned(),
         };
         format!("{certified}, {start_room_m:.6} m at the start")

@@ -28,7 +28,9 @@ mod time;
 mod validate;
 mod vehicle;
 
-pub use crate::link::{ActuationSpec, Failure, FailureKind, LinkFailure, Missing, NearBy, NetworkSpec, SensingSpec};
+pub use crate::link::{
+    ActuationSpec, Failure, FailureKind, LinkFailure, NearBy, NetworkSpec, SensingSpec, StalePolicy,
+};
 pub use error::{Field, Place, ScenarioError};
 pub use limits::{
     BYTES_PER_EDGE, BYTES_PER_VEHICLE, CONTACT_PREDICTION_M, LARGEST, MAX_HALVINGS, MAX_MEMORY_BYTES, MAX_NAME_CHARS,

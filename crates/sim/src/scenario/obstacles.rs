@@ -240,7 +240,7 @@ impl Scenario {
     /// Returns the vehicle with the smallest margin to a clearance and the obstacle, if the margin is at most
     /// `margin_m` \[m\].
     fn too_near(&self, positions_m: &Rows, margin_m: f64) -> Option<(f64, usize, usize)> {
-        least_room(&self.obstacles, positions_m).filter(|&(room_m, ..)| room_m <= margin_m)
+        least_room(&self.obstacles, positions_m).filter(|&(clearance_margin_m, ..)| clearance_margin_m <= margin_m)
     }
 
     fn refuse(&self, point_m: Vector3<f64>, number: usize, subject: std::fmt::Arguments<'_>) -> ScenarioError {

@@ -6,7 +6,7 @@
 use super::spec::{PlantSpec, Scenario};
 use crate::link::ImperfectionSpec;
 use tautline_core::swarm::{Rows, mean_row, row};
-use tautline_laws::law::{Certificate, Law, Void, certificate_through};
+use tautline_laws::law::{Certificate, Law, VoidReason, certificate_through};
 use tautline_laws::target::DeadlockMode;
 
 /// Drift of the whole swarm until the end of the flight.
@@ -63,8 +63,8 @@ impl Scenario {
         let ignored = !self.obstacles.is_empty() && !law.capabilities().avoids_obstacles;
         let is_uncounted = !self.wind.is_still() && !law.capabilities().certifies_under_wind;
         self.with_scenario_limits(self.promised(law))
-            .void_where(ignored, Void::ObstaclesUnknown)
-            .void_where(is_uncounted, Void::Windblown)
+            .void_where(ignored, VoidReason::ObstaclesUnknown)
+            .void_where(is_uncounted, VoidReason::Windblown)
     }
 
     /// Certificate of all legs, with the spread slots that a leg begins with under `deadlock.mode = "start"`.
@@ -90,13 +90,13 @@ impl Scenario {
     /// points, or if the certified distance cannot be distinguished from delta.
     #[must_use]
     pub fn with_scenario_limits(&self, promised: Certificate) -> Certificate {
-        let of_time = self.time.control_hz.map(|_| Void::CommandsHeld);
-        let of_body = (!self.airframe.is_point()).then_some(Void::NotAPoint);
+        let of_time = self.time.control_hz.map(|_| VoidReason::CommandsHeld);
+        let of_body = (!self.airframe.is_point()).then_some(VoidReason::NotAPoint);
         let of_links = self.imperfections().into_iter().flat_map(ImperfectionSpec::voids);
         let voids = of_time.into_iter().chain(of_links).chain(of_body);
         let promised = voids.fold(promised, |promised, void| promised.void_where(true, void));
         let unresolved = promised.certified_m.is_some_and(|certified_m| self.is_unresolved(certified_m));
-        promised.void_where(unresolved, Void::Unresolved)
+        promised.void_where(unresolved, VoidReason::Unresolved)
     }
 
     /// Returns whether a distance is too close to delta for the resolution of the plant's numbers.

@@ -8,7 +8,7 @@ use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::graph::Graph;
 use tautline_laws::law::{Certificate, Law, LawError, certificate_through};
 use tautline_laws::observation::{Observation, Others};
-use tautline_laws::space::{KeptPairs, Metric, Obstacle};
+use tautline_laws::space::{Metric, Obstacle, VerletList};
 use tautline_laws::target::{Change, CurrentTarget, Guidance, Supervisor};
 
 /// Control loop between the true state and the actuators, with all of its memory.
@@ -23,7 +23,7 @@ pub(super) struct Controller {
     pub(super) obstacles: Vec<Obstacle>,
     /// Metric of separations.
     metric: Metric,
-    near: KeptPairs,
+    near: VerletList,
     /// Last command of the law, N x 3 \[m/s^2\].
     commanded: Rows,
 }
@@ -37,7 +37,7 @@ impl Controller {
     ) -> Result<Self, SimError> {
         let target = CurrentTarget::first_of(&scenario.legs).ok_or(SimError::NoLeg)?;
         let (guidance, links) = (scenario.reference.clone(), scenario.graph.clone());
-        let (obstacles, near) = (scenario.obstacles.clone(), KeptPairs::default());
+        let (obstacles, near) = (scenario.obstacles.clone(), VerletList::default());
         let commanded = Rows::zeros(scenario.count());
         let metric = scenario.metric();
         Ok(Self { law, link, supervisor, target, guidance, links, obstacles, metric, near, commanded })

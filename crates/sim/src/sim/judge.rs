@@ -12,7 +12,7 @@ use tautline_core::record::Event;
 use tautline_core::swarm::{Bounce, ClosestApproach, Pair, Rows, Swarm, row};
 use tautline_laws::graph::Graph;
 use tautline_laws::law::Law;
-use tautline_laws::space::{self, Metric, NearPairs};
+use tautline_laws::space::{self, CellList, Metric};
 
 /// Auditor with the state that the loop needs from step to step.
 #[derive(Clone)]
@@ -37,13 +37,13 @@ pub(super) struct Judge {
     clearance: Option<ClearanceAuditor>,
     obstacles: Vec<Obstacle>,
     /// Smallest present distance of a vehicle beyond the clearance of an obstacle \[m\].
-    pub(super) room_m: f64,
+    pub(super) clearance_margin_m: f64,
     /// Closest approach since the last sample.
     pub(super) closest: Option<ClosestApproach>,
     /// Smallest separation over the last sweep: a lower bound of the present separations.
     pub(super) nearest_m: f64,
     /// Pairs that a step may bring too close.
-    near: NearPairs,
+    near: CellList,
     pub(super) engine_contacts: Vec<Pair>,
     contacts_now: Vec<Pair>,
     pub(super) bounces: Vec<Bounce>,
@@ -81,10 +81,10 @@ impl Judge {
             beyond_error: [false; 2],
             clearance,
             obstacles,
-            room_m: f64::INFINITY,
+            clearance_margin_m: f64::INFINITY,
             closest: None,
             nearest_m: 0.0,
-            near: NearPairs::default(),
+            near: CellList::default(),
             engine_contacts: Vec::new(),
             contacts_now: Vec::new(),
             bounces: Vec::new(),
@@ -124,7 +124,7 @@ impl Judge {
         self.clear_of_obstacles(time_s, positions_m, bend_m, events)?;
         if let Some(error_m) = self.error_m {
             self.beyond_error[0] |= self.delta_m - self.nearest_m > self.metric.most_scaled(error_m);
-            self.beyond_error[1] |= -self.room_m > error_m;
+            self.beyond_error[1] |= -self.clearance_margin_m > error_m;
         }
         Ok(())
     }
@@ -151,7 +151,7 @@ impl Judge {
     ) -> Result<(), AuditError> {
         if let Some(clearance) = &mut self.clearance {
             let ClearanceFinding { least_room_m, began, ended } = clearance.step(time_s, positions_m)?;
-            self.room_m = least_room_m;
+            self.clearance_margin_m = least_room_m;
             self.bent_past_obstacles += u64::from(is_undecided(least_room_m, bend_m, 0.0));
             for &Violation { pair, from_s: time_s, .. } in began {
                 if let ObjectPair::Obstacle { vehicle, obstacle } = pair {
@@ -213,7 +213,7 @@ impl Judge {
         let Some(barrier_m) = law.capabilities().barrier_m else { return false };
         let start = &start.positions_m;
         let instants = || path.passed().map(|(_, rows)| rows).chain([&end.positions_m]);
-        if moved_m > 0.5 * self.room_m
+        if moved_m > 0.5 * self.clearance_margin_m
             && law.capabilities().avoids_obstacles
             && self.nears_an_obstacle(start, path, end)
         {

@@ -13,7 +13,7 @@ mod simulation;
 
 pub use ending::{Breakdown, Ending, Flight, Performance, SimError};
 pub use judge::{judged, judged_shape};
-pub use simulation::{Parts, Saved, Simulation};
+pub use simulation::{Components, Saved, Simulation};
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -32,7 +32,7 @@ use tautline_core::record::{Event, RecordError, Sink, Step};
 /// reason is the last event of the recording.
 pub fn fly(
     scenario: &Scenario,
-    parts: Parts,
+    parts: Components,
     sink: &mut dyn Sink,
     carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Flight, SimError> {

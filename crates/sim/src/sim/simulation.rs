@@ -12,7 +12,7 @@ use crate::plant::{self, Path, Plant};
 use crate::scenario::Scenario;
 use tautline_core::record::{Channel, Event, Peaks, Sample};
 use tautline_core::swarm::{ClosestApproach, Rows, Swarm, first_row_beyond};
-use tautline_laws::law::{Certificate, Law, Void};
+use tautline_laws::law::{Certificate, Law, VoidReason};
 use tautline_laws::target::{Schedule, Supervisor};
 
 /// Flight in progress: law, link, supervisor, vehicles and audit, with all of their memory.
@@ -81,7 +81,7 @@ impl Simulation {
     /// # Errors
     /// [`SimError`] if the parameters give no law, or the audit does not support the scenario.
     pub fn new(scenario: &Scenario) -> Result<Self, SimError> {
-        Self::with(scenario, Parts::of(scenario)?)
+        Self::with(scenario, Components::of(scenario)?)
     }
 
     /// Creates a flight at its start with other components, which must have the scenario's number of vehicles. Audits
@@ -89,17 +89,18 @@ impl Simulation {
     ///
     /// # Errors
     /// [`SimError`] if the audit does not support the scenario.
-    pub fn with(scenario: &Scenario, parts: Parts) -> Result<Self, SimError> {
-        let Parts { law, plant, link, supervisor } = parts;
+    pub fn with(scenario: &Scenario, parts: Components) -> Result<Self, SimError> {
+        let Components { law, plant, link, supervisor } = parts;
         let count = scenario.count();
         if plant.count() != count {
             return Err(SimError::Vehicles { expected: count, found: plant.count() });
         }
-        let certificate =
-            scenario.certificate(law.as_ref()).void_where(!supervisor.keeps_to(&scenario.legs), Void::TargetChanges);
+        let certificate = scenario
+            .certificate(law.as_ref())
+            .void_where(!supervisor.keeps_to(&scenario.legs), VoidReason::TargetChanges);
         // The scenario's own imperfections already void the certificate.
         let is_void = !scenario.is_exact() && !certificate.void.is_empty();
-        let certificate = certificate.void_where(!link.is_exact() && !is_void, Void::InexactLink);
+        let certificate = certificate.void_where(!link.is_exact() && !is_void, VoidReason::InexactLink);
         let mut state = scenario.start.clone();
         plant.observe(&mut state);
         let flies_another = scenario.law().is_ok_and(|own| own.name() != law.name());
@@ -174,7 +175,7 @@ impl Simulation {
         }
         if self.ending.is_none() {
             self.overruled = true;
-            self.certificate = self.certificate.clone().void_where(true, Void::CommandsFromOutside);
+            self.certificate = self.certificate.clone().void_where(true, VoidReason::CommandsFromOutside);
             self.control.clone_from(commands);
             self.plant.apply(commands, &mut self.state);
         }
@@ -328,7 +329,7 @@ impl Simulation {
 }
 
 /// Components of a flight, besides its scenario.
-pub struct Parts {
+pub struct Components {
     /// The control law.
     pub law: Box<dyn Law>,
     /// Plant that moves the vehicles.
@@ -339,7 +340,7 @@ pub struct Parts {
     pub supervisor: Box<dyn Supervisor>,
 }
 
-impl Parts {
+impl Components {
     /// Returns the components of a scenario.
     ///
     /// # Errors

@@ -9,7 +9,7 @@ use tautline_laws::law::{
     LawSpec,
 };
 use tautline_laws::observation::Observation;
-use tautline_laws::space::NearPairs;
+use tautline_laws::space::CellList;
 
 use crate::ALLOCATOR;
 
@@ -51,7 +51,7 @@ pub(crate) fn a_law_that_senses_allocates_nothing_once_its_lists_have_grown() {
     for spec in LawSpec::all() {
         let context = LawContext::new(&links, &formation, 0.8, 0.1);
         let mut law = spec.complete(0.1).build(&context).expect("a law");
-        let mut near = NearPairs::default();
+        let mut near = CellList::default();
         near.update(&crowd.positions_m, law.capabilities().sensing_range_m.unwrap_or(0.0));
         let at = Observation { near: near.pairs(), ..Observation::exact(&crowd, &links, &formation) };
         law.command(&at, &mut control).expect("a state clear of delta");

@@ -8,7 +8,7 @@ use tautline_laws::law::{Law, LawError};
 use tautline_laws::observation::Observation;
 use tautline_sim::plant::{self, Path, Plant, PlantError};
 use tautline_sim::scenario::{Override, Scenario, Source};
-use tautline_sim::sim::{self, Parts};
+use tautline_sim::sim::{self, Components};
 
 use crate::ALLOCATOR;
 
@@ -79,7 +79,7 @@ fn builtin(name: &str, sets: &[&str]) -> Scenario {
 fn allocations(scenario: &Scenario, steps: u32, law: Box<dyn Law>, plant: Box<dyn Plant>) -> usize {
     let mut scenario = scenario.clone();
     scenario.time.duration_s = f64::from(steps) * scenario.time.dt_s;
-    let parts = Parts { plant, ..Parts::under(&scenario, law) };
+    let parts = Components { plant, ..Components::under(&scenario, law) };
     let region = Region::new(ALLOCATOR);
     let flown = sim::fly(&scenario, parts, &mut (), &mut |_step| ControlFlow::Continue(()));
     let change = region.change();

@@ -8,7 +8,7 @@ use tautline_laws::formation::Formation;
 use tautline_laws::law::Law;
 use tautline_sim::plant::{self, Plant};
 use tautline_sim::scenario::{Override, PlantSpec, Scenario, Source};
-use tautline_sim::sim::{self, Flight, Parts, SimError};
+use tautline_sim::sim::{self, Components, Flight, SimError};
 
 /// Reads a built-in scenario with overrides.
 pub(crate) fn builtin(name: &str, sets: &[&str]) -> Scenario {
@@ -55,7 +55,7 @@ pub(crate) fn fly_with(
     plant: Box<dyn Plant>,
 ) -> (Result<Flight, SimError>, Log) {
     let mut log = Log::default();
-    let parts = Parts { plant, ..Parts::under(scenario, law) };
+    let parts = Components { plant, ..Components::under(scenario, law) };
     let flown = sim::fly(scenario, parts, &mut log, &mut |_step| ControlFlow::Continue(()));
     (flown, log)
 }

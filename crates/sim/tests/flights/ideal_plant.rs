@@ -11,7 +11,7 @@ use tautline_laws::law::{EdgeTensionKeys, EdgeTensionLaw, Law, LawContext, LawEr
 use tautline_laws::observation::Observation;
 use tautline_sim::continuous::{self, IdealError, Solution, Tolerances};
 use tautline_sim::scenario::{Override, PlantSpec, Scenario, Source};
-use tautline_sim::sim::{self, Breakdown, Ending, Parts};
+use tautline_sim::sim::{self, Breakdown, Components, Ending};
 
 /// Reference values have 7 decimals.
 const PRINTED_M: f64 = 1e-7;
@@ -259,7 +259,7 @@ fn the_solution_of_the_ideal_plant_does_not_depend_on_the_step() {
         let scenario = scenario("pentagon", &["plant.kind=ideal", "time.duration_s=10", &format!("time.dt_s={dt}")]);
         assert_eq!(scenario.plant, PlantSpec::Ideal);
         let carry_on = &mut |_| ControlFlow::Continue(());
-        let parts = Parts::of(&scenario).expect("a law");
+        let parts = Components::of(&scenario).expect("a law");
         let flight = sim::fly(&scenario, parts, &mut (), carry_on).expect("a flight");
         let gap_m = (&flight.last.positions_m - &solved.states[0].positions_m).amax();
         assert!(gap_m < SOLVED_M, "dt = {dt}: {gap_m}");
@@ -273,7 +273,7 @@ fn baseline_in_long_steps(max_halvings: u32) -> (sim::Flight, f64) {
     let mut scenario = scenario("pentagon-laplacian", &sets);
     scenario.time.max_halvings = max_halvings;
     let carry_on = &mut |_| ControlFlow::Continue(());
-    let flight = sim::fly(&scenario, Parts::of(&scenario).expect("a law"), &mut (), carry_on).expect("a flight");
+    let flight = sim::fly(&scenario, Components::of(&scenario).expect("a law"), &mut (), carry_on).expect("a flight");
     let seconds: Vec<f64> = (0..=10_u32).map(f64::from).collect();
     let solution = solve(&scenario, &seconds);
     let mut chords = Auditor::new(scenario.count(), scenario.delta_m).expect("a judge");
@@ -305,12 +305,13 @@ fn the_ideal_plant_uses_the_given_law_and_ends_where_it_is_undefined() {
     let (_, start) = thrown(1.0);
     let mut scenario = scenario("pentagon", &["plant.kind=ideal", "time.duration_s=5"]);
     let carry_on = &mut |_| ControlFlow::Continue(());
-    let free = sim::fly(&scenario, Parts::under(&scenario, Box::new(Free)), &mut (), carry_on).expect("a flight");
+    let free = sim::fly(&scenario, Components::under(&scenario, Box::new(Free)), &mut (), carry_on).expect("a flight");
     assert_eq!(free.last, scenario.start, "no vehicle moves without a command");
 
     scenario = Scenario::new("wall", start, Formation::line(2, 3.0), 0.5, 5.0);
     scenario.plant = PlantSpec::Ideal;
-    let flight = sim::fly(&scenario, Parts::under(&scenario, Box::new(Wall)), &mut (), carry_on).expect("a flight");
+    let flight =
+        sim::fly(&scenario, Components::under(&scenario, Box::new(Wall)), &mut (), carry_on).expect("a flight");
     assert!(matches!(flight.ending, Ending::LawUndefined(LawError::Collision { .. })));
     assert!((flight.duration_s - 1.0).abs() <= scenario.time.dt_s, "{}", flight.duration_s);
 }
@@ -325,7 +326,7 @@ fn limited(speed_m_s: f64, law: &str) -> sim::Flight {
     );
     let scenario = Scenario::read(&Source::Text { name: "limited".to_owned(), text }, &[]).expect("a scenario");
     let carry_on = &mut |_| ControlFlow::Continue(());
-    sim::fly(&scenario, Parts::of(&scenario).expect("a law"), &mut (), carry_on).expect("a flight")
+    sim::fly(&scenario, Components::of(&scenario).expect("a law"), &mut (), carry_on).expect("a flight")
 }
 
 #[test]

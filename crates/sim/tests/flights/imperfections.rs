@@ -5,7 +5,7 @@ use tautline_audit::Status;
 use tautline_core::record::OwnedSample;
 use tautline_core::swarm::{Pair, Rows, Swarm, row};
 use tautline_laws::formation::Formation;
-use tautline_laws::law::{LawError, Linear, Void};
+use tautline_laws::law::{LawError, Linear, VoidReason};
 use tautline_sim::scenario::{Failure, FailureKind, Override, Scenario, Source};
 use tautline_sim::sim::{Ending, Simulation};
 
@@ -101,23 +101,23 @@ fn the_seed_changes_only_the_noise_and_threads_change_no_bits() {
 #[test]
 fn certificates_are_void_with_a_reason() {
     for (set, reason) in [
-        ("sensing.latency_s=0.01", Void::KnownLate),
-        ("sensing.near_latency_s=0.01", Void::KnownLate),
-        ("sensing.rate_hz=100", Void::KnownLate),
-        ("sensing.position_bias_m=0.01", Void::KnownWrongly),
-        ("network.latency_s=0.01", Void::HeardLate),
-        ("network.rate_hz=50", Void::HeardLate),
-        ("actuation.max_accel_m_s2=1", Void::AccelerationLimited),
-        ("actuation.lag_s=0.01", Void::AccelerationLate),
-        ("time.control_hz=60", Void::CommandsHeld),
-        ("failure=[{vehicle=1, at_s=0.5, kind=\"dead\"}]", Void::VehicleFails),
+        ("sensing.latency_s=0.01", VoidReason::KnownLate),
+        ("sensing.near_latency_s=0.01", VoidReason::KnownLate),
+        ("sensing.rate_hz=100", VoidReason::KnownLate),
+        ("sensing.position_bias_m=0.01", VoidReason::KnownWrongly),
+        ("network.latency_s=0.01", VoidReason::HeardLate),
+        ("network.rate_hz=50", VoidReason::HeardLate),
+        ("actuation.max_accel_m_s2=1", VoidReason::AccelerationLimited),
+        ("actuation.lag_s=0.01", VoidReason::AccelerationLate),
+        ("time.control_hz=60", VoidReason::CommandsHeld),
+        ("failure=[{vehicle=1, at_s=0.5, kind=\"dead\"}]", VoidReason::VehicleFails),
     ] {
         let (flight, _) = fly(&builtin("pentagon", &["time.duration_s=1", set]));
         assert_eq!((flight.certificate.certified_m, flight.certificate.void), (None, vec![reason]), "{set}");
     }
     let silent = ["time.duration_s=1", "network.rate_hz=50", "failure=[{vehicle=1, at_s=0.5, kind=\"silent\"}]"];
     let (flight, _) = fly(&builtin("pentagon", &silent));
-    assert_eq!(flight.certificate.void, [Void::HeardLate, Void::MessagesLost]);
+    assert_eq!(flight.certificate.void, [VoidReason::HeardLate, VoidReason::MessagesLost]);
     assert!(fly(&builtin("pentagon", &["time.duration_s=1"])).0.certificate.certified_m.is_some());
 }
 

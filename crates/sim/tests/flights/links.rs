@@ -5,7 +5,7 @@ use tautline_laws::formation::Formation;
 use tautline_laws::graph::Graph;
 use tautline_laws::observation::{Neighbour, Others, Picture};
 use tautline_sim::link::{Imperfections, Sensed, of};
-use tautline_sim::scenario::{Failure, FailureKind, LinkFailure, Missing, NearBy, Scenario};
+use tautline_sim::scenario::{Failure, FailureKind, LinkFailure, NearBy, Scenario, StalePolicy};
 
 const DT_S: f64 = 0.01;
 const COUNT: usize = 4;
@@ -110,13 +110,13 @@ fn near_vehicles_are_sensed_or_heard_with_the_given_delays() {
 fn old_messages_are_held_or_extrapolated() {
     let mut scenario = scenario();
     (scenario.network.latency_s, scenario.network.rate_hz) = (0.05, Some(10.0));
-    for missing in [Missing::Hold, Missing::Extrapolate] {
+    for missing in [StalePolicy::Hold, StalePolicy::Extrapolate] {
         scenario.network.missing = missing;
         after(of(&scenario, true).as_mut(), 0..=100, |time_s, sensed| {
             let heard = picture(&sensed).heard(2, 0);
             let sent_s = ((time_s - 0.05 + 1e-9).max(0.0) * 10.0).floor() / 10.0;
             let (then, ahead_s) = (truth(sent_s), time_s - sent_s);
-            let carried_m = if missing == Missing::Hold { 0.0 } else { ahead_s };
+            let carried_m = if missing == StalePolicy::Hold { 0.0 } else { ahead_s };
             let expected = row(&then.positions_m, 0) + row(&then.velocities_m_s, 0) * carried_m;
             assert!((heard.position_m - expected).norm() < 1e-9, "{missing:?} {time_s}");
         });
@@ -255,6 +255,6 @@ fn a_dead_vehicle_has_no_command_and_a_frozen_one_keeps_its_last() {
 fn without_imperfections_the_link_is_the_direct_one() {
     assert!(of(&scenario(), true).is_exact());
     let mut scenario = scenario();
-    scenario.network.missing = Missing::Extrapolate;
+    scenario.network.missing = StalePolicy::Extrapolate;
     assert!(of(&scenario, true).is_exact(), "no imperfection");
 }

@@ -10,11 +10,11 @@ use tautline_audit::Status;
 use tautline_core::record::{Event, OwnedSample};
 use tautline_core::swarm::{Rows, Swarm, row, separation};
 use tautline_laws::formation::Formation;
-use tautline_laws::law::{Capabilities, Certificate, LaplacianKeys, Law, LawError, LawSpec, Void};
+use tautline_laws::law::{Capabilities, Certificate, LaplacianKeys, Law, LawError, LawSpec, VoidReason};
 use tautline_laws::observation::Observation;
 use tautline_sim::plant::{self, Path, Plant, PlantError, rapier};
 use tautline_sim::scenario::Scenario;
-use tautline_sim::sim::{self, Breakdown, Ending, Flight, Parts, SimError};
+use tautline_sim::sim::{self, Breakdown, Components, Ending, Flight, SimError};
 
 /// Rounding of a sum of ten tensions and five squares relative to that sum.
 const ENERGY_ROUNDING: f64 = 1e-12;
@@ -335,8 +335,10 @@ fn a_law_that_requires_the_calling_thread_runs_on_no_other() {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
     let asked_by = |stays: bool| {
         let by = Arc::new(Mutex::new(BTreeSet::new()));
-        let parts =
-            Parts { law: Box::new(Asked { stays, by: Arc::clone(&by) }), ..Parts::of(&scenario).expect("parts") };
+        let parts = Components {
+            law: Box::new(Asked { stays, by: Arc::clone(&by) }),
+            ..Components::of(&scenario).expect("parts")
+        };
         let many = || by.lock().expect("no thread panicked").len();
         let enough = |step: u64| stays && step == 300 || many() > 1;
         let mut go_on = |step| if enough(step) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) };
@@ -352,7 +354,7 @@ fn an_interrupted_flight_is_complete_up_to_the_interruption() {
     for (break_at, last_sample) in [(1, 1), (100, 100), (101, 101)] {
         let mut log = Log::default();
         let mut asked = Vec::new();
-        let flight = sim::fly(&scenario, Parts::of(&scenario).expect("parts"), &mut log, &mut |step| {
+        let flight = sim::fly(&scenario, Components::of(&scenario).expect("parts"), &mut log, &mut |step| {
             asked.push(step);
             if step == break_at { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         })
@@ -369,7 +371,7 @@ fn an_interrupted_flight_is_complete_up_to_the_interruption() {
 #[test]
 fn an_interruption_at_the_last_step_completes_the_flight() {
     let scenario = builtin("pentagon", &["time.duration_s=1"]);
-    let flight = sim::fly(&scenario, Parts::of(&scenario).expect("parts"), &mut (), &mut |step| {
+    let flight = sim::fly(&scenario, Components::of(&scenario).expect("parts"), &mut (), &mut |step| {
         if step == 240 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     assert_eq!(flight.expect("a flight").ending, Ending::Completed);
@@ -418,7 +420,7 @@ impl Law for Careless {
     }
 
     fn certificate(&self, _: &Observation<'_>, _: &[&Formation]) -> Certificate {
-        Certificate { certified_m: Some(3.0), void: Vec::new(), ..Certificate::void(Void::NoBarrier) }
+        Certificate { certified_m: Some(3.0), void: Vec::new(), ..Certificate::void(VoidReason::NoBarrier) }
     }
 }
 
@@ -429,5 +431,5 @@ fn a_law_that_ignores_later_formations_certifies_no_flight_through_them() {
     let mut legs = still.clone();
     legs.legs.push(legs.legs[0].clone());
     let certificate = legs.certificate(&Careless);
-    assert_eq!((certificate.certified_m, &certificate.void[..]), (None, &[Void::TargetChanges][..]));
+    assert_eq!((certificate.certified_m, &certificate.void[..]), (None, &[VoidReason::TargetChanges][..]));
 }

@@ -10,7 +10,7 @@ use tautline_core::record::Event;
 use tautline_core::swarm::{Rows, Swarm, separation};
 use tautline_laws::formation::Formation;
 use tautline_laws::graph::{Graph, Pinning};
-use tautline_laws::law::{DisplacementKeys, LawSpec, Void};
+use tautline_laws::law::{DisplacementKeys, LawSpec, VoidReason};
 use tautline_laws::space::{Obstacle, Shape, least_room};
 use tautline_laws::target::{Begins, DeadlockMode, Guidance, Leg, ReferenceMotion};
 use tautline_sim::plant;
@@ -53,7 +53,8 @@ fn among(seed: u64) -> Scenario {
                 let at = point(&mut numbers);
                 (0..3).for_each(|axis| rows[(i, axis)] = at[axis]);
                 let alone = Rows::from_row_slice(at.as_slice());
-                let has_room = least_room(&obstacles, &alone).is_some_and(|(room_m, ..)| room_m > 0.2 * delta_m);
+                let has_room = least_room(&obstacles, &alone)
+                    .is_some_and(|(clearance_margin_m, ..)| clearance_margin_m > 0.2 * delta_m);
                 if has_room && (0..i).all(|j| separation(&rows, i, j) > least * delta_m) {
                     break;
                 }
@@ -100,13 +101,17 @@ fn no_random_flight_among_obstacles_violates_its_certificate() {
             (certificate.certified_m.expect("a promise"), certificate.certified_room_m.expect("a promise"));
         let closest_m = flight.audit.closest.expect("a pair").separation_m;
         let clearance = flight.clearance.expect("obstacles");
-        let room_m = clearance.closest.iter().map(|near| near.lower_m - near.limit_m).fold(f64::INFINITY, f64::min);
+        let clearance_margin_m =
+            clearance.closest.iter().map(|near| near.lower_m - near.limit_m).fold(f64::INFINITY, f64::min);
         assert!(closest_m >= certified_m, "seed {seed}: {closest_m} {certified_m}");
-        assert!(room_m >= certified_room_m && certified_room_m > 0.0, "seed {seed}: {room_m} {certified_room_m}");
+        assert!(
+            clearance_margin_m >= certified_room_m && certified_room_m > 0.0,
+            "seed {seed}: {clearance_margin_m} {certified_room_m}"
+        );
         assert_eq!((flight.audit.status, clearance.status), (Status::Clear, Status::Clear), "seed {seed}");
         assert_eq!(clearance.parry.disagreements, 0, "seed {seed}");
-        tightest = tightest.min((room_m - certified_room_m) / scenario.delta_m);
-        near += u64::from(room_m < 0.1 * scenario.delta_m);
+        tightest = tightest.min((clearance_margin_m - certified_room_m) / scenario.delta_m);
+        near += u64::from(clearance_margin_m < 0.1 * scenario.delta_m);
         let rise = flight.energy_rise.expect("an energy");
         worst_rise = worst_rise.max((rise.to - rise.from) / rise.from);
     }
@@ -131,7 +136,7 @@ fn ignorant(scenario: &Scenario) -> (Flight, Log) {
 fn a_law_without_obstacles_hits_them_and_has_no_certificate() {
     let too_near = (0..12).map(among).filter(|scenario| {
         let (flight, log) = ignorant(scenario);
-        assert_eq!(flight.certificate.void, [Void::ObstaclesUnknown]);
+        assert_eq!(flight.certificate.void, [VoidReason::ObstaclesUnknown]);
         let clearance = flight.clearance.expect("obstacles");
         let began = log.events.iter().filter(|event| matches!(event, Event::ObstacleViolationBegan { .. })).count();
         assert_eq!(began, clearance.violations.len());
@@ -209,12 +214,12 @@ fn a_moving_reference_or_added_energy_voids_the_certificate_among_obstacles() {
     assert!(certified(&scenario).certified_room_m.is_some());
     let guidance = scenario.reference.take();
     scenario.a22_per_s = 0.1;
-    assert_eq!(certified(&scenario).void, [Void::VelocityUndamped]);
+    assert_eq!(certified(&scenario).void, [VoidReason::VelocityUndamped]);
     scenario.a22_per_s = -0.1;
     assert!(certified(&scenario).certified_room_m.is_some(), "with drag it needs no reference");
     let motion = ReferenceMotion::Velocity { from_m: Vector3::zeros(), velocity_m_s: Vector3::x() };
     scenario.reference = guidance.map(|guidance| Guidance { motion, ..guidance });
-    assert_eq!(certified(&scenario).void, [Void::CarriedPastObstacles]);
+    assert_eq!(certified(&scenario).void, [VoidReason::CarriedPastObstacles]);
     assert!(certified(&scenario).certified_m.is_none());
 }
 

@@ -11,7 +11,7 @@
 use tautline_audit::Status;
 use tautline_core::record::Sink as _;
 use tautline_laws::formation::{Formation, Freedom};
-use tautline_laws::law::{EdgeTension, Void};
+use tautline_laws::law::{EdgeTension, VoidReason};
 use tautline_laws::target::DeadlockMode;
 use tautline_sim::metrics::Metrics;
 use tautline_sim::scenario::Scenario;
@@ -159,7 +159,7 @@ fn fly(scenario: &Scenario) -> Flown {
             is_more.then(|| format!("an energy of {highest}, bound {promised}"))
         }
         // The energy is so large that the bound cannot be distinguished from delta.
-        None => (flight.certificate.void != [Void::Unresolved]).then(|| "no certificate".to_owned()),
+        None => (flight.certificate.void != [VoidReason::Unresolved]).then(|| "no certificate".to_owned()),
     };
     let (recoveries, assignments) = (flight.deadlock_recoveries.len(), flight.assignments.len());
     Flown { reached_at_s, recoveries, assignments, separation_m, broken }

@@ -8,14 +8,14 @@ use tautline_core::record::{Event, Sink, StateHash};
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::formation::{Formation, largest_edge_error_m};
 use tautline_laws::graph::Graph;
-use tautline_laws::law::{EdgeTensionKeys, LaplacianKeys, LawSpec, PotentialKeys, Void};
+use tautline_laws::law::{EdgeTensionKeys, LaplacianKeys, LawSpec, PotentialKeys, VoidReason};
 use tautline_laws::observation::{Held, Others};
 use tautline_laws::target::{Begins, CurrentTarget, Leg, Supervisor};
 use tautline_sim::continuous::{self, Tolerances};
 use tautline_sim::link::{Imperfections, Sensed};
 use tautline_sim::metrics::Metrics;
 use tautline_sim::scenario::{PlantSpec, Scenario};
-use tautline_sim::sim::{self, Ending, Parts, SimError, Simulation};
+use tautline_sim::sim::{self, Components, Ending, SimError, Simulation};
 
 use crate::flight::{Log, builtin, fly};
 
@@ -106,7 +106,7 @@ fn a_simulation_pushed_for_one_step_ends_with_another_hash() {
 fn stepping_equals_flying() {
     let scenario = builtin("pentagon", &["time.duration_s=3"]);
     let mut flown = StateHash::new();
-    let parts = Parts::of(&scenario).expect("the parts of a valid scenario");
+    let parts = Components::of(&scenario).expect("the parts of a valid scenario");
     sim::fly(&scenario, parts, &mut flown, &mut |_step| ControlFlow::Continue(())).expect("a flight");
     let (mut simulation, mut hash) = (Simulation::new(&scenario).expect("a simulation"), StateHash::new());
     record(&mut simulation, &mut hash);
@@ -162,7 +162,7 @@ fn legs_begin_by_time_or_when_the_previous_leg_is_reached() {
         let scenario = two_legs(begins);
         let mut log = Log::default();
         let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival);
-        let parts = Parts::of(&scenario).expect("parts");
+        let parts = Components::of(&scenario).expect("parts");
         let flight = sim::fly(&scenario, parts, &mut (&mut log, &mut metrics), &mut |_| ControlFlow::Continue(()))
             .expect("a flight");
         assert_eq!(flight.ending, Ending::Completed);
@@ -177,7 +177,7 @@ fn legs_begin_by_time_or_when_the_previous_leg_is_reached() {
     }
     let scenario = two_legs(Begins::At(119.0));
     let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival);
-    sim::fly(&scenario, Parts::of(&scenario).expect("parts"), &mut metrics, &mut |_| ControlFlow::Continue(()))
+    sim::fly(&scenario, Components::of(&scenario).expect("parts"), &mut metrics, &mut |_| ControlFlow::Continue(()))
         .expect("a flight");
     assert_eq!(metrics.finish().reached_at_s, None, "a leg that has only begun is not reached");
 }
@@ -218,7 +218,7 @@ fn a_delayed_flight_does_not_depend_on_the_steps_that_were_refused() {
         scenario.sensing.latency_s = 0.05;
         let (flight, log) = fly(&scenario);
         let refused = log.events.iter().any(|event| matches!(event, Event::StepRefined { .. }));
-        assert!(flight.certificate.void.contains(&Void::KnownLate), "late knowledge voids the certificate");
+        assert!(flight.certificate.void.contains(&VoidReason::KnownLate), "late knowledge voids the certificate");
         (flight.last.positions_m, refused)
     };
     let ((coarse, refused), (fine, _)) = (end(0.4), end(0.4 / 128.0));
@@ -272,7 +272,7 @@ fn commands_from_outside_void_the_certificate_in_continuous_time() {
     (0..240).for_each(|_| still.step_with(&Rows::zeros(5)).expect("finite commands"));
     assert_eq!(still.state(), &scenario.start, "no vehicle is accelerated");
     let certificate = still.finish().certificate;
-    assert_eq!((certificate.certified_m, certificate.void), (None, vec![Void::CommandsFromOutside]));
+    assert_eq!((certificate.certified_m, certificate.void), (None, vec![VoidReason::CommandsFromOutside]));
 }
 
 /// Returns two vehicles that drift at each other, 1 mm before the barrier.
@@ -318,7 +318,7 @@ fn a_certificate_for_one_leg_is_void_for_two_and_laws_follow_the_target() {
         scenario.legs.push(Leg { begins: Begins::At(2.0), ..Leg::first(Formation::pentagon(2.5)) });
         scenario.validate().expect("two legs");
         let (flight, _) = fly(&scenario);
-        assert_eq!((flight.certificate.certified_m, flight.certificate.void), (None, vec![Void::TargetChanges]));
+        assert_eq!((flight.certificate.certified_m, flight.certificate.void), (None, vec![VoidReason::TargetChanges]));
         let off_m = largest_edge_error_m(&flight.last.positions_m, &scenario.legs[1].formation, &scenario.graph);
         assert!(off_m < 0.01, "{}: {off_m}", flight.law);
     }
@@ -362,7 +362,7 @@ impl Supervisor for Astray {
 #[test]
 fn a_leg_that_the_scenario_does_not_have_is_never_reached() {
     let scenario = builtin("pentagon", &["time.duration_s=60"]);
-    let parts = Parts { supervisor: Box::new(Astray), ..Parts::of(&scenario).expect("parts") };
+    let parts = Components { supervisor: Box::new(Astray), ..Components::of(&scenario).expect("parts") };
     let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival);
     sim::fly(&scenario, parts, &mut metrics, &mut |_| ControlFlow::Continue(())).expect("a flight");
     assert_eq!((metrics.finish().reached_at_s, metrics.ended_legs().len()), (None, 7));
@@ -395,7 +395,7 @@ fn copies_of_the_true_state_give_the_same_flight() {
         let mut scenario = builtin("pentagon", &["time.duration_s=2"]);
         (scenario.law, scenario.graph) = (law, graph);
         let shared = fly(&scenario).0;
-        let parts = Parts { link: Box::new(Copied(None)), ..Parts::of(&scenario).expect("parts") };
+        let parts = Components { link: Box::new(Copied(None)), ..Components::of(&scenario).expect("parts") };
         let held = sim::fly(&scenario, parts, &mut (), &mut |_| ControlFlow::Continue(())).expect("a flight");
         let off = (&shared.last.positions_m - &held.last.positions_m).amax();
         // Sums in another order.
@@ -421,7 +421,7 @@ impl Sink for Full {
 #[test]
 fn a_sink_that_cannot_keep_a_sample_ends_the_run_with_its_error() {
     let scenario = builtin("pentagon", &["time.duration_s=1"]);
-    let parts = Parts::of(&scenario).expect("the parts of a valid scenario");
+    let parts = Components::of(&scenario).expect("the parts of a valid scenario");
     let flown = sim::fly(&scenario, parts, &mut Full, &mut |_step| ControlFlow::Continue(()));
     assert!(matches!(flown, Err(SimError::Record(_))));
 }

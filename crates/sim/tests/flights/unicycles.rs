@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::Vector3;
 use tautline_audit::Status;
 use tautline_core::swarm::{Rows, Swarm, row};
-use tautline_laws::law::Void;
+use tautline_laws::law::VoidReason;
 use tautline_sim::plant;
 use tautline_sim::plant::{Path, Plant as _, Unicycles};
 use tautline_sim::scenario::{Override, Scenario, Source};
@@ -114,7 +114,7 @@ fn five_unicycles_fly_in_a_pentagon_without_a_certificate() {
     let scenario = read(FLIGHT);
     let (flight, log) = fly(&scenario);
     assert_eq!((flight.ending.clone(), flight.audit.status), (Ending::Completed, Status::Clear));
-    assert!(flight.certificate.certified_m.is_none() && flight.certificate.void.contains(&Void::NotAPoint));
+    assert!(flight.certificate.certified_m.is_none() && flight.certificate.void.contains(&VoidReason::NotAPoint));
     let formation = scenario.formation();
     let last = &flight.last;
     for (i, j) in scenario.graph.edges() {

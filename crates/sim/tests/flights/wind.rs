@@ -3,7 +3,7 @@
 use tautline_core::record::StateHash;
 use tautline_core::swarm::{Rows, Swarm, row, separation};
 use tautline_laws::formation::Formation;
-use tautline_laws::law::Void;
+use tautline_laws::law::VoidReason;
 use tautline_laws::wind::{Gust, WindSpec};
 use tautline_sim::continuous::{self, Tolerances};
 use tautline_sim::plant::{Path, rapier};
@@ -245,17 +245,17 @@ fn a_certificate_in_wind_ends_at_its_time() {
     let turbulent = |shared: bool| format!("dryden = {{ speed_20ft_m_s = 5.0, height_m = 10.0 }}\nshared = {shared}\n");
     let shared = certificate(&format!("{mean}{}", turbulent(true)));
     assert_eq!((shared.certified_m, &shared.void[..]), (still.certified_m, &[][..]));
-    assert_eq!(certificate(&format!("{mean}{}", turbulent(false))).void, [Void::WindUnbounded]);
-    assert_eq!(certificate(&format!("{rest}{mean}{}", turbulent(true))).void, [Void::WindUnbounded]);
+    assert_eq!(certificate(&format!("{mean}{}", turbulent(false))).void, [VoidReason::WindUnbounded]);
+    assert_eq!(certificate(&format!("{rest}{mean}{}", turbulent(true))).void, [VoidReason::WindUnbounded]);
     let mut led = five("[vehicle]\ndrag_per_s = 0.4\n[wind]\nmean_m_s = [2.0, 0.0]\n[time]\nduration_s = 30.0");
     led.law = tautline_laws::law::LawSpec::Potential(tautline_laws::law::PotentialKeys::default());
-    assert!(led.certificate(led.law().expect("a law").as_ref()).void.contains(&Void::Windblown));
+    assert!(led.certificate(led.law().expect("a law").as_ref()).void.contains(&VoidReason::Windblown));
 }
 
 #[test]
 fn a_leader_blown_off_its_reference_voids_the_certificate() {
     let scenario = builtin("pentagon-leader", &["vehicle.drag_per_s=0.3", "wind.mean_m_s=[1.0, 0.0]"]);
-    assert!(scenario.certificate(scenario.law().expect("a law").as_ref()).void.contains(&Void::LeaderBlown));
+    assert!(scenario.certificate(scenario.law().expect("a law").as_ref()).void.contains(&VoidReason::LeaderBlown));
 }
 
 #[test]

@@ -5,7 +5,7 @@ use std::error::Error;
 use tautline_sim::law::{Law, LawError};
 use tautline_sim::observation::Observation;
 use tautline_sim::scenario::{Scenario, Source};
-use tautline_sim::sim::{Parts, Simulation};
+use tautline_sim::sim::{Components, Simulation};
 use tautline_sim::swarm::{Rows, row, set_row};
 
 /// `u_i = -(p_i - h_i) - 2 v_i`
@@ -28,7 +28,7 @@ impl Law for Springs {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let scenario = Scenario::read(&Source::resolve("pentagon")?, &[])?;
-    let mut simulation = Simulation::with(&scenario, Parts::under(&scenario, Box::new(Springs)))?;
+    let mut simulation = Simulation::with(&scenario, Components::under(&scenario, Box::new(Springs)))?;
     while simulation.ending().is_none() {
         simulation.step();
     }

@@ -32,7 +32,7 @@ fn law(links: &Graph, formation: &Formation, later: &[Leg], guidance: &Guidance)
 }
 
 fn command(law: &mut DisplacementLaw, at: &Observation<'_>) -> Rows {
-    let mut near = NearPairs::default();
+    let mut near = CellList::default();
     near.update(&at.own.positions_m, law.tension.rest_m());
     let mut command = Rows::zeros(COUNT);
     law.command(&Observation { near: near.pairs(), ..*at }, &mut command).expect("a command");
@@ -230,7 +230,7 @@ fn a_moving_reference_without_feed_forward_voids_the_certificate() {
         let law = law(&links, &formation, &[], &not_fed);
         let certificate = law.certificate(&observation(&swarm, &links, &formation, not_fed.motion.at(0.0)), &[]);
         assert_eq!(certificate.certified_m.is_some(), holds);
-        assert_eq!(certificate.void.contains(&Void::ReferenceNotFed), !holds);
+        assert_eq!(certificate.void.contains(&VoidReason::ReferenceNotFed), !holds);
     }
     let unknown = Guidance { known_by: Pinning::Listed(Vec::new()), ..guidance(&Pinning::All) };
     let context = LawContext { guidance: Some(&unknown), ..LawContext::new(&links, &formation, DELTA_M, 0.0) };

@@ -18,7 +18,7 @@ fn law(links: &Graph, formation: &Formation) -> DisplacementLaw {
 }
 
 fn command(law: &mut DisplacementLaw, at: &Observation<'_>) -> Result<Rows, LawError> {
-    let mut near = NearPairs::default();
+    let mut near = CellList::default();
     near.update(&at.own.positions_m, law.capabilities().sensing_range_m.expect("a range"));
     let mut command = Rows::from_element(at.own.count(), f64::NAN);
     law.command(&Observation { near: near.pairs(), ..*at }, &mut command).map(|()| command)
@@ -208,7 +208,7 @@ fn invalid_states_and_parameters_are_refused() {
     let touching = Swarm::at_rest(Formation::line(2, DELTA_M).slots_m);
     let at = Observation::exact(&touching, &links, &formation);
     assert!(matches!(command(&mut law(&links, &formation), &at), Err(LawError::Collision { .. })));
-    assert!(matches!(law(&links, &formation).certificate(&at, &[]).void[..], [Void::StartRefused(_)]));
+    assert!(matches!(law(&links, &formation).certificate(&at, &[]).void[..], [VoidReason::StartRefused(_)]));
 
     let apart = Graph::from_edges(4, &[(0, 1), (2, 3)]).expect("a graph");
     let line = Formation::line(4, 2.0);

@@ -85,7 +85,7 @@ fn the_certificate_is_the_smallest_root_over_all_pairs() {
 fn a_void_certificate_lists_its_reasons() {
     let (graph, formation) = (Graph::ring(5), Formation::pentagon(3.0));
     let on_ring = law(&graph, &formation, 2.0).certificate(&exact(&pentagon_start()), &[]);
-    assert_eq!((on_ring.certified_m, on_ring.void), (None, vec![Void::GraphNotComplete]));
+    assert_eq!((on_ring.certified_m, on_ring.void), (None, vec![VoidReason::GraphNotComplete]));
     assert!(on_ring.energy_initial.is_some());
 
     let mut touching = pentagon_start();
@@ -94,7 +94,7 @@ fn a_void_certificate_lists_its_reasons() {
     assert_eq!(certificate.void.len(), 2);
     let certificate = pentagon_law().certificate(&exact(&touching), &[]);
     assert_eq!((certificate.certified_m, certificate.energy_initial), (None, None));
-    assert!(matches!(certificate.void[..], [Void::StartRefused(LawError::Collision { .. })]));
+    assert!(matches!(certificate.void[..], [VoidReason::StartRefused(LawError::Collision { .. })]));
 }
 
 #[test]
@@ -150,7 +150,7 @@ fn states_that_are_not_finite_or_of_another_swarm_are_refused() {
                     assert_eq!(law.energy(&exact(&swarm)), None);
                     assert_eq!(
                         law.certificate(&exact(&swarm), &[]).void,
-                        [Void::StartRefused(LawError::NotFinite { vehicle })]
+                        [VoidReason::StartRefused(LawError::NotFinite { vehicle })]
                     );
                 }
             }

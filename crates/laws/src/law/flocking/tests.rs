@@ -2,7 +2,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::graph::Graph;
-use crate::space::NearPairs;
+use crate::space::CellList;
 use tautline_core::swarm::Swarm;
 
 const SPACING_M: f64 = 7.0;
@@ -14,7 +14,7 @@ fn law(count: usize, keys: FlockingKeys) -> FlockingLaw {
 }
 
 fn command(law: &mut FlockingLaw, swarm: &Swarm) -> Result<Rows, LawError> {
-    let (links, mut near) = (Graph::complete(swarm.count()), NearPairs::default());
+    let (links, mut near) = (Graph::complete(swarm.count()), CellList::default());
     near.update(&swarm.positions_m, law.range_m());
     let formation = Formation::line(swarm.count(), SPACING_M);
     let at = Observation { near: near.pairs(), ..Observation::exact(swarm, &links, &formation) };

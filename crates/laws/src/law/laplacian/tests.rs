@@ -65,7 +65,7 @@ fn the_certificate_is_void_and_the_energy_exists_on_the_complete_graph() -> Resu
     let (formation, swarm) = (Formation::grid(6, 2.0), swarm(6));
     let law = |graph: &Graph, f1| laplacian(graph, &formation, f1, 1.1);
     let certificate = law(&Graph::complete(6), 1.0)?.certificate(&exact(&swarm, &formation), &[]);
-    assert_eq!((certificate.certified_m, certificate.void), (None, vec![Void::NoBarrier]));
+    assert_eq!((certificate.certified_m, certificate.void), (None, vec![VoidReason::NoBarrier]));
     assert!(certificate.energy_initial.is_some_and(|energy| energy > 0.0));
     assert_eq!(law(&Graph::complete(6), -1.0)?.energy(&exact(&swarm, &formation)), None);
     assert_eq!(law(&Graph::ring(6), 1.0)?.energy(&exact(&swarm, &formation)), None);

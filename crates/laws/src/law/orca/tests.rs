@@ -3,7 +3,7 @@ use proptest::prelude::*;
 use super::*;
 use crate::formation::Formation;
 use crate::graph::Graph;
-use crate::space::NearPairs;
+use crate::space::CellList;
 use tautline_core::swarm::Swarm;
 
 const DELTA_M: f64 = 2.0;
@@ -25,7 +25,7 @@ fn law(formation: &Formation, keys: OrcaKeys) -> OrcaLaw {
 
 /// Returns the chosen velocities and the commanded accelerations.
 fn answer(law: &mut OrcaLaw, swarm: &Swarm, formation: &Formation) -> Result<(Rows, Rows), LawError> {
-    let (links, mut near) = (Graph::complete(swarm.count()), NearPairs::default());
+    let (links, mut near) = (Graph::complete(swarm.count()), CellList::default());
     near.update(&swarm.positions_m, law.range_m);
     let at = Observation { near: near.pairs(), ..Observation::exact(swarm, &links, formation) };
     let (mut velocities, mut command) = (Rows::zeros(swarm.count()), Rows::zeros(swarm.count()));

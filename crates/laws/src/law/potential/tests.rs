@@ -2,7 +2,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::formation::Formation;
-use crate::space::NearPairs;
+use crate::space::CellList;
 use tautline_core::swarm::Swarm;
 
 const DELTA_M: f64 = 1.0;
@@ -15,7 +15,7 @@ fn law(links: &Graph, formation: &Formation) -> PotentialLaw {
 }
 
 fn command(law: &mut PotentialLaw, at: &Observation<'_>) -> Result<Rows, LawError> {
-    let mut near = NearPairs::default();
+    let mut near = CellList::default();
     near.update(&at.own.positions_m, law.range_m);
     let mut command = Rows::from_element(at.own.count(), f64::NAN);
     law.command(&Observation { near: near.pairs(), ..*at }, &mut command).map(|()| command)
@@ -77,12 +77,12 @@ fn collisions_and_void_certificates_are_reported() {
     let fed = PotentialLaw::new(&context, PotentialKeys::default()).expect("finite gains");
     let apart = Swarm::at_rest(formation.slots_m.clone());
     let at = Observation::exact(&apart, &links, &formation);
-    assert_eq!(fed.certificate(&at, &[]).void, [Void::VelocityUndamped]);
+    assert_eq!(fed.certificate(&at, &[]).void, [VoidReason::VelocityUndamped]);
 
     let keys = PotentialKeys { max_accel_m_s2: Some(0.5), ..PotentialKeys::default() };
     let context = LawContext { a22_per_s: 0.0, ..context };
     let mut limited = PotentialLaw::new(&context, keys).expect("finite gains");
-    assert_eq!(limited.certificate(&at, &[]).void, [Void::CommandLimited]);
+    assert_eq!(limited.certificate(&at, &[]).void, [VoidReason::CommandLimited]);
     let near = Swarm::at_rest(Formation::line(2, 1.1 * DELTA_M).slots_m);
     let pushed = command(&mut limited, &Observation::exact(&near, &links, &formation)).expect("a command");
     assert!((pushed[(0, 0)] + 0.5).abs() < 1e-12 && (pushed[(1, 0)] - 0.5).abs() < 1e-12, "{pushed}");

@@ -12,7 +12,7 @@ use crate::plant::PlantError;
 use crate::scenario::{MAX_HALVINGS, Scenario, TimeSpec};
 use tautline_core::record::Event;
 use tautline_core::swarm::{Rows, Swarm, first_row_beyond, largest_row_norm};
-use tautline_laws::law::{Law, LawError, RateQuery, Void};
+use tautline_laws::law::{Law, LawError, RateQuery, VoidReason};
 
 /// Number of vehicles from which law and audit of a step run concurrently, if two threads are available. Both only read
 /// the state, so the bits are the same. For fewer vehicles, starting a thread costs more.
@@ -45,7 +45,7 @@ impl Simulation {
         self.shortest = shortest;
         self.refined_steps += u64::from(shortest < whole);
         if is_overlong && self.overlong_steps == 0 {
-            self.certificate = self.certificate.clone().void_where(true, Void::StepsTooLong);
+            self.certificate = self.certificate.clone().void_where(true, VoidReason::StepsTooLong);
         }
         self.overlong_steps += u64::from(is_overlong);
         flown
@@ -58,7 +58,7 @@ impl Simulation {
             return 0.0;
         }
         let Self { controller: Controller { law, links, .. }, scenario, judge, state, .. } = self;
-        let rate = |nearest_m: f64| rate_per_s(law.as_ref(), scenario, (nearest_m, judge.room_m));
+        let rate = |nearest_m: f64| rate_per_s(law.as_ref(), scenario, (nearest_m, judge.clearance_margin_m));
         let of_any_pair = rate(judge.nearest_m);
         // The nearest pair may not be one that the law acts on. The exact distance visits every edge.
         if of_any_pair * length_s <= scenario.time.stable_rate_dt() {
@@ -183,8 +183,9 @@ impl Simulation {
         if !plant.holds_commands() {
             return (judge.refuses(of, moves, moved_m), at_start_per_s);
         }
-        let (room_m, most) = (judge.room_m - moved_m, TimeSpec::DEFAULT_MAX_RATE_DT.min(scenario.time.max_rate_dt));
-        let rate = |nearest_m: f64| rate_per_s(law.as_ref(), scenario, (nearest_m, room_m));
+        let (clearance_margin_m, most) =
+            (judge.clearance_margin_m - moved_m, TimeSpec::DEFAULT_MAX_RATE_DT.min(scenario.time.max_rate_dt));
+        let rate = |nearest_m: f64| rate_per_s(law.as_ref(), scenario, (nearest_m, clearance_margin_m));
         let enough = |nearest_m: f64| nearest_m > barrier_m && rate(nearest_m) * length_s <= most;
         let may_leap = link.is_exact() && judge.nearest_m > barrier_m;
         let nearest_m = judge.nearest_over(of, moves, moved_m, enough);
@@ -279,9 +280,9 @@ impl Simulation {
 }
 
 /// Returns the fastest rate of a law \[1/s\] while no pair and no obstacle is closer than given \[m\].
-fn rate_per_s(law: &dyn Law, scenario: &Scenario, (nearest_m, room_m): (f64, f64)) -> f64 {
+fn rate_per_s(law: &dyn Law, scenario: &Scenario, (nearest_m, clearance_margin_m): (f64, f64)) -> f64 {
     let query = RateQuery::new(scenario.velocity_coefficient_per_s(), Some(nearest_m));
-    let rates = law.rates(&RateQuery { obstacle_room_m: Some(room_m), ..query });
+    let rates = law.rates(&RateQuery { obstacle_room_m: Some(clearance_margin_m), ..query });
     let of_pairs = rates.fastest_per_s.unwrap_or(0.0);
     match rates.obstacles_per_s2 {
         0.0 => of_pairs,

@@ -5,7 +5,7 @@ use tautline_audit::Status;
 use tautline_core::record::Event;
 use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::formation::{Formation, largest_edge_error_m};
-use tautline_laws::law::Void;
+use tautline_laws::law::VoidReason;
 use tautline_sim::plant::{Path, Quadrotors, rapier};
 use tautline_sim::scenario::{Scenario, Space};
 use tautline_sim::sim::{Ending, Simulation};
@@ -43,7 +43,7 @@ fn five_crazyflies_reach_the_pentagon_clear_with_nothing_certified() {
     let scenario = builtin("crazyflies", &[]);
     let (flown, log) = fly(&scenario);
     assert_eq!((flown.ending, flown.audit.status), (Ending::Completed, Status::Clear));
-    assert!(flown.certificate.void.contains(&Void::NotAPoint) && flown.certificate.certified_m.is_none());
+    assert!(flown.certificate.void.contains(&VoidReason::NotAPoint) && flown.certificate.certified_m.is_none());
     let error_m = largest_edge_error_m(&flown.last.positions_m, scenario.formation(), &scenario.graph);
     assert!(error_m < scenario.arrival.edge_error_m, "{error_m} m");
     // The height is held up to the sag of a tilt.
@@ -247,7 +247,7 @@ fn a_dead_quadrotor_falls_and_one_that_loses_a_rotor_turns_over_in_either_plant(
         let fallen = |failure: &str| {
             let sets = ["time.duration_s=2", &format!("plant.kind={plant}"), &format!("failure=[{failure}]")];
             let (flown, _) = fly(&builtin("crazyflies", &sets));
-            assert!(flown.certificate.void.contains(&Void::VehicleFails));
+            assert!(flown.certificate.void.contains(&VoidReason::VehicleFails));
             (flown.ending, flown.last.positions_m.column(2).iter().copied().collect::<Vec<_>>())
         };
         let (ending, heights_m) = fallen("{vehicle=4, at_s=1.0, kind=\"dead\"}");
