@@ -96,8 +96,8 @@ fn unordered_and_duplicate_rows_are_read_by_options() {
     for (words, exit, expected) in [
         (&[][..], 2, "recording/time-backwards"),
         (&["--sort"], 2, "recording/duplicate-row"),
-        (&["--sort", "--duplicates", "first"], 0, "rows left out"),
-        (&["--sort", "--duplicates", "last"], 0, "rows left out"),
+        (&["--sort", "--duplicates", "first"], 0, "rows omitted"),
+        (&["--sort", "--duplicates", "last"], 0, "rows omitted"),
         (&["--sort", "--duplicates", "refuse"], 2, "recording/duplicate-row"),
     ] {
         let (code, text) = said(&audit(&[("f.csv", text)], &[&["f.csv", "--delta", "1"], words].concat()));

@@ -29,10 +29,13 @@ const VVIZ: &str = concat!(
     "\n",
     r#"{"id": 0, "agentDescription": {"homeX": -7.5, "homeY": 0.5, "homeZ": 3.0, "homeH": 0.0, "agentTraversal": ["#,
     "\n",
-    r#"{"dx": 0, "dy": 0, "dz": 0}, {"dt": 1.5, "dx": 0, "dy": 10, "dz": 0, "dh": 3}, {"dx": 1, "dy": 0, "dz": 2}]}, "#,
+    r#"{"dx": 0, "dy": 0, "dz": 0}, {"dt": 1.5, "dx": 0, "dy": 10, "dz": 0, "dh": 3}, {"dx": 1, "dy": 0, "dz": 2}]},"#,
+    "\n",
     r#""payloadDescription": [{"id": 0, "type": "Light", "payloadActions": [{"r": 1, "g": 2, "#,
-    r#""b": 3, "frames": 4}]}]}, "#,
-    r#"{"id": "B", "agentDescription": {"homeX": 1, "homeY": 0, "homeZ": 0, "agentTraversal": [ "#,
+    r#""b": 3, "frames": 4}]}]},"#,
+    "\n",
+    r#"{"id": "B", "agentDescription": {"homeX": 1, "homeY": 0, "homeZ": 0, "agentTraversal": ["#,
+    "\n",
     r#"{"dt": 0.5, "dx": 0, "dy": 1, "dz": 0}]}, "payloadDescription": []}]}"#,
 );
 
