@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import sys
+import textwrap
 from typing import Any, Iterator
 
 Schema = dict[str, Any]
@@ -66,7 +67,7 @@ class Reference:
         parts.append(f"Required tables: {listed(links, 'and')}.\nAll others are optional.\n")
         for name in tables:
             parts.extend(self.section(name, keys[name], 2))
-        return "\n".join(parts)
+        return "\n".join(wrapped("\n".join(parts)))
 
     def section(self, path: str, use: Schema, level: int) -> Iterator[str]:
         """Yields the section of a table, then those of its subtables."""
@@ -217,6 +218,13 @@ def listed(names: list[str], last: str) -> str:
 
 def toml(value: Any) -> str:
     return json.dumps(value)
+
+
+def wrapped(page: str) -> Iterator[str]:
+    """Yields the lines of a page, with paragraphs wrapped at 120 characters."""
+    for line in page.split("\n"):
+        is_kept = line.startswith("|") or len(line) <= 120
+        yield from [line] if is_kept else textwrap.wrap(line, 120, break_on_hyphens=False)
 
 
 def sentence(words: str) -> str:

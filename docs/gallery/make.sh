@@ -17,7 +17,8 @@ target/release/tautline render "$out/sphere/run.mcap" --out "$out/ball" --at end
     --size 960x540 --quiet
 
 target/release/tautline render "$out/obstacles/run.mcap" --out "$out/among" --at 3 --size 960x540 --quiet
-target/release/tautline render "$out/show/run.mcap" --out "$out/word" --at 15.5 --camera top --theme light --size 960x540 \
+target/release/tautline render "$out/show/run.mcap" --out "$out/word" \
+    --at 15.5 --camera top --theme light --size 960x540 \
     --quiet
 
 for moment in start closest end; do

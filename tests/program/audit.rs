@@ -32,7 +32,8 @@ fn the_first_line_and_the_exit_code_have_the_verdict() {
     assert_eq!(clear.exit, Some(0), "{clear:?}");
     assert!(
         clear.out.starts_with(
-            "CLEAR if straight between samples: never closer than 1.000000 m, alpha and bravo at 0.50 s (delta 0.500 m); from 0.000 s to \
+            "CLEAR if straight between samples: never closer than 1.000000 m, alpha and bravo at 0.50 s \
+             (delta 0.500 m); from 0.000 s to \
              1.000 s"
         ),
         "{clear:?}"

@@ -1,4 +1,5 @@
-//! docs/report.md lists exactly the keys of the JSON of `run` and `check`, with units; docs/study-json.md those of studies.
+//! docs/report.md lists exactly the keys of the JSON of `run` and `check`, with units; docs/study-json.md those of
+//! studies.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;

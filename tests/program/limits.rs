@@ -123,7 +123,8 @@ fn corners_of_a_show_are_one_note_and_a_window_judges_them() {
     let audit = |words: &[&str]| ran_by(TAUTLINE, folder.path(), &[&["audit", "show"], words].concat());
     let plain = audit(&["--limit", "accel=4", "--delta", "1"]);
     assert_eq!(plain.exit, Some(0), "{plain:?}");
-    let said = "CLEAR if vehicles round off 78 corners (velocity jumps by at most 6.000 m/s, cf1 at 1.00 s; --accel-window judges them): ";
+    let said = "CLEAR if vehicles round off 78 corners (velocity jumps by at most 6.000 m/s, cf1 at 1.00 s; \
+                --accel-window judges them): ";
     assert!(plain.out.starts_with(said), "{plain:?}");
     let report: serde_json::Value = serde_json::from_str(&audit(&["--limit", "accel=4", "--json"]).out).expect("JSON");
     let corners = &report["limits"][0]["corners"];

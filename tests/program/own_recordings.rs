@@ -80,7 +80,8 @@ fn a_recording_has_the_verdict_of_its_run() {
     let folder = pentagon();
     let judged = audit(folder.path(), &["flown"]);
     assert_eq!(judged.exit, Some(0), "{judged:?}");
-    let said = "PROVED CLEAR by the run's audit of every step: never closer than 2.460355 m, 2 and 3 at 2.15 s (delta 2.000 m); from 0.000 s to 4.000 s";
+    let said = "PROVED CLEAR by the run's audit of every step: \
+                never closer than 2.460355 m, 2 and 3 at 2.15 s (delta 2.000 m); from 0.000 s to 4.000 s";
     assert_eq!(judged.out.lines().next(), Some(said));
     let found = json(&audit(folder.path(), &["flown", "--json"]).out);
     assert_eq!((&found["audit"]["proved"], &found["audit"]["judged_by_run"]), (&true.into(), &true.into()));

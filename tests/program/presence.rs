@@ -30,7 +30,8 @@ fn the_headline_names_absent_vehicles_with_their_times() {
     let (ran, folder) = audit(&[60, 60, 55], &["--delta", "1", "--html", "p.html"]);
     assert_eq!(ran.exit, Some(0), "{ran:?}");
     let headline = ran.out.lines().next().expect("a headline");
-    let said = "; from 0.000 s to 60.000 s, over which 1 of 3 vehicles is not seen throughout: v2 is seen from 0.000 s to 55.000 s";
+    let said = "; from 0.000 s to 60.000 s, over which 1 of 3 vehicles is not seen throughout: \
+                v2 is seen from 0.000 s to 55.000 s";
     assert!(headline.starts_with("CLEAR if straight") && headline.ends_with(said), "{headline}");
     assert!(ran.out.contains("presence: 2 seen throughout, 1 not\n  v2 is seen from 0.000 s to 55.000 s\n"), "{ran:?}");
     let page = fs::read_to_string(folder.path().join("p.html")).expect("a page");

@@ -160,7 +160,8 @@ class Recordings(Case):
         self.refuses(tl.Error, "exists", lambda: tl.export(self.folder / "run.mcap", self.folder / "copy.csv"))
         tl.export(self.folder / "run.mcap", self.folder / "copy.csv", force=True)
         unknown = self.folder / "a.xyz"
-        self.refuses(tl.Error, "has no extension of a known format", lambda: tl.export(self.folder / "run.mcap", unknown))
+        message = "has no extension of a known format"
+        self.refuses(tl.Error, message, lambda: tl.export(self.folder / "run.mcap", unknown))
 
     def test_a_rate_interpolates_except_across_gaps(self) -> None:
         file = self.folder / "a.csv"

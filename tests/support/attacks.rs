@@ -1,4 +1,4 @@
-//! CMA-ES beside uniform random search, and the worst start found for each law, as the tables of docs/attack.md.
+//! Tables of docs/attack.md: CMA-ES compared with uniform random search, and the worst start found for each law.
 
 use tautline::attack::{Attack, Bound, Options, SearchSpace};
 use tautline::request::{ScenarioRequest, Silent};
@@ -6,7 +6,7 @@ use tautline::studies::base::BaseScenario;
 use tautline::studies::{Batch, StudyRequest, answer};
 use tautline::wind::Normals;
 
-/// A search: the scenario, what is set, what is varied, and for how many flights.
+/// A search: scenario, settings, varied keys and number of flights.
 pub(crate) struct Case {
     pub(crate) name: &'static str,
     scenario: &'static str,
@@ -17,7 +17,7 @@ pub(crate) struct Case {
     flights: u64,
 }
 
-/// What CMA-ES has to beat random search on with as many flights.
+/// Searches in which CMA-ES must beat random search with the same number of flights.
 pub(crate) const CASES: [Case; 2] = [
     Case {
         name: "potential field, acceleration limited",
@@ -42,7 +42,7 @@ pub(crate) const CASES: [Case; 2] = [
 /// Seeds of the search in a comparison.
 pub(crate) const SEEDS: u64 = 20;
 
-/// The laws whose worst start on the pentagon is looked for.
+/// Laws whose worst start on the pentagon is searched for.
 const LAWS: [&str; 7] = ["edge-tension", "displacement", "laplacian", "potential", "orca", "cbf-qp", "flocking"];
 const LAW_FLIGHTS: u64 = 300;
 
@@ -61,7 +61,7 @@ impl Case {
         attack.unwrap_or_else(|error| panic!("{}: {error}", self.name)).expect("not interrupted")
     }
 
-    /// The smallest separation of as many flights that are uniform within the bounds, each drawn by itself \[m\].
+    /// Returns the smallest separation of the same number of flights drawn uniformly within the bounds \[m\].
     fn random_m(&self, seed: u64) -> f64 {
         let StudyRequest { scenario, options, .. } = self.request(None, seed);
         let space = SearchSpace::new(&BaseScenario::of(&scenario).expect("a scenario"), &options).expect("a space");
@@ -75,19 +75,19 @@ impl Case {
         flown.into_iter().flatten().filter_map(|flight| flight.min_m).fold(f64::INFINITY, f64::min)
     }
 
-    /// The smallest separation that CMA-ES finds, and random search \[m\].
+    /// Returns the smallest separations that CMA-ES and random search find \[m\].
     pub(crate) fn found_m(&self, seed: u64) -> [f64; 2] {
         let attack = self.search(None, seed);
         [attack.worst().and_then(|worst| worst.flown.min_m).expect("a separation"), self.random_m(seed)]
     }
 
-    /// A seed's cells in the table.
+    /// Returns the cells of one seed.
     pub(crate) fn cells(&self, seed: u64) -> [String; 2] {
         self.found_m(seed).map(shown)
     }
 }
 
-/// Both searches on every case, a line a seed, and how often CMA-ES finds the smaller separation.
+/// Returns a row for each seed with both searches, and how often CMA-ES finds the smaller separation.
 pub(crate) fn beside_random() -> String {
     let names: Vec<_> = CASES.iter().map(|case| format!("{}: CMA-ES [m] | random [m]", case.name)).collect();
     let mut better = [0; CASES.len()];
@@ -108,19 +108,19 @@ pub(crate) fn beside_random() -> String {
     )
 }
 
-/// A separation as the tables have it \[m\], rounded down: what is below delta is shown below it.
+/// Formats a separation \[m\], rounded down so that a value below delta is shown below it.
 fn shown(found_m: f64) -> String {
     format!("{:.4}", (1e4 * found_m).floor() / 1e4)
 }
 
-/// The worst start found for each law on the pentagon, a line a law.
+/// Returns a row for each law with its worst start on the pentagon.
 pub(crate) fn worst_starts() -> String {
     let head = "| law | as it is [m] | worst found [m] | certified for that start [m] | flights that violated |\n\
                 | --- | --- | --- | --- | --- |\n";
     head.to_owned() + &LAWS.map(worst_start).concat()
 }
 
-/// A law's line.
+/// Returns the row of one law.
 pub(crate) fn worst_start(law: &str) -> String {
     let case = Case {
         name: "pentagon",

@@ -1,4 +1,4 @@
-//! A page of ours in a real browser: at the width of a phone and of a desktop, in light and in dark.
+//! Opens a page in a real browser: at the width of a phone and of a desktop, in light and in dark.
 //!
 //! Needs `chromium` (or the program that `CHROMIUM` names); `tests/run.sh` installs it.
 
@@ -7,17 +7,17 @@ use std::path::Path;
 use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
-/// A page loads in a second or two; a browser that hangs is stopped.
+/// Time limit of a browser; a page loads in a second or two.
 const PATIENCE: Duration = Duration::from_mins(2);
-/// Some browsers draw WebGL without a graphics card, others do not.
+/// Flags for WebGL without a graphics card.
 pub(crate) const WITHOUT_WEBGL: [&str; 2] = ["--disable-gpu", "--disable-3d-apis"];
 const WIDTHS_PX: [u32; 3] = [320, 390, 1280];
-/// A contrast of text that people with moderately low vision read (WCAG 2.2, level AA).
+/// Smallest contrast of text for readers with moderately low vision (WCAG 2.2, level AA).
 const CONTRAST: f64 = 4.5;
 
-/// Measures the page in the frame and writes what it found into the title.
+/// Measures the page in the frame and writes the results into the title.
 ///
-/// A headless window is never narrower than some 500 pixels, so the page is put into a frame as wide as a phone.
+/// A headless window is at least 500 pixels wide, so the page is in a frame of the width of a phone.
 const PROBE: &str = r#"
 const frame = document.querySelector("iframe");
 frame.addEventListener("load", () => {
@@ -25,7 +25,8 @@ frame.addEventListener("load", () => {
   const inside = element => element.closest(".scroll, pre, svg") !== null;
   const stickingOut = [...page.body.querySelectorAll("*")].filter(element =>
     !inside(element) && element.getBoundingClientRect().right > view.innerWidth + 0.5);
-  const rgb = color => color.match(/[\d.]+/g).map((part, k) => k < 3 && color.startsWith("color(") ? 255 * part : Number(part));
+  const scale = (color, k) => k < 3 && color.startsWith("color(") ? 255 : 1;
+  const rgb = color => color.match(/[\d.]+/g).map((part, k) => scale(color, k) * part);
   const luminance = color => {
     const [r, g, b] = rgb(color).map(c => c / 255).map(c => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4);
     return 0.2126 * r + 0.7152 * g + 0.0722 * b;
@@ -64,7 +65,7 @@ fn browser() -> String {
     std::env::var("CHROMIUM").unwrap_or_else(|_| "chromium".to_owned())
 }
 
-/// Runs the browser without a screen and waits for it.
+/// Runs the headless browser and waits for its end.
 pub(crate) fn open(folder: &Path, page: &Path, flags: &[String]) -> Output {
     let mut command = Command::new(browser());
     command
@@ -75,7 +76,7 @@ pub(crate) fn open(folder: &Path, page: &Path, flags: &[String]) -> Output {
             "--disable-sync",
             "--disable-dev-shm-usage",
         ])
-        // A file may look into the frame of another file.
+        // Gives a file access to the frame of another file.
         .args(["--allow-file-access-from-files", "--enable-logging=stderr", "--virtual-time-budget=5000"])
         .arg(format!("--user-data-dir={}", folder.join("browser").display()))
         .args(flags)
@@ -110,7 +111,7 @@ fn drain(pipe: Option<impl std::io::Read + Send + 'static>) -> std::thread::Join
     })
 }
 
-/// What the probe found, and what the browser's console said.
+/// Returns the results of the probe and the output of the browser's console.
 pub(crate) fn probe(folder: &Path, page: &Path, width_px: u32, dark: bool) -> (serde_json::Value, Vec<String>) {
     let wrapper = folder.join(format!("wrapper-{width_px}-{dark}.html"));
     let html = format!(
@@ -136,7 +137,7 @@ fn scheme(dark: bool) -> Option<String> {
     dark.then(|| "--blink-settings=preferredColorScheme=0".to_owned())
 }
 
-/// Nothing sticks out, nothing is loaded from elsewhere, nothing is complained about, and all text can be read.
+/// Asserts that no element sticks out, nothing external is loaded, the console is empty and all text has contrast.
 pub(crate) fn check(folder: &Path, page: &Path, heading: &str, verdict: &str, figures: u64) {
     for width_px in WIDTHS_PX {
         for dark in [false, true] {

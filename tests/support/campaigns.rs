@@ -1,4 +1,4 @@
-//! How each law fares from random starts, as the tables of docs/campaigns.md.
+//! Tables of docs/campaigns.md: results of each law from random starts.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use tautline::request::Silent;
 use tautline::statistics::Proportion;
 use tautline::studies::Batch;
 
-/// Random starts of so many vehicles.
+/// Random starts of `vehicles` vehicles.
 struct Starts {
     vehicles: u32,
     dimensions: u32,
@@ -16,7 +16,7 @@ struct Starts {
     runs: u64,
 }
 
-/// Boxes have room for each vehicle's 1.5 m and not much more: they start in each other's way.
+/// Start boxes, hardly larger than the 1.5 m of each vehicle require, so that vehicles block each other.
 const STARTS: [Starts; 6] = [
     Starts {
         vehicles: 5,
@@ -69,8 +69,9 @@ impl Starts {
     fn scenario(&self) -> String {
         let Self { vehicles, dimensions, half_extent_m, formation, .. } = self;
         format!(
-            "name = \"random-starts\"\nformation = {formation}\n[swarm]\ncount = {vehicles}\ndimensions = {dimensions}\n[start]\nshape = \
-             \"random\"\nhalf_extent_m = {half_extent_m:?}\n[law]\ndelta_m = 1.0\n[time]\nduration_s = {DURATION_S:?}\n"
+            "name = \"random-starts\"\nformation = {formation}\n[swarm]\ncount = {vehicles}\n\
+             dimensions = {dimensions}\n[start]\nshape = \"random\"\nhalf_extent_m = {half_extent_m:?}\n\
+             [law]\ndelta_m = 1.0\n[time]\nduration_s = {DURATION_S:?}\n"
         )
     }
 
@@ -80,7 +81,7 @@ impl Starts {
     }
 }
 
-/// The answer of a specification, flown on all cores.
+/// Flies a specification on all cores and returns its summary.
 fn answer(spec: &str, folder: &Path) -> Summary {
     let spec = Spec::read("spec", spec).expect("a specification");
     let campaign = Campaign::plan(&spec, "docs", folder, None, Program::running().expect("a program")).expect("a plan");
@@ -109,7 +110,7 @@ fn row(cells: &[String]) -> String {
     format!("| {} |\n", cells.join(" | "))
 }
 
-/// Reach and clearance of each law, told line by line as they are known; at most so many runs of each.
+/// Passes the rows of the table to `tell` as they are known: reach and clearance of each law, at most `most_runs` runs.
 pub(crate) fn table(most_runs: u64, tell: &mut dyn FnMut(&str)) {
     let folder = std::env::temp_dir().join(format!("tautline-campaigns-{}", std::process::id()));
     std::fs::create_dir_all(&folder).expect("a folder");
@@ -129,7 +130,7 @@ pub(crate) fn table(most_runs: u64, tell: &mut dyn FnMut(&str)) {
     std::fs::remove_dir_all(&folder).expect("removed");
 }
 
-/// The leader star over a radio that loses 2 % of its messages.
+/// Returns the result of the leader star over a network that loses 2 % of its messages.
 pub(crate) fn lossy(runs: u64) -> String {
     let spec = format!("scenario = \"leader-lossy\"\nruns = {runs}\nseed = 1\n[set]\nnetwork.loss = 0.02\n");
     let summary = answer(&spec, Path::new("."));

@@ -1,10 +1,10 @@
-//! How much of each imperfection five points and five Crazyflies survive on the same way, as the table of docs/margins.md.
+//! Table of docs/margins.md: how much of each imperfection five points and five Crazyflies survive.
 
 use tautline::margin::{Margin, Options, Range};
 use tautline::request::{ScenarioRequest, Silent};
 use tautline::studies::{Question, StudyRequest, answer};
 
-/// One imperfection: what it is, its key, its first and last value, runs of each value, and what else is set.
+/// One imperfection: name, key, first and last value, runs of each value, further settings.
 struct Row {
     what: &'static str,
     key: &'static str,
@@ -77,14 +77,14 @@ impl Row {
     }
 }
 
-/// What a table has to say of a key for one of the two kinds of vehicles: how much keeps clear, and how much passes.
+/// Returns the cells of a key for one kind of vehicle: values that stay clear, and values that pass.
 #[allow(dead_code, reason = "not every program that shares this asks for a part")]
 pub(crate) fn cells(key: &str, vehicles: usize) -> Option<[String; 2]> {
     let row = ROWS.iter().find(|row| row.key == key)?;
     Some([Question::Clear, Question::Pass].map(|question| row.cell(&row.margin(VEHICLES[vehicles].1, question))))
 }
 
-/// The table in Markdown, a line an imperfection.
+/// Returns the table in Markdown, a row for each imperfection.
 pub(crate) fn table() -> String {
     let headings = VEHICLES.map(|(vehicles, _)| format!("{vehicles} stay clear | {vehicles} pass"));
     let line = |row: &Row| {

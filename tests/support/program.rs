@@ -1,17 +1,17 @@
-//! The program, run as a user runs it.
+//! Runs the program as a user does.
 
 use std::path::Path;
 use std::time::Duration;
 
 use assert_cmd::Command;
 
-/// Longer than any command of a test takes on a slow machine.
+/// Time limit of a command, generous for slow machines.
 const PATIENCE: Duration = Duration::from_mins(5);
 
-/// The program under test.
+/// Path of the program under test.
 pub(crate) const TAUTLINE: &str = env!("CARGO_BIN_EXE_tautline");
 
-/// What a command left behind.
+/// Result of a command.
 #[derive(Debug)]
 pub(crate) struct Ran {
     pub(crate) exit: Option<i32>,
@@ -19,10 +19,10 @@ pub(crate) struct Ran {
     pub(crate) err: String,
 }
 
-/// Runs a program in a folder, its input closed and its output in pipes.
+/// Runs a program in a folder, with closed input and captured output.
 pub(crate) fn ran_by(program: &str, folder: &Path, arguments: &[&str]) -> Ran {
     let mut command = Command::new(program);
-    // Graphics drivers complain where there is no such folder.
+    // Graphics drivers warn if this folder does not exist.
     command.args(arguments).current_dir(folder).env("XDG_RUNTIME_DIR", folder).timeout(PATIENCE);
     let done = command.output().expect(program);
     let text = |bytes| String::from_utf8(bytes).expect("the program writes UTF-8");

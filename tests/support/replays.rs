@@ -1,19 +1,21 @@
-//! Pages with replays, steered and looked at in the browser.
+//! Controls pages with replays in the browser and reads their state.
 
 use std::fs;
 use std::path::Path;
 
 use crate::browser::open;
 
-/// Puts a page into a frame so wide, runs a script there once it is loaded, and gives what the script returns and what the
-/// browser's console said. The script knows the page's `win` and `doc`, its first replay `root`, the `player` in it, and
+/// Opens a page in a frame of the given width and runs a script in it. Returns the value of the script and the output
+/// of the browser's console.
+///
+/// The script has the variables `win` and `doc` of the page, its first replay `root`, the `player` of this replay, and
 /// `key(name)`, which presses a key and draws at once.
 pub(crate) fn steer(folder: &Path, page: &Path, look: (u32, bool), script: &str) -> (serde_json::Value, Vec<String>) {
-    // The graphics card in software.
+    // Software rendering.
     steer_with(folder, page, look, &["--use-angle=swiftshader", "--enable-unsafe-swiftshader"], script)
 }
 
-/// The same in a browser that is started so.
+/// Does the same as [`steer`] in a browser with these flags.
 pub(crate) fn steer_with(
     folder: &Path,
     page: &Path,
@@ -27,9 +29,11 @@ pub(crate) fn steer_with(
          <iframe style=\"width:{width_px}px;height:800px;border:0\"></iframe><script>\
          const frame = document.querySelector('iframe');\
          frame.addEventListener('load', () => {{\
-           const win = frame.contentWindow, doc = frame.contentDocument, root = doc.querySelector('.replay'), player = root.player;\
+           const win = frame.contentWindow, doc = frame.contentDocument;\
+           const root = doc.querySelector('.replay'), player = root.player;\
            const key = (name, shiftKey = false) => {{\
-             doc.querySelector('.replay-view').dispatchEvent(new win.KeyboardEvent('keydown', {{ key: name, shiftKey, bubbles: true }}));\
+             const event = new win.KeyboardEvent('keydown', {{ key: name, shiftKey, bubbles: true }});\
+             doc.querySelector('.replay-view').dispatchEvent(event);\
              root.player.draw();\
            }};\
            let found;\
@@ -50,7 +54,7 @@ pub(crate) fn steer_with(
     let found: serde_json::Value =
         serde_json::from_str(&found).unwrap_or_else(|error| panic!("{error} in {found:?}\n{dom:.1000}\n{log}"));
     assert!(found.get("error").is_none(), "{found}\n{log}");
-    // What the driver says of its own speed is about reading pictures back.
+    // The driver warns about its own speed, because pictures are read back.
     let is_said = |line: &&str| line.contains(":CONSOLE") && !line.contains("GL Driver Message (OpenGL, Performance");
     (found, log.lines().filter(is_said).map(str::to_owned).collect())
 }

@@ -151,7 +151,7 @@ pub struct Scene {
     pub shells: Vec<Ball>,
     /// Height of shells over their width.
     pub shell_ratio: f32,
-    /// Ground, trails, start marks, goal slots, edges, pairs, arms of quadrotors: a later one is drawn over those before it.
+    /// Ground, trails, start marks, goal slots, edges, pairs, arms of quadrotors; each is drawn over the previous ones.
     pub lines: Vec<Line>,
     /// Words and legends.
     pub annotations: Vec<Annotation>,

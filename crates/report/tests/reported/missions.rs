@@ -250,7 +250,7 @@ fn a_stalled_swarm_arrives_only_with_deadlock_recovery() {
     );
 }
 
-/// Slots that are spread from the start, on a weakly damped star: the certificate before the first step includes that spreading.
+/// Slots are spread from the start on a weakly damped star. The certificate includes this spreading.
 #[test]
 fn the_certificate_includes_slots_spread_from_the_start() {
     let weak = WEAK_STAR.replace("MODE", "start");
@@ -301,7 +301,7 @@ fn spreading_slots_renews_the_certificates_of_legs() {
     assert!(report.separation.min_m > report.separation.certified_m);
 }
 
-/// Interchangeable vehicles that are stuck get each other's slots, keep them on the leg that follows, and spread no slots.
+/// Blocked interchangeable vehicles exchange slots and keep them on the next leg; no slots are spread.
 #[test]
 fn stalled_interchangeable_vehicles_are_reassigned_and_spread_no_slots() {
     let anew = "assignment = \"when-stalled\"";
