@@ -133,7 +133,7 @@ fn positions_beyond_their_resolution_end_a_flight() {
     };
     let lost = json(&fly("time.duration_s=150").out);
     let reason = lost["run"]["ended_early"].as_str().expect("ended early");
-    assert!(reason.contains("rounding may have moved vehicles by 1.0e-2 m, and 0.01 m has to be resolved"), "{reason}");
+    assert!(reason.contains("rounding may have moved vehicles by 1.0e-2 m; 0.01 m is required"), "{reason}");
     let end_s = lost["run"]["duration_s"].as_f64().expect("a time");
     // Rounding of 2e-16 m/s grows to about 3e10 m/s in 120 s; at this speed every step rounds by 1e-6 m/s.
     assert!((100.0..140.0).contains(&end_s), "{end_s}");

@@ -61,8 +61,7 @@ pub struct ObstacleTable {
     /// Position in m; the origin for a capsule or a half-space unless given.
     #[serde(skip_serializing_if = "Option::is_none")]
     at_m: Option<[f64; 3]>,
-    /// Path of a moving obstacle: a row `[t, x, y, z]` for each instant, in s and m. Only for `tautline audit
-    /// --obstacles`.
+    /// Path of a moving obstacle: a row `[t, x, y, z]` for each instant. Only for `tautline audit --obstacles`.
     #[serde(skip_serializing_if = "Option::is_none")]
     path: Option<Vec<[f64; 4]>>,
     /// Smallest distance in m of the centre of a vehicle from the surface. Unless given, half of `law.delta_m`, or 0.02

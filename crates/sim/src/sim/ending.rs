@@ -68,7 +68,7 @@ impl Flight {
         self.audit.status.and(self.clearance.as_ref().map_or(Status::Clear, |clearance| clearance.status))
     }
 
-    /// Returns the verdict on the whole flight that the scenario asks for: undecided at best where it ended early.
+    /// Returns the verdict on the whole flight: at best undecided if it ended early.
     #[must_use]
     pub fn status(&self) -> Status {
         let is_whole = self.ending == Ending::Completed;
