@@ -81,7 +81,7 @@ fn a_tautline_recording_has_a_default_delta() {
     assert!(another.out.contains("(delta 1.500 m)") && !another.err.contains("recording's own"), "{another:?}");
     let of_others = audit(folder.path(), &["pass.csv"]);
     assert_eq!(of_others.exit, Some(2), "{of_others:?}");
-    assert!(of_others.err.contains("there is no delta"), "{of_others:?}");
+    assert!(of_others.err.contains("has no limit: neither delta nor its radius is given"), "{of_others:?}");
 }
 
 #[test]

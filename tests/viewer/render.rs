@@ -167,7 +167,7 @@ fn invalid_requests_are_refused_with_a_remedy() {
             WRONG_INPUT,
             "options for reading: have no effect on a recording of tautline",
         ),
-        (&["out/run.mcap", "--every", "1e-9"], WRONG_INPUT, "more than 100000"),
+        (&["out/run.mcap", "--every", "1e-9"], WRONG_INPUT, "at most 100000 pictures"),
         (&["out/run.mcap", "--sheet", "4"], WRONG_INPUT, "such as 4x3"),
         (&["out/run.mcap", "--sheet", "4000x4"], WRONG_INPUT, "do not fit into"),
         (&["out/run.mcap", "--sheet", "10x10", "--size", "60000x60000"], WRONG_INPUT, "pixels a side"),
@@ -360,7 +360,7 @@ fn a_window_uses_the_reading_options() {
         (&["own.csv", "--column", "x=east"], MACHINE_FAILED, "no display"),
         (&["own.csv", "--column", "x=east", "--input-format", "npz"], WRONG_INPUT, "own.csv"),
         (&["own.csv", "--column", "x=east", "--scale", "0"], WRONG_INPUT, "recording/option-out-of-range"),
-        (&["pentagon", "--scale", "0.001"], WRONG_INPUT, "a scenario is flown"),
+        (&["pentagon", "--scale", "0.001"], WRONG_INPUT, "have no effect on a scenario"),
     ];
     for (arguments, exit, message) in cases {
         let done = std::process::Command::new(TAUTLINE)

@@ -87,7 +87,7 @@ fn from_shape(shape: &Shape, limit: f64, found: &Minimum, position: impl Fn(f64)
 /// Returns the distance of a point from a shape by parry, zero inside.
 fn distance(shape: &Shape, point: Vector3<f64>) -> f64 {
     let vector = |v: Vector3<f64>| Vector::new(v.x, v.y, v.z);
-    let point = vector(shape.to_box_frame(point));
+    let point = vector(shape.in_box_frame(point));
     match shape {
         Shape::Ball { radius_m } => Ball::new(*radius_m).distance_to_local_point(point, true),
         Shape::Box { half_m, .. } => Cuboid::new(vector(*half_m)).distance_to_local_point(point, true),

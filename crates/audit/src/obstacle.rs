@@ -170,7 +170,7 @@ impl Shape {
         if let Self::HalfSpace { normal } = self {
             return point.dot(&normal.normalize());
         }
-        let point = self.to_box_frame(point);
+        let point = self.in_box_frame(point);
         let off = self.offset_from_core(point).norm();
         match self {
             Self::Box { half_m, .. } if off == 0.0 => (point.abs() - half_m).max(),
@@ -188,7 +188,7 @@ impl Shape {
             let (start, end) = (self.distance(from), self.distance(to));
             return if end < start { (end, 1.0) } else { (start, 0.0) };
         }
-        let (from, to) = (self.to_box_frame(from), self.to_box_frame(to));
+        let (from, to) = (self.in_box_frame(from), self.in_box_frame(to));
         let at = |u: f64| if u >= 1.0 { to } else { from + (to - from) * u };
         let mut best = (f64::INFINITY, 0.0);
         let mut start = (0.0, self.offset_from_core(from));
@@ -214,7 +214,7 @@ impl Shape {
     }
 
     /// Transforms a point into the frame in which a box is not rotated.
-    pub(super) fn to_box_frame(&self, point: Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn in_box_frame(&self, point: Vector3<f64>) -> Vector3<f64> {
         match self {
             Self::Box { yaw_rad, .. } if *yaw_rad != 0.0 => {
                 let (sin, cos) = (libm::sin(*yaw_rad), libm::cos(*yaw_rad));

@@ -58,9 +58,9 @@ impl Validation {
             .filter_map(|claim| Some((claim.finding?, claim)))
             .collect();
         findings.sort_by_key(|&(finding, _)| finding);
-        for (finding, Claim { id, statement, source, expected, .. }) in findings {
-            table += &format!("| {finding} | {} ({source}) | {} | `{id}` |\n", cell(statement), cell(expected));
-        }
+        table.extend(findings.into_iter().map(|(finding, Claim { id, statement, source, expected, .. })| {
+            format!("| {finding} | {} ({source}) | {} | `{id}` |\n", cell(statement), cell(expected))
+        }));
         table
     }
 

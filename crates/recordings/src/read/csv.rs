@@ -53,7 +53,7 @@ pub(super) const TEXT: Reader = Reader {
     packing: Packing::Any,
 };
 
-/// TrajNet table; never recognised by its first bytes, but by [`trajnet`] in a [`TEXT`] file.
+/// `TrajNet` table; never recognised by its first bytes, but by [`trajnet`] in a [`TEXT`] file.
 pub(super) const TRAJNET: Reader = Reader {
     name: "trajnet",
     title: "a table of TrajNet",

@@ -131,7 +131,7 @@ fn foxglove_messages_are_read_in_protobuf_and_json() {
 
 #[test]
 fn messages_without_a_time_use_the_log_time() {
-    let json = concat!(r#"{"poses": [{"position": {"x": 1, "y": 2, "z": 3}}]}"#,);
+    let json = r#"{"poses": [{"position": {"x": 1, "y": 2, "z": 3}}]}"#;
     let found = whole("json.mcap", &mcap_of(&[("/p", "foxglove.PosesInFrame", "json", 2_500_000_000, json.into())]));
     assert_eq!(found.samples(), [(2.5, "1", [1.0, 2.0, 3.0])]);
 }

@@ -183,7 +183,7 @@ impl Camera {
     }
 
     /// Transforms a point to camera coordinates: right, up, back \[m\].
-    pub(super) fn to_camera_frame(&self, point_m: Vector3<f64>) -> Vector3<f64> {
+    pub(super) fn in_camera_frame(&self, point_m: Vector3<f64>) -> Vector3<f64> {
         let from_eye = point_m - self.eye_m;
         Vector3::new(self.right.dot(&from_eye), self.up.dot(&from_eye), self.back.dot(&from_eye))
     }
@@ -191,7 +191,7 @@ impl Camera {
     /// Projects a point to the picture; `None` if it is behind a perspective camera.
     #[must_use]
     pub fn project(&self, point_m: Vector3<f64>) -> Option<Projected> {
-        let local = self.to_camera_frame(point_m);
+        let local = self.in_camera_frame(point_m);
         let depth_m = -local.z;
         let [width, height] = self.size_px.map(f64::from);
         let half = match self.lens {

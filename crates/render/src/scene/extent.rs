@@ -180,7 +180,7 @@ impl Extent {
     /// Returns the smallest and largest depth of the content for a camera \[m\].
     pub(super) fn depth_m(&self, camera: &Camera) -> [f64; 2] {
         let (centre, radius) = self.reach;
-        let middle = -camera.to_camera_frame(centre).z;
+        let middle = -camera.in_camera_frame(centre).z;
         let far = (middle + radius).max(1e-2);
         [(middle - radius).max(NEAREST * far), far]
     }

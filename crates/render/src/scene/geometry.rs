@@ -74,7 +74,7 @@ impl SceneBuilder<'_> {
             match self.quadrotor(k) {
                 Some(quadrotor) => scene.balls.extend(quadrotor.body(colour, theme.ink())),
                 None => {
-                    scene.balls.push(ball(self.at_least(place, self.timeline.radius_m[k], MIN_RADIUS_PX[0]), colour))
+                    scene.balls.push(ball(self.at_least(place, self.timeline.radius_m[k], MIN_RADIUS_PX[0]), colour));
                 }
             }
             if let Some(radius_m) = self.shell_m(k) {
@@ -87,7 +87,7 @@ impl SceneBuilder<'_> {
                 let power = match self.camera.lens {
                     Lens::Perspective(_) => away.norm_squared() - radius_m * radius_m,
                     Lens::Parallel(_) if !metric.is_metres() => -away.dot(&metric.scaled(self.camera.back)),
-                    Lens::Parallel(_) => -self.camera.to_camera_frame(Vector3::from(ball.centre_m.map(f64::from))).z,
+                    Lens::Parallel(_) => -self.camera.in_camera_frame(Vector3::from(ball.centre_m.map(f64::from))).z,
                 };
                 shells.push((power, ball));
             }
@@ -376,7 +376,7 @@ impl SceneBuilder<'_> {
             #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
             let radius_m = quadrotor.shape.rotor_radius_m as f32;
             let disc = |centre| Disc { centre_m: single(centre), radius_m, normal, colour };
-            ordered.extend(quadrotor.rotors().map(|centre| (self.camera.to_camera_frame(centre).z, disc(centre))));
+            ordered.extend(quadrotor.rotors().map(|centre| (self.camera.in_camera_frame(centre).z, disc(centre))));
         }
         ordered.sort_by(|a, b| a.0.total_cmp(&b.0));
         discs.extend(ordered.into_iter().map(|(_, disc)| disc));

@@ -20,7 +20,7 @@ use tautline_sim::scenario::{Failure, FailureKind, Scenario};
 use tautline_sim::sim::{Breakdown, Ending, Flight};
 
 /// Version of the keys. It increases when a key is renamed or removed or changes its meaning.
-pub const SCHEMA_VERSION: u32 = 1;
+pub const SCHEMA_VERSION: u32 = 2;
 
 /// Content of `report.json`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -429,7 +429,7 @@ impl FlightResult<'_> {
     fn ended_early(&self) -> Option<String> {
         match &self.flight.ending {
             Ending::BrokeDown(why @ Breakdown::Unresolved { .. }) => {
-                Some(format!("{why}; shorten time.duration_s, or reduce what drives the mean velocity"))
+                Some(format!("{why}; shorten time.duration_s, or reduce the drift of the mean velocity"))
             }
             Ending::BrokeDown(why) => Some(format!("{why}; shorten time.dt_s, or look for speeds and gains that grow")),
             ending => ending.reason(),

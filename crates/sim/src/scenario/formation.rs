@@ -60,7 +60,7 @@ fn freedom(scenario: &Scenario) -> Result<Option<Freedom>, ScenarioError> {
             scenario.count()
         ))
         .coded("scenario/out-of-range")
-        .with_help(format!("set assignment to \"given\", or reduce swarm.count"))
+        .with_help("set assignment to \"given\", or reduce swarm.count")
         .at_keys(["formation.assignment", "swarm.count"]));
     }
     Ok(Some(freedom))

@@ -124,7 +124,7 @@ pub(super) fn require_finite(what: impl Display, number: f64) -> Result<f64, Sce
     Err(match not_finite(number) {
         Some(shown) => ScenarioError::out_of_range(format!("{what} is {shown}")).with_help("give a finite number"),
         None => ScenarioError::out_of_range(format!("{what} must be at most {LARGEST:e} in magnitude, got {number:e}"))
-            .with_help(format!("give a smaller number")),
+            .with_help("give a smaller number"),
     })
 }
 
