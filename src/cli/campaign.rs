@@ -142,7 +142,7 @@ struct ReplayArguments {
     /// Law of the flight [default: the first].
     #[arg(long, value_name = "NAME")]
     law: Option<String>,
-    /// Index in the violated flights of the run, from 0, for campaigns that estimate rare violations.
+    /// Violated flight of the run to repeat, counted from 0; only for campaigns that estimate rare violations.
     #[arg(long, value_name = "K")]
     bad: Option<usize>,
     /// Folder for the recording and the report [default: worst/LAW-run-I in the folder of the campaign].

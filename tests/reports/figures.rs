@@ -56,7 +56,7 @@ impl<'a> Drawing<'a> {
         at_a + (number - a) / (b - a) * (at_b - at_a)
     }
 
-    /// Returns the corners of the polylines with a stroke and a width.
+    /// Returns the corners of each polyline that has the given stroke and stroke width.
     pub(crate) fn polylines(&self, (stroke, width): (&str, &str)) -> Vec<Vec<(f64, f64)>> {
         let of_style = |node: &Node<'_, '_>| {
             node.attribute("stroke") == Some(stroke) && node.attribute("stroke-width") == Some(width)

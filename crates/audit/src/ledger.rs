@@ -274,7 +274,7 @@ pub(super) struct Results {
 }
 
 impl Results {
-    /// Creates the results of a recording: findings are counted, and the worst and first of them listed.
+    /// Creates empty results with a bounded ledger. It counts all findings and lists only the worst and the first.
     pub(super) fn bounded(interruption: Interruption) -> Self {
         Self { ledger: Ledger::bounded(), interruption, ..Self::default() }
     }

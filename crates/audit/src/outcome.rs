@@ -212,7 +212,7 @@ impl<P> Default for ParryEvidence<P> {
 pub struct Disagreement<P = Pair> {
     /// Pair of objects.
     pub pair: P,
-    /// Start of the segment of motion, in a flight of the step \[s\].
+    /// Start of the segment of motion \[s\]. The segments of a flight are its steps.
     pub from_s: f64,
     /// End of the segment \[s\].
     pub to_s: f64,

@@ -22,7 +22,7 @@ pub(super) struct PairSweep<'a> {
     pub(super) judges: bool,
     /// Whether bounds on the motion allow the distance to fall below its limit; if so, the second detector runs too.
     pub(super) may_violate: bool,
-    /// Height at or below which both objects are on the ground.
+    /// Height at or below which an object counts as on the ground.
     pub(super) above: Option<f64>,
 }
 
@@ -37,8 +37,8 @@ pub(super) struct Overlap<'a> {
 /// Calls `f` with the time that each segment of `first` shares with each segment of `second`, in order of time.
 ///
 /// Segments are closed: a segment shares an instant with one that begins where it ends. If two segments end together,
-/// both advance, so that two jumps at one instant are swept together. A segment without a successor stays for the
-/// successor of the other, unless both are jumps.
+/// the sweep advances in both, so that two jumps at one instant are swept together. If only one of the two has a
+/// successor, the other is also swept with that successor, unless both are jumps.
 pub(super) fn overlaps<'a>(first: &'a [Segment], second: &'a [Segment], mut f: impl FnMut(Overlap<'a>)) {
     let (mut a, mut b) = (0, 0);
     while let (Some(one), Some(other)) = (first.get(a), second.get(b)) {
@@ -154,8 +154,8 @@ impl PairSweep<'_> {
         }
     }
 
-    /// Returns whether an object is on the ground during a whole shared time. A segment that takes off begins on the
-    /// ground, which matters if the shared time is an instant.
+    /// Returns whether an object is on the ground during all of `over`. If `over` is a single instant, the height at
+    /// this instant counts, because a segment that takes off begins on the ground.
     #[inline]
     fn is_on_ground(&self, of: &Segment, over: Interval) -> bool {
         let starts_there = |above: f64| {
@@ -197,7 +197,7 @@ impl PairSweep<'_> {
         let floor = if matches!(self.target, Target::Origin) { 0.0 } else { f64::NEG_INFINITY };
         let lower = |lowest: &Minimum| (lowest.lower - deviation - rounding).max(floor);
         let deviation_at = |u: f64| first.deviation_at(over.at(u)) + second.deviation_at(over.at(u));
-        // The distance at an end is certain if the ends are samples.
+        // The deviation is zero at a sample, so the distance at an end may be the smaller upper bound.
         let upper = |search: &Search<'_>, from: f64, to: f64, lowest: &Minimum| {
             let [start, end] = [from, to].map(|u| search.distance(u) + deviation_at(u));
             (lowest.upper + deviation_at(lowest.at)).min(start).min(end) + rounding
@@ -214,7 +214,7 @@ impl PairSweep<'_> {
             return;
         }
         let mut enter = None;
-        // Where it is unknown whether both vehicles are on the ground, no time below the limit is a certain violation.
+        // A violation is certain only if at least one of the two is known to be in the air.
         let counts = [first, second].iter().any(|segment| segment.grounded == Some(false));
         if upper_m < limit_m && counts {
             for (from, to) in search.below(limit_m, drawn.at) {

@@ -226,8 +226,8 @@ impl Segment {
     }
 }
 
-/// Error of an interpolated position relative to the largest coordinate of its line: a quotient, a product and a sum,
-/// on each of three axes.
+/// Bound on the rounding error of an interpolated position, relative to the largest coordinate of its line. It covers
+/// a quotient, a product and a sum on each of three axes.
 pub(super) const INTERPOLATION: f64 = 32.0 * QUOTIENT;
 
 /// Straight motion between two samples; a jump if both samples have one time.

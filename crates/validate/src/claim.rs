@@ -158,7 +158,7 @@ pub const SCHEMA_VERSION: u32 = 1;
 pub struct Validation {
     /// [`SCHEMA_VERSION`].
     pub schema_version: u32,
-    /// Program.
+    /// Name and version of the program that measured the claims.
     pub tool: Tool,
     /// Whether every claim is as expected.
     pub pass: bool,

@@ -128,8 +128,8 @@ pub struct Outcome {
     pub presence: Vec<Option<Presence>>,
     /// Selected vehicles that are not present over the whole window, by index.
     pub absences: Vec<Absence>,
-    /// Longest interval between two samples of each vehicle without a gap \[s\]: that of the settings, or one and a
-    /// half of the usual interval.
+    /// Largest interval between two samples that is not a gap \[s\], for each vehicle: `max_gap_s` of the settings, or
+    /// 1.5 times the usual sampling interval.
     pub max_gaps_s: Vec<f64>,
     /// First and last judged instant \[s\]; `None` if nothing was judged.
     pub span_s: Option<(f64, f64)>,

@@ -311,7 +311,7 @@ fn distances_from_obstacles_are_judged() {
     assert_eq!(status(&flight, with(ground(1.6))), Status::Violation);
     let wider = Obstacle { clearance_m: Some(0.7), ..ground(1.4) };
     assert_eq!(status(&flight, with(wider)), Status::Violation);
-    // A moving obstacle: present when the vehicle passes, or gone.
+    // A moving obstacle that crosses while the vehicle passes, or 3 s later.
     let moving = |late_s: f64| Obstacle {
         path: vec![(late_s, Vector3::new(0.0, -10.0, 2.0)), (late_s + 1.0, Vector3::new(0.0, 10.0, 2.0))],
         ..obstacle_at(ball, [0.0; 3])

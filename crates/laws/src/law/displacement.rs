@@ -50,8 +50,9 @@ impl Default for DisplacementKeys {
 /// sigma = 1/lambda2(L),   c = max(0, zeta + a22),   R = smallest distance of two slots on any leg
 /// ```
 ///
-/// where `V_R` is the [`EdgeTension`] with rest length R, used only where it pushes; its slope is continuous at R. The
-/// first sum is over links, the second over near pairs, linked or not. The sum of all `u_i` is zero.
+/// where `V_R` is the [`EdgeTension`] with rest length R for l < R, and 0 beyond; its slope is continuous at R. The
+/// first sum is over links. The second is over near pairs, which are closer than R, linked or not. The sum of all
+/// `u_i` is zero.
 ///
 /// On the complete graph sigma = 1/N, and the first sum is `N [k (e_i - mean e) + c (v_i - mean v)]`.
 ///
@@ -95,10 +96,10 @@ impl Default for DisplacementKeys {
 ///
 /// # Obstacles
 /// The same one-sided tension acts between vehicles and fixed obstacles, on the distance from the surface less the
-/// clearance. Its range is R - delta, or the smallest margin of a slot if slots have fixed places and that is smaller.
-/// E then contains these tensions and absolute velocities. The certificate for pairs and obstacles therefore needs a
-/// reference at rest, or no reference and a22 <= 0. A leader does not interact with others and keeps clear by its
-/// reference.
+/// clearance. Its range is R - delta; if slots have fixed positions, it is at most the smallest clearance margin of a
+/// slot. E then includes these tensions, and its kinetic part uses absolute velocities. The certificate for pairs and
+/// obstacles therefore needs a reference at rest, or no reference and a22 <= 0. A leader follows only its reference,
+/// which must keep clear of obstacles.
 ///
 /// # Cost
 /// O(links + near pairs) per step without allocation; O(N + near pairs) on the complete graph. Each obstacle adds O(N).
@@ -302,10 +303,12 @@ fn tension_between(
 }
 
 impl DisplacementLaw {
-    /// With mu the largest eigenvalue of the graph's Laplacian, a near pair adds 2 `V_R''` at `nearest_m` to omega^2
-    /// and the links add sigma k mu. The integrator follows damping while sigma c mu dt <= 0.5; `max_rate_dt` = 0.3
-    /// keeps this. In a crowd several near pairs may add up to 3.6 times this amount to omega^2, and the step still
-    /// follows.
+    /// Returns the fastest rate omega of the law \[1/s\], which bounds the time step.
+    ///
+    /// With mu the largest eigenvalue of the graph's Laplacian, the links add sigma k mu to omega^2, and a near pair
+    /// adds 2 `V_R''` at `nearest_m`. The integrator is accurate for damping while sigma c mu dt <= 0.5, which
+    /// `max_rate_dt` = 0.3 ensures. Several near pairs of one vehicle may add 3.6 times the amount of one pair; the
+    /// step is still short enough.
     fn fastest_per_s(&self, nearest_m: f64) -> f64 {
         const DAMPED: f64 = 0.3 / 0.5;
         let contact = if nearest_m < self.tension.rest_m() {
@@ -318,8 +321,10 @@ impl DisplacementLaw {
         omega.max(DAMPED * links * self.damping_per_s())
     }
 
-    /// A mode with eigenvalue m >= 1 of sigma M obeys e'' + (c m - a22) e' + k m e = 0. Its rate is least at m = 1 or
-    /// in the limit of large m, where it tends to k/c.
+    /// Returns the slowest decay rate of the linear modes.
+    ///
+    /// A mode with eigenvalue m >= 1 of sigma M obeys e'' + (c m - a22) e' + k m e = 0. Its rate is smallest at m = 1,
+    /// or in the limit of large m, where it tends to k/c.
     fn settling(&self) -> Settling {
         let (k, c) = (self.keys.k_per_s2, self.damping_per_s());
         let half = 0.5 * (c - self.a22_per_s);
@@ -462,8 +467,9 @@ impl DisplacementLaw {
             .map(|(before, next)| self.stretch(|i| row(&next.slots_m, i) - row(&before.slots_m, i)).sqrt())
     }
 
-    /// Returns the largest energy under wind before the first change of slots. This bounds later wind too: it adds less
-    /// to sqrt E at larger E. The certificate ends where its separation is within the position resolution of delta.
+    /// Returns a bound on the energy under wind up to the first change of slots, and the time until which the
+    /// certificate holds. The bound also covers later wind, because wind adds less to sqrt E at larger E. The
+    /// certificate ends when the certified separation exceeds delta by less than the position resolution.
     fn bounded(&self, energy: f64, start: &Observation<'_>, ahead: &[&Formation]) -> BoundedEnergy {
         let Some(energy_bound) = &self.energy_bound else { return BoundedEnergy { energy, until_s: None } };
         let borne = self.tension.value(self.delta_m + energy_bound.resolution_m()).sqrt();

@@ -306,7 +306,7 @@ impl MotiveHead {
             let problem = format!("two rigid bodies have the name {}", quoted(name));
             return refuse("recording/vehicle-twice", problem, "give each rigid body its own name, and export again");
         }
-        let mut notes = vec!["axes of Motive, with y up, are mapped to x, -z, y".to_owned()];
+        let mut notes = vec!["Motive has y up: its x, -z and y are read as x, y and z".to_owned()];
         notes.extend(note_of_markers(&vehicles));
         let is_read = |name: &str| known.contains(name.split(':').next().unwrap_or_default());
         let others = self.names.iter().skip(2).map(String::as_str).filter(|name| !name.is_empty() && !is_read(name));

@@ -19,7 +19,7 @@ use super::source::{Lines, Source};
 use super::table::Cells;
 use super::{clock, heading, table};
 
-/// CSV table, or text without a row.
+/// CSV table; also a text file that has no line besides comments.
 pub(super) const CSV: Reader = Reader {
     name: "csv",
     title: "a table in CSV",

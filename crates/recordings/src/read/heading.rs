@@ -40,7 +40,7 @@ pub(super) fn is_angle(role: Role) -> bool {
 }
 
 const HEIGHT: Role = EARTH + 2;
-/// Height that counts downwards: occurs only in headings, not as a role of the user.
+/// Depth: a height with the opposite sign. Column names may have this role; the user cannot select it.
 const DEPTH: Role = EARTH + 3;
 
 /// Names of latitude and longitude.
@@ -181,7 +181,7 @@ pub(super) fn is_quantity_name(name: &str) -> bool {
     words.rfind(|word| !word.is_empty()).is_some_and(|word| QUANTITIES.contains(word))
 }
 
-/// Returns whether an unused column cannot identify vehicles: attitudes, rates, sensors.
+/// Returns whether an unused column holds attitudes, rates or sensor values, and therefore no vehicle names.
 pub(super) fn is_not_vehicle_column(name: &str) -> bool {
     let stem = bracketed(name).0.to_lowercase();
     let is = |start: &str, ends: &[&str]| stem.strip_prefix(start).is_some_and(|end| ends.contains(&end));
@@ -270,9 +270,8 @@ pub(super) fn is_id(name: &str) -> bool {
         || behind.into_iter().any(is)
 }
 
-/// Returns how likely a column is a name and not another quantity, 0 for the most likely: `id`, then `track_id`, then
-/// `name`. Returns `None` for words that may be a quantity, such as `track`, or an index in a list, such as
-/// `object_index`.
+/// Returns the rank of a column among the candidates for vehicle names; 0 is the best. The order is `id`, `track_id`,
+/// `name`. Returns `None` for a name that may be a quantity, such as `track`, or a list index, such as `object_index`.
 pub(super) fn rank_of_name(name: &str) -> Option<u8> {
     match joined(name).as_str() {
         "id" | "uid" | "uuid" => Some(0),
@@ -286,8 +285,8 @@ fn joined(name: &str) -> String {
     bracketed(name).0.to_lowercase().replace(['_', ' ', '-', '.'], "")
 }
 
-/// Adds the units of a row of units to the column names. A name keeps an equal unit of its own, and so does a name that
-/// consists of the unit of a part of a time.
+/// Appends the units of a row of units to the column names. A name that already has the same unit stays unchanged. So
+/// does a name that ends with a unit of time and is not a time itself, such as `stamp.nanosec`.
 pub(super) fn with_units(header: &[String], below: &[&str]) -> Result<Vec<String>, Fault> {
     let with_unit = |(name, unit): (&String, &&str)| -> Result<String, Fault> {
         let is_time = is_time(name);
@@ -388,7 +387,7 @@ pub(super) fn bracketed(name: &str) -> (&str, Option<&str>) {
     }
 }
 
-/// Returns all splits of a name into a part and a unit without brackets, and whether the unit is one of velocity.
+/// Returns each split of a name such as `x_mm` into stem and unit; the flag is true for units of velocity.
 pub(super) fn endings(name: &str) -> impl Iterator<Item = (&str, &str, bool)> {
     let units = VELOCITY_ENDS.map(|unit| (unit, true)).into_iter().chain(LENGTH_ENDS.map(|unit| (unit, false)));
     units.filter_map(|(unit, velocity)| {

@@ -104,7 +104,7 @@ impl<'a> Head<'a> {
         magic.iter().any(|magic| self.bytes.starts_with(magic))
     }
 
-    /// Returns whether the text has a property; `false` if the bytes are not text.
+    /// Returns whether the bytes are text and the text satisfies `has`.
     pub(super) fn is_text(&self, has: impl FnOnce(&[u8]) -> bool) -> bool {
         self.text.is_some_and(has)
     }

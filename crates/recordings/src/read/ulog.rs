@@ -378,7 +378,8 @@ fn text(bytes: &[u8]) -> Result<&str, Fault> {
     str::from_utf8(bytes).map_err(|_| Fault::NotUtf8)
 }
 
-/// Returns the end of the readable messages by the flags of a log: data appended after a crash are not positions.
+/// Reads the flags of a log and returns the byte offset at which its messages end. Data that were appended after a
+/// crash hold no positions.
 fn flags(body: &[u8]) -> Result<u64, Fault> {
     const APPENDED: u8 = 1;
     let needed: [u8; 8] = take(body, 8)?;

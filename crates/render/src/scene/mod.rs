@@ -114,7 +114,7 @@ pub enum Annotation {
     },
     /// A straight line.
     Stroke {
-        /// Its ends.
+        /// End points.
         ends_px: [[f32; 2]; 2],
         /// Its colour.
         colour: Colour,

@@ -33,7 +33,7 @@ pub struct GridAxis<'a> {
     pub values: &'a [f64],
 }
 
-/// Draws a number over a grid of two keys as colours, with a colour scale.
+/// Draws a heat map of one quantity over two keys, with a colour scale.
 ///
 /// `numbers` has a row for each value of `y`, and each row a cell for each value of `x`. A cell without a number is
 /// crossed out. The scale spans `range`, or the range of the numbers if `range` is `None`.

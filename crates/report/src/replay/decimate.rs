@@ -174,7 +174,7 @@ mod tests {
             let kept = chosen(&times, &spans, most);
             prop_assert!(kept.len() <= most && kept.len() <= count && kept.is_sorted_by(|a, b| a < b));
             prop_assert!(count == 0 || (kept.first() == Some(&0) && kept.last() == Some(&(count - 1))));
-            // The rest is spread evenly, for which a quarter of the room is reserved.
+            // At least a quarter of the kept instants are evenly spaced.
             let widest = kept.windows(2).map(|two| two[1] - two[0]).max().unwrap_or(1);
             prop_assert!(widest <= 1 + count.div_ceil((most / 4).max(1)));
         }

@@ -72,7 +72,7 @@ impl ImperfectionSpec for Vec<Failure> {
             let &Failure { vehicle, at_s, kind } = failure;
             if vehicle == 0 || failure.index() >= scenario.count() {
                 return Err(ScenarioError::new(format!(
-                    "the vehicle must be one of 1 to {}, got {vehicle}",
+                    "the vehicle must be from 1 to {}, got {vehicle}",
                     scenario.count()
                 ))
                 .coded("scenario/unknown-vehicle")

@@ -1,12 +1,12 @@
-//! What lies between the true world and the laws: sensors and network on the way in, actuators on the way out.
+//! Imperfections between true state and law: sensors and network before the law, actuators after it.
 //!
 //! Each imperfection is a file of this module. The file holds the table of the scenario, which implements
-//! [`ImperfectionSpec`], and the part of the link. [`of`] combines the parts into one [`Imperfections`]. [`Direct`] has
-//! no imperfection: laws read the true state without a copy. docs/imperfections.md has the equations.
+//! [`ImperfectionSpec`], and its simulation in flight. [`of`] combines all of them into one [`Imperfections`].
+//! [`Direct`] has no imperfection: laws read the true state without a copy. docs/imperfections.md has the equations.
 //!
-//! Measurements and messages have instants of their own. [`Imperfections::settle`] makes them when the flight has
-//! reached these instants. A measurement or message depends only on the seed, the vehicle and its number. Steps, trial
-//! states and threads do not change it.
+//! Sensors measure and vehicles send at fixed times, which need not be the ends of steps. [`Imperfections::settle`]
+//! makes the measurements and messages that are due. Each depends only on the seed, the vehicle and its sequence
+//! number, and not on steps, trial states or threads.
 
 mod actuation;
 mod failure;
@@ -118,7 +118,7 @@ pub trait Imperfections: DynClone + Send {
         false
     }
 
-    /// Returns the longest step of continuous time that the memory of the link allows \[s\].
+    /// Returns the longest solver step \[s\] in continuous time at which delayed states can be interpolated.
     fn longest_step_s(&self) -> f64 {
         f64::INFINITY
     }
@@ -238,8 +238,8 @@ struct World {
     knows_itself: bool,
     time_s: f64,
     own: Swarm,
-    /// Largest distance of a vehicle's true position, or its position as known to another vehicle, from its sensed
-    /// position \[m\].
+    /// Bound on the difference between a separation in the law and the same separation in the search for near
+    /// vehicles \[m\].
     slack_m: f64,
 }
 
@@ -275,8 +275,8 @@ impl World {
         Neighbour { position_m: heard.position_m + heard.velocity_m_s * ahead_s, ..heard }
     }
 
-    /// Updates the slack: near vehicles known by messages are searched at their own positions but used at received
-    /// positions.
+    /// Updates the slack. Near vehicles are searched for at true positions, but the law uses own positions as known
+    /// and positions as received.
     fn find_slack(&mut self, truth: &Swarm) {
         let own = (0..self.own.count())
             .map(|i| (row(&self.own.positions_m, i) - row(&truth.positions_m, i)).norm())

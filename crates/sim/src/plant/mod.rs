@@ -85,7 +85,7 @@ pub trait Plant: DynClone + Send {
         Duration::ZERO
     }
 
-    /// Returns the channels of the vehicles besides position and velocity, without values.
+    /// Returns the recorded channels of the plant, such as attitude, with names and columns but no values.
     fn channels(&self) -> Vec<Channel> {
         Vec::new()
     }

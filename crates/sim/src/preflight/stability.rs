@@ -140,7 +140,8 @@ impl Rigidity {
     }
 }
 
-/// Returns the rank of the rigidity matrix of all pairs of `count` points that span `dimensions`.
+/// Returns the rank of the rigidity matrix of the complete graph on `count` points in general position in a space
+/// of dimension `dimensions`.
 fn needed(count: usize, dimensions: usize) -> usize {
     if count <= dimensions {
         count * count.saturating_sub(1) / 2

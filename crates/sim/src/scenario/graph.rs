@@ -114,7 +114,7 @@ fn drawn(degree: Option<u64>, seed: u64, count: usize) -> Result<Graph, Scenario
     if !(1..=most).contains(&degree) {
         return Err(ScenarioError::new(format!("the mean number of links must be from 1 to {most}, got {degree}"))
             .coded("scenario/out-of-range")
-            .with_help("a connected graph has a mean of about 2 links or more")
+            .with_help("a connected graph has a mean degree of about 2 or more")
             .at("graph.degree"));
     }
     let edges = usize::try_from(random_edge_count(degree, count)).unwrap_or(usize::MAX);

@@ -135,7 +135,7 @@ impl ReferenceTable {
         let index = |number: u64, key: &'static str| {
             let index = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
             index.filter(|&index| index < count).ok_or_else(|| {
-                ScenarioError::new(format!("the vehicle must be one of 1 to {count}, got {number}"))
+                ScenarioError::new(format!("the vehicle must be from 1 to {count}, got {number}"))
                     .coded("scenario/unknown-vehicle")
                     .with_help("vehicles are counted from 1")
                     .at(key)

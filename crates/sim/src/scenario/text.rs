@@ -256,7 +256,7 @@ impl Override {
                     table.entry(Spanned::new(span, Cow::Borrowed(name))).or_insert(below)
                 }
                 DeValue::Array(list) => {
-                    let what = format!("the entry must be one of 1 to {}, got {name}", list.len());
+                    let what = format!("the entry must be from 1 to {}, got {name}", list.len());
                     let entry = self.entry(part)?.checked_sub(1).and_then(|entry| list.get_mut(entry));
                     entry.ok_or_else(|| self.refuse(part, &what))?
                 }

@@ -537,7 +537,7 @@ impl Scenario {
             Some(met) if !met.is_sorted() || met.last().is_some_and(|&last| last >= self.count()) => {
                 Err(ScenarioError::new("a gust names a vehicle that the swarm does not have")
                     .coded("scenario/unknown-vehicle")
-                    .with_help(format!("vehicles are counted from 1 to {}", self.count()))
+                    .with_help(format!("give numbers from 1 to {}", self.count()))
                     .at("wind.gust"))
             }
             _ => Ok(()),

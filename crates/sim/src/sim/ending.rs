@@ -200,8 +200,8 @@ pub enum SimError {
     },
     /// Given accelerations do not have one finite row per vehicle.
     #[error(
-        "{found} rows of accelerations for {expected} vehicles, or a number among them that is not finite or beyond \
-         {MAX_COMMAND_M_S2:e} m/s^2"
+        "the accelerations must have {expected} rows of finite numbers up to {MAX_COMMAND_M_S2:e} m/s^2, got {found} \
+         rows"
     )]
     Commands {
         /// Number of vehicles.

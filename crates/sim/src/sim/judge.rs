@@ -30,8 +30,7 @@ pub(super) struct Judge {
     /// Bound of the distance between the audited motion and that of the law \[m\], once a step was too long for the
     /// law.
     error_m: Option<f64>,
-    /// Whether a violation of delta, and one of an obstacle's clearance, is deeper than the integration error at its
-    /// time.
+    /// Whether a violation exceeds the integration error: first for separations, then for obstacles.
     beyond_error: [bool; 2],
     /// Auditor of obstacles, if there are any, and the obstacles.
     clearance: Option<ClearanceAuditor>,
@@ -136,7 +135,7 @@ impl Judge {
         }
     }
 
-    /// Returns whether delta was violated, and whether the clearance of an obstacle was.
+    /// Returns whether a pair came closer than delta, and whether a vehicle violated the clearance of an obstacle.
     fn violated(&self) -> [bool; 2] {
         let mut past_obstacles = self.clearance.iter().flat_map(ClearanceAuditor::violations);
         [!self.auditor.violations().is_empty(), past_obstacles.next().is_some()]

@@ -26,7 +26,8 @@ const CLEARANCE_M: f64 = 0.1;
 const EXTENT_M: f64 = 4.0;
 /// Rounding of a control relative to its largest terms (see [`Case::scale`]): sums of at most 40 terms.
 const ROUNDING: f64 = 1e-13;
-/// Rounding after a transformation of positions: 1e-15 m over the clearance.
+/// Relative error of a control after a transformation of positions. Positions are rounded to 1e-15 m; the steep
+/// barrier magnifies this by at most 1000 over the clearance.
 const MOVED_ROUNDING: f64 = 1e-12 / CLEARANCE_M;
 /// Relative error of a central difference of the energy, at the step of [`rate_of_energy`].
 const DIFFERENCE: f64 = 1e-6;

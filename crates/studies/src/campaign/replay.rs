@@ -215,7 +215,7 @@ pub(super) fn fly_worst_again(
     Ok(flights)
 }
 
-/// Repeats a violated flight of an estimate.
+/// Repeats a violated flight that a splitting estimate kept, and describes it for the page of the campaign.
 fn bad_again(folder: &Folder, law: &Law, bad: &BadRun) -> Result<WorstFlight, Failure> {
     let flight = FlightId { law, run: bad.run, bad: Some(bad.bad) };
     fly_bad(folder, flight, bad.bad, &flight.folder(folder))?;

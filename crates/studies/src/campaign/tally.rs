@@ -12,7 +12,7 @@ use crate::statistics::{CONFIDENCE, Proportion, anytime};
 /// Number of runs at the first look for an early stop; each later look has twice the number.
 const FIRST_LOOK: u64 = 100;
 
-/// Kind of the intervals of shares.
+/// Method of the confidence intervals of proportions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Intervals {

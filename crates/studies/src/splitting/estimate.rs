@@ -12,7 +12,7 @@ use tautline_report::request::Failure;
 use tautline_sim::scenario::Scenario;
 use tautline_sim::sim::{Flight, Saved, SimError, Simulation, fly_on};
 
-/// Number of flights from which on estimates seldom end without a survivor.
+/// Recommended smallest number of flights. With fewer, many estimates end without a survivor.
 const ENOUGH: usize = 100;
 /// Number of estimates below which Student's interval of a skewed distribution is too narrow.
 const MANY: usize = 20;
@@ -23,7 +23,7 @@ const MANY: usize = 20;
 pub struct Settings {
     /// Number of simultaneous flights, n: at least 2; 100 or more is recommended.
     pub flights: usize,
-    /// Smallest number of flights that a round ends, k, less than n. 1 is the most accurate for the steps flown.
+    /// Smallest number k of flights that a round ends, from 1 to n - 1. k = 1 has the smallest error per step flown.
     pub kill: usize,
     /// Largest number of violated flights that an estimate keeps.
     pub keep: usize,
@@ -127,7 +127,7 @@ pub fn estimate(
     Ok(Some(Splitting { repetition, probability, flights, kill, iterations, extinct, steps, bad }))
 }
 
-/// Refuses what [`estimate`] refuses before its first flight.
+/// Checks the settings, and that the scenario has the noise that [`estimate`] needs.
 ///
 /// # Errors
 /// [`Failure`] `campaign/splitting` for wrong settings, and for a scenario without noise from step to step.
@@ -308,7 +308,7 @@ pub struct Repetitions {
 }
 
 impl Repetitions {
-    /// Returns the mean of repetitions under one seed, each with another number.
+    /// Returns the mean of estimates that have the same seed and different repetition numbers.
     #[must_use]
     pub fn new(estimates: &[Splitting]) -> Self {
         let probabilities: Vec<_> = estimates.iter().map(|estimate| estimate.probability).collect();
@@ -322,7 +322,7 @@ impl Repetitions {
         let mut advice: Vec<_> = fewest.and_then(warning).into_iter().collect();
         if extinct > 0 {
             advice.push(format!(
-                "{extinct} of {} estimates ended without a survivor, at 0: {}; fly more at a time",
+                "{extinct} of {} estimates ended without a survivor and are 0: {}; increase splitting.flights",
                 estimates.len(),
                 if all_extinct { "there is no upper bound" } else { "the mean comes from the others" }
             ));

@@ -138,7 +138,7 @@ impl Drawing {
     }
 }
 
-/// Returns the raster of an area with about this many pixels drawn.
+/// Returns a raster of the regions with at least about `least` filled pixels, and at most [`MOST_PIXELS`] a side.
 fn fine_enough(regions: &[Region], least: usize) -> Mask {
     let coarse = Mask::of(regions, PIXELS);
     let finer = (least as f64 / coarse.count().max(1) as f64).sqrt();

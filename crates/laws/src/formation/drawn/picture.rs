@@ -144,7 +144,7 @@ impl Mask {
         rows
     }
 
-    /// Returns the first pixel of a row or column whose centre is not before a coordinate.
+    /// Returns the index of the first pixel, along one axis, whose centre is at or beyond `coordinate`.
     fn first_from(&self, coordinate: f64) -> usize {
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to the raster")]
         let first = (coordinate / self.side - 0.5).ceil().clamp(0.0, self.width as f64) as usize;

@@ -119,7 +119,7 @@ fn vehicles_at_the_barrier_brake_with_full_acceleration() {
     law.a22_per_s = 0.0;
     let found = command(&mut law, &swarm, &formation).expect("a command");
     assert!((found[(0, 0)] + 5.0).abs() < 1e-9 && (found[(1, 0)] - 5.0).abs() < 1e-9, "{found}");
-    // Below delta the pair parts; at the same position there is no direction.
+    // Below delta the law separates the pair. At equal positions the direction of separation is undefined.
     let touching = Swarm::at_rest(&swarm.positions_m * 0.5);
     let found = command(&mut law, &touching, &formation).expect("a command");
     // gamma (2 A 0.5 m)^(3/2) exceeds the acceleration limits.

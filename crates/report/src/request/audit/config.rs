@@ -130,9 +130,7 @@ impl AuditTable {
             return Err(wrong(format!("{key} must be a finite number")));
         }
         if self.max_accel_m_s2.is_some() && request.settings.motion.is_none() && !is_bounded {
-            return Err(wrong(
-                "max_accel_m_s2 has no effect on a motion that is known exactly: add motion = \"bounded\"".to_owned(),
-            ));
+            return Err(wrong("max_accel_m_s2 has no effect without motion = \"bounded\"".to_owned()));
         }
         let has_max_accel = request.has_max_accel();
         let settings = &mut request.settings;
@@ -175,7 +173,7 @@ impl AuditTable {
                 limits.push(Limit { quantity, allowed });
             }
         }
-        let asked_by = Some(format!("what the command line leaves open is asked as {} says", path.display()));
+        let asked_by = Some(format!("options that the command line does not set come from {}", path.display()));
         Ok(ConfiguredAudit { request, asked_by })
     }
 }
@@ -219,9 +217,9 @@ mod tests {
             ("[audit]\ndelta = 1.5", "show/tautline.toml, line 2: unknown field `delta`"),
             ("[audit]\nmotion = \"spline\"", "line 2: unknown variant `spline`"),
             ("[audit.limits]\nspeed = 5.0", "`speed` is not a limit: the limits are speed_m_s,"),
-            ("[audit]\nmax_accel_m_s2 = 2.0", "add motion = \"bounded\""),
+            ("[audit]\nmax_accel_m_s2 = 2.0", "has no effect without motion = \"bounded\""),
             ("[audit]\naxes = \"nes\"", "`nes` is not three directions"),
-            ("[audit]\nscale = [1, 0, 1]", "a scale of 0"),
+            ("[audit]\nscale = [1, 0, 1]", "a scale must not be 0"),
             ("[audit]\nlayout = \"time,axis\"", "layout: `time,axis` is none of time,vehicle,axis "),
             ("[audit]\ndelta_m = nan", "delta_m must be a finite number"),
             ("[audit]\nellipsoid_m = [1.0, 1.0, 2.0]\nradius_m = 0.1", "are both given"),

@@ -29,7 +29,7 @@ use tautline_recordings::read::{self, Format, ReadError, ReadOptions};
 /// Number of items that are read before the first is judged. They determine the usual sampling intervals.
 const OPENING: usize = 65_536;
 
-/// Largest number of vehicles without company that get a note of their own.
+/// Largest number of notes on vehicles that are never present together with another vehicle.
 const MOST_ALONE: usize = 3;
 
 /// Function that opens the recording at its beginning, at each call.
@@ -95,7 +95,7 @@ impl Subject<'_> {
         }
     }
 
-    /// Returns the contents of a recording of `tautline run` besides positions, and the limit that a show states \[m\].
+    /// Returns limits, obstacles and audit of a `tautline run` recording, and the safety distance of a show file \[m\].
     fn own(&self, monitor: &dyn Monitor) -> Result<(Option<OwnRecording>, Option<f64>), Failure> {
         match self {
             Self::Held { own, .. } => Ok((own.cloned(), None)),
@@ -311,7 +311,7 @@ impl<'a> AuditRequest<'a> {
         if self.has_max_accel() && self.settings.motion != Some(Interpolation::Bounded) {
             return Err(Failure::input(
                 "audit/unused-acceleration",
-                "--max-accel has no effect on a motion that is known exactly",
+                "--max-accel has no effect without --motion bounded",
                 "add --motion bounded, or leave --max-accel out",
             ));
         }
@@ -487,7 +487,7 @@ impl ConfiguredAudit<'_> {
         }
         let source = Source { recording: request.subject.called(), clock, planar: is_planar, notes };
         let early_end = own.as_ref().and_then(|own| own.early_end.clone());
-        // A window that ends before the recording was flown whole.
+        // An early end of the flight does not affect a window that ends before it.
         let is_beyond = |to_s: f64| outcome.span_s.is_none_or(|(_, end_s)| to_s > end_s);
         let early_end = early_end.filter(|_| settings.to_s.is_none_or(is_beyond));
         let mut report = RecordedReport::new(&outcome, &settings, source, between);
@@ -501,7 +501,7 @@ impl ConfiguredAudit<'_> {
         }
         report.source.notes.extend(shortened);
 
-        // The verdict first: a file that cannot be written does not cost it.
+        // Print the verdict before writing files, so that a write error does not hide it.
         monitor.say(&format!("{}\n{}", report.headline(), report.text()));
         if let Some((html, instants)) = request.html.as_ref().zip(instants) {
             let (replay, figures) = replays::of_recording(open, monitor, &settings, &outcome, &report, instants)?;

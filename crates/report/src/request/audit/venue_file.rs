@@ -126,7 +126,7 @@ mod tests {
     fn errors_name_their_line() {
         for (text, expected) in [
             ("[[obstacle]]\nname = \"a\"\nbal = { radius_m = 1.0 }", "line 3: unknown field `bal`"),
-            ("[[obstacle]]\nname = \"a\"\nat_m = [0, 0, 0]", "line 1: obstacle `a` needs one shape"),
+            ("[[obstacle]]\nname = \"a\"\nat_m = [0, 0, 0]", "line 1: obstacle `a` must have exactly one shape"),
             ("\n[[obstacle]]\nname = \"a\"\nball = { radius_m = 1.0 }", "line 2: obstacle `a` has no place"),
             ("[[obstacle]]\nname = \"a\"\nball = { radius_m = -1.0 }\nat_m = [0, 0, 0]", "must be above 0 m, not -1"),
             ("[[obstacle]]\nname = \"a\"\nball = 3", "line 3: "),
@@ -153,7 +153,7 @@ mod fence_file_tests {
             ("\n[fence]\npolygon_m = [[0, 0], [1, 1]]", "line 2: a fence has 3 to 4096 corners, not 2"),
             (
                 "[fence]\npolygon_m = [[0, 0], [1, 1], [1, 0], [0, 1]]",
-                "line 1: the edges of the fence from corner 1 and from corner 3 meet",
+                "line 1: the edges of the fence from corner 1 and from corner 3 cross or touch",
             ),
         ] {
             let message = read(text).unwrap_err();

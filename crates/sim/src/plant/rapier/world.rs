@@ -53,8 +53,8 @@ pub(super) fn keep_out_contacts(world: &PhysicsWorld, pairs: &mut Vec<Pair>) {
     pairs[before..].sort_unstable();
 }
 
-/// Appends the pairs whose hulls collided in a drift from given positions \[m\] with given velocities \[m/s\], in index
-/// order.
+/// Appends the pairs whose hulls collided in the last step, in index order. Their closing speeds follow from the
+/// positions \[m\] at the start of the step and the velocities \[m/s\] before the collision.
 pub(super) fn hull_contacts(world: &PhysicsWorld, began_m: &Rows, drift_m_s: &Rows, contacts: &mut Vec<HullContact>) {
     let before = contacts.len();
     for contact in world.narrow_phase.contact_pairs() {
