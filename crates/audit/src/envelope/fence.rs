@@ -25,7 +25,7 @@ pub struct Fence {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FenceError {
     /// The number of corners is out of range.
-    #[error("a fence has 3 to {MAX_CORNERS} corners, not {0}")]
+    #[error("a fence must have 3 to {MAX_CORNERS} corners, got {0}")]
     Corners(usize),
     /// A number is not finite or too large.
     #[error("{what} of the fence must be a finite number below 1e70, got {value:?}")]

@@ -127,8 +127,8 @@ mod tests {
         for (text, expected) in [
             ("[[obstacle]]\nname = \"a\"\nbal = { radius_m = 1.0 }", "line 3: unknown field `bal`"),
             ("[[obstacle]]\nname = \"a\"\nat_m = [0, 0, 0]", "line 1: obstacle `a` must have exactly one shape"),
-            ("\n[[obstacle]]\nname = \"a\"\nball = { radius_m = 1.0 }", "line 2: obstacle `a` has no place"),
-            ("[[obstacle]]\nname = \"a\"\nball = { radius_m = -1.0 }\nat_m = [0, 0, 0]", "must be above 0 m, not -1"),
+            ("\n[[obstacle]]\nname = \"a\"\nball = { radius_m = 1.0 }", "line 2: obstacle `a` has neither at_m nor path"),
+            ("[[obstacle]]\nname = \"a\"\nball = { radius_m = -1.0 }\nat_m = [0, 0, 0]", "must be above 0 m, got -1"),
             ("[[obstacle]]\nname = \"a\"\nball = 3", "line 3: "),
         ] {
             let message = read(text).unwrap_err();
@@ -150,7 +150,7 @@ mod fence_file_tests {
         for (text, expected) in [
             ("", "line 1: missing field `fence`"),
             ("\n[fence]\npolygon = []", "line 3: unknown field `polygon`"),
-            ("\n[fence]\npolygon_m = [[0, 0], [1, 1]]", "line 2: a fence has 3 to 4096 corners, not 2"),
+            ("\n[fence]\npolygon_m = [[0, 0], [1, 1]]", "line 2: a fence must have 3 to 4096 corners, got 2"),
             (
                 "[fence]\npolygon_m = [[0, 0], [1, 1], [1, 0], [0, 1]]",
                 "line 1: the edges of the fence from corner 1 and from corner 3 cross or touch",
