@@ -57,7 +57,7 @@ pub struct Law {
 }
 
 impl Campaign {
-    /// Plans a campaign with a name and a number of shards, by default one for each [`RUNS_OF_A_SHARD`] runs. The path
+    /// Plans a campaign with a name and a number of shards, by default one for each `RUNS_OF_A_SHARD` runs. The path
     /// of a scenario is relative to `folder`.
     ///
     /// # Errors

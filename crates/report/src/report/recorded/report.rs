@@ -158,7 +158,7 @@ pub struct SeenWhen {
     pub throughout: usize,
     /// Number of selected vehicles that are not.
     pub partly: usize,
-    /// Times of the latter, at most [`ABSENT_LISTED`], by their numbers.
+    /// Times of the latter, at most 1000, by their numbers.
     pub listed: Vec<OfVehicle<Seen>>,
 }
 
