@@ -17,7 +17,7 @@ const NOTHING_RECORDED: &str = "record again, or give another file";
 #[derive(Debug, thiserror::Error)]
 #[error("{file}{}: {fault}", self.comma_place())]
 pub struct ReadError {
-    /// The file; empty until it is set by [`ReadError::of`].
+    /// The file; empty until it is set by `ReadError::of`.
     pub file: String,
     /// Place in the file, if known.
     pub place: Option<Place>,

@@ -78,7 +78,7 @@ impl Default for Scale {
 }
 
 impl From<f64> for Scale {
-    /// Returns one factor for all axes, unchecked: [`ReadOptions::check`] refuses values out of range.
+    /// Returns one factor for all axes, unchecked: `ReadOptions::check` refuses values out of range.
     fn from(metres: f64) -> Self {
         Self { metres, each: [1.0; 3] }
     }

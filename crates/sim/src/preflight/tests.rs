@@ -382,7 +382,11 @@ fn a_law_whose_links_are_too_fast_for_the_shortest_steps_is_refused() {
 fn a_certificate_within_the_resolution_of_delta_is_void() {
     let faint = ["law.kind=displacement", "law.alpha=1e-9", "graph.kind=path", "start.positions_m.4.x=-1e5"];
     let found = check(&scenario("pentagon", &faint));
-    assert!(found.certified_m.is_none() && found.certificate_void[0].contains("exceeds delta by less than the position resolution"), "{found:?}");
+    assert!(
+        found.certified_m.is_none()
+            && found.certificate_void[0].contains("exceeds delta by less than the position resolution"),
+        "{found:?}"
+    );
     assert!(found.energy_initial.is_some());
     assert!(check(&scenario("pentagon", &faint[..1])).certified_m.is_some());
 }

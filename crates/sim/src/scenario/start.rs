@@ -70,7 +70,7 @@ pub(super) fn shuffle(swarm: &mut Swarm, random: &mut ChaCha8Rng) {
 /// drawn in order; each is drawn again until it is at least `min_separation_m` from those before it.
 ///
 /// # Errors
-/// [`ScenarioError`] if no position was found for a vehicle in [`TRIES`] tries.
+/// [`ScenarioError`] if no position was found for a vehicle in `TRIES` tries.
 pub fn scatter(
     count: usize,
     space: Space,

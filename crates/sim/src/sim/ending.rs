@@ -119,7 +119,7 @@ pub enum Breakdown {
         /// The vehicle, from 0.
         vehicle: usize,
     },
-    /// A command of the law is beyond [`MAX_COMMAND_M_S2`].
+    /// A command of the law is beyond `MAX_COMMAND_M_S2`.
     #[error("step {step}: the law's command for vehicle {} is beyond {MAX_COMMAND_M_S2:e} m/s^2", vehicle + 1)]
     CommandOutOfRange {
         /// The step, from 1; 0 is the start.

@@ -127,7 +127,10 @@ mod tests {
         for (text, expected) in [
             ("[[obstacle]]\nname = \"a\"\nbal = { radius_m = 1.0 }", "line 3: unknown field `bal`"),
             ("[[obstacle]]\nname = \"a\"\nat_m = [0, 0, 0]", "line 1: obstacle `a` must have exactly one shape"),
-            ("\n[[obstacle]]\nname = \"a\"\nball = { radius_m = 1.0 }", "line 2: obstacle `a` has neither at_m nor path"),
+            (
+                "\n[[obstacle]]\nname = \"a\"\nball = { radius_m = 1.0 }",
+                "line 2: obstacle `a` has neither at_m nor path",
+            ),
             ("[[obstacle]]\nname = \"a\"\nball = { radius_m = -1.0 }\nat_m = [0, 0, 0]", "must be above 0 m, got -1"),
             ("[[obstacle]]\nname = \"a\"\nball = 3", "line 3: "),
         ] {
