@@ -178,7 +178,11 @@ fn invalid_requests_are_refused_with_a_remedy() {
         (&["out/run.mcap", "--film", "film.mp4", "--speed", "-3"], WRONG_INPUT, "--speed: must be more than 0, got -3"),
         (&["out/run.mcap", "--speed", "2"], WRONG_INPUT, "required arguments were not provided: --film <FILE>"),
         (&["out/run.mcap", "--at", "end", "--fps", "10"], WRONG_INPUT, "not provided: --film <FILE>"),
-        (&["out/run.mcap", "--film", "film.mp4", "--speed", "nan"], WRONG_INPUT, "--speed: must be more than 0, got NaN"),
+        (
+            &["out/run.mcap", "--film", "film.mp4", "--speed", "nan"],
+            WRONG_INPUT,
+            "--speed: must be more than 0, got NaN",
+        ),
         (&["out/run.mcap", "--film", "folder.mp4"], WRONG_INPUT, "folder.mp4 is a folder"),
         (&["out/run.mcap", "--out", "refused", "--camera", "follow:9"], WRONG_INPUT, "there is no vehicle `9`"),
         (&["out/run.mcap", "--out", "refused", "--size", "60000x9"], WRONG_INPUT, "pixels a side"),
