@@ -90,7 +90,7 @@ class Arrays(Case):
         self.assertIn("in the plane of x and y", flat.notes[0])
         self.assertTrue(flat.headline.endswith("in the plane of x and y: no heights are known"), flat.headline)
         self.assertEqual((flat.is_planar, space.is_planar), (True, False))
-        with self.assertRaisesRegex(tl.Error, "heights of its vehicles are not known"):
+        with self.assertRaisesRegex(tl.Error, "heights of its vehicles are unknown"):
             tl.audit(t, p[:, :, :2], limit={"height": 120})
 
     def test_layout_gives_the_order_of_axes(self) -> None:
@@ -175,7 +175,7 @@ class Files(Case):
         (self.folder / "tautline.toml").write_text("[audit]\ndelta_m = 1.5\n")
         self.assertEqual(tl.audit(self.folder / "p.npz").verdict, "VIOLATION")
         self.assertTrue(tl.audit(self.folder / "p.npz", delta=0.1).is_clear)
-        self.refuses(tl.Error, "there is no delta", lambda: tl.audit(self.folder / "p.npz", config=False))
+        self.refuses(tl.Error, "neither delta nor its radius is given", lambda: tl.audit(self.folder / "p.npz", config=False))
 
     def test_join_reads_files_with_one_vehicle_each(self) -> None:
         for name, x in (("a", 0.0), ("b", 1.0)):

@@ -70,7 +70,7 @@ class Arrays(Case):
     def test_wrong_options_have_the_message_of_the_command_line(self) -> None:
         t, p = passing()
         for message, options in (
-            ("there is no delta", {}),
+            ("neither delta nor its radius is given", {}),
             ("delta must be above 0", {"delta": -1}),
             ("delta must be above 0", {"delta": float("nan")}),
             ("[possible values: linear, hold, polynomial, bounded]", {"delta": 1, "motion": "spline"}),
