@@ -175,7 +175,8 @@ class Files(Case):
         (self.folder / "tautline.toml").write_text("[audit]\ndelta_m = 1.5\n")
         self.assertEqual(tl.audit(self.folder / "p.npz").verdict, "VIOLATION")
         self.assertTrue(tl.audit(self.folder / "p.npz", delta=0.1).is_clear)
-        self.refuses(tl.Error, "neither delta nor its radius is given", lambda: tl.audit(self.folder / "p.npz", config=False))
+        message = "neither delta nor its radius is given"
+        self.refuses(tl.Error, message, lambda: tl.audit(self.folder / "p.npz", config=False))
 
     def test_join_reads_files_with_one_vehicle_each(self) -> None:
         for name, x in (("a", 0.0), ("b", 1.0)):
