@@ -75,7 +75,7 @@ impl<'a> Operator<'a> {
 
     fn project(&self, x: &mut [f64]) {
         match *self.pinning {
-            Pinning::Nobody => {
+            Pinning::Unpinned => {
                 let mean = x.iter().sum::<f64>() / x.len().max(1) as f64;
                 for x in x {
                     *x -= mean;
@@ -111,7 +111,7 @@ impl<'a> Operator<'a> {
     /// dependent.
     fn orthonormal(&self, block: DMatrix<f64>) -> DMatrix<f64> {
         let kept_out = match *self.pinning {
-            Pinning::Nobody => Some(vec![1.0; block.nrows()]),
+            Pinning::Unpinned => Some(vec![1.0; block.nrows()]),
             Pinning::Leader(leader) => {
                 let mut unit = vec![0.0; block.nrows()];
                 unit[leader] = 1.0;
@@ -236,7 +236,7 @@ mod tests {
         assert_eq!(next, count);
         let spider = Graph::from_edges(count, &edges).expect("a graph");
         let exact = 2.0 - 2.0 * libm::cos(std::f64::consts::PI / (2.0 * 101.0 + 1.0));
-        let off = solved(&spider, &Pinning::Nobody) / exact - 1.0;
+        let off = solved(&spider, &Pinning::Unpinned) / exact - 1.0;
         assert!(off.abs() < 1e-8, "{off}");
         let ring = Graph::ring(600);
         for (graph, every) in [(Graph::path(401), 3), (Graph::path(401), 2), (ring.clone(), 4), (ring, 5)] {
@@ -252,7 +252,7 @@ mod tests {
         let count = 10_000;
         let path = Graph::path(count);
         let degrees = vec![2; count];
-        let found = Operator::new(&path, &Pinning::Nobody, &degrees).inverse_iteration().expect("solved");
+        let found = Operator::new(&path, &Pinning::Unpinned, &degrees).inverse_iteration().expect("solved");
         let exact = 2.0 - 2.0 * libm::cos(std::f64::consts::PI / count as f64);
         assert!((found / exact - 1.0).abs() < 1e-8, "{found} {exact}");
         // A path pinned at one end is half of a path of twice its length.

@@ -10,7 +10,7 @@
 pub enum Pinning {
     /// No vehicle: the mean of the swarm moves freely.
     #[default]
-    Nobody,
+    Unpinned,
     /// Every vehicle.
     All,
     /// These vehicles, from 0, in ascending order.
@@ -24,7 +24,7 @@ impl Pinning {
     #[must_use]
     pub fn pins(&self, vehicle: usize) -> bool {
         match self {
-            Self::Nobody | Self::Leader(_) => false,
+            Self::Unpinned | Self::Leader(_) => false,
             Self::All => true,
             Self::Listed(listed) => listed.binary_search(&vehicle).is_ok(),
         }

@@ -25,7 +25,7 @@ impl Graph {
     /// `4/(N (N - 1))` replaces lambda2, and [`Graph::connectivity_is_bound`] returns true.
     #[must_use]
     pub fn algebraic_connectivity(&self) -> f64 {
-        self.pinned_connectivity(&Pinning::Nobody)
+        self.pinned_connectivity(&Pinning::Unpinned)
     }
 
     /// Returns the least eigenvalue of the pinned Laplacian M (see [`Pinning`]). It is positive exactly if the graph is
@@ -36,7 +36,7 @@ impl Graph {
     /// graph. Otherwise as [`Graph::algebraic_connectivity`], with the lower bound `1/N^2`.
     #[must_use]
     pub fn pinned_connectivity(&self, pinning: &Pinning) -> f64 {
-        if *pinning == Pinning::Nobody {
+        if *pinning == Pinning::Unpinned {
             return *self.cache.algebraic.get_or_init(|| self.least_eigenvalue(pinning));
         }
         let (first, least) = self.cache.pinned.get_or_init(|| (pinning.clone(), self.least_eigenvalue(pinning)));
@@ -50,7 +50,7 @@ impl Graph {
     }
 
     fn least_eigenvalue(&self, pinning: &Pinning) -> f64 {
-        let fewest = if *pinning == Pinning::Nobody { 2 } else { 1 };
+        let fewest = if *pinning == Pinning::Unpinned { 2 } else { 1 };
         if self.count() < fewest || !self.is_connected() {
             return 0.0;
         }
@@ -61,7 +61,7 @@ impl Graph {
         if self.count() <= DENSE_UP_TO {
             let mut eigenvalues = self.pinned_laplacian(pinning).symmetric_eigenvalues().data.as_vec().clone();
             eigenvalues.sort_unstable_by(f64::total_cmp);
-            return eigenvalues[usize::from(*pinning == Pinning::Nobody)];
+            return eigenvalues[usize::from(*pinning == Pinning::Unpinned)];
         }
         self.solved_or_bounded(pinning, &mut Operator::new(self, pinning, &degrees))
     }
@@ -76,7 +76,7 @@ impl Graph {
         operator.inverse_iteration().unwrap_or_else(|| {
             self.cache.bounded.get_or_init(|| ());
             let count = self.count() as f64;
-            if *pinning == Pinning::Nobody { 4.0 / (count * (count - 1.0)) } else { 1.0 / (count * count) }
+            if *pinning == Pinning::Unpinned { 4.0 / (count * (count - 1.0)) } else { 1.0 / (count * count) }
         })
     }
 
@@ -86,12 +86,12 @@ impl Graph {
         let most = degrees.iter().copied().max().unwrap_or_default();
         let is_star = self.edge_count() + 1 == self.count() && most == self.edge_count();
         match pinning {
-            Pinning::Nobody if self.is_complete() => Some(count),
-            Pinning::Nobody if is_star => Some(1.0),
-            Pinning::Nobody if most == 2 && self.edge_count() == self.count() => {
+            Pinning::Unpinned if self.is_complete() => Some(count),
+            Pinning::Unpinned if is_star => Some(1.0),
+            Pinning::Unpinned if most == 2 && self.edge_count() == self.count() => {
                 Some(2.0 - 2.0 * libm::cos(2.0 * PI / count))
             }
-            Pinning::Nobody if most == 2 => Some(2.0 - 2.0 * libm::cos(PI / count)),
+            Pinning::Unpinned if most == 2 => Some(2.0 - 2.0 * libm::cos(PI / count)),
             Pinning::All => Some(1.0),
             Pinning::Listed(listed) if listed.is_empty() => Some(0.0),
             // The smaller root of x^2 - (N + 1) x + m, without cancellation.
@@ -103,7 +103,7 @@ impl Graph {
             Pinning::Leader(_) if self.count() == 1 => Some(1.0),
             Pinning::Leader(_) if self.is_complete() => Some(1.0),
             &Pinning::Leader(leader) if is_star && degrees[leader] == most => Some(1.0),
-            Pinning::Nobody | Pinning::Listed(_) | Pinning::Leader(_) => None,
+            Pinning::Unpinned | Pinning::Listed(_) | Pinning::Leader(_) => None,
         }
     }
 
@@ -129,7 +129,7 @@ impl Graph {
         }
         let is_dense = self.count() <= DENSE_UP_TO;
         let mut eigenvalues = match pinning {
-            Pinning::Nobody if self.is_complete() => vec![least],
+            Pinning::Unpinned if self.is_complete() => vec![least],
             Pinning::All if self.is_complete() => vec![least, self.count() as f64 + 1.0],
             _ if is_dense => self.pinned_laplacian(pinning).symmetric_eigenvalues().data.as_vec().clone(),
             _ => vec![least, self.largest_eigenvalue_bound(pinning)],
@@ -144,7 +144,7 @@ impl Graph {
     #[must_use]
     pub fn largest_eigenvalue(&self) -> f64 {
         if self.is_complete() || self.count() > DENSE_UP_TO {
-            return self.largest_eigenvalue_bound(&Pinning::Nobody);
+            return self.largest_eigenvalue_bound(&Pinning::Unpinned);
         }
         self.laplacian().symmetric_eigenvalues().iter().copied().fold(0.0, f64::max)
     }
@@ -227,13 +227,13 @@ mod tests {
                 let eigenvalues = dense(&graph);
                 let found = graph.algebraic_connectivity();
                 assert!((found - eigenvalues[1]).abs() < 1e-13 * count as f64, "{count}: {found}, {}", eigenvalues[1]);
-                let (bound, largest) = (graph.largest_eigenvalue_bound(&Pinning::Nobody), eigenvalues[count - 1]);
+                let (bound, largest) = (graph.largest_eigenvalue_bound(&Pinning::Unpinned), eigenvalues[count - 1]);
                 assert!(bound >= largest * (1.0 - 1e-12), "{count}: {bound}, {largest}");
             }
         }
         // A star about another hub is a star.
         let hub = Graph::from_edges(5, &[(2, 0), (2, 1), (2, 3), (2, 4)]).expect("a graph");
-        assert_eq!((hub.algebraic_connectivity(), hub.largest_eigenvalue_bound(&Pinning::Nobody)), (1.0, 5.0));
+        assert_eq!((hub.algebraic_connectivity(), hub.largest_eigenvalue_bound(&Pinning::Unpinned)), (1.0, 5.0));
         let apart = Graph::from_edges(4, &[(0, 1), (2, 3)]).expect("a graph");
         assert_eq!(apart.algebraic_connectivity(), 0.0);
     }
@@ -246,7 +246,7 @@ mod tests {
             let found = graph.algebraic_connectivity();
             let off = found / eigenvalues[1] - 1.0;
             assert!((-1e-9..1e-8).contains(&off), "{extra}: {found} instead of {}", eigenvalues[1]);
-            assert!(graph.largest_eigenvalue_bound(&Pinning::Nobody) >= eigenvalues[count - 1]);
+            assert!(graph.largest_eigenvalue_bound(&Pinning::Unpinned) >= eigenvalues[count - 1]);
         }
     }
 
@@ -293,10 +293,10 @@ mod tests {
         let graph = random(420, 0);
         let exact = graph.algebraic_connectivity();
         assert!(!graph.connectivity_is_bound());
-        let mut exhausted = Operator::new(&graph, &Pinning::Nobody, &graph.degrees());
+        let mut exhausted = Operator::new(&graph, &Pinning::Unpinned, &graph.degrees());
         exhausted.exhaust();
         let copy = graph.clone();
-        let bound = copy.solved_or_bounded(&Pinning::Nobody, &mut exhausted);
+        let bound = copy.solved_or_bounded(&Pinning::Unpinned, &mut exhausted);
         assert!(0.0 < bound && bound <= exact && graph.connectivity_is_bound(), "{bound} {exact}");
         let (leader, exact) = (Pinning::Leader(7), least(&graph, &Pinning::Leader(7)));
         let mut exhausted = Operator::new(&graph, &leader, &graph.degrees());

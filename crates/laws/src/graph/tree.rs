@@ -44,7 +44,7 @@ impl SpanningTree {
             pins[parent[i]] += pin / (1.0 + pin);
             pins[i] = 1.0 + pin;
         }
-        if matches!(pinning, Pinning::Nobody | Pinning::Leader(_)) {
+        if matches!(pinning, Pinning::Unpinned | Pinning::Leader(_)) {
             pins[root] = f64::INFINITY;
         }
         Self { order, parent, pivot: pins }
@@ -149,15 +149,15 @@ mod tests {
         let is_chosen = |graph: &Graph, pinning: &Pinning| SpanningTree::new_if_worthwhile(graph, pinning).is_some();
         let half = |graph: &Graph| Pinning::Listed((0..graph.count()).step_by(2).collect());
         let (path, ladder) = (Graph::path(1000), ladder(1000));
-        assert!(is_chosen(&path, &Pinning::Nobody) && is_chosen(&path, &half(&path)), "the tree is the graph itself");
+        assert!(is_chosen(&path, &Pinning::Unpinned) && is_chosen(&path, &half(&path)), "the tree is the graph itself");
         assert!(is_chosen(&Graph::star(1000), &Pinning::Leader(3)));
-        assert!(is_chosen(&ladder, &Pinning::Nobody) && is_chosen(&ladder, &Pinning::Leader(7)));
+        assert!(is_chosen(&ladder, &Pinning::Unpinned) && is_chosen(&ladder, &Pinning::Leader(7)));
         assert!(!is_chosen(&ladder, &half(&ladder)), "every vehicle is near a pinned one");
         let side = 40;
         let right = (0..side * side).filter(|i| i % side + 1 < side).map(|i| (i, i + 1));
         let grid: Vec<_> = right.chain((side..side * side).map(|i| (i - side, i))).collect();
         let grid = Graph::from_edges(side * side, &grid).expect("a grid");
-        assert!(!is_chosen(&grid, &Pinning::Nobody));
+        assert!(!is_chosen(&grid, &Pinning::Unpinned));
     }
 
     #[test]
@@ -185,7 +185,7 @@ mod tests {
         // The slowest mode of a ladder is that of one rail.
         let rungs = 3000;
         let graph = ladder(rungs);
-        let found = Operator::new(&graph, &Pinning::Nobody, &graph.degrees()).inverse_iteration().expect("solved");
+        let found = Operator::new(&graph, &Pinning::Unpinned, &graph.degrees()).inverse_iteration().expect("solved");
         let exact = 2.0 - 2.0 * libm::cos(std::f64::consts::PI / rungs as f64);
         assert!((found / exact - 1.0).abs() < 1e-8, "{found} {exact}");
     }

@@ -205,7 +205,7 @@ impl DisplacementLaw {
 
     /// Whether some vehicle knows a reference.
     fn is_guided(&self) -> bool {
-        self.pulls.pinning != Pinning::Nobody
+        self.pulls.pinning != Pinning::Unpinned
     }
 
     /// Returns the push of vehicle `j` on vehicle `i` at relative position `apart_m`, and `V_R`; `None` out of range.

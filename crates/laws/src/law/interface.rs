@@ -274,7 +274,7 @@ impl<'a> LawContext<'a> {
 
     /// Returns the vehicles that know the reference.
     pub(super) fn pinning(&self) -> Pinning {
-        self.guidance.map_or(Pinning::Nobody, |guidance| guidance.known_by.clone())
+        self.guidance.map_or(Pinning::Unpinned, |guidance| guidance.known_by.clone())
     }
 }
 
@@ -296,7 +296,7 @@ impl ReferenceUse {
         let Some(guidance) = context.guidance else { return Ok(Self { is_guided: false, has_feed_forward: false }) };
         match guidance.known_by {
             Pinning::All => Ok(Self { is_guided: true, has_feed_forward: guidance.feed_forward }),
-            Pinning::Nobody | Pinning::Listed(_) | Pinning::Leader(_) => Err(ParameterError::ReferenceNotHeard),
+            Pinning::Unpinned | Pinning::Listed(_) | Pinning::Leader(_) => Err(ParameterError::ReferenceNotHeard),
         }
     }
 

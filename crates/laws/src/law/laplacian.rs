@@ -130,7 +130,7 @@ impl Law for LaplacianLaw {
     fn linear(&self, _formation: &Formation) -> Option<Linear> {
         let count = self.graph.count().max(1) as f64;
         let gain = Mode { stiffness_per_s2: self.f1_per_s2, damping_per_s: self.f2_per_s }.times(1.0 / count);
-        Some(PinnedConsensus::new(&self.graph, Pinning::Nobody).linear(gain, gain))
+        Some(PinnedConsensus::new(&self.graph, Pinning::Unpinned).linear(gain, gain))
     }
 
     fn capabilities(&self) -> Capabilities {

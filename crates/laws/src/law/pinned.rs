@@ -36,7 +36,7 @@ impl PinnedConsensus {
 
     /// Returns the least eigenvalue of the pinned Laplacian M; 1 for a single vehicle without a reference.
     pub(super) fn connectivity(&self) -> f64 {
-        if self.graph.count() == 1 && self.pinning == Pinning::Nobody {
+        if self.graph.count() == 1 && self.pinning == Pinning::Unpinned {
             return 1.0;
         }
         self.graph.pinned_connectivity(&self.pinning)
@@ -58,7 +58,7 @@ impl PinnedConsensus {
         let (&first, &last) = (own.first()?, own.last()?);
         if own.iter().all(|&other| other == first) {
             // M = D - A. Without a reference the common motion has the eigenvalue 0 of M.
-            let common = (self.pinning == Pinning::Nobody).then_some(first);
+            let common = (self.pinning == Pinning::Unpinned).then_some(first);
             return Some(HeardLinks::Alike {
                 own: first,
                 others: eigenvalues.iter().map(|eigenvalue| first - eigenvalue).chain(common).collect(),
@@ -67,7 +67,7 @@ impl PinnedConsensus {
         let (least, most) = (own.iter().copied().fold(first, f64::min), own.iter().copied().fold(last, f64::max));
         let leaves = self.graph.edge_count();
         let is_star = leaves + 1 == self.graph.count()
-            && matches!(self.pinning, Pinning::Nobody | Pinning::All)
+            && matches!(self.pinning, Pinning::Unpinned | Pinning::All)
             && most - least == (leaves - 1) as f64;
         is_star.then_some(HeardLinks::Star { hub: most, leaf: least, leaves: leaves as f64 })
     }
@@ -140,7 +140,7 @@ impl PinnedConsensus {
     /// leader if there is one, and otherwise to the reference.
     pub(super) fn kinetic_energy(&self, swarm: &Swarm, reference: &Reference) -> f64 {
         let velocity_m_s = match self.pinning {
-            Pinning::Nobody => return relative_kinetic_energy(swarm),
+            Pinning::Unpinned => return relative_kinetic_energy(swarm),
             Pinning::Leader(leader) => row(&swarm.velocities_m_s, leader),
             Pinning::All | Pinning::Listed(_) => reference.velocity_m_s,
         };

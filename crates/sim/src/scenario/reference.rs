@@ -329,7 +329,7 @@ impl From<&Guidance> for ReferenceTable {
             }
         };
         let (known_by, leader) = match &guidance.known_by {
-            Pinning::Nobody => (Some(Vehicles::Listed(Vec::new())), None),
+            Pinning::Unpinned => (Some(Vehicles::Listed(Vec::new())), None),
             Pinning::All => (None, None),
             Pinning::Listed(listed) => {
                 (Some(Vehicles::Listed(listed.iter().map(|&vehicle| vehicle as u64 + 1).collect())), None)

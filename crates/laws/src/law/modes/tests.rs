@@ -147,11 +147,11 @@ fn grows(heard: &Heard, graph: &Graph, pinning: &Pinning, late: (f64, f64)) -> b
 #[test]
 fn delay_margins_of_received_states_match_the_roots_of_the_swarm() {
     for (graph, pinning, a22) in [
-        (Graph::complete(5), Pinning::Nobody, 0.0),
-        (Graph::complete(4), Pinning::Nobody, -0.2),
-        (Graph::ring(5), Pinning::Nobody, 0.0),
-        (Graph::star(5), Pinning::Nobody, 0.0),
-        (Graph::star(5), Pinning::Nobody, -0.1),
+        (Graph::complete(5), Pinning::Unpinned, 0.0),
+        (Graph::complete(4), Pinning::Unpinned, -0.2),
+        (Graph::ring(5), Pinning::Unpinned, 0.0),
+        (Graph::star(5), Pinning::Unpinned, 0.0),
+        (Graph::star(5), Pinning::Unpinned, -0.1),
         (Graph::ring(6), Pinning::All, 0.1),
         (Graph::star(4), Pinning::All, 0.1),
     ] {
@@ -176,13 +176,13 @@ fn followers_of_a_leader_on_a_star_are_stable_with_any_delay() {
     let linear = links.linear(gain, gain);
     assert_eq!(linear.heard.and_then(|heard| heard.delay_margin_s(0.1)), Some(f64::INFINITY));
     // On a path own and received terms do not have the modes of their sum.
-    let path = crate::law::pinned::PinnedConsensus::new(&Graph::path(4), Pinning::Nobody);
+    let path = crate::law::pinned::PinnedConsensus::new(&Graph::path(4), Pinning::Unpinned);
     assert_eq!(path.linear(gain, gain).heard, None);
     // Without a reference, unstable common motion cannot be separated on a star, but can if D is a multiple of the
     // identity.
-    let star = crate::law::pinned::PinnedConsensus::new(&graph, Pinning::Nobody).linear(gain, gain).heard;
+    let star = crate::law::pinned::PinnedConsensus::new(&graph, Pinning::Unpinned).linear(gain, gain).heard;
     assert_eq!(star.expect("a star").delay_margin_s(0.1), None);
-    let ring = crate::law::pinned::PinnedConsensus::new(&Graph::ring(5), Pinning::Nobody).linear(gain, gain).heard;
+    let ring = crate::law::pinned::PinnedConsensus::new(&Graph::ring(5), Pinning::Unpinned).linear(gain, gain).heard;
     assert!(ring.expect("a ring").delay_margin_s(0.1).is_some());
 }
 
