@@ -84,7 +84,7 @@ class RayCluster(unittest.TestCase):
         program.chmod(0o755)
         flown = ran(*self.driver(camp.path, "--tautline", str(program)), env=ENVIRONMENT)
         self.assertEqual(flown.returncode, 2, flown.stderr)
-        self.assertIn("hash", flown.stderr)
+        self.assertIn("SHA-256", flown.stderr)
 
     def test_killed_stopped_and_added_nodes_give_the_same_bytes(self) -> None:
         camp = Campaign(self.folder, runs=120, duration_s=2.0)
