@@ -1,9 +1,8 @@
-//! `tautline list` (built-in scenarios), `schema` (of the scenario file) and `completions` (of a shell).
+//! `tautline list` (built-in scenarios) and `schema` (of the scenario file).
 
 use std::path::Path;
 
 use clap::Args;
-use clap_complete::Shell;
 
 use super::{Exit, console};
 use tautline_recordings::mcap::McapRecording;
@@ -58,19 +57,5 @@ fn table() -> String {
 /// Prints the JSON Schema of the scenario file.
 pub(super) fn schema() -> Result<Exit, Failure> {
     console::json(&scenario::schema())?;
-    Ok(Exit::Good)
-}
-
-/// Arguments of `tautline completions`.
-#[derive(Debug, Args)]
-pub(super) struct CompletionsArguments {
-    /// Shell of the script.
-    shell: Shell,
-}
-
-pub(super) fn completions(arguments: &CompletionsArguments, program: &mut clap::Command) -> Result<Exit, Failure> {
-    let mut script = Vec::new();
-    clap_complete::generate(arguments.shell, program, env!("CARGO_PKG_NAME"), &mut script);
-    console::data(&String::from_utf8_lossy(&script))?;
     Ok(Exit::Good)
 }

@@ -6,11 +6,14 @@
 mod audit;
 mod audit_formats;
 mod campaign;
+mod completions;
 mod console;
+mod doctor;
 #[cfg(feature = "viewer")]
 mod drawing;
 mod export;
 mod list;
+mod new;
 mod reading;
 #[cfg(feature = "viewer")]
 mod render;
@@ -24,7 +27,7 @@ use std::ffi::OsString;
 use std::process::ExitCode;
 use std::sync::Once;
 
-use clap::{CommandFactory as _, Parser, Subcommand};
+use clap::{Parser, Subcommand};
 
 use console::Exit;
 use tautline_recordings::read;
@@ -40,6 +43,9 @@ pub fn main() -> ExitCode {
 #[must_use]
 pub fn entry(arguments: &[OsString]) -> u8 {
     quiet_guarded_panics();
+    if completions::answer(arguments) {
+        return Exit::Good as u8;
+    }
     let words: Vec<_> = arguments.iter().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
     let line = command_line(words.iter().map(String::as_str));
     let arguments = match Arguments::try_parse_from(arguments) {
@@ -56,7 +62,9 @@ pub fn entry(arguments: &[OsString]) -> u8 {
         Command::Run(run) => run.draws(),
         Command::Compare(compare) => compare.draws(),
         Command::Attack(attack) => attack.draws(),
-        other => matches!(other, Command::Campaign(_) | Command::Render(_) | Command::View(_)),
+        other => {
+            matches!(other, Command::Campaign(_) | Command::Render(_) | Command::View(_) | Command::Doctor(_))
+        }
     } {
         drawing::silence_driver();
     }
@@ -107,10 +115,14 @@ enum Command {
     View(view::ViewArguments),
     /// List the built-in scenarios, or print one as TOML.
     List(list::ListArguments),
+    /// Write a commented scenario file to start from.
+    New(new::NewArguments),
     /// Print the JSON Schema of the scenario file.
     Schema,
-    /// Print a completion script for a shell.
-    Completions(list::CompletionsArguments),
+    /// Say what this machine can do, with remedies.
+    Doctor(doctor::DoctorArguments),
+    /// Print a script that completes commands, scenarios and keys in a shell.
+    Completions(completions::CompletionsArguments),
 }
 
 /// Silences the panic hook for panics that become errors.
@@ -149,7 +161,9 @@ fn dispatch(command: Command, line: &str) -> Result<Exit, Failure> {
         Command::View(arguments) => view::view(&arguments),
         Command::List(arguments) => list::list(&arguments),
         Command::Schema => list::schema(),
-        Command::Completions(arguments) => list::completions(&arguments, &mut Arguments::command()),
+        Command::New(arguments) => new::new(&arguments),
+        Command::Doctor(arguments) => doctor::doctor(&arguments),
+        Command::Completions(arguments) => completions::completions(&arguments),
     }
 }
 

@@ -1,22 +1,26 @@
 //! `tautline run` and `tautline check`, and the arguments of all commands with a scenario.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use clap::{Args, Parser};
 
-use super::Exit;
 use super::console::{self, Console, Terminal};
-use tautline_report::request::{Failure, Pictures, RunRequest, ScenarioRequest, command_line, run_into};
+use super::{Exit, completions};
+use tautline_report::request::{Failure, Monitor as _, Pictures, RunRequest, ScenarioRequest, command_line, run_into};
 use tautline_sim::preflight::Preflight;
+
+/// Time between two looks at a watched file.
+const WATCH_INTERVAL: Duration = Duration::from_millis(200);
 
 /// Scenario with its overrides.
 #[derive(Debug, Args)]
 pub(super) struct ScenarioArguments {
     /// Scenario file, name of a built-in scenario, or - for standard input.
-    #[arg(default_value = "pentagon")]
+    #[arg(default_value = "pentagon", add = completions::scenario())]
     pub(super) scenario: String,
     /// Set a key of the scenario; repeatable.
-    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE", add = completions::key("="))]
     pub(super) overrides: Vec<String>,
 }
 
@@ -54,6 +58,12 @@ pub(super) struct RunArguments {
     /// Overwrite a folder with a finished run.
     #[arg(long)]
     force: bool,
+    /// Open the report in a browser.
+    #[arg(long)]
+    open: bool,
+    /// Fly again after each change of the scenario file, until Ctrl-C; overwrites its folder each time.
+    #[arg(long, conflicts_with = "json")]
+    watch: bool,
     /// Draw no figures.
     #[arg(long)]
     no_figures: bool,
@@ -87,6 +97,15 @@ impl RunArguments {
 
 pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
+    let terminal = Terminal::new(console)?;
+    if arguments.watch {
+        return watch(arguments, &terminal);
+    }
+    fly(arguments, arguments.force, arguments.open, &terminal)
+}
+
+/// Flies the scenario once. `opens` states whether the page is opened.
+fn fly(arguments: &RunArguments, force: bool, opens: bool, terminal: &Terminal) -> Result<Exit, Failure> {
     let plant = arguments.plant.as_ref().map(|kind| format!("plant.kind={kind}"));
     let what = arguments.what.request()?;
     // `--plant` is short for the last override; the command that repeats the flight keeps it as written.
@@ -97,18 +116,68 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
     let words: Vec<_> = ["run", &what.argument].into_iter().chain(sets).chain(plant).collect();
     let request = RunRequest {
         out: arguments.out.clone(),
-        force: arguments.force,
+        force,
         figures: !arguments.no_figures,
         verify: arguments.verify,
         threads: arguments.threads.map(usize::from),
         ..RunRequest::new(&scenario, command_line(words.iter().copied()))
     };
     let pictures = pictures(&arguments.adapter, !arguments.no_snapshots);
-    let left = run_into(&request, &*pictures, &Terminal::new(console)?)?;
+    let left = run_into(&request, &*pictures, terminal)?;
+    terminal.say(&next_steps(&left.page));
+    if opens && let Err(error) = open::that_detached(&left.page) {
+        terminal.warn(&format!("note: cannot open the report in a browser: {error}"));
+    }
     if arguments.json {
         console::json(&left.report)?;
     }
     Ok(Exit::good_if(left.report.verdict.pass))
+}
+
+/// Returns where to look at a run with this page.
+fn next_steps(page: &Path) -> String {
+    let folder = page.parent().unwrap_or(Path::new(".")).to_string_lossy();
+    let view = command_line(["view", &folder].into_iter());
+    let window = if cfg!(feature = "viewer") { format!(", or `{view}`") } else { String::new() };
+    format!("to look at it: open {}{window}", page.display())
+}
+
+/// Flies the scenario, and again whenever its file changes, until an interruption. A scenario that cannot be flown is
+/// reported and waited for.
+fn watch(arguments: &RunArguments, terminal: &Terminal) -> Result<Exit, Failure> {
+    let path = Path::new(&arguments.what.scenario);
+    if !path.is_file() {
+        let message = format!("--watch: `{}` is not a file", arguments.what.scenario);
+        return Err(Failure::input("usage/no-effect", message, "give a scenario file; `tautline new NAME` writes one"));
+    }
+    // Read before the flight, so that a change during the flight is noticed.
+    let mut flown = content(path);
+    let mut exit = match fly(arguments, arguments.force, arguments.open, terminal) {
+        // Without --force a finished run of another time is kept.
+        Err(failure) if failure.code() == "files/finished" => return Err(failure),
+        first => shown(first),
+    };
+    while !terminal.is_interrupted() {
+        terminal.warn(&format!("waiting for a change of {}; Ctrl-C ends", path.display()));
+        while !terminal.is_interrupted() && content(path) == flown {
+            std::thread::sleep(WATCH_INTERVAL);
+        }
+        if !terminal.is_interrupted() {
+            flown = content(path);
+            exit = shown(fly(arguments, true, false, terminal));
+        }
+    }
+    Ok(exit)
+}
+
+/// Returns the exit code of a flight, and prints its failure.
+fn shown(flown: Result<Exit, Failure>) -> Exit {
+    flown.unwrap_or_else(|failure| console::show(&failure))
+}
+
+/// Returns the content of a file; `None` while it is missing, as between the two steps of an editor that replaces it.
+fn content(path: &Path) -> Option<Vec<u8>> {
+    std::fs::read(path).ok()
 }
 
 /// Arguments of `tautline check`.

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 use clap::Args;
 use clap::builder::{PossibleValue, TypedValueParser};
 
-use super::Exit;
 use super::console::{Console, Terminal};
 use super::reading::one_of;
 use super::run::{ScenarioArguments, pictures};
+use super::{Exit, completions};
 use tautline_report::request::Failure;
 use tautline_studies::attack::{Bound, FLIGHTS, SEEDS_OF_A_CANDIDATE};
 use tautline_studies::margin::Range;
@@ -121,7 +121,7 @@ pub(super) struct MarginArguments {
     #[command(flatten)]
     runs: RunArguments,
     /// Key to vary, such as `time.control_hz`.
-    #[arg(long, value_name = "KEY.PATH")]
+    #[arg(long, value_name = "KEY.PATH", add = completions::key(""))]
     key: String,
     /// First value of the key.
     #[arg(long, value_name = "A", allow_negative_numbers = true)]
@@ -178,7 +178,12 @@ pub(super) struct SweepArguments {
     runs: RunArguments,
     /// Key with evenly spaced or listed values: `network.loss=0:0.5:11` or `law.alpha=0.5,1,2`; give it twice for a
     /// grid.
-    #[arg(long = "key", value_name = "KEY=FROM:TO:COUNT|KEY=V1,V2,...", required = true)]
+    #[arg(
+        long = "key",
+        value_name = "KEY=FROM:TO:COUNT|KEY=V1,V2,...",
+        required = true,
+        add = completions::key("=")
+    )]
     keys: Vec<String>,
     /// Verdict whose share is counted.
     #[arg(long, value_name = "WHAT", default_value = "pass", value_parser = verdict())]
@@ -205,7 +210,7 @@ pub(super) struct AttackArguments {
     #[command(flatten)]
     study: StudyArguments,
     /// Numeric key with its bounds, such as `network.loss=0..0.3`; repeatable.
-    #[arg(long, value_name = "KEY=LOW..HIGH")]
+    #[arg(long, value_name = "KEY=LOW..HIGH", add = completions::key("="))]
     vary: Vec<String>,
     /// Move each start by up to R metres along each axis.
     #[arg(long, value_name = "R", allow_negative_numbers = true)]

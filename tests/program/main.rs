@@ -14,6 +14,7 @@ mod determinism;
 mod doors;
 mod ellipsoids;
 mod exports;
+mod first_steps;
 mod fixes;
 mod heights;
 mod imperfections;

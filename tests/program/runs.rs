@@ -122,8 +122,9 @@ fn the_verdict_comes_first_and_the_paths_of_files_last() {
     let lines: Vec<&str> = out.lines().collect();
     assert!(lines[0].starts_with("CLEAR: never closer than 2.4"), "{out}");
     assert!(lines[0].contains("(delta 2.000 m), formation reached at 3"), "{out}");
-    let last = lines[lines.len() - 1];
-    assert!(last.contains("run.mcap") && last.contains("report.json"), "{out}");
+    let [.., wrote, look] = &lines[..] else { panic!("{out}") };
+    assert_eq!(*wrote, "wrote out: run.mcap, report.json and report.html");
+    assert!(look.starts_with("to look at it: open out/report.html"), "{out}");
     assert!(!out.contains('\u{1b}'), "no colour and no progress bar in a pipe");
 }
 
@@ -324,9 +325,7 @@ fn every_shell_gets_a_completion_script() {
     for shell in ["bash", "elvish", "fish", "powershell", "zsh"] {
         let script = ran(folder.path(), &["completions", shell]);
         assert_eq!(script.exit, GOOD, "{}", script.err);
-        for word in ["tautline", "run", "list", "schema", "completions"] {
-            assert!(script.out.contains(word), "{shell}: {word}");
-        }
+        assert!(script.out.contains("tautline") && script.out.contains("COMPLETE"), "{shell}: {}", script.out);
     }
     assert_eq!(ran(folder.path(), &["completions", "tcsh"]).exit, WRONG_INPUT);
 }

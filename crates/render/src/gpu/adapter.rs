@@ -129,21 +129,35 @@ fn name(adapter: &wgpu::Adapter) -> String {
     format!("{} ({:?}, {:?})", info.name, info.device_type, info.backend)
 }
 
+/// Returns the names of the graphics adapters that can draw, best first.
+#[must_use]
+pub fn adapters() -> Vec<String> {
+    best_first(&instance(None)).iter().map(name).collect()
+}
+
+fn device_type(adapter: &wgpu::Adapter) -> DeviceType {
+    adapter.get_info().device_type
+}
+
+fn best_first(instance: &wgpu::Instance) -> Vec<wgpu::Adapter> {
+    let mut adapters = pollster::block_on(instance.enumerate_adapters(BACKENDS));
+    adapters.sort_by_key(|adapter| BEST_FIRST.iter().position(|known| *known == device_type(adapter)));
+    adapters
+}
+
 /// Returns the best adapter of a choice.
 fn pick(
     instance: &wgpu::Instance,
     choice: &AdapterChoice,
     surface: Option<&wgpu::Surface<'_>>,
 ) -> Result<wgpu::Adapter, RenderError> {
-    let kind = |adapter: &wgpu::Adapter| adapter.get_info().device_type;
-    let mut adapters = pollster::block_on(instance.enumerate_adapters(BACKENDS));
+    let mut adapters = best_first(instance);
     adapters.retain(|adapter| surface.is_none_or(|surface| adapter.is_surface_supported(surface)));
-    adapters.sort_by_key(|adapter| BEST_FIRST.iter().position(|known| *known == kind(adapter)));
     let found: Vec<String> = adapters.iter().map(name).collect();
     let chosen = adapters.into_iter().find(|adapter| match choice {
         AdapterChoice::Best => true,
-        AdapterChoice::Hardware => kind(adapter) != DeviceType::Cpu,
-        AdapterChoice::Software => kind(adapter) == DeviceType::Cpu,
+        AdapterChoice::Hardware => device_type(adapter) != DeviceType::Cpu,
+        AdapterChoice::Software => device_type(adapter) == DeviceType::Cpu,
         AdapterChoice::Named(wanted) => name(adapter).to_lowercase().contains(&wanted.to_lowercase()),
     });
     chosen.ok_or_else(|| {

@@ -10,7 +10,7 @@ mod adapter;
 mod overlay;
 mod pipelines;
 
-pub use adapter::AdapterChoice;
+pub use adapter::{AdapterChoice, adapters};
 
 use adapter::failed;
 pub(crate) use adapter::lost;

@@ -72,6 +72,8 @@ pub struct RunFiles {
     pub log: Arc<FlightLog>,
     /// Pictures with their names, such as `closest`.
     pub pictures: Vec<NamedPicture>,
+    /// Path of the page `report.html`.
+    pub page: PathBuf,
 }
 
 /// Flies a scenario and writes its folder: `run.mcap`, `report.html`, `figures/*.svg`, `snapshots/*.png` and
@@ -123,13 +125,8 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
     for reason in &report.verdict.reasons {
         monitor.say(reason);
     }
-    monitor.say(&format!(
-        "wrote {}, {} and {}",
-        folder.file(RECORDING).display(),
-        folder.report().display(),
-        page.display()
-    ));
-    Ok(RunFiles { report, log, pictures })
+    monitor.say(&format!("wrote {}: {RECORDING}, report.json and report.html", folder.path().display()));
+    Ok(RunFiles { report, log, pictures, page })
 }
 
 /// Flies the scenario. The recording is closed when this function returns, with or without an error.

@@ -1,4 +1,6 @@
-//! Built-in scenarios, embedded in the program.
+//! Built-in scenarios, embedded in the program, and the text of new scenario files.
+
+use super::limits::{MAX_NAME_CHARS, may_be_in_a_name};
 
 /// Built-in scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -84,4 +86,42 @@ pub fn all() -> &'static [Builtin] {
 #[must_use]
 pub fn find(name: &str) -> Option<&'static Builtin> {
     ALL.iter().find(|builtin| builtin.name == name)
+}
+
+/// Returns the text of a new scenario file, with comments; `None` if the name is not 1 to 64 letters, digits, `-` and
+/// `_`. Lines such as `#key = value` are optional keys.
+#[must_use]
+pub fn new_scenario(name: &str) -> Option<String> {
+    let is_name = (1..=MAX_NAME_CHARS).contains(&name.len()) && name.chars().all(may_be_in_a_name);
+    is_name.then(|| include_str!("../../../../assets/new-scenario.toml").replace("NAME", name))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Scenario, Source};
+    use super::new_scenario;
+
+    #[test]
+    fn a_new_scenario_is_valid_with_and_without_its_optional_keys() {
+        let text = new_scenario("ring").expect("a name");
+        let optional = |line: &str| {
+            line.strip_prefix('#')
+                .filter(|rest| rest.starts_with(|c: char| c.is_ascii_lowercase() || c == '['))
+                .map(str::to_owned)
+        };
+        let all: Vec<_> = text.lines().map(|line| optional(line).unwrap_or_else(|| line.to_owned())).collect();
+        assert_eq!(text.lines().filter(|line| optional(line).is_some()).count(), 20);
+        for text in [text.clone(), all.join("\n")] {
+            let source = Source::Text { name: "ring".to_owned(), text };
+            let scenario = Scenario::read(&source, &[]).expect("a scenario");
+            assert_eq!((scenario.name.as_str(), scenario.count()), ("ring", 6));
+        }
+    }
+
+    #[test]
+    fn a_wrong_name_gives_no_scenario() {
+        for name in ["", "a b", "a/b", "ä", "\"", &"a".repeat(65)] {
+            assert_eq!(new_scenario(name), None, "{name}");
+        }
+    }
 }

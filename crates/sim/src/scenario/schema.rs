@@ -3,6 +3,7 @@
 //! The schema is generated from the types of `document` and their doc comments. [`check`](super::check) checks files
 //! against the schema.
 
+use std::collections::BTreeSet;
 use std::sync::LazyLock;
 
 use serde_json::{Value, json};
@@ -211,6 +212,30 @@ pub fn takes_integers_only(source: &Source, overrides: &[Override], key: &str) -
     at.0.is_some_and(|node| node.kind() == "integer")
 }
 
+/// Returns the paths of all keys of the scenario file, such as `law.delta_m`; entries of lists of tables have the number
+/// 1, such as `leg.1.radius_m`. Keys under names that the file chooses, such as `laws.NAME.alpha`, are left out.
+#[must_use]
+pub fn key_paths() -> Vec<String> {
+    let mut paths = BTreeSet::new();
+    collect_paths(Node::root(), "", &mut paths);
+    paths.into_iter().collect()
+}
+
+fn collect_paths(table: Node, prefix: &str, paths: &mut BTreeSet<String>) {
+    let parts = || std::iter::once(table).chain(table.alternatives());
+    for (part, key) in parts().flat_map(|part| part.keys().map(move |key| (part, key))) {
+        let Some(node) = part.property(key) else { continue };
+        let path = format!("{prefix}{key}");
+        match node.items() {
+            Some(entry) if entry.is_table() => collect_paths(entry, &format!("{path}.1."), paths),
+            _ if node.is_table() => collect_paths(node, &format!("{path}."), paths),
+            _ => {
+                paths.insert(path);
+            }
+        }
+    }
+}
+
 /// Returns the tables of the scenario file that have a key of this name, such as `[swarm]`, or
 /// `[law] with kind = "laplacian"`.
 pub(super) fn tables_with(key: &str) -> Vec<String> {
@@ -239,6 +264,17 @@ mod tests {
         assert_eq!(tables_with("alpha"), ["[law] with kind = \"edge-tension\"", "[law] with kind = \"displacement\""]);
         assert_eq!(tables_with("half_extent_m"), ["[start] with shape = \"random\""]);
         assert_eq!(tables_with("nowhere"), [] as [&str; 0]);
+    }
+
+    #[test]
+    fn paths_lead_to_keys_of_tables_lists_and_alternatives() {
+        let paths = key_paths();
+        for path in
+            ["name", "law.kind", "law.alpha", "law.f1_per_s2", "leg.1.radius_m", "wind.gust.1.rise_s", "time.dt_s"]
+        {
+            assert!(paths.iter().any(|known| known == path), "{path}: {paths:?}");
+        }
+        assert!(!paths.iter().any(|path| path == "law" || path.ends_with('.')), "{paths:?}");
     }
 
     fn takes_integers(builtin: &str, sets: &[&str], key: &str) -> bool {

@@ -1,0 +1,53 @@
+//! `tautline new`: writes a commented scenario file to start from.
+
+use std::ffi::OsStr;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::Exit;
+use super::console::Console;
+use tautline_report::report::write_atomically;
+use tautline_report::request::{Failure, command_line};
+use tautline_sim::scenario::builtin;
+
+/// Arguments of `tautline new`.
+#[derive(Debug, Args)]
+pub(super) struct NewArguments {
+    /// Name of the scenario, or path of its file; `.toml` is added.
+    name: PathBuf,
+    /// Overwrite an existing file.
+    #[arg(long)]
+    force: bool,
+}
+
+pub(super) fn new(arguments: &NewArguments) -> Result<Exit, Failure> {
+    let path = match arguments.name.extension() {
+        Some(extension) if extension == "toml" => arguments.name.clone(),
+        _ => {
+            let mut path = arguments.name.clone().into_os_string();
+            path.push(".toml");
+            PathBuf::from(path)
+        }
+    };
+    let name = path.file_stem().and_then(OsStr::to_str).unwrap_or_default();
+    let text = builtin::new_scenario(name).ok_or_else(|| wrong_name(name))?;
+    if path.exists() && !arguments.force {
+        let message = format!("{} exists already", path.display());
+        return Err(Failure::input("files/exists", message, "give another name, or overwrite it with --force"));
+    }
+    write_atomically(&path, text.as_bytes())?;
+    let console = Console { data_on_stdout: false, quiet: false };
+    console.say(&format!("wrote {}\nnext: {}", path.display(), flight(&path)));
+    Ok(Exit::Good)
+}
+
+/// Returns the command that flies a scenario file.
+fn flight(path: &Path) -> String {
+    command_line(["run", &path.to_string_lossy(), "--open"].into_iter())
+}
+
+fn wrong_name(name: &str) -> Failure {
+    let message = format!("NAME: must have 1 to 64 letters, digits, `-` or `_`, got `{name}`");
+    Failure::input("usage/name", message, "give a name such as `ring`, or a path such as scenarios/ring.toml")
+}

@@ -1,0 +1,151 @@
+//! First steps of a user: `new`, `doctor`, completions, `run --watch`, and where a run says to look.
+
+use std::fs;
+use std::path::Path;
+use std::process::Command;
+
+use crate::program::{Ran, TAUTLINE, ran_by};
+use serde_json::Value;
+use tempfile::TempDir;
+
+const GOOD: Option<i32> = Some(0);
+const BAD: Option<i32> = Some(1);
+const WRONG_INPUT: Option<i32> = Some(2);
+
+fn folder() -> TempDir {
+    tempfile::tempdir().expect("a folder")
+}
+
+fn ran(folder: &Path, arguments: &[&str]) -> Ran {
+    ran_by(TAUTLINE, folder, arguments)
+}
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).expect("JSON")
+}
+
+#[test]
+fn a_new_scenario_flies_clear_and_reaches_its_formation() {
+    let folder = folder();
+    let new = ran(folder.path(), &["new", "ring"]);
+    assert_eq!((new.exit, new.err.as_str()), (GOOD, ""));
+    assert_eq!(new.out, "wrote ring.toml\nnext: tautline run ring.toml --open\n");
+    let run = ran(folder.path(), &["run", "ring.toml", "--no-snapshots"]);
+    assert_eq!((run.exit, run.err.as_str()), (GOOD, ""), "{}", run.out);
+    assert!(run.out.starts_with("CLEAR: "), "{}", run.out);
+    assert!(run.out.contains("open out/ring/report.html, or `tautline view out/ring`"), "{}", run.out);
+    assert!(folder.path().join("out/ring/report.html").is_file());
+}
+
+#[test]
+fn a_new_scenario_overwrites_only_with_force() {
+    let folder = folder();
+    fs::write(folder.path().join("mine.toml"), "# mine\n").expect("a file");
+    let refused = ran(folder.path(), &["new", "mine.toml"]);
+    assert_eq!(refused.exit, WRONG_INPUT);
+    assert!(refused.err.contains("mine.toml exists already"), "{}", refused.err);
+    assert_eq!(fs::read_to_string(folder.path().join("mine.toml")).expect("the file"), "# mine\n");
+    assert_eq!(ran(folder.path(), &["new", "mine", "--force"]).exit, GOOD);
+    assert!(fs::read_to_string(folder.path().join("mine.toml")).expect("the file").contains("name = \"mine\""));
+}
+
+#[test]
+fn a_new_scenario_needs_a_name() {
+    let folder = folder();
+    for name in ["two words", ".toml", "a\"b"] {
+        let refused = ran(folder.path(), &["new", name]);
+        assert_eq!(refused.exit, WRONG_INPUT, "{name}");
+        assert!(refused.err.contains("usage/name"), "{}", refused.err);
+    }
+    assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 0, "nothing was written");
+}
+
+#[test]
+fn the_doctor_gives_a_remedy_for_each_missing_thing() {
+    let folder = folder();
+    let text = ran(folder.path(), &["doctor"]);
+    let findings = ran(folder.path(), &["doctor", "--json"]);
+    assert_eq!((text.exit, findings.exit), (GOOD, GOOD), "{}", findings.err);
+    let findings = json(&findings.out);
+    for name in ["tautline", "cores", "pictures", "window", "mp4", "python", "package"] {
+        let finding = findings.as_array().expect("a list").iter().find(|finding| finding["name"] == name);
+        let finding = finding.unwrap_or_else(|| panic!("{name}: {findings}"));
+        assert_eq!(finding["available"] == true, finding["remedy"].is_null(), "{finding}");
+        assert!(text.out.lines().any(|line| line.starts_with(name)), "{}", text.out);
+    }
+    // No program is found on this path, and no window opens without a desktop.
+    let mut bare = Command::new(TAUTLINE);
+    bare.args(["doctor", "--json"]).env("PATH", folder.path()).env_remove("DISPLAY").env_remove("WAYLAND_DISPLAY");
+    let bare = json(&String::from_utf8_lossy(&bare.output().expect("the program").stdout));
+    let missing =
+        |name: &str| bare.as_array().expect("a list").iter().any(|f| f["name"] == name && f["available"] == false);
+    assert!(missing("python") && missing("package"), "{bare}");
+    assert!(!cfg!(target_os = "linux") || missing("window"), "{bare}");
+}
+
+/// Returns the candidates for the last of the words.
+fn completed(folder: &Path, words: &[&str]) -> Vec<String> {
+    let mut shell = Command::new(TAUTLINE);
+    shell.arg("--").args(words).current_dir(folder);
+    shell.env("COMPLETE", "bash").env("_CLAP_COMPLETE_INDEX", (words.len() - 1).to_string()).env("_CLAP_IFS", "\n");
+    let answer = shell.output().expect("the program");
+    assert!(answer.status.success());
+    String::from_utf8(answer.stdout).expect("text").lines().map(str::to_owned).collect()
+}
+
+#[test]
+fn completion_knows_scenarios_files_and_keys() {
+    let folder = folder();
+    fs::write(folder.path().join("circus.toml"), "").expect("a file");
+    assert_eq!(completed(folder.path(), &["tautline", "run", "circ"]), ["circle", "circus.toml"]);
+    assert_eq!(completed(folder.path(), &["tautline", "run", "--set", "law.delta"]), ["law.delta_m="]);
+    assert_eq!(completed(folder.path(), &["tautline", "margin", "--key", "time.dt"]), ["time.dt_s"]);
+    assert_eq!(completed(folder.path(), &["tautline", "run", "--set", "nowhere"]), [] as [&str; 0]);
+}
+
+#[test]
+fn watching_needs_a_file() {
+    let refused = ran(folder().path(), &["run", "pentagon", "--watch"]);
+    assert_eq!(refused.exit, WRONG_INPUT);
+    assert!(refused.err.contains("--watch: `pentagon` is not a file"), "{}", refused.err);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_watched_scenario_is_flown_again_after_each_change() {
+    use std::io::{BufRead as _, BufReader};
+    use std::process::Stdio;
+
+    let folder = folder();
+    assert_eq!(ran(folder.path(), &["new", "ring"]).exit, GOOD);
+    let file = folder.path().join("ring.toml");
+    let text = fs::read_to_string(&file).expect("a scenario");
+    let mut watching = Command::new(TAUTLINE)
+        .args(["run", "ring.toml", "--watch", "--no-snapshots", "--no-figures"])
+        .current_dir(folder.path())
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program");
+    let mut notes = BufReader::new(watching.stderr.take().expect("standard error"));
+    // Returns what is printed up to the next wait.
+    let mut until_it_waits = || {
+        let mut printed = String::new();
+        while !printed.contains("waiting for a change") {
+            assert_ne!(notes.read_line(&mut printed).expect("a line"), 0, "it ended: {printed}");
+        }
+        printed
+    };
+    until_it_waits();
+    fs::write(&file, text.replace("delta_m = 1.0", "delta_m = true")).expect("a wrong scenario");
+    assert!(until_it_waits().contains("delta_m"), "the failure is reported");
+    fs::write(&file, text.replace("duration_s = 60.0", "duration_s = 1.0")).expect("a short flight");
+    until_it_waits();
+    let sent = Command::new("kill").args(["-s", "INT", &watching.id().to_string()]).status();
+    assert!(sent.expect("kill").success());
+    let ended = watching.wait_with_output().expect("an end");
+    let printed = String::from_utf8_lossy(&ended.stdout);
+    assert_eq!(ended.status.code(), BAD, "the last flight did not reach its formation: {printed}");
+    assert!(printed.contains("CLEAR: ") && printed.contains("NOT REACHED: "), "{printed}");
+}
