@@ -30,8 +30,7 @@ NOT_RUN_HERE = {
 
 # (page, beginning of the command): reason for a duration of more than 20 s. Runs with TAUTLINE_LONG, else is parsed.
 LONG = {
-    ("README.md", "tautline margin crazyflies"): "quadrotors, eleven flights and more",
-    ("README.md", "tautline compare"): "sixty flights",
+    ("README.md", "tautline campaign run examples/campaign.toml"): "a thousand flights",
     ("docs/attack.md", "tautline attack pentagon"): "a thousand flights",
     ("docs/campaigns.md", "tautline campaign run examples/campaign.toml"): "a thousand flights",
     ("docs/campaigns.md", "tautline campaign replay out/campaign"): "of the campaign above",
