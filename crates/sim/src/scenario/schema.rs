@@ -212,8 +212,8 @@ pub fn takes_integers_only(source: &Source, overrides: &[Override], key: &str) -
     at.0.is_some_and(|node| node.kind() == "integer")
 }
 
-/// Returns the paths of all keys of the scenario file, such as `law.delta_m`; entries of lists of tables have the number
-/// 1, such as `leg.1.radius_m`. Keys under names that the file chooses, such as `laws.NAME.alpha`, are left out.
+/// Returns the paths of all keys of the scenario file, such as `law.delta_m`. Entries of lists of tables have the
+/// number 1, such as `leg.1.radius_m`. Keys under names that the file chooses, such as `laws.NAME.alpha`, are left out.
 #[must_use]
 pub fn key_paths() -> Vec<String> {
     let mut paths = BTreeSet::new();
