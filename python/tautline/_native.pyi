@@ -68,19 +68,19 @@ class Observation:
     def shared(self) -> bool:
         """Whether every vehicle knows all ``positions`` and ``velocities``; the arrays below are then None."""
     @property
-    def heard_positions(self) -> NDArray[np.float64] | None:
+    def received_positions(self) -> NDArray[np.float64] | None:
         """(N, N, 3) positions [m]; ``[i, j]`` is the last position of vehicle j that vehicle i received."""
     @property
-    def heard_velocities(self) -> NDArray[np.float64] | None:
+    def received_velocities(self) -> NDArray[np.float64] | None:
         """(N, N, 3) velocities [m/s], with the same indices."""
     @property
-    def heard_ages_s(self) -> NDArray[np.float64] | None:
+    def received_ages_s(self) -> NDArray[np.float64] | None:
         """(N, N) ages of these positions and velocities [s]."""
     @property
-    def seen_positions(self) -> NDArray[np.float64] | None:
+    def sensed_positions(self) -> NDArray[np.float64] | None:
         """(N, N, 3) positions [m] of vehicle j from a sensor of vehicle i; None without a sensing range."""
     @property
-    def seen_velocities(self) -> NDArray[np.float64] | None:
+    def sensed_velocities(self) -> NDArray[np.float64] | None:
         """(N, N, 3) velocities [m/s], with the same indices."""
 
 @final

@@ -492,14 +492,14 @@ fn voids(context: &LawContext<'_>) -> Vec<VoidReason> {
     let is_turbulent = exposure.is_some_and(|exposure| exposure.wind.turbulence.is_some());
     let is_led = guidance.is_some_and(|of| matches!(of.known_by, Pinning::Leader(_)));
     let reasons = [
-        (guidance.is_some_and(is_unfed), VoidReason::ReferenceNotFed),
-        (!obstacles.is_empty() && is_carried, VoidReason::CarriedPastObstacles),
+        (guidance.is_some_and(is_unfed), VoidReason::NoFeedForward),
+        (!obstacles.is_empty() && is_carried, VoidReason::ReferenceAmongObstacles),
         (!obstacles.is_empty() && is_driven, VoidReason::VelocityUndamped),
         (
             is_turbulent && (frame(context) == Frame::Ground || exposure.is_some_and(|b| !b.wind.shared)),
             VoidReason::WindUnbounded,
         ),
-        (is_led && exposure.is_some(), VoidReason::LeaderBlown),
+        (is_led && exposure.is_some(), VoidReason::LeaderInWind),
     ];
     reasons.into_iter().filter(|(holds, _)| *holds).map(|(_, void)| void).collect()
 }

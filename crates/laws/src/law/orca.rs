@@ -180,7 +180,7 @@ impl OrcaLaw {
         self.nearest.clear();
         let own_m = row(&at.own.positions_m, i);
         for &j in self.near.of(i) {
-            let apart = (at.seen(i, j).position_m - own_m).norm_squared();
+            let apart = (at.sensed(i, j).position_m - own_m).norm_squared();
             if apart > self.range_m * self.range_m {
                 continue;
             }
@@ -194,15 +194,15 @@ impl OrcaLaw {
 
     /// Returns the half-space of velocities of vehicle i that vehicle j allows.
     fn half_space(&self, at: &Observation<'_>, i: usize, j: usize) -> Result<HalfSpace, LawError> {
-        let seen = at.seen(i, j);
+        let sensed = at.sensed(i, j);
         let own_m_s = row(&at.own.velocities_m_s, i);
-        let towards_m = seen.position_m - row(&at.own.positions_m, i);
+        let towards_m = sensed.position_m - row(&at.own.positions_m, i);
         if towards_m.norm_squared() == 0.0 {
             return Err(LawError::Collision { pair: Pair::new(i, j), separation_m: 0.0, delta_m: self.delta_m });
         }
         let (diameter_m, horizon_s) = (self.diameter_m, self.keys.horizon_s);
         let obstacle = VelocityObstacle { towards_m, diameter_m, horizon_s, parting_s: 1.0 / self.keys.tracking_per_s };
-        let (normal, depth_m_s) = obstacle.way_out(own_m_s - seen.velocity_m_s);
+        let (normal, depth_m_s) = obstacle.way_out(own_m_s - sensed.velocity_m_s);
         Ok(HalfSpace { normal, offset: normal.dot(&own_m_s) + 0.5 * depth_m_s })
     }
 }

@@ -3,10 +3,11 @@
 use nalgebra::Vector3;
 
 use super::consensus::{
-    add_heard, add_laplacian_product, of_errors_m, of_table, relative_kinetic_energy, sum_of_squares_about_mean,
+    add_laplacian_product, add_received_terms, of_errors_m, of_table, relative_kinetic_energy,
+    sum_of_squares_about_mean,
 };
 use super::error::LawError;
-use super::modes::{Heard, HeardLinks, Linear, Mode};
+use super::modes::{DelayedLinks, Linear, Mode, ReceivedStateLoop};
 use crate::formation::Formation;
 use crate::graph::{Graph, Pinning};
 use crate::observation::Observation;
@@ -48,18 +49,18 @@ impl PinnedConsensus {
         let leads = self.pinning.leader().map(|_| lead);
         let eigenvalues = self.graph.pinned_spectrum(&self.pinning);
         let free = eigenvalues.iter().map(|&eigenvalue| gain.times(eigenvalue)).chain(leads).collect();
-        let links = self.heard_links(&eigenvalues);
-        Linear { free, stiffest_contact_mode: None, heard: links.map(|links| Heard { gain, links }) }
+        let links = self.delayed_links(&eigenvalues);
+        Linear { free, stiffest_contact_mode: None, received: links.map(|links| ReceivedStateLoop { gain, links }) }
     }
 
     /// Returns the loop over links if own and received terms have the same modes, or on a star.
-    fn heard_links(&self, eigenvalues: &[f64]) -> Option<HeardLinks> {
+    fn delayed_links(&self, eigenvalues: &[f64]) -> Option<DelayedLinks> {
         let own = self.graph.pinned_diagonal(&self.pinning);
         let (&first, &last) = (own.first()?, own.last()?);
         if own.iter().all(|&other| other == first) {
             // M = D - A. Without a reference the common motion has the eigenvalue 0 of M.
             let common = (self.pinning == Pinning::Unpinned).then_some(first);
-            return Some(HeardLinks::Alike {
+            return Some(DelayedLinks::EqualDegree {
                 own: first,
                 others: eigenvalues.iter().map(|eigenvalue| first - eigenvalue).chain(common).collect(),
             });
@@ -69,7 +70,7 @@ impl PinnedConsensus {
         let is_star = leaves + 1 == self.graph.count()
             && matches!(self.pinning, Pinning::Unpinned | Pinning::All)
             && most - least == (leaves - 1) as f64;
-        is_star.then_some(HeardLinks::Star { hub: most, leaf: least, leaves: leaves as f64 })
+        is_star.then_some(DelayedLinks::Star { hub: most, leaf: least, leaves: leaves as f64 })
     }
 
     /// Adds to row i `scale` times the sum over neighbours j of `k (e_i - e_j) + c (v_i - v_j)`, plus `scale` times
@@ -99,9 +100,9 @@ impl PinnedConsensus {
                 add_laplacian_product(&self.graph, &of_table(&self.pulls), scale, sums);
             }
         } else {
-            add_heard(at, sums, |i, own, j, heard| {
-                let error_m = (own.position_m - row(slots_m, i)) - (heard.position_m - row(slots_m, j));
-                Ok(scale * (k * error_m + c * (own.velocity_m_s - heard.velocity_m_s)))
+            add_received_terms(at, sums, |i, own, j, received| {
+                let error_m = (own.position_m - row(slots_m, i)) - (received.position_m - row(slots_m, j));
+                Ok(scale * (k * error_m + c * (own.velocity_m_s - received.velocity_m_s)))
             })?;
         }
         if matches!(self.pinning, Pinning::All | Pinning::Listed(_)) {

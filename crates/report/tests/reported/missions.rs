@@ -204,7 +204,7 @@ fn followers_lag_without_feed_forward_of_the_leaders_acceleration() {
     assert!(exact.iter().all(|&lag_m| lag_m < 1e-3), "{exact:?}");
     assert!(certificate.certified_m.is_some());
     let (late, certificate) = flown(false);
-    assert!(certificate.void.contains(&VoidReason::ReferenceNotFed));
+    assert!(certificate.void.contains(&VoidReason::NoFeedForward));
     let rate_per_s = std::f64::consts::TAU / RADIUS_PERIOD_S;
     let expected_m = 1e4 * rate_per_s * rate_per_s;
     assert!(late.iter().all(|lag_m| (lag_m - expected_m).abs() < 0.01 * expected_m), "{late:?} {expected_m}");

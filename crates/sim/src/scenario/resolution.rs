@@ -63,8 +63,8 @@ impl Scenario {
         let ignored = !self.obstacles.is_empty() && !law.capabilities().avoids_obstacles;
         let is_uncounted = !self.wind.is_still() && !law.capabilities().certifies_under_wind;
         self.with_scenario_limits(self.promised(law))
-            .void_where(ignored, VoidReason::ObstaclesUnknown)
-            .void_where(is_uncounted, VoidReason::Windblown)
+            .void_where(ignored, VoidReason::ObstaclesNotAvoided)
+            .void_where(is_uncounted, VoidReason::WindNotCovered)
     }
 
     /// Certificate of all legs, with the spread slots that a leg begins with under `deadlock.mode = "start"`.
@@ -91,7 +91,7 @@ impl Scenario {
     #[must_use]
     pub fn with_scenario_limits(&self, promised: Certificate) -> Certificate {
         let of_time = self.time.control_hz.map(|_| VoidReason::CommandsHeld);
-        let of_body = (!self.airframe.is_point()).then_some(VoidReason::NotAPoint);
+        let of_body = (!self.airframe.is_point()).then_some(VoidReason::VehicleNotPoint);
         let of_links = self.imperfections().into_iter().flat_map(ImperfectionSpec::voids);
         let voids = of_time.into_iter().chain(of_links).chain(of_body);
         let promised = voids.fold(promised, |promised, void| promised.void_where(true, void));

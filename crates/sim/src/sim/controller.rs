@@ -7,7 +7,7 @@ use crate::scenario::Scenario;
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::graph::Graph;
 use tautline_laws::law::{Certificate, Law, LawError, certificate_through};
-use tautline_laws::observation::{Observation, Others};
+use tautline_laws::observation::{Observation, OtherStates};
 use tautline_laws::space::{Metric, Obstacle, VerletList};
 use tautline_laws::target::{Change, CurrentTarget, Guidance, Supervisor};
 
@@ -67,8 +67,8 @@ impl Controller {
         let Some(command) = command else { return Ok(()) };
         if let Some(range_m) = self.law.capabilities().sensing_range_m {
             let from = match sensed.others {
-                Others::Shared => None,
-                Others::Held(picture) => picture.near_from(),
+                OtherStates::Shared => None,
+                OtherStates::PerVehicle(picture) => picture.near_search_positions(),
             };
             let (positions_m, slack_m) = from.unwrap_or((&sensed.own.positions_m, 0.0));
             self.near.update(positions_m, range_m + slack_m);

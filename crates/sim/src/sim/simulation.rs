@@ -175,7 +175,7 @@ impl Simulation {
         }
         if self.ending.is_none() {
             self.overruled = true;
-            self.certificate = self.certificate.clone().void_where(true, VoidReason::CommandsFromOutside);
+            self.certificate = self.certificate.clone().void_where(true, VoidReason::ExternalCommands);
             self.control.clone_from(commands);
             self.plant.apply(commands, &mut self.state);
         }

@@ -136,7 +136,7 @@ fn ignorant(scenario: &Scenario) -> (Flight, Log) {
 fn a_law_without_obstacles_hits_them_and_has_no_certificate() {
     let too_near = (0..12).map(among).filter(|scenario| {
         let (flight, log) = ignorant(scenario);
-        assert_eq!(flight.certificate.void, [VoidReason::ObstaclesUnknown]);
+        assert_eq!(flight.certificate.void, [VoidReason::ObstaclesNotAvoided]);
         let clearance = flight.clearance.expect("obstacles");
         let began = log.events.iter().filter(|event| matches!(event, Event::ObstacleViolationBegan { .. })).count();
         assert_eq!(began, clearance.violations.len());
@@ -219,7 +219,7 @@ fn a_moving_reference_or_added_energy_voids_the_certificate_among_obstacles() {
     assert!(certified(&scenario).certified_room_m.is_some(), "with drag it needs no reference");
     let motion = ReferenceMotion::Velocity { from_m: Vector3::zeros(), velocity_m_s: Vector3::x() };
     scenario.reference = guidance.map(|guidance| Guidance { motion, ..guidance });
-    assert_eq!(certified(&scenario).void, [VoidReason::CarriedPastObstacles]);
+    assert_eq!(certified(&scenario).void, [VoidReason::ReferenceAmongObstacles]);
     assert!(certified(&scenario).certified_m.is_none());
 }
 

@@ -9,10 +9,10 @@ use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::formation::{Formation, largest_edge_error_m};
 use tautline_laws::graph::Graph;
 use tautline_laws::law::{EdgeTensionKeys, LaplacianKeys, LawSpec, PotentialKeys, VoidReason};
-use tautline_laws::observation::{Held, Others};
+use tautline_laws::observation::{OtherStates, StateTables};
 use tautline_laws::target::{Begins, CurrentTarget, Leg, Supervisor};
 use tautline_sim::continuous::{self, Tolerances};
-use tautline_sim::link::{Imperfections, Sensed};
+use tautline_sim::link::{Imperfections, StateEstimates};
 use tautline_sim::metrics::Metrics;
 use tautline_sim::scenario::{PlantSpec, Scenario};
 use tautline_sim::sim::{self, Components, Ending, SimError, Simulation};
@@ -218,7 +218,7 @@ fn a_delayed_flight_does_not_depend_on_the_steps_that_were_refused() {
         scenario.sensing.latency_s = 0.05;
         let (flight, log) = fly(&scenario);
         let refused = log.events.iter().any(|event| matches!(event, Event::StepRefined { .. }));
-        assert!(flight.certificate.void.contains(&VoidReason::KnownLate), "late knowledge voids the certificate");
+        assert!(flight.certificate.void.contains(&VoidReason::SensingDelayed), "late knowledge voids the certificate");
         (flight.last.positions_m, refused)
     };
     let ((coarse, refused), (fine, _)) = (end(0.4), end(0.4 / 128.0));
@@ -272,7 +272,7 @@ fn commands_from_outside_void_the_certificate_in_continuous_time() {
     (0..240).for_each(|_| still.step_with(&Rows::zeros(5)).expect("finite commands"));
     assert_eq!(still.state(), &scenario.start, "no vehicle is accelerated");
     let certificate = still.finish().certificate;
-    assert_eq!((certificate.certified_m, certificate.void), (None, vec![VoidReason::CommandsFromOutside]));
+    assert_eq!((certificate.certified_m, certificate.void), (None, vec![VoidReason::ExternalCommands]));
 }
 
 /// Returns two vehicles that drift at each other, 1 mm before the barrier.
@@ -370,17 +370,17 @@ fn a_leg_that_the_scenario_does_not_have_is_never_reached() {
 
 /// Imperfections that give each vehicle its own copy of the true state.
 #[derive(Clone)]
-struct Copied(Option<Held>);
+struct Copied(Option<StateTables>);
 
 impl Imperfections for Copied {
-    fn sense<'a>(&'a mut self, _: f64, truth: &'a Swarm) -> Sensed<'a> {
+    fn sense<'a>(&'a mut self, _: f64, truth: &'a Swarm) -> StateEstimates<'a> {
         let count = truth.count();
-        let held = Held {
-            heard: vec![truth.clone(); count],
+        let held = StateTables {
+            received: vec![truth.clone(); count],
             ages_s: vec![vec![0.0; count]; count],
-            seen: vec![truth.clone(); count],
+            sensed: vec![truth.clone(); count],
         };
-        Sensed { own: truth, others: Others::Held(self.0.insert(held)) }
+        StateEstimates { own: truth, others: OtherStates::PerVehicle(self.0.insert(held)) }
     }
 }
 

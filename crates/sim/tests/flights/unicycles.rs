@@ -114,7 +114,7 @@ fn five_unicycles_fly_in_a_pentagon_without_a_certificate() {
     let scenario = read(FLIGHT);
     let (flight, log) = fly(&scenario);
     assert_eq!((flight.ending.clone(), flight.audit.status), (Ending::Completed, Status::Clear));
-    assert!(flight.certificate.certified_m.is_none() && flight.certificate.void.contains(&VoidReason::NotAPoint));
+    assert!(flight.certificate.certified_m.is_none() && flight.certificate.void.contains(&VoidReason::VehicleNotPoint));
     let formation = scenario.formation();
     let last = &flight.last;
     for (i, j) in scenario.graph.edges() {

@@ -43,7 +43,7 @@ fn five_crazyflies_reach_the_pentagon_clear_with_nothing_certified() {
     let scenario = builtin("crazyflies", &[]);
     let (flown, log) = fly(&scenario);
     assert_eq!((flown.ending, flown.audit.status), (Ending::Completed, Status::Clear));
-    assert!(flown.certificate.void.contains(&VoidReason::NotAPoint) && flown.certificate.certified_m.is_none());
+    assert!(flown.certificate.void.contains(&VoidReason::VehicleNotPoint) && flown.certificate.certified_m.is_none());
     let error_m = largest_edge_error_m(&flown.last.positions_m, scenario.formation(), &scenario.graph);
     assert!(error_m < scenario.arrival.edge_error_m, "{error_m} m");
     // The height is held up to the sag of a tilt.
