@@ -65,7 +65,7 @@ fn steps(criterion: &mut Criterion, name: &str, scenario: &Scenario, steps: u16)
             bencher.iter_batched(
                 || Simulation::new(scenario).expect("a law and a judge"),
                 |simulation| {
-                    pool.install(|| sim::fly_on(simulation, &mut (), &mut |_| ControlFlow::Continue(())))
+                    pool.install(|| sim::continue_flight(simulation, &mut (), &mut |_| ControlFlow::Continue(())))
                         .expect("a clean flight")
                 },
                 BatchSize::LargeInput,

@@ -39,7 +39,7 @@ impl Law for SpringsAndRepulsion {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let scenario = Scenario::read(&Source::resolve("pentagon")?, &[])?;
-    let parts = Components::under(&scenario, Box::new(SpringsAndRepulsion));
+    let parts = Components::with_law(&scenario, Box::new(SpringsAndRepulsion));
     let flight = sim::fly(&scenario, parts, &mut (), &mut |_step| ControlFlow::Continue(()))?;
     println!("{}: {:?}", flight.law, flight.audit.status);
     if let Some(closest) = flight.audit.closest {

@@ -142,11 +142,11 @@ pub(crate) fn fly(
     let mut signals = Signals::new();
     let flight = || -> Result<_, SimError> {
         let preflight = match &law {
-            Some(law) => Preflight::under(scenario, law),
+            Some(law) => Preflight::with_law(scenario, law),
             None => Preflight::of(scenario)?,
         };
         let parts = match law {
-            Some(law) => Components::under(scenario, Box::new(law)),
+            Some(law) => Components::with_law(scenario, Box::new(law)),
             None => Components::of(scenario)?,
         };
         let recording = record.as_deref().map(|path| {

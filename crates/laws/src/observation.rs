@@ -1,8 +1,8 @@
 //! Input of a control law at one instant.
 //!
 //! Vehicle i knows its own state and the target. Of each other vehicle j it has two states. The *received* state came
-//! over a link of the graph, with the age of the message. The *sensed* state is measured by its own sensor. If every vehicle knows the true present state of every other, all of these are one shared table without
-//! copies.
+//! over a link of the graph, with the age of the message. The *sensed* state is measured by its own sensor. If
+//! every vehicle knows the true present state of every other, all of these are one shared table without copies.
 
 use std::fmt;
 

@@ -40,7 +40,7 @@ pub fn run_while(
 }
 
 /// Flies a scenario like [`run_while`], with parts that may differ from those of the scenario, such as another law.
-/// `preflight` is the check of that law ([`Preflight::under`]). Also returns how the flight ended.
+/// `preflight` is the check of that law ([`Preflight::with_law`]). Also returns how the flight ended.
 ///
 /// # Errors
 /// As [`run`].
@@ -53,8 +53,8 @@ pub fn run_with(
 ) -> Result<(Report, Ending), SimError> {
     let freedom = parts.law.capabilities().controls.freedom();
     let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival)
-        .free_by(freedom)
-        .carried_by(scenario.reference.as_ref());
+        .with_freedom(freedom)
+        .with_reference(scenario.reference.as_ref());
     let mut state_hash = StateHash::new();
     let is_beside = scenario.count() >= BESIDE_FROM && rayon::current_num_threads() > 1 && !sink.looks_at_steps();
     let mut recorders = (sink, &mut state_hash);
@@ -69,7 +69,7 @@ pub fn run_with(
         flight: &flight,
         summary: &metrics.finish(),
         ended_legs: metrics.ended_legs(),
-        strain: metrics.strain(),
+        quadrotor_peaks: metrics.quadrotor_peaks(),
         state_hash: &state_hash.finish(),
     });
     Ok((report, flight.ending))

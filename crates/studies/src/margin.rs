@@ -14,7 +14,7 @@ use tautline_core::text::{as_toml, counted, significant};
 use tautline_report::figures::{Share, margin as figure};
 use tautline_report::report::page::{Badge, Tone};
 use tautline_report::request::{Failure, ScenarioRequest, in_range};
-use tautline_sim::preflight::{Bound, Near, PredictedMargin, Preflight};
+use tautline_sim::preflight::{Bound, ContactState, PredictedMargin, Preflight};
 use tautline_sim::scenario::Scenario;
 
 /// Admitted numbers of scanned values.
@@ -278,7 +278,8 @@ impl Margin {
 /// Returns a prediction of linear theory in words.
 fn prediction(margin: &PredictedMargin) -> String {
     let bound = if margin.bound == Bound::AtMost { "up to" } else { "from" };
-    let state = if margin.state == Near::Free { "without contact" } else { "with the nearest pairs in contact" };
+    let state =
+        if margin.state == ContactState::Free { "without contact" } else { "with the nearest pairs in contact" };
     margin.value.map_or_else(|| format!("any {state}"), |value| format!("{bound} {} {state}", significant(value, 4)))
 }
 

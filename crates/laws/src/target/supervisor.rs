@@ -75,7 +75,7 @@ impl Schedule {
 
     /// Sets the motions by which a reached formation may differ from its slots; any rigid motion by default.
     #[must_use]
-    pub fn free_by(mut self, freedom: Freedom) -> Self {
+    pub fn with_freedom(mut self, freedom: Freedom) -> Self {
         self.freedom = freedom;
         self
     }
@@ -92,7 +92,7 @@ impl Schedule {
     /// Ignores the common position error of all vehicles in the detection of stalls if `is_blown`, because a wind keeps
     /// all vehicles off their slots. Call after [`Schedule::deadlock_recovery`].
     #[must_use]
-    pub fn blown(mut self, is_blown: bool) -> Self {
+    pub fn with_wind(mut self, is_blown: bool) -> Self {
         if let Some(resolver) = self.resolver.as_mut().filter(|_| is_blown) {
             resolver.ignore_common_errors();
         }

@@ -14,7 +14,7 @@ use tautline_core::record::{DeadlockRecovery, Reassignment};
 use tautline_core::swarm::{ClosestApproach, Pair};
 use tautline_laws::law::{Certificate, VoidReason};
 use tautline_sim::link::Traffic;
-use tautline_sim::metrics::{LegSummary, Strain, Summary};
+use tautline_sim::metrics::{LegSummary, QuadrotorPeaks, Summary};
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::{Failure, FailureKind, Scenario};
 use tautline_sim::sim::{Breakdown, Ending, Flight};
@@ -392,7 +392,7 @@ pub struct FlightResult<'a> {
     /// Legs that ended before the last one.
     pub ended_legs: &'a [LegSummary],
     /// Extremes of tilt and thrust, for quadrotors.
-    pub strain: Option<Strain>,
+    pub quadrotor_peaks: Option<QuadrotorPeaks>,
     /// [`tautline_core::record::StateHash`] of the recorded states.
     pub state_hash: &'a str,
 }
@@ -510,7 +510,7 @@ impl FlightResult<'_> {
 
     fn vehicle(&self) -> Option<VehicleNumbers> {
         let model = &self.scenario.airframe.quadrotor()?.model;
-        let Strain { max_tilt_rad, max_thrust_n } = self.strain?;
+        let QuadrotorPeaks { max_tilt_rad, max_thrust_n } = self.quadrotor_peaks?;
         Some(VehicleNumbers {
             model: model.name.clone(),
             max_tilt_deg: max_tilt_rad.to_degrees(),

@@ -135,7 +135,7 @@ impl Case {
             flight: &flight,
             summary: &self.summary,
             ended_legs: &self.ended_legs,
-            strain: None,
+            quadrotor_peaks: None,
             state_hash: "0123456789abcdef",
         })
     }

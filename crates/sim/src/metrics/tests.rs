@@ -76,7 +76,7 @@ fn a_reassigned_vehicle_is_compared_with_its_new_slot() {
     let (mut legs, graph) = pair_of_vehicles();
     legs[0].interchangeable = true;
     let swapped = Swarm::at_rest(legs[0].formation.reordered(&[1, 0]).slots_m);
-    let mut metrics = Metrics::new(&legs, &graph, JUDGE).free_by(Freedom::Translation);
+    let mut metrics = Metrics::new(&legs, &graph, JUDGE).with_freedom(Freedom::Translation);
     let look = |metrics: &mut Metrics<'_>| {
         metrics.observe(&Sample::new(0.0, 0, &swapped, &Rows::zeros(2)));
         metrics.finish().rms_position_error_m

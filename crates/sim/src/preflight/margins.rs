@@ -12,7 +12,7 @@ pub struct PredictedMargin {
     /// Key of the imperfection.
     pub key: &'static str,
     /// Contact of the vehicles near their slots.
-    pub state: Near,
+    pub state: ContactState,
     /// Whether `value` is an upper or a lower limit.
     pub bound: Bound,
     /// Limit in the unit of the key; null if every value is tolerated.
@@ -22,7 +22,7 @@ pub struct PredictedMargin {
 /// Contact of the vehicles near their slots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Near {
+pub enum ContactState {
     /// No pair in contact: beyond the limit the smallest disturbance grows. An upper bound on the tolerance.
     Free,
     /// The nearest pairs at the edge of contact, as they are at the goal: a lower bound on the tolerance.
@@ -59,14 +59,16 @@ pub(super) fn margins(law: &dyn Law, scenario: &Scenario) -> Vec<PredictedMargin
         bound: Bound::AtLeast,
         value: finite(1.0 / period_s).filter(|rate_hz| *rate_hz > 0.0),
     };
-    let mut margins = vec![at_most(SENSING_LATENCY, Near::Free, linear.delay_margin_s(a22_per_s))];
+    let mut margins = vec![at_most(SENSING_LATENCY, ContactState::Free, linear.delay_margin_s(a22_per_s))];
     margins.extend(
-        stiffest_contact_mode.map(|mode| at_most(SENSING_LATENCY, Near::InContact, mode.delay_margin_s(a22_per_s))),
+        stiffest_contact_mode
+            .map(|mode| at_most(SENSING_LATENCY, ContactState::InContact, mode.delay_margin_s(a22_per_s))),
     );
     let received_s = received.as_ref().and_then(|received| received.delay_margin_s(a22_per_s));
-    margins.extend(received_s.map(|received_s| at_most(NETWORK_LATENCY, Near::Free, received_s)));
-    margins.push(at_least(Near::Free, linear.sampling_margin_s(a22_per_s)));
-    margins.extend(stiffest_contact_mode.map(|mode| at_least(Near::InContact, mode.sampling_margin_s(a22_per_s))));
+    margins.extend(received_s.map(|received_s| at_most(NETWORK_LATENCY, ContactState::Free, received_s)));
+    margins.push(at_least(ContactState::Free, linear.sampling_margin_s(a22_per_s)));
+    margins
+        .extend(stiffest_contact_mode.map(|mode| at_least(ContactState::InContact, mode.sampling_margin_s(a22_per_s))));
     margins
 }
 
@@ -75,13 +77,13 @@ fn finite(value: f64) -> Option<f64> {
 }
 
 /// Returns a message if a scenario exceeds a margin of free vehicles.
-pub(super) fn beyond(margins: &[PredictedMargin], scenario: &Scenario) -> Option<String> {
+pub(super) fn exceeded_margin(margins: &[PredictedMargin], scenario: &Scenario) -> Option<String> {
     let given = |key: &str| match key {
         SENSING_LATENCY => Some(scenario.sensing.latency_s),
         NETWORK_LATENCY => Some(scenario.network.latency_s),
         _ => scenario.time.control_hz,
     };
-    margins.iter().filter(|margin| margin.state == Near::Free).find_map(|margin| {
+    margins.iter().filter(|margin| margin.state == ContactState::Free).find_map(|margin| {
         let (given, value) = (given(margin.key)?, margin.value?);
         let (is_beyond, limit) = match margin.bound {
             Bound::AtMost => (given > value, "upper"),
@@ -103,7 +105,7 @@ pub(super) fn beyond(margins: &[PredictedMargin], scenario: &Scenario) -> Option
 pub(super) fn line(margins: &[PredictedMargin]) -> Option<String> {
     let of = |key: &str| {
         let mut parts = margins.iter().filter(|margin| margin.key == key).map(|margin| {
-            let state = if margin.state == Near::Free { "" } else { " in contact" };
+            let state = if margin.state == ContactState::Free { "" } else { " in contact" };
             let bound = if margin.bound == Bound::AtMost { "up to" } else { "from" };
             margin.value.map_or_else(|| format!("any{state}"), |value| format!("{bound} {}{state}", significant(value)))
         });

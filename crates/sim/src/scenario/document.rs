@@ -97,12 +97,12 @@ pub(super) struct Document {
     #[serde(default, skip_serializing_if = "is_default")]
     pub(super) noise: NoiseTable,
     #[serde(skip)]
-    pub(super) given: Given,
+    pub(super) given: TimeKeys,
 }
 
 /// Keys of `[time]` that the file gives; the others depend on other tables.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Given {
+pub(super) struct TimeKeys {
     pub(super) dt_s: bool,
     pub(super) record_hz: bool,
     pub(super) max_halvings: bool,

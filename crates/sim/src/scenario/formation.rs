@@ -179,7 +179,7 @@ pub(super) fn formation(shape: &FormationShape, count: usize, delta_m: f64) -> R
 }
 
 /// Resolves the file of a shape relative to a folder, and replaces a file of points by a list.
-pub(super) fn found_from(folder: &std::path::Path, shape: &mut FormationShape) -> Result<(), ScenarioError> {
+pub(super) fn resolve_path(folder: &std::path::Path, shape: &mut FormationShape) -> Result<(), ScenarioError> {
     match shape {
         FormationShape::Svg(keys) => keys.file = keys.file.take().map(|file| folder.join(file)),
         FormationShape::Image(keys) => keys.file = folder.join(&keys.file),

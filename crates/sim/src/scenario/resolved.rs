@@ -7,8 +7,8 @@ use sha2::{Digest, Sha256};
 use toml::{Table, Value};
 
 use super::document::{
-    Assignment, Document, FormationShape, FormationTable, Given, LawTable, LegTable, NoiseTable, Placement, PlantTable,
-    SafetyTable, StartTable, SwarmTable,
+    Assignment, Document, FormationShape, FormationTable, LawTable, LegTable, NoiseTable, Placement, PlantTable,
+    SafetyTable, StartTable, SwarmTable, TimeKeys,
 };
 use super::document::{Edge, LegStart, PerVehicle, Point};
 use super::graph::{GraphKind, GraphTable};
@@ -114,7 +114,7 @@ impl From<&Scenario> for Document {
             actuation: scenario.actuation,
             failure: scenario.failures.clone(),
             noise: NoiseTable { seed: scenario.noise_seed },
-            given: Given::default(),
+            given: TimeKeys::default(),
         }
     }
 }

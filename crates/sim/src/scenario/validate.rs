@@ -2,11 +2,11 @@
 
 use nalgebra::Vector3;
 
-use super::check::{Misfit, conform};
+use super::check::{SchemaError, check_schema};
 use super::error::ScenarioError;
 use super::limits::{
     CONTACT_PREDICTION_M, MAX_NAME_CHARS, MAX_STEPS, SLOT_MARGIN, check_count, check_lengths, check_memory,
-    first_within, may_be_in_a_name, require_finite,
+    first_pair_within, is_name_character, require_finite,
 };
 use super::spec::{Safety, Scenario, Space};
 use super::text::Text;
@@ -43,7 +43,7 @@ impl Scenario {
         let resolved = self.resolved_toml();
         let mut tree = Text { name: &self.name, toml: &resolved, overrides: &[] }.tree()?;
         self.check_lengths()?;
-        conform(&mut tree, resolved.len() + 1).map_err(Misfit::without_text)?;
+        check_schema(&mut tree, resolved.len() + 1).map_err(SchemaError::without_text)?;
         self.check()
     }
 
@@ -263,7 +263,7 @@ impl Scenario {
         };
         let metric = self.metric();
         let apart = if metric.is_metres() { "apart," } else { "apart, scaled to the ellipsoid," };
-        if let Some((pair, separation_m)) = first_within(&metric.scaled_rows(&self.start.positions_m), delta_m) {
+        if let Some((pair, separation_m)) = first_pair_within(&metric.scaled_rows(&self.start.positions_m), delta_m) {
             let said = if separation_m == 0.0 {
                 format!("vehicles {pair} start at the same point")
             } else {
@@ -274,7 +274,7 @@ impl Scenario {
         }
         let least_m = delta_m * (1.0 + SLOT_MARGIN);
         let too_near = |(number, leg): (usize, &Leg)| {
-            Some((number, first_within(&metric.scaled_rows(&leg.formation.slots_m), least_m)?))
+            Some((number, first_pair_within(&metric.scaled_rows(&leg.formation.slots_m), least_m)?))
         };
         if let Some((leg, (pair, distance_m))) = self.legs.iter().enumerate().find_map(too_near) {
             let [a, b] = pair.numbers();
@@ -374,7 +374,7 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
         "the name is empty".to_owned()
     } else if name.chars().count() > MAX_NAME_CHARS {
         format!("the name has more than {MAX_NAME_CHARS} characters")
-    } else if let Some(bad) = name.chars().find(|&c| !may_be_in_a_name(c)) {
+    } else if let Some(bad) = name.chars().find(|&c| !is_name_character(c)) {
         format!("the name contains {bad:?}")
     } else {
         return Ok(());

@@ -6,7 +6,7 @@ use tautline_laws::formation::Formation;
 use tautline_laws::law::VoidReason;
 use tautline_laws::wind::{Gust, WindSpec};
 use tautline_sim::continuous::{self, Tolerances};
-use tautline_sim::plant::{Path, rapier};
+use tautline_sim::plant::{StepPath, rapier};
 use tautline_sim::scenario::{Override, PlantSpec, Scenario, Source, TimeSpec};
 use tautline_sim::sim::Simulation;
 
@@ -171,7 +171,7 @@ fn an_undone_step_is_repeated_in_the_same_wind() {
     );
     let mut straight = rapier::plant(&scenario);
     let mut halting = straight.clone();
-    let (mut state, mut path, command) = (scenario.start.clone(), Path::default(), Rows::zeros(5));
+    let (mut state, mut path, command) = (scenario.start.clone(), StepPath::default(), Rows::zeros(5));
     let mut other: Swarm = state.clone();
     straight.apply(&command, &mut state);
     halting.apply(&command, &mut other);

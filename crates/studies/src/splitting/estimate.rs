@@ -10,7 +10,7 @@ use crate::statistics::{CONFIDENCE, Estimate, Proportion};
 use tautline_core::record::{Event, RecordError, Sample, Sink, StateHash, Step};
 use tautline_report::request::Failure;
 use tautline_sim::scenario::Scenario;
-use tautline_sim::sim::{Flight, Saved, SimError, Simulation, fly_on};
+use tautline_sim::sim::{Flight, SavedState, SimError, Simulation, continue_flight};
 
 /// Recommended smallest number of flights. With fewer, many estimates end without a survivor.
 const ENOUGH: usize = 100;
@@ -105,7 +105,7 @@ pub struct Splitting {
 /// The result depends only on the scenario, the settings, `seed` and `repetition`. `carry_on` is called after each step
 /// with the number of all steps; if it breaks, the result is `None`.
 ///
-/// Memory holds at most ten states of each flight ([`Saved`]), each 30 kB for 3 vehicles and 0.3 MB for 100. A hundred
+/// Memory holds at most ten states of each flight ([`SavedState`]), each 30 kB for 3 vehicles and 0.3 MB for 100. A hundred
 /// flights of 100 vehicles take 0.3 GB.
 ///
 /// # Errors
@@ -159,7 +159,7 @@ struct Running<'a> {
 }
 
 impl Path for Running<'_> {
-    type Saved = Saved;
+    type Saved = SavedState;
     type Error = SimError;
 
     fn begin(&mut self, noise_seed: u64) -> Result<(), SimError> {
@@ -179,17 +179,17 @@ impl Path for Running<'_> {
         self.simulation.least_clearance_m().map_or(f64::NEG_INFINITY, |clearance_m| -clearance_m)
     }
 
-    fn save(&self) -> Saved {
+    fn save(&self) -> SavedState {
         self.simulation.save()
     }
 
-    fn restore(&mut self, saved: &Saved, noise_seed: Option<u64>) {
+    fn restore(&mut self, saved: &SavedState, noise_seed: Option<u64>) {
         self.simulation.load(saved, noise_seed);
     }
 }
 
 /// Returns up to `keep` of the violated flights, those with different first ancestors first.
-fn bad(path: &mut Running<'_>, split: &mut Split<Saved>, keep: usize) -> Vec<BadFlight> {
+fn bad(path: &mut Running<'_>, split: &mut Split<SavedState>, keep: usize) -> Vec<BadFlight> {
     let hit: Vec<_> = split.lineages.iter().filter(|lineage| lineage.score() > 0.0).collect();
     let ancestor = |lineage: &Lineage<_>| lineage.genealogy().noise_seed;
     let earlier = |index: usize| hit[..index].iter().filter(|other| ancestor(other) == ancestor(hit[index])).count();
@@ -281,7 +281,7 @@ pub fn replay(scenario: &Scenario, genealogy: &Genealogy, sink: &mut dyn Sink) -
         ControlFlow::Continue(())
     };
     let _goes_on = take_over(&mut simulation);
-    fly_on(simulation, sink, &mut take_over)
+    continue_flight(simulation, sink, &mut take_over)
 }
 
 /// Returns the scenario at its start, with a seed of noise.
