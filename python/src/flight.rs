@@ -62,7 +62,7 @@ impl Sink for Samples {
         Ok(())
     }
 
-    fn looks_at_steps(&self) -> bool {
+    fn needs_steps(&self) -> bool {
         false
     }
 }
@@ -118,7 +118,7 @@ impl Sink for OutputFiles {
         self.page.as_mut().map_or(Ok(()), |page| page.event(event))
     }
 
-    fn looks_at_steps(&self) -> bool {
+    fn needs_steps(&self) -> bool {
         false
     }
 }

@@ -202,7 +202,7 @@ impl Sink for McapRecorder {
         self.flush_if_due(event.time_s())
     }
 
-    fn looks_at_steps(&self) -> bool {
+    fn needs_steps(&self) -> bool {
         false
     }
 }

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::report::OfVehicle;
-use tautline_audit::envelope::{Corner, Exceeding, Limit, LimitOutcome};
+use tautline_audit::envelope::{Corner, Exceedance, Limit, LimitOutcome};
 use tautline_audit::recorded::Outcome;
 use tautline_audit::{Status, Tally};
 use tautline_core::text::{at_least, at_most, counted, exact, fixed, seconds};
@@ -18,7 +18,7 @@ pub struct OfLimit {
     /// Status of the limit.
     pub status: Status,
     /// Value closest to the limit or farthest beyond it; null if no value is known.
-    pub extreme: Option<OfVehicle<Exceeding>>,
+    pub extreme: Option<OfVehicle<Exceedance>>,
     /// Assumptions beyond the motion between samples; null without any.
     pub assumes: Option<String>,
     /// Corners of curves, where the velocity jumps and the limit is not applied; null without corners.
@@ -28,9 +28,9 @@ pub struct OfLimit {
     /// Number of undecided times, and how many are listed.
     pub undecided_tally: Tally,
     /// Violations; of a long list the worst, and the first of each vehicle.
-    pub violations: Vec<OfVehicle<Exceeding>>,
+    pub violations: Vec<OfVehicle<Exceedance>>,
     /// Undecided times, cut in the same way.
-    pub undecided: Vec<OfVehicle<Exceeding>>,
+    pub undecided: Vec<OfVehicle<Exceedance>>,
     /// Vehicles for which the quantity is unknown.
     pub unknown: Vec<String>,
     #[serde(skip)]
@@ -61,7 +61,7 @@ impl OfCorners {
 
 impl OfLimit {
     pub(super) fn new(found: &LimitOutcome, outcome: &Outcome) -> Self {
-        let named = |of: &Exceeding| OfVehicle::new(outcome, of.vehicle, *of);
+        let named = |of: &Exceedance| OfVehicle::new(outcome, of.vehicle, *of);
         let largest = |of: Corner| OfVehicle::new(outcome, of.vehicle, of);
         let corners = found.corners.map(|of| OfCorners { count: of.count, largest: largest(of.largest) });
         let assumes: Vec<_> = found.assumes.iter().cloned().chain(corners.as_ref().map(OfCorners::assumed)).collect();
@@ -101,7 +101,7 @@ impl OfLimit {
     }
 
     /// Formats the value of an extreme or of a violation, rounded so that the statement holds.
-    fn value(&self, of: &Exceeding) -> String {
+    fn value(&self, of: &Exceedance) -> String {
         let (lower, upper) = (of.lower, of.upper);
         let number = match (lower.is_finite(), upper.is_finite()) {
             (false, false) => return "not known".to_owned(),
@@ -177,16 +177,16 @@ impl OfLimit {
     }
 
     /// Returns a violation or an undecided time in a sentence.
-    pub(super) fn in_words(&self, of: &OfVehicle<Exceeding>, is_violation: bool) -> String {
+    pub(super) fn in_words(&self, of: &OfVehicle<Exceedance>, is_violation: bool) -> String {
         self.words(of, if is_violation { "beyond" } else { "against" })
     }
 
     /// Returns a violation or an undecided time in a few words.
-    pub(super) fn in_short(&self, OfVehicle { vehicle, finding }: &OfVehicle<Exceeding>) -> String {
+    pub(super) fn in_short(&self, OfVehicle { vehicle, finding }: &OfVehicle<Exceedance>) -> String {
         format!("{vehicle}: {} {} (limit {})", self.quantity_name(), self.value(finding), self.limit_in_words())
     }
 
-    fn words(&self, OfVehicle { vehicle, finding }: &OfVehicle<Exceeding>, how: &str) -> String {
+    fn words(&self, OfVehicle { vehicle, finding }: &OfVehicle<Exceedance>, how: &str) -> String {
         format!(
             "{vehicle}: {} {} by {} s, {how} the limit of {} from {} s to {} s",
             self.quantity_name(),

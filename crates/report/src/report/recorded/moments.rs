@@ -4,7 +4,7 @@ use super::report::RecordedReport;
 use super::report::{OfPair, OfVehicle};
 use super::words::interval;
 use crate::replay::{Judged, Kind, LONGEST_NAME, Moment, Span, cut};
-use tautline_audit::envelope::Exceeding;
+use tautline_audit::envelope::Exceedance;
 use tautline_audit::recorded::{Approach, Gap, ObjectPair};
 use tautline_audit::{Undecided, Violation};
 
@@ -40,8 +40,8 @@ impl RecordedReport {
     fn moments_of_limits(&self) -> Vec<Moment> {
         let of_limit = |limit: &super::envelope::OfLimit| {
             let named = |kind: Kind| {
-                move |of: &OfVehicle<Exceeding>| {
-                    let (of, Exceeding { vehicle, from_s, to_s, at_s, .. }) = (of.short(), of.finding);
+                move |of: &OfVehicle<Exceedance>| {
+                    let (of, Exceedance { vehicle, from_s, to_s, at_s, .. }) = (of.short(), of.finding);
                     let (brief, said) = (limit.in_short(&of), limit.in_words(&of, kind == Kind::Violation));
                     Moment {
                         kind,
