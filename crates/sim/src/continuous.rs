@@ -226,7 +226,7 @@ impl Continuous {
                 self.swarm = solver.swarm();
                 None
             }
-            Err(IdealError::Law { time_s, source }) if source.is_at_a_barrier() => {
+            Err(IdealError::Law { time_s, source }) if source.is_at_barrier() => {
                 let (now_s, state) = (solver.method.t(), solver.method.y());
                 let coast = flow.coast(now_s, state, dt_s - now_s);
                 let (after, bend_m) = coast.ok_or(IdealError::Law { time_s, source })?;

@@ -11,7 +11,7 @@ pub struct Certificate {
     pub certified_until_s: Option<f64>,
     /// Lower bound of the clearance margin of every vehicle at every obstacle \[m\]: distance from the surface less the
     /// obstacle's clearance. `None` without obstacles, or if the law does not avoid them.
-    pub certified_room_m: Option<f64>,
+    pub certified_clearance_margin_m: Option<f64>,
     /// Energy E(0) of the start \[m^2/s^2\], if the law has an energy; also given when the certificate is void.
     pub energy_initial: Option<f64>,
     /// Lower bound of the separation of linked pairs \[m\] while the energy does not exceed E(0). On an incomplete
@@ -31,7 +31,7 @@ pub struct LegBound {
     /// Lower bound of the separation of every pair \[m\].
     pub certified_m: Option<f64>,
     /// Lower bound of the clearance margin of every vehicle at every obstacle \[m\].
-    pub certified_room_m: Option<f64>,
+    pub certified_clearance_margin_m: Option<f64>,
 }
 
 /// Reason why a certificate is void.
@@ -143,7 +143,8 @@ impl Certificate {
         }
         let least = |before_m: Option<f64>, now_m: Option<f64>| before_m.zip(now_m).map(|(a, b)| a.min(b));
         self.certified_m = least(self.certified_m, later.certified_m);
-        self.certified_room_m = least(self.certified_room_m, later.certified_room_m);
+        self.certified_clearance_margin_m =
+            least(self.certified_clearance_margin_m, later.certified_clearance_margin_m);
         let ends = [self.certified_until_s, later.certified_until_s];
         self.certified_until_s = ends.into_iter().flatten().reduce(f64::min);
         self.void.clone_from(&later.void);
@@ -154,7 +155,8 @@ impl Certificate {
         for (bound, now) in self.legs.iter_mut().skip(leg).zip(later.legs.iter().skip(1)) {
             bound.energy = bound.energy.max(now.energy);
             bound.certified_m = least(bound.certified_m, now.certified_m);
-            bound.certified_room_m = least(bound.certified_room_m, now.certified_room_m);
+            bound.certified_clearance_margin_m =
+                least(bound.certified_clearance_margin_m, now.certified_clearance_margin_m);
         }
     }
 
@@ -162,7 +164,7 @@ impl Certificate {
     #[must_use]
     pub fn void_where(mut self, breaks: bool, reason: VoidReason) -> Self {
         if breaks && !self.void.contains(&reason) {
-            (self.certified_m, self.certified_until_s, self.certified_room_m) = (None, None, None);
+            (self.certified_m, self.certified_until_s, self.certified_clearance_margin_m) = (None, None, None);
             self.legs.clear();
             self.void.push(reason);
         }

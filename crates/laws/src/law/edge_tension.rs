@@ -117,7 +117,7 @@ impl EdgeTensionLaw {
     fn set_rest_lengths(&mut self) -> Result<(), (Pair, TensionError)> {
         let Self { alpha, delta_m, .. } = *self;
         self.tightest = None;
-        self.cache.forget();
+        self.cache.clear();
         for ((i, j), inverse_k_per_m) in self.graph.edges().zip(self.kernel.inverse_k_per_m_mut()) {
             let tension = EdgeTension::new(alpha, delta_m, self.formation.desired_distance(i, j))
                 .map_err(|source| (Pair::new(i, j), source))?;
@@ -205,7 +205,7 @@ impl Law for EdgeTensionLaw {
         let velocity_gain = (1.0 + a22_per_s) * per_vehicle;
         if let Some(swarm) = at.shared() {
             let potential = self.kernel.add_pulls(&swarm.positions_m, command).map_err(|_| self.fault(swarm))?;
-            self.cache.keep(&swarm.positions_m, potential);
+            self.cache.store(&swarm.positions_m, potential);
             *command *= alpha * per_vehicle;
             add_laplacian_product(&self.graph, &of_table(&swarm.velocities_m_s), velocity_gain, command);
         } else {

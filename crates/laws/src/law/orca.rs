@@ -202,7 +202,7 @@ impl OrcaLaw {
         }
         let (diameter_m, horizon_s) = (self.diameter_m, self.keys.horizon_s);
         let obstacle = VelocityObstacle { towards_m, diameter_m, horizon_s, parting_s: 1.0 / self.keys.tracking_per_s };
-        let (normal, depth_m_s) = obstacle.way_out(own_m_s - sensed.velocity_m_s);
+        let (normal, depth_m_s) = obstacle.nearest_exit(own_m_s - sensed.velocity_m_s);
         Ok(HalfSpace { normal, offset: normal.dot(&own_m_s) + 0.5 * depth_m_s })
     }
 }
@@ -264,24 +264,24 @@ impl VelocityObstacle {
     /// The set is the ball of radius diameter/horizon about `towards_m`/horizon and its shadow away from the origin.
     /// The shadow is a cone whose half-angle has the sine diameter/distance. The nearest point is on the ball if the
     /// vector from the centre to the velocity points off the cone's lateral surface, and on that surface otherwise.
-    fn way_out(&self, relative_m_s: Vector3<f64>) -> (Vector3<f64>, f64) {
+    fn nearest_exit(&self, relative_m_s: Vector3<f64>) -> (Vector3<f64>, f64) {
         let Self { towards_m, diameter_m, horizon_s, parting_s } = self;
         let distance_m = towards_m.norm();
         let sight = towards_m / distance_m;
         if distance_m <= *diameter_m {
-            return self.out_of_ball(relative_m_s, *parting_s);
+            return self.exit_ball(relative_m_s, *parting_s);
         }
         let from_centre = relative_m_s - towards_m / *horizon_s;
         let sine = diameter_m / distance_m;
         if -from_centre.dot(&sight) > sine * from_centre.norm() {
-            return self.out_of_ball(relative_m_s, *horizon_s);
+            return self.exit_ball(relative_m_s, *horizon_s);
         }
         let cosine = ((distance_m - diameter_m) * (distance_m + diameter_m)).sqrt() / distance_m;
         let normal = across(relative_m_s, sight) * cosine - sight * sine;
         (normal, -normal.dot(&relative_m_s))
     }
 
-    fn out_of_ball(&self, relative_m_s: Vector3<f64>, within_s: f64) -> (Vector3<f64>, f64) {
+    fn exit_ball(&self, relative_m_s: Vector3<f64>, within_s: f64) -> (Vector3<f64>, f64) {
         let from_centre = relative_m_s - self.towards_m / within_s;
         let length = from_centre.norm();
         let normal = if length > 0.0 { from_centre / length } else { -self.towards_m.normalize() };

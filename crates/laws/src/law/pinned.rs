@@ -107,7 +107,7 @@ impl PinnedConsensus {
         }
         if matches!(self.pinning, Pinning::All | Pinning::Listed(_)) {
             for i in (0..self.graph.count()).filter(|&i| self.pinning.pins(i)) {
-                let (error_m, velocity_m_s) = off_reference(at, i);
+                let (error_m, velocity_m_s) = reference_errors(at, i);
                 let sum = row(sums, i) + scale * (k * error_m + c * velocity_m_s);
                 set_row(sums, i, sum);
             }
@@ -118,7 +118,7 @@ impl PinnedConsensus {
     /// Replaces the leader's row by its own tracking of the reference, independent of other vehicles.
     pub(super) fn lead(&self, at: &Observation<'_>, gains: Gains, a22_per_s: f64, command: &mut Rows) {
         if let Some(leader) = self.pinning.leader() {
-            let (error_m, velocity_m_s) = off_reference(at, leader);
+            let (error_m, velocity_m_s) = reference_errors(at, leader);
             let back = gains.position * error_m + gains.velocity * velocity_m_s;
             set_row(command, leader, feed_forward_acceleration(&at.target.reference, a22_per_s) - back);
         }
@@ -151,7 +151,7 @@ impl PinnedConsensus {
 }
 
 /// `p_i - h_i - r` \[m\] and `v_i - r'` \[m/s\].
-fn off_reference(at: &Observation<'_>, i: usize) -> (Vector3<f64>, Vector3<f64>) {
+fn reference_errors(at: &Observation<'_>, i: usize) -> (Vector3<f64>, Vector3<f64>) {
     let reference = &at.target.reference;
     let error_m = error_m(&at.own.positions_m, at.target.formation, reference.position_m, i);
     (error_m, row(&at.own.velocities_m_s, i) - reference.velocity_m_s)

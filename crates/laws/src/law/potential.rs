@@ -197,7 +197,7 @@ impl Law for PotentialLaw {
         }
         let potential = add_pushes(at, command, |i, j, apart_m| self.repulsion(i, j, apart_m))?;
         if let Some(potential) = potential {
-            self.cache.keep(&at.own.positions_m, potential);
+            self.cache.store(&at.own.positions_m, potential);
         }
         if let Some(limit) = self.keys.max_accel_m_s2 {
             (0..command.nrows()).for_each(|i| set_row(command, i, row(command, i).cap_magnitude(limit)));
@@ -215,7 +215,7 @@ impl Law for PotentialLaw {
                 delta_m,
             })?;
             self.revision = target.revision;
-            self.cache.forget();
+            self.cache.clear();
         }
         Ok(())
     }

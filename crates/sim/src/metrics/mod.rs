@@ -11,7 +11,7 @@ use tautline_core::record::{Event, Peaks, RecordError, Sample, Sink, Step};
 use tautline_core::swarm::{Rows, Swarm, largest_row_norm, mean_row, row};
 use tautline_laws::formation::Freedom;
 use tautline_laws::graph::Graph;
-use tautline_laws::target::{Arrival, Distance, Guidance, Leg, Reference, assign_anew};
+use tautline_laws::target::{Arrival, FormationError, Guidance, Leg, Reference, reassign};
 
 /// Running metrics of samples, in order of time; results in a [`Summary`].
 #[derive(Clone, Debug)]
@@ -32,7 +32,7 @@ pub struct Metrics<'a> {
     /// Last instant that was checked \[s\].
     judged_to_s: Option<f64>,
     last_s: f64,
-    distance: Distance,
+    distance: FormationError,
     common_m_s: f64,
     peak_control_m_s2: f64,
     final_control_m_s2: f64,
@@ -119,7 +119,7 @@ impl<'a> Metrics<'a> {
             good_since_s: None,
             judged_to_s: None,
             last_s: 0.0,
-            distance: Distance::unknown(),
+            distance: FormationError::unknown(),
             common_m_s: f64::NAN,
             peak_control_m_s2: 0.0,
             final_control_m_s2: 0.0,
@@ -150,8 +150,8 @@ impl<'a> Metrics<'a> {
         self.samples += 1;
         self.last_s = sample.time_s;
         let leg = self.legs.get(self.leg);
-        self.distance = leg.map_or_else(Distance::unknown, |leg| {
-            Distance::of(sample.swarm, &leg.formation, &self.reference(sample.time_s), self.graph, self.freedom)
+        self.distance = leg.map_or_else(FormationError::unknown, |leg| {
+            FormationError::of(sample.swarm, &leg.formation, &self.reference(sample.time_s), self.graph, self.freedom)
         });
         self.common_m_s = sample.swarm.mean_velocity_m_s().norm();
         self.observe_control(sample.control);
@@ -287,7 +287,7 @@ impl Sink for Metrics<'_> {
         match event {
             &Event::LegBegan { leg, time_s } => self.begin_leg(leg, time_s),
             Event::Assigned { slots, .. } => {
-                assign_anew(self.legs.to_mut(), self.leg, slots);
+                reassign(self.legs.to_mut(), self.leg, slots);
                 self.judged_to_s = None;
             }
             _ => {}

@@ -1,6 +1,6 @@
 use super::*;
 use tautline_laws::formation::Formation;
-use tautline_laws::target::Begins;
+use tautline_laws::target::LegTrigger;
 
 /// Rounding of sums of a few numbers of order 1.
 const ROUNDING: f64 = 1e-12;
@@ -58,7 +58,7 @@ fn a_formation_that_is_lost_again_is_not_reached() {
 #[test]
 fn a_leg_is_held_up_to_the_time_at_which_the_next_begins() {
     let (mut legs, graph) = pair_of_vehicles();
-    legs.push(Leg { begins: Begins::At(1.0), ..legs[0].clone() });
+    legs.push(Leg { begins: LegTrigger::At(1.0), ..legs[0].clone() });
     let swarm = Swarm::at_rest(legs[0].formation.slots_m.clone());
     let control = Rows::zeros(2);
     for (next_s, reached_at_s) in [(1.0, Some(0.0)), (0.99, None)] {

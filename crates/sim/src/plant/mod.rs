@@ -261,7 +261,7 @@ impl Air {
     /// Returns the time for which the wind is smooth, from `before_s` seconds before the present on \[s\].
     pub(crate) fn smooth_s(&self, before_s: f64) -> f64 {
         let time_s = self.wind.now_s() - before_s;
-        self.wind.next_turn_s(time_s) - time_s
+        self.wind.next_slope_change_s(time_s) - time_s
     }
 
     pub(crate) fn reseed(&mut self, seed: u64) {

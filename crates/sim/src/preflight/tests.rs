@@ -330,7 +330,7 @@ fn the_json_has_the_promised_keys_and_codes() {
     }
     assert_eq!(json["connectivity_is"], "solved");
     let circle = scenario("circle", &[]);
-    circle.graph.clone().pretend_a_bound();
+    circle.graph.clone().mark_connectivity_as_bound();
     let bound = check(&circle);
     assert_eq!(serde_json::to_value(&bound).expect("plain data")["connectivity_is"], "bound");
     assert!(bound.text().contains("a lower bound"), "{}", bound.text());

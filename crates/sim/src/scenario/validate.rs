@@ -14,7 +14,7 @@ use super::time::TimeSpec;
 use tautline_core::swarm::{Pair, row};
 use tautline_laws::graph::{Graph, Pinning};
 use tautline_laws::law::{Controls, LawSpec, ParameterError};
-use tautline_laws::target::{Begins, DeadlockMode, Guidance, Leg};
+use tautline_laws::target::{DeadlockMode, Guidance, Leg, LegTrigger};
 use tautline_laws::wind::Gust;
 
 /// Relative rounding of the position \[m\] and velocity \[m/s\] of a leader on the reference.
@@ -114,7 +114,7 @@ impl Scenario {
                 .with_help("every leg needs a slot for each vehicle")
                 .at_leg(number, "formation.points_m"));
             }
-            let Begins::At(start_s) = leg.begins else { continue };
+            let LegTrigger::At(start_s) = leg.begins else { continue };
             if !(start_s >= from_s && start_s < self.time.duration_s) {
                 return Err(ScenarioError::new(format!("leg {} begins at {start_s} s", number + 1))
                     .coded("scenario/outside-flight")

@@ -83,7 +83,7 @@ impl Controller {
             obstacles: &self.obstacles,
         };
         let commanded = self.law.command(&at, &mut self.commanded);
-        commanded.map_err(|error| error.against_truth(truth, self.metric, &self.obstacles))?;
+        commanded.map_err(|error| error.with_true_distance(truth, self.metric, &self.obstacles))?;
         self.actuate(time_s, command);
         Ok(())
     }
@@ -99,7 +99,7 @@ impl Controller {
         let change = self.supervisor.take_change()?;
         let target = self.target.view();
         let exact = Observation::exact(truth, &self.links, target.formation);
-        let mut ahead = self.supervisor.ahead(&target);
+        let mut ahead = self.supervisor.later_formations(&target);
         if matches!(change, Change::Assigned { .. }) {
             // The slots of the leg follow after the spread ones.
             ahead.insert(0, target.formation);

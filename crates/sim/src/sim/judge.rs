@@ -149,9 +149,9 @@ impl Judge {
         events: &mut Vec<Event>,
     ) -> Result<(), AuditError> {
         if let Some(clearance) = &mut self.clearance {
-            let ClearanceFinding { least_room_m, began, ended } = clearance.step(time_s, positions_m)?;
-            self.clearance_margin_m = least_room_m;
-            self.obstacles_undecided_by_bend += u64::from(is_undecided(least_room_m, bend_m, 0.0));
+            let ClearanceFinding { smallest_margin_m, began, ended } = clearance.step(time_s, positions_m)?;
+            self.clearance_margin_m = smallest_margin_m;
+            self.obstacles_undecided_by_bend += u64::from(is_undecided(smallest_margin_m, bend_m, 0.0));
             for &Violation { pair, from_s: time_s, .. } in began {
                 if let ObjectPair::Obstacle { vehicle, obstacle } = pair {
                     events.push(Event::ObstacleViolationBegan { vehicle, obstacle, time_s });

@@ -97,7 +97,7 @@ impl Simulation {
         }
         let certificate = scenario
             .certificate(law.as_ref())
-            .void_where(!supervisor.keeps_to(&scenario.legs), VoidReason::TargetChanges);
+            .void_where(!supervisor.follows_legs(&scenario.legs), VoidReason::TargetChanges);
         // The scenario's own imperfections already void the certificate.
         let is_void = !scenario.is_exact() && !certificate.void.is_empty();
         let certificate = certificate.void_where(!link.is_exact() && !is_void, VoidReason::InexactLink);

@@ -170,7 +170,7 @@ impl Fleet {
     pub fn smooth_s(&self, before_s: f64) -> f64 {
         self.wind.as_ref().map_or(f64::INFINITY, |wind| {
             let time_s = wind.now_s() - before_s;
-            wind.next_turn_s(time_s) - time_s
+            wind.next_slope_change_s(time_s) - time_s
         })
     }
 

@@ -10,7 +10,7 @@ use tautline_laws::formation::{Formation, largest_edge_error_m};
 use tautline_laws::graph::Graph;
 use tautline_laws::law::{EdgeTensionKeys, LaplacianKeys, LawSpec, PotentialKeys, VoidReason};
 use tautline_laws::observation::{OtherStates, StateTables};
-use tautline_laws::target::{Begins, CurrentTarget, Leg, Supervisor};
+use tautline_laws::target::{CurrentTarget, Leg, LegTrigger, Supervisor};
 use tautline_sim::continuous::{self, Tolerances};
 use tautline_sim::link::{Imperfections, StateEstimates};
 use tautline_sim::metrics::Metrics;
@@ -150,7 +150,7 @@ fn commands_from_outside_replace_those_of_the_law() {
 }
 
 /// Returns a flight to the pentagon and then to a larger one.
-fn two_legs(begins: Begins) -> Scenario {
+fn two_legs(begins: LegTrigger) -> Scenario {
     let mut scenario = builtin("pentagon", &["time.duration_s=120", "swarm.a22_per_s=-0.1"]);
     scenario.legs.push(Leg { begins, ..Leg::first(Formation::pentagon(4.0)) });
     scenario
@@ -158,7 +158,7 @@ fn two_legs(begins: Begins) -> Scenario {
 
 #[test]
 fn legs_begin_by_time_or_when_the_previous_leg_is_reached() {
-    for (begins, expected_s) in [(Begins::At(50.0), 50.0..=50.0), (Begins::Reached, 20.0..=60.0)] {
+    for (begins, expected_s) in [(LegTrigger::At(50.0), 50.0..=50.0), (LegTrigger::Reached, 20.0..=60.0)] {
         let scenario = two_legs(begins);
         let mut log = Log::default();
         let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival);
@@ -175,7 +175,7 @@ fn legs_begin_by_time_or_when_the_previous_leg_is_reached() {
         assert!(last.reached_at_s.is_some_and(|reached_s| reached_s > *time_s), "{last:?}");
         assert!(last.max_edge_error_m < 0.01, "the larger pentagon is the one that is held");
     }
-    let scenario = two_legs(Begins::At(119.0));
+    let scenario = two_legs(LegTrigger::At(119.0));
     let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival);
     sim::fly(&scenario, Components::of(&scenario).expect("parts"), &mut metrics, &mut |_| ControlFlow::Continue(()))
         .expect("a flight");
@@ -315,7 +315,7 @@ fn a_certificate_for_one_leg_is_void_for_two_and_laws_follow_the_target() {
         let slots = Formation::pentagon(4.0);
         let mut scenario = Scenario::new("nearer", Swarm::at_rest(slots.slots_m.clone()), slots, 1.0, 60.0);
         scenario.law = law;
-        scenario.legs.push(Leg { begins: Begins::At(2.0), ..Leg::first(Formation::pentagon(2.5)) });
+        scenario.legs.push(Leg { begins: LegTrigger::At(2.0), ..Leg::first(Formation::pentagon(2.5)) });
         scenario.validate().expect("two legs");
         let (flight, _) = fly(&scenario);
         assert_eq!((flight.certificate.certified_m, flight.certificate.void), (None, vec![VoidReason::TargetChanges]));
@@ -327,7 +327,7 @@ fn a_certificate_for_one_leg_is_void_for_two_and_laws_follow_the_target() {
 #[test]
 fn legs_that_cannot_be_flown_are_refused() {
     type Break = fn(&mut Scenario);
-    let good = two_legs(Begins::At(50.0));
+    let good = two_legs(LegTrigger::At(50.0));
     assert!(good.validate().is_ok());
     let breaks: [Break; 6] = [
         |scenario| scenario.legs.clear(),
@@ -335,7 +335,7 @@ fn legs_that_cannot_be_flown_are_refused() {
         |scenario| scenario.legs[1].formation.slots_m[(2, 0)] = f64::NAN,
         |scenario| scenario.legs[1].formation = Formation::pentagon(1.0),
         |scenario| scenario.legs[1].formation.slots_m[(2, 2)] = 1.0,
-        |scenario| scenario.legs[1].begins = Begins::At(f64::NAN),
+        |scenario| scenario.legs[1].begins = LegTrigger::At(f64::NAN),
     ];
     for (number, broken) in breaks.into_iter().enumerate() {
         let mut scenario = good.clone();

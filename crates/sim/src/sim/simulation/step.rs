@@ -282,7 +282,7 @@ impl Simulation {
 /// Returns the fastest rate of a law \[1/s\] while no pair and no obstacle is closer than given \[m\].
 fn rate_per_s(law: &dyn Law, scenario: &Scenario, (nearest_m, clearance_margin_m): (f64, f64)) -> f64 {
     let query = RateQuery::new(scenario.velocity_coefficient_per_s(), Some(nearest_m));
-    let rates = law.rates(&RateQuery { obstacle_room_m: Some(clearance_margin_m), ..query });
+    let rates = law.rates(&RateQuery { obstacle_margin_m: Some(clearance_margin_m), ..query });
     let of_pairs = rates.fastest_per_s.unwrap_or(0.0);
     match rates.obstacles_per_s2 {
         0.0 => of_pairs,
