@@ -38,7 +38,7 @@ mod _native {
     #[pymodule_export]
     use super::read::{Columns, read};
     #[pymodule_export]
-    use super::request::{Question, ReadOptions};
+    use super::request::{AuditOptions, ReadOptions};
     #[pymodule_export]
     use super::scenario::Scenario;
     #[pymodule_export]

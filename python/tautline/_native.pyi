@@ -9,7 +9,7 @@ __all__ = [
     "Error",
     "FlightData",
     "Observation",
-    "Question",
+    "AuditOptions",
     "ReadOptions",
     "Scenario",
     "FlightFindings",
@@ -224,7 +224,7 @@ class ReadOptions:
     ) -> ReadOptions: ...
 
 @final
-class Question:
+class AuditOptions:
     def __new__(
         cls,
         *,
@@ -248,7 +248,7 @@ class Question:
         max_gap: float | None,
         require_presence: bool,
         independent: bool,
-    ) -> Question: ...
+    ) -> AuditOptions: ...
 
 def attack(
     scenario: Scenario,
@@ -263,7 +263,7 @@ def attack(
     outputs: dict[str, str | bool | int | None],
 ) -> _Answer: ...
 def audit_arrays(
-    question: Question,
+    question: AuditOptions,
     command: str,
     times: Any,
     positions: Any,
@@ -273,7 +273,7 @@ def audit_arrays(
     html: str | None,
 ) -> _AuditOutcome: ...
 def audit_files(
-    question: Question, command: str, paths: Sequence[str], options: ReadOptions, html: str | None
+    question: AuditOptions, command: str, paths: Sequence[str], options: ReadOptions, html: str | None
 ) -> _AuditOutcome: ...
 def audit_in_rust(
     times: NDArray[np.float64], positions: NDArray[np.float64], delta_m: float

@@ -87,7 +87,7 @@ fn a_reassigned_vehicle_is_compared_with_its_new_slot() {
 }
 
 #[test]
-fn rounding_of_times_does_not_cost_the_hold() {
+fn rounding_of_times_does_not_shorten_the_hold() {
     let (legs, graph) = pair_of_vehicles();
     let mut metrics = Metrics::new(&legs, &graph, JUDGE);
     let swarm = Swarm::at_rest(legs[0].formation.slots_m.clone());
@@ -108,7 +108,7 @@ fn a_state_that_is_not_a_number_is_never_within_tolerance() {
 }
 
 #[test]
-fn no_samples_reach_nothing() {
+fn a_flight_without_samples_reaches_no_formation() {
     let s = summary(&[], JUDGE);
     assert_eq!((s.samples, s.reached_at_s, s.energy_initial), (0, None, None));
     assert_eq!(summary(&[], Arrival { hold_s: 0.0, ..JUDGE }).reached_at_s, None);

@@ -196,7 +196,7 @@ fn a_bias_is_constant_and_does_not_affect_near_vehicles() {
 }
 
 #[test]
-fn refused_steps_and_trial_states_change_no_knowledge() {
+fn refused_steps_and_trial_states_change_no_estimates() {
     let mut scenario = scenario();
     scenario.sensing.rate_hz = Some(30.0);
     scenario.sensing.position_noise_m = 0.1;
@@ -256,7 +256,7 @@ fn a_dead_vehicle_has_no_command_and_a_frozen_one_keeps_its_last() {
 }
 
 #[test]
-fn without_imperfections_the_link_is_the_direct_one() {
+fn without_imperfections_laws_read_the_true_state() {
     assert!(of(&scenario(), true).is_exact());
     let mut scenario = scenario();
     scenario.network.missing = StalePolicy::Extrapolate;

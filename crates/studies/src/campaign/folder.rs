@@ -12,7 +12,7 @@ use sha2::{Digest as _, Sha256};
 use super::flights::Campaign;
 use super::shard::{self, PartState, Row, fields};
 use super::spec::refused;
-use super::summary::{Gathered, Summary};
+use super::summary::{Summary, SummaryAccumulator};
 use crate::SCHEMA_VERSION;
 use crate::study::Study as _;
 use crate::table::{Cell, ParquetTable};
@@ -267,7 +267,7 @@ impl Folder {
 
     /// Returns the answer, and calls `take` for each row that counts, in order.
     fn gather(&self, take: &mut dyn FnMut(&Row) -> Result<(), Failure>) -> Result<Summary, Failure> {
-        let mut gathered = Gathered::new(self.campaign());
+        let mut gathered = SummaryAccumulator::new(self.campaign());
         for shard in 0..self.campaign().manifest().shards {
             if gathered.is_enough() {
                 break;

@@ -4,9 +4,9 @@ use std::path::{Path, PathBuf};
 
 use super::folder::FAULTY;
 use super::folder::cannot;
-use super::{BadRun, Campaign, Folder, Law, Row, Summary, Worst};
+use super::{Campaign, Folder, Law, Row, Summary, ViolatedRun, Worst};
 use crate::flight::Outcome;
-use crate::splitting::{self, StateAt};
+use crate::splitting::{self, StateHashAtStep};
 use crate::study::{Block, Section};
 use tautline_core::text::metres;
 use tautline_recordings::mcap::{Header, McapRecorder};
@@ -216,7 +216,7 @@ pub(super) fn fly_worst_again(
 }
 
 /// Repeats a violated flight that a splitting estimate kept, and describes it for the page of the campaign.
-fn bad_again(folder: &Folder, law: &Law, bad: &BadRun) -> Result<WorstFlight, Failure> {
+fn bad_again(folder: &Folder, law: &Law, bad: &ViolatedRun) -> Result<WorstFlight, Failure> {
     let flight = FlightId { law, run: bad.run, bad: Some(bad.bad) };
     fly_bad(folder, flight, bad.bad, &flight.folder(folder))?;
     let (run, number) = (bad.run.to_string(), bad.bad.to_string());
@@ -253,7 +253,7 @@ fn fly_bad(folder: &Folder, flight: FlightId<'_>, bad: usize, out: &Path) -> Res
     std::fs::create_dir_all(out).map_err(cannot("write", out))?;
     let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
     let mut recording = McapRecorder::create(&out.join(RECORDING), &header)?;
-    let mut state = StateAt::violation_of(violated);
+    let mut state = StateHashAtStep::violation_of(violated);
     let flown = splitting::replay(&scenario, &violated.genealogy, &mut (&mut recording, &mut state));
     let closed = recording.finish();
     flown?;

@@ -147,7 +147,7 @@ impl Folder {
 /// First line of a part.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Heading {
+struct PartHeader {
     schema_version: u32,
     campaign: String,
     shard: u64,
@@ -157,7 +157,7 @@ struct Heading {
 /// Last line of a part.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Seal {
+struct PartTrailer {
     rows: usize,
     sha256: String,
 }
@@ -178,13 +178,17 @@ pub enum PartState {
 /// # Errors
 /// None in practice: every row has a JSON form.
 pub(super) fn encode(manifest: &Manifest, shard: u64, rows: &[Row]) -> Result<Vec<u8>, Failure> {
-    let heading =
-        Heading { schema_version: SCHEMA_VERSION, campaign: manifest.campaign.clone(), shard, shards: manifest.shards };
+    let heading = PartHeader {
+        schema_version: SCHEMA_VERSION,
+        campaign: manifest.campaign.clone(),
+        shard,
+        shards: manifest.shards,
+    };
     let mut bytes = line(&heading)?;
     for row in rows {
         bytes.extend(line(row)?);
     }
-    let seal = Seal { rows: rows.len(), sha256: base16(&Sha256::digest(&bytes)) };
+    let seal = PartTrailer { rows: rows.len(), sha256: base16(&Sha256::digest(&bytes)) };
     bytes.extend(line(&seal)?);
     Ok(bytes)
 }
@@ -216,12 +220,12 @@ fn decode(bytes: &[u8], manifest: &Manifest, shard: u64, laws: usize, path: &Pat
     let Some(body) = bytes.strip_suffix(b"\n") else { return Ok(PartState::Damaged(TRUNCATED)) };
     let Some(end) = body.iter().rposition(|&byte| byte == b'\n') else { return Ok(PartState::Damaged(TRUNCATED)) };
     let (sealed, seal) = (&bytes[..=end], &body[end + 1..]);
-    let Ok(seal) = serde_json::from_slice::<Seal>(seal) else { return Ok(PartState::Damaged(TRUNCATED)) };
+    let Ok(seal) = serde_json::from_slice::<PartTrailer>(seal) else { return Ok(PartState::Damaged(TRUNCATED)) };
     if seal.sha256 != base16(&Sha256::digest(sealed)) {
         return Ok(PartState::Damaged(ALTERED));
     }
     let mut lines = sealed.split_inclusive(|&byte| byte == b'\n');
-    let Some(heading) = lines.next().and_then(|line| serde_json::from_slice::<Heading>(line).ok()) else {
+    let Some(heading) = lines.next().and_then(|line| serde_json::from_slice::<PartHeader>(line).ok()) else {
         return Ok(PartState::Damaged(ALTERED));
     };
     let is_ours = heading.campaign == manifest.campaign && heading.shards == manifest.shards && heading.shard == shard;
@@ -308,7 +312,7 @@ pub struct Row {
 
 /// Verdict on the separation of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Known {
+pub enum SeparationVerdict {
     /// No violation up to the end of the flight.
     Clear,
     /// A violation.
@@ -324,13 +328,13 @@ pub enum Known {
 impl Row {
     /// Returns the verdict on the separation.
     #[must_use]
-    pub fn known(&self) -> Known {
+    pub fn known(&self) -> SeparationVerdict {
         match self.flight.as_ref().map(|flight| flight.outcome) {
-            None if self.splitting.is_some() => Known::Estimated,
-            None => Known::NotFlown,
-            Some(Outcome::Clear) => Known::Clear,
-            Some(Outcome::Violated) => Known::Violated,
-            Some(Outcome::EndedEarly | Outcome::Undecided) => Known::Unknown,
+            None if self.splitting.is_some() => SeparationVerdict::Estimated,
+            None => SeparationVerdict::NotFlown,
+            Some(Outcome::Clear) => SeparationVerdict::Clear,
+            Some(Outcome::Violated) => SeparationVerdict::Violated,
+            Some(Outcome::EndedEarly | Outcome::Undecided) => SeparationVerdict::Unknown,
         }
     }
 

@@ -46,7 +46,7 @@ fn clearance_m(towards_m: Vector3<f64>, relative_m_s: Vector3<f64>) -> f64 {
 }
 
 #[test]
-fn the_way_out_matches_a_hand_calculation() {
+fn the_nearest_exit_matches_a_hand_calculation() {
     let towards = obstacle(Vector3::new(4.0, 0.0, 0.0));
     let is = |relative: [f64; 3], normal: [f64; 3], depth_m_s: f64| {
         let (found, depth) = towards.nearest_exit(relative.into());

@@ -62,7 +62,7 @@ fn five_crazyflies_reach_the_pentagon_clear_with_nothing_certified() {
 }
 
 #[test]
-fn the_flight_of_points_is_the_pentagons_to_scale_and_keeps_more_apart() {
+fn the_flight_of_points_is_the_scaled_pentagon_with_larger_separations() {
     let least_m = |sets: &[&str]| fly(&builtin("crazyflies", sets)).0.audit.closest.expect("a pair").separation_m;
     let [points_m, quadrotors_m] =
         ["point", "crazyflie"].map(|model| least_m(&["time.duration_s=5", &format!("vehicle.model={model}")]));
