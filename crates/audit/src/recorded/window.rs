@@ -1,10 +1,10 @@
 //! Selection of the pairs to sweep in a window of time.
 //!
-//! Over the window every vehicle is near its chord: the uniform motion between its positions at both ends. Its stray is
-//! the largest distance of its corners from the chord at the same time. Two vehicles are at least as far apart as their
-//! chords, less both deviations. This is one closed form for a whole window, and equally sharp for swarms at rest and in
-//! common motion. Sort and sweep along the longest axis finds the pairs to compare. A window with too many remaining
-//! pairs is halved.
+//! Over the window every vehicle is near its chord: the uniform motion between its positions at both ends. Its
+//! deviation is the largest distance of its corners from the chord at the same time. Two vehicles are at least as far
+//! apart as their chords, less both deviations. This is one closed form for a whole window, and equally sharp for
+//! swarms at rest and in common motion. Sort and sweep along the longest axis finds the pairs to compare. A window with
+//! too many remaining pairs is halved.
 
 use std::mem;
 use std::ops::Range;

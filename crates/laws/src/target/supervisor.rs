@@ -81,7 +81,7 @@ impl Schedule {
     }
 
     /// Enables deadlock recovery: spreads slots (about a leader's slot, if there is a leader) if the swarm is stalled.
-    /// `settling` describes the law. Call after [`Schedule::free_by`].
+    /// `settling` describes the law. Call after [`Schedule::with_freedom`].
     #[must_use]
     pub fn deadlock_recovery(
         mut self,

@@ -44,7 +44,8 @@ impl RotorLag {
         Self { up: libm::exp(-dt_s / model.lag_up_s), down: libm::exp(-dt_s / model.lag_down_s) }
     }
 
-    /// Returns the exact speeds \[rpm\] after this time with constant `commanded_rpm`; a speed never crosses its command.
+    /// Returns the exact speeds \[rpm\] after this time with constant `commanded_rpm`. A speed never crosses its
+    /// command.
     #[must_use]
     pub fn after(self, rotors_rpm: Vector4<f64>, commanded_rpm: Vector4<f64>) -> Vector4<f64> {
         rotors_rpm.zip_map(&commanded_rpm, |speed_rpm, commanded_rpm| {

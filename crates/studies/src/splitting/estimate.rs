@@ -105,8 +105,8 @@ pub struct Splitting {
 /// The result depends only on the scenario, the settings, `seed` and `repetition`. `carry_on` is called after each step
 /// with the number of all steps; if it breaks, the result is `None`.
 ///
-/// Memory holds at most ten states of each flight ([`SavedState`]), each 30 kB for 3 vehicles and 0.3 MB for 100. A hundred
-/// flights of 100 vehicles take 0.3 GB.
+/// Memory holds at most ten states of each flight ([`SavedState`]), each 30 kB for 3 vehicles and 0.3 MB for 100. A
+/// hundred flights of 100 vehicles take 0.3 GB.
 ///
 /// # Errors
 /// [`Failure`] for wrong settings, for a scenario without noise from step to step, and for a law or a judge that cannot
