@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 use criterion::{BatchSize, BenchmarkId, Criterion, criterion_group, criterion_main};
 use tautline::formation::Formation;
 use tautline::law::{EdgeTensionKeys, LawSpec};
-use tautline::plant::{Path, rapier};
+use tautline::plant::{StepPath, rapier};
 use tautline::scenario::{DEFAULT_ATTITUDE_HZ, Scenario};
 use tautline::sim::{self, Components};
 use tautline::swarm::{Rows, Swarm};
@@ -45,7 +45,7 @@ fn flights(criterion: &mut Criterion) {
             );
         });
         group.bench_function(BenchmarkId::from_parameter("vehicles alone"), |bencher| {
-            let (held, mut state, mut path) = (Rows::zeros(COUNT), scenario.start.clone(), Path::default());
+            let (held, mut state, mut path) = (Rows::zeros(COUNT), scenario.start.clone(), StepPath::default());
             bencher.iter_batched(
                 || rapier::plant(&scenario),
                 |mut plant| {

@@ -10,7 +10,7 @@ use std::ops::ControlFlow;
 use criterion::{BatchSize, BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use tautline::formation::Formation;
 use tautline::law::{DisplacementKeys, LawSpec};
-use tautline::plant::{Path, rapier};
+use tautline::plant::{StepPath, rapier};
 use tautline::scenario::Scenario;
 use tautline::sim::{self, Simulation};
 use tautline::swarm::{Rows, Swarm};
@@ -46,7 +46,7 @@ fn steps(criterion: &mut Criterion, name: &str, scenario: &Scenario, steps: u16)
     group.sample_size(10).throughput(Throughput::Elements(u64::from(steps)));
     scenario.validate().expect("the lattice can be flown");
     group.bench_function(BenchmarkId::from_parameter("bare engine"), |bencher| {
-        let (held, mut state, mut path) = (Rows::zeros(count), scenario.start.clone(), Path::default());
+        let (held, mut state, mut path) = (Rows::zeros(count), scenario.start.clone(), StepPath::default());
         bencher.iter_batched(
             || rapier::plant(scenario),
             |mut plant| {
@@ -65,7 +65,7 @@ fn steps(criterion: &mut Criterion, name: &str, scenario: &Scenario, steps: u16)
             bencher.iter_batched(
                 || Simulation::new(scenario).expect("a law and a judge"),
                 |simulation| {
-                    pool.install(|| sim::fly_on(simulation, &mut (), &mut |_| ControlFlow::Continue(())))
+                    pool.install(|| sim::continue_flight(simulation, &mut (), &mut |_| ControlFlow::Continue(())))
                         .expect("a clean flight")
                 },
                 BatchSize::LargeInput,

@@ -28,7 +28,7 @@ impl Law for SpringsAndRepulsion {
             let position = row(&at.own.positions_m, i);
             let mut u = row(&at.target.formation.slots_m, i) - position - 2.0 * row(&at.own.velocities_m_s, i);
             for j in (0..at.own.count()).filter(|&j| j != i) {
-                let away = position - at.seen(i, j).position_m;
+                let away = position - at.sensed(i, j).position_m;
                 u += 4.0 * away / away.norm_squared().powi(2);
             }
             set_row(command, i, u);
@@ -39,7 +39,7 @@ impl Law for SpringsAndRepulsion {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let scenario = Scenario::read(&Source::resolve("pentagon")?, &[])?;
-    let parts = Components::under(&scenario, Box::new(SpringsAndRepulsion));
+    let parts = Components::with_law(&scenario, Box::new(SpringsAndRepulsion));
     let flight = sim::fly(&scenario, parts, &mut (), &mut |_step| ControlFlow::Continue(()))?;
     println!("{}: {:?}", flight.law, flight.audit.status);
     if let Some(closest) = flight.audit.closest {

@@ -15,13 +15,13 @@ use tautline::track::Tracks as _;
 use crate::arrays::{Arrays, notes_of_absence};
 use crate::errors::{IntoException as _, internal_error, wrong_input};
 use crate::numbers::{borrowed, shape_text};
-use crate::request::{Question, ReadOptions};
+use crate::request::{AuditOptions, ReadOptions};
 use crate::work::run_in_thread;
 
 /// Verdict in words, headline, summary, and report as JSON.
-type Judged = (String, String, String, String);
+type AuditTexts = (String, String, String, String);
 
-fn judged(report: &RecordedReport) -> PyResult<Judged> {
+fn judged(report: &RecordedReport) -> PyResult<AuditTexts> {
     let json = serde_json::to_string(report).map_err(|error| internal_error(&error.to_string()))?;
     Ok((report.verdict(), report.headline(), report.text(), json))
 }
@@ -85,12 +85,12 @@ impl<'py> AuditArrays<'py> {
 #[pyfunction]
 pub(crate) fn audit_files(
     py: Python<'_>,
-    question: &Question,
+    question: &AuditOptions,
     command: &str,
     paths: Vec<PathBuf>,
     options: &ReadOptions,
     html: Option<PathBuf>,
-) -> PyResult<Judged> {
+) -> PyResult<AuditTexts> {
     let subject = Subject::Files { paths, options: Box::new(options.0.clone()) };
     let monitor = Silent::default();
     let request = question.request(subject, command, html);
@@ -103,7 +103,7 @@ pub(crate) fn audit_files(
 #[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
 pub(crate) fn audit_arrays<'py>(
     py: Python<'py>,
-    question: &Question,
+    question: &AuditOptions,
     command: &str,
     times: &Bound<'py, PyAny>,
     positions: &Bound<'py, PyAny>,
@@ -111,7 +111,7 @@ pub(crate) fn audit_arrays<'py>(
     names: Vec<String>,
     findings: Option<&FlightFindings>,
     html: Option<PathBuf>,
-) -> PyResult<Judged> {
+) -> PyResult<AuditTexts> {
     let given = AuditArrays::new(times, positions, velocities)?;
     if names.len() != given.positions.shape()[1] {
         return Err(wrong_input(format!("names: {} for {} vehicles", names.len(), given.positions.shape()[1])));
@@ -127,7 +127,7 @@ pub(crate) fn audit_arrays<'py>(
     let monitor = Silent::default();
     let work = || {
         let open: &Open<'_> = &|| Ok(Box::new(arrays.clone()));
-        let subject = Subject::Held { name: "arrays", own, open };
+        let subject = Subject::InMemory { name: "arrays", own, open };
         request::audit_files(&question.request(subject, command, html), &monitor)
     };
     let audited = run_in_thread(py, monitor.interruption(), work)?;

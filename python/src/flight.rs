@@ -62,7 +62,7 @@ impl Sink for Samples {
         Ok(())
     }
 
-    fn looks_at_steps(&self) -> bool {
+    fn needs_steps(&self) -> bool {
         false
     }
 }
@@ -118,7 +118,7 @@ impl Sink for OutputFiles {
         self.page.as_mut().map_or(Ok(()), |page| page.event(event))
     }
 
-    fn looks_at_steps(&self) -> bool {
+    fn needs_steps(&self) -> bool {
         false
     }
 }
@@ -142,11 +142,11 @@ pub(crate) fn fly(
     let mut signals = Signals::new();
     let flight = || -> Result<_, SimError> {
         let preflight = match &law {
-            Some(law) => Preflight::under(scenario, law),
+            Some(law) => Preflight::with_law(scenario, law),
             None => Preflight::of(scenario)?,
         };
         let parts = match law {
-            Some(law) => Components::under(scenario, Box::new(law)),
+            Some(law) => Components::with_law(scenario, Box::new(law)),
             None => Components::of(scenario)?,
         };
         let recording = record.as_deref().map(|path| {

@@ -38,7 +38,7 @@ mod _native {
     #[pymodule_export]
     use super::read::{Columns, read};
     #[pymodule_export]
-    use super::request::{Question, ReadOptions};
+    use super::request::{AuditOptions, ReadOptions};
     #[pymodule_export]
     use super::scenario::Scenario;
     #[pymodule_export]
@@ -54,7 +54,7 @@ mod _native {
         // Errors that are raised in Python have no code.
         module.getattr("Error")?.setattr("code", module.py().None())?;
         let origin: std::path::PathBuf = module.getattr("__spec__")?.getattr("origin")?.extract()?;
-        tautline::campaign::Program::is_in(origin);
+        tautline::campaign::Program::set_library_file(origin);
         Ok(())
     }
 }

@@ -2,7 +2,7 @@
 
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods as _};
 use pyo3::prelude::*;
-use tautline::observation::{self, Neighbour, Others};
+use tautline::observation::{self, NeighbourState, OtherStates};
 
 use crate::numbers::{cube, table, vectors};
 
@@ -28,15 +28,15 @@ pub(crate) struct Observation {
     /// Whether every vehicle knows all `positions` and `velocities`; the arrays below are then None.
     shared: bool,
     /// (N, N, 3) positions [m]; `[i, j]` is the last position of vehicle j that vehicle i received.
-    heard_positions: Option<Py<PyArray3<f64>>>,
+    received_positions: Option<Py<PyArray3<f64>>>,
     /// (N, N, 3) velocities [m/s], with the same indices.
-    heard_velocities: Option<Py<PyArray3<f64>>>,
+    received_velocities: Option<Py<PyArray3<f64>>>,
     /// (N, N) ages of these positions and velocities [s].
-    heard_ages_s: Option<Py<PyArray2<f64>>>,
+    received_ages_s: Option<Py<PyArray2<f64>>>,
     /// (N, N, 3) positions [m] of vehicle j from a sensor of vehicle i; None without a sensing range.
-    seen_positions: Option<Py<PyArray3<f64>>>,
+    sensed_positions: Option<Py<PyArray3<f64>>>,
     /// (N, N, 3) velocities [m/s], with the same indices.
-    seen_velocities: Option<Py<PyArray3<f64>>>,
+    sensed_velocities: Option<Py<PyArray3<f64>>>,
 }
 
 impl Observation {
@@ -47,11 +47,11 @@ impl Observation {
         let (v, a) = (target.reference.velocity_m_s, target.reference.acceleration_m_s2);
         let pairs = at.near.iter().flat_map(|&(i, j)| [i64::try_from(i), i64::try_from(j)]);
         let near = PyArray1::from_vec(py, pairs.map(|index| index.unwrap_or(i64::MAX)).collect());
-        let shared = matches!(at.others, Others::Shared);
-        let heard = (!shared).then(|| NeighbourTables::of(py, at, |i, j| at.heard(i, j))).transpose()?;
-        let seen = (!shared && sees).then(|| NeighbourTables::of(py, at, |i, j| at.seen(i, j))).transpose()?;
-        let (heard_positions, heard_velocities, heard_ages_s) = NeighbourTables::split(heard);
-        let (seen_positions, seen_velocities, _) = NeighbourTables::split(seen);
+        let shared = matches!(at.others, OtherStates::Shared);
+        let received = (!shared).then(|| NeighbourTables::of(py, at, |i, j| at.received(i, j))).transpose()?;
+        let sensed = (!shared && sees).then(|| NeighbourTables::of(py, at, |i, j| at.sensed(i, j))).transpose()?;
+        let (received_positions, received_velocities, received_ages_s) = NeighbourTables::split(received);
+        let (sensed_positions, sensed_velocities, _) = NeighbourTables::split(sensed);
         Ok(Self {
             t: at.time_s,
             positions: table(py, &at.own.positions_m)?.unbind(),
@@ -62,11 +62,11 @@ impl Observation {
             reference_acceleration_m_s2: (a.x, a.y, a.z),
             near: near.reshape([at.near.len(), 2])?.unbind(),
             shared,
-            heard_positions,
-            heard_velocities,
-            heard_ages_s,
-            seen_positions,
-            seen_velocities,
+            received_positions,
+            received_velocities,
+            received_ages_s,
+            sensed_positions,
+            sensed_velocities,
         })
     }
 }
@@ -84,13 +84,14 @@ impl NeighbourTables {
     fn of(
         py: Python<'_>,
         at: &observation::Observation<'_>,
-        known: impl Fn(usize, usize) -> Neighbour,
+        known: impl Fn(usize, usize) -> NeighbourState,
     ) -> PyResult<Self> {
         let count = at.own.count();
         let pairs = || (0..count).flat_map(|i| (0..count).map(move |j| (i, j)));
         let (mut positions, mut velocities, mut ages_s) = (Vec::new(), Vec::new(), Vec::new());
         for (i, j) in pairs() {
-            let Neighbour { position_m: p, velocity_m_s: v, age_s } = if i == j { own(at, i) } else { known(i, j) };
+            let NeighbourState { position_m: p, velocity_m_s: v, age_s } =
+                if i == j { own(at, i) } else { known(i, j) };
             positions.extend([p.x, p.y, p.z]);
             velocities.extend([v.x, v.y, v.z]);
             ages_s.push(age_s);
@@ -111,7 +112,7 @@ impl NeighbourTables {
 }
 
 /// Returns the own state of a vehicle.
-fn own(at: &observation::Observation<'_>, i: usize) -> Neighbour {
+fn own(at: &observation::Observation<'_>, i: usize) -> NeighbourState {
     let row = tautline::swarm::row;
-    Neighbour { position_m: row(&at.own.positions_m, i), velocity_m_s: row(&at.own.velocities_m_s, i), age_s: 0.0 }
+    NeighbourState { position_m: row(&at.own.positions_m, i), velocity_m_s: row(&at.own.velocities_m_s, i), age_s: 0.0 }
 }

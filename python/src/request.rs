@@ -100,7 +100,7 @@ impl ReadOptions {
 
 /// Options of an audit.
 #[pyclass(frozen, module = "tautline._native")]
-pub(crate) struct Question {
+pub(crate) struct AuditOptions {
     settings: recorded::Settings,
     obstacles: Option<PathBuf>,
     fence: Option<PathBuf>,
@@ -110,10 +110,10 @@ pub(crate) struct Question {
 }
 
 /// Value of a quantity for all vehicles, and values by name.
-type OfVehicles = (Option<f64>, Vec<(String, f64)>);
+type PerVehicleValues = (Option<f64>, Vec<(String, f64)>);
 
 #[pymethods]
-impl Question {
+impl AuditOptions {
     #[new]
     #[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
     #[pyo3(signature = (*, delta, motion, max_accel, radius, ellipsoid, obstacles, limit, fence, accel_window, config,
@@ -122,8 +122,8 @@ impl Question {
     fn new(
         delta: Option<f64>,
         motion: Option<String>,
-        max_accel: OfVehicles,
-        radius: OfVehicles,
+        max_accel: PerVehicleValues,
+        radius: PerVehicleValues,
         ellipsoid: Option<[f64; 3]>,
         obstacles: Option<PathBuf>,
         limit: Vec<(String, f64)>,
@@ -183,7 +183,7 @@ impl Question {
     }
 }
 
-impl Question {
+impl AuditOptions {
     /// Returns the request for an audit. `command` is the call that repeats it.
     pub(crate) fn request<'a>(&self, subject: Subject<'a>, command: &str, html: Option<PathBuf>) -> AuditRequest<'a> {
         AuditRequest {

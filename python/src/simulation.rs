@@ -74,7 +74,7 @@ impl Simulation {
         let is_of_python = law.is_some();
         let begin = || -> Result<_, SimError> {
             let parts = match law {
-                Some(law) => Components::under(scenario, Box::new(law)),
+                Some(law) => Components::with_law(scenario, Box::new(law)),
                 None => Components::of(scenario)?,
             };
             sim::Simulation::with(scenario, parts)

@@ -9,7 +9,7 @@ use tautline::export::WRITTEN;
 use tautline::margin::Range;
 use tautline::request::{ExportRequest, Failure, Monitor as _, Silent, export_file};
 use tautline::scenario::builtin;
-use tautline::studies::{Experiment, Question, Study as _, StudyFiles, StudyRequest};
+use tautline::studies::{Criterion, Experiment, Study as _, StudyFiles, StudyRequest};
 use tautline::sweep::SweptKey;
 use tautline::validate::{ValidateRequest, validate_into};
 
@@ -86,8 +86,8 @@ where
     Ok((study.is_good(), json(study.to_json())?))
 }
 
-fn question(verdict: String) -> PyResult<Question> {
-    let questions = Question::ALL.map(|question| (question.name(), question));
+fn question(verdict: String) -> PyResult<Criterion> {
+    let questions = Criterion::ALL.map(|question| (question.name(), question));
     Ok(choice("verdict", Some(verdict), &questions)?.unwrap_or_default())
 }
 

@@ -289,7 +289,7 @@ def audit(
         raise Error("ids: no vehicle is named; leave it out to audit all")
     # Arrays have no folder that could hold a tautline.toml.
     looks_for_config = config is None and positions is None
-    question = _native.Question(
+    question = _native.AuditOptions(
         delta=optional_number(delta, "delta"),
         motion=optional_text(motion, "motion"),
         max_accel=number_or_by_name(max_accel, "max_accel"),
@@ -349,7 +349,7 @@ def transposed(array: NDArray[np.float64], layout: str) -> NDArray[np.float64]:
 
 
 def audit_files(
-    question: _native.Question,
+    question: _native.AuditOptions,
     command: str,
     t: object,
     read_as: Mapping[str, Any],
@@ -369,7 +369,7 @@ def audit_files(
 
 
 def audit_arrays(
-    question: _native.Question,
+    question: _native.AuditOptions,
     command: str,
     t: Any,
     positions: Any,

@@ -9,7 +9,7 @@ __all__ = [
     "Error",
     "FlightData",
     "Observation",
-    "Question",
+    "AuditOptions",
     "ReadOptions",
     "Scenario",
     "FlightFindings",
@@ -68,19 +68,19 @@ class Observation:
     def shared(self) -> bool:
         """Whether every vehicle knows all ``positions`` and ``velocities``; the arrays below are then None."""
     @property
-    def heard_positions(self) -> NDArray[np.float64] | None:
+    def received_positions(self) -> NDArray[np.float64] | None:
         """(N, N, 3) positions [m]; ``[i, j]`` is the last position of vehicle j that vehicle i received."""
     @property
-    def heard_velocities(self) -> NDArray[np.float64] | None:
+    def received_velocities(self) -> NDArray[np.float64] | None:
         """(N, N, 3) velocities [m/s], with the same indices."""
     @property
-    def heard_ages_s(self) -> NDArray[np.float64] | None:
+    def received_ages_s(self) -> NDArray[np.float64] | None:
         """(N, N) ages of these positions and velocities [s]."""
     @property
-    def seen_positions(self) -> NDArray[np.float64] | None:
+    def sensed_positions(self) -> NDArray[np.float64] | None:
         """(N, N, 3) positions [m] of vehicle j from a sensor of vehicle i; None without a sensing range."""
     @property
-    def seen_velocities(self) -> NDArray[np.float64] | None:
+    def sensed_velocities(self) -> NDArray[np.float64] | None:
         """(N, N, 3) velocities [m/s], with the same indices."""
 
 @final
@@ -224,7 +224,7 @@ class ReadOptions:
     ) -> ReadOptions: ...
 
 @final
-class Question:
+class AuditOptions:
     def __new__(
         cls,
         *,
@@ -248,7 +248,7 @@ class Question:
         max_gap: float | None,
         require_presence: bool,
         independent: bool,
-    ) -> Question: ...
+    ) -> AuditOptions: ...
 
 def attack(
     scenario: Scenario,
@@ -263,7 +263,7 @@ def attack(
     outputs: dict[str, str | bool | int | None],
 ) -> _Answer: ...
 def audit_arrays(
-    question: Question,
+    question: AuditOptions,
     command: str,
     times: Any,
     positions: Any,
@@ -273,7 +273,7 @@ def audit_arrays(
     html: str | None,
 ) -> _AuditOutcome: ...
 def audit_files(
-    question: Question, command: str, paths: Sequence[str], options: ReadOptions, html: str | None
+    question: AuditOptions, command: str, paths: Sequence[str], options: ReadOptions, html: str | None
 ) -> _AuditOutcome: ...
 def audit_in_rust(
     times: NDArray[np.float64], positions: NDArray[np.float64], delta_m: float

@@ -16,8 +16,8 @@ use tautline_audit::recorded::{Interpolation, Settings, VehicleSettings};
 use tautline_recordings::read::Format;
 use tautline_report::report::recorded::RecordedReport;
 use tautline_report::report::write_atomically;
-use tautline_report::request::outputs::Called;
-use tautline_report::request::{AuditRequest, Audited, ConfigFile, Failure, Monitor as _, Subject};
+use tautline_report::request::outputs::NamedPath;
+use tautline_report::request::{AuditRequest, AuditedRecording, ConfigFile, Failure, Monitor as _, Subject};
 
 /// Recordings that could not be judged, with the failures.
 type Failures = [(String, Failure)];
@@ -41,7 +41,7 @@ pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, 
         // No output may replace an input of any recording, even if the settings of a recording are wrong.
         request.check_outputs(&arguments.outputs())?;
         let configured = settings.and_then(|settings| AuditRequest { settings, ..request.clone() }.configured());
-        asked.push((request.subject.called(), configured));
+        asked.push((request.subject.name(), configured));
     }
     let mut complete = asked.iter().filter_map(|(_, asked)| asked.as_ref().ok());
     complete.try_for_each(|asked| asked.check_outputs(&arguments.outputs()))?;
@@ -77,7 +77,12 @@ pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, 
 }
 
 /// Writes the machine-readable outputs: one report for one recording, a list with all failures for several.
-fn answer(arguments: &AuditArguments, judged: &[Audited], failures: &Failures, is_one: bool) -> Result<(), Failure> {
+fn answer(
+    arguments: &AuditArguments,
+    judged: &[AuditedRecording],
+    failures: &Failures,
+    is_one: bool,
+) -> Result<(), Failure> {
     if arguments.json {
         match judged {
             [] if is_one => {}
@@ -116,7 +121,7 @@ enum Answer<'a> {
 }
 
 impl<'a> Answers<'a> {
-    fn of(judged: &'a [Audited], failures: &'a Failures) -> Self {
+    fn of(judged: &'a [AuditedRecording], failures: &'a Failures) -> Self {
         let not_judged = failures
             .iter()
             .map(|(recording, failure)| Answer::NotJudged { recording, error: failure.message().to_owned() });
@@ -385,7 +390,7 @@ impl AuditArguments {
     }
 
     /// Returns the output files that cover all recordings, with their options.
-    pub(super) fn outputs(&self) -> Vec<Called<'_>> {
+    pub(super) fn outputs(&self) -> Vec<NamedPath<'_>> {
         let outputs = [("--events", &self.events), ("--junit", &self.junit), ("--summary", &self.summary)];
         outputs.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?))).collect()
     }

@@ -6,20 +6,20 @@ use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
 use tautline_core::text::{at_least, counted, fixed};
 use tautline_report::report::Status;
-use tautline_report::report::recorded::{OfLimit, OfPair, OfVehicle, RecordedReport};
-use tautline_report::request::{Audited, Failure};
+use tautline_report::report::recorded::{LimitFindings, PairFinding, RecordedReport, VehicleFinding};
+use tautline_report::request::{AuditedRecording, Failure};
 
 const COLUMNS: [&str; 10] =
     ["kind", "first", "second", "from_s", "to_s", "lower_m", "upper_m", "at_s", "limit_m", "rate_hz"];
 
 /// Returns one row for each violation, undecided time, gap and early end, in order of time. With `named`, the first
 /// column is the recording.
-pub(super) fn csv(judged: &[Audited], named: bool) -> Result<Vec<u8>, Failure> {
+pub(super) fn csv(judged: &[AuditedRecording], named: bool) -> Result<Vec<u8>, Failure> {
     let failed =
         |error: csv::Error| Failure::machine("files/cannot-write", format!("cannot write the events: {error}"));
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(named.then_some("recording").into_iter().chain(COLUMNS)).map_err(failed)?;
-    for Audited { report, .. } in judged {
+    for AuditedRecording { report, .. } in judged {
         let recording = named.then(|| report.source.recording.clone());
         for row in rows(report) {
             writer.write_record(recording.iter().cloned().chain(row)).map_err(failed)?;
@@ -32,18 +32,17 @@ pub(super) fn csv(judged: &[Audited], named: bool) -> Result<Vec<u8>, Failure> {
 
 /// Returns the rows of one recording.
 fn rows(report: &RecordedReport) -> impl Iterator<Item = Vec<String>> {
-    let violations = report.violations.iter().map(|OfPair { who: [first, second], finding: v }| {
+    let violations = report.violations.iter().map(|PairFinding { who: [first, second], finding: v }| {
         let numbers = [Some(v.min_m), Some(v.min_m), Some(v.min_at_s), Some(v.limit_m), None];
         ("violation", [first.as_str(), second], [v.from_s, v.to_s], numbers)
     });
-    let undecided = report.undecided.iter().map(|OfPair { who: [first, second], finding: u }| {
+    let undecided = report.undecided.iter().map(|PairFinding { who: [first, second], finding: u }| {
         let numbers = [Some(u.lower_m), Some(u.upper_m), None, Some(u.limit_m), u.rate_hz];
         ("undecided", [first.as_str(), second], [u.from_s, u.to_s], numbers)
     });
-    let gaps = report
-        .gaps
-        .iter()
-        .map(|OfVehicle { vehicle, finding: gap }| ("gap", [vehicle.as_str(), ""], [gap.from_s, gap.to_s], [None; 5]));
+    let gaps = report.gaps.iter().map(|VehicleFinding { vehicle, finding: gap }| {
+        ("gap", [vehicle.as_str(), ""], [gap.from_s, gap.to_s], [None; 5])
+    });
     let early_end =
         report.ended_early.iter().map(|end| ("ended-early", ["", ""], [end.at_s, end.duration_s], [None; 5]));
     let rows = violations.chain(undecided).chain(gaps).chain(early_end).map(|(kind, who, span_s, numbers)| {
@@ -62,10 +61,10 @@ fn rows(report: &RecordedReport) -> impl Iterator<Item = Vec<String>> {
 type Row = ([f64; 2], Vec<String>, [Option<f64>; 5]);
 
 /// Returns the rows of a limit of single vehicles; the name of the limit is in the column of the second vehicle.
-fn beyond(limit: &OfLimit) -> impl Iterator<Item = Row> + '_ {
+fn beyond(limit: &LimitFindings) -> impl Iterator<Item = Row> + '_ {
     let violations = limit.violations.iter().map(|of| ("violation", of));
     let undecided = limit.undecided.iter().map(|of| ("undecided", of));
-    violations.chain(undecided).map(|(kind, OfVehicle { vehicle, finding })| {
+    violations.chain(undecided).map(|(kind, VehicleFinding { vehicle, finding })| {
         let words = vec![kind.to_owned(), vehicle.clone(), limit.quantity.to_owned()];
         let numbers = [Some(finding.lower), Some(finding.upper), Some(finding.at_s), Some(limit.allowed), None];
         ([finding.from_s, finding.to_s], words, numbers)
@@ -79,7 +78,7 @@ fn number(x: f64) -> String {
 
 /// Returns a suite for each recording, and an error for each failure. Undecided results fail, or are skipped if
 /// allowed.
-pub(super) fn junit(judged: &[Audited], failures: &[(String, Failure)]) -> Result<String, Failure> {
+pub(super) fn junit(judged: &[AuditedRecording], failures: &[(String, Failure)]) -> Result<String, Failure> {
     let mut junit = Report::new("tautline audit");
     junit.add_test_suites(judged.iter().map(suite));
     junit.add_test_suites(failures.iter().map(|(recording, failure)| {
@@ -97,7 +96,7 @@ pub(super) fn junit(judged: &[Audited], failures: &[(String, Failure)]) -> Resul
 }
 
 /// Returns a case for the verdict and a case for each finding.
-fn suite(Audited { report, allows_undecided, .. }: &Audited) -> TestSuite {
+fn suite(AuditedRecording { report, allows_undecided, .. }: &AuditedRecording) -> TestSuite {
     let failed = |message: &str| {
         let mut status = TestCaseStatus::non_success(NonSuccessKind::Failure);
         status.set_message(message);
@@ -127,15 +126,15 @@ fn suite(Audited { report, allows_undecided, .. }: &Audited) -> TestSuite {
         let words = format!("{} not seen throughout", counted(partly, "vehicle is", "vehicles are"));
         cases.push(TestCase::new("presence", verdict(status, &words)));
     }
-    for OfPair { who: [first, second], finding: v } in &report.violations {
+    for PairFinding { who: [first, second], finding: v } in &report.violations {
         let words = format!("{:?} below {:?} from {:?} s to {:?} s", v.min_m, v.limit_m, v.from_s, v.to_s);
         cases.push(TestCase::new(format!("{first} and {second} at {:.3} s", v.min_at_s), failed(&words)));
     }
-    for OfPair { who: [first, second], finding: u } in &report.undecided {
+    for PairFinding { who: [first, second], finding: u } in &report.undecided {
         let words = format!("between {:?} and {:?} against {:?} by {:?} s", u.lower_m, u.upper_m, u.limit_m, u.to_s);
         cases.push(TestCase::new(format!("{first} and {second} from {:.3} s", u.from_s), doubtful(&words)));
     }
-    for OfVehicle { vehicle, finding: gap } in &report.gaps {
+    for VehicleFinding { vehicle, finding: gap } in &report.gaps {
         let words = format!("not seen from {:?} s to {:?} s", gap.from_s, gap.to_s);
         cases.push(TestCase::new(format!("{vehicle} from {:.3} s", gap.from_s), doubtful(&words)));
     }
@@ -150,11 +149,11 @@ fn suite(Audited { report, allows_undecided, .. }: &Audited) -> TestSuite {
 }
 
 /// Returns a summary in Markdown: a row for each recording, then the findings of each recording that is not clear.
-pub(super) fn markdown(judged: &[Audited], failures: &[(String, Failure)]) -> String {
+pub(super) fn markdown(judged: &[AuditedRecording], failures: &[(String, Failure)]) -> String {
     let mut text =
         "## tautline audit\n\n| recording | verdict | closest | vehicles | at |\n| --- | --- | --- | --- | --- |\n"
             .to_owned();
-    for Audited { report, .. } in judged {
+    for AuditedRecording { report, .. } in judged {
         let closest = report.closest.first();
         let unit = if report.measure == "metres" { "m" } else { "ellipsoids" };
         let cells = [
@@ -175,7 +174,7 @@ pub(super) fn markdown(judged: &[Audited], failures: &[(String, Failure)]) -> St
             escape_markdown(&failure.in_words())
         );
     }
-    for Audited { report, .. } in judged {
+    for AuditedRecording { report, .. } in judged {
         let notes = report.source.notes.iter().map(|note| format!("note: {note}\n"));
         let (headline, found) = (report.headline(), report.text() + &notes.collect::<String>());
         let fence = "`".repeat(longest_run(&headline).max(longest_run(&found)).max(2) + 1);
@@ -190,13 +189,13 @@ pub(super) fn markdown(judged: &[Audited], failures: &[(String, Failure)]) -> St
 }
 
 /// Returns an annotation of GitHub Actions for each recording.
-pub(super) fn github(judged: &[Audited], failures: &[(String, Failure)]) -> String {
+pub(super) fn github(judged: &[AuditedRecording], failures: &[(String, Failure)]) -> String {
     let mut text = String::new();
     let mut line = |level: &str, recording: &str, title: &str, message: &str| {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "::{level} file={},title={}::{}", property(recording), property(title), data(message));
     };
-    for Audited { report, allows_undecided, asked_by } in judged {
+    for AuditedRecording { report, allows_undecided, asked_by } in judged {
         let level = match report.status {
             Status::Clear => "notice",
             Status::Undecided if *allows_undecided => "warning",
@@ -212,7 +211,7 @@ pub(super) fn github(judged: &[Audited], failures: &[(String, Failure)]) -> Stri
 }
 
 /// Returns the numbers of recordings with each verdict in one line.
-pub(super) fn counts(judged: &[Audited], failures: usize) -> String {
+pub(super) fn counts(judged: &[AuditedRecording], failures: usize) -> String {
     let of = |status: Status| judged.iter().filter(|of| of.report.status == status).count() as u64;
     let mut parts = vec![
         counted(of(Status::Clear), "recording clear", "recordings clear"),

@@ -16,7 +16,7 @@ use tautline_render::{
     CameraSpec, Extent, Film, FilmFormat, Picture, RenderError, Renderer, Scene, Theme, Timeline, View, contact_sheet,
 };
 use tautline_report::report::{write_atomically, write_atomically_with};
-use tautline_report::request::outputs::{self, Called};
+use tautline_report::request::outputs::{self, NamedPath};
 use tautline_report::request::{Failure, try_to_write_in};
 
 /// Largest number of pictures of one command.
@@ -114,7 +114,7 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let frames = film.map_or(Ok(Vec::new()), |_| film_times(fps, arguments.speed, &timeline))?;
     let sheet = arguments.sheet.map(|sheet| sheet_plan(sheet, arguments.size, &timeline)).transpose()?;
     let sheet_path = folder.join("sheet.png");
-    let outputs: Vec<Called<'_>> = (stills.iter().map(|still| ("the picture", still.path.as_path())))
+    let outputs: Vec<NamedPath<'_>> = (stills.iter().map(|still| ("the picture", still.path.as_path())))
         .chain(sheet.iter().map(|_| ("the sheet", sheet_path.as_path())))
         .chain(film.map(|(path, _)| ("--film", path)))
         .collect();

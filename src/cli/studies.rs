@@ -14,7 +14,7 @@ use tautline_studies::attack::{Bound, FLIGHTS, SEEDS_OF_A_CANDIDATE};
 use tautline_studies::margin::Range;
 use tautline_studies::sweep::SweptKey;
 use tautline_studies::{
-    Experiment, MOST_RUNS, Question, SEEDS, Study as _, StudyFiles, StudyRequest, answer, attack, compare, margin,
+    Criterion, Experiment, MOST_RUNS, SEEDS, Study as _, StudyFiles, StudyRequest, answer, attack, compare, margin,
     sweep,
 };
 
@@ -131,7 +131,7 @@ pub(super) struct MarginArguments {
     to: f64,
     /// Verdict that every run must show.
     #[arg(long, value_name = "WHAT", default_value = "pass", value_parser = verdict())]
-    verdict: Question,
+    verdict: Criterion,
     /// Number of evenly spaced values, with both ends, that are flown first.
     #[arg(long, value_name = "N", default_value_t = 5, value_parser = clap::value_parser!(u16).range(2..=1000))]
     scan: u16,
@@ -143,13 +143,13 @@ pub(super) struct MarginArguments {
     log: bool,
 }
 
-fn verdict() -> impl TypedValueParser<Value = Question> {
+fn verdict() -> impl TypedValueParser<Value = Criterion> {
     let help = |question| match question {
-        Question::Pass => "Clear, and the formation is reached as far as the scenario requires",
-        Question::Clear => "No two vehicles come closer than delta up to the end",
-        Question::Reached => "The formation is reached and kept to the end",
+        Criterion::Pass => "Clear, and the formation is reached as far as the scenario requires",
+        Criterion::Clear => "No two vehicles come closer than delta up to the end",
+        Criterion::Reached => "The formation is reached and kept to the end",
     };
-    one_of(Question::ALL.map(|question| (PossibleValue::new(question.name()).help(help(question)), question)).into())
+    one_of(Criterion::ALL.map(|question| (PossibleValue::new(question.name()).help(help(question)), question)).into())
 }
 
 impl MarginArguments {
@@ -187,7 +187,7 @@ pub(super) struct SweepArguments {
     keys: Vec<String>,
     /// Verdict whose share is counted.
     #[arg(long, value_name = "WHAT", default_value = "pass", value_parser = verdict())]
-    verdict: Question,
+    verdict: Criterion,
 }
 
 impl SweepArguments {

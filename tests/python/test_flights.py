@@ -87,11 +87,11 @@ class Laws(Case):
         tl.fly(short(**{"network.latency_s": 0.1, "network.rate_hz": 20}), law=Observes())
         obs = seen[-1]
         self.assertFalse(obs.shared)
-        self.assertEqual((obs.heard_positions.shape, obs.heard_ages_s.shape), ((5, 5, 3), (5, 5)))
-        self.assertTrue((obs.heard_ages_s[~np.eye(5, dtype=bool)] >= 0.1 - 1e-9).all())
-        np.testing.assert_array_equal(obs.heard_positions[2, 2], obs.positions[2])
-        self.assertTrue((obs.heard_positions[0, 1] != obs.positions[1]).any())
-        self.assertIsNone(obs.seen_positions)
+        self.assertEqual((obs.received_positions.shape, obs.received_ages_s.shape), ((5, 5, 3), (5, 5)))
+        self.assertTrue((obs.received_ages_s[~np.eye(5, dtype=bool)] >= 0.1 - 1e-9).all())
+        np.testing.assert_array_equal(obs.received_positions[2, 2], obs.positions[2])
+        self.assertTrue((obs.received_positions[0, 1] != obs.positions[1]).any())
+        self.assertIsNone(obs.sensed_positions)
 
     def test_an_exception_of_a_law_keeps_its_traceback(self) -> None:
         class Fails(tl.Law):

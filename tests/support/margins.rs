@@ -2,7 +2,7 @@
 
 use tautline::margin::{Margin, Options, Range};
 use tautline::request::{ScenarioRequest, Silent};
-use tautline::studies::{Question, StudyRequest, answer};
+use tautline::studies::{Criterion, StudyRequest, answer};
 
 /// One imperfection: name, key, first and last value, runs of each value, further settings.
 struct Row {
@@ -57,7 +57,7 @@ impl Row {
         Self { logarithmic: true, ..self }
     }
 
-    fn margin(&self, vehicle: &[&str], question: Question) -> Margin {
+    fn margin(&self, vehicle: &[&str], question: Criterion) -> Margin {
         let sets: Vec<_> = self.sets.iter().chain(vehicle).map(|&set| set.to_owned()).collect();
         let Self { from, to, logarithmic, runs, .. } = *self;
         let range = Range { from, to, scan: SCAN, halvings: HALVINGS, logarithmic };
@@ -81,7 +81,7 @@ impl Row {
 #[allow(dead_code, reason = "not every program that shares this asks for a part")]
 pub(crate) fn cells(key: &str, vehicles: usize) -> Option<[String; 2]> {
     let row = ROWS.iter().find(|row| row.key == key)?;
-    Some([Question::Clear, Question::Pass].map(|question| row.cell(&row.margin(VEHICLES[vehicles].1, question))))
+    Some([Criterion::Clear, Criterion::Pass].map(|question| row.cell(&row.margin(VEHICLES[vehicles].1, question))))
 }
 
 /// Returns the table in Markdown, a row for each imperfection.
@@ -89,7 +89,7 @@ pub(crate) fn table() -> String {
     let headings = VEHICLES.map(|(vehicles, _)| format!("{vehicles} stay clear | {vehicles} pass"));
     let line = |row: &Row| {
         let cells = VEHICLES.iter().flat_map(|(_, vehicle)| {
-            [Question::Clear, Question::Pass].map(|question| row.cell(&row.margin(vehicle, question)))
+            [Criterion::Clear, Criterion::Pass].map(|question| row.cell(&row.margin(vehicle, question)))
         });
         format!("| {} | `{}` | {} |\n", row.what, row.key, cells.collect::<Vec<_>>().join(" | "))
     };

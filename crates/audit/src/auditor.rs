@@ -70,7 +70,7 @@ impl Auditor {
     /// changes then, which keeps the outcome from being clear.
     pub fn start(&mut self, time_s: f64, positions_m: &Rows) -> Result<StepFinding<'_>, AuditError> {
         let checked = if self.time_s.is_some() { Err(AuditError::AlreadyStarted) } else { Ok(()) };
-        self.admit(checked.and_then(|()| check_instant(self.vehicles, time_s, positions_m)))?;
+        self.check_input(checked.and_then(|()| check_instant(self.vehicles, time_s, positions_m)))?;
         self.positions_m.clone_from(positions_m);
         self.nearest_m = (1..self.vehicles).map(|i| separation(positions_m, i - 1, i)).fold(f64::INFINITY, f64::min);
         Ok(self.sweep(Interval { from_s: time_s, to_s: time_s }, positions_m))
@@ -87,7 +87,7 @@ impl Auditor {
             Some(previous_s) if time_s <= previous_s => Err(AuditError::TimeNotIncreasing { previous_s, time_s }),
             Some(previous_s) => check_instant(self.vehicles, time_s, positions_m).map(|()| previous_s),
         };
-        let previous_s = self.admit(checked)?;
+        let previous_s = self.check_input(checked)?;
         self.outcome.steps += 1;
         Ok(self.sweep(Interval { from_s: previous_s, to_s: time_s }, positions_m))
     }
@@ -122,7 +122,7 @@ impl Auditor {
         AuditOutcome { status, violations, parry, ..self.outcome }
     }
 
-    fn admit<T>(&mut self, checked: Result<T, AuditError>) -> Result<T, AuditError> {
+    fn check_input<T>(&mut self, checked: Result<T, AuditError>) -> Result<T, AuditError> {
         self.outcome.refused += u64::from(checked.is_err());
         checked
     }
@@ -186,10 +186,10 @@ impl Auditor {
 }
 
 /// Returns the straight motion of a pair over a step.
-fn exact_motion([from, to]: [&Rows; 2], [i, j]: [usize; 2], over: Interval) -> ExactMotion {
-    let Interval { from_s, to_s } = over;
+fn exact_motion([from, to]: [&Rows; 2], [i, j]: [usize; 2], interval: Interval) -> ExactMotion {
+    let Interval { from_s, to_s } = interval;
     let line = |of| Line { from_s, to_s, from: row(from, of), to: row(to, of) };
-    ExactMotion { first: line(i), second: line(j), over }
+    ExactMotion { first: line(i), second: line(j), interval }
 }
 
 /// Checks that an instant can be judged: a finite time, and a position within range for each vehicle.

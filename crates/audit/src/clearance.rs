@@ -29,7 +29,7 @@ pub struct ClearanceAuditor {
     /// Distances at the last instant \[m\], grouped by vehicle, and whether they are below the limit.
     distances_m: Vec<f64>,
     is_below: Vec<bool>,
-    least_room_m: f64,
+    smallest_margin_m: f64,
     results: Results,
     began: Vec<Violation<ObjectPair>>,
     ended: Vec<Violation<ObjectPair>>,
@@ -47,7 +47,7 @@ struct GuardedObstacle {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ClearanceFinding<'a> {
     /// Smallest distance beyond the clearance of any vehicle and obstacle at the end of the step \[m\].
-    pub least_room_m: f64,
+    pub smallest_margin_m: f64,
     /// Violations that began in this step.
     pub began: &'a [Violation<ObjectPair>],
     /// Violations that ended in this step, complete. A violation that began and ended in this step is in both lists.
@@ -96,7 +96,7 @@ impl ClearanceAuditor {
             positions_m: Rows::zeros(0),
             distances_m: vec![0.0; vehicles * obstacles.len()],
             is_below: vec![false; vehicles * obstacles.len()],
-            least_room_m: f64::INFINITY,
+            smallest_margin_m: f64::INFINITY,
             results: Results { obstacles: ClosestPairs::to_limits(), ..Results::default() },
             began: Vec::new(),
             ended: Vec::new(),
@@ -123,13 +123,13 @@ impl ClearanceAuditor {
         let step = Interval { from_s: self.time_s.unwrap_or(time_s), to_s: time_s };
         self.began.clear();
         self.ended.clear();
-        self.least_room_m = f64::INFINITY;
+        self.smallest_margin_m = f64::INFINITY;
         for vehicle in 0..self.vehicles {
             self.sweep(step, vehicle, positions_m);
         }
         self.positions_m.copy_from(positions_m);
         self.time_s = Some(time_s);
-        Ok(ClearanceFinding { least_room_m: self.least_room_m, began: &self.began, ended: &self.ended })
+        Ok(ClearanceFinding { smallest_margin_m: self.smallest_margin_m, began: &self.began, ended: &self.ended })
     }
 
     /// Sweeps the path of a vehicle past every obstacle.
@@ -142,7 +142,7 @@ impl ClearanceAuditor {
             let end_m = obstacle.shape.distance(to - place_m);
             let start_m = if is_first { end_m } else { self.distances_m[place] };
             self.distances_m[place] = end_m;
-            self.least_room_m = self.least_room_m.min(end_m - limit_m);
+            self.smallest_margin_m = self.smallest_margin_m.min(end_m - limit_m);
             let pair = ObjectPair::Obstacle { vehicle, obstacle: index };
             let rounding_m = ROUNDING * ((from - place_m).norm() + (to - place_m).norm() + limit_m);
             let least_m = 0.5 * (start_m + end_m - moved_m) - rounding_m;

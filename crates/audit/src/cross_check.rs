@@ -10,7 +10,7 @@ use parry3d::shape::{Ball, Capsule, Cuboid, HalfSpace};
 
 use super::enclosure::{Minimum, Search, Target};
 use super::obstacle::Shape;
-use super::polynomial::{stray, value};
+use super::polynomial::{motion_deviation, value};
 use super::sweep::{ClosestPoint, RelativeMotion, Span, larger};
 
 /// Largest number of chords per segment of a curve.
@@ -38,7 +38,7 @@ pub(super) fn cross_check(search: &Search<'_>, keep_out: &KeepOut, found: &Minim
 /// Casts keep-out balls along chords of a curve. The results may differ by the distance of the chords from the curve.
 fn along_chords(keep_out: &KeepOut, r: &[Vector3<f64>], found: &Minimum, rounding: f64) -> CrossCheck {
     let limit = keep_out.delta_m;
-    let whole = stray(r);
+    let whole = motion_deviation(r);
     let wanted = (whole / (CHORD_OVER_LIMIT * limit)).sqrt().ceil();
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to a small number")]
     let chords = wanted.clamp(1.0, f64::from(MAX_CHORDS)) as u32;
@@ -54,16 +54,16 @@ fn along_chords(keep_out: &KeepOut, r: &[Vector3<f64>], found: &Minimum, roundin
         from = to;
     }
     // The second derivative is bounded by the coefficients; n chords divide its effect by n^2.
-    let strayed = curvature_stray(r) / f64::from(chords).powi(2) + rounding;
+    let deviation_bound = curvature_deviation(r) / f64::from(chords).powi(2) + rounding;
     let agrees = match contact {
-        None => found.upper >= limit - strayed,
-        Some(fraction) => !fraction.is_nan() && found.lower <= limit + strayed,
+        None => found.upper >= limit - deviation_bound,
+        Some(fraction) => !fraction.is_nan() && found.lower <= limit + deviation_bound,
     };
     CrossCheck { contact, agrees }
 }
 
 /// Returns a bound on the distance of a chord over a part of length 1 / n from the curve, times n^2: max |r''| / 8.
-fn curvature_stray(r: &[Vector3<f64>]) -> f64 {
+fn curvature_deviation(r: &[Vector3<f64>]) -> f64 {
     r.iter().enumerate().skip(2).map(|(k, c)| (k * (k - 1)) as f64 * c.norm()).sum::<f64>() / 8.0
 }
 

@@ -70,7 +70,7 @@ impl DoubleDouble {
 
     /// Returns the quotient, to within [`QUOTIENT`].
     #[inline]
-    pub(super) fn over(self, divisor: Self) -> Self {
+    pub(super) fn divided_by(self, divisor: Self) -> Self {
         let first = self.high / divisor.high;
         let rest = self - divisor * Self::from(first);
         fast_two_sum(first, rest.high / divisor.high)
@@ -207,7 +207,7 @@ mod tests {
             prop_assert!(within(a + almost, &x + &z, OPERATION));
             prop_assert!(within(a - b, &x - &y, OPERATION));
             prop_assert!(within(a * b, &x * &y, OPERATION));
-            prop_assert!(within(a.over(b), &x / &y, QUOTIENT));
+            prop_assert!(within(a.divided_by(b), &x / &y, QUOTIENT));
             prop_assert_eq!(value(DoubleDouble::difference(a.high, b.high)), exact(a.high) - exact(b.high));
         }
 

@@ -197,13 +197,13 @@ impl<'a> Search<'a> {
         let from = self.part[0];
         let to: Vector3<f64> = self.part.iter().sum();
         let last = (n - 1).max(1) as f64;
-        let (mut stray, mut high) = (0.0_f64, f64::NEG_INFINITY);
+        let (mut motion_deviation, mut high) = (0.0_f64, f64::NEG_INFINITY);
         for (k, control) in self.basis.points(&self.part).enumerate() {
-            stray = stray.max((control - (from + (to - from) * (k as f64 / last))).norm());
+            motion_deviation = motion_deviation.max((control - (from + (to - from) * (k as f64 / last))).norm());
             high = high.max(shape.distance(control));
         }
         let rounding = 4.0 * n as f64 * f64::EPSILON * self.magnitude();
-        (shape.closest(from, to).0 - stray - rounding, high + rounding)
+        (shape.closest(from, to).0 - motion_deviation - rounding, high + rounding)
     }
 
     /// Returns a bound on the sum of the terms of a position.

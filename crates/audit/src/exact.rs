@@ -21,7 +21,7 @@ use nalgebra::Vector3;
 use num_bigint::BigInt;
 
 use super::double_double::{DoubleDouble, OPERATION, is_shorter};
-use super::segment::{INTERPOLATION, Line, Place};
+use super::segment::{EndPosition, INTERPOLATION, Line};
 use super::sweep::Interval;
 
 /// Motion of two vehicles on lines over an interval within both.
@@ -29,7 +29,7 @@ use super::sweep::Interval;
 pub(super) struct ExactMotion {
     pub(super) first: Line,
     pub(super) second: Line,
-    pub(super) over: Interval,
+    pub(super) interval: Interval,
 }
 
 /// Range of squared lengths in which no product of four lengths underflows or overflows.
@@ -91,35 +91,35 @@ impl ExactMotion {
 
     /// Returns the first time of the smallest separation, rounded down to a double \[s\].
     pub(super) fn closest_s(&self) -> f64 {
-        self.integer(0.0).closest_s(self.over)
+        self.integer(0.0).closest_s(self.interval)
     }
 
     /// Returns the motion in integers.
     #[cold]
     fn integer(&self, distance: f64) -> IntegerMotion {
-        IntegerMotion::new([&self.first, &self.second], self.over, distance)
+        IntegerMotion::new([&self.first, &self.second], self.interval, distance)
     }
 
     /// Returns the relative position at both ends.
-    fn ends(&self) -> [End; 2] {
+    fn ends(&self) -> [RelativeEnd; 2] {
         let Self { first, second, .. } = self;
         if first.from == first.to && second.from == second.to {
-            let still = End { r: difference(&second.from, &first.from), error: 0.0 };
+            let still = RelativeEnd { r: difference(&second.from, &first.from), error: 0.0 };
             return [still, still];
         }
-        [(self.over.from_s, false), (self.over.to_s, true)].map(|(time_s, is_end)| {
+        [(self.interval.from_s, false), (self.interval.to_s, true)].map(|(time_s, is_end)| {
             let [first, second] = [&self.first, &self.second].map(|line| line.place(time_s, is_end));
-            if let (Place::Sample(a), Place::Sample(b)) = (&first, &second) {
-                return End { r: difference(b, a), error: 0.0 };
+            if let (EndPosition::Sample(a), EndPosition::Sample(b)) = (&first, &second) {
+                return RelativeEnd { r: difference(b, a), error: 0.0 };
             }
             let position = |line: &Line, place| match place {
-                Place::Sample(at) => [0, 1, 2].map(|axis| DoubleDouble::from(at[axis])),
-                Place::Between => line.position(time_s),
+                EndPosition::Sample(at) => [0, 1, 2].map(|axis| DoubleDouble::from(at[axis])),
+                EndPosition::Interpolated => line.position(time_s),
             };
             let (a, b) = (position(&self.first, first), position(&self.second, second));
             let size = |line: &Line| line.from.amax() + line.to.amax();
             let error = INTERPOLATION * (size(&self.first) + size(&self.second));
-            End { r: [0, 1, 2].map(|axis| b[axis] - a[axis]), error }
+            RelativeEnd { r: [0, 1, 2].map(|axis| b[axis] - a[axis]), error }
         })
     }
 
@@ -127,13 +127,13 @@ impl ExactMotion {
     fn decide_by_double_doubles(&self, distance: f64) -> Option<bool> {
         let [start, end] = self.ends();
         let is_below = start.is_below(distance)?;
-        if is_below || End::are_same(&start, &end) {
+        if is_below || RelativeEnd::are_same(&start, &end) {
             return Some(is_below);
         }
         if end.is_below(distance)? {
             return Some(true);
         }
-        let between = Between::of(&start, &end)?;
+        let between = InteriorMinimum::of(&start, &end)?;
         if !between.may_be_closer() {
             return Some(false);
         }
@@ -151,9 +151,9 @@ impl ExactMotion {
         let [start, end] = self.ends();
         let ends = [&start, &end].map(|end| dot(&end.r, &end.r).high);
         let nearest = ends[0].min(ends[1]);
-        let between = if End::are_same(&start, &end) { None } else { Some(Between::of(&start, &end)?) };
-        let squared = match between.filter(Between::may_be_closer) {
-            Some(between) => between.cross_squared.over(between.by_squared).high.min(nearest),
+        let between = if RelativeEnd::are_same(&start, &end) { None } else { Some(InteriorMinimum::of(&start, &end)?) };
+        let squared = match between.filter(InteriorMinimum::may_be_closer) {
+            Some(between) => between.cross_squared.divided_by(between.by_squared).high.min(nearest),
             None => nearest,
         };
         SQUARES.contains(&squared).then(|| squared.sqrt())
@@ -162,12 +162,12 @@ impl ExactMotion {
 
 /// Relative position at an end of the shared time, with a bound on its error.
 #[derive(Clone, Copy)]
-struct End {
+struct RelativeEnd {
     r: [DoubleDouble; 3],
     error: f64,
 }
 
-impl End {
+impl RelativeEnd {
     /// Returns whether the relative position is constant.
     fn are_same(start: &Self, end: &Self) -> bool {
         start.error == 0.0 && end.error == 0.0 && start.r == end.r
@@ -199,7 +199,7 @@ impl End {
 }
 
 /// Terms that decide whether a relative motion is closest between its ends.
-struct Between {
+struct InteriorMinimum {
     /// |r0|^2 |d|^2 - (r0 . d)^2.
     cross_squared: DoubleDouble,
     /// |d|^2.
@@ -214,9 +214,9 @@ struct Between {
     end_error: f64,
 }
 
-impl Between {
+impl InteriorMinimum {
     /// Creates the terms; `None` if the sizes are out of range or the error of the ends is too large.
-    fn of(start: &End, end: &End) -> Option<Self> {
+    fn of(start: &RelativeEnd, end: &RelativeEnd) -> Option<Self> {
         let d = [0, 1, 2].map(|axis| end.r[axis] - start.r[axis]);
         let end_error = start.error.max(end.error);
         let (from_squared, by_squared) = (dot(&start.r, &start.r), dot(&d, &d));
@@ -295,20 +295,22 @@ fn product(a: &[BigInt; 3], b: &[BigInt; 3]) -> BigInt {
 
 impl IntegerMotion {
     #[cold]
-    pub(super) fn new(lines: [&Line; 2], over: Interval, distance: f64) -> Self {
-        let times = Units::of(lines.iter().flat_map(|line| [line.from_s, line.to_s]).chain([over.from_s, over.to_s]));
+    pub(super) fn new(lines: [&Line; 2], interval: Interval, distance: f64) -> Self {
+        let times =
+            Units::of(lines.iter().flat_map(|line| [line.from_s, line.to_s]).chain([interval.from_s, interval.to_s]));
         let coordinates = lines.iter().flat_map(|line| line.from.iter().chain(&line.to).copied());
         let units = Units::of(coordinates.chain([distance]));
-        let at = [(over.from_s, false), (over.to_s, true)];
-        let is_between = |line: &Line| at.iter().any(|&(t, end)| matches!(line.place(t, end), Place::Between));
+        let at = [(interval.from_s, false), (interval.to_s, true)];
+        let is_between =
+            |line: &Line| at.iter().any(|&(t, end)| matches!(line.place(t, end), EndPosition::Interpolated));
         let weights = lines.map(|line| {
             if is_between(line) { times.integer(line.to_s) - times.integer(line.from_s) } else { BigInt::from(1) }
         });
         let position = |k: usize, time_s: f64, is_end: bool| {
             let line = lines[k];
             [0, 1, 2].map(|axis| match line.place(time_s, is_end) {
-                Place::Sample(at) => units.integer(at[axis]) * &weights[k],
-                Place::Between => {
+                EndPosition::Sample(at) => units.integer(at[axis]) * &weights[k],
+                EndPosition::Interpolated => {
                     let by = units.integer(line.to[axis]) - units.integer(line.from[axis]);
                     units.integer(line.from[axis]) * &weights[k]
                         + by * (times.integer(time_s) - times.integer(line.from_s))
@@ -348,28 +350,28 @@ impl IntegerMotion {
 
     pub(super) fn separation(&self) -> f64 {
         let (squared, by_squared) = self.closest();
-        root(&squared, &(by_squared * &self.weight * &self.weight), self.units.0)
+        rounded_root(&squared, &(by_squared * &self.weight * &self.weight), self.units.0)
     }
 
     /// Returns the first time of the smallest separation by bisection of the doubles in the interval.
-    pub(super) fn closest_s(&self, over: Interval) -> f64 {
+    pub(super) fn closest_s(&self, interval: Interval) -> f64 {
         let start_rate = product(&self.ends[0], &self.by);
         if start_rate >= BigInt::ZERO {
-            return over.from_s;
+            return interval.from_s;
         }
         if product(&self.ends[1], &self.by) <= BigInt::ZERO {
-            return over.to_s;
+            return interval.to_s;
         }
         let by_squared = product(&self.by, &self.by);
         // (t - from_s) |d|^2 <= -(r0 . d) (to_s - from_s)
         let is_reached = |time_s: f64| {
-            let times = Units::of([over.from_s, over.to_s, time_s]);
-            let [from, to, at] = [over.from_s, over.to_s, time_s].map(|time_s| times.integer(time_s));
+            let times = Units::of([interval.from_s, interval.to_s, time_s]);
+            let [from, to, at] = [interval.from_s, interval.to_s, time_s].map(|time_s| times.integer(time_s));
             (at - &from) * &by_squared <= -&start_rate * (to - from)
         };
-        let (mut low, mut high) = (over.from_s, over.to_s);
+        let (mut low, mut high) = (interval.from_s, interval.to_s);
         while low.next_up() < high {
-            let middle = between(low, high);
+            let middle = midpoint(low, high);
             if is_reached(middle) {
                 low = middle;
             } else {
@@ -391,7 +393,7 @@ pub(super) fn compare_height(line: &Line, time_s: f64, height: f64) -> Ordering 
 }
 
 /// Returns the double in the middle of all doubles between two.
-fn between(low: f64, high: f64) -> f64 {
+fn midpoint(low: f64, high: f64) -> f64 {
     // Integers in the order of the doubles.
     let key = |number: f64| {
         let bits = number.to_bits().cast_signed();
@@ -402,7 +404,7 @@ fn between(low: f64, high: f64) -> f64 {
 }
 
 /// Returns the square root of a fraction, times 2^`exponent`, rounded down to a double.
-fn root(numerator: &BigInt, denominator: &BigInt, exponent: i32) -> f64 {
+fn rounded_root(numerator: &BigInt, denominator: &BigInt, exponent: i32) -> f64 {
     const DIGITS: u64 = 53;
     if *numerator == BigInt::ZERO {
         return 0.0;
@@ -442,9 +444,9 @@ mod tests {
                 let [t, u, v, w] = times;
                 let (first, second) = ([t.min(u), t.max(u)], if is_together { [t, u] } else { [v, w] });
                 let second = [second[0].min(second[1]).min(first[1]), second[0].max(second[1]).max(first[0])];
-                let over = Interval { from_s: first[0].max(second[0]), to_s: first[1].min(second[1]) };
+                let interval = Interval { from_s: first[0].max(second[0]), to_s: first[1].min(second[1]) };
                 let line = |[from_s, to_s]: [f64; 2], from, to| Line { from_s, to_s, from, to };
-                ExactMotion { first: line(first, a, b), second: line(second, c, d), over }
+                ExactMotion { first: line(first, a, b), second: line(second, c, d), interval }
             },
         )
     }
@@ -463,7 +465,7 @@ mod tests {
                 prop_assert_eq!(motion.starts_below(distance), integer.starts_below());
             }
             let at_s = motion.closest_s();
-            prop_assert!(motion.over.from_s <= at_s && at_s <= motion.over.to_s);
+            prop_assert!(motion.interval.from_s <= at_s && at_s <= motion.interval.to_s);
         }
     }
 
@@ -476,8 +478,8 @@ mod tests {
                 from: Vector3::new(-x, y, 0.0),
                 to: Vector3::new(x, y, 0.0),
             };
-            let over = Interval { from_s: 0.0, to_s: 1.0 };
-            let motion = ExactMotion { first: line(0.0, 1.0), second: line(size, -1.0), over };
+            let interval = Interval { from_s: 0.0, to_s: 1.0 };
+            let motion = ExactMotion { first: line(0.0, 1.0), second: line(size, -1.0), interval };
             assert_eq!((motion.separation(), motion.closest_s()), (size, 0.5));
             assert!(!motion.is_below(size) && motion.is_below(size.next_up()));
         }

@@ -54,30 +54,30 @@ impl Tally {
 
 /// Number with the total order of `f64::total_cmp`.
 #[derive(Clone, Copy, Debug)]
-struct Ordered(f64);
+struct TotalOrder(f64);
 
-impl Ord for Ordered {
+impl Ord for TotalOrder {
     fn cmp(&self, other: &Self) -> Ordering {
         self.0.total_cmp(&other.0)
     }
 }
 
-impl PartialOrd for Ordered {
+impl PartialOrd for TotalOrder {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl PartialEq for Ordered {
+impl PartialEq for TotalOrder {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
 
-impl Eq for Ordered {}
+impl Eq for TotalOrder {}
 
 /// Excess of a finding, then its start and its subject.
-type Rank<Subject> = (Ordered, Reverse<(Ordered, Subject)>);
+type Rank<Subject> = (TotalOrder, Reverse<(TotalOrder, Subject)>);
 
 /// The worst findings, and the first of each pair or vehicle. The content does not depend on the order in which
 /// findings of different pairs are added. Findings of one pair are added in order of time.
@@ -89,7 +89,7 @@ pub(super) struct Shortlist<T: Finding> {
     worst: BTreeMap<Rank<T::Subject>, T>,
     firsts: BTreeMap<T::Subject, T>,
     /// Start of each first finding.
-    begins: BTreeSet<(Ordered, T::Subject)>,
+    begins: BTreeSet<(TotalOrder, T::Subject)>,
 }
 
 impl<T: Finding> Shortlist<T> {
@@ -98,8 +98,8 @@ impl<T: Finding> Shortlist<T> {
     }
 
     pub(super) fn offer(&mut self, finding: T) {
-        let (begin, subject) = ((Ordered(finding.span_s()[0]), finding.subject()), finding.subject());
-        let key = (Ordered(finding.excess()), Reverse(begin));
+        let (begin, subject) = ((TotalOrder(finding.span_s()[0]), finding.subject()), finding.subject());
+        let key = (TotalOrder(finding.excess()), Reverse(begin));
         let is_full = self.worst.len() >= self.capacity;
         if !is_full || self.worst.first_key_value().is_some_and(|(least, _)| *least < key) {
             self.worst.insert(key, finding);
@@ -132,7 +132,8 @@ impl<T: Finding> Shortlist<T> {
     /// Returns every kept finding once, ordered by start and then by subject.
     pub(super) fn into_list(self) -> Vec<T> {
         let both = self.worst.into_values().chain(self.firsts.into_values());
-        let key = |of: &T| (Ordered(of.span_s()[0]), of.subject(), Ordered(of.span_s()[1]), Ordered(of.excess()));
+        let key =
+            |of: &T| (TotalOrder(of.span_s()[0]), of.subject(), TotalOrder(of.span_s()[1]), TotalOrder(of.excess()));
         both.map(|of| (key(&of), of)).collect::<BTreeMap<_, _>>().into_values().collect()
     }
 }
@@ -152,12 +153,12 @@ pub(super) struct Episodes<T: Finding> {
     all: Vec<T>,
     /// Indices of each pair's findings, in order of time.
     of_pair: BTreeMap<T::Subject, Vec<usize>>,
-    settled: Option<Settled<T>>,
+    settled: Option<SettledFindings<T>>,
     is_exact: bool,
 }
 
 #[derive(Clone, Debug)]
-struct Settled<T: Finding> {
+struct SettledFindings<T: Finding> {
     list: Shortlist<T>,
     count: u64,
     /// Window that is being swept.
@@ -187,7 +188,7 @@ impl<T: Finding> Episodes<T> {
     pub(super) fn bounded() -> Self {
         let window = Interval { from_s: f64::NEG_INFINITY, to_s: f64::INFINITY };
         let list = Shortlist::new(LISTED);
-        let settled = Settled { list, count: 0, window, swept_from: 0, settle_at: MIN_HELD };
+        let settled = SettledFindings { list, count: 0, window, swept_from: 0, settle_at: MIN_HELD };
         Self { settled: Some(settled), ..Self::default() }
     }
 

@@ -104,14 +104,14 @@ impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
         exact: &ExactMotion,
         least_m: impl FnOnce() -> f64,
     ) -> Option<usize> {
-        let (limit_m, over, approach) = (keep_out.delta_m, exact.over, motion.closest());
+        let (limit_m, interval, approach) = (keep_out.delta_m, exact.interval, motion.closest());
         let resolution_m = motion.resolution_m();
         let is_surely_below = approach.separation_m() + resolution_m < limit_m;
         let is_below = is_surely_below || exact.is_below(limit_m);
         let (span, check) = keep_out.compare(motion, approach, is_below, contact);
-        self.add_cross_check(pair, over, approach.separation_m(), span.map(|span| span.enter), check);
+        self.add_cross_check(pair, interval, approach.separation_m(), span.map(|span| span.enter), check);
         let span = span?;
-        let (from_s, to_s, min_at_s) = (over.at(span.enter), over.at(span.exit), over.at(approach.at));
+        let (from_s, to_s, min_at_s) = (interval.at(span.enter), interval.at(span.exit), interval.at(approach.at));
         if self.violations.is_from_earlier_window(to_s) {
             return None;
         }
@@ -162,16 +162,16 @@ impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
     pub(super) fn add_cross_check(
         &mut self,
         pair: P,
-        over: Interval,
+        interval: Interval,
         min_m: f64,
         enter: Option<f64>,
         check: CrossCheck,
     ) {
-        let [closed_form_s, parry_s] = [enter, check.contact].map(|fraction| fraction.map(|u| over.at(u)));
+        let [closed_form_s, parry_s] = [enter, check.contact].map(|fraction| fraction.map(|u| interval.at(u)));
         let earlier_s = self.parry.min_toi_s;
         self.parry.min_toi_s = earlier_s.into_iter().chain(parry_s.filter(|time_s| !time_s.is_nan())).reduce(f64::min);
         if !check.agrees {
-            let Interval { from_s, to_s } = over;
+            let Interval { from_s, to_s } = interval;
             self.parry.disagreements += 1;
             let new = Disagreement { pair, from_s, to_s, min_m, closed_form_s, parry_s };
             self.parry.first_disagreement.get_or_insert(new);

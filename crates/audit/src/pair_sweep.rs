@@ -31,7 +31,7 @@ pub(super) struct PairSweep<'a> {
 pub(super) struct Overlap<'a> {
     pub(super) first: &'a Segment,
     pub(super) second: &'a Segment,
-    pub(super) over: Interval,
+    pub(super) interval: Interval,
 }
 
 /// Calls `f` with the time that each segment of `first` shares with each segment of `second`, in order of time.
@@ -44,7 +44,7 @@ pub(super) fn overlaps<'a>(first: &'a [Segment], second: &'a [Segment], mut f: i
     while let (Some(one), Some(other)) = (first.get(a), second.get(b)) {
         let (from_s, to_s) = (one.from_s.max(other.from_s), one.to_s.min(other.to_s));
         if from_s <= to_s {
-            f(Overlap { first: one, second: other, over: Interval { from_s, to_s } });
+            f(Overlap { first: one, second: other, interval: Interval { from_s, to_s } });
         }
         let (mut step_a, mut step_b) = (one.to_s <= to_s, other.to_s <= to_s);
         if step_a && step_b {
@@ -62,7 +62,7 @@ pub(super) fn overlaps<'a>(first: &'a [Segment], second: &'a [Segment], mut f: i
 /// Smallest separation of straight segments below a cutoff. Rounded bounds select the candidates; their separations are
 /// exact.
 #[derive(Debug)]
-struct Nearest<'a> {
+struct SmallestSeparation<'a> {
     cutoff: f64,
     /// Upper bound of the smallest separation, and its square with a margin.
     upper: f64,
@@ -71,28 +71,28 @@ struct Nearest<'a> {
     candidates: Vec<(f64, f64, Overlap<'a>)>,
 }
 
-impl<'a> Nearest<'a> {
+impl<'a> SmallestSeparation<'a> {
     /// Margin of the rough bound. With the resolution e, (x + e)^2 <= x^2 (1 + m) + e^2 (1 + 1 / m), and e^2 is 64
     /// eps^2 times the squared scale.
     const MARGIN: f64 = 1e-6;
     const OF_SCALE: f64 = 1e-23;
 
-    fn below(cutoff: f64) -> Self {
+    fn with_cutoff(cutoff: f64) -> Self {
         Self { cutoff, upper: cutoff, upper_squared: cutoff * cutoff * (1.0 + Self::MARGIN), candidates: Vec::new() }
     }
 
     #[inline]
-    fn take(&mut self, overlap: &Overlap<'a>, motion: &RelativeMotion, closest: ClosestPoint) {
+    fn add(&mut self, overlap: &Overlap<'a>, motion: &RelativeMotion, closest: ClosestPoint) {
         if closest.squared < self.upper_squared + Self::OF_SCALE * motion.scale_squared() {
-            self.take_near(overlap, motion, closest);
+            self.add_close(overlap, motion, closest);
         }
     }
 
     #[inline(never)]
-    fn take_near(&mut self, overlap: &Overlap<'a>, motion: &RelativeMotion, closest: ClosestPoint) {
+    fn add_close(&mut self, overlap: &Overlap<'a>, motion: &RelativeMotion, closest: ClosestPoint) {
         let (separation, resolution) = (closest.separation_m(), motion.resolution_m());
         let (lower, upper) = (separation - resolution, separation + resolution);
-        if lower < self.upper && !self.candidates.last().is_some_and(|(.., before)| before.is_at_rest_like(overlap)) {
+        if lower < self.upper && !self.candidates.last().is_some_and(|(.., before)| before.is_same_rest(overlap)) {
             self.candidates.push((lower, closest.at, *overlap));
         }
         if upper < self.upper {
@@ -109,7 +109,7 @@ impl<'a> Nearest<'a> {
                 let exact = overlap.exact();
                 if exact.is_below(least) {
                     least = exact.separation();
-                    found = Some((least, overlap.over.at(at)));
+                    found = Some((least, overlap.interval.at(at)));
                 }
             }
         }
@@ -121,30 +121,31 @@ impl PairSweep<'_> {
     /// Judges a pair in a window. Straight segments are judged whole, so that findings do not depend on windows; curves
     /// are judged within the window.
     pub(super) fn judge(&self, first: &[Segment], second: &[Segment], window: Interval, results: &mut Results) {
-        let mut nearest = Nearest::below(self.cutoff);
+        let mut nearest = SmallestSeparation::with_cutoff(self.cutoff);
         let vehicles = matches!(self.target, Target::Origin);
         let mut swept = 0;
         overlaps(first, second, |overlap| {
             if results.interruption.is_set() {
                 return;
             }
-            if self.is_on_ground(overlap.first, overlap.over) && self.is_on_ground(overlap.second, overlap.over) {
+            if self.is_on_ground(overlap.first, overlap.interval) && self.is_on_ground(overlap.second, overlap.interval)
+            {
                 return;
             }
             if vehicles && overlap.is_straight() {
                 swept += 1;
                 let motion = overlap.straight();
                 let closest = motion.closest();
-                nearest.take(&overlap, &motion, closest);
+                nearest.add(&overlap, &motion, closest);
                 if self.may_violate {
                     self.straight(&overlap, &motion, closest, results);
                 }
             } else {
-                let Interval { from_s, to_s } = overlap.over;
-                let over = Interval { from_s: from_s.max(window.from_s), to_s: to_s.min(window.to_s) };
-                if over.from_s <= over.to_s {
+                let Interval { from_s, to_s } = overlap.interval;
+                let interval = Interval { from_s: from_s.max(window.from_s), to_s: to_s.min(window.to_s) };
+                if interval.from_s <= interval.to_s {
                     swept += 1;
-                    self.curved(&Overlap { over, ..overlap }, results);
+                    self.curved(&Overlap { interval, ..overlap }, results);
                 }
             }
         });
@@ -154,14 +155,14 @@ impl PairSweep<'_> {
         }
     }
 
-    /// Returns whether an object is on the ground during all of `over`. If `over` is a single instant, the height at
+    /// Returns whether an object is on the ground during all of `interval`. If this is a single instant, the height at
     /// this instant counts, because a segment that takes off begins on the ground.
     #[inline]
-    fn is_on_ground(&self, of: &Segment, over: Interval) -> bool {
+    fn is_on_ground(&self, of: &Segment, interval: Interval) -> bool {
         let starts_there = |above: f64| {
-            over.from_s >= over.to_s
+            interval.from_s >= interval.to_s
                 && !of.jumps()
-                && of.position(over.from_s).z + of.deviation_at(over.from_s) <= above
+                && of.position(interval.from_s).z + of.deviation_at(interval.from_s) <= above
         };
         of.grounded == Some(true) || self.above.is_some_and(starts_there)
     }
@@ -184,7 +185,7 @@ impl PairSweep<'_> {
 
     /// Judges an interval in which one object is on a curve or is an obstacle.
     fn curved(&self, overlap: &Overlap<'_>, results: &mut Results) {
-        let Overlap { first, second, over } = *overlap;
+        let Overlap { first, second, interval } = *overlap;
         let (pair, limit_m) = (self.pair, self.keep_out.delta_m);
         let r = overlap.relative();
         let mut search = Search::new(self.target, &r);
@@ -196,7 +197,7 @@ impl PairSweep<'_> {
 
         let floor = if matches!(self.target, Target::Origin) { 0.0 } else { f64::NEG_INFINITY };
         let lower = |lowest: &Minimum| (lowest.lower - deviation - rounding).max(floor);
-        let deviation_at = |u: f64| first.deviation_at(over.at(u)) + second.deviation_at(over.at(u));
+        let deviation_at = |u: f64| first.deviation_at(interval.at(u)) + second.deviation_at(interval.at(u));
         // The deviation is zero at a sample, so the distance at an end may be the smaller upper bound.
         let upper = |search: &Search<'_>, from: f64, to: f64, lowest: &Minimum| {
             let [start, end] = [from, to].map(|u| search.distance(u) + deviation_at(u));
@@ -208,7 +209,7 @@ impl PairSweep<'_> {
         };
         let (lower_m, upper_m) = (lower(&drawn), upper(&search, 0.0, 1.0, &drawn));
         if lower_m < self.cutoff {
-            self.offer(lower_m, upper_m, over.at(drawn.at), results);
+            self.offer(lower_m, upper_m, interval.at(drawn.at), results);
         }
         if !self.judges {
             return;
@@ -221,11 +222,11 @@ impl PairSweep<'_> {
                 let holds = from <= drawn.at && drawn.at <= to;
                 let other = if holds { None } else { search.minimum_within((from, to), f64::INFINITY) };
                 let lowest = other.unwrap_or(drawn);
-                let (from_s, to_s) = (over.at(from), over.at(to));
+                let (from_s, to_s) = (interval.at(from), interval.at(to));
                 let min_m = upper(&search, from, to, &lowest);
                 if min_m < limit_m {
                     let from_start = from <= 0.0 && search.distance(0.0) < limit_m;
-                    let min_at_s = over.at(lowest.at);
+                    let min_at_s = interval.at(lowest.at);
                     results
                         .ledger
                         .add_violation(Violation { pair, from_s, to_s, min_m, min_at_s, limit_m }, from_start);
@@ -235,11 +236,11 @@ impl PairSweep<'_> {
                 }
             }
         } else if lower_m < limit_m {
-            results.ledger.add_undecided(undecided(over.from_s, over.to_s, lower_m, upper_m, &drawn));
+            results.ledger.add_undecided(undecided(interval.from_s, interval.to_s, lower_m, upper_m, &drawn));
         }
         if self.may_violate {
             let check = cross_check(&search, &self.keep_out, &drawn, rounding);
-            results.ledger.add_cross_check(pair, over, drawn.upper, enter, check);
+            results.ledger.add_cross_check(pair, interval, drawn.upper, enter, check);
         }
     }
 }
@@ -253,7 +254,7 @@ impl Overlap<'_> {
 
     /// Returns whether both vehicles stand still at the same positions as in another overlap.
     #[inline]
-    fn is_at_rest_like(&self, other: &Self) -> bool {
+    fn is_same_rest(&self, other: &Self) -> bool {
         let is_still = |of: &Segment, other: &Segment| of.from == of.to && of.from == other.from && of.to == other.to;
         is_still(self.first, other.first) && is_still(self.second, other.second)
     }
@@ -266,14 +267,14 @@ impl Overlap<'_> {
         if are_samples && a.from_s == b.from_s && a.to_s == b.to_s {
             RelativeMotion::new(b.from - a.from, b.to - a.to)
         } else {
-            self.cut()
+            self.interpolated()
         }
     }
 
     /// Returns the relative motion of two straight segments with different times, or of parts of segments.
     /// Displacements are added to the difference of two starting points, which loses no digits far from the origin.
     #[inline(never)]
-    fn cut(&self) -> RelativeMotion {
+    fn interpolated(&self) -> RelativeMotion {
         let (a, b) = (self.first.line(), self.second.line());
         let (start, by_a, by_b) = (b.from - a.from, a.to - a.from, b.to - b.from);
         let at = |time_s: f64, end: bool| {
@@ -281,12 +282,16 @@ impl Overlap<'_> {
                 |line: &Line| if line.to_s <= line.from_s { f64::from(u8::from(end)) } else { line.fraction(time_s) };
             start + (by_b * share(&b) - by_a * share(&a))
         };
-        RelativeMotion::interpolated([at(self.over.from_s, false), at(self.over.to_s, true)], start, [by_a, by_b])
+        RelativeMotion::interpolated(
+            [at(self.interval.from_s, false), at(self.interval.to_s, true)],
+            start,
+            [by_a, by_b],
+        )
     }
 
     /// Returns the exact motion of two straight segments.
     pub(super) fn exact(&self) -> ExactMotion {
-        ExactMotion { first: self.first.line(), second: self.second.line(), over: self.over }
+        ExactMotion { first: self.first.line(), second: self.second.line(), interval: self.interval }
     }
 
     /// Returns the relative position as a polynomial of the fraction of the shared time. It has at least one
@@ -297,8 +302,8 @@ impl Overlap<'_> {
             let motion = self.straight();
             return vec![motion.from, motion.by];
         }
-        let mut r = b.local(self.over);
-        let less = a.local(self.over);
+        let mut r = b.local(self.interval);
+        let less = a.local(self.interval);
         r.resize(r.len().max(less.len()).max(1), Vector3::zeros());
         for (r, less) in r.iter_mut().zip(&less) {
             *r -= less;
@@ -334,7 +339,7 @@ mod tests {
 
     fn times(first: &[Segment], second: &[Segment]) -> Vec<(f64, f64)> {
         let mut times = Vec::new();
-        overlaps(first, second, |overlap| times.push((overlap.over.from_s, overlap.over.to_s)));
+        overlaps(first, second, |overlap| times.push((overlap.interval.from_s, overlap.interval.to_s)));
         times
     }
 

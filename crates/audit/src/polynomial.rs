@@ -94,17 +94,17 @@ pub(super) fn classify_parts(
 }
 
 /// Returns a bound on the distance of a polynomial from the uniform motion between its ends, by its control points.
-pub(super) fn stray(c: &[Vector3<f64>]) -> f64 {
+pub(super) fn motion_deviation(c: &[Vector3<f64>]) -> f64 {
     let n = c.len();
     let Some(from) = c.first().filter(|_| n > 2) else { return 0.0 };
     let by: Vector3<f64> = c[1..].iter().sum();
-    let strays = |(k, point): (usize, Vector3<f64>)| (point - from - by * (k as f64 / (n - 1) as f64)).norm();
-    BernsteinBasis::of_degree(n - 1).points(c).enumerate().map(strays).fold(0.0, f64::max)
+    let deviations = |(k, point): (usize, Vector3<f64>)| (point - from - by * (k as f64 / (n - 1) as f64)).norm();
+    BernsteinBasis::of_degree(n - 1).points(c).enumerate().map(deviations).fold(0.0, f64::max)
 }
 
 /// Returns a bound on the distance of a polynomial from the straight line between its ends, by its control points.
-/// Unlike [`stray`] it compares no times. The distance from a line is a convex function of the position.
-pub(super) fn stray_across(c: &[Vector3<f64>]) -> f64 {
+/// Unlike [`motion_deviation`] it compares no times. The distance from a line is a convex function of the position.
+pub(super) fn chord_deviation(c: &[Vector3<f64>]) -> f64 {
     let n = c.len();
     let Some(from) = c.first().filter(|_| n > 2) else { return 0.0 };
     let by: Vector3<f64> = c[1..].iter().sum();
@@ -121,18 +121,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_stray_of_a_curve_is_bounded_by_its_control_points() {
+    fn the_deviation_of_a_curve_is_bounded_by_its_control_points() {
         let r = [Vector3::zeros(), Vector3::new(1.0, 4.0, 0.0), Vector3::new(0.0, -4.0, 0.0)];
         // The parabola rises by 1; its one inner control point by 2.
-        assert_eq!(stray(&r), 2.0);
-        assert_eq!(stray(&r[..2]), 0.0);
-        assert_eq!((stray_across(&r), stray_across(&r[..2])), (2.0, 0.0));
+        assert_eq!(motion_deviation(&r), 2.0);
+        assert_eq!(motion_deviation(&r[..2]), 0.0);
+        assert_eq!((chord_deviation(&r), chord_deviation(&r[..2])), (2.0, 0.0));
         // An eased motion on a straight line never leaves the line. A motion past its end leaves it by its control
         // points.
         let eased = [0.0, 0.0, 3.0, -2.0].map(|x| Vector3::new(x, 2.0 * x, 0.0));
-        assert!(stray_across(&eased) < 1e-15 && stray(&eased) > 0.5);
+        assert!(chord_deviation(&eased) < 1e-15 && motion_deviation(&eased) > 0.5);
         let back = [0.0, 4.0, -3.0].map(|x| Vector3::new(x, 0.0, 0.0));
-        assert_eq!(stray_across(&back), 1.0);
+        assert_eq!(chord_deviation(&back), 1.0);
         assert_eq!(BernsteinBasis::of_degree(2).range(&[0.0, 4.0, -4.0]), (0.0, 2.0));
     }
 

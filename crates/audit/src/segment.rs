@@ -240,11 +240,11 @@ pub(super) struct Line {
 }
 
 /// Position of a vehicle at an end of the shared time.
-pub(super) enum Place {
+pub(super) enum EndPosition {
     /// At a sample.
     Sample(Vector3<f64>),
     /// Between the two samples.
-    Between,
+    Interpolated,
 }
 
 impl Line {
@@ -273,21 +273,21 @@ impl Line {
         8.0 * f64::EPSILON * (self.from.amax() + self.to.amax())
     }
 
-    pub(super) fn place(&self, time_s: f64, is_end: bool) -> Place {
+    pub(super) fn place(&self, time_s: f64, is_end: bool) -> EndPosition {
         let jumps = self.to_s <= self.from_s;
         if (jumps && !is_end) || (!jumps && time_s <= self.from_s) || self.from == self.to {
-            Place::Sample(self.from)
+            EndPosition::Sample(self.from)
         } else if jumps || time_s >= self.to_s {
-            Place::Sample(self.to)
+            EndPosition::Sample(self.to)
         } else {
-            Place::Between
+            EndPosition::Interpolated
         }
     }
 
     /// Returns the position at a time within the line, to within [`INTERPOLATION`].
     pub(super) fn position(&self, time_s: f64) -> [DoubleDouble; 3] {
         let length = DoubleDouble::difference(self.to_s, self.from_s);
-        let share = DoubleDouble::difference(time_s, self.from_s).over(length);
+        let share = DoubleDouble::difference(time_s, self.from_s).divided_by(length);
         [0, 1, 2].map(|axis| {
             let by = DoubleDouble::difference(self.to[axis], self.from[axis]);
             DoubleDouble::from(self.from[axis]) + by * share

@@ -1,9 +1,8 @@
 //! Input of a control law at one instant.
 //!
-//! Vehicle i knows its own state and the target. Of each other vehicle j it has two states. The state that it *heard*
-//! was received over a link of the graph, with the age of the message. The state that it *sees* is measured by its own
-//! sensor. If every vehicle knows the true present state of every other, all of these are one shared table without
-//! copies.
+//! Vehicle i knows its own state and the target. Of each other vehicle j it has two states. The *received* state came
+//! over a link of the graph, with the age of the message. The *sensed* state is measured by its own sensor. If
+//! every vehicle knows the true present state of every other, all of these are one shared table without copies.
 
 use std::fmt;
 
@@ -23,7 +22,7 @@ pub struct Observation<'a> {
     /// Own states as the vehicles know them: row i is the state of vehicle i as vehicle i knows it.
     pub own: &'a Swarm,
     /// States of other vehicles as each vehicle knows them.
-    pub others: Others<'a>,
+    pub others: OtherStates<'a>,
     /// Formation and reference to reach.
     pub target: Target<'a>,
     /// Communication links.
@@ -37,23 +36,23 @@ pub struct Observation<'a> {
 
 /// States of other vehicles as each vehicle knows them.
 #[derive(Clone, Copy, Debug)]
-pub enum Others<'a> {
+pub enum OtherStates<'a> {
     /// Every vehicle knows all own states exactly: [`Observation::own`] holds them.
     Shared,
     /// Each vehicle has its own received and sensed states of the others.
-    Held(&'a dyn Picture),
+    PerVehicle(&'a dyn NeighbourStates),
 }
 
 /// Received and sensed states that each vehicle has of every other.
-pub trait Picture: fmt::Debug + Sync {
+pub trait NeighbourStates: fmt::Debug + Sync {
     /// State of vehicle `j` as vehicle `i` last received it; without a link from j to i the value is unspecified.
-    fn heard(&self, i: usize, j: usize) -> Neighbour;
+    fn received(&self, i: usize, j: usize) -> NeighbourState;
 
     /// State of vehicle `j` as vehicle `i` senses it.
-    fn seen(&self, i: usize, j: usize) -> Neighbour;
+    fn sensed(&self, i: usize, j: usize) -> NeighbourState;
 
     /// Whether the tables are of `count` vehicles.
-    fn is_of(&self, count: usize) -> bool;
+    fn matches_count(&self, count: usize) -> bool;
 
     /// First vehicle whose received or sensed state is not finite in some table.
     fn first_not_finite(&self) -> Option<usize> {
@@ -62,25 +61,25 @@ pub trait Picture: fmt::Debug + Sync {
 
     /// Positions for the search of near pairs, with the distance \[m\] to add to the sensing range. With this addition
     /// the search finds every pair whose sensed separation is in range. `None`: own positions and no addition.
-    fn near_from(&self) -> Option<(&Rows, f64)> {
+    fn near_search_positions(&self) -> Option<(&Rows, f64)> {
         None
     }
 }
 
 /// Received and sensed states as dense tables: 100 bytes per ordered pair of vehicles.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Held {
-    /// Row j of `heard[i]` is the state of vehicle j that vehicle i last received.
-    pub heard: Vec<Swarm>,
+pub struct StateTables {
+    /// Row j of `received[i]` is the state of vehicle j that vehicle i last received.
+    pub received: Vec<Swarm>,
     /// `ages_s[i][j]` is the present age of that state \[s\].
     pub ages_s: Vec<Vec<f64>>,
-    /// Row j of `seen[i]` is the state of vehicle j that vehicle i senses.
-    pub seen: Vec<Swarm>,
+    /// Row j of `sensed[i]` is the state of vehicle j that vehicle i senses.
+    pub sensed: Vec<Swarm>,
 }
 
 /// State of one vehicle as another knows it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Neighbour {
+pub struct NeighbourState {
     /// Position \[m\].
     pub position_m: Vector3<f64>,
     /// Velocity \[m/s\].
@@ -89,29 +88,29 @@ pub struct Neighbour {
     pub age_s: f64,
 }
 
-impl Picture for Held {
-    fn heard(&self, i: usize, j: usize) -> Neighbour {
-        Neighbour::of(&self.heard[i], j, self.ages_s[i][j])
+impl NeighbourStates for StateTables {
+    fn received(&self, i: usize, j: usize) -> NeighbourState {
+        NeighbourState::of(&self.received[i], j, self.ages_s[i][j])
     }
 
-    fn seen(&self, i: usize, j: usize) -> Neighbour {
-        Neighbour::of(&self.seen[i], j, 0.0)
+    fn sensed(&self, i: usize, j: usize) -> NeighbourState {
+        NeighbourState::of(&self.sensed[i], j, 0.0)
     }
 
-    fn is_of(&self, count: usize) -> bool {
-        let Self { heard, ages_s, seen } = self;
-        let swarms = heard.iter().chain(seen);
-        [heard.len(), ages_s.len(), seen.len()].iter().all(|&length| length == count)
+    fn matches_count(&self, count: usize) -> bool {
+        let Self { received, ages_s, sensed } = self;
+        let swarms = received.iter().chain(sensed);
+        [received.len(), ages_s.len(), sensed.len()].iter().all(|&length| length == count)
             && ages_s.iter().all(|ages_s| ages_s.len() == count)
             && swarms.flat_map(|swarm| [&swarm.positions_m, &swarm.velocities_m_s]).all(|rows| rows.nrows() == count)
     }
 
     fn first_not_finite(&self) -> Option<usize> {
-        self.heard.iter().chain(&self.seen).find_map(Swarm::first_not_finite)
+        self.received.iter().chain(&self.sensed).find_map(Swarm::first_not_finite)
     }
 }
 
-impl Neighbour {
+impl NeighbourState {
     /// Returns the state of vehicle `j` of a swarm with age `age_s` \[s\].
     #[must_use]
     pub fn of(swarm: &Swarm, j: usize, age_s: f64) -> Self {
@@ -127,7 +126,7 @@ impl<'a> Observation<'a> {
         Self {
             time_s: 0.0,
             own: swarm,
-            others: Others::Shared,
+            others: OtherStates::Shared,
             target: Target::at_rest(formation),
             links,
             near: &[],
@@ -138,7 +137,7 @@ impl<'a> Observation<'a> {
     /// Returns the state table that all vehicles share, if they share one.
     #[must_use]
     pub fn shared(&self) -> Option<&'a Swarm> {
-        matches!(self.others, Others::Shared).then_some(self.own)
+        matches!(self.others, OtherStates::Shared).then_some(self.own)
     }
 
     /// Returns the state of vehicle `j` that vehicle `i` received over a link.
@@ -146,10 +145,10 @@ impl<'a> Observation<'a> {
     /// # Panics
     /// If a vehicle is out of range.
     #[must_use]
-    pub fn heard(&self, i: usize, j: usize) -> Neighbour {
+    pub fn received(&self, i: usize, j: usize) -> NeighbourState {
         match self.others {
-            Others::Shared => Neighbour::of(self.own, j, 0.0),
-            Others::Held(held) => held.heard(i, j),
+            OtherStates::Shared => NeighbourState::of(self.own, j, 0.0),
+            OtherStates::PerVehicle(held) => held.received(i, j),
         }
     }
 
@@ -158,10 +157,10 @@ impl<'a> Observation<'a> {
     /// # Panics
     /// If a vehicle is out of range.
     #[must_use]
-    pub fn seen(&self, i: usize, j: usize) -> Neighbour {
+    pub fn sensed(&self, i: usize, j: usize) -> NeighbourState {
         match self.others {
-            Others::Shared => Neighbour::of(self.own, j, 0.0),
-            Others::Held(held) => held.seen(i, j),
+            OtherStates::Shared => NeighbourState::of(self.own, j, 0.0),
+            OtherStates::PerVehicle(held) => held.sensed(i, j),
         }
     }
 }
@@ -171,19 +170,22 @@ mod tests {
     use super::*;
 
     #[test]
-    fn heard_and_seen_states_come_from_the_shared_table_or_from_each_vehicle() {
+    fn received_and_sensed_states_come_from_the_shared_table_or_from_each_vehicle() {
         let at = |x: f64| Swarm::at_rest(Formation::line(2, x).slots_m);
         let (own, graph, formation) = (at(1.0), Graph::complete(2), Formation::line(2, 1.0));
         let exact = Observation::exact(&own, &graph, &formation);
         assert_eq!(exact.shared(), Some(&own));
-        assert_eq!(exact.heard(0, 1), exact.seen(0, 1));
-        assert_eq!((exact.heard(0, 1).position_m.x, exact.heard(0, 1).age_s), (1.0, 0.0));
+        assert_eq!(exact.received(0, 1), exact.sensed(0, 1));
+        assert_eq!((exact.received(0, 1).position_m.x, exact.received(0, 1).age_s), (1.0, 0.0));
 
-        let held =
-            Held { heard: vec![at(2.0), at(3.0)], ages_s: vec![vec![0.0, 0.5]; 2], seen: vec![at(4.0), at(5.0)] };
-        let late = Observation { others: Others::Held(&held), ..exact };
+        let held = StateTables {
+            received: vec![at(2.0), at(3.0)],
+            ages_s: vec![vec![0.0, 0.5]; 2],
+            sensed: vec![at(4.0), at(5.0)],
+        };
+        let late = Observation { others: OtherStates::PerVehicle(&held), ..exact };
         assert_eq!(late.shared(), None);
-        assert_eq!((late.heard(0, 1).position_m.x, late.heard(0, 1).age_s), (2.0, 0.5));
-        assert_eq!((late.heard(1, 1).position_m.x, late.seen(1, 1).position_m.x), (3.0, 5.0));
+        assert_eq!((late.received(0, 1).position_m.x, late.received(0, 1).age_s), (2.0, 0.5));
+        assert_eq!((late.received(1, 1).position_m.x, late.sensed(1, 1).position_m.x), (3.0, 5.0));
     }
 }

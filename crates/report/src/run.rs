@@ -6,7 +6,7 @@
 use std::ops::ControlFlow;
 
 use crate::report::{FlightResult, Report, Verification};
-use tautline_core::record::{Sink, StateHash, record_beside};
+use tautline_core::record::{Sink, StateHash, record_in_thread};
 use tautline_sim::metrics::Metrics;
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::Scenario;
@@ -26,7 +26,7 @@ const BESIDE_FROM: usize = 512;
 
 /// Flies a scenario like [`run`], with the findings of its check. `carry_on` is called after each step with the number
 /// of flown steps, and [`ControlFlow::Break`] ends the flight. Samples of a large swarm are recorded in a thread of
-/// their own if threads are available and the sink does not [look at steps](Sink::looks_at_steps).
+/// their own if threads are available and the sink does not [need steps](Sink::needs_steps).
 ///
 /// # Errors
 /// As [`run`].
@@ -40,7 +40,7 @@ pub fn run_while(
 }
 
 /// Flies a scenario like [`run_while`], with parts that may differ from those of the scenario, such as another law.
-/// `preflight` is the check of that law ([`Preflight::under`]). Also returns how the flight ended.
+/// `preflight` is the check of that law ([`Preflight::with_law`]). Also returns how the flight ended.
 ///
 /// # Errors
 /// As [`run`].
@@ -53,13 +53,13 @@ pub fn run_with(
 ) -> Result<(Report, Ending), SimError> {
     let freedom = parts.law.capabilities().controls.freedom();
     let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival)
-        .free_by(freedom)
-        .carried_by(scenario.reference.as_ref());
+        .with_freedom(freedom)
+        .with_reference(scenario.reference.as_ref());
     let mut state_hash = StateHash::new();
-    let is_beside = scenario.count() >= BESIDE_FROM && rayon::current_num_threads() > 1 && !sink.looks_at_steps();
+    let is_beside = scenario.count() >= BESIDE_FROM && rayon::current_num_threads() > 1 && !sink.needs_steps();
     let mut recorders = (sink, &mut state_hash);
     let flight = if is_beside {
-        record_beside(&mut recorders, |beside| sim::fly(scenario, parts, &mut (beside, &mut metrics), carry_on))?
+        record_in_thread(&mut recorders, |beside| sim::fly(scenario, parts, &mut (beside, &mut metrics), carry_on))?
     } else {
         sim::fly(scenario, parts, &mut (&mut recorders, &mut metrics), carry_on)?
     };
@@ -69,7 +69,7 @@ pub fn run_with(
         flight: &flight,
         summary: &metrics.finish(),
         ended_legs: metrics.ended_legs(),
-        strain: metrics.strain(),
+        quadrotor_peaks: metrics.quadrotor_peaks(),
         state_hash: &state_hash.finish(),
     });
     Ok((report, flight.ending))

@@ -25,7 +25,7 @@ use flow::{Flow, FreeMotion, packed};
 use nalgebra::Vector3;
 
 use crate::plant::Feedback;
-use crate::plant::{Air, Path, Plant, PlantError};
+use crate::plant::{Air, Plant, PlantError, StepPath};
 use crate::scenario::Scenario;
 use tautline_core::record::Channel;
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm};
@@ -204,7 +204,7 @@ impl Continuous {
         (from_s, dt_s): (f64, f64),
         feedback: &mut dyn Feedback,
         end: &mut Swarm,
-        path: &mut Path,
+        path: &mut StepPath,
     ) -> Result<Option<LawError>, IdealError> {
         if let Some(air) = &mut self.air {
             air.advance(dt_s);
@@ -213,27 +213,27 @@ impl Continuous {
         let flow = Flow::new(feedback, &self.swarm, motion, from_s);
         let mut solver = Solver::begin(&flow, 0.0, &packed(&self.swarm), Tolerances::default(), self.step_s.min(dt_s))?;
         solver.most_trials = Some(MOST_TRIALS);
-        let mut turned_m_s = vec![0.0; self.swarm.count()];
+        let mut velocity_changes_m_s = vec![0.0; self.swarm.count()];
         let solved = solver.advance(dt_s, &mut |solver| {
-            solver.add_turns(&mut turned_m_s);
+            solver.add_velocity_changes(&mut velocity_changes_m_s);
             flow.accept(solver.method.t(), solver.method.y());
             Ok(())
         });
-        path.bend(0.25 * dt_s * turned_m_s.into_iter().fold(0.0, f64::max));
+        path.raise_bend(0.25 * dt_s * velocity_changes_m_s.into_iter().fold(0.0, f64::max));
         let undefined = match solved {
             Ok(()) => {
                 self.step_s = solver.method.h();
                 self.swarm = solver.swarm();
                 None
             }
-            Err(IdealError::Law { time_s, source }) if source.is_at_a_barrier() => {
+            Err(IdealError::Law { time_s, source }) if source.is_at_barrier() => {
                 let (now_s, state) = (solver.method.t(), solver.method.y());
-                let coasted = flow.coasted(now_s, state, dt_s - now_s);
-                let (after, bend_m) = coasted.ok_or(IdealError::Law { time_s, source })?;
+                let coast = flow.coast(now_s, state, dt_s - now_s);
+                let (after, bend_m) = coast.ok_or(IdealError::Law { time_s, source })?;
                 if now_s > 0.0 {
-                    path.pass(now_s, &solver.swarm().positions_m);
+                    path.add_instant(now_s, &solver.swarm().positions_m);
                 }
-                path.bend(bend_m);
+                path.raise_bend(bend_m);
                 self.step_s = FIRST_STEP_S;
                 self.swarm = flow.swarm_of(&after);
                 Some(source)
@@ -246,9 +246,9 @@ impl Continuous {
 }
 
 /// Constant accelerations over a step.
-struct Held<'a>(&'a Rows);
+struct HeldCommand<'a>(&'a Rows);
 
-impl Feedback for Held<'_> {
+impl Feedback for HeldCommand<'_> {
     fn command(&mut self, _time_s: f64, _truth: &Swarm, command: &mut Rows) -> Result<(), LawError> {
         command.copy_from(self.0);
         Ok(())
@@ -269,9 +269,9 @@ impl Plant for Continuous {
         self.swarm.count()
     }
 
-    fn advance(&mut self, dt_s: f64, end: &mut Swarm, path: &mut Path) -> Result<(), PlantError> {
+    fn advance(&mut self, dt_s: f64, end: &mut Swarm, path: &mut StepPath) -> Result<(), PlantError> {
         let held = std::mem::replace(&mut self.held, Rows::zeros(0));
-        let solved = self.solve((0.0, dt_s), &mut Held(&held), end, path);
+        let solved = self.solve((0.0, dt_s), &mut HeldCommand(&held), end, path);
         self.held = held;
         solved?;
         Ok(())
@@ -286,7 +286,7 @@ impl Plant for Continuous {
         feedback: &mut dyn Feedback,
         interval: (f64, f64),
         end: &mut Swarm,
-        path: &mut Path,
+        path: &mut StepPath,
     ) -> Result<Option<LawError>, PlantError> {
         Ok(self.solve(interval, feedback, end, path)?)
     }
@@ -427,7 +427,7 @@ impl<'a, 'law> Solver<'a, 'law> {
             let nearest_m = before.separation_m.min(after.separation_m) - reach_m;
             let may_be_closest = closest.is_none_or(|closest| nearest_m < closest.separation_m);
             if before.is_closing && !after.is_closing && may_be_closest {
-                let (time_s, separation_m) = self.turn(pair)?;
+                let (time_s, separation_m) = self.local_minimum(pair)?;
                 offer(closest, pair, separation_m, time_s);
             }
         }
@@ -436,7 +436,7 @@ impl<'a, 'law> Solver<'a, 'law> {
 
     /// Returns the time of the minimum of the distance of a pair in the last step \[s\], and the distance \[m\]. The
     /// pair must close at the beginning of the step and open at its end.
-    fn turn(&self, pair: Pair) -> Result<(f64, f64), IdealError> {
+    fn local_minimum(&self, pair: Pair) -> Result<(f64, f64), IdealError> {
         let (mut low_s, mut high_s) = (self.method.t_prev(), self.method.t());
         loop {
             let middle_s = low_s + 0.5 * (high_s - low_s);
@@ -453,9 +453,9 @@ impl<'a, 'law> Solver<'a, 'law> {
     }
 
     /// Adds the change of velocity of each vehicle in the last step \[m/s\].
-    fn add_turns(&self, turned_m_s: &mut [f64]) {
-        let (before, after, count) = (self.method.y_prev(), self.method.y(), turned_m_s.len());
-        for (i, turned) in turned_m_s.iter_mut().enumerate() {
+    fn add_velocity_changes(&self, velocity_changes_m_s: &mut [f64]) {
+        let (before, after, count) = (self.method.y_prev(), self.method.y(), velocity_changes_m_s.len());
+        for (i, turned) in velocity_changes_m_s.iter_mut().enumerate() {
             let change = |axis: usize| after[(3 + axis) * count + i] - before[(3 + axis) * count + i];
             *turned += Vector3::from([0, 1, 2].map(change)).norm();
         }
@@ -516,7 +516,7 @@ mod tests {
         let scenario = Scenario::new("switching", start, Formation::line(2, 3.0), 2.0, 1.0);
         let mut end = scenario.start.clone();
         let mut advance = |rate_hz: f64| {
-            let mut path = Path::default();
+            let mut path = StepPath::default();
             Continuous::new(&scenario).solve((0.0, 0.1), &mut Switching(rate_hz), &mut end, &mut path)
         };
         assert_eq!(advance(20.0), Ok(None));

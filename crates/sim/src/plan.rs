@@ -13,12 +13,12 @@ use tautline_laws::graph::Graph;
 use tautline_laws::law::LawSpec;
 use tautline_laws::law::{EdgeTension, EdgeTensionKeys};
 use tautline_laws::space::Obstacle;
-use tautline_laws::target::{Course, Guidance};
+use tautline_laws::target::{Guidance, LegHistory};
 
 /// Formations, graph and edge tensions of a flight.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    course: Course,
+    course: LegHistory,
     guidance: Option<Guidance>,
     freedom: Freedom,
     /// Pairs that sense each other.
@@ -34,7 +34,7 @@ impl Plan {
     #[must_use]
     pub fn of(scenario: &Scenario) -> Self {
         Self {
-            course: Course::new(&scenario.legs),
+            course: LegHistory::new(&scenario.legs),
             guidance: scenario.reference.clone(),
             freedom: scenario.law().map_or(Freedom::RigidMotion, |law| law.capabilities().controls.freedom()),
             graph: scenario.graph.clone(),

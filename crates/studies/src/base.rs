@@ -164,7 +164,7 @@ pub(crate) fn jitter_note(jitter_m: f64) -> String {
 /// Verdict that a flight must show.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Question {
+pub enum Criterion {
     /// The flight is proved clear to its end.
     #[default]
     Clear,
@@ -174,7 +174,7 @@ pub enum Question {
     Pass,
 }
 
-impl Question {
+impl Criterion {
     /// All questions.
     pub const ALL: [Self; 3] = [Self::Pass, Self::Clear, Self::Reached];
 

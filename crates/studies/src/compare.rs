@@ -209,7 +209,7 @@ impl Experiment for Options {
 impl Options {
     /// Returns the laws to compare, without repetition.
     fn laws(&self, template: &Template) -> Result<Vec<NamedLaw>, Failure> {
-        let names = self.laws.clone().unwrap_or_else(|| template.compared());
+        let names = self.laws.clone().unwrap_or_else(|| template.compared_laws());
         if names.is_empty() {
             let help = "give the kind of a law, such as edge-tension";
             return Err(Failure::input("compare/no-law", "--laws: must name at least one law", help));

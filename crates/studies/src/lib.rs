@@ -17,7 +17,7 @@
 
 use std::ops::RangeInclusive;
 
-pub use base::Question;
+pub use base::Criterion;
 pub use batch::Batch;
 pub use flight::{FlightSummary, Outcome};
 pub use study::{Experiment, SCHEMA_VERSION, Study, StudyFiles, StudyRequest, answer};

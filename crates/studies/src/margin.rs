@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 
 use serde::Serialize;
 
-use crate::base::{BaseScenario, JITTER_KEY, Question, Runs, check_runs, jitter_note};
+use crate::base::{BaseScenario, Criterion, JITTER_KEY, Runs, check_runs, jitter_note};
 use crate::batch::Batch;
 use crate::flight::FlightSummary;
 use crate::statistics::{CONFIDENCE, Proportion};
@@ -14,7 +14,7 @@ use tautline_core::text::{as_toml, counted, significant};
 use tautline_report::figures::{Share, margin as figure};
 use tautline_report::report::page::{Badge, Tone};
 use tautline_report::request::{Failure, ScenarioRequest, in_range};
-use tautline_sim::preflight::{Bound, Near, PredictedMargin, Preflight};
+use tautline_sim::preflight::{Bound, ContactState, PredictedMargin, Preflight};
 use tautline_sim::scenario::Scenario;
 
 /// Admitted numbers of scanned values.
@@ -39,7 +39,7 @@ pub struct Options {
     /// Its values.
     pub range: Range,
     /// Verdict that every run must show.
-    pub question: Question,
+    pub question: Criterion,
     /// Runs of each value: 1 to [`crate::MOST_RUNS`]. A single run changes only the key.
     pub runs: u64,
     /// Seed of the first run; run k, from 0, has this seed plus k for start and noise.
@@ -76,7 +76,7 @@ pub struct Probe {
 
 /// Turn of the verdict between two values.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Turn {
+pub struct VerdictChange {
     /// The two values between which the verdict turns, the smaller value first.
     pub bracket: [f64; 2],
     /// Whether the verdict holds at the smaller value.
@@ -98,7 +98,7 @@ pub struct Margin {
     /// Whether values were spaced and halved by their ratio.
     pub logarithmic: bool,
     /// Verdict that every run of a value must show.
-    pub question: Question,
+    pub question: Criterion,
     /// Runs of each value.
     pub runs: u64,
     /// Seed of the first run.
@@ -108,7 +108,7 @@ pub struct Margin {
     /// Confidence of all intervals.
     pub confidence: f64,
     /// Turn of the verdict; `None` if the verdict is the same at every value.
-    pub turn: Option<Turn>,
+    pub turn: Option<VerdictChange>,
     /// Predictions of linear theory for this key near the first formation, as in `check`; empty without a theory.
     pub predicted: Vec<PredictedMargin>,
     /// Whether an interruption left the bracket wider than requested.
@@ -125,7 +125,7 @@ impl Options {
     #[must_use]
     pub fn new(key: &str, from: f64, to: f64) -> Self {
         let range = Range { from, to, scan: 5, halvings: 6, logarithmic: false };
-        Self { key: key.to_owned(), range, question: Question::Pass, runs: 1, seed: 0 }
+        Self { key: key.to_owned(), range, question: Criterion::Pass, runs: 1, seed: 0 }
     }
 
     /// Returns the scenario with a value of the key and the overrides of a run.
@@ -214,7 +214,7 @@ impl Experiment for Options {
         };
         let turn = match found {
             Bisection::Even(_) => None,
-            Bisection::Turn { before, after, was, turns } => Some(Turn {
+            Bisection::VerdictChange { before, after, was, turns } => Some(VerdictChange {
                 bracket: [before.min(after), before.max(after)],
                 holds_below: was == (before < after),
                 turns: turns as u64,
@@ -240,7 +240,7 @@ impl Experiment for Options {
 }
 
 impl Probe {
-    fn new(value: f64, question: Question, flights: Vec<FlightSummary>) -> Self {
+    fn new(value: f64, question: Criterion, flights: Vec<FlightSummary>) -> Self {
         let held = flights.iter().filter(|flight| question.holds(flight)).count();
         let min_m = flights.iter().filter_map(|flight| flight.min_m).reduce(f64::min);
         Self { value, held: Proportion::new(held as u64, flights.len() as u64), min_m, flights }
@@ -254,7 +254,7 @@ impl Probe {
 
     /// Returns the index of the first run that did not show the verdict; 0 if every run showed it.
     #[must_use]
-    pub fn worst_run(&self, question: Question) -> u64 {
+    pub fn worst_run(&self, question: Criterion) -> u64 {
         self.flights.iter().position(|flight| !question.holds(flight)).unwrap_or_default() as u64
     }
 }
@@ -269,7 +269,7 @@ impl Margin {
     /// Returns the values on either side of the turn; the verdict holds at the first.
     #[must_use]
     pub fn sides(&self) -> Option<[&Probe; 2]> {
-        let Turn { bracket, holds_below, .. } = self.turn?;
+        let VerdictChange { bracket, holds_below, .. } = self.turn?;
         let [low, high] = bracket.map(|value| self.probes.iter().find(|probe| probe.value == value));
         if holds_below { Some([low?, high?]) } else { Some([high?, low?]) }
     }
@@ -278,7 +278,8 @@ impl Margin {
 /// Returns a prediction of linear theory in words.
 fn prediction(margin: &PredictedMargin) -> String {
     let bound = if margin.bound == Bound::AtMost { "up to" } else { "from" };
-    let state = if margin.state == Near::Free { "without contact" } else { "with the nearest pairs in contact" };
+    let state =
+        if margin.state == ContactState::Free { "without contact" } else { "with the nearest pairs in contact" };
     margin.value.map_or_else(|| format!("any {state}"), |value| format!("{bound} {} {state}", significant(value, 4)))
 }
 
@@ -388,7 +389,7 @@ enum Bisection {
     /// The answer is the same at every value that was tried.
     Even(bool),
     /// The answer turns between two values.
-    Turn {
+    VerdictChange {
         /// The last value with the answer of the first value.
         before: f64,
         /// The first value with the other answer.
@@ -448,7 +449,7 @@ fn search<E>(
             None => break,
         }
     }
-    Ok(Some(Bisection::Turn { before, after, was, turns: turns().count() }))
+    Ok(Some(Bisection::VerdictChange { before, after, was, turns: turns().count() }))
 }
 
 #[cfg(test)]

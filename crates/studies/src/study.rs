@@ -14,7 +14,7 @@ use crate::table::Table;
 use tautline_report::figures::Figure;
 use tautline_report::report::page::{self, Badge, Markup, Page};
 use tautline_report::report::{ScenarioIdentity, Tool};
-use tautline_report::request::outputs::{self, Called, is_standard_output, write};
+use tautline_report::request::outputs::{self, NamedPath, is_standard_output, write};
 use tautline_report::request::{Failure, Monitor, Pictures, ScenarioRequest};
 use tautline_sim::scenario::Scenario;
 
@@ -255,7 +255,7 @@ pub struct StudyFiles {
 
 impl StudyFiles {
     /// Returns the requested files, each with its option.
-    pub fn outputs(&self) -> impl Iterator<Item = Called<'_>> {
+    pub fn outputs(&self) -> impl Iterator<Item = NamedPath<'_>> {
         let all = [("--json", &self.json), ("--csv", &self.csv), ("--latex", &self.latex), ("--html", &self.html)];
         all.into_iter().filter_map(|(option, file)| Some((option, file.as_deref()?)))
     }

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::attack::{Bound, FLIGHTS};
-use crate::base::{BaseScenario, JITTER_KEY, Question, Runs, check_runs, jitter_note, overlap};
+use crate::base::{BaseScenario, Criterion, JITTER_KEY, Runs, check_runs, jitter_note, overlap};
 use crate::batch::Batch;
 use crate::flight::{FlightSummary, Outcome};
 use crate::statistics::{CONFIDENCE, Estimate, Proportion};
@@ -41,7 +41,7 @@ pub struct Options {
     /// One key or two.
     pub keys: Vec<SweptKey>,
     /// Verdict whose share is counted.
-    pub question: Question,
+    pub question: Criterion,
     /// Runs of each point: 1 to [`crate::MOST_RUNS`]. A single run changes only the swept keys.
     pub runs: u64,
     /// Seed of the first run; run k, from 0, has this seed plus k for start and noise.
@@ -81,7 +81,7 @@ pub struct Sweep {
     #[serde(rename = "grid")]
     pub keys: Vec<SweptKey>,
     /// Verdict whose share is counted.
-    pub question: Question,
+    pub question: Criterion,
     /// Runs of each point.
     pub runs: u64,
     /// Seed of the first run.
@@ -277,7 +277,7 @@ impl Experiment for Options {
 }
 
 impl Point {
-    fn new(values: Vec<f64>, question: Question, runs: Vec<Result<FlightSummary, String>>) -> Self {
+    fn new(values: Vec<f64>, question: Criterion, runs: Vec<Result<FlightSummary, String>>) -> Self {
         let (flights, refusals): (Vec<_>, Vec<_>) = runs.into_iter().partition(Result::is_ok);
         let flights: Vec<_> = flights.into_iter().flatten().collect();
         let of = flights.len() as u64;

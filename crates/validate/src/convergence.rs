@@ -9,7 +9,7 @@ use super::flights::{builtin, continuous, engine, larger, relative_speed_squared
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_core::text::bound;
 use tautline_sim::continuous::Tolerances;
-use tautline_sim::plant::{Path, rapier};
+use tautline_sim::plant::{StepPath, rapier};
 use tautline_sim::scenario::Scenario;
 
 /// Steps per second, from coarse to fine.
@@ -145,7 +145,7 @@ fn free_decay_error() -> Result<f64, MeasureError> {
             let velocity = Vector3::new(1.0, -0.5, 0.0) * (1.0 + i as f64);
             set_row(&mut scenario.start.velocities_m_s, i, velocity);
         }
-        let (mut plant, mut path) = (rapier::plant(&scenario), Path::default());
+        let (mut plant, mut path) = (rapier::plant(&scenario), StepPath::default());
         let (mut state, mut time_s) = (scenario.start.clone(), 0.0);
         plant.apply(&Rows::zeros(scenario.count()), &mut state);
         for step in 0..FREE_STEPS {

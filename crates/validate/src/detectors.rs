@@ -37,8 +37,8 @@ fn fly(name: &str, progress: &Progress<'_>) -> Result<BuiltinFlight, MeasureErro
     let scenario = builtin(name)?;
     let freedom = scenario.law()?.capabilities().controls.freedom();
     let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival)
-        .free_by(freedom)
-        .carried_by(scenario.reference.as_ref());
+        .with_freedom(freedom)
+        .with_reference(scenario.reference.as_ref());
     let mut log = FlightLog::of(&scenario);
     let flight = engine(&scenario, |sample| {
         metrics.observe(sample);

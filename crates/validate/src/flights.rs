@@ -86,7 +86,7 @@ pub(super) fn engine_to_any_end(
     observe: impl FnMut(&Sample<'_>),
 ) -> Result<Flight, MeasureError> {
     let go_on = &mut |_| ControlFlow::Continue(());
-    Ok(sim::fly(scenario, Components::under(scenario, law), &mut SampleSink(observe), go_on)?)
+    Ok(sim::fly(scenario, Components::with_law(scenario, law), &mut SampleSink(observe), go_on)?)
 }
 
 /// Returns the scenario in Rapier with another step \[s\], every step recorded, without refinement.

@@ -19,7 +19,7 @@ const NO_TENSION: f64 = 1e-8;
 const DISTURBANCE_M: f64 = 1e-3;
 /// Sampling rate and step rate of a flight \[Hz\].
 const SAMPLE_HZ: f64 = 10.0;
-/// Duration of a flight in margins for heard delays, which change slowly, and for other kinds \[s\].
+/// Duration of a flight in margins for delays of messages, which change slowly, and for other kinds \[s\].
 const LONG_MARGINS: f64 = 25.0;
 const SHORT_S: f64 = 40.0;
 /// Number of commands in a flight with held commands.
@@ -33,9 +33,9 @@ const PUSHED_S: f64 = 40.0;
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     /// Delay of all known states.
-    KnownLate,
+    SensingDelayed,
     /// Delay of the states of others.
-    HeardLate,
+    MessagesDelayed,
     /// Period between commands.
     Held,
 }
@@ -43,16 +43,18 @@ enum Kind {
 impl Kind {
     fn predicted_s(self, linear: &Linear) -> f64 {
         match self {
-            Self::KnownLate => linear.delay_margin_s(0.0),
-            Self::HeardLate => linear.heard.as_ref().and_then(|heard| heard.delay_margin_s(0.0)).unwrap_or(f64::NAN),
+            Self::SensingDelayed => linear.delay_margin_s(0.0),
+            Self::MessagesDelayed => {
+                linear.received.as_ref().and_then(|received| received.delay_margin_s(0.0)).unwrap_or(f64::NAN)
+            }
             Self::Held => linear.sampling_margin_s(0.0),
         }
     }
 
     fn set(self, scenario: &mut Scenario, value_s: f64) {
         match self {
-            Self::KnownLate => scenario.sensing.latency_s = value_s,
-            Self::HeardLate => {
+            Self::SensingDelayed => scenario.sensing.latency_s = value_s,
+            Self::MessagesDelayed => {
                 scenario.network.latency_s = value_s;
                 scenario.time.duration_s = LONG_MARGINS * value_s;
             }
@@ -170,7 +172,7 @@ fn margin_s(kind: Kind, graph: &str) -> Result<(f64, f64), MeasureError> {
     let rate = |share: f64| {
         let mut scenario = plain.clone();
         kind.set(&mut scenario, share * predicted_s);
-        growth_per_s(&scenario, kind == Kind::HeardLate)
+        growth_per_s(&scenario, kind == Kind::MessagesDelayed)
     };
     let (below, above) = (rate(1.0 - ASIDE)?, rate(1.0 + ASIDE)?);
     if !(below < 0.0 && above > 0.0) {
@@ -234,8 +236,8 @@ fn with_tension(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
 
 pub(super) fn judge(progress: &Progress<'_>) -> ClaimsResult {
     Ok(vec![
-        free("margin-known-late", Kind::KnownLate, progress)?,
-        free("margin-heard-late", Kind::HeardLate, progress)?,
+        free("margin-known-late", Kind::SensingDelayed, progress)?,
+        free("margin-heard-late", Kind::MessagesDelayed, progress)?,
         free("margin-commands-held", Kind::Held, progress)?,
         with_tension(progress)?,
     ])

@@ -31,7 +31,7 @@ pub(super) type EnclosedValue = (Interval, Enclosure);
 
 /// Precision to which the largest value is enclosed.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Goal {
+pub(super) struct Precision {
     /// Largest value found before. A value that is not above it is only shown to be no larger.
     pub(super) known: f64,
     /// Bound that the value must not exceed.
@@ -53,10 +53,10 @@ struct Part {
 /// its end, and an upper bound in between. The part with the largest upper bound is bisected first.
 pub(super) fn largest(
     c: &[Vector3<f64>],
-    goal: Goal,
+    goal: Precision,
     evaluate: impl Fn(&[Vector3<f64>], &BernsteinBasis) -> [f64; 3],
 ) -> Enclosure {
-    let Goal { known, bound, width, coarse } = goal;
+    let Precision { known, bound, width, coarse } = goal;
     let basis = BernsteinBasis::of_degree(c.len().saturating_sub(1));
     let rounding = 4.0 * c.len() as f64 * f64::EPSILON * c.iter().map(Vector3::norm).sum::<f64>();
     let mut found = Enclosure { lower: f64::NEG_INFINITY, upper: f64::NEG_INFINITY, at: 0.0 };
@@ -108,7 +108,7 @@ impl PartialEq for Part {
 impl Eq for Part {}
 
 /// Encloses the largest value of a quantity that is a convex function of a polynomial.
-pub(super) fn largest_of(quantity: Quantity, c: &[Vector3<f64>], goal: Goal) -> Enclosure {
+pub(super) fn largest_of(quantity: Quantity, c: &[Vector3<f64>], goal: Precision) -> Enclosure {
     largest(c, goal, |part, basis| {
         let upper = basis.points(part).map(|point| quantity.of(point)).fold(f64::NEG_INFINITY, f64::max);
         [quantity.of(part[0]), quantity.of(value(part, 1.0)), upper]
@@ -146,7 +146,13 @@ impl MeanAcceleration {
 
     /// Adds the next velocity. Returns the largest mean accelerations over windows of length `length_s` that end in its
     /// interval and lie in `within`.
-    pub(super) fn take(&mut self, next: Velocity, length_s: f64, within: Interval, goal: Goal) -> Vec<EnclosedValue> {
+    pub(super) fn take(
+        &mut self,
+        next: Velocity,
+        length_s: f64,
+        within: Interval,
+        goal: Precision,
+    ) -> Vec<EnclosedValue> {
         let needed_from_s = next.over.from_s - length_s;
         while self.recent.front().is_some_and(|first| first.over.to_s <= needed_from_s) {
             self.recent.pop_front();
@@ -160,7 +166,13 @@ impl MeanAcceleration {
 }
 
 /// Encloses the mean acceleration over windows that begin in the interval of one velocity and end in that of another.
-fn between(first: &Velocity, last: &Velocity, length_s: f64, within: Interval, goal: Goal) -> Option<EnclosedValue> {
+fn between(
+    first: &Velocity,
+    last: &Velocity,
+    length_s: f64,
+    within: Interval,
+    goal: Precision,
+) -> Option<EnclosedValue> {
     let from_s = first.over.from_s.max(last.over.from_s - length_s).max(within.from_s);
     let to_s = first.over.to_s.min(last.over.to_s - length_s).min(within.to_s - length_s);
     if from_s >= to_s {
@@ -192,8 +204,8 @@ impl Velocity {
 mod tests {
     use super::*;
 
-    fn to(width: f64) -> Goal {
-        Goal { known: f64::NEG_INFINITY, bound: f64::INFINITY, width, coarse: 0.0 }
+    fn to(width: f64) -> Precision {
+        Precision { known: f64::NEG_INFINITY, bound: f64::INFINITY, width, coarse: 0.0 }
     }
 
     #[test]
@@ -225,8 +237,8 @@ mod tests {
         }
     }
 
-    fn goal() -> Goal {
-        Goal { known: f64::NEG_INFINITY, bound: f64::INFINITY, width: 1e-9, coarse: 0.0 }
+    fn goal() -> Precision {
+        Precision { known: f64::NEG_INFINITY, bound: f64::INFINITY, width: 1e-9, coarse: 0.0 }
     }
 
     fn along_x(from_s: f64, to_s: f64, coefficients: &[f64]) -> Velocity {

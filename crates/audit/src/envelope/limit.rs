@@ -176,12 +176,12 @@ pub struct LimitOutcome {
     /// Verdict.
     pub status: Status,
     /// Value that came nearest to the limit, or went farthest beyond it; `None` if no value is known.
-    pub extreme: Option<Exceeding>,
+    pub extreme: Option<Exceedance>,
     /// Times at which a vehicle was beyond the limit, in order of time. A long list is shortened to the worst and the
     /// first of each vehicle.
-    pub violations: Vec<Exceeding>,
+    pub violations: Vec<Exceedance>,
     /// Undecided times, shortened likewise.
-    pub undecided: Vec<Exceeding>,
+    pub undecided: Vec<Exceedance>,
     /// Number of times at which a vehicle was beyond the limit.
     pub violations_tally: Tally,
     /// Number of undecided times.
@@ -217,7 +217,7 @@ pub struct Corner {
 
 /// Value of a vehicle over an interval of time, which is that of the surrounding samples or pieces.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Exceeding {
+pub struct Exceedance {
     /// Index of the vehicle.
     #[serde(skip)]
     pub vehicle: usize,

@@ -25,5 +25,5 @@ mod limit;
 mod monitor;
 
 pub use fence::{Fence, FenceError};
-pub use limit::{Corner, Corners, Envelope, EnvelopeOutcome, Exceeding, Limit, LimitOutcome, Quantity};
+pub use limit::{Corner, Corners, Envelope, EnvelopeOutcome, Exceedance, Limit, LimitOutcome, Quantity};
 pub(super) use monitor::{ItemContext, LimitMonitor};

@@ -3,14 +3,14 @@
 use nalgebra::Vector3;
 
 use super::extremum::{
-    EnclosedValue, Enclosure, Goal, MeanAcceleration, Velocity, WIDTH, derivative, largest, largest_of,
+    EnclosedValue, Enclosure, MeanAcceleration, Precision, Velocity, WIDTH, derivative, largest, largest_of,
 };
 use super::fence::Fence;
-use super::limit::{Corner, Corners, Envelope, EnvelopeOutcome, Exceeding, Limit, LimitOutcome, Quantity};
+use super::limit::{Corner, Corners, Envelope, EnvelopeOutcome, Exceedance, Limit, LimitOutcome, Quantity};
 use crate::findings::{Finding, LISTED, Shortlist, Tally};
 use crate::ledger::Interruption;
 use crate::outcome::Status;
-use crate::polynomial::{rescale, stray_across, value};
+use crate::polynomial::{chord_deviation, rescale, value};
 use crate::sweep::Interval;
 use tautline_core::track::{Item, Piece, Sample};
 
@@ -137,7 +137,7 @@ impl LimitMonitor {
         let accelerations = self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::Acceleration);
         for of in accelerations {
             let (known, bound, width) = (of.known(), of.limit.bound(), WIDTH * of.limit.allowance());
-            let goal = Goal { known, bound, width, coarse: 0.0 };
+            let goal = Precision { known, bound, width, coarse: 0.0 };
             for found in self.means[vehicle].take(velocity.clone(), length_s, self.window, goal) {
                 of.note(vehicle, Some(found));
             }
@@ -212,7 +212,7 @@ impl LimitMonitor {
             let second = derivative(&first, clipped_s);
             let is_mean = self.accel_window_s.is_some();
             for of in self.of.iter_mut().filter(|of| !(is_mean && of.limit.quantity == Quantity::Acceleration)) {
-                let goal = Goal {
+                let goal = Precision {
                     known: of.known(),
                     bound: of.limit.bound(),
                     width: WIDTH * of.limit.allowance(),
@@ -220,7 +220,7 @@ impl LimitMonitor {
                 };
                 let found = match (of.limit.quantity, of.limit.quantity.derivative()) {
                     (Quantity::Fence, _) => {
-                        self.fence.as_ref().map(|fence| outside(fence, &part, Goal { coarse: COARSE, ..goal }))
+                        self.fence.as_ref().map(|fence| outside(fence, &part, Precision { coarse: COARSE, ..goal }))
                     }
                     (quantity, order) => Some(largest_of(quantity, [&part, &first, &second][order], goal)),
                 };
@@ -308,7 +308,7 @@ fn position_value_between(
     let place = |time_s: f64| before.position_m.lerp(&seen.position_m, (time_s - before.time_s) / whole_s);
     let from = if over.from_s > before.time_s { place(over.from_s) } else { before.position_m };
     let to = if over.to_s < seen.time_s { place(over.to_s) } else { seen.position_m };
-    let stray_m = bound_m_s2 * whole_s * whole_s / 8.0;
+    let deviation_m = bound_m_s2 * whole_s * whole_s / 8.0;
     let (first, second, drawn) = match fence.filter(|_| limit.quantity == Quantity::Fence) {
         None => {
             let ends = [from, to].map(|here| limit.quantity.of(here));
@@ -317,7 +317,7 @@ fn position_value_between(
         Some(fence) => {
             let drawn = -fence.clearance_margin_m(from, to);
             // The end matters only where the value is worse than the worst known value.
-            let [first, second] = if stray_m == 0.0 && drawn <= known.min(limit.bound()) {
+            let [first, second] = if deviation_m == 0.0 && drawn <= known.min(limit.bound()) {
                 [drawn; 2]
             } else {
                 [from, to].map(|here| -fence.clearance_margin_m(here, here))
@@ -327,9 +327,9 @@ fn position_value_between(
     };
     let is_seen = |time_s: f64| time_s == before.time_s || time_s == seen.time_s;
     let ends = [(over.from_s, first), (over.to_s, second)].into_iter().filter(|&(time_s, _)| is_seen(time_s));
-    let lower = if stray_m == 0.0 { drawn } else { ends.map(|(_, value)| value).fold(f64::NEG_INFINITY, f64::max) };
+    let lower = if deviation_m == 0.0 { drawn } else { ends.map(|(_, value)| value).fold(f64::NEG_INFINITY, f64::max) };
     let at = if second > first { 1.0 } else { 0.0 };
-    (over.from_s <= over.to_s).then_some((over, Enclosure { lower, upper: drawn + stray_m, at }))
+    (over.from_s <= over.to_s).then_some((over, Enclosure { lower, upper: drawn + deviation_m, at }))
 }
 
 /// Encloses speeds between two samples from the mean velocity, the recorded velocities, and the bound on acceleration.
@@ -367,13 +367,13 @@ fn rounding_m(before: &Sample, seen: &Sample) -> f64 {
 }
 
 /// Encloses the largest distance of a curve outside the fence.
-fn outside(fence: &MonitoredFence, part: &[Vector3<f64>], goal: Goal) -> Enclosure {
+fn outside(fence: &MonitoredFence, part: &[Vector3<f64>], goal: Precision) -> Enclosure {
     largest(part, goal, |part, _| {
         let (from, to) = (part[0], value(part, 1.0));
         [
             -fence.clearance_margin_m(from, from),
             -fence.clearance_margin_m(to, to),
-            stray_across(part) - fence.clearance_margin_m(from, to),
+            chord_deviation(part) - fence.clearance_margin_m(from, to),
         ]
     })
 }
@@ -382,9 +382,9 @@ fn outside(fence: &MonitoredFence, part: &[Vector3<f64>], goal: Goal) -> Enclosu
 #[derive(Clone, Debug)]
 pub(super) struct LimitRecord {
     pub(super) limit: Limit,
-    extreme: Option<Exceeding>,
-    violations: ExceedingIntervals,
-    undecided: ExceedingIntervals,
+    extreme: Option<Exceedance>,
+    violations: ExceedanceIntervals,
+    undecided: ExceedanceIntervals,
     /// Whether any value is known, for each vehicle.
     observed: Vec<bool>,
     /// Assumption about the quantity.
@@ -395,7 +395,7 @@ pub(super) struct LimitRecord {
 
 impl LimitRecord {
     pub(super) fn new(limit: Limit) -> Self {
-        let (violations, undecided) = (ExceedingIntervals::default(), ExceedingIntervals::default());
+        let (violations, undecided) = (ExceedanceIntervals::default(), ExceedanceIntervals::default());
         Self { limit, extreme: None, violations, undecided, observed: Vec::new(), assumes: None, corners: None }
     }
 
@@ -411,7 +411,7 @@ impl LimitRecord {
         }
         self.observed[vehicle] = true;
         let at_s = over.from_s + at * (over.to_s - over.from_s);
-        let found = Exceeding { vehicle, from_s: over.from_s, to_s: over.to_s, lower, upper, at_s };
+        let found = Exceedance { vehicle, from_s: over.from_s, to_s: over.to_s, lower, upper, at_s };
         let bound = self.limit.bound();
         if lower > bound {
             self.violations.add(found);
@@ -420,7 +420,7 @@ impl LimitRecord {
         }
         let extreme = self.extreme.get_or_insert(found);
         if found.lower > extreme.lower {
-            *extreme = Exceeding { upper: extreme.upper.max(upper), ..found };
+            *extreme = Exceedance { upper: extreme.upper.max(upper), ..found };
         } else {
             extreme.upper = extreme.upper.max(upper);
         }
@@ -445,11 +445,11 @@ impl LimitRecord {
             .filter(|&(vehicle, &is_judged)| is_judged && !is_observed(vehicle))
             .map(|(k, _)| k)
             .collect();
-        let signed = |of: Exceeding| {
+        let signed = |of: Exceedance| {
             let (lower, upper) = if limit.quantity.is_least() { (-of.upper, -of.lower) } else { (of.lower, of.upper) };
-            Exceeding { lower, upper, ..of }
+            Exceedance { lower, upper, ..of }
         };
-        let listed = |times: ExceedingIntervals| {
+        let listed = |times: ExceedanceIntervals| {
             let (list, tally) = times.finish();
             (list.into_iter().map(signed).collect::<Vec<_>>(), tally)
         };
@@ -472,15 +472,15 @@ impl LimitRecord {
 
 /// Intervals of vehicles, merged where they touch. All are counted; the worst and the first of each vehicle are kept.
 #[derive(Clone, Debug)]
-struct ExceedingIntervals {
+struct ExceedanceIntervals {
     /// Last interval of each vehicle, which may be extended.
-    open: Vec<Option<Exceeding>>,
-    ended: Shortlist<Exceeding>,
+    open: Vec<Option<Exceedance>>,
+    ended: Shortlist<Exceedance>,
     count: u64,
 }
 
-impl ExceedingIntervals {
-    fn add(&mut self, found: Exceeding) {
+impl ExceedanceIntervals {
+    fn add(&mut self, found: Exceedance) {
         if self.open.len() <= found.vehicle {
             self.open.resize(found.vehicle + 1, None);
         }
@@ -498,7 +498,7 @@ impl ExceedingIntervals {
     }
 
     /// Returns the kept intervals in order of time, and their number.
-    fn finish(mut self) -> (Vec<Exceeding>, Tally) {
+    fn finish(mut self) -> (Vec<Exceedance>, Tally) {
         self.ended.extend(self.open.into_iter().flatten());
         let list = self.ended.into_list();
         let tally = Tally { count: self.count, listed: list.len(), is_exact: true };
@@ -506,13 +506,13 @@ impl ExceedingIntervals {
     }
 }
 
-impl Default for ExceedingIntervals {
+impl Default for ExceedanceIntervals {
     fn default() -> Self {
         Self { open: Vec::new(), ended: Shortlist::new(LISTED), count: 0 }
     }
 }
 
-impl Finding for Exceeding {
+impl Finding for Exceedance {
     type Subject = usize;
 
     fn subject(&self) -> usize {

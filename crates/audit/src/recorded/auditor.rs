@@ -3,9 +3,9 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use super::outcome::{Gaps, Outcome, Rates, Tallies, absences, vehicles_alone};
+use super::outcome::{Gaps, Outcome, Rates, Tallies, absences, vehicles_without_others};
 use super::settings::{LARGEST, RecordedError, Settings};
-use super::smallest::Smallest;
+use super::smallest::SmallestDistances;
 use super::vehicle::Vehicle;
 use super::window::Windows;
 use crate::envelope::LimitMonitor;
@@ -39,7 +39,7 @@ pub struct TrackAuditor {
     windows: Windows,
     results: Results,
     gaps: Gaps,
-    smallest: Option<Smallest>,
+    smallest: Option<SmallestDistances>,
     envelope: Option<LimitMonitor>,
     /// Smallest clock offset of any vehicle \[s\].
     least_offset_s: f64,
@@ -92,7 +92,7 @@ impl TrackAuditor {
     /// [`push`](Self::push).
     #[must_use]
     pub fn with_smallest(mut self) -> Self {
-        self.smallest = Some(Smallest::new(&self.settings));
+        self.smallest = Some(SmallestDistances::new(&self.settings));
         self
     }
 
@@ -281,7 +281,7 @@ impl TrackAuditor {
         }
         let Results { ledger, closest, obstacles, swept, .. } = self.results;
         let has_approach = !(closest.kept.is_empty() && obstacles.kept.is_empty());
-        let alone = if obstructed || !is_separation_judged { Vec::new() } else { vehicles_alone(&presence) };
+        let alone = if obstructed || !is_separation_judged { Vec::new() } else { vehicles_without_others(&presence) };
         let decided = has_approach && ledger.is_decided() && is_gapless && contradiction.is_none();
         let parry = ledger.parry;
         let are_pairs_known = has_approach && parry.disagreements == 0 && contradiction.is_none();
@@ -305,7 +305,7 @@ impl TrackAuditor {
             span_s,
             closest: closest.kept,
             obstacles: obstacles.kept,
-            smallest: self.smallest.filter(|_| is_separation_judged).map_or_else(Vec::new, Smallest::finish),
+            smallest: self.smallest.filter(|_| is_separation_judged).map_or_else(Vec::new, SmallestDistances::finish),
             violations,
             undecided,
             gaps,

@@ -80,7 +80,7 @@ impl Tallies {
 }
 
 /// Returns the vehicles that are never present together with another vehicle. No pair of such a vehicle is judged.
-pub(super) fn vehicles_alone(presence: &[Option<Presence>]) -> Vec<usize> {
+pub(super) fn vehicles_without_others(presence: &[Option<Presence>]) -> Vec<usize> {
     let present = presence.iter().enumerate().filter_map(|(vehicle, present)| Some((present.as_ref()?, vehicle)));
     let mut present: Vec<_> = present.collect();
     present.sort_by(|(a, _), (b, _)| a.from_s.total_cmp(&b.from_s));

@@ -200,7 +200,7 @@ impl PairSeries {
             _ => return,
         };
         overlaps(first, second, |overlap| {
-            let Interval { from_s, to_s } = overlap.over;
+            let Interval { from_s, to_s } = overlap.interval;
             if to_s <= until_s {
                 let next = found.len();
                 samples(&overlap, target, &mut found);
@@ -248,7 +248,7 @@ impl PairSample {
 /// Samples the time that two segments share: its ends, the closest approach of straight segments, and points in between
 /// on curves. Adds at least one sample.
 fn samples(overlap: &Overlap<'_>, target: Target<'_>, found: &mut Vec<PairSample>) {
-    let Overlap { first, second, over: Interval { from_s, to_s } } = *overlap;
+    let Overlap { first, second, interval: Interval { from_s, to_s } } = *overlap;
     let at = |time_s: f64| {
         let positions_m = [first.position(time_s), second.position(time_s)];
         let deviation_m = first.deviation_at(time_s) + second.deviation_at(time_s);

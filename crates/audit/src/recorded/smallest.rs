@@ -21,13 +21,13 @@ const MIN_SAMPLES: usize = 32;
 
 /// Closest approach of all pairs in consecutive slices of time.
 #[derive(Clone, Debug)]
-pub(super) struct Smallest {
+pub(super) struct SmallestDistances {
     windows: Windows,
     slices: Slices,
     interruption: Interruption,
 }
 
-impl Smallest {
+impl SmallestDistances {
     pub(super) fn new(settings: &Settings) -> Self {
         let interruption = Interruption::default();
         Self { windows: Windows::of_closest(settings.limits()), slices: Slices::new(MAX_KEPT), interruption }
@@ -39,7 +39,7 @@ impl Smallest {
 
     /// Judges a window in slices between its samples and the instants at which a vehicle appears or leaves.
     pub(super) fn follow(&mut self, vehicles: &[Vehicle], window: Interval) {
-        let intervals = PresenceIntervals::over(vehicles, window);
+        let intervals = PresenceIntervals::of_window(vehicles, window);
         let mut parts: Option<Vec<Vehicle>> = None;
         for two in ends(vehicles, window, &intervals).windows(2) {
             let over = Interval { from_s: two[0], to_s: two[1] };
@@ -103,7 +103,7 @@ pub(super) struct PresenceIntervals {
 }
 
 impl PresenceIntervals {
-    pub(super) fn over(vehicles: &[Vehicle], window: Interval) -> Self {
+    pub(super) fn of_window(vehicles: &[Vehicle], window: Interval) -> Self {
         // Time, change of the number of present vehicles, and change of the number of vehicles in the air.
         let mut events: Vec<(f64, [i32; 2])> = Vec::new();
         for vehicle in vehicles {

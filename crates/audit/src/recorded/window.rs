@@ -1,10 +1,10 @@
 //! Selection of the pairs to sweep in a window of time.
 //!
-//! Over the window every vehicle is near its chord: the uniform motion between its positions at both ends. Its stray is
-//! the largest distance of its corners from the chord at the same time. Two vehicles are at least as far apart as their
-//! chords, less both strays. This is one closed form for a whole window, and equally sharp for swarms at rest and in
-//! common motion. Sort and sweep along the longest axis finds the pairs to compare. A window with too many remaining
-//! pairs is halved.
+//! Over the window every vehicle is near its chord: the uniform motion between its positions at both ends. Its
+//! deviation is the largest distance of its corners from the chord at the same time. Two vehicles are at least as far
+//! apart as their chords, less both deviations. This is one closed form for a whole window, and equally sharp for
+//! swarms at rest and in common motion. Sort and sweep along the longest axis finds the pairs to compare. A window with
+//! too many remaining pairs is halved.
 
 use std::mem;
 use std::ops::Range;
@@ -19,7 +19,7 @@ use crate::ledger::{MAX_KEPT, Results};
 use crate::obstacle::Obstacle;
 use crate::outcome::ObjectPair;
 use crate::pair_sweep::PairSweep;
-use crate::polynomial::stray;
+use crate::polynomial::motion_deviation;
 use crate::segment::Segment;
 use crate::sweep::{Interval, RelativeMotion, larger};
 use tautline_core::swarm::Pair;
@@ -69,8 +69,8 @@ struct ExtentPair {
     second: u32,
     /// Smallest squared distance of the chords.
     squared: f64,
-    /// Sum of both strays.
-    stray: f64,
+    /// Sum of both deviations.
+    motion_deviation: f64,
 }
 
 impl ExtentPair {
@@ -78,13 +78,13 @@ impl ExtentPair {
     fn new(extents: &[Extent], first: u32, second: u32) -> Self {
         let (a, b) = (&extents[first as usize].chord, &extents[second as usize].chord);
         let squared = RelativeMotion::new(b.from - a.from, b.to - a.to).closest().squared;
-        Self { first, second, squared, stray: a.stray + b.stray }
+        Self { first, second, squared, motion_deviation: a.motion_deviation + b.motion_deviation }
     }
 
-    /// Returns whether the two could come closer than a distance. The strays include the rounding of positions.
+    /// Returns whether the two could come closer than a distance. The deviations include the rounding of positions.
     #[inline]
     fn may_come_within(&self, distance: f64) -> bool {
-        let reach = (distance + self.stray) * (1.0 + ROUNDING);
+        let reach = (distance + self.motion_deviation) * (1.0 + ROUNDING);
         self.squared < reach * reach
     }
 }
@@ -112,7 +112,8 @@ impl Windows {
     fn judge_or_halve(&mut self, vehicles: &[Vehicle], window: Interval, halvings: u32, results: &mut Results) {
         results.ledger.begin_window(window);
         self.extents.clear();
-        self.extents.extend(vehicles.iter().enumerate().filter_map(|(k, vehicle)| Extent::over(k, vehicle, window)));
+        self.extents
+            .extend(vehicles.iter().enumerate().filter_map(|(k, vehicle)| Extent::of_window(k, vehicle, window)));
         let count = self.extents.len();
         if count > 1 {
             self.sort();
@@ -233,7 +234,7 @@ impl Windows {
     fn sweep_obstacles(&self, vehicles: &[Vehicle], window: Interval, results: &mut Results) {
         for (index, (obstacle, path)) in self.obstacles.iter().enumerate() {
             let path = &path[within(path, window)];
-            let place = Chord::over(path, window);
+            let place = Chord::of_window(path, window);
             for extent in self.extents.iter().filter(|extent| !extent.grounded) {
                 if !results.settle_and_continue() {
                     return;
@@ -242,7 +243,7 @@ impl Windows {
                 let limit = self.limits.of_obstacle(obstacle, extent.radius);
                 let (cutoff, chord) = (results.obstacles.cutoff(pair, limit), &extent.chord);
                 let between = obstacle.shape.closest(chord.from - place.from, chord.to - place.to).0;
-                let least = between - chord.stray - place.stray;
+                let least = between - chord.motion_deviation - place.motion_deviation;
                 if least < limit.max(cutoff) {
                     let (target, keep_out) = (Target::Shape(&obstacle.shape), KeepOut::new(limit));
                     let (may_violate, above) = (least < limit, self.limits.above);
@@ -263,17 +264,22 @@ impl Windows {
 struct Chord {
     from: Vector3<f64>,
     to: Vector3<f64>,
-    stray: f64,
+    motion_deviation: f64,
     curved: bool,
 }
 
 impl Chord {
     /// Creates the chord of segments that meet the window, at least one. At times without a segment the last position
-    /// is kept, which only widens the stray.
+    /// is kept, which only increases the deviation.
     #[inline]
-    fn over(parts: &[Segment], window: Interval) -> Self {
+    fn of_window(parts: &[Segment], window: Interval) -> Self {
         let (Some(first), Some(last)) = (parts.first(), parts.last()) else {
-            return Self { from: Vector3::zeros(), to: Vector3::zeros(), stray: f64::INFINITY, curved: false };
+            return Self {
+                from: Vector3::zeros(),
+                to: Vector3::zeros(),
+                motion_deviation: f64::INFINITY,
+                curved: false,
+            };
         };
         let Interval { from_s, to_s } = window;
         let (from, to) = (first.position(from_s.max(first.from_s)), last.position(to_s));
@@ -294,25 +300,25 @@ impl Chord {
             (end_s, end) = (part.to_s, part.to);
         }
         let curved = parts.iter().any(|part| part.curve().is_some());
-        let beyond = if curved { stray_of_curves(parts, window) } else { 0.0 };
+        let beyond = if curved { deviation_of_curves(parts, window) } else { 0.0 };
         // The ends of the chord are interpolated on the first and the last segment.
         let rounding = ROUNDING * (from.amax() + to.amax()) + first.rounding() + last.rounding();
         // In a window too short to divide by, the motion is unbounded.
-        let stray =
+        let motion_deviation =
             if per_s.is_finite() { squared.sqrt() * (1.0 + ROUNDING) + beyond + rounding } else { f64::INFINITY };
-        Self { from, to, stray, curved }
+        Self { from, to, motion_deviation, curved }
     }
 }
 
 /// Returns a bound on the distance of curves from the chords of their corners.
 #[cold]
-fn stray_of_curves(parts: &[Segment], window: Interval) -> f64 {
+fn deviation_of_curves(parts: &[Segment], window: Interval) -> f64 {
     let curves = parts.iter().filter(|part| part.curve().is_some());
-    let strays = curves.map(|part| {
+    let deviations = curves.map(|part| {
         let (from_s, to_s) = (part.from_s.max(window.from_s), part.to_s.min(window.to_s));
-        stray(&part.local(Interval { from_s, to_s })) + part.deviation() + part.rounding()
+        motion_deviation(&part.local(Interval { from_s, to_s })) + part.deviation() + part.rounding()
     });
-    strays.fold(0.0, larger)
+    deviations.fold(0.0, larger)
 }
 
 /// Returns the range of segments that meet a window, in most cases all.
@@ -327,14 +333,14 @@ pub(super) fn within(segments: &[Segment], Interval { from_s, to_s }: Interval) 
 impl Extent {
     /// Returns the extent of the segments of a vehicle that meet the window; `None` without such segments.
     #[inline]
-    fn over(vehicle: usize, of: &Vehicle, window: Interval) -> Option<Self> {
+    fn of_window(vehicle: usize, of: &Vehicle, window: Interval) -> Option<Self> {
         let segments = within(&of.segments, window);
         let parts = &of.segments[segments.clone()];
         if parts.is_empty() {
             return None;
         }
-        let chord = Chord::over(parts, window);
-        let aside = Vector3::repeat(chord.stray);
+        let chord = Chord::of_window(parts, window);
+        let aside = Vector3::repeat(chord.motion_deviation);
         Some(Self {
             low: chord.from.inf(&chord.to) - aside,
             high: chord.from.sup(&chord.to) + aside,
@@ -358,35 +364,35 @@ mod tests {
     use crate::segment::{Curve, Deviation};
 
     #[test]
-    fn the_stray_of_a_vehicle_is_that_of_its_corners() {
+    fn the_deviation_of_a_vehicle_is_that_of_its_corners() {
         let at = |x: f64, y: f64| Vector3::new(x, y, 0.0);
         let parts = [
             Segment::straight(0.0, 1.0, at(0.0, 0.0), at(1.0, 0.5)),
             Segment::straight(1.0, 2.0, at(1.0, 0.5), at(2.0, 0.0)),
         ];
-        let way = Chord::over(&parts, Interval { from_s: 0.0, to_s: 2.0 });
+        let way = Chord::of_window(&parts, Interval { from_s: 0.0, to_s: 2.0 });
         assert_eq!((way.from, way.to), (at(0.0, 0.0), at(2.0, 0.0)));
-        assert!((way.stray - 0.5).abs() < 1e-12 && way.stray >= 0.5);
-        // A vehicle that covers the chord at the wrong time strays along it.
+        assert!((way.motion_deviation - 0.5).abs() < 1e-12 && way.motion_deviation >= 0.5);
+        // A vehicle that covers the chord at the wrong time deviates along it.
         let hurried = [
             Segment::straight(0.0, 0.5, at(0.0, 0.0), at(1.5, 0.0)),
             Segment::straight(0.5, 2.0, at(1.5, 0.0), at(2.0, 0.0)),
         ];
-        assert!((Chord::over(&hurried, Interval { from_s: 0.0, to_s: 2.0 }).stray - 1.0).abs() < 1e-12);
+        assert!((Chord::of_window(&hurried, Interval { from_s: 0.0, to_s: 2.0 }).motion_deviation - 1.0).abs() < 1e-12);
         // A vehicle that appears late counts as at its first position before.
         let late = [Segment::straight(1.0, 2.0, at(5.0, 0.0), at(5.0, 1.0))];
-        let way = Chord::over(&late, Interval { from_s: 0.0, to_s: 2.0 });
+        let way = Chord::of_window(&late, Interval { from_s: 0.0, to_s: 2.0 });
         assert_eq!(way.from, at(5.0, 0.0));
-        assert!((way.stray - 0.5).abs() < 1e-12);
-        // A vehicle strays where it appears again after a gap.
+        assert!((way.motion_deviation - 0.5).abs() < 1e-12);
+        // A vehicle deviates where it appears again after a gap.
         let away = [
             Segment::straight(0.0, 1.0, at(0.0, 0.0), at(1.0, 0.0)),
             Segment::straight(3.0, 4.0, at(3.0, 2.0), at(4.0, 0.0)),
         ];
-        assert!((Chord::over(&away, Interval { from_s: 0.0, to_s: 4.0 }).stray - 2.0).abs() < 1e-12);
+        assert!((Chord::of_window(&away, Interval { from_s: 0.0, to_s: 4.0 }).motion_deviation - 2.0).abs() < 1e-12);
         // In a window too short to divide by, a vehicle may be anywhere.
         let instant = [Segment::straight(0.0, 3e-310, at(0.0, 0.0), at(1.0, 0.0))];
-        assert_eq!(Chord::over(&instant, Interval { from_s: 0.0, to_s: 3e-310 }).stray, f64::INFINITY);
+        assert_eq!(Chord::of_window(&instant, Interval { from_s: 0.0, to_s: 3e-310 }).motion_deviation, f64::INFINITY);
     }
 
     #[test]

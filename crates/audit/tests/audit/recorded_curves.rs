@@ -139,7 +139,7 @@ fn bounded_motion_is_the_sweep_plus_or_minus_the_deviation() {
 }
 
 #[test]
-fn the_deciding_rate_decides() {
+fn samples_at_the_deciding_rate_give_a_verdict() {
     let straight = |rates_hz: [f64; 2]| {
         let mut items = Vec::new();
         for (vehicle, rate_hz) in rates_hz.into_iter().enumerate() {

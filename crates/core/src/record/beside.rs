@@ -9,14 +9,14 @@ use super::{Event, OwnedSample, RecordError, Sample, Sink};
 const CAPACITY: usize = 2;
 
 /// Item of the queue to the recorder thread.
-enum Queued {
+enum QueueItem {
     Sample(Box<OwnedSample>),
     Event(Event),
 }
 
 /// Sink that sends copies to the recorder thread.
 struct QueueSink {
-    queue: SyncSender<Queued>,
+    queue: SyncSender<QueueItem>,
     /// Recorded samples, whose memory is reused.
     recorded: Receiver<Box<OwnedSample>>,
 }
@@ -28,7 +28,7 @@ struct QueueSink {
 ///
 /// # Errors
 /// The first error of the recorder. The flight receives it with a later sample or event, or at its end.
-pub fn record_beside<T, E: From<RecordError>>(
+pub fn record_in_thread<T, E: From<RecordError>>(
     sink: &mut (dyn Sink + Send),
     fly: impl FnOnce(&mut dyn Sink) -> Result<T, E>,
 ) -> Result<T, E> {
@@ -45,11 +45,15 @@ pub fn record_beside<T, E: From<RecordError>>(
 }
 
 /// Records until the queue is closed or the sink fails.
-fn record(sink: &mut dyn Sink, queued: &Receiver<Queued>, back: &Sender<Box<OwnedSample>>) -> Result<(), RecordError> {
+fn record(
+    sink: &mut dyn Sink,
+    queued: &Receiver<QueueItem>,
+    back: &Sender<Box<OwnedSample>>,
+) -> Result<(), RecordError> {
     for item in queued {
         match item {
-            Queued::Event(event) => sink.event(&event)?,
-            Queued::Sample(sample) => {
+            QueueItem::Event(event) => sink.event(&event)?,
+            QueueItem::Sample(sample) => {
                 sink.sample(&sample.as_sample())?;
                 // The receiver is gone after the end of the flight.
                 let _ = back.send(sample);
@@ -60,8 +64,8 @@ fn record(sink: &mut dyn Sink, queued: &Receiver<Queued>, back: &Sender<Box<Owne
 }
 
 impl QueueSink {
-    fn send(&self, item: Queued) -> Result<(), RecordError> {
-        // `record_beside` returns the recorder's own error after joining its thread.
+    fn send(&self, item: QueueItem) -> Result<(), RecordError> {
+        // `record_in_thread` returns the recorder's own error after joining its thread.
         let gone = |_| RecordError::Write {
             path: "the recording".to_owned(),
             source: std::io::Error::other("writing failed before"),
@@ -79,11 +83,11 @@ impl Sink for QueueSink {
             }
             Err(_) => Box::new(OwnedSample::from(sample)),
         };
-        self.send(Queued::Sample(copy))
+        self.send(QueueItem::Sample(copy))
     }
 
     fn event(&mut self, event: &Event) -> Result<(), RecordError> {
-        self.send(Queued::Event(event.clone()))
+        self.send(QueueItem::Event(event.clone()))
     }
 }
 
@@ -136,7 +140,7 @@ mod tests {
     #[test]
     fn order_is_preserved() {
         let mut times = Times::default();
-        assert_eq!(record_beside(&mut times, fly).expect("recorded"), 20);
+        assert_eq!(record_in_thread(&mut times, fly).expect("recorded"), 20);
         assert_eq!(times.0, (0..40).map(|k| 0.5 * f64::from(k)).collect::<Vec<_>>());
     }
 
@@ -144,7 +148,7 @@ mod tests {
     fn recorder_error_ends_the_flight() {
         for failing_s in [0.0, 7.5, 19.5] {
             let mut times = Times(Vec::new(), Some(failing_s));
-            let error = record_beside(&mut times, fly).expect_err("a full disk");
+            let error = record_in_thread(&mut times, fly).expect_err("a full disk");
             assert_eq!(error.to_string(), "cannot write run.mcap: the disk is full");
             assert_eq!(times.0.last().map_or(0.0, |last| last + 0.5), failing_s);
         }

@@ -52,7 +52,7 @@ impl Sink for StateHash {
         Ok(())
     }
 
-    fn looks_at_steps(&self) -> bool {
+    fn needs_steps(&self) -> bool {
         false
     }
 }

@@ -7,7 +7,7 @@ mod beside;
 mod error;
 mod hash;
 
-pub use beside::record_beside;
+pub use beside::record_in_thread;
 pub use error::{ReadFault, RecordError};
 pub use hash::{MessageHash, StateHash, sha256_hex};
 
@@ -380,8 +380,8 @@ pub trait Sink {
     /// Receives the end of a step, recorded or not. The last step of a flight may arrive twice.
     fn step(&mut self, _step: &Step<'_>) {}
 
-    /// Returns whether [`Sink::step`] has an effect. If not, [`record_beside`] may run this sink in another thread.
-    fn looks_at_steps(&self) -> bool {
+    /// Returns whether [`Sink::step`] has an effect. If not, [`record_in_thread`] may run this sink in another thread.
+    fn needs_steps(&self) -> bool {
         true
     }
 }
@@ -396,7 +396,7 @@ impl Sink for () {
         Ok(())
     }
 
-    fn looks_at_steps(&self) -> bool {
+    fn needs_steps(&self) -> bool {
         false
     }
 }
@@ -414,8 +414,8 @@ impl<R: Sink + ?Sized> Sink for &mut R {
         (**self).step(step);
     }
 
-    fn looks_at_steps(&self) -> bool {
-        (**self).looks_at_steps()
+    fn needs_steps(&self) -> bool {
+        (**self).needs_steps()
     }
 }
 
@@ -436,7 +436,7 @@ impl<A: Sink, B: Sink> Sink for (A, B) {
         self.1.step(step);
     }
 
-    fn looks_at_steps(&self) -> bool {
-        self.0.looks_at_steps() || self.1.looks_at_steps()
+    fn needs_steps(&self) -> bool {
+        self.0.needs_steps() || self.1.needs_steps()
     }
 }

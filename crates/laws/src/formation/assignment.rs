@@ -40,8 +40,8 @@ pub fn optimal_slots(positions_m: &Rows, formation: &Formation, freedom: Freedom
         return assign(positions_m, &formation.slots_m).map(|(slots, _)| slots);
     }
     let (centre_m, slots_centre_m) = (mean_row(positions_m), mean_row(&formation.slots_m));
-    let positions_m = about(positions_m, centre_m);
-    let slots = Formation::points(about(&formation.slots_m, slots_centre_m));
+    let positions_m = centred_on(positions_m, centre_m);
+    let slots = Formation::points(centred_on(&formation.slots_m, slots_centre_m));
     if freedom == Freedom::Translation {
         return assign(&positions_m, &slots.slots_m).map(|(slots, _)| slots);
     }
@@ -53,7 +53,7 @@ pub fn optimal_slots(positions_m: &Rows, formation: &Formation, freedom: Freedom
         let rotation =
             Rotation3::from_matrix_unchecked(nalgebra::matrix![cos, -sin, 0.0; sin, cos, 0.0; 0.0, 0.0, 1.0]);
         let turned = map(&slots.slots_m, |slot| rotation * Vector3::new(slot.x, mirror * slot.y, slot.z));
-        let found = settle(&positions_m, &slots, turned)?;
+        let found = alternate(&positions_m, &slots, turned)?;
         if best.as_ref().is_none_or(|(_, least)| found.1 < *least) {
             best = Some(found);
         }
@@ -78,7 +78,7 @@ pub fn optimal_slots_around(positions_m: &Rows, formation: &Formation, leader: u
 }
 
 /// Alternates assignment and best fit until the assignment stays the same.
-fn settle(positions_m: &Rows, slots: &Formation, mut placed_m: Rows) -> Option<(Vec<usize>, f64)> {
+fn alternate(positions_m: &Rows, slots: &Formation, mut placed_m: Rows) -> Option<(Vec<usize>, f64)> {
     let mut found = assign(positions_m, &placed_m)?;
     for _ in 0..MOST_ROUNDS {
         let motion = best_rigid_motion(positions_m, &slots.reordered(&found.0))?;
@@ -106,7 +106,7 @@ fn assign(positions_m: &Rows, slots_m: &Rows) -> Option<(Vec<usize>, f64)> {
     Some((slots, sum))
 }
 
-fn about(rows: &Rows, centre_m: Vector3<f64>) -> Rows {
+fn centred_on(rows: &Rows, centre_m: Vector3<f64>) -> Rows {
     map(rows, |point| point - centre_m)
 }
 

@@ -106,7 +106,7 @@ pub fn procrustes_rms_m(positions_m: &Rows, formation: &Formation) -> f64 {
 
 /// Returns the sum of the two largest distances \[m\] of positions from their slots after [`best_rigid_motion`]; NaN
 /// without a fit. Allocates nothing.
-pub(super) fn two_farthest_m(positions_m: &Rows, formation: &Formation) -> f64 {
+pub(super) fn two_largest_errors_m(positions_m: &Rows, formation: &Formation) -> f64 {
     let Some(fit) = Fit::new(positions_m, formation) else { return f64::NAN };
     let distances_m = fit.residuals_m(positions_m, formation).map(|residual_m| residual_m.norm());
     let (first, second) = distances_m.fold((0.0_f64, 0.0_f64), |(first, second), distance_m| {
@@ -160,7 +160,7 @@ const MOST_EDGES: usize = 1_000_000;
 
 /// Returns the number of edges or vehicles that [`largest_edge_error_m`] evaluates.
 #[must_use]
-pub fn edges_looked_at(graph: &Graph) -> usize {
+pub fn evaluated_edges(graph: &Graph) -> usize {
     if is_bounded(graph) { graph.count() } else { graph.edge_count() }
 }
 
@@ -184,7 +184,7 @@ pub fn largest_edge_error_m(positions_m: &Rows, formation: &Formation, graph: &G
         return f64::NAN;
     }
     if is_bounded(graph) {
-        return two_farthest_m(positions_m, formation);
+        return two_largest_errors_m(positions_m, formation);
     }
     let mut largest = 0.0;
     for i in 0..count {

@@ -17,7 +17,7 @@ pub use assignment::{most_assigned, optimal_slots, optimal_slots_around};
 pub use drawn::{Drawing, DrawingError, Ink, MAX_DRAWN_SLOTS, MAX_PIXELS, MAX_TEXT_CHARS};
 pub use fit::affine_dimension;
 pub use fit::{Freedom, PositionError, RigidMotion, best_rigid_motion, procrustes_rms_m};
-pub use fit::{edges_looked_at, largest_edge_error_m};
+pub use fit::{evaluated_edges, largest_edge_error_m};
 pub use shapes::NARROWEST_V_RAD;
 
 /// Target shape: slot `h_i` for vehicle i.

@@ -68,7 +68,7 @@ impl Graph {
 
     /// Marks the connectivity as a bound, so that tests of reports need no graph that takes half a minute.
     #[doc(hidden)]
-    pub fn pretend_a_bound(&self) {
+    pub fn mark_connectivity_as_bound(&self) {
         self.cache.bounded.get_or_init(|| ());
     }
 

@@ -130,8 +130,8 @@ impl CbfQpLaw {
 
     /// Returns the half-space of accelerations of vehicle i that vehicle j allows; `None` out of range.
     fn half_space(&self, at: &Observation<'_>, i: usize, j: usize) -> Result<Option<HalfSpace>, LawError> {
-        let seen = at.seen(i, j);
-        let apart_m = row(&at.own.positions_m, i) - seen.position_m;
+        let sensed = at.sensed(i, j);
+        let apart_m = row(&at.own.positions_m, i) - sensed.position_m;
         let distance_m = apart_m.norm();
         if distance_m == 0.0 {
             return Err(LawError::Collision { pair: Pair::new(i, j), separation_m: 0.0, delta_m: self.delta_m });
@@ -140,7 +140,7 @@ impl CbfQpLaw {
             return Ok(None);
         }
         let normal = apart_m / distance_m;
-        let bound = self.bound_m_s2(normal, distance_m, row(&at.own.velocities_m_s, i) - seen.velocity_m_s);
+        let bound = self.bound_m_s2(normal, distance_m, row(&at.own.velocities_m_s, i) - sensed.velocity_m_s);
         Ok(Some(HalfSpace { normal, offset: -0.5 * bound }))
     }
 

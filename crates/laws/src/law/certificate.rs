@@ -11,7 +11,7 @@ pub struct Certificate {
     pub certified_until_s: Option<f64>,
     /// Lower bound of the clearance margin of every vehicle at every obstacle \[m\]: distance from the surface less the
     /// obstacle's clearance. `None` without obstacles, or if the law does not avoid them.
-    pub certified_room_m: Option<f64>,
+    pub certified_clearance_margin_m: Option<f64>,
     /// Energy E(0) of the start \[m^2/s^2\], if the law has an energy; also given when the certificate is void.
     pub energy_initial: Option<f64>,
     /// Lower bound of the separation of linked pairs \[m\] while the energy does not exceed E(0). On an incomplete
@@ -31,7 +31,7 @@ pub struct LegBound {
     /// Lower bound of the separation of every pair \[m\].
     pub certified_m: Option<f64>,
     /// Lower bound of the clearance margin of every vehicle at every obstacle \[m\].
-    pub certified_room_m: Option<f64>,
+    pub certified_clearance_margin_m: Option<f64>,
 }
 
 /// Reason why a certificate is void.
@@ -60,16 +60,16 @@ pub enum VoidReason {
         "The sensed states are late: vehicles have moved since the measurement \
          (sensing.latency_s, sensing.near_latency_s, sensing.rate_hz)."
     )]
-    KnownLate,
+    SensingDelayed,
     /// Sensed states have errors.
     #[error("The sensed states have errors (sensing.position_noise_m, position_bias_m, velocity_noise_m_s).")]
-    KnownWrongly,
+    SensingInexact,
     /// Received states of other vehicles are late.
     #[error(
         "The received states are late: each message has a latency and is used until the next one arrives \
          (network.latency_s, network.rate_hz)."
     )]
-    HeardLate,
+    MessagesDelayed,
     /// Some messages are lost.
     #[error(
         "The network loses messages: vehicles use the last state that arrived (network.loss, network.failure, failure)."
@@ -83,37 +83,37 @@ pub enum VoidReason {
     AccelerationLimited,
     /// Accelerations follow the commands with a lag.
     #[error("The acceleration follows the command with a lag (actuation.lag_s).")]
-    AccelerationLate,
+    AccelerationLagged,
     /// A vehicle fails and no longer carries out the law's commands.
     #[error("The run continues with a failed vehicle that does not carry out the law's commands (failure).")]
     VehicleFails,
     /// The caller supplied commands in place of the law's.
     #[error("The commands came from the caller in place of the law.")]
-    CommandsFromOutside,
+    ExternalCommands,
     /// Commands are held constant over control periods.
     #[error("The commands are held constant over each control period (time.control_hz).")]
     CommandsHeld,
     /// The scenario has wind, and the law's proof excludes wind.
     #[error("The wind acts on the vehicles: the law's proof covers still air only.")]
-    Windblown,
+    WindNotCovered,
     /// The wind is turbulent, and its contribution to the energy has no bound.
     #[error("The wind is turbulent (wind.dryden): its contribution to the energy has no bound.")]
     WindUnbounded,
     /// The wind pushes the leader off the reference, and the law's proof assumes that the leader flies it exactly.
     #[error("The wind pushes the leader off the reference: the law's proof assumes a leader exactly on it.")]
-    LeaderBlown,
+    LeaderInWind,
     /// Vehicles have dynamics of their own, so they carry out commands with delay and error.
     #[error("The vehicles are not points: they carry out a command with delay and error (vehicle.model).")]
-    NotAPoint,
+    VehicleNotPoint,
     /// The motion of the reference is not fed forward to the vehicles.
     #[error("The motion of the reference is not fed forward to the vehicles (reference.feed_forward).")]
-    ReferenceNotFed,
+    NoFeedForward,
     /// The scenario has obstacles, and the law does not avoid them.
     #[error("The law does not keep clear of obstacles: its proof does not cover vehicles that hit one.")]
-    ObstaclesUnknown,
+    ObstaclesNotAvoided,
     /// The reference moves the swarm among fixed obstacles.
     #[error("The reference moves among fixed obstacles: it may press the swarm against them.")]
-    CarriedPastObstacles,
+    ReferenceAmongObstacles,
     /// The law needs shorter time steps than the run was allowed to take.
     #[error("The law needs shorter time steps than the run could take: the motion flown is outside the law's proof.")]
     StepsTooLong,
@@ -143,7 +143,8 @@ impl Certificate {
         }
         let least = |before_m: Option<f64>, now_m: Option<f64>| before_m.zip(now_m).map(|(a, b)| a.min(b));
         self.certified_m = least(self.certified_m, later.certified_m);
-        self.certified_room_m = least(self.certified_room_m, later.certified_room_m);
+        self.certified_clearance_margin_m =
+            least(self.certified_clearance_margin_m, later.certified_clearance_margin_m);
         let ends = [self.certified_until_s, later.certified_until_s];
         self.certified_until_s = ends.into_iter().flatten().reduce(f64::min);
         self.void.clone_from(&later.void);
@@ -154,7 +155,8 @@ impl Certificate {
         for (bound, now) in self.legs.iter_mut().skip(leg).zip(later.legs.iter().skip(1)) {
             bound.energy = bound.energy.max(now.energy);
             bound.certified_m = least(bound.certified_m, now.certified_m);
-            bound.certified_room_m = least(bound.certified_room_m, now.certified_room_m);
+            bound.certified_clearance_margin_m =
+                least(bound.certified_clearance_margin_m, now.certified_clearance_margin_m);
         }
     }
 
@@ -162,7 +164,7 @@ impl Certificate {
     #[must_use]
     pub fn void_where(mut self, breaks: bool, reason: VoidReason) -> Self {
         if breaks && !self.void.contains(&reason) {
-            (self.certified_m, self.certified_until_s, self.certified_room_m) = (None, None, None);
+            (self.certified_m, self.certified_until_s, self.certified_clearance_margin_m) = (None, None, None);
             self.legs.clear();
             self.void.push(reason);
         }
@@ -181,22 +183,22 @@ impl VoidReason {
             Self::CommandLimited => "command-limited",
             Self::TargetChanges => "target-changes",
             Self::InexactLink => "inexact-link",
-            Self::KnownLate => "known-late",
-            Self::KnownWrongly => "known-wrongly",
-            Self::HeardLate => "heard-late",
+            Self::SensingDelayed => "known-late",
+            Self::SensingInexact => "known-wrongly",
+            Self::MessagesDelayed => "heard-late",
             Self::MessagesLost => "messages-lost",
             Self::AccelerationLimited => "acceleration-limited",
-            Self::AccelerationLate => "acceleration-late",
+            Self::AccelerationLagged => "acceleration-late",
             Self::VehicleFails => "vehicle-fails",
-            Self::CommandsFromOutside => "commands-from-outside",
+            Self::ExternalCommands => "commands-from-outside",
             Self::CommandsHeld => "commands-held",
-            Self::Windblown => "windblown",
+            Self::WindNotCovered => "windblown",
             Self::WindUnbounded => "wind-unbounded",
-            Self::LeaderBlown => "leader-blown",
-            Self::NotAPoint => "not-a-point",
-            Self::ReferenceNotFed => "reference-not-fed",
-            Self::ObstaclesUnknown => "obstacles-unknown",
-            Self::CarriedPastObstacles => "carried-past-obstacles",
+            Self::LeaderInWind => "leader-blown",
+            Self::VehicleNotPoint => "not-a-point",
+            Self::NoFeedForward => "reference-not-fed",
+            Self::ObstaclesNotAvoided => "obstacles-unknown",
+            Self::ReferenceAmongObstacles => "carried-past-obstacles",
             Self::StepsTooLong => "steps-too-long",
             Self::Unresolved => "certificate-unresolved",
             Self::StartRefused(LawError::Collision { .. }) => "start-too-close",
@@ -241,22 +243,22 @@ mod tests {
             VoidReason::CommandLimited,
             VoidReason::TargetChanges,
             VoidReason::InexactLink,
-            VoidReason::KnownLate,
-            VoidReason::KnownWrongly,
-            VoidReason::HeardLate,
+            VoidReason::SensingDelayed,
+            VoidReason::SensingInexact,
+            VoidReason::MessagesDelayed,
             VoidReason::MessagesLost,
             VoidReason::AccelerationLimited,
-            VoidReason::AccelerationLate,
+            VoidReason::AccelerationLagged,
             VoidReason::VehicleFails,
-            VoidReason::CommandsFromOutside,
+            VoidReason::ExternalCommands,
             VoidReason::CommandsHeld,
-            VoidReason::Windblown,
+            VoidReason::WindNotCovered,
             VoidReason::WindUnbounded,
-            VoidReason::LeaderBlown,
-            VoidReason::NotAPoint,
-            VoidReason::ReferenceNotFed,
-            VoidReason::ObstaclesUnknown,
-            VoidReason::CarriedPastObstacles,
+            VoidReason::LeaderInWind,
+            VoidReason::VehicleNotPoint,
+            VoidReason::NoFeedForward,
+            VoidReason::ObstaclesNotAvoided,
+            VoidReason::ReferenceAmongObstacles,
             VoidReason::StepsTooLong,
             VoidReason::Unresolved,
             VoidReason::StartRefused(collision),

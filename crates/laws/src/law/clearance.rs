@@ -27,7 +27,7 @@ impl ClearanceTension {
 
     /// Adds the push of the obstacles to the row of each vehicle, and returns the sum of the tensions \[m^2/s^2\].
     pub(super) fn add_pushes(&self, at: &Observation<'_>, sums: &mut Rows) -> Result<f64, LawError> {
-        self.walk(at.obstacles, &at.own.positions_m, |vehicle, push| {
+        self.sum_tensions(at.obstacles, &at.own.positions_m, |vehicle, push| {
             let sum = row(sums, vehicle) + push;
             set_row(sums, vehicle, sum);
         })
@@ -35,10 +35,10 @@ impl ClearanceTension {
 
     /// Sum of the tensions over all vehicles and obstacles \[m^2/s^2\].
     pub(super) fn potential(&self, obstacles: &[Obstacle], positions_m: &Rows) -> Result<f64, LawError> {
-        self.walk(obstacles, positions_m, |_, _| {})
+        self.sum_tensions(obstacles, positions_m, |_, _| {})
     }
 
-    fn walk(
+    fn sum_tensions(
         &self,
         obstacles: &[Obstacle],
         positions_m: &Rows,
@@ -74,14 +74,14 @@ impl ClearanceTension {
     }
 
     /// Returns the smallest margin that an energy \[m^2/s^2\] allows \[m\].
-    pub(super) fn least_room_m(&self, energy: f64) -> f64 {
+    pub(super) fn smallest_clearance_margin_m(&self, energy: f64) -> f64 {
         self.tension.push_side_root(energy)
     }
 }
 
 /// Returns the smallest margin of any slot of any leg \[m\] for a reference at rest; infinite if slots have no fixed
 /// place.
-pub(super) fn slot_room_m(context: &LawContext<'_>) -> Result<f64, ParameterError> {
+pub(super) fn slot_clearance_margin_m(context: &LawContext<'_>) -> Result<f64, ParameterError> {
     let Some(guidance) = context.guidance.filter(|guidance| guidance.motion.is_at_rest()) else {
         return Ok(f64::INFINITY);
     };

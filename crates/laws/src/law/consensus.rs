@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::error::LawError;
 use super::interface::VelocityMargin;
 use crate::graph::Graph;
-use crate::observation::{Neighbour, Observation, Others};
+use crate::observation::{NeighbourState, Observation, OtherStates};
 use tautline_core::swarm::{Rows, Swarm, columns, columns_mut, first_row_not_finite, row, set_row};
 
 /// Checks that a state is of `count` vehicles and finite.
@@ -104,9 +104,9 @@ pub(super) fn check_observation(count: usize, at: &Observation<'_>, command: &Ro
 /// Checks the sizes as [`check_observation`] does, but does not check a shared state for finite numbers.
 pub(super) fn check_tables(count: usize, at: &Observation<'_>, command: &Rows) -> Result<(), LawError> {
     check_rows(count, at.own)?;
-    if let Others::Held(held) = at.others {
+    if let OtherStates::PerVehicle(held) = at.others {
         check_state(count, at.own)?;
-        if !held.is_of(count) {
+        if !held.matches_count(count) {
             return Err(LawError::Pictures { count });
         }
         held.first_not_finite().map_or(Ok(()), |vehicle| Err(LawError::NotFinite { vehicle }))?;
@@ -114,21 +114,21 @@ pub(super) fn check_tables(count: usize, at: &Observation<'_>, command: &Rows) -
     check_count(count, command.nrows())
 }
 
-/// Adds `term(i, own, j, heard)` to row i of `sums` for each neighbour j of vehicle i: `own` is the state of i and
-/// `heard` the state of j that i received.
-pub(super) fn add_heard(
+/// Adds `term(i, own, j, received)` to row i of `sums` for each neighbour j of vehicle i: `own` is the state of i and
+/// `received` the state of j that i received.
+pub(super) fn add_received_terms(
     at: &Observation<'_>,
     sums: &mut Rows,
-    term: impl Fn(usize, Neighbour, usize, Neighbour) -> Result<Vector3<f64>, LawError>,
+    term: impl Fn(usize, NeighbourState, usize, NeighbourState) -> Result<Vector3<f64>, LawError>,
 ) -> Result<(), LawError> {
-    let own = |i: usize| Neighbour {
+    let own = |i: usize| NeighbourState {
         position_m: row(&at.own.positions_m, i),
         velocity_m_s: row(&at.own.velocities_m_s, i),
         age_s: 0.0,
     };
     for (a, b) in at.links.edges() {
         for (i, j) in [(a, b), (b, a)] {
-            let sum = row(sums, i) + term(i, own(i), j, at.heard(i, j))?;
+            let sum = row(sums, i) + term(i, own(i), j, at.received(i, j))?;
             set_row(sums, i, sum);
         }
     }
@@ -159,7 +159,7 @@ pub(super) fn add_pushes(
     }
     for &(a, b) in at.near {
         for (i, j) in [(a, b), (b, a)] {
-            let apart_m = row(&at.own.positions_m, i) - at.seen(i, j).position_m;
+            let apart_m = row(&at.own.positions_m, i) - at.sensed(i, j).position_m;
             if let Some((pushed, _)) = push(i, j, apart_m)? {
                 let sum = row(sums, i) + pushed;
                 set_row(sums, i, sum);

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
 use super::certificate::{Certificate, LegBound, VoidReason};
-use super::clearance::{ClearanceTension, slot_room_m};
+use super::clearance::{ClearanceTension, slot_clearance_margin_m};
 use super::consensus::{add_pushes, check_count, check_range, check_state, check_tables};
 use super::energy::PotentialCache;
 use super::energy::{BoundedEnergy, EnergyBound, Frame};
@@ -19,7 +19,7 @@ use crate::formation::Formation;
 use crate::graph::Pinning;
 use crate::observation::Observation;
 use crate::space::{CellList, Metric, Obstacle};
-use crate::target::{Guidance, ReferenceMotion, Settling, Target};
+use crate::target::{Guidance, ReferenceMotion, SettlingMode, Target};
 use tautline_core::swarm::{Pair, Rows, row, set_row};
 
 /// Keys of `[law]` with `kind = "displacement"`.
@@ -168,7 +168,7 @@ impl DisplacementLaw {
         let clearance = if obstacles.is_empty() {
             None
         } else {
-            let range_m = slot_room_m(context)?.min(tension.rest_m() - delta_m);
+            let range_m = slot_clearance_margin_m(context)?.min(tension.rest_m() - delta_m);
             let tension = ClearanceTension::new(keys.alpha, range_m);
             Some(tension.map_err(|source| ParameterError::Tension { pair: Pair::new(0, 1), source })?)
         };
@@ -239,14 +239,14 @@ impl DisplacementLaw {
     }
 
     /// `(sigma k/2) e' M e` \[m^2/s^2\].
-    fn stretch(&self, error_m: impl Fn(usize) -> Vector3<f64>) -> f64 {
+    fn consensus_energy(&self, error_m: impl Fn(usize) -> Vector3<f64>) -> f64 {
         0.5 * self.scale() * self.keys.k_per_s2 * self.pulls.stretch_m2(error_m)
     }
 
     fn try_energy(&self, at: &Observation<'_>) -> Result<f64, LawError> {
         check_state(self.pulls.graph.count(), at.own)?;
         let (positions_m, Target { formation, reference, .. }) = (&at.own.positions_m, at.target);
-        let stretch = self.stretch(|i| error_m(positions_m, formation, reference.position_m, i));
+        let stretch = self.consensus_energy(|i| error_m(positions_m, formation, reference.position_m, i));
         let pushes = self.cache.of(positions_m).map_or_else(|| self.potential(positions_m, at.obstacles), Ok)?;
         let is_absolute = self.clearance.is_some() && !self.is_guided();
         let kinetic = if is_absolute {
@@ -265,7 +265,7 @@ impl DisplacementLaw {
         let of_pairs = add_pushes(at, command, |i, j, apart_m| self.push(i, j, apart_m))?;
         let of_obstacles = self.clearance.as_ref().map_or(Ok(0.0), |clearance| clearance.add_pushes(at, command))?;
         if let Some(of_pairs) = of_pairs {
-            self.cache.keep(&at.own.positions_m, of_pairs + of_obstacles);
+            self.cache.store(&at.own.positions_m, of_pairs + of_obstacles);
         }
         if self.is_guided() {
             if self.has_feed_forward {
@@ -281,7 +281,7 @@ impl DisplacementLaw {
     }
 
     /// Returns the nearest pair of slots, and R for these slots \[m\].
-    fn rest_for(&self, formation: &Formation) -> (Pair, f64) {
+    fn rest_length_for(&self, formation: &Formation) -> (Pair, f64) {
         let (pair, distance_m) = nearest_slots(formation, self.delta_m, self.metric);
         (pair, distance_m.min(self.rest_at_most_m))
     }
@@ -325,12 +325,12 @@ impl DisplacementLaw {
     ///
     /// A mode with eigenvalue m >= 1 of sigma M obeys e'' + (c m - a22) e' + k m e = 0. Its rate is smallest at m = 1,
     /// or in the limit of large m, where it tends to k/c.
-    fn settling(&self) -> Settling {
+    fn settling(&self) -> SettlingMode {
         let (k, c) = (self.keys.k_per_s2, self.damping_per_s());
         let half = 0.5 * (c - self.a22_per_s);
         let first_per_s = if half * half > k { k / (half + (half * half - k).sqrt()) } else { half };
         let rate_per_s = if c > 0.0 { first_per_s.min(k / c) } else { first_per_s };
-        Settling { rate_per_s, response_s: rate_per_s / k }
+        SettlingMode { rate_per_s, response_s: rate_per_s / k }
     }
 }
 
@@ -351,10 +351,10 @@ impl Law for DisplacementLaw {
             check_count(self.pulls.graph.count(), target.formation.count())?;
             // Spread slots are farther apart than the leg's own, so R stays.
             if target.spread <= 1.0 {
-                let (delta_m, (pair, distance_m)) = (self.delta_m, self.rest_for(target.formation));
+                let (delta_m, (pair, distance_m)) = (self.delta_m, self.rest_length_for(target.formation));
                 self.tension = EdgeTension::new(self.keys.alpha, delta_m, distance_m)
                     .map_err(|_: TensionError| LawError::Target { pair, distance_m, delta_m })?;
-                self.cache.forget();
+                self.cache.clear();
             }
             self.revision = target.revision;
         }
@@ -405,7 +405,7 @@ impl Law for DisplacementLaw {
         let damping_per_s = self.damping_per_s() * of_graph;
         Rates {
             fastest_per_s: at.nearest_m.map(|nearest_m| self.fastest_per_s(nearest_m)),
-            obstacles_per_s2: (self.clearance.zip(at.obstacle_room_m))
+            obstacles_per_s2: (self.clearance.zip(at.obstacle_margin_m))
                 .map_or(0.0, |(clearance, clearance_margin_m)| clearance.rate_squared(clearance_margin_m)),
             velocity_margin: Some(VelocityMargin {
                 per_s: damping_per_s - at.a22_per_s,
@@ -424,17 +424,17 @@ impl DisplacementLaw {
             Ok(energy) => energy,
             Err(fault) => return Certificate::void(VoidReason::StartRefused(fault)),
         };
-        let BoundedEnergy { energy: most, until_s } = self.bounded(energy, start, ahead);
+        let BoundedEnergy { energy: most, until_s } = self.bound_under_wind(energy, start, ahead);
         let legs = self.bounds(most, start.target.formation, ahead);
         let last = legs.last();
-        let (certified_m, certified_room_m) =
-            (last.and_then(|last| last.certified_m), last.and_then(|last| last.certified_room_m));
+        let (certified_m, certified_clearance_margin_m) =
+            (last.and_then(|last| last.certified_m), last.and_then(|last| last.certified_clearance_margin_m));
         let legs = if ahead.is_empty() { Vec::new() } else { legs };
-        let closes_in = ahead.iter().any(|formation| self.rest_for(formation).1 < self.tension.rest_m());
+        let closes_in = ahead.iter().any(|formation| self.rest_length_for(formation).1 < self.tension.rest_m());
         let promised = Certificate {
             certified_m,
             certified_until_s: until_s,
-            certified_room_m,
+            certified_clearance_margin_m,
             energy_initial: Some(energy),
             legs,
             ..Certificate::default()
@@ -448,11 +448,11 @@ impl DisplacementLaw {
         let bound = |energy: f64| LegBound {
             energy,
             certified_m: self.has_pairs.then(|| self.tension.push_side_root(energy)),
-            certified_room_m: self.clearance.map(|clearance| clearance.least_room_m(energy)),
+            certified_clearance_margin_m: self.clearance.map(|clearance| clearance.smallest_clearance_margin_m(energy)),
         };
         let mut root = energy.sqrt();
         let mut bounds = vec![bound(energy)];
-        for step in self.steps(now, ahead) {
+        for step in self.energy_root_increases(now, ahead) {
             root += step;
             bounds.push(bound(root * root));
         }
@@ -460,20 +460,24 @@ impl DisplacementLaw {
     }
 
     /// Returns the largest growth of sqrt E at each change of slots \[m/s\].
-    fn steps<'a>(&'a self, now: &'a Formation, ahead: &'a [&Formation]) -> impl Iterator<Item = f64> + 'a {
+    fn energy_root_increases<'a>(
+        &'a self,
+        now: &'a Formation,
+        ahead: &'a [&Formation],
+    ) -> impl Iterator<Item = f64> + 'a {
         std::iter::once(now)
             .chain(ahead.iter().copied())
             .zip(ahead)
-            .map(|(before, next)| self.stretch(|i| row(&next.slots_m, i) - row(&before.slots_m, i)).sqrt())
+            .map(|(before, next)| self.consensus_energy(|i| row(&next.slots_m, i) - row(&before.slots_m, i)).sqrt())
     }
 
     /// Returns a bound on the energy under wind up to the first change of slots, and the time until which the
     /// certificate holds. The bound also covers later wind, because wind adds less to sqrt E at larger E. The
     /// certificate ends when the certified separation exceeds delta by less than the position resolution.
-    fn bounded(&self, energy: f64, start: &Observation<'_>, ahead: &[&Formation]) -> BoundedEnergy {
+    fn bound_under_wind(&self, energy: f64, start: &Observation<'_>, ahead: &[&Formation]) -> BoundedEnergy {
         let Some(energy_bound) = &self.energy_bound else { return BoundedEnergy { energy, until_s: None } };
         let borne = self.tension.value(self.delta_m + energy_bound.resolution_m()).sqrt();
-        let left = borne - self.steps(start.target.formation, ahead).sum::<f64>();
+        let left = borne - self.energy_root_increases(start.target.formation, ahead).sum::<f64>();
         energy_bound.of(energy, start.time_s, left.max(0.0).powi(2))
     }
 }
@@ -486,26 +490,26 @@ impl DisplacementLaw {
 /// - the wind's contribution has no bound, or the wind moves a leader.
 fn voids(context: &LawContext<'_>) -> Vec<VoidReason> {
     let &LawContext { guidance, obstacles, a22_per_s, exposure, .. } = context;
-    let is_unfed = |of: &Guidance| !of.feed_forward && !needs_no_feed(&of.motion, a22_per_s);
+    let is_unfed = |of: &Guidance| !of.feed_forward && !needs_no_feed_forward(&of.motion, a22_per_s);
     let is_carried = guidance.is_some_and(|of| !of.motion.is_at_rest());
     let is_driven = guidance.is_none() && a22_per_s > 0.0;
     let is_turbulent = exposure.is_some_and(|exposure| exposure.wind.turbulence.is_some());
     let is_led = guidance.is_some_and(|of| matches!(of.known_by, Pinning::Leader(_)));
     let reasons = [
-        (guidance.is_some_and(is_unfed), VoidReason::ReferenceNotFed),
-        (!obstacles.is_empty() && is_carried, VoidReason::CarriedPastObstacles),
+        (guidance.is_some_and(is_unfed), VoidReason::NoFeedForward),
+        (!obstacles.is_empty() && is_carried, VoidReason::ReferenceAmongObstacles),
         (!obstacles.is_empty() && is_driven, VoidReason::VelocityUndamped),
         (
             is_turbulent && (frame(context) == Frame::Ground || exposure.is_some_and(|b| !b.wind.shared)),
             VoidReason::WindUnbounded,
         ),
-        (is_led && exposure.is_some(), VoidReason::LeaderBlown),
+        (is_led && exposure.is_some(), VoidReason::LeaderInWind),
     ];
     reasons.into_iter().filter(|(holds, _)| *holds).map(|(_, void)| void).collect()
 }
 
 /// Whether a vehicle stays on the reference without feed-forward.
-fn needs_no_feed(motion: &ReferenceMotion, a22_per_s: f64) -> bool {
+fn needs_no_feed_forward(motion: &ReferenceMotion, a22_per_s: f64) -> bool {
     motion.is_at_rest() || (motion.is_uniform() && a22_per_s == 0.0)
 }
 

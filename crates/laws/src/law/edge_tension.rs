@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::certificate::{Certificate, VoidReason};
 use super::consensus::{
-    add_heard, add_laplacian_product, check_count, check_observation, check_range, check_rows, check_state,
+    add_laplacian_product, add_received_terms, check_count, check_observation, check_range, check_rows, check_state,
     consensus_margin, of_table, relative_kinetic_energy,
 };
 use super::energy::PotentialCache;
@@ -117,7 +117,7 @@ impl EdgeTensionLaw {
     fn set_rest_lengths(&mut self) -> Result<(), (Pair, TensionError)> {
         let Self { alpha, delta_m, .. } = *self;
         self.tightest = None;
-        self.cache.forget();
+        self.cache.clear();
         for ((i, j), inverse_k_per_m) in self.graph.edges().zip(self.kernel.inverse_k_per_m_mut()) {
             let tension = EdgeTension::new(alpha, delta_m, self.formation.desired_distance(i, j))
                 .map_err(|source| (Pair::new(i, j), source))?;
@@ -130,10 +130,10 @@ impl EdgeTensionLaw {
     }
 
     /// Adds `w_ij (p_i - p_j) / alpha` for the received states of all neighbours.
-    fn add_heard_pulls(&self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+    fn add_received_pulls(&self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
         let Self { alpha, delta_m, .. } = *self;
-        add_heard(at, command, |i, own, j, heard| {
-            let edge_m = own.position_m - heard.position_m;
+        add_received_terms(at, command, |i, own, j, received| {
+            let edge_m = own.position_m - received.position_m;
             let separation_m = edge_m.norm();
             if separation_m <= delta_m {
                 return Err(LawError::Collision { pair: Pair::new(i, j), separation_m, delta_m });
@@ -205,13 +205,15 @@ impl Law for EdgeTensionLaw {
         let velocity_gain = (1.0 + a22_per_s) * per_vehicle;
         if let Some(swarm) = at.shared() {
             let potential = self.kernel.add_pulls(&swarm.positions_m, command).map_err(|_| self.fault(swarm))?;
-            self.cache.keep(&swarm.positions_m, potential);
+            self.cache.store(&swarm.positions_m, potential);
             *command *= alpha * per_vehicle;
             add_laplacian_product(&self.graph, &of_table(&swarm.velocities_m_s), velocity_gain, command);
         } else {
-            self.add_heard_pulls(at, command)?;
+            self.add_received_pulls(at, command)?;
             *command *= alpha * per_vehicle;
-            add_heard(at, command, |_, own, _, heard| Ok(velocity_gain * (own.velocity_m_s - heard.velocity_m_s)))?;
+            add_received_terms(at, command, |_, own, _, received| {
+                Ok(velocity_gain * (own.velocity_m_s - received.velocity_m_s))
+            })?;
         }
         check_range(command)
     }
@@ -266,7 +268,7 @@ impl Law for EdgeTensionLaw {
         // Rounding may make zero eigenvalues slightly negative.
         let stiffnesses = stiffness.symmetric_eigenvalues().map(|eigenvalue| eigenvalue.max(0.0));
         let mode = |&stiffness_per_s2: &f64| Mode { stiffness_per_s2, damping_per_s: 1.0 + a22_per_s };
-        Some(Linear { free: stiffnesses.iter().map(mode).collect(), stiffest_contact_mode: None, heard: None })
+        Some(Linear { free: stiffnesses.iter().map(mode).collect(), stiffest_contact_mode: None, received: None })
     }
 
     /// On the complete graph `V_ij(l_ij(t)) <= N E(0)` for every pair and all time. As functions of s = (l - delta)/K

@@ -31,12 +31,12 @@ pub(super) enum Frame {
 pub(super) struct EnergyBound {
     /// zeta \[1/s\]; if it is not positive, only the second bound applies.
     damping_per_s: f64,
-    spans: Vec<Span>,
+    spans: Vec<WindSpan>,
     resolution_m: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Span {
+struct WindSpan {
     from_s: f64,
     to_s: f64,
     /// Upper bound of |w| in the span \[m/s^2\].
@@ -55,7 +55,7 @@ pub(super) struct BoundedEnergy {
 impl EnergyBound {
     /// Builds the bound for a wind without turbulence from time 0 to the end of the run.
     pub(super) fn new(exposure: &WindExposure<'_>, count: usize, frame: Frame, damping_per_s: f64) -> Self {
-        let groups = groups(exposure, count);
+        let groups = vehicle_groups(exposure, count);
         let corners_s = corners_s(exposure);
         let mut spans = Vec::new();
         for ends in corners_s.windows(2) {
@@ -69,7 +69,7 @@ impl EnergyBound {
             let at_s = |part: u32| from_s + length_s * (f64::from(part) / f64::from(parts));
             spans.extend((0..parts).map(|part| {
                 let (from_s, to_s) = (at_s(part), at_s(part + 1));
-                Span { from_s, to_s, most_m_s2: most_m_s2(exposure, &groups, frame, (from_s, to_s)) }
+                WindSpan { from_s, to_s, most_m_s2: most_m_s2(exposure, &groups, frame, (from_s, to_s)) }
             }));
         }
         Self { damping_per_s, spans, resolution_m: exposure.resolution_m }
@@ -86,7 +86,7 @@ impl EnergyBound {
             return BoundedEnergy { energy, until_s: Some(from_s) };
         }
         let mut now = energy;
-        for &Span { from_s: begins_s, to_s, most_m_s2 } in self.spans.iter().filter(|span| span.to_s > from_s) {
+        for &WindSpan { from_s: begins_s, to_s, most_m_s2 } in self.spans.iter().filter(|span| span.to_s > from_s) {
             let begins_s = begins_s.max(from_s);
             let length_s = to_s - begins_s;
             let pushed = (now.sqrt() + most_m_s2 * length_s * std::f64::consts::FRAC_1_SQRT_2).powi(2);
@@ -106,10 +106,10 @@ impl EnergyBound {
 }
 
 /// Groups the vehicles by the set of gusts that meet them; returns each set with its number of vehicles.
-fn groups(exposure: &WindExposure<'_>, count: usize) -> Vec<(Vec<bool>, usize)> {
+fn vehicle_groups(exposure: &WindExposure<'_>, count: usize) -> Vec<(Vec<bool>, usize)> {
     let mut groups: Vec<(Vec<bool>, usize)> = Vec::new();
     for vehicle in 0..count {
-        let met: Vec<_> = exposure.wind.gusts.iter().map(|gust| gust.meets(vehicle)).collect();
+        let met: Vec<_> = exposure.wind.gusts.iter().map(|gust| gust.affects(vehicle)).collect();
         match groups.iter_mut().find(|(known, _)| *known == met) {
             Some((_, size)) => *size += 1,
             None => groups.push((met, 1)),
@@ -174,12 +174,12 @@ impl PotentialCache {
     }
 
     /// Stores the potential of these positions, which must have the `count` rows of [`PotentialCache::new`].
-    pub(super) fn keep(&mut self, positions_m: &Rows, potential: f64) {
+    pub(super) fn store(&mut self, positions_m: &Rows, potential: f64) {
         self.positions_m.as_mut_slice().copy_from_slice(positions_m.as_slice());
         self.potential = Some(potential);
     }
 
-    pub(super) fn forget(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.potential = None;
     }
 

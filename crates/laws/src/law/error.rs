@@ -114,7 +114,7 @@ pub enum LawError {
 impl LawError {
     /// Whether a pair or a vehicle at an obstacle reached the barrier of the law, in truth or by sensed states.
     #[must_use]
-    pub fn is_at_a_barrier(self) -> bool {
+    pub fn is_at_barrier(self) -> bool {
         matches!(
             self,
             Self::Collision { .. } | Self::Obstacle { .. } | Self::KnownCollision { .. } | Self::KnownObstacle { .. }
@@ -124,7 +124,7 @@ impl LawError {
     /// Adds the true distance to an error that is based on sensed or received states, if the two distances differ.
     /// `metric` measures separations.
     #[must_use]
-    pub fn against_truth(self, truth: &Swarm, metric: Metric, obstacles: &[Obstacle]) -> Self {
+    pub fn with_true_distance(self, truth: &Swarm, metric: Metric, obstacles: &[Obstacle]) -> Self {
         let place = |vehicle: usize| row(&truth.positions_m, vehicle);
         let differs = |known_m: f64, true_m: f64| (known_m - true_m).abs() > ROUNDING * known_m.abs().max(true_m.abs());
         match self {

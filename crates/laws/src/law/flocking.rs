@@ -170,9 +170,9 @@ impl Law for FlockingLaw {
         }
         for &(a, b) in at.near {
             for (i, j) in [(a, b), (b, a)] {
-                let seen = at.seen(i, j);
-                let towards_m = seen.position_m - row(&at.own.positions_m, i);
-                let pull = self.pull_m_s2(towards_m, seen.velocity_m_s - row(&at.own.velocities_m_s, i));
+                let sensed = at.sensed(i, j);
+                let towards_m = sensed.position_m - row(&at.own.positions_m, i);
+                let pull = self.pull_m_s2(towards_m, sensed.velocity_m_s - row(&at.own.velocities_m_s, i));
                 let sum = row(command, i) + pull;
                 set_row(command, i, sum);
             }

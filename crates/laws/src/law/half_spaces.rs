@@ -71,16 +71,16 @@ impl HalfSpaces {
         match search.best(&self.given, &Subspace::space()) {
             Ok(point) => Nearest { point, violation: 0.0 },
             Err(Infeasible { place, last }) => {
-                let least = self.violate_least(place, last, radius);
+                let least = self.minimize_violation(place, last, radius);
                 let relaxed = Search { slack: self.largest_violation(&least), ..search };
-                let point = relaxed.best_but_for_rounding(&self.given).unwrap_or(least);
+                let point = relaxed.best_up_to_rounding(&self.given).unwrap_or(least);
                 Nearest { point, violation: self.largest_violation(&point) }
             }
         }
     }
 
     /// Returns a point of minimal largest violation. `point` must lie in all half-spaces before `place`.
-    fn violate_least(&mut self, place: usize, mut point: Vector3<f64>, radius: f64) -> Vector3<f64> {
+    fn minimize_violation(&mut self, place: usize, mut point: Vector3<f64>, radius: f64) -> Vector3<f64> {
         let Self { given, no_worse } = self;
         let mut largest = 0.0;
         for (i, worst) in given.iter().enumerate().skip(place) {
@@ -91,7 +91,7 @@ impl HalfSpaces {
             no_worse.extend(given[..i].iter().filter_map(|other| difference(other, worst)));
             let search =
                 Search { objective: Objective::Along(worst.normal), radius, slack: 0.0, rounding: ROUNDING[0] };
-            point = search.best_but_for_rounding(no_worse).unwrap_or(point);
+            point = search.best_up_to_rounding(no_worse).unwrap_or(point);
             largest = given[..=i].iter().map(|given| given.violation(&point)).fold(0.0, f64::max);
         }
         point
@@ -152,7 +152,7 @@ impl Search {
     }
 
     /// Returns the best point when one exists up to rounding; tries growing tolerances.
-    fn best_but_for_rounding(&self, within: &[HalfSpace]) -> Option<Vector3<f64>> {
+    fn best_up_to_rounding(&self, within: &[HalfSpace]) -> Option<Vector3<f64>> {
         let rounded = |rounding| Self { rounding, ..*self }.best(within, &Subspace::space()).ok();
         ROUNDING.into_iter().find_map(rounded)
     }

@@ -10,7 +10,7 @@ use crate::formation::{Formation, Freedom};
 use crate::graph::{Graph, Pinning};
 use crate::observation::Observation;
 use crate::space::{Metric, Obstacle};
-use crate::target::{Guidance, Leg, Reference, Settling, Target};
+use crate::target::{Guidance, Leg, Reference, SettlingMode, Target};
 use crate::wind::WindSpec;
 use tautline_core::swarm::Rows;
 
@@ -113,7 +113,7 @@ pub struct Capabilities {
     pub requires_calling_thread: bool,
     /// Settling of position errors of an undisturbed swarm. Set for a law that can follow slots that are spread for a
     /// while ([`crate::target::DeadlockOptions`]) and certifies again then.
-    pub settling: Option<Settling>,
+    pub settling: Option<SettlingMode>,
     /// Assumptions of the certified separation, as a sentence.
     pub assumptions: &'static str,
 }
@@ -148,7 +148,7 @@ pub struct RateQuery {
     /// Lower bound of every separation \[m\]; `None` if no bound is known.
     pub nearest_m: Option<f64>,
     /// Lower bound of the clearance margin of every vehicle at every obstacle \[m\]; `None` without obstacles.
-    pub obstacle_room_m: Option<f64>,
+    pub obstacle_margin_m: Option<f64>,
     /// Algebraic connectivity of the graph.
     pub connectivity: f64,
 }
@@ -158,7 +158,7 @@ impl RateQuery {
     /// obstacles, on a disconnected graph (connectivity 0).
     #[must_use]
     pub fn new(a22_per_s: f64, nearest_m: Option<f64>) -> Self {
-        Self { a22_per_s, nearest_m, obstacle_room_m: None, connectivity: 0.0 }
+        Self { a22_per_s, nearest_m, obstacle_margin_m: None, connectivity: 0.0 }
     }
 }
 

@@ -4,8 +4,8 @@ use serde::{Deserialize, Serialize};
 
 use super::certificate::{Certificate, VoidReason};
 use super::consensus::{
-    add_heard, add_laplacian_product, check_observation, check_range, check_state, consensus_margin, of_errors_m,
-    of_table, relative_kinetic_energy, sum_of_squares_about_mean,
+    add_laplacian_product, add_received_terms, check_observation, check_range, check_state, consensus_margin,
+    of_errors_m, of_table, relative_kinetic_energy, sum_of_squares_about_mean,
 };
 use super::error::{LawError, ParameterError};
 use super::interface::LawContext;
@@ -103,9 +103,9 @@ impl Law for LaplacianLaw {
             add_laplacian_product(&self.graph, &of_errors_m(&swarm.positions_m, slots_m), f1, command);
             add_laplacian_product(&self.graph, &of_table(&swarm.velocities_m_s), f2, command);
         } else {
-            add_heard(at, command, |i, own, j, heard| {
-                let errors_m = (own.position_m - row(slots_m, i)) - (heard.position_m - row(slots_m, j));
-                Ok(f1 * errors_m + f2 * (own.velocity_m_s - heard.velocity_m_s))
+            add_received_terms(at, command, |i, own, j, received| {
+                let errors_m = (own.position_m - row(slots_m, i)) - (received.position_m - row(slots_m, j));
+                Ok(f1 * errors_m + f2 * (own.velocity_m_s - received.velocity_m_s))
             })?;
         }
         check_range(command)

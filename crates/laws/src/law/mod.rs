@@ -34,7 +34,7 @@ pub use interface::{
     Capabilities, Controls, Law, LawContext, RateQuery, Rates, VelocityMargin, WindExposure, certificate_through,
 };
 pub use laplacian::{LaplacianKeys, LaplacianLaw};
-pub use modes::{Heard, HeardLinks, Linear, Mode};
+pub use modes::{DelayedLinks, Linear, Mode, ReceivedStateLoop};
 pub use orca::{OrcaKeys, OrcaLaw};
 pub use potential::{PotentialKeys, PotentialLaw};
 pub use spec::LawSpec;

@@ -7,8 +7,8 @@
 //! s^2 - a22 s + (K + C s) e^(-s tau) = 0
 //! ```
 //!
-//! If only the received states are late, own and received terms separate: see [`Heard`]. docs/margins.md has the
-//! derivations.
+//! If only the received states are late, own and received terms separate: see [`ReceivedStateLoop`]. docs/margins.md
+//! has the derivations.
 
 use std::f64::consts::TAU;
 
@@ -28,7 +28,7 @@ pub struct Linear {
     /// unknown or the law has no contact forces.
     pub stiffest_contact_mode: Option<Mode>,
     /// Loop over received states, if its modes with late received and present own states are known.
-    pub heard: Option<Heard>,
+    pub received: Option<ReceivedStateLoop>,
 }
 
 /// Mode x'' = a22 x' - K x - C x'.
@@ -43,18 +43,18 @@ pub struct Mode {
 /// Loop over received states: u = -(k + c s) (D - A e^(-s tau)) x with gains k and c on each link. D is diagonal: the
 /// number of neighbours of each vehicle, plus one if it knows a reference. A is the adjacency matrix.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Heard {
+pub struct ReceivedStateLoop {
     /// k \[1/s^2\] and c \[1/s\].
     pub gain: Mode,
     /// D and A.
-    pub links: HeardLinks,
+    pub links: DelayedLinks,
 }
 
 /// Links whose modes are known with different delays of own and received terms.
 #[derive(Clone, Debug, PartialEq)]
-pub enum HeardLinks {
+pub enum DelayedLinks {
     /// D is a multiple of the identity, so D and A have the same modes.
-    Alike {
+    EqualDegree {
         /// Diagonal entry of D.
         own: f64,
         /// Eigenvalues of A.
@@ -167,7 +167,7 @@ fn bisect(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
     }
 }
 
-impl Heard {
+impl ReceivedStateLoop {
     /// Returns the longest delay \[s\] of received states, with present own states, below which all modes are stable;
     /// infinite if every delay is stable. `None` if the common motion is unstable (a22 > 0) and cannot be separated.
     ///
@@ -175,12 +175,12 @@ impl Heard {
     #[must_use]
     pub fn delay_margin_s(&self, a22_per_s: f64) -> Option<f64> {
         match &self.links {
-            HeardLinks::Alike { own, others } => {
+            DelayedLinks::EqualDegree { own, others } => {
                 let is_common = |alpha: f64| (own - alpha).abs() <= 1e-9 * own.abs();
                 let counted = others.iter().filter(|&&alpha| !(a22_per_s > 0.0 && is_common(alpha)));
-                Some(counted.map(|&alpha| self.alike_s(*own, alpha, a22_per_s)).fold(f64::INFINITY, f64::min))
+                Some(counted.map(|&alpha| self.equal_degree_s(*own, alpha, a22_per_s)).fold(f64::INFINITY, f64::min))
             }
-            &HeardLinks::Star { hub, leaf, leaves } => {
+            &DelayedLinks::Star { hub, leaf, leaves } => {
                 let is_free = hub * leaf <= leaves * (1.0 + 1e-9);
                 (!is_free || a22_per_s <= 0.0).then(|| self.star_s(hub, leaf, leaves, a22_per_s))
             }
@@ -195,7 +195,7 @@ impl Heard {
 
     /// Returns the delay margin of s^2 - a22 s + (k + c s) (d - alpha e^(-s tau)) = 0. At s = i omega the moduli give a
     /// quadratic in omega^2, and the angles give the delay.
-    fn alike_s(&self, d: f64, alpha: f64, a22_per_s: f64) -> f64 {
+    fn equal_degree_s(&self, d: f64, alpha: f64, a22_per_s: f64) -> f64 {
         let Mode { stiffness_per_s2: k, damping_per_s: c } = self.gain;
         let relative = d - alpha;
         if relative.abs() > 1e-9 * d.abs() && !self.gain.times(relative).is_stable(a22_per_s) {

@@ -180,7 +180,7 @@ impl OrcaLaw {
         self.nearest.clear();
         let own_m = row(&at.own.positions_m, i);
         for &j in self.near.of(i) {
-            let apart = (at.seen(i, j).position_m - own_m).norm_squared();
+            let apart = (at.sensed(i, j).position_m - own_m).norm_squared();
             if apart > self.range_m * self.range_m {
                 continue;
             }
@@ -194,15 +194,15 @@ impl OrcaLaw {
 
     /// Returns the half-space of velocities of vehicle i that vehicle j allows.
     fn half_space(&self, at: &Observation<'_>, i: usize, j: usize) -> Result<HalfSpace, LawError> {
-        let seen = at.seen(i, j);
+        let sensed = at.sensed(i, j);
         let own_m_s = row(&at.own.velocities_m_s, i);
-        let towards_m = seen.position_m - row(&at.own.positions_m, i);
+        let towards_m = sensed.position_m - row(&at.own.positions_m, i);
         if towards_m.norm_squared() == 0.0 {
             return Err(LawError::Collision { pair: Pair::new(i, j), separation_m: 0.0, delta_m: self.delta_m });
         }
         let (diameter_m, horizon_s) = (self.diameter_m, self.keys.horizon_s);
         let obstacle = VelocityObstacle { towards_m, diameter_m, horizon_s, parting_s: 1.0 / self.keys.tracking_per_s };
-        let (normal, depth_m_s) = obstacle.way_out(own_m_s - seen.velocity_m_s);
+        let (normal, depth_m_s) = obstacle.nearest_exit(own_m_s - sensed.velocity_m_s);
         Ok(HalfSpace { normal, offset: normal.dot(&own_m_s) + 0.5 * depth_m_s })
     }
 }
@@ -264,24 +264,24 @@ impl VelocityObstacle {
     /// The set is the ball of radius diameter/horizon about `towards_m`/horizon and its shadow away from the origin.
     /// The shadow is a cone whose half-angle has the sine diameter/distance. The nearest point is on the ball if the
     /// vector from the centre to the velocity points off the cone's lateral surface, and on that surface otherwise.
-    fn way_out(&self, relative_m_s: Vector3<f64>) -> (Vector3<f64>, f64) {
+    fn nearest_exit(&self, relative_m_s: Vector3<f64>) -> (Vector3<f64>, f64) {
         let Self { towards_m, diameter_m, horizon_s, parting_s } = self;
         let distance_m = towards_m.norm();
         let sight = towards_m / distance_m;
         if distance_m <= *diameter_m {
-            return self.out_of_ball(relative_m_s, *parting_s);
+            return self.exit_ball(relative_m_s, *parting_s);
         }
         let from_centre = relative_m_s - towards_m / *horizon_s;
         let sine = diameter_m / distance_m;
         if -from_centre.dot(&sight) > sine * from_centre.norm() {
-            return self.out_of_ball(relative_m_s, *horizon_s);
+            return self.exit_ball(relative_m_s, *horizon_s);
         }
         let cosine = ((distance_m - diameter_m) * (distance_m + diameter_m)).sqrt() / distance_m;
         let normal = across(relative_m_s, sight) * cosine - sight * sine;
         (normal, -normal.dot(&relative_m_s))
     }
 
-    fn out_of_ball(&self, relative_m_s: Vector3<f64>, within_s: f64) -> (Vector3<f64>, f64) {
+    fn exit_ball(&self, relative_m_s: Vector3<f64>, within_s: f64) -> (Vector3<f64>, f64) {
         let from_centre = relative_m_s - self.towards_m / within_s;
         let length = from_centre.norm();
         let normal = if length > 0.0 { from_centre / length } else { -self.towards_m.normalize() };

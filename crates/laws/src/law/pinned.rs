@@ -3,10 +3,11 @@
 use nalgebra::Vector3;
 
 use super::consensus::{
-    add_heard, add_laplacian_product, of_errors_m, of_table, relative_kinetic_energy, sum_of_squares_about_mean,
+    add_laplacian_product, add_received_terms, of_errors_m, of_table, relative_kinetic_energy,
+    sum_of_squares_about_mean,
 };
 use super::error::LawError;
-use super::modes::{Heard, HeardLinks, Linear, Mode};
+use super::modes::{DelayedLinks, Linear, Mode, ReceivedStateLoop};
 use crate::formation::Formation;
 use crate::graph::{Graph, Pinning};
 use crate::observation::Observation;
@@ -48,18 +49,18 @@ impl PinnedConsensus {
         let leads = self.pinning.leader().map(|_| lead);
         let eigenvalues = self.graph.pinned_spectrum(&self.pinning);
         let free = eigenvalues.iter().map(|&eigenvalue| gain.times(eigenvalue)).chain(leads).collect();
-        let links = self.heard_links(&eigenvalues);
-        Linear { free, stiffest_contact_mode: None, heard: links.map(|links| Heard { gain, links }) }
+        let links = self.delayed_links(&eigenvalues);
+        Linear { free, stiffest_contact_mode: None, received: links.map(|links| ReceivedStateLoop { gain, links }) }
     }
 
     /// Returns the loop over links if own and received terms have the same modes, or on a star.
-    fn heard_links(&self, eigenvalues: &[f64]) -> Option<HeardLinks> {
+    fn delayed_links(&self, eigenvalues: &[f64]) -> Option<DelayedLinks> {
         let own = self.graph.pinned_diagonal(&self.pinning);
         let (&first, &last) = (own.first()?, own.last()?);
         if own.iter().all(|&other| other == first) {
             // M = D - A. Without a reference the common motion has the eigenvalue 0 of M.
             let common = (self.pinning == Pinning::Unpinned).then_some(first);
-            return Some(HeardLinks::Alike {
+            return Some(DelayedLinks::EqualDegree {
                 own: first,
                 others: eigenvalues.iter().map(|eigenvalue| first - eigenvalue).chain(common).collect(),
             });
@@ -69,7 +70,7 @@ impl PinnedConsensus {
         let is_star = leaves + 1 == self.graph.count()
             && matches!(self.pinning, Pinning::Unpinned | Pinning::All)
             && most - least == (leaves - 1) as f64;
-        is_star.then_some(HeardLinks::Star { hub: most, leaf: least, leaves: leaves as f64 })
+        is_star.then_some(DelayedLinks::Star { hub: most, leaf: least, leaves: leaves as f64 })
     }
 
     /// Adds to row i `scale` times the sum over neighbours j of `k (e_i - e_j) + c (v_i - v_j)`, plus `scale` times
@@ -99,14 +100,14 @@ impl PinnedConsensus {
                 add_laplacian_product(&self.graph, &of_table(&self.pulls), scale, sums);
             }
         } else {
-            add_heard(at, sums, |i, own, j, heard| {
-                let error_m = (own.position_m - row(slots_m, i)) - (heard.position_m - row(slots_m, j));
-                Ok(scale * (k * error_m + c * (own.velocity_m_s - heard.velocity_m_s)))
+            add_received_terms(at, sums, |i, own, j, received| {
+                let error_m = (own.position_m - row(slots_m, i)) - (received.position_m - row(slots_m, j));
+                Ok(scale * (k * error_m + c * (own.velocity_m_s - received.velocity_m_s)))
             })?;
         }
         if matches!(self.pinning, Pinning::All | Pinning::Listed(_)) {
             for i in (0..self.graph.count()).filter(|&i| self.pinning.pins(i)) {
-                let (error_m, velocity_m_s) = off_reference(at, i);
+                let (error_m, velocity_m_s) = reference_errors(at, i);
                 let sum = row(sums, i) + scale * (k * error_m + c * velocity_m_s);
                 set_row(sums, i, sum);
             }
@@ -117,7 +118,7 @@ impl PinnedConsensus {
     /// Replaces the leader's row by its own tracking of the reference, independent of other vehicles.
     pub(super) fn lead(&self, at: &Observation<'_>, gains: Gains, a22_per_s: f64, command: &mut Rows) {
         if let Some(leader) = self.pinning.leader() {
-            let (error_m, velocity_m_s) = off_reference(at, leader);
+            let (error_m, velocity_m_s) = reference_errors(at, leader);
             let back = gains.position * error_m + gains.velocity * velocity_m_s;
             set_row(command, leader, feed_forward_acceleration(&at.target.reference, a22_per_s) - back);
         }
@@ -150,7 +151,7 @@ impl PinnedConsensus {
 }
 
 /// `p_i - h_i - r` \[m\] and `v_i - r'` \[m/s\].
-fn off_reference(at: &Observation<'_>, i: usize) -> (Vector3<f64>, Vector3<f64>) {
+fn reference_errors(at: &Observation<'_>, i: usize) -> (Vector3<f64>, Vector3<f64>) {
     let reference = &at.target.reference;
     let error_m = error_m(&at.own.positions_m, at.target.formation, reference.position_m, i);
     (error_m, row(&at.own.velocities_m_s, i) - reference.velocity_m_s)

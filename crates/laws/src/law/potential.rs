@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 
 use super::certificate::{Certificate, VoidReason};
 use super::consensus::{
-    add_heard, add_laplacian_product, add_pushes, check_count, check_observation, check_range, check_state, of_errors_m,
+    add_laplacian_product, add_pushes, add_received_terms, check_count, check_observation, check_range, check_state,
+    of_errors_m,
 };
 use super::energy::PotentialCache;
 use super::error::{LawError, ParameterError};
@@ -190,13 +191,13 @@ impl Law for PotentialLaw {
         if let Some(swarm) = at.shared() {
             add_laplacian_product(&self.graph, &of_errors_m(&swarm.positions_m, slots_m), gain, command);
         } else {
-            add_heard(at, command, |i, own, j, heard| {
-                Ok(gain * ((own.position_m - row(slots_m, i)) - (heard.position_m - row(slots_m, j))))
+            add_received_terms(at, command, |i, own, j, received| {
+                Ok(gain * ((own.position_m - row(slots_m, i)) - (received.position_m - row(slots_m, j))))
             })?;
         }
         let potential = add_pushes(at, command, |i, j, apart_m| self.repulsion(i, j, apart_m))?;
         if let Some(potential) = potential {
-            self.cache.keep(&at.own.positions_m, potential);
+            self.cache.store(&at.own.positions_m, potential);
         }
         if let Some(limit) = self.keys.max_accel_m_s2 {
             (0..command.nrows()).for_each(|i| set_row(command, i, row(command, i).cap_magnitude(limit)));
@@ -214,7 +215,7 @@ impl Law for PotentialLaw {
                 delta_m,
             })?;
             self.revision = target.revision;
-            self.cache.forget();
+            self.cache.clear();
         }
         Ok(())
     }

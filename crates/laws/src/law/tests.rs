@@ -3,7 +3,7 @@
 use super::*;
 use crate::formation::Formation;
 use crate::graph::Graph;
-use crate::observation::{Held, Observation, Others};
+use crate::observation::{Observation, OtherStates, StateTables};
 use crate::space::CellList;
 use crate::target::{CurrentTarget, Leg};
 use tautline_core::swarm::{Rows, Swarm};
@@ -36,17 +36,17 @@ fn command(law: &mut dyn Law, at: &Observation<'_>) -> Rows {
 #[test]
 fn separate_exact_tables_give_the_command_of_the_shared_state() {
     let (swarm, formation) = (swarm(), Formation::grid(COUNT, 2.0));
-    let held = Held {
-        heard: vec![swarm.clone(); COUNT],
+    let held = StateTables {
+        received: vec![swarm.clone(); COUNT],
         ages_s: vec![vec![0.0; COUNT]; COUNT],
-        seen: vec![swarm.clone(); COUNT],
+        sensed: vec![swarm.clone(); COUNT],
     };
     for spec in LawSpec::all() {
         for links in [Graph::complete(COUNT), Graph::star(COUNT)] {
             let mut law = built(&spec, &links, &formation);
             let shared = Observation::exact(&swarm, &links, &formation);
             let expected = command(law.as_mut(), &shared);
-            let found = command(law.as_mut(), &Observation { others: Others::Held(&held), ..shared });
+            let found = command(law.as_mut(), &Observation { others: OtherStates::PerVehicle(&held), ..shared });
             assert!((&found - &expected).amax() < 1e-12 * expected.amax(), "{spec:?}: {found} {expected}");
             assert!(expected.amax() > 0.1, "{spec:?}: command is not zero");
         }
@@ -57,14 +57,14 @@ fn separate_exact_tables_give_the_command_of_the_shared_state() {
 fn a_command_depends_only_on_the_tables_of_its_vehicle() {
     let (swarm, formation) = (swarm(), Formation::grid(COUNT, 2.0));
     let pictures = |vehicle: Option<usize>| {
-        let mut held = Held {
-            heard: vec![swarm.clone(); COUNT],
+        let mut held = StateTables {
+            received: vec![swarm.clone(); COUNT],
             ages_s: vec![vec![0.0; COUNT]; COUNT],
-            seen: vec![swarm.clone(); COUNT],
+            sensed: vec![swarm.clone(); COUNT],
         };
         if let Some(vehicle) = vehicle {
             // This vehicle's tables have all others displaced and moving quickly to the middle.
-            for picture in [&mut held.heard[vehicle], &mut held.seen[vehicle]] {
+            for picture in [&mut held.received[vehicle], &mut held.sensed[vehicle]] {
                 picture.positions_m.iter_mut().enumerate().for_each(|(k, x)| *x += 0.05 * libm::sin(k as f64));
                 picture.velocities_m_s -= 6.0 * &picture.positions_m;
             }
@@ -76,7 +76,10 @@ fn a_command_depends_only_on_the_tables_of_its_vehicle() {
             let mut law = built(&spec, &links, &formation);
             let mut command_with = |vehicle: Option<usize>| {
                 let held = pictures(vehicle);
-                let at = Observation { others: Others::Held(&held), ..Observation::exact(&swarm, &links, &formation) };
+                let at = Observation {
+                    others: OtherStates::PerVehicle(&held),
+                    ..Observation::exact(&swarm, &links, &formation)
+                };
                 command(law.as_mut(), &at)
             };
             let plain = command_with(None);

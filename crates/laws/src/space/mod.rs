@@ -3,7 +3,7 @@
 //! - [`CellList`] finds all near pairs of a table.
 //! - [`VerletList`] reuses them while points move little.
 //! - [`closest_pair`] finds the nearest pair.
-//! - [`Spaced`] accepts points one by one that keep a minimum distance.
+//! - [`SpacedPoints`] accepts points one by one that keep a minimum distance.
 //! - [`Shape`] gives the distance of a point from a solid.
 //! - [`Metric`] scales lengths so that keep-out ellipsoids become balls.
 //!
@@ -18,7 +18,7 @@ pub use metric::Metric;
 pub(crate) use near::NearLists;
 pub use near::{CellList, VerletList};
 pub use shape::Shape;
-pub use spaced::{Spaced, closest_pair};
+pub use spaced::{SpacedPoints, closest_pair};
 
 use nalgebra::Vector3;
 
@@ -50,7 +50,7 @@ impl Obstacle {
 /// Returns the smallest clearance margin of any position at any obstacle \[m\], with the row and the obstacle; `None`
 /// without positions or obstacles.
 #[must_use]
-pub fn least_room(obstacles: &[Obstacle], positions_m: &Rows) -> Option<(f64, usize, usize)> {
+pub fn smallest_clearance_margin(obstacles: &[Obstacle], positions_m: &Rows) -> Option<(f64, usize, usize)> {
     let rooms = (0..positions_m.nrows()).flat_map(|i| {
         let point_m = row(positions_m, i);
         obstacles.iter().enumerate().map(move |(k, obstacle)| (obstacle.clearance_margin_m(point_m).0, i, k))

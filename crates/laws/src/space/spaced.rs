@@ -11,13 +11,13 @@ use tautline_core::swarm::{Pair, Rows, first_row_not_finite, separation};
 /// Points lie in cubic cells of twice the distance. Points within the distance are therefore in the same or adjacent
 /// cells, rounding of the cell number included. A cell holds few points because of the spacing.
 #[derive(Clone, Debug)]
-pub struct Spaced {
+pub struct SpacedPoints {
     distance_m: f64,
     cells: HashMap<[i64; 3], Vec<(usize, Vector3<f64>)>>,
     count: usize,
 }
 
-impl Spaced {
+impl SpacedPoints {
     /// Creates an empty set; `distance_m` must be positive.
     #[must_use]
     pub fn new(distance_m: f64) -> Self {
@@ -103,7 +103,7 @@ mod tests {
 
     #[test]
     fn a_point_at_the_minimum_spacing_is_rejected() {
-        let mut spaced = Spaced::new(2.0);
+        let mut spaced = SpacedPoints::new(2.0);
         assert_eq!(spaced.insert(Vector3::zeros()), Ok(()));
         assert_eq!(spaced.insert(Vector3::new(2.0, 0.0, 0.0)), Err((0, 2.0)));
         assert_eq!(spaced.insert(Vector3::new(2.0_f64.next_up(), 0.0, 0.0)), Ok(()));
@@ -117,7 +117,7 @@ mod tests {
             far in prop::sample::select(vec![0.0, 1e3, -1e9]),
         ) {
             let points: Vec<_> = points.iter().map(|&[x, y, z]| Vector3::new(x + far, y, z)).collect();
-            let mut spaced = Spaced::new(distance_m);
+            let mut spaced = SpacedPoints::new(distance_m);
             let found = points.iter().enumerate().find_map(|(j, &p)| spaced.insert(p).err().map(|(i, l)| (i, j, l)));
             let expected = points.iter().enumerate().find_map(|(j, &p)| {
                 let near = |&i: &usize| (p - points[i]).norm() <= distance_m;

@@ -37,7 +37,7 @@ impl Default for Arrival {
 
 /// Errors of a swarm with respect to its formation.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Distance {
+pub struct FormationError {
     /// Largest error of a desired distance over the graph's edges \[m\].
     pub max_edge_error_m: f64,
     /// Root mean square distance from the fitted formation \[m\]. The fit may rotate and mirror it if the law allows
@@ -49,7 +49,7 @@ pub struct Distance {
     pub disagreement_m_s: f64,
 }
 
-impl Distance {
+impl FormationError {
     /// Computes the errors of a swarm with respect to a formation at the reference, fitted within `freedom`. Takes
     /// O(edges), or O(N) if [`largest_edge_error_m`] uses its bound.
     #[must_use]
@@ -85,7 +85,7 @@ impl Distance {
 }
 
 impl Arrival {
-    /// Whether a swarm is within the limits, as [`Arrival::is_within`] of its [`Distance::of`].
+    /// Whether a swarm is within the limits, as [`Arrival::is_within`] of its [`FormationError::of`].
     ///
     /// Checks speeds first, then some edges, then positions. Checks all edges only if positions do not decide: vehicles
     /// within e of their slots have distances within 2 e of the desired ones. O(N) except near the limits, without
@@ -103,7 +103,7 @@ impl Arrival {
         let has_length = |(i, j): (usize, usize)| {
             (separation(positions_m, i, j) - formation.desired_distance(i, j)).abs() <= self.edge_error_m
         };
-        let is_slow = Distance::disagreement_m_s(swarm, reference, freedom) <= self.disagreement_m_s;
+        let is_slow = FormationError::disagreement_m_s(swarm, reference, freedom) <= self.disagreement_m_s;
         let may_hold = is_slow && formation.count() == swarm.count();
         if !may_hold || !graph.edges().take(swarm.count()).all(has_length) {
             return false;
@@ -116,7 +116,7 @@ impl Arrival {
 
     /// Whether all errors are within the limits; false for values that are not finite.
     #[must_use]
-    pub fn is_within(&self, distance: &Distance) -> bool {
+    pub fn is_within(&self, distance: &FormationError) -> bool {
         distance.max_edge_error_m <= self.edge_error_m
             && distance.max_position_error_m <= self.edge_error_m
             && distance.disagreement_m_s <= self.disagreement_m_s
@@ -137,7 +137,7 @@ mod tests {
     #[test]
     fn each_arrival_limit_counts_and_nan_is_outside() {
         let arrival = Arrival::default();
-        let good = Distance {
+        let good = FormationError {
             max_edge_error_m: 0.01,
             rms_position_error_m: 0.01,
             max_position_error_m: 0.01,
@@ -145,9 +145,9 @@ mod tests {
         };
         assert!(arrival.is_within(&good));
         for bad in [0.011, f64::NAN] {
-            assert!(!arrival.is_within(&Distance { max_edge_error_m: bad, ..good }));
-            assert!(!arrival.is_within(&Distance { max_position_error_m: bad, ..good }));
-            assert!(!arrival.is_within(&Distance { disagreement_m_s: bad, ..good }));
+            assert!(!arrival.is_within(&FormationError { max_edge_error_m: bad, ..good }));
+            assert!(!arrival.is_within(&FormationError { max_position_error_m: bad, ..good }));
+            assert!(!arrival.is_within(&FormationError { disagreement_m_s: bad, ..good }));
         }
     }
 
@@ -164,7 +164,7 @@ mod tests {
         set_row(&mut swarm.positions_m, 399, off_m);
         let arrival = Arrival::default();
         for freedom in [Freedom::Fixed, Freedom::Translation, Freedom::RigidMotion] {
-            let distance = Distance::of(&swarm, &formation, &Reference::at_rest(), &graph, freedom);
+            let distance = FormationError::of(&swarm, &formation, &Reference::at_rest(), &graph, freedom);
             assert!(distance.max_edge_error_m < 0.01 && distance.rms_position_error_m < 0.01, "{distance:?}");
             assert!(!arrival.is_within(&distance), "{distance:?}");
             assert!(!arrival.holds(&swarm, &formation, &Reference::at_rest(), &graph, freedom));

@@ -6,14 +6,14 @@ use tautline_core::record::Event;
 
 /// Legs with their start times and with the times of new assignments, as recorded in the events of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Course {
+pub struct LegHistory {
     /// Start time \[s\] and index of each leg except the first.
     begun: Vec<(f64, usize)>,
     /// Time \[s\] from which each assignment holds, with the legs as assigned; the first holds from the start.
     assigned: Vec<(f64, Vec<Leg>)>,
 }
 
-impl Course {
+impl LegHistory {
     /// Creates the course of a run through these legs.
     #[must_use]
     pub fn new(legs: &[Leg]) -> Self {
@@ -26,13 +26,13 @@ impl Course {
     }
 
     /// Records an assignment at a time \[s\]: on the present leg and the following ones, vehicle i goes to the slot of
-    /// vehicle `slots[i]` ([`assign_anew`]). Calls must be in order of time. Ignores `slots` that are not a
+    /// vehicle `slots[i]` ([`reassign`]). Calls must be in order of time. Ignores `slots` that are not a
     /// permutation.
     pub fn assign(&mut self, slots: &[usize], time_s: f64) {
         let leg = self.leg_at(time_s);
         let Some((_, legs)) = self.assigned.last() else { return };
         let mut legs = legs.clone();
-        if assign_anew(&mut legs, leg, slots) {
+        if reassign(&mut legs, leg, slots) {
             self.assigned.push((time_s, legs));
         }
     }
@@ -81,7 +81,7 @@ impl Course {
 
 /// Gives vehicle i the slot of vehicle `slots[i]` on a leg (from 0) and on the following legs, as long as vehicles are
 /// interchangeable there. Returns false, and changes nothing, if `slots` is not a permutation of the vehicles.
-pub fn assign_anew(legs: &mut [Leg], leg: usize, slots: &[usize]) -> bool {
+pub fn reassign(legs: &mut [Leg], leg: usize, slots: &[usize]) -> bool {
     let count = legs.get(leg).map_or(0, |leg| leg.formation.count());
     let mut taken = vec![false; count];
     let is_order = slots.len() == count
@@ -103,25 +103,25 @@ mod tests {
     }
 
     /// Returns x of the slots at a time.
-    fn slots(course: &Course, time_s: f64) -> Vec<f64> {
+    fn slots(course: &LegHistory, time_s: f64) -> Vec<f64> {
         course.formation_at(time_s).expect("a leg").slots_m.column(0).iter().copied().collect()
     }
 
     #[test]
     fn a_leg_lasts_until_the_next_one_begins() {
-        let mut course = Course::new(&[legs([false; 3]), legs([false; 3])].concat());
+        let mut course = LegHistory::new(&[legs([false; 3]), legs([false; 3])].concat());
         course.begin(1, 2.0);
         course.begin(2, 2.0);
         course.begin(3, 5.0);
         assert_eq!([0.0, 1.9, 2.0, 4.9, 5.0, 9.0].map(|time_s| course.leg_at(time_s)), [0, 0, 2, 2, 3, 3]);
         course.begin(9, 10.0);
         assert_eq!((course.leg_at(11.0), course.count()), (5, 6), "there is no tenth leg");
-        assert_eq!(Course::default().formation_at(0.0), None);
+        assert_eq!(LegHistory::default().formation_at(0.0), None);
     }
 
     #[test]
     fn an_assignment_holds_for_following_interchangeable_legs() {
-        let mut course = Course::new(&legs([true, true, false]));
+        let mut course = LegHistory::new(&legs([true, true, false]));
         let given = slots(&course, 0.0);
         course.assign(&[2, 0, 1], 3.0);
         assert_eq!(slots(&course, 2.9), given);
@@ -138,10 +138,10 @@ mod tests {
     #[test]
     fn an_invalid_permutation_changes_nothing() {
         for wrong in [&[0, 1][..], &[0, 1, 1], &[0, 1, 3], &[0, 1, 2, 0]] {
-            let mut course = Course::new(&legs([true; 3]));
+            let mut course = LegHistory::new(&legs([true; 3]));
             course.assign(wrong, 1.0);
-            assert_eq!(course, Course::new(&legs([true; 3])), "{wrong:?}");
+            assert_eq!(course, LegHistory::new(&legs([true; 3])), "{wrong:?}");
         }
-        assert!(!assign_anew(&mut [], 0, &[0]));
+        assert!(!reassign(&mut [], 0, &[0]));
     }
 }

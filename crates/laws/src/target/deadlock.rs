@@ -60,7 +60,7 @@ impl DeadlockOptions {
 
 /// Settling of position errors under a law without contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Settling {
+pub struct SettlingMode {
     /// Rate of the slowest mode \[1/s\].
     pub rate_per_s: f64,
     /// Time in which the commanded acceleration brings a vehicle from rest to the speed of that mode \[s\].
@@ -116,7 +116,7 @@ enum Phase {
 ///
 /// - some vehicle is more than twice the arrival limit from its slot;
 /// - the root mean square speed is below 0.2 of the rate of the law's slowest mode times the root mean square error
-///   ([`Settling`]).
+///   ([`SettlingMode`]).
 ///
 /// Slots are then scaled about their centre, or about a leader's slot. They are held at least for `hold_s`, until every
 /// vehicle is within a quarter of the smallest slot distance of its slot or there is no progress for 10 s. They close
@@ -127,7 +127,7 @@ enum Phase {
 #[derive(Clone, Debug)]
 pub(super) struct DeadlockResolver {
     deadlock: DeadlockOptions,
-    settling: Settling,
+    settling: SettlingMode,
     tolerance_m: f64,
     freedom: Freedom,
     leader: Option<usize>,
@@ -167,7 +167,7 @@ impl Errors {
 impl DeadlockResolver {
     pub(super) fn new(
         deadlock: DeadlockOptions,
-        settling: Settling,
+        settling: SettlingMode,
         leader: Option<usize>,
         arrival: Arrival,
         freedom: Freedom,
@@ -302,7 +302,7 @@ impl Leg {
 mod tests {
     use super::*;
 
-    const SETTLING: Settling = Settling { rate_per_s: 1.0, response_s: 1.0 };
+    const SETTLING: SettlingMode = SettlingMode { rate_per_s: 1.0, response_s: 1.0 };
     const ARRIVAL: Arrival = Arrival { edge_error_m: 0.01, disagreement_m_s: 0.01, hold_s: 1.0 };
 
     /// Returns the spread at times 0, 0.5, 1, ... while vehicle 2 is at x = `off_m(time)` \[m\].
@@ -378,7 +378,7 @@ mod tests {
             resolver.supervise(0.5 * f64::from(k), &swarm, &leg, &mut target);
             if let Some(change) = resolver.take_change() {
                 if let Change::Assigned { slots } = &change {
-                    super::super::assign_anew(std::slice::from_mut(&mut leg), 0, slots);
+                    super::super::reassign(std::slice::from_mut(&mut leg), 0, slots);
                     assert_eq!(target.view().formation, &leg.formation);
                 }
                 found.push(change);

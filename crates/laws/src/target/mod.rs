@@ -9,9 +9,9 @@ mod deadlock;
 mod reference;
 mod supervisor;
 
-pub use arrival::{Arrival, Distance};
-pub use course::{Course, assign_anew};
-pub use deadlock::{Change, DeadlockMode, DeadlockOptions, Settling};
+pub use arrival::{Arrival, FormationError};
+pub use course::{LegHistory, reassign};
+pub use deadlock::{Change, DeadlockMode, DeadlockOptions, SettlingMode};
 pub use reference::{Guidance, Reference, ReferenceMotion, Spline};
 pub use supervisor::{Schedule, Supervisor};
 
@@ -26,14 +26,14 @@ pub struct Leg {
     /// Slots of the leg.
     pub formation: Formation,
     /// Event that begins this leg and ends the previous one. Ignored for the first leg, which begins with the run.
-    pub begins: Begins,
+    pub begins: LegTrigger,
     /// Whether any vehicle may go to any slot. A stalled swarm is then reassigned before its slots are spread.
     pub interchangeable: bool,
 }
 
 /// Event that begins a leg.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Begins {
+pub enum LegTrigger {
     /// A time of the run \[s\].
     At(f64),
     /// Arrival at the previous leg, held for [`Arrival::hold_s`].
@@ -44,7 +44,7 @@ impl Leg {
     /// Creates the first leg of a run.
     #[must_use]
     pub fn first(formation: Formation) -> Self {
-        Self { formation, begins: Begins::At(0.0), interchangeable: false }
+        Self { formation, begins: LegTrigger::At(0.0), interchangeable: false }
     }
 
     /// Returns the leg with its slots scaled by `scale` and rotated by `yaw_rad` (counterclockwise seen from above)

@@ -2,8 +2,8 @@
 
 use dyn_clone::DynClone;
 
-use super::deadlock::{Change, DeadlockOptions, DeadlockResolver, Settling};
-use super::{Arrival, Begins, CurrentTarget, Leg, Target, assign_anew};
+use super::deadlock::{Change, DeadlockOptions, DeadlockResolver, SettlingMode};
+use super::{Arrival, CurrentTarget, Leg, LegTrigger, Target, reassign};
 use crate::formation::{Formation, Freedom};
 use crate::graph::Graph;
 use tautline_core::swarm::Swarm;
@@ -22,7 +22,7 @@ pub trait Supervisor: DynClone + Send {
 
     /// Whether the supervisor goes through the formations of these legs in order, so that the certificate for them
     /// holds.
-    fn keeps_to(&self, _legs: &[Leg]) -> bool {
+    fn follows_legs(&self, _legs: &[Leg]) -> bool {
         self.is_idle()
     }
 
@@ -33,7 +33,7 @@ pub trait Supervisor: DynClone + Send {
     }
 
     /// Returns the formations after the present target's.
-    fn ahead(&self, _target: &Target<'_>) -> Vec<&Formation> {
+    fn later_formations(&self, _target: &Target<'_>) -> Vec<&Formation> {
         Vec::new()
     }
 
@@ -75,15 +75,20 @@ impl Schedule {
 
     /// Sets the motions by which a reached formation may differ from its slots; any rigid motion by default.
     #[must_use]
-    pub fn free_by(mut self, freedom: Freedom) -> Self {
+    pub fn with_freedom(mut self, freedom: Freedom) -> Self {
         self.freedom = freedom;
         self
     }
 
     /// Enables deadlock recovery: spreads slots (about a leader's slot, if there is a leader) if the swarm is stalled.
-    /// `settling` describes the law. Call after [`Schedule::free_by`].
+    /// `settling` describes the law. Call after [`Schedule::with_freedom`].
     #[must_use]
-    pub fn deadlock_recovery(mut self, deadlock: DeadlockOptions, settling: Settling, leader: Option<usize>) -> Self {
+    pub fn deadlock_recovery(
+        mut self,
+        deadlock: DeadlockOptions,
+        settling: SettlingMode,
+        leader: Option<usize>,
+    ) -> Self {
         self.resolver =
             deadlock.is_on().then(|| DeadlockResolver::new(deadlock, settling, leader, self.arrival, self.freedom));
         self
@@ -92,18 +97,18 @@ impl Schedule {
     /// Ignores the common position error of all vehicles in the detection of stalls if `is_blown`, because a wind keeps
     /// all vehicles off their slots. Call after [`Schedule::deadlock_recovery`].
     #[must_use]
-    pub fn blown(mut self, is_blown: bool) -> Self {
+    pub fn with_wind(mut self, is_blown: bool) -> Self {
         if let Some(resolver) = self.resolver.as_mut().filter(|_| is_blown) {
             resolver.ignore_common_errors();
         }
         self
     }
 
-    fn is_due(&mut self, begins: Begins, time_s: f64, sensed: &Swarm, target: &CurrentTarget) -> bool {
+    fn is_due(&mut self, begins: LegTrigger, time_s: f64, sensed: &Swarm, target: &CurrentTarget) -> bool {
         match begins {
-            Begins::At(from_s) => time_s >= from_s,
-            Begins::Reached if self.resolver.as_ref().is_some_and(|resolver| !resolver.is_closed()) => false,
-            Begins::Reached => {
+            LegTrigger::At(from_s) => time_s >= from_s,
+            LegTrigger::Reached if self.resolver.as_ref().is_some_and(|resolver| !resolver.is_closed()) => false,
+            LegTrigger::Reached => {
                 let Target { formation, ref reference, .. } = target.view();
                 let within = self.arrival.holds(sensed, formation, reference, &self.links, self.freedom);
                 self.within_since_s = within.then(|| self.within_since_s.unwrap_or(time_s));
@@ -131,7 +136,7 @@ impl Supervisor for Schedule {
             resolver.supervise(time_s, sensed, leg, target);
             if let Some(change) = resolver.take_change() {
                 if let Change::Assigned { slots } = &change {
-                    assign_anew(&mut self.legs, target.view().leg, slots);
+                    reassign(&mut self.legs, target.view().leg, slots);
                 }
                 self.change = Some(change);
             }
@@ -142,7 +147,7 @@ impl Supervisor for Schedule {
         self.legs.len() < 2 && self.resolver.is_none()
     }
 
-    fn keeps_to(&self, legs: &[Leg]) -> bool {
+    fn follows_legs(&self, legs: &[Leg]) -> bool {
         self.is_idle() || self.legs == legs
     }
 
@@ -150,7 +155,7 @@ impl Supervisor for Schedule {
         self.change.take()
     }
 
-    fn ahead(&self, target: &Target<'_>) -> Vec<&Formation> {
+    fn later_formations(&self, target: &Target<'_>) -> Vec<&Formation> {
         let from = if target.spread == 1.0 { target.leg + 1 } else { target.leg };
         self.legs.iter().skip(from).map(|leg| &leg.formation).collect()
     }
@@ -160,7 +165,7 @@ impl Supervisor for Schedule {
 mod tests {
     use super::*;
 
-    fn legs(begins: [Begins; 2]) -> Vec<Leg> {
+    fn legs(begins: [LegTrigger; 2]) -> Vec<Leg> {
         let leg = |spacing_m, begins| Leg { begins, ..Leg::first(Formation::line(2, spacing_m)) };
         vec![Leg::first(Formation::line(2, 1.0)), leg(2.0, begins[0]), leg(3.0, begins[1])]
     }
@@ -181,13 +186,13 @@ mod tests {
 
     #[test]
     fn legs_begin_at_their_times_also_two_at_once() {
-        assert_eq!(flown(&legs([Begins::At(1.0), Begins::At(2.5)]), |_| 0), [0, 0, 1, 1, 1, 2, 2, 2]);
-        assert_eq!(flown(&legs([Begins::At(1.0), Begins::At(1.0)]), |_| 0), [0, 0, 2, 2, 2, 2, 2, 2]);
+        assert_eq!(flown(&legs([LegTrigger::At(1.0), LegTrigger::At(2.5)]), |_| 0), [0, 0, 1, 1, 1, 2, 2, 2]);
+        assert_eq!(flown(&legs([LegTrigger::At(1.0), LegTrigger::At(1.0)]), |_| 0), [0, 0, 2, 2, 2, 2, 2, 2]);
     }
 
     #[test]
     fn a_leg_ends_only_when_its_formation_is_held() {
-        let legs = legs([Begins::Reached, Begins::Reached]);
+        let legs = legs([LegTrigger::Reached, LegTrigger::Reached]);
         assert_eq!(flown(&legs, |time_s| usize::from(time_s > 1.0)), [0, 0, 1, 1, 1, 2, 2, 2]);
         assert_eq!(flown(&legs, |time_s| usize::from(time_s == 0.5)), [0, 0, 0, 0, 1, 1, 1, 1]);
     }

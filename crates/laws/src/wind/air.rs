@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use nalgebra::Vector3;
 
-use super::dryden::{Dryden, Eddy, Step};
+use super::dryden::{Dryden, Step, TurbulenceState};
 use super::normal::Normals;
 use super::spec::WindSpec;
 use tautline_core::record::Channel;
@@ -45,7 +45,7 @@ impl Wind {
     pub fn advance(&mut self, dt_s: f64) {
         (self.before_s, self.now_s) = (self.now_s, self.now_s + dt_s);
         if let Some(turbulence) = &mut self.turbulence {
-            turbulence.reach(self.before_s, self.now_s);
+            turbulence.cover(self.before_s, self.now_s);
         }
     }
 
@@ -63,7 +63,7 @@ impl Wind {
     /// Returns the next time \[s\] at which turbulence changes slope. Until then only gusts change the derivative of
     /// the wind.
     #[must_use]
-    pub fn next_turn_s(&self, time_s: f64) -> f64 {
+    pub fn next_slope_change_s(&self, time_s: f64) -> f64 {
         // A change within rounding of `time_s` counts as passed.
         let turned = |_: &Turbulence| ((time_s * TURBULENCE_HZ + 1e-9).floor() + 1.0) / TURBULENCE_HZ;
         self.turbulence.as_ref().map_or(f64::INFINITY, turned)
@@ -113,7 +113,7 @@ struct Turbulence {
     frame: [Vector3<f64>; 3],
     step: Step,
     /// Filters: one per vehicle, or one for all.
-    eddies: Vec<Eddy>,
+    eddies: Vec<TurbulenceState>,
     /// Index of the sampling instant of the first row of the window.
     first: u64,
     /// Velocity of the air at consecutive sampling instants, one row per instant \[m/s\]. Covers the last step.
@@ -131,13 +131,13 @@ impl Turbulence {
         let mut turbulence = Self {
             frame: Dryden::frame(mean_m_s),
             step: dryden.step(mean_m_s, 1.0 / TURBULENCE_HZ),
-            eddies: (0..streams).map(|stream| Eddy::new(normals(seed, stream))).collect(),
+            eddies: (0..streams).map(|stream| TurbulenceState::new(normals(seed, stream))).collect(),
             first: 0,
             window: VecDeque::new(),
             spare: Vec::new(),
         };
         turbulence.push();
-        turbulence.reach(0.0, 0.0);
+        turbulence.cover(0.0, 0.0);
         turbulence
     }
 
@@ -158,7 +158,7 @@ impl Turbulence {
     }
 
     /// Moves the window so that it covers the times from one to the other.
-    fn reach(&mut self, from_s: f64, to_s: f64) {
+    fn cover(&mut self, from_s: f64, to_s: f64) {
         while self.window.len() > 2 && (self.first + 1) as f64 <= from_s * TURBULENCE_HZ {
             self.spare.extend(self.window.pop_front());
             self.first += 1;

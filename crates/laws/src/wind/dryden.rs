@@ -64,7 +64,11 @@ impl Dryden {
     pub(super) fn step(&self, mean_m_s: Vector3<f64>, dt_s: f64) -> Step {
         let carried_m = mean_m_s.norm().max(SLOWEST_M_S) * dt_s;
         let [along, across, up] = (Vector3::repeat(carried_m).component_div(&self.length_m())).into();
-        Step { intensity_m_s: self.intensity_m_s(), along: Along::new(along), across: [across, up].map(Across::new) }
+        Step {
+            intensity_m_s: self.intensity_m_s(),
+            along: LongitudinalFilter::new(along),
+            across: [across, up].map(TransverseFilter::new),
+        }
     }
 
     /// Returns the unit directions of u, v and w.
@@ -79,18 +83,18 @@ impl Dryden {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Step {
     intensity_m_s: Vector3<f64>,
-    along: Along,
-    across: [Across; 2],
+    along: LongitudinalFilter,
+    across: [TransverseFilter; 2],
 }
 
 /// Filter of u: u+ = p u + sqrt(1 - p^2) xi with p = e^-d, d = V dt/L.
 #[derive(Clone, Copy, Debug)]
-struct Along {
+struct LongitudinalFilter {
     p: f64,
     kick: f64,
 }
 
-impl Along {
+impl LongitudinalFilter {
     fn new(d: f64) -> Self {
         Self { p: libm::exp(-d), kick: (-libm::expm1(-2.0 * d)).sqrt() }
     }
@@ -108,7 +112,7 @@ impl Along {
 /// Q11 = (1 - p^2)/2,   Q12 = (1 - (1 + 2d) p^2)/4,   Q22 = (1 - (1 + 2d + 2d^2) p^2)/4
 /// ```
 #[derive(Clone, Copy, Debug)]
-struct Across {
+struct TransverseFilter {
     p: f64,
     d: f64,
     l11: f64,
@@ -116,7 +120,7 @@ struct Across {
     l22: f64,
 }
 
-impl Across {
+impl TransverseFilter {
     fn new(d: f64) -> Self {
         let (p, lost) = (libm::exp(-d), -libm::expm1(-2.0 * d));
         let squared = 1.0 - lost;
@@ -131,14 +135,14 @@ impl Across {
 
 /// Filter states of the turbulence of one vehicle, or of all, scaled to unit variance.
 #[derive(Clone, Debug)]
-pub(super) struct Eddy {
+pub(super) struct TurbulenceState {
     along: f64,
     /// States x and y of v and of w.
     across: [[f64; 2]; 2],
     normals: Normals,
 }
 
-impl Eddy {
+impl TurbulenceState {
     /// Draws the states from the stationary distribution.
     pub(super) fn new(normals: Normals) -> Self {
         let mut eddy = Self { along: 0.0, across: [[0.0; 2]; 2], normals };
@@ -158,7 +162,7 @@ impl Eddy {
     pub(super) fn advance(&mut self, step: &Step) {
         let Self { along, across, normals } = self;
         *along = step.along.p * *along + step.along.kick * normals.next();
-        for ([x, y], Across { p, d, l11, l21, l22 }) in across.iter_mut().zip(step.across) {
+        for ([x, y], TransverseFilter { p, d, l11, l21, l22 }) in across.iter_mut().zip(step.across) {
             let (first, second) = (normals.next(), normals.next());
             *y = p * (*y + d * *x) + l21 * first + l22 * second;
             *x = p * *x + l11 * first;

@@ -152,7 +152,7 @@ impl Gust {
 
     /// Whether the gust affects a vehicle.
     #[must_use]
-    pub fn meets(&self, vehicle: usize) -> bool {
+    pub fn affects(&self, vehicle: usize) -> bool {
         self.vehicles.as_ref().is_none_or(|met| met.binary_search(&vehicle).is_ok())
     }
 }
@@ -167,7 +167,7 @@ impl WindSpec {
     /// Returns the mean wind and gusts at a vehicle and a time \[m/s\].
     #[must_use]
     pub fn steady_m_s(&self, vehicle: usize, time_s: f64) -> Vector3<f64> {
-        let met = self.gusts.iter().filter(|gust| gust.meets(vehicle));
+        let met = self.gusts.iter().filter(|gust| gust.affects(vehicle));
         met.fold(self.mean_m_s, |sum, gust| sum + gust.share(time_s) * gust.velocity_m_s)
     }
 

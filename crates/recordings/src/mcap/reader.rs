@@ -8,7 +8,7 @@ use serde::de::DeserializeOwned;
 use super::message::{
     AUDIT, CHANNEL_SCHEMA, ChannelMessage, EventMessage, RunTopic, SummaryMessage, SwarmMessage, fault,
 };
-use super::topic::{CDR, Declared, Message, Part, Topic, TopicReader, decode};
+use super::topic::{CDR, DeclaredTopic, Message, Part, Topic, TopicReader, decode};
 use super::{Header, RunAudit};
 use tautline_core::record::MessageHash;
 use tautline_core::record::{Event, OwnedSample, ReadFault, RecordError};
@@ -162,7 +162,7 @@ impl Contents {
         taken.map(|()| true).map_err(|fault| topics.fault(fault))
     }
 
-    fn declare(&mut self, declared: &Declared) -> Result<(), ReadFault> {
+    fn declare(&mut self, declared: &DeclaredTopic) -> Result<(), ReadFault> {
         let Some(own) = RunTopic::of(&declared.topic) else { return Ok(()) };
         let Topic { name: topic, schema_name: expected, message_encoding, .. } = own.topic();
         if declared.schema != expected || declared.encoding != message_encoding {
@@ -175,7 +175,7 @@ impl Contents {
     }
 
     fn take(&mut self, message: &Message<'_>) -> Result<(), ReadFault> {
-        let Declared { topic, schema, encoding, .. } = message.of;
+        let DeclaredTopic { topic, schema, encoding, .. } = message.of;
         let own = RunTopic::of(topic);
         if own.is_some() {
             self.messages.take(topic, message.bytes);

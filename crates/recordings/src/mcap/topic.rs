@@ -124,7 +124,7 @@ fn io_error(error: McapError) -> io::Error {
 
 /// Topic as declared in a file.
 #[derive(Clone, Debug)]
-pub(crate) struct Declared {
+pub(crate) struct DeclaredTopic {
     pub(crate) channel: u16,
     pub(crate) topic: String,
     /// Name of the schema; empty without a schema.
@@ -136,7 +136,7 @@ pub(crate) struct Declared {
 pub(crate) struct Message<'a> {
     /// Position of the message, or of its chunk, in the file \[bytes\].
     pub(crate) offset: u64,
-    pub(crate) of: &'a Declared,
+    pub(crate) of: &'a DeclaredTopic,
     pub(crate) log_ns: u64,
     pub(crate) bytes: &'a [u8],
 }
@@ -145,7 +145,7 @@ pub(crate) struct Message<'a> {
 pub(crate) enum Part<'a> {
     /// The name of a schema.
     Schema(&'a str),
-    Topic(&'a Declared),
+    Topic(&'a DeclaredTopic),
     Message(Message<'a>),
     /// Record without topic information, or a message of an undeclared topic.
     Other,
@@ -156,7 +156,7 @@ pub(crate) struct TopicReader {
     path: PathBuf,
     records: RecordReader,
     schemas: BTreeMap<u16, String>,
-    topics: BTreeMap<u16, Declared>,
+    topics: BTreeMap<u16, DeclaredTopic>,
 }
 
 impl TopicReader {
@@ -201,10 +201,10 @@ impl TopicReader {
     }
 }
 
-fn declared(mut fields: Fields<'_>, schemas: &BTreeMap<u16, String>) -> Option<Declared> {
+fn declared(mut fields: Fields<'_>, schemas: &BTreeMap<u16, String>) -> Option<DeclaredTopic> {
     let (channel, schema) = (fields.u16()?, fields.u16()?);
     let (topic, encoding) = (fields.str()?.to_owned(), fields.str()?.to_owned());
-    Some(Declared { channel, topic, schema: schemas.get(&schema).cloned().unwrap_or_default(), encoding })
+    Some(DeclaredTopic { channel, topic, schema: schemas.get(&schema).cloned().unwrap_or_default(), encoding })
 }
 
 /// Returns channel, log time \[ns\] and content of a message.

@@ -42,7 +42,7 @@ pub trait ExtraTopic: Send {
 }
 
 /// Topic writer without seeking: a chunk is built in memory and written as a whole.
-type Out = TopicWriter<NoSeek<BufWriter<File>>>;
+type RunWriter = TopicWriter<NoSeek<BufWriter<File>>>;
 
 /// Recorder of a run into an MCAP file.
 ///
@@ -52,7 +52,7 @@ type Out = TopicWriter<NoSeek<BufWriter<File>>>;
 pub struct McapRecorder {
     path: PathBuf,
     /// Writer whose first topics are [`RunTopic::ALL`], so that `RunTopic as usize` is the index of a topic.
-    out: Option<Out>,
+    out: Option<RunWriter>,
     /// Channels so far, with the indices of their topics.
     channels: Vec<(Arc<str>, usize)>,
     /// Additional topic and its index.
@@ -101,7 +101,7 @@ impl McapRecorder {
     /// # Errors
     /// [`RecordError::Write`] if the system refuses or refused before.
     pub fn finish(mut self) -> Result<(), RecordError> {
-        self.with_out(Out::finish)
+        self.with_out(RunWriter::finish)
     }
 
     /// Writes the audit of the finished run with its hash, and closes the file as [`McapRecorder::finish`] does.
@@ -158,7 +158,7 @@ impl McapRecorder {
 
     fn flush_if_due(&mut self, time_s: f64) -> Result<(), RecordError> {
         if time_s - self.flushed_at_s >= FLUSH_PERIOD_S || self.waiting_bytes >= FLUSH_BYTES {
-            self.with_out(Out::flush)?;
+            self.with_out(RunWriter::flush)?;
             self.flushed_at_s = time_s;
             self.waiting_bytes = 0;
         }
@@ -166,7 +166,7 @@ impl McapRecorder {
     }
 
     /// Runs `action` on the open file; the first error closes the file permanently.
-    fn with_out<T>(&mut self, action: impl FnOnce(&mut Out) -> io::Result<T>) -> Result<T, RecordError> {
+    fn with_out<T>(&mut self, action: impl FnOnce(&mut RunWriter) -> io::Result<T>) -> Result<T, RecordError> {
         let Some(out) = self.out.as_mut() else {
             return Err(write_error(&self.path, io::Error::other("writing failed before")));
         };
@@ -202,12 +202,12 @@ impl Sink for McapRecorder {
         self.flush_if_due(event.time_s())
     }
 
-    fn looks_at_steps(&self) -> bool {
+    fn needs_steps(&self) -> bool {
         false
     }
 }
 
-fn open(path: &Path) -> io::Result<Out> {
+fn open(path: &Path) -> io::Result<RunWriter> {
     // The recorder closes the chunks, not their size alone: the messages of one sample stay in one chunk.
     let options = WriteOptions::new().chunk_size(None).disable_seeking(true);
     let mut out = TopicWriter::new(NoSeek::new(BufWriter::new(File::create(path)?)), options)?;

@@ -34,7 +34,7 @@ use super::source::{Lines, Source};
 
 /// Source of the time of a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum When {
+enum TimeSource {
     /// A column \[s\].
     Column(usize),
     /// Frame numbers in the first column, at this rate \[Hz\]; the second column counts subframes.
@@ -42,15 +42,15 @@ enum When {
 }
 
 /// Vehicle with the columns x, y and z of its markers.
-type Marked = (String, Vec<[usize; 3]>);
+type MarkerColumns = (String, Vec<[usize; 3]>);
 
 /// Columns of a take.
 struct Capture {
     /// First line with a row, from 1.
     first_line: u64,
-    when: When,
+    when: TimeSource,
     /// Vehicles with their marker columns; the position of a vehicle is the mean of its markers.
-    vehicles: Vec<Marked>,
+    vehicles: Vec<MarkerColumns>,
     /// Length of a unit \[m\].
     metres: f64,
     /// Whether y is up, x right and z backwards.
@@ -60,8 +60,8 @@ struct Capture {
 
 /// Groups markers into vehicles by the name before the colon. Two markers with one name are refused, because their mean
 /// has no meaning.
-fn by_subject(markers: Vec<(String, [usize; 3])>) -> Result<Vec<Marked>, Fault> {
-    let mut vehicles: Vec<Marked> = Vec::new();
+fn by_subject(markers: Vec<(String, [usize; 3])>) -> Result<Vec<MarkerColumns>, Fault> {
+    let mut vehicles: Vec<MarkerColumns> = Vec::new();
     let (mut known, mut names) = (BTreeMap::new(), BTreeSet::new());
     for (name, columns) in markers {
         if !names.insert(name.clone()) {
@@ -89,7 +89,7 @@ fn note_of_others<'a>(why: &str, others: impl Iterator<Item = &'a str>) -> Optio
 }
 
 /// Returns the note on vehicles with several markers.
-fn note_of_markers(vehicles: &[Marked]) -> Option<String> {
+fn note_of_markers(vehicles: &[MarkerColumns]) -> Option<String> {
     let several = vehicles.iter().filter(|(_, markers)| markers.len() > 1);
     let several: Vec<_> = several.map(|(name, markers)| format!("{name} ({})", markers.len())).collect();
     let what = "the position is the mean of the markers, if all of them are seen, for";
@@ -134,8 +134,8 @@ impl Table {
     fn stamp(&self, cells: &[&[u8]]) -> Result<Stamp, Fault> {
         let needed = |column| number(cells, column)?.ok_or_else(|| Fault::empty_cell(&(column + 1).to_string()));
         match self.capture.when {
-            When::Column(column) => needed(column).map(Stamp::Real),
-            When::Frames(rate) => {
+            TimeSource::Column(column) => needed(column).map(Stamp::Real),
+            TimeSource::Frames(rate) => {
                 if let Some(part) = number(cells, 1)?.filter(|part| *part != 0.0) {
                     let problem = format!("it is subframe {part}");
                     return refuse("recording/frame-rate", problem, "export trajectories at the camera rate");
@@ -312,7 +312,7 @@ impl MotiveHead {
         let others = self.names.iter().skip(2).map(String::as_str).filter(|name| !name.is_empty() && !is_read(name));
         let why = if has_bodies { "they are not rigid bodies" } else { "they are not labelled markers" };
         notes.extend(note_of_others(why, others));
-        Ok(Capture { first_line: self.first_line, when: When::Column(time), vehicles, metres, y_up: true, notes })
+        Ok(Capture { first_line: self.first_line, when: TimeSource::Column(time), vehicles, metres, y_up: true, notes })
     }
 
     /// Returns the position columns of all items of a type.
@@ -464,7 +464,7 @@ impl ViconSection {
             );
         }
         let notes = note_of_markers(&vehicles).into_iter().collect();
-        let when = When::Frames(rate);
+        let when = TimeSource::Frames(rate);
         Ok(Capture { first_line: self.first_line, when, vehicles, metres, y_up: false, notes })
     }
 

@@ -193,7 +193,7 @@ impl Probe {
         Self { first, last: first, step: f64::INFINITY, whole, integral, in_order: true }
     }
 
-    pub(super) fn see(&mut self, stamp: Stamp) {
+    pub(super) fn observe(&mut self, stamp: Stamp) {
         let order = self.last.compare(stamp);
         if order == Ordering::Equal {
             return;
@@ -440,7 +440,7 @@ mod tests {
         let stamps: Vec<_> = texts.iter().map(|text| Stamp::parse(text).expect("a number")).collect();
         let mut probe = Probe::new(stamps[0]);
         for &stamp in &stamps {
-            probe.see(stamp);
+            probe.observe(stamp);
         }
         let (timing, note) = Timing::settle(&probe, known);
         let seconds = stamps.iter().map(|&stamp| timing.seconds(stamp)).collect();
@@ -535,9 +535,9 @@ mod tests {
     #[test]
     fn decreasing_time_is_detected() {
         let mut probe = Probe::new(Stamp::Whole(2));
-        probe.see(Stamp::Whole(2));
+        probe.observe(Stamp::Whole(2));
         assert!(probe.in_order);
-        probe.see(Stamp::Whole(1));
+        probe.observe(Stamp::Whole(1));
         assert!(!probe.in_order);
     }
 }

@@ -120,14 +120,14 @@ fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Record
     let mut text = TextTable::open(source, format)?;
     if format == Format::TEXT && !text.named && options.dimensions.is_none() {
         match trajnet(source, text.separator)? {
-            Likeness::Certain => text = TextTable::open(source, Format::TRAJNET)?,
-            Likeness::Possible => {
+            TrajnetMatch::Certain => text = TextTable::open(source, Format::TRAJNET)?,
+            TrajnetMatch::Possible => {
                 let problem = "each line may be a frame, a vehicle, x and y, or a time, x, y and z: the first two \
                                numbers are whole";
                 let remedy = "use --format trajnet, or --dimensions 3 for a time and a position";
                 return refuse("recording/ambiguous-layout", problem, remedy);
             }
-            Likeness::None => {}
+            TrajnetMatch::None => {}
         }
     }
     let header_row = text.row();
@@ -360,7 +360,7 @@ fn next_line(lines: &mut Lines, comments: bool) -> Result<bool, ReadError> {
 
 /// Likeness of a table of plain numbers to the `TrajNet` format.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Likeness {
+enum TrajnetMatch {
     /// The numbers cannot be a frame and a vehicle.
     None,
     /// The first two numbers of each line are whole, and no two successive lines have the same frame.
@@ -370,26 +370,26 @@ enum Likeness {
 }
 
 /// Compares a table without a header to `TrajNet`: whole numbers for frame and vehicle, and two more numbers.
-fn trajnet(source: &Source, separator: Separator) -> Result<Likeness, ReadError> {
+fn trajnet(source: &Source, separator: Separator) -> Result<TrajnetMatch, ReadError> {
     let mut lines = Lines::new(source)?;
     let (mut fields, mut frame, mut vehicles) = (Fields::default(), None, BTreeSet::new());
-    let mut likeness = Likeness::Possible;
+    let mut likeness = TrajnetMatch::Possible;
     while next_line(&mut lines, true)? {
         if fields.split(lines.line(), separator, usize::MAX).is_err() || fields.ends.len() != TRAJNET_COLUMNS.len() {
-            return Ok(Likeness::None);
+            return Ok(TrajnetMatch::None);
         }
         let whole = |index| {
             let text = str::from_utf8(fields.bytes(lines.line(), index)).ok()?;
             Stamp::parse(text.trim())?.whole()
         };
-        let (Some(of_frame), Some(vehicle)) = (whole(0), whole(1)) else { return Ok(Likeness::None) };
+        let (Some(of_frame), Some(vehicle)) = (whole(0), whole(1)) else { return Ok(TrajnetMatch::None) };
         if frame.replace(of_frame) == Some(of_frame) {
-            likeness = Likeness::Certain;
+            likeness = TrajnetMatch::Certain;
         } else {
             vehicles.clear();
         }
         if !vehicles.insert(vehicle) {
-            return Ok(Likeness::None);
+            return Ok(TrajnetMatch::None);
         }
     }
     Ok(likeness)

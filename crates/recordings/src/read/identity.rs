@@ -150,7 +150,7 @@ impl AlternativeId {
     }
 
     /// Records the value in a row of a vehicle.
-    pub(super) fn see(&mut self, vehicle: usize, value: &str) {
+    pub(super) fn observe(&mut self, vehicle: usize, value: &str) {
         if value.is_empty() || (self.contradicts && self.vehicles.len() > 1) {
             return;
         }
@@ -243,7 +243,7 @@ impl SuspectColumn {
     }
 
     /// Records the value in the next row.
-    pub(super) fn see(&mut self, value: &str, time: f64, position: Vector3<f64>) {
+    pub(super) fn observe(&mut self, value: &str, time: f64, position: Vector3<f64>) {
         self.has_decimals |= value.parse::<f64>().is_ok_and(|number| number.fract() != 0.0 || !number.is_finite());
         if self.values.len() > MOST_VALUES {
             (self.cleared, self.values) = (true, HashMap::new());
@@ -400,7 +400,7 @@ impl SwapMonitor {
     }
 
     /// Refuses distinct values that are permuted from one row to the next: the columns may name vehicles.
-    pub(super) fn see(&mut self, now: Vec<String>, header: &[String]) -> Result<(), Fault> {
+    pub(super) fn observe(&mut self, now: Vec<String>, header: &[String]) -> Result<(), Fault> {
         let sorted = |values: &[String]| {
             let mut values = values.to_vec();
             values.sort_unstable();

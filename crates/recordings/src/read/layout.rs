@@ -247,7 +247,7 @@ impl Layout {
     }
 
     /// Returns the columns that are read or examined, each once, in ascending order.
-    pub(super) fn columns_to_see(&self) -> Vec<usize> {
+    pub(super) fn columns_to_observe(&self) -> Vec<usize> {
         let columns: BTreeSet<_> = self
             .columns()
             .into_iter()

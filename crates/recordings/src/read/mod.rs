@@ -90,7 +90,9 @@ pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, 
         }
     }
     let opened = open_folder(all, options);
-    opened.and_then(|recording| axes::turned(recording, options)).map_err(|error| error.of(Path::new(&called(paths))))
+    opened
+        .and_then(|recording| axes::turned(recording, options))
+        .map_err(|error| error.of(Path::new(&recording_name(paths))))
 }
 
 /// Opens the channels of a run recording or of an MCAP export; `None` without channels, and for any other recording.
@@ -110,7 +112,7 @@ pub fn open_run(path: &Path) -> Option<McapRecording> {
 
 /// Returns the name of several files that form one recording.
 #[must_use]
-pub fn called(paths: &[&Path]) -> String {
+pub fn recording_name(paths: &[&Path]) -> String {
     const LISTED: usize = 3;
     let named: Vec<_> = paths.iter().take(LISTED).map(|path| path.display().to_string()).collect();
     let more = paths.len().saturating_sub(LISTED);

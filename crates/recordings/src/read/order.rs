@@ -395,7 +395,7 @@ fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, ReadError> {
     let mut batch = Vec::new();
     while rows.next(&mut batch)? {
         for row in batch.drain(..) {
-            probe.get_or_insert_with(|| Probe::new(row.stamp)).see(row.stamp);
+            probe.get_or_insert_with(|| Probe::new(row.stamp)).observe(row.stamp);
         }
     }
     Ok(probe)
@@ -405,7 +405,7 @@ fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, ReadError> {
 pub(super) fn probe(rows: &[Row]) -> Option<Probe> {
     let mut probe = Probe::new(rows.first()?.stamp);
     for row in rows {
-        probe.see(row.stamp);
+        probe.observe(row.stamp);
     }
     Some(probe)
 }

@@ -72,7 +72,7 @@ pub(super) fn open<C: Cells + 'static>(
     let local = origin(&mut cells, &layout, options)?;
     info.metadata.notes.extend(local.map(|local| local.note()));
     info.metadata.earth_origin = local.map(|local| local.measured_from(options.origin));
-    cells.restart(&layout.columns_to_see(), true)?;
+    cells.restart(&layout.columns_to_observe(), true)?;
     // For places on the Earth the scale applies to heights only, and is part of the column factors.
     info.scale = if layout.on_earth { 1.0 } else { info.scale };
     let has_own_clock = options.is_joined && layout.convention.counts_from_boot;
@@ -211,7 +211,7 @@ impl<C: Cells> Table<C> {
         for watch in &mut self.watches {
             let texts = watch.columns.iter().map(|&column| Ok(self.cells.text(column)?.trim().to_owned()));
             let texts = texts.collect::<Result<Vec<_>, Fault>>()?;
-            watch.see(texts, self.cells.header())?;
+            watch.observe(texts, self.cells.header())?;
         }
         if !self.layout.suspects.is_empty() {
             self.suspect(rows.last().filter(|row| row.place == self.cells.row()).copied())?;
@@ -228,7 +228,7 @@ impl<C: Cells> Table<C> {
         let suspects = &mut self.suspects[row.vehicle];
         for suspect in suspects.iter_mut() {
             let value = self.cells.text(suspect.column)?;
-            suspect.see(value.trim(), row.stamp.approximately(), row.position);
+            suspect.observe(value.trim(), row.stamp.approximately(), row.position);
         }
         suspects.retain(|suspect| !suspect.is_cleared());
         Ok(())
@@ -324,7 +324,7 @@ impl<C: Cells> Rows for Table<C> {
         self.no_fixes.clear();
         self.suspects.clear();
         self.named = 0;
-        self.cells.restart(&self.layout.columns_to_see(), true)
+        self.cells.restart(&self.layout.columns_to_observe(), true)
     }
 
     fn vehicles(&self) -> &[String] {
@@ -367,13 +367,13 @@ impl<C: Cells> Rows for Table<C> {
         while self.cells.advance()? {
             let stamp = self.stamp().and_then(|stamp| self.vehicle(id).map(|_| stamp));
             let stamp = stamp.map_err(|fault| self.at_row(fault))?;
-            probe.get_or_insert_with(|| Probe::new(stamp)).see(stamp);
+            probe.get_or_insert_with(|| Probe::new(stamp)).observe(stamp);
             rows += 1;
             is_one_instant &= *first.get_or_insert(stamp) == stamp;
             for alternative in &mut self.alternative_ids {
                 let value =
                     self.cells.text(alternative.column).map_err(|fault| fault.at(C::place(self.cells.row())))?;
-                alternative.see(self.vehicle, value.trim());
+                alternative.observe(self.vehicle, value.trim());
             }
         }
         self.check_names(id, rows, is_one_instant)?;

@@ -372,12 +372,12 @@ fn numbers_of_the_ground_do_not_cover_vehicles_or_shells() {
 /// A later leg behind a moving reference: goals are the slots of that leg at the reference's position.
 #[test]
 fn goals_are_those_of_the_current_leg_at_the_reference() {
-    use tautline_laws::target::{Begins, Guidance, Leg, ReferenceMotion};
+    use tautline_laws::target::{Guidance, Leg, LegTrigger, ReferenceMotion};
 
     let start = Swarm::at_rest(Formation::line(4, 3.0).slots_m);
     let mut scenario = Scenario::new("legs", start.clone(), Formation { slots_m: start.positions_m }, 2.0, 10.0);
     scenario.law = tautline_laws::law::LawSpec::Displacement(tautline_laws::law::DisplacementKeys::default());
-    let next = Leg { begins: Begins::At(1.0), ..Leg::first(Formation::grid(4, 5.0)) };
+    let next = Leg { begins: LegTrigger::At(1.0), ..Leg::first(Formation::grid(4, 5.0)) };
     scenario.legs.push(next);
     scenario.reference = Some(Guidance {
         motion: ReferenceMotion::Velocity { from_m: Vector3::zeros(), velocity_m_s: Vector3::new(0.5, 0.0, 0.0) },

@@ -7,9 +7,9 @@ use super::distances::quantile;
 use super::spans::{Span, Spans};
 use super::svg::{INK, PALETTE, Stroke};
 use crate::flight_log::{FEW_VEHICLES, FlightLog, ROTORS, SERIES};
-use tautline_laws::formation::{edges_looked_at, largest_edge_error_m};
+use tautline_laws::formation::{evaluated_edges, largest_edge_error_m};
 use tautline_laws::graph::Graph;
-use tautline_laws::target::{Course, Leg};
+use tautline_laws::target::{Leg, LegHistory};
 
 /// Largest number of distances that are computed for the shape error.
 const DISTANCES: usize = 16_000_000;
@@ -126,8 +126,8 @@ pub fn shape_error(log: &FlightLog, legs: &[Leg], graph: &Graph, allowed_m: Opti
     let spans = Spans::of(log);
     let count = spans.vehicles();
     let fits = !legs.is_empty() && legs.iter().all(|leg| leg.formation.count() == count) && graph.count() == count;
-    let instants = spans.spread((DISTANCES / edges_looked_at(graph).max(1)).max(FEWEST_INSTANTS));
-    let mut course = Course::new(legs);
+    let instants = spans.spread((DISTANCES / evaluated_edges(graph).max(1)).max(FEWEST_INSTANTS));
+    let mut course = LegHistory::new(legs);
     log.targets().iter().for_each(|event| course.note(event));
     let error = |span: &&Span<'_>| {
         let formation = course.formation_at(span.time_s)?;

@@ -435,7 +435,7 @@ impl Sink for FlightLog {
         Ok(())
     }
 
-    fn looks_at_steps(&self) -> bool {
+    fn needs_steps(&self) -> bool {
         false
     }
 }

@@ -120,7 +120,7 @@ struct MomentData<'a> {
 
 /// Properties of the judgement.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Judged {
+pub struct JudgementContext {
     /// Whether the audit decided everything besides the findings.
     pub is_else_known: bool,
     /// Limit of separations, if it is the same for all pairs.
@@ -143,7 +143,7 @@ impl Replay {
         stage: &Stage,
         log: &FlightLog,
         moments: &[Moment],
-        judged: Judged,
+        judged: JudgementContext,
         room_bytes: usize,
     ) -> Result<Self, NoReplay> {
         let present = present(stage, log)?;

@@ -16,7 +16,7 @@ mod stage;
 mod statements;
 
 pub use chart::Chart;
-pub use data::{Judged, Replay};
+pub use data::{JudgementContext, Replay};
 pub use decimate::{MOST_INSTANTS, MOST_VEHICLES, Span, chosen};
 pub use stage::Stage;
 

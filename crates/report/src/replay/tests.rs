@@ -12,7 +12,7 @@ use tautline_core::record::Sample;
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm, set_row};
 use tautline_sim::scenario::{Scenario, Source};
 
-const JUDGED: Judged = Judged { is_else_known: true, limit: Some(1.0), unit: "m" };
+const JUDGED: JudgementContext = JudgementContext { is_else_known: true, limit: Some(1.0), unit: "m" };
 
 fn stage(vehicles: usize) -> Stage {
     Stage {

@@ -8,13 +8,13 @@ use super::artefact::{ArtefactError, write_atomically};
 use super::hulls::Hulls;
 use super::legs::LegNumbers;
 use super::obstacles::Obstacles;
-use super::verdict::{Fails, Verdict, at_rest, energy_rises};
+use super::verdict::{UnmetCriterion, Verdict, at_rest, energy_rises};
 use tautline_audit::{self as audit, Status};
 use tautline_core::record::{DeadlockRecovery, Reassignment};
 use tautline_core::swarm::{ClosestApproach, Pair};
 use tautline_laws::law::{Certificate, VoidReason};
 use tautline_sim::link::Traffic;
-use tautline_sim::metrics::{LegSummary, Strain, Summary};
+use tautline_sim::metrics::{LegSummary, QuadrotorPeaks, Summary};
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::{Failure, FailureKind, Scenario};
 use tautline_sim::sim::{Breakdown, Ending, Flight};
@@ -214,7 +214,7 @@ pub struct FormationNumbers {
     /// Time over which all errors had stayed within their limits at the end \[s\]; null if an error exceeds its limit.
     pub held_s: Option<f64>,
     /// Criterion that keeps the formation from being reached; null if it is reached.
-    pub fails: Option<Fails>,
+    pub fails: Option<UnmetCriterion>,
     /// Whether the vehicles have come to rest elsewhere, relative to each other; null if the formation is reached or
     /// this is unknown.
     pub at_rest: Option<bool>,
@@ -392,7 +392,7 @@ pub struct FlightResult<'a> {
     /// Legs that ended before the last one.
     pub ended_legs: &'a [LegSummary],
     /// Extremes of tilt and thrust, for quadrotors.
-    pub strain: Option<Strain>,
+    pub quadrotor_peaks: Option<QuadrotorPeaks>,
     /// [`tautline_core::record::StateHash`] of the recorded states.
     pub state_hash: &'a str,
 }
@@ -510,7 +510,7 @@ impl FlightResult<'_> {
 
     fn vehicle(&self) -> Option<VehicleNumbers> {
         let model = &self.scenario.airframe.quadrotor()?.model;
-        let Strain { max_tilt_rad, max_thrust_n } = self.strain?;
+        let QuadrotorPeaks { max_tilt_rad, max_thrust_n } = self.quadrotor_peaks?;
         Some(VehicleNumbers {
             model: model.name.clone(),
             max_tilt_deg: max_tilt_rad.to_degrees(),
@@ -541,7 +541,7 @@ impl Report {
                 reached: result.reached_at_s().is_some(),
                 reached_at_s: result.reached_at_s().and_then(finite),
                 held_s: summary.held_s.and_then(finite),
-                fails: Fails::of(result),
+                fails: UnmetCriterion::of(result),
                 at_rest: at_rest(result),
                 max_edge_error_m: finite(summary.max_edge_error_m),
                 rms_position_error_m: finite(summary.rms_position_error_m),

@@ -28,7 +28,7 @@ pub use hulls::{Hulls, PassedThrough};
 pub use legs::LegNumbers;
 pub use obstacles::{ObstacleApproach, ObstacleViolation, Obstacles};
 pub use tautline_audit::Status;
-pub use verdict::{Fails, Verdict};
+pub use verdict::{UnmetCriterion, Verdict};
 
 #[cfg(test)]
 mod tests;

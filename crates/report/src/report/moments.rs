@@ -2,7 +2,7 @@
 
 use super::flight::{self, Report};
 use super::obstacles::{ObstacleApproach, ObstacleViolation};
-use crate::replay::{Judged, LONGEST_NAME, Moment, cut};
+use crate::replay::{JudgementContext, LONGEST_NAME, Moment, cut};
 use tautline_audit::{ObjectPair, Status, Violation};
 use tautline_core::swarm::Pair;
 use tautline_core::text::at_least;
@@ -51,13 +51,13 @@ impl Report {
 
     /// Returns the limit of separations, and whether the audit decided everything else.
     #[must_use]
-    pub fn judgement(&self) -> Judged {
+    pub fn judgement(&self) -> JudgementContext {
         let unit = if self.separation.ellipsoid.is_some() { "m, scaled" } else { "m" };
         let of_pairs = self.audit.undecided == 0 && self.audit.parry.disagreements == 0;
         let of_obstacles = self.obstacles.iter().all(|of| of.undecided == 0 && of.disagreements == 0);
         let is_judged = self.audit.status != Status::Undecided || self.is_clear_until_its_early_end();
         let is_else_known = is_judged && of_pairs && of_obstacles;
-        Judged { is_else_known, limit: Some(self.separation.delta_m), unit }
+        JudgementContext { is_else_known, limit: Some(self.separation.delta_m), unit }
     }
 }
 

@@ -75,7 +75,7 @@ impl Obstacles {
         let of_closest = |found: &Approach| approach(found.pair, found.limit_m, found.certain_m(), found.time_s);
         Some(Self {
             status: if result.flight.ending == Ending::Completed { *status } else { status.and(Status::Undecided) },
-            certified_room_m: result.flight.certificate.certified_room_m.and_then(finite),
+            certified_room_m: result.flight.certificate.certified_clearance_margin_m.and_then(finite),
             closest: closest.iter().filter_map(of_closest).collect(),
             violations: violations.iter().filter_map(of_violation).collect(),
             undecided: undecided.len() as u64 + unresolved + refused,

@@ -135,7 +135,7 @@ impl Case {
             flight: &flight,
             summary: &self.summary,
             ended_legs: &self.ended_legs,
-            strain: None,
+            quadrotor_peaks: None,
             state_hash: "0123456789abcdef",
         })
     }
@@ -355,24 +355,24 @@ fn headline_names_the_unmet_criterion() {
         (REACHED, None, ""),
         (
             Summary { max_edge_error_m: 0.5, final_control_m_s2: 0.1, ..lost },
-            Some(Fails::MaxEdgeErrorM),
+            Some(UnmetCriterion::MaxEdgeErrorM),
             "largest edge error 0.500 m, still moving",
         ),
         (
             Summary { max_position_error_m: 0.6, ..lost },
-            Some(Fails::MaxPositionErrorM),
+            Some(UnmetCriterion::MaxPositionErrorM),
             "another shape or place, largest position error 0.600 m, at rest elsewhere",
         ),
         (
             Summary { disagreement_m_s: 0.7, ..lost },
-            Some(Fails::Disagreement),
+            Some(UnmetCriterion::Disagreement),
             "largest relative speed 0.700 m/s, still moving",
         ),
-        (Summary { held_s: Some(0.4), ..lost }, Some(Fails::HeldS), "kept for the last 0.40 s only"),
-        (Summary { max_edge_error_m: f64::NAN, ..lost }, Some(Fails::Unknown), "no state at the end is known"),
+        (Summary { held_s: Some(0.4), ..lost }, Some(UnmetCriterion::HeldS), "kept for the last 0.40 s only"),
+        (Summary { max_edge_error_m: f64::NAN, ..lost }, Some(UnmetCriterion::Unknown), "no state at the end is known"),
         (
             Summary { max_edge_error_m: 0.5, final_control_m_s2: f64::NAN, ..lost },
-            Some(Fails::MaxEdgeErrorM),
+            Some(UnmetCriterion::MaxEdgeErrorM),
             "largest edge error 0.500 m",
         ),
     ];
@@ -474,8 +474,11 @@ fn report_file_contains_the_json() {
 fn every_leg_must_be_reached_and_the_first_miss_is_named() {
     let ended = |ended_at_s: f64, reached_at_s: Option<f64>| LegSummary { ended_at_s, reached_at_s };
     let report = |legs: usize, ended_legs: Vec<LegSummary>, summary: Summary| {
-        let bound =
-            |energy: f64, certified_m: f64| LegBound { energy, certified_m: Some(certified_m), certified_room_m: None };
+        let bound = |energy: f64, certified_m: f64| LegBound {
+            energy,
+            certified_m: Some(certified_m),
+            certified_clearance_margin_m: None,
+        };
         let certificate = Certificate { legs: vec![bound(3.0, 2.1), bound(4.0, 2.06)], ..Case::good().certificate };
         Case { summary, certificate, legs, ended_legs, ..Case::good() }.report()
     };
@@ -509,7 +512,7 @@ fn certificate_tolerance_is_relative_to_its_clearance() {
         let certificate = Certificate {
             certified_m: Some(certified_m),
             certified_until_s: None,
-            certified_room_m: None,
+            certified_clearance_margin_m: None,
             energy_initial: Some(3.656),
             linked_m: None,
             void: vec![],
@@ -555,8 +558,8 @@ fn passing_a_ball(miss_m: f64) -> ClearanceOutcome {
 
 #[test]
 fn violated_clearance_or_certificate_of_an_obstacle_does_not_pass() {
-    let report = |miss_m: f64, certified_room_m: Option<f64>| {
-        let certificate = Certificate { certified_room_m, ..Case::good().certificate };
+    let report = |miss_m: f64, certified_clearance_margin_m: Option<f64>| {
+        let certificate = Certificate { certified_clearance_margin_m, ..Case::good().certificate };
         Case { clearance: Some(passing_a_ball(miss_m)), certificate, ..Case::good() }.report()
     };
     let clear = report(2.0, Some(0.4));
@@ -647,7 +650,7 @@ fn formation_kept_up_to_an_early_end_is_not_reached() {
     let report = Case { summary: REACHED, ..early() }.report();
     let formation = &report.formation;
     assert_eq!((formation.reached, formation.reached_at_s), (false, None));
-    assert_eq!(formation.fails, Some(Fails::EndedEarly));
+    assert_eq!(formation.fails, Some(UnmetCriterion::EndedEarly));
     let headline = report.headline();
     assert!(headline.starts_with("UNDECIDED: the flight ended early ") && !headline.contains("reached"), "{headline}");
     assert_eq!(report.verdict.reasons.len(), 1, "the early end: {:?}", report.verdict.reasons);

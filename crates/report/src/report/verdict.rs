@@ -56,7 +56,7 @@ impl Verdict {
 /// Criterion that keeps a formation from being reached, by its key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Fails {
+pub enum UnmetCriterion {
     /// The formation was reached, but the flight ended early.
     EndedEarly,
     /// All errors were within their limits at the end, but for too short a time.
@@ -74,7 +74,7 @@ pub enum Fails {
     Disagreement,
 }
 
-impl Fails {
+impl UnmetCriterion {
     pub(super) fn of(result: &FlightResult<'_>) -> Option<Self> {
         let (summary, judge) = (result.summary, result.scenario.arrival);
         if summary.reached_at_s.is_some() {
@@ -260,25 +260,25 @@ fn not_reached(report: &Report, result: &FlightResult<'_>) -> Option<String> {
     let (summary, judge) = (result.summary, result.scenario.arrival);
     let why = match report.formation.fails? {
         // The early end has a reason of its own.
-        Fails::EndedEarly => return None,
-        Fails::HeldS => format!(
+        UnmetCriterion::EndedEarly => return None,
+        UnmetCriterion::HeldS => format!(
             "it was kept for the last {} only; {} is required",
             seconds(summary.held_s.unwrap_or_default()),
             seconds(judge.hold_s)
         ),
-        Fails::Unknown => "no state at the end is known".to_owned(),
-        Fails::MaxEdgeErrorM => format!(
+        UnmetCriterion::Unknown => "no state at the end is known".to_owned(),
+        UnmetCriterion::MaxEdgeErrorM => format!(
             "at the end the largest edge error is {} m (limit {} m)",
             metres(summary.max_edge_error_m),
             judge.edge_error_m
         ),
-        Fails::MaxPositionErrorM => format!(
+        UnmetCriterion::MaxPositionErrorM => format!(
             "at the end every edge error is within its limit, but the shape, its attitude or its place is another \
              one: the largest position error is {} m (limit {} m)",
             metres(summary.max_position_error_m),
             judge.edge_error_m
         ),
-        Fails::Disagreement => format!(
+        UnmetCriterion::Disagreement => format!(
             "at the end the largest speed relative to the mean velocity, or to that of the reference, is {} m/s \
              (limit {} m/s)",
             metres(summary.disagreement_m_s),

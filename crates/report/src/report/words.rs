@@ -2,7 +2,7 @@
 
 use super::flight::{Ellipsoid, FailedVehicle, Performance, Report, VehicleNumbers, Verification};
 use super::obstacles::Obstacles;
-use super::verdict::{Fails, breaks_certificate, is_unresolved_by_step};
+use super::verdict::{UnmetCriterion, breaks_certificate, is_unresolved_by_step};
 use tautline_audit::Status;
 use tautline_core::text::{at_least, counted, metres, metres_below, seconds, table};
 use tautline_sim::link::Traffic;
@@ -161,17 +161,17 @@ impl Report {
     fn missing(&self) -> Option<String> {
         let formation = &self.formation;
         let (what, number, unit) = match formation.fails? {
-            Fails::EndedEarly => return None,
-            Fails::Unknown => return Some("not reached: no state at the end is known".to_owned()),
-            Fails::HeldS => {
+            UnmetCriterion::EndedEarly => return None,
+            UnmetCriterion::Unknown => return Some("not reached: no state at the end is known".to_owned()),
+            UnmetCriterion::HeldS => {
                 let held_s = formation.held_s.unwrap_or_default();
                 return Some(format!("not reached: kept for the last {} only", seconds(held_s)));
             }
-            Fails::MaxEdgeErrorM => ("largest edge error", formation.max_edge_error_m, "m"),
-            Fails::MaxPositionErrorM => {
+            UnmetCriterion::MaxEdgeErrorM => ("largest edge error", formation.max_edge_error_m, "m"),
+            UnmetCriterion::MaxPositionErrorM => {
                 ("another shape or place, largest position error", formation.max_position_error_m, "m")
             }
-            Fails::Disagreement => ("largest relative speed", self.velocity.disagreement_m_s, "m/s"),
+            UnmetCriterion::Disagreement => ("largest relative speed", self.velocity.disagreement_m_s, "m/s"),
         };
         let then = match formation.at_rest {
             Some(true) => ", at rest elsewhere",

@@ -18,7 +18,7 @@ pub mod outputs;
 mod run;
 mod scenario;
 
-pub use audit::{AuditRequest, Audited, ConfigFile, OwnRecording, Subject, audit_files, run_audit};
+pub use audit::{AuditRequest, AuditedRecording, ConfigFile, OwnRecording, Subject, audit_files, run_audit};
 pub use export::{ExportRequest, export_file};
 pub use failure::{Failure, blanked, in_range};
 pub use monitor::{Monitor, NamedPicture, PICTURES_BYTES, Pictures, Quiet, Silent};

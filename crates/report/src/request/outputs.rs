@@ -14,13 +14,13 @@ use crate::report::{INTERRUPTED, write_atomically};
 const STANDARD_OUTPUT: &str = "-";
 
 /// File with its name in messages, such as `--events` or `the recording`.
-pub type Called<'a> = (&'static str, &'a Path);
+pub type NamedPath<'a> = (&'static str, &'a Path);
 
 /// Rejects outputs that would overwrite an input or each other, or become part of an input folder of CSV files.
 ///
 /// # Errors
 /// [`Failure`] that names both files.
-pub fn check(inputs: &[Called<'_>], outputs: &[Called<'_>]) -> Result<(), Failure> {
+pub fn check(inputs: &[NamedPath<'_>], outputs: &[NamedPath<'_>]) -> Result<(), Failure> {
     let mut taken: BTreeMap<_, _> = inputs.iter().filter_map(|&(called, path)| Some((place(path)?, called))).collect();
     for &(option, path) in outputs {
         let Some(place) = place(path) else { continue };
@@ -44,7 +44,7 @@ pub fn check(inputs: &[Called<'_>], outputs: &[Called<'_>]) -> Result<(), Failur
 ///
 /// # Errors
 /// [`Failure`] that names the file.
-pub fn check_new<'a>(scenario: &str, outputs: impl Iterator<Item = Called<'a>>, force: bool) -> Result<(), Failure> {
+pub fn check_new<'a>(scenario: &str, outputs: impl Iterator<Item = NamedPath<'a>>, force: bool) -> Result<(), Failure> {
     let (piped, files): (Vec<_>, Vec<_>) = outputs.partition(|(_, file)| is_standard_output(file));
     if let [(first, _), (second, _), ..] = piped[..] {
         let message = format!("{first} and {second} are both to go to standard output");
@@ -212,7 +212,7 @@ pub fn try_to_write_in(folder: &Path) -> io::Result<()> {
 mod tests {
     use super::*;
 
-    fn clash(inputs: &[Called<'_>], outputs: &[Called<'_>]) -> Option<String> {
+    fn clash(inputs: &[NamedPath<'_>], outputs: &[NamedPath<'_>]) -> Option<String> {
         check(inputs, outputs).err().map(|failure| failure.message().to_owned())
     }
 

@@ -181,7 +181,7 @@ pub fn replay_of_run(
     room_bytes: usize,
 ) -> Result<Replay, NoReplay> {
     let names: Vec<_> = scenario.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect();
-    let stage = Stage::of(scenario, scenario.obstacles.iter().map(sim::judged).collect());
+    let stage = Stage::of(scenario, scenario.obstacles.iter().map(sim::audit_obstacle).collect());
     Replay::new(&stage, log, &report.moments(&names), report.judgement(), room_bytes)
 }
 

@@ -10,7 +10,7 @@ use tautline_core::swarm::{Swarm, row, set_row};
 use tautline_laws::formation::Formation;
 use tautline_laws::graph::{Graph, Pinning};
 use tautline_laws::law::{DisplacementKeys, LawSpec, VoidReason};
-use tautline_laws::target::{Begins, DeadlockMode, Guidance, Leg, ReferenceMotion};
+use tautline_laws::target::{DeadlockMode, Guidance, Leg, LegTrigger, ReferenceMotion};
 use tautline_report::run::run;
 use tautline_sim::scenario::{PlantSpec, Scenario};
 use tautline_sim::sim::Simulation;
@@ -37,7 +37,7 @@ fn mission(seed: u64) -> Scenario {
             _ => Formation::circle(count, radius_m),
         };
         let moved_m = Vector3::new(numbers.between(-1.0, 1.0), numbers.between(-1.0, 1.0), 0.0) * extent_m;
-        let leg = Leg { begins: Begins::At(2.0 * f64::from(number)), ..Leg::first(formation) };
+        let leg = Leg { begins: LegTrigger::At(2.0 * f64::from(number)), ..Leg::first(formation) };
         legs.push(leg.placed(numbers.between(1.0, 1.5), numbers.between(-3.0, 3.0), moved_m));
     }
     let mut scenario = Scenario::new("mission", Swarm::at_rest(start), legs[0].formation.clone(), delta_m, 6.0);
@@ -204,7 +204,7 @@ fn followers_lag_without_feed_forward_of_the_leaders_acceleration() {
     assert!(exact.iter().all(|&lag_m| lag_m < 1e-3), "{exact:?}");
     assert!(certificate.certified_m.is_some());
     let (late, certificate) = flown(false);
-    assert!(certificate.void.contains(&VoidReason::ReferenceNotFed));
+    assert!(certificate.void.contains(&VoidReason::NoFeedForward));
     let rate_per_s = std::f64::consts::TAU / RADIUS_PERIOD_S;
     let expected_m = 1e4 * rate_per_s * rate_per_s;
     assert!(late.iter().all(|lag_m| (lag_m - expected_m).abs() < 0.01 * expected_m), "{late:?} {expected_m}");

@@ -78,7 +78,7 @@ fn audit_request(subject: Subject<'_>, settings: Settings) -> AuditRequest<'_> {
 fn motion_in_memory_is_judged_like_its_recording() {
     let folder = tempfile::tempdir().expect("a folder");
     let page = folder.path().join("page.html");
-    let subject = Subject::Held { name: "arrays", own: None, open: held() };
+    let subject = Subject::InMemory { name: "arrays", own: None, open: held() };
     let request = AuditRequest {
         command: "audit(...)".to_owned(),
         html: Some(page.clone()),

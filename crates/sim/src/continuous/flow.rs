@@ -28,7 +28,7 @@ impl FreeMotion<'_> {
     }
 
     /// Adds the acceleration by the wind at a time of the solver \[s\], axis by axis.
-    fn blow(&self, time_s: f64, accelerations: &mut [f64]) {
+    fn add_wind(&self, time_s: f64, accelerations: &mut [f64]) {
         let Some(air) = self.air else { return };
         let count = accelerations.len() / 3;
         for i in 0..count {
@@ -91,7 +91,7 @@ impl<'law> Flow<'law> {
 impl Flow<'_> {
     /// Returns the state after `time_s` more under the present accelerations, at the solver's time `now_s`, and the
     /// bend of the way \[m\]. `None` if the law is undefined now.
-    pub(super) fn coasted(&self, now_s: f64, state: &Vec<f64>, time_s: f64) -> Option<(Vec<f64>, f64)> {
+    pub(super) fn coast(&self, now_s: f64, state: &Vec<f64>, time_s: f64) -> Option<(Vec<f64>, f64)> {
         let mut rates = vec![0.0; state.len()];
         self.diff(now_s, state, &mut rates);
         if self.take_failure().is_some() {
@@ -129,7 +129,7 @@ impl ODE<f64, Vec<f64>> for Flow<'_> {
         for ((rate, v), u) in rates[half..].iter_mut().zip(velocities).zip(control.as_slice()) {
             *rate = self.motion.a22_per_s * v + u;
         }
-        self.motion.blow(time_s, &mut rates[half..]);
+        self.motion.add_wind(time_s, &mut rates[half..]);
     }
 }
 

@@ -9,7 +9,7 @@ use differential_equations::ode::{ODE, OrdinaryNumericalMethod as _};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 use super::{Method, RESOLUTION, Tolerances};
-use crate::plant::{self, Path, Plant, PlantError};
+use crate::plant::{self, Plant, PlantError, StepPath};
 use crate::vehicle::{Fleet, State};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm, set_row};
@@ -30,7 +30,7 @@ impl Quadrotors {
     /// Creates quadrotors in the states of a fleet.
     #[must_use]
     pub fn new(mut fleet: Fleet) -> Self {
-        fleet.feel();
+        fleet.compute_wrenches();
         Self { fleet }
     }
 
@@ -74,9 +74,9 @@ impl Plant for Quadrotors {
         self.fleet.count()
     }
 
-    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, path: &mut Path) -> Result<(), PlantError> {
-        self.fleet.remember();
-        self.fleet.blow(dt_s);
+    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, path: &mut StepPath) -> Result<(), PlantError> {
+        self.fleet.save_state();
+        self.fleet.advance_wind(dt_s);
         let mut passed_s = 0.0;
         loop {
             let due_s = self.fleet.run_attitude();
@@ -84,8 +84,8 @@ impl Plant for Quadrotors {
             let due_s = due_s.min(self.fleet.smooth_s(left_s));
             let is_last = due_s >= left_s - ROUNDING * dt_s;
             let length_s = if is_last { left_s } else { due_s };
-            path.bend(self.solve(length_s, left_s)?);
-            self.fleet.pass(length_s);
+            path.raise_bend(self.solve(length_s, left_s)?);
+            self.fleet.advance_clock(length_s);
             passed_s += length_s;
             if is_last {
                 break;
@@ -94,7 +94,7 @@ impl Plant for Quadrotors {
             for (i, state) in self.fleet.states.iter().enumerate() {
                 set_row(&mut places_m, i, state.position_m);
             }
-            path.pass(passed_s, &places_m);
+            path.add_instant(passed_s, &places_m);
         }
         self.fleet.observe(predicted);
         match predicted.first_not_finite() {
@@ -113,7 +113,7 @@ impl Plant for Quadrotors {
     }
 
     fn restore(&mut self, _swarm: &Swarm) {
-        self.fleet.go_back();
+        self.fleet.restore_state();
     }
 
     fn channels(&self) -> Vec<Channel> {
@@ -153,11 +153,11 @@ impl Flow<'_> {
                 )),
                 rates_rad_s: three(10),
                 shares: self.before.states[i].shares,
-                rotors_rpm: lag.after(self.before.states[i].rotors_rpm, self.before.asked_rpm(i)),
+                rotors_rpm: lag.after(self.before.states[i].rotors_rpm, self.before.commanded_rpm(i)),
             };
         }
-        fleet.blow_before(self.before_s - time_s);
-        fleet.feel();
+        fleet.set_wind_time(self.before_s - time_s);
+        fleet.compute_wrenches();
     }
 }
 

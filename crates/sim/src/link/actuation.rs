@@ -41,7 +41,7 @@ impl ImperfectionSpec for ActuationSpec {
     fn voids(&self) -> Vec<VoidReason> {
         let voids = [
             (self.max_accel_m_s2.is_some(), VoidReason::AccelerationLimited),
-            (self.lag_s > 0.0, VoidReason::AccelerationLate),
+            (self.lag_s > 0.0, VoidReason::AccelerationLagged),
         ];
         voids.into_iter().filter_map(|(is, void)| is.then_some(void)).collect()
     }

@@ -165,19 +165,19 @@ impl Scenario {
 
 /// Replaces the commands of failed vehicles.
 #[derive(Clone, Debug)]
-pub(super) struct Failing {
-    all: Vec<Failed>,
+pub(super) struct FailureEffects {
+    all: Vec<FailedVehicle>,
 }
 
 #[derive(Clone, Debug)]
-struct Failed {
+struct FailedVehicle {
     vehicle: usize,
     at_s: f64,
     /// Command after the failure \[m/s^2\]; unknown until the failure if the vehicle keeps its last command.
     kept: Option<Vector3<f64>>,
 }
 
-impl Failing {
+impl FailureEffects {
     pub(super) fn new(scenario: &Scenario) -> Self {
         let failed = scenario.failures.iter().filter_map(|failure| {
             let kept = match failure.kind {
@@ -185,7 +185,7 @@ impl Failing {
                 FailureKind::Frozen {} => None,
                 FailureKind::Silent {} | FailureKind::Rotor { .. } => return None,
             };
-            Some(Failed { vehicle: failure.index(), at_s: failure.at_s, kept })
+            Some(FailedVehicle { vehicle: failure.index(), at_s: failure.at_s, kept })
         });
         Self { all: failed.collect() }
     }

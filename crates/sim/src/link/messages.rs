@@ -4,13 +4,13 @@ use std::collections::VecDeque;
 
 use super::failure::FailureKind;
 use super::history::History;
-use super::network::{NearBy, NetworkSpec};
-use super::noise::{Noise, Source};
-use super::sensing::{SAME_S, Sensing};
+use super::network::{NearStates, NetworkSpec};
+use super::noise::{Noise, NoiseSource};
+use super::sensing::{SAME_S, StateSensor};
 use crate::scenario::Scenario;
 use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::graph::Graph;
-use tautline_laws::observation::Neighbour;
+use tautline_laws::observation::NeighbourState;
 
 /// Random doubles per message on a link: one for its loss, one for its jitter.
 const DRAWS: usize = 2;
@@ -30,15 +30,15 @@ struct Broadcast {
 
 /// Last message received over a link.
 #[derive(Clone, Copy, Debug)]
-struct Heard {
+struct ReceivedMessage {
     number: u64,
-    neighbour: Neighbour,
+    neighbour: NeighbourState,
     measured_s: f64,
 }
 
 /// Two vehicles whose link is down for some time.
 #[derive(Clone, Copy, Debug)]
-struct Down {
+struct LinkOutage {
     ends: [usize; 2],
     from_s: f64,
     to_s: f64,
@@ -57,13 +57,13 @@ pub(super) struct Messages {
     jitter_s: f64,
     loss: Option<Loss>,
     noise: Noise,
-    down: Vec<Down>,
+    down: Vec<LinkOutage>,
     silent_from_s: Vec<f64>,
     /// Number of the next message, from 1.
     next: u64,
     under_way: VecDeque<Broadcast>,
     spare: Vec<Broadcast>,
-    heard: Vec<Heard>,
+    received: Vec<ReceivedMessage>,
     /// Whether the last message on each link was lost; `None` before the first.
     lost_before: Vec<Option<bool>>,
     sent: u64,
@@ -72,22 +72,23 @@ pub(super) struct Messages {
 }
 
 impl Messages {
-    pub(super) fn new(scenario: &Scenario, sensing: &Sensing, rate_hz: f64) -> Self {
+    pub(super) fn new(scenario: &Scenario, sensing: &StateSensor, rate_hz: f64) -> Self {
         let NetworkSpec { latency_s, jitter_s, loss, loss_burst, near, .. } = scenario.network;
         let count = scenario.count();
         let links = match near {
-            NearBy::Seen => Links::of(&scenario.graph),
-            NearBy::Heard => Links::of(&Graph::complete(count)),
+            NearStates::Sensed => Links::of(&scenario.graph),
+            NearStates::Received => Links::of(&Graph::complete(count)),
         };
         let mut known = scenario.start.clone();
-        sensing.know(&History::new(0.0), 0.0, Some(&scenario.start), &mut known);
-        let mut heard = Vec::with_capacity(links.len());
+        sensing.measure(&History::new(0.0), 0.0, Some(&scenario.start), &mut known);
+        let mut received = Vec::with_capacity(links.len());
         for sender in 0..count {
-            let start = Heard { number: 0, neighbour: Neighbour::of(&known, sender, 0.0), measured_s: 0.0 };
-            heard.extend(links.from(sender).map(|_| start));
+            let start =
+                ReceivedMessage { number: 0, neighbour: NeighbourState::of(&known, sender, 0.0), measured_s: 0.0 };
+            received.extend(links.from(sender).map(|_| start));
         }
         let index = |number: u64| usize::try_from(number.saturating_sub(1)).unwrap_or(usize::MAX);
-        let down = scenario.network.failure.iter().map(|failure| Down {
+        let down = scenario.network.failure.iter().map(|failure| LinkOutage {
             ends: failure.link.map(index),
             from_s: failure.from_s,
             to_s: failure.to_s.unwrap_or(f64::INFINITY),
@@ -102,14 +103,14 @@ impl Messages {
             latency_s,
             jitter_s,
             loss: (loss > 0.0).then(|| Loss::new(loss, loss_burst)),
-            noise: Noise::new(scenario.noise_seed, Source::Radio),
+            noise: Noise::new(scenario.noise_seed, NoiseSource::Messages),
             down: down.collect(),
             silent_from_s,
             next: 1,
             under_way: VecDeque::new(),
             spare: Vec::new(),
             lost_before: vec![None; links.len()],
-            heard,
+            received,
             links,
             sent: 0,
             lost: 0,
@@ -132,7 +133,7 @@ impl Messages {
     }
 
     /// Sends the messages that are due up to a time \[s\], and delivers those that have arrived.
-    pub(super) fn settle(&mut self, time_s: f64, sensing: &Sensing, history: &History) {
+    pub(super) fn settle(&mut self, time_s: f64, sensing: &StateSensor, history: &History) {
         loop {
             let sent_s = self.begins_s + (self.next - 1) as f64 / self.rate_hz;
             if sent_s > time_s + SAME_S {
@@ -143,7 +144,7 @@ impl Messages {
         self.deliver(time_s);
     }
 
-    fn send(&mut self, sent_s: f64, sensing: &Sensing, history: &History) {
+    fn send(&mut self, sent_s: f64, sensing: &StateSensor, history: &History) {
         let mut broadcast = self.spare.pop().unwrap_or_else(|| Broadcast {
             number: 0,
             sent_s,
@@ -153,7 +154,7 @@ impl Messages {
         });
         (broadcast.number, broadcast.sent_s) = (self.next, sent_s);
         broadcast.measured_s = sensing.measured_s(sent_s);
-        sensing.know(history, sent_s, None, &mut broadcast.states);
+        sensing.measure(history, sent_s, None, &mut broadcast.states);
         for sender in 0..self.links.count() {
             if sent_s + SAME_S < self.silent_from_s[sender] {
                 self.send_from(sender, &mut broadcast);
@@ -161,27 +162,27 @@ impl Messages {
                 self.links.from(sender).for_each(|(link, _)| broadcast.arrives_s[link] = f64::INFINITY);
             }
         }
-        self.heard.iter().for_each(|heard| self.ages.take(sent_s - heard.measured_s));
+        self.received.iter().for_each(|received| self.ages.take(sent_s - received.measured_s));
         self.next += 1;
         self.under_way.push_back(broadcast);
     }
 
     fn send_from(&mut self, sender: usize, broadcast: &mut Broadcast) {
-        let hearers = self.links.from(sender).len();
+        let receivers = self.links.from(sender).len();
         let is_random = self.loss.is_some() || self.jitter_s > 0.0;
-        let mut draw = is_random.then(|| self.noise.draw(sender, 0, self.next, DRAWS * hearers));
-        for (link, hearer) in self.links.from(sender) {
-            let [unit, late] = draw.as_mut().map_or([0.0; DRAWS], |draw| [draw.unit(), draw.unit()]);
+        let mut draw = is_random.then(|| self.noise.draw(sender, 0, self.next, DRAWS * receivers));
+        for (link, receiver) in self.links.from(sender) {
+            let [unit, jitter] = draw.as_mut().map_or([0.0; DRAWS], |draw| [draw.unit(), draw.unit()]);
             let by_chance = self.loss.is_some_and(|loss| {
                 let is_lost = loss.next(self.lost_before[link], unit);
                 self.lost_before[link] = Some(is_lost);
                 is_lost
             });
-            let is_lost = by_chance || self.down.iter().any(|down| down.stops(sender, hearer, broadcast.sent_s));
+            let is_lost = by_chance || self.down.iter().any(|down| down.blocks(sender, receiver, broadcast.sent_s));
             self.sent += 1;
             self.lost += u64::from(is_lost);
             broadcast.arrives_s[link] =
-                if is_lost { f64::INFINITY } else { broadcast.sent_s + self.latency_s + self.jitter_s * late };
+                if is_lost { f64::INFINITY } else { broadcast.sent_s + self.latency_s + self.jitter_s * jitter };
         }
     }
 
@@ -193,10 +194,10 @@ impl Messages {
             }
             for sender in 0..self.links.count() {
                 for (link, _) in self.links.from(sender) {
-                    if broadcast.arrives_s[link] <= time_s + SAME_S && broadcast.number > self.heard[link].number {
-                        self.heard[link] = Heard {
+                    if broadcast.arrives_s[link] <= time_s + SAME_S && broadcast.number > self.received[link].number {
+                        self.received[link] = ReceivedMessage {
                             number: broadcast.number,
-                            neighbour: Neighbour::of(&broadcast.states, sender, 0.0),
+                            neighbour: NeighbourState::of(&broadcast.states, sender, 0.0),
                             measured_s: broadcast.measured_s,
                         };
                     }
@@ -210,19 +211,27 @@ impl Messages {
     }
 
     /// Returns the last state of vehicle `j` that vehicle `i` received, at a time \[s\]; `None` without a link.
-    pub(super) fn heard(&self, i: usize, j: usize, time_s: f64) -> Option<Neighbour> {
-        let heard = self.heard[self.links.find(i, j)?];
-        Some(Neighbour { age_s: (time_s - heard.measured_s).max(0.0), ..heard.neighbour })
+    pub(super) fn received(&self, i: usize, j: usize, time_s: f64) -> Option<NeighbourState> {
+        let received = self.received[self.links.find(i, j)?];
+        Some(NeighbourState { age_s: (time_s - received.measured_s).max(0.0), ..received.neighbour })
     }
 
     /// Returns the largest distance \[m\] of a received position from the true position of its sender.
-    pub(super) fn farthest_m(&self, positions_m: &Rows, carried: impl Fn(Neighbour) -> Neighbour, time_s: f64) -> f64 {
-        (0..self.links.count()).fold(0.0, |farthest_m, sender| {
+    pub(super) fn largest_error_m(
+        &self,
+        positions_m: &Rows,
+        extrapolated: impl Fn(NeighbourState) -> NeighbourState,
+        time_s: f64,
+    ) -> f64 {
+        (0..self.links.count()).fold(0.0, |largest_error_m, sender| {
             let place_m = row(positions_m, sender);
-            self.links.from(sender).fold(farthest_m, |farthest_m: f64, (link, _)| {
-                let heard = self.heard[link];
-                let held = carried(Neighbour { age_s: (time_s - heard.measured_s).max(0.0), ..heard.neighbour });
-                farthest_m.max((held.position_m - place_m).norm())
+            self.links.from(sender).fold(largest_error_m, |largest_error_m: f64, (link, _)| {
+                let received = self.received[link];
+                let held = extrapolated(NeighbourState {
+                    age_s: (time_s - received.measured_s).max(0.0),
+                    ..received.neighbour
+                });
+                largest_error_m.max((held.position_m - place_m).norm())
             })
         })
     }
@@ -231,25 +240,25 @@ impl Messages {
     pub(super) fn write_ages(&self, time_s: f64, oldest_and_mean_s: &mut [f64]) {
         oldest_and_mean_s.fill(0.0);
         for sender in 0..self.links.count() {
-            for (link, hearer) in self.links.from(sender) {
-                let age_s = (time_s - self.heard[link].measured_s).max(0.0);
-                let [oldest_s, sum_s] = [2 * hearer, 2 * hearer + 1];
+            for (link, receiver) in self.links.from(sender) {
+                let age_s = (time_s - self.received[link].measured_s).max(0.0);
+                let [oldest_s, sum_s] = [2 * receiver, 2 * receiver + 1];
                 oldest_and_mean_s[oldest_s] = oldest_and_mean_s[oldest_s].max(age_s);
                 oldest_and_mean_s[sum_s] += age_s;
             }
         }
-        for hearer in 0..self.links.count() {
-            // Links are bidirectional: a vehicle hears as many vehicles as hear it.
-            let neighbours = self.links.from(hearer).len().max(1);
-            oldest_and_mean_s[2 * hearer + 1] /= neighbours as f64;
+        for receiver in 0..self.links.count() {
+            // Links are bidirectional: a vehicle receives from as many vehicles as it sends to.
+            let neighbours = self.links.from(receiver).len().max(1);
+            oldest_and_mean_s[2 * receiver + 1] /= neighbours as f64;
         }
     }
 }
 
-impl Down {
-    fn stops(&self, sender: usize, hearer: usize, sent_s: f64) -> bool {
+impl LinkOutage {
+    fn blocks(&self, sender: usize, receiver: usize, sent_s: f64) -> bool {
         let [a, b] = self.ends;
-        let is_this = (sender, hearer) == (a, b) || (sender, hearer) == (b, a);
+        let is_this = (sender, receiver) == (a, b) || (sender, receiver) == (b, a);
         is_this && (self.from_s..self.to_s).contains(&(sent_s + SAME_S))
     }
 }
@@ -302,13 +311,13 @@ impl Ages {
     }
 }
 
-/// Links of a graph, one for each direction, ordered by sender and then by hearer.
+/// Links of a graph, one for each direction, ordered by sender and then by receiver.
 #[derive(Clone, Debug)]
 pub(super) struct Links {
     count: usize,
-    /// Hearers of vehicle j: `hearers[offsets[j]..offsets[j + 1]]`, ascending.
+    /// Receivers of vehicle j: `receivers[offsets[j]..offsets[j + 1]]`, ascending.
     offsets: Vec<usize>,
-    hearers: Vec<usize>,
+    receivers: Vec<usize>,
 }
 
 impl Links {
@@ -320,20 +329,20 @@ impl Links {
             offsets[j + 1] += 1;
         }
         (0..count).for_each(|i| offsets[i + 1] += offsets[i]);
-        let (mut next, mut hearers) = (offsets.clone(), vec![0; 2 * graph.edge_count()]);
+        let (mut next, mut receivers) = (offsets.clone(), vec![0; 2 * graph.edge_count()]);
         for (i, j) in graph.edges() {
             for (from, to) in [(i, j), (j, i)] {
-                hearers[next[from]] = to;
+                receivers[next[from]] = to;
                 next[from] += 1;
             }
         }
-        // Edges come in row order: each vehicle gets its hearers of smaller index before those of larger index.
-        Self { count, offsets, hearers }
+        // Edges come in row order: each vehicle gets its receivers of smaller index before those of larger index.
+        Self { count, offsets, receivers }
     }
 
     /// Returns the number of directed links.
     pub(super) fn len(&self) -> usize {
-        self.hearers.len()
+        self.receivers.len()
     }
 
     /// Returns the number of vehicles.
@@ -341,16 +350,16 @@ impl Links {
         self.count
     }
 
-    /// Returns the links of a sender, each with its hearer.
+    /// Returns the links of a sender, each with its receiver.
     pub(super) fn from(&self, sender: usize) -> impl ExactSizeIterator<Item = (usize, usize)> + '_ {
         let places = self.offsets[sender]..self.offsets[sender + 1];
-        places.clone().zip(&self.hearers[places]).map(|(link, &hearer)| (link, hearer))
+        places.clone().zip(&self.receivers[places]).map(|(link, &receiver)| (link, receiver))
     }
 
-    /// Returns the link from a sender to a hearer.
-    pub(super) fn find(&self, hearer: usize, sender: usize) -> Option<usize> {
+    /// Returns the link from a sender to a receiver.
+    pub(super) fn find(&self, receiver: usize, sender: usize) -> Option<usize> {
         let from = self.offsets[sender];
-        self.hearers[from..self.offsets[sender + 1]].binary_search(&hearer).ok().map(|place| from + place)
+        self.receivers[from..self.offsets[sender + 1]].binary_search(&receiver).ok().map(|place| from + place)
     }
 }
 
@@ -386,7 +395,7 @@ impl Loss {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::link::noise::{Noise, Source};
+    use crate::link::noise::{Noise, NoiseSource};
 
     #[test]
     fn quantiles_are_known_to_a_hundredth() {
@@ -409,8 +418,8 @@ mod tests {
             assert_eq!((links.len(), links.count()), (2 * graph.edge_count(), graph.count()));
             let mut met = vec![false; links.len()];
             for sender in 0..graph.count() {
-                for (link, hearer) in links.from(sender) {
-                    assert!(graph.has_edge(sender, hearer) && links.find(hearer, sender) == Some(link));
+                for (link, receiver) in links.from(sender) {
+                    assert!(graph.has_edge(sender, receiver) && links.find(receiver, sender) == Some(link));
                     met[link] = true;
                 }
                 assert_eq!(links.find(sender, sender), None);
@@ -424,7 +433,7 @@ mod tests {
     fn measured(loss: Loss, messages: u64) -> (f64, f64) {
         // Numbers are drawn in runs, because each draw begins a block of the generator.
         const RUN: usize = 4096;
-        let noise = Noise::new(3, Source::Radio);
+        let noise = Noise::new(3, NoiseSource::Messages);
         let mut draw = noise.draw(0, 0, 0, RUN);
         let (mut before, mut lost, mut bursts) = (None, 0_u64, 0_u64);
         for number in 0..messages {

@@ -2,7 +2,8 @@
 //!
 //! Each imperfection is a file of this module. The file holds the table of the scenario, which implements
 //! [`ImperfectionSpec`], and its simulation in flight. [`of`] combines all of them into one [`Imperfections`].
-//! [`Direct`] has no imperfection: laws read the true state without a copy. docs/imperfections.md has the equations.
+//! Without imperfections ([`NoImperfections`]), laws read the true state without a copy. docs/imperfections.md has the
+//! equations.
 //!
 //! Sensors measure and vehicles send at fixed times, which need not be the ends of steps. [`Imperfections::settle`]
 //! makes the measurements and messages that are due. Each depends only on the seed, the vehicle and its sequence
@@ -19,21 +20,21 @@ mod sensing;
 pub use actuation::ActuationSpec;
 pub use failure::{Failure, FailureKind};
 pub use history::History;
-pub use network::{LinkFailure, NearBy, NetworkSpec, StalePolicy};
+pub use network::{LinkFailure, NearStates, NetworkSpec, StalePolicy};
 pub use sensing::SensingSpec;
 
 use actuation::Actuation;
 use dyn_clone::DynClone;
-use failure::Failing;
+use failure::FailureEffects;
 use network::Network;
-use sensing::{Sensing, Sight};
+use sensing::{RelativeSensor, StateSensor};
 use serde::{Deserialize, Serialize};
 
 use crate::scenario::{Scenario, ScenarioError};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::law::VoidReason;
-use tautline_laws::observation::{Neighbour, Others, Picture};
+use tautline_laws::observation::{NeighbourState, NeighbourStates, OtherStates};
 
 /// A table of the scenario that describes an imperfection.
 pub trait ImperfectionSpec {
@@ -97,7 +98,7 @@ pub trait Imperfections: DynClone + Send {
     ///
     /// In continuous time the integrator also calls this for trial states, in any order of time. Only states that
     /// [`Imperfections::accept`] receives are part of the flight.
-    fn sense<'a>(&'a mut self, time_s: f64, truth: &'a Swarm) -> Sensed<'a>;
+    fn sense<'a>(&'a mut self, time_s: f64, truth: &'a Swarm) -> StateEstimates<'a>;
 
     /// Changes the commanded accelerations \[m/s^2\], N x 3, into those that reach the vehicles. Between two commands
     /// of the law, `_command` is the held command. Of two calls for the same instant the last counts.
@@ -144,11 +145,11 @@ dyn_clone::clone_trait_object!(Imperfections);
 
 /// Knowledge of the vehicles at one instant.
 #[derive(Clone, Copy, Debug)]
-pub struct Sensed<'a> {
+pub struct StateEstimates<'a> {
     /// Knowledge of each vehicle of its own state.
     pub own: &'a Swarm,
     /// Knowledge of the vehicles of each other.
-    pub others: Others<'a>,
+    pub others: OtherStates<'a>,
 }
 
 /// Messages of a network up to now.
@@ -165,11 +166,11 @@ pub struct Traffic {
 
 /// A link without imperfections.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Direct;
+pub struct NoImperfections;
 
-impl Imperfections for Direct {
-    fn sense<'a>(&'a mut self, _time_s: f64, truth: &'a Swarm) -> Sensed<'a> {
-        Sensed { own: truth, others: Others::Shared }
+impl Imperfections for NoImperfections {
+    fn sense<'a>(&'a mut self, _time_s: f64, truth: &'a Swarm) -> StateEstimates<'a> {
+        StateEstimates { own: truth, others: OtherStates::Shared }
     }
 
     fn is_exact(&self) -> bool {
@@ -214,28 +215,28 @@ fn is_default<T: Default + PartialEq>(value: &T) -> bool {
 /// Solver steps of continuous time within the shortest delay, so that the past is interpolated finely enough.
 const STEPS_PER_DELAY: f64 = 8.0;
 
-/// Returns the imperfections of a scenario, [`Direct`] if it has none. `senses` is whether the law senses near
+/// Returns the imperfections of a scenario, [`NoImperfections`] if it has none. `senses` is whether the law senses near
 /// vehicles.
 #[must_use]
 pub fn of(scenario: &Scenario, senses: bool) -> Box<dyn Imperfections> {
-    if scenario.is_exact() { Box::new(Direct) } else { Box::new(World::new(scenario, senses)) }
+    if scenario.is_exact() { Box::new(NoImperfections) } else { Box::new(ScenarioImperfections::new(scenario, senses)) }
 }
 
 /// Sensors, network and actuators of a scenario.
 #[derive(Clone, Debug)]
-struct World {
+struct ScenarioImperfections {
     history: History,
-    sensing: Sensing,
-    sight: Sight,
+    sensing: StateSensor,
+    relative_sensor: RelativeSensor,
     network: Network,
     actuation: Actuation,
-    failing: Failing,
+    failures: FailureEffects,
     missing: StalePolicy,
-    near: NearBy,
+    near: NearStates,
     /// Whether all vehicles use each sender's knowledge of its own state, without communication effects.
     is_shared: bool,
     /// Whether vehicles know their true present state.
-    knows_itself: bool,
+    has_exact_own_state: bool,
     time_s: f64,
     own: Swarm,
     /// Bound on the difference between a separation in the law and the same separation in the search for near
@@ -243,20 +244,20 @@ struct World {
     slack_m: f64,
 }
 
-impl World {
+impl ScenarioImperfections {
     fn new(scenario: &Scenario, senses: bool) -> Self {
-        let (sensing, sight) = (Sensing::new(scenario), Sight::new(scenario));
+        let (sensing, relative_sensor) = (StateSensor::new(scenario), RelativeSensor::new(scenario));
         let network = Network::new(scenario, &sensing);
-        let span_s = sensing.span_s().max(sight.span_s()) + scenario.network.latency_s;
+        let span_s = sensing.span_s().max(relative_sensor.span_s()) + scenario.network.latency_s;
         Self {
             history: History::new(span_s),
-            is_shared: matches!(network, Network::None) && (!senses || sight.is_own()),
-            knows_itself: sensing.is_exact(),
+            is_shared: matches!(network, Network::None) && (!senses || relative_sensor.uses_own_measurements()),
+            has_exact_own_state: sensing.is_exact(),
             sensing,
-            sight,
+            relative_sensor,
             network,
             actuation: Actuation::new(scenario),
-            failing: Failing::new(scenario),
+            failures: FailureEffects::new(scenario),
             missing: scenario.network.missing,
             near: scenario.network.near,
             time_s: 0.0,
@@ -266,71 +267,71 @@ impl World {
     }
 
     /// Extrapolates a received state to the time of the receiver's own measurement, unless states are held.
-    fn carried(&self, heard: Neighbour) -> Neighbour {
+    fn extrapolated(&self, received: NeighbourState) -> NeighbourState {
         if self.missing == StalePolicy::Hold {
-            return heard;
+            return received;
         }
         let own_age_s = self.time_s - self.sensing.measured_s(self.time_s);
-        let ahead_s = (heard.age_s - own_age_s).max(0.0);
-        Neighbour { position_m: heard.position_m + heard.velocity_m_s * ahead_s, ..heard }
+        let ahead_s = (received.age_s - own_age_s).max(0.0);
+        NeighbourState { position_m: received.position_m + received.velocity_m_s * ahead_s, ..received }
     }
 
     /// Updates the slack. Near vehicles are searched for at true positions, but the law uses own positions as known
     /// and positions as received.
-    fn find_slack(&mut self, truth: &Swarm) {
+    fn update_slack(&mut self, truth: &Swarm) {
         let own = (0..self.own.count())
             .map(|i| (row(&self.own.positions_m, i) - row(&truth.positions_m, i)).norm())
             .fold(0.0, f64::max);
-        let carried = |heard: Neighbour| self.carried(heard);
-        let others = self.network.farthest_m(&truth.positions_m, carried, self.time_s, own);
+        let extrapolated = |received: NeighbourState| self.extrapolated(received);
+        let others = self.network.largest_error_m(&truth.positions_m, extrapolated, self.time_s, own);
         self.slack_m = own + others;
     }
 }
 
-impl Picture for World {
-    fn heard(&self, i: usize, j: usize) -> Neighbour {
-        let heard = self.network.heard(i, j, self.time_s).map(|heard| self.carried(heard));
-        heard.unwrap_or_else(|| Neighbour::of(&self.own, j, self.time_s - self.sensing.measured_s(self.time_s)))
+impl NeighbourStates for ScenarioImperfections {
+    fn received(&self, i: usize, j: usize) -> NeighbourState {
+        let received = self.network.received(i, j, self.time_s).map(|received| self.extrapolated(received));
+        received.unwrap_or_else(|| NeighbourState::of(&self.own, j, self.time_s - self.sensing.measured_s(self.time_s)))
     }
 
-    fn seen(&self, i: usize, j: usize) -> Neighbour {
+    fn sensed(&self, i: usize, j: usize) -> NeighbourState {
         match self.near {
-            NearBy::Seen => self.sight.of(&self.own, i, j),
-            NearBy::Heard => self.heard(i, j),
+            NearStates::Sensed => self.relative_sensor.of(&self.own, i, j),
+            NearStates::Received => self.received(i, j),
         }
     }
 
-    fn is_of(&self, count: usize) -> bool {
+    fn matches_count(&self, count: usize) -> bool {
         self.own.count() == count
     }
 
-    fn near_from(&self) -> Option<(&Rows, f64)> {
-        Some((self.sight.seen_m(), self.slack_m))
+    fn near_search_positions(&self) -> Option<(&Rows, f64)> {
+        Some((self.relative_sensor.true_positions_m(), self.slack_m))
     }
 }
 
-impl Imperfections for World {
-    fn sense<'a>(&'a mut self, time_s: f64, truth: &'a Swarm) -> Sensed<'a> {
+impl Imperfections for ScenarioImperfections {
+    fn sense<'a>(&'a mut self, time_s: f64, truth: &'a Swarm) -> StateEstimates<'a> {
         self.time_s = time_s;
         if self.is_shared {
-            if self.knows_itself {
-                return Sensed { own: truth, others: Others::Shared };
+            if self.has_exact_own_state {
+                return StateEstimates { own: truth, others: OtherStates::Shared };
             }
-            self.sensing.know_now(&self.history, time_s, truth, &mut self.own);
-            return Sensed { own: &self.own, others: Others::Shared };
+            self.sensing.update(&self.history, time_s, truth, &mut self.own);
+            return StateEstimates { own: &self.own, others: OtherStates::Shared };
         }
-        self.sensing.know_now(&self.history, time_s, truth, &mut self.own);
-        self.sight.look(&self.history, time_s, truth);
-        self.network.hear(time_s, &self.sensing, &self.history);
-        if self.near == NearBy::Heard {
+        self.sensing.update(&self.history, time_s, truth, &mut self.own);
+        self.relative_sensor.measure(&self.history, time_s, truth);
+        self.network.update(time_s, &self.sensing, &self.history);
+        if self.near == NearStates::Received {
             // Sensed positions are the true ones here; the slack covers the difference to received positions.
-            self.find_slack(truth);
+            self.update_slack(truth);
         }
-        Sensed { own: &self.own, others: Others::Held(self) }
+        StateEstimates { own: &self.own, others: OtherStates::PerVehicle(self) }
     }
 
     fn actuate(&mut self, time_s: f64, command: &mut Rows) {
-        self.failing.act(time_s, command);
+        self.failures.act(time_s, command);
         self.actuation.act(time_s, command);
     }
 
@@ -341,7 +342,7 @@ impl Imperfections for World {
     fn forget_after(&mut self, time_s: f64) {
         self.history.forget_after(time_s);
         self.sensing.forget_after(time_s);
-        self.sight.forget_after(time_s);
+        self.relative_sensor.forget_after(time_s);
     }
 
     fn settle(&mut self, time_s: f64) {
@@ -350,8 +351,8 @@ impl Imperfections for World {
     }
 
     fn longest_step_s(&self) -> f64 {
-        let heard_s = self.network.delay_s().map_or(0.0, |delay_s| self.sensing.latency_s() + delay_s);
-        let delays = [self.sensing.latency_s(), self.sight.latency_s(), heard_s];
+        let received_s = self.network.delay_s().map_or(0.0, |delay_s| self.sensing.latency_s() + delay_s);
+        let delays = [self.sensing.latency_s(), self.relative_sensor.latency_s(), received_s];
         let shortest_s = delays.into_iter().filter(|delay_s| *delay_s > 0.0).fold(f64::INFINITY, f64::min);
         shortest_s / STEPS_PER_DELAY
     }
@@ -370,7 +371,7 @@ impl Imperfections for World {
 
     fn reseed(&mut self, seed: u64) {
         self.sensing.reseed(seed);
-        self.sight.reseed(seed);
+        self.relative_sensor.reseed(seed);
         self.network.reseed(seed);
     }
 }

@@ -6,13 +6,13 @@ use serde::{Deserialize, Serialize};
 use super::failure::Failure;
 use super::history::History;
 use super::messages::Messages;
-use super::sensing::Sensing;
+use super::sensing::StateSensor;
 use super::{ImperfectionSpec, Traffic, is_default, is_off, latency};
 use crate::scenario::{MAX_MEMORY_BYTES, Scenario, ScenarioError};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::law::VoidReason;
-use tautline_laws::observation::Neighbour;
+use tautline_laws::observation::NeighbourState;
 
 /// Messages between vehicles over links: without loss and delay, in continuous time unless given.
 #[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
@@ -45,8 +45,8 @@ pub struct NetworkSpec {
     pub missing: StalePolicy,
     /// How a vehicle knows near vehicles, with or without a link.
     #[serde(skip_serializing_if = "is_default")]
-    #[schemars(extend("default" = NearBy::default()))]
-    pub near: NearBy,
+    #[schemars(extend("default" = NearStates::default()))]
+    pub near: NearStates,
     /// Links that are down for some time. Needs `rate_hz`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub failure: Vec<LinkFailure>,
@@ -65,13 +65,14 @@ pub enum StalePolicy {
 
 /// How a vehicle knows near vehicles.
 #[derive(Clone, Copy, Debug, Default, Deserialize, Eq, PartialEq, Serialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum NearBy {
+pub enum NearStates {
     /// With a sensor on board, independent of the network.
     #[default]
-    Seen,
+    #[serde(rename = "seen")]
+    Sensed,
     /// By messages that each vehicle sends to all others.
-    Heard,
+    #[serde(rename = "heard")]
+    Received,
 }
 
 /// A link that is down for some time. Messages over it are lost in both directions.
@@ -99,7 +100,8 @@ impl NetworkSpec {
 
 impl ImperfectionSpec for NetworkSpec {
     fn is_exact(&self) -> bool {
-        Self { missing: StalePolicy::Hold, near: NearBy::Seen, loss_burst: None, ..self.clone() } == Self::default()
+        Self { missing: StalePolicy::Hold, near: NearStates::Sensed, loss_burst: None, ..self.clone() }
+            == Self::default()
     }
 
     fn is_random(&self) -> bool {
@@ -128,7 +130,7 @@ impl ImperfectionSpec for NetworkSpec {
 
     fn voids(&self) -> Vec<VoidReason> {
         let is_late = self.latency_s > 0.0 || self.rate_hz.is_some();
-        let voids = [(is_late, VoidReason::HeardLate), (self.loses(), VoidReason::MessagesLost)];
+        let voids = [(is_late, VoidReason::MessagesDelayed), (self.loses(), VoidReason::MessagesLost)];
         voids.into_iter().filter_map(|(is, void)| is.then_some(void)).collect()
     }
 }
@@ -166,7 +168,7 @@ impl Scenario {
         let index = |number: u64| usize::try_from(number).unwrap_or(usize::MAX).checked_sub(1);
         let is_link = match (index(a), index(b)) {
             (Some(i), Some(j)) if i != j && i.max(j) < self.count() => {
-                self.network.near == NearBy::Heard || self.graph.has_edge(i, j)
+                self.network.near == NearStates::Received || self.graph.has_edge(i, j)
             }
             _ => false,
         };
@@ -204,16 +206,17 @@ impl Scenario {
         }
         let count = self.count() as u128;
         let pairs = count * count.saturating_sub(1);
-        let heard = if self.network.near == NearBy::Heard { pairs } else { 2 * self.graph.edge_count() as u128 };
+        let received =
+            if self.network.near == NearStates::Received { pairs } else { 2 * self.graph.edge_count() as u128 };
         let under_way = ((self.network.latency_s + self.network.jitter_s) * rate_hz).ceil() + 2.0;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "more than 2; too many saturate")]
-        let bytes = heard.saturating_mul(BYTES_PER_LINK + BYTES_PER_MESSAGE * under_way as u128);
+        let bytes = received.saturating_mul(BYTES_PER_LINK + BYTES_PER_MESSAGE * under_way as u128);
         if bytes <= MAX_MEMORY_BYTES {
             return Ok(());
         }
         let gib = MAX_MEMORY_BYTES >> 30;
         Err(ScenarioError::new(format!(
-            "messages over {heard} links need {} GiB of memory, more than the limit of {gib} GiB",
+            "messages over {received} links need {} GiB of memory, more than the limit of {gib} GiB",
             bytes >> 30
         ))
         .coded("scenario/memory")
@@ -241,51 +244,53 @@ pub(super) enum Network {
     /// Measurements of the other vehicles, without delay.
     None,
     /// Measurements of the other vehicles after a constant delay.
-    Late(Late),
+    Delayed(DelayedStates),
     /// Single messages at a rate.
     Messages(Box<Messages>),
 }
 
 /// Communication with a constant delay.
 #[derive(Clone, Debug)]
-pub(super) struct Late {
-    by_s: f64,
+pub(super) struct DelayedStates {
+    delay_s: f64,
     known: Swarm,
     measured_s: f64,
 }
 
 impl Network {
-    pub(super) fn new(scenario: &Scenario, sensing: &Sensing) -> Self {
+    pub(super) fn new(scenario: &Scenario, sensing: &StateSensor) -> Self {
         let late_s = scenario.network.latency_s;
-        let is_heard = !scenario.network.is_exact() || scenario.failures.iter().any(Failure::is_silent);
-        match scenario.message_hz().filter(|_| is_heard) {
+        let has_messages = !scenario.network.is_exact() || scenario.failures.iter().any(Failure::is_silent);
+        match scenario.message_hz().filter(|_| has_messages) {
             Some(rate_hz) => Self::Messages(Box::new(Messages::new(scenario, sensing, rate_hz))),
-            None if late_s > 0.0 => Self::Late(Late { by_s: late_s, known: scenario.start.clone(), measured_s: 0.0 }),
+            None if late_s > 0.0 => {
+                Self::Delayed(DelayedStates { delay_s: late_s, known: scenario.start.clone(), measured_s: 0.0 })
+            }
             None => Self::None,
         }
     }
 
-    /// Returns the state of `sender` that `hearer` knows at a time \[s\]; `None` without a delay or
+    /// Returns the state of `sender` that `receiver` knows at a time \[s\]; `None` without a delay or
     /// without a link.
-    pub(super) fn heard(&self, hearer: usize, sender: usize, time_s: f64) -> Option<Neighbour> {
+    pub(super) fn received(&self, receiver: usize, sender: usize, time_s: f64) -> Option<NeighbourState> {
         match self {
             Self::None => None,
-            Self::Late(late) => Some(Neighbour::of(&late.known, sender, time_s - late.measured_s)),
-            Self::Messages(messages) => messages.heard(hearer, sender, time_s),
+            Self::Delayed(delayed) => Some(NeighbourState::of(&delayed.known, sender, time_s - delayed.measured_s)),
+            Self::Messages(messages) => messages.received(receiver, sender, time_s),
         }
     }
 
     /// Updates the delayed states to a time \[s\].
-    pub(super) fn hear(&mut self, time_s: f64, sensing: &Sensing, history: &History) {
-        if let Self::Late(late) = self {
-            let said_s = (time_s - late.by_s).max(0.0);
-            late.measured_s = sensing.measured_s(said_s);
-            sensing.know(history, said_s, None, &mut late.known);
+    pub(super) fn update(&mut self, time_s: f64, sensing: &StateSensor, history: &History) {
+        if let Self::Delayed(delayed) = self {
+            let sent_s = (time_s - delayed.delay_s).max(0.0);
+            delayed.measured_s = sensing.measured_s(sent_s);
+            sensing.measure(history, sent_s, None, &mut delayed.known);
         }
     }
 
     /// Sends and delivers the messages that are due by a time \[s\].
-    pub(super) fn settle(&mut self, time_s: f64, sensing: &Sensing, history: &History) {
+    pub(super) fn settle(&mut self, time_s: f64, sensing: &StateSensor, history: &History) {
         if let Self::Messages(messages) = self {
             messages.settle(time_s, sensing, history);
         }
@@ -293,33 +298,33 @@ impl Network {
 
     /// Returns the largest distance \[m\] between the true position of a vehicle and its position as known to another;
     /// `own_m` without a delay.
-    pub(super) fn farthest_m(
+    pub(super) fn largest_error_m(
         &self,
         positions_m: &Rows,
-        carried: impl Fn(Neighbour) -> Neighbour,
+        extrapolated: impl Fn(NeighbourState) -> NeighbourState,
         time_s: f64,
         own_m: f64,
     ) -> f64 {
         match self {
             Self::None => own_m,
-            Self::Late(late) => (0..late.known.count())
-                .map(|i| Neighbour::of(&late.known, i, time_s - late.measured_s))
+            Self::Delayed(delayed) => (0..delayed.known.count())
+                .map(|i| NeighbourState::of(&delayed.known, i, time_s - delayed.measured_s))
                 .enumerate()
-                .map(|(i, heard)| (carried(heard).position_m - row(positions_m, i)).norm())
+                .map(|(i, received)| (extrapolated(received).position_m - row(positions_m, i)).norm())
                 .fold(0.0, f64::max),
-            Self::Messages(messages) => messages.farthest_m(positions_m, carried, time_s),
+            Self::Messages(messages) => messages.largest_error_m(positions_m, extrapolated, time_s),
         }
     }
 
     /// Returns the constant delay \[s\], if the communication has one.
     pub(super) fn delay_s(&self) -> Option<f64> {
-        if let Self::Late(late) = self { Some(late.by_s) } else { None }
+        if let Self::Delayed(delayed) = self { Some(delayed.delay_s) } else { None }
     }
 
     pub(super) fn channels(&self) -> Vec<Channel> {
         match self {
             Self::None => Vec::new(),
-            Self::Late(_) | Self::Messages(_) => vec![Channel::new("message_age", &["oldest_s", "mean_s"])],
+            Self::Delayed(_) | Self::Messages(_) => vec![Channel::new("message_age", &["oldest_s", "mean_s"])],
         }
     }
 
@@ -328,7 +333,7 @@ impl Network {
         ages.values.resize(2 * count, 0.0);
         match self {
             Self::None => {}
-            Self::Late(late) => ages.values.fill(time_s - late.measured_s),
+            Self::Delayed(delayed) => ages.values.fill(time_s - delayed.measured_s),
             Self::Messages(messages) => messages.write_ages(time_s, &mut ages.values),
         }
     }

@@ -11,15 +11,15 @@ const DOUBLE_WORDS: usize = 2;
 
 /// Use of random numbers; each source has its own streams.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Source {
+pub(super) enum NoiseSource {
     /// Errors of vehicles' measurements of themselves.
     Own,
     /// Constant errors of vehicles' measurements of themselves.
     Bias,
     /// Errors of vehicles' measurements of each other.
-    Sight,
+    RelativeSensor,
     /// Losses and delays of messages.
-    Radio,
+    Messages,
 }
 
 /// Random numbers that depend only on a seed, a source, a pair of vehicles and the number of the draw, not on the order
@@ -27,13 +27,13 @@ pub(super) enum Source {
 #[derive(Clone, Debug)]
 pub(super) struct Noise {
     random: ChaCha8Rng,
-    source: Source,
+    source: NoiseSource,
     /// Last draw made before the seed was changed, and its generator.
     before: Option<(u64, ChaCha8Rng)>,
 }
 
 impl Noise {
-    pub(super) fn new(seed: u64, source: Source) -> Self {
+    pub(super) fn new(seed: u64, source: NoiseSource) -> Self {
         Self { random: ChaCha8Rng::seed_from_u64(seed), source, before: None }
     }
 
@@ -89,7 +89,7 @@ mod tests {
 
     #[test]
     fn a_draw_depends_only_on_source_vehicles_and_number() {
-        let noise = Noise::new(7, Source::Own);
+        let noise = Noise::new(7, NoiseSource::Own);
         let first = noise.draw(3, 0, 41, 6).six_normals();
         noise.draw(3, 0, 42, 6).six_normals();
         assert_eq!(noise.draw(3, 0, 41, 6).six_normals(), first);
@@ -97,8 +97,8 @@ mod tests {
             noise.draw(3, 0, 42, 6),
             noise.draw(4, 0, 41, 6),
             noise.draw(3, 1, 41, 6),
-            Noise::new(8, Source::Own).draw(3, 0, 41, 6),
-            Noise::new(7, Source::Sight).draw(3, 0, 41, 6),
+            Noise::new(8, NoiseSource::Own).draw(3, 0, 41, 6),
+            Noise::new(7, NoiseSource::RelativeSensor).draw(3, 0, 41, 6),
         ];
         for mut other in others {
             assert!(other.six_normals().iter().zip(first).all(|(a, b)| *a != b));
@@ -109,7 +109,7 @@ mod tests {
     fn another_seed_changes_only_later_draws() {
         let draw = |noise: &Noise, number: u64| noise.draw(3, 0, number, 6).six_normals();
         let (first, second, third) =
-            (Noise::new(7, Source::Own), Noise::new(8, Source::Own), Noise::new(9, Source::Own));
+            (Noise::new(7, NoiseSource::Own), Noise::new(8, NoiseSource::Own), Noise::new(9, NoiseSource::Own));
         let mut noise = first.clone();
         noise.reseed(8, 41);
         assert_eq!([draw(&noise, 41), draw(&noise, 42)], [draw(&first, 41), draw(&second, 42)]);
@@ -122,7 +122,7 @@ mod tests {
 
     #[test]
     fn normal_numbers_have_mean_0_variance_1_and_the_fourth_moment_3() {
-        let noise = Noise::new(1, Source::Own);
+        let noise = Noise::new(1, NoiseSource::Own);
         let numbers: Vec<f64> = (0..50_000).flat_map(|number| noise.draw(0, 0, number, 6).six_normals()).collect();
         let moment = |power: i32| numbers.iter().map(|x| x.powi(power)).sum::<f64>() / numbers.len() as f64;
         // Standard errors of 300,000 numbers: 0.002, 0.003 and 0.02.

@@ -5,12 +5,12 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::history::History;
-use super::noise::{Noise, Source};
+use super::noise::{Noise, NoiseSource};
 use super::{ImperfectionSpec, is_off, latency};
 use crate::scenario::{Scenario, ScenarioError, Space};
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_laws::law::VoidReason;
-use tautline_laws::observation::Neighbour;
+use tautline_laws::observation::NeighbourState;
 
 /// Measurements of the vehicles: exact, without latency and in continuous time unless given.
 #[derive(Clone, Copy, Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
@@ -91,7 +91,7 @@ impl ImperfectionSpec for SensingSpec {
 
     fn voids(&self) -> Vec<VoidReason> {
         let is_late = self.latency_s > 0.0 || self.near_s() > 0.0 || self.rate_hz.is_some();
-        let voids = [(is_late, VoidReason::KnownLate), (self.is_noisy(), VoidReason::KnownWrongly)];
+        let voids = [(is_late, VoidReason::SensingDelayed), (self.is_noisy(), VoidReason::SensingInexact)];
         voids.into_iter().filter_map(|(is, void)| is.then_some(void)).collect()
     }
 }
@@ -109,12 +109,12 @@ pub(super) fn period(time_s: f64, rate_hz: f64) -> u64 {
 
 /// Times of measurements: the latest one available at a time, and its number.
 #[derive(Clone, Copy, Debug)]
-struct Clock {
+struct MeasurementTimes {
     rate_hz: Option<f64>,
     latency_s: f64,
 }
 
-impl Clock {
+impl MeasurementTimes {
     fn latest(self, time_s: f64) -> (f64, u64) {
         let late_s = (time_s - self.latency_s).max(0.0);
         self.rate_hz.map_or((late_s, 0), |rate_hz| {
@@ -131,14 +131,14 @@ impl Clock {
 
 /// Standard deviations of errors along each axis.
 #[derive(Clone, Copy, Debug)]
-struct Errors {
+struct NoiseDeviations {
     position_m: f64,
     velocity_m_s: f64,
     axes: usize,
 }
 
-impl Errors {
-    fn are_none(self) -> bool {
+impl NoiseDeviations {
+    fn are_zero(self) -> bool {
         self.position_m == 0.0 && self.velocity_m_s == 0.0
     }
 
@@ -153,9 +153,9 @@ impl Errors {
 
 /// Vehicles' measurements of themselves.
 #[derive(Clone, Debug)]
-pub(super) struct Sensing {
-    clock: Clock,
-    errors: Errors,
+pub(super) struct StateSensor {
+    clock: MeasurementTimes,
+    errors: NoiseDeviations,
     noise: Noise,
     /// Constant errors, N x 3 \[m\].
     bias_m: Rows,
@@ -164,13 +164,13 @@ pub(super) struct Sensing {
     held: Option<u64>,
 }
 
-impl Sensing {
+impl StateSensor {
     pub(super) fn new(scenario: &Scenario) -> Self {
         let SensingSpec { rate_hz, latency_s, position_bias_m, .. } = scenario.sensing;
         Self {
-            clock: Clock { rate_hz, latency_s },
+            clock: MeasurementTimes { rate_hz, latency_s },
             errors: errors(scenario),
-            noise: Noise::new(scenario.noise_seed, Source::Own),
+            noise: Noise::new(scenario.noise_seed, NoiseSource::Own),
             bias_m: bias_m(scenario, position_bias_m),
             is_biased: position_bias_m > 0.0,
             held: None,
@@ -192,12 +192,12 @@ impl Sensing {
 
     /// Returns whether vehicles know their true present state.
     pub(super) fn is_exact(&self) -> bool {
-        self.clock.rate_hz.is_none() && self.clock.latency_s == 0.0 && !self.errs()
+        self.clock.rate_hz.is_none() && self.clock.latency_s == 0.0 && !self.has_errors()
     }
 
     /// Returns whether measurements have errors.
-    fn errs(&self) -> bool {
-        !self.errors.are_none() || self.is_biased
+    fn has_errors(&self) -> bool {
+        !self.errors.are_zero() || self.is_biased
     }
 
     /// Returns the time of the measurement that is available at a time \[s\].
@@ -212,24 +212,24 @@ impl Sensing {
     }
 
     /// Updates `known` to the present measurement. `known` must hold the result of the previous call.
-    pub(super) fn know_now(&mut self, history: &History, time_s: f64, now: &Swarm, known: &mut Swarm) {
+    pub(super) fn update(&mut self, history: &History, time_s: f64, now: &Swarm, known: &mut Swarm) {
         let number = self.clock.rate_hz.map(|_| self.clock.latest(time_s).1);
         if number.is_none() || number != self.held {
-            self.know(history, time_s, Some(now), known);
+            self.measure(history, time_s, Some(now), known);
             self.held = number;
         }
     }
 
     /// Writes the measurement that is available at a present or past time; `now` is the state at that time if it is the
     /// present.
-    pub(super) fn know(&self, history: &History, time_s: f64, now: Option<&Swarm>, known: &mut Swarm) {
+    pub(super) fn measure(&self, history: &History, time_s: f64, now: Option<&Swarm>, known: &mut Swarm) {
         let (measured_s, number) = self.clock.latest(time_s);
-        look_back(history, measured_s, now.filter(|_| measured_s >= time_s), known);
-        if !self.errs() {
+        read_state(history, measured_s, now.filter(|_| measured_s >= time_s), known);
+        if !self.has_errors() {
             return;
         }
         for vehicle in 0..known.count() {
-            let (off_m, off_m_s) = if self.errors.are_none() {
+            let (off_m, off_m_s) = if self.errors.are_zero() {
                 (Vector3::zeros(), Vector3::zeros())
             } else {
                 self.errors.of(self.noise.draw(vehicle, 0, number, 6).six_normals())
@@ -245,8 +245,8 @@ impl Sensing {
 /// Draws constant errors with a standard deviation \[m\], N x 3 \[m\].
 fn bias_m(scenario: &Scenario, position_m: f64) -> Rows {
     let mut bias_m = Rows::zeros(scenario.count());
-    let bias = Noise::new(scenario.noise_seed, Source::Bias);
-    let lasting = Errors { position_m, velocity_m_s: 0.0, axes: scenario.space.dimensions() };
+    let bias = Noise::new(scenario.noise_seed, NoiseSource::Bias);
+    let lasting = NoiseDeviations { position_m, velocity_m_s: 0.0, axes: scenario.space.dimensions() };
     for vehicle in (0..scenario.count()).filter(|_| position_m > 0.0) {
         let (off_m, _) = lasting.of(bias.draw(vehicle, 0, 0, 6).six_normals());
         set_row(&mut bias_m, vehicle, off_m);
@@ -254,14 +254,14 @@ fn bias_m(scenario: &Scenario, position_m: f64) -> Rows {
     bias_m
 }
 
-fn errors(scenario: &Scenario) -> Errors {
+fn errors(scenario: &Scenario) -> NoiseDeviations {
     let SensingSpec { position_noise_m, velocity_noise_m_s, .. } = scenario.sensing;
     let axes = if scenario.space == Space::Plane { 2 } else { 3 };
-    Errors { position_m: position_noise_m, velocity_m_s: velocity_noise_m_s, axes }
+    NoiseDeviations { position_m: position_noise_m, velocity_m_s: velocity_noise_m_s, axes }
 }
 
 /// Writes the state at a present or past time.
-fn look_back(history: &History, time_s: f64, now: Option<&Swarm>, state: &mut Swarm) {
+fn read_state(history: &History, time_s: f64, now: Option<&Swarm>, state: &mut Swarm) {
     match now {
         Some(now) => state.copy_from(now),
         None => history.at(time_s, state),
@@ -273,31 +273,31 @@ fn look_back(history: &History, time_s: f64, now: Option<&Swarm>, state: &mut Sw
 /// Errors of the observer's own position do not enter. Errors have the standard deviations of its own measurements,
 /// drawn for each observed vehicle.
 #[derive(Clone, Debug)]
-pub(super) struct Sight {
-    clock: Clock,
-    errors: Errors,
+pub(super) struct RelativeSensor {
+    clock: MeasurementTimes,
+    errors: NoiseDeviations,
     noise: Noise,
     /// Measured true state, and the number of the measurement.
-    seen: Swarm,
+    sensed: Swarm,
     number: u64,
     held: Option<u64>,
     age_s: f64,
     /// Whether vehicles measure each other at their own measured states.
-    is_own: bool,
+    uses_own_measurements: bool,
 }
 
-impl Sight {
+impl RelativeSensor {
     pub(super) fn new(scenario: &Scenario) -> Self {
         let sensing = scenario.sensing;
         Self {
-            clock: Clock { rate_hz: sensing.rate_hz, latency_s: sensing.near_s() },
+            clock: MeasurementTimes { rate_hz: sensing.rate_hz, latency_s: sensing.near_s() },
             errors: errors(scenario),
-            noise: Noise::new(scenario.noise_seed, Source::Sight),
-            seen: scenario.start.clone(),
+            noise: Noise::new(scenario.noise_seed, NoiseSource::RelativeSensor),
+            sensed: scenario.start.clone(),
             number: 0,
             held: None,
             age_s: 0.0,
-            is_own: !sensing.is_noisy() && sensing.near_s() == sensing.latency_s,
+            uses_own_measurements: !sensing.is_noisy() && sensing.near_s() == sensing.latency_s,
         }
     }
 
@@ -315,21 +315,21 @@ impl Sight {
     }
 
     /// Returns whether vehicles measure each other at their own measured states.
-    pub(super) fn is_own(&self) -> bool {
-        self.is_own
+    pub(super) fn uses_own_measurements(&self) -> bool {
+        self.uses_own_measurements
     }
 
     /// Returns the true positions at the time of the measurement \[m\].
-    pub(super) fn seen_m(&self) -> &Rows {
-        &self.seen.positions_m
+    pub(super) fn true_positions_m(&self) -> &Rows {
+        &self.sensed.positions_m
     }
 
     /// Measures at a time at which the true state is `now`.
-    pub(super) fn look(&mut self, history: &History, time_s: f64, now: &Swarm) {
+    pub(super) fn measure(&mut self, history: &History, time_s: f64, now: &Swarm) {
         let (seen_s, number) = self.clock.latest(time_s);
         let measured = self.clock.rate_hz.map(|_| number);
         if measured.is_none() || measured != self.held {
-            look_back(history, seen_s, Some(now).filter(|_| seen_s >= time_s), &mut self.seen);
+            read_state(history, seen_s, Some(now).filter(|_| seen_s >= time_s), &mut self.sensed);
             self.held = measured;
         }
         (self.number, self.age_s) = (number, time_s - seen_s);
@@ -342,20 +342,20 @@ impl Sight {
     }
 
     /// Returns the measurement of vehicle `j` by vehicle `i`, whose own measurement is its row of `own`.
-    pub(super) fn of(&self, own: &Swarm, i: usize, j: usize) -> Neighbour {
-        let seen = Neighbour::of(&self.seen, j, self.age_s);
-        if self.is_own {
-            return seen;
+    pub(super) fn of(&self, own: &Swarm, i: usize, j: usize) -> NeighbourState {
+        let sensed = NeighbourState::of(&self.sensed, j, self.age_s);
+        if self.uses_own_measurements {
+            return sensed;
         }
-        let from = Neighbour::of(&self.seen, i, 0.0);
-        let (off_m, off_m_s) = if self.errors.are_none() {
+        let from = NeighbourState::of(&self.sensed, i, 0.0);
+        let (off_m, off_m_s) = if self.errors.are_zero() {
             (Vector3::zeros(), Vector3::zeros())
         } else {
             self.errors.of(self.noise.draw(i, j, self.number, 6).six_normals())
         };
-        Neighbour {
-            position_m: row(&own.positions_m, i) + (seen.position_m - from.position_m) + off_m,
-            velocity_m_s: row(&own.velocities_m_s, i) + (seen.velocity_m_s - from.velocity_m_s) + off_m_s,
+        NeighbourState {
+            position_m: row(&own.positions_m, i) + (sensed.position_m - from.position_m) + off_m,
+            velocity_m_s: row(&own.velocities_m_s, i) + (sensed.velocity_m_s - from.velocity_m_s) + off_m_s,
             age_s: self.age_s,
         }
     }

@@ -11,7 +11,7 @@ use tautline_core::record::{Event, Peaks, RecordError, Sample, Sink, Step};
 use tautline_core::swarm::{Rows, Swarm, largest_row_norm, mean_row, row};
 use tautline_laws::formation::Freedom;
 use tautline_laws::graph::Graph;
-use tautline_laws::target::{Arrival, Distance, Guidance, Leg, Reference, assign_anew};
+use tautline_laws::target::{Arrival, FormationError, Guidance, Leg, Reference, reassign};
 
 /// Running metrics of samples, in order of time; results in a [`Summary`].
 #[derive(Clone, Debug)]
@@ -32,7 +32,7 @@ pub struct Metrics<'a> {
     /// Last instant that was checked \[s\].
     judged_to_s: Option<f64>,
     last_s: f64,
-    distance: Distance,
+    distance: FormationError,
     common_m_s: f64,
     peak_control_m_s2: f64,
     final_control_m_s2: f64,
@@ -41,7 +41,7 @@ pub struct Metrics<'a> {
     origin_m: Option<Vector3<f64>>,
     extent_m: f64,
     fastest_m_s: f64,
-    strain: Option<Strain>,
+    quadrotor_peaks: Option<QuadrotorPeaks>,
 }
 
 /// Range of the energy \[m^2/s^2\] over the samples that have one.
@@ -119,7 +119,7 @@ impl<'a> Metrics<'a> {
             good_since_s: None,
             judged_to_s: None,
             last_s: 0.0,
-            distance: Distance::unknown(),
+            distance: FormationError::unknown(),
             common_m_s: f64::NAN,
             peak_control_m_s2: 0.0,
             final_control_m_s2: 0.0,
@@ -127,20 +127,20 @@ impl<'a> Metrics<'a> {
             origin_m: None,
             extent_m: 0.0,
             fastest_m_s: 0.0,
-            strain: None,
+            quadrotor_peaks: None,
         }
     }
 
     /// Sets the motions that the formation is free to make; by default any rigid motion.
     #[must_use]
-    pub fn free_by(mut self, freedom: Freedom) -> Self {
+    pub fn with_freedom(mut self, freedom: Freedom) -> Self {
         self.freedom = freedom;
         self
     }
 
     /// Sets the reference that carries the formations.
     #[must_use]
-    pub fn carried_by(mut self, guidance: Option<&'a Guidance>) -> Self {
+    pub fn with_reference(mut self, guidance: Option<&'a Guidance>) -> Self {
         self.guidance = guidance;
         self
     }
@@ -150,15 +150,15 @@ impl<'a> Metrics<'a> {
         self.samples += 1;
         self.last_s = sample.time_s;
         let leg = self.legs.get(self.leg);
-        self.distance = leg.map_or_else(Distance::unknown, |leg| {
-            Distance::of(sample.swarm, &leg.formation, &self.reference(sample.time_s), self.graph, self.freedom)
+        self.distance = leg.map_or_else(FormationError::unknown, |leg| {
+            FormationError::of(sample.swarm, &leg.formation, &self.reference(sample.time_s), self.graph, self.freedom)
         });
         self.common_m_s = sample.swarm.mean_velocity_m_s().norm();
         self.observe_control(sample.control);
         self.observe_energy(sample.energy);
         self.observe_peaks(sample.peaks);
         self.observe_extent(sample.swarm);
-        Strain::observe(&mut self.strain, sample);
+        QuadrotorPeaks::observe(&mut self.quadrotor_peaks, sample);
         if self.judged_to_s != Some(sample.time_s) {
             self.judge(sample.time_s, sample.swarm, self.arrival.is_within(&self.distance));
         }
@@ -192,8 +192,8 @@ impl<'a> Metrics<'a> {
 
     /// Returns the largest tilt and rotor thrust, for quadrotors.
     #[must_use]
-    pub fn strain(&self) -> Option<Strain> {
-        self.strain
+    pub fn quadrotor_peaks(&self) -> Option<QuadrotorPeaks> {
+        self.quadrotor_peaks
     }
 
     /// Updates the commands; the final command of a sample without one is NaN.
@@ -287,7 +287,7 @@ impl Sink for Metrics<'_> {
         match event {
             &Event::LegBegan { leg, time_s } => self.begin_leg(leg, time_s),
             Event::Assigned { slots, .. } => {
-                assign_anew(self.legs.to_mut(), self.leg, slots);
+                reassign(self.legs.to_mut(), self.leg, slots);
                 self.judged_to_s = None;
             }
             _ => {}
@@ -312,19 +312,20 @@ fn larger(a: f64, b: f64) -> f64 {
 
 /// Peaks of the channels of quadrotors, over the samples that have them.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Strain {
+pub struct QuadrotorPeaks {
     /// Largest angle between a vehicle's thrust and the vertical \[rad\].
     pub max_tilt_rad: f64,
     /// Largest thrust of a rotor \[N\].
     pub max_thrust_n: f64,
 }
 
-impl Strain {
+impl QuadrotorPeaks {
     /// Updates the peaks; samples without a channel `attitude` change nothing.
-    fn observe(strain: &mut Option<Self>, sample: &Sample<'_>) {
+    fn observe(quadrotor_peaks: &mut Option<Self>, sample: &Sample<'_>) {
         let channel = |name: &str| sample.channels.iter().find(|channel| &*channel.name == name);
         let (Some(attitude), Some(rotors)) = (channel("attitude"), channel("rotors")) else { return };
-        let Self { max_tilt_rad, max_thrust_n } = strain.get_or_insert(Self { max_tilt_rad: 0.0, max_thrust_n: 0.0 });
+        let Self { max_tilt_rad, max_thrust_n } =
+            quadrotor_peaks.get_or_insert(Self { max_tilt_rad: 0.0, max_thrust_n: 0.0 });
         for q in attitude.values.chunks_exact(4) {
             // Half angle from the vertical: its sine is the norm of the quaternion's x and y components.
             *max_tilt_rad = max_tilt_rad.max(2.0 * libm::asin((q[1] * q[1] + q[2] * q[2]).sqrt().min(1.0)));

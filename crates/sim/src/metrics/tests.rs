@@ -1,6 +1,6 @@
 use super::*;
 use tautline_laws::formation::Formation;
-use tautline_laws::target::Begins;
+use tautline_laws::target::LegTrigger;
 
 /// Rounding of sums of a few numbers of order 1.
 const ROUNDING: f64 = 1e-12;
@@ -58,7 +58,7 @@ fn a_formation_that_is_lost_again_is_not_reached() {
 #[test]
 fn a_leg_is_held_up_to_the_time_at_which_the_next_begins() {
     let (mut legs, graph) = pair_of_vehicles();
-    legs.push(Leg { begins: Begins::At(1.0), ..legs[0].clone() });
+    legs.push(Leg { begins: LegTrigger::At(1.0), ..legs[0].clone() });
     let swarm = Swarm::at_rest(legs[0].formation.slots_m.clone());
     let control = Rows::zeros(2);
     for (next_s, reached_at_s) in [(1.0, Some(0.0)), (0.99, None)] {
@@ -76,7 +76,7 @@ fn a_reassigned_vehicle_is_compared_with_its_new_slot() {
     let (mut legs, graph) = pair_of_vehicles();
     legs[0].interchangeable = true;
     let swapped = Swarm::at_rest(legs[0].formation.reordered(&[1, 0]).slots_m);
-    let mut metrics = Metrics::new(&legs, &graph, JUDGE).free_by(Freedom::Translation);
+    let mut metrics = Metrics::new(&legs, &graph, JUDGE).with_freedom(Freedom::Translation);
     let look = |metrics: &mut Metrics<'_>| {
         metrics.observe(&Sample::new(0.0, 0, &swapped, &Rows::zeros(2)));
         metrics.finish().rms_position_error_m
@@ -87,7 +87,7 @@ fn a_reassigned_vehicle_is_compared_with_its_new_slot() {
 }
 
 #[test]
-fn rounding_of_times_does_not_cost_the_hold() {
+fn rounding_of_times_does_not_shorten_the_hold() {
     let (legs, graph) = pair_of_vehicles();
     let mut metrics = Metrics::new(&legs, &graph, JUDGE);
     let swarm = Swarm::at_rest(legs[0].formation.slots_m.clone());
@@ -108,7 +108,7 @@ fn a_state_that_is_not_a_number_is_never_within_tolerance() {
 }
 
 #[test]
-fn no_samples_reach_nothing() {
+fn a_flight_without_samples_reaches_no_formation() {
     let s = summary(&[], JUDGE);
     assert_eq!((s.samples, s.reached_at_s, s.energy_initial), (0, None, None));
     assert_eq!(summary(&[], Arrival { hold_s: 0.0, ..JUDGE }).reached_at_s, None);

@@ -38,7 +38,7 @@ pub trait Plant: DynClone + Send {
     ///
     /// # Errors
     /// [`PlantError`]; the state of the plant is then undefined.
-    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, path: &mut Path) -> Result<(), PlantError>;
+    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, path: &mut StepPath) -> Result<(), PlantError>;
 
     /// Returns whether a command is held over a step. Otherwise the plant evaluates the law in continuous time
     /// ([`Plant::advance_under`]).
@@ -57,7 +57,7 @@ pub trait Plant: DynClone + Send {
         _feedback: &mut dyn Feedback,
         (_from_s, dt_s): (f64, f64),
         end: &mut Swarm,
-        path: &mut Path,
+        path: &mut StepPath,
     ) -> Result<Option<LawError>, PlantError> {
         self.advance(dt_s, end, path).map(|()| None)
     }
@@ -168,14 +168,14 @@ pub enum PlantError {
 /// A plant that moves along one straight line per step adds nothing. A plant with internal steps adds their ends; a
 /// plant with curved paths adds their bend.
 #[derive(Clone, Debug, Default)]
-pub struct Path {
+pub struct StepPath {
     /// Instants; their memory is reused, and only the first `passed` belong to this step.
     instants: Vec<(f64, Rows)>,
     passed: usize,
     bend_m: f64,
 }
 
-impl Path {
+impl StepPath {
     /// Resets the way to a straight line from the state before the step.
     pub fn begin(&mut self) {
         (self.passed, self.bend_m) = (0, 0.0);
@@ -183,7 +183,7 @@ impl Path {
 
     /// Adds positions \[m\], N x 3, `after_s` seconds after the beginning of the step, in increasing order and before
     /// its end.
-    pub fn pass(&mut self, after_s: f64, positions_m: &Rows) {
+    pub fn add_instant(&mut self, after_s: f64, positions_m: &Rows) {
         if self.passed == self.instants.len() {
             self.instants.push((after_s, positions_m.clone()));
         } else {
@@ -195,7 +195,7 @@ impl Path {
     }
 
     /// Raises the bound of the deviation to at least this value \[m\].
-    pub fn bend(&mut self, bend_m: f64) {
+    pub fn raise_bend(&mut self, bend_m: f64) {
         self.bend_m = self.bend_m.max(bend_m);
     }
 
@@ -206,7 +206,7 @@ impl Path {
     }
 
     /// Returns the instants between the ends of the step: seconds from its beginning, and positions \[m\].
-    pub fn passed(&self) -> impl Iterator<Item = (f64, &Rows)> {
+    pub fn instants(&self) -> impl Iterator<Item = (f64, &Rows)> {
         self.instants[..self.passed].iter().map(|(after_s, positions_m)| (*after_s, positions_m))
     }
 }
@@ -261,7 +261,7 @@ impl Air {
     /// Returns the time for which the wind is smooth, from `before_s` seconds before the present on \[s\].
     pub(crate) fn smooth_s(&self, before_s: f64) -> f64 {
         let time_s = self.wind.now_s() - before_s;
-        self.wind.next_turn_s(time_s) - time_s
+        self.wind.next_slope_change_s(time_s) - time_s
     }
 
     pub(crate) fn reseed(&mut self, seed: u64) {
@@ -284,15 +284,15 @@ mod tests {
     #[test]
     fn a_path_holds_the_instants_of_its_step_and_the_largest_bend() {
         let at = |x: f64| Rows::from_element(2, x);
-        let mut path = Path::default();
-        path.pass(0.1, &at(1.0));
-        path.pass(0.2, &at(2.0));
-        path.bend(0.5);
-        path.bend(0.25);
+        let mut path = StepPath::default();
+        path.add_instant(0.1, &at(1.0));
+        path.add_instant(0.2, &at(2.0));
+        path.raise_bend(0.5);
+        path.raise_bend(0.25);
         assert_eq!(path.bend_m(), 0.5);
         path.begin();
-        path.pass(0.3, &at(3.0));
-        assert_eq!(path.passed().collect::<Vec<_>>(), [(0.3, &at(3.0))]);
+        path.add_instant(0.3, &at(3.0));
+        assert_eq!(path.instants().collect::<Vec<_>>(), [(0.3, &at(3.0))]);
         assert_eq!(path.bend_m(), 0.0);
     }
 }

@@ -4,7 +4,7 @@
 //! bend. The steering of the command at the beginning of a step acts over its first half, that of the next command over
 //! its second half. This makes the coupling second order, as for rigid bodies.
 
-use super::{Path, Plant, PlantError};
+use super::{Plant, PlantError, StepPath};
 use crate::vehicle::{Heading, Steering, Unicycle};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
@@ -39,11 +39,11 @@ impl Plant for Unicycles {
         self.headings.len()
     }
 
-    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, path: &mut Path) -> Result<(), PlantError> {
+    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, path: &mut StepPath) -> Result<(), PlantError> {
         for (i, heading) in self.headings.iter_mut().enumerate() {
             let by = self.unicycle.steering(*heading, row(&self.held, i), dt_s);
             let position_m = row(&self.positions_m, i) + heading.way_m(by, dt_s);
-            path.bend(heading.bend_m(by, dt_s));
+            path.raise_bend(heading.bend_m(by, dt_s));
             set_row(&mut self.positions_m, i, position_m);
             self.began[i] = (*heading, by);
             *heading = self.unicycle.after(*heading, by, dt_s);

@@ -12,7 +12,7 @@ pub struct PredictedMargin {
     /// Key of the imperfection.
     pub key: &'static str,
     /// Contact of the vehicles near their slots.
-    pub state: Near,
+    pub state: ContactState,
     /// Whether `value` is an upper or a lower limit.
     pub bound: Bound,
     /// Limit in the unit of the key; null if every value is tolerated.
@@ -22,7 +22,7 @@ pub struct PredictedMargin {
 /// Contact of the vehicles near their slots.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Near {
+pub enum ContactState {
     /// No pair in contact: beyond the limit the smallest disturbance grows. An upper bound on the tolerance.
     Free,
     /// The nearest pairs at the edge of contact, as they are at the goal: a lower bound on the tolerance.
@@ -39,9 +39,9 @@ pub enum Bound {
     AtLeast,
 }
 
-const KNOWN_LATE: &str = "sensing.latency_s";
-const HEARD_LATE: &str = "network.latency_s";
-const COMMANDED: &str = "time.control_hz";
+const SENSING_LATENCY: &str = "sensing.latency_s";
+const NETWORK_LATENCY: &str = "network.latency_s";
+const CONTROL_RATE: &str = "time.control_hz";
 
 /// Returns the margins of linear theory for the first formation. Empty if the modes of the law are unknown, and for
 /// vehicles that are not points, whose own lag the theory does not include.
@@ -50,22 +50,25 @@ pub(super) fn margins(law: &dyn Law, scenario: &Scenario) -> Vec<PredictedMargin
         return Vec::new();
     }
     let Some(linear) = law.linear(scenario.formation()) else { return Vec::new() };
-    let Linear { stiffest_contact_mode, heard, .. } = &linear;
+    let Linear { stiffest_contact_mode, received, .. } = &linear;
     let a22_per_s = scenario.velocity_coefficient_per_s();
     let at_most = |key, state, value: f64| PredictedMargin { key, state, bound: Bound::AtMost, value: finite(value) };
     let at_least = |state, period_s: f64| PredictedMargin {
-        key: COMMANDED,
+        key: CONTROL_RATE,
         state,
         bound: Bound::AtLeast,
         value: finite(1.0 / period_s).filter(|rate_hz| *rate_hz > 0.0),
     };
-    let mut margins = vec![at_most(KNOWN_LATE, Near::Free, linear.delay_margin_s(a22_per_s))];
+    let mut margins = vec![at_most(SENSING_LATENCY, ContactState::Free, linear.delay_margin_s(a22_per_s))];
+    margins.extend(
+        stiffest_contact_mode
+            .map(|mode| at_most(SENSING_LATENCY, ContactState::InContact, mode.delay_margin_s(a22_per_s))),
+    );
+    let received_s = received.as_ref().and_then(|received| received.delay_margin_s(a22_per_s));
+    margins.extend(received_s.map(|received_s| at_most(NETWORK_LATENCY, ContactState::Free, received_s)));
+    margins.push(at_least(ContactState::Free, linear.sampling_margin_s(a22_per_s)));
     margins
-        .extend(stiffest_contact_mode.map(|mode| at_most(KNOWN_LATE, Near::InContact, mode.delay_margin_s(a22_per_s))));
-    let heard_s = heard.as_ref().and_then(|heard| heard.delay_margin_s(a22_per_s));
-    margins.extend(heard_s.map(|heard_s| at_most(HEARD_LATE, Near::Free, heard_s)));
-    margins.push(at_least(Near::Free, linear.sampling_margin_s(a22_per_s)));
-    margins.extend(stiffest_contact_mode.map(|mode| at_least(Near::InContact, mode.sampling_margin_s(a22_per_s))));
+        .extend(stiffest_contact_mode.map(|mode| at_least(ContactState::InContact, mode.sampling_margin_s(a22_per_s))));
     margins
 }
 
@@ -74,20 +77,20 @@ fn finite(value: f64) -> Option<f64> {
 }
 
 /// Returns a message if a scenario exceeds a margin of free vehicles.
-pub(super) fn beyond(margins: &[PredictedMargin], scenario: &Scenario) -> Option<String> {
+pub(super) fn exceeded_margin(margins: &[PredictedMargin], scenario: &Scenario) -> Option<String> {
     let given = |key: &str| match key {
-        KNOWN_LATE => Some(scenario.sensing.latency_s),
-        HEARD_LATE => Some(scenario.network.latency_s),
+        SENSING_LATENCY => Some(scenario.sensing.latency_s),
+        NETWORK_LATENCY => Some(scenario.network.latency_s),
         _ => scenario.time.control_hz,
     };
-    margins.iter().filter(|margin| margin.state == Near::Free).find_map(|margin| {
+    margins.iter().filter(|margin| margin.state == ContactState::Free).find_map(|margin| {
         let (given, value) = (given(margin.key)?, margin.value?);
         let (is_beyond, limit) = match margin.bound {
             Bound::AtMost => (given > value, "upper"),
             Bound::AtLeast => (given < value, "lower"),
         };
         is_beyond.then(|| {
-            let common = if margin.key == HEARD_LATE { " of the swarm, common motion included," } else { "" };
+            let common = if margin.key == NETWORK_LATENCY { " of the swarm, common motion included," } else { "" };
             format!(
                 "{} = {given} is beyond the {limit} limit {}: a small disturbance{common} grows, even without other \
                  imperfections.",
@@ -102,13 +105,13 @@ pub(super) fn beyond(margins: &[PredictedMargin], scenario: &Scenario) -> Option
 pub(super) fn line(margins: &[PredictedMargin]) -> Option<String> {
     let of = |key: &str| {
         let mut parts = margins.iter().filter(|margin| margin.key == key).map(|margin| {
-            let state = if margin.state == Near::Free { "" } else { " in contact" };
+            let state = if margin.state == ContactState::Free { "" } else { " in contact" };
             let bound = if margin.bound == Bound::AtMost { "up to" } else { "from" };
             margin.value.map_or_else(|| format!("any{state}"), |value| format!("{bound} {}{state}", significant(value)))
         });
         let first = parts.next()?;
         Some(parts.fold(format!("{key} {first}"), |line, part| format!("{line}, {part}")))
     };
-    let lines: Vec<_> = [KNOWN_LATE, HEARD_LATE, COMMANDED].into_iter().filter_map(of).collect();
+    let lines: Vec<_> = [SENSING_LATENCY, NETWORK_LATENCY, CONTROL_RATE].into_iter().filter_map(of).collect();
     (!lines.is_empty()).then(|| lines.join("; ") + " (each without other imperfections)")
 }

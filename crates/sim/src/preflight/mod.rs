@@ -16,9 +16,9 @@ use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_core::text::at_least;
 use tautline_laws::formation::affine_dimension;
 use tautline_laws::law::{Controls, Law, LegBound, ParameterError, RateQuery, VelocityMargin, VoidReason};
-use tautline_laws::space::{closest_pair, least_room};
+use tautline_laws::space::{closest_pair, smallest_clearance_margin};
 
-pub use margins::{Bound, Near, PredictedMargin};
+pub use margins::{Bound, ContactState, PredictedMargin};
 pub use stability::{FLATNESS, MOST_RANKED, RANK_TOLERANCE, Rigidity};
 pub use warning::{Code, Warning};
 
@@ -155,12 +155,12 @@ impl Preflight {
     /// # Errors
     /// [`ParameterError`] if the parameters give no law; for a validated scenario only if memory cannot be allocated.
     pub fn of(scenario: &Scenario) -> Result<Self, ParameterError> {
-        Ok(Self::under(scenario, scenario.law()?.as_ref()))
+        Ok(Self::with_law(scenario, scenario.law()?.as_ref()))
     }
 
     /// Checks a scenario under another law.
     #[must_use]
-    pub fn under(scenario: &Scenario, law: &dyn Law) -> Self {
+    pub fn with_law(scenario: &Scenario, law: &dyn Law) -> Self {
         let certificate = scenario.certificate(law);
         let formation_dimension = scenario.formation().affine_dimension(FLATNESS);
         let connectivity = scenario.graph.algebraic_connectivity();
@@ -168,7 +168,7 @@ impl Preflight {
         let rates = law.rates(&RateQuery {
             a22_per_s: scenario.velocity_coefficient_per_s(),
             nearest_m: certificate.certified_m,
-            obstacle_room_m: certificate.certified_room_m,
+            obstacle_margin_m: certificate.certified_clearance_margin_m,
             connectivity,
         });
         let drift = scenario.drift(rates.common_mode_per_s);
@@ -187,8 +187,8 @@ impl Preflight {
             energy_initial: certificate.energy_initial,
             certified_m: certificate.certified_m,
             certified_until_s: certificate.certified_until_s,
-            certified_room_m: certificate.certified_room_m,
-            start_room_m: least_room(&scenario.obstacles, &scenario.start.positions_m)
+            certified_room_m: certificate.certified_clearance_margin_m,
+            start_room_m: smallest_clearance_margin(&scenario.obstacles, &scenario.start.positions_m)
                 .map(|(clearance_margin_m, ..)| clearance_margin_m),
             legs: certificate
                 .legs
@@ -242,7 +242,7 @@ impl Preflight {
             (trap, found.start_too_flat()),
             (Code::StepTooLong, step_too_long(law, scenario)),
             (Code::DriftUnresolved, found.drift_unresolved(scenario)),
-            (Code::BeyondMargin, margins::beyond(&found.margins, scenario)),
+            (Code::BeyondMargin, margins::exceeded_margin(&found.margins, scenario)),
             (Code::NoCertificate, found.no_certificate()),
             (Code::NotRigid, found.not_rigid(scenario)),
             (Code::FlatFormationInSpace, found.flat_formation_in_space()),

@@ -330,7 +330,7 @@ fn the_json_has_the_promised_keys_and_codes() {
     }
     assert_eq!(json["connectivity_is"], "solved");
     let circle = scenario("circle", &[]);
-    circle.graph.clone().pretend_a_bound();
+    circle.graph.clone().mark_connectivity_as_bound();
     let bound = check(&circle);
     assert_eq!(serde_json::to_value(&bound).expect("plain data")["connectivity_is"], "bound");
     assert!(bound.text().contains("a lower bound"), "{}", bound.text());
@@ -393,17 +393,17 @@ fn a_certificate_within_the_resolution_of_delta_is_void() {
 
 #[test]
 fn margins_are_predicted_and_scenarios_beyond_them_get_a_warning() {
-    let margin = |found: &Preflight, key: &str, state: Near| {
+    let margin = |found: &Preflight, key: &str, state: ContactState| {
         found.margins.iter().find(|margin| margin.key == key && margin.state == state).copied()
     };
     let sets = ["law.kind=displacement", "swarm.a22_per_s=0"];
     let found = check(&scenario("pentagon", &sets));
-    let value = |key: &str, state: Near| margin(&found, key, state).expect(key).value.expect("a bound");
-    assert!((value("sensing.latency_s", Near::Free) - 0.711).abs() < 5e-4);
-    assert!((value("sensing.latency_s", Near::InContact) - 0.0811).abs() < 5e-5);
-    assert!((value("time.control_hz", Near::Free) - 0.5).abs() < 1e-9, "2 s between commands");
-    assert!(value("time.control_hz", Near::InContact) > 5.0);
-    assert!(value("network.latency_s", Near::Free) > 3.0, "each of five vehicles contributes a fifth");
+    let value = |key: &str, state: ContactState| margin(&found, key, state).expect(key).value.expect("a bound");
+    assert!((value("sensing.latency_s", ContactState::Free) - 0.711).abs() < 5e-4);
+    assert!((value("sensing.latency_s", ContactState::InContact) - 0.0811).abs() < 5e-5);
+    assert!((value("time.control_hz", ContactState::Free) - 0.5).abs() < 1e-9, "2 s between commands");
+    assert!(value("time.control_hz", ContactState::InContact) > 5.0);
+    assert!(value("network.latency_s", ContactState::Free) > 3.0, "each of five vehicles contributes a fifth");
     let text = found.text();
     assert!(text.contains("sensing.latency_s up to 0.711, up to 0.0811 in contact"), "{text}");
 
@@ -414,7 +414,7 @@ fn margins_are_predicted_and_scenarios_beyond_them_get_a_warning() {
     }
     // Vehicles that follow only a hub form no loop.
     let led = check(&scenario("pentagon-leader", &[]));
-    assert_eq!(margin(&led, "network.latency_s", Near::Free).expect("a star").value, None);
+    assert_eq!(margin(&led, "network.latency_s", ContactState::Free).expect("a star").value, None);
 
     for (set, is_beyond) in [
         ("sensing.latency_s=0.70", false),

@@ -19,20 +19,20 @@ use super::schema::{Node, tables_with};
 const NAME_CHARS: usize = 40;
 
 /// A value that the schema does not admit: an error without a place, and the bytes of the value.
-pub(super) struct Misfit {
+pub(super) struct SchemaError {
     pub(super) error: ScenarioError,
     pub(super) span: Range<usize>,
     /// Keys and entries that lead to the value, innermost first.
     path: Vec<String>,
 }
 
-impl Misfit {
+impl SchemaError {
     fn new(code: &'static str, message: impl AsRef<str>, help: impl AsRef<str>, span: Range<usize>) -> Self {
         let error = ScenarioError::new(message).coded(code).with_help(help);
         Self { error, span, path: Vec::new() }
     }
 
-    fn below(mut self, key: impl Into<String>) -> Self {
+    fn child(mut self, key: impl Into<String>) -> Self {
         self.path.push(key.into());
         self
     }
@@ -48,7 +48,7 @@ impl Misfit {
 ///
 /// Spans from `overridden_from` on belong to overrides. A choice of an override drops the keys of the file that belong
 /// to another choice.
-pub(super) fn conform(file: &mut Spanned<DeValue<'_>>, overridden_from: usize) -> Result<(), Misfit> {
+pub(super) fn check_schema(file: &mut Spanned<DeValue<'_>>, overridden_from: usize) -> Result<(), SchemaError> {
     Check { overridden_from }.value(file, Node::root(), "scenario", None)
 }
 
@@ -64,12 +64,13 @@ impl Check {
         node: Node,
         name: &str,
         own_name: Option<&(&str, Range<usize>)>,
-    ) -> Result<(), Misfit> {
+    ) -> Result<(), SchemaError> {
         let span = value.span();
         if let (Some(node), DeValue::Table(table)) = (node.values(), value.get_mut()) {
             return table.iter_mut().try_for_each(|(key, value)| {
                 let name = &**key.get_ref();
-                self.value(value, node, name, Some(&(name, key.span()))).map_err(|misfit| misfit.below(name))
+                self.value(value, node, name, Some(&(name, key.span())))
+                    .map_err(|schema_error| schema_error.child(name))
             });
         }
         if node.is_table() {
@@ -107,7 +108,8 @@ impl Check {
             DeValue::Array(list) => {
                 let Some(node) = node.items() else { return Ok(()) };
                 list.iter_mut().enumerate().try_for_each(|(entry, value)| {
-                    self.value(value, node, name, None).map_err(|misfit| misfit.below((entry + 1).to_string()))
+                    self.value(value, node, name, None)
+                        .map_err(|schema_error| schema_error.child((entry + 1).to_string()))
                 })
             }
             number @ (DeValue::Integer(_) | DeValue::Float(_)) => in_range(name, node, number, span),
@@ -121,7 +123,7 @@ impl Check {
         node: Node,
         span: &Range<usize>,
         own_name: Option<&(&str, Range<usize>)>,
-    ) -> Result<(), Misfit> {
+    ) -> Result<(), SchemaError> {
         let alternatives: Vec<_> = node.alternatives().into_iter().filter(|part| part.tag().is_some()).collect();
         let chosen = match alternatives.first().and_then(|part| part.tag()) {
             Some((tag, _)) => self.chosen(table, tag, &alternatives, span, own_name, node)?,
@@ -140,17 +142,18 @@ impl Check {
             };
             // `chosen` has checked the tag.
             if node.keyword("const").is_null() {
-                self.value(value, node, name, None).map_err(|misfit| misfit.below(&**name))?;
+                self.value(value, node, name, None).map_err(|schema_error| schema_error.child(&**name))?;
             }
         }
         let required = node.required().chain(chosen.into_iter().flat_map(Node::required));
         if let Some(missing) = required.into_iter().find(|key| !table.contains_key(*key)) {
             let help = format!("`{missing}` is {}", known(missing).map_or_else(String::new, expected));
-            let misfit = Misfit::new("scenario/missing-key", format!("missing key `{missing}`"), help, span.clone());
-            return Err(misfit);
+            let schema_error =
+                SchemaError::new("scenario/missing-key", format!("missing key `{missing}`"), help, span.clone());
+            return Err(schema_error);
         }
         if let Some((chosen, (tag, _))) = chosen.and_then(|chosen| Some((chosen, chosen.tag()?))) {
-            nest(table, node, chosen, tag);
+            nest_choice(table, node, chosen, tag);
         }
         Ok(())
     }
@@ -164,14 +167,16 @@ impl Check {
         span: &Range<usize>,
         own_name: Option<&(&str, Range<usize>)>,
         node: Node,
-    ) -> Result<Option<Node>, Misfit> {
+    ) -> Result<Option<Node>, SchemaError> {
         let names: Vec<_> = alternatives.iter().filter_map(|part| part.tag()).map(|(_, name)| name).collect();
         let default = alternatives.iter().find(|part| !part.requires(tag)).and_then(|part| part.tag());
         let (name, at) = match (table.get(tag), own_name, default) {
             (Some(value), ..) => {
                 let Some(name) = value.get_ref().as_str() else {
                     let message = format!("`{tag}` must be {}, got {}", listed(&names), found(value.get_ref()));
-                    return Err(Misfit::new("scenario/wrong-type", message, about(node), value.span()).below(tag));
+                    return Err(
+                        SchemaError::new("scenario/wrong-type", message, description(node), value.span()).child(tag)
+                    );
                 };
                 (name.to_owned(), value.span())
             }
@@ -181,19 +186,24 @@ impl Check {
             (None, None, None) if node.keyword("anyOf").is_array() => return Ok(None),
             (None, None, None) => {
                 let help = format!("give one of {}", listed(&names));
-                return Err(Misfit::new("scenario/missing-key", format!("missing key `{tag}`"), help, span.clone()));
+                return Err(SchemaError::new(
+                    "scenario/missing-key",
+                    format!("missing key `{tag}`"),
+                    help,
+                    span.clone(),
+                ));
             }
         };
         let Some(&chosen) = alternatives.iter().find(|part| part.tag().is_some_and(|(_, known)| known == name)) else {
-            let mut misfit = unknown_choice(&name, &names, at);
+            let mut schema_error = unknown_choice(&name, &names, at);
             if own_name.is_some() && !table.contains_key(tag) {
                 let help = format!(
                     "the name of a law is its kind unless the table [laws.NAME] has a `kind`: {}",
-                    misfit.error.help().unwrap_or_default()
+                    schema_error.error.help().unwrap_or_default()
                 );
-                misfit.error = misfit.error.with_help(help);
+                schema_error.error = schema_error.error.with_help(help);
             }
-            return Err(misfit.below(tag));
+            return Err(schema_error.child(tag));
         };
         if at.start >= self.overridden_from {
             let is_left = |key: &str, value: &Spanned<DeValue<'_>>| {
@@ -215,7 +225,7 @@ impl Check {
 }
 
 /// Moves the keys of a choice into a table below the tag, named as the choice.
-fn nest(table: &mut DeTable<'_>, node: Node, chosen: Node, tag: &'static str) {
+fn nest_choice(table: &mut DeTable<'_>, node: Node, chosen: Node, tag: &'static str) {
     let Some((tag_key, name)) = table.remove_entry(tag) else { return };
     let span = name.span();
     let DeValue::String(name) = name.into_inner() else { return };
@@ -244,13 +254,13 @@ fn admits(node: Node, value: &DeValue<'_>) -> bool {
 }
 
 /// Refuses a number that is not finite, outside the bounds of the schema, or outside [`SMALLEST`] to [`LARGEST`].
-fn in_range(name: &str, node: Node, number: &DeValue<'_>, span: Range<usize>) -> Result<(), Misfit> {
+fn in_range(name: &str, node: Node, number: &DeValue<'_>, span: Range<usize>) -> Result<(), SchemaError> {
     let (written, number) = match number {
         DeValue::Integer(written) => {
             let Ok(whole) = i64::from_str_radix(written.as_str(), written.radix()) else {
                 let most = if node.kind() == "integer" { i64::MAX.to_string() } else { format!("{LARGEST:e}") };
                 let message = format!("`{name}` must be at most {most} in magnitude, got {}", written.as_str());
-                return Err(Misfit::new("scenario/out-of-range", message, about(node), span));
+                return Err(SchemaError::new("scenario/out-of-range", message, description(node), span));
             };
             (whole.to_string(), whole as f64)
         }
@@ -263,7 +273,7 @@ fn in_range(name: &str, node: Node, number: &DeValue<'_>, span: Range<usize>) ->
     let bound = |keyword: &str| node.keyword(keyword).as_f64();
     let refuse = |must: String| {
         let message = format!("`{name}` must be {must}, got {written}");
-        Err(Misfit::new("scenario/out-of-range", message, about(node), span.clone()))
+        Err(SchemaError::new("scenario/out-of-range", message, description(node), span.clone()))
     };
     if !number.is_finite() {
         return refuse("a finite number".to_owned());
@@ -289,24 +299,24 @@ fn in_range(name: &str, node: Node, number: &DeValue<'_>, span: Range<usize>) ->
     Ok(())
 }
 
-fn unknown_key(name: &str, mut known: Vec<&str>, span: Range<usize>) -> Misfit {
+fn unknown_key(name: &str, mut known: Vec<&str>, span: Range<usize>) -> SchemaError {
     known.sort_unstable();
     known.dedup();
     let help = match tables_with(name)[..] {
         [] => suggest(name, &known),
         ref tables => format!("`{name}` belongs in {}; {}", tables.join(", or "), suggest(name, &known)),
     };
-    Misfit::new("scenario/unknown-key", format!("unknown key `{}`", short(name)), help, span).below(name)
+    SchemaError::new("scenario/unknown-key", format!("unknown key `{}`", short(name)), help, span).child(name)
 }
 
-fn unknown_choice(name: &str, known: &[&str], span: Range<usize>) -> Misfit {
+fn unknown_choice(name: &str, known: &[&str], span: Range<usize>) -> SchemaError {
     let message = format!("unknown choice `{}`", short(name));
-    Misfit::new("scenario/unknown-choice", message, suggest(name, known), span)
+    SchemaError::new("scenario/unknown-choice", message, suggest(name, known), span)
 }
 
-fn wrong_type(name: &str, node: Node, value: &DeValue<'_>, span: Range<usize>) -> Misfit {
+fn wrong_type(name: &str, node: Node, value: &DeValue<'_>, span: Range<usize>) -> SchemaError {
     let message = format!("`{}` must be {}, got {}", short(name), expected(node), found(value));
-    Misfit::new("scenario/wrong-type", message, about(node), span)
+    SchemaError::new("scenario/wrong-type", message, description(node), span)
 }
 
 /// Returns a value in words.
@@ -354,9 +364,9 @@ fn expected(node: Node) -> String {
 }
 
 /// Returns the first sentence of the description of a key.
-fn about(node: Node) -> String {
-    let about = node.about().unwrap_or("`tautline schema` describes every key");
-    about.split_once(". ").map_or(about, |(first, _)| first).replace('\n', " ")
+fn description(node: Node) -> String {
+    let description = node.description().unwrap_or("`tautline schema` describes every key");
+    description.split_once(". ").map_or(description, |(first, _)| first).replace('\n', " ")
 }
 
 fn listed(names: &[&str]) -> String {

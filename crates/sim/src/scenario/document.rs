@@ -20,7 +20,7 @@ use crate::link::{ActuationSpec, Failure, NetworkSpec, SensingSpec};
 use tautline_core::swarm::{Rows, set_row};
 use tautline_laws::formation::Ink;
 use tautline_laws::law::LawSpec;
-use tautline_laws::target::{Arrival, Begins, DeadlockOptions};
+use tautline_laws::target::{Arrival, DeadlockOptions, LegTrigger};
 use tautline_laws::wind::WindSpec;
 
 /// Scenario: a swarm, its start, its formations and its control law. All numbers are in SI units, named at the end of
@@ -97,12 +97,12 @@ pub(super) struct Document {
     #[serde(default, skip_serializing_if = "is_default")]
     pub(super) noise: NoiseTable,
     #[serde(skip)]
-    pub(super) given: Given,
+    pub(super) given: TimeKeys,
 }
 
 /// Keys of `[time]` that the file gives; the others depend on other tables.
 #[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Given {
+pub(super) struct TimeKeys {
     pub(super) dt_s: bool,
     pub(super) record_hz: bool,
     pub(super) max_halvings: bool,
@@ -579,10 +579,10 @@ pub(super) enum Reached {
 }
 
 impl LegStart {
-    pub(super) fn begins(self) -> Begins {
+    pub(super) fn begins(self) -> LegTrigger {
         match self {
-            Self::When(Reached::Reached) => Begins::Reached,
-            Self::At(start_s) => Begins::At(start_s),
+            Self::When(Reached::Reached) => LegTrigger::Reached,
+            Self::At(start_s) => LegTrigger::At(start_s),
         }
     }
 }

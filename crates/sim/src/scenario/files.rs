@@ -84,7 +84,7 @@ impl Columns {
                 continue;
             }
             if columns.is_empty() {
-                (columns, is_named) = self.places(&fields).map_err(|said| refused(line, &said))?;
+                (columns, is_named) = self.column_indices(&fields).map_err(|said| refused(line, &said))?;
                 if is_named {
                     continue;
                 }
@@ -111,7 +111,7 @@ impl Columns {
     }
 
     /// Returns the position of each column, and whether the first line is a heading.
-    fn places(&self, fields: &[&str]) -> Result<(Vec<usize>, bool), String> {
+    fn column_indices(&self, fields: &[&str]) -> Result<(Vec<usize>, bool), String> {
         if let Some(places) = self.named(fields) {
             return Ok((places, true));
         }
@@ -195,7 +195,7 @@ pub(super) fn slots(path: &Path) -> Result<Vec<Point>, ScenarioError> {
 
 /// Reads times \[s\], which must increase, and positions \[m\] from a file with the columns t, x, y and optionally z;
 /// at least two rows.
-pub(super) fn places(path: &Path) -> Result<(Vec<f64>, Vec<Point>), ScenarioError> {
+pub(super) fn timed_positions(path: &Path) -> Result<(Vec<f64>, Vec<Point>), ScenarioError> {
     let rows = PLACES.read(path)?;
     let mut before_s = f64::NEG_INFINITY;
     for (line, numbers) in &rows {

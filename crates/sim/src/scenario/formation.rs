@@ -16,7 +16,7 @@ use tautline_core::swarm::{Pair, Rows, row, set_row};
 use tautline_laws::formation::{
     Drawing, DrawingError, Formation, Freedom, MAX_DRAWN_SLOTS, most_assigned, optimal_slots, optimal_slots_around,
 };
-use tautline_laws::target::{Begins, Leg};
+use tautline_laws::target::{Leg, LegTrigger};
 
 /// Number of slots of the pentagon.
 const PENTAGON_COUNT: usize = 5;
@@ -37,7 +37,7 @@ pub(super) fn legs(scenario: &mut Scenario, first: &FormationTable, later: &[Leg
             .as_ref()
             .map_or_else(|| Ok(before.clone()), |shape| formation(shape, count, delta_m))
             .map_err(|error| error.on_leg(number + 1))?;
-        let begins = start_s.map_or(Begins::Reached, LegStart::begins);
+        let begins = start_s.map_or(LegTrigger::Reached, LegStart::begins);
         let interchangeable = interchangeable(scenario, number + 1, placement.assignment)?;
         let mut leg = placement.place(Leg { formation, begins, interchangeable });
         assign(&mut leg, placement.assignment, &before.slots_m, (freedom, leader));
@@ -179,7 +179,7 @@ pub(super) fn formation(shape: &FormationShape, count: usize, delta_m: f64) -> R
 }
 
 /// Resolves the file of a shape relative to a folder, and replaces a file of points by a list.
-pub(super) fn found_from(folder: &std::path::Path, shape: &mut FormationShape) -> Result<(), ScenarioError> {
+pub(super) fn resolve_path(folder: &std::path::Path, shape: &mut FormationShape) -> Result<(), ScenarioError> {
     match shape {
         FormationShape::Svg(keys) => keys.file = keys.file.take().map(|file| folder.join(file)),
         FormationShape::Image(keys) => keys.file = folder.join(&keys.file),

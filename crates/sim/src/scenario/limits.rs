@@ -4,7 +4,7 @@ use std::fmt::Display;
 
 use super::error::ScenarioError;
 use tautline_core::swarm::{Pair, Rows, row};
-use tautline_laws::space::Spaced;
+use tautline_laws::space::SpacedPoints;
 
 /// Largest magnitude of a number, in SI units; in metres a million kilometres, where doubles are 0.1 um apart.
 pub const LARGEST: f64 = 1e9;
@@ -35,7 +35,7 @@ pub(super) const DEFAULT_SPACING: f64 = 1.5;
 pub const MAX_NAME_CHARS: usize = 64;
 
 /// Returns whether a name may contain the character.
-pub(super) fn may_be_in_a_name(c: char) -> bool {
+pub(super) fn is_name_character(c: char) -> bool {
     c.is_ascii_alphanumeric() || c == '-' || c == '_'
 }
 
@@ -111,8 +111,8 @@ pub(super) fn rounded_up(number: f64) -> f64 {
 }
 
 /// Returns the first pair of rows that are at most `distance_m` apart, and their distance.
-pub(super) fn first_within(rows: &Rows, distance_m: f64) -> Option<(Pair, f64)> {
-    let mut spaced = Spaced::new(distance_m);
+pub(super) fn first_pair_within(rows: &Rows, distance_m: f64) -> Option<(Pair, f64)> {
+    let mut spaced = SpacedPoints::new(distance_m);
     (0..rows.nrows()).find_map(|j| spaced.insert(row(rows, j)).err().map(|(i, apart_m)| (Pair::new(i, j), apart_m)))
 }
 

@@ -29,7 +29,7 @@ mod validate;
 mod vehicle;
 
 pub use crate::link::{
-    ActuationSpec, Failure, FailureKind, LinkFailure, NearBy, NetworkSpec, SensingSpec, StalePolicy,
+    ActuationSpec, Failure, FailureKind, LinkFailure, NearStates, NetworkSpec, SensingSpec, StalePolicy,
 };
 pub use error::{Field, Place, ScenarioError};
 pub use limits::{

@@ -29,7 +29,7 @@ use super::error::ScenarioError;
 use super::limits::{CONTACT_PREDICTION_M, SLOT_MARGIN, SMALLEST};
 use super::spec::Scenario;
 use tautline_core::swarm::{Rows, row, set_row};
-use tautline_laws::space::{Obstacle, Shape, least_room};
+use tautline_laws::space::{Obstacle, Shape, smallest_clearance_margin};
 
 /// Remedy for a wrong obstacle: the format of the table.
 pub const OBSTACLE_HELP: &str = "an obstacle has a name, one of ball, box, capsule and half_space, and at_m = [x, y, \
@@ -239,7 +239,8 @@ impl Scenario {
     /// Returns the vehicle with the smallest margin to a clearance and the obstacle, if the margin is at most
     /// `margin_m` \[m\].
     fn too_near(&self, positions_m: &Rows, margin_m: f64) -> Option<(f64, usize, usize)> {
-        least_room(&self.obstacles, positions_m).filter(|&(clearance_margin_m, ..)| clearance_margin_m <= margin_m)
+        smallest_clearance_margin(&self.obstacles, positions_m)
+            .filter(|&(clearance_margin_m, ..)| clearance_margin_m <= margin_m)
     }
 
     fn refuse(&self, point_m: Vector3<f64>, number: usize, subject: std::fmt::Arguments<'_>) -> ScenarioError {

@@ -112,7 +112,7 @@ impl ReferenceTable {
     }
 
     /// Replaces a file, named relative to a folder, by its points.
-    pub(super) fn found_from(&mut self, folder: &Path) -> Result<(), ScenarioError> {
+    pub(super) fn resolve_path(&mut self, folder: &Path) -> Result<(), ScenarioError> {
         if let ReferenceKind::File { file } = &self.kind {
             self.kind = ReferenceKind::of_file(&folder.join(file))?;
         }
@@ -166,7 +166,7 @@ impl ReferenceTable {
 
 impl ReferenceKind {
     fn of_file(file: &Path) -> Result<Self, ScenarioError> {
-        let (times_s, points_m) = super::files::places(file)?;
+        let (times_s, points_m) = super::files::timed_positions(file)?;
         Ok(Self::Spline { points_m, times_s })
     }
 

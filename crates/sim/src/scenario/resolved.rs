@@ -7,8 +7,8 @@ use sha2::{Digest, Sha256};
 use toml::{Table, Value};
 
 use super::document::{
-    Assignment, Document, FormationShape, FormationTable, Given, LawTable, LegTable, NoiseTable, Placement, PlantTable,
-    SafetyTable, StartTable, SwarmTable,
+    Assignment, Document, FormationShape, FormationTable, LawTable, LegTable, NoiseTable, Placement, PlantTable,
+    SafetyTable, StartTable, SwarmTable, TimeKeys,
 };
 use super::document::{Edge, LegStart, PerVehicle, Point};
 use super::graph::{GraphKind, GraphTable};
@@ -18,7 +18,7 @@ use super::spec::{Scenario, Space};
 use super::template::Laws;
 use super::vehicle::VehicleTable;
 use tautline_core::swarm::Rows;
-use tautline_laws::target::{Begins, Leg};
+use tautline_laws::target::{Leg, LegTrigger};
 
 impl Scenario {
     /// Returns the scenario as TOML with every default written out. Reading it gives an equal scenario, bit for bit.
@@ -47,8 +47,8 @@ impl Scenario {
     fn leg_table(&self, leg: &Leg) -> LegTable {
         LegTable {
             start_s: match leg.begins {
-                Begins::At(start_s) => Some(LegStart::At(start_s)),
-                Begins::Reached => None,
+                LegTrigger::At(start_s) => Some(LegStart::At(start_s)),
+                LegTrigger::Reached => None,
             },
             placement: placement(leg),
             shape: Some(FormationShape::Points { points_m: self.points(&leg.formation.slots_m) }),
@@ -114,7 +114,7 @@ impl From<&Scenario> for Document {
             actuation: scenario.actuation,
             failure: scenario.failures.clone(),
             noise: NoiseTable { seed: scenario.noise_seed },
-            given: Given::default(),
+            given: TimeKeys::default(),
         }
     }
 }

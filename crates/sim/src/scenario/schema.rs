@@ -74,7 +74,7 @@ fn tidy(schema: &mut Value) {
 pub(super) struct Node {
     schema: &'static Value,
     /// Description of the key, if the part belongs to a key.
-    about: Option<&'static str>,
+    description: Option<&'static str>,
 }
 
 impl Node {
@@ -85,23 +85,23 @@ impl Node {
 
     /// Returns the part that a reference points to. The description of the key precedes the description of its type.
     fn of(schema: &'static Value) -> Self {
-        let about = schema["description"].as_str();
+        let description = schema["description"].as_str();
         let definition = schema["$ref"].as_str().and_then(|path| SCHEMA.pointer(path.trim_start_matches('#')));
-        definition.map_or(Self { schema, about }, |definition| {
+        definition.map_or(Self { schema, description }, |definition| {
             let of = Self::of(definition);
-            Self { about: about.or(of.about), ..of }
+            Self { description: description.or(of.description), ..of }
         })
     }
 
     /// Returns a part of the same key, with the description of the key.
     fn part(self, schema: &'static Value) -> Self {
         let part = Self::of(schema);
-        Self { about: self.about.or(part.about), ..part }
+        Self { description: self.description.or(part.description), ..part }
     }
 
     /// Returns the description of the key or of the type.
-    pub(super) fn about(self) -> Option<&'static str> {
-        self.about
+    pub(super) fn description(self) -> Option<&'static str> {
+        self.description
     }
 
     /// Returns the value of a keyword, such as `minimum`.
@@ -182,8 +182,8 @@ impl Node {
         })
     }
 
-    /// Returns the part below for a key or the number of an entry, in a value of the file.
-    fn below(self, value: Option<&Spanned<DeValue<'_>>>, key: &str) -> Option<Self> {
+    /// Returns the child part for a key or the number of an entry, in a value of the file.
+    fn child(self, value: Option<&Spanned<DeValue<'_>>>, key: &str) -> Option<Self> {
         if let Some(part) = self.property(key).or_else(|| self.values()).or_else(|| self.items()) {
             return Some(part);
         }
@@ -201,7 +201,7 @@ pub fn takes_integers_only(source: &Source, overrides: &[Override], key: &str) -
     let mut at = (Some(Node::root()), Some(&tree));
     for part in key.split('.') {
         let (node, value) = at;
-        let node = node.and_then(|node| node.below(value, part));
+        let node = node.and_then(|node| node.child(value, part));
         let entry = || part.parse::<usize>().ok()?.checked_sub(1);
         let value = value.and_then(|value| match value.get_ref() {
             DeValue::Array(list) => list.get(entry()?),

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use super::document::Document;
 use super::error::suggest;
 use super::error::{Place, ScenarioError};
-use super::limits::{MAX_NAME_CHARS, may_be_in_a_name};
+use super::limits::{MAX_NAME_CHARS, is_name_character};
 use super::spec::Scenario;
 use super::text::Override;
 use super::text::Text;
@@ -108,7 +108,7 @@ impl Scenario {
 /// Reads the keys of a text, with paths relative to a folder.
 pub(super) fn decoded(text: &Text<'_>, folder: &Path) -> Result<Document, ScenarioError> {
     let mut document = text.decode()?;
-    document.vehicle.found_from(folder).map_err(|error| text.place(error))?;
+    document.vehicle.resolve_path(folder).map_err(|error| text.place(error))?;
     find_files(&mut document, folder).map_err(|error| text.place(error))?;
     Ok(document)
 }
@@ -125,13 +125,13 @@ pub(super) fn finish(mut document: Document, text: &Text<'_>) -> Result<Scenario
 
 /// Resolves the files of shapes and of the reference relative to a folder.
 fn find_files(document: &mut Document, folder: &Path) -> Result<(), ScenarioError> {
-    super::formation::found_from(folder, &mut document.formation.shape)?;
+    super::formation::resolve_path(folder, &mut document.formation.shape)?;
     if let Some(reference) = &mut document.reference {
-        reference.found_from(folder)?;
+        reference.resolve_path(folder)?;
     }
     for (number, leg) in document.leg.iter_mut().enumerate() {
         if let Some(shape) = &mut leg.shape {
-            super::formation::found_from(folder, shape).map_err(|error| error.on_leg(number + 1))?;
+            super::formation::resolve_path(folder, shape).map_err(|error| error.on_leg(number + 1))?;
         }
     }
     Ok(())
@@ -146,7 +146,7 @@ fn unknown_builtin(name: &str) -> ScenarioError {
 
 /// Replaces characters that a name may not contain by `-`.
 fn as_name(text: &str) -> String {
-    text.chars().take(MAX_NAME_CHARS).map(|c| if may_be_in_a_name(c) { c } else { '-' }).collect()
+    text.chars().take(MAX_NAME_CHARS).map(|c| if is_name_character(c) { c } else { '-' }).collect()
 }
 
 /// Reads a UTF-8 file of at most [`MAX_FILE_BYTES`].

@@ -9,7 +9,7 @@ use super::error::ScenarioError;
 use super::spec::Space;
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_laws::formation::Formation;
-use tautline_laws::space::Spaced;
+use tautline_laws::space::SpacedPoints;
 
 /// Default smallest separation of random positions, as a multiple of delta.
 const DEFAULT_SEPARATION: f64 = 1.5;
@@ -78,7 +78,7 @@ pub fn scatter(
     min_separation_m: f64,
     random: &mut ChaCha8Rng,
 ) -> Result<Rows, ScenarioError> {
-    let mut placed = Spaced::new(min_separation_m);
+    let mut placed = SpacedPoints::new(min_separation_m);
     let mut positions_m = Rows::zeros(count);
     for i in 0..count {
         let free = (0..TRIES).map(|_| offset(half_extent_m, space, random)).find(|&p| placed.insert(p).is_ok());

@@ -10,7 +10,7 @@ use toml::{Table, Value};
 use super::document::{Document, StartShape, StartTable};
 use super::error::ScenarioError;
 use super::error::suggest;
-use super::limits::{MAX_NAME_CHARS, may_be_in_a_name};
+use super::limits::{MAX_NAME_CHARS, is_name_character};
 use super::source::{Source, decoded, finish};
 use super::spec::Scenario;
 use super::text::Override;
@@ -114,7 +114,7 @@ impl Template {
 
     /// Returns the names of the laws to compare by default: those of `[laws.NAME]`, or else every kind.
     #[must_use]
-    pub fn compared(&self) -> Vec<String> {
+    pub fn compared_laws(&self) -> Vec<String> {
         let listed: Vec<_> = self.laws.iter().map(|(name, _)| name.clone()).collect();
         if listed.is_empty() { self.law_names() } else { listed }
     }
@@ -213,7 +213,7 @@ pub(super) fn check_laws(laws: &Laws) -> Result<(), (&str, ScenarioError)> {
 
 fn check_name(name: &str) -> Result<(), ScenarioError> {
     let help = format!("use 1 to {MAX_NAME_CHARS} letters, digits, `-` and `_`");
-    let said = match name.chars().find(|&c| !may_be_in_a_name(c)) {
+    let said = match name.chars().find(|&c| !is_name_character(c)) {
         Some(c) => format!("the name of a law contains {c:?}"),
         None if name.is_empty() => "the name of a law is empty".to_owned(),
         None if name.len() > MAX_NAME_CHARS => format!("the name of a law has {} characters", name.len()),

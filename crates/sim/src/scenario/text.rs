@@ -10,8 +10,8 @@ use serde::Deserialize as _;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 use toml::{Spanned, map::Map};
 
-use super::check::conform;
-use super::document::{Document, Given};
+use super::check::check_schema;
+use super::document::{Document, TimeKeys};
 use super::error::{Field, Place, ScenarioError};
 
 /// Keys from which a missing key takes its value, in order. An error about the missing key is placed at one of these.
@@ -59,9 +59,11 @@ impl<'a> Text<'a> {
         }
         let time = root.get_ref().get("time");
         let gives = |key: &str| time.is_some_and(|time| time.get_ref().get(key).is_some());
-        let given = Given { dt_s: gives("dt_s"), record_hz: gives("record_hz"), max_halvings: gives("max_halvings") };
-        conform(&mut root, self.toml.len() + 1).map_err(|misfit| misfit.error.with_place(self.locate(misfit.span)))?;
-        // `conform` accepts only what serde reads. An error of serde is a defect of the schema.
+        let given =
+            TimeKeys { dt_s: gives("dt_s"), record_hz: gives("record_hz"), max_halvings: gives("max_halvings") };
+        check_schema(&mut root, self.toml.len() + 1)
+            .map_err(|schema_error| schema_error.error.with_place(self.locate(schema_error.span)))?;
+        // `check_schema` accepts only what serde reads. An error of serde is a defect of the schema.
         let document = Document::deserialize(ValueDeserializer::from(root)).map_err(|error| {
             ScenarioError::new(error.message())
                 .coded("scenario/wrong-type")

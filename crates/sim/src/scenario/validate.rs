@@ -2,11 +2,11 @@
 
 use nalgebra::Vector3;
 
-use super::check::{Misfit, conform};
+use super::check::{SchemaError, check_schema};
 use super::error::ScenarioError;
 use super::limits::{
     CONTACT_PREDICTION_M, MAX_NAME_CHARS, MAX_STEPS, SLOT_MARGIN, check_count, check_lengths, check_memory,
-    first_within, may_be_in_a_name, require_finite,
+    first_pair_within, is_name_character, require_finite,
 };
 use super::spec::{Safety, Scenario, Space};
 use super::text::Text;
@@ -14,7 +14,7 @@ use super::time::TimeSpec;
 use tautline_core::swarm::{Pair, row};
 use tautline_laws::graph::{Graph, Pinning};
 use tautline_laws::law::{Controls, LawSpec, ParameterError};
-use tautline_laws::target::{Begins, DeadlockMode, Guidance, Leg};
+use tautline_laws::target::{DeadlockMode, Guidance, Leg, LegTrigger};
 use tautline_laws::wind::Gust;
 
 /// Relative rounding of the position \[m\] and velocity \[m/s\] of a leader on the reference.
@@ -43,7 +43,7 @@ impl Scenario {
         let resolved = self.resolved_toml();
         let mut tree = Text { name: &self.name, toml: &resolved, overrides: &[] }.tree()?;
         self.check_lengths()?;
-        conform(&mut tree, resolved.len() + 1).map_err(Misfit::without_text)?;
+        check_schema(&mut tree, resolved.len() + 1).map_err(SchemaError::without_text)?;
         self.check()
     }
 
@@ -114,7 +114,7 @@ impl Scenario {
                 .with_help("every leg needs a slot for each vehicle")
                 .at_leg(number, "formation.points_m"));
             }
-            let Begins::At(start_s) = leg.begins else { continue };
+            let LegTrigger::At(start_s) = leg.begins else { continue };
             if !(start_s >= from_s && start_s < self.time.duration_s) {
                 return Err(ScenarioError::new(format!("leg {} begins at {start_s} s", number + 1))
                     .coded("scenario/outside-flight")
@@ -263,7 +263,7 @@ impl Scenario {
         };
         let metric = self.metric();
         let apart = if metric.is_metres() { "apart," } else { "apart, scaled to the ellipsoid," };
-        if let Some((pair, separation_m)) = first_within(&metric.scaled_rows(&self.start.positions_m), delta_m) {
+        if let Some((pair, separation_m)) = first_pair_within(&metric.scaled_rows(&self.start.positions_m), delta_m) {
             let said = if separation_m == 0.0 {
                 format!("vehicles {pair} start at the same point")
             } else {
@@ -274,7 +274,7 @@ impl Scenario {
         }
         let least_m = delta_m * (1.0 + SLOT_MARGIN);
         let too_near = |(number, leg): (usize, &Leg)| {
-            Some((number, first_within(&metric.scaled_rows(&leg.formation.slots_m), least_m)?))
+            Some((number, first_pair_within(&metric.scaled_rows(&leg.formation.slots_m), least_m)?))
         };
         if let Some((leg, (pair, distance_m))) = self.legs.iter().enumerate().find_map(too_near) {
             let [a, b] = pair.numbers();
@@ -374,7 +374,7 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
         "the name is empty".to_owned()
     } else if name.chars().count() > MAX_NAME_CHARS {
         format!("the name has more than {MAX_NAME_CHARS} characters")
-    } else if let Some(bad) = name.chars().find(|&c| !may_be_in_a_name(c)) {
+    } else if let Some(bad) = name.chars().find(|&c| !is_name_character(c)) {
         format!("the name contains {bad:?}")
     } else {
         return Ok(());

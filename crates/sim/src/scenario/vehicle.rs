@@ -9,7 +9,9 @@ use super::error::suggest;
 use super::error::{Place, ScenarioError};
 use super::files;
 use super::spec::{PlantSpec, Scenario, Space};
-use crate::vehicle::{self, Airframe, Fleet, Ground, Heading, MODELS, Misread, Model, ModelError, Quadrotor, Unicycle};
+use crate::vehicle::{
+    self, Airframe, Fleet, Ground, Heading, MODELS, Model, ModelError, ModelParseError, Quadrotor, Unicycle,
+};
 use tautline_core::swarm::row;
 use tautline_laws::space::{Obstacle, Shape};
 
@@ -90,7 +92,7 @@ impl Default for ModelKey {
 
 impl VehicleTable {
     /// Reads the file of a model, named relative to a folder.
-    pub(super) fn found_from(&mut self, folder: &Path) -> Result<(), ScenarioError> {
+    pub(super) fn resolve_path(&mut self, folder: &Path) -> Result<(), ScenarioError> {
         if let ModelKey::Named(name) = &self.model
             && name.contains(['/', '\\', '.'])
         {
@@ -248,7 +250,7 @@ fn read(path: &Path) -> Result<Model, ScenarioError> {
             .with_help("save the file as UTF-8 text")
             .at(MODEL)
     })?;
-    vehicle::read(&text).map_err(|Misread { message, help, span }| {
+    vehicle::read(&text).map_err(|ModelParseError { message, help, span }| {
         ScenarioError::new(message).coded("scenario/file").with_help(help).with_place(Place::new(&shown, &text, span))
     })
 }
@@ -273,8 +275,8 @@ impl Scenario {
         };
         let grounds: Vec<_> = self.obstacles.iter().filter_map(ground).collect();
         let fleet = Fleet::trimmed(self.airframe.quadrotor()?, &grounds, &self.start, self.space == Space::Plane);
-        let fleet = fleet.failing(self.rotor_failures());
-        Some(if self.wind.is_still() { fleet } else { fleet.blown(self.air()) })
+        let fleet = fleet.with_failures(self.rotor_failures());
+        Some(if self.wind.is_still() { fleet } else { fleet.with_wind(self.air()) })
     }
 
     /// Sets the airframe of all vehicles, and the mass, hull and default rates that belong to it. Quadrotors have no

@@ -7,7 +7,7 @@ use crate::scenario::Scenario;
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::graph::Graph;
 use tautline_laws::law::{Certificate, Law, LawError, certificate_through};
-use tautline_laws::observation::{Observation, Others};
+use tautline_laws::observation::{Observation, OtherStates};
 use tautline_laws::space::{Metric, Obstacle, VerletList};
 use tautline_laws::target::{Change, CurrentTarget, Guidance, Supervisor};
 
@@ -67,8 +67,8 @@ impl Controller {
         let Some(command) = command else { return Ok(()) };
         if let Some(range_m) = self.law.capabilities().sensing_range_m {
             let from = match sensed.others {
-                Others::Shared => None,
-                Others::Held(picture) => picture.near_from(),
+                OtherStates::Shared => None,
+                OtherStates::PerVehicle(picture) => picture.near_search_positions(),
             };
             let (positions_m, slack_m) = from.unwrap_or((&sensed.own.positions_m, 0.0));
             self.near.update(positions_m, range_m + slack_m);
@@ -83,7 +83,7 @@ impl Controller {
             obstacles: &self.obstacles,
         };
         let commanded = self.law.command(&at, &mut self.commanded);
-        commanded.map_err(|error| error.against_truth(truth, self.metric, &self.obstacles))?;
+        commanded.map_err(|error| error.with_true_distance(truth, self.metric, &self.obstacles))?;
         self.actuate(time_s, command);
         Ok(())
     }
@@ -99,7 +99,7 @@ impl Controller {
         let change = self.supervisor.take_change()?;
         let target = self.target.view();
         let exact = Observation::exact(truth, &self.links, target.formation);
-        let mut ahead = self.supervisor.ahead(&target);
+        let mut ahead = self.supervisor.later_formations(&target);
         if matches!(change, Change::Assigned { .. }) {
             // The slots of the leg follow after the spread ones.
             ahead.insert(0, target.formation);

@@ -1,7 +1,7 @@
 //! Connects the audit with the simulation loop: sweeps every step and collects findings for the next sample.
 
 use super::ending::SimError;
-use crate::plant::{HullContact, Path, Plant};
+use crate::plant::{HullContact, Plant, StepPath};
 use crate::scenario::Scenario;
 use tautline_audit as audit;
 use tautline_audit::{
@@ -25,8 +25,8 @@ pub(super) struct Judge {
     scaled: Rows,
     delta_m: f64,
     /// Number of sweeps that are clear by less than the bend of the paths.
-    bent: u64,
-    bent_past_obstacles: u64,
+    undecided_by_bend: u64,
+    obstacles_undecided_by_bend: u64,
     /// Bound of the distance between the audited motion and that of the law \[m\], once a step was too long for the
     /// law.
     error_m: Option<f64>,
@@ -63,7 +63,7 @@ pub(super) struct AuditResults {
 impl Judge {
     pub(super) fn new(scenario: &Scenario) -> Result<Self, SimError> {
         let count = scenario.count();
-        let obstacles: Vec<_> = scenario.obstacles.iter().map(judged).collect();
+        let obstacles: Vec<_> = scenario.obstacles.iter().map(audit_obstacle).collect();
         let clearance = if obstacles.is_empty() { None } else { Some(ClearanceAuditor::new(count, &obstacles)?) };
         let metric = scenario.metric();
         let widest_m = 2.0 * scenario.hull_radius_m.iter().copied().fold(0.0, f64::max);
@@ -74,8 +74,8 @@ impl Judge {
             metric,
             scaled: Rows::zeros(0),
             delta_m: scenario.delta_m,
-            bent: 0,
-            bent_past_obstacles: 0,
+            undecided_by_bend: 0,
+            obstacles_undecided_by_bend: 0,
             error_m: None,
             beyond_error: [false; 2],
             clearance,
@@ -99,7 +99,7 @@ impl Judge {
         }
         let finding = auditor.start(time_s, in_metric(*metric, positions_m, scaled))?;
         note(finding, &mut self.closest, &mut self.nearest_m, events);
-        self.clear_of_obstacles(time_s, positions_m, 0.0, events)
+        self.sweep_obstacles(time_s, positions_m, 0.0, events)
     }
 
     /// Sweeps the straight line to these positions; true paths deviate by at most `bend_m` \[m\].
@@ -117,10 +117,10 @@ impl Judge {
         let finding = auditor.step(time_s, in_metric(*metric, positions_m, scaled))?;
         if let Some(closest) = finding.closest {
             let nearer_m = 2.0 * metric.most_scaled(bend_m);
-            self.bent += u64::from(is_undecided(closest.separation_m, nearer_m, self.delta_m));
+            self.undecided_by_bend += u64::from(is_undecided(closest.separation_m, nearer_m, self.delta_m));
         }
         note(finding, &mut self.closest, &mut self.nearest_m, events);
-        self.clear_of_obstacles(time_s, positions_m, bend_m, events)?;
+        self.sweep_obstacles(time_s, positions_m, bend_m, events)?;
         if let Some(error_m) = self.error_m {
             self.beyond_error[0] |= self.delta_m - self.nearest_m > self.metric.most_scaled(error_m);
             self.beyond_error[1] |= -self.clearance_margin_m > error_m;
@@ -129,7 +129,7 @@ impl Judge {
     }
 
     /// Records that later sweeps may differ from the law's motion by `error_m` \[m\]. Earlier violations are exact.
-    pub(super) fn may_err_by(&mut self, error_m: f64) {
+    pub(super) fn note_integration_error(&mut self, error_m: f64) {
         if self.error_m.replace(error_m).is_none() {
             self.beyond_error = self.violated();
         }
@@ -141,7 +141,7 @@ impl Judge {
         [!self.auditor.violations().is_empty(), past_obstacles.next().is_some()]
     }
 
-    fn clear_of_obstacles(
+    fn sweep_obstacles(
         &mut self,
         time_s: f64,
         positions_m: &Rows,
@@ -149,9 +149,9 @@ impl Judge {
         events: &mut Vec<Event>,
     ) -> Result<(), AuditError> {
         if let Some(clearance) = &mut self.clearance {
-            let ClearanceFinding { least_room_m, began, ended } = clearance.step(time_s, positions_m)?;
-            self.clearance_margin_m = least_room_m;
-            self.bent_past_obstacles += u64::from(is_undecided(least_room_m, bend_m, 0.0));
+            let ClearanceFinding { smallest_margin_m, began, ended } = clearance.step(time_s, positions_m)?;
+            self.clearance_margin_m = smallest_margin_m;
+            self.obstacles_undecided_by_bend += u64::from(is_undecided(smallest_margin_m, bend_m, 0.0));
             for &Violation { pair, from_s: time_s, .. } in began {
                 if let ObjectPair::Obstacle { vehicle, obstacle } = pair {
                     events.push(Event::ObstacleViolationBegan { vehicle, obstacle, time_s });
@@ -159,7 +159,7 @@ impl Judge {
             }
             for ended @ &Violation { pair, to_s: time_s, min_m, .. } in ended {
                 if let ObjectPair::Obstacle { vehicle, obstacle } = pair {
-                    events.extend(deepest_past_obstacle(ended));
+                    events.extend(obstacle_violation_event(ended));
                     events.push(Event::ObstacleViolationEnded { vehicle, obstacle, time_s, min_m });
                 }
             }
@@ -183,10 +183,13 @@ impl Judge {
     }
 
     /// Returns the closest approaches of violations that last until an instant.
-    pub(super) fn lasting(&self, time_s: f64) -> impl Iterator<Item = Event> + '_ {
-        let pairs = self.auditor.violations().iter().filter(move |violation| violation.to_s == time_s).map(deepest);
+    pub(super) fn ongoing_violations(&self, time_s: f64) -> impl Iterator<Item = Event> + '_ {
+        let pairs =
+            self.auditor.violations().iter().filter(move |violation| violation.to_s == time_s).map(violation_event);
         let past_obstacles = self.clearance.iter().flat_map(ClearanceAuditor::violations);
-        pairs.chain(past_obstacles.filter(move |violation| violation.to_s == time_s).filter_map(deepest_past_obstacle))
+        pairs.chain(
+            past_obstacles.filter(move |violation| violation.to_s == time_s).filter_map(obstacle_violation_event),
+        )
     }
 
     /// Returns the closest approaches of vehicles to obstacles so far.
@@ -203,18 +206,18 @@ impl Judge {
 
     /// Returns whether the move from `start` to `end` takes more than half of the clearance of some pair above the
     /// law's barrier. For a law that avoids obstacles, clearances of vehicles from obstacles count as well.
-    pub(super) fn refuses(
+    pub(super) fn is_step_too_long(
         &mut self,
         (law, links): (&dyn Law, &Graph),
-        (start, path, end): (&Swarm, &Path, &Swarm),
+        (start, path, end): (&Swarm, &StepPath, &Swarm),
         moved_m: f64,
     ) -> bool {
         let Some(barrier_m) = law.capabilities().barrier_m else { return false };
         let start = &start.positions_m;
-        let instants = || path.passed().map(|(_, rows)| rows).chain([&end.positions_m]);
+        let instants = || path.instants().map(|(_, rows)| rows).chain([&end.positions_m]);
         if moved_m > 0.5 * self.clearance_margin_m
             && law.capabilities().avoids_obstacles
-            && self.nears_an_obstacle(start, path, end)
+            && self.comes_near_obstacle(start, path, end)
         {
             return true;
         }
@@ -239,7 +242,7 @@ impl Judge {
 
     /// Returns a lower bound of the separations of the pairs that the law acts on, in the auditor's metric: all pairs
     /// for a law that senses, otherwise linked pairs. Visits every edge of an incomplete graph.
-    pub(super) fn nearest_acted_on_m(&self, law: &dyn Law, links: &Graph, state: &Swarm) -> f64 {
+    pub(super) fn smallest_separation_of_law_m(&self, law: &dyn Law, links: &Graph, state: &Swarm) -> f64 {
         if law.capabilities().sensing_range_m.is_some() || links.is_complete() {
             return self.nearest_m;
         }
@@ -250,15 +253,15 @@ impl Judge {
     /// Returns the smallest separation of a pair that the law acts on over the move from `start` to `end`, in the
     /// auditor's metric. No vehicle moves farther than `moved_m`. A lower bound that is at least `enough` may replace
     /// the exact value.
-    pub(super) fn nearest_over(
+    pub(super) fn smallest_separation_of_move(
         &mut self,
         (law, links): (&dyn Law, &Graph),
-        (start, path, end): (&Swarm, &Path, &Swarm),
+        (start, path, end): (&Swarm, &StepPath, &Swarm),
         moved_m: f64,
         enough: impl Fn(f64) -> bool,
     ) -> f64 {
         let start = &start.positions_m;
-        let instants = || path.passed().map(|(_, rows)| rows).chain([&end.positions_m]);
+        let instants = || path.instants().map(|(_, rows)| rows).chain([&end.positions_m]);
         let least_m = self.nearest_m - self.metric.most_scaled(2.0 * moved_m);
         if enough(least_m) {
             return least_m;
@@ -279,13 +282,13 @@ impl Judge {
         }
     }
 
-    fn nears_an_obstacle(&self, start: &Rows, path: &Path, end: &Swarm) -> bool {
+    fn comes_near_obstacle(&self, start: &Rows, path: &StepPath, end: &Swarm) -> bool {
         (0..start.nrows()).any(|i| {
             self.obstacles.iter().any(|obstacle| {
                 let limit_m = obstacle.clearance_m.unwrap_or_default();
                 let mut from = row(start, i);
                 let least_m = limit_m + 0.5 * (swept_distance_m(obstacle, from, from) - limit_m);
-                path.passed().map(|(_, rows)| rows).chain([&end.positions_m]).any(|rows| {
+                path.instants().map(|(_, rows)| rows).chain([&end.positions_m]).any(|rows| {
                     let to = row(rows, i);
                     swept_distance_m(obstacle, std::mem::replace(&mut from, to), to) < least_m
                 })
@@ -326,12 +329,12 @@ impl Judge {
             known => known,
         };
         let mut audit = self.auditor.finish();
-        audit.unresolved += self.bent;
-        audit.status = unless(self.bent, in_doubt[0], audit.status);
+        audit.unresolved += self.undecided_by_bend;
+        audit.status = unless(self.undecided_by_bend, in_doubt[0], audit.status);
         let mut clearance = self.clearance.map(ClearanceAuditor::finish);
         if let Some(clearance) = &mut clearance {
-            clearance.unresolved += self.bent_past_obstacles;
-            clearance.status = unless(self.bent_past_obstacles, in_doubt[1], clearance.status);
+            clearance.unresolved += self.obstacles_undecided_by_bend;
+            clearance.status = unless(self.obstacles_undecided_by_bend, in_doubt[1], clearance.status);
         }
         AuditResults {
             audit,
@@ -344,9 +347,9 @@ impl Judge {
 }
 
 /// Returns the largest distance of a vehicle from its position at `start`, on its path to `end` \[m\].
-pub(super) fn longest_move_m(start: &Swarm, path: &Path, end: &Swarm) -> f64 {
+pub(super) fn longest_move_m(start: &Swarm, path: &StepPath, end: &Swarm) -> f64 {
     let start = &start.positions_m;
-    path.passed()
+    path.instants()
         .map(|(_, rows)| rows)
         .chain([&end.positions_m])
         .flat_map(|rows| (0..start.nrows()).map(move |i| (row(rows, i) - row(start, i)).norm()))
@@ -369,12 +372,12 @@ fn is_undecided(distance_m: f64, nearer_m: f64, limit_m: f64) -> bool {
 }
 
 /// Returns the closest approach of a violation as an event.
-fn deepest(violation: &Violation) -> Event {
+fn violation_event(violation: &Violation) -> Event {
     Event::Approach { pair: violation.pair, time_s: violation.min_at_s, separation_m: violation.min_m }
 }
 
 /// Returns the closest approach of a violation of an obstacle's clearance as an event.
-fn deepest_past_obstacle(violation: &Violation<ObjectPair>) -> Option<Event> {
+fn obstacle_violation_event(violation: &Violation<ObjectPair>) -> Option<Event> {
     match violation.pair {
         ObjectPair::Obstacle { vehicle, obstacle } => {
             let (time_s, distance_m) = (violation.min_at_s, violation.min_m);
@@ -395,17 +398,17 @@ fn note(finding: StepFinding<'_>, closest: &mut Option<ClosestApproach>, nearest
     }
     for violation in finding.ended {
         let &Violation { pair, to_s, min_m, .. } = violation;
-        events.push(deepest(violation));
+        events.push(violation_event(violation));
         events.push(Event::ViolationEnded { pair, time_s: to_s, min_m });
     }
 }
 
 /// Returns an obstacle at rest in the types of the audit.
 #[must_use]
-pub fn judged(obstacle: &space::Obstacle) -> audit::Obstacle {
+pub fn audit_obstacle(obstacle: &space::Obstacle) -> audit::Obstacle {
     audit::Obstacle {
         name: obstacle.name.clone(),
-        shape: judged_shape(obstacle.shape),
+        shape: audit_shape(obstacle.shape),
         clearance_m: Some(obstacle.clearance_m),
         path: vec![(0.0, obstacle.place_m)],
     }
@@ -413,7 +416,7 @@ pub fn judged(obstacle: &space::Obstacle) -> audit::Obstacle {
 
 /// Returns a shape in the types of the audit.
 #[must_use]
-pub fn judged_shape(shape: space::Shape) -> audit::Shape {
+pub fn audit_shape(shape: space::Shape) -> audit::Shape {
     match shape {
         space::Shape::Ball { radius_m } => audit::Shape::Ball { radius_m },
         space::Shape::Box { half_m, yaw_deg } => audit::Shape::Box { half_m, yaw_rad: yaw_deg.to_radians() },

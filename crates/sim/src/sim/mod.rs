@@ -12,8 +12,8 @@ mod monitors;
 mod simulation;
 
 pub use ending::{Breakdown, Ending, Flight, Performance, SimError};
-pub use judge::{judged, judged_shape};
-pub use simulation::{Components, Saved, Simulation};
+pub use judge::{audit_obstacle, audit_shape};
+pub use simulation::{Components, SavedState, Simulation};
 
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -37,7 +37,7 @@ pub fn fly(
     carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Flight, SimError> {
     let simulation = Simulation::with(scenario, parts)?;
-    fly_on(simulation, sink, &mut |simulation| carry_on(simulation.steps()))
+    continue_flight(simulation, sink, &mut |simulation| carry_on(simulation.steps()))
 }
 
 /// Continues a simulation to its end, like [`fly`]. `after` is called after each step; it may load a saved state, and
@@ -45,19 +45,19 @@ pub fn fly(
 ///
 /// # Errors
 /// [`SimError`] if the recording cannot be written.
-pub fn fly_on(
+pub fn continue_flight(
     mut simulation: Simulation,
     sink: &mut dyn Sink,
     after: &mut dyn FnMut(&mut Simulation) -> ControlFlow<()>,
 ) -> Result<Flight, SimError> {
     let began = Instant::now();
-    hand_over(&mut simulation, sink)?;
+    pass_to_sink(&mut simulation, sink)?;
     while simulation.ending().is_none() {
         simulation.step();
-        hand_over(&mut simulation, sink)?;
+        pass_to_sink(&mut simulation, sink)?;
         if simulation.ending().is_none() && after(&mut simulation).is_break() {
             simulation.interrupt();
-            hand_over(&mut simulation, sink)?;
+            pass_to_sink(&mut simulation, sink)?;
         }
     }
     if let Some(reason) = simulation.ending().and_then(Ending::reason) {
@@ -68,7 +68,7 @@ pub fn fly_on(
 }
 
 /// Passes events and a due sample to the sink in order of time, then the step.
-fn hand_over(simulation: &mut Simulation, sink: &mut dyn Sink) -> Result<(), RecordError> {
+fn pass_to_sink(simulation: &mut Simulation, sink: &mut dyn Sink) -> Result<(), RecordError> {
     simulation.events().try_for_each(|event| sink.event(&event))?;
     sink.step(&Step { time_s: simulation.time_s(), swarm: simulation.state(), control: simulation.control() });
     let began = Instant::now();

@@ -33,7 +33,7 @@ pub(super) struct IntegrationError {
 
 /// Substep, as far as its error depends on it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Part {
+pub(super) struct Substep {
     /// Length \[s\].
     pub(super) length_s: f64,
     /// Fastest rate of the law over it \[1/s\].
@@ -54,8 +54,8 @@ impl IntegrationError {
 
     /// Returns the error after one more substep.
     #[must_use]
-    pub(super) fn after(self, part: Part) -> Self {
-        let Part { length_s, rate_per_s, moved_m, limit_m_s2, is_overlong } = part;
+    pub(super) fn after(self, part: Substep) -> Self {
+        let Substep { length_s, rate_per_s, moved_m, limit_m_s2, is_overlong } = part;
         // Infinite rate times zero way is NaN, which `min` ignores.
         let change_m_s2 = |way_m: f64, most_m_s2: f64| (rate_per_s * rate_per_s * way_m).min(most_m_s2);
         let own_m_s = if is_overlong { length_s * change_m_s2(moved_m, 2.0 * limit_m_s2) } else { 0.0 };
@@ -80,7 +80,7 @@ const VELOCITY_ROUNDINGS: f64 = 3.0;
 /// A vehicle whose displacement per step is below half a unit in the last place of its position stands still; the bound
 /// includes this error.
 #[derive(Clone, Copy)]
-pub(super) struct Resolution {
+pub(super) struct RoundingBound {
     /// Centre of the start, the origin of a plant's positions \[m\].
     origin_m: Vector3<f64>,
     required_m: f64,
@@ -90,7 +90,7 @@ pub(super) struct Resolution {
     present_m: f64,
 }
 
-impl Resolution {
+impl RoundingBound {
     pub(super) fn of(scenario: &Scenario) -> Self {
         Self {
             origin_m: mean_row(&scenario.start.positions_m),
@@ -105,7 +105,7 @@ impl Resolution {
     ///
     /// # Errors
     /// [`Breakdown::Unresolved`] if the bound exceeds the tolerance of arrival.
-    pub(super) fn take(&mut self, swarm: &Swarm, dt_s: f64, step: u64) -> Result<(), Breakdown> {
+    pub(super) fn add_step(&mut self, swarm: &Swarm, dt_s: f64, step: u64) -> Result<(), Breakdown> {
         let half_unit = 0.5 * f64::EPSILON;
         let far_m = largest_coordinate(&swarm.positions_m, self.origin_m);
         self.velocity_m_s +=
@@ -142,7 +142,7 @@ pub(super) struct EnergyMonitor {
 
 impl EnergyMonitor {
     /// Records the supervisor's changes at an instant, and renews the certificate if necessary.
-    pub(super) fn look(
+    pub(super) fn note_changes(
         &mut self,
         scenario: &Scenario,
         controller: &mut Controller,
@@ -170,7 +170,7 @@ impl EnergyMonitor {
     }
 
     /// Records the energy of the next instant, under the target with this revision.
-    pub(super) fn take(&mut self, revision: u64, energy: Option<f64>) {
+    pub(super) fn add(&mut self, revision: u64, energy: Option<f64>) {
         let Some(energy) = energy else { return };
         let from = match self.since {
             Some((of, from)) if of == revision => from,
@@ -195,14 +195,14 @@ mod tests {
     use super::*;
     use tautline_laws::formation::Formation;
 
-    const OVERLONG: Part =
-        Part { length_s: 0.25, rate_per_s: 2.0, moved_m: 0.5, limit_m_s2: f64::INFINITY, is_overlong: true };
+    const OVERLONG: Substep =
+        Substep { length_s: 0.25, rate_per_s: 2.0, moved_m: 0.5, limit_m_s2: f64::INFINITY, is_overlong: true };
 
     /// Tests x'' = omega^2 x, the fastest growth, from x = 1 in kicks and drifts with omega h = 0.5, against cosh(omega
     /// t).
     #[test]
     fn the_bound_holds_for_a_motion_that_is_stepped_too_coarsely() {
-        let Part { length_s: h, rate_per_s: omega, .. } = OVERLONG;
+        let Substep { length_s: h, rate_per_s: omega, .. } = OVERLONG;
         let kick = |x: f64| 0.5 * h * omega * omega * x;
         let (mut x, mut v, mut error) = (1.0, 0.0, IntegrationError::default());
         for step in 1..=8_u32 {
@@ -210,7 +210,7 @@ mod tests {
             v += kick(x);
             x += h * v;
             v += kick(x);
-            error = error.after(Part { moved_m: x - before, ..OVERLONG });
+            error = error.after(Substep { moved_m: x - before, ..OVERLONG });
             let exact = libm::cosh(omega * h * f64::from(step));
             assert!((x - exact).abs() <= error.position_m(), "step {step}: {x} for {exact}, {error:?}");
         }
@@ -219,15 +219,15 @@ mod tests {
     #[test]
     fn an_error_is_zero_until_a_part_is_too_long_and_unbounded_at_a_barrier_without_a_limit() {
         let none = IntegrationError::default();
-        assert_eq!(none.after(Part { is_overlong: false, ..OVERLONG }), none);
+        assert_eq!(none.after(Substep { is_overlong: false, ..OVERLONG }), none);
         for moved_m in [0.5, 0.0] {
-            let at_barrier = Part { rate_per_s: f64::INFINITY, moved_m, ..OVERLONG };
+            let at_barrier = Substep { rate_per_s: f64::INFINITY, moved_m, ..OVERLONG };
             let error = none.after(at_barrier);
             assert_eq!(error.position_m(), f64::INFINITY, "moved by {moved_m} m");
-            let later = error.after(Part { rate_per_s: 0.0, is_overlong: false, ..OVERLONG });
+            let later = error.after(Substep { rate_per_s: 0.0, is_overlong: false, ..OVERLONG });
             assert_eq!(later.position_m(), f64::INFINITY);
             // A limit of 3 m/s^2 bounds the change by 6 m/s^2.
-            let limited = none.after(Part { limit_m_s2: 3.0, ..at_barrier });
+            let limited = none.after(Substep { limit_m_s2: 3.0, ..at_barrier });
             assert_eq!(limited, IntegrationError { position_m: 0.375, velocity_m_s: 6.0 });
         }
     }
@@ -237,10 +237,10 @@ mod tests {
     fn steps(from_m: f64, at_m: f64, speed_m_s: f64, dt_s: f64) -> u64 {
         let rows = |x_m: f64| Rows::from_row_slice(&[x_m, 0.0, 0.0, x_m + 4.0, 0.0, 0.0]);
         let scenario = Scenario::new("pair", Swarm::at_rest(rows(from_m)), Formation::line(2, 3.0), 2.0, 1.0);
-        let mut resolution = Resolution::of(&scenario);
+        let mut resolution = RoundingBound::of(&scenario);
         let mut state = Swarm::at_rest(rows(at_m));
         state.velocities_m_s.column_mut(1).fill(speed_m_s);
-        let is_exceeded = |step: &u64| match resolution.take(&state, dt_s, *step) {
+        let is_exceeded = |step: &u64| match resolution.add_step(&state, dt_s, *step) {
             Err(Breakdown::Unresolved { step: at, rounding_m, required_m }) => {
                 assert!(at == *step && rounding_m > required_m && required_m == 0.01);
                 true
@@ -272,24 +272,24 @@ mod tests {
     fn rises_count_within_a_target_only() {
         let mut energy_monitor = EnergyMonitor::default();
         assert_eq!(energy_monitor.worst(), None);
-        energy_monitor.take(0, None);
+        energy_monitor.add(0, None);
         for (revision, energy) in [(0, 4.0), (0, 3.0), (1, 9.0), (1, 8.0), (2, 2.0)] {
-            energy_monitor.take(revision, Some(energy));
+            energy_monitor.add(revision, Some(energy));
         }
         assert_eq!(energy_monitor.worst(), Some(EnergyRise { from: 2.0, to: 2.0 }), "it only fell");
-        energy_monitor.take(2, Some(2.5));
-        energy_monitor.take(2, Some(2.2));
+        energy_monitor.add(2, Some(2.5));
+        energy_monitor.add(2, Some(2.2));
         assert_eq!(energy_monitor.worst(), Some(EnergyRise { from: 2.0, to: 2.5 }));
     }
 
     #[test]
     fn a_ratio_of_tiny_energies_does_not_hide_a_rise() {
         let mut energy_monitor = EnergyMonitor::default();
-        energy_monitor.take(0, Some(0.0));
-        energy_monitor.take(0, Some(1e-3));
+        energy_monitor.add(0, Some(0.0));
+        energy_monitor.add(0, Some(1e-3));
         assert_eq!(energy_monitor.worst(), Some(EnergyRise { from: 0.0, to: 1e-3 }));
         for (revision, energy) in [(1, 1e-16), (1, 1e-9), (2, 9.0), (2, 12.0), (3, 100.0), (3, 100.05)] {
-            energy_monitor.take(revision, Some(energy));
+            energy_monitor.add(revision, Some(energy));
         }
         assert_eq!(energy_monitor.worst(), Some(EnergyRise { from: 9.0, to: 12.0 }));
     }

@@ -6,9 +6,9 @@ use super::controller::Controller;
 use super::ending::{Breakdown, Ending, Flight, MAX_COMMAND_M_S2, Performance, SimError};
 use super::judge::{AuditResults, Judge};
 use super::monitors::EnergyMonitor;
-use super::monitors::{IntegrationError, Resolution};
+use super::monitors::{IntegrationError, RoundingBound};
 use crate::link::{self, Imperfections};
-use crate::plant::{self, Path, Plant};
+use crate::plant::{self, Plant, StepPath};
 use crate::scenario::Scenario;
 use tautline_core::record::{Channel, Event, Peaks, Sample};
 use tautline_core::swarm::{ClosestApproach, Rows, Swarm, first_row_beyond};
@@ -37,14 +37,14 @@ use tautline_laws::target::{Schedule, Supervisor};
 #[derive(Clone)]
 pub struct Simulation {
     scenario: Scenario,
-    resolution: Resolution,
+    resolution: RoundingBound,
     controller: Controller,
     plant: Box<dyn Plant>,
     certificate: Certificate,
     judge: Judge,
     state: Swarm,
     next: Swarm,
-    path: Path,
+    path: StepPath,
     control: Rows,
     /// Whether `control` is from outside and the law has not been evaluated for the present state.
     overruled: bool,
@@ -72,7 +72,7 @@ pub struct Simulation {
 
 /// State of a [`Simulation`] at one instant.
 #[derive(Clone)]
-pub struct Saved(Simulation);
+pub struct SavedState(Simulation);
 
 impl Simulation {
     /// Creates a flight at its start, with the scenario's own components. The scenario must be valid
@@ -97,7 +97,7 @@ impl Simulation {
         }
         let certificate = scenario
             .certificate(law.as_ref())
-            .void_where(!supervisor.keeps_to(&scenario.legs), VoidReason::TargetChanges);
+            .void_where(!supervisor.follows_legs(&scenario.legs), VoidReason::TargetChanges);
         // The scenario's own imperfections already void the certificate.
         let is_void = !scenario.is_exact() && !certificate.void.is_empty();
         let certificate = certificate.void_where(!link.is_exact() && !is_void, VoidReason::InexactLink);
@@ -112,7 +112,7 @@ impl Simulation {
             certificate,
             judge: Judge::new(scenario)?,
             next: state.clone(),
-            path: Path::default(),
+            path: StepPath::default(),
             control: Rows::zeros(count),
             overruled: false,
             state,
@@ -130,12 +130,12 @@ impl Simulation {
             sample_is_due: false,
             ending: None,
             performance: Performance::default(),
-            resolution: Resolution::of(scenario),
+            resolution: RoundingBound::of(scenario),
             scenario: scenario.clone(),
         };
         let began = simulation.begin();
         simulation.sample_is_due = began.is_ok();
-        simulation.end_on(began);
+        simulation.end_if_over(began);
         Ok(simulation)
     }
 
@@ -156,10 +156,10 @@ impl Simulation {
     /// ([`Flight::overlong_steps`]), and the certificate is void.
     pub fn step(&mut self) {
         if self.ending.is_none() && std::mem::take(&mut self.overruled) {
-            let asked = self.ask();
-            self.end_on(asked);
+            let asked = self.evaluate_law();
+            self.end_if_over(asked);
         }
-        self.step_on();
+        self.step_or_end();
     }
 
     /// Flies one step with given accelerations \[m/s^2\], N x 3, instead of those of the law. The step is not divided
@@ -175,15 +175,15 @@ impl Simulation {
         }
         if self.ending.is_none() {
             self.overruled = true;
-            self.certificate = self.certificate.clone().void_where(true, VoidReason::CommandsFromOutside);
+            self.certificate = self.certificate.clone().void_where(true, VoidReason::ExternalCommands);
             self.control.clone_from(commands);
             self.plant.apply(commands, &mut self.state);
         }
-        self.step_on();
+        self.step_or_end();
         Ok(())
     }
 
-    fn step_on(&mut self) {
+    fn step_or_end(&mut self) {
         if self.ending.is_some() {
             return;
         }
@@ -191,21 +191,21 @@ impl Simulation {
         let flown = self.advance(step);
         self.sample_is_due = flown.is_ok() && self.scenario.time.records(step);
         let is_last = step == self.scenario.time.steps();
-        self.end_on(flown.and(if is_last { Err(Ending::Completed) } else { Ok(()) }));
+        self.end_if_over(flown.and(if is_last { Err(Ending::Completed) } else { Ok(()) }));
     }
 
     /// Ends the flight as interrupted, unless it has ended.
     pub fn interrupt(&mut self) {
         if self.ending.is_none() {
-            self.end_on(Err(Ending::Interrupted));
+            self.end_if_over(Err(Ending::Interrupted));
         }
     }
 
     /// Ends the flight if it is over or cannot continue. Records its last instant if that is not recorded yet.
-    fn end_on(&mut self, flown: Result<(), Ending>) {
+    fn end_if_over(&mut self, flown: Result<(), Ending>) {
         if let Err(ending) = flown {
             self.sample_is_due |= ending != Ending::Completed && self.judge.closest.is_some();
-            self.events.extend(self.judge.lasting(self.time_s));
+            self.events.extend(self.judge.ongoing_violations(self.time_s));
             self.events.extend(self.judge.closest_to_obstacles());
             self.ending = Some(ending);
         }
@@ -287,13 +287,13 @@ impl Simulation {
 
     /// Saves the present state.
     #[must_use]
-    pub fn save(&self) -> Saved {
-        Saved(self.clone())
+    pub fn save(&self) -> SavedState {
+        SavedState(self.clone())
     }
 
     /// Restores a saved state, of any scenario, and continues with the same bits. A `noise_seed` changes later random
     /// numbers only: the present wind, a held measurement, constant errors of sensors and messages under way stay.
-    pub fn load(&mut self, saved: &Saved, noise_seed: Option<u64>) {
+    pub fn load(&mut self, saved: &SavedState, noise_seed: Option<u64>) {
         self.clone_from(&saved.0);
         if let Some(seed) = noise_seed {
             self.controller.reseed(seed);
@@ -346,19 +346,19 @@ impl Components {
     /// # Errors
     /// [`SimError::Law`] if the parameters give no law; for a valid scenario only if memory cannot be allocated.
     pub fn of(scenario: &Scenario) -> Result<Self, SimError> {
-        Ok(Self::under(scenario, scenario.law()?))
+        Ok(Self::with_law(scenario, scenario.law()?))
     }
 
     /// Returns the components of a scenario under another law.
     #[must_use]
-    pub fn under(scenario: &Scenario, law: Box<dyn Law>) -> Self {
+    pub fn with_law(scenario: &Scenario, law: Box<dyn Law>) -> Self {
         let link = link::of(scenario, law.capabilities().sensing_range_m.is_some());
         let supervisor = Schedule::new(&scenario.legs, &scenario.graph, scenario.arrival)
-            .free_by(law.capabilities().controls.freedom());
+            .with_freedom(law.capabilities().controls.freedom());
         let supervisor = match law.capabilities().settling {
             Some(settling) => {
                 let leader = scenario.reference.as_ref().and_then(|guidance| guidance.known_by.leader());
-                supervisor.deadlock_recovery(scenario.deadlock, settling, leader).blown(!scenario.wind.is_still())
+                supervisor.deadlock_recovery(scenario.deadlock, settling, leader).with_wind(!scenario.wind.is_still())
             }
             None => supervisor,
         };

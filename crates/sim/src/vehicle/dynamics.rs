@@ -157,13 +157,13 @@ impl Dynamics {
 
     /// Returns force and torque without gravity, in a wind \[m/s\] and the downwash on each rotor \[m/s\].
     #[must_use]
-    pub fn wrench(&self, state: &State, wind_m_s: Vector3<f64>, down_m_s: [f64; 4]) -> Wrench {
+    pub fn wrench(&self, state: &State, wind_m_s: Vector3<f64>, downwash_m_s: [f64; 4]) -> Wrench {
         let body = state.attitude.to_rotation_matrix().into_inner();
         let (up, past_m_s) = (body.row(2).transpose(), body.tr_mul(&(state.velocity_m_s - wind_m_s)));
         let thrusts_n = self.thrusts_n(state);
         let (mut force_n, mut torque_n_m) = (Vector3::zeros(), Vector3::zeros());
         for (rotor, arm_m) in self.arms_m.iter().enumerate() {
-            let rotor_m_s = past_m_s + state.rates_rad_s.cross(arm_m) + up * down_m_s[rotor];
+            let rotor_m_s = past_m_s + state.rates_rad_s.cross(arm_m) + up * downwash_m_s[rotor];
             let mut rotor_n = self.drag.component_mul(&rotor_m_s) * -state.rotors_rpm[rotor];
             rotor_n.z += thrusts_n[rotor];
             force_n += rotor_n;
@@ -171,7 +171,7 @@ impl Dynamics {
             torque_n_m.z += self.reactions_m[rotor] * thrusts_n[rotor];
         }
         if self.parasitic_n_s2_m2 != Vector3::zeros() {
-            let past_m_s = past_m_s + up * (0.25 * down_m_s.iter().sum::<f64>());
+            let past_m_s = past_m_s + up * (0.25 * downwash_m_s.iter().sum::<f64>());
             force_n -= past_m_s.norm() * self.parasitic_n_s2_m2.component_mul(&past_m_s);
         }
         Wrench { force_n: body * force_n, torque_n_m }
@@ -179,7 +179,7 @@ impl Dynamics {
 
     /// Returns the downwash of other vehicles' rotors on each rotor of a vehicle, at least 0 \[m/s\].
     #[must_use]
-    pub fn down_m_s(&self, vehicle: usize, state: &State, jets: &[Downwash]) -> [f64; 4] {
+    pub fn downwash_m_s(&self, vehicle: usize, state: &State, jets: &[Downwash]) -> [f64; 4] {
         if jets.is_empty() {
             return [0.0; 4];
         }
@@ -207,7 +207,7 @@ impl Dynamics {
     /// Returns the rotor speeds \[rpm\] that execute an acceleration \[m/s^2\] in this state, within the limits of the
     /// rotors.
     #[must_use]
-    pub fn asked_rpm(&self, state: &State, acceleration_m_s2: Vector3<f64>) -> Vector4<f64> {
+    pub fn commanded_rpm(&self, state: &State, acceleration_m_s2: Vector3<f64>) -> Vector4<f64> {
         let force_n = self.attitude.force_n(acceleration_m_s2);
         let (lift_n, torque_n_m) = self.attitude.wrench(force_n, &state.attitude, state.rates_rad_s);
         self.mixer.thrusts_n(lift_n, torque_n_m).map(|thrust_n| self.curve.speed_rpm(thrust_n))
@@ -216,7 +216,7 @@ impl Dynamics {
     /// Returns the lag of the rotors over a time \[s\].
     #[must_use]
     pub fn rotor_lag(&self, dt_s: f64) -> RotorLag {
-        RotorLag::over(&self.model, dt_s)
+        RotorLag::for_time(&self.model, dt_s)
     }
 
     /// Returns the rates of change of the velocity \[m/s^2\] and of the rates about the body axes \[rad/s^2\].
@@ -234,11 +234,11 @@ impl Dynamics {
     /// Returns the first half of a step: half of the kick of `wrench`, and the angular velocity in the middle of the
     /// step. Without torque the angular momentum in the world frame is constant, which is the gyroscopic term.
     #[must_use]
-    pub fn begin(&self, state: &State, wrench: &Wrench, dt_s: f64) -> Drift {
+    pub fn begin_step(&self, state: &State, wrench: &Wrench, dt_s: f64) -> Drift {
         let kick_m_s = 0.5 * dt_s * self.acceleration_m_s2(wrench);
         let twist = state.attitude * (0.5 * dt_s * wrench.torque_n_m);
         let momentum = state.attitude * self.inertia_kg_m2.component_mul(&state.rates_rad_s) + twist;
-        let middle = turned(&state.attitude, self.turn_rad_s(&state.attitude, momentum), 0.5 * dt_s);
+        let middle = rotated(&state.attitude, self.turn_rad_s(&state.attitude, momentum), 0.5 * dt_s);
         Drift {
             velocity_m_s: state.velocity_m_s + kick_m_s,
             turn_rad_s: self.turn_rad_s(&middle, momentum),
@@ -262,14 +262,20 @@ impl Dynamics {
     }
 
     /// Applies the second half of a step, with the wrench at its end.
-    pub fn end(&self, state: &mut State, drift: &Drift, wrench: &Wrench, dt_s: f64) {
+    pub fn end_step(&self, state: &mut State, drift: &Drift, wrench: &Wrench, dt_s: f64) {
         state.velocity_m_s = drift.velocity_m_s + 0.5 * dt_s * self.acceleration_m_s2(wrench);
         let momentum = state.attitude.inverse_transform_vector(&drift.momentum) + 0.5 * dt_s * wrench.torque_n_m;
         state.rates_rad_s = momentum.component_div(&self.inertia_kg_m2);
     }
 
     /// Adds the changes of velocity \[m/s\] and angular velocity \[rad/s\] by a collision to a drift.
-    pub fn hit(&self, drift: &mut Drift, attitude: &UnitQuaternion<f64>, by_m_s: Vector3<f64>, by_rad_s: Vector3<f64>) {
+    pub fn add_impulse(
+        &self,
+        drift: &mut Drift,
+        attitude: &UnitQuaternion<f64>,
+        by_m_s: Vector3<f64>,
+        by_rad_s: Vector3<f64>,
+    ) {
         drift.velocity_m_s += by_m_s;
         let by = attitude.inverse_transform_vector(&by_rad_s);
         drift.momentum += attitude * self.inertia_kg_m2.component_mul(&by);
@@ -278,7 +284,7 @@ impl Dynamics {
 
 /// Rotates an attitude by an angular velocity in the world frame \[rad/s\] for a time \[s\], as the engine does. The
 /// angle is 2 atan(|w| t/2), which is |w| t to second order.
-fn turned(attitude: &UnitQuaternion<f64>, turn_rad_s: Vector3<f64>, dt_s: f64) -> UnitQuaternion<f64> {
+fn rotated(attitude: &UnitQuaternion<f64>, turn_rad_s: Vector3<f64>, dt_s: f64) -> UnitQuaternion<f64> {
     let half = 0.5 * dt_s * turn_rad_s;
     UnitQuaternion::new_normalize(Quaternion::new(1.0, half.x, half.y, half.z) * attitude.into_inner())
 }
@@ -338,7 +344,7 @@ impl Attitude {
         rates_rad_s: Vector3<f64>,
     ) -> (f64, Vector3<f64>) {
         let body = attitude.to_rotation_matrix().into_inner();
-        let asked = facing(force_n);
+        let asked = attitude_along(force_n);
         let off = asked.transpose() * body;
         let error = 0.5 * Vector3::new(off[(2, 1)] - off[(1, 2)], off[(0, 2)] - off[(2, 0)], off[(1, 0)] - off[(0, 1)]);
         let turn_rad_s2 = self.rad_s * (self.rad_s * error + 2.0 * self.damping * rates_rad_s);
@@ -350,7 +356,7 @@ impl Attitude {
 
 /// Returns the attitude with its z axis along a force and its x axis towards the world's x axis, as a matrix of its
 /// axes.
-fn facing(force_n: Vector3<f64>) -> Matrix3<f64> {
+fn attitude_along(force_n: Vector3<f64>) -> Matrix3<f64> {
     let up = force_n.normalize();
     let left = up.cross(&Vector3::x()).normalize();
     Matrix3::from_columns(&[left.cross(&up), left, up])

@@ -28,18 +28,18 @@ pub struct Fleet {
     pub wind_m_s: Rows,
     /// Wind, if it is not constant.
     wind: Option<Wind>,
-    asked_rpm: Vec<Vector4<f64>>,
+    commanded_rpm: Vec<Vector4<f64>>,
     /// Commanded accelerations \[m/s^2\].
     commands: Rows,
     /// Whether the height z = 0 is held for any command.
     holds_height: bool,
     attitude_hz: f64,
-    clock: Clock,
+    clock: AttitudeClock,
     jets: Vec<Downwash>,
     wrenches: Vec<Wrench>,
     failures: Vec<RotorFailure>,
-    /// State at the last [`Fleet::remember`].
-    before: Before,
+    /// State at the last [`Fleet::save_state`].
+    before: SavedStep,
 }
 
 /// Rotors that lose some or all thrust for the rest of the flight.
@@ -57,16 +57,16 @@ pub struct RotorFailure {
 
 /// State to restore when a step is undone.
 #[derive(Clone, Debug, Default)]
-struct Before {
+struct SavedStep {
     states: Vec<State>,
-    asked_rpm: Vec<Vector4<f64>>,
+    commanded_rpm: Vec<Vector4<f64>>,
     wrenches: Vec<Wrench>,
-    clock: Clock,
+    clock: AttitudeClock,
 }
 
 /// Time flown, and number of runs of the attitude loops.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Clock {
+struct AttitudeClock {
     time_s: f64,
     samples: f64,
 }
@@ -79,39 +79,39 @@ impl Fleet {
         let (dynamics, count) = (Dynamics::new(quadrotor, grounds), start.count());
         let state = |i: usize| dynamics.trimmed(row(&start.positions_m, i), row(&start.velocities_m_s, i));
         let states: Vec<_> = (0..count).map(state).collect();
-        let asked_rpm = vec![Vector4::repeat(dynamics.hover_rpm()); count];
+        let commanded_rpm = vec![Vector4::repeat(dynamics.hover_rpm()); count];
         let mut fleet = Self {
-            before: Before::default(),
+            before: SavedStep::default(),
             wrenches: vec![Wrench::default(); count],
             failures: Vec::new(),
             states,
             wind_m_s: Rows::zeros(count),
             wind: None,
-            asked_rpm,
+            commanded_rpm,
             commands: Rows::zeros(count),
             holds_height,
             attitude_hz: quadrotor.attitude_hz,
-            clock: Clock::default(),
+            clock: AttitudeClock::default(),
             jets: Vec::with_capacity(if quadrotor.downwash { 4 * count } else { 0 }),
             dynamics,
         };
-        fleet.feel();
-        fleet.remember();
+        fleet.compute_wrenches();
+        fleet.save_state();
         fleet
     }
 
     /// Adds a wind, which must be at the same instant.
     #[must_use]
-    pub fn blown(mut self, wind: Wind) -> Self {
+    pub fn with_wind(mut self, wind: Wind) -> Self {
         wind.write(&mut self.wind_m_s);
         self.wind = Some(wind);
-        self.feel();
+        self.compute_wrenches();
         self
     }
 
     /// Adds failures of rotors.
     #[must_use]
-    pub fn failing(mut self, failures: Vec<RotorFailure>) -> Self {
+    pub fn with_failures(mut self, failures: Vec<RotorFailure>) -> Self {
         self.failures = failures;
         self
     }
@@ -127,20 +127,20 @@ impl Fleet {
         self.commands.copy_from(accelerations_m_s2);
     }
 
-    /// Saves the state for [`Fleet::go_back`].
-    pub fn remember(&mut self) {
-        let Self { before, states, asked_rpm, wrenches, clock, .. } = self;
+    /// Saves the state for [`Fleet::restore_state`].
+    pub fn save_state(&mut self) {
+        let Self { before, states, commanded_rpm, wrenches, clock, .. } = self;
         before.states.clone_from(states);
-        before.asked_rpm.clone_from(asked_rpm);
+        before.commanded_rpm.clone_from(commanded_rpm);
         before.wrenches.clone_from(wrenches);
         before.clock = *clock;
     }
 
-    /// Restores the state of the last [`Fleet::remember`].
-    pub fn go_back(&mut self) {
-        let Self { before, states, asked_rpm, wrenches, clock, .. } = self;
+    /// Restores the state of the last [`Fleet::save_state`].
+    pub fn restore_state(&mut self) {
+        let Self { before, states, commanded_rpm, wrenches, clock, .. } = self;
         states.clone_from(&before.states);
-        asked_rpm.clone_from(&before.asked_rpm);
+        commanded_rpm.clone_from(&before.commanded_rpm);
         wrenches.clone_from(&before.wrenches);
         *clock = before.clock;
         if let Some(wind) = &mut self.wind {
@@ -149,8 +149,8 @@ impl Fleet {
         }
     }
 
-    /// Advances the wind to the end of a step \[s\]; [`Fleet::go_back`] undoes it.
-    pub fn blow(&mut self, dt_s: f64) {
+    /// Advances the wind to the end of a step \[s\]; [`Fleet::restore_state`] undoes it.
+    pub fn advance_wind(&mut self, dt_s: f64) {
         if let Some(wind) = &mut self.wind {
             wind.advance(dt_s);
             wind.write(&mut self.wind_m_s);
@@ -158,7 +158,7 @@ impl Fleet {
     }
 
     /// Sets the wind at the vehicles to an instant `before_s` seconds before its present.
-    pub fn blow_before(&mut self, before_s: f64) {
+    pub fn set_wind_time(&mut self, before_s: f64) {
         if let Some(wind) = &self.wind {
             let time_s = wind.now_s() - before_s;
             (0..self.states.len()).for_each(|i| set_row(&mut self.wind_m_s, i, wind.air_at_m_s(i, time_s)));
@@ -170,7 +170,7 @@ impl Fleet {
     pub fn smooth_s(&self, before_s: f64) -> f64 {
         self.wind.as_ref().map_or(f64::INFINITY, |wind| {
             let time_s = wind.now_s() - before_s;
-            wind.next_turn_s(time_s) - time_s
+            wind.next_slope_change_s(time_s) - time_s
         })
     }
 
@@ -184,24 +184,24 @@ impl Fleet {
     /// Applies due failures of rotors and runs the attitude loops if they are due. Returns the time until the next of
     /// either \[s\].
     pub fn run_attitude(&mut self) -> f64 {
-        let Clock { time_s, samples } = self.clock;
+        let AttitudeClock { time_s, samples } = self.clock;
         let now_s = time_s + ROUNDING / self.attitude_hz;
-        let next_s = self.fail(now_s) - time_s;
+        let next_s = self.apply_failures(now_s) - time_s;
         if time_s * self.attitude_hz + ROUNDING >= samples {
             self.clock.samples = (time_s * self.attitude_hz + ROUNDING).floor() + 1.0;
             for i in 0..self.count() {
                 let command_m_s2 = self.acceleration_m_s2(i);
-                self.asked_rpm[i] = self.dynamics.asked_rpm(&self.states[i], command_m_s2);
+                self.commanded_rpm[i] = self.dynamics.commanded_rpm(&self.states[i], command_m_s2);
             }
         }
         for failure in self.failures.iter().filter(|failure| failure.rotor.is_none() && failure.at_s <= now_s) {
-            self.asked_rpm[failure.vehicle].fill(0.0);
+            self.commanded_rpm[failure.vehicle].fill(0.0);
         }
         next_s.min(self.clock.samples / self.attitude_hz - time_s)
     }
 
     /// Reduces the thrust of rotors that have failed by a time \[s\]. Returns the time of the next failure.
-    fn fail(&mut self, time_s: f64) -> f64 {
+    fn apply_failures(&mut self, time_s: f64) -> f64 {
         let (mut next_s, mut changed) = (f64::INFINITY, false);
         for &RotorFailure { vehicle, rotor, at_s, share } in &self.failures {
             if at_s > time_s {
@@ -214,14 +214,14 @@ impl Fleet {
             }
         }
         if changed {
-            self.feel();
+            self.compute_wrenches();
         }
         next_s
     }
 
     /// Commands rotor speeds \[rpm\] and turns the attitude loops off.
-    pub fn open_loop(&mut self, asked_rpm: &[Vector4<f64>]) {
-        self.asked_rpm.copy_from_slice(asked_rpm);
+    pub fn open_loop(&mut self, commanded_rpm: &[Vector4<f64>]) {
+        self.commanded_rpm.copy_from_slice(commanded_rpm);
         self.clock.samples = f64::INFINITY;
     }
 
@@ -236,26 +236,26 @@ impl Fleet {
     }
 
     /// Advances the clock by a time \[s\].
-    pub fn pass(&mut self, dt_s: f64) {
+    pub fn advance_clock(&mut self, dt_s: f64) {
         self.clock.time_s += dt_s;
     }
 
     /// Returns the rotor speeds \[rpm\] that the attitude loop of a vehicle commands.
     #[must_use]
-    pub fn asked_rpm(&self, vehicle: usize) -> Vector4<f64> {
-        self.asked_rpm[vehicle]
+    pub fn commanded_rpm(&self, vehicle: usize) -> Vector4<f64> {
+        self.commanded_rpm[vehicle]
     }
 
     /// Computes force and torque on each vehicle, without gravity, in the present states.
-    pub fn feel(&mut self) {
+    pub fn compute_wrenches(&mut self) {
         let Self { dynamics, states, wind_m_s, jets, wrenches, .. } = self;
         dynamics.jets(states.iter(), jets);
         for (i, (state, wrench)) in states.iter().zip(wrenches).enumerate() {
-            *wrench = dynamics.wrench(state, row(wind_m_s, i), dynamics.down_m_s(i, state, jets));
+            *wrench = dynamics.wrench(state, row(wind_m_s, i), dynamics.downwash_m_s(i, state, jets));
         }
     }
 
-    /// Returns force and torque on a vehicle from the last [`Fleet::feel`].
+    /// Returns force and torque on a vehicle from the last [`Fleet::compute_wrenches`].
     #[must_use]
     pub fn wrench(&self, vehicle: usize) -> &Wrench {
         &self.wrenches[vehicle]
@@ -265,7 +265,7 @@ impl Fleet {
     pub fn complete(&mut self, drifts: &[Drift], dt_s: f64) {
         let Self { dynamics, states, wrenches, .. } = self;
         for ((state, wrench), drift) in states.iter_mut().zip(wrenches).zip(drifts) {
-            dynamics.end(state, drift, wrench, dt_s);
+            dynamics.end_step(state, drift, wrench, dt_s);
         }
     }
 

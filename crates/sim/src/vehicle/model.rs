@@ -26,7 +26,7 @@ pub struct Model {
     /// Positions of the rotors relative to the centre of mass, x ahead and y to the left, in m.
     pub rotor_positions_m: [[f64; 2]; 4],
     /// Direction of rotation of each rotor, seen from above.
-    pub rotor_turns: [Turn; 4],
+    pub rotor_turns: [RotorDirection; 4],
     /// Radius of a rotor in m.
     pub rotor_radius_m: f64,
     /// Coefficient a of the thrust a n^2 + b n of a rotor in N, with n in revolutions per minute.
@@ -61,7 +61,7 @@ pub struct Model {
 /// Direction of rotation of a rotor, seen from above.
 #[derive(Clone, Copy, Debug, Deserialize, Eq, PartialEq, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Turn {
+pub enum RotorDirection {
     /// Counterclockwise; the reaction turns the body clockwise.
     Ccw,
     /// Clockwise; the reaction turns the body counterclockwise.
@@ -81,7 +81,7 @@ pub struct Quadrotor {
     pub downwash: bool,
 }
 
-impl Turn {
+impl RotorDirection {
     /// Returns the sign of the rotor's reaction torque on the body about z.
     pub(super) fn reaction(self) -> f64 {
         match self {
@@ -120,7 +120,7 @@ pub const MODELS: [(&str, &str); 3] = [
 
 /// Error in the text of a model, with its bytes.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Misread {
+pub struct ModelParseError {
     /// Message, one sentence.
     pub message: String,
     /// Remedy.
@@ -132,9 +132,9 @@ pub struct Misread {
 /// Reads and checks a model.
 ///
 /// # Errors
-/// [`Misread`] if the text is not TOML, has a missing or unknown key, or the model is invalid.
-pub fn read(text: &str) -> Result<Model, Misread> {
-    let model: Model = toml::from_str(text).map_err(|error| Misread {
+/// [`ModelParseError`] if the text is not TOML, has a missing or unknown key, or the model is invalid.
+pub fn read(text: &str) -> Result<Model, ModelParseError> {
+    let model: Model = toml::from_str(text).map_err(|error| ModelParseError {
         message: error.message().to_owned(),
         help: "a model has the keys of the built-in ones, which docs/vehicles.md lists".to_owned(),
         span: error.span().unwrap_or(0..0),
@@ -142,7 +142,7 @@ pub fn read(text: &str) -> Result<Model, Misread> {
     model.check().map_err(|ModelError { key, message, help }| {
         let table = DeTable::parse(text).ok();
         let span = table.and_then(|table| Some(table.get_ref().get(key)?.span())).unwrap_or(0..0);
-        Misread { message, help, span }
+        ModelParseError { message, help, span }
     })?;
     Ok(model)
 }

@@ -40,16 +40,17 @@ pub struct RotorLag {
 }
 
 impl RotorLag {
-    pub(super) fn over(model: &Model, dt_s: f64) -> Self {
+    pub(super) fn for_time(model: &Model, dt_s: f64) -> Self {
         Self { up: libm::exp(-dt_s / model.lag_up_s), down: libm::exp(-dt_s / model.lag_down_s) }
     }
 
-    /// Returns the exact speeds \[rpm\] after this time with constant `asked_rpm`; a speed never crosses its command.
+    /// Returns the exact speeds \[rpm\] after this time with constant `commanded_rpm`. A speed never crosses its
+    /// command.
     #[must_use]
-    pub fn after(self, rotors_rpm: Vector4<f64>, asked_rpm: Vector4<f64>) -> Vector4<f64> {
-        rotors_rpm.zip_map(&asked_rpm, |speed_rpm, asked_rpm| {
-            let left = if asked_rpm > speed_rpm { self.up } else { self.down };
-            asked_rpm + (speed_rpm - asked_rpm) * left
+    pub fn after(self, rotors_rpm: Vector4<f64>, commanded_rpm: Vector4<f64>) -> Vector4<f64> {
+        rotors_rpm.zip_map(&commanded_rpm, |speed_rpm, commanded_rpm| {
+            let left = if commanded_rpm > speed_rpm { self.up } else { self.down };
+            commanded_rpm + (speed_rpm - commanded_rpm) * left
         })
     }
 }

@@ -6,7 +6,7 @@ use stats_alloc::Region;
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::law::{Law, LawError};
 use tautline_laws::observation::Observation;
-use tautline_sim::plant::{self, Path, Plant, PlantError};
+use tautline_sim::plant::{self, Plant, PlantError, StepPath};
 use tautline_sim::scenario::{Override, Scenario, Source};
 use tautline_sim::sim::{self, Components};
 
@@ -29,7 +29,7 @@ impl Plant for Euler {
         self.state.count()
     }
 
-    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut Path) -> Result<(), PlantError> {
+    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut StepPath) -> Result<(), PlantError> {
         let Swarm { positions_m, velocities_m_s } = &mut self.state;
         for (v, u) in velocities_m_s.iter_mut().zip(self.held.iter()) {
             *v += (*u + self.a22_per_s * *v) * dt_s;
@@ -79,7 +79,7 @@ fn builtin(name: &str, sets: &[&str]) -> Scenario {
 fn allocations(scenario: &Scenario, steps: u32, law: Box<dyn Law>, plant: Box<dyn Plant>) -> usize {
     let mut scenario = scenario.clone();
     scenario.time.duration_s = f64::from(steps) * scenario.time.dt_s;
-    let parts = Components { plant, ..Components::under(&scenario, law) };
+    let parts = Components { plant, ..Components::with_law(&scenario, law) };
     let region = Region::new(ALLOCATOR);
     let flown = sim::fly(&scenario, parts, &mut (), &mut |_step| ControlFlow::Continue(()));
     let change = region.change();

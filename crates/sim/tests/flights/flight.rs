@@ -55,7 +55,7 @@ pub(crate) fn fly_with(
     plant: Box<dyn Plant>,
 ) -> (Result<Flight, SimError>, Log) {
     let mut log = Log::default();
-    let parts = Components { plant, ..Components::under(scenario, law) };
+    let parts = Components { plant, ..Components::with_law(scenario, law) };
     let flown = sim::fly(scenario, parts, &mut log, &mut |_step| ControlFlow::Continue(()));
     (flown, log)
 }

@@ -305,13 +305,14 @@ fn the_ideal_plant_uses_the_given_law_and_ends_where_it_is_undefined() {
     let (_, start) = thrown(1.0);
     let mut scenario = scenario("pentagon", &["plant.kind=ideal", "time.duration_s=5"]);
     let carry_on = &mut |_| ControlFlow::Continue(());
-    let free = sim::fly(&scenario, Components::under(&scenario, Box::new(Free)), &mut (), carry_on).expect("a flight");
+    let free =
+        sim::fly(&scenario, Components::with_law(&scenario, Box::new(Free)), &mut (), carry_on).expect("a flight");
     assert_eq!(free.last, scenario.start, "no vehicle moves without a command");
 
     scenario = Scenario::new("wall", start, Formation::line(2, 3.0), 0.5, 5.0);
     scenario.plant = PlantSpec::Ideal;
     let flight =
-        sim::fly(&scenario, Components::under(&scenario, Box::new(Wall)), &mut (), carry_on).expect("a flight");
+        sim::fly(&scenario, Components::with_law(&scenario, Box::new(Wall)), &mut (), carry_on).expect("a flight");
     assert!(matches!(flight.ending, Ending::LawUndefined(LawError::Collision { .. })));
     assert!((flight.duration_s - 1.0).abs() <= scenario.time.dt_s, "{}", flight.duration_s);
 }

@@ -101,14 +101,14 @@ fn the_seed_changes_only_the_noise_and_threads_change_no_bits() {
 #[test]
 fn certificates_are_void_with_a_reason() {
     for (set, reason) in [
-        ("sensing.latency_s=0.01", VoidReason::KnownLate),
-        ("sensing.near_latency_s=0.01", VoidReason::KnownLate),
-        ("sensing.rate_hz=100", VoidReason::KnownLate),
-        ("sensing.position_bias_m=0.01", VoidReason::KnownWrongly),
-        ("network.latency_s=0.01", VoidReason::HeardLate),
-        ("network.rate_hz=50", VoidReason::HeardLate),
+        ("sensing.latency_s=0.01", VoidReason::SensingDelayed),
+        ("sensing.near_latency_s=0.01", VoidReason::SensingDelayed),
+        ("sensing.rate_hz=100", VoidReason::SensingDelayed),
+        ("sensing.position_bias_m=0.01", VoidReason::SensingInexact),
+        ("network.latency_s=0.01", VoidReason::MessagesDelayed),
+        ("network.rate_hz=50", VoidReason::MessagesDelayed),
         ("actuation.max_accel_m_s2=1", VoidReason::AccelerationLimited),
-        ("actuation.lag_s=0.01", VoidReason::AccelerationLate),
+        ("actuation.lag_s=0.01", VoidReason::AccelerationLagged),
         ("time.control_hz=60", VoidReason::CommandsHeld),
         ("failure=[{vehicle=1, at_s=0.5, kind=\"dead\"}]", VoidReason::VehicleFails),
     ] {
@@ -117,7 +117,7 @@ fn certificates_are_void_with_a_reason() {
     }
     let silent = ["time.duration_s=1", "network.rate_hz=50", "failure=[{vehicle=1, at_s=0.5, kind=\"silent\"}]"];
     let (flight, _) = fly(&builtin("pentagon", &silent));
-    assert_eq!(flight.certificate.void, [VoidReason::HeardLate, VoidReason::MessagesLost]);
+    assert_eq!(flight.certificate.void, [VoidReason::MessagesDelayed, VoidReason::MessagesLost]);
     assert!(fly(&builtin("pentagon", &["time.duration_s=1"])).0.certificate.certified_m.is_some());
 }
 
@@ -251,7 +251,7 @@ fn the_delay_margin_matches_the_formula() {
 #[test]
 fn the_margin_of_the_network_delay_matches_the_formula() {
     let plain = disturbed("star", LOOK);
-    let margin_s = linear(&plain).heard.and_then(|heard| heard.delay_margin_s(0.0)).expect("a margin");
+    let margin_s = linear(&plain).received.and_then(|received| received.delay_margin_s(0.0)).expect("a margin");
     for (share, expected) in [(0.95, false), (1.05, true)] {
         let mut late = plain.clone();
         (late.time.duration_s, late.network.latency_s) = (20.0 * margin_s, share * margin_s);

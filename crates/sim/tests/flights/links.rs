@@ -3,9 +3,9 @@
 use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::formation::Formation;
 use tautline_laws::graph::Graph;
-use tautline_laws::observation::{Neighbour, Others, Picture};
-use tautline_sim::link::{Imperfections, Sensed, of};
-use tautline_sim::scenario::{Failure, FailureKind, LinkFailure, NearBy, Scenario, StalePolicy};
+use tautline_laws::observation::{NeighbourState, NeighbourStates, OtherStates};
+use tautline_sim::link::{Imperfections, StateEstimates, of};
+use tautline_sim::scenario::{Failure, FailureKind, LinkFailure, NearStates, Scenario, StalePolicy};
 
 const DT_S: f64 = 0.01;
 const COUNT: usize = 4;
@@ -18,8 +18,8 @@ fn truth(time_s: f64) -> Swarm {
     }
 }
 
-fn in_row(swarm: &Swarm, i: usize) -> Neighbour {
-    Neighbour { position_m: row(&swarm.positions_m, i), velocity_m_s: row(&swarm.velocities_m_s, i), age_s: 0.0 }
+fn in_row(swarm: &Swarm, i: usize) -> NeighbourState {
+    NeighbourState { position_m: row(&swarm.positions_m, i), velocity_m_s: row(&swarm.velocities_m_s, i), age_s: 0.0 }
 }
 
 fn scenario() -> Scenario {
@@ -30,7 +30,11 @@ fn scenario() -> Scenario {
 }
 
 /// Advances a link over steps and passes its result at each to `show`.
-fn after(link: &mut dyn Imperfections, steps: std::ops::RangeInclusive<u32>, mut show: impl FnMut(f64, Sensed<'_>)) {
+fn after(
+    link: &mut dyn Imperfections,
+    steps: std::ops::RangeInclusive<u32>,
+    mut show: impl FnMut(f64, StateEstimates<'_>),
+) {
     for step in steps {
         let time_s = f64::from(step) * DT_S;
         let now = truth(time_s);
@@ -40,14 +44,14 @@ fn after(link: &mut dyn Imperfections, steps: std::ops::RangeInclusive<u32>, mut
     }
 }
 
-fn picture<'a>(sensed: &Sensed<'a>) -> &'a dyn Picture {
+fn picture<'a>(sensed: &StateEstimates<'a>) -> &'a dyn NeighbourStates {
     match sensed.others {
-        Others::Held(picture) => picture,
-        Others::Shared => panic!("all is shared"),
+        OtherStates::PerVehicle(picture) => picture,
+        OtherStates::Shared => panic!("all is shared"),
     }
 }
 
-fn is_of(neighbour: Neighbour, vehicle: usize, time_s: f64) -> bool {
+fn is_of(neighbour: NeighbourState, vehicle: usize, time_s: f64) -> bool {
     let then = truth(time_s.max(0.0));
     (neighbour.position_m - row(&then.positions_m, vehicle)).norm() < 1e-9
         && (neighbour.velocity_m_s - row(&then.velocities_m_s, vehicle)).norm() < 1e-9
@@ -61,7 +65,7 @@ fn delayed_states_have_exactly_the_given_age() {
         late.sensing.latency_s = latency_s;
         let mut link = of(&late, true);
         after(link.as_mut(), 0..=100, |time_s, sensed| {
-            assert!(matches!(sensed.others, Others::Shared));
+            assert!(matches!(sensed.others, OtherStates::Shared));
             (0..COUNT).for_each(|i| assert!(is_of(in_row(sensed.own, i), i, time_s - latency_s), "{time_s}"));
         });
         assert!(!link.is_exact());
@@ -77,30 +81,30 @@ fn the_network_delays_only_received_states() {
         after(link.as_mut(), 0..=100, |time_s, sensed| {
             let picture = picture(&sensed);
             assert_eq!(sensed.own, &truth(time_s));
-            let heard = picture.heard(1, 0);
-            assert!(is_of(heard, 0, time_s - 0.05), "{rate_hz:?} {time_s}");
-            assert!((heard.age_s - time_s.min(0.05)).abs() < 1e-9);
-            assert!(is_of(picture.seen(1, 2), 2, time_s));
+            let received = picture.received(1, 0);
+            assert!(is_of(received, 0, time_s - 0.05), "{rate_hz:?} {time_s}");
+            assert!((received.age_s - time_s.min(0.05)).abs() < 1e-9);
+            assert!(is_of(picture.sensed(1, 2), 2, time_s));
         });
     }
 }
 
 #[test]
-fn near_vehicles_are_sensed_or_heard_with_the_given_delays() {
+fn near_vehicles_are_sensed_or_received_with_the_given_delays() {
     let mut own_late = scenario();
     (own_late.sensing.latency_s, own_late.sensing.near_latency_s) = (0.05, Some(0.0));
     after(of(&own_late, true).as_mut(), 0..=50, |time_s, sensed| {
-        let (seen, own_m) = (picture(&sensed).seen(1, 2), row(&sensed.own.positions_m, 1));
+        let (near, own_m) = (picture(&sensed).sensed(1, 2), row(&sensed.own.positions_m, 1));
         assert!(is_of(in_row(sensed.own, 1), 1, time_s - 0.05));
         let apart_m = row(&truth(time_s).positions_m, 2) - row(&truth(time_s).positions_m, 1);
-        assert!((seen.position_m - own_m - apart_m).norm() < 1e-12, "present relative position");
+        assert!((near.position_m - own_m - apart_m).norm() < 1e-12, "present relative position");
     });
-    let mut heard = scenario();
-    (heard.network.latency_s, heard.network.near) = (0.05, NearBy::Heard);
-    after(of(&heard, true).as_mut(), 0..=50, |time_s, sensed| {
-        assert!(is_of(picture(&sensed).seen(1, 2), 2, time_s - 0.05), "without a link too");
-        let (positions_m, slack_m) = picture(&sensed).near_from().expect("a place to look from");
-        let held_m = (picture(&sensed).seen(1, 2).position_m - row(&sensed.own.positions_m, 1)).norm();
+    let mut received = scenario();
+    (received.network.latency_s, received.network.near) = (0.05, NearStates::Received);
+    after(of(&received, true).as_mut(), 0..=50, |time_s, sensed| {
+        assert!(is_of(picture(&sensed).sensed(1, 2), 2, time_s - 0.05), "without a link too");
+        let (positions_m, slack_m) = picture(&sensed).near_search_positions().expect("a place to look from");
+        let held_m = (picture(&sensed).sensed(1, 2).position_m - row(&sensed.own.positions_m, 1)).norm();
         let found_m = (row(positions_m, 2) - row(positions_m, 1)).norm();
         assert!(held_m + slack_m >= found_m && slack_m >= (found_m - held_m).abs());
     });
@@ -113,12 +117,12 @@ fn old_messages_are_held_or_extrapolated() {
     for missing in [StalePolicy::Hold, StalePolicy::Extrapolate] {
         scenario.network.missing = missing;
         after(of(&scenario, true).as_mut(), 0..=100, |time_s, sensed| {
-            let heard = picture(&sensed).heard(2, 0);
+            let received = picture(&sensed).received(2, 0);
             let sent_s = ((time_s - 0.05 + 1e-9).max(0.0) * 10.0).floor() / 10.0;
             let (then, ahead_s) = (truth(sent_s), time_s - sent_s);
             let carried_m = if missing == StalePolicy::Hold { 0.0 } else { ahead_s };
             let expected = row(&then.positions_m, 0) + row(&then.velocities_m_s, 0) * carried_m;
-            assert!((heard.position_m - expected).norm() < 1e-9, "{missing:?} {time_s}");
+            assert!((received.position_m - expected).norm() < 1e-9, "{missing:?} {time_s}");
         });
     }
 }
@@ -134,10 +138,10 @@ fn broken_links_and_silent_vehicles_leave_the_last_message() {
         let picture = picture(&sensed);
         let is_down = (0.2 - 1e-9..0.4 - 1e-9).contains(&time_s);
         let known_s = if is_down { 0.19 } else { time_s };
-        assert!(is_of(picture.heard(2, 0), 0, known_s) && is_of(picture.heard(0, 2), 2, known_s), "{time_s}");
-        assert!(is_of(picture.heard(3, 0), 0, time_s), "other links are up");
-        assert!(is_of(picture.heard(0, 1), 1, time_s.min(0.29)), "{time_s}");
-        assert!(is_of(picture.heard(1, 0), 0, time_s), "the silent vehicle still receives");
+        assert!(is_of(picture.received(2, 0), 0, known_s) && is_of(picture.received(0, 2), 2, known_s), "{time_s}");
+        assert!(is_of(picture.received(3, 0), 0, time_s), "other links are up");
+        assert!(is_of(picture.received(0, 1), 1, time_s.min(0.29)), "{time_s}");
+        assert!(is_of(picture.received(1, 0), 0, time_s), "the silent vehicle still receives");
     });
     let traffic = link.traffic().expect("messages");
     // 81 instants, six directed links: 20 messages are lost on two of them, and one sender stops at message 30.
@@ -153,12 +157,12 @@ fn errors_have_the_given_deviation_and_are_drawn_for_each_measurement() {
     let (mut sums, mut number, mut last) = ([0.0; 4], 0.0, None);
     after(of(&noisy, true).as_mut(), 0..=20_000, |time_s, sensed| {
         let own = in_row(sensed.own, 1);
-        let seen = picture(&sensed).seen(1, 2);
+        let sensed = picture(&sensed).sensed(1, 2);
         let is_new = last.replace(own) != Some(own);
         assert_eq!(is_new, (time_s / DT_S).round() % 2.0 == 0.0, "{time_s}");
         let measured_s = (time_s * 50.0 + 1e-9).floor() / 50.0;
         let then = in_row(&truth(measured_s), 1);
-        let apart_m = seen.position_m - own.position_m;
+        let apart_m = sensed.position_m - own.position_m;
         if is_new {
             number += 1.0;
             sums[0] += (own.position_m - then.position_m).x.powi(2);
@@ -166,11 +170,11 @@ fn errors_have_the_given_deviation_and_are_drawn_for_each_measurement() {
             sums[2] += (apart_m.x - 10.0).powi(2);
             sums[3] += (own.position_m - then.position_m).x * (apart_m.x - 10.0);
         }
-        assert_eq!((own.position_m.z, seen.position_m.z), (0.0, 0.0), "no error leaves the plane");
+        assert_eq!((own.position_m.z, sensed.position_m.z), (0.0, 0.0), "no error leaves the plane");
     });
-    let [own, speed, seen, both] = sums.map(|sum| sum / number);
+    let [own, speed, sensed, both] = sums.map(|sum| sum / number);
     // 10,001 draws: the standard error of a variance is 1.4 %.
-    for (variance, expected) in [(own, 0.01), (speed, 0.0004), (seen, 0.01)] {
+    for (variance, expected) in [(own, 0.01), (speed, 0.0004), (sensed, 0.01)] {
         assert!((variance / expected - 1.0).abs() < 0.05, "{variance} {expected}");
     }
     assert!(both.abs() < 0.0004, "errors of near vehicles are independent: {both}");
@@ -185,20 +189,20 @@ fn a_bias_is_constant_and_does_not_affect_near_vehicles() {
         let off_m = &sensed.own.positions_m - truth(time_s).positions_m;
         let before = first.get_or_insert_with(|| off_m.clone());
         assert!((&off_m - &*before).amax() < 1e-12 && off_m.amax() > 0.1);
-        let apart_m = picture(&sensed).seen(1, 2).position_m - row(&sensed.own.positions_m, 1);
+        let apart_m = picture(&sensed).sensed(1, 2).position_m - row(&sensed.own.positions_m, 1);
         assert!((apart_m - row(&truth(time_s).positions_m, 2) + row(&truth(time_s).positions_m, 1)).norm() < 1e-12);
-        assert!((picture(&sensed).heard(1, 0).position_m - row(&sensed.own.positions_m, 0)).norm() == 0.0);
+        assert!((picture(&sensed).received(1, 0).position_m - row(&sensed.own.positions_m, 0)).norm() == 0.0);
     });
 }
 
 #[test]
-fn refused_steps_and_trial_states_change_no_knowledge() {
+fn refused_steps_and_trial_states_change_no_estimates() {
     let mut scenario = scenario();
     scenario.sensing.rate_hz = Some(30.0);
     scenario.sensing.position_noise_m = 0.1;
     (scenario.network.latency_s, scenario.network.jitter_s) = (0.03, 0.05);
     (scenario.network.loss, scenario.network.loss_burst) = (0.3, Some(4.0));
-    let heard = |link: &mut dyn Imperfections, disturb: bool| {
+    let received = |link: &mut dyn Imperfections, disturb: bool| {
         let mut all = Vec::new();
         for step in 0..=200 {
             let time_s = f64::from(step) * DT_S;
@@ -214,22 +218,22 @@ fn refused_steps_and_trial_states_change_no_knowledge() {
             }
             after(link, step..=step, |_, sensed| {
                 let picture = picture(&sensed);
-                all.push((sensed.own.clone(), picture.heard(0, 2), picture.heard(3, 0), picture.seen(1, 3)));
+                all.push((sensed.own.clone(), picture.received(0, 2), picture.received(3, 0), picture.sensed(1, 3)));
             });
         }
         (all, link.traffic())
     };
-    let plain = heard(of(&scenario, true).as_mut(), false);
-    let disturbed = heard(of(&scenario, true).as_mut(), true);
+    let plain = received(of(&scenario, true).as_mut(), false);
+    let disturbed = received(of(&scenario, true).as_mut(), true);
     assert_eq!(plain.1, disturbed.1);
-    let far = |a: &Neighbour, b: &Neighbour| (a.position_m - b.position_m).norm();
+    let far = |a: &NeighbourState, b: &NeighbourState| (a.position_m - b.position_m).norm();
     for (a, b) in plain.0.iter().zip(&disturbed.0) {
         // Values between two states are interpolated from different states.
         assert!((&a.0.positions_m - &b.0.positions_m).amax() < 1e-12);
         assert!(far(&a.1, &b.1) < 1e-12 && far(&a.2, &b.2) < 1e-12 && far(&a.3, &b.3) < 1e-12);
     }
     scenario.noise_seed = 6;
-    assert_ne!(heard(of(&scenario, true).as_mut(), false).1, plain.1, "another seed, another fate");
+    assert_ne!(received(of(&scenario, true).as_mut(), false).1, plain.1, "another seed, another fate");
 }
 
 #[test]
@@ -252,7 +256,7 @@ fn a_dead_vehicle_has_no_command_and_a_frozen_one_keeps_its_last() {
 }
 
 #[test]
-fn without_imperfections_the_link_is_the_direct_one() {
+fn without_imperfections_laws_read_the_true_state() {
     assert!(of(&scenario(), true).is_exact());
     let mut scenario = scenario();
     scenario.network.missing = StalePolicy::Extrapolate;

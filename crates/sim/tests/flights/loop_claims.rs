@@ -12,7 +12,7 @@ use tautline_core::swarm::{Rows, Swarm, row, separation};
 use tautline_laws::formation::Formation;
 use tautline_laws::law::{Capabilities, Certificate, LaplacianKeys, Law, LawError, LawSpec, VoidReason};
 use tautline_laws::observation::Observation;
-use tautline_sim::plant::{self, Path, Plant, PlantError, rapier};
+use tautline_sim::plant::{self, Plant, PlantError, StepPath, rapier};
 use tautline_sim::scenario::Scenario;
 use tautline_sim::sim::{self, Breakdown, Components, Ending, Flight, SimError};
 
@@ -70,7 +70,7 @@ impl Plant for Lost {
         self.inner.count()
     }
 
-    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, path: &mut Path) -> Result<(), PlantError> {
+    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, path: &mut StepPath) -> Result<(), PlantError> {
         self.inner.advance(dt_s, predicted, path)?;
         self.steps_left = self.steps_left.saturating_sub(1);
         self.observe(predicted);
@@ -240,7 +240,7 @@ fn a_state_that_is_not_finite_is_reported_with_vehicle_and_step() {
 #[test]
 fn the_engine_reports_a_state_that_is_not_finite() {
     let scenario = builtin("pentagon", &["time.duration_s=1", "swarm.mass_kg=100"]);
-    let (mut plant, mut state, mut path) = (rapier::plant(&scenario), scenario.start.clone(), Path::default());
+    let (mut plant, mut state, mut path) = (rapier::plant(&scenario), scenario.start.clone(), StepPath::default());
     let mut control = Rows::zeros(5);
     plant.apply(&control, &mut state);
     assert_eq!(plant.advance(0.01, &mut state, &mut path), Ok(()));

@@ -5,7 +5,7 @@ use crate::flight::{builtin, fly};
 use nalgebra::Vector3;
 use tautline_core::swarm::{Pair, Rows, Swarm, row, separation, set_row};
 use tautline_laws::formation::Formation;
-use tautline_sim::plant::{Path, Plant, rapier};
+use tautline_sim::plant::{Plant, StepPath, rapier};
 use tautline_sim::scenario::{Scenario, Space};
 
 const DT_S: f64 = 1.0 / 240.0;
@@ -15,7 +15,7 @@ const HULL_RADIUS_M: f64 = 0.25;
 fn step(plant: &mut dyn Plant, command: &Rows, dt_s: f64) {
     let mut state = observed(plant, command.nrows());
     plant.apply(command, &mut state);
-    plant.advance(dt_s, &mut state, &mut Path::default()).expect("a finite motion");
+    plant.advance(dt_s, &mut state, &mut StepPath::default()).expect("a finite motion");
 }
 
 /// Returns vehicles with positions \[m\] and velocities \[m/s\].

@@ -129,7 +129,8 @@ struct Flown {
 /// Flies until the formation has been held.
 fn fly(scenario: &Scenario) -> Flown {
     let mut simulation = Simulation::new(scenario).expect("a flight");
-    let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival).free_by(Freedom::Translation);
+    let mut metrics =
+        Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival).with_freedom(Freedom::Translation);
     let mut highest = 0.0_f64;
     let reached_at_s = loop {
         for event in simulation.events() {

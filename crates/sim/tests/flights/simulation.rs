@@ -9,10 +9,10 @@ use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::formation::{Formation, largest_edge_error_m};
 use tautline_laws::graph::Graph;
 use tautline_laws::law::{EdgeTensionKeys, LaplacianKeys, LawSpec, PotentialKeys, VoidReason};
-use tautline_laws::observation::{Held, Others};
-use tautline_laws::target::{Begins, CurrentTarget, Leg, Supervisor};
+use tautline_laws::observation::{OtherStates, StateTables};
+use tautline_laws::target::{CurrentTarget, Leg, LegTrigger, Supervisor};
 use tautline_sim::continuous::{self, Tolerances};
-use tautline_sim::link::{Imperfections, Sensed};
+use tautline_sim::link::{Imperfections, StateEstimates};
 use tautline_sim::metrics::Metrics;
 use tautline_sim::scenario::{PlantSpec, Scenario};
 use tautline_sim::sim::{self, Components, Ending, SimError, Simulation};
@@ -150,7 +150,7 @@ fn commands_from_outside_replace_those_of_the_law() {
 }
 
 /// Returns a flight to the pentagon and then to a larger one.
-fn two_legs(begins: Begins) -> Scenario {
+fn two_legs(begins: LegTrigger) -> Scenario {
     let mut scenario = builtin("pentagon", &["time.duration_s=120", "swarm.a22_per_s=-0.1"]);
     scenario.legs.push(Leg { begins, ..Leg::first(Formation::pentagon(4.0)) });
     scenario
@@ -158,7 +158,7 @@ fn two_legs(begins: Begins) -> Scenario {
 
 #[test]
 fn legs_begin_by_time_or_when_the_previous_leg_is_reached() {
-    for (begins, expected_s) in [(Begins::At(50.0), 50.0..=50.0), (Begins::Reached, 20.0..=60.0)] {
+    for (begins, expected_s) in [(LegTrigger::At(50.0), 50.0..=50.0), (LegTrigger::Reached, 20.0..=60.0)] {
         let scenario = two_legs(begins);
         let mut log = Log::default();
         let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival);
@@ -175,7 +175,7 @@ fn legs_begin_by_time_or_when_the_previous_leg_is_reached() {
         assert!(last.reached_at_s.is_some_and(|reached_s| reached_s > *time_s), "{last:?}");
         assert!(last.max_edge_error_m < 0.01, "the larger pentagon is the one that is held");
     }
-    let scenario = two_legs(Begins::At(119.0));
+    let scenario = two_legs(LegTrigger::At(119.0));
     let mut metrics = Metrics::new(&scenario.legs, &scenario.graph, scenario.arrival);
     sim::fly(&scenario, Components::of(&scenario).expect("parts"), &mut metrics, &mut |_| ControlFlow::Continue(()))
         .expect("a flight");
@@ -218,7 +218,7 @@ fn a_delayed_flight_does_not_depend_on_the_steps_that_were_refused() {
         scenario.sensing.latency_s = 0.05;
         let (flight, log) = fly(&scenario);
         let refused = log.events.iter().any(|event| matches!(event, Event::StepRefined { .. }));
-        assert!(flight.certificate.void.contains(&VoidReason::KnownLate), "late knowledge voids the certificate");
+        assert!(flight.certificate.void.contains(&VoidReason::SensingDelayed), "late knowledge voids the certificate");
         (flight.last.positions_m, refused)
     };
     let ((coarse, refused), (fine, _)) = (end(0.4), end(0.4 / 128.0));
@@ -272,7 +272,7 @@ fn commands_from_outside_void_the_certificate_in_continuous_time() {
     (0..240).for_each(|_| still.step_with(&Rows::zeros(5)).expect("finite commands"));
     assert_eq!(still.state(), &scenario.start, "no vehicle is accelerated");
     let certificate = still.finish().certificate;
-    assert_eq!((certificate.certified_m, certificate.void), (None, vec![VoidReason::CommandsFromOutside]));
+    assert_eq!((certificate.certified_m, certificate.void), (None, vec![VoidReason::ExternalCommands]));
 }
 
 /// Returns two vehicles that drift at each other, 1 mm before the barrier.
@@ -315,7 +315,7 @@ fn a_certificate_for_one_leg_is_void_for_two_and_laws_follow_the_target() {
         let slots = Formation::pentagon(4.0);
         let mut scenario = Scenario::new("nearer", Swarm::at_rest(slots.slots_m.clone()), slots, 1.0, 60.0);
         scenario.law = law;
-        scenario.legs.push(Leg { begins: Begins::At(2.0), ..Leg::first(Formation::pentagon(2.5)) });
+        scenario.legs.push(Leg { begins: LegTrigger::At(2.0), ..Leg::first(Formation::pentagon(2.5)) });
         scenario.validate().expect("two legs");
         let (flight, _) = fly(&scenario);
         assert_eq!((flight.certificate.certified_m, flight.certificate.void), (None, vec![VoidReason::TargetChanges]));
@@ -327,7 +327,7 @@ fn a_certificate_for_one_leg_is_void_for_two_and_laws_follow_the_target() {
 #[test]
 fn legs_that_cannot_be_flown_are_refused() {
     type Break = fn(&mut Scenario);
-    let good = two_legs(Begins::At(50.0));
+    let good = two_legs(LegTrigger::At(50.0));
     assert!(good.validate().is_ok());
     let breaks: [Break; 6] = [
         |scenario| scenario.legs.clear(),
@@ -335,7 +335,7 @@ fn legs_that_cannot_be_flown_are_refused() {
         |scenario| scenario.legs[1].formation.slots_m[(2, 0)] = f64::NAN,
         |scenario| scenario.legs[1].formation = Formation::pentagon(1.0),
         |scenario| scenario.legs[1].formation.slots_m[(2, 2)] = 1.0,
-        |scenario| scenario.legs[1].begins = Begins::At(f64::NAN),
+        |scenario| scenario.legs[1].begins = LegTrigger::At(f64::NAN),
     ];
     for (number, broken) in breaks.into_iter().enumerate() {
         let mut scenario = good.clone();
@@ -370,17 +370,17 @@ fn a_leg_that_the_scenario_does_not_have_is_never_reached() {
 
 /// Imperfections that give each vehicle its own copy of the true state.
 #[derive(Clone)]
-struct Copied(Option<Held>);
+struct Copied(Option<StateTables>);
 
 impl Imperfections for Copied {
-    fn sense<'a>(&'a mut self, _: f64, truth: &'a Swarm) -> Sensed<'a> {
+    fn sense<'a>(&'a mut self, _: f64, truth: &'a Swarm) -> StateEstimates<'a> {
         let count = truth.count();
-        let held = Held {
-            heard: vec![truth.clone(); count],
+        let held = StateTables {
+            received: vec![truth.clone(); count],
             ages_s: vec![vec![0.0; count]; count],
-            seen: vec![truth.clone(); count],
+            sensed: vec![truth.clone(); count],
         };
-        Sensed { own: truth, others: Others::Held(self.0.insert(held)) }
+        StateEstimates { own: truth, others: OtherStates::PerVehicle(self.0.insert(held)) }
     }
 }
 

@@ -8,7 +8,7 @@ use tautline_audit::Status;
 use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::law::VoidReason;
 use tautline_sim::plant;
-use tautline_sim::plant::{Path, Plant as _, Unicycles};
+use tautline_sim::plant::{Plant as _, StepPath, Unicycles};
 use tautline_sim::scenario::{Override, Scenario, Source};
 use tautline_sim::sim::{Ending, Simulation};
 use tautline_sim::vehicle::Unicycle;
@@ -44,7 +44,7 @@ fn flown(
     (duration_s, steps): (f64, u32),
     command: impl Fn(f64, Vector3<f64>) -> Vector3<f64>,
 ) -> (Swarm, f64) {
-    let (mut plant, mut state, mut path) = (Unicycles::new(unicycle, start), start.clone(), Path::default());
+    let (mut plant, mut state, mut path) = (Unicycles::new(unicycle, start), start.clone(), StepPath::default());
     let (dt_s, mut bend_m) = (duration_s / f64::from(steps), 0.0_f64);
     let apply = |plant: &mut Unicycles, state: &mut Swarm, time_s: f64| {
         let u = command(time_s, row(&state.velocities_m_s, 0));
@@ -114,7 +114,7 @@ fn five_unicycles_fly_in_a_pentagon_without_a_certificate() {
     let scenario = read(FLIGHT);
     let (flight, log) = fly(&scenario);
     assert_eq!((flight.ending.clone(), flight.audit.status), (Ending::Completed, Status::Clear));
-    assert!(flight.certificate.certified_m.is_none() && flight.certificate.void.contains(&VoidReason::NotAPoint));
+    assert!(flight.certificate.certified_m.is_none() && flight.certificate.void.contains(&VoidReason::VehicleNotPoint));
     let formation = scenario.formation();
     let last = &flight.last;
     for (i, j) in scenario.graph.edges() {
@@ -142,7 +142,7 @@ fn a_saved_flight_continues_with_the_same_bits_and_a_refused_step_has_no_effect(
 
     let start = one([0.9, 0.4]);
     let (mut plant, mut state, mut path) =
-        (Unicycles::new(Unicycle::default(), &start), start.clone(), Path::default());
+        (Unicycles::new(Unicycle::default(), &start), start.clone(), StepPath::default());
     plant.apply(&Rows::from_element(1, 0.7), &mut state);
     let mut other = plant.clone();
     plant.advance(0.2, &mut state, &mut path).expect("finite");

@@ -6,7 +6,7 @@ use tautline_laws::formation::Formation;
 use tautline_laws::law::VoidReason;
 use tautline_laws::wind::{Gust, WindSpec};
 use tautline_sim::continuous::{self, Tolerances};
-use tautline_sim::plant::{Path, rapier};
+use tautline_sim::plant::{StepPath, rapier};
 use tautline_sim::scenario::{Override, PlantSpec, Scenario, Source, TimeSpec};
 use tautline_sim::sim::Simulation;
 
@@ -171,7 +171,7 @@ fn an_undone_step_is_repeated_in_the_same_wind() {
     );
     let mut straight = rapier::plant(&scenario);
     let mut halting = straight.clone();
-    let (mut state, mut path, command) = (scenario.start.clone(), Path::default(), Rows::zeros(5));
+    let (mut state, mut path, command) = (scenario.start.clone(), StepPath::default(), Rows::zeros(5));
     let mut other: Swarm = state.clone();
     straight.apply(&command, &mut state);
     halting.apply(&command, &mut other);
@@ -249,13 +249,13 @@ fn a_certificate_in_wind_ends_at_its_time() {
     assert_eq!(certificate(&format!("{rest}{mean}{}", turbulent(true))).void, [VoidReason::WindUnbounded]);
     let mut led = five("[vehicle]\ndrag_per_s = 0.4\n[wind]\nmean_m_s = [2.0, 0.0]\n[time]\nduration_s = 30.0");
     led.law = tautline_laws::law::LawSpec::Potential(tautline_laws::law::PotentialKeys::default());
-    assert!(led.certificate(led.law().expect("a law").as_ref()).void.contains(&VoidReason::Windblown));
+    assert!(led.certificate(led.law().expect("a law").as_ref()).void.contains(&VoidReason::WindNotCovered));
 }
 
 #[test]
 fn a_leader_blown_off_its_reference_voids_the_certificate() {
     let scenario = builtin("pentagon-leader", &["vehicle.drag_per_s=0.3", "wind.mean_m_s=[1.0, 0.0]"]);
-    assert!(scenario.certificate(scenario.law().expect("a law").as_ref()).void.contains(&VoidReason::LeaderBlown));
+    assert!(scenario.certificate(scenario.law().expect("a law").as_ref()).void.contains(&VoidReason::LeaderInWind));
 }
 
 #[test]

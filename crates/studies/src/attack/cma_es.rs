@@ -60,7 +60,7 @@ struct Rates {
 }
 
 /// Returns the default population: 4 + 3 ln n in n dimensions.
-pub(super) fn usual_population(dimensions: usize) -> usize {
+pub(super) fn default_population(dimensions: usize) -> usize {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive and far below 2^32")]
     let more = (3.0 * libm::log(dimensions.max(1) as f64)) as usize;
     4 + more
@@ -229,7 +229,7 @@ impl Descent {
 impl Optimiser {
     /// Returns a search that starts at the middle of the bounds.
     pub(super) fn new(dimensions: usize, delta_m: f64, seed: u64) -> Self {
-        let descent = Descent::new(&vec![0.5; dimensions], usual_population(dimensions));
+        let descent = Descent::new(&vec![0.5; dimensions], default_population(dimensions));
         Self {
             normals: Normals::new(seed, 0),
             dimensions,
@@ -296,7 +296,7 @@ mod tests {
     /// Returns the number of candidates until a value is below `goal`; panics after `most` candidates.
     fn count_candidates(n: usize, goal: f64, most: usize, value: &dyn Fn(&[f64]) -> f64) -> usize {
         let mut normals = Normals::new(3, 0);
-        let mut search = CmaEs::new(&vec![0.5; n], 0.3, usual_population(n));
+        let mut search = CmaEs::new(&vec![0.5; n], 0.3, default_population(n));
         let mut count = 0;
         while count < most {
             let candidates: Vec<_> = (0..search.population()).map(|_| search.draw(&mut normals)).collect();

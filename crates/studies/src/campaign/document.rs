@@ -41,7 +41,7 @@ impl LawSummary {
     #[must_use]
     pub fn sentence(&self) -> String {
         if let Some(splitting) = &self.splitting {
-            return rare(splitting);
+            return rare_event_sentence(splitting);
         }
         let Proportion { count, of, confidence, .. } = self.violated;
         if of == 0 {
@@ -72,7 +72,7 @@ impl LawSummary {
 }
 
 /// Returns the probability of a violation in a sentence.
-fn rare(splitting: &Repetitions) -> String {
+fn rare_event_sentence(splitting: &Repetitions) -> String {
     let Repetitions { repetitions, probability, confidence, extinct, .. } = splitting;
     let range = match (probability.low, probability.high) {
         (Some(low), Some(high)) => {
@@ -164,7 +164,7 @@ impl Summary {
     }
 
     /// Returns the section with the shares over a varied key.
-    fn over(&self, varied: &Varied) -> Section {
+    fn varied_section(&self, varied: &Varied) -> Section {
         let share = |bin: &Bin, law: usize, pick: fn(&BinShares) -> Proportion| bin.laws.get(law).map(pick);
         let violated: fn(&BinShares) -> Proportion = |of| of.violated;
         let reached: fn(&BinShares) -> Proportion = |of| of.reached;
@@ -278,7 +278,7 @@ impl Study for Summary {
         if !self.pairs.is_empty() {
             sections.push(Section::new("Laws on the same runs", [Block::Table(self.pairs_table())]));
         }
-        sections.extend(self.varied.iter().map(|varied| self.over(varied)));
+        sections.extend(self.varied.iter().map(|varied| self.varied_section(varied)));
         sections
     }
 

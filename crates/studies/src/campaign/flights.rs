@@ -8,12 +8,12 @@ use serde_json::Value;
 use super::folder::{Manifest, Program, other_campaign};
 use super::shard::Row;
 use super::spec::{Method, Spec, Stop, refused};
-use super::summary::{Gathered, Summary};
+use super::summary::{Summary, SummaryAccumulator};
 use super::vary::Variation;
 use crate::SCHEMA_VERSION;
 use crate::base::BaseScenario;
 use crate::batch::Batch;
-use crate::splitting::{self, Settings};
+use crate::splitting::{self, SplittingSettings};
 use tautline_report::request::Failure;
 use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source};
 
@@ -43,7 +43,7 @@ pub struct Campaign {
     variations: BTreeMap<String, Variation>,
     seed: u64,
     stop: Option<Stop>,
-    splitting: Option<Settings>,
+    splitting: Option<SplittingSettings>,
     argument: String,
 }
 
@@ -273,7 +273,7 @@ impl Campaign {
 
     /// Returns the settings of splitting, if runs are estimates.
     #[must_use]
-    pub fn splitting(&self) -> Option<&Settings> {
+    pub fn splitting(&self) -> Option<&SplittingSettings> {
         self.splitting.as_ref()
     }
 
@@ -355,7 +355,7 @@ impl Campaign {
     /// As [`Campaign::row`].
     pub fn fly(&self, batch: &Batch<'_>) -> Result<Option<Summary>, Failure> {
         let (laws, runs) = (self.laws().len(), self.manifest().runs);
-        let mut gathered = Gathered::new(self);
+        let mut gathered = SummaryAccumulator::new(self);
         let mut from = 0;
         while from < runs && !gathered.is_enough() {
             let to = runs.min(from + AT_ONCE);

@@ -12,7 +12,7 @@ use sha2::{Digest as _, Sha256};
 use super::flights::Campaign;
 use super::shard::{self, PartState, Row, fields};
 use super::spec::refused;
-use super::summary::{Gathered, Summary};
+use super::summary::{Summary, SummaryAccumulator};
 use crate::SCHEMA_VERSION;
 use crate::study::Study as _;
 use crate::table::{Cell, ParquetTable};
@@ -93,7 +93,7 @@ impl Folder {
     /// Creates the folder of parts.
     pub(super) fn create_parts(&self) -> Result<(), Failure> {
         let parts = self.path.join("parts");
-        fs::create_dir_all(&parts).map_err(cannot("write", &parts))
+        fs::create_dir_all(&parts).map_err(file_failure("write", &parts))
     }
 
     /// Returns the campaign.
@@ -115,17 +115,17 @@ impl Folder {
     }
 
     /// Returns the path of the part of a shard.
-    pub(super) fn part(&self, shard: u64) -> PathBuf {
+    pub(super) fn part_path(&self, shard: u64) -> PathBuf {
         self.path.join("parts").join(format!("{}.jsonl", stem(shard)))
     }
 
     /// Returns the path for a part that differs from the part that another machine wrote.
-    pub(super) fn differs(&self, shard: u64) -> PathBuf {
+    pub(super) fn conflict_path(&self, shard: u64) -> PathBuf {
         self.path.join("parts").join(format!("{}.differs.jsonl", stem(shard)))
     }
 
     /// Returns the path of the wall-clock times of a shard.
-    pub(super) fn times(&self, shard: u64) -> PathBuf {
+    pub(super) fn times_path(&self, shard: u64) -> PathBuf {
         self.path.join("parts").join(format!("{}.times.json", stem(shard)))
     }
 
@@ -143,9 +143,9 @@ impl Folder {
             let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
             name.starts_with(&begin) && name.ends_with(&end)
         };
-        let entries = fs::read_dir(&folder).map_err(cannot("read", &folder))?;
+        let entries = fs::read_dir(&folder).map_err(file_failure("read", &folder))?;
         let paths = entries.map(|entry| entry.map(|entry| entry.path())).collect::<io::Result<Vec<_>>>();
-        let mut paths = paths.map_err(cannot("read", &folder))?;
+        let mut paths = paths.map_err(file_failure("read", &folder))?;
         paths.retain(is_one);
         paths.sort();
         Ok(paths)
@@ -157,7 +157,7 @@ impl Folder {
     /// [`Failure`] if the shard was flown twice with different results, the part is of another campaign, or the file
     /// cannot be read.
     pub fn read(&self, shard: u64) -> Result<PartState, Failure> {
-        let (kept, other) = (self.part(shard), self.differs(shard));
+        let (kept, other) = (self.part_path(shard), self.conflict_path(shard));
         if other.exists() {
             return Err(different_results(shard, &kept, &other));
         }
@@ -205,7 +205,7 @@ impl Folder {
     }
 
     fn damage(&self, shard: u64, why: &str) -> String {
-        format!("{} is damaged: {why}", self.part(shard).display())
+        format!("{} is damaged: {why}", self.part_path(shard).display())
     }
 
     /// Returns the failure of shards that are missing or damaged.
@@ -231,8 +231,9 @@ impl Folder {
     pub fn merge(&self) -> Result<Merged, Failure> {
         let path = self.file(RESULTS);
         let summary = write_atomically_with(&path, |file| {
-            let failed = |error: parquet::errors::ParquetError| cannot("write", &path)(std::io::Error::other(error));
-            let copy = file.try_clone().map_err(cannot("write", &path))?;
+            let failed =
+                |error: parquet::errors::ParquetError| file_failure("write", &path)(std::io::Error::other(error));
+            let copy = file.try_clone().map_err(file_failure("write", &path))?;
             let (columns, cells): (Vec<_>, Vec<_>) = fields(self.campaign()).into_iter().unzip();
             let about = ["tautline.campaign", &self.campaign().manifest().campaign];
             let mut table = ParquetTable::create(columns, about, copy).map_err(failed)?;
@@ -251,9 +252,9 @@ impl Folder {
             Ok::<_, Failure>(summary)
         })?;
         let answer = self.file(ANSWER);
-        let json = summary.to_json().map_err(|error| cannot("write", &answer)(error.into()))?;
+        let json = summary.to_json().map_err(|error| file_failure("write", &answer)(error.into()))?;
         write_atomically(&answer, json.as_bytes())?;
-        let bytes = fs::read(&path).map_err(cannot("read", &path))?;
+        let bytes = fs::read(&path).map_err(file_failure("read", &path))?;
         Ok(Merged { summary, sha256: base16(&Sha256::digest(&bytes)) })
     }
 
@@ -267,7 +268,7 @@ impl Folder {
 
     /// Returns the answer, and calls `take` for each row that counts, in order.
     fn gather(&self, take: &mut dyn FnMut(&Row) -> Result<(), Failure>) -> Result<Summary, Failure> {
-        let mut gathered = Gathered::new(self.campaign());
+        let mut gathered = SummaryAccumulator::new(self.campaign());
         for shard in 0..self.campaign().manifest().shards {
             if gathered.is_enough() {
                 break;
@@ -392,7 +393,7 @@ static HOLDER: OnceLock<PathBuf> = OnceLock::new();
 impl Program {
     /// Sets the file that contains this crate if it is a library of another program. The hash of this file then
     /// identifies the program. Call it before any campaign.
-    pub fn is_in(file: PathBuf) {
+    pub fn set_library_file(file: PathBuf) {
         // All calls set the same file, so a second call changes nothing.
         let _ = HOLDER.set(file);
     }
@@ -403,8 +404,8 @@ impl Program {
     /// [`Failure`] if its file cannot be read.
     pub fn running() -> Result<Self, Failure> {
         let path = HOLDER.get().cloned().map_or_else(std::env::current_exe, Ok);
-        let path = path.map_err(cannot("read", Path::new("the program")))?;
-        let program = fs::read(&path).map_err(cannot("read", &path))?;
+        let path = path.map_err(file_failure("read", Path::new("the program")))?;
+        let program = fs::read(&path).map_err(file_failure("read", &path))?;
         Ok(Self {
             name: tautline_core::PROGRAM.to_owned(),
             version: tautline_core::VERSION.to_owned(),
@@ -455,7 +456,7 @@ impl Manifest {
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
                 return foreign("no such campaign", "plan one with: tautline campaign plan SPEC.toml --out FOLDER");
             }
-            Err(error) => return Err(cannot("read", path)(error)),
+            Err(error) => return Err(file_failure("read", path)(error)),
         };
         let read = match serde_json::from_str::<Self>(&text) {
             Ok(read) => read,
@@ -489,7 +490,7 @@ impl Manifest {
     /// # Errors
     /// [`Failure`] if the file cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), Failure> {
-        let json = serde_json::to_string_pretty(self).map_err(|error| cannot("write", path)(error.into()))?;
+        let json = serde_json::to_string_pretty(self).map_err(|error| file_failure("write", path)(error.into()))?;
         Ok(write_atomically(path, (json + "\n").as_bytes())?)
     }
 }
@@ -500,7 +501,7 @@ pub(super) fn other_campaign(path: &Path, problem: impl AsRef<str>, remedy: impl
 }
 
 /// Returns a function that makes the failure of a file that cannot be read or written.
-pub(super) fn cannot(what: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Failure {
+pub(super) fn file_failure(what: &'static str, path: &Path) -> impl FnOnce(std::io::Error) -> Failure {
     let path = path.display();
     move |error| {
         Failure::machine("files/cannot-access", format!("{path}: cannot {what} the file: {error}"))

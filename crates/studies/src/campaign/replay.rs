@@ -3,10 +3,10 @@
 use std::path::{Path, PathBuf};
 
 use super::folder::FAULTY;
-use super::folder::cannot;
-use super::{BadRun, Campaign, Folder, Law, Row, Summary, Worst};
+use super::folder::file_failure;
+use super::{Campaign, Folder, Law, Row, Summary, ViolatedRun, Worst};
 use crate::flight::Outcome;
-use crate::splitting::{self, StateAt};
+use crate::splitting::{self, StateHashAtStep};
 use crate::study::{Block, Section};
 use tautline_core::text::metres;
 use tautline_recordings::mcap::{Header, McapRecorder};
@@ -156,7 +156,7 @@ pub fn replay(
     let flight = FlightId { law, run, bad };
     let out = request.out.clone().unwrap_or_else(|| flight.folder(folder));
     if let Some(bad) = bad {
-        let hash = fly_bad(folder, flight, bad, &out)?;
+        let hash = fly_violated_flight(folder, flight, bad, &out)?;
         monitor.say(&format!("state hash {hash}, as in the campaign\nwrote {}", out.join(RECORDING).display()));
         return Ok(false);
     }
@@ -194,7 +194,7 @@ pub(super) fn fly_worst_again(
         if monitor.is_interrupted() {
             break;
         }
-        flights.push(bad_again(folder, law, bad)?);
+        flights.push(repeat_violated_flight(folder, law, bad)?);
     }
     let mut worst: Vec<_> = laws().flat_map(|(law, of)| of.worst.iter().map(move |worst| (law, worst))).collect();
     let rank = |worst: &Worst| worst.outcome != Outcome::Violated;
@@ -216,9 +216,9 @@ pub(super) fn fly_worst_again(
 }
 
 /// Repeats a violated flight that a splitting estimate kept, and describes it for the page of the campaign.
-fn bad_again(folder: &Folder, law: &Law, bad: &BadRun) -> Result<WorstFlight, Failure> {
+fn repeat_violated_flight(folder: &Folder, law: &Law, bad: &ViolatedRun) -> Result<WorstFlight, Failure> {
     let flight = FlightId { law, run: bad.run, bad: Some(bad.bad) };
-    fly_bad(folder, flight, bad.bad, &flight.folder(folder))?;
+    fly_violated_flight(folder, flight, bad.bad, &flight.folder(folder))?;
     let (run, number) = (bad.run.to_string(), bad.bad.to_string());
     // Relative to the folder of the page, so that the page has the same bytes for any path of the campaign.
     let command = ["campaign", "replay", ".", "--run", &run, "--law", &law.name, "--bad", &number];
@@ -242,7 +242,7 @@ fn bad_again(folder: &Folder, law: &Law, bad: &BadRun) -> Result<WorstFlight, Fa
 
 /// Repeats and records a violated flight of an estimate, and compares the state after the step of the violation.
 /// Returns the state hash.
-fn fly_bad(folder: &Folder, flight: FlightId<'_>, bad: usize, out: &Path) -> Result<String, Failure> {
+fn fly_violated_flight(folder: &Folder, flight: FlightId<'_>, bad: usize, out: &Path) -> Result<String, Failure> {
     let kept = flight.row(folder)?.and_then(|row| row.splitting).map(|splitting| splitting.bad).unwrap_or_default();
     let Some(violated) = kept.get(bad) else {
         let problem = format!("--bad: the campaign has no {}", flight.words());
@@ -250,10 +250,10 @@ fn fly_bad(folder: &Folder, flight: FlightId<'_>, bad: usize, out: &Path) -> Res
         return Err(Failure::input("campaign/no-flight", problem, remedy));
     };
     let scenario = flight.scenario(folder.campaign())?;
-    std::fs::create_dir_all(out).map_err(cannot("write", out))?;
+    std::fs::create_dir_all(out).map_err(file_failure("write", out))?;
     let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
     let mut recording = McapRecorder::create(&out.join(RECORDING), &header)?;
-    let mut state = StateAt::violation_of(violated);
+    let mut state = StateHashAtStep::violation_of(violated);
     let flown = splitting::replay(&scenario, &violated.genealogy, &mut (&mut recording, &mut state));
     let closed = recording.finish();
     flown?;

@@ -6,7 +6,7 @@ use std::time::Instant;
 
 use super::replay::{WorstFlight, fly_worst_again};
 use super::{ANSWER, Campaign, Folder, Program, RESULTS, Shard, Spec, Stop, Summary, Tally};
-use crate::Question;
+use crate::Criterion;
 use crate::batch::Batch;
 use crate::study::{Study as _, StudyPage};
 use tautline_core::text::counted;
@@ -70,7 +70,7 @@ impl CampaignRequest {
         })?;
         let mut spec = Spec::read(&shown, &text)?;
         if self.until_width.is_some() || self.until_decided.is_some() {
-            let stop = spec.stop.unwrap_or(Stop { of: Question::Clear, width: None, decided: None });
+            let stop = spec.stop.unwrap_or(Stop { of: Criterion::Clear, width: None, decided: None });
             spec.stop = Some(Stop {
                 width: self.until_width.or(stop.width),
                 decided: self.until_decided.or(stop.decided),

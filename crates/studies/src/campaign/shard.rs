@@ -17,7 +17,7 @@ use serde_json::Value;
 use sha2::{Digest as _, Sha256};
 
 use super::flights::Campaign;
-use super::folder::{Folder, JOURNAL, Manifest, base16, cannot, different_results, other_campaign};
+use super::folder::{Folder, JOURNAL, Manifest, base16, different_results, file_failure, other_campaign};
 use crate::SCHEMA_VERSION;
 use crate::batch::Batch;
 use crate::flight::{FlightSummary, Outcome};
@@ -69,7 +69,7 @@ impl Folder {
         self.remove_journals(shard)?;
         let (seconds, threads) = (began.elapsed().as_secs_f64(), batch.threads());
         let times = format!("{{\"wall_s\": {seconds:.3}, \"threads\": {threads}, \"flights\": {flown}}}\n");
-        tautline_report::report::write_atomically(&self.times(shard), times.as_bytes())?;
+        tautline_report::report::write_atomically(&self.times_path(shard), times.as_bytes())?;
         Ok(Some(Shard { rows, flown: flown as u64 }))
     }
 
@@ -98,8 +98,8 @@ impl Folder {
     /// Publishes a complete part in one step. If another process has published the part, both must be equal.
     fn publish(&self, shard: u64, rows: &[Row]) -> Result<(), Failure> {
         let bytes = encode(self.campaign().manifest(), shard, rows)?;
-        let (path, own) = (self.part(shard), self.unique_path(shard, "partial"));
-        let failed = |error| cannot("write", &own)(error);
+        let (path, own) = (self.part_path(shard), self.unique_path(shard, "partial"));
+        let failed = |error| file_failure("write", &own)(error);
         let written = File::create(&own).and_then(|mut file| file.write_all(&bytes).and_then(|()| file.sync_all()));
         if let Err(error) = written {
             let _ = fs::remove_file(&own);
@@ -120,13 +120,13 @@ impl Folder {
 
     /// Compares this process's part with the published one: equal bytes are dropped, different bytes are a failure.
     fn compare_with_published(&self, shard: u64, own: &Path, bytes: &[u8]) -> Result<(), Failure> {
-        let kept = self.part(shard);
-        let there = fs::read(&kept).map_err(cannot("read", &kept))?;
+        let kept = self.part_path(shard);
+        let there = fs::read(&kept).map_err(file_failure("read", &kept))?;
         if there == bytes {
-            return fs::remove_file(own).map_err(cannot("write", own));
+            return fs::remove_file(own).map_err(file_failure("write", own));
         }
-        let other = self.differs(shard);
-        fs::rename(own, &other).map_err(cannot("write", &other))?;
+        let other = self.conflict_path(shard);
+        fs::rename(own, &other).map_err(file_failure("write", &other))?;
         Err(different_results(shard, &kept, &other))
     }
 
@@ -135,7 +135,7 @@ impl Folder {
         for path in self.leftovers(shard, JOURNAL)? {
             match fs::remove_file(&path) {
                 Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                    return Err(cannot("write", &path)(error));
+                    return Err(file_failure("write", &path)(error));
                 }
                 _ => {}
             }
@@ -147,7 +147,7 @@ impl Folder {
 /// First line of a part.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Heading {
+struct PartHeader {
     schema_version: u32,
     campaign: String,
     shard: u64,
@@ -157,7 +157,7 @@ struct Heading {
 /// Last line of a part.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Seal {
+struct PartTrailer {
     rows: usize,
     sha256: String,
 }
@@ -178,19 +178,23 @@ pub enum PartState {
 /// # Errors
 /// None in practice: every row has a JSON form.
 pub(super) fn encode(manifest: &Manifest, shard: u64, rows: &[Row]) -> Result<Vec<u8>, Failure> {
-    let heading =
-        Heading { schema_version: SCHEMA_VERSION, campaign: manifest.campaign.clone(), shard, shards: manifest.shards };
+    let heading = PartHeader {
+        schema_version: SCHEMA_VERSION,
+        campaign: manifest.campaign.clone(),
+        shard,
+        shards: manifest.shards,
+    };
     let mut bytes = line(&heading)?;
     for row in rows {
         bytes.extend(line(row)?);
     }
-    let seal = Seal { rows: rows.len(), sha256: base16(&Sha256::digest(&bytes)) };
+    let seal = PartTrailer { rows: rows.len(), sha256: base16(&Sha256::digest(&bytes)) };
     bytes.extend(line(&seal)?);
     Ok(bytes)
 }
 
 fn line(value: &impl Serialize) -> Result<Vec<u8>, Failure> {
-    let written = serde_json::to_vec(value).map_err(|error| cannot("write", Path::new("a row"))(error.into()));
+    let written = serde_json::to_vec(value).map_err(|error| file_failure("write", Path::new("a row"))(error.into()));
     written.map(|mut bytes| {
         bytes.push(b'\n');
         bytes
@@ -205,7 +209,7 @@ pub(super) fn read(path: &Path, manifest: &Manifest, shard: u64, laws: usize) ->
     let bytes = match fs::read(path) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(PartState::Missing),
-        Err(error) => return Err(cannot("read", path)(error)),
+        Err(error) => return Err(file_failure("read", path)(error)),
     };
     decode(&bytes, manifest, shard, laws, path)
 }
@@ -216,12 +220,12 @@ fn decode(bytes: &[u8], manifest: &Manifest, shard: u64, laws: usize, path: &Pat
     let Some(body) = bytes.strip_suffix(b"\n") else { return Ok(PartState::Damaged(TRUNCATED)) };
     let Some(end) = body.iter().rposition(|&byte| byte == b'\n') else { return Ok(PartState::Damaged(TRUNCATED)) };
     let (sealed, seal) = (&bytes[..=end], &body[end + 1..]);
-    let Ok(seal) = serde_json::from_slice::<Seal>(seal) else { return Ok(PartState::Damaged(TRUNCATED)) };
+    let Ok(seal) = serde_json::from_slice::<PartTrailer>(seal) else { return Ok(PartState::Damaged(TRUNCATED)) };
     if seal.sha256 != base16(&Sha256::digest(sealed)) {
         return Ok(PartState::Damaged(ALTERED));
     }
     let mut lines = sealed.split_inclusive(|&byte| byte == b'\n');
-    let Some(heading) = lines.next().and_then(|line| serde_json::from_slice::<Heading>(line).ok()) else {
+    let Some(heading) = lines.next().and_then(|line| serde_json::from_slice::<PartHeader>(line).ok()) else {
         return Ok(PartState::Damaged(ALTERED));
     };
     let is_ours = heading.campaign == manifest.campaign && heading.shards == manifest.shards && heading.shard == shard;
@@ -254,7 +258,7 @@ impl Journal {
     /// # Errors
     /// [`Failure`] if the file cannot be created.
     pub(super) fn create(path: PathBuf, manifest: &Manifest) -> Result<Self, Failure> {
-        let file = File::create(&path).map_err(cannot("write", &path))?;
+        let file = File::create(&path).map_err(file_failure("write", &path))?;
         Ok(Self { path, file, campaign: manifest.campaign.clone() })
     }
 
@@ -265,7 +269,7 @@ impl Journal {
     pub(super) fn add(&mut self, row: &Row) -> Result<(), Failure> {
         let row = line(row)?;
         let written = [seal_of(&self.campaign, &row).as_bytes(), b" ", &row].concat();
-        self.file.write_all(&written).map_err(cannot("write", &self.path))
+        self.file.write_all(&written).map_err(file_failure("write", &self.path))
     }
 
     /// Returns the rows of a campaign in a journal.
@@ -308,7 +312,7 @@ pub struct Row {
 
 /// Verdict on the separation of a row.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Known {
+pub enum SeparationVerdict {
     /// No violation up to the end of the flight.
     Clear,
     /// A violation.
@@ -324,13 +328,13 @@ pub enum Known {
 impl Row {
     /// Returns the verdict on the separation.
     #[must_use]
-    pub fn known(&self) -> Known {
+    pub fn known(&self) -> SeparationVerdict {
         match self.flight.as_ref().map(|flight| flight.outcome) {
-            None if self.splitting.is_some() => Known::Estimated,
-            None => Known::NotFlown,
-            Some(Outcome::Clear) => Known::Clear,
-            Some(Outcome::Violated) => Known::Violated,
-            Some(Outcome::EndedEarly | Outcome::Undecided) => Known::Unknown,
+            None if self.splitting.is_some() => SeparationVerdict::Estimated,
+            None => SeparationVerdict::NotFlown,
+            Some(Outcome::Clear) => SeparationVerdict::Clear,
+            Some(Outcome::Violated) => SeparationVerdict::Violated,
+            Some(Outcome::EndedEarly | Outcome::Undecided) => SeparationVerdict::Unknown,
         }
     }
 

@@ -8,9 +8,9 @@ use toml::de::{DeTable, DeValue};
 use toml::{Table, Value};
 
 use super::vary::Variation;
-use crate::Question;
+use crate::Criterion;
 use crate::base::overlap;
-use crate::splitting::Settings;
+use crate::splitting::SplittingSettings;
 use tautline_report::request::Failure;
 use tautline_sim::scenario::{Place, ScenarioError};
 
@@ -53,7 +53,7 @@ pub struct Spec {
     pub method: Method,
     /// Settings of splitting.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub splitting: Option<Settings>,
+    pub splitting: Option<SplittingSettings>,
     #[serde(skip)]
     source: Source,
 }
@@ -89,7 +89,7 @@ impl Method {
 pub struct Stop {
     /// Verdict whose share decides.
     #[serde(default)]
-    pub of: Question,
+    pub of: Criterion,
     /// Stop when the interval of every law's share is at most this wide.
     pub width: Option<f64>,
     /// Stop when the interval of every law's share does not contain this share.
@@ -311,7 +311,7 @@ mod tests {
         let variations = spec.variations().expect("variations");
         assert_eq!(variations.keys().collect::<Vec<_>>(), ["network.loss", "start.jitter_m", "start.seed"]);
         assert_eq!(variations["start.seed"], Variation::Seed {});
-        assert_eq!(spec.stop.map(|stop| stop.of), Some(Question::Clear));
+        assert_eq!(spec.stop.map(|stop| stop.of), Some(Criterion::Clear));
         let again = Spec::read("again", &spec.to_toml().expect("TOML")).expect("read");
         assert_eq!(Spec { source: spec.source.clone(), ..again }, spec);
     }

@@ -3,10 +3,10 @@
 use serde::Serialize;
 
 use super::flights::{Campaign, Law};
-use super::shard::{Known, Row};
+use super::shard::{Row, SeparationVerdict};
 use super::tally::{Intervals, Tally, UpperBound};
 use super::tally::{KeyColumn, Varied};
-use crate::Question;
+use crate::Criterion;
 use crate::SCHEMA_VERSION;
 use crate::flight::{FlightSummary, Outcome};
 use crate::splitting::{Repetitions, Splitting};
@@ -88,12 +88,12 @@ pub struct LawSummary {
     pub splitting: Option<Repetitions>,
     /// Violated flights of the estimates, the largest violation first.
     #[serde(skip_serializing_if = "Vec::is_empty")]
-    pub bad: Vec<BadRun>,
+    pub bad: Vec<ViolatedRun>,
 }
 
 /// Violated flight of an estimate.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct BadRun {
+pub struct ViolatedRun {
     /// Number of the run.
     pub run: u64,
     /// Index in the violated flights of the run, from 0.
@@ -135,7 +135,7 @@ pub struct Pair {
 
 /// Accumulator of rows for a summary. It holds a few numbers of each row.
 #[derive(Debug)]
-pub(super) struct Gathered {
+pub(super) struct SummaryAccumulator {
     intervals: Intervals,
     tally: Tally,
     laws: Vec<LawNumbers>,
@@ -153,10 +153,10 @@ struct LawNumbers {
     not_flown_because: Option<String>,
     worst: Vec<Worst>,
     estimates: Vec<Splitting>,
-    bad: Vec<BadRun>,
+    bad: Vec<ViolatedRun>,
 }
 
-impl Gathered {
+impl SummaryAccumulator {
     /// Returns an empty accumulator.
     #[must_use]
     pub(super) fn new(campaign: &Campaign) -> Self {
@@ -213,9 +213,9 @@ impl Gathered {
             certificates_broken: counts.certificates_broken,
             violated: counts.violated(intervals),
             violated_below: counts.violated_below(intervals),
-            clear: counts.share(Question::Clear, intervals),
-            reached: counts.share(Question::Reached, intervals),
-            pass: counts.share(Question::Pass, intervals),
+            clear: counts.share(Criterion::Clear, intervals),
+            reached: counts.share(Criterion::Reached, intervals),
+            pass: counts.share(Criterion::Pass, intervals),
             clearance_m: Quantiles::of(&numbers.clearance_m, intervals),
             reached_at_s: Quantiles::of(&numbers.reached_at_s, intervals),
             path_length_m: Quantiles::of(&numbers.path_length_m, intervals),
@@ -245,7 +245,8 @@ impl Gathered {
 impl LawNumbers {
     fn take(&mut self, row: &Row) {
         let (known, reached) = (row.known(), row.flight.as_ref().is_some_and(|flight| flight.reached));
-        self.outcomes.push((known != Known::NotFlown).then_some([known == Known::Clear, reached]));
+        self.outcomes
+            .push((known != SeparationVerdict::NotFlown).then_some([known == SeparationVerdict::Clear, reached]));
         if let Some(flight) = &row.flight {
             self.clearance_m.extend(row.clearance_m());
             self.reached_at_s.extend(flight.reached_at_s.filter(|_| flight.reached));
@@ -280,7 +281,7 @@ impl LawNumbers {
     }
 
     fn take_estimate(&mut self, run: u64, splitting: &Splitting) {
-        self.bad.extend(splitting.bad.iter().enumerate().map(|(bad, flight)| BadRun {
+        self.bad.extend(splitting.bad.iter().enumerate().map(|(bad, flight)| ViolatedRun {
             run,
             bad,
             clearance_m: flight.clearance_m,

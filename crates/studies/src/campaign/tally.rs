@@ -3,10 +3,10 @@
 use serde::Serialize;
 use serde_json::Value;
 
-use super::shard::{Known, Row};
+use super::shard::{Row, SeparationVerdict};
 use super::spec::Stop;
 use super::vary::Variation;
-use crate::Question;
+use crate::Criterion;
 use crate::statistics::{CONFIDENCE, Proportion, anytime};
 
 /// Number of runs at the first look for an early stop; each later look has twice the number.
@@ -99,11 +99,11 @@ pub struct Counts {
 impl Counts {
     fn take(&mut self, row: &Row) {
         let counter = match row.known() {
-            Known::Clear => &mut self.clear,
-            Known::Violated => &mut self.violated,
-            Known::Unknown => &mut self.unknown,
-            Known::NotFlown => &mut self.not_flown,
-            Known::Estimated => return,
+            SeparationVerdict::Clear => &mut self.clear,
+            SeparationVerdict::Violated => &mut self.violated,
+            SeparationVerdict::Unknown => &mut self.unknown,
+            SeparationVerdict::NotFlown => &mut self.not_flown,
+            SeparationVerdict::Estimated => return,
         };
         *counter += 1;
         self.flown += u64::from(row.flight.is_some());
@@ -114,11 +114,11 @@ impl Counts {
 
     /// Returns the share of flights that show a verdict.
     #[must_use]
-    pub fn share(&self, question: Question, intervals: Intervals) -> Proportion {
+    pub fn share(&self, question: Criterion, intervals: Intervals) -> Proportion {
         match question {
-            Question::Clear => intervals.share(self.clear, self.unknown, self.flown),
-            Question::Reached => intervals.share(self.reached, 0, self.flown),
-            Question::Pass => intervals.share(self.pass, 0, self.flown),
+            Criterion::Clear => intervals.share(self.clear, self.unknown, self.flown),
+            Criterion::Reached => intervals.share(self.reached, 0, self.flown),
+            Criterion::Pass => intervals.share(self.pass, 0, self.flown),
         }
     }
 
@@ -251,7 +251,7 @@ pub(super) struct KeyColumn {
 struct Flight {
     law: usize,
     value: Value,
-    known: Known,
+    known: SeparationVerdict,
     reached: bool,
 }
 
@@ -270,8 +270,8 @@ impl KeyColumn {
     }
 
     /// Adds a flight.
-    pub(super) fn take(&mut self, law: usize, value: &Value, known: Known, reached: bool) {
-        if !self.is_seed && !matches!(known, Known::NotFlown | Known::Estimated) {
+    pub(super) fn take(&mut self, law: usize, value: &Value, known: SeparationVerdict, reached: bool) {
+        if !self.is_seed && !matches!(known, SeparationVerdict::NotFlown | SeparationVerdict::Estimated) {
             self.flights.push(Flight { law, value: value.clone(), known, reached });
         }
     }
@@ -361,9 +361,9 @@ impl KeyColumn {
             let count = |is: &dyn Fn(&Flight) -> bool| {
                 members.iter().filter(|flight| flight.law == law && is(flight)).count() as u64
             };
-            let unknown = count(&|flight| flight.known == Known::Unknown);
+            let unknown = count(&|flight| flight.known == SeparationVerdict::Unknown);
             BinShares {
-                violated: intervals.share(count(&|flight| flight.known == Known::Violated), unknown, of),
+                violated: intervals.share(count(&|flight| flight.known == SeparationVerdict::Violated), unknown, of),
                 reached: intervals.share(count(&|flight| flight.reached), 0, of),
             }
         };

@@ -1,7 +1,7 @@
 //! Bisection, and margins of flights.
 
 use super::{Bisection, Margin, Options, Range, search};
-use crate::Question;
+use crate::Criterion;
 use crate::study::{Experiment as _, Study as _};
 use crate::tests::{base, batch, pair};
 
@@ -22,7 +22,7 @@ fn found(range: Range, answer: &dyn Fn(f64) -> bool) -> (Option<Bisection>, usiz
 fn the_bracket_contains_the_turn_and_each_halving_halves_it() {
     for (from, to) in [(0.0, 4.0), (4.0, 0.0)] {
         let (turn, asked) = found(range(from, to, 5, 10), &|value| value < 1.2345);
-        let Some(Bisection::Turn { before, after, was, turns }) = turn else { panic!("{turn:?}") };
+        let Some(Bisection::VerdictChange { before, after, was, turns }) = turn else { panic!("{turn:?}") };
         assert_eq!((was, turns, asked), (from < to, 1, 15));
         assert!((before - 1.2345) * (after - 1.2345) <= 0.0, "{before} {after}");
         assert_eq!((after - before).abs(), 2.0_f64.powi(-10));
@@ -40,7 +40,7 @@ fn values_of_a_logarithmic_range_are_spaced_by_their_ratio() {
     for (value, exact) in asked.iter().zip([1e-6, 1e-4, 1e-2, 1.0]) {
         assert!((value / exact - 1.0).abs() < 1e-12, "{value} {exact}");
     }
-    assert!(matches!(found, Ok(Some(Bisection::Turn { was: true, .. }))), "{found:?}");
+    assert!(matches!(found, Ok(Some(Bisection::VerdictChange { was: true, .. }))), "{found:?}");
 }
 
 #[test]
@@ -51,7 +51,7 @@ fn integers_are_probed_at_most_once_and_bracketed_by_neighbours() {
             asked.push(value);
             Ok::<_, ()>(Some(value < 6.5))
         });
-        let Ok(Some(Bisection::Turn { before, after, .. })) = found else { panic!("{found:?}") };
+        let Ok(Some(Bisection::VerdictChange { before, after, .. })) = found else { panic!("{found:?}") };
         assert_eq!((before.min(after), before.max(after)), (6.0, 7.0));
         assert!(asked.iter().all(|value| value.fract() == 0.0), "{asked:?}");
         asked.sort_by(f64::total_cmp);
@@ -63,7 +63,7 @@ fn integers_are_probed_at_most_once_and_bracketed_by_neighbours() {
 fn constant_answers_are_even_and_two_turns_are_counted() {
     assert_eq!(found(range(0.0, 1.0, 5, 8), &|_| true), (Some(Bisection::Even(true)), 5));
     let (twice, _) = found(range(0.0, 1.0, 11, 20), &|value| !(0.33..0.77).contains(&value));
-    let Some(Bisection::Turn { before, after, turns: 2, .. }) = twice else { panic!("{twice:?}") };
+    let Some(Bisection::VerdictChange { before, after, turns: 2, .. }) = twice else { panic!("{twice:?}") };
     assert!(before < 0.33 && after >= 0.33 && after - before < 1e-6, "{before} {after}");
 }
 
@@ -78,11 +78,11 @@ fn an_interrupted_search_returns_only_known_brackets() {
     };
     assert_eq!(broken(0), Ok(None));
     assert_eq!(broken(1), Ok(None), "one value is no bracket");
-    let Ok(Some(Bisection::Turn { before, after, .. })) = broken(2) else { panic!("two values are one") };
+    let Ok(Some(Bisection::VerdictChange { before, after, .. })) = broken(2) else { panic!("two values are one") };
     assert_eq!((before, after), (0.0, 0.5));
 }
 
-fn options(key: &str, range: Range, question: Question, runs: u64, seed: u64) -> Options {
+fn options(key: &str, range: Range, question: Criterion, runs: u64, seed: u64) -> Options {
     Options { key: key.to_owned(), range, question, runs, seed }
 }
 
@@ -97,7 +97,7 @@ fn margin_of(options: &Options) -> Margin {
 
 #[test]
 fn a_formation_is_reached_if_the_duration_suffices() {
-    let margin = margin_of(&options("time.duration_s", range(1.5, 40.0, 3, 6), Question::Reached, 1, 0));
+    let margin = margin_of(&options("time.duration_s", range(1.5, 40.0, 3, 6), Criterion::Reached, 1, 0));
     let turn = margin.turn.expect("it takes time to arrive");
     assert!(!turn.holds_below, "{turn:?}");
     let [holds, fails] = margin.sides().expect("both sides");
@@ -110,7 +110,7 @@ fn a_formation_is_reached_if_the_duration_suffices() {
 
 #[test]
 fn an_integer_key_is_halved_at_integers() {
-    let margin = |key| margin_of(&options(key, range(1.0, 8.0, 3, 2), Question::Clear, 1, 0));
+    let margin = |key| margin_of(&options(key, range(1.0, 8.0, 3, 2), Criterion::Clear, 1, 0));
     let any = margin("time.record_hz");
     assert!(any.probes.iter().any(|probe| probe.value.fract() != 0.0), "record_hz takes any number");
     let whole = margin("start.seed");
@@ -120,7 +120,7 @@ fn an_integer_key_is_halved_at_integers() {
 
 #[test]
 fn several_runs_have_seeds_and_jitter() {
-    let margin = margin_of(&options("law.alpha", range(0.5, 1.0, 2, 1), Question::Clear, 3, 7));
+    let margin = margin_of(&options("law.alpha", range(0.5, 1.0, 2, 1), Criterion::Clear, 3, 7));
     assert!(margin.turn.is_none() && margin.holds_everywhere() && margin.jittered);
     for probe in &margin.probes {
         let seeds: Vec<_> = probe.flights.iter().map(|flown| flown.seed).collect();
@@ -134,7 +134,7 @@ fn several_runs_have_seeds_and_jitter() {
 #[test]
 fn wrong_ranges_and_refused_values_are_refused() {
     let refused = |key: &str, range: Range| {
-        let options = options(key, range, Question::Pass, 1, 0);
+        let options = options(key, range, Criterion::Pass, 1, 0);
         let flown = options.check().and_then(|()| batch(1, &mut |batch| options.fly(&base(pair(), &[]), batch)));
         flown.expect_err("refused").to_string()
     };

@@ -4,13 +4,13 @@ use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
 
-use super::levels::{Path, Rule, Split, split};
+use super::levels::{RandomProcess, SplitResult, SplittingRule, split};
 use super::lineage::{Genealogy, Lineage};
 use crate::statistics::{CONFIDENCE, Estimate, Proportion};
 use tautline_core::record::{Event, RecordError, Sample, Sink, StateHash, Step};
 use tautline_report::request::Failure;
 use tautline_sim::scenario::Scenario;
-use tautline_sim::sim::{Flight, Saved, SimError, Simulation, fly_on};
+use tautline_sim::sim::{Flight, SavedState, SimError, Simulation, continue_flight};
 
 /// Recommended smallest number of flights. With fewer, many estimates end without a survivor.
 const ENOUGH: usize = 100;
@@ -20,7 +20,7 @@ const MANY: usize = 20;
 /// Settings of an estimate: the keys of `[splitting]`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Settings {
+pub struct SplittingSettings {
     /// Number of simultaneous flights, n: at least 2; 100 or more is recommended.
     pub flights: usize,
     /// Smallest number k of flights that a round ends, from 1 to n - 1. k = 1 has the smallest error per step flown.
@@ -29,13 +29,13 @@ pub struct Settings {
     pub keep: usize,
 }
 
-impl Default for Settings {
+impl Default for SplittingSettings {
     fn default() -> Self {
         Self { flights: ENOUGH, kill: 1, keep: 10 }
     }
 }
 
-impl Settings {
+impl SplittingSettings {
     /// Refuses numbers of flights with which no round can end or copy a flight.
     ///
     /// # Errors
@@ -92,7 +92,7 @@ pub struct Splitting {
     pub steps: u64,
     /// Some of the flights that were violated at the end, each equally likely. Flights with different first ancestors
     /// come first, because they have the least in common.
-    pub bad: Vec<BadFlight>,
+    pub bad: Vec<ViolatedFlight>,
 }
 
 /// Estimates the probability, over the noise and from the scenario's start, that a flight is violated.
@@ -105,24 +105,24 @@ pub struct Splitting {
 /// The result depends only on the scenario, the settings, `seed` and `repetition`. `carry_on` is called after each step
 /// with the number of all steps; if it breaks, the result is `None`.
 ///
-/// Memory holds at most ten states of each flight ([`Saved`]), each 30 kB for 3 vehicles and 0.3 MB for 100. A hundred
-/// flights of 100 vehicles take 0.3 GB.
+/// Memory holds at most ten states of each flight ([`SavedState`]), each 30 kB for 3 vehicles and 0.3 MB for 100. A
+/// hundred flights of 100 vehicles take 0.3 GB.
 ///
 /// # Errors
 /// [`Failure`] for wrong settings, for a scenario without noise from step to step, and for a law or a judge that cannot
 /// be built.
 pub fn estimate(
     scenario: &Scenario,
-    settings: &Settings,
+    settings: &SplittingSettings,
     [seed, repetition]: [u64; 2],
     carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Option<Splitting>, Failure> {
     check(scenario, settings)?;
-    let mut path = Running { scenario, simulation: begun(scenario, scenario.noise_seed)? };
-    let rule = Rule::new(settings.flights, settings.kill, 0.0);
+    let mut path = SimulatedFlight { scenario, simulation: simulation_at_start(scenario, scenario.noise_seed)? };
+    let rule = SplittingRule::new(settings.flights, settings.kill, 0.0);
     let Some(mut split) = split(&mut path, rule, [seed, repetition], carry_on)? else { return Ok(None) };
     let bad = bad(&mut path, &mut split, settings.keep);
-    let Split { probability, iterations, extinct, steps, .. } = split;
+    let SplitResult { probability, iterations, extinct, steps, .. } = split;
     let [flights, kill] = [settings.flights, settings.kill].map(|number| number as u64);
     Ok(Some(Splitting { repetition, probability, flights, kill, iterations, extinct, steps, bad }))
 }
@@ -131,7 +131,7 @@ pub fn estimate(
 ///
 /// # Errors
 /// [`Failure`] `campaign/splitting` for wrong settings, and for a scenario without noise from step to step.
-pub fn check(scenario: &Scenario, settings: &Settings) -> Result<(), Failure> {
+pub fn check(scenario: &Scenario, settings: &SplittingSettings) -> Result<(), Failure> {
     settings.check()?;
     if is_noisy(scenario) {
         return Ok(());
@@ -153,17 +153,17 @@ fn is_noisy(scenario: &Scenario) -> bool {
 }
 
 /// Running flight.
-struct Running<'a> {
+struct SimulatedFlight<'a> {
     scenario: &'a Scenario,
     simulation: Simulation,
 }
 
-impl Path for Running<'_> {
-    type Saved = Saved;
+impl RandomProcess for SimulatedFlight<'_> {
+    type Saved = SavedState;
     type Error = SimError;
 
     fn begin(&mut self, noise_seed: u64) -> Result<(), SimError> {
-        self.simulation = begun(self.scenario, noise_seed)?;
+        self.simulation = simulation_at_start(self.scenario, noise_seed)?;
         Ok(())
     }
 
@@ -179,17 +179,17 @@ impl Path for Running<'_> {
         self.simulation.least_clearance_m().map_or(f64::NEG_INFINITY, |clearance_m| -clearance_m)
     }
 
-    fn save(&self) -> Saved {
+    fn save(&self) -> SavedState {
         self.simulation.save()
     }
 
-    fn restore(&mut self, saved: &Saved, noise_seed: Option<u64>) {
+    fn restore(&mut self, saved: &SavedState, noise_seed: Option<u64>) {
         self.simulation.load(saved, noise_seed);
     }
 }
 
 /// Returns up to `keep` of the violated flights, those with different first ancestors first.
-fn bad(path: &mut Running<'_>, split: &mut Split<Saved>, keep: usize) -> Vec<BadFlight> {
+fn bad(path: &mut SimulatedFlight<'_>, split: &mut SplitResult<SavedState>, keep: usize) -> Vec<ViolatedFlight> {
     let hit: Vec<_> = split.lineages.iter().filter(|lineage| lineage.score() > 0.0).collect();
     let ancestor = |lineage: &Lineage<_>| lineage.genealogy().noise_seed;
     let earlier = |index: usize| hit[..index].iter().filter(|other| ancestor(other) == ancestor(hit[index])).count();
@@ -202,7 +202,7 @@ fn bad(path: &mut Running<'_>, split: &mut Split<Saved>, keep: usize) -> Vec<Bad
         let mut hash = StateHash::new();
         let (time_s, steps) = (simulation.time_s(), simulation.steps());
         hash.observe(&Sample::new(time_s, steps, simulation.state(), simulation.control()));
-        Some(BadFlight {
+        Some(ViolatedFlight {
             genealogy: hit[index].genealogy().clone(),
             violated_at_step,
             clearance_m: simulation.least_clearance_m()?,
@@ -214,7 +214,7 @@ fn bad(path: &mut Running<'_>, split: &mut Split<Saved>, keep: usize) -> Vec<Bad
 
 /// Violated flight.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct BadFlight {
+pub struct ViolatedFlight {
     /// Random numbers that repeat the flight.
     pub genealogy: Genealogy,
     /// Step of the violation, from 1; 0 is the start.
@@ -226,18 +226,18 @@ pub struct BadFlight {
     pub state_hash: String,
 }
 
-/// Hash over the state after one step, as in [`BadFlight::state_hash`].
+/// Hash over the state after one step, as in [`ViolatedFlight::state_hash`].
 #[derive(Clone, Debug)]
-pub struct StateAt {
+pub struct StateHashAtStep {
     step: u64,
     seen: u64,
     hash: Option<String>,
 }
 
-impl StateAt {
+impl StateHashAtStep {
     /// Returns the hasher for the step at which a flight was violated.
     #[must_use]
-    pub fn violation_of(flight: &BadFlight) -> Self {
+    pub fn violation_of(flight: &ViolatedFlight) -> Self {
         Self { step: flight.violated_at_step, seen: 0, hash: None }
     }
 
@@ -248,7 +248,7 @@ impl StateAt {
     }
 }
 
-impl Sink for StateAt {
+impl Sink for StateHashAtStep {
     fn sample(&mut self, _sample: &Sample<'_>) -> Result<(), RecordError> {
         Ok(())
     }
@@ -272,7 +272,7 @@ impl Sink for StateAt {
 /// # Errors
 /// [`SimError`] if the law or the judge cannot be built, or `sink` cannot record.
 pub fn replay(scenario: &Scenario, genealogy: &Genealogy, sink: &mut dyn Sink) -> Result<Flight, SimError> {
-    let mut simulation = begun(scenario, genealogy.noise_seed)?;
+    let mut simulation = simulation_at_start(scenario, genealogy.noise_seed)?;
     let mut branches = genealogy.branches.iter().peekable();
     let mut take_over = |simulation: &mut Simulation| {
         while let Some(branch) = branches.next_if(|branch| branch.step == simulation.steps()) {
@@ -281,11 +281,11 @@ pub fn replay(scenario: &Scenario, genealogy: &Genealogy, sink: &mut dyn Sink) -
         ControlFlow::Continue(())
     };
     let _goes_on = take_over(&mut simulation);
-    fly_on(simulation, sink, &mut take_over)
+    continue_flight(simulation, sink, &mut take_over)
 }
 
 /// Returns the scenario at its start, with a seed of noise.
-fn begun(scenario: &Scenario, noise_seed: u64) -> Result<Simulation, SimError> {
+fn simulation_at_start(scenario: &Scenario, noise_seed: u64) -> Result<Simulation, SimError> {
     Simulation::new(&Scenario { noise_seed, ..scenario.clone() })
 }
 

@@ -8,7 +8,7 @@ use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 use super::lineage::{Crossing, Lineage, StepCounter};
 
 /// Random path that advances step by step. One value holds one path at a time.
-pub trait Path {
+pub trait RandomProcess {
     /// Complete state at a step, random number generators included.
     type Saved;
     /// Reason why a path cannot begin.
@@ -36,7 +36,7 @@ pub trait Path {
 
 /// Parameters of a splitting.
 #[derive(Clone, Copy, Debug)]
-pub struct Rule {
+pub struct SplittingRule {
     /// Number of simultaneous paths, n.
     pub flights: usize,
     /// The level is the k-th smallest score; k is at least 1 and less than n.
@@ -47,7 +47,7 @@ pub struct Rule {
     pub is_past: fn(score: f64, level: f64) -> bool,
 }
 
-impl Rule {
+impl SplittingRule {
     /// Returns the rule whose copies branch off above the level.
     #[must_use]
     pub fn new(flights: usize, kill: usize, target: f64) -> Self {
@@ -56,7 +56,7 @@ impl Rule {
 }
 
 /// Result of a splitting.
-pub struct Split<S> {
+pub struct SplitResult<S> {
     /// Estimated probability of the event.
     pub probability: f64,
     /// Number of rounds that ended paths.
@@ -85,13 +85,13 @@ pub struct Split<S> {
 ///
 /// # Errors
 /// The error of a path that cannot begin.
-pub fn split<P: Path>(
+pub fn split<P: RandomProcess>(
     path: &mut P,
-    rule: Rule,
+    rule: SplittingRule,
     [seed, repetition]: [u64; 2],
     carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
-) -> Result<Option<Split<P::Saved>>, P::Error> {
-    let Rule { flights, kill, target, is_past } = rule;
+) -> Result<Option<SplitResult<P::Saved>>, P::Error> {
+    let SplittingRule { flights, kill, target, is_past } = rule;
     let (mut draws, mut watch) = (Draws::new(seed, repetition), StepCounter { steps: 0, carry_on });
     let mut lineages = Vec::with_capacity(flights);
     for _ in 0..flights {
@@ -137,7 +137,7 @@ pub fn split<P: Path>(
     }
     let share = lineages.iter().filter(is_hit).count() as f64 / flights as f64;
     let extinct = product == 0.0;
-    Ok(Some(Split { probability: product * share, iterations, extinct, steps: watch.steps, lineages }))
+    Ok(Some(SplitResult { probability: product * share, iterations, extinct, steps: watch.steps, lineages }))
 }
 
 /// Returns the k-th smallest score.

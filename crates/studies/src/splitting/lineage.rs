@@ -5,7 +5,7 @@ use std::rc::Rc;
 
 use serde::{Deserialize, Serialize};
 
-use super::levels::Path;
+use super::levels::RandomProcess;
 
 /// Largest number of kept states of a path besides its first.
 const KEPT: usize = 8;
@@ -107,7 +107,7 @@ impl<S> Lineage<S> {
     }
 
     /// Runs a path from its start to its end or above the target.
-    pub(super) fn begin<P: Path<Saved = S>>(
+    pub(super) fn begin<P: RandomProcess<Saved = S>>(
         path: &mut P,
         noise_seed: u64,
         target: f64,
@@ -126,7 +126,7 @@ impl<S> Lineage<S> {
     }
 
     /// Runs a copy: the path up to a crossing, then with fresh noise.
-    pub(super) fn branch<P: Path<Saved = S>>(
+    pub(super) fn branch<P: RandomProcess<Saved = S>>(
         &self,
         path: &mut P,
         at: &Crossing<S>,
@@ -147,7 +147,7 @@ impl<S> Lineage<S> {
     }
 
     /// Continues from a step, whose state `path` has.
-    fn grow<P: Path<Saved = S>>(
+    fn grow<P: RandomProcess<Saved = S>>(
         mut self,
         path: &mut P,
         mut step: u64,
@@ -165,7 +165,7 @@ impl<S> Lineage<S> {
     }
 
     /// Adds a record if the score is higher than before.
-    fn observe<P: Path<Saved = S>>(&mut self, path: &P, step: u64) {
+    fn observe<P: RandomProcess<Saved = S>>(&mut self, path: &P, step: u64) {
         let score = path.score();
         if score > self.score {
             self.score = score;
@@ -191,7 +191,7 @@ impl<S> Lineage<S> {
     }
 
     /// Moves `path` to the first record that satisfies `is_past`. Returns `None` without such a record.
-    pub(super) fn crossing<P: Path<Saved = S>>(
+    pub(super) fn crossing<P: RandomProcess<Saved = S>>(
         &self,
         path: &mut P,
         is_past: impl Fn(f64) -> bool,
@@ -205,7 +205,7 @@ impl<S> Lineage<S> {
     }
 
     /// Moves `path` to its last record and returns the step.
-    pub(super) fn last<P: Path<Saved = S>>(&self, path: &mut P) -> Option<u64> {
+    pub(super) fn last<P: RandomProcess<Saved = S>>(&self, path: &mut P) -> Option<u64> {
         let step = self.records.last()?.step;
         let reached =
             self.reach(path, step, &mut StepCounter { steps: 0, carry_on: &mut |_| ControlFlow::Continue(()) });
@@ -213,7 +213,12 @@ impl<S> Lineage<S> {
     }
 
     /// Recomputes the path up to a step, from the last kept state before it.
-    fn reach<P: Path<Saved = S>>(&self, path: &mut P, step: u64, watch: &mut StepCounter<'_>) -> ControlFlow<()> {
+    fn reach<P: RandomProcess<Saved = S>>(
+        &self,
+        path: &mut P,
+        step: u64,
+        watch: &mut StepCounter<'_>,
+    ) -> ControlFlow<()> {
         if let Some(state) = self.states.iter().rev().find(|state| state.step <= step) {
             path.restore(&state.saved, state.noise_seed);
             for _ in state.step..step {
@@ -232,7 +237,7 @@ mod tests {
     /// Path whose score rises by 1 at each step, up to 10,000.
     struct Climb(u64);
 
-    impl Path for Climb {
+    impl RandomProcess for Climb {
         type Saved = u64;
         type Error = std::convert::Infallible;
 

@@ -17,6 +17,8 @@ mod lineage;
 #[cfg(test)]
 mod tests;
 
-pub use estimate::{BadFlight, Repetitions, Settings, Splitting, StateAt, check, estimate, replay};
-pub use levels::{Path, Rule, Split, split};
+pub use estimate::{
+    Repetitions, Splitting, SplittingSettings, StateHashAtStep, ViolatedFlight, check, estimate, replay,
+};
+pub use levels::{RandomProcess, SplitResult, SplittingRule, split};
 pub use lineage::{Branch, Genealogy, Lineage};

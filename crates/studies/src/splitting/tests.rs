@@ -4,7 +4,7 @@ mod walk;
 
 use std::ops::ControlFlow;
 
-use super::{Genealogy, Repetitions, Settings, Splitting, estimate, replay};
+use super::{Genealogy, Repetitions, Splitting, SplittingSettings, estimate, replay};
 use tautline_core::record::{Event, RecordError, Sample, Sink, StateHash, Step};
 use tautline_sim::scenario::{Scenario, Source};
 use tautline_sim::sim::Simulation;
@@ -34,7 +34,7 @@ fn all_random() -> Scenario {
     windy("displacement", 14.0, &[SENSING, NETWORK].concat())
 }
 
-fn split(scenario: &Scenario, settings: &Settings, repetition: u64) -> Splitting {
+fn split(scenario: &Scenario, settings: &SplittingSettings, repetition: u64) -> Splitting {
     let split = estimate(scenario, settings, [7, repetition], &mut |_| ControlFlow::Continue(()));
     split.expect("an estimate").expect("no interruption")
 }
@@ -66,7 +66,7 @@ fn splitting_agrees_with_plain_flights() {
     let (runs, repetitions) = (1500 * more, 20 * more);
     let plain = (0..runs).filter(|&seed| violations(&scenario, seed)[0]).count();
     let share = plain as f64 / runs as f64;
-    let settings = Settings { flights: 30, kill: 3, keep: 0 };
+    let settings = SplittingSettings { flights: 30, kill: 3, keep: 0 };
     let estimates: Vec<_> = (0..repetitions).map(|repetition| split(&scenario, &settings, repetition)).collect();
     let mean = Repetitions::new(&estimates).probability.value.expect("estimates");
     let squares = estimates.iter().map(|estimate| (estimate.probability - mean).powi(2)).sum::<f64>();
@@ -123,7 +123,7 @@ fn seen(scenario: &Scenario, genealogy: &Genealogy) -> Seen {
 #[test]
 fn a_violated_flight_is_replayed_with_the_same_bits() {
     for scenario in [windy("laplacian", 3.0, ""), all_random()] {
-        let settings = Settings { flights: 30, kill: 3, keep: 4 };
+        let settings = SplittingSettings { flights: 30, kill: 3, keep: 4 };
         let bad: Vec<_> = (0..2).flat_map(|repetition| split(&scenario, &settings, repetition).bad).collect();
         assert!(bad.iter().any(|bad| bad.genealogy.branches.len() > 1));
         for bad in &bad {
@@ -166,7 +166,7 @@ fn fresh_noise_keeps_held_measurements() {
 
 #[test]
 fn an_estimate_is_the_same_for_the_same_seed_and_can_be_ended() {
-    let (scenario, settings) = (windy("laplacian", 3.0, ""), Settings { flights: 6, kill: 1, keep: 2 });
+    let (scenario, settings) = (windy("laplacian", 3.0, ""), SplittingSettings { flights: 6, kill: 1, keep: 2 });
     let first = split(&scenario, &settings, 0);
     assert_eq!(split(&scenario, &settings, 0), first);
     assert_ne!(split(&scenario, &settings, 1).steps, first.steps);
@@ -179,7 +179,7 @@ fn an_estimate_is_the_same_for_the_same_seed_and_can_be_ended() {
 #[test]
 fn scenarios_that_cannot_be_split_are_refused_with_a_remedy() {
     let refused = |scenario: &Scenario, flights: usize, kill: usize| {
-        let settings = Settings { flights, kill, keep: 1 };
+        let settings = SplittingSettings { flights, kill, keep: 1 };
         estimate(scenario, &settings, [1, 0], &mut |_| ControlFlow::Break(())).expect_err("refused").to_string()
     };
     let windy = windy("laplacian", 3.0, "");
@@ -194,8 +194,10 @@ fn scenarios_that_cannot_be_split_are_refused_with_a_remedy() {
         let words = refused(&still, 10, 1);
         assert!(words.starts_with("nothing in this flight is random") && words.contains("network.loss"), "{words}");
     }
-    assert!(Settings::default().warning().is_none());
+    assert!(SplittingSettings::default().warning().is_none());
     assert!(
-        Settings { flights: 20, ..Settings::default() }.warning().is_some_and(|words| words.contains("100 or more"))
+        SplittingSettings { flights: 20, ..SplittingSettings::default() }
+            .warning()
+            .is_some_and(|words| words.contains("100 or more"))
     );
 }

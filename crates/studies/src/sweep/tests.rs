@@ -1,14 +1,14 @@
 //! Grids of one key and two, refused points, and wrong input.
 
 use super::{MOST_POINTS, Options, Sweep, SweptKey};
-use crate::Question;
+use crate::Criterion;
 use crate::batch::Batch;
 use crate::study::{Experiment as _, Study as _, StudyPage};
 use crate::tests::{InterruptAfter, base, batch, pair};
 
 fn options(keys: &[&str], runs: u64) -> Options {
     let keys = keys.iter().map(|key| SweptKey::parse(key).expect("a key")).collect();
-    Options { keys, question: Question::Clear, runs, seed: 7 }
+    Options { keys, question: Criterion::Clear, runs, seed: 7 }
 }
 
 fn swept(options: &Options) -> Sweep {

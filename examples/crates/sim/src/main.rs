@@ -28,7 +28,7 @@ impl Law for Springs {
 
 fn main() -> Result<(), Box<dyn Error>> {
     let scenario = Scenario::read(&Source::resolve("pentagon")?, &[])?;
-    let mut simulation = Simulation::with(&scenario, Components::under(&scenario, Box::new(Springs)))?;
+    let mut simulation = Simulation::with(&scenario, Components::with_law(&scenario, Box::new(Springs)))?;
     while simulation.ending().is_none() {
         simulation.step();
     }

@@ -22,13 +22,13 @@ const MOST_PIXELS: usize = 8192;
 /// Letters, lines or areas in the plane, without a scale.
 #[derive(Clone, Debug)]
 pub struct Drawing {
-    drawn: Drawn,
+    drawn: DrawnShape,
     /// Number of letters; each needs a slot.
     letters: usize,
 }
 
 #[derive(Clone, Debug)]
-enum Drawn {
+enum DrawnShape {
     Lines(Vec<Region>),
     Areas(Vec<Region>),
     Pixels(Mask),
@@ -42,7 +42,7 @@ impl Drawing {
     /// [`MAX_TEXT_CHARS`](super::MAX_TEXT_CHARS) characters, or blanks alone.
     pub fn text(text: &str) -> Result<Self, DrawingError> {
         let letters = outline::letters(text)?;
-        Ok(Self { drawn: Drawn::Areas(regions(&letters, false)?), letters: letters.len() })
+        Ok(Self { drawn: DrawnShape::Areas(regions(&letters, false)?), letters: letters.len() })
     }
 
     /// Reads SVG path data (`M 0 0 L 4 3 ...`, y downwards): its lines, or the area inside them.
@@ -69,23 +69,25 @@ impl Drawing {
     /// [`DrawingError`] for bytes that are not a PNG file, more than [`MAX_PIXELS`](super::MAX_PIXELS), or an empty
     /// drawing.
     pub fn png(bytes: &[u8], ink: Option<Ink>) -> Result<Self, DrawingError> {
-        Ok(Self { drawn: Drawn::Pixels(mask(bytes, ink)?), letters: 0 })
+        Ok(Self { drawn: DrawnShape::Pixels(mask(bytes, ink)?), letters: 0 })
     }
 
     fn curves(curves: &[Curves], filled: bool) -> Result<Self, DrawingError> {
         let regions = regions(curves, true)?;
-        Ok(Self { drawn: if filled { Drawn::Areas(regions) } else { Drawn::Lines(regions) }, letters: 0 })
+        Ok(Self { drawn: if filled { DrawnShape::Areas(regions) } else { DrawnShape::Lines(regions) }, letters: 0 })
     }
 
     /// Returns width and height relative to the longer side.
     #[must_use]
     pub fn size(&self) -> [f64; 2] {
         match &self.drawn {
-            Drawn::Lines(regions) | Drawn::Areas(regions) => {
+            DrawnShape::Lines(regions) | DrawnShape::Areas(regions) => {
                 let points = || regions.iter().flat_map(|region| region.lines.iter().flatten());
                 [0, 1].map(|axis| points().map(|point| point[axis]).fold(0.0, f64::max))
             }
-            Drawn::Pixels(mask) => [mask.width, mask.drawn.len() / mask.width].map(|pixels| pixels as f64 * mask.side),
+            DrawnShape::Pixels(mask) => {
+                [mask.width, mask.drawn.len() / mask.width].map(|pixels| pixels as f64 * mask.side)
+            }
         }
     }
 
@@ -114,26 +116,26 @@ impl Drawing {
         let least = (count * SAMPLES).max(LEAST_SAMPLES);
         let raster;
         let mask = match &self.drawn {
-            Drawn::Lines(regions) => {
+            DrawnShape::Lines(regions) => {
                 let lines: Vec<&[Point]> = regions.iter().flat_map(|region| &region.lines).map(Vec::as_slice).collect();
                 let odd = least.div_ceil(count.max(1)) | 1;
-                let (samples, step) = outline::along(&lines, odd * count);
+                let (samples, step) = outline::points_along(&lines, odd * count);
                 return if samples.is_empty() {
                     Err(DrawingError::Empty)
                 } else {
                     Ok(spread(&samples, count, step, 0.0))
                 };
             }
-            Drawn::Areas(regions) => {
+            DrawnShape::Areas(regions) => {
                 raster = fine_enough(regions, least);
                 &raster
             }
-            Drawn::Pixels(mask) => mask,
+            DrawnShape::Pixels(mask) => mask,
         };
         if mask.count() == 0 {
             return Err(DrawingError::Empty);
         }
-        let (samples, side) = outline::inside(mask, least);
+        let (samples, side) = outline::points_inside(mask, least);
         Ok(spread(&samples, count, side, mask.side))
     }
 }

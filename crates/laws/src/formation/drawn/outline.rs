@@ -223,7 +223,7 @@ impl OutlinePen for Pen {
 const ORDER: u8 = 16;
 
 /// Returns points at equal steps along polylines, from half a step after the start, and the step; none without length.
-pub(super) fn along(lines: &[&[Point]], points: usize) -> (Vec<Point>, f64) {
+pub(super) fn points_along(lines: &[&[Point]], points: usize) -> (Vec<Point>, f64) {
     let pieces =
         || lines.iter().flat_map(|line| line.windows(2).map(|ends| (ends[0], ends[1], length(ends[0], ends[1]))));
     let whole: f64 = pieces().map(|(.., length)| length).sum();
@@ -249,7 +249,7 @@ fn length([x0, y0]: Point, [x1, y1]: Point) -> f64 {
 
 /// Returns `count` sample points inside a mask, along a Hilbert curve, and the distance of neighbouring candidates. The
 /// candidates are pixel centres or centres of equal parts of pixels, evenly thinned out. Empty for an empty mask.
-pub(super) fn inside(mask: &Mask, count: usize) -> (Vec<Point>, f64) {
+pub(super) fn points_inside(mask: &Mask, count: usize) -> (Vec<Point>, f64) {
     let drawn = mask.count();
     let parts = (1..=count.isqrt() + 1).find(|parts| drawn * parts * parts >= count).unwrap_or(1);
     let mut places: Vec<[usize; 2]> = mask

@@ -110,7 +110,7 @@ impl Field {
     /// Runs at most `rounds` Lloyd rounds, until no slot moves far.
     fn settle(&mut self, rounds: usize, off: f64) {
         for _ in 0..rounds {
-            if self.step_to_middles(off) <= SETTLED * self.side {
+            if self.step_to_centroids(off) <= SETTLED * self.side {
                 break;
             }
         }
@@ -118,7 +118,7 @@ impl Field {
 
     /// Moves every slot to the centre of the samples nearest to it, or to the nearest of these samples if the centre is
     /// off the drawing. Returns the largest move.
-    fn step_to_middles(&mut self, off: f64) -> f64 {
+    fn step_to_centroids(&mut self, off: f64) -> f64 {
         let owners = self.owners();
         let mut sums = vec![([0.0, 0.0], 0.0); self.slots.len()];
         for (&owner, sample) in owners.iter().zip(&self.samples) {
@@ -132,7 +132,7 @@ impl Field {
         let cells = self.begins.windows(2).enumerate().flat_map(|(cell, ends)| (ends[0]..ends[1]).map(move |_| cell));
         for ((&owner, &place), cell) in owners.iter().zip(&self.samples).zip(cells) {
             let Some(owner) = owner else { continue };
-            let apart = square(place, middles[owner]);
+            let apart = distance_squared(place, middles[owner]);
             if nearest[owner].is_none_or(|(least, _)| apart < least) {
                 nearest[owner] = Some((apart, Slot { place, cell }));
             }
@@ -141,7 +141,7 @@ impl Field {
         for (slot, (nearest, middle)) in self.slots.iter_mut().zip(nearest.into_iter().zip(middles)) {
             let Some((apart, sample)) = nearest else { continue };
             let place = if apart <= off * off { middle } else { sample.place };
-            farthest = farthest.max(square(place, slot.place).sqrt());
+            farthest = farthest.max(distance_squared(place, slot.place).sqrt());
             *slot = Slot { place, cell: sample.cell };
         }
         self.gather();
@@ -155,7 +155,7 @@ impl Field {
         for cell in 0..self.around.len() {
             self.near(cell, &mut near);
             for &sample in &self.samples[self.begins[cell]..self.begins[cell + 1]] {
-                let apart = |&(i, place): &(usize, Point)| (square(sample, place), i);
+                let apart = |&(i, place): &(usize, Point)| (distance_squared(sample, place), i);
                 owners.push(near.iter().map(apart).reduce(|a, b| if b < a { b } else { a }).map(|(_, i)| i));
             }
         }
@@ -167,12 +167,12 @@ impl Field {
     /// moved slot was before.
     fn fill_gaps(&mut self, near_part: f64) -> bool {
         let mut near = Vec::new();
-        let mut apart: Vec<f64> = (0..self.slots.len()).map(|i| self.apart(i, &mut near)).collect();
+        let mut apart: Vec<f64> = (0..self.slots.len()).map(|i| self.nearest_distance_squared(i, &mut near)).collect();
         let middle = apart.len() / 2;
         let median = if apart.is_empty() { 0.0 } else { *apart.select_nth_unstable_by(middle, f64::total_cmp).1 };
         let mut moved = false;
         for i in 0..self.slots.len() {
-            let now = self.apart(i, &mut near);
+            let now = self.nearest_distance_squared(i, &mut near);
             if now >= near_part * near_part * median {
                 continue;
             }
@@ -196,7 +196,7 @@ impl Field {
             self.near(cell, near);
             for &place in &self.samples[self.begins[cell]..self.begins[cell + 1]] {
                 let others = near.iter().filter(|&&(other, _)| other != i);
-                let apart = others.map(|&(_, other)| square(place, other)).fold(f64::INFINITY, f64::min);
+                let apart = others.map(|&(_, other)| distance_squared(place, other)).fold(f64::INFINITY, f64::min);
                 if apart > widest.0 && apart.is_finite() {
                     widest = (apart, Slot { place, cell });
                 }
@@ -206,10 +206,10 @@ impl Field {
     }
 
     /// Returns the square of the distance of a slot to the nearest other one; infinite without another slot in reach.
-    fn apart(&self, i: usize, near: &mut Vec<(usize, Point)>) -> f64 {
+    fn nearest_distance_squared(&self, i: usize, near: &mut Vec<(usize, Point)>) -> f64 {
         self.near(self.slots[i].cell, near);
         let others = near.iter().filter(|&&(other, _)| other != i);
-        others.map(|&(_, other)| square(self.slots[i].place, other)).fold(f64::INFINITY, f64::min)
+        others.map(|&(_, other)| distance_squared(self.slots[i].place, other)).fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -231,6 +231,6 @@ fn cell(point: Point, side: f64) -> [i64; 2] {
     number
 }
 
-fn square([x0, y0]: Point, [x1, y1]: Point) -> f64 {
+fn distance_squared([x0, y0]: Point, [x1, y1]: Point) -> f64 {
     (x1 - x0) * (x1 - x0) + (y1 - y0) * (y1 - y0)
 }

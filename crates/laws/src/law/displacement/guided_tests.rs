@@ -4,7 +4,7 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::graph::Graph;
-use crate::observation::{Held, Others};
+use crate::observation::{OtherStates, StateTables};
 use crate::target::{Guidance, Leg, Reference, ReferenceMotion};
 use tautline_core::swarm::Swarm;
 
@@ -82,12 +82,12 @@ fn a_vehicle_that_is_not_finite_is_reported_with_any_pinning_and_tables() {
             let (clear, mut lost) =
                 (Swarm::at_rest(formation.slots_m.clone()), Swarm::at_rest(formation.slots_m.clone()));
             lost.velocities_m_s[(vehicle, 1)] = f64::NAN;
-            let held = Held {
-                heard: vec![clear.clone(); COUNT],
+            let held = StateTables {
+                received: vec![clear.clone(); COUNT],
                 ages_s: vec![vec![0.0; COUNT]; COUNT],
-                seen: vec![clear; COUNT],
+                sensed: vec![clear; COUNT],
             };
-            for others in [Others::Shared, Others::Held(&held)] {
+            for others in [OtherStates::Shared, OtherStates::PerVehicle(&held)] {
                 let at = Observation { others, ..observation(&lost, &links, &formation, moving()) };
                 assert_eq!(
                     law.command(&at, &mut Rows::zeros(COUNT)),
@@ -104,8 +104,8 @@ fn a_vehicle_that_is_not_finite_is_reported_with_any_pinning_and_tables() {
     let mut lost = Swarm::at_rest(formation.slots_m.clone());
     lost.positions_m[(0, 2)] = f64::INFINITY;
     let clear = Swarm::at_rest(formation.slots_m.clone());
-    let held = Held { heard: vec![clear.clone()], ages_s: vec![vec![0.0]], seen: vec![clear] };
-    for others in [Others::Shared, Others::Held(&held)] {
+    let held = StateTables { received: vec![clear.clone()], ages_s: vec![vec![0.0]], sensed: vec![clear] };
+    for others in [OtherStates::Shared, OtherStates::PerVehicle(&held)] {
         let at = Observation { others, ..Observation::exact(&lost, &links, &formation) };
         assert_eq!(law.command(&at, &mut Rows::zeros(1)), Err(LawError::NotFinite { vehicle: 0 }));
     }
@@ -230,7 +230,7 @@ fn a_moving_reference_without_feed_forward_voids_the_certificate() {
         let law = law(&links, &formation, &[], &not_fed);
         let certificate = law.certificate(&observation(&swarm, &links, &formation, not_fed.motion.at(0.0)), &[]);
         assert_eq!(certificate.certified_m.is_some(), holds);
-        assert_eq!(certificate.void.contains(&VoidReason::ReferenceNotFed), !holds);
+        assert_eq!(certificate.void.contains(&VoidReason::NoFeedForward), !holds);
     }
     let unknown = Guidance { known_by: Pinning::Listed(Vec::new()), ..guidance(&Pinning::All) };
     let context = LawContext { guidance: Some(&unknown), ..LawContext::new(&links, &formation, DELTA_M, 0.0) };

@@ -47,7 +47,7 @@ fn a_short_gust_adds_to_the_root_of_the_energy() {
 fn gusts_on_different_vehicles_are_grouped() {
     let gusts = vec![gust(Vector3::x(), Some(vec![0])), gust(-Vector3::x(), Some(vec![1])), gust(Vector3::y(), None)];
     let wind = WindSpec { gusts, ..WindSpec::default() };
-    let held = |frame: Frame| most_m_s2(&exposure(&wind), &groups(&exposure(&wind), 4), frame, (3.0, 4.0));
+    let held = |frame: Frame| most_m_s2(&exposure(&wind), &vehicle_groups(&exposure(&wind), 4), frame, (3.0, 4.0));
     assert!((held(Frame::Mean) - 0.5 * 2.0_f64.sqrt()).abs() < 1e-15);
     assert!((held(Frame::Ground) - 0.5 * 6.0_f64.sqrt()).abs() < 1e-15);
 }

@@ -112,7 +112,7 @@ fn wishes() -> impl Strategy<Value = Vector3<f64>> {
 
 proptest! {
     #[test]
-    fn the_answer_is_clarabels(given in general(), wish in wishes(), radius in 0.3..2.0_f64) {
+    fn the_answer_matches_clarabel(given in general(), wish in wishes(), radius in 0.3..2.0_f64) {
         check(&given, wish, radius, nearest(&given, wish, radius)).map_err(TestCaseError::fail)?;
     }
 
@@ -165,7 +165,7 @@ proptest! {
 }
 
 #[test]
-fn answers_known_by_hand() {
+fn projections_match_hand_calculations() {
     let wish = Vector3::new(2.0, 1.0, 0.0);
     let is_at = |given: &[HalfSpace], radius: f64, point: [f64; 3], violation: f64| {
         let found = nearest(given, wish, radius);

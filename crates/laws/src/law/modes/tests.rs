@@ -98,7 +98,7 @@ fn the_response_to_a_held_command_is_accurate_for_small_a22() {
 
 /// Returns the determinant of s^2 - a22 s + (k + c s) (D - A e^(-s tau)) over a graph.
 fn determinant(
-    heard: &Heard,
+    received: &ReceivedStateLoop,
     graph: &Graph,
     pinning: &Pinning,
     (a22, tau): (f64, f64),
@@ -106,7 +106,7 @@ fn determinant(
 ) -> Complex<f64> {
     let matrix = graph.pinned_laplacian(pinning);
     let late = (-s * tau).exp();
-    let gain = s * heard.gain.damping_per_s + heard.gain.stiffness_per_s2;
+    let gain = s * received.gain.damping_per_s + received.gain.stiffness_per_s2;
     DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
         let part = if i == j { Complex::new(matrix[(i, j)], 0.0) } else { late * matrix[(i, j)] };
         gain * part + if i == j { s * s - s * a22 } else { Complex::new(0.0, 0.0) }
@@ -116,7 +116,7 @@ fn determinant(
 
 /// Whether some root is to the right of the imaginary axis, except at the origin. Counts the turns of the determinant
 /// along a large half disc whose straight edge is slightly off the axis (argument principle).
-fn grows(heard: &Heard, graph: &Graph, pinning: &Pinning, late: (f64, f64)) -> bool {
+fn grows(received: &ReceivedStateLoop, graph: &Graph, pinning: &Pinning, late: (f64, f64)) -> bool {
     const PARTS: u32 = 60_000;
     const RADIUS: f64 = 60.0;
     const OFF: f64 = 1e-3;
@@ -131,7 +131,7 @@ fn grows(heard: &Heard, graph: &Graph, pinning: &Pinning, late: (f64, f64)) -> b
             Complex::new(OFF + RADIUS * angle.cos(), RADIUS * angle.sin())
         }
     };
-    let value = |k: u32| determinant(heard, graph, pinning, late, along(k % PARTS));
+    let value = |k: u32| determinant(received, graph, pinning, late, along(k % PARTS));
     let mut before = value(0);
     let turns: f64 = (1..=PARTS)
         .map(|k| {
@@ -157,14 +157,14 @@ fn delay_margins_of_received_states_match_the_roots_of_the_swarm() {
     ] {
         let links = crate::law::pinned::PinnedConsensus::new(&graph, pinning.clone());
         let gain = mode(1.0, 1.0 + a22).times(1.0 / graph.pinned_connectivity(&pinning));
-        let heard = links.linear(gain, gain).heard.expect("a graph of the list");
-        let margin_s = heard.delay_margin_s(a22).expect("a margin");
+        let received = links.linear(gain, gain).received.expect("a graph of the list");
+        let margin_s = received.delay_margin_s(a22).expect("a margin");
         if margin_s.is_infinite() {
-            assert!(!grows(&heard, &graph, &pinning, (a22, 30.0)), "{graph:?}");
+            assert!(!grows(&received, &graph, &pinning, (a22, 30.0)), "{graph:?}");
             continue;
         }
-        assert!(!grows(&heard, &graph, &pinning, (a22, 0.95 * margin_s)), "{graph:?} {pinning:?} {margin_s}");
-        assert!(grows(&heard, &graph, &pinning, (a22, 1.05 * margin_s)), "{graph:?} {pinning:?} {margin_s}");
+        assert!(!grows(&received, &graph, &pinning, (a22, 0.95 * margin_s)), "{graph:?} {pinning:?} {margin_s}");
+        assert!(grows(&received, &graph, &pinning, (a22, 1.05 * margin_s)), "{graph:?} {pinning:?} {margin_s}");
     }
 }
 
@@ -174,15 +174,15 @@ fn followers_of_a_leader_on_a_star_are_stable_with_any_delay() {
     let links = crate::law::pinned::PinnedConsensus::new(&graph, Pinning::Leader(0));
     let gain = mode(1.0, 1.0);
     let linear = links.linear(gain, gain);
-    assert_eq!(linear.heard.and_then(|heard| heard.delay_margin_s(0.1)), Some(f64::INFINITY));
+    assert_eq!(linear.received.and_then(|received| received.delay_margin_s(0.1)), Some(f64::INFINITY));
     // On a path own and received terms do not have the modes of their sum.
     let path = crate::law::pinned::PinnedConsensus::new(&Graph::path(4), Pinning::Unpinned);
-    assert_eq!(path.linear(gain, gain).heard, None);
+    assert_eq!(path.linear(gain, gain).received, None);
     // Without a reference, unstable common motion cannot be separated on a star, but can if D is a multiple of the
     // identity.
-    let star = crate::law::pinned::PinnedConsensus::new(&graph, Pinning::Unpinned).linear(gain, gain).heard;
+    let star = crate::law::pinned::PinnedConsensus::new(&graph, Pinning::Unpinned).linear(gain, gain).received;
     assert_eq!(star.expect("a star").delay_margin_s(0.1), None);
-    let ring = crate::law::pinned::PinnedConsensus::new(&Graph::ring(5), Pinning::Unpinned).linear(gain, gain).heard;
+    let ring = crate::law::pinned::PinnedConsensus::new(&Graph::ring(5), Pinning::Unpinned).linear(gain, gain).received;
     assert!(ring.expect("a ring").delay_margin_s(0.1).is_some());
 }
 
@@ -235,6 +235,6 @@ fn edge_tension_modes_match_differences_of_its_command() {
     }
     assert!((found / stiffest - 1.0).abs() < 1e-5, "{found} {stiffest}");
     assert!(
-        EdgeTensionKeys::default().alpha == 1.0 && linear.stiffest_contact_mode.is_none() && linear.heard.is_none()
+        EdgeTensionKeys::default().alpha == 1.0 && linear.stiffest_contact_mode.is_none() && linear.received.is_none()
     );
 }

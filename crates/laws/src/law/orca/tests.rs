@@ -46,10 +46,10 @@ fn clearance_m(towards_m: Vector3<f64>, relative_m_s: Vector3<f64>) -> f64 {
 }
 
 #[test]
-fn the_way_out_matches_a_hand_calculation() {
+fn the_nearest_exit_matches_a_hand_calculation() {
     let towards = obstacle(Vector3::new(4.0, 0.0, 0.0));
     let is = |relative: [f64; 3], normal: [f64; 3], depth_m_s: f64| {
-        let (found, depth) = towards.way_out(relative.into());
+        let (found, depth) = towards.nearest_exit(relative.into());
         assert!((found - Vector3::from(normal)).norm() < 1e-12 && (depth - depth_m_s).abs() < 1e-12, "{found} {depth}");
     };
     // The tip: the ball of radius 1 about (2, 0), approached from the near side.
@@ -64,7 +64,7 @@ fn the_way_out_matches_a_hand_calculation() {
     // Directly towards the other vehicle: turns left.
     is([3.0, 0.0, 0.0], [-sine, cosine, 0.0], 3.0 * sine);
     // Already too near: out of the ball of radius 8 about (4, 0), within a quarter of a second.
-    let (normal, depth_m_s) = obstacle(Vector3::new(1.0, 0.0, 0.0)).way_out(Vector3::zeros());
+    let (normal, depth_m_s) = obstacle(Vector3::new(1.0, 0.0, 0.0)).nearest_exit(Vector3::zeros());
     assert_eq!((normal, depth_m_s), (-Vector3::x(), 4.0));
 }
 
@@ -74,7 +74,7 @@ proptest! {
         towards_m in vectors(5.0), relative in vectors(4.0), turn in vectors(1.0),
     ) {
         prop_assume!(towards_m.norm() > DELTA_M + 0.01 && turn.norm() > 0.01);
-        let (normal, depth_m_s) = obstacle(towards_m).way_out(relative);
+        let (normal, depth_m_s) = obstacle(towards_m).nearest_exit(relative);
         prop_assert!((normal.norm() - 1.0).abs() < 1e-12);
         let clearance = clearance_m(towards_m, relative);
         prop_assert!(clearance.abs() < 1e-9 || (clearance < 0.0) == (depth_m_s > 0.0), "{clearance} {depth_m_s}");
@@ -90,8 +90,8 @@ proptest! {
     ) {
         prop_assume!(towards_m.norm() > 0.1);
         let relative = if straight { towards_m * relative.x } else { relative };
-        let (normal, depth_m_s) = obstacle(towards_m).way_out(relative);
-        let (other, other_depth_m_s) = obstacle(-towards_m).way_out(-relative);
+        let (normal, depth_m_s) = obstacle(towards_m).nearest_exit(relative);
+        let (other, other_depth_m_s) = obstacle(-towards_m).nearest_exit(-relative);
         prop_assert!((normal + other).norm() < 1e-6 && (depth_m_s - other_depth_m_s).abs() < 1e-9);
     }
 

@@ -12,7 +12,7 @@ fn seconds(d: f64) -> f64 {
 
 /// Returns u, v, w at `count` steps.
 fn drawn(step: &Step, seed: u64, count: usize) -> Vec<Vector3<f64>> {
-    let mut eddy = Eddy::new(Normals::new(seed, 0));
+    let mut eddy = TurbulenceState::new(Normals::new(seed, 0));
     let mut next = || {
         eddy.advance(step);
         eddy.velocity_m_s(step)
@@ -87,10 +87,10 @@ fn scales_match_the_standard() {
 /// Compares both sides of the step below which a factor is replaced by its leading term.
 #[test]
 fn the_noise_of_a_step_is_continuous_at_the_change_of_formula() {
-    let [below, above] = [Across::new(SHORT * (1.0 - 1e-9)), Across::new(SHORT)];
+    let [below, above] = [TransverseFilter::new(SHORT * (1.0 - 1e-9)), TransverseFilter::new(SHORT)];
     assert!((below.l22 / above.l22 - 1.0).abs() < 2e-3, "{} {}", below.l22, above.l22);
     for d in [1e-9, 1e-6, 0.3, 40.0] {
-        let Across { p, l11, l21, l22, .. } = Across::new(d);
+        let TransverseFilter { p, l11, l21, l22, .. } = TransverseFilter::new(d);
         // Stationarity: a step preserves the covariance of x, 1/2, and of y, 1/4.
         assert!((p * p * 0.5 + l11 * l11 - 0.5).abs() < 1e-15);
         let y = p * p * (0.25 + 2.0 * d * 0.25 + d * d * 0.5) + l21 * l21 + l22 * l22;

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use crate::mcap::topic::{CDR, Declared, decode};
+use crate::mcap::topic::{CDR, DeclaredTopic, decode};
 
 /// Decoder of messages in an encoding; the error describes the damage.
 pub(super) type Reader = fn(encoding: &str, bytes: &[u8]) -> Result<Vec<Observation>, String>;
@@ -105,7 +105,7 @@ pub(super) fn reader_of(schema: &str) -> Option<Reader> {
 }
 
 /// Returns the decoder of a topic with positions in a supported encoding.
-pub(super) fn reader_of_topic(topic: &Declared) -> Option<Reader> {
+pub(super) fn reader_of_topic(topic: &DeclaredTopic) -> Option<Reader> {
     reader_of(&topic.schema).filter(|_| matches!(&*topic.encoding, "protobuf" | "json" | CDR))
 }
 

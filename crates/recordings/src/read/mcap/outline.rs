@@ -10,7 +10,7 @@ use super::super::heading::Words;
 use super::foreign::SplitFiles;
 use super::messages::{EARTH, FIXES, Observation, PoseKind, VehicleKey, is_of_transforms, reader_of_topic};
 use super::tree::{FramePose, Tree, VehicleFrame};
-use crate::mcap::topic::{Declared, Message, Part};
+use crate::mcap::topic::{DeclaredTopic, Message, Part};
 
 /// Largest number of topic parts searched for a namespace of transforms.
 const DEEPEST: usize = 16;
@@ -78,7 +78,7 @@ impl Outline {
     }
 
     /// Returns whether the messages of a topic are read: transforms are always read, because frames may require them.
-    fn reads(&self, topic: &Declared) -> bool {
+    fn reads(&self, topic: &DeclaredTopic) -> bool {
         self.named.is_empty() || self.named.contains(&topic.topic) || is_of_transforms(&topic.schema)
     }
 

@@ -2,15 +2,15 @@
 
 use serde::Serialize;
 
-use super::report::OfVehicle;
-use tautline_audit::envelope::{Corner, Exceeding, Limit, LimitOutcome};
+use super::report::VehicleFinding;
+use tautline_audit::envelope::{Corner, Exceedance, Limit, LimitOutcome};
 use tautline_audit::recorded::Outcome;
 use tautline_audit::{Status, Tally};
 use tautline_core::text::{at_least, at_most, counted, exact, fixed, seconds};
 
 /// Findings on one limit of each vehicle by itself.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct OfLimit {
+pub struct LimitFindings {
     /// Limited quantity with its unit, such as `speed_m_s`.
     pub quantity: &'static str,
     /// Limit: an upper bound, but a lower bound for `floor_m` and `fence_room_m`.
@@ -18,19 +18,19 @@ pub struct OfLimit {
     /// Status of the limit.
     pub status: Status,
     /// Value closest to the limit or farthest beyond it; null if no value is known.
-    pub extreme: Option<OfVehicle<Exceeding>>,
+    pub extreme: Option<VehicleFinding<Exceedance>>,
     /// Assumptions beyond the motion between samples; null without any.
     pub assumes: Option<String>,
     /// Corners of curves, where the velocity jumps and the limit is not applied; null without corners.
-    pub corners: Option<OfCorners>,
+    pub corners: Option<CornerFindings>,
     /// Number of violations, and how many are listed.
     pub violations_tally: Tally,
     /// Number of undecided times, and how many are listed.
     pub undecided_tally: Tally,
     /// Violations; of a long list the worst, and the first of each vehicle.
-    pub violations: Vec<OfVehicle<Exceeding>>,
+    pub violations: Vec<VehicleFinding<Exceedance>>,
     /// Undecided times, cut in the same way.
-    pub undecided: Vec<OfVehicle<Exceeding>>,
+    pub undecided: Vec<VehicleFinding<Exceedance>>,
     /// Vehicles for which the quantity is unknown.
     pub unknown: Vec<String>,
     #[serde(skip)]
@@ -39,17 +39,17 @@ pub struct OfLimit {
 
 /// Corners of curves.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct OfCorners {
+pub struct CornerFindings {
     /// Number of corners of all vehicles.
     pub count: u64,
     /// Corner with the largest jump of the velocity.
-    pub largest: OfVehicle<Corner>,
+    pub largest: VehicleFinding<Corner>,
 }
 
-impl OfCorners {
+impl CornerFindings {
     /// Returns the assumption of a clear verdict about corners.
     fn assumed(&self) -> String {
-        let OfVehicle { vehicle, finding } = &self.largest;
+        let VehicleFinding { vehicle, finding } = &self.largest;
         format!(
             "vehicles round off {} (velocity jumps by at most {} m/s, {vehicle} at {}; --accel-window judges them)",
             counted(self.count, "corner", "corners"),
@@ -59,12 +59,13 @@ impl OfCorners {
     }
 }
 
-impl OfLimit {
+impl LimitFindings {
     pub(super) fn new(found: &LimitOutcome, outcome: &Outcome) -> Self {
-        let named = |of: &Exceeding| OfVehicle::new(outcome, of.vehicle, *of);
-        let largest = |of: Corner| OfVehicle::new(outcome, of.vehicle, of);
-        let corners = found.corners.map(|of| OfCorners { count: of.count, largest: largest(of.largest) });
-        let assumes: Vec<_> = found.assumes.iter().cloned().chain(corners.as_ref().map(OfCorners::assumed)).collect();
+        let named = |of: &Exceedance| VehicleFinding::new(outcome, of.vehicle, *of);
+        let largest = |of: Corner| VehicleFinding::new(outcome, of.vehicle, of);
+        let corners = found.corners.map(|of| CornerFindings { count: of.count, largest: largest(of.largest) });
+        let assumes: Vec<_> =
+            found.assumes.iter().cloned().chain(corners.as_ref().map(CornerFindings::assumed)).collect();
         Self {
             quantity: found.limit.quantity.key(),
             allowed: found.limit.allowed,
@@ -101,7 +102,7 @@ impl OfLimit {
     }
 
     /// Formats the value of an extreme or of a violation, rounded so that the statement holds.
-    fn value(&self, of: &Exceeding) -> String {
+    fn value(&self, of: &Exceedance) -> String {
         let (lower, upper) = (of.lower, of.upper);
         let number = match (lower.is_finite(), upper.is_finite()) {
             (false, false) => return "not known".to_owned(),
@@ -177,16 +178,16 @@ impl OfLimit {
     }
 
     /// Returns a violation or an undecided time in a sentence.
-    pub(super) fn in_words(&self, of: &OfVehicle<Exceeding>, is_violation: bool) -> String {
+    pub(super) fn in_words(&self, of: &VehicleFinding<Exceedance>, is_violation: bool) -> String {
         self.words(of, if is_violation { "beyond" } else { "against" })
     }
 
     /// Returns a violation or an undecided time in a few words.
-    pub(super) fn in_short(&self, OfVehicle { vehicle, finding }: &OfVehicle<Exceeding>) -> String {
+    pub(super) fn in_short(&self, VehicleFinding { vehicle, finding }: &VehicleFinding<Exceedance>) -> String {
         format!("{vehicle}: {} {} (limit {})", self.quantity_name(), self.value(finding), self.limit_in_words())
     }
 
-    fn words(&self, OfVehicle { vehicle, finding }: &OfVehicle<Exceeding>, how: &str) -> String {
+    fn words(&self, VehicleFinding { vehicle, finding }: &VehicleFinding<Exceedance>, how: &str) -> String {
         format!(
             "{vehicle}: {} {} by {} s, {how} the limit of {} from {} s to {} s",
             self.quantity_name(),

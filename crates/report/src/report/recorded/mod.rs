@@ -7,7 +7,10 @@ mod moments;
 mod report;
 mod words;
 
-pub use envelope::{OfCorners, OfLimit};
-pub use report::{Basis, Between, Clock, EarlyEnd, Obstacles, RecordedAudit, RecordedReport, Seen, SeenWhen, Source};
-pub use report::{OfPair, OfVehicle};
+pub use envelope::{CornerFindings, LimitFindings};
+pub use report::{
+    AssumedMotion, Basis, Clock, EarlyEnd, Obstacles, PresenceSpan, PresenceSummary, RecordedAudit, RecordedReport,
+    Source,
+};
+pub use report::{PairFinding, VehicleFinding};
 pub use words::interval;

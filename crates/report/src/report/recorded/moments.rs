@@ -1,10 +1,10 @@
 //! Findings on a recording that its replay jumps to.
 
 use super::report::RecordedReport;
-use super::report::{OfPair, OfVehicle};
+use super::report::{PairFinding, VehicleFinding};
 use super::words::interval;
-use crate::replay::{Judged, Kind, LONGEST_NAME, Moment, Span, cut};
-use tautline_audit::envelope::Exceeding;
+use crate::replay::{JudgementContext, Kind, LONGEST_NAME, Moment, Span, cut};
+use tautline_audit::envelope::Exceedance;
 use tautline_audit::recorded::{Approach, Gap, ObjectPair};
 use tautline_audit::{Undecided, Violation};
 
@@ -14,11 +14,11 @@ impl RecordedReport {
     #[must_use]
     pub fn moments(&self) -> Vec<Moment> {
         let over = |of: &Violation<ObjectPair>| of.min_m - of.limit_m;
-        let mut violations: Vec<_> = self.violations.iter().map(OfPair::short).collect();
+        let mut violations: Vec<_> = self.violations.iter().map(PairFinding::short).collect();
         violations.sort_by(|a, b| over(&a.finding).total_cmp(&over(&b.finding)));
         let closest = self.closest.first().or(self.obstacles.closest.first());
         let unit = self.judgement().unit;
-        let closest = closest.map(OfPair::short).map(|of| {
+        let closest = closest.map(PairFinding::short).map(|of| {
             let &Approach { pair, lower_m, upper_m, time_s, .. } = &of.finding;
             Moment::closest(pair, &of.names(), &format!("{} {unit}", interval(lower_m, upper_m)), time_s)
         });
@@ -32,16 +32,16 @@ impl RecordedReport {
 
     /// Returns the limit of separations, and whether the audit decided everything else.
     #[must_use]
-    pub fn judgement(&self) -> Judged {
+    pub fn judgement(&self) -> JudgementContext {
         let unit = if self.measure == "metres" { "m" } else { "ellipsoids" };
-        Judged { is_else_known: self.is_else_known, limit: self.separation.delta_m, unit }
+        JudgementContext { is_else_known: self.is_else_known, limit: self.separation.delta_m, unit }
     }
 
     fn moments_of_limits(&self) -> Vec<Moment> {
-        let of_limit = |limit: &super::envelope::OfLimit| {
+        let of_limit = |limit: &super::envelope::LimitFindings| {
             let named = |kind: Kind| {
-                move |of: &OfVehicle<Exceeding>| {
-                    let (of, Exceeding { vehicle, from_s, to_s, at_s, .. }) = (of.short(), of.finding);
+                move |of: &VehicleFinding<Exceedance>| {
+                    let (of, Exceedance { vehicle, from_s, to_s, at_s, .. }) = (of.short(), of.finding);
                     let (brief, said) = (limit.in_short(&of), limit.in_words(&of, kind == Kind::Violation));
                     Moment {
                         kind,
@@ -60,21 +60,21 @@ impl RecordedReport {
     }
 }
 
-fn undecided(of: &OfPair<Undecided<ObjectPair>>) -> Moment {
+fn undecided(of: &PairFinding<Undecided<ObjectPair>>) -> Moment {
     let Undecided { pair, from_s, to_s, .. } = of.finding;
     let span = Span { from_s, to_s, at_s: f64::midpoint(from_s, to_s) };
     let brief = format!("{} may come too close", of.names());
     Moment::new(Kind::Undecided, pair, span, brief, format!("Undecided: {}", of.words()))
 }
 
-fn unseen(of: &OfVehicle<Gap>) -> Moment {
+fn unseen(of: &VehicleFinding<Gap>) -> Moment {
     let Gap { vehicle, from_s, to_s, .. } = of.finding;
     let span = Span { from_s, to_s, at_s: f64::midpoint(from_s, to_s) };
     let (brief, said) = (format!("{} is not seen", of.vehicle), format!("Undecided: {}", of.words()));
     Moment { kind: Kind::Unseen, vehicles: vec![vehicle], obstacle: None, span, brief, said }
 }
 
-impl<T> OfPair<T> {
+impl<T> PairFinding<T> {
     /// Returns the names of both vehicles, or of vehicle and obstacle.
     pub(super) fn names(&self) -> String {
         let [first, second] = &self.who;
@@ -82,14 +82,14 @@ impl<T> OfPair<T> {
     }
 }
 
-impl<T: Clone> OfPair<T> {
+impl<T: Clone> PairFinding<T> {
     /// Returns the finding with names cut to the length that a replay shows.
     fn short(&self) -> Self {
         Self { who: self.who.each_ref().map(|name| cut(name, LONGEST_NAME)), finding: self.finding.clone() }
     }
 }
 
-impl<T: Clone> OfVehicle<T> {
+impl<T: Clone> VehicleFinding<T> {
     fn short(&self) -> Self {
         Self { vehicle: cut(&self.vehicle, LONGEST_NAME), finding: self.finding.clone() }
     }
@@ -105,7 +105,7 @@ mod tests {
     fn long_names_are_cut_and_direction_controls_are_replaced() {
         let pair = ObjectPair::Vehicles(Pair::new(0, 1));
         let finding = Violation { pair, from_s: 1.0, to_s: 2.0, min_m: 0.25, min_at_s: 1.5, limit_m: 1.0 };
-        let of = OfPair { who: ["ü".repeat(5000), "drone \u{202e}b".to_owned()], finding };
+        let of = PairFinding { who: ["ü".repeat(5000), "drone \u{202e}b".to_owned()], finding };
         let said = in_order(&Moment::violation(&finding, &of.short().names(), "m").said);
         let expected =
             "… and drone \u{fffd}b came to 0.250 m (limit 1.000) at 1.500 s, below it from 1.000 s to 2.000 s";

@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::envelope::OfLimit;
+use super::envelope::LimitFindings;
 use crate::report::flight::{self, Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Separation, finite};
 use tautline_audit::recorded::{
     Absence, Approach, Contradiction, Gap, ObjectPair, Outcome, Presence, Settings, TOUCHING_ELLIPSOIDS, Tallies,
@@ -36,7 +36,7 @@ pub struct Clock {
 
 /// Motion between two samples, and its basis.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Between {
+pub struct AssumedMotion {
     /// Motion in words, such as `straight between samples`.
     pub motion: String,
     /// Basis of the motion.
@@ -102,7 +102,7 @@ pub struct RecordedReport {
     /// First and last judged instant \[s\].
     pub span_s: Option<(f64, f64)>,
     /// Presence of the vehicles in the window.
-    pub presence: SeenWhen,
+    pub presence: PresenceSummary,
     /// Smallest separation.
     pub separation: Separation<Option<f64>>,
     /// Findings of the audit.
@@ -110,21 +110,21 @@ pub struct RecordedReport {
     /// Number of findings, and how many are listed.
     pub findings: Tallies,
     /// Violations of pairs and obstacles in order of time; of a long list the worst, and the first of each pair.
-    pub violations: Vec<OfPair<Violation<ObjectPair>>>,
+    pub violations: Vec<PairFinding<Violation<ObjectPair>>>,
     /// The ten closest pairs.
-    pub closest: Vec<OfPair<Approach>>,
+    pub closest: Vec<PairFinding<Approach>>,
     /// Findings on obstacles.
     pub obstacles: Obstacles,
     /// Findings on the limits of single vehicles.
-    pub limits: Vec<OfLimit>,
+    pub limits: Vec<LimitFindings>,
     /// Intervals in which a vehicle was not seen.
-    pub gaps: Vec<OfVehicle<Gap>>,
+    pub gaps: Vec<VehicleFinding<Gap>>,
     /// Vehicles that are never present together with another one, with their intervals, unless an obstacle is judged.
-    pub alone: Vec<OfVehicle<Presence>>,
+    pub alone: Vec<VehicleFinding<Presence>>,
     /// Intervals in which the separation of a pair is undecided.
-    pub undecided: Vec<OfPair<Undecided<ObjectPair>>>,
+    pub undecided: Vec<PairFinding<Undecided<ObjectPair>>>,
     /// Time at which the recording contradicts the assumed bound on acceleration.
-    pub contradiction: Option<OfVehicle<Contradiction>>,
+    pub contradiction: Option<VehicleFinding<Contradiction>>,
     /// Early end of the flight inside the judged window. The rest of the window is unknown.
     pub ended_early: Option<EarlyEnd>,
     /// Verdict and finding up to the early end, if clear up to there.
@@ -149,7 +149,7 @@ const ABSENT_LISTED: usize = 1000;
 
 /// Presence of the vehicles in the window.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct SeenWhen {
+pub struct PresenceSummary {
     /// Window of the verdict \[s\]: the requested one, or that of the recording; null if nothing was judged.
     pub window_s: Option<(f64, f64)>,
     /// Whether the verdict depends on the presence.
@@ -159,25 +159,25 @@ pub struct SeenWhen {
     /// Number of selected vehicles that are not.
     pub partly: usize,
     /// Times of the latter, at most 1000, by their numbers.
-    pub listed: Vec<OfVehicle<Seen>>,
+    pub listed: Vec<VehicleFinding<PresenceSpan>>,
 }
 
 /// First and last time at which a vehicle is seen; null if it is not seen in the window.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Seen {
+pub struct PresenceSpan {
     /// First time \[s\].
     pub from_s: Option<f64>,
     /// Last time \[s\].
     pub to_s: Option<f64>,
 }
 
-impl SeenWhen {
+impl PresenceSummary {
     fn new(outcome: &Outcome, settings: &Settings) -> Self {
         let is_asked = |name: &&String| settings.only.as_ref().is_none_or(|only| only.contains(*name));
         let (asked, partly) = (outcome.vehicles.iter().filter(is_asked).count(), outcome.absences.len());
         let seen = |of: &Absence| {
-            let seen = Seen { from_s: of.seen.map(|seen| seen.from_s), to_s: of.seen.map(|seen| seen.to_s) };
-            OfVehicle::new(outcome, of.vehicle, seen)
+            let seen = PresenceSpan { from_s: of.seen.map(|seen| seen.from_s), to_s: of.seen.map(|seen| seen.to_s) };
+            VehicleFinding::new(outcome, of.vehicle, seen)
         };
         let (first_s, last_s) = (outcome.span_s.map(|span| span.0), outcome.span_s.map(|span| span.1));
         Self {
@@ -194,29 +194,29 @@ impl SeenWhen {
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Obstacles {
     /// The ten closest approaches.
-    pub closest: Vec<OfPair<Approach>>,
+    pub closest: Vec<PairFinding<Approach>>,
     /// Intervals in which a vehicle was below its clearance.
-    pub violations: Vec<OfPair<Violation<ObjectPair>>>,
+    pub violations: Vec<PairFinding<Violation<ObjectPair>>>,
 }
 
 impl RecordedReport {
     /// Returns the report on the outcome of an audit.
     #[must_use]
-    pub fn new(outcome: &Outcome, settings: &Settings, source: Source, between: Between) -> Self {
+    pub fn new(outcome: &Outcome, settings: &Settings, source: Source, between: AssumedMotion) -> Self {
         let first = outcome.closest.first();
         let scaled = settings.ellipsoid_m.is_some();
         let min_m = first.and_then(|first| finite(first.certain_m()));
-        let limits: Vec<_> = outcome.envelope.limits.iter().map(|found| OfLimit::new(found, outcome)).collect();
+        let limits: Vec<_> = outcome.envelope.limits.iter().map(|found| LimitFindings::new(found, outcome)).collect();
         let by_limits = limits.iter().filter_map(|limit| limit.assumes.clone());
         let by_motion = (!matches!(between.basis, Basis::Recorded | Basis::Run)).then_some(between.motion.clone());
         let assumes: Vec<_> = by_motion.into_iter().chain(by_limits).collect();
         let is_assumed = between.basis == Basis::Assumed || limits.iter().any(|limit| limit.assumes.is_some());
         let names = |pair: ObjectPair| outcome.names(pair, &settings.obstacles);
-        let closest = |of: &[Approach]| of.iter().map(|a| OfPair { who: names(a.pair), finding: *a }).collect();
-        let violations = outcome.violations.iter().map(|v| OfPair { who: names(v.pair), finding: *v });
+        let closest = |of: &[Approach]| of.iter().map(|a| PairFinding { who: names(a.pair), finding: *a }).collect();
+        let violations = outcome.violations.iter().map(|v| PairFinding { who: names(v.pair), finding: *v });
         let violations: Vec<_> = violations.collect();
         let alone = outcome.alone.iter();
-        let alone = alone.filter_map(|&of| Some(OfVehicle::new(outcome, of, outcome.presence[of]?)));
+        let alone = alone.filter_map(|&of| Some(VehicleFinding::new(outcome, of, outcome.presence[of]?)));
         Self {
             schema_version: SCHEMA_VERSION,
             status: outcome.status,
@@ -226,7 +226,7 @@ impl RecordedReport {
             vehicles: outcome.vehicles.clone(),
             judged: outcome.presence.iter().flatten().count(),
             span_s: outcome.span_s,
-            presence: SeenWhen::new(outcome, settings),
+            presence: PresenceSummary::new(outcome, settings),
             findings: outcome.tallies,
             deciding_rate_hz: outcome.deciding_rate_hz,
             separation: Separation {
@@ -275,10 +275,10 @@ impl RecordedReport {
             run_objection: None,
             separation_asked: outcome.separation.is_some(),
             is_else_known: outcome.is_else_known,
-            gaps: outcome.gaps.iter().map(|gap| OfVehicle::new(outcome, gap.vehicle, *gap)).collect(),
+            gaps: outcome.gaps.iter().map(|gap| VehicleFinding::new(outcome, gap.vehicle, *gap)).collect(),
             alone: alone.collect(),
-            undecided: outcome.undecided.iter().map(|u| OfPair { who: names(u.pair), finding: *u }).collect(),
-            contradiction: outcome.contradiction.map(|of| OfVehicle::new(outcome, of.vehicle, of)),
+            undecided: outcome.undecided.iter().map(|u| PairFinding { who: names(u.pair), finding: *u }).collect(),
+            contradiction: outcome.contradiction.map(|of| VehicleFinding::new(outcome, of.vehicle, of)),
         }
     }
 
@@ -313,7 +313,7 @@ impl RecordedReport {
 
 /// A finding on a pair of vehicles, or a vehicle and an obstacle, with their names.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct OfPair<T> {
+pub struct PairFinding<T> {
     /// The two names.
     pub who: [String; 2],
     /// The finding.
@@ -323,7 +323,7 @@ pub struct OfPair<T> {
 
 /// A finding on a vehicle, with its name.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct OfVehicle<T> {
+pub struct VehicleFinding<T> {
     /// Name of the vehicle.
     pub vehicle: String,
     /// The finding.
@@ -331,7 +331,7 @@ pub struct OfVehicle<T> {
     pub finding: T,
 }
 
-impl<T> OfVehicle<T> {
+impl<T> VehicleFinding<T> {
     /// Returns the finding with the name of its vehicle.
     pub(super) fn new(outcome: &Outcome, vehicle: usize, finding: T) -> Self {
         Self { vehicle: outcome.name(vehicle), finding }

@@ -1,8 +1,8 @@
 //! The report on a recording in words and as a page.
 
-use super::envelope::OfLimit;
-use super::report::{EarlyEnd, RecordedReport, Seen};
-use super::report::{OfPair, OfVehicle};
+use super::envelope::LimitFindings;
+use super::report::{EarlyEnd, PresenceSpan, RecordedReport};
+use super::report::{PairFinding, VehicleFinding};
 use crate::figures::Figure;
 use crate::replay::{NoReplay, Replay};
 use crate::report::page::{self, Badge, Page, Start, Tone};
@@ -35,7 +35,7 @@ impl RecordedReport {
         if presence.partly == 0 {
             return if self.status == Status::Clear { window } else { String::new() };
         }
-        let named = presence.listed.iter().take(NAMED_IN_HEADLINE).map(OfVehicle::<Seen>::words);
+        let named = presence.listed.iter().take(NAMED_IN_HEADLINE).map(VehicleFinding::<PresenceSpan>::words);
         let rest = presence.partly.saturating_sub(NAMED_IN_HEADLINE);
         let more = (rest > 0).then(|| format!("and {rest} more"));
         let named = named.chain(more).collect::<Vec<_>>().join(", ");
@@ -71,8 +71,8 @@ impl RecordedReport {
 
     /// Returns the findings with the status of the verdict, on pairs and on limits.
     fn finding_of_motion(&self) -> String {
-        let decides = |limit: &&OfLimit| limit.status == self.status;
-        let limits = self.limits.iter().filter(decides).map(OfLimit::brief);
+        let decides = |limit: &&LimitFindings| limit.status == self.status;
+        let limits = self.limits.iter().filter(decides).map(LimitFindings::brief);
         let of_pairs = self.separation_asked && self.audit.flight.status == self.status;
         let in_plane = self.source.planar.then(|| "in the plane of x and y: no heights are known".to_owned());
         let pairs = of_pairs.then(|| self.finding_of_pairs());
@@ -89,7 +89,7 @@ impl RecordedReport {
             Status::Clear => {
                 let all = self.closest.iter().chain(&self.obstacles.closest);
                 let lowest = all.min_by(|a, b| a.finding.lower_m.total_cmp(&b.finding.lower_m));
-                let closest = lowest.map_or(String::new(), |OfPair { who: [first, second], finding }| {
+                let closest = lowest.map_or(String::new(), |PairFinding { who: [first, second], finding }| {
                     let (least, at) = (at_least(finding.lower_m, 6), seconds(finding.time_s));
                     format!("never closer than {least}{unit}, {first} and {second} at {at} ")
                 });
@@ -98,13 +98,13 @@ impl RecordedReport {
                 format!("{closest}({delta}{motion}){}", self.never_with_another())
             }
             Status::Violation => {
-                let over = |of: &OfPair<Violation<ObjectPair>>| of.finding.min_m - of.finding.limit_m;
+                let over = |of: &PairFinding<Violation<ObjectPair>>| of.finding.min_m - of.finding.limit_m;
                 let deepest = self.violations.iter().min_by(|a, b| over(a).total_cmp(&over(b)));
                 let others = match counted_in_words(self.findings.violations) {
                     _ if self.findings.violations.count <= 1 => String::new(),
                     count => format!("; {count} violations in all"),
                 };
-                deepest.map_or(String::new(), |OfPair { who: [first, second], finding }| {
+                deepest.map_or(String::new(), |PairFinding { who: [first, second], finding }| {
                     format!(
                         "{first} and {second} came to {}{unit} (limit {}{unit}) at {}, {}{others}",
                         metres_below(finding.min_m, finding.limit_m),
@@ -135,7 +135,7 @@ impl RecordedReport {
         if let Some(why) = &self.run_objection {
             return why.clone();
         }
-        if let Some(OfVehicle { vehicle, finding }) = &self.contradiction {
+        if let Some(VehicleFinding { vehicle, finding }) = &self.contradiction {
             return format!(
                 "{vehicle} needs {} m/s^2 at {}, more than the assumed {:?} m/s^2",
                 fixed(finding.needs_m_s2, 3),
@@ -144,7 +144,7 @@ impl RecordedReport {
             );
         }
         let closest = self.undecided.iter().min_by(|a, b| a.finding.lower_m.total_cmp(&b.finding.lower_m));
-        if let Some(OfPair { who: [first, second], finding }) = closest {
+        if let Some(PairFinding { who: [first, second], finding }) = closest {
             let rate = self
                 .deciding_rate_hz
                 .map_or(String::new(), |hz| format!("; sampling at {} Hz would decide", at_most(hz, 1)));
@@ -161,10 +161,10 @@ impl RecordedReport {
         match &self.gaps[..] {
             [] if self.span_s.is_none() => "the window holds nothing to judge".to_owned(),
             [] => "no two vehicles are present at the same time".to_owned(),
-            [OfVehicle { vehicle, finding }] => {
+            [VehicleFinding { vehicle, finding }] => {
                 format!("{vehicle} was not seen from {}; {joined}", span(finding.from_s, finding.to_s))
             }
-            [OfVehicle { vehicle, finding }, ..] => {
+            [VehicleFinding { vehicle, finding }, ..] => {
                 let (count, at) = (counted_in_words(self.findings.gaps), seconds(finding.from_s));
                 format!("{count} gaps, the first of {vehicle} at {at}; {joined}")
             }
@@ -174,8 +174,8 @@ impl RecordedReport {
     /// Returns the sections of the text and of the page.
     fn sections(&self) -> Vec<Section> {
         let caption = format!("smallest distances in {}", self.unit().trim());
-        let closest = |heading: &'static str, closest: &[OfPair<Approach>]| {
-            let row = |OfPair { who: [first, second], finding }: &OfPair<Approach>| {
+        let closest = |heading: &'static str, closest: &[PairFinding<Approach>]| {
+            let row = |PairFinding { who: [first, second], finding }: &PairFinding<Approach>| {
                 let apart = interval(finding.lower_m, finding.upper_m);
                 [format!("{first} and {second}"), apart, fixed(finding.time_s, 3), exact(finding.limit_m)]
             };
@@ -186,26 +186,30 @@ impl RecordedReport {
         let limits = "limits, and the vehicles closest to them";
         let presence = &self.presence;
         let seen = format!("{} seen throughout, {} not", presence.throughout, presence.partly);
-        let all = |of: Tally, tally: fn(&OfLimit) -> Tally| self.limits.iter().map(tally).fold(of, sum);
+        let all = |of: Tally, tally: fn(&LimitFindings) -> Tally| self.limits.iter().map(tally).fold(of, sum);
         let unknown = self.limits.iter().map(|limit| limit.unknown.len()).sum();
         let violations = all(self.findings.violations, |limit| limit.violations_tally);
         let undecided = sum(all(self.findings.undecided, |limit| limit.undecided_tally), Tally::all(unknown));
         let list = |heading: &'static str, tally: Tally, lines: Vec<String>| {
             Section::list(heading, shortened_in_words(tally), lines)
         };
-        let violated = self.violations.iter().map(OfPair::<Violation<_>>::words);
-        let violated = violated.chain(self.limits.iter().flat_map(OfLimit::violations_in_words)).collect();
-        let open = self.undecided.iter().map(OfPair::<Undecided<_>>::words);
-        let open = open.chain(self.limits.iter().flat_map(OfLimit::undecided_in_words)).collect();
+        let violated = self.violations.iter().map(PairFinding::<Violation<_>>::words);
+        let violated = violated.chain(self.limits.iter().flat_map(LimitFindings::violations_in_words)).collect();
+        let open = self.undecided.iter().map(PairFinding::<Undecided<_>>::words);
+        let open = open.chain(self.limits.iter().flat_map(LimitFindings::undecided_in_words)).collect();
         let sections = [
             closest("Closest pairs", &self.closest),
             closest("Closest to obstacles", &self.obstacles.closest),
-            Section::table("Each vehicle by itself", limits, columns, self.limits.iter().map(OfLimit::row)),
-            Section::list("Presence", seen, presence.listed.iter().map(OfVehicle::<Seen>::words).collect())
-                .of_all(presence.partly),
+            Section::table("Each vehicle by itself", limits, columns, self.limits.iter().map(LimitFindings::row)),
+            Section::list(
+                "Presence",
+                seen,
+                presence.listed.iter().map(VehicleFinding::<PresenceSpan>::words).collect(),
+            )
+            .of_all(presence.partly),
             list("Violations", violations, violated),
             list("Undecided", undecided, open),
-            list("Gaps", self.findings.gaps, self.gaps.iter().map(OfVehicle::<Gap>::words).collect()),
+            list("Gaps", self.findings.gaps, self.gaps.iter().map(VehicleFinding::<Gap>::words).collect()),
         ];
         sections.into_iter().filter(|section| !section.rows.is_empty()).collect()
     }
@@ -308,7 +312,7 @@ impl EarlyEnd {
     }
 }
 
-impl OfPair<Violation<ObjectPair>> {
+impl PairFinding<Violation<ObjectPair>> {
     pub(super) fn words(&self) -> String {
         let Self { who: [first, second], finding } = self;
         let min = metres_below(finding.min_m, finding.limit_m);
@@ -321,7 +325,7 @@ impl OfPair<Violation<ObjectPair>> {
     }
 }
 
-impl OfPair<Undecided<ObjectPair>> {
+impl PairFinding<Undecided<ObjectPair>> {
     pub(super) fn words(&self) -> String {
         let Self { who: [first, second], finding } = self;
         let rate = finding.rate_hz.map_or(String::new(), |hz| format!("; {} Hz would decide", at_most(hz, 1)));
@@ -338,16 +342,16 @@ impl OfPair<Undecided<ObjectPair>> {
     }
 }
 
-impl OfVehicle<Gap> {
+impl VehicleFinding<Gap> {
     pub(super) fn words(&self) -> String {
         format!("{} was not seen from {}", self.vehicle, span(self.finding.from_s, self.finding.to_s))
     }
 }
 
-impl OfVehicle<Seen> {
+impl VehicleFinding<PresenceSpan> {
     pub(super) fn words(&self) -> String {
         match self.finding {
-            Seen { from_s: Some(from_s), to_s: Some(to_s) } => {
+            PresenceSpan { from_s: Some(from_s), to_s: Some(to_s) } => {
                 format!("{} is seen from {}", self.vehicle, span(from_s, to_s))
             }
             _ => format!("{} is not seen", self.vehicle),

@@ -17,7 +17,7 @@ pub use own::{OwnRecording, run_audit};
 
 use self::own::RunAnswer;
 use super::{Failure, Monitor, RECORDING, outputs};
-use crate::report::recorded::{Basis, Between, Clock, RecordedReport, Source};
+use crate::report::recorded::{AssumedMotion, Basis, Clock, RecordedReport, Source};
 use crate::report::{Status, write_atomically};
 use replays::Instants;
 use tautline_audit::Obstacle;
@@ -46,7 +46,7 @@ pub enum Subject<'a> {
         options: Box<ReadOptions>,
     },
     /// Motion in the memory of the caller.
-    Held {
+    InMemory {
         /// Name of the motion in messages.
         name: &'a str,
         /// Limits, obstacles and audit of a flight of `tautline run`.
@@ -59,10 +59,10 @@ pub enum Subject<'a> {
 impl Subject<'_> {
     /// Returns the name of the recording in messages.
     #[must_use]
-    pub fn called(&self) -> String {
+    pub fn name(&self) -> String {
         match self {
-            Self::Files { paths, .. } => read::called(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>()),
-            Self::Held { name, .. } => (*name).to_owned(),
+            Self::Files { paths, .. } => read::recording_name(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>()),
+            Self::InMemory { name, .. } => (*name).to_owned(),
         }
     }
 
@@ -73,7 +73,7 @@ impl Subject<'_> {
     pub fn open(&self) -> Result<Box<dyn Tracks<Error = ReadError> + '_>, ReadError> {
         match self {
             Self::Files { paths, options } => open(paths, options).map(|recording| recording as _),
-            Self::Held { open, .. } => open(),
+            Self::InMemory { open, .. } => open(),
         }
     }
 
@@ -84,21 +84,21 @@ impl Subject<'_> {
                 [path] => Some((path, options)),
                 _ => None,
             },
-            Self::Held { .. } => None,
+            Self::InMemory { .. } => None,
         }
     }
 
     fn paths(&self) -> &[PathBuf] {
         match self {
             Self::Files { paths, .. } => paths,
-            Self::Held { .. } => &[],
+            Self::InMemory { .. } => &[],
         }
     }
 
     /// Returns limits, obstacles and audit of a `tautline run` recording, and the safety distance of a show file \[m\].
     fn own(&self, monitor: &dyn Monitor) -> Result<(Option<OwnRecording>, Option<f64>), Failure> {
         match self {
-            Self::Held { own, .. } => Ok((own.cloned(), None)),
+            Self::InMemory { own, .. } => Ok((own.cloned(), None)),
             Self::Files { paths, options } => {
                 let limit_m = paths.first().and_then(|path| read::own_limit_m(path, options));
                 Ok((own_recording(paths, options, monitor)?, limit_m))
@@ -203,7 +203,7 @@ impl<'a> AuditRequest<'a> {
 
 /// The answer of an audit.
 #[derive(Clone, Debug)]
-pub struct Audited {
+pub struct AuditedRecording {
     /// The report.
     pub report: RecordedReport,
     /// Whether an undecided verdict counts as good.
@@ -212,7 +212,7 @@ pub struct Audited {
     pub asked_by: Option<String>,
 }
 
-impl Audited {
+impl AuditedRecording {
     /// Returns whether the verdict is clear, or undecided if that is allowed.
     #[must_use]
     pub fn is_good(&self) -> bool {
@@ -253,7 +253,7 @@ pub struct ConfiguredAudit<'a> {
 /// # Errors
 /// [`Failure`] if the request or the recording is wrong, or a file cannot be written. The monitor receives the verdict
 /// before files are written.
-pub fn audit_files(request: &AuditRequest<'_>, monitor: &dyn Monitor) -> Result<Audited, Failure> {
+pub fn audit_files(request: &AuditRequest<'_>, monitor: &dyn Monitor) -> Result<AuditedRecording, Failure> {
     request.check_outputs(&[])?;
     let configured = request.configured()?;
     configured.check_outputs(&[])?;
@@ -279,7 +279,7 @@ impl<'a> AuditRequest<'a> {
     ///
     /// # Errors
     /// [`Failure`] that names both files.
-    pub fn check_outputs(&self, more: &[outputs::Called<'_>]) -> Result<(), Failure> {
+    pub fn check_outputs(&self, more: &[outputs::NamedPath<'_>]) -> Result<(), Failure> {
         let Self { subject, obstacles, fence, html, proof, .. } = self;
         let settings = config::file_of(self);
         let mut inputs: Vec<_> = subject.paths().iter().map(|path| ("the recording", path.as_path())).collect();
@@ -343,7 +343,7 @@ impl<'a> AuditRequest<'a> {
 
     /// Rejects a single vehicle without other limits, and a number of vehicles other than the expected one.
     fn check_count(&self, outcome: &Outcome, settings: &Settings) -> Result<(), Failure> {
-        let path = self.subject.called();
+        let path = self.subject.name();
         let judged = outcome.presence.iter().flatten().count();
         if let Some(expected) = self.expect_vehicles
             && judged != expected
@@ -391,7 +391,7 @@ impl<'a> AuditRequest<'a> {
             (settings.envelope.limits.iter().any(|limit| limit.quantity.unit() != "m"), "--limit"),
         ];
         let Some((_, option)) = asked.into_iter().find(|(is_asked, _)| *is_asked) else { return Ok(()) };
-        let path = self.subject.called();
+        let path = self.subject.name();
         if unit != "s" {
             let message = format!(
                 "{path}: the unit of time {unit} is inferred from the steps of whole numbers only, and {option} \
@@ -413,7 +413,13 @@ impl<'a> AuditRequest<'a> {
 
     /// Returns the motion between samples, for a recording of curves or of `tautline run`. Nothing is proved if the
     /// samples themselves are assumed.
-    fn between(&self, curves: bool, holds_every_step: bool, answer: &RunAnswer, assumed: Option<&str>) -> Between {
+    fn assumed_motion(
+        &self,
+        curves: bool,
+        holds_every_step: bool,
+        answer: &RunAnswer,
+        assumed: Option<&str>,
+    ) -> AssumedMotion {
         let most = || {
             let all = self.settings.max_accel_m_s2.map(|a| format!("{a:?} m/s^2"));
             let by_name =
@@ -429,8 +435,8 @@ impl<'a> AuditRequest<'a> {
             _ => ("straight between samples".to_owned(), Basis::Assumed),
         };
         match assumed {
-            Some(assumed) => Between { motion: format!("{motion}, {assumed}"), basis: Basis::Assumed },
-            None => Between { motion, basis },
+            Some(assumed) => AssumedMotion { motion: format!("{motion}, {assumed}"), basis: Basis::Assumed },
+            None => AssumedMotion { motion, basis },
         }
     }
 }
@@ -446,7 +452,7 @@ impl ConfiguredAudit<'_> {
     ///
     /// # Errors
     /// [`Failure`] that names both.
-    pub fn check_outputs(&self, more: &[outputs::Called<'_>]) -> Result<(), Failure> {
+    pub fn check_outputs(&self, more: &[outputs::NamedPath<'_>]) -> Result<(), Failure> {
         self.request.check_outputs(more)
     }
 
@@ -454,13 +460,13 @@ impl ConfiguredAudit<'_> {
     ///
     /// # Errors
     /// As [`audit_files`].
-    pub fn judge(&self, monitor: &dyn Monitor) -> Result<Audited, Failure> {
+    pub fn judge(&self, monitor: &dyn Monitor) -> Result<AuditedRecording, Failure> {
         let request = &self.request;
         let mut settings = request.complete_settings()?;
         let (own, own_limit_m) = request.subject.own(monitor)?;
         let open: &Open<'_> = &|| request.subject.open();
         let own = if request.independent { own.map(OwnRecording::independent) } else { own };
-        let taken = Taken::fill(&mut settings, request, own.as_ref(), own_limit_m);
+        let taken = RecordedLimits::fill(&mut settings, request, own.as_ref(), own_limit_m);
         proof::check(request, &settings)?;
         let mut auditor = TrackAuditor::new(settings.clone())?;
         if request.html.is_some() {
@@ -468,7 +474,7 @@ impl ConfiguredAudit<'_> {
         }
         auditor = auditor.with_interruption(monitor.interruption().clone());
         let mut instants = request.html.as_ref().map(|_| Instants::default());
-        let Judged { mut outcome, clock, mut notes, assumed, curves, is_planar } =
+        let JudgedRecording { mut outcome, clock, mut notes, assumed, curves, is_planar } =
             self.judged(auditor, &settings, open, monitor, &mut |items, names| {
                 if let Some(instants) = &mut instants {
                     instants.note(items, names, &settings);
@@ -478,14 +484,14 @@ impl ConfiguredAudit<'_> {
         let answer = own.as_ref().map(|own| own.answer(&mut outcome, &settings, request, &mut notes));
         let answer = answer.unwrap_or(RunAnswer::Samples);
         let holds_every_step = own.as_ref().is_some_and(OwnRecording::holds_every_step);
-        let between = request.between(curves, holds_every_step, &answer, assumed.as_deref());
+        let between = request.assumed_motion(curves, holds_every_step, &answer, assumed.as_deref());
         notes.extend(taken.notes(request, own.as_ref()));
         notes.extend(notes_on_alone(&outcome));
         notes.extend(self.asked_by.clone());
         for note in &notes {
             monitor.warn(&format!("note: {note}"));
         }
-        let source = Source { recording: request.subject.called(), clock, planar: is_planar, notes };
+        let source = Source { recording: request.subject.name(), clock, planar: is_planar, notes };
         let early_end = own.as_ref().and_then(|own| own.early_end.clone());
         // An early end of the flight does not affect a window that ends before it.
         let is_beyond = |to_s: f64| outcome.span_s.is_none_or(|(_, end_s)| to_s > end_s);
@@ -514,7 +520,7 @@ impl ConfiguredAudit<'_> {
                 monitor.warn(&format!("note: {why}"));
             }
         }
-        Ok(Audited { report, allows_undecided: request.allow_undecided, asked_by: self.asked_by.clone() })
+        Ok(AuditedRecording { report, allows_undecided: request.allow_undecided, asked_by: self.asked_by.clone() })
     }
 
     /// Reads and judges all items.
@@ -525,8 +531,8 @@ impl ConfiguredAudit<'_> {
         open: &Open<'_>,
         monitor: &dyn Monitor,
         note: &mut dyn FnMut(&[Item], &[String]),
-    ) -> Result<Judged, Failure> {
-        let called = self.request.subject.called();
+    ) -> Result<JudgedRecording, Failure> {
+        let called = self.request.subject.name();
         let mut recording = open()?;
         let is_planar = recording.is_planar();
         let level = places::refuse_unknown(&self.request, self.asked_by(), settings, recording.as_ref())?;
@@ -556,18 +562,18 @@ impl ConfiguredAudit<'_> {
         let clock = Clock { unit: clock.unit.to_owned(), inferred: clock.inferred, epoch_ns: clock.epoch_ns };
         let outcome = auditor.finish().map_err(|error| Failure::from(error).of(Path::new(&called)))?;
         let (notes, assumed) = (recording.notes().to_vec(), recording.assumed().map(str::to_owned));
-        Ok(Judged { outcome, clock, notes, assumed, curves, is_planar })
+        Ok(JudgedRecording { outcome, clock, notes, assumed, curves, is_planar })
     }
 }
 
 /// Limits and obstacles that the recording states itself and the request leaves open.
-struct Taken<'a> {
+struct RecordedLimits<'a> {
     delta_m: Option<f64>,
     ellipsoid_m: Option<Vector3<f64>>,
     obstacles: Option<&'a [Obstacle]>,
 }
 
-impl<'a> Taken<'a> {
+impl<'a> RecordedLimits<'a> {
     /// Fills the settings with the limits and obstacles of the recording.
     fn fill(
         settings: &mut Settings,
@@ -627,7 +633,7 @@ fn notes_on_alone(outcome: &Outcome) -> impl Iterator<Item = String> {
 }
 
 /// A recording after its audit.
-struct Judged {
+struct JudgedRecording {
     outcome: Outcome,
     clock: Clock,
     notes: Vec<String>,

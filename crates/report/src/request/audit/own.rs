@@ -121,7 +121,7 @@ impl OwnRecording {
         Self {
             limit_m: if ellipsoid_m.is_some() { TOUCHING_ELLIPSOIDS } else { delta_m * scale },
             ellipsoid_m,
-            obstacles: scenario.obstacles.iter().map(|obstacle| sim::judged(obstacle).scaled(scale)).collect(),
+            obstacles: scenario.obstacles.iter().map(|obstacle| sim::audit_obstacle(obstacle).scaled(scale)).collect(),
             early_end: None,
             audit: StoredAudit::None,
             run_findings: Vec::new(),

@@ -15,11 +15,11 @@ const MOST_DROP_M: f64 = 1.0;
 const EARTH_RADIUS_M: f64 = 6_371_000.0;
 
 /// Limits and obstacles of a request that depend on heights or places.
-struct Asked<'a> {
+struct RequestedLimits<'a> {
     settings: &'a Settings,
 }
 
-impl Asked<'_> {
+impl RequestedLimits<'_> {
     fn limit(&self, is_asked: fn(Quantity) -> bool) -> Option<String> {
         let limit = self.settings.envelope.limits.iter().find(|limit| is_asked(limit.quantity));
         limit.map(|limit| format!("the limit `{}`", limit.quantity.name()))
@@ -66,7 +66,7 @@ impl Asked<'_> {
 }
 
 /// Checks that z is a height above ground at all vehicles, if the request needs that.
-pub(super) struct Level<'a> {
+pub(super) struct HeightCheck<'a> {
     settings: &'a Settings,
     /// Part of the request that needs heights; `None` without a check.
     asked: Option<String>,
@@ -78,8 +78,8 @@ pub(super) fn refuse_unknown<'a>(
     asked_by: Option<&str>,
     settings: &'a Settings,
     recording: &dyn Tracks<Error = ReadError>,
-) -> Result<Level<'a>, Failure> {
-    let asked = Asked { settings };
+) -> Result<HeightCheck<'a>, Failure> {
+    let asked = RequestedLimits { settings };
     let of_heights = || {
         let asked = asked.of_heights().filter(|_| recording.is_planar())?;
         let help = "name the column of the height with --column z=NAME, or remove the limit";
@@ -93,17 +93,17 @@ pub(super) fn refuse_unknown<'a>(
         Some((format!("positions are relative to the first one, {place}, and {asked} depends on that"), help))
     };
     let Some((problem, help)) = of_heights().or_else(of_places) else {
-        return Ok(Level { settings, asked: origin.and_then(|_| asked.of_level()) });
+        return Ok(HeightCheck { settings, asked: origin.and_then(|_| asked.of_level()) });
     };
     let asked_by = asked_by.map_or(String::new(), |note| format!(" ({note})"));
     Err(Failure::input(
         "audit/unknown-place",
-        format!("{}: {problem}", request.subject.called()),
+        format!("{}: {problem}", request.subject.name()),
         format!("{help}{asked_by}"),
     ))
 }
 
-impl Level<'_> {
+impl HeightCheck<'_> {
     /// Rejects judged positions so far from the origin that level ground is well below the tangent plane.
     pub(super) fn check(&self, path: &str, names: &[String], items: &[Item]) -> Result<(), Failure> {
         let Some(asked) = &self.asked else { return Ok(()) };

@@ -82,7 +82,7 @@ pub(super) fn check(request: &AuditRequest<'_>, settings: &Settings) -> Result<(
     let is_plain =
         request.subject.only_file().is_some_and(|(path, options)| is_table(path) && is_read_plainly(options));
     if !is_plain {
-        let called = request.subject.called();
+        let called = request.subject.name();
         let help = "write it as a table with `tautline export RECORDING -o FILE.csv`, and audit that";
         return no_proof(
             &format!("{called}: it is not one CSV file with the columns t_s, id, x, y and z in metres"),

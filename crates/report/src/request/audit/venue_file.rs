@@ -49,7 +49,7 @@ fn parse_obstacles(text: &str, path: &Path) -> Result<Vec<Obstacle>, Failure> {
 fn obstacle(table: ObstacleTable) -> Result<Obstacle, String> {
     let name = table.name.clone();
     let Solid { shape, path, clearance_m } = table.solid()?;
-    let obstacle = Obstacle { name, shape: sim::judged_shape(shape), clearance_m, path };
+    let obstacle = Obstacle { name, shape: sim::audit_shape(shape), clearance_m, path };
     obstacle.check().map(|()| obstacle).map_err(|error| error.to_string())
 }
 

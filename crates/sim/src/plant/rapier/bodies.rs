@@ -6,7 +6,7 @@ use rapier3d::prelude::{LockedAxes, PhysicsWorld, RigidBodyBuilder, RigidBodyHan
 use super::world::{
     copied, empty_world, from_engine, hull, hull_contacts, insert_obstacle, keep_out, keep_out_contacts, to_engine,
 };
-use crate::plant::{Air, HullContact, Path, Plant, PlantError};
+use crate::plant::{Air, HullContact, Plant, PlantError, StepPath};
 use crate::scenario::{Scenario, Space};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Pair, Rows, Swarm, mean_row, row, set_row};
@@ -96,7 +96,7 @@ impl Plant for Bodies {
         self.handles.len()
     }
 
-    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut Path) -> Result<(), PlantError> {
+    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut StepPath) -> Result<(), PlantError> {
         self.world.integration_parameters.dt = dt_s;
         // The held command completes a pending drift.
         let (completing, half_decay) = (self.half_decay(self.drifted_s), self.half_decay(dt_s));

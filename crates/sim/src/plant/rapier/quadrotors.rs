@@ -8,7 +8,7 @@ use rapier3d::prelude::{MassProperties, PhysicsWorld, Real, RigidBodyBuilder, Ri
 use super::world::{
     copied, empty_world, from_engine, hull, hull_contacts, insert_obstacle, keep_out, keep_out_contacts, to_engine,
 };
-use crate::plant::{HullContact, Path, Plant, PlantError, Quadrotors};
+use crate::plant::{HullContact, Plant, PlantError, Quadrotors, StepPath};
 use crate::scenario::Scenario;
 use crate::vehicle::{Drift, Fleet};
 use tautline_core::record::Channel;
@@ -35,7 +35,7 @@ pub(super) struct Fliers {
 
 impl Fliers {
     pub(super) fn new(scenario: &Scenario, mut fleet: Fleet) -> Self {
-        fleet.feel();
+        fleet.compute_wrenches();
         let mut world = empty_world();
         let origin_m = mean_row(&scenario.start.positions_m);
         let (model, inertia_kg_m2) = (fleet.dynamics.model(), fleet.dynamics.inertia_kg_m2());
@@ -76,7 +76,7 @@ impl Fliers {
     fn begin(&mut self, dt_s: f64) {
         self.drifts.clear();
         for (i, &handle) in self.handles.iter().enumerate() {
-            let drift = self.fleet.dynamics.begin(&self.fleet.states[i], self.fleet.wrench(i), dt_s);
+            let drift = self.fleet.dynamics.begin_step(&self.fleet.states[i], self.fleet.wrench(i), dt_s);
             let body = &mut self.world.bodies[handle];
             set_row(&mut self.drift_m_s, i, drift.velocity_m_s);
             set_row(&mut self.began_m, i, from_engine(body.translation()));
@@ -91,21 +91,21 @@ impl Fliers {
         let lag = self.fleet.dynamics.rotor_lag(dt_s);
         for (i, &handle) in self.handles.iter().enumerate() {
             let (body, drift) = (&self.world.bodies[handle], &mut self.drifts[i]);
-            let asked_rpm = self.fleet.asked_rpm(i);
+            let commanded_rpm = self.fleet.commanded_rpm(i);
             let state = &mut self.fleet.states[i];
             state.position_m = self.origin_m + from_engine(body.translation());
             state.attitude = attitude(*body.rotation());
-            state.rotors_rpm = lag.after(state.rotors_rpm, asked_rpm);
+            state.rotors_rpm = lag.after(state.rotors_rpm, commanded_rpm);
             let by_m_s = from_engine(body.linvel() - to_engine(drift.velocity_m_s));
             let by_rad_s = from_engine(body.angvel() - to_engine(drift.turn_rad_s));
             if by_m_s != Vector3::zeros() || by_rad_s != Vector3::zeros() {
-                self.fleet.dynamics.hit(drift, &state.attitude, by_m_s, by_rad_s);
+                self.fleet.dynamics.add_impulse(drift, &state.attitude, by_m_s, by_rad_s);
             }
             self.fleet.dynamics.predict(state, drift);
         }
-        self.fleet.blow(dt_s);
+        self.fleet.advance_wind(dt_s);
         // Also begins the next step: forces differ from those of the completed velocities by the square of the step.
-        self.fleet.feel();
+        self.fleet.compute_wrenches();
         self.fleet.complete(&self.drifts, dt_s);
     }
 }
@@ -136,10 +136,10 @@ impl Plant for Fliers {
         self.handles.len()
     }
 
-    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut Path) -> Result<(), PlantError> {
+    fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut StepPath) -> Result<(), PlantError> {
         self.world.integration_parameters.dt = dt_s;
         let began = Instant::now();
-        self.fleet.remember();
+        self.fleet.save_state();
         self.fleet.run_attitude();
         self.begin(dt_s);
         self.airframe += began.elapsed();
@@ -150,7 +150,7 @@ impl Plant for Fliers {
         }
         let began = Instant::now();
         self.end(dt_s);
-        self.fleet.pass(dt_s);
+        self.fleet.advance_clock(dt_s);
         self.fleet.observe(predicted);
         self.airframe += began.elapsed();
         Ok(())
@@ -166,7 +166,7 @@ impl Plant for Fliers {
     }
 
     fn restore(&mut self, _swarm: &Swarm) {
-        self.fleet.go_back();
+        self.fleet.restore_state();
         for (i, &handle) in self.handles.iter().enumerate() {
             let body = &mut self.world.bodies[handle];
             body.set_translation(to_engine(row(&self.began_m, i)), true);

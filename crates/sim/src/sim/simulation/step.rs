@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 use super::super::controller::Controller;
 use super::super::ending::{Breakdown, Ending, MAX_BEND_M, MAX_COMMAND_M_S2};
 use super::super::judge::longest_move_m;
-use super::super::monitors::Part;
+use super::super::monitors::Substep;
 use super::Simulation;
 use crate::plant::Feedback as _;
 use crate::plant::PlantError;
@@ -35,7 +35,7 @@ impl Simulation {
     pub(super) fn advance(&mut self, step: u64) -> Result<(), Ending> {
         let whole = 1_u64 << self.scenario.time.max_halvings.min(MAX_HALVINGS);
         let mut parts = Substeps { shortest: whole, is_overlong: false };
-        let flown = self.fly_parts(step, whole, &mut parts);
+        let flown = self.fly_substeps(step, whole, &mut parts);
         let Substeps { shortest, is_overlong } = parts;
         if shortest < whole && shortest != self.shortest {
             let (time_s, length_s) = (self.scenario.time.end_s(step - 1), self.scenario.time.length_s(step));
@@ -64,7 +64,7 @@ impl Simulation {
         if of_any_pair * length_s <= scenario.time.stable_rate_dt() {
             return of_any_pair;
         }
-        rate(judge.nearest_acted_on_m(law.as_ref(), links, state))
+        rate(judge.smallest_separation_of_law_m(law.as_ref(), links, state))
     }
 
     /// Returns whether substeps of the law's length change the motion. Under a control rate or given commands, the
@@ -74,7 +74,7 @@ impl Simulation {
     }
 
     /// Flies the `whole` smallest substeps of a step, as many at once as the law's rate and the checks allow.
-    fn fly_parts(&mut self, step: u64, whole: u64, substeps: &mut Substeps) -> Result<(), Ending> {
+    fn fly_substeps(&mut self, step: u64, whole: u64, substeps: &mut Substeps) -> Result<(), Ending> {
         let (begin_s, length_s) = (self.scenario.time.end_s(step - 1), self.scenario.time.length_s(step));
         let seconds = |parts: u64| length_s * (parts as f64 / whole as f64);
         let (mut flown, mut part) = (0, whole);
@@ -86,7 +86,7 @@ impl Simulation {
             }
             let undefined = self.move_vehicles(step, seconds(part))?;
             let bend_m = self.path.bend_m();
-            let (is_refused, on_the_way_per_s) = self.refuses(seconds(part), rate_per_s);
+            let (is_refused, on_the_way_per_s) = self.is_step_too_long(seconds(part), rate_per_s);
             if part > 1 && (bend_m > MAX_BEND_M || is_refused) {
                 self.plant.restore(&self.state);
                 self.controller.link.forget_after(self.time_s);
@@ -111,7 +111,7 @@ impl Simulation {
                 self.time_s = begin_s + seconds(flown);
             }
             std::mem::swap(&mut self.state, &mut self.next);
-            self.resolution.take(&self.state, seconds(part), step)?;
+            self.resolution.add_step(&self.state, seconds(part), step)?;
             self.judge_and_command(Some((step, from_s)), flown == whole)?;
             while part < whole && flown.is_multiple_of(2 * part) {
                 part *= 2;
@@ -130,10 +130,10 @@ impl Simulation {
         let moved_m = longest_move_m(&self.state, &self.path, &self.next);
         let limits_m_s2 = [self.controller.law.capabilities().max_command_m_s2, self.scenario.actuation.max_accel_m_s2];
         let limit_m_s2 = limits_m_s2.into_iter().flatten().fold(f64::INFINITY, f64::min);
-        let part = Part { length_s, rate_per_s, moved_m, limit_m_s2, is_overlong };
+        let part = Substep { length_s, rate_per_s, moved_m, limit_m_s2, is_overlong };
         let error = self.error.unwrap_or_default().after(part);
         self.error = Some(error);
-        self.judge.may_err_by(error.position_m());
+        self.judge.note_integration_error(error.position_m());
     }
 
     /// Moves the vehicles from `state` to `next`. Returns the law's error if the law was undefined on the way and the
@@ -163,7 +163,7 @@ impl Simulation {
     /// Returns whether the last move must be halved: it comes too close to the barrier, or to states in which the law
     /// is too fast for this length \[s\]. The second result is the fastest rate of the law on the way \[1/s\]. It is
     /// that at the start if the law has no barrier or is not evaluated.
-    fn refuses(&mut self, length_s: f64, at_start_per_s: f64) -> (bool, f64) {
+    fn is_step_too_long(&mut self, length_s: f64, at_start_per_s: f64) -> (bool, f64) {
         let Self {
             controller: Controller { law, links, link, .. },
             judge,
@@ -181,17 +181,17 @@ impl Simulation {
         };
         let moved_m = longest_move_m(state, path, next);
         if !plant.holds_commands() {
-            return (judge.refuses(of, moves, moved_m), at_start_per_s);
+            return (judge.is_step_too_long(of, moves, moved_m), at_start_per_s);
         }
         let (clearance_margin_m, most) =
             (judge.clearance_margin_m - moved_m, TimeSpec::DEFAULT_MAX_RATE_DT.min(scenario.time.max_rate_dt));
         let rate = |nearest_m: f64| rate_per_s(law.as_ref(), scenario, (nearest_m, clearance_margin_m));
         let enough = |nearest_m: f64| nearest_m > barrier_m && rate(nearest_m) * length_s <= most;
         let may_leap = link.is_exact() && judge.nearest_m > barrier_m;
-        let nearest_m = judge.nearest_over(of, moves, moved_m, enough);
+        let nearest_m = judge.smallest_separation_of_move(of, moves, moved_m, enough);
         let on_the_way_per_s = rate(nearest_m);
         let is_too_fast = on_the_way_per_s * length_s > MAX_RATE_DT_ON_THE_WAY.max(scenario.time.max_rate_dt);
-        let is_refused = is_too_fast || judge.refuses(of, moves, moved_m);
+        let is_refused = is_too_fast || judge.is_step_too_long(of, moves, moved_m);
         // A law may have no rate at or inside its barrier; no substep is short enough there.
         let leaps = may_leap && nearest_m <= barrier_m;
         (is_refused, if leaps { f64::INFINITY } else { on_the_way_per_s })
@@ -203,7 +203,7 @@ impl Simulation {
         let (number, from_s) = step.unwrap_or((0, self.time_s));
         let refused = |why| Ending::from(Breakdown::Audit { step: number, why });
         let bend_m = self.path.bend_m() + self.resolution.rounding_m();
-        for (after_s, positions_m) in self.path.passed() {
+        for (after_s, positions_m) in self.path.instants() {
             self.judge.sweep(from_s + after_s, positions_m, bend_m, &mut self.events).map_err(refused)?;
         }
         self.controller.accept(self.time_s, &self.state);
@@ -237,8 +237,8 @@ impl Simulation {
             if side_by_side { rayon::join(audit, act) } else { (audit(), act()) };
         self.performance.audit += audit_time;
         let Self { energy_monitor, scenario, controller, state, certificate, events, .. } = self;
-        energy_monitor.look(scenario, controller, (time_s, state), certificate, events);
-        let commanded = self.hold(number, commanded.map_err(Ending::from), law_time);
+        energy_monitor.note_changes(scenario, controller, (time_s, state), certificate, events);
+        let commanded = self.apply_command(number, commanded.map_err(Ending::from), law_time);
         judged.map_err(refused)?;
         self.judge.note_engine_contacts(self.plant.as_ref(), self.time_s, &mut self.events);
         self.judge.note_bounces(self.plant.as_ref(), from_s, &mut self.events);
@@ -246,14 +246,14 @@ impl Simulation {
     }
 
     /// Evaluates the law for the present state.
-    pub(super) fn ask(&mut self) -> Result<(), Ending> {
+    pub(super) fn evaluate_law(&mut self) -> Result<(), Ending> {
         let began = Instant::now();
         let commanded = self.controller.command(self.time_s, &self.state, &mut self.control);
-        self.hold(self.steps, commanded.map_err(Ending::from), began.elapsed())
+        self.apply_command(self.steps, commanded.map_err(Ending::from), began.elapsed())
     }
 
     /// Applies the command to the plant, if the law has one.
-    fn hold(&mut self, step: u64, commanded: Result<(), Ending>, took: Duration) -> Result<(), Ending> {
+    fn apply_command(&mut self, step: u64, commanded: Result<(), Ending>, took: Duration) -> Result<(), Ending> {
         self.performance.law += took;
         let checked = commanded.and_then(|()| match first_row_beyond(&self.control, MAX_COMMAND_M_S2) {
             Some(vehicle) if self.control.row(vehicle).iter().all(|x| x.is_finite()) => {
@@ -273,7 +273,7 @@ impl Simulation {
         let began = Instant::now();
         self.energy = self.controller.energy(self.time_s, &self.state);
         self.performance.energy += began.elapsed();
-        self.energy_monitor.take(self.controller.target.view().revision, self.energy);
+        self.energy_monitor.add(self.controller.target.view().revision, self.energy);
         self.peaks.take(largest_row_norm(&self.control), self.energy);
         Ok(())
     }
@@ -282,7 +282,7 @@ impl Simulation {
 /// Returns the fastest rate of a law \[1/s\] while no pair and no obstacle is closer than given \[m\].
 fn rate_per_s(law: &dyn Law, scenario: &Scenario, (nearest_m, clearance_margin_m): (f64, f64)) -> f64 {
     let query = RateQuery::new(scenario.velocity_coefficient_per_s(), Some(nearest_m));
-    let rates = law.rates(&RateQuery { obstacle_room_m: Some(clearance_margin_m), ..query });
+    let rates = law.rates(&RateQuery { obstacle_margin_m: Some(clearance_margin_m), ..query });
     let of_pairs = rates.fastest_per_s.unwrap_or(0.0);
     match rates.obstacles_per_s2 {
         0.0 => of_pairs,

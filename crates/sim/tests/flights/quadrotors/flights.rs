@@ -6,7 +6,7 @@ use tautline_core::record::Event;
 use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::formation::{Formation, largest_edge_error_m};
 use tautline_laws::law::VoidReason;
-use tautline_sim::plant::{Path, Quadrotors, rapier};
+use tautline_sim::plant::{Quadrotors, StepPath, rapier};
 use tautline_sim::scenario::{Scenario, Space};
 use tautline_sim::sim::{Ending, Simulation};
 use tautline_sim::vehicle::{Airframe, Downwash, Fleet, GRAVITY_M_S2, Ground, Quadrotor, State};
@@ -31,10 +31,10 @@ fn two(positions_m: &[f64; 6], velocities_m_s: &[f64; 6], change: &dyn Fn(&mut Q
 }
 
 fn step(plant: &mut dyn Quadrotors, command: &Rows) -> Swarm {
-    let (mut swarm, mut path) = (Swarm::at_rest(Rows::zeros(command.nrows())), Path::default());
+    let (mut swarm, mut path) = (Swarm::at_rest(Rows::zeros(command.nrows())), StepPath::default());
     plant.apply(command, &mut swarm);
     plant.advance(DT_S, &mut swarm, &mut path).expect("a finite motion");
-    assert!(path.passed().next().is_none() && path.bend_m() == 0.0, "a step is one straight line");
+    assert!(path.instants().next().is_none() && path.bend_m() == 0.0, "a step is one straight line");
     swarm
 }
 
@@ -43,7 +43,7 @@ fn five_crazyflies_reach_the_pentagon_clear_with_nothing_certified() {
     let scenario = builtin("crazyflies", &[]);
     let (flown, log) = fly(&scenario);
     assert_eq!((flown.ending, flown.audit.status), (Ending::Completed, Status::Clear));
-    assert!(flown.certificate.void.contains(&VoidReason::NotAPoint) && flown.certificate.certified_m.is_none());
+    assert!(flown.certificate.void.contains(&VoidReason::VehicleNotPoint) && flown.certificate.certified_m.is_none());
     let error_m = largest_edge_error_m(&flown.last.positions_m, scenario.formation(), &scenario.graph);
     assert!(error_m < scenario.arrival.edge_error_m, "{error_m} m");
     // The height is held up to the sag of a tilt.
@@ -62,7 +62,7 @@ fn five_crazyflies_reach_the_pentagon_clear_with_nothing_certified() {
 }
 
 #[test]
-fn the_flight_of_points_is_the_pentagons_to_scale_and_keeps_more_apart() {
+fn the_flight_of_points_is_the_scaled_pentagon_with_larger_separations() {
     let least_m = |sets: &[&str]| fly(&builtin("crazyflies", sets)).0.audit.closest.expect("a pair").separation_m;
     let [points_m, quadrotors_m] =
         ["point", "crazyflie"].map(|model| least_m(&["time.duration_s=5", &format!("vehicle.model={model}")]));
@@ -195,7 +195,7 @@ fn downwash_acts_below_rotors_and_not_beside() {
     let push = |place_m: Vector3<f64>, downwash: bool| {
         let at = [0.0, 0.0, 0.0, place_m.x, place_m.y, place_m.z];
         let (_, mut fleet) = two(&at, &[0.0; 6], &|quadrotor| quadrotor.downwash = downwash);
-        fleet.feel();
+        fleet.compute_wrenches();
         let weight_n = fleet.dynamics.model().weight_n();
         (1.0 - fleet.wrench(1).force_n.z / weight_n, 1.0 - fleet.wrench(0).force_n.z / weight_n)
     };
@@ -214,13 +214,13 @@ fn rotor_speeds_saturate_at_their_limits() {
     let (dynamics, state) = (&fleet.dynamics, &fleet.states[0]);
     let most_rpm = tautline_sim::vehicle::RotorCurve::of(dynamics.model()).speed_rpm(dynamics.model().max_thrust_n);
     for command_m_s2 in [1e9, -1e9].into_iter().flat_map(|x| [Vector3::x(), Vector3::z()].map(|axis| axis * x)) {
-        let asked_rpm: Vector4<f64> = dynamics.asked_rpm(state, command_m_s2);
-        assert!(asked_rpm.iter().all(|rpm| (0.0..=most_rpm).contains(rpm)), "{command_m_s2}: {asked_rpm}");
+        let commanded_rpm: Vector4<f64> = dynamics.commanded_rpm(state, command_m_s2);
+        assert!(commanded_rpm.iter().all(|rpm| (0.0..=most_rpm).contains(rpm)), "{command_m_s2}: {commanded_rpm}");
     }
     // A level hover needs the rotors to carry the weight; a tilted vehicle turns back before it climbs.
-    let level = dynamics.asked_rpm(state, Vector3::zeros());
+    let level = dynamics.commanded_rpm(state, Vector3::zeros());
     assert!((level - Vector4::repeat(dynamics.hover_rpm())).amax() <= 1e-6);
-    let climbing = dynamics.asked_rpm(state, Vector3::z() * GRAVITY_M_S2);
+    let climbing = dynamics.commanded_rpm(state, Vector3::z() * GRAVITY_M_S2);
     assert!(climbing.iter().all(|&rpm| rpm > dynamics.hover_rpm()));
 }
 

@@ -9,7 +9,7 @@ mod scenarios;
 use nalgebra::{Vector3, Vector4};
 use tautline_core::swarm::{Rows, Swarm, set_row};
 use tautline_laws::formation::Formation;
-use tautline_sim::plant::{Path, Quadrotors, rapier};
+use tautline_sim::plant::{Quadrotors, StepPath, rapier};
 use tautline_sim::scenario::Scenario;
 use tautline_sim::vehicle::{self, Airframe, Fleet, MODELS, Model, Quadrotor, State};
 
@@ -50,7 +50,7 @@ fn fly(
     for step in (0_u32..).take_while(|&step| f64::from(step) * dt_s < duration_s - 0.5 * dt_s) {
         set_row(&mut command, 0, law(f64::from(step) * dt_s, &plant.fleet().states[0]));
         plant.apply(&command, &mut swarm);
-        let mut path = Path::default();
+        let mut path = StepPath::default();
         plant.advance(dt_s, &mut swarm, &mut path).expect("a finite motion");
     }
     plant.fleet().states[0]
@@ -60,12 +60,12 @@ fn fly(
 fn open_loop(
     model: Model,
     from: &dyn Fn(&mut State),
-    asked_rpm: Vector4<f64>,
+    commanded_rpm: Vector4<f64>,
     (duration_s, dt_s): (f64, f64),
 ) -> State {
     let (scenario, mut fleet) = alone(model, 500.0);
     from(&mut fleet.states[0]);
-    fleet.open_loop(&[asked_rpm]);
+    fleet.open_loop(&[commanded_rpm]);
     let mut plant = rapier::quadrotors(&scenario, fleet);
     fly(plant.as_mut(), (duration_s, dt_s), &mut |_, _| Vector3::zeros())
 }

@@ -6,7 +6,7 @@ use std::ops::ControlFlow;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 
-use crate::splitting::{Path, Rule, split};
+use crate::splitting::{RandomProcess, SplittingRule, split};
 
 const STEPS: u32 = 200;
 
@@ -18,25 +18,25 @@ struct Walk {
     steps: u32,
     place: f64,
     highest: f64,
-    sight: Sight,
+    score_kind: Score,
 }
 
 /// Score of a walk.
 #[derive(Clone, Copy)]
-enum Sight {
+enum Score {
     /// The height.
     Height,
     /// The height, rounded down to a multiple of this number.
-    Grains(f64),
+    Quantized(f64),
     /// Distance to this height in standard deviations of the remaining walk, negated; positive above the height. It
     /// predicts the event well: the relative spread of estimates at 1e-6 is about 0.25.
-    Chance(f64),
+    Lookahead(f64),
 }
 
 impl Walk {
-    fn new(sight: Sight) -> Self {
+    fn new(score_kind: Score) -> Self {
         let (random, highest) = (ChaCha8Rng::seed_from_u64(0), f64::NEG_INFINITY);
-        Self { random, second: None, steps: 0, place: 0.0, highest, sight }
+        Self { random, second: None, steps: 0, place: 0.0, highest, score_kind }
     }
 
     fn normal(&mut self) -> f64 {
@@ -50,25 +50,25 @@ impl Walk {
         radius * cos
     }
 
-    fn look(&mut self) {
-        let seen = match self.sight {
-            Sight::Height => self.place,
-            Sight::Grains(grain) => (self.place / grain).floor() * grain,
-            Sight::Chance(height) if self.place > height => self.place - height,
+    fn update_score(&mut self) {
+        let seen = match self.score_kind {
+            Score::Height => self.place,
+            Score::Quantized(grain) => (self.place / grain).floor() * grain,
+            Score::Lookahead(height) if self.place > height => self.place - height,
             // A walk in discrete time exceeds `height` as often as one in continuous time exceeds `height + 0.58`.
-            Sight::Chance(height) => -(height - self.place + 0.58) / f64::from(STEPS - self.steps).sqrt(),
+            Score::Lookahead(height) => -(height - self.place + 0.58) / f64::from(STEPS - self.steps).sqrt(),
         };
         self.highest = self.highest.max(seen);
     }
 }
 
-impl Path for Walk {
+impl RandomProcess for Walk {
     type Saved = Self;
     type Error = Infallible;
 
     fn begin(&mut self, noise_seed: u64) -> Result<(), Infallible> {
-        *self = Self { random: ChaCha8Rng::seed_from_u64(noise_seed), ..Self::new(self.sight) };
-        self.look();
+        *self = Self { random: ChaCha8Rng::seed_from_u64(noise_seed), ..Self::new(self.score_kind) };
+        self.update_score();
         Ok(())
     }
 
@@ -78,7 +78,7 @@ impl Path for Walk {
         }
         self.steps += 1;
         self.place += self.normal();
-        self.look();
+        self.update_score();
         true
     }
 
@@ -156,7 +156,7 @@ fn reflected(height: f64) -> f64 {
     libm::erfc(height / f64::from(2 * STEPS).sqrt())
 }
 
-fn estimates(walk: &Walk, rule: Rule, repetitions: u64) -> Vec<f64> {
+fn estimates(walk: &Walk, rule: SplittingRule, repetitions: u64) -> Vec<f64> {
     let mut walk = walk.clone();
     let one = |repetition: u64| {
         let Ok(split) = split(&mut walk, rule, [2016, repetition], &mut |_| ControlFlow::Continue(()));
@@ -189,7 +189,7 @@ fn the_recursion_converges_and_agrees_with_plain_walks() {
         assert!((above(height, 60.0, 10) / truth - 1.0).abs() < 1e-7);
     }
     let (height, count) = (30.0, 20_000_u32);
-    let mut walk = Walk::new(Sight::Height);
+    let mut walk = Walk::new(Score::Height);
     let hits = (0..count).filter(|&seed| {
         let Ok(()) = walk.begin(u64::from(seed));
         while walk.step() {}
@@ -219,7 +219,7 @@ fn estimates_of_1e_6_and_1e_9_have_no_bias() {
     for (height, near) in [(HEIGHT_1E6, 1e-6), (HEIGHT_1E9, 1e-9)] {
         let truth = above(height, 45.0, 6);
         assert!((0.5..2.0).contains(&(truth / near)), "{truth}");
-        let estimates = estimates(&Walk::new(Sight::Chance(height)), Rule::new(100, 1, 0.0), repetitions());
+        let estimates = estimates(&Walk::new(Score::Lookahead(height)), SplittingRule::new(100, 1, 0.0), repetitions());
         assert!(errors_above(&estimates, truth).abs() < 3.0, "{}", described(&estimates, truth));
         // The formula of continuous time is 20 % and 25 % too high, and the same check detects it.
         let reflected = reflected(height);
@@ -234,7 +234,7 @@ fn estimates_of_1e_6_and_1e_9_have_no_bias() {
 #[test]
 fn estimates_by_height_alone_have_no_bias_and_a_larger_spread() {
     let truth = above(HEIGHT_1E6, 45.0, 6);
-    let estimates = estimates(&Walk::new(Sight::Height), Rule::new(400, 20, HEIGHT_1E6), repetitions() / 4);
+    let estimates = estimates(&Walk::new(Score::Height), SplittingRule::new(400, 20, HEIGHT_1E6), repetitions() / 4);
     assert!(errors_above(&estimates, truth).abs() < 3.0, "{}", described(&estimates, truth));
 }
 
@@ -244,9 +244,9 @@ fn ties_are_unbiased_and_branching_at_the_level_is_biased() {
     let height = 40.0;
     // Integers above 40 are heights of 41 and more.
     let truth = above(height + 1.0, 45.0, 6);
-    let right = Rule::new(100, 1, height);
-    let wrong = Rule { is_past: |score, level| score >= level, ..right };
-    let walk = Walk::new(Sight::Grains(1.0));
+    let right = SplittingRule::new(100, 1, height);
+    let wrong = SplittingRule { is_past: |score, level| score >= level, ..right };
+    let walk = Walk::new(Score::Quantized(1.0));
     let off = [right, wrong].map(|rule| {
         let estimates = estimates(&walk, rule, repetitions());
         errors_above(&estimates, truth)
@@ -257,10 +257,10 @@ fn ties_are_unbiased_and_branching_at_the_level_is_biased() {
 
 #[test]
 fn an_estimate_depends_only_on_seed_and_repetition_and_can_be_ended() {
-    let rule = Rule::new(20, 3, 30.0);
+    let rule = SplittingRule::new(20, 3, 30.0);
     let one = |seed, repetition, most: u64| {
         let carry_on = &mut |steps: u64| if steps < most { ControlFlow::Continue(()) } else { ControlFlow::Break(()) };
-        let Ok(split) = split(&mut Walk::new(Sight::Height), rule, [seed, repetition], carry_on);
+        let Ok(split) = split(&mut Walk::new(Score::Height), rule, [seed, repetition], carry_on);
         split.map(|split| (split.probability, split.iterations, split.steps))
     };
     let first = one(1, 0, u64::MAX).expect("an estimate");
@@ -276,7 +276,7 @@ fn an_estimate_depends_only_on_seed_and_repetition_and_can_be_ended() {
 /// Without a survivor the estimate is 0; if all walks exceed the target it is 1.
 #[test]
 fn no_survivor_gives_0_and_no_ended_walk_gives_1() {
-    let coarse = Walk::new(Sight::Grains(1e6));
-    assert!(estimates(&coarse, Rule::new(10, 1, 5.0), 3).iter().all(|&estimate| estimate == 0.0));
-    assert!(estimates(&coarse, Rule::new(10, 1, -2e6), 3).iter().all(|&estimate| estimate == 1.0));
+    let coarse = Walk::new(Score::Quantized(1e6));
+    assert!(estimates(&coarse, SplittingRule::new(10, 1, 5.0), 3).iter().all(|&estimate| estimate == 0.0));
+    assert!(estimates(&coarse, SplittingRule::new(10, 1, -2e6), 3).iter().all(|&estimate| estimate == 1.0));
 }
