@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{Connectivity, LegCertificate, Preflight, margins};
 use crate::vehicle::Quadrotor;
 use tautline_core::text;
-use tautline_core::text::{at_least, counted, seconds, table};
+use tautline_core::text::{at_least, beside_limit, counted, seconds, table};
 
 /// Warning about a scenario.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -123,7 +123,7 @@ impl Preflight {
             Some(certified_m) => {
                 format!(
                     "certified never closer than {} m in continuous time (delta {} m){}",
-                    at_least(certified_m, 6),
+                    beside_limit(certified_m, self.delta_m, 6),
                     self.delta_m,
                     match (self.recovers_from_deadlock, self.reassigns) {
                         (true, true) => " unless slots are spread or reassigned",
