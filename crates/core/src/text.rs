@@ -70,7 +70,10 @@ pub fn beside_limit(number: f64, limit: f64, decimals: u8) -> String {
 #[must_use]
 pub fn below_bound(number: f64, bound: f64) -> [String; 2] {
     let both = |decimals: u8| [number, bound].map(|number| at_least(number, decimals));
-    (3..=17).map(both).find(|[below, bound]| below != bound).unwrap_or_else(|| [number, bound].map(|x| format!("{x:e}")))
+    (3..=17)
+        .map(both)
+        .find(|[below, bound]| below != bound)
+        .unwrap_or_else(|| [number, bound].map(|x| format!("{x:e}")))
 }
 
 /// Formats a length \[m\], speed or acceleration with three decimals, or in powers of ten below 5e-3 and from 1e7 on.

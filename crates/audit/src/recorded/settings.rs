@@ -211,7 +211,7 @@ impl Limits {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RecordedError {
     /// A number of the settings is out of range.
-    #[error("{option}: must be {range}, got {}{value}", of.as_ref().map(|of| format!("{of}=")).unwrap_or_default())]
+    #[error("{option}: must be {range}, got {}{value:?}", of.as_ref().map(|of| format!("{of}=")).unwrap_or_default())]
     OutOfRange {
         /// Name of the setting, which is that of the option of `tautline audit`.
         option: &'static str,

@@ -42,7 +42,11 @@ pub fn distances(log: &FlightLog, delta_m: f64, certified_m: Option<f64>, title:
     chart.y = Axis::distances("m", &numbers, delta_m);
     chart.level(delta_m, Stroke::solid(INK, 2.0), format!("safety distance δ = {delta_m} m"));
     if let Some(certified_m) = certified_m {
-        chart.level(certified_m, Stroke::dashed(INK, 1.3), format!("certified {} m", beside_limit(certified_m, delta_m, 3)));
+        chart.level(
+            certified_m,
+            Stroke::dashed(INK, 1.3),
+            format!("certified {} m", beside_limit(certified_m, delta_m, 3)),
+        );
     }
     let scale = if chart.y.scale == Scale::Log { " on a logarithmic axis" } else { "" };
     let of = if log.metric().is_metres() { "" } else { ", scaled to the ellipsoids that must stay empty," };

@@ -246,7 +246,9 @@ impl From<RecordedError> for Failure {
             RecordedError::LimitOfJumps { .. } => {
                 ("audit/limit-of-jumps", "give --motion linear, or bounded with --max-accel")
             }
-            RecordedError::UnknownVehicle { .. } => ("audit/unknown-vehicle", "use the names of the recording in --ids, --radius, --max-accel and --offset"),
+            RecordedError::UnknownVehicle { .. } => {
+                ("audit/unknown-vehicle", "use the names of the recording in --ids, --radius, --max-accel and --offset")
+            }
             RecordedError::NotACurve { .. } => ("audit/no-curves", "give --motion linear, hold or bounded"),
             RecordedError::NotSamples { .. } => ("audit/no-samples", "leave --motion out, or give --motion polynomial"),
             RecordedError::RadiusChanges { .. } => {

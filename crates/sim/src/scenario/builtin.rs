@@ -14,8 +14,13 @@ pub struct Builtin {
 const ALL: &[Builtin] = &[
     Builtin {
         name: "pentagon",
-        summary: "five vehicles from a line to a pentagon under the edge-tension law: clear and reached",
+        summary: "five vehicles from a line to the hourglass of the edge-tension paper: clear and reached",
         toml: include_str!("../../../../assets/pentagon.toml"),
+    },
+    Builtin {
+        name: "hexagon",
+        summary: "six vehicles from two rows to a regular hexagon, with less than 1 g: clear and reached",
+        toml: include_str!("../../../../assets/hexagon.toml"),
     },
     Builtin {
         name: "circle",
@@ -69,7 +74,7 @@ const ALL: &[Builtin] = &[
     },
     Builtin {
         name: "thousand",
-        summary: "a thousand vehicles draw together in space: clear and reached",
+        summary: "a thousand vehicles gather in space: clear and reached",
         toml: include_str!("../../../../assets/thousand.toml"),
     },
 ];

@@ -137,9 +137,7 @@ impl Template {
             } else {
                 format!("no law has the name `{name}`")
             };
-            return Err(ScenarioError::new(problem)
-                .coded("scenario/unknown-choice")
-                .with_help(help));
+            return Err(ScenarioError::new(problem).coded("scenario/unknown-choice").with_help(help));
         };
         Ok(NamedLaw { name: name.to_owned(), law: law.complete(self.own.velocity_coefficient_per_s()) })
     }

@@ -286,7 +286,9 @@ impl Scenario {
             } else if distance_m <= delta_m {
                 format!("the slots of vehicles {pair} are {distance} m apart, not more than delta = {delta_m} m")
             } else {
-                format!("the slots of vehicles {pair} are farther apart than delta = {delta_m} m by less than a billionth")
+                format!(
+                    "the slots of vehicles {pair} are farther apart than delta = {delta_m} m by less than a billionth"
+                )
             };
             let help = "enlarge the formation, or reduce law.delta_m";
             return refuse(said, help, (leg, "formation.points_m"), pair);
