@@ -47,8 +47,8 @@ pub fn exact(limit: f64) -> String {
 
 /// Formats `number` beside a `limit` that [`exact`] formats, so that the printed order is the true order.
 ///
-/// Rounds down as [`at_least`] does, with `decimals` decimals or more. Returns `just below ...` for a number that is less
-/// than the limit by at most a relative 1e-9.
+/// Rounds down as [`at_least`] does, with `decimals` decimals or more. Returns `just below ...` for a number that is
+/// less than the limit by at most a relative 1e-9.
 #[must_use]
 pub fn beside_limit(number: f64, limit: f64, decimals: u8) -> String {
     const JUST: f64 = 1e-9;

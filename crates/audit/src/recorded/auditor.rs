@@ -255,9 +255,8 @@ impl TrackAuditor {
     /// Returns the verdict over everything judged.
     ///
     /// # Errors
-    /// [`RecordedError::UnknownVehicle`] if the settings name a vehicle that the recording does not have,
-    /// [`RecordedError::NoBound`] or [`RecordedError::NoLimit`] if a vehicle cannot be judged,
-    /// [`RecordedError::TwoClocks`] if the first samples of two vehicles are more than a month apart.
+    /// [`RecordedError`] if the settings name a vehicle that the recording does not have, if a vehicle cannot be judged,
+    /// or if the first samples of two vehicles are more than a month apart.
     pub fn finish(mut self) -> Result<Outcome, RecordedError> {
         self.check_names()?;
         if let Some(refused) = self.refused {

@@ -47,7 +47,8 @@ impl Preflight {
             format!("the mean velocity carries the whole swarm {} m away", warning::significant(self.drift_m))
         };
         Some(format!(
-            "Positions are not resolved: {said}, {unresolved}. Reduce time.duration_s, or the cause of the mean velocity."
+            "Positions are not resolved: {said}, {unresolved}. Reduce time.duration_s, or the cause of the mean \
+             velocity."
         ))
     }
 

@@ -111,8 +111,8 @@ pub(super) fn significant(number: f64) -> String {
 }
 
 impl Preflight {
-    /// Returns the result in one line: `READY: certified never closer than 2.055307 m in continuous time (delta 2 m), no
-    /// warnings`, or `REFUSED: start-on-line`.
+    /// Returns the result in one line: `READY: certified never closer than 2.055307 m in continuous time (delta 2 m),
+    /// no warnings`, or `REFUSED: start-on-line`.
     #[must_use]
     pub fn headline(&self) -> String {
         let refusing = self.refusing();
