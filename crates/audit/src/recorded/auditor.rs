@@ -255,8 +255,11 @@ impl TrackAuditor {
     /// Returns the verdict over everything judged.
     ///
     /// # Errors
-    /// [`RecordedError`] if the settings name a vehicle that the recording does not have, if a vehicle cannot be judged,
-    /// or if the first samples of two vehicles are more than a month apart.
+    /// [`RecordedError`] in one of these cases:
+    ///
+    /// - the settings name a vehicle that the recording does not have,
+    /// - a vehicle cannot be judged,
+    /// - the first samples of two vehicles are more than a month apart.
     pub fn finish(mut self) -> Result<Outcome, RecordedError> {
         self.check_names()?;
         if let Some(refused) = self.refused {
