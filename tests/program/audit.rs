@@ -234,7 +234,10 @@ fn a_separation_just_above_its_limit_is_shown_above_it() {
     let apart = "t,id,x,y,z\n0,a,0,0,0\n0,b,1.5327002,0,0\n1,a,0,0,0\n1,b,1.5327002,0,0\n";
     let folder = folder(&[("apart.csv", apart)]);
     let judged = audit(folder.path(), &["apart.csv", "--delta", "1.53270015"]);
-    assert!(judged.out.contains(": never closer than 1.53270019"), "{judged:?}");
+    assert!(
+        judged.out.contains(": never closer than 1.5327002 m, a and b at 0.00 s (delta 1.53270015 m)"),
+        "{judged:?}"
+    );
 }
 
 #[test]

@@ -258,7 +258,7 @@ impl Preflight {
     }
 
     fn peak_line(&self) -> Option<String> {
-        let of_leg = if self.legs.is_empty() { "" } else { ", the largest at the start of a leg" };
+        let of_leg = if self.legs.is_empty() { "" } else { " of a leg" };
         self.start_peak_m_s2.map(|peak_m_s2| format!("{} m/s^2 at the start{of_leg}", metres(peak_m_s2)))
     }
 
