@@ -20,7 +20,7 @@ fn a_separation_just_above_delta_is_shown_above_it() {
     assert_eq!(clear.headline(), expected);
     assert!(clear.text().contains("separation   1.532715 m at 3.63 s, vehicles 4 and 5 (delta 1.5327 m"));
     let violated = run(&flown("pentagon-laplacian", &["law.delta_m=1.53272"]), &mut ()).expect("a report");
-    let expected = "VIOLATION: vehicles 4 and 5 came to 1.53271 m (delta 1.53272 m) at 3.63 s";
+    let expected = "VIOLATION: vehicles 4 and 5 came to 1.532715 m (delta 1.53272 m) at 3.63 s";
     assert_eq!(violated.headline(), expected);
 }
 
