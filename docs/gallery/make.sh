@@ -18,7 +18,7 @@ target/release/tautline render "$out/sphere/run.mcap" --out "$out/ball" --at end
 
 target/release/tautline render "$out/obstacles/run.mcap" --out "$out/among" --at 3 --size 960x540 --quiet
 target/release/tautline render "$out/show/run.mcap" --out "$out/word" \
-    --at 15.5 --camera top --theme light --size 960x540 \
+    --at 23.8 --camera top --theme light --size 960x540 \
     --quiet
 
 for moment in start closest end; do
@@ -27,4 +27,4 @@ done
 cp "$out/laplacian/snapshots/violation-1.png" docs/gallery/laplacian-violation.png
 cp "$out/ball/end.png" docs/gallery/sphere.png
 cp "$out/among/at-3.000s.png" docs/gallery/obstacles.png
-cp "$out/word/at-15.500s.png" docs/gallery/show.png
+cp "$out/word/at-23.800s.png" docs/gallery/show.png

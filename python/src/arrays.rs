@@ -50,7 +50,7 @@ impl<'a> Arrays<'a> {
         };
         if !time_s.is_finite() {
             let problem = format!("it is {time_s}");
-            return Err(wrong(NOT_FINITE, format!("t[{k}]"), problem, "times are finite: take the instant out"));
+            return Err(wrong(NOT_FINITE, format!("t[{k}]"), problem, "remove the instant, or correct its time"));
         }
         if let Some(before_s) = k.checked_sub(1).map(|before| self.times_s[before]).filter(|before| *before >= time_s) {
             let how = if before_s == time_s { "is repeated" } else { "runs backwards" };
@@ -64,7 +64,7 @@ impl<'a> Arrays<'a> {
             if position.iter().all(|x| x.is_finite()) {
                 let velocity = velocity.filter(|of| !of.iter().all(|x| x.is_nan()));
                 if let Some(odd) = velocity.and_then(|of| of.into_iter().find(|x| !x.is_finite())) {
-                    let remedy = "velocities are finite, or NaN in every axis where they are not known";
+                    let remedy = "give finite velocities, or NaN in every axis of an unknown velocity";
                     let place = format!("velocities[{k}, {vehicle}]");
                     return Err(wrong(NOT_FINITE, place, format!("it holds {odd}"), remedy));
                 }

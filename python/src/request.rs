@@ -64,7 +64,7 @@ impl ReadOptions {
         for (role, name) in &column {
             if !columns.set(role, name) {
                 let roles = ColumnNames::ROLES.join(", ");
-                return Err(wrong_input(format!("column: `{role}` is no column: the columns are {roles}")));
+                return Err(wrong_input(format!("column: must be one of {roles}, got `{role}`")));
             }
         }
         let scale = match scale.as_deref() {

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
-use tautline_core::text::{at_least, counted, fixed};
+use tautline_core::text::{beside_limit, counted, fixed};
 use tautline_report::report::Status;
 use tautline_report::report::recorded::{LimitFindings, PairFinding, RecordedReport, VehicleFinding};
 use tautline_report::request::{AuditedRecording, Failure};
@@ -159,7 +159,10 @@ pub(super) fn markdown(judged: &[AuditedRecording], failures: &[(String, Failure
         let cells = [
             escape_markdown(&report.source.recording),
             format!("{} {}", mark(report.status), escape_markdown(&report.verdict())),
-            closest.map_or(String::new(), |of| format!("{} {unit}", at_least(of.finding.lower_m, 3))),
+            closest.map_or(String::new(), |of| {
+                let finding = &of.finding;
+                format!("{} {unit}", beside_limit(finding.lower_m, finding.limit_m, 3))
+            }),
             closest.map_or(String::new(), |of| escape_markdown(&of.who.join(" and "))),
             closest.map_or(String::new(), |of| format!("{} s", fixed(of.finding.time_s, 2))),
         ];

@@ -5,9 +5,10 @@ use std::path::Path;
 use clap::Args;
 
 use super::{Exit, console};
+use tautline_core::text::aligned;
 use tautline_recordings::mcap::McapRecording;
 use tautline_report::request::Failure;
-use tautline_sim::scenario::{self, builtin};
+use tautline_sim::scenario::{self, Scenario, Source, builtin};
 
 /// Arguments of `tautline list`.
 #[derive(Debug, Args)]
@@ -23,7 +24,7 @@ pub(super) fn list(arguments: &ListArguments) -> Result<Exit, Failure> {
             Some(builtin) => builtin.toml.to_owned(),
             None => of_recording(name)?,
         },
-        None => table(),
+        None => table()?,
     };
     console::data(&text)?;
     Ok(Exit::Good)
@@ -48,10 +49,17 @@ fn of_recording(name: &str) -> Result<String, Failure> {
     Ok(recording.header().scenario_toml.clone())
 }
 
-fn table() -> String {
-    let width = builtin::all().iter().map(|builtin| builtin.name.len()).max().unwrap_or(0);
-    let lines: Vec<_> = builtin::all().iter().map(|b| format!("{:width$}  {}\n", b.name, b.summary)).collect();
-    lines.concat()
+/// Returns the built-in scenarios with the size of their flights, which decides how long a flight takes.
+fn table() -> Result<String, Failure> {
+    let heading = ["scenario", "vehicles", "time", "steps", "content"].map(str::to_owned).to_vec();
+    let row = |builtin: &builtin::Builtin| {
+        let scenario = Scenario::read(&Source::Builtin(builtin.name.to_owned()), &[])?;
+        let (vehicles, time) = (scenario.count().to_string(), format!("{} s", scenario.time.duration_s));
+        let (steps, content) = (scenario.time.steps().to_string(), builtin.summary.to_owned());
+        Ok(vec![builtin.name.to_owned(), vehicles, time, steps, content])
+    };
+    let rows = std::iter::once(Ok(heading)).chain(builtin::all().iter().map(row));
+    Ok(aligned(&rows.collect::<Result<Vec<_>, Failure>>()?))
 }
 
 /// Prints the JSON Schema of the scenario file.

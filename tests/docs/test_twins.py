@@ -36,9 +36,9 @@ tautline list
 ```
 
 ```text
-circle              six vehicles from a line to a circle under the edge-tension law: clear and reached
+scenario            vehicles  time   steps  content
 ...
-swap                twelve vehicles change places across a circle under the displacement law: clear and reached
+thousand            1000      40 s   4000   a thousand vehicles gather in space: clear and reached
 ```
 
 ```sh
@@ -54,8 +54,8 @@ FAULTS = {
     "an unknown option within a line": ("audit --delta", "audit --dleta", "has no option --dleta"),
     "a missing exit code": ("# exit code 1: a", "# a", "the page says exit code 0, it was 1"),
     "a wrong exit code": ("tautline list\n", "tautline list  # exit code 1\n", "the page says exit code 1, it was 0"),
-    "old output": ("six vehicles from a line", "seven vehicles from a line", "seven vehicles from a line"),
-    "lines in the wrong order": ("circle  ", "thousand  ", "thousand  "),
+    "old output": ("a thousand vehicles", "a million vehicles", "a million vehicles"),
+    "lines in the wrong order": ("scenario  ", "thousand  ", "thousand  "),
     "omitted lines without `...`": ("...\n", "", "does not print"),
     "a file with a wrong key": ("runs = 3", "rums = 3", "rums"),
     "a malformed file": ("runs = 3", "runs 3", "runs"),

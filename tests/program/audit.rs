@@ -199,6 +199,48 @@ fn wrong_input_exits_with_2_and_a_remedy() {
 }
 
 #[test]
+fn messages_name_the_option_and_the_known_names() {
+    let folder = folder(&[("pass.csv", PASS)]);
+    for (arguments, message, help) in [
+        (&["--delta", "-1"][..], "--delta: must be a finite number above 0, got -1.0", "give --delta NUMBER"),
+        (&["--radius", "alpha=-1"], "--radius: must be a finite number of at least 0, got alpha=-1.0", "NAME=NUMBER"),
+        (&["--delta", "1", "--above", "nan"], "--above: must be a finite number, got NaN", "give --above NUMBER"),
+        (
+            &["--delta", "1", "--motion", "bounded", "--max-accel", "zulu=1"],
+            "the recording has no vehicle zulu; it has alpha, bravo",
+            "the names of the recording",
+        ),
+        (
+            &["--delta", "1", "--motion", "hold", "--limit", "accel=2"],
+            "the limit of accel needs continuous motion; with motion hold, vehicles jump from sample to sample",
+            "give --motion linear",
+        ),
+    ] {
+        let ran = audit(folder.path(), &[&["pass.csv"], arguments].concat());
+        let said = ran.err.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(said.contains(message) && said.contains(help), "{ran:?}");
+    }
+    let missing = audit(folder.path(), &["none.csv", "--delta", "1"]);
+    assert!(missing.err.contains("none.csv: cannot read the file: "), "{missing:?}");
+    let layout = audit(folder.path(), &["pass.csv", "--delta", "1", "--layout", "x,y"]);
+    assert!(layout.err.contains("must be one of `time,vehicle,axis`, "), "{layout:?}");
+    let high = audit(folder.path(), &["pass.csv", "--delta", "1", "--above", "100"]);
+    let expected = "UNDECIDED: no two vehicles are present at the same time, one of them above 100.000 m (--above)";
+    assert!(high.out.starts_with(expected), "{high:?}");
+}
+
+#[test]
+fn a_separation_just_above_its_limit_is_shown_above_it() {
+    let apart = "t,id,x,y,z\n0,a,0,0,0\n0,b,1.5327002,0,0\n1,a,0,0,0\n1,b,1.5327002,0,0\n";
+    let folder = folder(&[("apart.csv", apart)]);
+    let judged = audit(folder.path(), &["apart.csv", "--delta", "1.53270015"]);
+    assert!(
+        judged.out.contains(": never closer than 1.5327002 m, a and b at 0.00 s (delta 1.53270015 m)"),
+        "{judged:?}"
+    );
+}
+
+#[test]
 fn an_unwritable_file_exits_with_3() {
     let folder = folder(&[("pass.csv", PASS)]);
     let ran = audit(folder.path(), &["pass.csv", "--delta", "2", "--html", "none/a.html"]);

@@ -114,6 +114,13 @@ fn a_killed_run_can_be_read_up_to_the_last_chunk() {
     assert!(samples.len() > undisturbed.len(), "{} samples", samples.len());
     assert!(samples[..undisturbed.len()] == undisturbed, "what was read is what was flown");
     assert!(samples.iter().enumerate().all(|(k, sample)| sample.step == 4 * k as u64), "without a gap");
+
+    let judged = ran_by(TAUTLINE, underway.folder.path(), &["audit", "out/run.mcap", "--allow-unfinished"]);
+    let last_s = samples.last().expect("samples").time_s;
+    let expected = format!(
+        "UNDECIDED: the recording ends at {last_s:.2} s, before the end of its flight of 1000000.00 s; until then "
+    );
+    assert!(judged.exit == Some(1) && judged.out.starts_with(&expected), "{judged:?}");
 }
 
 /// Judges the recording of an interrupted run with every output.

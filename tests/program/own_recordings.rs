@@ -12,8 +12,9 @@ use tempfile::TempDir;
 use crate::program::{Ran, TAUTLINE, ran_by};
 
 /// Built-in scenarios with the duration of their flights in short tests \[s\].
-const BUILT_IN: [(&str, &str); 12] = [
+const BUILT_IN: [(&str, &str); 13] = [
     ("pentagon", "4"),
+    ("hexagon", "2"),
     ("circle", "2"),
     ("pentagon-laplacian", "5"),
     ("pentagon-collinear", "2"),

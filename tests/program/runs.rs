@@ -292,15 +292,17 @@ fn the_resolved_scenario_of_a_recording_flies_the_same_states_again() {
 fn list_names_every_built_in_and_shows_one_as_toml() {
     let folder = folder();
     let listed = ran(folder.path(), &["list"]);
-    assert_eq!((listed.exit, listed.out.lines().count()), (GOOD, builtin::all().len()));
+    assert_eq!((listed.exit, listed.out.lines().count()), (GOOD, 1 + builtin::all().len()));
     for builtin in builtin::all() {
         assert!(listed.out.contains(builtin.name) && listed.out.contains(builtin.summary), "{}", listed.out);
         let shown = ran(folder.path(), &["list", "--show", builtin.name]);
         assert_eq!((shown.exit, shown.out.as_str()), (GOOD, builtin.toml));
     }
-    let unknown = ran(folder.path(), &["list", "--show", "hexagon"]);
+    let pentagon = listed.out.lines().nth(1).expect("a row").split_whitespace().take(5).collect::<Vec<_>>();
+    assert_eq!(pentagon, ["pentagon", "5", "120", "s", "28800"]);
+    let unknown = ran(folder.path(), &["list", "--show", "heptagon"]);
     assert_eq!((unknown.exit, unknown.out.as_str()), (WRONG_INPUT, ""));
-    assert!(unknown.err.contains("hexagon") && unknown.err.contains("tautline list"), "{}", unknown.err);
+    assert!(unknown.err.contains("heptagon") && unknown.err.contains("tautline list"), "{}", unknown.err);
 }
 
 #[test]

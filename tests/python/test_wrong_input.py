@@ -71,8 +71,8 @@ class Arrays(Case):
         t, p = passing()
         for message, options in (
             ("neither delta nor its radius is given", {}),
-            ("delta must be above 0", {"delta": -1}),
-            ("delta must be above 0", {"delta": float("nan")}),
+            ("--delta: must be a finite number above 0", {"delta": -1}),
+            ("--delta: must be a finite number above 0", {"delta": float("nan")}),
             ("[possible values: linear, hold, polynomial, bounded]", {"delta": 1, "motion": "spline"}),
             ("with --max-accel A", {"delta": 1, "motion": "bounded"}),
             ("--max-accel has no effect", {"delta": 1, "max_accel": 2.0}),

@@ -310,7 +310,7 @@ mod tests {
         assert_eq!((first.pair, first.closed_form_s, first.min_m), (Pair::new(0, 1), None, 2.05));
         assert!(first.parry_s.is_some() && first.parry_s == outcome.parry.min_toi_s);
         let sentence = first.to_string();
-        assert!(sentence.starts_with("vehicles 1-2 between 0 s and 1 s, smallest separation 2.05 m"), "{sentence}");
+        assert!(sentence.starts_with("vehicles 1 and 2 between 0 s and 1 s, smallest separation 2.05 m"), "{sentence}");
     }
 
     #[test]

@@ -192,7 +192,7 @@ impl TryFrom<[usize; 2]> for Pair {
 
 impl fmt::Display for Pair {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}-{}", self.first + 1, self.second + 1)
+        write!(f, "{} and {}", self.first + 1, self.second + 1)
     }
 }
 
@@ -260,6 +260,6 @@ mod tests {
     fn a_pair_is_ordered_and_shown_from_one() {
         let pair = Pair::new(2, 1);
         assert_eq!((pair.first(), pair.second(), pair.numbers()), (1, 2, [2, 3]));
-        assert_eq!(pair.to_string(), "2-3");
+        assert_eq!(pair.to_string(), "2 and 3");
     }
 }

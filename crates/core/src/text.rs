@@ -45,21 +45,35 @@ pub fn exact(limit: f64) -> String {
     (3..=17).map(|decimals| fixed(limit, decimals)).find(is_limit).unwrap_or_else(|| format!("{limit:e}"))
 }
 
-/// Formats `number` \[m\], which is below `limit_m` \[m\], so that the text differs from the limit.
+/// Formats `number` beside a `limit` that [`exact`] formats, so that the printed order is the true order.
 ///
-/// Rounds down as [`at_least`] does, with three decimals or more. Returns `just below ...` within a relative 1e-9 of
-/// the limit.
+/// Rounds down as [`at_least`] does, with `decimals` decimals or more. Returns `just below ...` for a number that is
+/// less than the limit by at most a relative 1e-9.
 #[must_use]
-pub fn metres_below(number: f64, limit_m: f64) -> String {
+pub fn beside_limit(number: f64, limit: f64, decimals: u8) -> String {
     const JUST: f64 = 1e-9;
-    if number >= limit_m * (1.0 - JUST) {
-        return format!("just below {}", exact(limit_m));
-    }
-    let is_distinct = |&decimals: &u8| {
+    let keeps_order = |&decimals: &u8| {
+        if number >= limit {
+            return at_least(number, decimals).parse().is_ok_and(|shown: f64| shown >= limit);
+        }
         let shown = fixed(number, usize::from(decimals));
-        shown != fixed(limit_m, usize::from(decimals)) && (number == 0.0 || shown.parse() != Ok(0.0))
+        shown != fixed(limit, usize::from(decimals)) && (number == 0.0 || shown.parse() != Ok(0.0))
     };
-    (3..=17).find(is_distinct).map_or_else(|| format!("{number:e}"), |decimals| at_least(number, decimals))
+    if number < limit && number >= limit * (1.0 - JUST) {
+        return format!("just below {}", exact(limit));
+    }
+    (decimals..=17).find(keeps_order).map_or_else(|| format!("{number:e}"), |decimals| at_least(number, decimals))
+}
+
+/// Formats a number that is less than a `bound` and the bound, both rounded down, with three decimals or more, so that
+/// the texts differ.
+#[must_use]
+pub fn below_bound(number: f64, bound: f64) -> [String; 2] {
+    let both = |decimals: u8| [number, bound].map(|number| at_least(number, decimals));
+    (3..=17)
+        .map(both)
+        .find(|[below, bound]| below != bound)
+        .unwrap_or_else(|| [number, bound].map(|x| format!("{x:e}")))
 }
 
 /// Formats a length \[m\], speed or acceleration with three decimals, or in powers of ten below 5e-3 and from 1e7 on.
@@ -178,7 +192,7 @@ mod tests {
     }
 
     #[test]
-    fn at_most_rounds_up_and_metres_below_differs_from_the_limit() {
+    fn at_most_rounds_up_and_a_number_beside_its_limit_keeps_the_order() {
         for length_m in [1.999_999_9, 2.46, 1.001, 0.305_304_9, 0.1 + 0.2, 0.0, -0.5, 123_456.789_9] {
             let shown: f64 = at_most(length_m, 6).parse().expect("a number");
             assert!(shown >= length_m && shown - length_m < 1e-6 * (1.0 + 1e-9), "{length_m:?}: {shown}");
@@ -191,9 +205,16 @@ mod tests {
             (2.0_f64.next_down(), 2.0, "just below 2.000"),
             (0.3_f64.next_down(), 0.3, "just below 0.300"),
             (6e-13, 1e-12, "0.0000000000006"),
+            (1.532_715_2, 1.5327, "1.5327"),
+            (1.5327, 1.5327, "1.5327"),
+            (2.460_355, 2.0, "2.460"),
+            (0.1 + 0.2, 0.1 + 0.2, "0.30000000000000004"),
+            (f64::INFINITY, 2.0, "inf"),
         ] {
-            assert_eq!(metres_below(number, limit_m), expected);
+            assert_eq!(beside_limit(number, limit_m, 3), expected);
         }
+        assert_eq!([beside_limit(1.5, 2.0, 6), beside_limit(2.5, 2.0, 6)], ["1.500000", "2.500000"]);
+        assert_eq!(below_bound(2.055_2, 2.055_306_9), ["2.0552", "2.0553"]);
     }
 
     #[test]

@@ -9,7 +9,7 @@ use crate::flight::{FlightSummary, Outcome};
 use crate::statistics::{CONFIDENCE, Estimate, Proportion};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
-use tautline_core::text::{as_toml, at_least, counted, metres_below};
+use tautline_core::text::{as_toml, beside_limit, counted};
 use tautline_report::figures::{Figure, GridAxis, Separation, Share, heat_map, separations, shares};
 use tautline_report::report::page::{Badge, Tone};
 use tautline_report::request::{Failure, ScenarioRequest};
@@ -370,8 +370,7 @@ impl Study for Sweep {
         let interrupted = if self.interrupted { "INTERRUPTED: " } else { "" };
         let every = if self.runs == 1 { String::new() } else { format!(" in each of {} runs", self.runs) };
         let worst = self.worst().and_then(|(point, flight)| Some((point, flight.min_m?))).map(|(point, min_m)| {
-            let shown =
-                if min_m < self.about.delta_m { metres_below(min_m, self.about.delta_m) } else { at_least(min_m, 3) };
+            let shown = beside_limit(min_m, self.about.delta_m, 3);
             format!("; the smallest separation is {shown} m with {}", sets(&self.keys, &point.values).join(", "))
         });
         format!(

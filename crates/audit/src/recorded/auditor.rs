@@ -50,6 +50,9 @@ pub struct TrackAuditor {
     done_s: f64,
     pending: usize,
     segments: u64,
+    /// First vehicle that cannot be judged. An unknown name in the settings may be the cause, and is reported instead
+    /// once all names are known.
+    refused: Option<RecordedError>,
 }
 
 /// Audits a recording in memory: items in order of time, of vehicles with these names.
@@ -85,6 +88,7 @@ impl TrackAuditor {
             done_s: f64::NEG_INFINITY,
             pending: 0,
             segments: 0,
+            refused: None,
         })
     }
 
@@ -130,6 +134,9 @@ impl TrackAuditor {
             self.vehicles.push(Vehicle::new(name, &self.settings, max_gap_s));
         }
         for item in items {
+            if self.refused.is_some() {
+                break;
+            }
             self.take(item)?;
         }
         Ok(())
@@ -157,8 +164,9 @@ impl TrackAuditor {
             }
             Err(error) => return Err(error),
         };
-        if unseen {
-            vehicle.check(&self.settings)?;
+        if unseen && let Err(refused) = vehicle.check(&self.settings) {
+            self.refused = Some(refused);
+            return Ok(());
         }
         if let Some(envelope) = &mut self.envelope {
             envelope.take(item, vehicle.item_context(after_gap));
@@ -247,10 +255,16 @@ impl TrackAuditor {
     /// Returns the verdict over everything judged.
     ///
     /// # Errors
-    /// [`RecordedError::UnknownVehicle`] if the settings name a vehicle that the recording does not have,
-    /// [`RecordedError::TwoClocks`] if the first samples of two vehicles are more than a month apart.
+    /// [`RecordedError`] in one of these cases:
+    ///
+    /// - the settings name a vehicle that the recording does not have,
+    /// - a vehicle cannot be judged,
+    /// - the first samples of two vehicles are more than a month apart.
     pub fn finish(mut self) -> Result<Outcome, RecordedError> {
         self.check_names()?;
+        if let Some(refused) = self.refused {
+            return Err(refused);
+        }
         let end_s = self.vehicles.iter().map(Vehicle::known_s).fold(self.done_s, f64::max);
         if end_s.is_finite() {
             self.judge_until(end_s);

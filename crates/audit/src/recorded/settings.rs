@@ -132,42 +132,41 @@ impl Settings {
 
     /// Checks that every number is in range.
     pub(super) fn check(&self) -> Result<(), RecordedError> {
-        const POSITIVE: (f64, &str) = (MIN_LIMIT_M, "above 0, and finite");
-        const RADIUS: (f64, &str) = (0.0, "0 m or more, and finite");
-        const ACCELERATION: (f64, &str) = (0.0, "0 or more, and finite");
+        const POSITIVE: (f64, &str) = (MIN_LIMIT_M, "a finite number above 0");
+        const NOT_NEGATIVE: (f64, &str) = (0.0, "a finite number of at least 0");
         const FINITE: (f64, &str) = (-LARGEST, "a finite number");
-        let check = |what: &str, value: Option<f64>, (least, range): (f64, &'static str)| match value {
+        let check_of = |option, of: Option<&str>, value: Option<f64>, (least, range): (f64, &'static str)| match value {
             Some(value) if !(least..=LARGEST).contains(&value) => {
-                Err(RecordedError::OutOfRange { what: what.to_owned(), range, value })
+                Err(RecordedError::OutOfRange { option, of: of.map(str::to_owned), range, value })
             }
             _ => Ok(()),
         };
+        let check = |option, value, range| check_of(option, None, value, range);
         check("delta", self.delta_m, POSITIVE)?;
-        check("the radius", self.radius_m, RADIUS)?;
-        check("the largest acceleration", self.max_accel_m_s2, ACCELERATION)?;
+        check("radius", self.radius_m, NOT_NEGATIVE)?;
+        check("max-accel", self.max_accel_m_s2, NOT_NEGATIVE)?;
         for axis in self.ellipsoid_m.iter().flatten() {
-            check("each axis of the ellipsoid", Some(*axis), POSITIVE)?;
+            check("ellipsoid", Some(*axis), POSITIVE)?;
         }
-        check("the start of the window", self.from_s, FINITE)?;
-        check("the end of the window", self.to_s, FINITE)?;
-        check("the height", self.above_m, FINITE)?;
-        if let Some(value) = self.max_gap_s.filter(|gap_s| gap_s.is_nan() || *gap_s < 0.0) {
-            return Err(RecordedError::OutOfRange { what: "the longest gap".to_owned(), range: "0 s or more", value });
-        }
+        check("from", self.from_s, FINITE)?;
+        check("to", self.to_s, FINITE)?;
+        check("above", self.above_m, FINITE)?;
+        // An infinite gap joins all samples.
+        check("max-gap", self.max_gap_s.filter(|gap_s| *gap_s != f64::INFINITY), NOT_NEGATIVE)?;
         let Interval { from_s, to_s } = self.window();
         if from_s > to_s {
             return Err(RecordedError::EmptyWindow { from_s, to_s });
         }
         for (name, of) in &self.vehicles {
-            check(&format!("the radius of {name}"), of.radius_m, RADIUS)?;
-            check(&format!("the clock offset of {name}"), Some(of.offset_s), FINITE)?;
-            check(&format!("the largest acceleration of {name}"), of.max_accel_m_s2, ACCELERATION)?;
+            check_of("radius", Some(name), of.radius_m, NOT_NEGATIVE)?;
+            check_of("offset", Some(name), Some(of.offset_s), FINITE)?;
+            check_of("max-accel", Some(name), of.max_accel_m_s2, NOT_NEGATIVE)?;
         }
         for Limit { quantity, allowed } in &self.envelope.limits {
             let range = if quantity.derivative() == 0 { FINITE } else { POSITIVE };
-            check(&format!("the limit of {}", quantity.name()), Some(*allowed), range)?;
+            check_of("limit", Some(quantity.name()), Some(*allowed), range)?;
         }
-        check("the window of accelerations", self.accel_window_s, POSITIVE)?;
+        check("accel-window", self.accel_window_s, POSITIVE)?;
         let is_limited = self.envelope.limits.iter().any(|limit| limit.quantity == Quantity::Acceleration);
         if self.accel_window_s.is_some() && (!is_limited || self.motion == Some(Interpolation::Bounded)) {
             return Err(RecordedError::NoAccelWindow);
@@ -212,10 +211,12 @@ impl Limits {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RecordedError {
     /// A number of the settings is out of range.
-    #[error("{what} must be {range}, got {value:?}")]
+    #[error("{option}: must be {range}, got {}{value:?}", of.as_ref().map(|of| format!("{of}=")).unwrap_or_default())]
     OutOfRange {
-        /// Name of the setting.
-        what: String,
+        /// Name of the setting, which is that of the option of `tautline audit`.
+        option: &'static str,
+        /// Name of the vehicle or of the limit, if the setting is given for several.
+        of: Option<String>,
         /// Allowed range.
         range: &'static str,
         /// Value.
@@ -318,7 +319,7 @@ pub enum RecordedError {
         radius_m: f64,
     },
     /// A speed or an acceleration is limited for vehicles that jump.
-    #[error("{limit}: vehicles that are held between samples jump and have no {limit}; choose another motion")]
+    #[error("the limit of {limit} needs continuous motion; with motion hold, vehicles jump from sample to sample")]
     LimitOfJumps {
         /// Name of the limited quantity.
         limit: &'static str,

@@ -277,6 +277,14 @@ fn the_limit_is_the_larger_of_delta_and_the_radii() {
     assert_eq!(status(&own, Settings::default()), Status::Violation);
     let none = audit(&names(2), &apart(1.4), Settings::default()).unwrap_err();
     assert_eq!(none, RecordedError::NoLimit { vehicle: "alpha".to_owned() });
+    // A name that the recording does not have is the cause, and is reported with the names of the recording.
+    let zulu = VehicleSettings { radius_m: Some(1.0), max_accel_m_s2: Some(1.0), ..VehicleSettings::default() };
+    let by_name = Settings { vehicles: of(&[("zulu", zulu)]), ..Settings::default() };
+    let bounded = Settings { motion: Some(Interpolation::Bounded), delta_m: Some(1.0), ..by_name.clone() };
+    for settings in [by_name, bounded] {
+        let unknown = audit(&names(2), &pass(3.0), settings).expect_err("an unknown vehicle");
+        assert_eq!(unknown.to_string(), "the recording has no vehicle zulu; it has alpha, bravo");
+    }
 }
 
 pub(crate) fn obstacle_at(shape: Shape, at: [f64; 3]) -> Obstacle {

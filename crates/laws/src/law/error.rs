@@ -4,6 +4,7 @@ use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::space::{Metric, Obstacle};
 use tautline_core::swarm::{Pair, Swarm, first_row_not_finite, row};
+use tautline_core::text::{beside_limit, exact};
 
 use super::tension::TensionError;
 
@@ -17,7 +18,11 @@ pub enum LawError {
     #[error("it failed")]
     Failed,
     /// A pair is at or inside the distance where its tension is infinite. This is a collision; values are not clamped.
-    #[error("vehicles {pair} are {separation_m} m apart, not more than the safety distance {delta_m} m")]
+    #[error(
+        "vehicles {pair} are {} m apart, not more than the safety distance {} m",
+        beside_limit(*separation_m, *delta_m, 3),
+        exact(*delta_m)
+    )]
     Collision {
         /// The first such pair in index order.
         pair: Pair,
@@ -28,9 +33,11 @@ pub enum LawError {
     },
     /// A vehicle is at or inside the clearance of an obstacle, where the law's tension is infinite.
     #[error(
-        "vehicle {} is {distance_m} m from obstacle {}, not more than the clearance {clearance_m} m",
+        "vehicle {} is {} m from obstacle {}, not more than the clearance {} m",
         vehicle + 1,
-        obstacle + 1
+        beside_limit(*distance_m, *clearance_m, 3),
+        obstacle + 1,
+        exact(*clearance_m)
     )]
     Obstacle {
         /// The first such vehicle, from 0.
@@ -44,8 +51,11 @@ pub enum LawError {
     },
     /// A pair is at or inside the barrier distance by a sensed or received state, though not in truth.
     #[error(
-        "vehicles {pair} sense or receive a separation of {known_m} m, not more than the safety distance {delta_m} m; \
-         their true separation is {true_m} m"
+        "vehicles {pair} sense or receive a separation of {} m, not more than the safety distance {} m; their true \
+         separation is {} m",
+        beside_limit(*known_m, *delta_m, 3),
+        exact(*delta_m),
+        beside_limit(*true_m, *delta_m, 3)
     )]
     KnownCollision {
         /// The first such pair in index order.
@@ -59,10 +69,13 @@ pub enum LawError {
     },
     /// A vehicle is at or inside the clearance of an obstacle by its sensed position, though not in truth.
     #[error(
-        "vehicle {} senses a distance of {known_m} m from obstacle {}, not more than the clearance {clearance_m} m; \
-         its true distance is {true_m} m",
+        "vehicle {} senses a distance of {} m from obstacle {}, not more than the clearance {} m; its true distance is \
+         {} m",
         vehicle + 1,
-        obstacle + 1
+        beside_limit(*known_m, *clearance_m, 3),
+        obstacle + 1,
+        exact(*clearance_m),
+        beside_limit(*true_m, *clearance_m, 3)
     )]
     KnownObstacle {
         /// The first such vehicle, from 0.
@@ -86,7 +99,11 @@ pub enum LawError {
     #[error("the state of the swarm is too large for double precision")]
     OutOfRange,
     /// The slots of a pair are so close that its tension does not exist.
-    #[error("the slots of vehicles {pair} are {distance_m} m apart, not more than the safety distance {delta_m} m")]
+    #[error(
+        "the slots of vehicles {pair} are {} m apart, not more than the safety distance {} m",
+        beside_limit(*distance_m, *delta_m, 3),
+        exact(*delta_m)
+    )]
     Target {
         /// The first such pair in index order.
         pair: Pair,
@@ -159,9 +176,11 @@ pub enum ParameterError {
     },
     /// A slot is at or inside the clearance of an obstacle.
     #[error(
-        "the slot of vehicle {} is {distance_m} m from obstacle {}, not more than the clearance {clearance_m} m",
+        "the slot of vehicle {} is {} m from obstacle {}, not more than the clearance {} m",
         vehicle + 1,
-        obstacle + 1
+        beside_limit(*distance_m, *clearance_m, 3),
+        obstacle + 1,
+        exact(*clearance_m)
     )]
     ObstacleOverSlot {
         /// The vehicle, from 0.

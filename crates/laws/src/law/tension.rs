@@ -3,6 +3,8 @@
 
 use std::hint::select_unpredictable;
 
+use tautline_core::text::{beside_limit, exact};
+
 /// asinh(1) = ln(1 + sqrt 2): the scaled clearance s = (l - delta)/K at the minimum.
 pub(super) const REST: f64 = 0.881_373_587_019_543;
 /// exp(-2 asinh(1)) = (sqrt 2 - 1)^2.
@@ -54,7 +56,11 @@ pub enum TensionError {
         delta_m: f64,
     },
     /// The rest length does not exceed delta: K = (d - delta)/asinh(1) would not be positive.
-    #[error("the desired distance is {rest_m} m; it must be finite and greater than the safety distance {delta_m} m")]
+    #[error(
+        "the desired distance is {} m; it must be finite and greater than the safety distance {} m",
+        beside_limit(*rest_m, *delta_m, 3),
+        exact(*delta_m)
+    )]
     Rest {
         /// Given value \[m\].
         rest_m: f64,

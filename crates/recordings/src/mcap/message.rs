@@ -8,6 +8,7 @@ use serde::{Deserialize, Serialize, Serializer};
 use super::topic::Topic;
 use tautline_core::record::{Channel, Event, OwnedSample, Peaks, ReadFault, Sample};
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm};
+use tautline_core::text::{at_least, metres};
 
 /// Topic that every run recording has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -237,13 +238,13 @@ impl From<&Event> for EventMessage<&'static str> {
                 "violation-ended",
                 pair.numbers(),
                 *min_m,
-                format!("vehicles {pair} are clear again after coming to {min_m} m"),
+                format!("vehicles {pair} are clear again after coming to {} m", at_least(*min_m, 6)),
             ),
             Event::Approach { pair, separation_m, .. } => (
                 "approach",
                 pair.numbers(),
                 *separation_m,
-                format!("vehicles {pair} came to {separation_m} m at the closest"),
+                format!("vehicles {pair} came to {} m at the closest", at_least(*separation_m, 6)),
             ),
             Event::ObstacleViolationBegan { vehicle, obstacle, .. } => (
                 "obstacle-violation-began",
@@ -255,13 +256,23 @@ impl From<&Event> for EventMessage<&'static str> {
                 "obstacle-violation-ended",
                 [vehicle + 1, obstacle + 1],
                 *min_m,
-                format!("vehicle {} is clear of obstacle {} again after {min_m} m", vehicle + 1, obstacle + 1),
+                format!(
+                    "vehicle {} is clear of obstacle {} again after coming to {} m",
+                    vehicle + 1,
+                    obstacle + 1,
+                    at_least(*min_m, 6)
+                ),
             ),
             Event::ObstacleApproach { vehicle, obstacle, distance_m, .. } => (
                 "obstacle-approach",
                 [vehicle + 1, obstacle + 1],
                 *distance_m,
-                format!("vehicle {} came to {distance_m} m from obstacle {} at the closest", vehicle + 1, obstacle + 1),
+                format!(
+                    "vehicle {} came to {} m from obstacle {} at the closest",
+                    vehicle + 1,
+                    at_least(*distance_m, 6),
+                    obstacle + 1
+                ),
             ),
             Event::OtherLaw { name, .. } => ("other-law", NO_PAIR, f64::NAN, name.clone()),
             Event::LegBegan { leg, .. } => {
@@ -287,7 +298,7 @@ impl From<&Event> for EventMessage<&'static str> {
                 "hulls-hit",
                 pair.numbers(),
                 *closing_m_s,
-                format!("the hulls of vehicles {pair} hit at {closing_m_s} m/s"),
+                format!("the hulls of vehicles {pair} hit at {} m/s", metres(*closing_m_s)),
             ),
             Event::StepRefined { dt_s, .. } => {
                 ("step-refined", NO_PAIR, *dt_s, format!("a step was flown in steps down to {dt_s} s"))

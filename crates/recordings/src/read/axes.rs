@@ -40,7 +40,7 @@ impl FromStr for Axes {
 
     /// Parses as [`Self::from_name`] does.
     fn from_str(name: &str) -> Result<Self, String> {
-        let help = "three directions such as enu, ned or nwu, or the source of x, y and z such as y,x,-z";
+        let help = "three directions such as enu, ned and nwu; or the source of x, y and z such as y,x,-z";
         Self::from_name(name).ok_or_else(|| format!("`{name}` is not {help}"))
     }
 }

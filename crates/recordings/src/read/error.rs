@@ -112,7 +112,7 @@ impl fmt::Display for Place {
 #[non_exhaustive]
 pub enum Fault {
     /// Error of the operating system.
-    #[error("{0}")]
+    #[error("cannot read the file: {0}")]
     System(#[source] io::Error),
     /// The file has no bytes.
     #[error("it is empty")]
@@ -133,7 +133,7 @@ pub enum Fault {
     #[error("it is truncated: {0}")]
     Truncated(String),
     /// The file was not closed, so that its end may be missing.
-    #[error("it is truncated: it was not closed, so that its end may be missing")]
+    #[error("the recorder did not close the file, so the end may be missing")]
     Unfinished,
     /// Compressed data exceed the growth limit; the sizes.
     #[error("{0}")]

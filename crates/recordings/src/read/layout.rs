@@ -509,7 +509,7 @@ impl<'a> Columns<'a> {
             let size = heading::size_of(unit, is_velocity(role)).ok_or_else(|| {
                 let problem = format!("column {name} has an unknown unit of {what}, {}", quoted(unit));
                 let remedy =
-                    "use m, cm, mm, km, ft or in, or name the column with --column and set its unit with --scale";
+                    "use one of m, cm, mm, km, ft, in; or name the column with --column and set its unit with --scale";
                 Fault::coded("recording/unknown-unit", problem, remedy)
             })?;
             metres[column] = size;

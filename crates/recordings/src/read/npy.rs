@@ -78,7 +78,7 @@ impl Array {
         let descr = value(&header, "descr").ok_or_else(|| broken("type"))?;
         let descr = descr.trim_matches(['\'', '"']);
         let (kind, width, big_endian) = kind(descr).ok_or_else(|| {
-            let remedy = "save times as float64, int64 or datetime64, and positions as float32 or float64";
+            let remedy = "save times as one of float64, int64, datetime64, and positions as one of float32, float64";
             Fault::coded("recording/element-type", format!("it holds elements of type `{descr}`"), remedy)
         })?;
         let fortran_order = value(&header, "fortran_order").ok_or_else(|| broken("order"))? == "True";

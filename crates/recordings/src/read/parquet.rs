@@ -146,7 +146,7 @@ fn unreadable(
         _ => None,
     });
     packed.map(|what| {
-        ("recording/unsupported-compression", what, "save it uncompressed, or packed by snappy, gzip, lz4 or zstd")
+        ("recording/unsupported-compression", what, "save it uncompressed, or packed by one of snappy, gzip, lz4, zstd")
     })
 }
 
@@ -187,7 +187,7 @@ fn read_cells(column: &mut Column, name: &str, count: usize) -> Result<Vec<Cell>
         _ => refuse(
             "recording/element-type",
             format!("column `{name}` holds neither numbers (float, double, int32, int64) nor text"),
-            "save numbers as double, time as double, int64 or time stamps, and vehicles as text or int64",
+            "save numbers as double, time as one of double, int64, timestamp, and vehicles as one of text, int64",
         ),
     }
 }

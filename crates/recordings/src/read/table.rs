@@ -141,8 +141,8 @@ impl<C: Cells> Table<C> {
             return refuse(
                 "recording/time-format",
                 problem,
-                "write all times as numbers, in seconds or in s, ms, us or ns since 1970, or all as dates with a time \
-                 like 2023-11-14T22:13:20.5Z",
+                "write all times as numbers in one unit (s, ms, us, ns), or all as dates with a time like \
+                 2023-11-14T22:13:20.5Z",
             );
         }
         let number = odd_number(&self.cells, column, "remove the row: each row needs a time")?;

@@ -8,7 +8,7 @@ use super::labels::{LabelLayout, width};
 use super::{Annotation, pixels};
 use tautline_audit::Violation;
 use tautline_core::swarm::{Bounce, Pair};
-use tautline_core::text::at_least;
+use tautline_core::text::{at_least, beside_limit, exact};
 use tautline_sim::plan::Plan;
 
 /// Number of vehicles up to which all names are drawn; in a larger swarm only those of vehicles closer than delta to
@@ -68,11 +68,11 @@ impl SceneBuilder<'_> {
     fn banner(&self, labels: &mut LabelLayout) -> f32 {
         let Some(&(violation, distance_m)) = self.violated.first() else { return self.obstacle_banner(labels) };
         let Violation { min_m, min_at_s, limit_m, .. } = violation;
-        let (pair, limit) = (self.pair(violation.pair), metres(limit_m));
+        let pair = self.pair(violation.pair);
         let apart = if distance_m < limit_m {
-            format!("{} apart", metres(distance_m))
+            format!("{} m apart", beside_limit(distance_m, limit_m, 3))
         } else if min_m < limit_m {
-            format!("{} apart at {min_at_s:.2} s", metres(min_m))
+            format!("{} m apart at {min_at_s:.2} s", beside_limit(min_m, limit_m, 3))
         } else {
             "too close".to_owned()
         };
@@ -81,7 +81,7 @@ impl SceneBuilder<'_> {
             more => format!(" and {more} more"),
         };
         let texts = [
-            format!("VIOLATION  vehicles {pair} {apart}, delta {limit}{more}"),
+            format!("VIOLATION  vehicles {pair} {apart}, delta {} m{more}", exact(limit_m)),
             format!("VIOLATION {pair} {apart}"),
             "VIOLATION".to_owned(),
         ];
@@ -165,10 +165,12 @@ impl SceneBuilder<'_> {
     /// Returns the closest approach so far, from the longest wording to the shortest.
     fn closest_so_far(&self) -> Vec<String> {
         let Some(approach) = self.frame.so_far else { return Vec::new() };
-        let (separation, pair) = (metres(approach.separation_m), self.pair(approach.pair));
+        let shown_m = |delta_m| beside_limit(approach.separation_m, delta_m, 3);
+        let separation = self.timeline.delta_m.map_or(metres(approach.separation_m), |delta_m| shown_m(delta_m) + " m");
+        let pair = self.pair(approach.pair);
         let at = format!("{:.2} s", approach.time_s);
         let scaled = if self.timeline.log.metric().is_metres() { "" } else { ", scaled" };
-        let delta = |delta_m| format!("  (delta {}{scaled})", metres(delta_m));
+        let delta = |delta_m| format!("  (delta {} m{scaled})", exact(delta_m));
         let delta = self.timeline.delta_m.map_or(String::new(), delta);
         vec![
             format!("closest so far {separation}, vehicles {pair} at {at}{delta}"),

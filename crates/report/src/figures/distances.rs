@@ -7,7 +7,7 @@ use super::spans::{Span, Spans};
 use super::svg::{INK, PALETTE, SOFT_INK, Stroke};
 use crate::flight_log::{FEW_VEHICLES, FlightLog, nearest_present, pairs};
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, separation};
-use tautline_core::text::{at_least, counted};
+use tautline_core::text::{beside_limit, counted};
 
 /// Largest number of pairs whose distances are ranked at an instant.
 const RANKED_PAIRS: usize = 20_000;
@@ -42,7 +42,11 @@ pub fn distances(log: &FlightLog, delta_m: f64, certified_m: Option<f64>, title:
     chart.y = Axis::distances("m", &numbers, delta_m);
     chart.level(delta_m, Stroke::solid(INK, 2.0), format!("safety distance δ = {delta_m} m"));
     if let Some(certified_m) = certified_m {
-        chart.level(certified_m, Stroke::dashed(INK, 1.3), format!("certified {} m", at_least(certified_m, 3)));
+        chart.level(
+            certified_m,
+            Stroke::dashed(INK, 1.3),
+            format!("certified {} m", beside_limit(certified_m, delta_m, 3)),
+        );
     }
     let scale = if chart.y.scale == Scale::Log { " on a logarithmic axis" } else { "" };
     let of = if log.metric().is_metres() { "" } else { ", scaled to the ellipsoids that must stay empty," };
@@ -51,7 +55,7 @@ pub fn distances(log: &FlightLog, delta_m: f64, certified_m: Option<f64>, title:
         spans.vehicles()
     );
     if let Some(closest) = closest {
-        let metres = at_least(closest.separation_m, 3);
+        let metres = beside_limit(closest.separation_m, delta_m, 3);
         let [first, second] = closest.pair.numbers();
         let words = format!("{metres} m, vehicles {first} and {second} at {:.2} s", closest.time_s);
         description.extend([" Closest: ", &words, "."]);
@@ -117,7 +121,8 @@ fn of_many_pairs(spans: &Spans<'_>, chart: &mut Chart) -> String {
     for (k, pair) in closest_pairs(&closest, spans.vehicles()).into_iter().enumerate() {
         let apart_m = |span: &Span<'_>| separation(&scaled(span), pair.first(), pair.second());
         let apart = spans.iter().map(|span| (span.time_s, apart_m(span))).collect();
-        chart.line(apart, Stroke::solid(PALETTE[k + 1], 1.0), pair.to_string());
+        let [first, second] = pair.numbers();
+        chart.line(apart, Stroke::solid(PALETTE[k + 1], 1.0), format!("{first}-{second}"));
     }
     let smallest = closest.iter().map(|&(time_s, closest)| (time_s, closest.separation_m)).collect();
     chart.line(smallest, Stroke::dashed(SOFT_INK, 1.4), "smallest");

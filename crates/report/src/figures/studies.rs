@@ -4,7 +4,7 @@ use super::Figure;
 use super::axis::Axis;
 use super::chart::{Chart, Mark};
 use super::svg::{INK, PALETTE, SOFT_INK, Stroke};
-use tautline_core::text::metres;
+use tautline_core::text::{exact, metres};
 
 /// Draws the smallest separation found so far \[m\] over the `flights` of a search, with delta and the separation of
 /// the flight of the unchanged scenario. `found` holds each flight, numbered from 1, that was worse than all before.
@@ -21,7 +21,7 @@ pub fn attack(found: &[(u64, f64)], flights: u64, delta_m: f64, own_m: Option<f6
     }
     points.extend(points.last().map(|&(_, worst_m)| (last, worst_m)));
     chart.line(points, Stroke::solid(PALETTE[0], 1.8), "worst so far");
-    chart.level(delta_m, Stroke::dashed(INK, 1.3), format!("delta = {} m", metres(delta_m)));
+    chart.level(delta_m, Stroke::dashed(INK, 1.3), format!("delta = {} m", exact(delta_m)));
     if let Some(own_m) = own_m {
         chart.level(own_m, Stroke::dashed(SOFT_INK, 1.0), "unchanged scenario".to_owned());
     }
@@ -124,7 +124,7 @@ pub fn separations(name: &str, key: &str, flights: &[Separation], delta_m: f64) 
     let curve = |of: fn(&Separation) -> f64| flights.iter().map(|flight| (flight.value, of(flight))).collect();
     chart.line(curve(|of| of.median_m), Stroke::of_line(0), "median of the flights");
     chart.line(curve(|of| of.smallest_m), Stroke::of_line(1), "smallest of all flights");
-    chart.level(delta_m, Stroke::dashed(INK, 1.3), format!("delta = {} m", metres(delta_m)));
+    chart.level(delta_m, Stroke::dashed(INK, 1.3), format!("delta = {} m", exact(delta_m)));
     let title = format!("Smallest separation over {key}");
     chart.figure(
         name,

@@ -166,7 +166,7 @@ impl Replay {
         let has_gaps =
             !judged.is_else_known || moments.iter().any(|of| matches!(of.kind, Kind::Undecided | Kind::Unseen));
         let name = |vehicle: usize| stage.vehicles.get(vehicle).map(|name| cut(name, LONGEST_NAME));
-        let words = Words { unit: judged.unit, has_gaps, name };
+        let words = Words { unit: judged.unit, limit: judged.limit, has_gaps, name };
         let things = obstacle_meshes(stage, &extent, listed, room_bytes);
         let obstacles_off_m = things.iter().map(|thing| thing.off_m).fold(0.0, f64::max);
         let mut data = Data {

@@ -24,7 +24,7 @@ use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use nalgebra::Vector3;
 use tautline_audit::{ObjectPair, Violation};
-use tautline_core::text::{exact, fixed, metres_below};
+use tautline_core::text::{beside_limit, exact, fixed};
 
 /// Largest size of the replays of a page \[bytes\].
 pub const PAGE_BYTES: usize = 1_000_000;
@@ -96,7 +96,7 @@ impl Moment {
     #[must_use]
     pub fn violation(found: &Violation<ObjectPair>, names: &str, unit: &str) -> Self {
         let &Violation { pair, from_s, to_s, min_m, min_at_s, limit_m } = found;
-        let (least, limit) = (metres_below(min_m, limit_m), exact(limit_m));
+        let (least, limit) = (beside_limit(min_m, limit_m, 3), exact(limit_m));
         let [at, from, to] = [min_at_s, from_s, to_s].map(|time_s| fixed(time_s, 3));
         let brief = format!("{names} come to {least} {unit} (limit {limit})");
         let said = format!(

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::{Kind, Moment, base64_of, doubles};
 use tautline_audit::{Approach, Slice, Slices};
-use tautline_core::text::{at_least, at_most, seconds};
+use tautline_core::text::{at_most, beside_limit, seconds};
 
 /// Number of decimals of a distance.
 const DECIMALS: u8 = 3;
@@ -18,6 +18,8 @@ pub(super) type Statement = (f64, String);
 pub(super) struct Words<'a, N> {
     /// Unit of distances.
     pub(super) unit: &'a str,
+    /// Limit of all separations; the limit of a pair if it is `None`.
+    pub(super) limit: Option<f64>,
     /// Whether distances are unknown at some times.
     pub(super) has_gaps: bool,
     /// Function that returns the name of a vehicle.
@@ -73,7 +75,8 @@ impl<N: Fn(usize) -> Option<String>> Words<'_, N> {
         let names = of.pair.vehicles().and_then(|pair| Some([(self.name)(pair.first())?, (self.name)(pair.second())?]));
         let who = names.map_or(String::new(), |[first, second]| format!(", {first} and {second}"));
         let bound = if of.is_known() { "" } else { "at least " };
-        format!("{} {bound}{} {}{who}", self.begin(), at_least(of.certain_m(), DECIMALS), self.unit)
+        let shown = beside_limit(of.certain_m(), self.limit.unwrap_or(of.limit_m), DECIMALS);
+        format!("{} {bound}{shown} {}{who}", self.begin(), self.unit)
     }
 
     fn at_most(&self, of: &Approach) -> String {
@@ -215,7 +218,7 @@ mod tests {
     }
 
     fn nearest_said(slices: &[Slice], has_gaps: bool) -> Vec<(f64, String)> {
-        Words { unit: "m", has_gaps, name: |k: usize| Some((k + 1).to_string()) }.over(slices)
+        Words { unit: "m", limit: None, has_gaps, name: |k: usize| Some((k + 1).to_string()) }.over(slices)
     }
 
     #[test]
@@ -246,7 +249,7 @@ mod tests {
     fn number_of_statements_is_bounded() {
         let mut slices = Slices::new(5000);
         (0..4000).map(f64::from).for_each(|k| slices.take(slice(k, [5000.0 - k; 2])));
-        let words = Words { unit: "m", has_gaps: false, name: |_| None };
+        let words = Words { unit: "m", limit: None, has_gaps: false, name: |_| None };
         let said = so_far(&slices, &words, 40);
         assert!(said.len() <= 40 && said.len() > 24, "{}", said.len());
         assert_eq!(said.last(), Some(&(4000.0, "closest so far 1001.000 m".to_owned())));

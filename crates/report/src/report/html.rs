@@ -9,7 +9,7 @@ use super::section::Section;
 use crate::figures::Figure;
 use crate::replay::{NoReplay, Replay};
 use tautline_core::swarm::Bounce;
-use tautline_core::text::{at_least, metres, seconds, significant};
+use tautline_core::text::{beside_limit, metres, seconds, significant};
 use tautline_laws::formation::Freedom;
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::{PlantSpec, Scenario};
@@ -55,8 +55,8 @@ impl Report {
         page.sections.extend(self.sections().iter().map(|section| section.html(LISTED)));
         page.add("Pictures", [page::pictures(about.pictures)]);
         page.add("Figures", [page::figures(about.figures)]);
-        page.add("What was assumed", [page::list(&self.assumptions(about.scenario))]);
-        page.add("Repeat it", [self.repetition(about)]);
+        page.add("Assumptions", [page::list(&self.assumptions(about.scenario))]);
+        page.add("Reproduce", [self.repetition(about)]);
         page.add("Performance", self.performance.map(|times| page::list(&[times.line()])));
         page.render()
     }
@@ -65,7 +65,8 @@ impl Report {
     fn sections(&self) -> Vec<Section> {
         let violation = |violation: &Violation| {
             let [from, to, at] = [violation.from_s, violation.to_s, violation.min_at_s].map(seconds);
-            [violation.pair.to_string(), from, to, format!("{} m", at_least(violation.min_m, 6)), at]
+            let min = beside_limit(violation.min_m, self.separation.delta_m, 6);
+            [violation.pair.to_string(), from, to, format!("{min} m"), at]
         };
         let columns = &["Vehicles", "From", "To", "Smallest", "At"];
         let caption = "intervals in which a pair was below delta";

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::flight::FlightResult;
 use tautline_audit::AuditOutcome;
 use tautline_core::swarm::{Bounce, Pair};
-use tautline_core::text::{metres, metres_below, seconds};
+use tautline_core::text::{beside_limit, exact, metres, seconds};
 
 /// Collisions of solid hulls, or the pair of points whose hulls would have collided.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -85,8 +85,8 @@ impl Hulls {
             format!(
                 "Vehicles {first} and {second} passed through each other: their hulls touch at {} m, and they came to \
                  {} m at {}. {why}. Solid hulls would move otherwise from then on.",
-                metres(touching_m),
-                metres_below(min_m, touching_m),
+                exact(touching_m),
+                beside_limit(min_m, touching_m, 3),
                 seconds(min_at_s)
             )
         });

@@ -5,7 +5,7 @@ use super::obstacles::{ObstacleApproach, ObstacleViolation};
 use crate::replay::{JudgementContext, LONGEST_NAME, Moment, cut};
 use tautline_audit::{ObjectPair, Status, Violation};
 use tautline_core::swarm::Pair;
-use tautline_core::text::at_least;
+use tautline_core::text::beside_limit;
 
 impl Report {
     /// Returns the closest approach, the violations of pairs and those of these obstacles, the gravest first. Distances
@@ -14,7 +14,7 @@ impl Report {
     pub fn moments(&self, obstacles: &[String]) -> Vec<Moment> {
         let (delta_m, unit) = (self.separation.delta_m, self.judgement().unit);
         let closest = self.separation.closest().map(|of| {
-            let distance = format!("{} {unit}", at_least(of.separation_m, 6));
+            let distance = format!("{} {unit}", beside_limit(of.separation_m, delta_m, 6));
             Moment::closest(ObjectPair::Vehicles(of.pair), &names_of(of.pair), &distance, of.time_s)
         });
         let pair = |of: &ObstacleApproach| {
@@ -24,7 +24,7 @@ impl Report {
         let names = |of: &ObstacleApproach| format!("{} and {}", of.vehicle, cut(&of.obstacle, LONGEST_NAME));
         let nearest = self.obstacles.iter().flat_map(|of| &of.closest).next();
         let closest = closest.or_else(|| {
-            let distance = format!("{} m", at_least(nearest?.min_m, 6));
+            let distance = format!("{} m", beside_limit(nearest?.min_m, nearest?.clearance_m, 6));
             nearest.map(|of| Moment::closest(pair(of), &names(of), &distance, of.min_at_s))
         });
         let mut violations: Vec<_> = self.audit.violations.iter().collect();

@@ -6,7 +6,7 @@ use super::flight::{FlightResult, finite};
 use super::section::Section;
 use super::verdict::INTEGRATION;
 use tautline_audit::{Approach, ClearanceOutcome, ObjectPair, Status, Violation};
-use tautline_core::text::{at_least, counted, metres, metres_below, seconds};
+use tautline_core::text::{at_least, beside_limit, counted, exact, metres, seconds};
 use tautline_sim::sim::Ending;
 
 /// Findings of the audit on obstacles.
@@ -159,7 +159,8 @@ impl Obstacles {
     pub(super) fn sections(&self) -> [Section; 2] {
         let cells = |approach: &ObstacleApproach| {
             let ObstacleApproach { vehicle, obstacle, clearance_m, min_m, min_at_s } = approach;
-            [vehicle.to_string(), obstacle.clone(), metres(*clearance_m), shown(*min_m), seconds(*min_at_s)]
+            let near = shown(*min_m, *clearance_m);
+            [vehicle.to_string(), obstacle.clone(), exact(*clearance_m), near, seconds(*min_at_s)]
         };
         let certified = match self.certified_room_m {
             Some(clearance_margin_m) => {
@@ -191,8 +192,8 @@ impl Obstacles {
             let at = seconds(*min_at_s);
             format!(
                 "{} m at {at}, vehicle {vehicle} from `{obstacle}` (clearance {} m",
-                shown(*min_m),
-                metres(*clearance_m)
+                shown(*min_m, *clearance_m),
+                exact(*clearance_m)
             )
         });
         let certified = match self.certified_room_m {
@@ -207,17 +208,17 @@ impl Obstacles {
 impl ObstacleApproach {
     fn brief(&self) -> String {
         let Self { vehicle, obstacle, clearance_m, min_m, min_at_s } = self;
-        let (clearance, at) = (metres(*clearance_m), seconds(*min_at_s));
+        let (clearance, at) = (exact(*clearance_m), seconds(*min_at_s));
         if *min_m < 0.0 {
             let deep = metres(-min_m);
             return format!("vehicle {vehicle} was {deep} m inside `{obstacle}` at {at} (clearance {clearance} m)");
         }
-        let near = if min_m < clearance_m { metres_below(*min_m, *clearance_m) } else { at_least(*min_m, 3) };
+        let near = beside_limit(*min_m, *clearance_m, 3);
         format!("vehicle {vehicle} came to {near} m from `{obstacle}` at {at} (clearance {clearance} m)")
     }
 }
 
-/// Formats a distance, rounded down if it is positive.
-fn shown(distance_m: f64) -> String {
-    if distance_m < 0.0 { metres(distance_m) } else { at_least(distance_m, 6) }
+/// Formats a distance beside its clearance; rounded down if it is positive.
+fn shown(distance_m: f64, clearance_m: f64) -> String {
+    if distance_m < 0.0 { metres(distance_m) } else { beside_limit(distance_m, clearance_m, 6) }
 }

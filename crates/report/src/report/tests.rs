@@ -636,7 +636,10 @@ fn early_end_keeps_violations_and_other_undecided_times() {
     let violated = Case { audit: passing(1.5), ..early() }.report();
     assert_eq!(violated.audit.status, Status::Violation);
     let headline = violated.headline();
-    assert!(headline.starts_with("VIOLATION: ") && headline.ends_with("; ended early: at 120.00 s"), "{headline}");
+    assert!(
+        headline.starts_with("VIOLATION: ") && headline.ends_with("; the flight ended early at 120.00 s"),
+        "{headline}"
+    );
     let mut doubtful = early();
     doubtful.audit.status = Status::Undecided;
     doubtful.audit.unresolved = 1;

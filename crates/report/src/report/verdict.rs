@@ -8,7 +8,7 @@ use super::legs;
 use super::obstacles::Obstacles;
 use tautline_audit::Status;
 use tautline_core::record::EnergyRise;
-use tautline_core::text::{counted, metres, metres_below, seconds};
+use tautline_core::text::{below_bound, beside_limit, counted, exact, metres, seconds};
 use tautline_sim::metrics::Summary;
 use tautline_sim::scenario::TimeSpec;
 use tautline_sim::sim::Ending;
@@ -134,7 +134,7 @@ fn violation(result: &FlightResult<'_>) -> Option<String> {
     let delta_m = result.scenario.delta_m;
     let violations = &result.flight.audit.violations;
     let Some(deepest) = violations.iter().min_by(|a, b| a.min_m.total_cmp(&b.min_m)) else {
-        return Some(format!("Two vehicles came closer than {} m.", metres(delta_m)));
+        return Some(format!("Two vehicles came closer than {} m.", exact(delta_m)));
     };
     let [first, second] = deepest.pair.numbers();
     let others = match violations.len() - 1 {
@@ -144,9 +144,9 @@ fn violation(result: &FlightResult<'_>) -> Option<String> {
     };
     Some(format!(
         "Vehicles {first} and {second} came to {} m at {}; the safety distance is {} m.{others}",
-        metres_below(deepest.min_m, delta_m),
+        beside_limit(deepest.min_m, delta_m, 3),
         seconds(deepest.min_at_s),
-        metres(delta_m),
+        exact(delta_m),
     ))
 }
 
@@ -166,8 +166,8 @@ fn unresolved_by_step(result: &FlightResult<'_>) -> Option<String> {
     Some(format!(
         "The step cannot resolve whether the safety distance of {} m is kept. In the flown motion vehicles {first} and \
          {second} came to {} m at {}, but the integration error of steps that are too long for the law may be larger.",
-        metres(result.scenario.delta_m),
-        metres_below(deepest.min_m, result.scenario.delta_m),
+        exact(result.scenario.delta_m),
+        beside_limit(deepest.min_m, result.scenario.delta_m, 3),
         seconds(deepest.min_at_s),
     ))
 }
@@ -231,12 +231,12 @@ fn risen_energy(result: &FlightResult<'_>) -> Option<String> {
 fn broken_certificate(report: &Report) -> Option<String> {
     let (certified_m, closest) = (report.separation.certified_m?, report.separation.closest()?);
     report.breaks_certificate().then(|| {
+        let [min, certified] = below_bound(closest.separation_m, certified_m);
         format!(
-            "The law certifies {} m in continuous time, but {} came to {} m: the flown motion is not the one that \
-             the proof covers. Shorten time.dt_s, and look for positions so large that their differences lose digits.",
-            metres(certified_m),
+            "The law certifies {certified} m in continuous time, but {} came to {min} m: the flown motion is not the \
+             one that the proof covers. Shorten time.dt_s, and look for positions so large that their differences lose \
+             digits.",
             vehicles(closest.pair),
-            metres_below(closest.separation_m, certified_m),
         )
     })
 }

@@ -4,7 +4,7 @@ use super::flight::{Ellipsoid, FailedVehicle, Performance, Report, VehicleNumber
 use super::obstacles::Obstacles;
 use super::verdict::{UnmetCriterion, breaks_certificate, is_unresolved_by_step};
 use tautline_audit::Status;
-use tautline_core::text::{at_least, counted, metres, metres_below, seconds, table};
+use tautline_core::text::{at_least, below_bound, beside_limit, counted, exact, metres, seconds, table};
 use tautline_sim::link::Traffic;
 
 impl Report {
@@ -46,10 +46,11 @@ impl Report {
             self.separation.certified_m.filter(|_| has_no_violation && self.breaks_certificate()).map(|certified_m| {
                 let closest = self.separation.closest().map(|closest| {
                     let [first, second] = closest.pair.numbers();
-                    let min_m = metres_below(closest.separation_m, certified_m);
-                    format!("vehicles {first} and {second} came to {min_m} m at {}, ", seconds(closest.time_s))
+                    let [min, certified] = below_bound(closest.separation_m, certified_m);
+                    let at = seconds(closest.time_s);
+                    format!("vehicles {first} and {second} came to {min} m at {at}, certified {certified} m")
                 });
-                format!("certificate broken: {}certified {} m", closest.unwrap_or_default(), metres(certified_m))
+                format!("certificate broken: {}", closest.unwrap_or_default())
             });
         let past_obstacles =
             self.obstacles.as_ref().filter(|_| has_no_violation).and_then(Obstacles::broken_certificate);
@@ -63,7 +64,7 @@ impl Report {
         });
         let is_in_lead = self.is_clear_until_its_early_end();
         let ended = (self.run.ended_early.is_some() && !is_in_lead)
-            .then(|| format!("ended early: at {}", seconds(self.run.duration_s)));
+            .then(|| format!("the flight ended early at {}", seconds(self.run.duration_s)));
         [
             refused,
             past_obstacles,
@@ -110,7 +111,7 @@ impl Report {
             let at = seconds(self.run.duration_s);
             return format!("the flight ended early at {at}; until then {}", self.clearance([" (", ")"]));
         }
-        let delta = metres(self.separation.delta_m);
+        let delta = exact(self.separation.delta_m);
         let why = if self.audit.parry.disagreements > 0 {
             format!("the two detectors disagree (delta {delta} m)")
         } else if self.is_unresolved_by_step() {
@@ -136,11 +137,12 @@ impl Report {
 
     /// Returns the smallest separation, delta between two brackets, and the distance beyond obstacles.
     fn clearance(&self, [open, close]: [&str; 2]) -> String {
-        let closest = self.separation.min_m.map(|min_m| at_least(min_m, 3));
+        let delta_m = self.separation.delta_m;
+        let closest = self.separation.min_m.map(|min_m| beside_limit(min_m, delta_m, 3));
         let closest = closest.map_or("no two vehicles".to_owned(), |min| format!("never closer than {min} m"));
         let room = self.obstacles.as_ref().and_then(Obstacles::room);
         let room = room.map(|room| format!(", {room}")).unwrap_or_default();
-        format!("{closest}{}{open}delta {} m{close}{room}", self.scaled(), metres(self.separation.delta_m))
+        format!("{closest}{}{open}delta {} m{close}{room}", self.scaled(), exact(delta_m))
     }
 
     /// Returns whether integration may have caused all violations.
@@ -194,14 +196,14 @@ impl Report {
         let Self { separation, .. } = self;
         let delta_m = separation.delta_m;
         let (Some([first, second]), Some(min_m)) = (separation.min_pair, separation.min_m) else {
-            return format!("two vehicles came closer than {} m", metres(delta_m));
+            return format!("two vehicles came closer than {} m", exact(delta_m));
         };
         let at = separation.min_at_s.map(|at_s| format!(" at {}", seconds(at_s))).unwrap_or_default();
         format!(
             "vehicles {first} and {second} came to {} m{} (delta {} m){at}",
-            metres_below(min_m, delta_m),
+            beside_limit(min_m, delta_m, 3),
             self.scaled(),
-            metres(delta_m)
+            exact(delta_m)
         )
     }
 
@@ -242,22 +244,23 @@ impl Report {
 
     fn separation_line(&self) -> String {
         let separation = &self.separation;
+        let delta_m = separation.delta_m;
         let pair = separation.min_pair.map(|[first, second]| format!(", vehicles {first} and {second}"));
         let at = separation.min_at_s.map(|at_s| format!(" at {}", seconds(at_s)));
         let certified = match separation.certified_m {
             Some(certified_m) => {
                 let until = separation.certified_until_s.map(|until_s| format!(" until {}", seconds(until_s)));
-                format!("certified {} m{}", at_least(certified_m, 6), until.unwrap_or_default())
+                format!("certified {} m{}", beside_limit(certified_m, delta_m, 6), until.unwrap_or_default())
             }
             None => "not certified".to_owned(),
         };
         format!(
             "{} m{}{}{} (delta {} m, {certified})",
-            separation.min_m.map_or("-".to_owned(), |min_m| at_least(min_m, 6)),
+            separation.min_m.map_or("-".to_owned(), |min_m| beside_limit(min_m, delta_m, 6)),
             self.scaled(),
             at.unwrap_or_default(),
             pair.unwrap_or_default(),
-            metres(separation.delta_m),
+            exact(delta_m),
         )
     }
 

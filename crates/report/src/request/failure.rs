@@ -226,8 +226,12 @@ impl From<RecordedError> for Failure {
     fn from(error: RecordedError) -> Self {
         let (code, help) = match &error {
             RecordedError::Interrupted => return Self::interrupted(),
-            RecordedError::OutOfRange { .. } => ("audit/out-of-range", "give another number"),
-            RecordedError::EmptyWindow { .. } => ("audit/empty-window", "give another number"),
+            RecordedError::OutOfRange { option, of, range, .. } => {
+                let name = if of.is_some() { "NAME=" } else { "" };
+                let help = format!("give --{option} {name}NUMBER, where NUMBER is {range}");
+                return Self::input("audit/out-of-range", format!("--{error}"), &help);
+            }
+            RecordedError::EmptyWindow { .. } => ("audit/empty-window", "give a --to that is at least --from"),
             RecordedError::NoBound { .. } => (
                 "audit/no-acceleration-bound",
                 "give the largest acceleration with --max-accel A or --max-accel NAME=A",
@@ -242,7 +246,9 @@ impl From<RecordedError> for Failure {
             RecordedError::LimitOfJumps { .. } => {
                 ("audit/limit-of-jumps", "give --motion linear, or bounded with --max-accel")
             }
-            RecordedError::UnknownVehicle { .. } => ("audit/unknown-vehicle", "use the names of the recording"),
+            RecordedError::UnknownVehicle { .. } => {
+                ("audit/unknown-vehicle", "use the names of the recording in --ids, --radius, --max-accel and --offset")
+            }
             RecordedError::NotACurve { .. } => ("audit/no-curves", "give --motion linear, hold or bounded"),
             RecordedError::NotSamples { .. } => ("audit/no-samples", "leave --motion out, or give --motion polynomial"),
             RecordedError::RadiusChanges { .. } => {

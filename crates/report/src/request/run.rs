@@ -93,6 +93,9 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
     for warning in &preflight.warnings {
         monitor.warn(&warning.to_string());
     }
+    if let Some(note) = &preflight.drift_note {
+        monitor.warn(&format!("note: {note}"));
+    }
     // All checks of the input precede the first write.
     let path = request.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name));
     let folder = OutFolder::at(path, "run", "report.json");

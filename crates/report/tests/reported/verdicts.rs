@@ -3,12 +3,49 @@
 use tautline_audit::Status;
 use tautline_report::report::Report;
 use tautline_report::run::run;
-use tautline_sim::scenario::{PlantSpec, Scenario};
+use tautline_sim::preflight::Preflight;
+use tautline_sim::scenario::{PlantSpec, Scenario, builtin};
 
-use crate::flight::{fly, read};
+use crate::flight::{builtin as flown, fly, read};
 
 fn report(toml: &str) -> Report {
     run(&read(toml), &mut ()).expect("a report")
+}
+
+#[test]
+fn a_separation_just_above_delta_is_shown_above_it() {
+    // The smallest separation is 1.532715 m.
+    let clear = run(&flown("pentagon-laplacian", &["law.delta_m=1.5327"]), &mut ()).expect("a report");
+    let expected = "CLEAR: never closer than 1.5327 m (delta 1.5327 m), formation reached at 12.78 s";
+    assert_eq!(clear.headline(), expected);
+    assert!(clear.text().contains("separation   1.532715 m at 3.63 s, vehicles 4 and 5 (delta 1.5327 m"));
+    let violated = run(&flown("pentagon-laplacian", &["law.delta_m=1.53272"]), &mut ()).expect("a report");
+    let expected = "VIOLATION: vehicles 4 and 5 came to 1.532715 m (delta 1.53272 m) at 3.63 s";
+    assert_eq!(violated.headline(), expected);
+}
+
+/// Standard gravity \[m/s^2\].
+const GRAVITY_M_S2: f64 = 9.806_65;
+
+#[test]
+fn built_ins_stay_below_five_times_gravity() {
+    for builtin in builtin::all() {
+        let short: &[&str] = if builtin.name == "thousand" { &["time.duration_s=3"] } else { &[] };
+        let report = run(&flown(builtin.name, short), &mut ()).expect("a report");
+        let peak_m_s2 = report.control.peak_m_s2.expect("a peak");
+        assert!(peak_m_s2 < 5.0 * GRAVITY_M_S2, "{}: {peak_m_s2} m/s^2", builtin.name);
+        let expected = !["pentagon-laplacian", "pentagon-collinear"].contains(&builtin.name) && short.is_empty();
+        assert!(!expected || report.verdict.pass, "{}: {}", builtin.name, report.headline());
+    }
+}
+
+#[test]
+fn the_hexagon_is_an_ordinary_flight() {
+    let hexagon = flown("hexagon", &[]);
+    assert_eq!(Preflight::of(&hexagon).expect("a law").warnings, []);
+    let report = run(&hexagon, &mut ()).expect("a report");
+    assert!(report.verdict.pass && report.formation.reached, "{}", report.headline());
+    assert!(report.control.peak_m_s2.is_some_and(|peak_m_s2| peak_m_s2 < GRAVITY_M_S2), "{}", report.text());
 }
 
 /// Three vehicles on a star, far from the origin. Two of them approach at the end, to 0.995142 m in continuous time.

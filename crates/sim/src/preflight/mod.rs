@@ -5,6 +5,7 @@
 //! check --json`.
 
 mod margins;
+mod peak;
 mod stability;
 mod warning;
 
@@ -116,6 +117,13 @@ pub struct Preflight {
     pub formation_margin_m: Option<f64>,
     /// Infinitesimal rigidity of the formation on its graph, in the space of the swarm.
     pub rigidity: Rigidity,
+    /// Largest acceleration that the law commands at the start of a leg \[m/s^2\], with the vehicles at rest on the
+    /// slots of the leg before. The peak of the flight is at least this if every leg is reached.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub start_peak_m_s2: Option<f64>,
+    /// Note on the growth of the mean velocity, which is no reason for a warning.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub drift_note: Option<String>,
     /// Warnings, the most severe first.
     pub warnings: Vec<Warning>,
     /// Model of quadrotors, which replaces the properties of points.
@@ -155,10 +163,15 @@ impl Preflight {
     /// # Errors
     /// [`ParameterError`] if the parameters give no law; for a validated scenario only if memory cannot be allocated.
     pub fn of(scenario: &Scenario) -> Result<Self, ParameterError> {
-        Ok(Self::with_law(scenario, scenario.law()?.as_ref()))
+        let mut law = scenario.law()?;
+        let mut found = Self::with_law(scenario, law.as_ref());
+        found.start_peak_m_s2 = peak::start_peak_m_s2(scenario, law.as_mut());
+        let message = found.start_peak_m_s2.and_then(peak::extreme_acceleration);
+        found.warnings.extend(message.map(|message| Warning { code: Code::ExtremeAcceleration, message }));
+        Ok(found)
     }
 
-    /// Checks a scenario under another law.
+    /// Checks a scenario under another law, which is not asked for a command.
     #[must_use]
     pub fn with_law(scenario: &Scenario, law: &dyn Law) -> Self {
         let certificate = scenario.certificate(law);
@@ -217,6 +230,8 @@ impl Preflight {
             formation_dimension,
             formation_margin_m: scenario.legs.iter().filter_map(|leg| margin(&leg.formation.slots_m)).reduce(f64::min),
             rigidity: Rigidity::of(scenario.formation(), &scenario.graph, scenario.space.dimensions()),
+            start_peak_m_s2: None,
+            drift_note: None,
             warnings: Vec::new(),
             vehicle: scenario.airframe.quadrotor().cloned(),
             controls: capabilities.controls,
@@ -246,10 +261,10 @@ impl Preflight {
             (Code::NoCertificate, found.no_certificate()),
             (Code::NotRigid, found.not_rigid(scenario)),
             (Code::FlatFormationInSpace, found.flat_formation_in_space()),
-            (Code::CommonModeUnstable, found.common_mode_unstable(scenario)),
         ];
         let said = |(code, message): (Code, Option<String>)| Some(Warning { code, message: message? });
         found.warnings = warnings.into_iter().filter_map(said).collect();
+        found.drift_note = found.drift_note(scenario);
         found
     }
 

@@ -11,6 +11,8 @@ use tautline_laws::graph::Graph;
 
 /// Fewest spacings of floating-point numbers within the arrival tolerance at which a drift is harmless.
 const FINE_SPACINGS: f64 = 100.0;
+/// Smallest drift by the growth of the mean velocity that is reported, relative to delta.
+const VISIBLE_DRIFT: f64 = 0.01;
 
 impl Preflight {
     /// Describes the growth of the mean velocity and the distance over which it carries the swarm.
@@ -18,7 +20,7 @@ impl Preflight {
         let drift = scenario.drift(self.common_mode_rate_per_s);
         let seed = if scenario.start.mean_velocity_m_s().norm() > 0.0 { "it" } else { "rounding" };
         format!(
-            "The mean velocity grows as exp({} t), since {why}: in {} s {seed} grows to about {} m/s and carries the \
+            "the mean velocity grows as exp({} t), since {why}: in {} s {seed} grows to about {} m/s and carries the \
              whole swarm {} m away",
             self.common_mode_rate_per_s,
             scenario.time.duration_s,
@@ -42,9 +44,12 @@ impl Preflight {
         let said = if self.common_mode_rate_per_s > 0.0 {
             self.drift_in_words(scenario, self.why_common_mode_grows(scenario))
         } else {
-            format!("The mean velocity carries the whole swarm {} m away", warning::significant(self.drift_m))
+            format!("the mean velocity carries the whole swarm {} m away", warning::significant(self.drift_m))
         };
-        Some(format!("{said}, {unresolved}. Reduce time.duration_s, or the cause of the mean velocity."))
+        Some(format!(
+            "Positions are not resolved: {said}, {unresolved}. Reduce time.duration_s, or the cause of the mean \
+             velocity."
+        ))
     }
 
     /// Returns a bound of the rounding errors of all steps of the drift \[m\].
@@ -67,15 +72,17 @@ impl Preflight {
         }
     }
 
-    pub(super) fn common_mode_unstable(&self, scenario: &Scenario) -> Option<String> {
-        if self.common_mode_rate_per_s <= 0.0 || self.drift_unresolved(scenario).is_some() {
+    /// Returns a note on the growth of the mean velocity, if it carries the swarm a visible distance.
+    pub(super) fn drift_note(&self, scenario: &Scenario) -> Option<String> {
+        let is_visible = self.drift_m >= VISIBLE_DRIFT * scenario.delta_m;
+        if self.common_mode_rate_per_s <= 0.0 || !is_visible || self.drift_unresolved(scenario).is_some() {
             return None;
         }
         let effect = if FINE_SPACINGS * self.spacing_m <= scenario.arrival.edge_error_m {
-            ". This changes no separation.".to_owned()
+            "; this changes no separation".to_owned()
         } else {
             let spacing = warning::significant(self.spacing_m);
-            format!(", where the position resolution is {spacing} m. Reduce time.duration_s or swarm.a22_per_s.")
+            format!(", where the position resolution is {spacing} m; reduce time.duration_s or swarm.a22_per_s")
         };
         Some(self.drift_in_words(scenario, self.why_common_mode_grows(scenario)) + &effect)
     }

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{Connectivity, LegCertificate, Preflight, margins};
 use crate::vehicle::Quadrotor;
 use tautline_core::text;
-use tautline_core::text::{at_least, counted, seconds, table};
+use tautline_core::text::{at_least, beside_limit, counted, metres, seconds, table};
 
 /// Warning about a scenario.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -38,8 +38,8 @@ pub enum Code {
     NotRigid,
     /// A flat formation in space: no force resists motion out of its plane to first order.
     FlatFormationInSpace,
-    /// The swarm's mean velocity grows.
-    CommonModeUnstable,
+    /// The law commands accelerations that few vehicles reach.
+    ExtremeAcceleration,
 }
 
 impl Code {
@@ -54,7 +54,7 @@ impl Code {
         Self::NoCertificate,
         Self::NotRigid,
         Self::FlatFormationInSpace,
-        Self::CommonModeUnstable,
+        Self::ExtremeAcceleration,
     ];
 
     /// Returns whether the warning refuses the flight: the formation cannot be reached, or the flight would be
@@ -84,7 +84,7 @@ impl Code {
             Self::NoCertificate => "no-certificate",
             Self::NotRigid => "not-rigid",
             Self::FlatFormationInSpace => "flat-formation-in-space",
-            Self::CommonModeUnstable => "common-mode-unstable",
+            Self::ExtremeAcceleration => "extreme-acceleration",
         }
     }
 }
@@ -111,8 +111,8 @@ pub(super) fn significant(number: f64) -> String {
 }
 
 impl Preflight {
-    /// Returns the result in one line: `READY: certified never closer than 2.055307 m in continuous time (delta 2 m), 2
-    /// warnings`, or `REFUSED: start-on-line`.
+    /// Returns the result in one line: `READY: certified never closer than 2.055307 m in continuous time (delta 2 m),
+    /// no warnings`, or `REFUSED: start-on-line`.
     #[must_use]
     pub fn headline(&self) -> String {
         let refusing = self.refusing();
@@ -123,7 +123,7 @@ impl Preflight {
             Some(certified_m) => {
                 format!(
                     "certified never closer than {} m in continuous time (delta {} m){}",
-                    at_least(certified_m, 6),
+                    beside_limit(certified_m, self.delta_m, 6),
                     self.delta_m,
                     match (self.recovers_from_deadlock, self.reassigns) {
                         (true, true) => " unless slots are spread or reassigned",
@@ -165,6 +165,8 @@ impl Preflight {
             ("rigidity", self.rigidity_line()),
         ];
         rows.extend(rest.map(|(name, line)| (name.to_owned(), line)));
+        rows.extend(self.peak_line().map(|line| ("control".to_owned(), line)));
+        rows.extend(self.drift_note.iter().map(|note| ("drift".to_owned(), note.clone())));
         table(rows)
     }
 
@@ -253,6 +255,11 @@ impl Preflight {
 
     fn formation_line(&self) -> String {
         format!("{}, nearest slots {} m above delta", flat(self.formation_dimension), margin(self.formation_margin_m))
+    }
+
+    fn peak_line(&self) -> Option<String> {
+        let of_leg = if self.legs.is_empty() { "" } else { " of a leg" };
+        self.start_peak_m_s2.map(|peak_m_s2| format!("{} m/s^2 at the start{of_leg}", metres(peak_m_s2)))
     }
 
     fn rigidity_line(&self) -> String {

@@ -1,6 +1,6 @@
 //! Built-in scenarios, embedded in the program, and the text of new scenario files.
 
-use super::limits::{MAX_NAME_CHARS, may_be_in_a_name};
+use super::limits::{MAX_NAME_CHARS, is_name_character};
 
 /// Built-in scenario.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -16,8 +16,13 @@ pub struct Builtin {
 const ALL: &[Builtin] = &[
     Builtin {
         name: "pentagon",
-        summary: "five vehicles from a line to a pentagon under the edge-tension law: clear and reached",
+        summary: "five vehicles from a line to the hourglass of the edge-tension paper: clear and reached",
         toml: include_str!("../../../../assets/pentagon.toml"),
+    },
+    Builtin {
+        name: "hexagon",
+        summary: "six vehicles from two rows to a regular hexagon, with less than 1 g: clear and reached",
+        toml: include_str!("../../../../assets/hexagon.toml"),
     },
     Builtin {
         name: "circle",
@@ -71,7 +76,7 @@ const ALL: &[Builtin] = &[
     },
     Builtin {
         name: "thousand",
-        summary: "a thousand vehicles draw together in space: clear and reached",
+        summary: "a thousand vehicles gather in space: clear and reached",
         toml: include_str!("../../../../assets/thousand.toml"),
     },
 ];
@@ -92,7 +97,7 @@ pub fn find(name: &str) -> Option<&'static Builtin> {
 /// `_`. Lines such as `#key = value` are optional keys.
 #[must_use]
 pub fn new_scenario(name: &str) -> Option<String> {
-    let is_name = (1..=MAX_NAME_CHARS).contains(&name.len()) && name.chars().all(may_be_in_a_name);
+    let is_name = (1..=MAX_NAME_CHARS).contains(&name.len()) && name.chars().all(is_name_character);
     is_name.then(|| include_str!("../../../../assets/new-scenario.toml").replace("NAME", name))
 }
 

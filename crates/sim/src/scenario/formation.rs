@@ -13,6 +13,7 @@ use super::files;
 use super::limits::{DEFAULT_SPACING, SLOT_MARGIN, rounded_up};
 use super::spec::Scenario;
 use tautline_core::swarm::{Pair, Rows, row, set_row};
+use tautline_core::text::beside_limit;
 use tautline_laws::formation::{
     Drawing, DrawingError, Formation, Freedom, MAX_DRAWN_SLOTS, most_assigned, optimal_slots, optimal_slots_around,
 };
@@ -385,8 +386,8 @@ impl Dimension {
         }
         let enough_m = rounded_up(delta_m * (1.0 + SLOT_MARGIN) / nearest * drawn);
         Err(ScenarioError::new(format!(
-            "in a drawing {asked_m} m {name}, {count} vehicles come as near as {nearest_m} m, not more than delta = \
-             {delta_m} m"
+            "in a drawing {asked_m} m {name}, {count} vehicles come as near as {} m, not more than delta = {delta_m} m",
+            beside_limit(nearest_m, delta_m, 3)
         ))
         .coded("scenario/within-delta")
         .with_help(format!(

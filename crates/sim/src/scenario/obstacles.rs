@@ -29,6 +29,7 @@ use super::error::ScenarioError;
 use super::limits::{CONTACT_PREDICTION_M, SLOT_MARGIN, SMALLEST};
 use super::spec::Scenario;
 use tautline_core::swarm::{Rows, row, set_row};
+use tautline_core::text::beside_limit;
 use tautline_laws::space::{Obstacle, Shape, smallest_clearance_margin};
 
 /// Remedy for a wrong obstacle: the format of the table.
@@ -249,7 +250,8 @@ impl Scenario {
         let said = if distance_m <= 0.0 {
             format!("{subject} inside obstacle `{name}`")
         } else {
-            format!("{subject} {distance_m} m from obstacle `{name}`, not more than its clearance of {clearance_m} m")
+            let distance = beside_limit(distance_m, *clearance_m, 3);
+            format!("{subject} {distance} m from obstacle `{name}`, not more than its clearance of {clearance_m} m")
         };
         ScenarioError::new(said)
             .coded("scenario/near-obstacle")

@@ -132,9 +132,12 @@ impl Template {
             let known = self.law_names();
             let known: Vec<_> = known.iter().map(String::as_str).collect();
             let help = format!("{}; give other names in tables [laws.NAME] of the scenario", suggest(name, &known));
-            return Err(ScenarioError::new(format!("no law has the name `{name}`"))
-                .coded("scenario/unknown-choice")
-                .with_help(help));
+            let problem = if name.is_empty() {
+                "the name of a law is empty".to_owned()
+            } else {
+                format!("no law has the name `{name}`")
+            };
+            return Err(ScenarioError::new(problem).coded("scenario/unknown-choice").with_help(help));
         };
         Ok(NamedLaw { name: name.to_owned(), law: law.complete(self.own.velocity_coefficient_per_s()) })
     }

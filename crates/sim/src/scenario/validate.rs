@@ -12,6 +12,7 @@ use super::spec::{Safety, Scenario, Space};
 use super::text::Text;
 use super::time::TimeSpec;
 use tautline_core::swarm::{Pair, row};
+use tautline_core::text::{beside_limit, exact, metres};
 use tautline_laws::graph::{Graph, Pinning};
 use tautline_laws::law::{Controls, LawSpec, ParameterError};
 use tautline_laws::target::{DeadlockMode, Guidance, Leg, LegTrigger};
@@ -165,9 +166,10 @@ impl Scenario {
             return Ok(());
         }
         Err(ScenarioError::new(format!(
-            "the leader {} must start on the reference, got an offset of {off_m} m and {} m/s",
+            "the leader {} must start on the reference, got an offset of {} m and {} m/s",
             leader + 1,
-            off_m_s.norm()
+            metres(off_m),
+            metres(off_m_s.norm())
         ))
         .coded("scenario/reference")
         .with_help("leave out its start velocity: the default is that of the reference")
@@ -267,7 +269,8 @@ impl Scenario {
             let said = if separation_m == 0.0 {
                 format!("vehicles {pair} start at the same point")
             } else {
-                format!("vehicles {pair} start {separation_m} m {apart} not more than delta = {delta_m} m")
+                let separation = beside_limit(separation_m, delta_m, 3);
+                format!("vehicles {pair} start {separation} m {apart} not more than delta = {delta_m} m")
             };
             let help = "move one of the vehicles away, or reduce law.delta_m";
             return refuse(said, help, (0, "start.positions_m"), pair);
@@ -277,15 +280,14 @@ impl Scenario {
             Some((number, first_pair_within(&metric.scaled_rows(&leg.formation.slots_m), least_m)?))
         };
         if let Some((leg, (pair, distance_m))) = self.legs.iter().enumerate().find_map(too_near) {
-            let [a, b] = pair.numbers();
+            let distance = beside_limit(distance_m, delta_m, 3);
             let said = if distance_m == 0.0 {
-                format!("the slots of vehicles {a} and {b} are the same point")
+                format!("the slots of vehicles {pair} are the same point")
             } else if distance_m <= delta_m {
-                format!("a desired distance of {distance_m} m (vehicles {pair}) is not more than delta = {delta_m} m")
+                format!("the slots of vehicles {pair} are {distance} m apart, not more than delta = {delta_m} m")
             } else {
                 format!(
-                    "a desired distance of {distance_m} m (vehicles {pair}) exceeds delta = {delta_m} m by less than a \
-                     billionth of it"
+                    "the slots of vehicles {pair} are farther apart than delta = {delta_m} m by less than a billionth"
                 )
             };
             let help = "enlarge the formation, or reduce law.delta_m";
@@ -304,9 +306,10 @@ impl Scenario {
             return Ok(());
         }
         Err(ScenarioError::new(format!(
-            "the hulls of vehicles {} touch at {touching_m} m, less than {CONTACT_PREDICTION_M} m before the safety \
-             distance delta = {} m",
+            "the hulls of vehicles {} touch at {} m, less than {CONTACT_PREDICTION_M} m before the safety distance \
+             delta = {} m",
             Pair::new(i, j),
+            exact(touching_m),
             self.delta_m
         ))
         .coded("scenario/hulls-touch")
@@ -534,13 +537,16 @@ impl Scenario {
             Some([]) => Err(ScenarioError::new("the list of vehicles of a gust is empty")
                 .with_help("leave out `vehicles`: the gust then acts on all vehicles")
                 .at("wind.gust")),
-            Some(met) if !met.is_sorted() || met.last().is_some_and(|&last| last >= self.count()) => {
-                Err(ScenarioError::new("a gust names a vehicle that the swarm does not have")
-                    .coded("scenario/unknown-vehicle")
-                    .with_help(format!("give numbers from 1 to {}", self.count()))
-                    .at("wind.gust"))
-            }
-            _ => Ok(()),
+            met => match met.unwrap_or_default().iter().find(|&&vehicle| vehicle >= self.count()) {
+                Some(vehicle) => {
+                    let problem = format!("a gust acts on vehicle {}, but the swarm has {}", vehicle + 1, self.count());
+                    Err(ScenarioError::new(problem)
+                        .coded("scenario/unknown-vehicle")
+                        .with_help(format!("give numbers from 1 to {}", self.count()))
+                        .at("wind.gust"))
+                }
+                None => Ok(()),
+            },
         }
     }
 }

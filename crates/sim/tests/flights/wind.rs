@@ -316,6 +316,7 @@ fn a_wrong_wind_is_refused_at_its_place_with_a_remedy() {
         let error = wrong(&[set]);
         assert_eq!(error.code(), code, "{error}");
     }
+    assert!(wrong(&[&gust("vehicles = [2, 6]")]).to_string().contains("a gust acts on vehicle 6, but the swarm has 5"));
     let unfelt = wrong(&["vehicle.drag_per_s=0", "wind.mean_m_s=[1.0, 0.0]"]);
     assert_eq!(unfelt.code(), "scenario/unsupported-by-vehicle", "{unfelt}");
     let rigid = wrong(&["vehicle.model=crazyflie", "swarm.a22_per_s=0"]);

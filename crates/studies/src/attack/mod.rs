@@ -21,7 +21,7 @@ use crate::flight::{FlightSummary, Outcome};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
 use cma_es::{Optimiser, folded};
-use tautline_core::text::{at_least, counted, exact, metres_below, seconds};
+use tautline_core::text::{beside_limit, counted, exact, seconds};
 use tautline_report::figures::attack as figure;
 use tautline_report::report::page::{Badge, Tone};
 use tautline_report::request::{
@@ -382,8 +382,7 @@ impl Attack {
     fn closest(&self, worst: &Candidate) -> String {
         let FlightSummary { min_m, min_at_s, min_pair, .. } = &worst.flown;
         let Some(min_m) = *min_m else { return "no two vehicles".to_owned() };
-        let shown =
-            if min_m < self.about.delta_m { metres_below(min_m, self.about.delta_m) } else { at_least(min_m, 3) };
+        let shown = beside_limit(min_m, self.about.delta_m, 3);
         let at = min_at_s.map_or_else(String::new, |at_s| format!(" at {}", seconds(at_s)));
         let pair = min_pair.map_or_else(String::new, |[a, b]| format!(", vehicles {a}-{b}"));
         format!("{shown} m{at}{pair}")

@@ -8,7 +8,7 @@ use super::{Campaign, Folder, Law, Row, Summary, ViolatedRun, Worst};
 use crate::flight::Outcome;
 use crate::splitting::{self, StateHashAtStep};
 use crate::study::{Block, Section};
-use tautline_core::text::metres;
+use tautline_core::text::{beside_limit, metres};
 use tautline_recordings::mcap::{Header, McapRecorder};
 use tautline_report::replay::{NoReplay, PAGE_BYTES, Replay};
 use tautline_report::report::page::{self, Picture, Start};
@@ -281,7 +281,7 @@ fn shown(flight: FlightId<'_>, campaign: &Campaign, worst: &Worst, left: &RunFil
         flight.run,
         flight.law.name,
         if by_obstacle { "a vehicle came nearer to an obstacle than its clearance; " } else { "" },
-        metres(worst.min_m),
+        beside_limit(worst.min_m, worst.min_m - worst.clearance_m, 3),
         metres(worst.clearance_m.abs()),
         if worst.clearance_m < 0.0 { "below" } else { "above" }
     );

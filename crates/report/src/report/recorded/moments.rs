@@ -19,8 +19,9 @@ impl RecordedReport {
         let closest = self.closest.first().or(self.obstacles.closest.first());
         let unit = self.judgement().unit;
         let closest = closest.map(PairFinding::short).map(|of| {
-            let &Approach { pair, lower_m, upper_m, time_s, .. } = &of.finding;
-            Moment::closest(pair, &of.names(), &format!("{} {unit}", interval(lower_m, upper_m)), time_s)
+            let &Approach { pair, lower_m, upper_m, time_s, limit_m } = &of.finding;
+            let distance = format!("{} {unit}", interval(lower_m, upper_m, limit_m));
+            Moment::closest(pair, &of.names(), &distance, time_s)
         });
         let violations = violations.iter().map(|of| Moment::violation(&of.finding, &of.names(), unit));
         let undecided = self.undecided.iter().map(|of| undecided(&of.short()));

@@ -130,6 +130,9 @@ pub struct RecordedReport {
     /// Verdict and finding up to the early end, if clear up to there.
     #[serde(skip)]
     pub(super) until_then: Option<String>,
+    /// Height at or below which vehicles are on the ground \[m\].
+    #[serde(skip)]
+    pub(super) above_m: Option<f64>,
     /// Reason why the run's own audit does not decide the question.
     #[serde(skip)]
     pub run_objection: Option<String>,
@@ -271,6 +274,7 @@ impl RecordedReport {
             violations,
             limits,
             ended_early: None,
+            above_m: settings.above_m,
             until_then: None,
             run_objection: None,
             separation_asked: outcome.separation.is_some(),

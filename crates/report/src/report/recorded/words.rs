@@ -9,7 +9,7 @@ use crate::report::page::{self, Badge, Page, Start, Tone};
 use crate::report::section::Section;
 use tautline_audit::recorded::{Approach, Gap, ObjectPair, WIDTH_M};
 use tautline_audit::{LISTED, Status, Tally, Undecided, Violation};
-use tautline_core::text::{at_least, at_most, counted, exact, fixed, in_order, metres_below, seconds};
+use tautline_core::text::{at_least, at_most, beside_limit, counted, exact, fixed, in_order, seconds};
 
 /// Largest numbers of violations in the text, and on the page.
 const LISTED_IN_WORDS: usize = 10;
@@ -90,7 +90,7 @@ impl RecordedReport {
                 let all = self.closest.iter().chain(&self.obstacles.closest);
                 let lowest = all.min_by(|a, b| a.finding.lower_m.total_cmp(&b.finding.lower_m));
                 let closest = lowest.map_or(String::new(), |PairFinding { who: [first, second], finding }| {
-                    let (least, at) = (at_least(finding.lower_m, 6), seconds(finding.time_s));
+                    let (least, at) = (beside_limit(finding.lower_m, finding.limit_m, 6), seconds(finding.time_s));
                     format!("never closer than {least}{unit}, {first} and {second} at {at} ")
                 });
                 let is_in_verdict = self.audit.judged_by_run || !self.audit.proved;
@@ -107,7 +107,7 @@ impl RecordedReport {
                 deepest.map_or(String::new(), |PairFinding { who: [first, second], finding }| {
                     format!(
                         "{first} and {second} came to {}{unit} (limit {}{unit}) at {}, {}{others}",
-                        metres_below(finding.min_m, finding.limit_m),
+                        beside_limit(finding.min_m, finding.limit_m, 3),
                         exact(finding.limit_m),
                         seconds(finding.min_at_s),
                         self.motion
@@ -160,7 +160,10 @@ impl RecordedReport {
         let joined = format!("--max-gap {} would judge across", (longest_s * 1e6).ceil() / 1e6);
         match &self.gaps[..] {
             [] if self.span_s.is_none() => "the window holds nothing to judge".to_owned(),
-            [] => "no two vehicles are present at the same time".to_owned(),
+            [] => {
+                let above = self.above_m.map(|above_m| format!(", one of them above {} m (--above)", exact(above_m)));
+                format!("no two vehicles are present at the same time{}", above.unwrap_or_default())
+            }
             [VehicleFinding { vehicle, finding }] => {
                 format!("{vehicle} was not seen from {}; {joined}", span(finding.from_s, finding.to_s))
             }
@@ -176,7 +179,7 @@ impl RecordedReport {
         let caption = format!("smallest distances in {}", self.unit().trim());
         let closest = |heading: &'static str, closest: &[PairFinding<Approach>]| {
             let row = |PairFinding { who: [first, second], finding }: &PairFinding<Approach>| {
-                let apart = interval(finding.lower_m, finding.upper_m);
+                let apart = interval(finding.lower_m, finding.upper_m, finding.limit_m);
                 [format!("{first} and {second}"), apart, fixed(finding.time_s, 3), exact(finding.limit_m)]
             };
             let columns = &["who", "smallest distance", "at [s]", "limit"];
@@ -274,8 +277,8 @@ impl RecordedReport {
             "A distance strictly below its limit is a violation; equality is not.".to_owned(),
             format!("Time 0 s is {} ns on the recording's clock.", self.source.clock.epoch_ns),
         ];
-        page.add("What was assumed", [page::list(&assumed)]);
-        page.add("Repeat it", [page::command(command)]);
+        page.add("Assumptions", [page::list(&assumed)]);
+        page.add("Reproduce", [page::command(command)]);
         page.render()
     }
 }
@@ -307,15 +310,17 @@ impl EarlyEnd {
     #[must_use]
     pub fn words(&self) -> String {
         let (at, duration) = (seconds(self.at_s), seconds(self.duration_s));
-        let reason = self.reason.as_ref().map(|reason| format!(" ({reason})"));
-        format!("the flight ended early, at {at} of {duration}{}", reason.unwrap_or_default())
+        match &self.reason {
+            Some(reason) => format!("the flight ended early, at {at} of {duration} ({reason})"),
+            None => format!("the recording ends at {at}, before the end of its flight of {duration}"),
+        }
     }
 }
 
 impl PairFinding<Violation<ObjectPair>> {
     pub(super) fn words(&self) -> String {
         let Self { who: [first, second], finding } = self;
-        let min = metres_below(finding.min_m, finding.limit_m);
+        let min = beside_limit(finding.min_m, finding.limit_m, 3);
         format!(
             "{first} and {second}: {min} at {} s, below {} from {}",
             fixed(finding.min_at_s, 3),
@@ -330,7 +335,7 @@ impl PairFinding<Undecided<ObjectPair>> {
         let Self { who: [first, second], finding } = self;
         let rate = finding.rate_hz.map_or(String::new(), |hz| format!("; {} Hz would decide", at_most(hz, 1)));
         let apart = if finding.upper_m.is_finite() {
-            interval(finding.lower_m, finding.upper_m)
+            interval(finding.lower_m, finding.upper_m, finding.limit_m)
         } else {
             "not known".to_owned()
         };
@@ -364,9 +369,10 @@ fn span(from_s: f64, to_s: f64) -> String {
     format!("{} s to {} s", fixed(from_s, 3), fixed(to_s, 3))
 }
 
-/// Formats a distance with six decimals, rounded down. If the bounds differ, returns an interval that contains both.
+/// Formats a distance beside its limit with six decimals, rounded down. If the bounds differ, returns an interval that
+/// contains both.
 #[must_use]
-pub fn interval(lower: f64, upper: f64) -> String {
-    let (low, high) = (at_least(lower, 6), at_most(upper, 6));
+pub fn interval(lower: f64, upper: f64, limit: f64) -> String {
+    let (low, high) = (beside_limit(lower, limit, 6), at_most(upper, 6));
     if upper - lower <= 2.0 * WIDTH_M || low == high { low } else { format!("{low} .. {high}") }
 }

@@ -220,7 +220,7 @@ mod tests {
             ("[audit]\nmax_accel_m_s2 = 2.0", "has no effect without motion = \"bounded\""),
             ("[audit]\naxes = \"nes\"", "`nes` is not three directions"),
             ("[audit]\nscale = [1, 0, 1]", "a scale must not be 0"),
-            ("[audit]\nlayout = \"time,axis\"", "layout: unknown layout `time,axis`; use one of time,vehicle,axis "),
+            ("[audit]\nlayout = \"time,axis\"", "layout: must be one of `time,vehicle,axis`, "),
             ("[audit]\ndelta_m = nan", "delta_m must be a finite number"),
             ("[audit]\nellipsoid_m = [1.0, 1.0, 2.0]\nradius_m = 0.1", "are both given"),
         ] {

@@ -168,7 +168,7 @@ fn encounter(series: PairSeries, approach: &Approach, settings: &Settings, outco
         paths_m: [Vec::new(), Vec::new()],
         limit_m: approach.limit_m,
         closest_s: approach.time_s,
-        closest: format!("{} {unit}", interval(approach.lower_m, approach.upper_m)),
+        closest: format!("{} {unit}", interval(approach.lower_m, approach.upper_m, approach.limit_m)),
     };
     for sample in series.finish() {
         if sample.unseen_before {
