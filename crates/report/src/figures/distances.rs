@@ -75,12 +75,18 @@ pub fn distances(log: &FlightLog, delta_m: f64, certified_m: Option<f64>, title:
     chart.figure("distances", title, &(description + &note))
 }
 
+/// Returns the short label of a pair beside its line, such as `1-2`.
+fn pair_label(pair: Pair) -> String {
+    let [first, second] = pair.numbers();
+    format!("{first}-{second}")
+}
+
 fn of_all_pairs(spans: &Spans<'_>) -> Vec<Line> {
     let count = pairs(spans.vehicles()).count();
     let lines = pairs(spans.vehicles()).enumerate().map(|(k, (i, j))| {
         let points = spans.iter().map(|span| (span.time_s, span.extremes.pair_min_m[k])).collect();
         let (stroke, label) = if count <= TOLD_APART {
-            (Stroke::of_line(k), Some(Pair::new(i, j).to_string()))
+            (Stroke::of_line(k), Some(pair_label(Pair::new(i, j))))
         } else {
             (Stroke::solid(PALETTE[0], 0.9).faint(0.55), (k == 0).then(|| format!("all {count} pairs")))
         };
@@ -121,8 +127,7 @@ fn of_many_pairs(spans: &Spans<'_>, chart: &mut Chart) -> String {
     for (k, pair) in closest_pairs(&closest, spans.vehicles()).into_iter().enumerate() {
         let apart_m = |span: &Span<'_>| separation(&scaled(span), pair.first(), pair.second());
         let apart = spans.iter().map(|span| (span.time_s, apart_m(span))).collect();
-        let [first, second] = pair.numbers();
-        chart.line(apart, Stroke::solid(PALETTE[k + 1], 1.0), format!("{first}-{second}"));
+        chart.line(apart, Stroke::solid(PALETTE[k + 1], 1.0), pair_label(pair));
     }
     let smallest = closest.iter().map(|&(time_s, closest)| (time_s, closest.separation_m)).collect();
     chart.line(smallest, Stroke::dashed(SOFT_INK, 1.4), "smallest");
