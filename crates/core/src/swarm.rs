@@ -190,9 +190,11 @@ impl TryFrom<[usize; 2]> for Pair {
     }
 }
 
+/// Writes `4-5`, and `4 and 5` with the flag `#`.
 impl fmt::Display for Pair {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}-{}", self.first + 1, self.second + 1)
+        let between = if f.alternate() { " and " } else { "-" };
+        write!(f, "{}{between}{}", self.first + 1, self.second + 1)
     }
 }
 

@@ -62,6 +62,12 @@ pub fn metres_below(number: f64, limit_m: f64) -> String {
     (3..=17).find(is_distinct).map_or_else(|| format!("{number:e}"), |decimals| at_least(number, decimals))
 }
 
+/// Formats `number` \[m\], which is at most `limit_m` \[m\], as [`metres_below`] does; the limit itself exactly.
+#[must_use]
+pub fn metres_up_to(number: f64, limit_m: f64) -> String {
+    if number < limit_m { metres_below(number, limit_m) } else { exact(limit_m) }
+}
+
 /// Formats a length \[m\], speed or acceleration with three decimals, or in powers of ten below 5e-3 and from 1e7 on.
 #[must_use]
 pub fn metres(number: f64) -> String {

@@ -301,7 +301,10 @@ pub fn answer<E: Experiment>(
         monitor.warn(&format!("note: {note}"));
     }
     let repeats = study.repeats(scenario);
-    let repeated: Vec<_> = repeats.iter().map(|(what, command)| format!("{what}\n  {command}")).collect();
+    let repeated = match &repeats[..] {
+        [_, _, _, ..] => vec!["--html writes a page with the command that repeats each of these flights".to_owned()],
+        few => few.iter().map(|(what, command)| format!("{what}\n  {command}")).collect(),
+    };
     monitor.say(&format!("{}\n\n{}\n{}", study.headline(), study.text(), repeated.join("\n")));
     let not_written = |error: &dyn std::error::Error| {
         Failure::machine("files/cannot-write", format!("cannot write the result: {error}"))

@@ -103,7 +103,7 @@ pub enum GraphError {
         count: usize,
     },
     /// An edge is listed twice, in either direction.
-    #[error("edge {} joins vehicles {pair} a second time", edge + 1)]
+    #[error("edge {} joins vehicles {pair:#} a second time", edge + 1)]
     Duplicate {
         /// Index of the repetition in the list, from 0.
         edge: usize,

@@ -95,7 +95,7 @@ fn invalid_edge_lists_are_refused_with_numbers_from_one() {
         message(&[(0, usize::MAX)]),
         Err(format!("edge 1 names vehicle {}, but the swarm has 3", usize::MAX as u128 + 1))
     );
-    assert_eq!(message(&[(1, 2), (0, 1), (2, 1)]), Err("edge 3 joins vehicles 2-3 a second time".into()));
+    assert_eq!(message(&[(1, 2), (0, 1), (2, 1)]), Err("edge 3 joins vehicles 2 and 3 a second time".into()));
     assert_eq!(message(&[(1, 2), (0, 1)]), Ok(Graph::path(3)).map_err(|e: GraphError| e.to_string()));
 }
 

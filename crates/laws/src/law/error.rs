@@ -4,6 +4,7 @@ use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::space::{Metric, Obstacle};
 use tautline_core::swarm::{Pair, Swarm, first_row_not_finite, row};
+use tautline_core::text::metres_up_to;
 
 use super::tension::TensionError;
 
@@ -17,7 +18,10 @@ pub enum LawError {
     #[error("it failed")]
     Failed,
     /// A pair is at or inside the distance where its tension is infinite. This is a collision; values are not clamped.
-    #[error("vehicles {pair} are {separation_m} m apart, not more than the safety distance {delta_m} m")]
+    #[error(
+        "vehicles {pair:#} are {} m apart, not more than the safety distance {delta_m} m",
+        metres_up_to(*separation_m, *delta_m)
+    )]
     Collision {
         /// The first such pair in index order.
         pair: Pair,
@@ -44,7 +48,7 @@ pub enum LawError {
     },
     /// A pair is at or inside the barrier distance by a sensed or received state, though not in truth.
     #[error(
-        "vehicles {pair} sense or receive a separation of {known_m} m, not more than the safety distance {delta_m} m; \
+        "vehicles {pair:#} sense or receive a separation of {known_m} m, not more than the safety distance {delta_m} m; \
          their true separation is {true_m} m"
     )]
     KnownCollision {
@@ -86,7 +90,10 @@ pub enum LawError {
     #[error("the state of the swarm is too large for double precision")]
     OutOfRange,
     /// The slots of a pair are so close that its tension does not exist.
-    #[error("the slots of vehicles {pair} are {distance_m} m apart, not more than the safety distance {delta_m} m")]
+    #[error(
+        "the slots of vehicles {pair:#} are {} m apart, not more than the safety distance {delta_m} m",
+        metres_up_to(*distance_m, *delta_m)
+    )]
     Target {
         /// The first such pair in index order.
         pair: Pair,
@@ -150,7 +157,7 @@ impl LawError {
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum ParameterError {
     /// An edge has no tension.
-    #[error("vehicles {pair}: {source}")]
+    #[error("vehicles {pair:#}: {source}")]
     Tension {
         /// The first such edge in index order.
         pair: Pair,

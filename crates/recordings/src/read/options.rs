@@ -56,7 +56,7 @@ impl ArrayAxis {
     pub fn layout_of(name: &str) -> Result<ArrayLayout, String> {
         let layout = Self::LAYOUTS.into_iter().find(|layout| Self::layout_name(*layout) == name);
         layout.ok_or_else(|| {
-            format!("unknown layout `{name}`; use one of {}", Self::LAYOUTS.map(Self::layout_name).join(" "))
+            format!("must be {}", Self::LAYOUTS.map(Self::layout_name).join(", or "))
         })
     }
 }

@@ -78,7 +78,7 @@ fn step_into_the_barrier_ends_the_run_without_halvings() {
     assert_eq!(&last.swarm, &flight.last);
     assert_eq!(last.control.nrows(), 0, "the law has no command in this state");
     let Some(Event::EndedEarly { time_s, reason }) = log.events.last() else { panic!("{:?}", log.events) };
-    assert!(*time_s == 0.125 && reason.contains("vehicles 1-2"), "{reason}");
+    assert!(*time_s == 0.125 && reason.contains("vehicles 1 and 2"), "{reason}");
 }
 
 #[test]

@@ -12,6 +12,7 @@ use super::spec::{Safety, Scenario, Space};
 use super::text::Text;
 use super::time::TimeSpec;
 use tautline_core::swarm::{Pair, row};
+use tautline_core::text::metres_up_to;
 use tautline_laws::graph::{Graph, Pinning};
 use tautline_laws::law::{Controls, LawSpec, ParameterError};
 use tautline_laws::target::{Begins, DeadlockMode, Guidance, Leg};
@@ -265,9 +266,10 @@ impl Scenario {
         let apart = if metric.is_metres() { "apart," } else { "apart, scaled to the ellipsoid," };
         if let Some((pair, separation_m)) = first_within(&metric.scaled_rows(&self.start.positions_m), delta_m) {
             let said = if separation_m == 0.0 {
-                format!("vehicles {pair} start at the same point")
+                format!("vehicles {pair:#} start at the same point")
             } else {
-                format!("vehicles {pair} start {separation_m} m {apart} not more than delta = {delta_m} m")
+                let separation = metres_up_to(separation_m, delta_m);
+                format!("vehicles {pair:#} start {separation} m {apart} not more than delta = {delta_m} m")
             };
             let help = "move one of the vehicles away, or reduce law.delta_m";
             return refuse(said, help, (0, "start.positions_m"), pair);
@@ -281,10 +283,11 @@ impl Scenario {
             let said = if distance_m == 0.0 {
                 format!("the slots of vehicles {a} and {b} are the same point")
             } else if distance_m <= delta_m {
-                format!("a desired distance of {distance_m} m (vehicles {pair}) is not more than delta = {delta_m} m")
+                let distance = metres_up_to(distance_m, delta_m);
+                format!("a desired distance of {distance} m (vehicles {pair:#}) is not more than delta = {delta_m} m")
             } else {
                 format!(
-                    "a desired distance of {distance_m} m (vehicles {pair}) exceeds delta = {delta_m} m by less than a \
+                    "a desired distance of {distance_m} m (vehicles {pair:#}) exceeds delta = {delta_m} m by less than a \
                      billionth of it"
                 )
             };
@@ -304,7 +307,7 @@ impl Scenario {
             return Ok(());
         }
         Err(ScenarioError::new(format!(
-            "the hulls of vehicles {} touch at {touching_m} m, less than {CONTACT_PREDICTION_M} m before the safety \
+            "the hulls of vehicles {:#} touch at {touching_m} m, less than {CONTACT_PREDICTION_M} m before the safety \
              distance delta = {} m",
             Pair::new(i, j),
             self.delta_m

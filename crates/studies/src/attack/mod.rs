@@ -385,7 +385,7 @@ impl Attack {
         let shown =
             if min_m < self.about.delta_m { metres_below(min_m, self.about.delta_m) } else { at_least(min_m, 3) };
         let at = min_at_s.map_or_else(String::new, |at_s| format!(" at {}", seconds(at_s)));
-        let pair = min_pair.map_or_else(String::new, |[a, b]| format!(", vehicles {a}-{b}"));
+        let pair = min_pair.map_or_else(String::new, |[a, b]| format!(", vehicles {a} and {b}"));
         format!("{shown} m{at}{pair}")
     }
 }

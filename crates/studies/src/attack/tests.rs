@@ -202,12 +202,12 @@ fn wrong_options_are_refused() {
     let start = || start_options(10);
     assert!(refused(varied(&[], 10)).contains("nothing is varied"));
     assert!(
-        refused(Options { start_m: Some(0.0), ..start() }).contains("--start: must be a finite number above 0, got 0")
+        refused(Options { start_m: Some(0.0), ..start() }).contains("--start 0: must be a finite number above 0")
     );
     assert!(refused(Options { velocity_m_s: Some(f64::NAN), ..start() }).contains("velocity"));
-    assert!(refused(Options { flights: 0, ..start() }).contains("--flights: must be at least the 1 of --seeds, got 0"));
+    assert!(refused(Options { flights: 0, ..start() }).contains("--flights 0: must be at least 1, the number of --seeds"));
     assert!(
-        refused(Options { seeds: 11, ..start() }).contains("--flights: must be at least the 11 of --seeds, got 10")
+        refused(Options { seeds: 11, ..start() }).contains("--flights 10: must be at least 11, the number of --seeds")
     );
     assert!(refused(Options { seeds: 2, ..start() }).contains("nothing in the flight is random"));
     assert!(refused(varied(&["law.f1=0..1"], 10)).contains("f1"));

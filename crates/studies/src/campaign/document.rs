@@ -47,10 +47,6 @@ impl LawSummary {
         if of == 0 {
             return "no flight was flown".to_owned();
         }
-        let unknown = match self.unknown {
-            0 => String::new(),
-            unknown => format!(", {} unknown", separated(unknown)),
-        };
         // An upper bound of 1 is no information.
         let bound = self.violated_below.filter(|bound| bound.share < 1.0).map(|bound| {
             let kind = match bound.kind {
@@ -58,7 +54,7 @@ impl LawSummary {
                 BoundKind::ConfidenceSequence => "confidence sequence",
             };
             let (below, confidence) = (percent_at_most(bound.share), 100.0 * bound.confidence);
-            format!(": below {below} with {confidence:.0} % confidence ({kind})")
+            if self.unknown == 0 && count == 0 { format!(": below {below} with {confidence:.0} % confidence ({kind})") } else { format!("; violated below {below} with {confidence:.0} % confidence ({kind})") }
         });
         let bound = if confidence == 1.0 { Some(": all points of the grid, no sample".to_owned()) } else { bound };
         let flights = if of == 1 { "flight" } else { "flights" };
@@ -66,8 +62,16 @@ impl LawSummary {
             0 => String::new(),
             count => format!("CERTIFICATE BROKEN in {}: ", counted(count, "flight", "flights")),
         };
-        let (count, of) = (separated(count), separated(of));
-        format!("{broken}{count} of {of} {flights} violated{unknown}{}", bound.unwrap_or_default())
+        let [of, violated, unknown, clear] = [of, count, self.unknown, self.clear.count].map(separated);
+        // What failed comes first.
+        let counts = match (count, self.unknown) {
+            (_, 0) if self.clear.count == 0 || count == 0 => format!("{violated} of {of} {flights} violated"),
+            (_, 0) => format!("{violated} of {of} {flights} violated, {clear} clear"),
+            (0, _) => format!("{unknown} of {of} {flights} unknown, 0 violated, {clear} clear"),
+            _ => format!("{violated} of {of} {flights} violated, {unknown} unknown, {clear} clear"),
+        };
+        let bound = bound.unwrap_or_default();
+        format!("{broken}{counts}{bound}")
     }
 }
 
@@ -227,7 +231,12 @@ impl Study for Summary {
     fn headline(&self) -> String {
         match &self.laws[..] {
             [law] => law.sentence(),
-            laws => laws.iter().map(|law| format!("{}: {}", law.name, law.sentence())).collect::<Vec<_>>().join("; "),
+            laws => {
+                // Laws with violations come first, then laws with unknown flights.
+                let mut laws: Vec<_> = laws.iter().collect();
+                laws.sort_by_key(|law| (law.certificates_broken == 0, law.violated.count == 0, law.unknown == 0));
+                laws.iter().map(|law| format!("{}: {}", law.name, law.sentence())).collect::<Vec<_>>().join("; ")
+            }
         }
     }
 

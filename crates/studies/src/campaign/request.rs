@@ -227,6 +227,11 @@ fn answer(
         monitor.warn(&format!("note: {note}"));
     }
     monitor.say(&format!("{}\n\n{}", summary.headline(), summary.text()));
+    let again = summary.laws.iter().map(|law| law.worst.len() + law.bad.len()).sum::<usize>().min(worst);
+    if again > 0 {
+        let flights = counted(again as u64, "flight", "flights");
+        monitor.warn(&format!("flying {flights} with the least clearance again for the page; --worst 0 leaves it out"));
+    }
     let flights = fly_worst_again(folder, &summary, worst, pictures, monitor)?;
     let path = folder.file(PAGE);
     if monitor.is_interrupted() {

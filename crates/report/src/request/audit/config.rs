@@ -149,8 +149,9 @@ impl AuditTable {
         settings.max_gap_s = settings.max_gap_s.or(self.max_gap_s);
         settings.accel_window_s = settings.accel_window_s.or(self.accel_window_s);
         settings.require_presence |= self.require_presence.unwrap_or(false);
+        let given = self.layout.clone().unwrap_or_default();
         let layout = self.layout.map(|layout| ArrayAxis::layout_of(&layout)).transpose();
-        let layout = layout.map_err(|error| wrong(format!("layout: {error}")))?;
+        let layout = layout.map_err(|error| wrong(format!("layout: {error}, got `{given}`")))?;
         let axes = self.axes.map(|axes| axes.parse::<Axes>()).transpose().map_err(wrong)?;
         let scale = self.scale.map(ScaleEntry::scale).transpose().map_err(wrong)?;
         if let Subject::Files { options, .. } = &mut request.subject {
@@ -220,7 +221,7 @@ mod tests {
             ("[audit]\nmax_accel_m_s2 = 2.0", "has no effect without motion = \"bounded\""),
             ("[audit]\naxes = \"nes\"", "`nes` is not three directions"),
             ("[audit]\nscale = [1, 0, 1]", "a scale must not be 0"),
-            ("[audit]\nlayout = \"time,axis\"", "layout: unknown layout `time,axis`; use one of time,vehicle,axis "),
+            ("[audit]\nlayout = \"time,axis\"", "layout: must be time,vehicle,axis, or "),
             ("[audit]\ndelta_m = nan", "delta_m must be a finite number"),
             ("[audit]\nellipsoid_m = [1.0, 1.0, 2.0]\nradius_m = 0.1", "are both given"),
         ] {
