@@ -175,13 +175,13 @@ impl Options {
         if points > MOST_POINTS || flights > *FLIGHTS.end() {
             let keys = self.keys.iter().map(|key| format!("--key {} ({})", key.key, key.values.len()));
             let keys = keys.collect::<Vec<_>>().join(" and ");
-            let why = if points > MOST_POINTS {
-                format!("{keys}: the grid must have at most {MOST_POINTS} points, got {points}")
-            } else {
-                let most = FLIGHTS.end();
-                format!("--runs {}: {points} points must have at most {most} flights, got {flights}", self.runs)
-            };
-            return grid(why, "give fewer values of a key, or fewer --runs");
+            if points > MOST_POINTS {
+                let why = format!("{keys}: the grid must have at most {MOST_POINTS} points, got {points}");
+                return grid(why, "give fewer values of a key");
+            }
+            let most = FLIGHTS.end();
+            let why = format!("--runs {}: {points} points must have at most {most} flights, got {flights}", self.runs);
+            return grid(why, "give fewer runs, or fewer values of a key");
         }
         Ok(())
     }

@@ -246,8 +246,8 @@ impl SearchSpace {
         Err(Failure::input(
             "attack/out-of-range",
             format!(
-                "--apart {apart_m}: must be more than delta ({delta_m} m) and at most {}, the scenario's own smallest \
-                 separation [m]",
+                "--apart {apart_m}: must be more than delta ({delta_m} m) and at most {} m, the smallest separation \
+                 of the scenario's start",
                 at_least(own_m, 3)
             ),
             "give a distance in this range, or leave --apart out",
@@ -347,8 +347,8 @@ mod tests {
             ("law.alpha=a..2", "`a` is not a number"),
             ("law.alpha=2..2", "must be in increasing order"),
             ("law.alpha=3..2", "must be in increasing order"),
-            ("law.alpha=0..inf", "must be finite, got 0 to inf"),
-            ("law.alpha=nan..1", "must be finite, got NaN to 1"),
+            ("law.alpha=0..inf", "law.alpha=0..inf: the range must be finite"),
+            ("law.alpha=nan..1", "law.alpha=NaN..1: the range must be finite"),
             ("law.alpha=-1e308..1e308", "must be finite"),
         ] {
             let refused = Bound::parse(text).expect_err(text);

@@ -151,7 +151,8 @@ fn starts_keep_the_separation_of_apart() {
     for apart_m in [1.0, 5.1, f64::NAN] {
         let refused =
             space(&sets, &Options { apart_m: Some(apart_m), ..wide.clone() }).expect_err("refused").to_string();
-        assert!(refused.contains("must be more than delta (1 m) and at most the scenario's own 5 m"), "{refused}");
+        assert!(refused.contains(&format!("--apart {apart_m}: must be more than delta (1 m)")), "{refused}");
+        assert!(refused.contains("at most 5.000 m, the smallest separation of the scenario's start"), "{refused}");
     }
 }
 
@@ -218,7 +219,7 @@ fn wrong_options_are_refused() {
     let x = ["start.positions_m.1.x=0..1", "start.positions_m.1.1=0..1"];
     assert!(refused(varied(&x, 10)).contains("varied twice"));
     let both = Options { start_m: Some(1.0), ..varied(&["start.positions_m.1.x=0..1"], 10) };
-    assert!(refused(both).contains("start.positions_m.1.x is varied twice"));
+    assert!(refused(both).contains("--vary start.positions_m.1.x: the key is varied twice"));
 }
 
 #[test]

@@ -162,7 +162,7 @@ fn fly_shard(folder: &Folder, shard: u64, batch: &Batch<'_>, monitor: &dyn Monit
     if flown.is_none() {
         monitor.finish();
         monitor
-            .warn(&format!("interrupted in shard {shard}: finished flights are kept, and the same command continues"));
+            .warn(&format!("interrupted in shard {shard}: finished flights are kept; the same command continues"));
     }
     Ok(flown)
 }
@@ -235,7 +235,8 @@ fn answer(
     let flights = fly_worst_again(folder, &summary, worst, pictures, monitor)?;
     let path = folder.file(PAGE);
     if monitor.is_interrupted() {
-        monitor.warn("interrupted: no page was written");
+        let report = command_line(["campaign", "report", &folder.path().display().to_string()].into_iter());
+        monitor.warn(&format!("interrupted: all flights are kept, and no page was written; write it with: {report}"));
         return Ok(None);
     }
     let command = command_line(["campaign", "run", &format!("{}.toml", summary.name)].into_iter());

@@ -204,19 +204,17 @@ impl Spec {
         if place.span.start > key.len() {
             return Some(self.place(if table == "set" { value } else { name }));
         }
-        // The key up to the end of the refused part.
+        // The key of the file that ends with the refused part, or that has the refused part within its quotes.
         let part = key.get(place.span.clone())?;
-        let upto = format!("{table}.{}", key.get(..place.span.end)?);
-        if let Some((name, _)) = find(parsed.get_ref(), &upto) {
-            return Some(self.place(name));
-        }
-        // The file has several parts in one quoted key.
-        let written = self.source.text.get(name.clone())?;
-        let after = key.len() - place.span.end;
+        let upto = find(parsed.get_ref(), &format!("{table}.{}", key.get(..place.span.end)?));
+        let after = if upto.is_some() { 0 } else { key.len() - place.span.end };
+        let whole = upto.map_or(name, |(name, _)| name);
+        let written = self.source.text.get(whole.clone())?;
         let quote = written.len() - written.trim_end_matches(['"', '\'']).len();
-        let end = name.end.checked_sub(quote + after)?;
+        let end = whole.end.checked_sub(quote + after)?;
         let span = end.checked_sub(part.len())?..end;
-        (self.source.text.get(span.clone()) == Some(part)).then(|| self.place(span))
+        let is_part = self.source.text.get(span.clone()) == Some(part);
+        Some(self.place(if is_part { span } else { whole }))
     }
 }
 
