@@ -123,7 +123,12 @@ fn errors_have_line_and_column_of_the_specification() {
         ("time.duration_s", "time.duratoin_s", "duratoin_s", "spec.toml:5:6"),
         ("runs = 12", "runs = 0", "`runs` must be at least 1, got 0", "spec.toml:2:8"),
         ("runs = 12", "runs = \"ten\"", "`runs` must be a whole number, got the text \"ten\"", "spec.toml:2:8"),
-        ("{ uniform = [0.0, 0.3] }", "{ grid = 3 }", "`grid` must be a list with at least one entry or a table", ":7:29"),
+        (
+            "{ uniform = [0.0, 0.3] }",
+            "{ grid = 3 }",
+            "`grid` must be a list with at least one entry or a table",
+            ":7:29",
+        ),
         ("time.duration_s", "breathing.mode", "unknown key `breathing`", "spec.toml:5:1"),
         ("time.duration_s = 1.0", "\"breathing.mode\" = \"x\"", "unknown key `breathing`", "spec.toml:5:2"),
         ("time.duration_s = 1.0", "\"time.dt_s\" = [1.0]", "`dt_s` must be a number, got a list", "spec.toml:5:15"),
@@ -196,7 +201,9 @@ fn options_out_of_range_are_named_with_their_value() {
 
 #[test]
 fn a_report_says_that_it_flies_flights_again() {
-    let place = place(&SPEC.replace("runs = 12", "runs = 3").replace("duration_s = 1.0", "duration_s = 0.1\narrival.hold_s = 0.1"));
+    let place = place(
+        &SPEC.replace("runs = 12", "runs = 3").replace("duration_s = 1.0", "duration_s = 0.1\narrival.hold_s = 0.1"),
+    );
     let ran = campaign(place.path(), &["run", "spec.toml", "--out", "camp", "--worst", "0"]);
     assert!(!ran.err.contains("again"), "{}", ran.err);
     let report = campaign(place.path(), &["report", "camp", "--worst", "2", "--no-snapshots"]);

@@ -374,8 +374,10 @@ fn a_table_is_printed_unless_quiet() {
     assert_eq!(exit, Some(0), "{err}");
     assert!(out.starts_with("pair: 2 laws from the same 6 starts (start.seed 0 to 5), delta 2 m\n"), "{out}");
     // One table, with a row for each law.
-    let headings = ["Law ", "Violated ", "Unknown ", "Reached ", "Time to reach, median [s] ", "Clearance, smallest [m]"];
-    let table: Vec<_> = out.lines().skip_while(|line| !line.starts_with("Law ")).take_while(|line| *line != "").collect();
+    let headings =
+        ["Law ", "Violated ", "Unknown ", "Reached ", "Time to reach, median [s] ", "Clearance, smallest [m]"];
+    let table: Vec<_> =
+        out.lines().skip_while(|line| !line.starts_with("Law ")).take_while(|line| *line != "").collect();
     assert!(headings.iter().all(|heading| table[0].contains(heading)), "{out}");
     assert_eq!(out.lines().filter(|line| line.starts_with("laplacian ")).count(), 1, "{out}");
     assert!(table[1].starts_with("edge-tension ") && table[2].starts_with("laplacian "), "{out}");

@@ -388,7 +388,7 @@ fn verdicts_have_colours_only_if_forced_or_on_a_terminal() {
     let folder = tempfile::tempdir().expect("a folder");
     let colours = |variables: &[(&str, &str)]| {
         let mut command = std::process::Command::new(crate::program::TAUTLINE);
-        command.args(["run", "--no-snapshots", "--no-figures", "--force", "--set", "time.duration_s=0.1"]);
+        command.args(["run", "--no-snapshots", "--no-figures", "--force", "--set", "time.duration_s=1"]);
         command.current_dir(folder.path()).env("XDG_RUNTIME_DIR", folder.path());
         command.env_remove("NO_COLOR").env_remove("CLICOLOR_FORCE").envs(variables.iter().copied());
         let ran = command.output().expect("the program");

@@ -55,9 +55,7 @@ impl ArrayAxis {
     /// A message with the names of all layouts, if the name is unknown.
     pub fn layout_of(name: &str) -> Result<ArrayLayout, String> {
         let layout = Self::LAYOUTS.into_iter().find(|layout| Self::layout_name(*layout) == name);
-        layout.ok_or_else(|| {
-            format!("must be {}", Self::LAYOUTS.map(Self::layout_name).join(", or "))
-        })
+        layout.ok_or_else(|| format!("must be {}", Self::LAYOUTS.map(Self::layout_name).join(", or ")))
     }
 }
 

@@ -48,8 +48,9 @@ impl Bound {
     pub fn parse(text: &str) -> Result<Self, Failure> {
         let parts = text.split_once('=').and_then(|(key, range)| Some((key.trim(), range.split_once("..")?)));
         let Some((key, (low, high))) = parts else { return Err(wrong(&format!("{text}: is not KEY=LOW..HIGH"))) };
-        let number =
-            |end: &str| end.trim().parse::<f64>().map_err(|_| wrong(&format!("{text}: `{}` is not a number", end.trim())));
+        let number = |end: &str| {
+            end.trim().parse::<f64>().map_err(|_| wrong(&format!("{text}: `{}` is not a number", end.trim())))
+        };
         Self::new(key, number(low)?, number(high)?)
     }
 
@@ -196,10 +197,8 @@ impl SearchSpace {
             let near_m = self.options.apart_m.map(|apart_m| (apart_m, closest_start_m(&scenario)));
             match near_m {
                 Some((apart_m, near_m)) if near_m < apart_m => {
-                    {
                     let near = metres_below(near_m, apart_m);
                     Err(format!("two vehicles start {near} m apart, less than --apart {apart_m} m"))
-                }
                 }
                 _ => Ok(scenario),
             }

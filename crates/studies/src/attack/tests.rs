@@ -202,11 +202,11 @@ fn wrong_options_are_refused() {
     let refused = |options: Options| space(&[], &options).expect_err("refused").to_string();
     let start = || start_options(10);
     assert!(refused(varied(&[], 10)).contains("nothing is varied"));
-    assert!(
-        refused(Options { start_m: Some(0.0), ..start() }).contains("--start 0: must be a finite number above 0")
-    );
+    assert!(refused(Options { start_m: Some(0.0), ..start() }).contains("--start 0: must be a finite number above 0"));
     assert!(refused(Options { velocity_m_s: Some(f64::NAN), ..start() }).contains("velocity"));
-    assert!(refused(Options { flights: 0, ..start() }).contains("--flights 0: must be at least 1, the number of --seeds"));
+    assert!(
+        refused(Options { flights: 0, ..start() }).contains("--flights 0: must be at least 1, the number of --seeds")
+    );
     assert!(
         refused(Options { seeds: 11, ..start() }).contains("--flights 10: must be at least 11, the number of --seeds")
     );

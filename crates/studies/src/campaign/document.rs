@@ -54,7 +54,8 @@ impl LawSummary {
                 BoundKind::ConfidenceSequence => "confidence sequence",
             };
             let (below, confidence) = (percent_at_most(bound.share), 100.0 * bound.confidence);
-            if self.unknown == 0 && count == 0 { format!(": below {below} with {confidence:.0} % confidence ({kind})") } else { format!("; violated below {below} with {confidence:.0} % confidence ({kind})") }
+            let link = if count == 0 && self.unknown == 0 { ": " } else { "; violated " };
+            format!("{link}below {below} with {confidence:.0} % confidence ({kind})")
         });
         let bound = if confidence == 1.0 { Some(": all points of the grid, no sample".to_owned()) } else { bound };
         let flights = if of == 1 { "flight" } else { "flights" };
@@ -62,16 +63,20 @@ impl LawSummary {
             0 => String::new(),
             count => format!("CERTIFICATE BROKEN in {}: ", counted(count, "flight", "flights")),
         };
-        let [of, violated, unknown, clear] = [of, count, self.unknown, self.clear.count].map(separated);
-        // What failed comes first.
-        let counts = match (count, self.unknown) {
-            (_, 0) if self.clear.count == 0 || count == 0 => format!("{violated} of {of} {flights} violated"),
-            (_, 0) => format!("{violated} of {of} {flights} violated, {clear} clear"),
-            (0, _) => format!("{unknown} of {of} {flights} unknown, 0 violated, {clear} clear"),
-            _ => format!("{violated} of {of} {flights} violated, {unknown} unknown, {clear} clear"),
-        };
+        let counts = outcomes(count, self.unknown, self.clear.count, &format!("{} {flights}", separated(of)));
         let bound = bound.unwrap_or_default();
         format!("{broken}{counts}{bound}")
+    }
+}
+
+/// Returns the numbers of flights by outcome, what failed first. `all` names all flights, such as `100 flights`.
+fn outcomes(violated: u64, unknown: u64, clear: u64, all: &str) -> String {
+    let [shown, not_known, proved] = [violated, unknown, clear].map(separated);
+    match (violated, unknown, clear) {
+        (0, 0, _) | (_, 0, 0) => format!("{shown} of {all} violated"),
+        (_, 0, _) => format!("{shown} of {all} violated, {proved} clear"),
+        (0, ..) => format!("{not_known} of {all} unknown, 0 violated, {proved} clear"),
+        _ => format!("{shown} of {all} violated, {not_known} unknown, {proved} clear"),
     }
 }
 
@@ -310,6 +315,19 @@ impl Study for Summary {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_headline_begins_with_what_failed() {
+        for (violated, unknown, clear, expected) in [
+            (3, 2, 95, "3 of 100 flights violated, 2 unknown, 95 clear"),
+            (3, 0, 97, "3 of 100 flights violated, 97 clear"),
+            (0, 2, 98, "2 of 100 flights unknown, 0 violated, 98 clear"),
+            (0, 0, 100, "0 of 100 flights violated"),
+            (100, 0, 0, "100 of 100 flights violated"),
+        ] {
+            assert_eq!(outcomes(violated, unknown, clear, "100 flights"), expected);
+        }
+    }
 
     #[test]
     fn a_small_p_value_is_a_bound() {

@@ -16,8 +16,8 @@ use super::summary::{Gathered, Summary};
 use crate::SCHEMA_VERSION;
 use crate::study::Study as _;
 use crate::table::{Cell, ParquetTable};
-use tautline_report::report::{write_atomically, write_atomically_with};
 use tautline_core::text::counted;
+use tautline_report::report::{write_atomically, write_atomically_with};
 use tautline_report::request::{Failure, command_line};
 
 /// File name of the table in the folder of a campaign.

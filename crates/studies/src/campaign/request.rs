@@ -161,8 +161,7 @@ fn fly_shard(folder: &Folder, shard: u64, batch: &Batch<'_>, monitor: &dyn Monit
     let flown = folder.fly(shard, batch)?;
     if flown.is_none() {
         monitor.finish();
-        monitor
-            .warn(&format!("interrupted in shard {shard}: finished flights are kept; the same command continues"));
+        monitor.warn(&format!("interrupted in shard {shard}: finished flights are kept; the same command continues"));
     }
     Ok(flown)
 }

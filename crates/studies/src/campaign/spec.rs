@@ -113,9 +113,7 @@ impl Spec {
             let remedy = "a specification is `key = value` lines below `[table]` headers";
             failed("campaign/specification", &problem, Some(remedy), error.span().unwrap_or_default())
         };
-        let misfit = |code| {
-            move |(error, span): (ScenarioError, _)| failed(code, error.message(), error.help(), span)
-        };
+        let misfit = |code| move |(error, span): (ScenarioError, _)| failed(code, error.message(), error.help(), span);
         let table = DeTable::parse(text).map_err(not_toml)?.into_inner();
         let mut file = Spanned::new(0..0, DeValue::Table(table));
         SPEC.check("specification", &mut file).map_err(misfit("campaign/specification"))?;
@@ -373,7 +371,10 @@ mod tests {
             ("runs = 10", "spec.toml, line 1: missing key `scenario` (`scenario` is text)"),
             ("scenario = ", "line 1: the text is not TOML: "),
             ("scenario = 'p'\nmethod = 'split'", "line 2: unknown choice `split` (did you mean `splitting`? "),
-            ("scenario = 'p'\nmethod = ['splitting']", "`method` must be \"flights\" or \"splitting\", got a list of 1"),
+            (
+                "scenario = 'p'\nmethod = ['splitting']",
+                "`method` must be \"flights\" or \"splitting\", got a list of 1",
+            ),
             ("scenario = 'p'\nruns = -1", "line 2: `runs` must be at least 1, got -1 (Number of runs; by default"),
             ("scenario = 'p'\nruns = 2.5", "line 2: `runs` must be a whole number, got 2.5 "),
             ("scenario = 'p'\nruns = 'ten'", "line 2: `runs` must be a whole number, got the text \"ten\" "),
@@ -392,7 +393,10 @@ mod tests {
             (&vary("{ uniform = [0.0] }"), "line 3: `uniform` must be a list of 2 numbers, got a list of 1 "),
             (&vary("{ uniform = '0..1' }"), "line 3: `uniform` must be a list of 2 numbers, got the text \"0..1\" "),
             (&vary("{ uniform = [0, 1], list = [2] }"), "line 3: `vary.law.alpha` must have one key, got 2 "),
-            (&vary("{ uniform = [1, 0] }"), "vary.law.alpha: must be two finite numbers in increasing order, got 1 and "),
+            (
+                &vary("{ uniform = [1, 0] }"),
+                "vary.law.alpha: must be two finite numbers in increasing order, got 1 and ",
+            ),
             (&vary("{ integer = [0.5, 2] }"), "line 3: `integer` must be a whole number, got 0.5 "),
             (&vary("{ grid = [] }"), "line 3: `grid` must be a list with at least one entry, got a list of 0 "),
             (&vary("{ list = [] }"), "line 3: `list` must be a list with at least one entry, got a list of 0 "),

@@ -125,8 +125,15 @@ fn wrong_grids_are_refused() {
     assert_eq!(refused(&options(&axes, 1)).0, "sweep/grid", "the name and the number of one axis");
     assert_eq!(refused(&Options { runs: 0, ..key("law.alpha=1") }).0, "request/out-of-range");
     let (code, said) = refused(&options(&["law.alpha=0:1:51", "law.delta_m=0:1:50"], 1));
-    assert!(code == "sweep/grid" && said.contains("points, got 2550") && said.contains(&MOST_POINTS.to_string()), "{said}");
-    assert!(refused(&options(&["law.alpha=0:1:50"], 1_000_000)).1.contains("--runs 1000000: 50 points must have at most 10000000 flights, got 50000000"));
+    assert!(
+        code == "sweep/grid" && said.contains("points, got 2550") && said.contains(&MOST_POINTS.to_string()),
+        "{said}"
+    );
+    assert!(
+        refused(&options(&["law.alpha=0:1:50"], 1_000_000))
+            .1
+            .contains("--runs 1000000: 50 points must have at most 10000000 flights, got 50000000")
+    );
     let (code, said) = refused(&key("time.max_halvings=0:5:3"));
     assert!(code == "sweep/grid" && said.contains("takes integers only, got 2.5"), "{said}");
     assert_eq!(refused(&key("law.alfa=1,2")).0, "scenario/unknown-key");
