@@ -298,7 +298,8 @@ mod tests {
         }
         assert_eq!(
             reasons[24].to_string(),
-            "The law is undefined at the start: vehicles 1 and 2 are 1.500 m apart, not more than the safety distance 2 m."
+            "The law is undefined at the start: vehicles 1 and 2 are 1.500 m apart, not more than the safety distance \
+             2 m."
         );
     }
 }

@@ -48,8 +48,8 @@ pub enum LawError {
     },
     /// A pair is at or inside the barrier distance by a sensed or received state, though not in truth.
     #[error(
-        "vehicles {pair:#} sense or receive a separation of {known_m} m, not more than the safety distance {delta_m} m; \
-         their true separation is {true_m} m"
+        "vehicles {pair:#} sense or receive a separation of {known_m} m, not more than the safety distance {delta_m} \
+         m; their true separation is {true_m} m"
     )]
     KnownCollision {
         /// The first such pair in index order.

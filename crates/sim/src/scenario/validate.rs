@@ -287,8 +287,8 @@ impl Scenario {
                 format!("a desired distance of {distance} m (vehicles {pair:#}) is not more than delta = {delta_m} m")
             } else {
                 format!(
-                    "a desired distance of {distance_m} m (vehicles {pair:#}) exceeds delta = {delta_m} m by less than a \
-                     billionth of it"
+                    "a desired distance of {distance_m} m (vehicles {pair:#}) exceeds delta = {delta_m} m by less than \
+                     a billionth of it"
                 )
             };
             let help = "enlarge the formation, or reduce law.delta_m";
