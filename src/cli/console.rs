@@ -60,16 +60,13 @@ fn coloured(text: &str) -> String {
     };
     let (mut shown, mut at) = (String::with_capacity(text.len()), 0);
     while let Some(c) = text[at..].chars().next() {
-        match verdict(&text[at..]).filter(|_| !text[..at].ends_with(is_word)) {
-            Some((length, colour)) => {
-                let style = Style::new().bold().fg_color(Some(colour.into()));
-                shown += &format!("{style}{}{style:#}", &text[at..at + length]);
-                at += length;
-            }
-            None => {
-                shown.push(c);
-                at += c.len_utf8();
-            }
+        if let Some((length, colour)) = verdict(&text[at..]).filter(|_| !text[..at].ends_with(is_word)) {
+            let style = Style::new().bold().fg_color(Some(colour.into()));
+            shown.extend([&style.render().to_string(), &text[at..at + length], &style.render_reset().to_string()]);
+            at += length;
+        } else {
+            shown.push(c);
+            at += c.len_utf8();
         }
     }
     shown
