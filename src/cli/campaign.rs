@@ -33,9 +33,9 @@ enum CampaignCommand {
     Shard(ShardArguments),
     /// Print the missing shards as a list for --shard; exits with 0 if none is missing.
     Missing(FolderArguments),
-    /// Merge all parts into results.parquet, campaign.json and campaign.html.
+    /// Merge all parts into results.parquet, campaign.json and campaign.html; flies the worst flights again (--worst).
     Merge(AnswerArguments),
-    /// Print the answer of a merged campaign and rewrite its page.
+    /// Print the answer of a campaign and rewrite its page; flies the worst flights again (--worst).
     Report(AnswerArguments),
     /// Repeat one flight with recording and pictures, and compare its state hash.
     Replay(ReplayArguments),
@@ -118,7 +118,8 @@ struct AnswerArguments {
 /// Form of an answer.
 #[derive(Debug, Args)]
 struct AnswerOptions {
-    /// Number of flights with the least clearance to repeat, each with recording, report and pictures.
+    /// Number of flights with the least clearance to fly again, each with recording, report and pictures for the page;
+    /// 0 flies none.
     #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u8).range(0..=10))]
     worst: u8,
     /// Take no pictures of these flights.

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use anstyle::{AnsiColor, Style};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use miette::{GraphicalReportHandler, LabeledSpan, MietteDiagnostic, NamedSource, Report};
 use serde::Serialize;
@@ -14,8 +15,8 @@ use tautline_report::request::{Failure, Monitor, blanked};
 
 /// Refresh rate of a progress bar \[Hz\].
 const PROGRESS_HZ: u8 = 10;
-/// Exit code of a second Ctrl-C, as shells give it.
-const INTERRUPTED_TWICE: i32 = 130;
+/// Exit code of a process that Ctrl-C ends, as shells give it.
+const INTERRUPTED: i32 = 130;
 
 /// Output settings of a command.
 #[derive(Clone, Copy, Debug)]
@@ -26,17 +27,63 @@ pub(super) struct Console {
     pub(super) quiet: bool,
 }
 
+/// Words of verdicts with their colours. Of words with a common beginning the longest comes first.
+const VERDICTS: [(&str, AnsiColor); 15] = [
+    ("CERTIFICATE BROKEN", AnsiColor::Red),
+    ("CLEAR", AnsiColor::Green),
+    ("DEFECT", AnsiColor::Red),
+    ("DOES NOT PASS", AnsiColor::Red),
+    ("INTERRUPTED", AnsiColor::Yellow),
+    ("NOT FIRM", AnsiColor::Yellow),
+    ("NOT PASSED", AnsiColor::Red),
+    ("NOT REACHED", AnsiColor::Yellow),
+    ("NOT VALID", AnsiColor::Red),
+    ("PASS", AnsiColor::Green),
+    ("PROVED CLEAR", AnsiColor::Green),
+    ("PROVED", AnsiColor::Green),
+    ("REACHED", AnsiColor::Green),
+    ("UNDECIDED", AnsiColor::Yellow),
+    ("VIOLATION", AnsiColor::Red),
+];
+
+/// Returns a text with colours for the words of verdicts, and for counts of unknown flights such as `2 unknown`.
+fn coloured(text: &str) -> String {
+    let is_word = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-' | '/');
+    let verdict = |rest: &str| {
+        let end = |word: &str| rest.strip_prefix(word).is_some_and(|after| !after.starts_with(is_word));
+        let unknown = || {
+            let digits = rest.find(|c: char| !c.is_ascii_digit() && c != ',')?;
+            let is_count = !matches!(&rest[..digits], "" | "0") && rest[digits..].starts_with(" unknown");
+            is_count.then_some((digits + " unknown".len(), AnsiColor::Yellow))
+        };
+        VERDICTS.iter().find(|(word, _)| end(word)).map(|(word, colour)| (word.len(), *colour)).or_else(unknown)
+    };
+    let (mut shown, mut at) = (String::with_capacity(text.len()), 0);
+    while let Some(c) = text[at..].chars().next() {
+        if let Some((length, colour)) = verdict(&text[at..]).filter(|_| !text[..at].ends_with(is_word)) {
+            let style = Style::new().bold().fg_color(Some(colour.into()));
+            shown.extend([&style.render().to_string(), &text[at..at + length], &style.render_reset().to_string()]);
+            at += length;
+        } else {
+            shown.push(c);
+            at += c.len_utf8();
+        }
+    }
+    shown
+}
+
 impl Console {
     /// Prints text without control characters. A closed stream is ignored.
     pub(super) fn say(self, text: &str) {
         if self.quiet {
             return;
         }
-        let text = blanked(text.trim_end());
+        let text = coloured(&blanked(text.trim_end()));
+        // These streams remove the colours unless they are a terminal; they observe NO_COLOR and CLICOLOR_FORCE.
         let _ = if self.data_on_stdout {
-            writeln!(io::stderr().lock(), "{text}")
+            writeln!(anstream::stderr().lock(), "{text}")
         } else {
-            writeln!(io::stdout().lock(), "{text}")
+            writeln!(anstream::stdout().lock(), "{text}")
         };
     }
 
@@ -69,37 +116,50 @@ impl Console {
 /// the process.
 pub(super) struct Terminal {
     console: Console,
-    bar: Mutex<ProgressBar>,
+    bar: Arc<Mutex<ProgressBar>>,
     interruption: Arc<AtomicBool>,
 }
 
 impl Terminal {
     /// Returns a terminal that handles Ctrl-C.
     pub(super) fn new(console: Console) -> Result<Self, Failure> {
-        let interruption = Arc::new(AtomicBool::new(false));
-        let flag = Arc::clone(&interruption);
-        let again = move || {
+        let terminal = Self::without_signals(console);
+        let (flag, bar) = (Arc::clone(&terminal.interruption), Arc::clone(&terminal.bar));
+        listen(move || {
             if flag.swap(true, Ordering::Relaxed) {
-                std::process::exit(INTERRUPTED_TWICE);
+                bar.lock().unwrap_or_else(PoisonError::into_inner).finish_and_clear();
+                std::process::exit(INTERRUPTED);
             }
-        };
-        ctrlc::set_handler(again)
-            .map_err(|error| Failure::machine("machine/signals", format!("cannot listen to Ctrl-C: {error}")))?;
-        Ok(Self::with(console, interruption))
+        })?;
+        Ok(terminal)
+    }
+
+    /// Returns a terminal for work that cannot be continued: the first Ctrl-C prints `message` and ends the process.
+    pub(super) fn that_abandons(console: Console, message: &'static str) -> Result<Self, Failure> {
+        let terminal = Self::without_signals(console);
+        let bar = Arc::clone(&terminal.bar);
+        listen(move || {
+            bar.lock().unwrap_or_else(PoisonError::into_inner).finish_and_clear();
+            console.warn(message);
+            std::process::exit(INTERRUPTED);
+        })?;
+        Ok(terminal)
     }
 
     /// Returns a terminal that leaves Ctrl-C to the system, which ends the program.
     pub(super) fn without_signals(console: Console) -> Self {
-        Self::with(console, Arc::default())
-    }
-
-    fn with(console: Console, interruption: Arc<AtomicBool>) -> Self {
-        Self { console, bar: Mutex::new(ProgressBar::hidden()), interruption }
+        Self { console, bar: Arc::new(Mutex::new(ProgressBar::hidden())), interruption: Arc::default() }
     }
 
     fn bar(&self) -> ProgressBar {
         self.bar.lock().unwrap_or_else(PoisonError::into_inner).clone()
     }
+}
+
+/// Calls `handler` at each Ctrl-C and request to terminate.
+fn listen(handler: impl FnMut() + Send + 'static) -> Result<(), Failure> {
+    ctrlc::set_handler(handler)
+        .map_err(|error| Failure::machine("machine/signals", format!("cannot listen to Ctrl-C: {error}")))
 }
 
 impl Monitor for Terminal {
@@ -206,4 +266,28 @@ pub(super) fn show(failure: &Failure) -> Exit {
     // An error here means that standard error is closed.
     let _ = io::stderr().lock().write_all(text.as_bytes());
     Exit::of(failure)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::coloured;
+
+    #[test]
+    fn verdicts_have_colours_as_whole_words_only() {
+        for (text, colour) in [
+            ("CLEAR: never closer than 2.460 m", "32m"),
+            ("PROVED CLEAR", "32m"),
+            ("VIOLATION: vehicles 2 and 3", "31m"),
+            ("edge-tension: CERTIFICATE BROKEN in 1 flight", "31m"),
+            ("NOT REACHED: largest edge error 1 m", "33m"),
+            ("1,234 unknown, 3 clear", "33m"),
+        ] {
+            let shown = coloured(text);
+            assert!(shown.contains(colour), "{shown:?}");
+            assert_eq!(shown.matches("\u{1b}[0m").count(), 1, "{shown:?}");
+        }
+        for text in ["clear", "CLEARANCE", "out/CLEAR.csv", "UNCLEAR", "PASSED", "0 unknown", "no unknown key", ""] {
+            assert_eq!(coloured(text), text);
+        }
+    }
 }

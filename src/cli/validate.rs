@@ -40,7 +40,8 @@ pub(super) fn validate(arguments: &ValidateArguments) -> Result<Exit, Failure> {
         force: arguments.force,
         threads: arguments.threads.map(usize::from),
     };
-    let validation = validate_into(&request, &Terminal::without_signals(console))?;
+    let terminal = Terminal::that_abandons(console, "interrupted: nothing was written; give the command again")?;
+    let validation = validate_into(&request, &terminal)?;
     if arguments.json {
         let json = validation.to_json();
         let failed = |error| Failure::machine("files/cannot-write", format!("cannot write the answer: {error}"));

@@ -123,7 +123,11 @@ fn a_torn_part_is_flown_again_and_that_of_another_campaign_refused() {
         assert_eq!((missing.exit, missing.out.trim()), (Some(1), "1"), "{torn}");
         let holes = place.campaign(&["merge", "camp", "--worst", "0"]);
         assert_eq!(holes.exit, Some(2));
-        assert!(holes.err.contains("shards 1 of 3 are missing") && holes.err.contains("--shard 1"), "{}", holes.err);
+        assert!(
+            holes.err.contains("1 of 3 shards is missing or damaged: 1; ") && holes.err.contains("--shard 1"),
+            "{}",
+            holes.err
+        );
     }
     let changed = String::from_utf8(bytes.clone()).expect("text").replacen("\"pass\":", "\"pass\" :", 1);
     fs::write(&part, changed).expect("changed");

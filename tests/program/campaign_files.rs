@@ -73,6 +73,9 @@ fn every_file_of_the_answer_has_the_same_bytes_for_any_shards_threads_and_folder
     assert!(flown.out.contains("\"performance\""), "{}", flown.err);
 }
 
+/// Remedy of a missing part: a command alone.
+const HELP: &str = "help: tautline campaign shard camp --shard 1";
+
 #[test]
 fn a_damaged_part_is_reported_and_flown_again() {
     let place = place(SPEC);
@@ -89,7 +92,7 @@ fn a_damaged_part_is_reported_and_flown_again() {
             let refused = campaign(place.path(), command);
             let said = refused.err.split_whitespace().collect::<Vec<_>>().join(" ").replace("│ ", "");
             assert_eq!(refused.exit, Some(2), "{said}");
-            for part in ["shard-000000001.jsonl is damaged: it ", why, "campaign shard camp --shard 1, which replaces"]
+            for part in ["1 of 3 shards is missing or damaged: 1; ", "shard-000000001.jsonl is damaged: it ", why, HELP]
             {
                 assert!(said.contains(part), "{part}: {said}");
             }
@@ -106,20 +109,30 @@ fn a_damaged_part_is_reported_and_flown_again() {
     // A missing part is not damaged.
     fs::remove_file(&path).expect("removed");
     let missing = campaign(place.path(), &["merge", "camp", "--worst", "0"]);
-    assert!(missing.err.contains("shards 1 of 3 are missing") && !missing.err.contains("damaged"), "{}", missing.err);
+    assert!(missing.err.contains("1 of 3 shards is missing: 1") && !missing.err.contains("damaged"), "{}", missing.err);
     assert!(!campaign(place.path(), &["missing", "camp"]).err.contains("damaged"));
 }
 
 #[test]
 fn errors_have_line_and_column_of_the_specification() {
     for (from, to, says, at) in [
-        ("start.jitter_m", "start.jiter_m", "jiter_m", "spec.toml:7:1"),
+        ("start.jitter_m", "start.jiter_m", "jiter_m", "spec.toml:7:8"),
         ("{ uniform", "{ unifrom", "unifrom", "spec.toml:7:22"),
         ("[0.0, 0.3]", "[0.3, 0.0]", "vary.start.jitter_m: must be two", "spec.toml:7:1"),
         ("[0.0, 0.3]", "[-2.0, -1.0]", "jitter_m", "spec.toml:7:1"),
         ("time.duration_s", "time.duratoin_s", "duratoin_s", "spec.toml:5:6"),
-        ("runs = 12", "runs = 0", "runs = 0", "spec.toml:2:1"),
-        ("seed = 5", "laws = [\"orcca\"]", "orcca", "spec.toml:3:1"),
+        ("runs = 12", "runs = 0", "`runs` must be at least 1, got 0", "spec.toml:2:8"),
+        ("runs = 12", "runs = \"ten\"", "`runs` must be a whole number, got the text \"ten\"", "spec.toml:2:8"),
+        (
+            "{ uniform = [0.0, 0.3] }",
+            "{ grid = 3 }",
+            "`grid` must be a list with at least one entry or a table",
+            ":7:29",
+        ),
+        ("time.duration_s", "breathing.mode", "unknown key `breathing`", "spec.toml:5:1"),
+        ("time.duration_s = 1.0", "\"breathing.mode\" = \"x\"", "unknown key `breathing`", "spec.toml:5:2"),
+        ("time.duration_s = 1.0", "\"time.dt_s\" = [1.0]", "`dt_s` must be a number, got a list", "spec.toml:5:15"),
+        ("seed = 5", "laws = [\"orcca\"]", "orcca", "spec.toml:3:9"),
         ("\"pentagon\"", "\"pentagan\"", "pentagan", "spec.toml:1:1"),
         ("[set]", "stop = { width = 3.0 }\n[set]", "stop.width", "spec.toml:4:10"),
     ] {
@@ -165,4 +178,35 @@ fn a_bound_has_its_kind_in_text_json_and_page() {
     fs::write(place.path().join("spec.toml"), spec).expect("written");
     let all = campaign(place.path(), &["run", "spec.toml", "--out", "all", "--worst", "0"]);
     assert!(all.out.lines().any(|line| line == "3 of 3 flights violated"), "{}", all.out);
+}
+
+#[test]
+fn options_out_of_range_are_named_with_their_value() {
+    let place = place(SPEC);
+    let refused = campaign(place.path(), &["plan", "spec.toml", "--out", "camp", "--shards", "0"]);
+    assert_eq!(refused.exit, Some(2), "{}", refused.out);
+    assert!(refused.err.contains("--shards 0: must be from 1 to 12, the number of runs"), "{}", refused.err);
+    assert!(refused.err.contains("help: give a number in this range, or leave --shards out"), "{}", refused.err);
+    assert_eq!(campaign(place.path(), &["plan", "spec.toml", "--out", "camp", "--shards", "3"]).exit, Some(0));
+    for (arguments, says) in [
+        (&["merge", "camp"][..], "3 of 3 shards are missing: 0-2"),
+        (&["shard", "camp", "--shard", "4"], "--shard 4: must be from 0 to 2"),
+        (&["replay", "camp", "--run", "12"], "--run 12: must be from 0 to 11"),
+        (&["replay", "camp", "--run", "1", "--law", "orca"], "--law orca: the campaign has no such law"),
+    ] {
+        let refused = campaign(place.path(), arguments);
+        assert!(refused.exit == Some(2) && refused.err.contains(says), "{says}: {}", refused.err);
+    }
+}
+
+#[test]
+fn a_report_says_that_it_flies_flights_again() {
+    let place = place(
+        &SPEC.replace("runs = 12", "runs = 3").replace("duration_s = 1.0", "duration_s = 0.1\narrival.hold_s = 0.1"),
+    );
+    let ran = campaign(place.path(), &["run", "spec.toml", "--out", "camp", "--worst", "0"]);
+    assert!(!ran.err.contains("again"), "{}", ran.err);
+    let report = campaign(place.path(), &["report", "camp", "--worst", "2", "--no-snapshots"]);
+    let says = "flying 2 flights with the least clearance again for the page; --worst 0 leaves it out";
+    assert!(report.err.contains(says), "{}", report.err);
 }

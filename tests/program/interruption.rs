@@ -202,3 +202,42 @@ fn a_stopped_run_writes_a_report_on_its_flight() {
         assert_the_audit_agrees(underway.folder.path(), last.time_s);
     }
 }
+
+/// Starts a command that does not end, interrupts it after `after`, and returns its result.
+fn interrupted(folder: &Path, arguments: &[&str], after: Duration) -> Output {
+    let child = Command::new(TAUTLINE)
+        .args(arguments)
+        .current_dir(folder)
+        .env("XDG_RUNTIME_DIR", folder)
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program");
+    std::thread::sleep(after);
+    let sent = Command::new("kill").args(["-s", "INT", &child.id().to_string()]).status();
+    assert!(sent.expect("kill").success());
+    child.wait_with_output().expect("an end")
+}
+
+#[test]
+fn an_interrupted_command_says_what_is_kept_and_how_to_continue() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let spec = "scenario = \"pentagon\"\nruns = 4000\n[vary]\nstart.jitter_m = { uniform = [0.0, 0.3] }\n";
+    fs::write(folder.path().join("spec.toml"), spec).expect("written");
+    let begins = "nothing was kept; give the command again";
+    for (arguments, exit, says) in [
+        (&["run", "--no-snapshots", "--set", DRAG, "--set", FOREVER][..], 1, "the same command begins again"),
+        (&["campaign", "run", "spec.toml"], 1, "finished flights are kept; the same command continues"),
+        (&["compare", "--set", DRAG, "--set", FOREVER], 1, begins),
+        (&["sweep", "--key", "law.alpha=0.5:1:3", "--set", DRAG, "--set", FOREVER], 1, begins),
+        (&["margin", "--key", "law.alpha", "--from", "1", "--to", "2", "--set", DRAG, "--set", FOREVER], 1, begins),
+        (&["attack", "--start", "0.1", "--set", DRAG, "--set", FOREVER], 1, begins),
+        (&["validate"], 130, "interrupted: nothing was written; give the command again"),
+    ] {
+        let ended = interrupted(folder.path(), arguments, Duration::from_secs(3));
+        let err = String::from_utf8_lossy(&ended.stderr);
+        assert_eq!(ended.status.code(), Some(exit), "{arguments:?}: {err}");
+        assert!(err.contains(says), "{arguments:?}: {err}");
+    }
+}

@@ -383,3 +383,19 @@ fn a_closed_pipe_is_no_error() {
         assert_eq!((done.status.code(), err.as_ref()), (GOOD, ""), "{arguments:?}");
     }
 }
+
+#[test]
+fn verdicts_have_colours_only_if_forced_or_on_a_terminal() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let colours = |variables: &[(&str, &str)]| {
+        let mut command = std::process::Command::new(crate::program::TAUTLINE);
+        command.args(["run", "--no-snapshots", "--no-figures", "--force", "--set", "time.duration_s=1"]);
+        command.current_dir(folder.path()).env("XDG_RUNTIME_DIR", folder.path());
+        command.env_remove("NO_COLOR").env_remove("CLICOLOR_FORCE").envs(variables.iter().copied());
+        let ran = command.output().expect("the program");
+        String::from_utf8(ran.stdout).expect("text").contains('\u{1b}')
+    };
+    assert!(colours(&[("CLICOLOR_FORCE", "1")]));
+    assert!(!colours(&[]), "a pipe is no terminal");
+    assert!(!colours(&[("NO_COLOR", "1")]));
+}

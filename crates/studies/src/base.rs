@@ -1,5 +1,6 @@
 //! The scenario that a study changes: its text with the overrides of the call, and the seeds of its runs.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::flight::{FlightSummary, Outcome};
@@ -109,7 +110,7 @@ impl Runs {
         if self.count <= 1 || differ {
             return Ok(());
         }
-        let message = format!("--runs: must be 1 for values of {key}, got {}", self.count);
+        let message = format!("--runs {}: must be 1 for values of {key}", self.count);
         Err(Failure::input("request/equal-runs", message, "leave --runs out: all runs of one seed are the same flight"))
     }
 
@@ -162,7 +163,7 @@ pub(crate) fn jitter_note(jitter_m: f64) -> String {
 }
 
 /// Verdict that a flight must show.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Criterion {
     /// The flight is proved clear to its end.

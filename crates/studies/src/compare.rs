@@ -217,7 +217,7 @@ impl Options {
         if let Some((_, twice)) = names.iter().enumerate().find(|&(k, name)| names[..k].contains(name)) {
             return Err(Failure::input(
                 "compare/law-twice",
-                format!("--laws: `{twice}` is named twice"),
+                format!("--laws {}: `{twice}` is named twice", names.join(",")),
                 "name each law once; variants of a law are tables [laws.NAME] with the same `kind`",
             ));
         }
@@ -411,6 +411,19 @@ impl Study for Comparison {
             ),
             Section::detail("Keys", [Block::Table(keys)]),
         ]
+    }
+
+    fn text(&self) -> String {
+        let delta_m = self.about.delta_m;
+        Table::of("Flights of each law, with 95 % intervals", &self.laws)
+            .column("", "Law", Kind::Text, |law| law.name.clone())
+            .column("", "Violated", Kind::Share, |law| law.violated)
+            .column("", "Unknown", Kind::Count, |law| law.undecided + law.ended_early)
+            .column("", "Reached", Kind::Share, |law| law.reached)
+            .column("", "Time to reach, median [s]", Kind::Estimate, |law| law.reached_median_s)
+            .column("", "Clearance, smallest [m]", Kind::AtLeast, |law| law.min_smallest_m.map(|min_m| min_m - delta_m))
+            .build()
+            .text()
     }
 
     fn assumptions(&self) -> Vec<String> {

@@ -151,11 +151,11 @@ impl Experiment for Options {
         in_range("--halvings", &self.range.halvings, &HALVINGS)?;
         let Range { from, to, logarithmic, .. } = self.range;
         let why = if !from.is_finite() || !to.is_finite() {
-            format!("--from, --to: the range {from} to {to} is not finite")
+            format!("--from {from} --to {to}: the range is not finite")
         } else if from == to {
-            format!("--from, --to: both ends of the range are {from}")
+            format!("--from {from} --to {to}: both ends of the range are equal")
         } else if logarithmic && (from <= 0.0 || to <= 0.0) {
-            format!("--log: the range {from} to {to} is not positive")
+            format!("--from {from} --to {to}: the range is not positive, as --log requires")
         } else {
             return Ok(());
         };

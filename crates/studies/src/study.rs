@@ -294,14 +294,17 @@ pub fn answer<E: Experiment>(
     let flown = options.fly(&base, &batch);
     monitor.finish();
     let Some(study) = flown? else {
-        monitor.warn("interrupted before there was an answer");
+        monitor.warn("interrupted before there was an answer: nothing was kept; give the command again");
         return Ok(None);
     };
     for note in study.notes() {
         monitor.warn(&format!("note: {note}"));
     }
     let repeats = study.repeats(scenario);
-    let repeated: Vec<_> = repeats.iter().map(|(what, command)| format!("{what}\n  {command}")).collect();
+    let repeated = match &repeats[..] {
+        [_, _, _, ..] => vec!["--html writes a page with the command that repeats each of these flights".to_owned()],
+        few => few.iter().map(|(what, command)| format!("{what}\n  {command}")).collect(),
+    };
     monitor.say(&format!("{}\n\n{}\n{}", study.headline(), study.text(), repeated.join("\n")));
     let not_written = |error: &dyn std::error::Error| {
         Failure::machine("files/cannot-write", format!("cannot write the result: {error}"))
@@ -324,6 +327,12 @@ pub fn answer<E: Experiment>(
     }
     for (_, file) in files.outputs().filter(|(_, file)| !is_standard_output(file)) {
         monitor.say(&format!("wrote {}", file.display()));
+    }
+    if monitor.is_interrupted() {
+        let files = if files.outputs().next().is_none() { "" } else { ", and its files were written" };
+        monitor.warn(&format!(
+            "interrupted: the answer counts the flights up to here{files}; the same command begins again"
+        ));
     }
     options.conclude(scenario, &study, pictures, monitor)?;
     Ok(Some(study))

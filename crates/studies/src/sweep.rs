@@ -99,8 +99,10 @@ pub struct Sweep {
 }
 
 fn wrong(why: &str) -> Failure {
-    let help = "write KEY=FROM:TO:COUNT with two different finite numbers and a count of at least 2, or KEY=V1,V2,... \
-                with finite numbers";
+    let help = format!(
+        "write KEY=FROM:TO:COUNT with two different finite numbers and a count from 2 to {MOST_POINTS}, or \
+         KEY=V1,V2,... with finite numbers"
+    );
     Failure::input("sweep/key", why, help)
 }
 
@@ -111,7 +113,7 @@ impl SweptKey {
     /// [`Failure`] `sweep/key`.
     pub fn parse(text: &str) -> Result<Self, Failure> {
         let Some((key, values)) = text.split_once('=') else {
-            return Err(wrong(&format!("--key: `{text}` is not KEY=VALUES")));
+            return Err(wrong(&format!("--key {text}: is not KEY=VALUES")));
         };
         let number = |text: &str| {
             let number = text.trim().parse::<f64>();
@@ -122,21 +124,19 @@ impl SweptKey {
             [from, to, count] => {
                 let most = MOST_POINTS;
                 let count =
-                    count.trim().parse::<usize>().ok().filter(|count| (1..=most).contains(count)).ok_or_else(|| {
-                        wrong(&format!("--key {key}: the count `{}` is not an integer from 1 to {most}", count.trim()))
+                    count.trim().parse::<usize>().ok().filter(|count| (2..=most).contains(count)).ok_or_else(|| {
+                        wrong(&format!("--key {text}: the count must be from 2 to {most}, got `{}`", count.trim()))
                     })?;
                 let (from, to) = (number(from)?, number(to)?);
-                if (count > 1) == (from == to) || !(to - from).is_finite() {
-                    return Err(wrong(&format!(
-                        "--key {key}: needs different finite ends and 2 values, got {count} from {from} to {to}"
-                    )));
+                if from == to || !(to - from).is_finite() {
+                    return Err(wrong(&format!("--key {text}: the ends must be two different finite numbers")));
                 }
                 let range = Bound { key: key.to_owned(), low: from.min(to), high: from.max(to), whole: false };
-                let part = |k: usize| k as f64 / (count - 1).max(1) as f64;
+                let part = |k: usize| k as f64 / (count - 1) as f64;
                 let value = |k: usize| range.at(if from <= to { part(k) } else { 1.0 - part(k) });
-                Self::new(key, if count == 1 { vec![from] } else { (0..count).map(value).collect() })
+                Self::new(key, (0..count).map(value).collect())
             }
-            _ => Err(wrong(&format!("--key {key}: `{values}` is neither FROM:TO:COUNT nor a list"))),
+            _ => Err(wrong(&format!("--key {text}: is neither KEY=FROM:TO:COUNT nor a list"))),
         }
     }
 
@@ -167,15 +167,21 @@ impl Options {
         if let [one, other] = &self.keys[..]
             && overlap(&one.key, &other.key)
         {
-            let why = format!("--key: {} and {} overlap", one.key, other.key);
+            let why = format!("--key {} --key {}: the keys overlap", one.key, other.key);
             return grid(why, "give two different keys; all values of a key are in one --key");
         }
         let points = self.keys.iter().map(|key| key.values.len()).fold(1, usize::saturating_mul);
         let flights = (points as u64).saturating_mul(self.runs);
         if points > MOST_POINTS || flights > *FLIGHTS.end() {
-            let why = format!("--key: {points} points with {} runs each are {flights} flights", self.runs);
-            let help = format!("give at most {MOST_POINTS} points and {} flights", FLIGHTS.end());
-            return grid(why, &help);
+            let keys = self.keys.iter().map(|key| format!("--key {} ({})", key.key, key.values.len()));
+            let keys = keys.collect::<Vec<_>>().join(" and ");
+            if points > MOST_POINTS {
+                let why = format!("{keys}: the grid must have at most {MOST_POINTS} points, got {points}");
+                return grid(why, "give fewer values of a key");
+            }
+            let most = FLIGHTS.end();
+            let why = format!("--runs {}: {points} points must have at most {most} flights, got {flights}", self.runs);
+            return grid(why, "give fewer runs, or fewer values of a key");
         }
         Ok(())
     }
@@ -302,6 +308,16 @@ impl Point {
 }
 
 impl Sweep {
+    /// Returns the number of flown points, of all points after an interruption, and of flights.
+    fn size(&self) -> String {
+        let flights: u64 = self.points.iter().map(|point| point.held.of).sum();
+        let (flown, flights) = (self.points.len() as u64, counted(flights, "flight", "flights"));
+        if self.interrupted {
+            return format!("{flown} of {} points, {flights}", self.points_asked);
+        }
+        format!("{}, {flights}", counted(flown, "point", "points"))
+    }
+
     /// Returns the worst flight and its point.
     fn worst(&self) -> Option<(&Point, &FlightSummary)> {
         let flights = self.points.iter().flat_map(|point| point.flights.iter().map(move |flight| (point, flight)));
@@ -360,14 +376,12 @@ impl Study for Sweep {
     }
 
     fn badge(&self) -> Badge {
-        let flights: u64 = self.points.iter().map(|point| point.held.of).sum();
-        let points = counted(self.points.len() as u64, "point", "points");
-        Badge { tone: Tone::Neutral, word: format!("{points}, {}", counted(flights, "flight", "flights")) }
+        Badge { tone: Tone::Neutral, word: self.size() }
     }
 
     fn headline(&self) -> String {
         let holds = |point: &&Point| point.held.of == self.runs && point.held.count == self.runs;
-        let interrupted = if self.interrupted { "INTERRUPTED: " } else { "" };
+        let interrupted = if self.interrupted { format!("INTERRUPTED after {}: ", self.size()) } else { String::new() };
         let every = if self.runs == 1 { String::new() } else { format!(" in each of {} runs", self.runs) };
         let worst = self.worst().and_then(|(point, flight)| Some((point, flight.min_m?))).map(|(point, min_m)| {
             let shown = beside_limit(min_m, self.about.delta_m, 3);
@@ -384,16 +398,13 @@ impl Study for Sweep {
     }
 
     fn notes(&self) -> Vec<String> {
-        let flown = self.points.len();
-        let interrupted =
-            self.interrupted.then(|| format!("interrupted: {flown} of {} points were flown", self.points_asked));
         let refused = self.points.iter().find_map(|point| Some((point, point.first_refusal.as_ref()?)));
         let refused = refused.map(|(point, why)| {
             let runs = self.points.iter().map(|point| point.refused).sum();
             let (runs, with) = (counted(runs, "run", "runs"), sets(&self.keys, &point.values).join(", "));
             format!("{runs} could not be flown and count in no share, the first with {with}: {why}")
         });
-        [interrupted, refused, self.jitter_m.map(jitter_note)].into_iter().flatten().collect()
+        [refused, self.jitter_m.map(jitter_note)].into_iter().flatten().collect()
     }
 
     fn records(&self) -> Table {

@@ -3,14 +3,12 @@
 //! The crate `tempfile` would replace five lines here, the temporary name and its removal, and cost 5 core-seconds of a
 //! cold build. Links, pipes and the sync to the disk need the code of this module in any case.
 
+use std::collections::hash_map::RandomState;
 use std::ffi::OsString;
 use std::fs::{self, File};
+use std::hash::BuildHasher as _;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
-
-/// Number of files that this process began to write. It is part of their temporary names.
-static WRITTEN: AtomicU64 = AtomicU64::new(0);
 
 /// Error of a file that could not be written.
 #[derive(Debug, thiserror::Error)]
@@ -54,23 +52,44 @@ pub fn write_atomically_with<T, E: From<ArtefactError>>(
         return write(&mut File::options().write(true).open(path).map_err(error)?);
     }
     let target = behind_links(path);
-    let no_name = || error(io::Error::new(io::ErrorKind::InvalidInput, "the path has no file name"));
-    let mut temporary = OsString::from(".");
-    temporary.push(target.file_name().ok_or_else(no_name)?);
+    let (temporary, written) = write_beside(&target, write)?;
     // Two processes or threads may write the same file; the later one wins, as a whole.
-    let number = WRITTEN.fetch_add(1, Ordering::Relaxed);
-    temporary.push(format!(".{}.{number}.partial", std::process::id()));
-    let temporary = target.with_file_name(temporary);
+    fs::rename(&temporary, &target).map(|()| written).map_err(error).inspect_err(|_| remove(&temporary))
+}
+
+/// Writes a complete file beside `target`, under a name that no other process or thread uses. Returns its path and the
+/// value of `write`. The caller renames, links or removes the file.
+///
+/// # Errors
+/// As [`write_atomically_with`]; the file is removed.
+pub fn write_beside<T, E: From<ArtefactError>>(
+    target: &Path,
+    write: impl FnOnce(&mut File) -> Result<T, E>,
+) -> Result<(PathBuf, T), E> {
+    let error = |source| E::from(ArtefactError::new(target, source));
+    let no_name = || error(io::Error::new(io::ErrorKind::InvalidInput, "the path has no file name"));
+    let mut name = OsString::from(".");
+    name.push(target.file_name().ok_or_else(no_name)?);
+    // Several machines may write into one folder, so the number of the process is not enough.
+    name.push(format!(".{:016x}.partial", RandomState::new().hash_one(std::process::id())));
+    let temporary = target.with_file_name(name);
     let written = File::create(&temporary).map_err(error).and_then(|mut file| {
         let written = write(&mut file)?;
         file.sync_all().map_err(error)?;
         Ok(written)
     });
-    let renamed = written.and_then(|written| fs::rename(&temporary, &target).map(|()| written).map_err(error));
-    renamed.inspect_err(|_| {
-        // The first error is reported; an error of the removal is ignored.
-        let _ = fs::remove_file(&temporary);
-    })
+    match written {
+        Ok(written) => Ok((temporary, written)),
+        Err(error) => {
+            remove(&temporary);
+            Err(error)
+        }
+    }
+}
+
+/// Removes a temporary file. The first error is reported; an error of the removal is ignored.
+fn remove(temporary: &Path) {
+    let _ = fs::remove_file(temporary);
 }
 
 /// Returns the file that a path leads to through symbolic links, whether or not it exists.

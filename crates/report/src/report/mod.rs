@@ -17,7 +17,7 @@ mod section;
 mod verdict;
 mod words;
 
-pub use artefact::{ArtefactError, write_atomically, write_atomically_with};
+pub use artefact::{ArtefactError, write_atomically, write_atomically_with, write_beside};
 pub use flight::{
     Audit, ClosedForm, Control, Ellipsoid, Energy, FailedVehicle, FlightResult, FormationNumbers, INTERRUPTED, Parry,
     Performance, Rapier, Report, Run, SCHEMA_VERSION, ScenarioIdentity, Separation, Tool, VehicleNumbers, Velocity,

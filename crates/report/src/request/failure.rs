@@ -150,7 +150,7 @@ pub fn in_range<T: PartialOrd + Display>(option: &str, value: &T, range: &RangeI
         return Ok(());
     }
     let (least, most) = (range.start(), range.end());
-    let message = format!("{option}: {value} is not in {least}..={most}");
+    let message = format!("{option} {value}: must be from {least} to {most}");
     Err(Failure::input("request/out-of-range", message, "give a number in this range"))
 }
 

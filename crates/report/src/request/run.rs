@@ -15,6 +15,7 @@ use crate::flight_log::FlightLog;
 use crate::replay::{NoReplay, PAGE_BYTES, Replay, Stage};
 use crate::report::{INTERRUPTED, Report, RunPage, write_atomically};
 use crate::run::{run_while, verify};
+use tautline_core::text::seconds;
 use tautline_recordings::mcap::{Header, McapRecorder};
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::Scenario;
@@ -129,6 +130,12 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
         monitor.say(reason);
     }
     monitor.say(&format!("wrote {}: {RECORDING}, report.json and report.html", folder.path().display()));
+    if monitor.is_interrupted() {
+        let at = seconds(report.run.duration_s);
+        monitor.warn(&format!(
+            "interrupted: the files hold the flight up to {at}; the same command begins again and replaces them"
+        ));
+    }
     Ok(RunFiles { report, log, pictures, page })
 }
 

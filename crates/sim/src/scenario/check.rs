@@ -49,10 +49,17 @@ impl SchemaError {
 /// Spans from `overridden_from` on belong to overrides. A choice of an override drops the keys of the file that belong
 /// to another choice.
 pub(super) fn check_schema(file: &mut Spanned<DeValue<'_>>, overridden_from: usize) -> Result<(), SchemaError> {
-    Check { overridden_from }.value(file, Node::root(), "scenario", None)
+    Check { file: Node::root(), overridden_from }.value(file, Node::root(), "scenario", None)
+}
+
+/// Checks a value of a file without overrides against a part of its schema. `key` names the value.
+pub(super) fn check_value(key: &str, value: &mut Spanned<DeValue<'_>>, node: Node) -> Result<(), SchemaError> {
+    Check { overridden_from: usize::MAX, file: node.whole_file() }.value(value, node, key, None)
 }
 
 struct Check {
+    /// Part of the schema for the whole file.
+    file: Node,
     overridden_from: usize,
 }
 
@@ -73,6 +80,9 @@ impl Check {
                     .map_err(|schema_error| schema_error.child(name))
             });
         }
+        if node.keyword("additionalProperties") == true && value.get_ref().is_table() {
+            return Ok(());
+        }
         if node.is_table() {
             return match value.get_mut() {
                 DeValue::Table(table) => self.table(table, node, &span, own_name),
@@ -89,10 +99,13 @@ impl Check {
         }
         let alternatives = node.alternatives();
         if !alternatives.is_empty() {
-            let Some(node) = alternatives.into_iter().find(|part| admits(*part, value.get_ref())) else {
-                return Err(wrong_type(name, node, value.get_ref(), span));
+            let admitting: Vec<_> = alternatives.into_iter().filter(|part| admits(*part, value.get_ref())).collect();
+            let part = match (&admitting[..], value.get_ref()) {
+                ([], _) => return Err(wrong_type(name, node, value.get_ref(), span)),
+                (parts @ [_, _, ..], DeValue::Table(table)) => self.named_by_key(name, parts, table, span)?,
+                (&[first, ..], _) => first,
             };
-            return self.value(value, node, name, None);
+            return self.value(value, part, name, None);
         }
         if !admits(node, value.get_ref()) {
             return Err(wrong_type(name, node, value.get_ref(), span));
@@ -117,6 +130,35 @@ impl Check {
         }
     }
 
+    /// Returns the alternative of a table whose only key names the alternative.
+    fn named_by_key(
+        &self,
+        name: &str,
+        parts: &[Node],
+        table: &DeTable<'_>,
+        span: Range<usize>,
+    ) -> Result<Node, SchemaError> {
+        let names: Vec<_> = parts.iter().flat_map(|part| part.keys()).collect();
+        let mut keys = table.keys();
+        let (Some(key), None) = (keys.next(), keys.next()) else {
+            let message = format!("`{}` must have one key, got {}", short(name), table.len());
+            let help = format!("give one of {}", names.join(", "));
+            return Err(SchemaError::new("scenario/wrong-type", message, help, span));
+        };
+        let of_key = parts.iter().copied().find(|part| part.property(key.get_ref()).is_some());
+        of_key.ok_or_else(|| self.unknown_key(key.get_ref(), names, key.span()))
+    }
+
+    fn unknown_key(&self, name: &str, mut known: Vec<&str>, span: Range<usize>) -> SchemaError {
+        known.sort_unstable();
+        known.dedup();
+        let help = match tables_with(self.file, name)[..] {
+            [] => suggest(name, &known),
+            ref tables => format!("`{name}` belongs in {}; {}", tables.join(", or "), suggest(name, &known)),
+        };
+        SchemaError::new("scenario/unknown-key", format!("unknown key `{}`", short(name)), help, span).child(name)
+    }
+
     fn table(
         &self,
         table: &mut DeTable<'_>,
@@ -138,7 +180,7 @@ impl Check {
                 let at =
                     if !is_of_override(key.span()) && is_of_override(value.span()) { value.span() } else { key.span() };
                 let known: Vec<_> = node.keys().chain(chosen.into_iter().flat_map(Node::keys)).collect();
-                return Err(unknown_key(name, known, at));
+                return Err(self.unknown_key(name, known, at));
             };
             // `chosen` has checked the tag.
             if node.keyword("const").is_null() {
@@ -299,16 +341,6 @@ fn in_range(name: &str, node: Node, number: &DeValue<'_>, span: Range<usize>) ->
     Ok(())
 }
 
-fn unknown_key(name: &str, mut known: Vec<&str>, span: Range<usize>) -> SchemaError {
-    known.sort_unstable();
-    known.dedup();
-    let help = match tables_with(name)[..] {
-        [] => suggest(name, &known),
-        ref tables => format!("`{name}` belongs in {}; {}", tables.join(", or "), suggest(name, &known)),
-    };
-    SchemaError::new("scenario/unknown-key", format!("unknown key `{}`", short(name)), help, span).child(name)
-}
-
 fn unknown_choice(name: &str, known: &[&str], span: Range<usize>) -> SchemaError {
     let message = format!("unknown choice `{}`", short(name));
     SchemaError::new("scenario/unknown-choice", message, suggest(name, known), span)
@@ -356,17 +388,23 @@ fn expected(node: Node) -> String {
             match (node.keyword("minItems").as_u64(), node.keyword("maxItems").as_u64()) {
                 (Some(least), Some(most)) if least == most => format!("a list of {least}{of}"),
                 (Some(least), Some(most)) => format!("a list of {least} to {most}{of}"),
+                (Some(1), None) => "a list with at least one entry".to_owned(),
+                (Some(least), None) => format!("a list of at least {least}{of}"),
                 _ => format!("a list of{of}"),
             }
         }
-        _ => node.alternatives().into_iter().map(expected).collect::<Vec<_>>().join(" or "),
+        _ => {
+            let mut types: Vec<_> = node.alternatives().into_iter().map(expected).collect();
+            types.dedup();
+            types.join(" or ")
+        }
     }
 }
 
-/// Returns the first sentence of the description of a key.
+/// Returns the first sentence of the description of a key, without a full stop.
 fn description(node: Node) -> String {
     let description = node.description().unwrap_or("`tautline schema` describes every key");
-    description.split_once(". ").map_or(description, |(first, _)| first).replace('\n', " ")
+    description.split_once(". ").map_or(description, |(first, _)| first).trim_end_matches('.').replace('\n', " ")
 }
 
 fn listed(names: &[&str]) -> String {

@@ -217,7 +217,8 @@ pub(super) fn suggest(name: &str, known: &[&str]) -> String {
 
 /// Returns the Levenshtein distance of two words: the fewest insertions, deletions and replacements of a character.
 /// Words of more than 64 characters are compared by their first 64.
-fn edit_distance(a: &str, b: &str) -> usize {
+#[must_use]
+pub fn edit_distance(a: &str, b: &str) -> usize {
     let b: Vec<char> = b.chars().take(64).collect();
     let mut row: Vec<usize> = (0..=b.len()).collect();
     for (i, x) in a.chars().take(64).enumerate() {

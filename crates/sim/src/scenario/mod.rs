@@ -31,14 +31,14 @@ mod vehicle;
 pub use crate::link::{
     ActuationSpec, Failure, FailureKind, LinkFailure, NearStates, NetworkSpec, SensingSpec, StalePolicy,
 };
-pub use error::{Field, Place, ScenarioError};
+pub use error::{Field, Place, ScenarioError, edit_distance};
 pub use limits::{
     BYTES_PER_EDGE, BYTES_PER_VEHICLE, CONTACT_PREDICTION_M, LARGEST, MAX_HALVINGS, MAX_MEMORY_BYTES, MAX_NAME_CHARS,
     MAX_STEPS, SMALLEST,
 };
 pub use obstacles::{OBSTACLE_HELP, ObstacleTable, Solid};
 pub use resolution::Drift;
-pub use schema::{key_paths, schema, takes_integers_only};
+pub use schema::{TomlSchema, key_paths, schema, takes_integers_only};
 pub use source::{MAX_FILE_BYTES, Source};
 pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Safety, Scenario, Space};
 pub use start::{offset, random, scatter};

@@ -4,13 +4,16 @@
 //! against the schema.
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 use std::sync::LazyLock;
 
+use schemars::JsonSchema;
 use serde_json::{Value, json};
 use toml::Spanned;
 use toml::de::DeValue;
 
 use super::document::Document;
+use super::error::ScenarioError;
 use super::source::Source;
 use super::text::Override;
 use super::text::Text;
@@ -69,33 +72,71 @@ fn tidy(schema: &mut Value) {
     }
 }
 
-/// A part of the schema, for one value of the file.
+/// JSON Schema of the keys of a TOML file that is not a scenario.
+#[derive(Debug)]
+pub struct TomlSchema(Value);
+
+impl TomlSchema {
+    /// Returns the schema of a type. Its doc comments are the help of errors.
+    #[must_use]
+    pub fn of<T: JsonSchema>() -> Self {
+        let mut schema = schemars::schema_for!(T).to_value();
+        tidy(&mut schema);
+        Self(schema)
+    }
+
+    /// Checks keys, types, words and bounds of a value. `key` is its name in messages.
+    ///
+    /// # Errors
+    /// The first error, without a place, and the offending bytes.
+    pub fn check(
+        &'static self,
+        key: &str,
+        value: &mut Spanned<DeValue<'_>>,
+    ) -> Result<(), (ScenarioError, Range<usize>)> {
+        super::check::check_value(key, value, Node::of_file(&self.0)).map_err(|found| (found.error, found.span))
+    }
+}
+
+/// A part of a schema, for one value of the file.
 #[derive(Clone, Copy)]
 pub(super) struct Node {
+    /// Schema of the whole file.
+    file: &'static Value,
     schema: &'static Value,
     /// Description of the key, if the part belongs to a key.
     description: Option<&'static str>,
 }
 
 impl Node {
-    /// Returns the part for the whole file.
+    /// Returns the part for a whole scenario file.
     pub(super) fn root() -> Self {
-        Self::of(&SCHEMA)
+        Self::of_file(&SCHEMA)
+    }
+
+    /// Returns the part for the whole file that a schema describes.
+    fn of_file(file: &'static Value) -> Self {
+        Self { file, schema: file, description: None }.resolve(file)
+    }
+
+    /// Returns the part for the same file.
+    pub(super) fn whole_file(self) -> Self {
+        Self::of_file(self.file)
     }
 
     /// Returns the part that a reference points to. The description of the key precedes the description of its type.
-    fn of(schema: &'static Value) -> Self {
+    fn resolve(self, schema: &'static Value) -> Self {
         let description = schema["description"].as_str();
-        let definition = schema["$ref"].as_str().and_then(|path| SCHEMA.pointer(path.trim_start_matches('#')));
-        definition.map_or(Self { schema, description }, |definition| {
-            let of = Self::of(definition);
+        let definition = schema["$ref"].as_str().and_then(|path| self.file.pointer(path.trim_start_matches('#')));
+        definition.map_or(Self { schema, description, ..self }, |definition| {
+            let of = self.resolve(definition);
             Self { description: description.or(of.description), ..of }
         })
     }
 
     /// Returns a part of the same key, with the description of the key.
     fn part(self, schema: &'static Value) -> Self {
-        let part = Self::of(schema);
+        let part = self.resolve(schema);
         Self { description: self.description.or(part.description), ..part }
     }
 
@@ -116,7 +157,10 @@ impl Node {
 
     /// Returns the part for a key of a table, without the keys of alternatives.
     pub(super) fn property(self, key: &str) -> Option<Self> {
-        self.schema["properties"].get(key).map(Self::of)
+        self.schema["properties"].get(key).map(|schema| {
+            let property = self.resolve(schema);
+            Self { description: property.description.or(self.description), ..property }
+        })
     }
 
     /// Returns the keys of a table, without those of alternatives.
@@ -126,7 +170,7 @@ impl Node {
 
     /// Returns the part for every value of a table with free keys.
     pub(super) fn values(self) -> Option<Self> {
-        self.schema["additionalProperties"].is_object().then(|| Self::of(&self.schema["additionalProperties"]))
+        self.schema["additionalProperties"].is_object().then(|| self.resolve(&self.schema["additionalProperties"]))
     }
 
     /// Returns the part for the entries of a list.
@@ -156,7 +200,7 @@ impl Node {
     /// Returns the admitted words; empty for other values.
     pub(super) fn words(self) -> Vec<&'static str> {
         let words = |part: Self| part.schema["const"].as_str();
-        self.schema["oneOf"].as_array().into_iter().flatten().filter_map(|part| words(Self::of(part))).collect()
+        self.schema["oneOf"].as_array().into_iter().flatten().filter_map(|part| words(self.resolve(part))).collect()
     }
 
     /// Returns whether the part describes a table.
@@ -236,19 +280,23 @@ fn collect_paths(table: Node, prefix: &str, paths: &mut BTreeSet<String>) {
     }
 }
 
-/// Returns the tables of the scenario file that have a key of this name, such as `[swarm]`, or
-/// `[law] with kind = "laplacian"`.
-pub(super) fn tables_with(key: &str) -> Vec<String> {
+/// Returns the tables of a file that have a key of this name, such as `[swarm]`, or
+/// `[law] with kind = "laplacian" or "orca"`.
+pub(super) fn tables_with(file: Node, key: &str) -> Vec<String> {
     let mut found = Vec::new();
-    for table in Node::root().keys() {
-        let Some(node) = Node::root().property(table) else { continue };
+    for table in file.keys() {
+        let Some(node) = file.property(table) else { continue };
         let node = node.items().unwrap_or(node);
-        if node.property(key).is_some() {
-            found.push(format!("[{table}]"));
-        }
-        for part in node.alternatives().into_iter().filter(|part| part.property(key).is_some()) {
-            let chosen = part.tag().filter(|(tag, _)| *tag != key);
-            found.push(chosen.map_or(format!("[{table}]"), |(tag, name)| format!("[{table}] with {tag} = \"{name}\"")));
+        let parts: Vec<_> = node.alternatives().into_iter().filter(|part| part.property(key).is_some()).collect();
+        let choices = parts.iter().map(|part| part.tag().filter(|(tag, _)| *tag != key)).collect::<Option<Vec<_>>>();
+        match choices.as_deref() {
+            _ if node.property(key).is_some() => found.push(format!("[{table}]")),
+            None => found.push(format!("[{table}]")),
+            Some([]) => {}
+            Some(choices @ [(tag, _), ..]) => {
+                let names: Vec<_> = choices.iter().map(|(_, name)| format!("\"{name}\"")).collect();
+                found.push(format!("[{table}] with {tag} = {}", names.join(" or ")));
+            }
         }
     }
     found
@@ -260,10 +308,10 @@ mod tests {
 
     #[test]
     fn a_key_is_found_in_its_table_and_in_each_alternative_that_has_it() {
-        assert_eq!(tables_with("count"), ["[swarm]"]);
-        assert_eq!(tables_with("alpha"), ["[law] with kind = \"edge-tension\"", "[law] with kind = \"displacement\""]);
-        assert_eq!(tables_with("half_extent_m"), ["[start] with shape = \"random\""]);
-        assert_eq!(tables_with("nowhere"), [] as [&str; 0]);
+        assert_eq!(tables_with(Node::root(), "count"), ["[swarm]"]);
+        assert_eq!(tables_with(Node::root(), "alpha"), ["[law] with kind = \"edge-tension\" or \"displacement\""]);
+        assert_eq!(tables_with(Node::root(), "half_extent_m"), ["[start] with shape = \"random\""]);
+        assert_eq!(tables_with(Node::root(), "nowhere"), [] as [&str; 0]);
     }
 
     #[test]

@@ -384,7 +384,7 @@ impl Attack {
         let Some(min_m) = *min_m else { return "no two vehicles".to_owned() };
         let shown = beside_limit(min_m, self.about.delta_m, 3);
         let at = min_at_s.map_or_else(String::new, |at_s| format!(" at {}", seconds(at_s)));
-        let pair = min_pair.map_or_else(String::new, |[a, b]| format!(", vehicles {a}-{b}"));
+        let pair = min_pair.map_or_else(String::new, |[a, b]| format!(", vehicles {a} and {b}"));
         format!("{shown} m{at}{pair}")
     }
 }

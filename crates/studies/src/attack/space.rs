@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::Options;
 use crate::base::{BaseScenario, overlap};
 use tautline_core::swarm::{Rows, separation};
-use tautline_core::text::as_toml;
+use tautline_core::text::{as_toml, at_least, beside_limit};
 use tautline_report::request::Failure;
 use tautline_sim::scenario::{Scenario, ScenarioError};
 
@@ -47,9 +47,10 @@ impl Bound {
     /// [`Failure`] `attack/variation`.
     pub fn parse(text: &str) -> Result<Self, Failure> {
         let parts = text.split_once('=').and_then(|(key, range)| Some((key.trim(), range.split_once("..")?)));
-        let Some((key, (low, high))) = parts else { return Err(wrong(&format!("`{text}` is not KEY=LOW..HIGH"))) };
-        let number =
-            |text: &str| text.trim().parse::<f64>().map_err(|_| wrong(&format!("`{}` is not a number", text.trim())));
+        let Some((key, (low, high))) = parts else { return Err(wrong(&format!("{text}: is not KEY=LOW..HIGH"))) };
+        let number = |end: &str| {
+            end.trim().parse::<f64>().map_err(|_| wrong(&format!("{text}: `{}` is not a number", end.trim())))
+        };
         Self::new(key, number(low)?, number(high)?)
     }
 
@@ -59,10 +60,10 @@ impl Bound {
     /// [`Failure`] `attack/variation` unless the values are finite and in increasing order.
     pub fn new(key: &str, low: f64, high: f64) -> Result<Self, Failure> {
         if !(low.is_finite() && high.is_finite() && (high - low).is_finite()) {
-            return Err(wrong(&format!("the range of {key} must be finite, got {low} to {high}")));
+            return Err(wrong(&format!("{key}={low}..{high}: the range must be finite")));
         }
         if low >= high {
-            return Err(wrong(&format!("the range of {key} must be in increasing order, got {low} to {high}")));
+            return Err(wrong(&format!("{key}={low}..{high}: the range must be in increasing order")));
         }
         Ok(Self { key: key.to_owned(), low, high, whole: false })
     }
@@ -88,7 +89,7 @@ impl Bound {
 fn wrong(why: &str) -> Failure {
     Failure::input(
         "attack/variation",
-        format!("--vary: {why}"),
+        format!("--vary {why}"),
         "write a numeric key and two finite numbers in increasing order, such as --vary network.loss=0..0.3",
     )
 }
@@ -112,7 +113,7 @@ impl SearchSpace {
         if seeds == 0 || flights < seeds {
             return Err(Failure::input(
                 "attack/too-few-flights",
-                format!("--flights: must be at least the {seeds} of --seeds, got {flights}"),
+                format!("--flights {flights}: must be at least {seeds}, the number of --seeds"),
                 "give more flights or fewer seeds",
             ));
         }
@@ -129,7 +130,7 @@ impl SearchSpace {
             if !(by.is_finite() && by > 0.0) {
                 return Err(Failure::input(
                     "attack/out-of-range",
-                    format!("{option}: must be a finite number above 0, got {by}"),
+                    format!("{option} {by}: must be a finite number above 0"),
                     "give --start in metres and --velocity in metres per second",
                 ));
             }
@@ -146,7 +147,7 @@ impl SearchSpace {
         if seeds > 1 && !is_random {
             return Err(Failure::input(
                 "attack/nothing-random",
-                format!("--seeds: nothing in the flight is random, so all {seeds} seeds give the same flight"),
+                format!("--seeds {seeds}: nothing in the flight is random, so all seeds give the same flight"),
                 "leave --seeds out, or add turbulence, noise of measurement, loss or jitter to the scenario",
             ));
         }
@@ -196,7 +197,8 @@ impl SearchSpace {
             let near_m = self.options.apart_m.map(|apart_m| (apart_m, closest_start_m(&scenario)));
             match near_m {
                 Some((apart_m, near_m)) if near_m < apart_m => {
-                    Err(format!("two vehicles start {near_m} m apart, less than --apart {apart_m} m"))
+                    let near = beside_limit(near_m, apart_m, 3);
+                    Err(format!("two vehicles start {near} m apart, less than --apart {apart_m} m"))
                 }
                 _ => Ok(scenario),
             }
@@ -219,14 +221,14 @@ impl SearchSpace {
         if twice || of_start {
             return Err(Failure::input(
                 "attack/key-twice",
-                format!("--vary: {key} is varied twice"),
+                format!("--vary {key}: the key is varied twice"),
                 "vary each key once; --start and --velocity vary the whole of [start]",
             ));
         }
         if key.rsplit('.').next() == Some("seed") {
             return Err(Failure::input(
                 "attack/seed-varied",
-                format!("--vary: {key} is a seed, and varying a seed does not make a scenario harder"),
+                format!("--vary {key}: the key is a seed, and varying a seed does not make a scenario harder"),
                 "leave the seed out; --seeds K flies each candidate with K seeds of noise",
             ));
         }
@@ -243,7 +245,9 @@ impl SearchSpace {
         Err(Failure::input(
             "attack/out-of-range",
             format!(
-                "--apart: must be more than delta ({delta_m} m) and at most the scenario's own {own_m} m, got {apart_m}"
+                "--apart {apart_m}: must be more than delta ({delta_m} m) and at most {} m, the smallest separation \
+                 of the scenario's start",
+                at_least(own_m, 3)
             ),
             "give a distance in this range, or leave --apart out",
         ))
@@ -342,8 +346,8 @@ mod tests {
             ("law.alpha=a..2", "`a` is not a number"),
             ("law.alpha=2..2", "must be in increasing order"),
             ("law.alpha=3..2", "must be in increasing order"),
-            ("law.alpha=0..inf", "must be finite, got 0 to inf"),
-            ("law.alpha=nan..1", "must be finite, got NaN to 1"),
+            ("law.alpha=0..inf", "law.alpha=0..inf: the range must be finite"),
+            ("law.alpha=nan..1", "law.alpha=NaN..1: the range must be finite"),
             ("law.alpha=-1e308..1e308", "must be finite"),
         ] {
             let refused = Bound::parse(text).expect_err(text);

@@ -47,10 +47,6 @@ impl LawSummary {
         if of == 0 {
             return "no flight was flown".to_owned();
         }
-        let unknown = match self.unknown {
-            0 => String::new(),
-            unknown => format!(", {} unknown", separated(unknown)),
-        };
         // An upper bound of 1 is no information.
         let bound = self.violated_below.filter(|bound| bound.share < 1.0).map(|bound| {
             let kind = match bound.kind {
@@ -58,7 +54,8 @@ impl LawSummary {
                 BoundKind::ConfidenceSequence => "confidence sequence",
             };
             let (below, confidence) = (percent_at_most(bound.share), 100.0 * bound.confidence);
-            format!(": below {below} with {confidence:.0} % confidence ({kind})")
+            let link = if count == 0 && self.unknown == 0 { ": " } else { "; violated " };
+            format!("{link}below {below} with {confidence:.0} % confidence ({kind})")
         });
         let bound = if confidence == 1.0 { Some(": all points of the grid, no sample".to_owned()) } else { bound };
         let flights = if of == 1 { "flight" } else { "flights" };
@@ -66,8 +63,20 @@ impl LawSummary {
             0 => String::new(),
             count => format!("CERTIFICATE BROKEN in {}: ", counted(count, "flight", "flights")),
         };
-        let (count, of) = (separated(count), separated(of));
-        format!("{broken}{count} of {of} {flights} violated{unknown}{}", bound.unwrap_or_default())
+        let counts = outcomes(count, self.unknown, self.clear.count, &format!("{} {flights}", separated(of)));
+        let bound = bound.unwrap_or_default();
+        format!("{broken}{counts}{bound}")
+    }
+}
+
+/// Returns the numbers of flights by outcome, what failed first. `all` names all flights, such as `100 flights`.
+fn outcomes(violated: u64, unknown: u64, clear: u64, all: &str) -> String {
+    let [shown, not_known, proved] = [violated, unknown, clear].map(separated);
+    match (violated, unknown, clear) {
+        (0, 0, _) | (_, 0, 0) => format!("{shown} of {all} violated"),
+        (_, 0, _) => format!("{shown} of {all} violated, {proved} clear"),
+        (0, ..) => format!("{not_known} of {all} unknown, 0 violated, {proved} clear"),
+        _ => format!("{shown} of {all} violated, {not_known} unknown, {proved} clear"),
     }
 }
 
@@ -227,7 +236,12 @@ impl Study for Summary {
     fn headline(&self) -> String {
         match &self.laws[..] {
             [law] => law.sentence(),
-            laws => laws.iter().map(|law| format!("{}: {}", law.name, law.sentence())).collect::<Vec<_>>().join("; "),
+            laws => {
+                // Laws with violations come first, then laws with unknown flights.
+                let mut laws: Vec<_> = laws.iter().collect();
+                laws.sort_by_key(|law| (law.certificates_broken == 0, law.violated.count == 0, law.unknown == 0));
+                laws.iter().map(|law| format!("{}: {}", law.name, law.sentence())).collect::<Vec<_>>().join("; ")
+            }
         }
     }
 
@@ -301,6 +315,19 @@ impl Study for Summary {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_headline_begins_with_what_failed() {
+        for (violated, unknown, clear, expected) in [
+            (3, 2, 95, "3 of 100 flights violated, 2 unknown, 95 clear"),
+            (3, 0, 97, "3 of 100 flights violated, 97 clear"),
+            (0, 2, 98, "2 of 100 flights unknown, 0 violated, 98 clear"),
+            (0, 0, 100, "0 of 100 flights violated"),
+            (100, 0, 0, "100 of 100 flights violated"),
+        ] {
+            assert_eq!(outcomes(violated, unknown, clear, "100 flights"), expected);
+        }
+    }
 
     #[test]
     fn a_small_p_value_is_a_bound() {

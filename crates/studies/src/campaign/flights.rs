@@ -91,8 +91,9 @@ impl Campaign {
         };
         manifest.shards = shards.unwrap_or_else(|| manifest.runs.div_ceil(RUNS_OF_A_SHARD));
         if manifest.shards == 0 || manifest.shards > manifest.runs {
-            let problem = format!("--shards: must be from 1 to the {} runs, got {}", manifest.runs, manifest.shards);
-            return Err(refused(problem, "give fewer shards, or leave --shards out"));
+            let (runs, shards) = (manifest.runs, manifest.shards);
+            let problem = format!("--shards {shards}: must be from 1 to {runs}, the number of runs");
+            return Err(refused(problem, "give a number in this range, or leave --shards out"));
         }
         let mut campaign = Self::read(manifest, spec)?;
         campaign.check(spec)?;
@@ -141,8 +142,8 @@ impl Campaign {
         let written = written.map_err(|error| spec.scenario("set", "", error))?;
         let base = BaseScenario::read(source, written).map_err(|error| spec.scenario("scenario", "", error))?;
         let template = base.template();
-        let laws = spec.laws.iter().map(|name| {
-            let law = template.law(name).map_err(|error| spec.scenario("laws", "", error))?;
+        let laws = spec.laws.iter().zip(1..).map(|(name, entry)| {
+            let law = template.law(name).map_err(|error| spec.scenario(&format!("laws.{entry}"), "", error))?;
             Ok(Law { name: law.name.clone(), overrides: law.overrides() })
         });
         let mut laws = laws.collect::<Result<Vec<_>, Failure>>()?;
@@ -159,7 +160,7 @@ impl Campaign {
             (NOISE_SEED, template.flight_is_random() || varies(&variations, &FLIGHT)),
         ];
         let drawn: Vec<_> = open.into_iter().filter(|&(key, is_random)| is_random && is_open(key)).collect();
-        variations.extend(drawn.into_iter().map(|(key, _)| (key.to_owned(), Variation::Seed {})));
+        variations.extend(drawn.into_iter().map(|(key, _)| (key.to_owned(), Variation::Seed)));
         let splitting = (spec.method == Method::Splitting).then(|| spec.splitting.unwrap_or_default());
         let file = manifest.folder.join(&manifest.scenario_name);
         let builtin = tautline_sim::scenario::builtin::find(&manifest.scenario_name);
@@ -199,7 +200,7 @@ impl Campaign {
             let scenario = self.scenario(run, &self.laws[0]);
             scenario.map_or_else(|error| error.to_string(), |scenario| scenario.sha256_hex())
         };
-        let only_seeds = self.variations.values().all(|variation| *variation == Variation::Seed {});
+        let only_seeds = self.variations.values().all(|variation| *variation == Variation::Seed);
         only_seeds && (1..self.manifest.runs.min(3)).all(|run| hash(run) == hash(0))
     }
 

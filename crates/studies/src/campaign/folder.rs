@@ -16,8 +16,9 @@ use super::summary::{Summary, SummaryAccumulator};
 use crate::SCHEMA_VERSION;
 use crate::study::Study as _;
 use crate::table::{Cell, ParquetTable};
+use tautline_core::text::counted;
 use tautline_report::report::{write_atomically, write_atomically_with};
-use tautline_report::request::Failure;
+use tautline_report::request::{Failure, command_line};
 
 /// File name of the table in the folder of a campaign.
 pub const RESULTS: &str = "results.parquet";
@@ -212,12 +213,14 @@ impl Folder {
     fn missing_shards(&self, missing: &[u64], damaged: &[String]) -> Failure {
         let (list, shards) = (listed(missing), self.campaign.manifest().shards);
         let damages = damaged.iter().fold(String::new(), |text, damage| text + "; " + damage);
-        let replaced = if damaged.is_empty() { "" } else { ", which replaces damaged parts" };
-        let command = format!("tautline campaign shard {} --shard {list}", self.path.display());
+        let are = if missing.len() == 1 { "is" } else { "are" };
+        let what = if damaged.is_empty() { "missing" } else { "missing or damaged" };
+        let of = counted(shards, "shard", "shards");
+        let path = self.path.display().to_string();
         Failure::input(
             "campaign/missing-shards",
-            format!("shards {list} of {shards} are missing{damages}"),
-            format!("fly them with: {command}{replaced}"),
+            format!("{} of {of} {are} {what}: {list}{damages}", missing.len()),
+            command_line(["campaign", "shard", &path, "--shard", &list].into_iter()),
         )
     }
 }
@@ -327,7 +330,7 @@ pub fn listed(shards: &[u64]) -> String {
 pub fn parse(list: &str, shards: u64) -> Result<Vec<u64>, Failure> {
     let wrong = |problem: String| {
         let remedy = "give numbers from 0 on, such as 7, 3-5, 13,500-502, or env:SLURM_ARRAY_TASK_ID";
-        refused(format!("--shard: {problem}"), remedy)
+        refused(format!("--shard {list}: {problem}"), remedy)
     };
     if let Some(name) = list.strip_prefix("env:") {
         let value = std::env::var(name).map_err(|_| wrong(format!("no environment variable `{name}`")))?;
@@ -339,7 +342,7 @@ pub fn parse(list: &str, shards: u64) -> Result<Vec<u64>, Failure> {
         let number = |text: &str| text.trim().parse::<u64>().map_err(|_| wrong(format!("`{span}` is not a shard")));
         let (first, last) = (number(first)?, number(last)?);
         if first > last || last >= shards {
-            return Err(wrong(format!("must be from 0 to {}, got {span}", shards - 1)));
+            return Err(wrong(format!("must be from 0 to {}, in increasing order", shards - 1)));
         }
         parsed.extend(first..=last);
     }

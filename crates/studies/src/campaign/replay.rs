@@ -144,13 +144,13 @@ pub fn replay(
     let Some(law) = law else {
         let names: Vec<_> = campaign.laws().iter().map(|law| law.name.as_str()).collect();
         let name = request.law.as_deref().unwrap_or_default();
-        let problem = format!("--law: the campaign has no law `{name}`");
+        let problem = format!("--law {name}: the campaign has no such law");
         return Err(Failure::input("campaign/unknown-law", problem, format!("its laws are {}", names.join(", "))));
     };
     let (run, last) = (request.run, campaign.manifest().runs - 1);
     if run > last {
-        let problem = format!("--run: must be from 0 to {last}, got {run}");
-        return Err(Failure::input("campaign/no-run", problem, "give the number of a run of the campaign"));
+        let problem = format!("--run {run}: must be from 0 to {last}");
+        return Err(Failure::input("campaign/no-run", problem, "give the number of a run of the campaign, from 0"));
     }
     let bad = campaign.splitting().map(|_| request.bad.unwrap_or_default());
     let flight = FlightId { law, run, bad };
@@ -245,8 +245,11 @@ fn repeat_violated_flight(folder: &Folder, law: &Law, bad: &ViolatedRun) -> Resu
 fn fly_violated_flight(folder: &Folder, flight: FlightId<'_>, bad: usize, out: &Path) -> Result<String, Failure> {
     let kept = flight.row(folder)?.and_then(|row| row.splitting).map(|splitting| splitting.bad).unwrap_or_default();
     let Some(violated) = kept.get(bad) else {
-        let problem = format!("--bad: the campaign has no {}", flight.words());
-        let remedy = format!("this run has {} kept flights, counted from 0", kept.len());
+        let problem = format!("--bad {bad}: the campaign has no {}", flight.words());
+        let remedy = match kept.len() {
+            0 => "this run kept no violated flight: give another run".to_owned(),
+            kept => format!("give a number from 0 to {}", kept - 1),
+        };
         return Err(Failure::input("campaign/no-flight", problem, remedy));
     };
     let scenario = flight.scenario(folder.campaign())?;

@@ -161,8 +161,7 @@ fn fly_shard(folder: &Folder, shard: u64, batch: &Batch<'_>, monitor: &dyn Monit
     let flown = folder.fly(shard, batch)?;
     if flown.is_none() {
         monitor.finish();
-        monitor
-            .warn(&format!("interrupted in shard {shard}: finished flights are kept, and the same command continues"));
+        monitor.warn(&format!("interrupted in shard {shard}: finished flights are kept; the same command continues"));
     }
     Ok(flown)
 }
@@ -227,10 +226,16 @@ fn answer(
         monitor.warn(&format!("note: {note}"));
     }
     monitor.say(&format!("{}\n\n{}", summary.headline(), summary.text()));
+    let again = summary.laws.iter().map(|law| law.worst.len() + law.bad.len()).sum::<usize>().min(worst);
+    if again > 0 {
+        let flights = counted(again as u64, "flight", "flights");
+        monitor.warn(&format!("flying {flights} with the least clearance again for the page; --worst 0 leaves it out"));
+    }
     let flights = fly_worst_again(folder, &summary, worst, pictures, monitor)?;
     let path = folder.file(PAGE);
     if monitor.is_interrupted() {
-        monitor.warn("interrupted: no page was written");
+        let report = command_line(["campaign", "report", &folder.path().display().to_string()].into_iter());
+        monitor.warn(&format!("interrupted: all flights are kept, and no page was written; write it with: {report}"));
         return Ok(None);
     }
     let command = command_line(["campaign", "run", &format!("{}.toml", summary.name)].into_iter());

@@ -23,6 +23,7 @@ use crate::batch::Batch;
 use crate::flight::{FlightSummary, Outcome};
 use crate::splitting::Splitting;
 use crate::table::{Cell, Column, Kind};
+use tautline_report::report::write_beside;
 use tautline_report::request::Failure;
 
 /// Flights of a finished shard.
@@ -98,13 +99,9 @@ impl Folder {
     /// Publishes a complete part in one step. If another process has published the part, both must be equal.
     fn publish(&self, shard: u64, rows: &[Row]) -> Result<(), Failure> {
         let bytes = encode(self.campaign().manifest(), shard, rows)?;
-        let (path, own) = (self.part_path(shard), self.unique_path(shard, "partial"));
-        let failed = |error| file_failure("write", &own)(error);
-        let written = File::create(&own).and_then(|mut file| file.write_all(&bytes).and_then(|()| file.sync_all()));
-        if let Err(error) = written {
-            let _ = fs::remove_file(&own);
-            return Err(failed(error));
-        }
+        let path = self.part_path(shard);
+        let failed = |error| file_failure("write", &path)(error);
+        let (own, ()) = write_beside(&path, |file| file.write_all(&bytes).map_err(failed))?;
         if matches!(self.read(shard), Ok(PartState::Damaged(_))) {
             return fs::rename(&own, &path).map_err(failed);
         }

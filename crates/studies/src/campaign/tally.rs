@@ -264,7 +264,7 @@ impl KeyColumn {
             laws,
             is_continuous: matches!(variation, Variation::Uniform(_) | Variation::LogUniform(_) | Variation::Normal(_)),
             is_logarithmic: matches!(variation, Variation::LogUniform(_)),
-            is_seed: matches!(variation, Variation::Seed {}),
+            is_seed: matches!(variation, Variation::Seed),
             flights: Vec::new(),
         }
     }

@@ -4,23 +4,29 @@ use std::f64::consts::TAU;
 
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use sha2::{Digest as _, Sha256};
-
-use super::spec::in_words;
 
 /// Number of bits of drawn seeds; a double holds them exactly.
 const SEED_BITS: u32 = 53;
 
 /// Word for a seed that each run draws.
-const BY_RUN: &str = "run";
+pub(super) const BY_RUN: &str = "run";
+
+/// Forms of a variation.
+pub(super) const FORMS: &str = "write \"run\" for a seed, or one of { uniform = [low, high] }, { log_uniform = [low, \
+                                high] }, { normal = [mean, deviation] }, { integer = [low, high] }, { list = [...] }, \
+                                { grid = [...] }, { grid = { from = 0.0, to = 1.0, count = 11 } }";
 
 /// Distribution or grid of the values of a key.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
+#[schemars(description = FORMS)]
 pub enum Variation {
     /// A seed of 53 bits.
-    Seed {},
+    #[serde(skip)]
+    Seed,
     /// Uniform between two numbers.
     Uniform([f64; 2]),
     /// Uniform in the logarithm between two positive numbers.
@@ -30,24 +36,25 @@ pub enum Variation {
     /// Uniform integer in a range, both ends included.
     Integer([i64; 2]),
     /// Uniform choice from a list.
-    List(Vec<toml::Value>),
+    List(#[schemars(with = "Vec<serde_json::Value>", length(min = 1))] Vec<toml::Value>),
     /// Values in turn, crossed with every other grid.
     Grid(Grid),
 }
 
 /// Values that are flown in turn.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged)]
 pub enum Grid {
     /// Listed values.
-    Listed(Vec<toml::Value>),
+    Listed(#[schemars(with = "Vec<serde_json::Value>", length(min = 1))] Vec<toml::Value>),
     /// Evenly spaced values, both ends included.
     Spaced {
         /// First value.
         from: f64,
         /// Last value.
         to: f64,
-        /// Number of values.
+        /// Number of values, at least 2.
+        #[schemars(range(min = 2))]
         count: u64,
     },
 }
@@ -81,9 +88,9 @@ impl Variation {
     /// The problem, if the value is not a variation or its range is empty.
     pub fn read(value: &toml::Value) -> Result<Self, String> {
         if value.as_str() == Some(BY_RUN) {
-            return Ok(Self::Seed {});
+            return Ok(Self::Seed);
         }
-        let variation: Self = value.clone().try_into().map_err(|error: toml::de::Error| in_words(error.message()).0)?;
+        let variation: Self = value.clone().try_into().map_err(|error: toml::de::Error| error.message().to_owned())?;
         match &variation {
             Self::Uniform([low, high]) | Self::LogUniform([low, high])
                 if !(low < high && low.is_finite() && high.is_finite()) =>
@@ -126,7 +133,7 @@ impl Variation {
     pub fn samples(&self) -> Vec<toml::Value> {
         let ends = |[low, high]: [f64; 2]| vec![toml::Value::Float(low), toml::Value::Float(high)];
         match self {
-            Self::Seed {} => vec![toml::Value::Integer(0)],
+            Self::Seed => vec![toml::Value::Integer(0)],
             Self::Uniform(between) | Self::LogUniform(between) => ends(*between),
             Self::Normal([mean, _]) => vec![toml::Value::Float(*mean)],
             Self::Integer(between) => between.map(toml::Value::Integer).to_vec(),
@@ -141,7 +148,7 @@ impl Variation {
     pub fn value(&self, seed: u64, key: &str, run: u64, place: u64) -> toml::Value {
         let mut random = Random::of(seed, key, run);
         match self {
-            Self::Seed {} => toml::Value::Integer((random.word() >> (u64::BITS - SEED_BITS)).cast_signed()),
+            Self::Seed => toml::Value::Integer((random.word() >> (u64::BITS - SEED_BITS)).cast_signed()),
             Self::Uniform([low, high]) => toml::Value::Float(between(*low, *high, random.unit())),
             Self::LogUniform([low, high]) => {
                 let drawn = libm::exp(between(libm::log(*low), libm::log(*high), random.unit()));

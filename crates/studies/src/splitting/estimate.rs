@@ -2,6 +2,7 @@
 
 use std::ops::ControlFlow;
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::levels::{RandomProcess, SplitResult, SplittingRule, split};
@@ -18,12 +19,14 @@ const ENOUGH: usize = 100;
 const MANY: usize = 20;
 
 /// Settings of an estimate: the keys of `[splitting]`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SplittingSettings {
     /// Number of simultaneous flights, n: at least 2; 100 or more is recommended.
+    #[schemars(range(min = 2))]
     pub flights: usize,
     /// Smallest number k of flights that a round ends, from 1 to n - 1. k = 1 has the smallest error per step flown.
+    #[schemars(range(min = 1))]
     pub kill: usize,
     /// Largest number of violated flights that an estimate keeps.
     pub keep: usize,

@@ -149,8 +149,9 @@ impl AuditTable {
         settings.max_gap_s = settings.max_gap_s.or(self.max_gap_s);
         settings.accel_window_s = settings.accel_window_s.or(self.accel_window_s);
         settings.require_presence |= self.require_presence.unwrap_or(false);
+        let given = self.layout.clone().unwrap_or_default();
         let layout = self.layout.map(|layout| ArrayAxis::layout_of(&layout)).transpose();
-        let layout = layout.map_err(|error| wrong(format!("layout: {error}")))?;
+        let layout = layout.map_err(|error| wrong(format!("layout: {error}, got `{given}`")))?;
         let axes = self.axes.map(|axes| axes.parse::<Axes>()).transpose().map_err(wrong)?;
         let scale = self.scale.map(ScaleEntry::scale).transpose().map_err(wrong)?;
         if let Subject::Files { options, .. } = &mut request.subject {
