@@ -47,6 +47,15 @@ pub(super) struct Band {
     pub(super) label: Option<String>,
 }
 
+/// A filled polygon in the units of the axes, within the chart.
+#[derive(Clone, Debug)]
+pub(super) struct Shape {
+    pub(super) corners: Vec<(f64, f64)>,
+    pub(super) colour: Colour,
+    pub(super) opacity: f64,
+    pub(super) label: Option<String>,
+}
+
 /// A mark at a point, with an optional text beside it.
 #[derive(Clone, Debug)]
 pub(super) struct Mark {
@@ -76,7 +85,8 @@ pub(super) struct Chart {
     pub(super) x: Axis,
     pub(super) y: Axis,
     /// Whether units have the same length on both axes.
-    pub(super) equal: bool,
+    equal: bool,
+    pub(super) shapes: Vec<Shape>,
     pub(super) bands: Vec<Band>,
     pub(super) lines: Vec<Line>,
     pub(super) marks: Vec<Mark>,
@@ -102,7 +112,14 @@ enum Paint {
 
 impl Chart {
     pub(super) fn new(x: Axis, y: Axis) -> Self {
-        Self { x, y, equal: false, bands: Vec::new(), lines: Vec::new(), marks: Vec::new(), inset: None, left: LEFT }
+        let (bands, lines, marks) = (Vec::new(), Vec::new(), Vec::new());
+        Self { x, y, equal: false, shapes: Vec::new(), bands, lines, marks, inset: None, left: LEFT }
+    }
+
+    /// Gives units the same length on both axes, which widens one of them.
+    pub(super) fn make_equal(&mut self) {
+        self.equal = true;
+        self.make_axes_equal();
     }
 
     /// Adds a line with an entry in the legend.
@@ -141,6 +158,10 @@ impl Chart {
         let on_paper = |(x, y)| (left + (RIGHT - left) * self.x.share(x), bottom - height * self.y.share(y));
         self.draw_axes(&mut canvas, on_paper);
 
+        for Shape { corners, colour, opacity, .. } in &self.shapes {
+            let corners: Vec<_> = corners.iter().filter_map(|&at| self.place(at)).map(on_paper).collect();
+            canvas.area(&corners, *colour, *opacity);
+        }
         let bands = self.bands.iter().map(|band| (Paint::Area(band.colour, band.opacity), self.outline(band)));
         let lines = self.lines.iter().flat_map(|line| {
             self.stretches(&line.points).into_iter().map(|stretch| (Paint::Line(line.stroke), stretch))
@@ -274,10 +295,11 @@ impl Chart {
 
     /// Returns the entries of the legend, in rows of the width of a figure.
     fn legend(&self) -> Vec<Vec<Entry<'_>>> {
-        let bands = self.bands.iter().map(|band| (&band.label, Sample::Band(band)));
+        let shapes = self.shapes.iter().map(|of| (&of.label, Sample::Area(of.colour, of.opacity)));
+        let bands = self.bands.iter().map(|band| (&band.label, Sample::Area(band.colour, band.opacity)));
         let lines = self.lines.iter().map(|line| (&line.label, Sample::Line(line.stroke)));
         let marks = self.marks.iter().map(|mark| (&mark.label, Sample::Mark(mark)));
-        let labelled = bands.chain(lines).chain(marks);
+        let labelled = shapes.chain(bands).chain(lines).chain(marks);
         let entries = labelled.filter_map(|(words, sample)| Some(Entry { words: words.as_deref()?, sample }));
         let mut rows: Vec<Vec<_>> = Vec::new();
         let mut used = f64::INFINITY;
@@ -303,7 +325,7 @@ struct Entry<'a> {
 }
 
 enum Sample<'a> {
-    Band(&'a Band),
+    Area(Colour, f64),
     Line(Stroke),
     Mark(&'a Mark),
 }
@@ -336,7 +358,7 @@ fn draw_legend(canvas: &mut Canvas, rows: &[Vec<Entry<'_>>], top: f64) {
             let end = x + SAMPLE;
             match entry.sample {
                 Sample::Line(stroke) => canvas.line(&[(x, y), (end, y)], stroke),
-                Sample::Band(&Band { colour, opacity, .. }) => {
+                Sample::Area(colour, opacity) => {
                     let (top, bottom) = (y - 5.0, y + 5.0);
                     canvas.area(&[(x, top), (end, top), (end, bottom), (x, bottom)], colour, opacity);
                 }

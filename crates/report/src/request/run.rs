@@ -190,6 +190,7 @@ pub fn replay_of_run(
 
 /// Returns the charts of a run.
 fn figures(scenario: &Scenario, log: &FlightLog, report: &Report) -> Vec<Figure> {
+    let obstacles: Vec<_> = scenario.obstacles.iter().map(sim::judged).collect();
     let criteria = Criteria {
         delta_m: scenario.delta_m,
         certified_m: report.separation.certified_m,
@@ -197,6 +198,7 @@ fn figures(scenario: &Scenario, log: &FlightLog, report: &Report) -> Vec<Figure>
         edge_error_m: Some(scenario.arrival.edge_error_m),
         disagreement_m_s: Some(scenario.arrival.disagreement_m_s),
         most_thrust_n: scenario.airframe.quadrotor().map(|quadrotor| quadrotor.model.max_thrust_n),
+        obstacles: &obstacles,
     };
     figures::of_run(log, &criteria)
 }

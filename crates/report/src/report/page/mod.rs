@@ -10,9 +10,10 @@ use maud::{DOCTYPE, PreEscaped, html};
 pub use maud::{Markup, Render};
 pub use replay::{Start, replay};
 
-use crate::figures::Figure;
+use crate::figures::{Figure, page_rules};
 use tautline_core::text::in_order;
 
+/// Style sheet with the colours of light and dark pages.
 const STYLE: &str = include_str!("style.css");
 /// Content security policy: no loading. A script is admitted by its hash, on pages with a replay only.
 const POLICY: &str =
@@ -117,10 +118,18 @@ impl Page {
                     title { (self.title) " - " (self.badge.word) }
                     // An empty icon, because browsers request one otherwise.
                     link rel="icon" href="data:,";
-                    style { (PreEscaped(STYLE)) @if replays { (PreEscaped(replay::STYLE)) } }
+                    style { (PreEscaped(STYLE)) (PreEscaped(page_rules())) @if replays { (PreEscaped(replay::STYLE)) } }
                 }
                 body {
                     header {
+                        label.theme {
+                            "Theme "
+                            select autocomplete="off" {
+                                option value="auto" { "as in the browser" }
+                                option value="light" { "light" }
+                                option value="dark" { "dark" }
+                            }
+                        }
                         p.kind { (self.kind) }
                         h1 { (self.title) }
                         p.verdict { (self.badge) " " (self.verdict) }
@@ -174,7 +183,7 @@ pub fn figures(figures: &[Figure]) -> Markup {
 #[must_use]
 pub fn pictures(pictures: &[Picture]) -> Markup {
     side_by_side(pictures.iter().map(|Picture { description, data_uri }| {
-        (html! { img src=(data_uri) alt=(description); }, description.clone())
+        (html! { img.snapshot src=(data_uri) alt=(description); }, description.clone())
     }))
 }
 
