@@ -195,7 +195,7 @@ fn every_pair_of_a_small_swarm_has_a_line_and_the_closest_approach_is_marked() {
 
 #[test]
 fn paths_have_a_cross_at_each_start_a_ring_at_each_end_and_equal_axes() {
-    let figure = figures::paths(&history(3), "Paths");
+    let figure = figures::paths(&history(3), &[], "Paths");
     let drawing = Drawing::of(&figure);
     let per_metre = |vertical| drawing.place(vertical, 1.0) - drawing.place(vertical, 0.0);
     assert!((per_metre(false) + per_metre(true)).abs() < 0.01 * per_metre(false), "a metre differs between the axes");

@@ -117,7 +117,7 @@ fn of_flight(flown: &BuiltinFlight, names: [&str; 3], number: &str, flight: &str
     let [a, b, c] = names;
     let (log, certified_m) = (&flown.log, flown.flight.certificate.certified_m);
     [
-        named(a, figures::paths(log, &format!("{number}(a): {flight}, paths"))),
+        named(a, figures::paths(log, &[], &format!("{number}(a): {flight}, paths"))),
         named(b, figures::control(log, &format!("{number}(b): {flight}, control effort"))),
         named(c, figures::distances(log, flown.delta_m, certified_m, &format!("{number}(c): {flight}, distances"))),
     ]
