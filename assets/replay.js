@@ -182,7 +182,7 @@ const play = (root, data) => {
   const tail = select("Length of trails", [["Infinity", "whole trails"],
     .../** @type {[string, string][]} */ (tails.map(x => [`${x}`, `trails of ${x} s`]))], () => {});
   const follow = select("Camera", [["", "free camera"], ["swarm", "follow the swarm"],
-    ["picked", "follow the picked vehicle"]], () => approach());
+    ["picked", "follow the picked one"]], () => approach());
   const kinds = /** @type {[string, string][]} */ ([["", "colour: vehicle"],
     ...data.holds ? [] : [["speed", "colour: speed"]], ...count > 1 ? [["clearance", "colour: clearance"]] : []]);
   const colouring = select("Colour", kinds, () => recolour());
@@ -203,8 +203,8 @@ const play = (root, data) => {
     slots: "radial-gradient(circle closest-side,transparent 65%,var(--c1) 66% 85%,transparent 86%)",
     closest: "linear-gradient(transparent 35%,var(--ink) 35% 65%,transparent 65%)" };
   /** @type {Object<string, string>} */
-  const words = { shells: "keep-out shells", links: data.tension ? "links: push to pull" : "links: short to long",
-    slots: "slots of the formation", ground: `squares of ${data.square_m} m`, closest: "closest two" };
+  const words = { shells: "keep-out shells", links: data.tension ? "links push, pull" : "links short, long",
+    slots: "slots", ground: `squares of ${data.square_m} m`, closest: "closest two" };
   const swatch = (/** @type {string} */ background) =>
     make("i", { class: "replay-swatch", style: "background:" + background });
   const boxes = new Map(LAYERS.filter(name => shows[name]).map(name => {
@@ -228,9 +228,9 @@ const play = (root, data) => {
   const stage = make("div", { class: "replay-stage" }, canvas, names, state, chosen, said, scale, rate, poster, help);
   const panel = make("div",
     { class: "replay-panel", role: "group", "aria-label": "Replay of " + (root.dataset.label ?? "a flight") },
-    stage, make("div", { class: "replay-time" }, start, track, clock),
+    stage, make("div", { class: "replay-time" }, start, track, clock, question),
     make("div", { class: "replay-buttons" }, ...jumps, ...views, follow, colouring, ...shows.trails ? [tail] : [],
-      speeds, question),
+      speeds),
     make("div", { class: "replay-buttons" }, ...legend));
   root.prepend(panel);
 

@@ -27,11 +27,12 @@ fn hostile_page() -> Page {
     Page {
         title: text(),
         kind: HOSTILE,
+        replay: None,
         badge: Badge::judged(false),
         verdict: text(),
         reasons: vec![text()],
         warnings: vec![(text(), text())],
-        sections: vec![page::section(HOSTILE, &content)],
+        sections: vec![page::section(HOSTILE, HOSTILE, &content)],
     }
 }
 

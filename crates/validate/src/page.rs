@@ -127,6 +127,9 @@ fn named(name: &str, figure: Figure) -> Figure {
     Figure { name: name.to_owned(), ..figure }
 }
 
+/// Sentence below the heading of the convergence.
+const ABOUT_CONVERGENCE: &str = "Half the step leaves a quarter of the position error, so the method has order 2.";
+
 /// Assumptions of the claims.
 const ASSUMED: [&str; 3] = [
     "Continuous time is solved by an explicit Runge-Kutta method of order 8 with error control at 1e-12, independent \
@@ -145,16 +148,17 @@ impl Validation {
         let (of_convergence, of_paper): (Vec<_>, Vec<_>) =
             self.figures.iter().cloned().partition(|figure| figure.name == "convergence");
         sections.extend([
-            section("Convergence ladder", &[convergence(&self.convergence), page::figures(&of_convergence)]),
-            section("The paper's figures", &[page::figures(&of_paper)]),
-            section("Assumptions", &[page::list(&ASSUMED)]),
-            section("Command", &[page::command("tautline validate")]),
+            section("Convergence ladder", ABOUT_CONVERGENCE, &[convergence(&self.convergence), page::figures(&of_convergence)]),
+            section("The paper's figures", "The figures of the source paper, flown and drawn again.", &[page::figures(&of_paper)]),
+            section("Assumptions", "The measurements rest on these assumptions.", &[page::list(&ASSUMED)]),
+            section("Command", "This command measures everything again.", &[page::command("tautline validate")]),
         ]);
         Page {
             title: "Validation".to_owned(),
             kind: "Measurement of every claim of tautline and of its source paper",
             badge: Badge::judged(self.pass),
             verdict: self.headline(),
+            replay: None,
             reasons: failed.map(|claim| format!("{}: {}", claim.id, claim.measured)).collect(),
             warnings: Vec::new(),
             sections,
@@ -163,9 +167,26 @@ impl Validation {
     }
 }
 
+/// Returns a sentence on a group of claims for a first reader.
+fn about(id: &str) -> &'static str {
+    match id {
+        "tension" => "Each link of the law pulls or pushes by a tension that is unbounded at the safety distance.",
+        "law" => "The command of each vehicle at single instants, against its formula.",
+        "certificate" => "The energy of the law bounds how close any two vehicles can come.",
+        "figures" => "Flights of the paper's figures, with their numbers.",
+        "equilibria" => "Places where the law comes to rest without reaching its formation.",
+        "rates" => "How fast small errors decay near the formation.",
+        "displacement" => "The law that keeps displacements instead of distances.",
+        "margins" => "How much delay, and how slow a controller, the law tolerates.",
+        "engine" => "The simulated motion against the equations of motion in continuous time.",
+        "detectors" => "The judge of the audit against the engine's own contacts.",
+        _ => "",
+    }
+}
+
 fn claims(group: &Group) -> Markup {
     let columns = ["Claim", "Measured", "Outcome"];
-    section(group.title, &[page::words(&caption(group), &columns, group.claims.iter().map(row))])
+    section(group.title, about(group.id), &[page::words(&caption(group), &columns, group.claims.iter().map(row))])
 }
 
 fn caption(group: &Group) -> String {

@@ -5,7 +5,7 @@
 //! | [`paths`] | paths from above: start x, end o, obstacles, equal units on both axes |
 //! | [`at_closest`] | paths from above with the vehicles at the closest approach |
 //! | [`paths_in_space`] | paths in space, if the run is not level |
-//! | [`distances`] | distances of pairs, with the safety distance and the certified one |
+//! | [`distances`] | distances of pairs, with the safety distance and the certified one, and the clearance |
 //! | [`control`] | control effort of each vehicle |
 //! | [`channels`] | tilt, rotor thrust, wind and age of messages of each vehicle |
 //! | [`energy`] | the law's energy and its start E(0), its bound on a complete graph |
@@ -18,6 +18,7 @@
 //! | [`convergence`] | an integrator's error over its step |
 //! | [`attack`] | the smallest separation found so far over the flights of a search |
 //! | [`margin`] | the share of flights with a property over the values of a key |
+//! | [`by_law`] | a number of each law with its interval |
 //! | [`shares`] | such shares of several laws |
 //! | [`separations`] | the smallest separation of flights over the values of a key |
 //! | [`heat_map`](heat_map()) | a number over a grid of two keys |
@@ -34,6 +35,7 @@ mod axis;
 mod chart;
 mod distances;
 mod heat_map;
+mod laws;
 mod outlines;
 mod over_time;
 mod paths;
@@ -45,6 +47,7 @@ mod validation;
 
 pub use distances::distances;
 pub use heat_map::{GridAxis, heat_map};
+pub use laws::{OfLaw, by_law};
 pub use over_time::{channels, control, disagreement, energy, shape_error};
 pub use paths::{at_closest, paths, paths_in_space};
 pub use recorded::{Encounter, closest_approach, encounters, smallest};

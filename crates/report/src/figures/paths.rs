@@ -24,7 +24,7 @@ const MOST_PATHS: usize = 300;
 #[must_use]
 pub fn paths(log: &FlightLog, obstacles: &[Obstacle], title: &str) -> Figure {
     let spans = Spans::of(log);
-    let mut chart = from_above(&spans, obstacles);
+    let mut chart = from_above(&spans, &[], obstacles);
     for (k, &i) in drawn(log, MOST_PATHS).iter().enumerate() {
         let look = Look::of(i, log.count());
         let points = path(&spans, i);
@@ -43,11 +43,17 @@ pub fn paths(log: &FlightLog, obstacles: &[Obstacle], title: &str) -> Figure {
 const STILL_PATHS: usize = 40;
 
 /// Draws the paths from above with the vehicles at the time of the closest approach \[s\], and the closest two, from 0,
-/// joined. This still picture replaces a replay that cannot be drawn.
+/// joined. This still picture replaces a replay that cannot be drawn. Flights `beside` it widen the axes.
 #[must_use]
-pub fn at_closest(log: &FlightLog, obstacles: &[Obstacle], closest: Option<([usize; 2], f64)>) -> Figure {
+pub fn at_closest(
+    log: &FlightLog,
+    obstacles: &[Obstacle],
+    closest: Option<([usize; 2], f64)>,
+    beside: &[FlightLog],
+) -> Figure {
     let spans = Spans::of(log);
-    let mut chart = from_above(&spans, obstacles);
+    let beside: Vec<_> = beside.iter().map(Spans::of).collect();
+    let mut chart = from_above(&spans, &beside, obstacles);
     let time_s = closest.map_or(log.range_s()[0], |(_, time_s)| time_s);
     let now = log.positions_m(time_s);
     let place = |i: usize| now.as_ref().map(|now| (now[(i, 0)], now[(i, 1)]));
@@ -69,9 +75,10 @@ pub fn at_closest(log: &FlightLog, obstacles: &[Obstacle], closest: Option<([usi
 }
 
 /// Returns an empty chart of x and y \[m\] in equal units, with the obstacles.
-fn from_above(spans: &Spans<'_>, obstacles: &[Obstacle]) -> Chart {
+fn from_above(spans: &Spans<'_>, beside: &[Spans<'_>], obstacles: &[Obstacle]) -> Chart {
     let axis = |axis: usize, label: &str| {
-        let (low, high) = spans.extent(axis).unwrap_or((0.0, 1.0));
+        let extents = beside.iter().chain([spans]).filter_map(|spans| spans.extent(axis));
+        let (low, high) = extents.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or((0.0, 1.0));
         let margin = MARGIN * (high - low);
         Axis::linear(label, [low - margin, high + margin], false)
     };

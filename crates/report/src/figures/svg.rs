@@ -84,6 +84,11 @@ impl Stroke {
         Self { dashes, ..Self::solid(PALETTE[k % PALETTE.len()], 1.5) }
     }
 
+    /// Returns the stroke of lines that are not told apart.
+    pub(super) fn of_others() -> Self {
+        Self::solid(SOFT_INK, 0.9).faint(0.45)
+    }
+
     /// Returns the same stroke with this opacity.
     pub(super) fn faint(self, opacity: f64) -> Self {
         Self { opacity, ..self }
@@ -98,6 +103,7 @@ impl Stroke {
 pub(super) enum Marker {
     Cross,
     Ring,
+    Dot,
 }
 
 /// Anchor of a text: left, centre or right, and below (first letter), middle or above.
@@ -183,6 +189,10 @@ impl Canvas {
                 };
                 self.shapes += &shape.into_string();
             }
+            Marker::Dot => {
+                let shape = html! { circle cx=(px(x)) cy=(px(y)) r=(radius) fill=(colour.light) {} };
+                self.shapes += &shape.into_string();
+            }
             Marker::Cross => {
                 for down in [radius, -radius] {
                     self.line(&[(x - radius, y - down), (x + radius, y + down)], Stroke::solid(colour, MARK_WIDTH));
@@ -206,12 +216,20 @@ impl Canvas {
         self.shapes += &window.into_string();
     }
 
+    /// Draws into a group of a class.
+    pub(super) fn group(&mut self, class: &str, draw: impl FnOnce(&mut Self)) {
+        let around = std::mem::take(&mut self.shapes);
+        draw(self);
+        let within = std::mem::replace(&mut self.shapes, around);
+        self.shapes += &html! { g class=(class) { (PreEscaped(within)) } }.into_string();
+    }
+
     /// Draws a text beside a marker: to the lower left of a cross, and to the upper right of a ring. The texts of a
     /// vehicle that ends at its start do not overlap.
     pub(super) fn text_beside(&mut self, marker: Marker, (x, y): Point, words: &str) {
         match marker {
             Marker::Cross => self.text((x - 5.0, y + 4.0), Align::RIGHT_ABOVE, words),
-            Marker::Ring => self.text((x + 6.0, y - 3.0), Align::LEFT_BELOW, words),
+            Marker::Ring | Marker::Dot => self.text((x + 6.0, y - 3.0), Align::LEFT_BELOW, words),
         }
     }
 

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::{Judged, Kind, Moment};
 use crate::figures::time_ticks;
 use tautline_audit::Slice;
-use tautline_core::text::{at_least, exact};
+use tautline_core::text::at_least;
 
 /// Width and height.
 const SIZE: [f64; 2] = [1000.0, 100.0];
@@ -15,6 +15,9 @@ const MARGIN: f64 = 1.5;
 /// Largest distance, relative to the limit, up to which heights are proportional to distances.
 const LOW: f64 = 6.0;
 
+/// Smallest distance of two labels.
+const LABEL: f64 = 30.0;
+
 /// Lines and bands of the chart.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Chart {
@@ -22,7 +25,7 @@ pub struct Chart {
     pub distance: String,
     /// Height of the limit, from above.
     pub limit: Option<f64>,
-    /// Heights with their distances in words: the limit, and the largest distance.
+    /// Heights with their distances in words: the largest distance, and the limit.
     pub levels: Vec<(f64, String)>,
     /// Ticks of the axis of time: place and label.
     pub ticks: Vec<(f64, String)>,
@@ -61,6 +64,10 @@ impl Chart {
             let _ = write!(distance, "H{:.1}", x(to_s));
             end_s = to_s;
         }
+        let unit = if unit == "m" { " m" } else { "" };
+        let limit_label = limit.map(|limit| (y(limit), format!("{limit}{unit}")));
+        let largest = largest.map(|most| (y(most), format!("{}{unit}", at_least(most, 1))));
+        let levels = [largest.filter(|at| limit_label.as_ref().is_none_or(|of| of.0 - at.0 > LABEL)), limit_label];
         let of_pairs = moments.iter().find(|moment| moment.kind == Kind::Closest && moment.obstacle.is_none());
         let mut bands = Vec::new();
         for violation in [false, true] {
@@ -72,11 +79,7 @@ impl Chart {
         Self {
             distance,
             limit: limit.map(y),
-            levels: limit
-                .map(|limit| (y(limit), format!("limit {} {unit}", exact(limit))))
-                .into_iter()
-                .chain(largest.filter(|_| !near.is_empty()).map(|most| (y(most), format!("{} {unit}", at_least(most, 1)))))
-                .collect(),
+            levels: levels.into_iter().flatten().collect(),
             ticks: time_ticks(first_s, last_s).into_iter().map(|(time_s, label)| (x(time_s), label)).collect(),
             bands,
             closest: of_pairs.zip(sorted.first()).map(|(of, &least)| [x(of.span.at_s), y(least)]),

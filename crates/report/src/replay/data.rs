@@ -248,7 +248,7 @@ impl Replay {
         let closest = closest.map(|of| ([of.vehicles[0], of.vehicles[1]], of.span.at_s));
         Ok(Self {
             chart: Chart::of(&near, &moments, judged, [begin_s, end_s]),
-            still: at_closest(log, &stage.obstacles, closest),
+            still: at_closest(log, &stage.obstacles, closest, &[]),
             json,
             rounding_m,
             instants: [kept.len(), log.samples()],

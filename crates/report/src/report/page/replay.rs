@@ -98,7 +98,7 @@ fn chart(chart: &Chart) -> Markup {
             }
             }
             @for (height, words) in &chart.levels {
-                span.replay-level.replay-high[*height < 30.0] style=(format!("top:{:.2}rem", 0.03 * height)) { (words) }
+                span.replay-level style=(format!("top:{:.2}rem", 0.03 * height)) { (words) }
             }
             @for (k, (x, label)) in chart.ticks.iter().enumerate() {
                 span.replay-second.replay-first[*x < 20.0].replay-last[*x > 960.0] style=(format!("left:{:.1}%", 0.1 * x)) {
