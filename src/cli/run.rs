@@ -6,6 +6,7 @@ use clap::{Args, Parser};
 
 use super::Exit;
 use super::console::{self, Console, Terminal};
+use tautline_report::figures::Format;
 use tautline_report::request::{Failure, Pictures, RunRequest, ScenarioRequest, command_line, run_into};
 use tautline_sim::preflight::Preflight;
 
@@ -55,8 +56,11 @@ pub(super) struct RunArguments {
     #[arg(long)]
     force: bool,
     /// Draw no figures.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "figures")]
     no_figures: bool,
+    /// Formats of the figures; PDF and PNG have the width of a paper's column, 85 mm.
+    #[arg(long, value_name = "FORMAT,...", value_delimiter = ',', value_parser = ["svg", "pdf", "png"], default_value = "svg")]
+    figures: Vec<String>,
     /// Take no pictures.
     #[arg(long)]
     no_snapshots: bool,
@@ -99,6 +103,7 @@ pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
         out: arguments.out.clone(),
         force: arguments.force,
         figures: !arguments.no_figures,
+        formats: Format::ALL.into_iter().filter(|of| arguments.figures.iter().any(|name| name == of.name())).collect(),
         verify: arguments.verify,
         threads: arguments.threads.map(usize::from),
         ..RunRequest::new(&scenario, command_line(words.iter().copied()))

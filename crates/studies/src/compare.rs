@@ -202,7 +202,8 @@ impl Experiment for Options {
     }
 
     fn illustrate(&self, base: &BaseScenario, study: &Comparison, _pictures: &dyn Pictures) -> Vec<Section> {
-        const ABOUT: &str = "The flight of each law that came closest, from above, at that instant; all axes are alike.";
+        const ABOUT: &str =
+            "The flight of each law that came closest, from above, at that instant; all axes are alike.";
         let block = match closest_approaches(base, study) {
             Ok(figures) => Block::Figures(figures),
             Err(failure) => Block::Page(page::list(&[format!("no figures: {}", failure.in_words())])),

@@ -371,7 +371,11 @@ impl Study for Margin {
         let figures = std::iter::once(chart).chain(separation).collect();
         vec![
             Section::new("Where the verdict turns", ABOUT, [Block::Figures(figures)]),
-            Section::new("Every value tried", "A row for each value of the key, over all its flights.", [Block::Table(self.records())]),
+            Section::new(
+                "Every value tried",
+                "A row for each value of the key, over all its flights.",
+                [Block::Table(self.records())],
+            ),
         ]
     }
 

@@ -102,10 +102,22 @@ pub trait Study: Serialize {
             whole.add(&heading, &about, blocks.into_iter().map(Block::html));
         }
         whole.add("Assumptions", "The numbers hold under these assumptions.", [page::list(&self.assumptions())]);
-        whole.add("Command", "This command repeats the study with the same result.", page.commands.iter().map(|command| page::command(command)));
+        whole.add(
+            "Command",
+            "This command repeats the study with the same result.",
+            page.commands.iter().map(|command| page::command(command)),
+        );
         let repeat = |(what, command): &(String, String)| [page::list(&[what]), page::command(command)];
-        whole.add("Single flights", "These commands fly single flights of the study, each with a report of its own.", page.repeats.iter().flat_map(repeat));
-        whole.add("Performance", "Times on the clock of the computer that flew; they do not affect the result.", self.performance().iter().map(Table::html));
+        whole.add(
+            "Single flights",
+            "These commands fly single flights of the study, each with a report of its own.",
+            page.repeats.iter().flat_map(repeat),
+        );
+        whole.add(
+            "Performance",
+            "Times on the clock of the computer that flew; they do not affect the result.",
+            self.performance().iter().map(Table::html),
+        );
         whole.render()
     }
 }
@@ -144,11 +156,7 @@ pub enum Block {
 impl Section {
     /// Returns a section of an answer.
     #[must_use]
-    pub fn new(
-        heading: impl Into<String>,
-        about: impl Into<String>,
-        blocks: impl IntoIterator<Item = Block>,
-    ) -> Self {
+    pub fn new(heading: impl Into<String>, about: impl Into<String>, blocks: impl IntoIterator<Item = Block>) -> Self {
         Self { heading: heading.into(), about: about.into(), blocks: blocks.into_iter().collect(), is_detail: false }
     }
 

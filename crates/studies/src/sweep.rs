@@ -422,7 +422,11 @@ impl Study for Sweep {
     fn sections(&self) -> Vec<Section> {
         let mut sections = vec![
             Section::new("Over the grid", "The results over the values of the keys.", [Block::Figures(self.figures())]),
-            Section::new("Every point", "A row for each combination of values, over all its flights.", [Block::Table(self.records())]),
+            Section::new(
+                "Every point",
+                "A row for each combination of values, over all its flights.",
+                [Block::Table(self.records())],
+            ),
         ];
         let refused: Vec<_> = self.points.iter().filter(|point| point.refused > 0).collect();
         if !refused.is_empty() {
@@ -430,7 +434,11 @@ impl Study for Sweep {
                 .column("", "Point", Kind::Text, |point| sets(&self.keys, &point.values).join(", "))
                 .column("", "Why", Kind::Text, |point| point.first_refusal.clone())
                 .build();
-            sections.push(Section::new("Refused points", "These combinations of values are not a valid scenario.", [Block::Table(table)]));
+            sections.push(Section::new(
+                "Refused points",
+                "These combinations of values are not a valid scenario.",
+                [Block::Table(table)],
+            ));
         }
         sections
     }

@@ -148,8 +148,16 @@ impl Validation {
         let (of_convergence, of_paper): (Vec<_>, Vec<_>) =
             self.figures.iter().cloned().partition(|figure| figure.name == "convergence");
         sections.extend([
-            section("Convergence ladder", ABOUT_CONVERGENCE, &[convergence(&self.convergence), page::figures(&of_convergence)]),
-            section("The paper's figures", "The figures of the source paper, flown and drawn again.", &[page::figures(&of_paper)]),
+            section(
+                "Convergence ladder",
+                ABOUT_CONVERGENCE,
+                &[convergence(&self.convergence), page::figures(&of_convergence)],
+            ),
+            section(
+                "The paper's figures",
+                "The figures of the source paper, flown and drawn again.",
+                &[page::figures(&of_paper)],
+            ),
             section("Assumptions", "The measurements rest on these assumptions.", &[page::list(&ASSUMED)]),
             section("Command", "This command measures everything again.", &[page::command("tautline validate")]),
         ]);

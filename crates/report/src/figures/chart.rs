@@ -160,7 +160,8 @@ impl Chart {
     pub(super) fn figure(mut self, name: &str, title: &str, description: &str) -> Figure {
         let mut height = if self.equal { self.make_axes_equal() } else { HEIGHT };
         // Wide numbers move the plotting area to the right, away from the label of their axis.
-        let numbers_px = self.panel.iter().map(|panel| &panel.y).chain([&self.y]).map(Axis::labels_px).fold(0.0, f64::max);
+        let numbers_px =
+            self.panel.iter().map(|panel| &panel.y).chain([&self.y]).map(Axis::labels_px).fold(0.0, f64::max);
         self.left = LEFT.max(LABEL + TEXT / 2.0 + 2.0 * BESIDE_TICK + TICK + numbers_px);
         if self.equal && self.left > LEFT {
             height = self.make_axes_equal();
@@ -367,7 +368,8 @@ fn within(points: &[(f64, f64)], [low, high]: [f64; 2]) -> Vec<Vec<(f64, f64)>> 
     for two in points.windows(2) {
         let [(x, y), (to_x, to_y)] = [two[0], two[1]];
         let shares = [low, high].map(|end| (end - y) / (to_y - y));
-        let (from, to) = if y == to_y { (0.0, 1.0) } else { (shares[0].min(shares[1]).max(0.0), shares[0].max(shares[1]).min(1.0)) };
+        let (from, to) =
+            if y == to_y { (0.0, 1.0) } else { (shares[0].min(shares[1]).max(0.0), shares[0].max(shares[1]).min(1.0)) };
         if !(x + y + to_x + to_y).is_finite() || from > to || (y == to_y && !(low..=high).contains(&y)) {
             continue;
         }
@@ -438,11 +440,9 @@ mod tests {
 
     #[test]
     fn lines_are_cut_where_they_leave_a_range() {
-        let line = [(0.0, 3.0), (1.0, 1.0), (2.0, 0.5), (3.0, 4.5), (4.0, 5.0), (5.0, f64::NAN), (6.0, 1.0), (7.0, 1.0)];
-        let expected = vec![
-            vec![(0.5, 2.0), (1.0, 1.0), (2.0, 0.5), (2.375, 2.0)],
-            vec![(6.0, 1.0), (7.0, 1.0)],
-        ];
+        let line =
+            [(0.0, 3.0), (1.0, 1.0), (2.0, 0.5), (3.0, 4.5), (4.0, 5.0), (5.0, f64::NAN), (6.0, 1.0), (7.0, 1.0)];
+        let expected = vec![vec![(0.5, 2.0), (1.0, 1.0), (2.0, 0.5), (2.375, 2.0)], vec![(6.0, 1.0), (7.0, 1.0)]];
         assert_eq!(within(&line, [0.0, 2.0]), expected);
         assert_eq!(within(&[(0.0, 5.0), (1.0, 5.0)], [0.0, 2.0]), Vec::<Vec<_>>::new());
         assert_eq!(within(&[(0.0, -5.0), (1.0, 5.0)], [0.0, 5.0]), [[(0.5, 0.0), (1.0, 5.0)]]);

@@ -29,7 +29,8 @@ pub fn distances(log: &FlightLog, delta_m: f64, certified_m: Option<f64>, title:
     let (spans, closest) = (Spans::of(log), log.closest());
     let mut chart = Chart::new(spans.time_axis(), Axis::distances("m", &[], delta_m));
     let note = if spans.vehicles() <= FEW_VEHICLES {
-        let others = 1 + usize::from(certified_m.is_some()) + usize::from(closest.is_some()) + usize::from(log.hits().1 > 0);
+        let others =
+            1 + usize::from(certified_m.is_some()) + usize::from(closest.is_some()) + usize::from(log.hits().1 > 0);
         chart.lines = of_all_pairs(&spans, LEGEND.saturating_sub(others));
         String::new()
     } else {
@@ -92,18 +93,18 @@ fn of_all_pairs(spans: &Spans<'_>, most: usize) -> Vec<Line> {
     let mut order: Vec<_> = (0..all.len()).map(|k| (least_m(k), k)).collect();
     order.sort_by(|a, b| a.0.total_cmp(&b.0));
     let coloured = if all.len() <= most { all.len() } else { most.saturating_sub(1) };
-    // The closest pairs are drawn last, above the others.
-    let lines = order.iter().enumerate().rev().map(|(rank, &(_, k))| {
-        let points = spans.iter().map(|span| (span.time_s, span.extremes.pair_min_m[k])).collect();
+    let points = |k: usize| spans.iter().map(|span| (span.time_s, span.extremes.pair_min_m[k])).collect();
+    let (near, others) = order.split_at(coloured);
+    let grey = |points, label| Line { points, stroke: Stroke::of_others(), label };
+    let mut lines: Vec<_> = others.iter().map(|&(_, k)| grey(points(k), None)).collect();
+    lines.extend(near.iter().enumerate().map(|(rank, &(_, k))| {
         let (i, j) = all[k];
-        let (stroke, label) = if rank < coloured {
-            (Stroke::of_line(rank), Some(Pair::new(i, j).to_string()))
-        } else {
-            (Stroke::of_others(), (rank == coloured).then(|| format!("{} other pairs", all.len() - coloured)))
-        };
-        Line { points, stroke, label }
-    });
-    lines.collect()
+        Line { points: points(k), stroke: Stroke::of_line(rank), label: Some(Pair::new(i, j).to_string()) }
+    }));
+    if !others.is_empty() {
+        lines.push(grey(Vec::new(), Some(format!("{} other pairs", others.len()))));
+    }
+    lines
 }
 
 /// Draws the pairs of a large swarm. Returns a sentence, after a blank, on the pairs that are drawn.

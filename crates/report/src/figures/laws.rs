@@ -3,6 +3,8 @@
 use super::Figure;
 use super::axis::{Axis, extent};
 use super::chart::{TITLE, WIDTH};
+use tautline_core::text::significant;
+
 use super::svg::{Align, Canvas, GRID, INK, Marker, PALETTE, SOFT_INK, Stroke, text_px};
 
 /// Height of a row, of the numbers and label below the rows, and of the label of the limit \[px\].
@@ -78,10 +80,16 @@ pub fn by_law(
     canvas.line(&[(left, top), (left, bottom), (RIGHT, bottom)], Stroke::solid(SOFT_INK, 0.8));
     canvas.text((f64::midpoint(left, RIGHT), bottom + BELOW - 6.0), Align::CENTRE_BELOW, label);
     let said = rows.iter().map(|row| match row.value {
-        Some(value) => format!("{} {}", row.law, tautline_core::text::significant(value, 4)),
+        Some(value) => format!("{} {}", row.law, trimmed(value)),
         None => format!("{} none", row.law),
     });
     canvas.figure(name, &format!("{title}: {}.", said.collect::<Vec<_>>().join(", ")))
+}
+
+/// Formats a number with four significant digits, without zeros at the end.
+fn trimmed(number: f64) -> String {
+    let text = significant(number, 4);
+    if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 
 #[cfg(test)]

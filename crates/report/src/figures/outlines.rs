@@ -59,7 +59,8 @@ fn clipped(mut corners: Vec<(f64, f64)>, Window { low, high }: Window) -> Vec<(f
             .flat_map(|(a, b)| {
                 let (from, to) = (beyond(a), beyond(b));
                 let share = from / (from - to);
-                let crossing = ((from < 0.0) != (to < 0.0)).then(|| (a.0 + share * (b.0 - a.0), a.1 + share * (b.1 - a.1)));
+                let crossing =
+                    ((from < 0.0) != (to < 0.0)).then(|| (a.0 + share * (b.0 - a.0), a.1 + share * (b.1 - a.1)));
                 [Some(a).filter(|_| from >= 0.0), crossing]
             })
             .flatten()

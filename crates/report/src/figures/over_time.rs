@@ -106,14 +106,15 @@ fn of_each(chart: &mut Chart, spans: &Spans<'_>, numbers: impl for<'b> Fn(&'b Sp
             order.sort_by(|&a, &b| peaks[b].total_cmp(&peaks[a]));
         }
         let (coloured, others) = order.split_at(if count > LEGEND { LEGEND - 1 } else { count });
-        for (k, &i) in others.iter().enumerate() {
-            let label = (k == 0).then(|| format!("{} other vehicles", others.len()));
-            chart.lines.push(Line { points: points(i), stroke: Stroke::of_others(), label });
-        }
+        let grey = |points, label| Line { points, stroke: Stroke::of_others(), label };
+        chart.lines.extend(others.iter().map(|&i| grey(points(i), None)));
         let mut coloured = coloured.to_vec();
         coloured.sort_unstable();
         for i in coloured {
             chart.line(points(i), Stroke::of_line(i), format!("vehicle {}", i + 1));
+        }
+        if !others.is_empty() {
+            chart.lines.push(grey(Vec::new(), Some(format!("{} other vehicles", others.len()))));
         }
     } else {
         let ranks = spans.iter().map(|span| {
@@ -201,6 +202,7 @@ fn decay(
     if let Some(allowed) = allowed {
         chart.level(allowed, Stroke::dashed(INK, 1.3), format!("counts as reached: {allowed} {unit}"));
     }
-    let description = format!("The {what} over time on a logarithmic axis; {at_end:.2e} {unit} at the end.");
+    let at_end = if at_end == 0.0 { "0".to_owned() } else { format!("{at_end:.2e}") };
+    let description = format!("The {what} over time on a logarithmic axis; {at_end} {unit} at the end.");
     chart.figure(name, title, &description)
 }

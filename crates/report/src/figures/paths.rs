@@ -6,8 +6,8 @@ use super::Figure;
 use super::axis::Axis;
 use super::chart::{Chart, Line, Mark, Shape, TITLE, WIDTH};
 use super::distances::evenly;
-use super::spans::Spans;
 use super::outlines::{Window, outline};
+use super::spans::Spans;
 use super::svg::{Align, Canvas, Colour, GRID, INK, Marker, OBSTACLE, PALETTE, Point, SOFT_INK, Stroke, thinned};
 use crate::flight_log::{FEW_VEHICLES, FlightLog};
 use tautline_audit::Obstacle;
@@ -87,7 +87,12 @@ fn from_above(spans: &Spans<'_>, beside: &[Spans<'_>], obstacles: &[Obstacle]) -
     let window = Window { low: (chart.x.from, chart.y.from), high: (chart.x.to, chart.y.to) };
     let outlines = obstacles.iter().map(|obstacle| outline(obstacle, window)).filter(|outline| !outline.is_empty());
     for (k, corners) in outlines.enumerate() {
-        chart.shapes.push(Shape { corners, colour: OBSTACLE, opacity: 0.45, label: (k == 0).then(|| "obstacle".to_owned()) });
+        chart.shapes.push(Shape {
+            corners,
+            colour: OBSTACLE,
+            opacity: 0.45,
+            label: (k == 0).then(|| "obstacle".to_owned()),
+        });
     }
     chart
 }

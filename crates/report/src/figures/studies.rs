@@ -4,7 +4,7 @@ use super::Figure;
 use super::axis::Axis;
 use super::chart::{Chart, Mark};
 use super::svg::{INK, PALETTE, SOFT_INK, Stroke};
-use tautline_core::text::metres;
+use tautline_core::text::{metres, significant};
 
 /// Draws the smallest separation found so far \[m\] over the `flights` of a search, with delta and the separation of
 /// the flight of the unchanged scenario. `found` holds each flight, numbered from 1, that was worse than all before.
@@ -70,7 +70,10 @@ pub fn margin(
         chart.upright(*value, Stroke::dashed(PALETTE[1 + k % 2], 1.5), Some(format!("predicted {what}")));
     }
     let description = match bracket {
-        Some([low, high]) => format!("The share that {does} over {key}; the verdict turns between {low} and {high}."),
+        Some([low, high]) => {
+            let [low, high] = [low, high].map(|value| significant(value, 4));
+            format!("The share that {does} over {key}; the verdict turns between {low} and {high}.")
+        }
         None => format!("The share that {does} over {key}; the verdict does not turn."),
     };
     chart.figure("margin", &format!("Share that {does}"), &description)

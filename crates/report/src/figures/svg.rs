@@ -11,8 +11,8 @@ use crate::simplify::needed;
 pub(super) type Point = (f64, f64);
 
 /// Font sizes \[px\].
-pub(super) const TEXT: f64 = 13.0;
-const HEADING: f64 = 14.0;
+pub(super) const TEXT: f64 = 13.5;
+const HEADING: f64 = 14.5;
 /// Baseline of the title \[px\].
 const TITLE_BASELINE: f64 = 19.0;
 const MARK_WIDTH: f64 = 1.6;

@@ -53,15 +53,31 @@ impl Report {
         let rows = self.rows().into_iter().map(<[String; 2]>::from);
         page.add(
             "Findings",
-            "What the flight and its audit gave, part by part; `report.json` has all numbers.",
+            "What the flight and its audit gave, part by part; report.json has all numbers.",
             [page::words("Findings by part", &["Part", "Finding"], rows)],
         );
         page.sections.extend(self.sections().iter().map(|section| section.html(LISTED)));
-        page.add("Pictures", "The vehicles at some moments of the flight, each in the shell that must stay free.", [page::pictures(about.pictures)]);
-        page.add("Figures", "Quantities over the flight; bold and dashed lines across a chart are limits.", [page::figures(about.figures)]);
-        page.add("What was assumed", "The verdict holds under these assumptions.", [page::list(&self.assumptions(about.scenario))]);
+        page.add(
+            "Pictures",
+            "The vehicles at some moments of the flight, each in the shell that must stay free.",
+            [page::pictures(about.pictures)],
+        );
+        page.add(
+            "Figures",
+            "Quantities over the flight; bold and dashed lines across a chart are limits.",
+            [page::figures(about.figures)],
+        );
+        page.add(
+            "What was assumed",
+            "The verdict holds under these assumptions.",
+            [page::list(&self.assumptions(about.scenario))],
+        );
         page.add("Repeat it", "This command flies the same flight again.", [self.repetition(about)]);
-        page.add("Performance", "Times on the clock of the computer that flew; they do not affect the result.", self.performance.map(|times| page::list(&[times.line()])));
+        page.add(
+            "Performance",
+            "Times on the clock of the computer that flew; they do not affect the result.",
+            self.performance.map(|times| page::list(&[times.line()])),
+        );
         page.render()
     }
 

@@ -132,7 +132,7 @@ impl Page {
                         label.theme {
                             "Theme "
                             select autocomplete="off" {
-                                option value="auto" { "as in the browser" }
+                                option value="auto" { "automatic" }
                                 option value="light" { "light" }
                                 option value="dark" { "dark" }
                             }
@@ -249,7 +249,7 @@ fn table<R: IntoIterator<Item: Render>>(
                 } } }
                 tbody { @for row in rows { tr {
                     @for (k, cell) in row.into_iter().enumerate() {
-                        @if k == 0 { th scope="row" { (cell) } } @else { td class=[class(k)] { (cell) } }
+                        @if k == 0 { th scope="row" { (cell) } } @else { td class=[class(k)] data-label=[class(k).and_then(|_| columns.get(k))] { (cell) } }
                     }
                 } } }
             }

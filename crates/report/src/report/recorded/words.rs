@@ -261,7 +261,11 @@ impl RecordedReport {
         let badge = Badge { tone, word: self.verdict() };
         let mut page = Page::new("Audit of a recording", self.source.recording.clone(), badge, self.finding());
         page.replay = Some(page::replay(&self.source.recording, replay, Start::AtOnce));
-        page.add("Figures", "Distances over the recording; a bold line across a chart is the limit.", [page::figures(figures)]);
+        page.add(
+            "Figures",
+            "Distances over the recording; a bold line across a chart is the limit.",
+            [page::figures(figures)],
+        );
         page.sections.extend(self.sections().iter().map(|section| section.html(LISTED_ON_PAGE)));
         page.add("How it was read", "Decisions of the reader of this file format.", [page::list(&self.source.notes)]);
         let known = if self.audit.assumes.is_some() { "assumed" } else { "as recorded" };
