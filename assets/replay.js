@@ -182,7 +182,7 @@ const play = (root, data) => {
   const tail = select("Length of trails", [["Infinity", "whole trails"],
     .../** @type {[string, string][]} */ (tails.map(x => [`${x}`, `trails of ${x} s`]))], () => {});
   const follow = select("Camera", [["", "free camera"], ["swarm", "follow the swarm"],
-    ["picked", "follow the picked one"]], () => approach());
+    ["picked", "follow picked"]], () => approach());
   const kinds = /** @type {[string, string][]} */ ([["", "colour: vehicle"],
     ...data.holds ? [] : [["speed", "colour: speed"]], ...count > 1 ? [["clearance", "colour: clearance"]] : []]);
   const colouring = select("Colour", kinds, () => recolour());
@@ -241,6 +241,8 @@ const play = (root, data) => {
   const announce = moment => { current = moment; write(said, moment?.said ?? ""); };
   /** Picked vehicle. @type {number | null} */
   let picked = null;
+  /** Middles of names with half their sizes [px]. @type {number[][]} */
+  let labelled = [];
   /** Requests a frame, unless one is queued. */
   const ask = () => { if (!queued && !ended) queued = requestAnimationFrame(frame); };
   /** Plays or pauses. */
@@ -843,6 +845,7 @@ const play = (root, data) => {
       const depths = wanted.map(({ seen }) => seen[2]), near = Math.min(...depths), far = Math.max(...depths);
       /** @type {number[][]} */
       const taken = [];
+      labelled = taken;
       for (const { vehicle, seen: [x, y, away, px_per_m] } of wanted) {
         const text = data.vehicles[vehicle], half = pen.measureText(text).width / 2 + 2 * ratio, high = 7 * ratio;
         const off = Math.max(outer[vehicle] * px_per_m * ratio, 3 * ratio) + high + 2 * ratio;
@@ -881,6 +884,9 @@ const play = (root, data) => {
   view(...level ? /** @type {[number, number]} */ ([-UPRIGHT, UPRIGHT]) : slant);
   return {
     root, draw,
+    /** What is drawn, for tests: camera, places [CSS px], boxes around names [px], picked vehicle, arm [m]. */
+    seen: () => ({ pitch, picked, boxes: labelled, names: shows.names, arm,
+      places: [...radius.keys()].map(project).filter(at => at[2] > 0) }),
     /**
      * Draws a view at once, for tests: angles in rad, lengths in m, the time in s. Returns the camera.
      * @param {{yaw: number, pitch: number, distance: number, target: number[], t: number}} view

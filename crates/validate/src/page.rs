@@ -206,6 +206,28 @@ fn caption(group: &Group) -> String {
     }
 }
 
+/// Suffixes of names of numbers, with their units.
+const UNITS: [(&str, &str); 7] = [
+    ("_m2_s2", "m²/s²"),
+    ("_m_s2", "m/s²"),
+    ("_m_s", "m/s"),
+    ("_per_s", "1/s"),
+    ("_hz", "Hz"),
+    ("_m", "m"),
+    ("_s", "s"),
+];
+
+/// Replaces each name with its number in a list, such as `min_at_s 2.15`, by words and a unit: `min at 2.15 s`.
+fn readable(list: &str) -> String {
+    let entry = |entry: &str| {
+        let (name, number) = entry.split_once(' ').filter(|(_, number)| number.parse::<f64>().is_ok())?;
+        let (name, unit) = UNITS.iter().find_map(|(suffix, unit)| Some((name.strip_suffix(suffix)?, unit)))?;
+        let words = name.replace("min", "smallest separation").replace("_10_s", "_10 s").replace('_', " ");
+        Some(format!("{words} {number} {unit}"))
+    };
+    list.split(", ").map(|of| entry(of).unwrap_or_else(|| of.to_owned())).collect::<Vec<_>>().join(", ")
+}
+
 fn row(claim: &Claim) -> [Markup; 3] {
     let tone = match (claim.pass, claim.kind) {
         (false, _) => Tone::Bad,
@@ -214,10 +236,11 @@ fn row(claim: &Claim) -> [Markup; 3] {
     };
     let Claim { id, source, expected, tolerance, reason, .. } = claim;
     let finding = claim.finding.map(|finding| format!("{finding}; ")).unwrap_or_default();
+    let expected = readable(expected);
     let judged = format!("Expected: {expected}. Tolerance: {tolerance} ({reason}).");
     [
         noted(claim.statement, &format!("{finding}{id}; {source}")),
-        noted(&claim.measured, &judged),
+        noted(&readable(&claim.measured), &judged),
         Badge { tone, word: claim.outcome().to_owned() }.render(),
     ]
 }
@@ -250,6 +273,14 @@ mod tests {
     fn validation(claims: Vec<Claim>) -> Validation {
         let groups = vec![Group { id: "still", title: "Stillness", claims }];
         Validation::new(groups, Vec::new(), Vec::new(), 1.0)
+    }
+
+    #[test]
+    fn names_of_numbers_become_words_with_units() {
+        let list = "energy_initial_m2_s2 3.5, min_m 2.46, min_at_s 2.1, vehicle_1_x_at_10_s_m -1.0, off by 2 m, law_m x";
+        let words = "energy initial 3.5 m²/s², smallest separation 2.46 m, smallest separation at 2.1 s, \
+                     vehicle 1 x at 10 s -1.0 m, off by 2 m, law_m x";
+        assert_eq!(readable(list), words);
     }
 
     #[test]
