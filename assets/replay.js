@@ -220,7 +220,7 @@ const play = (root, data) => {
     [moments.some(moment => moment.kind === "violation"), "var(--alarm)", "violation"]]))
     if (drawn) legend.push(make("span", { class: "replay-key" }, swatch(background), text));
   const help = make("div", { class: "replay-help", hidden: "" },
-    ...HELP.map(([keys, what]) => make("div", {}, make("b", {}, keys), what)));
+    ...HELP.map(([keys, what]) => make("div", {}, make("kbd", {}, keys), what)));
   const question = button("?", "H", () => { help.hidden = !help.hidden; });
   question.setAttribute("aria-label", "Keys");
   const graph = /** @type {HTMLElement | null} */ (root.querySelector(".replay-graph"));

@@ -206,7 +206,7 @@ fn the_clearance_is_enlarged_unless_the_chart_shows_it() {
     assert_eq!(panels(&figure), 1);
     let panel = figure.svg.split("class=\"panel\"").nth(1).expect("a panel");
     assert!(panel.contains("clearance [m]") && panel.contains("<circle"), "the closest approach is in it: {panel}");
-    assert_eq!(panels(&figures::distances(&history(2), DELTA_M, None, "Distances")), 0);
+    assert_eq!(panels(&figures::distances(&history(2), 0.5, None, "Distances")), 0, "it would enlarge nothing");
     assert_eq!(panels(&figures::distances(&history(6), 0.0, None, "Distances")), 0);
 }
 

@@ -177,11 +177,14 @@ fn the_page_of_an_audit_shows_the_smallest_distance_and_an_inset() {
     assert_eq!((insets(&near), insets(&page(30.0))), (1, 0), "a visible approach has no inset");
 }
 
-/// Returns the number behind some words, with its number of decimals.
+/// Returns the last number that follows some words.
 fn number_after<'a>(text: &'a str, words: &str) -> Option<&'a str> {
-    let rest = text.split_once(words)?.1;
-    let end = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
-    Some(rest[..end].trim_end_matches('.')).filter(|number| number.parse::<f64>().is_ok())
+    let number = |(at, words): (usize, &str)| {
+        let rest = &text[at + words.len()..];
+        let end = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
+        Some(rest[..end].trim_end_matches('.')).filter(|number| number.parse::<f64>().is_ok())
+    };
+    text.match_indices(words).filter_map(number).last()
 }
 
 #[test]
@@ -205,7 +208,8 @@ fn a_number_that_is_shown_twice_is_the_same_number() {
     ];
     let (mut found, mut decimals) = (0, std::collections::BTreeSet::new());
     for (place, words) in least {
-        let place = if words == "<td>" { place.split_once("separation</th>").expect("a row").1 } else { place };
+        let row = place.split_once("separation</th>").and_then(|(_, rest)| rest.split("</tr>").next()).expect("a row");
+        let place = if words == "<td>" { row } else { place };
         let Some(number) = number_after(place, words) else { panic!("no number after {words:?}") };
         let digits = number.split_once('.').map_or(0, |(_, decimals)| decimals.len());
         let unit = 0.1_f64.powi(i32::try_from(digits).expect("a few"));

@@ -158,7 +158,7 @@ fn a_ball_is_exact_to_the_pixel_anywhere_in_the_picture() {
          return shots;";
     let (found, _) = steer(folder.path(), &page, (800, false), &script.replace("RADIUS", "0.5"));
     for shot in found.as_array().expect("pictures") {
-        assert!(shot["inside"].as_u64() > Some(2000) && shot["edge"].as_u64() < Some(1500), "{found}");
+        assert!(shot["inside"].as_u64() > Some(1500) && shot["edge"].as_u64() < Some(1500), "{found}");
         assert_eq!(shot["wrong"], 0, "{found}");
     }
     let (twin, _) = steer(folder.path(), &page, (800, false), &script.replace("RADIUS", "0.53"));

@@ -97,7 +97,8 @@ fn of_all_pairs(spans: &Spans<'_>, most: usize) -> Vec<Line> {
     let (near, others) = order.split_at(coloured);
     let grey = |points, label| Line { points, stroke: Stroke::of_others(), label };
     let mut lines: Vec<_> = others.iter().map(|&(_, k)| grey(points(k), None)).collect();
-    lines.extend(near.iter().enumerate().map(|(rank, &(_, k))| {
+    // The closest pair is drawn last, above the others.
+    lines.extend(near.iter().enumerate().rev().map(|(rank, &(_, k))| {
         let (i, j) = all[k];
         Line { points: points(k), stroke: Stroke::of_line(rank), label: Some(Pair::new(i, j).to_string()) }
     }));
