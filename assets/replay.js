@@ -27,7 +27,7 @@
 /**
  * Data of a page: struct `Data` in crates/report/src/replay/data.rs says more.
  * @typedef {{vehicles: string[], radius_m: number[], shell_m: number[] | null, times_s: Packed, middle_m: number[],
- *   origin_m: number[], look_m: number[], half_m: number[], cell_m: number, points: number, starts: Packed,
+ *   origin_m: number[], half_m: number[], cell_m: number, points: number, starts: Packed,
  *   steps: Packed, breaks: Packed, near_s: Packed, near_who: Packed, holds: boolean, nearest: [number, string][],
  *   verdicts: Verdict[], decimals: number, moments: Moment[], things: Thing[], ground: Packed, square_m: number,
  *   rotors: {at_m: number[][], radius_m: number} | null, turns: Packed, links: Packed, tension: boolean,

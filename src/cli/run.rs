@@ -59,7 +59,8 @@ pub(super) struct RunArguments {
     #[arg(long, conflicts_with = "figures")]
     no_figures: bool,
     /// Formats of the figures; PDF and PNG have the width of a paper's column, 85 mm.
-    #[arg(long, value_name = "FORMAT,...", value_delimiter = ',', value_parser = ["svg", "pdf", "png"], default_value = "svg")]
+    #[arg(long, value_name = "FORMAT,...", value_delimiter = ',', default_value = "svg")]
+    #[arg(value_parser = ["svg", "pdf", "png"])]
     figures: Vec<String>,
     /// Take no pictures.
     #[arg(long)]

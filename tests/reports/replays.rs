@@ -102,10 +102,7 @@ fn a_replay_draws_and_jumps_to_the_findings_of_the_audit() {
     );
     assert!(found["reds"].as_u64() > Some(20), "vehicles in violation are red: {found}");
     assert!(text(&found["violation"]["said"]).starts_with("Violation: 4 and 5 came to 1.532 m (limit 2.000) at"));
-    assert!(
-        text(&found["end"]["state"]) == "1 violation so far · closest so far 1.532 m, 4 and 5",
-        "{found}"
-    );
+    assert!(text(&found["end"]["state"]) == "1 violation so far · closest so far 1.532 m, 4 and 5", "{found}");
     assert_eq!((text(&found["end"]["clock"]), text(&found["end"]["said"])), ("10.00 s", ""));
     assert_eq!(found["steps"], "0.03 s", "two samples of 60 a second");
 }

@@ -267,7 +267,8 @@ fn closest_approaches(base: &BaseScenario, study: &Comparison) -> Result<Vec<Fig
         Figure {
             name: format!("closest-{}", law.name),
             description: format!(
-                "{}: {} m apart at {at_s:.2} s, vehicles {a} and {b}, the closest of {runs} flights (start.seed {seed}).",
+                "{}: {} m apart at {at_s:.2} s, vehicles {a} and {b}, the closest of {runs} flights \
+                 (start.seed {seed}).",
                 law.name,
                 at_least(*min_m, 3),
             ),

@@ -277,7 +277,8 @@ mod tests {
 
     #[test]
     fn names_of_numbers_become_words_with_units() {
-        let list = "energy_initial_m2_s2 3.5, min_m 2.46, min_at_s 2.1, vehicle_1_x_at_10_s_m -1.0, off by 2 m, law_m x";
+        let list =
+            "energy_initial_m2_s2 3.5, min_m 2.46, min_at_s 2.1, vehicle_1_x_at_10_s_m -1.0, off by 2 m, law_m x";
         let words = "energy initial 3.5 m²/s², smallest separation 2.46 m, smallest separation at 2.1 s, \
                      vehicle 1 x at 10 s -1.0 m, off by 2 m, law_m x";
         assert_eq!(readable(list), words);

@@ -29,7 +29,8 @@
 //! figure is bounded for any swarm and duration: for many vehicles it shows quantiles and extremes, and its description
 //! states that.
 //!
-//! A file has a white panel. A page replaces the colours by those of its theme (`page_rules`). Colour-blind readers can distinguish the colours.
+//! A file has a white panel. A page replaces the colours by those of its theme (`page_rules`). Colour-blind
+//! readers can distinguish the colours.
 
 mod axis;
 mod chart;

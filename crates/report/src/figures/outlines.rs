@@ -14,8 +14,8 @@ pub(super) struct Window {
     pub(super) high: (f64, f64),
 }
 
-/// Returns the outline of an obstacle at its first position, within a window: x and y \[m\]. Empty for level ground, and
-/// for an obstacle outside.
+/// Returns the outline of an obstacle at its first position, within a window: x and y \[m\]. It is empty for level
+/// ground and for an obstacle outside.
 pub(super) fn outline(obstacle: &Obstacle, window: Window) -> Vec<(f64, f64)> {
     let Some((_, place_m)) = obstacle.path.first() else { return Vec::new() };
     let place = place_m.xy();
@@ -60,7 +60,7 @@ fn clipped(mut corners: Vec<(f64, f64)>, Window { low, high }: Window) -> Vec<(f
                 let (from, to) = (beyond(a), beyond(b));
                 let share = from / (from - to);
                 let crossing =
-                    ((from < 0.0) != (to < 0.0)).then(|| (a.0 + share * (b.0 - a.0), a.1 + share * (b.1 - a.1)));
+                    ((from < 0.0) != (to < 0.0)).then_some((a.0 + share * (b.0 - a.0), a.1 + share * (b.1 - a.1)));
                 [Some(a).filter(|_| from >= 0.0), crossing]
             })
             .flatten()

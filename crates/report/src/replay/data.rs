@@ -74,9 +74,8 @@ struct Data<'a> {
     decimals: usize,
     /// Whether vehicles rest between two instants.
     holds: bool,
-    /// Origin of all drawn positions, and relative to it the middle and half of the box around everything \[m\].
+    /// Origin of all drawn positions, and half of the box around everything \[m\].
     origin_m: [f64; 3],
-    look_m: [f64; 3],
     half_m: [f64; 3],
     /// Side of the squares on the ground, and their lines relative to the origin, in single precision.
     square_m: f64,
@@ -184,7 +183,6 @@ impl Replay {
             decimals: decimals(end_s - begin_s),
             holds,
             origin_m: origin_m.into(),
-            look_m: (extent.middle_m() - origin_m).into(),
             half_m: extent.half_m().into(),
             square_m,
             ground: singles(&lines.iter().map(|at| at - origin_m).collect::<Vec<_>>()),
@@ -233,10 +231,8 @@ impl Replay {
         (data.middle_m, data.cell_m, data.rounding_m) = (motion.middle_m, motion.cell_m, rounding_m);
         data.starts = base64_of(motion.start_bytes().into_iter());
         data.steps = base64_of(motion.step_bytes().into_iter());
-        if stage.rotors.is_some() {
-            let turned = kept.iter().flat_map(|&k| turn_bytes(&log.keyframes()[k].attitudes, &shown));
-            data.turns = base64_of(turned);
-        }
+        let turned = kept.iter().flat_map(|&k| turn_bytes(&log.keyframes()[k].attitudes, &shown));
+        data.turns = base64_of(turned.take(turns * kept.len()));
         let json = written(&data);
         if json.len() > room_bytes {
             return Err(no_room);
@@ -244,11 +240,9 @@ impl Replay {
         let is_drawn =
             |of: &Moment| is_kept(log, &times_s, &kept, &of.span) && of.vehicles.iter().all(|&k| place(k).is_some());
         let is_exact = |of: &&Moment| of.kind == Kind::Unseen || is_drawn(of);
-        let closest = moments.iter().find(|of| of.kind == Kind::Closest && of.vehicles.len() == 2);
-        let closest = closest.map(|of| ([of.vehicles[0], of.vehicles[1]], of.span.at_s));
         Ok(Self {
             chart: Chart::of(&near, &moments, judged, [begin_s, end_s]),
-            still: at_closest(log, &stage.obstacles, closest, &[]),
+            still: still(stage, log, &moments),
             json,
             rounding_m,
             instants: [kept.len(), log.samples()],
@@ -260,6 +254,13 @@ impl Replay {
             obstacles_off_m,
         })
     }
+}
+
+/// Returns a picture of the closest approach of two vehicles, or of the start.
+fn still(stage: &Stage, log: &FlightLog, moments: &[Moment]) -> Figure {
+    let closest = moments.iter().find(|of| of.kind == Kind::Closest && of.vehicles.len() == 2);
+    let closest = closest.map(|of| ([of.vehicles[0], of.vehicles[1]], of.span.at_s));
+    at_closest(log, &stage.obstacles, closest, &[])
 }
 
 /// Size of the numbers of the grid, which is chosen later \[bytes\].

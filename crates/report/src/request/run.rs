@@ -225,8 +225,8 @@ pub fn flight_page(
     report.to_html(&page)
 }
 
-/// Writes figures and `report.html` into the folder of a run, and removes figures of an earlier run. Returns the path of
-/// the page.
+/// Writes figures and `report.html` into the folder of a run, and removes figures of an earlier run. Returns the path
+/// of the page.
 fn write_page(folder: &Path, report: &Report, page: &RunPage<'_>, formats: &[Format]) -> Result<PathBuf, Failure> {
     let all = figures::NAMES_OF_RUN.iter().flat_map(|name| Format::ALL.map(|of| format!("{name}.{}", of.name())));
     write_files(&folder.join("figures"), &all.collect::<Vec<_>>(), &figure_files(page.figures, formats))?;

@@ -249,7 +249,11 @@ fn table<R: IntoIterator<Item: Render>>(
                 } } }
                 tbody { @for row in rows { tr {
                     @for (k, cell) in row.into_iter().enumerate() {
-                        @if k == 0 { th scope="row" { (cell) } } @else { td class=[class(k)] data-label=[class(k).and_then(|_| columns.get(k))] { (cell) } }
+                        @if k == 0 {
+                            th scope="row" { (cell) }
+                        } @else {
+                            td class=[class(k)] data-label=[class(k).and_then(|_| columns.get(k))] { (cell) }
+                        }
                     }
                 } } }
             }

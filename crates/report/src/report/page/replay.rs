@@ -85,23 +85,24 @@ fn chart(chart: &Chart) -> Markup {
     html! {
         div.replay-graph role="img" aria-label="Smallest distance of any two over time, with its limit" {
             svg viewBox="0 0 1000 100" preserveAspectRatio="none" {
-            @for (x, _) in &chart.ticks {
-                line.replay-tick x1=(format!("{x:.1}")) x2=(format!("{x:.1}")) y1="0" y2="100" {}
-            }
-            @for found in &chart.bands { (band(found)) }
-            @if let Some(height) = chart.limit {
-                line.replay-limit x1="0" x2="1000" y1=(format!("{height:.1}")) y2=(format!("{height:.1}")) {}
-            }
-            @if !chart.distance.is_empty() { path d=(chart.distance) {} }
-            @if let Some([x, y]) = chart.closest {
-                path.replay-closest d=(format!("M{x:.1} {y:.1}h0.01")) {}
-            }
+                @for (x, _) in &chart.ticks {
+                    line.replay-tick x1=(format!("{x:.1}")) x2=(format!("{x:.1}")) y1="0" y2="100" {}
+                }
+                @for found in &chart.bands { (band(found)) }
+                @if let Some(height) = chart.limit {
+                    line.replay-limit x1="0" x2="1000" y1=(format!("{height:.1}")) y2=(format!("{height:.1}")) {}
+                }
+                @if !chart.distance.is_empty() { path d=(chart.distance) {} }
+                @if let Some([x, y]) = chart.closest {
+                    path.replay-closest d=(format!("M{x:.1} {y:.1}h0.01")) {}
+                }
             }
             @for (height, words) in &chart.levels {
                 span.replay-level style=(format!("top:{:.2}rem", 0.03 * height)) { (words) }
             }
             @for (k, (x, label)) in chart.ticks.iter().enumerate() {
-                span.replay-second.replay-first[*x < 20.0].replay-last[*x > 960.0] style=(format!("left:{:.1}%", 0.1 * x)) {
+                @let left = format!("left:{:.1}%", 0.1 * x);
+                span.replay-second.replay-first[*x < 20.0].replay-last[*x > 960.0] style=(left) {
                     (label) @if k + 1 == chart.ticks.len() { " s" }
                 }
             }
