@@ -262,7 +262,7 @@ fn closest_approaches(base: &BaseScenario, study: &Comparison) -> Result<Vec<Fig
         flown.into_iter().map(|(law, seed, scenario, closest, log)| ((law, seed, scenario, closest), log)).unzip();
     let figure = |((law, seed, scenario, ([a, b], at_s, min_m)), log): (&Flown<'_>, &FlightLog)| {
         let obstacles: Vec<_> = scenario.obstacles.iter().map(judged).collect();
-        let figure = at_closest(log, &obstacles, Some(([a - 1, b - 1], *at_s)), &logs);
+        let figure = at_closest(&law.name, log, &obstacles, Some(([a - 1, b - 1], *at_s)), &logs);
         let runs = study.runs;
         Figure {
             name: format!("closest-{}", law.name),

@@ -43,9 +43,11 @@ pub fn paths(log: &FlightLog, obstacles: &[Obstacle], title: &str) -> Figure {
 const STILL_PATHS: usize = 40;
 
 /// Draws the paths from above with the vehicles at the time of the closest approach \[s\], and the closest two, from 0,
-/// joined. This still picture replaces a replay that cannot be drawn. Flights `beside` it widen the axes.
+/// joined. This still picture replaces a replay that cannot be drawn. The title begins with the name of the flight, unless
+/// it is empty. Flights `beside` it widen the axes.
 #[must_use]
 pub fn at_closest(
+    name: &str,
     log: &FlightLog,
     obstacles: &[Obstacle],
     closest: Option<([usize; 2], f64)>,
@@ -68,6 +70,7 @@ pub fn at_closest(
         chart.marks.extend(place(i).map(mark));
     }
     let title = closest.map_or("Paths from above".to_owned(), |_| format!("Closest approach, at {time_s:.2} s"));
+    let title = if name.is_empty() { title } else { format!("{name}: {title}") };
     if let Some([Some(one), Some(other)]) = closest.map(|(pair, _)| pair.map(place)) {
         chart.line(vec![one, other], Stroke::solid(INK, 2.6), "closest two");
     }

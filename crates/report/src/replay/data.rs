@@ -260,7 +260,7 @@ impl Replay {
 fn still(stage: &Stage, log: &FlightLog, moments: &[Moment]) -> Figure {
     let closest = moments.iter().find(|of| of.kind == Kind::Closest && of.vehicles.len() == 2);
     let closest = closest.map(|of| ([of.vehicles[0], of.vehicles[1]], of.span.at_s));
-    at_closest(log, &stage.obstacles, closest, &[])
+    at_closest("", log, &stage.obstacles, closest, &[])
 }
 
 /// Size of the numbers of the grid, which is chosen later \[bytes\].
