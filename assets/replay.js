@@ -27,33 +27,41 @@
 /**
  * Data of a page: struct `Data` in crates/report/src/replay/data.rs says more.
  * @typedef {{vehicles: string[], radius_m: number[], shell_m: number[] | null, times_s: Packed, middle_m: number[],
- *   origin_m: number[], look_m: number[], half_m: number[], cell_m: number, points: number, starts: Packed,
+ *   origin_m: number[], half_m: number[], cell_m: number, points: number, starts: Packed,
  *   steps: Packed, breaks: Packed, near_s: Packed, near_who: Packed, holds: boolean, nearest: [number, string][],
  *   verdicts: Verdict[], decimals: number, moments: Moment[], things: Thing[], ground: Packed, square_m: number,
- *   links: Packed, tension: boolean, delta_m: number, formations: {from_s: number, slots: Packed}[], axis_m: number,
+ *   rotors: {at_m: number[][], radius_m: number} | null, turns: Packed, links: Packed, tension: boolean,
+ *   delta_m: number, formations: {from_s: number, slots: Packed}[], axis_m: number,
  *   axes: number | null, reference: number | null}} Data
  */
 /** @typedef {{vao: WebGLVertexArrayObject | null, count: number, buffer: WebGLBuffer | null}} Mesh */
 /** @typedef {{made: WebGLProgram, at: Object<string, WebGLUniformLocation>}} Program */
 
 // A step of ABSENT along x marks a point that is not there. TANGENT is that of half the camera's angle of view. At most
-// NAMED vehicles are all labelled.
-const ABSENT = -32768, TRAIL_PIECES = 24000, TANGENT = 0.36, NAMED = 64;
+// NAMED vehicles are all labelled, where there is room. RED is the largest number of red pieces of trails. The camera
+// fits at most SAMPLES positions.
+const ABSENT = -32768, TRAIL_PIECES = 24000, TANGENT = 0.36, NAMED = 24, RED = 40000, SAMPLES = 4000;
+const UPRIGHT = Math.PI / 2;
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16, 32, 64];
 // Uniforms that are integers.
-const WHOLE = new Set(["path", "paint", "row", "next", "points", "kind", "stride", "newest", "axis", "mark"]);
-// Colours of sRGB.
-const LIGHT = { paper: 0xeceff3, ink: 0x1b222b, grid: 0xcbd2da, shell: 0x5c7fa3, thing: 0x8a6d3b, alarm: 0xd40014,
-  push: 0xd96b00, rest: 0xa6aeb7, pull: 0x125fc4,
-  vehicles: [0x0072b2, 0xd55e00, 0x00936c, 0xb85f95, 0x9a7600, 0x7d858e] };
-const DARK = { paper: 0x14191f, ink: 0xe6eaef, grid: 0x2e3742, shell: 0x8fb4d9, thing: 0xb8a078, alarm: 0xff2f3c,
-  push: 0xff9e2c, rest: 0x6b7580, pull: 0x4fa3ff,
-  vehicles: [0x56a8e0, 0xf07f2e, 0x2fbf94, 0xdb8dbb, 0xcba42b, 0xa5adb6] };
+const WHOLE = new Set(["path", "paint", "value", "turn", "row", "next", "points", "kind", "stride", "newest", "axis",
+  "mark"]);
+// Names of the page's colours (crates/report/src/report/page/style.css); `c1` to `c6` are those of the vehicles.
+const COLOURS = ["sky", "ink", "floor", "shell", "thing", "alarm", "push", "rest", "pull", "c1", "c2", "c3", "c4", "c5",
+  "c6"];
+// Layers in the order of their keys 1 to 8.
+const LAYERS = ["shells", "links", "trails", "slots", "ground", "names", "closest", "caption"];
+const HELP = [["Space", "play or pause"], ["Left, Right", "previous or next instant; with Shift one second"],
+  ["Home, End", "start, end"], ["N", "closest approach"], ["B, Shift+B", "next, previous violation"],
+  ["U", "next undecided time"], ["-, +", "slower, faster"], ["Drag, W A S D", "turn"],
+  ["Right drag", "move"], ["Wheel, Page Up, Page Down", "zoom"], ["Click, V", "pick a vehicle"],
+  ["F", "show everything"], ["T", "change the theme"], ["1 to 8", LAYERS.join(", ")], ["P", "save a picture"],
+  ["H", "this help"]];
 
 const bytes = (/** @type {Packed} */ packed) => Uint8Array.from(atob(packed), letter => letter.charCodeAt(0)).buffer;
-/** @param {number} colour @param {number} [alpha] */
-const rgba = (colour, alpha = 1) => [(colour >> 16) / 255, (colour >> 8 & 255) / 255, (colour & 255) / 255, alpha];
-const css = (/** @type {number} */ colour) => "#" + colour.toString(16).padStart(6, "0");
+/** @param {number[]} colour Red, green and blue from 0 to 255. @param {number} [alpha] */
+const rgba = (colour, alpha = 1) => [...colour.map(part => part / 255), alpha];
+const css = (/** @type {number[]} */ colour) => `rgb(${colour})`;
 /** @param {number} x @param {number} low @param {number} high */
 const clamp = (x, low, high) => Math.min(Math.max(x, low), high);
 /**
@@ -127,60 +135,120 @@ const play = (root, data) => {
     }
   }
 
+  // Attitudes as quaternions x, y, z, w, in a texture like that of positions.
+  const rotors = data.rotors, turned = new Float32Array(rotors ? times.length * count * 4 : 4);
+  if (rotors) {
+    const parts = new Int8Array(bytes(data.turns));
+    for (let from = 0, to = 0; from < parts.length; from += 3, to += 4) {
+      const vector = [0, 1, 2].map(axis => parts[from + axis] / 127);
+      turned.set([...vector, Math.sqrt(Math.max(1 - Math.hypot(...vector) ** 2, 0))], to);
+    }
+  }
+  const arm = Math.max(...(rotors?.at_m ?? []).map(([x, y]) => Math.hypot(x, y)), 0);
+  // Distance from the centre to the farthest drawn point of each vehicle [m].
+  const outer = rotors ? radius.map(() => arm + rotors.radius_m) : radius;
+  const shell = data.shell_m ? Math.max(...data.shell_m) : 0;
+
   // Elements.
   const canvas = /** @type {HTMLCanvasElement} */ (make("canvas", {
     class: "replay-view", tabindex: "0", role: "img",
-    "aria-label": "Flight in 3-D. W, A, S and D rotate, Page Up and Page Down zoom, Space plays, arrows step." }));
+    "aria-label": "Flight in 3-D. Space plays, arrows step, W, A, S and D turn, H lists all keys." }));
   const gl = /** @type {WebGL2RenderingContext} */ (canvas.getContext("webgl2", { alpha: false, antialias: true }));
-  if (!gl) throw new Error("This browser does not draw WebGL 2: there is no replay. Pictures and figures are below.");
+  if (!gl) throw new Error("This browser does not draw WebGL 2: a still picture replaces the replay.");
   const names = /** @type {HTMLCanvasElement} */ (make("canvas", { class: "replay-names", "aria-hidden": "true" }));
-  const state = make("p", { class: "replay-state" });
+  const state = make("p", { class: "replay-state" }), chosen = make("p", { class: "replay-picked" });
   const rate = make("p", { class: "replay-rate", title: "frames a second, script time of each" });
+  const scale = make("p", { class: "replay-scale" });
   const said = make("p", { class: "replay-said", role: "status" }), clock = make("output", { class: "replay-clock" });
   const head = make("i", { class: "replay-head" });
   const button = (/** @type {string} */ text, /** @type {string} */ keys, /** @type {() => void} */ act) =>
-    Object.assign(make("button", { type: "button", "aria-keyshortcuts": keys }, text), { onclick: act });
+    Object.assign(make("button", { type: "button", ...keys && { "aria-keyshortcuts": keys, title: "key " + keys } },
+      text), { onclick: act });
   const start = Object.assign(button("Play", "Space", () => toggle()), { className: "replay-play" });
+  const poster = Object.assign(make("button", { type: "button", class: "replay-poster", "aria-label": "Play" }),
+    { onclick: () => { toggle(); canvas.focus(); } });
   const scrub = make("input", { type: "range", min: `${first}`, max: `${last}`, step: "any", "aria-label": "Time" });
   scrub.oninput = () => go(+scrub.value);
-  const speeds = make("select", { "aria-label": "Speed" },
-    ...SPEEDS.map(x => make("option", { value: `${x}` }, "× " + x)));
+  /**
+   * Makes a list of choices; every entry is a value and its text.
+   * @param {string} label @param {[string, string][]} choices @param {() => void} act
+   */
+  const select = (label, choices, act) => Object.assign(make("select", { "aria-label": label, title: label },
+    ...choices.map(([value, text]) => make("option", { value }, text))), { onchange: () => { act(); ask(); } });
+  const speeds = select("Speed", SPEEDS.map(x => [`${x}`, "× " + x]), () => {});
   // Real time unless the flight would then take more than 30 s.
   speeds.value = SPEEDS.find(x => (last - first) / x <= 30) ?? 64;
+  const span = last - first, tails = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000].filter(x => x < span).slice(-4);
+  const tail = select("Length of trails", [["Infinity", "whole trails"],
+    .../** @type {[string, string][]} */ (tails.map(x => [`${x}`, `trails of ${x} s`]))], () => {});
+  const follow = select("Camera", [["", "free camera"], ["swarm", "follow the swarm"],
+    ["picked", "follow picked"]], () => approach());
+  const kinds = /** @type {[string, string][]} */ ([["", "colour: vehicle"],
+    ...data.holds ? [] : [["speed", "colour: speed"]], ...count > 1 ? [["clearance", "colour: clearance"]] : []]);
+  const colouring = select("Colour", kinds, () => recolour());
   const jumps = /** @type {[string, string, string, number][]} */ ([
-    ["Closest approach", "C", "closest", 1], ["Previous violation", "Shift+V", "violation", -1],
-    ["Next violation", "V", "violation", 1], ["Next undecided", "U", "undecided", 1]])
+    ["Closest approach", "N", "closest", 1], ["Previous violation", "Shift+B", "violation", -1],
+    ["Next violation", "B", "violation", 1], ["Next undecided", "U", "undecided", 1]])
     .filter(([,, kind]) => moments.some(moment => moment.kind === kind))
     .map(([text, keys, kind, way]) => button(text, keys, () => jump(kind, way)));
-  jumps.push(button("Show all", "F", () => { home(); ask(); }));
+  const views = [button("Top", "", () => view(-UPRIGHT, UPRIGHT)), button("Front", "", () => view(-UPRIGHT, 0)),
+    button("Perspective", "", () => view(...slant)), button("Show all", "F", () => { fit(); ask(); })];
   /** @type {Object<string, boolean>} */
   const shows = { shells: !!data.shell_m, links: !!data.links, trails: !data.holds, slots: data.axes !== null,
-    names: true };
-  const layers = Object.keys(shows).filter(name => shows[name]).map(name => {
+    ground: true, names: true, closest: count > 1, caption: true };
+  /** Samples of the legend, as backgrounds. @type {Object<string, string>} */
+  const samples = { shells: "radial-gradient(circle closest-side,transparent 70%,var(--shell))",
+    links: "linear-gradient(90deg,var(--push),var(--rest),var(--pull))",
+    trails: "linear-gradient(90deg,transparent,var(--c1))",
+    slots: "radial-gradient(circle closest-side,transparent 65%,var(--c1) 66% 85%,transparent 86%)",
+    closest: "linear-gradient(transparent 35%,var(--ink) 35% 65%,transparent 65%)" };
+  /** @type {Object<string, string>} */
+  const words = { shells: "keep-out shells", links: data.tension ? "links push, pull" : "links short, long",
+    slots: "slots", ground: `squares of ${data.square_m} m`, closest: "closest two" };
+  const swatch = (/** @type {string} */ background) =>
+    make("i", { class: "replay-swatch", style: "background:" + background });
+  const boxes = new Map(LAYERS.filter(name => shows[name]).map(name => {
     const box = make("input", { type: "checkbox", checked: "" });
     box.onchange = () => { shows[name] = box.checked; ask(); };
-    return make("label", {}, box, name);
-  });
-  const graph = root.querySelector("svg");
-  const track = make("div", { class: "replay-track" }, ...graph ? [graph, head] : [], scrub);
-  const stage = make("div", { class: "replay-stage" }, canvas, names, state, rate);
+    return [name, box];
+  }));
+  const legend = [...boxes].map(([name, box]) =>
+    make("label", {}, box, ...samples[name] ? [swatch(samples[name])] : [], words[name] ?? name));
+  for (const [drawn, background, text] of /** @type {[boolean, string, string][]} */ ([
+    [data.things.length > 0, "var(--thing)", data.things.length > 1 ? "obstacles" : "obstacle"],
+    [data.reference !== null, "conic-gradient(var(--ink) 0 0)", "reference"],
+    [moments.some(moment => moment.kind === "violation"), "var(--alarm)", "violation"]]))
+    if (drawn) legend.push(make("span", { class: "replay-key" }, swatch(background), text));
+  const help = make("div", { class: "replay-help", hidden: "" },
+    ...HELP.map(([keys, what]) => make("div", {}, make("kbd", {}, keys), what)));
+  const question = button("?", "H", () => { help.hidden = !help.hidden; });
+  question.setAttribute("aria-label", "Keys");
+  const graph = /** @type {HTMLElement | null} */ (root.querySelector(".replay-graph"));
+  const track = make("div", { class: "replay-track" }, ...graph ? [graph] : [], head, scrub);
+  const stage = make("div", { class: "replay-stage" }, canvas, names, state, chosen, said, scale, rate, poster, help);
   const panel = make("div",
     { class: "replay-panel", role: "group", "aria-label": "Replay of " + (root.dataset.label ?? "a flight") },
-    stage, make("div", { class: "replay-time" }, start, track, clock), said,
-    make("div", { class: "replay-buttons" }, ...jumps, speeds, ...layers));
+    stage, make("div", { class: "replay-time" }, start, track, clock, question),
+    make("div", { class: "replay-buttons" }, ...jumps, ...views, follow, colouring, ...shows.trails ? [tail] : [],
+      speeds),
+    make("div", { class: "replay-buttons" }, ...legend));
   root.prepend(panel);
-  if (graph) graph.onpointerdown = event => go(first + (last - first) * event.offsetX / graph.clientWidth);
 
   // Time [s]. `frames` were drawn in `passed` ms; the script took `spent` ms of them. `queued` is the next frame.
   let t = first, playing = false, ended = false, queued = 0, before = 0, frames = 0, passed = 0, spent = 0;
   let current = /** @type {Moment | null} */ (null);
   /** Shows the sentence of a moment, or none. @param {Moment | null} moment */
   const announce = moment => { current = moment; write(said, moment?.said ?? ""); };
+  /** Picked vehicle. @type {number | null} */
+  let picked = null;
+  /** Middles of names with half their sizes [px]. @type {number[][]} */
+  let labelled = [];
   /** Requests a frame, unless one is queued. */
   const ask = () => { if (!queued && !ended) queued = requestAnimationFrame(frame); };
   /** Plays or pauses. */
   const toggle = () => {
     playing = !playing;
+    poster.hidden = true;
     if (playing && t >= last) t = first;
     write(start, playing ? "Pause" : "Play");
     before = frames = passed = spent = 0;
@@ -190,6 +258,7 @@ const play = (root, data) => {
   /** Pauses and shows a time [s]. @param {number} to */
   const go = to => {
     if (playing) toggle();
+    poster.hidden = true;
     t = clamp(to, first, last);
     announce(null);
     ask();
@@ -209,6 +278,7 @@ const play = (root, data) => {
     seek();
     const [a, b = a] = moment.who.map(place).filter(at => at[3]);
     if (!a) return;
+    follow.value = "";
     target = [0, 1, 2].map(axis => (a[axis] + b[axis]) / 2);
     distance = Math.min(distance, 40 * (Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) + least_m));
   };
@@ -227,7 +297,7 @@ const play = (root, data) => {
       before = now;
       if (passed > 500) {
         [root.dataset.fps, root.dataset.scriptMs] = [(1000 * frames / passed).toFixed(0), (spent / frames).toFixed(2)];
-        write(rate, `${root.dataset.fps} fps, ${root.dataset.scriptMs} ms`);
+        if (/[?&]fps/.test(location.search)) write(rate, `${root.dataset.fps} fps, ${root.dataset.scriptMs} ms`);
         frames = passed = spent = 0;
       }
       if (t >= last) { t = last; toggle(); }
@@ -240,16 +310,58 @@ const play = (root, data) => {
 
   // The camera looks at `target` [m] from `distance` [m]. Angles are in rad.
   let yaw = 0, pitch = 0, distance = 1, target = [0, 0, 0], kept = { yaw, pitch, distance, target };
-  /** Shows the whole flight, with its longer side across the picture; a flat flight is seen from higher up. */
-  const home = () => {
-    [yaw, pitch, target, distance] = [half[0] < half[1] ? -0.35 : -1.22,
-      half[2] < 0.3 * Math.max(half[0], half[1]) ? 0.8 : 0.45, data.look_m, 0];
-    const { right, up, back } = axes(), across = canvas.clientWidth / canvas.clientHeight || 1;
-    // Corners of the box around the flight.
-    for (let k = 0; k < 8; k++) {
-      const [x, y, z] = [right, up, back].map(axis =>
-        axis.reduce((sum, part, at) => sum + part * half[at] * (k >> at & 1 ? 1 : -1), 0));
-      distance = Math.max(distance, 1.04 * (Math.max(Math.abs(x) / across, Math.abs(y)) / TANGENT + z));
+  // Positions of the vehicles that the camera fits, with the radius around each [m].
+  /** @type {number[][]} */
+  const cloud = [];
+  for (let k = 0, all = times.length * count, by = Math.max(1, Math.floor(all / SAMPLES)); k < all; k += by) {
+    const vehicle = k % count, from = (Math.floor(k / count) * wide + vehicle) * 4;
+    if (path[from + 3]) cloud.push([path[from], path[from + 1], path[from + 2], Math.max(shell, outer[vehicle])]);
+  }
+  const bounds = [0, 1, 2].map(axis => cloud.reduce(([low, high], at) => [Math.min(low, at[axis]),
+    Math.max(high, at[axis])], [Infinity, -Infinity])), sizes = bounds.map(([low, high]) => high - low);
+  // A flight at one height is seen from the top, any other from a corner with its longer side across.
+  const level = sizes[2] <= 1e-3 * Math.max(sizes[0], sizes[1]);
+  const slant = /** @type {[number, number]} */ ([sizes[0] < sizes[1] ? -0.35 : -1.22,
+    sizes[2] < 0.3 * Math.max(sizes[0], sizes[1]) ? 0.8 : 0.45]);
+  /** Moves the camera along its direction and across until all positions of the vehicles fit into the picture. */
+  const fit = () => {
+    follow.value = "";
+    const { right, up, back } = axes(), wide = TANGENT * (canvas.clientWidth / canvas.clientHeight || 1) * 0.94;
+    const dot = (/** @type {number[]} */ a, /** @type {number[]} */ b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    target = bounds.map(([low, high]) => (low + high) / 2);
+    for (let turns = 0; turns < 4; turns++) {
+      const seen = cloud.map(at => {
+        const from = [0, 1, 2].map(axis => at[axis] - target[axis]);
+        return [dot(from, right), dot(from, up), dot(from, back), at[3]];
+      });
+      distance = 0;
+      for (const [x, y, z, r] of seen)
+        distance = Math.max(distance, (Math.abs(x) + r) / wide + z, (Math.abs(y) + r) / TANGENT / 0.84 + z,
+          1.01 * r + z);
+      const middle = [0, 1].map(axis => {
+        const places = seen.map(at => at[axis] / (distance - at[2]));
+        return (Math.max(...places) + Math.min(...places)) / 2 * distance;
+      });
+      target = target.map((x, k) => x + right[k] * middle[0] + up[k] * middle[1]);
+    }
+  };
+  /** Shows everything from a direction [rad]. @param {number} to @param {number} lift */
+  const view = (to, lift) => { [yaw, pitch] = [to, lift]; fit(); ask(); };
+  /** Centre of the vehicles that are there [m]. */
+  const centre = () => {
+    const all = radius.map((_, k) => place(k)).filter(at => at[3]);
+    return all.length ? [0, 1, 2].map(axis => all.reduce((sum, at) => sum + at[axis], 0) / all.length) : target;
+  };
+  /** Moves the camera near what it follows. */
+  const approach = () => {
+    if (follow.value === "picked") {
+      picked ??= 0;
+      distance = Math.max(16 * outer[picked], 8 * shell);
+    } else if (follow.value === "swarm") {
+      seek();
+      const at = centre(), all = radius.map((_, k) => place(k)).filter(at => at[3]);
+      const far = Math.max(...all.map(of => Math.hypot(of[0] - at[0], of[1] - at[1], of[2] - at[2])), 0);
+      distance = 1.15 * (far + Math.max(shell, outer[0])) / TANGENT;
     }
   };
   /** Axes of the camera, and its position. */
@@ -261,7 +373,7 @@ const play = (root, data) => {
   };
   const turn = (/** @type {number} */ by, /** @type {number} */ lift) => {
     yaw += by;
-    pitch = clamp(pitch + lift, -1.55, 1.55);
+    pitch = clamp(pitch + lift, -UPRIGHT, UPRIGHT);
     ask();
   };
   const zoom = (/** @type {number} */ by) => {
@@ -269,6 +381,7 @@ const play = (root, data) => {
     ask();
   };
   const pan = (/** @type {number} */ dx, /** @type {number} */ dy) => {
+    follow.value = "";
     const { right, up } = axes(), metres = 2 * TANGENT * distance / canvas.clientHeight;
     target = target.map((x, k) => x - (right[k] * dx - up[k] * dy) * metres);
     ask();
@@ -280,7 +393,10 @@ const play = (root, data) => {
     const [a, b] = [...fingers.values()];
     return [(a[0] + b[0]) / 2, (a[1] + b[1]) / 2, Math.hypot(a[0] - b[0], a[1] - b[1]) || 1];
   };
+  // Where the pointer went down [px]: a click picks a vehicle.
+  let pressed = [0, 0];
   canvas.onpointerdown = event => {
+    pressed = [event.clientX, event.clientY];
     if (!fingers.size) kept = { yaw, pitch, distance, target };
     fingers.set(event.pointerId, [event.clientX, event.clientY]);
     canvas.setPointerCapture(event.pointerId);
@@ -296,7 +412,18 @@ const play = (root, data) => {
       pan(now[0] - old[0], now[1] - old[1]);
     } else if (event.buttons & 2 || event.shiftKey) pan(dx, dy); else turn(-dx * by, dy * by);
   };
-  canvas.onpointerup = event => fingers.delete(event.pointerId);
+  canvas.onpointerup = event => {
+    fingers.delete(event.pointerId);
+    if (Math.hypot(event.clientX - pressed[0], event.clientY - pressed[1]) > 4) return;
+    const box = canvas.getBoundingClientRect(), [x, y] = [event.clientX - box.left, event.clientY - box.top];
+    let best = 24;
+    picked = null;
+    for (const vehicle of radius.keys()) {
+      const [px, py, away, px_per_m] = project(vehicle), off = Math.hypot(px - x, py - y) - outer[vehicle] * px_per_m;
+      if (away > 0 && off < best) [best, picked] = [off, vehicle];
+    }
+    ask();
+  };
   // The browser scrolls the page with this finger: the camera returns to where it was.
   canvas.onpointercancel = event => {
     fingers.delete(event.pointerId);
@@ -312,20 +439,38 @@ const play = (root, data) => {
   }, { passive: false });
   const faster = (/** @type {number} */ by) =>
     speeds.selectedIndex = clamp(speeds.selectedIndex + by, 0, SPEEDS.length - 1);
+  /** Changes the theme of the page. */
+  const theme = () => {
+    const choice = /** @type {HTMLSelectElement | null} */ (document.querySelector(".theme select"));
+    if (!choice) return;
+    choice.selectedIndex = (choice.selectedIndex + 1) % choice.length;
+    themed();
+  };
+  /** Saves the picture with its labels. */
+  const save = () => {
+    draw();
+    const sheet = make("canvas", { width: `${canvas.width}`, height: `${canvas.height}` });
+    const pen = sheet.getContext("2d");
+    for (const part of [canvas, names]) pen.drawImage(part, 0, 0);
+    make("a", { href: sheet.toDataURL(), download: `replay-${t.toFixed(data.decimals)}s.png` }).click();
+  };
   /** @type {Object<string, (shift: boolean) => void>} */
   const keys = {
-    " ": toggle, Home: () => go(first), End: () => go(last), c: () => jump("closest", 1), f: home,
-    v: shift => jump("violation", shift ? -1 : 1), u: shift => jump("undecided", shift ? -1 : 1),
+    " ": toggle, Home: () => go(first), End: () => go(last), n: () => jump("closest", 1), f: fit,
+    b: shift => jump("violation", shift ? -1 : 1), u: shift => jump("undecided", shift ? -1 : 1),
+    v: () => { picked = picked === null ? 0 : picked + 1 < count ? picked + 1 : null; },
     ArrowLeft: shift => go(shift ? t - 1 : [...times].findLast(time => time < t) ?? first),
     ArrowRight: shift => go(shift ? t + 1 : times[upTo(times, t)] ?? last),
     a: () => turn(-0.1, 0), d: () => turn(0.1, 0), w: () => turn(0, 0.1), s: () => turn(0, -0.1),
     PageUp: () => zoom(0.8), PageDown: () => zoom(1.25),
     "+": () => faster(1), "=": () => faster(1), "-": () => faster(-1),
+    t: theme, p: save, h: () => question.click(), "?": () => question.click(),
   };
+  LAYERS.forEach((name, k) => { keys[`${k + 1}`] = () => boxes.get(name)?.click(); });
   panel.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
     const on = /** @type {HTMLElement} */ (event.target);
     const key = event.key.length > 1 ? event.key : event.key.toLowerCase();
-    if (event.ctrlKey || event.altKey || event.metaKey || on === speeds
+    if (event.ctrlKey || event.altKey || event.metaKey || on instanceof HTMLSelectElement
       || key === " " && on !== canvas && on !== scrub || !keys[key]) return;
     event.preventDefault();
     keys[key](event.shiftKey);
@@ -355,14 +500,14 @@ const play = (root, data) => {
     return { made, at };
   };
   /**
-   * Makes the texture of a unit.
+   * Makes the texture of a unit, with four numbers a texel, or one in the format R32F.
    * @param {number} unit @param {number} format @param {number} across @param {number} high @param {number} kind
    * @param {ArrayBufferView} from
    */
   const texture = (unit, format, across, high, kind, from) => {
     gl.activeTexture(gl.TEXTURE0 + unit);
     gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
-    gl.texImage2D(gl.TEXTURE_2D, 0, format, across, high, 0, gl.RGBA, kind, from);
+    gl.texImage2D(gl.TEXTURE_2D, 0, format, across, high, 0, format === gl.R32F ? gl.RED : gl.RGBA, kind, from);
     for (const name of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER])
       gl.texParameteri(gl.TEXTURE_2D, name, gl.NEAREST);
   };
@@ -391,29 +536,106 @@ const play = (root, data) => {
     of.count = numbers.length / 3;
   };
   const ball = program("BALL"), line = program("LINE", "FLAT"), mark = program("MARK");
-  const solid = program("SOLID", "FLAT");
+  const solid = program("SOLID", "FLAT"), rotor = rotors ? program("ROTOR") : null;
   texture(0, gl.RGBA32F, wide, times.length, gl.FLOAT, path);
-  const paint = new Uint8Array(count * 4).fill(255);
-  texture(1, gl.RGBA8, count, 1, gl.UNSIGNED_BYTE, paint);
-  const bodies = mesh([3], 1, 1, Float32Array.from(radius)), slots = mesh([0], 3, 1);
+  // Rows of colours: present ones, with alpha 0 for a vehicle in violation, and those of the vehicles themselves.
+  const paint = new Uint8Array(count * 8).fill(255);
+  texture(1, gl.RGBA8, count, 2, gl.UNSIGNED_BYTE, paint);
+  texture(2, gl.R32F, 1, 1, gl.FLOAT, new Float32Array(1));
+  texture(3, gl.RGBA32F, rotors ? count : 1, rotors ? times.length : 1, gl.FLOAT, turned);
+  const arms = rotors ? [...rotors.at_m.flatMap(at => [...at, 0.18 * arm]), 0.75 * arm, 0, 0] : new Array(15).fill(0);
+  const bodies = mesh([3], 1, 1, Float32Array.from(radius, of => rotors ? 0.34 * arm : of));
+  const shells = mesh([3], 1, 1, Float32Array.from(radius)), slots = mesh([0], 3, 1);
   const links = mesh([2], 3, 1), pairs = mesh([2], 3, 1);
   const ground = mesh([0, 1], 3, 1, new Float32Array(bytes(data.ground)));
   const things = data.things.map(({ solid, rims, ...rest }) => ({ ...rest,
     solid: mesh([0, 1], 3, 0, new Float32Array(bytes(solid))),
     rims: mesh([0, 1], 3, 1, new Float32Array(bytes(rims))) }));
   gl.bindVertexArray(null);
+  // Pieces of trails within violations: both ends [m], and times from the start [s].
+  /** @type {number[]} */
+  const wrongs = [];
+  for (const { kind, who, from_s, to_s } of moments) if (kind === "violation") for (const k of who)
+    for (let row = Math.max(upTo(times, from_s) - 1, 0); row + 1 < times.length && times[row] < to_s; row++) {
+      const [a, b] = [(row * wide + k) * 4, ((row + 1) * wide + k) * 4], long = times[row + 1] - times[row];
+      if (path[a + 3] !== path[b + 3] || !path[a + 3] || wrongs.length > 9 * RED) continue;
+      const ends = [from_s, to_s].map(end => clamp((end - times[row]) / long, 0, 1));
+      for (const part of ends)
+        wrongs.push(...[0, 1, 2].map(axis => path[a + axis] + (path[b + axis] - path[a + axis]) * part));
+      wrongs.push(...ends.map(part => times[row] - first + part * long), 0);
+    }
+  const reds = mesh([0, 1, 2], 3, 1, Float32Array.from(wrongs));
+  gl.bindVertexArray(null);
 
   // Drawing. The time lies between the instants `row` and `next`, at the share `part` of the interval. `painted` lists
   // the vehicles in red, `shape` is the number of the formation in the meshes.
   const dark = matchMedia("(prefers-color-scheme: dark)");
-  let colours = LIGHT, painted = "", shape = -1, row = 0, next = 0, part = 0;
-  /** Applies the colours of the reader's theme. */
-  const themed = () => { [colours, painted] = [dark.matches ? DARK : LIGHT, "?"]; ask(); };
+  let painted = "", shape = -1, row = 0, next = 0, part = 0;
+  /** Colours by name. @type {Object<string, number[]>} */
+  let colours = {};
+  /** Smallest and largest number of the colour scale; equal where vehicles have colours of their own. */
+  let spanned = [0, 0];
+  /** Applies the colours of the page. */
+  const themed = () => {
+    painted = "?";
+    const numbers = (/** @type {string} */ name) => {
+      canvas.style.color = `var(--${name})`;
+      const found = getComputedStyle(canvas).color, scaled = found.startsWith("color(") ? 255 : 1;
+      return (found.match(/[\d.]+/g) ?? []).slice(0, 3).map(part => Math.round(+part * scaled));
+    };
+    colours = Object.fromEntries(COLOURS.map(name => [name, numbers(name)]));
+    ask();
+  };
+  /** Distance of each vehicle to its nearest neighbour at an instant, beyond the safety distance [m]. */
+  const clearances = (/** @type {number} */ row) => {
+    const at = (/** @type {number} */ k) => (row * wide + k) * 4;
+    const there = [...radius.keys()].filter(k => path[at(k) + 3]).sort((a, b) => path[at(a)] - path[at(b)]);
+    // Vertical lengths are scaled to the ellipsoid.
+    const high = data.shell_m ? data.shell_m[0] / data.shell_m[2] : 1, least = new Float32Array(count).fill(Infinity);
+    // Neighbours are sought in the order of x, up to the nearest so far.
+    for (let i = 0; i < there.length; i++) for (const way of [-1, 1]) for (let j = i + way; there[j] >= 0; j += way) {
+      const a = there[i], [x, y, z] = [0, 1, 2].map(axis => path[at(there[j]) + axis] - path[at(a) + axis]);
+      if (Math.abs(x) >= least[a]) break;
+      least[a] = Math.min(least[a], Math.hypot(x, y, z * high));
+    }
+    return least.map(of => of - 2 * (data.shell_m?.[0] ?? 0));
+  };
+  /** Speed of each vehicle at an instant [m/s], of the interval behind it, or before the last one. */
+  const speedsAt = (/** @type {number} */ row) => {
+    const [a, b] = row + 1 < times.length ? [row, row + 1] : [Math.max(row - 1, 0), row];
+    return Float32Array.from(radius, (_, k) => {
+      const [from, to] = [(a * wide + k) * 4, (b * wide + k) * 4], long = times[b] - times[a];
+      return path[from + 3] !== path[to + 3] || !(long > 0) ? 0
+        : Math.hypot(...[0, 1, 2].map(axis => path[to + axis] - path[from + axis])) / long;
+    });
+  };
+  /** Colours vehicles and trails by what is chosen. */
+  const recolour = () => {
+    const kind = colouring.value, at = kind === "speed" ? speedsAt : clearances;
+    spanned = [0, 0];
+    scale.replaceChildren();
+    if (!kind) return;
+    const numbers = new Float32Array(times.length * count);
+    let low = Infinity, high = -Infinity;
+    for (let row = 0; row < times.length; row++) {
+      const some = at(row);
+      numbers.set(some, row * count);
+      for (const x of some) if (x < Infinity) [low, high] = [Math.min(low, x), Math.max(high, x)];
+    }
+    if (kind === "speed") low = 0; else if (data.shell_m) high = Math.min(high, Math.max(low, 0) + 4 * shell);
+    gl.deleteTexture(gl.getParameter((gl.activeTexture(gl.TEXTURE2), gl.TEXTURE_BINDING_2D)));
+    texture(2, gl.R32F, count, times.length, gl.FLOAT, numbers);
+    spanned = [low, Math.max(high, low + 1e-9)];
+    const [unit, ends] = kind === "speed" ? ["m/s", ["pull", "push"]] : ["m", ["push", "pull"]];
+    scale.append(`${kind} ${low.toFixed(2)}`, make("i", {
+      style: `background:linear-gradient(90deg,var(--${ends[0]}),var(--rest),var(--${ends[1]}))` }),
+    `${high.toFixed(2)} ${unit}`);
+  };
   /**
    * Fits a canvas to its size on the page. Returns device pixels per CSS pixel, 0 for a canvas without a size.
    * @param {HTMLCanvasElement} of
    */
-  const fit = of => {
+  const sizeOf = of => {
     const ratio = Math.min(devicePixelRatio || 1, 2);
     const [across, high] = [Math.round(of.clientWidth * ratio), Math.round(of.clientHeight * ratio)];
     if (of.width !== across || of.height !== high) [of.width, of.height] = [across, high];
@@ -430,6 +652,14 @@ const play = (root, data) => {
     const [a, b] = [(row * wide + k) * 4, (next * wide + k) * 4];
     return [0, 1, 2].map(axis => path[a + axis] + (path[b + axis] - path[a + axis]) * part)
       .concat(path[a + 3] && (part <= 0 || path[a + 3] === path[b + 3]) ? 1 : 0);
+  };
+  /** Place of a vehicle in the picture [CSS px], its depth [m], or 0 where it is absent, and pixels per metre. */
+  const project = (/** @type {number} */ k) => {
+    const [x, y, z, there] = place(k), { right, up, back, eye } = axes();
+    const [across, above, behind] = [right, up, back].map(axis =>
+      (x - eye[0]) * axis[0] + (y - eye[1]) * axis[1] + (z - eye[2]) * axis[2]);
+    const [wide, high] = [canvas.clientWidth, canvas.clientHeight], scale = high / 2 / TANGENT / -behind;
+    return [wide / 2 + across * scale, high / 2 - above * scale, there ? -behind : 0, scale];
   };
   /** Position of an obstacle from the origin [m]. @param {number[][]} way */
   const thingAt = way => {
@@ -454,11 +684,13 @@ const play = (root, data) => {
     refill(links, Float32Array.from(joined));
   };
   const draw = () => {
-    const ratio = fit(canvas);
+    const ratio = sizeOf(canvas);
     if (!ratio || ended) return;
+    seek();
+    if (follow.value === "swarm") target = centre();
+    else if (follow.value === "picked" && picked !== null && place(picked)[3]) target = place(picked).slice(0, 3);
     const size = [canvas.width, canvas.height], { right, up, back, eye } = axes();
     const lens = [TANGENT * size[0] / size[1], TANGENT, distance * 0.02, distance + reach * 12];
-    seek();
     // Violations of this time, and their vehicles.
     const [, alarm, verdict, named, thing] = latest(data.verdicts, t) ?? [0, false, "", [], null];
     const wrong = [...moments.filter(of => of.kind === "violation" && of.from_s <= t && t <= of.to_s),
@@ -467,15 +699,16 @@ const play = (root, data) => {
     if ([...who].join() !== painted) {
       painted = [...who].join();
       for (let k = 0; k < count; k++) {
-        const colour = who.has(k) ? colours.alarm : colours.vehicles[count < 200 ? k % 6 : 0];
-        paint.set([colour >> 16, colour >> 8 & 255, colour & 255], 4 * k);
+        const own = colours[`c${count < 200 ? k % 6 + 1 : 1}`];
+        paint.set(who.has(k) ? [...colours.alarm, 0] : [...own, 255], 4 * k);
+        paint.set([...own, 255], 4 * (count + k));
       }
       gl.activeTexture(gl.TEXTURE1);
-      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, count, 1, gl.RGBA, gl.UNSIGNED_BYTE, paint);
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, count, 2, gl.RGBA, gl.UNSIGNED_BYTE, paint);
     }
     reform();
     gl.viewport(0, 0, size[0], size[1]);
-    gl.clearColor(...(/** @type {[number, number, number, number]} */ (rgba(colours.paper))));
+    gl.clearColor(...(/** @type {[number, number, number, number]} */ (rgba(colours.sky))));
     gl.enable(gl.DEPTH_TEST);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
@@ -492,12 +725,17 @@ const play = (root, data) => {
           const to = at[name], value = given[name];
           if (!to) continue;
           if (typeof value === "number") { if (WHOLE.has(name)) gl.uniform1i(to, value); else gl.uniform1f(to, value); }
+          else if (value.length === 15) gl.uniform3fv(to, value);
           else if (value.length === 2) gl.uniform2fv(to, value);
           else if (value.length === 3) gl.uniform3fv(to, value); else gl.uniform4fv(to, value);
         }
       };
-      set({ right, up, back, eye, lens, size, path: 0, paint: 1, row, next, part, points: count, shell: [0, 0, 0],
-        offset: [0, 0, 0], fixedAt: [0, 0, 0, 0], fixedPaint: [0, 0, 0, 0], ...values });
+      const ends = [colours.pull, colours.push].map(colour => rgba(colour).slice(0, 3));
+      if (colouring.value === "clearance") ends.reverse();
+      set({ right, up, back, eye, lens, size, path: 0, paint: 1, value: 2, turn: 3, row, next, part, points: count,
+        spanned, low: ends[0], mid: rgba(colours.rest).slice(0, 3), high: ends[1], arm, armLeast: 8 * ratio,
+        "arms[0]": arms, shell: [0, 0, 0], offset: [0, 0, 0], fixedAt: [0, 0, 0, 0], fixedPaint: [0, 0, 0, 0],
+        ...values });
     };
     /** Draws copies of a quad. @param {Mesh | null} of @param {number} [copies] */
     const quads = (of, copies = of?.count ?? 0) => {
@@ -529,14 +767,17 @@ const play = (root, data) => {
     gl.disable(gl.SAMPLE_ALPHA_TO_COVERAGE);
     gl.enable(gl.BLEND);
     gl.depthMask(false);
-    use(line, { kind: 0, width: ratio, tint: rgba(colours.grid) });
-    quads(ground);
+    use(line, { kind: 0, width: ratio, tint: rgba(colours.floor) });
+    if (shows.ground) quads(ground);
     if (shows.trails) {
+      const tailed = +tail.value;
       let stride = 1;
       while (row / stride > clamp(Math.floor(TRAIL_PIECES / count), 2, 400)) stride *= 2;
       set({ kind: 2, width: (count < 50 ? 2 : 1.3) * ratio, stride, newest: row - row % stride, now: t - first,
-        fading: Math.max(0.25 * (last - first), 1e-9) });
+        fading: Math.max(Math.min(0.25 * span, tailed), 1e-9), tail: Math.min(tailed, 1e30) });
       quads(null, count * (Math.floor(row / stride) + 1));
+      set({ kind: 3, width: 3 * ratio, tint: rgba(colours.alarm) });
+      quads(reds);
     }
     const many = links.count;
     set({ kind: 1, width: clamp(2.2 - many / 200, 1, 2.2) * ratio, delta: data.tension ? data.delta_m : -1,
@@ -544,9 +785,10 @@ const play = (root, data) => {
       rest: rgba(colours.rest, clamp(36 / many, 0.08, 0.9)) });
     if (shows.links) quads(links);
     // Lines of the closest pair, as the page's data names it, and of all pairs in violation.
-    const k = 2 * upTo(nearS, t) - 2, closest = [nearWho[k], nearWho[k + 1]].filter(vehicle => vehicle < count);
-    for (const [two, colour, width] of /** @type {[number[][], number, number][]} */ ([
-      [[closest], colours.ink, 2.6], [wrong.map(of => of.who), colours.alarm, 5]])) {
+    const k = 2 * upTo(nearS, t) - 2, slice = [nearWho[k], nearWho[k + 1]].filter(vehicle => vehicle < count);
+    const closest = current?.kind === "closest" && current.who.length === 2 ? current.who : slice;
+    for (const [two, colour, width] of /** @type {[number[][], number[], number][]} */ ([
+      [shows.closest ? [closest] : [], colours.ink, 2.6], [wrong.map(of => of.who), colours.alarm, 5]])) {
       set({ tint: rgba(colour), width: width * ratio });
       refill(pairs, Float32Array.from(two.filter(pair => pair.length === 2).flatMap(pair => [...pair, 0])));
       quads(pairs);
@@ -564,11 +806,23 @@ const play = (root, data) => {
       use(mark, { axis: data.reference, mark: 1, least: 7 * ratio, stroke: 0.8 * ratio, tint: rgba(colours.ink) });
       quads(null, 1);
     }
+    if (rotor) {
+      use(line, { kind: 4, width: 2.2 * ratio, tint: rgba(colours.ink) });
+      quads(null, 5 * count);
+      use(rotor, { rotor: rotors?.radius_m ?? 0 });
+      quads(null, 4 * count);
+    }
+    if (picked !== null) {
+      const at = place(picked);
+      use(ball, { shell: new Array(3).fill(Math.max(1.5 * outer[picked], 9 * ratio * 2 * TANGENT * distance / size[1])),
+        fixedAt: at, fixedPaint: rgba(colours.ink, 0.9) });
+      if (at[3]) quads(null, 1);
+    }
     solids(false);
     // The order of shells of one colour does not matter. Those of vehicles in violation come last.
     if (data.shell_m) {
       use(ball, { shell: data.shell_m, fixedPaint: rgba(colours.shell, 0.6) });
-      if (shows.shells) quads(bodies);
+      if (shows.shells) quads(shells);
       for (const at of [...who].map(place).filter(at => at[3])) {
         set({ fixedAt: at, fixedPaint: rgba(colours.alarm, 0.85) });
         quads(null, 1);
@@ -578,48 +832,68 @@ const play = (root, data) => {
 
     // Labels, on the second canvas.
     const pen = names.getContext("2d");
-    if (pen && fit(names)) {
+    if (pen && sizeOf(names)) {
       pen.clearRect(0, 0, names.width, names.height);
       pen.font = `${12 * ratio}px system-ui, sans-serif`;
       [pen.textAlign, pen.lineJoin, pen.lineWidth] = ["center", "round", 3 * ratio];
-      pen.strokeStyle = css(colours.paper);
-      for (const vehicle of !shows.names ? [] : count <= NAMED ? radius.keys() : new Set([...closest, ...who])) {
-        const [x, y, z, there] = place(vehicle);
-        const [across, above, away] = [right, up, back].map(axis =>
-          (x - eye[0]) * axis[0] + (y - eye[1]) * axis[1] + (z - eye[2]) * axis[2]);
-        if (!there || -away < lens[2]) continue;
-        const px = (1 - across / away / lens[0]) * size[0] / 2, py = (1 + above / away / lens[1]) * size[1] / 2
-          - Math.max(radius[vehicle] / -away / lens[1] * size[1] / 2, 2 * ratio) - 4 * ratio;
+      pen.strokeStyle = css(colours.sky);
+      // Important vehicles come first, then near ones. A name that would cover another one moves or is left out.
+      const urgent = new Set([...picked === null ? [] : [picked], ...closest, ...who]);
+      const wanted = !shows.names ? [] : [...count <= NAMED ? radius.keys() : urgent].map(vehicle =>
+        ({ vehicle, seen: project(vehicle) })).filter(({ seen }) => seen[2] > lens[2]);
+      wanted.sort((a, b) => +urgent.has(b.vehicle) - +urgent.has(a.vehicle) || a.seen[2] - b.seen[2]);
+      const depths = wanted.map(({ seen }) => seen[2]), near = Math.min(...depths), far = Math.max(...depths);
+      /** @type {number[][]} */
+      const taken = [];
+      labelled = taken;
+      for (const { vehicle, seen: [x, y, away, px_per_m] } of wanted) {
+        const text = data.vehicles[vehicle], half = pen.measureText(text).width / 2 + 2 * ratio, high = 7 * ratio;
+        const off = Math.max(outer[vehicle] * px_per_m * ratio, 3 * ratio) + high + 2 * ratio;
+        const free = [[0, -off], [0, off], [off + half - high, 0], [high - off - half, 0]]
+          .map(([dx, dy]) => [x * ratio + dx, y * ratio + dy]).find(([px, py]) => taken.every(of =>
+            Math.abs(of[0] - px) > of[2] + half || Math.abs(of[1] - py) > of[3] + high));
+        if (!free) continue;
+        taken.push([...free, half, high]);
+        pen.globalAlpha = urgent.has(vehicle) || far - near < 0.2 * far ? 1 : 1 - 0.6 * (away - near) / (far - near);
         pen.fillStyle = css(who.has(vehicle) ? colours.alarm : colours.ink);
-        pen.strokeText(data.vehicles[vehicle], px, py);
-        pen.fillText(data.vehicles[vehicle], px, py);
+        pen.strokeText(text, free[0], free[1] + 4 * ratio);
+        pen.fillText(text, free[0], free[1] + 4 * ratio);
       }
+      pen.globalAlpha = 1;
     }
     const time = t.toFixed(data.decimals);
-    write(state,
-      [verdict, latest(data.nearest, t)?.[1], `squares of ${data.square_m} m`].filter(words => words).join(" · "));
+    write(state, [verdict, latest(data.nearest, t)?.[1]].filter(words => words).join(" · "));
+    state.hidden = !shows.caption;
+    const there = picked !== null && place(picked)[3];
+    write(chosen, picked === null ? "" : `vehicle ${data.vehicles[picked]} · `
+      + (there ? data.holds ? "present" : speedsAt(row)[picked].toFixed(2) + " m/s" : "absent"));
     state.classList.toggle("replay-alarm", alarm);
     write(clock, time + " s");
     scrub.value = t;
     scrub.setAttribute("aria-valuetext", `${time} of ${last.toFixed(data.decimals)} seconds`);
-    head.style.left = `${100 * (t - first) / (last - first || 1)}%`;
+    head.style.left = `${100 * (t - first) / (span || 1)}%`;
   };
   canvas.addEventListener("webglcontextlost", () => {
     if (!ended) lose(root, "The graphics were lost. Start the replay again.");
   });
   dark.addEventListener("change", themed);
+  document.addEventListener("change", themed);
   const sized = new ResizeObserver(draw);
   sized.observe(stage);
-  home();
   themed();
+  view(...level ? /** @type {[number, number]} */ ([-UPRIGHT, UPRIGHT]) : slant);
   return {
     root, draw,
+    /** What is drawn, for tests: camera, places [CSS px], boxes around names [px], picked vehicle, arm [m]. */
+    seen: () => ({ pitch, picked, boxes: labelled, names: shows.names, arm,
+      places: [...radius.keys()].map(project).filter(at => at[2] > 0) }),
     /**
      * Draws a view at once, for tests: angles in rad, lengths in m, the time in s. Returns the camera.
      * @param {{yaw: number, pitch: number, distance: number, target: number[], t: number}} view
      */
     look(view) {
       ({ yaw, pitch, distance, target } = view);
+      follow.value = "";
       t = view.t;
       draw();
       return { ...axes(), tangent: TANGENT, place };
@@ -629,6 +903,7 @@ const play = (root, data) => {
       cancelAnimationFrame(queued);
       sized.disconnect();
       dark.removeEventListener("change", themed);
+      document.removeEventListener("change", themed);
       if (graph) root.append(graph);
       panel.remove();
       gl.getExtension("WEBGL_lose_context")?.loseContext();
@@ -666,9 +941,9 @@ const lose = (root, why) => {
 /** Adds the button that starts a replay. @param {HTMLElement} root */
 const offer = root => {
   const start = make("button", { type: "button", class: "replay-start",
-    "aria-label": "Replay this flight: " + (root.dataset.label ?? "") }, "Replay this flight");
+    "aria-label": "Replay this flight: " + (root.dataset.label ?? "") });
   start.onclick = () => { open(root); root.querySelector("canvas")?.focus(); };
-  root.prepend(start);
+  (root.querySelector(".replay-still") ?? root).prepend(start);
 };
 for (const root of /** @type {NodeListOf<HTMLElement>} */ (document.querySelectorAll(".replay")))
   if (root.dataset.start) offer(root); else open(root);

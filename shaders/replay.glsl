@@ -19,13 +19,34 @@ vec4 toClip(vec3 p) {
 @ VERTEX COMMON
 // `path` has a row for each instant and a column for each point (assets/replay.js); `part` is the share of the interval
 // between the instants `row` and `next`. `paint` has the colour of each vehicle.
-uniform sampler2D path, paint; uniform int row, next; uniform float part; uniform int points;
+// `value` has a number for each vehicle and instant, which colours it if `spanned` is a range; `turn` has attitudes.
+uniform sampler2D path, paint, value, turn; uniform int row, next; uniform float part; uniform int points;
+uniform vec2 spanned; uniform vec3 low, mid, high;
 vec4 point(int k, int instant) { return texelFetch(path, ivec2(k, instant), 0); }
 // Position of a point at the time of the picture, and 0 where it is absent.
 vec4 place(int k) {
   vec4 a = point(k, row), b = point(k, next);
   return vec4(mix(a.xyz, b.xyz, part), part <= 0. || a.w == b.w ? a.w : 0.);
 }
+// Colour of a vehicle at an instant: its own, or that of its number.
+vec3 hue(int k, int instant) {
+  if (spanned.y <= spanned.x) return texelFetch(paint, ivec2(k, 1), 0).rgb;
+  float s = clamp((texelFetch(value, ivec2(k, instant), 0).r - spanned.x) / (spanned.y - spanned.x), 0., 1.);
+  return s < .5 ? mix(low, mid, 2. * s) : mix(mid, high, 2. * s - 1.);
+}
+// Colour of a vehicle at the time of the picture; that of an alarm in a violation.
+vec3 hueNow(int k) {
+  vec4 own = texelFetch(paint, ivec2(k, 0), 0);
+  return own.a < .5 ? own.rgb : mix(hue(k, row), hue(k, next), part);
+}
+// Rotors of a quadrotor and its nose, from the centre of the body. Arms shorter than `armLeast` pixels are enlarged.
+uniform vec3 arms[5]; uniform float arm, armLeast;
+vec3 rotated(int k, vec3 v) {
+  vec4 a = texelFetch(turn, ivec2(k, row), 0), b = texelFetch(turn, ivec2(k, next), 0);
+  vec4 q = normalize(mix(a, dot(a, b) < 0. ? -b : b, part));
+  return v + 2. * cross(q.xyz, cross(q.xyz, v) + q.w * v);
+}
+float enlarged(vec3 at) { return max(1., armLeast * 2. * lens.y / size.y * max(-view(at).z, 0.) / arm); }
 // Outside of the picture.
 const vec4 NOWHERE = vec4(2, 2, 2, 1);
 @ BALL VERTEX
@@ -35,7 +56,7 @@ in float radius; uniform vec4 fixedAt, fixedPaint; uniform vec3 shell; uniform f
 flat out vec3 centre, axes; flat out vec4 colour;
 void main() {
   vec4 at = fixedAt.w > 0. ? vec4(fixedAt.xyz, 1) : place(gl_InstanceID);
-  colour = fixedPaint.w > 0. ? fixedPaint : texelFetch(paint, ivec2(gl_InstanceID, 0), 0);
+  colour = fixedPaint.w > 0. ? fixedPaint : vec4(hueNow(gl_InstanceID), 1);
   centre = at.xyz;
   vec3 c = view(centre);
   float pixel = 2. * lens.y / size.y, away = length(c);
@@ -80,9 +101,10 @@ void main() {
   }
 }
 @ LINE VERTEX
-// A straight line of a width in pixels. `kind` 0 joins two positions, 1 a pair of vehicles, 2 is a piece of a trail.
+// A straight line of a width in pixels. `kind` 0 joins two positions, 1 a pair of vehicles, 2 is a piece of a trail,
+// 3 a piece of a trail between two times, 4 an arm of a quadrotor.
 in vec3 from, to; in vec3 pair; uniform int kind, stride, newest;
-uniform float width, delta, fading, now; uniform vec3 offset;
+uniform float width, delta, fading, now, tail; uniform vec3 offset;
 uniform vec4 tint, push, rest, pull; out vec4 colour;
 float sinhOf(float x) { return .5 * (exp(x) - exp(-x)); }
 void main() {
@@ -106,8 +128,16 @@ void main() {
     a = point(k, max(old, 0));
     b = piece == 0 ? place(k) : point(k, max(old + stride, 0));
     float age = now - point(textureSize(path, 0).x - 1, max(old, 0)).x;
-    colour = vec4(texelFetch(paint, ivec2(k, 0), 0).rgb, .16 + .74 * max(0., 1. - age / fading));
-    if (old < 0 || a.w != b.w) a.w = 0.;
+    colour = vec4(hue(k, max(old, 0)), .16 + .74 * max(0., 1. - age / fading));
+    if (old < 0 || a.w != b.w || age > tail) a.w = 0.;
+  } else if (kind == 3) {
+    if (pair.x > now || now - pair.y > tail) a.w = 0.;
+    b.xyz = mix(a.xyz, b.xyz, clamp((now - pair.x) / max(pair.y - pair.x, 1e-9), 0., 1.));
+  } else if (kind == 4) {
+    int k = gl_InstanceID / 5, j = gl_InstanceID % 5;
+    a = place(k);
+    b = vec4(a.xyz + rotated(k, arms[j]) * enlarged(a.xyz), a.w);
+    if (j < 4) colour = vec4(hueNow(k), 1);
   }
   vec3 p = view(a.xyz), q = view(b.xyz);
   float n = lens.z;
@@ -120,6 +150,26 @@ void main() {
   vec2 across = dot(run, run) > 0. ? normalize(vec2(-run.y, run.x)) : vec2(0, 1);
   gl_Position = (gl_VertexID & 1) == 1 ? v : u;
   gl_Position.xy += across * (float(gl_VertexID >> 1) - .5) * 2. * width / size * gl_Position.w;
+}
+@ ROTOR VERTEX
+// Disc of a rotor across the axis of its body.
+uniform float rotor; out vec4 colour; out vec2 at;
+void main() {
+  int k = gl_InstanceID / 4;
+  vec4 c = place(k);
+  float times = enlarged(c.xyz);
+  at = (vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2. - 1.) * 1.15;
+  colour = vec4(hueNow(k), 1);
+  vec3 p = view(c.xyz + (rotated(k, arms[gl_InstanceID % 4]) + rotated(k, vec3(at * rotor, 0))) * times);
+  gl_Position = c.w < .5 || -p.z < lens.z ? NOWHERE : toClip(p);
+}
+@ ROTOR_PIXEL COMMON
+in vec4 colour; in vec2 at; out vec4 pixel;
+void main() {
+  float d = length(at), soft = fwidth(d), ring = 1. - smoothstep(.06, .06 + 1.5 * soft, abs(d - .94));
+  float a = max(.85 * ring, d < .94 ? .3 : 0.);
+  if (a <= .02) discard;
+  pixel = vec4(colour.rgb, a);
 }
 @ FLAT_PIXEL COMMON
 in vec4 colour; out vec4 pixel; void main() { pixel = colour; }
@@ -135,7 +185,7 @@ void main() {
   if (mark == 0) {
     p += ((place(axis + 1).xyz - c.xyz) * from.x + (place(axis + 2).xyz - c.xyz) * from.y
       + (place(axis + 3).xyz - c.xyz) * from.z) / length_m;
-    colour = vec4(texelFetch(paint, ivec2(gl_InstanceID, 0), 0).rgb, tint.a);
+    colour = vec4(texelFetch(paint, ivec2(gl_InstanceID, 1), 0).rgb, tint.a);
   }
   vec3 s = view(p);
   float pixel = 2. * lens.y / size.y * -s.z, r = mark == 0 ? max(size_m, least * pixel) : least * pixel;

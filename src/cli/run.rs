@@ -7,6 +7,7 @@ use clap::{Args, Parser};
 
 use super::console::{self, Console, Terminal};
 use super::{Exit, completions};
+use tautline_report::figures::Format;
 use tautline_report::request::{Failure, Monitor as _, Pictures, RunRequest, ScenarioRequest, command_line, run_into};
 use tautline_sim::preflight::Preflight;
 
@@ -65,8 +66,12 @@ pub(super) struct RunArguments {
     #[arg(long, conflicts_with = "json")]
     watch: bool,
     /// Draw no figures.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "figures")]
     no_figures: bool,
+    /// Formats of the figures; PDF and PNG have the width of a paper's column, 85 mm.
+    #[arg(long, value_name = "FORMAT,...", value_delimiter = ',', default_value = "svg")]
+    #[arg(value_parser = ["svg", "pdf", "png"])]
+    figures: Vec<String>,
     /// Take no pictures.
     #[arg(long)]
     no_snapshots: bool,
@@ -118,6 +123,7 @@ fn fly(arguments: &RunArguments, force: bool, opens: bool, terminal: &Terminal) 
         out: arguments.out.clone(),
         force,
         figures: !arguments.no_figures,
+        formats: Format::ALL.into_iter().filter(|of| arguments.figures.iter().any(|name| name == of.name())).collect(),
         verify: arguments.verify,
         threads: arguments.threads.map(usize::from),
         ..RunRequest::new(&scenario, command_line(words.iter().copied()))

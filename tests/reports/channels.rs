@@ -46,6 +46,7 @@ fn figures_of(count: usize, samples: u64, scale: impl Fn(u64) -> f64) -> Vec<Fig
         edge_error_m: None,
         disagreement_m_s: None,
         most_thrust_n: Some(MAX_THRUST_N),
+        obstacles: &[],
     };
     let mut figures = figures::of_run(&history, &criteria);
     assert!(figures.iter().all(|figure| figures::NAMES_OF_RUN.contains(&figure.name.as_str())));

@@ -13,7 +13,7 @@ const HOSTILE: &str = "</title></pre><script>alert(\"x\")</script>&amp;<img src=
 
 fn hostile_page() -> Page {
     let text = || HOSTILE.to_owned();
-    let figure = figures::paths(&FlightLog::default(), HOSTILE);
+    let figure = figures::paths(&FlightLog::default(), &[], HOSTILE);
     let picture = Picture { description: text(), data_uri: text() };
     let badge = Badge { word: HOSTILE.to_owned(), ..Badge::judged(false) };
     let content = [
@@ -27,11 +27,12 @@ fn hostile_page() -> Page {
     Page {
         title: text(),
         kind: HOSTILE,
+        replay: None,
         badge: Badge::judged(false),
         verdict: text(),
         reasons: vec![text()],
         warnings: vec![(text(), text())],
-        sections: vec![page::section(HOSTILE, &content)],
+        sections: vec![page::section(HOSTILE, HOSTILE, &content)],
     }
 }
 
@@ -135,7 +136,7 @@ fn unwanted_figures_are_removed() {
     let figure = folder.path().join("figures/energy.svg");
     assert!(figure.exists());
     let html = fly(folder.path(), &[&flown[..], &["--no-figures"]].concat());
-    assert!(!figure.exists() && !html.contains("<svg xmlns"));
+    assert!(!figure.exists() && !html.contains("E(0) = "), "only the still picture of the replay is left");
 }
 
 #[test]
@@ -174,4 +175,55 @@ fn the_page_of_an_audit_shows_the_smallest_distance_and_an_inset() {
     assert!((lowest.0 - f64::midpoint(first.0, last.0)).abs() < 10.0 && first.1 == last.1, "{corners:?}");
     let insets = |page: &str| page.matches("<svg x=").count();
     assert_eq!((insets(&near), insets(&page(30.0))), (1, 0), "a visible approach has no inset");
+}
+
+/// Returns the last number that follows some words.
+fn number_after<'a>(text: &'a str, words: &str) -> Option<&'a str> {
+    let number = |(at, words): (usize, &str)| {
+        let rest = &text[at + words.len()..];
+        let end = rest.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(rest.len());
+        Some(rest[..end].trim_end_matches('.')).filter(|number| number.parse::<f64>().is_ok())
+    };
+    text.match_indices(words).filter_map(number).last()
+}
+
+#[test]
+fn a_number_that_is_shown_twice_is_the_same_number() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let html = fly(folder.path(), &["pentagon-laplacian", "--set", "time.duration_s=10"]);
+    let report = fs::read_to_string(folder.path().join("report.json")).expect("a report");
+    let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
+    let of = |key: &str| report["separation"][key].as_f64().expect(key);
+    // Places of the smallest separation: headline, reason, table of findings, replay, still picture, figure, pictures.
+    let least = [
+        (&html[..], "vehicles 4 and 5 came to "),
+        (&html, "Vehicles 4 and 5 came to "),
+        (&html, "<td>"),
+        (&html, "Closest approach: "),
+        (&html, "4 and 5 come to "),
+        (&html, "closest so far "),
+        (&html, ">closest "),
+        (&html, " Closest: "),
+        (&html, "vehicles 4-5 at 3.63 s, "),
+    ];
+    let (mut found, mut decimals) = (0, std::collections::BTreeSet::new());
+    for (place, words) in least {
+        let row = place.split_once("separation</th>").and_then(|(_, rest)| rest.split("</tr>").next()).expect("a row");
+        let place = if words == "<td>" { row } else { place };
+        let Some(number) = number_after(place, words) else { panic!("no number after {words:?}") };
+        let digits = number.split_once('.').map_or(0, |(_, decimals)| decimals.len());
+        let unit = 0.1_f64.powi(i32::try_from(digits).expect("a few"));
+        let shown: f64 = number.parse().expect("a number");
+        let error = of("min_m") - shown;
+        assert!((-1e-12..unit).contains(&error), "{words:?}: {number}, not {} rounded down", of("min_m"));
+        found += 1;
+        decimals.insert(digits);
+    }
+    assert_eq!((found, decimals.into_iter().collect::<Vec<_>>()), (9, vec![3, 6]), "two precisions alone");
+    // Places of its time: headline, replay and figure.
+    for words in ["(delta 2.000 m) at ", "4 and 5 at ", "vehicles 4 and 5 at ", "Closest approach, at "] {
+        let number = number_after(&html, words).unwrap_or_else(|| panic!("no time after {words:?}"));
+        let shown: f64 = number.parse().expect("a number");
+        assert!((of("min_at_s") - shown).abs() <= 0.005 + 1e-9, "{words:?}: {number}, not {}", of("min_at_s"));
+    }
 }

@@ -63,6 +63,7 @@ fn a_large_swarm_sweeps_near_pairs_and_records_vehicles() {
             edge_error_m: None,
             disagreement_m_s: None,
             most_thrust_n: None,
+            obstacles: &[],
         };
         for figure in of_run(&history, &criteria) {
             let bytes = figure.svg.len();

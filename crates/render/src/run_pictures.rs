@@ -1,8 +1,7 @@
 //! Pictures of a run for its folder and its page.
 
-use std::ops::ControlFlow;
 use std::path::Path;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
@@ -15,8 +14,6 @@ use tautline_recordings::mcap::ExtraTopic;
 use tautline_report::flight_log::{FlightLog, PICTURED};
 use tautline_report::report::page;
 use tautline_report::request::{Failure, Monitor, NamedPicture, PICTURES_BYTES, Pictures, write_files};
-use tautline_report::run::run_while;
-use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::Scenario;
 
 /// Draws pictures of runs with a graphics adapter.
@@ -24,14 +21,13 @@ pub struct RunPictures {
     adapter: String,
     /// Whether snapshots are taken. The scene is recorded in any case.
     takes_snapshots: bool,
-    renderer: Mutex<Option<Renderer>>,
 }
 
 impl RunPictures {
     /// Selects the adapter: `best`, `hardware`, `software`, or a part of its name.
     #[must_use]
     pub fn new(adapter: &str) -> Self {
-        Self { adapter: adapter.to_owned(), takes_snapshots: true, renderer: Mutex::new(None) }
+        Self { adapter: adapter.to_owned(), takes_snapshots: true }
     }
 
     /// Enables or disables snapshots.
@@ -81,32 +77,9 @@ impl Pictures for RunPictures {
         Ok(on_page)
     }
 
-    fn shot(&self, scenario: &Scenario, at_s: f64, room_bytes: usize) -> Result<String, Failure> {
-        let mut renderer = self.renderer.lock().unwrap_or_else(PoisonError::into_inner);
-        let renderer = match &mut *renderer {
-            Some(renderer) => renderer,
-            none => none.insert(Renderer::open(&self.adapter.as_str().into())?),
-        };
-        let view = View { theme: Theme::Light, ..View::default() };
-        let [_, small] = encode(&renderer.shoot(&fly_until(scenario, at_s)?, at_s, &view)?, room_bytes)?;
-        Ok(data_uri(&small))
-    }
-
     fn topic(&self, scenario: &Scenario) -> Option<Box<dyn ExtraTopic>> {
         Some(Box::new(FoxgloveScene::of(scenario)))
     }
-}
-
-/// Flies a scenario until just after an instant, with every step recorded.
-fn fly_until(scenario: &Scenario, time_s: f64) -> Result<Timeline, Failure> {
-    let mut scenario = scenario.clone();
-    scenario.time.record_hz = 1.0 / scenario.time.dt_s;
-    let mut log = FlightLog::of(&scenario);
-    let mut continue_until = |step: u64| {
-        if scenario.time.end_s(step) > time_s { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-    };
-    run_while(&scenario, &Preflight::of(&scenario)?, &mut log, &mut continue_until)?;
-    Ok(Timeline::flown(&scenario, Arc::new(log)))
 }
 
 /// Picture with its name and description.

@@ -11,9 +11,13 @@ use crate::statistics::{CONFIDENCE, Estimate, Proportion};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
 use tautline_core::text::{at_least, counted};
-use tautline_report::report::page::{self, Badge, Picture, Tone};
-use tautline_report::request::{Failure, PICTURES_BYTES, Pictures, ScenarioRequest};
+use tautline_report::figures::{Figure, OfLaw, at_closest, by_law};
+use tautline_report::flight_log::FlightLog;
+use tautline_report::report::page::{self, Badge, Tone};
+use tautline_report::request::{Failure, Pictures, ScenarioRequest};
+use tautline_report::run::run;
 use tautline_sim::scenario::{Draw, NamedLaw, Scenario, Template};
+use tautline_sim::sim::audit_obstacle;
 
 /// Assumptions of the numbers.
 const ASSUMED: [&str; 5] = [
@@ -197,12 +201,14 @@ impl Experiment for Options {
         }))
     }
 
-    fn illustrate(&self, base: &BaseScenario, study: &Comparison, pictures: &dyn Pictures) -> Vec<Section> {
-        let block = match worst_moments(base, study, pictures) {
-            Ok(pictures) => page::pictures(&pictures),
-            Err(failure) => page::list(&[format!("no pictures: {}", failure.in_words())]),
+    fn illustrate(&self, base: &BaseScenario, study: &Comparison, _pictures: &dyn Pictures) -> Vec<Section> {
+        const ABOUT: &str =
+            "The flight of each law that came closest, from above, at that instant; all axes are alike.";
+        let block = match closest_approaches(base, study) {
+            Ok(figures) => Block::Figures(figures),
+            Err(failure) => Block::Page(page::list(&[format!("no figures: {}", failure.in_words())])),
         };
-        vec![Section::new("Smallest separation of each law", [Block::Page(block)])]
+        vec![Section::new("Closest approach of each law", ABOUT, [block])]
     }
 }
 
@@ -235,27 +241,41 @@ fn drawn(template: &Template, law: &NamedLaw, seed: u64, jitter_m: Option<f64>) 
     drawn.map_err(|error| Failure::from(error).under(&under(law, seed)))
 }
 
-/// Returns a picture for each law: the flight with the smallest separation, at the time of this separation.
-fn worst_moments(base: &BaseScenario, study: &Comparison, pictures: &dyn Pictures) -> Result<Vec<Picture>, Failure> {
-    let mut taken = Vec::new();
+/// The worst flight of a law: its seed, its scenario, and pair, time \[s\] and distance \[m\] of its closest approach.
+type Flown<'a> = (&'a LawRow, u64, Scenario, ([usize; 2], f64, f64));
+
+/// Returns a figure for each law: the flight with the smallest separation, flown again, at the time of this separation.
+fn closest_approaches(base: &BaseScenario, study: &Comparison) -> Result<Vec<Figure>, Failure> {
+    /// Memory of the history of a flight \[bytes\].
+    const HISTORY_BYTES: usize = 4 << 20;
+    let mut flown = Vec::new();
     for law in &study.laws {
         let Some(worst) = law.worst() else { continue };
-        let (Some(min_m), Some(min_at_s)) = (worst.min_m, worst.min_at_s) else { continue };
+        let (Some(min_m), Some(at_s), Some(pair)) = (worst.min_m, worst.min_at_s, worst.min_pair) else { continue };
         let named = base.template().law(&law.name)?;
-        let mut scenario = drawn(base.template(), &named, worst.seed, study.jitter_m)?;
-        scenario.name = format!("{}, {}", scenario.name, law.name);
-        let data_uri = pictures.shot(&scenario, min_at_s, PICTURES_BYTES / study.laws.len().max(1))?;
-        let pair = worst.min_pair.map_or_else(String::new, |[a, b]| format!(", vehicles {a} and {b}"));
-        let description = format!(
-            "{}: {} m apart at {min_at_s:.2} s{pair}, the closest of {} flights (start.seed {}).",
-            law.name,
-            at_least(min_m, 3),
-            study.runs,
-            worst.seed
-        );
-        taken.push(Picture { description, data_uri });
+        let scenario = drawn(base.template(), &named, worst.seed, study.jitter_m)?;
+        let mut log = FlightLog::of(&scenario).within(HISTORY_BYTES);
+        run(&scenario, &mut log)?;
+        flown.push((law, worst.seed, scenario, (pair, at_s, min_m), log));
     }
-    Ok(taken)
+    let (flights, logs): (Vec<_>, Vec<_>) =
+        flown.into_iter().map(|(law, seed, scenario, closest, log)| ((law, seed, scenario, closest), log)).unzip();
+    let figure = |((law, seed, scenario, ([a, b], at_s, min_m)), log): (&Flown<'_>, &FlightLog)| {
+        let obstacles: Vec<_> = scenario.obstacles.iter().map(audit_obstacle).collect();
+        let figure = at_closest(&law.name, log, &obstacles, Some(([a - 1, b - 1], *at_s)), &logs);
+        let runs = study.runs;
+        Figure {
+            name: format!("closest-{}", law.name),
+            description: format!(
+                "{}: {} m apart at {at_s:.2} s, vehicles {a} and {b}, the closest of {runs} flights \
+                 (start.seed {seed}).",
+                law.name,
+                at_least(*min_m, 3),
+            ),
+            ..figure
+        }
+    };
+    Ok(flights.iter().zip(&logs).map(figure).collect())
 }
 
 impl LawRow {
@@ -328,6 +348,50 @@ impl LawRow {
 fn worst(flights: &[FlightSummary]) -> Option<&FlightSummary> {
     let known = flights.iter().filter_map(|flight| Some((flight.min_m?, flight)));
     known.min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, flight)| flight)
+}
+
+impl Comparison {
+    /// Returns charts of the outcomes, the times and the clearances.
+    fn figures(&self) -> Vec<Figure> {
+        let row = |law: &LawRow, value: Option<f64>, interval: [Option<f64>; 2]| OfLaw {
+            law: law.name.clone(),
+            value,
+            interval,
+        };
+        let share = |name: &str, title: &str, of: fn(&LawRow) -> Proportion| {
+            let percent = |part: f64| 100.0 * part;
+            let rows = self.laws.iter().map(|law| {
+                let share = of(law);
+                row(law, share.share.map(percent), [share.low, share.high].map(percent).map(Some))
+            });
+            by_law(name, title, "share of the flights [%]", &rows.collect::<Vec<_>>(), Some([0.0, 100.0]), None)
+        };
+        let measured = |name: &str, title: &str, label: &str, of: &dyn Fn(&LawRow) -> Estimate, limit| {
+            let rows = self.laws.iter().map(|law| {
+                let estimate = of(law);
+                row(law, estimate.value, [estimate.low, estimate.high])
+            });
+            by_law(name, title, label, &rows.collect::<Vec<_>>(), None, limit)
+        };
+        let delta_m = self.about.delta_m;
+        let clearance = |law: &LawRow| {
+            let Estimate { value, low, high } = law.min_median_m;
+            let less = |length: Option<f64>| length.map(|length_m| length_m - delta_m);
+            Estimate { value: less(value), low: less(low), high: less(high) }
+        };
+        vec![
+            share("violated", "Violated", |law| law.violated),
+            share("reached", "Reached the formation", |law| law.reached),
+            measured("time", "Time to reach the formation, median", "time [s]", &|law| law.reached_median_s, None),
+            measured(
+                "clearance",
+                "Smallest separation less delta, median",
+                "clearance [m]",
+                &clearance,
+                Some((0.0, "delta")),
+            ),
+        ]
+    }
 }
 
 impl Study for Comparison {
@@ -403,13 +467,15 @@ impl Study for Comparison {
         vec![
             Section::new(
                 "Laws side by side",
+                "Each law flew from the same starts; dots are estimates, and lines are their 95 % intervals.",
                 [
+                    Block::Figures(self.figures()),
                     part("How flights ended, with 95 % intervals", 1..9),
                     part("Time to reach the formation, and separation", 9..14),
                     part("Path and control", 14..18),
                 ],
             ),
-            Section::detail("Keys", [Block::Table(keys)]),
+            Section::detail("Keys", "The keys of the scenario that fly each law.", [Block::Table(keys)]),
         ]
     }
 

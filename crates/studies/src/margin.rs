@@ -7,16 +7,18 @@ use serde::Serialize;
 use crate::base::{BaseScenario, Criterion, JITTER_KEY, Runs, check_runs, jitter_note};
 use crate::batch::Batch;
 use crate::flight::FlightSummary;
-use crate::statistics::{CONFIDENCE, Proportion};
+use crate::statistics::{CONFIDENCE, Estimate, Proportion};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
 use tautline_core::text::{as_toml, counted, significant};
-use tautline_report::figures::{Share, margin as figure};
+use tautline_report::figures::{Separation, Share, margin as figure, separations};
 use tautline_report::report::page::{Badge, Tone};
 use tautline_report::request::{Failure, ScenarioRequest, in_range};
 use tautline_sim::preflight::{Bound, ContactState, PredictedMargin, Preflight};
 use tautline_sim::scenario::Scenario;
 
+/// Sentence below the heading of the figures.
+const ABOUT: &str = "The result of the flights over the values of the key, and how close vehicles came.";
 /// Admitted numbers of scanned values.
 const SCANS: RangeInclusive<usize> = 2..=1000;
 /// Admitted numbers of halvings.
@@ -359,9 +361,22 @@ impl Study for Margin {
             &self.predicted.iter().filter_map(|margin| Some((margin.value?, prediction(margin)))).collect::<Vec<_>>(),
             self.logarithmic,
         );
+        let lengths = self.probes.iter().filter_map(|probe| {
+            let median_m = Estimate::quantile(&probe.flights.iter().filter_map(|of| of.min_m).collect::<Vec<_>>(), 0.5);
+            let interval_m = median_m.low.zip(median_m.high).map(|(low, high)| [low, high]);
+            Some(Separation { value: probe.value, smallest_m: probe.min_m?, median_m: median_m.value?, interval_m })
+        });
+        let lengths: Vec<_> = lengths.collect();
+        let separation = (!lengths.is_empty())
+            .then(|| separations("separation", &self.key, &lengths, self.about.delta_m, self.logarithmic));
+        let figures = std::iter::once(chart).chain(separation).collect();
         vec![
-            Section::new("Where the verdict turns", [Block::Figures(vec![chart])]),
-            Section::new("Every value tried", [Block::Table(self.records())]),
+            Section::new("Where the verdict turns", ABOUT, [Block::Figures(figures)]),
+            Section::new(
+                "Every value tried",
+                "A row for each value of the key, over all its flights.",
+                [Block::Table(self.records())],
+            ),
         ]
     }
 

@@ -94,18 +94,30 @@ pub trait Study: Serialize {
     /// the last section, on performance.
     fn to_html(&self, page: &StudyPage) -> String {
         let mut whole = Page::new(self.kind(), self.title(), self.badge(), self.headline());
-        for Section { heading, blocks, .. } in self.sections() {
-            whole.add(&heading, blocks.into_iter().map(Block::html));
+        for Section { heading, about, blocks, .. } in self.sections() {
+            whole.add(&heading, &about, blocks.into_iter().map(Block::html));
         }
-        whole.add("Notes", [page::list(&self.notes())]);
-        for Section { heading, blocks, .. } in page.sections.clone() {
-            whole.add(&heading, blocks.into_iter().map(Block::html));
+        whole.add("Notes", "Limits of the numbers above.", [page::list(&self.notes())]);
+        for Section { heading, about, blocks, .. } in page.sections.clone() {
+            whole.add(&heading, &about, blocks.into_iter().map(Block::html));
         }
-        whole.add("Assumptions", [page::list(&self.assumptions())]);
-        whole.add("Command", page.commands.iter().map(|command| page::command(command)));
+        whole.add("Assumptions", "The numbers hold under these assumptions.", [page::list(&self.assumptions())]);
+        whole.add(
+            "Command",
+            "This command repeats the study with the same result.",
+            page.commands.iter().map(|command| page::command(command)),
+        );
         let repeat = |(what, command): &(String, String)| [page::list(&[what]), page::command(command)];
-        whole.add("Single flights", page.repeats.iter().flat_map(repeat));
-        whole.add("Performance", self.performance().iter().map(Table::html));
+        whole.add(
+            "Single flights",
+            "These commands fly single flights of the study, each with a report of its own.",
+            page.repeats.iter().flat_map(repeat),
+        );
+        whole.add(
+            "Performance",
+            "Times on the clock of the computer that flew; they do not affect the result.",
+            self.performance().iter().map(Table::html),
+        );
         whole.render()
     }
 }
@@ -122,6 +134,8 @@ fn tables(study: &(impl Study + ?Sized)) -> Vec<Table> {
 pub struct Section {
     /// The heading.
     pub heading: String,
+    /// Sentence on the content for the first reader of a page.
+    pub about: String,
     /// Tables, figures and other blocks.
     pub blocks: Vec<Block>,
     /// Whether only the page has the section.
@@ -142,14 +156,18 @@ pub enum Block {
 impl Section {
     /// Returns a section of an answer.
     #[must_use]
-    pub fn new(heading: impl Into<String>, blocks: impl IntoIterator<Item = Block>) -> Self {
-        Self { heading: heading.into(), blocks: blocks.into_iter().collect(), is_detail: false }
+    pub fn new(heading: impl Into<String>, about: impl Into<String>, blocks: impl IntoIterator<Item = Block>) -> Self {
+        Self { heading: heading.into(), about: about.into(), blocks: blocks.into_iter().collect(), is_detail: false }
     }
 
     /// Returns a section for the page alone.
     #[must_use]
-    pub fn detail(heading: impl Into<String>, blocks: impl IntoIterator<Item = Block>) -> Self {
-        Self { is_detail: true, ..Self::new(heading, blocks) }
+    pub fn detail(
+        heading: impl Into<String>,
+        about: impl Into<String>,
+        blocks: impl IntoIterator<Item = Block>,
+    ) -> Self {
+        Self { is_detail: true, ..Self::new(heading, about, blocks) }
     }
 }
 

@@ -345,7 +345,7 @@ impl Sweep {
                 let lengths: Vec<_> = points.iter().filter_map(|point| separation(point)).collect();
                 vec![
                     shares("share", &key.key, does, &series, false),
-                    separations("separation", &key.key, &lengths, self.about.delta_m),
+                    separations("separation", &key.key, &lengths, self.about.delta_m, false),
                 ]
             }
             [y, x] => {
@@ -431,8 +431,12 @@ impl Study for Sweep {
 
     fn sections(&self) -> Vec<Section> {
         let mut sections = vec![
-            Section::new("Over the grid", [Block::Figures(self.figures())]),
-            Section::new("Every point", [Block::Table(self.records())]),
+            Section::new("Over the grid", "The results over the values of the keys.", [Block::Figures(self.figures())]),
+            Section::new(
+                "Every point",
+                "A row for each combination of values, over all its flights.",
+                [Block::Table(self.records())],
+            ),
         ];
         let refused: Vec<_> = self.points.iter().filter(|point| point.refused > 0).collect();
         if !refused.is_empty() {
@@ -440,7 +444,11 @@ impl Study for Sweep {
                 .column("", "Point", Kind::Text, |point| sets(&self.keys, &point.values).join(", "))
                 .column("", "Why", Kind::Text, |point| point.first_refusal.clone())
                 .build();
-            sections.push(Section::new("Refused points", [Block::Table(table)]));
+            sections.push(Section::new(
+                "Refused points",
+                "These combinations of values are not a valid scenario.",
+                [Block::Table(table)],
+            ));
         }
         sections
     }

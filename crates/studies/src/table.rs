@@ -13,7 +13,7 @@ use parquet::schema::types::Type;
 
 use crate::statistics::{Estimate, Proportion};
 use tautline_core::text::{aligned, as_toml, at_least, at_most, fixed, metres, significant};
-use tautline_report::report::page::{self, Markup, Render as _, noted};
+use tautline_report::report::page::{self, Markup, Render as _, Tone, noted, tinted};
 
 /// Text for an unknown or inapplicable value.
 const UNKNOWN: &str = "-";
@@ -90,6 +90,15 @@ impl Column {
     #[must_use]
     pub fn new(name: &str, heading: &str, kind: Kind) -> Self {
         Self { name: name.to_owned(), heading: heading.to_owned(), kind }
+    }
+
+    /// Returns whether large shares of the column are good or bad.
+    fn tone(&self) -> Option<Tone> {
+        match &*self.name {
+            "clear" | "reached" | "pass" | "held" => Some(Tone::Good),
+            "violated" => Some(Tone::Bad),
+            _ => None,
+        }
     }
 
     /// Returns the heading without its unit, and the unit.
@@ -322,7 +331,11 @@ impl Table {
         let headings: Vec<_> = self.headings().iter().map(|column| column.heading.as_str()).collect();
         let cell = |(column, cell): (&Column, &Cell)| {
             let (value, interval) = column.shown(cell);
-            interval.map_or_else(|| value.render(), |interval| noted(&value, &interval))
+            let shown = interval.map_or_else(|| value.render(), |interval| noted(&value, &interval));
+            match (cell, column.tone()) {
+                (Cell::Share(share), Some(tone)) => tinted(&shown, tone, share.share.unwrap_or(0.0)),
+                _ => shown,
+            }
         };
         let rows = self.rows.iter().map(|row| self.shown(row).map(cell).collect::<Vec<_>>());
         if self.headings().iter().all(|column| column.kind == Kind::Text) {

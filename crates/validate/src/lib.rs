@@ -32,8 +32,9 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use claim::{ClaimsResult, MeasureError, Progress};
+use tautline_report::figures::Format;
 use tautline_report::report::write_atomically;
-use tautline_report::request::{Failure, Monitor, OutFolder, in_range, svg_files, threads, write_files};
+use tautline_report::request::{Failure, Monitor, OutFolder, figure_files, in_range, threads, write_files};
 
 /// Group of claims: name, subject, units of work, and measurement.
 type Part = (&'static str, &'static str, u64, fn(&Progress<'_>) -> ClaimsResult);
@@ -132,7 +133,7 @@ pub fn validate_into(request: &ValidateRequest, monitor: &dyn Monitor) -> Result
     let json = validation
         .to_json()
         .map_err(|error| Failure::machine("files/cannot-write", format!("cannot write the result: {error}")))?;
-    write_files(&folder.file("figures"), &[], &svg_files(&validation.figures))?;
+    write_files(&folder.file("figures"), &[], &figure_files(&validation.figures, &[Format::Svg]))?;
     write_atomically(&folder.file(PAGE), validation.to_html().as_bytes())?;
     write_atomically(&folder.report(), json.as_bytes())?;
     monitor.say(&format!("{}{}", validation.text(), validation.headline()));

@@ -117,7 +117,7 @@ fn of_flight(flown: &BuiltinFlight, names: [&str; 3], number: &str, flight: &str
     let [a, b, c] = names;
     let (log, certified_m) = (&flown.log, flown.flight.certificate.certified_m);
     [
-        named(a, figures::paths(log, &format!("{number}(a): {flight}, paths"))),
+        named(a, figures::paths(log, &[], &format!("{number}(a): {flight}, paths"))),
         named(b, figures::control(log, &format!("{number}(b): {flight}, control effort"))),
         named(c, figures::distances(log, flown.delta_m, certified_m, &format!("{number}(c): {flight}, distances"))),
     ]
@@ -126,6 +126,9 @@ fn of_flight(flown: &BuiltinFlight, names: [&str; 3], number: &str, flight: &str
 fn named(name: &str, figure: Figure) -> Figure {
     Figure { name: name.to_owned(), ..figure }
 }
+
+/// Sentence below the heading of the convergence.
+const ABOUT_CONVERGENCE: &str = "Half the step leaves a quarter of the position error, so the method has order 2.";
 
 /// Assumptions of the claims.
 const ASSUMED: [&str; 3] = [
@@ -145,16 +148,25 @@ impl Validation {
         let (of_convergence, of_paper): (Vec<_>, Vec<_>) =
             self.figures.iter().cloned().partition(|figure| figure.name == "convergence");
         sections.extend([
-            section("Convergence ladder", &[convergence(&self.convergence), page::figures(&of_convergence)]),
-            section("The paper's figures", &[page::figures(&of_paper)]),
-            section("Assumptions", &[page::list(&ASSUMED)]),
-            section("Command", &[page::command("tautline validate")]),
+            section(
+                "Convergence ladder",
+                ABOUT_CONVERGENCE,
+                &[convergence(&self.convergence), page::figures(&of_convergence)],
+            ),
+            section(
+                "The paper's figures",
+                "The figures of the source paper, flown and drawn again.",
+                &[page::figures(&of_paper)],
+            ),
+            section("Assumptions", "The measurements rest on these assumptions.", &[page::list(&ASSUMED)]),
+            section("Command", "This command measures everything again.", &[page::command("tautline validate")]),
         ]);
         Page {
             title: "Validation".to_owned(),
             kind: "Measurement of every claim of tautline and of its source paper",
             badge: Badge::judged(self.pass),
             verdict: self.headline(),
+            replay: None,
             reasons: failed.map(|claim| format!("{}: {}", claim.id, claim.measured)).collect(),
             warnings: Vec::new(),
             sections,
@@ -163,9 +175,26 @@ impl Validation {
     }
 }
 
+/// Returns a sentence on a group of claims for a first reader.
+fn about(id: &str) -> &'static str {
+    match id {
+        "tension" => "Each link of the law pulls or pushes by a tension that is unbounded at the safety distance.",
+        "law" => "The command of each vehicle at single instants, against its formula.",
+        "certificate" => "The energy of the law bounds how close any two vehicles can come.",
+        "figures" => "Flights of the paper's figures, with their numbers.",
+        "equilibria" => "Places where the law comes to rest without reaching its formation.",
+        "rates" => "How fast small errors decay near the formation.",
+        "displacement" => "The law that keeps displacements instead of distances.",
+        "margins" => "How much delay, and how slow a controller, the law tolerates.",
+        "engine" => "The simulated motion against the equations of motion in continuous time.",
+        "detectors" => "The judge of the audit against the engine's own contacts.",
+        _ => "",
+    }
+}
+
 fn claims(group: &Group) -> Markup {
     let columns = ["Claim", "Measured", "Outcome"];
-    section(group.title, &[page::words(&caption(group), &columns, group.claims.iter().map(row))])
+    section(group.title, about(group.id), &[page::words(&caption(group), &columns, group.claims.iter().map(row))])
 }
 
 fn caption(group: &Group) -> String {
@@ -177,6 +206,28 @@ fn caption(group: &Group) -> String {
     }
 }
 
+/// Suffixes of names of numbers, with their units.
+const UNITS: [(&str, &str); 7] = [
+    ("_m2_s2", "m²/s²"),
+    ("_m_s2", "m/s²"),
+    ("_m_s", "m/s"),
+    ("_per_s", "1/s"),
+    ("_hz", "Hz"),
+    ("_m", "m"),
+    ("_s", "s"),
+];
+
+/// Replaces each name with its number in a list, such as `min_at_s 2.15`, by words and a unit: `min at 2.15 s`.
+fn readable(list: &str) -> String {
+    let entry = |entry: &str| {
+        let (name, number) = entry.split_once(' ').filter(|(_, number)| number.parse::<f64>().is_ok())?;
+        let (name, unit) = UNITS.iter().find_map(|(suffix, unit)| Some((name.strip_suffix(suffix)?, unit)))?;
+        let words = name.replace("min", "smallest separation").replace("_10_s", "_10 s").replace('_', " ");
+        Some(format!("{words} {number} {unit}"))
+    };
+    list.split(", ").map(|of| entry(of).unwrap_or_else(|| of.to_owned())).collect::<Vec<_>>().join(", ")
+}
+
 fn row(claim: &Claim) -> [Markup; 3] {
     let tone = match (claim.pass, claim.kind) {
         (false, _) => Tone::Bad,
@@ -185,10 +236,11 @@ fn row(claim: &Claim) -> [Markup; 3] {
     };
     let Claim { id, source, expected, tolerance, reason, .. } = claim;
     let finding = claim.finding.map(|finding| format!("{finding}; ")).unwrap_or_default();
+    let expected = readable(expected);
     let judged = format!("Expected: {expected}. Tolerance: {tolerance} ({reason}).");
     [
         noted(claim.statement, &format!("{finding}{id}; {source}")),
-        noted(&claim.measured, &judged),
+        noted(&readable(&claim.measured), &judged),
         Badge { tone, word: claim.outcome().to_owned() }.render(),
     ]
 }
@@ -221,6 +273,15 @@ mod tests {
     fn validation(claims: Vec<Claim>) -> Validation {
         let groups = vec![Group { id: "still", title: "Stillness", claims }];
         Validation::new(groups, Vec::new(), Vec::new(), 1.0)
+    }
+
+    #[test]
+    fn names_of_numbers_become_words_with_units() {
+        let list =
+            "energy_initial_m2_s2 3.5, min_m 2.46, min_at_s 2.1, vehicle_1_x_at_10_s_m -1.0, off by 2 m, law_m x";
+        let words = "energy initial 3.5 m²/s², smallest separation 2.46 m, smallest separation at 2.1 s, \
+                     vehicle 1 x at 10 s -1.0 m, off by 2 m, law_m x";
+        assert_eq!(readable(list), words);
     }
 
     #[test]

@@ -4,6 +4,8 @@ use super::Figure;
 use super::axis::Axis;
 use super::svg::{Align, Canvas, Colour, GRID, Marker, Point, SOFT_INK, Stroke, TEXT, text_px, thinned};
 
+/// Largest number of entries of a legend.
+pub(super) const LEGEND: usize = 6;
 /// Width of a figure \[px\].
 pub(super) const WIDTH: f64 = 460.0;
 /// Space for the title \[px\].
@@ -21,6 +23,9 @@ const HEIGHT: f64 = 240.0;
 const LEAST_HEIGHT: f64 = 130.0;
 const MOST_HEIGHT: f64 = 380.0;
 const HAIRLINE: f64 = 0.8;
+/// Height of a second plot, and its distance from the first \[px\].
+const PANEL: f64 = 110.0;
+const PANEL_GAP: f64 = 14.0;
 /// Side of an inset, and its distance from the edges of the plotting area \[px\].
 const INSET: f64 = 130.0;
 const INSET_GAP: f64 = 6.0;
@@ -42,6 +47,15 @@ pub(super) struct Line {
 #[derive(Clone, Debug)]
 pub(super) struct Band {
     pub(super) points: Vec<(f64, f64, f64)>,
+    pub(super) colour: Colour,
+    pub(super) opacity: f64,
+    pub(super) label: Option<String>,
+}
+
+/// A filled polygon in the units of the axes, within the chart.
+#[derive(Clone, Debug)]
+pub(super) struct Shape {
+    pub(super) corners: Vec<(f64, f64)>,
     pub(super) colour: Colour,
     pub(super) opacity: f64,
     pub(super) label: Option<String>,
@@ -76,13 +90,22 @@ pub(super) struct Chart {
     pub(super) x: Axis,
     pub(super) y: Axis,
     /// Whether units have the same length on both axes.
-    pub(super) equal: bool,
+    equal: bool,
+    pub(super) shapes: Vec<Shape>,
     pub(super) bands: Vec<Band>,
     pub(super) lines: Vec<Line>,
     pub(super) marks: Vec<Mark>,
     pub(super) inset: Option<Inset>,
+    pub(super) panel: Option<Panel>,
     /// Left end of the plotting area \[px\].
     left: f64,
+}
+
+/// A second plot below a chart over the same abscissae: the lines around a limit, less the limit.
+#[derive(Clone, Debug)]
+pub(super) struct Panel {
+    pub(super) y: Axis,
+    pub(super) limit: f64,
 }
 
 /// A square part of a chart with equal axes, drawn enlarged in a corner.
@@ -102,7 +125,14 @@ enum Paint {
 
 impl Chart {
     pub(super) fn new(x: Axis, y: Axis) -> Self {
-        Self { x, y, equal: false, bands: Vec::new(), lines: Vec::new(), marks: Vec::new(), inset: None, left: LEFT }
+        let (bands, lines, marks) = (Vec::new(), Vec::new(), Vec::new());
+        Self { x, y, equal: false, shapes: Vec::new(), bands, lines, marks, inset: None, panel: None, left: LEFT }
+    }
+
+    /// Gives units the same length on both axes, which widens one of them.
+    pub(super) fn make_equal(&mut self) {
+        self.equal = true;
+        self.make_axes_equal();
     }
 
     /// Adds a line with an entry in the legend.
@@ -130,17 +160,24 @@ impl Chart {
     pub(super) fn figure(mut self, name: &str, title: &str, description: &str) -> Figure {
         let mut height = if self.equal { self.make_axes_equal() } else { HEIGHT };
         // Wide numbers move the plotting area to the right, away from the label of their axis.
-        self.left = LEFT.max(LABEL + TEXT / 2.0 + 2.0 * BESIDE_TICK + TICK + self.y.labels_px());
+        let numbers_px =
+            self.panel.iter().map(|panel| &panel.y).chain([&self.y]).map(Axis::labels_px).fold(0.0, f64::max);
+        self.left = LEFT.max(LABEL + TEXT / 2.0 + 2.0 * BESIDE_TICK + TICK + numbers_px);
         if self.equal && self.left > LEFT {
             height = self.make_axes_equal();
         }
         let (left, bottom) = (self.left, TITLE + height);
         let legend = self.legend();
-        let mut canvas =
-            Canvas::new((WIDTH, bottom + BELOW + legend_height(&legend)), title, f64::midpoint(left, RIGHT));
+        let end = if self.panel.is_some() { bottom + PANEL_GAP + PANEL } else { bottom };
+        let mut canvas = Canvas::new((WIDTH, end + BELOW + legend_height(&legend)), title, f64::midpoint(left, RIGHT));
         let on_paper = |(x, y)| (left + (RIGHT - left) * self.x.share(x), bottom - height * self.y.share(y));
-        self.draw_axes(&mut canvas, on_paper);
+        draw_frame(&mut canvas, [&self.x, &self.y], on_paper);
+        self.draw_abscissae(&mut canvas, end);
 
+        for Shape { corners, colour, opacity, .. } in &self.shapes {
+            let corners: Vec<_> = corners.iter().filter_map(|&at| self.place(at)).map(on_paper).collect();
+            canvas.area(&corners, *colour, *opacity);
+        }
         let bands = self.bands.iter().map(|band| (Paint::Area(band.colour, band.opacity), self.outline(band)));
         let lines = self.lines.iter().flat_map(|line| {
             self.stretches(&line.points).into_iter().map(|stretch| (Paint::Line(line.stroke), stretch))
@@ -164,7 +201,10 @@ impl Chart {
         {
             self.draw_inset(&mut canvas, inset, on_paper(inset.middle), bottom);
         }
-        draw_legend(&mut canvas, &legend, bottom + BELOW);
+        if let Some(panel) = &self.panel {
+            canvas.group("panel", |canvas| self.draw_panel(canvas, panel, end));
+        }
+        draw_legend(&mut canvas, &legend, end + BELOW);
         canvas.figure(name, description)
     }
 
@@ -220,38 +260,39 @@ impl Chart {
         height
     }
 
-    /// Draws grid, axes, ticks and labels.
-    fn draw_axes(&self, canvas: &mut Canvas, on_paper: impl Fn(Point) -> Point) {
-        let [Axis { from: left, to: right, .. }, Axis { from: low, to: high, .. }] = [&self.x, &self.y];
-        let (grid, frame) = (Stroke::solid(GRID, HAIRLINE), Stroke::solid(SOFT_INK, HAIRLINE));
-        let mut ticks = Vec::new();
-        let apart_px = (RIGHT - self.left) / self.x.ticks.len().max(1) as f64;
+    /// Draws the numbers and the label of the horizontal axis below `bottom` \[px\].
+    fn draw_abscissae(&self, canvas: &mut Canvas, bottom: f64) {
+        let x = &self.x;
+        let apart_px = (RIGHT - self.left) / x.ticks.len().max(1) as f64;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a few")]
-        let every = ((self.x.labels_px() + 2.0 * BESIDE_TICK) / apart_px).ceil().max(1.0) as usize;
-        for (k, &tick) in self.x.ticks.iter().enumerate() {
-            let (at, top) = (on_paper((tick, *low)), on_paper((tick, *high)));
-            canvas.line(&[at, top], grid);
-            ticks.push([at, (at.0, at.1 + TICK)]);
-            if k.is_multiple_of(every) {
-                let label = self.x.tick_label(tick);
-                let x = at.0.min(WIDTH - 0.5 * text_px(&label));
-                canvas.text((x, at.1 + TICK + BESIDE_TICK), Align::CENTRE_ABOVE, &label);
+        let every = ((x.labels_px() + 2.0 * BESIDE_TICK) / apart_px).ceil().max(1.0) as usize;
+        for &tick in x.ticks.iter().step_by(every) {
+            let label = x.tick_label(tick);
+            let at = (self.left + (RIGHT - self.left) * x.share(tick)).min(WIDTH - 0.5 * text_px(&label));
+            canvas.text((at, bottom + TICK + BESIDE_TICK), Align::CENTRE_ABOVE, &label);
+        }
+        canvas.text((f64::midpoint(self.left, RIGHT), bottom + BELOW - 6.0), Align::CENTRE_BELOW, &x.label);
+    }
+
+    /// Draws the second plot, which ends at `bottom` \[px\].
+    fn draw_panel(&self, canvas: &mut Canvas, Panel { y, limit }: &Panel, bottom: f64) {
+        let on_paper =
+            |(x, height)| (self.left + (RIGHT - self.left) * self.x.share(x), bottom - PANEL * y.share(height));
+        draw_frame(canvas, [&self.x, y], on_paper);
+        let stretches = self.lines.iter().flat_map(|line| {
+            let points = line.points.iter().map(|&(x, height)| (x, height - limit)).collect::<Vec<_>>();
+            let within = within(&points, [y.from, y.to]).into_iter();
+            within.map(|stretch| (line.stroke, stretch.into_iter().map(on_paper).collect()))
+        });
+        for (stroke, points) in thinned(stretches.collect()) {
+            canvas.line(&points, stroke);
+        }
+        for mark in &self.marks {
+            let height = mark.at.1 - limit;
+            if (y.from..=y.to).contains(&height) {
+                canvas.marker(mark.marker, on_paper((mark.at.0, height)), mark.radius, mark.colour);
             }
         }
-        for &tick in &self.y.ticks {
-            let (at, end) = (on_paper((*left, tick)), on_paper((*right, tick)));
-            canvas.line(&[at, end], grid);
-            ticks.push([at, (at.0 - TICK, at.1)]);
-            canvas.text((at.0 - TICK - BESIDE_TICK, at.1), Align::RIGHT, &self.y.tick_label(tick));
-        }
-        let corner = on_paper((*left, *low));
-        let (top, end) = (on_paper((*left, *high)), on_paper((*right, *low)));
-        canvas.line(&[top, corner, end], frame);
-        for tick in ticks {
-            canvas.line(&tick, frame);
-        }
-        canvas.text((f64::midpoint(corner.0, end.0), corner.1 + BELOW - 6.0), Align::CENTRE_BELOW, &self.x.label);
-        canvas.text_upwards((LABEL, f64::midpoint(corner.1, top.1)), &self.y.label);
     }
 
     fn place(&self, (x, y): (f64, f64)) -> Option<(f64, f64)> {
@@ -274,10 +315,11 @@ impl Chart {
 
     /// Returns the entries of the legend, in rows of the width of a figure.
     fn legend(&self) -> Vec<Vec<Entry<'_>>> {
-        let bands = self.bands.iter().map(|band| (&band.label, Sample::Band(band)));
+        let shapes = self.shapes.iter().map(|of| (&of.label, Sample::Area(of.colour, of.opacity)));
+        let bands = self.bands.iter().map(|band| (&band.label, Sample::Area(band.colour, band.opacity)));
         let lines = self.lines.iter().map(|line| (&line.label, Sample::Line(line.stroke)));
         let marks = self.marks.iter().map(|mark| (&mark.label, Sample::Mark(mark)));
-        let labelled = bands.chain(lines).chain(marks);
+        let labelled = shapes.chain(bands).chain(lines).chain(marks);
         let entries = labelled.filter_map(|(words, sample)| Some(Entry { words: words.as_deref()?, sample }));
         let mut rows: Vec<Vec<_>> = Vec::new();
         let mut used = f64::INFINITY;
@@ -296,6 +338,50 @@ impl Chart {
     }
 }
 
+/// Draws grid, axes, ticks, and the numbers and the label of the vertical axis.
+fn draw_frame(canvas: &mut Canvas, [x, y]: [&Axis; 2], on_paper: impl Fn(Point) -> Point) {
+    let (grid, frame) = (Stroke::solid(GRID, HAIRLINE), Stroke::solid(SOFT_INK, HAIRLINE));
+    let mut ticks = Vec::new();
+    for &tick in &x.ticks {
+        let (at, top) = (on_paper((tick, y.from)), on_paper((tick, y.to)));
+        canvas.line(&[at, top], grid);
+        ticks.push([at, (at.0, at.1 + TICK)]);
+    }
+    for &tick in &y.ticks {
+        let (at, end) = (on_paper((x.from, tick)), on_paper((x.to, tick)));
+        canvas.line(&[at, end], grid);
+        ticks.push([at, (at.0 - TICK, at.1)]);
+        canvas.text((at.0 - TICK - BESIDE_TICK, at.1), Align::RIGHT, &y.tick_label(tick));
+    }
+    let corner = on_paper((x.from, y.from));
+    let (top, end) = (on_paper((x.from, y.to)), on_paper((x.to, y.from)));
+    canvas.line(&[top, corner, end], frame);
+    for tick in ticks {
+        canvas.line(&tick, frame);
+    }
+    canvas.text_upwards((LABEL, f64::midpoint(corner.1, top.1)), &y.label);
+}
+
+/// Returns the parts of a line whose ordinates are between two numbers.
+fn within(points: &[(f64, f64)], [low, high]: [f64; 2]) -> Vec<Vec<(f64, f64)>> {
+    let mut parts: Vec<Vec<(f64, f64)>> = Vec::new();
+    for two in points.windows(2) {
+        let [(x, y), (to_x, to_y)] = [two[0], two[1]];
+        let shares = [low, high].map(|end| (end - y) / (to_y - y));
+        let (from, to) =
+            if y == to_y { (0.0, 1.0) } else { (shares[0].min(shares[1]).max(0.0), shares[0].max(shares[1]).min(1.0)) };
+        if !(x + y + to_x + to_y).is_finite() || from > to || (y == to_y && !(low..=high).contains(&y)) {
+            continue;
+        }
+        let at = |share: f64| (x + share * (to_x - x), (y + share * (to_y - y)).clamp(low, high));
+        match parts.last_mut().filter(|part| from == 0.0 && part.last() == Some(&at(0.0))) {
+            Some(part) => part.push(at(to)),
+            None => parts.push(vec![at(from), at(to)]),
+        }
+    }
+    parts
+}
+
 /// Entry of the legend.
 struct Entry<'a> {
     words: &'a str,
@@ -303,7 +389,7 @@ struct Entry<'a> {
 }
 
 enum Sample<'a> {
-    Band(&'a Band),
+    Area(Colour, f64),
     Line(Stroke),
     Mark(&'a Mark),
 }
@@ -336,7 +422,7 @@ fn draw_legend(canvas: &mut Canvas, rows: &[Vec<Entry<'_>>], top: f64) {
             let end = x + SAMPLE;
             match entry.sample {
                 Sample::Line(stroke) => canvas.line(&[(x, y), (end, y)], stroke),
-                Sample::Band(&Band { colour, opacity, .. }) => {
+                Sample::Area(colour, opacity) => {
                     let (top, bottom) = (y - 5.0, y + 5.0);
                     canvas.area(&[(x, top), (end, top), (end, bottom), (x, bottom)], colour, opacity);
                 }
@@ -345,5 +431,20 @@ fn draw_legend(canvas: &mut Canvas, rows: &[Vec<Entry<'_>>], top: f64) {
             canvas.text((end + SPACE, y), Align::LEFT, entry.words);
             x += entry.width() + BETWEEN;
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lines_are_cut_where_they_leave_a_range() {
+        let line =
+            [(0.0, 3.0), (1.0, 1.0), (2.0, 0.5), (3.0, 4.5), (4.0, 5.0), (5.0, f64::NAN), (6.0, 1.0), (7.0, 1.0)];
+        let expected = vec![vec![(0.5, 2.0), (1.0, 1.0), (2.0, 0.5), (2.375, 2.0)], vec![(6.0, 1.0), (7.0, 1.0)]];
+        assert_eq!(within(&line, [0.0, 2.0]), expected);
+        assert_eq!(within(&[(0.0, 5.0), (1.0, 5.0)], [0.0, 2.0]), Vec::<Vec<_>>::new());
+        assert_eq!(within(&[(0.0, -5.0), (1.0, 5.0)], [0.0, 5.0]), [[(0.5, 0.0), (1.0, 5.0)]]);
     }
 }

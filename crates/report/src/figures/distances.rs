@@ -2,7 +2,7 @@
 
 use super::Figure;
 use super::axis::{Axis, Scale};
-use super::chart::{Band, Chart, Line, Mark};
+use super::chart::{Band, Chart, LEGEND, Line, Mark, Panel};
 use super::spans::{Span, Spans};
 use super::svg::{INK, PALETTE, SOFT_INK, Stroke};
 use crate::flight_log::{FEW_VEHICLES, FlightLog, nearest_present, pairs};
@@ -17,11 +17,10 @@ const RANKED_INSTANTS: usize = 400;
 const CLOSEST_PAIRS: usize = 5;
 /// Palette index of the colour of collisions.
 const HIT: usize = 1;
-/// Largest number of pairs with distinct colours.
-const TOLD_APART: usize = 15;
 
-/// Draws distances of pairs \[m\] over time \[s\], with the safety distance delta and the certified one. Up to 12
-/// vehicles, every pair has a line. For more vehicles the figure shows the smallest distance, bands of quantiles, and
+/// Draws distances of pairs \[m\] over time \[s\], with the safety distance delta and the certified one, and below the
+/// clearance: the distances less delta, near delta. Up to 12 vehicles, every pair has a line; the closest ones have
+/// colours. For more vehicles the figure shows the smallest distance, bands of quantiles, and
 /// the five closest pairs. Quantiles are those of at most 20 000 pairs, spread evenly over all.
 ///
 /// The closest approach includes the time between samples.
@@ -30,7 +29,9 @@ pub fn distances(log: &FlightLog, delta_m: f64, certified_m: Option<f64>, title:
     let (spans, closest) = (Spans::of(log), log.closest());
     let mut chart = Chart::new(spans.time_axis(), Axis::distances("m", &[], delta_m));
     let note = if spans.vehicles() <= FEW_VEHICLES {
-        chart.lines = of_all_pairs(&spans);
+        let others =
+            1 + usize::from(certified_m.is_some()) + usize::from(closest.is_some()) + usize::from(log.hits().1 > 0);
+        chart.lines = of_all_pairs(&spans, LEGEND.saturating_sub(others));
         String::new()
     } else {
         of_many_pairs(&spans, &mut chart)
@@ -40,6 +41,7 @@ pub fn distances(log: &FlightLog, delta_m: f64, certified_m: Option<f64>, title:
     let marked = closest.map(|closest| closest.separation_m);
     let numbers: Vec<f64> = drawn.chain(bands).chain(marked).chain([delta_m]).chain(certified_m).collect();
     chart.y = Axis::distances("m", &numbers, delta_m);
+    chart.panel = panel(&chart.y, closest.map_or(f64::NAN, |closest| closest.separation_m), delta_m);
     chart.level(delta_m, Stroke::solid(INK, 2.0), format!("safety distance δ = {delta_m} m"));
     if let Some(certified_m) = certified_m {
         chart.level(
@@ -81,18 +83,39 @@ fn pair_label(pair: Pair) -> String {
     format!("{first}-{second}")
 }
 
-fn of_all_pairs(spans: &Spans<'_>) -> Vec<Line> {
-    let count = pairs(spans.vehicles()).count();
-    let lines = pairs(spans.vehicles()).enumerate().map(|(k, (i, j))| {
-        let points = spans.iter().map(|span| (span.time_s, span.extremes.pair_min_m[k])).collect();
-        let (stroke, label) = if count <= TOLD_APART {
-            (Stroke::of_line(k), Some(pair_label(Pair::new(i, j))))
-        } else {
-            (Stroke::solid(PALETTE[0], 0.9).faint(0.55), (k == 0).then(|| format!("all {count} pairs")))
-        };
-        Line { points, stroke, label }
-    });
-    lines.collect()
+/// Returns the plot of the clearance \[m\], unless the chart shows it as well.
+fn panel(y: &Axis, least_m: f64, delta_m: f64) -> Option<Panel> {
+    /// Smallest enlargement.
+    const LEAST: f64 = 2.5;
+    let clearance_m = least_m - delta_m;
+    let top_m = if clearance_m > 0.0 { 2.0 * clearance_m } else { -clearance_m };
+    let top_m = top_m.max(0.25 * delta_m);
+    let near = Axis::linear("clearance [m]", [clearance_m.min(0.0), top_m], true);
+    let is_enlarged = y.scale == Scale::Log || (near.to - near.from) * LEAST < y.to - y.from;
+    (delta_m > 0.0 && clearance_m.is_finite() && is_enlarged).then_some(Panel { y: near, limit: delta_m })
+}
+
+/// Returns a line for each pair. At most `most` entries of the legend are used: the closest pairs have colours, and the
+/// others are grey.
+fn of_all_pairs(spans: &Spans<'_>, most: usize) -> Vec<Line> {
+    let all: Vec<_> = pairs(spans.vehicles()).collect();
+    let least_m = |k: usize| spans.iter().map(|span| span.extremes.pair_min_m[k]).fold(f64::INFINITY, f64::min);
+    let mut order: Vec<_> = (0..all.len()).map(|k| (least_m(k), k)).collect();
+    order.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let coloured = if all.len() <= most { all.len() } else { most.saturating_sub(1) };
+    let points = |k: usize| spans.iter().map(|span| (span.time_s, span.extremes.pair_min_m[k])).collect();
+    let (near, others) = order.split_at(coloured);
+    let grey = |points, label| Line { points, stroke: Stroke::of_others(), label };
+    let mut lines: Vec<_> = others.iter().map(|&(_, k)| grey(points(k), None)).collect();
+    // The closest pair is drawn last, above the others.
+    lines.extend(near.iter().enumerate().rev().map(|(rank, &(_, k))| {
+        let (i, j) = all[k];
+        Line { points: points(k), stroke: Stroke::of_line(rank), label: Some(pair_label(Pair::new(i, j))) }
+    }));
+    if !others.is_empty() {
+        lines.push(grey(Vec::new(), Some(format!("{} other pairs", others.len()))));
+    }
+    lines
 }
 
 /// Draws the pairs of a large swarm. Returns a sentence, after a blank, on the pairs that are drawn.

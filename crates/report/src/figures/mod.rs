@@ -2,9 +2,10 @@
 //!
 //! | function | shows |
 //! | --- | --- |
-//! | [`paths`] | paths from above: start x, end o, equal units on both axes |
+//! | [`paths`] | paths from above: start x, end o, obstacles, equal units on both axes |
+//! | [`at_closest`] | paths from above with the vehicles at the closest approach |
 //! | [`paths_in_space`] | paths in space, if the run is not level |
-//! | [`distances`] | distances of pairs, with the safety distance and the certified one |
+//! | [`distances`] | distances of pairs, with the safety distance and the certified one, and the clearance |
 //! | [`control`] | control effort of each vehicle |
 //! | [`channels`] | tilt, rotor thrust, wind and age of messages of each vehicle |
 //! | [`energy`] | the law's energy and its start E(0), its bound on a complete graph |
@@ -17,6 +18,7 @@
 //! | [`convergence`] | an integrator's error over its step |
 //! | [`attack`] | the smallest separation found so far over the flights of a search |
 //! | [`margin`] | the share of flights with a property over the values of a key |
+//! | [`by_law`] | a number of each law with its interval |
 //! | [`shares`] | such shares of several laws |
 //! | [`separations`] | the smallest separation of flights over the values of a key |
 //! | [`heat_map`](heat_map()) | a number over a grid of two keys |
@@ -27,14 +29,17 @@
 //! figure is bounded for any swarm and duration: for many vehicles it shows quantiles and extremes, and its description
 //! states that.
 //!
-//! Charts use their own fonts and styles only. The panel is white, or dark if the reader prefers dark pages.
-//! Colour-blind readers can distinguish the colours.
+//! A file has a white panel. A page replaces the colours by those of its theme (`page_rules`). Colour-blind
+//! readers can distinguish the colours.
 
 mod axis;
 mod chart;
 mod distances;
 mod heat_map;
+mod laws;
+mod outlines;
 mod over_time;
+mod paper;
 mod paths;
 mod recorded;
 mod spans;
@@ -44,13 +49,17 @@ mod validation;
 
 pub use distances::distances;
 pub use heat_map::{GridAxis, heat_map};
+pub use laws::{OfLaw, by_law};
 pub use over_time::{channels, control, disagreement, energy, shape_error};
-pub use paths::{paths, paths_in_space};
+pub use paper::Format;
+pub use paths::{at_closest, paths, paths_in_space};
 pub use recorded::{Encounter, closest_approach, encounters, smallest};
 pub use studies::{Histogram, Separation, Share, attack, histograms, margin, separations, shares};
 pub use validation::{Step, convergence, tension_curve};
 
 use spans::Spans;
+pub(crate) use svg::page_rules;
+use tautline_audit::Obstacle;
 use tautline_laws::graph::Graph;
 use tautline_laws::target::Leg;
 
@@ -84,13 +93,15 @@ pub struct Criteria<'a> {
     pub disagreement_m_s: Option<f64>,
     /// Largest thrust of a rotor \[N\].
     pub most_thrust_n: Option<f64>,
+    /// Obstacles.
+    pub obstacles: &'a [Obstacle],
 }
 
 /// Draws all figures that a run has data for, in reading order.
 #[must_use]
 pub fn of_run(log: &FlightLog, criteria: &Criteria<'_>) -> Vec<Figure> {
     let spans = Spans::of(log);
-    let mut figures = vec![paths(log, "Paths from above")];
+    let mut figures = vec![paths(log, criteria.obstacles, "Paths from above")];
     if !spans.is_level() {
         figures.push(paths_in_space(log, "Paths in space"));
     }
@@ -109,6 +120,12 @@ pub fn of_run(log: &FlightLog, criteria: &Criteria<'_>) -> Vec<Figure> {
     }
     figures.push(disagreement(log, criteria.disagreement_m_s, "Velocity disagreement"));
     figures
+}
+
+/// Returns round times from one time to another \[s\] with their labels, for the axis of a chart.
+pub(crate) fn time_ticks(from_s: f64, to_s: f64) -> Vec<(f64, String)> {
+    let axis = axis::Axis::time(from_s, to_s);
+    axis.ticks.iter().map(|&tick| (tick, axis.tick_label(tick))).collect()
 }
 
 /// Names of all figures that [`of_run`] can draw.

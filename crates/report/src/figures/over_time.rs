@@ -2,7 +2,7 @@
 
 use super::Figure;
 use super::axis::Axis;
-use super::chart::{Band, Chart, Mark};
+use super::chart::{Band, Chart, LEGEND, Line, Mark};
 use super::distances::quantile;
 use super::spans::{Span, Spans};
 use super::svg::{INK, PALETTE, Stroke};
@@ -16,16 +16,37 @@ const DISTANCES: usize = 16_000_000;
 /// Smallest number of instants on its curve.
 const FEWEST_INSTANTS: usize = 48;
 
+/// Share of the flight whose peak may hide the rest, and the smallest ratio of the peaks at which it does.
+const BEGINNING: f64 = 0.05;
+const SPIKE: f64 = 5.0;
+/// Smallest effort on a logarithmic axis, relative to the largest after the beginning.
+const DECADES: f64 = 1e-3;
+
+/// Returns the largest control effort after the beginning of a flight \[m/s^2\], if it is not zero.
+fn later_peak(spans: &Spans<'_>) -> Option<f64> {
+    let [from_s, to_s] = spans.log.range_s();
+    let later = spans.iter().filter(|span| span.time_s > from_s + BEGINNING * (to_s - from_s));
+    let efforts = later.flat_map(|span| &span.extremes.control_m_s2).copied().filter(|x| x.is_finite());
+    Some(efforts.fold(0.0, f64::max)).filter(|&later| later > 0.0)
+}
+
 /// Draws the control effort |u| \[m/s^2\] over time \[s\]. Up to 12 vehicles have a line each. For more vehicles the
 /// figure shows the largest effort, the median, and the band from 5 to 95 %. The peak over all steps has a mark if the
-/// samples miss it.
+/// samples miss it. The axis is logarithmic if the peak of the start would hide the rest.
 #[must_use]
 pub fn control(log: &FlightLog, title: &str) -> Figure {
     let spans = Spans::of(log);
     let count = spans.vehicles();
     let sampled = || spans.iter().flat_map(|span| &span.extremes.control_m_s2).copied().filter(|x| x.is_finite());
     let peak = log.peak_control();
-    let y = Axis::linear("control effort |u| [m/s²]", sampled().chain(peak.map(|[peak, _]| peak)).chain([0.0]), true);
+    let numbers = || sampled().chain(peak.map(|[peak, _]| peak));
+    let y = match later_peak(&spans).filter(|&later| numbers().fold(0.0, f64::max) > SPIKE * later) {
+        Some(later) => {
+            let shown = numbers().map(|effort| effort.max(DECADES * later));
+            Axis::log("control effort |u| [m/s²], logarithmic", shown)
+        }
+        None => Axis::linear("control effort |u| [m/s²]", numbers().chain([0.0]), true),
+    };
     let mut chart = Chart::new(spans.time_axis(), y);
     of_each(&mut chart, &spans, |span| &span.extremes.control_m_s2);
     if let Some([peak, time_s]) = peak.filter(|[peak, _]| *peak > sampled().fold(0.0, f64::max)) {
@@ -73,10 +94,27 @@ fn channel(spans: &Spans<'_>, k: usize, most_thrust_n: Option<f64>) -> Figure {
 fn of_each(chart: &mut Chart, spans: &Spans<'_>, numbers: impl for<'b> Fn(&'b Span<'_>) -> &'b [f64]) {
     let count = spans.vehicles();
     if count <= FEW_VEHICLES {
-        for i in 0..count {
+        let points = |i: usize| -> Vec<(f64, f64)> {
             let number = |span| numbers(span).get(i).copied().unwrap_or(f64::NAN);
-            let points = spans.iter().map(|span| (span.time_s, number(span))).collect();
-            chart.line(points, Stroke::of_line(i), format!("vehicle {}", i + 1));
+            spans.iter().map(|span| (span.time_s, number(span))).collect()
+        };
+        // Colours are those of the vehicles with the largest numbers.
+        let mut order: Vec<_> = (0..count).collect();
+        if count > LEGEND {
+            let peak = |i: usize| points(i).iter().map(|point| point.1).fold(f64::NEG_INFINITY, f64::max);
+            let peaks: Vec<_> = (0..count).map(peak).collect();
+            order.sort_by(|&a, &b| peaks[b].total_cmp(&peaks[a]));
+        }
+        let (coloured, others) = order.split_at(if count > LEGEND { LEGEND - 1 } else { count });
+        let grey = |points, label| Line { points, stroke: Stroke::of_others(), label };
+        chart.lines.extend(others.iter().map(|&i| grey(points(i), None)));
+        let mut coloured = coloured.to_vec();
+        coloured.sort_unstable();
+        for i in coloured {
+            chart.line(points(i), Stroke::of_line(i), format!("vehicle {}", i + 1));
+        }
+        if !others.is_empty() {
+            chart.lines.push(grey(Vec::new(), Some(format!("{} other vehicles", others.len()))));
         }
     } else {
         let ranks = spans.iter().map(|span| {
@@ -164,6 +202,7 @@ fn decay(
     if let Some(allowed) = allowed {
         chart.level(allowed, Stroke::dashed(INK, 1.3), format!("counts as reached: {allowed} {unit}"));
     }
-    let description = format!("The {what} over time on a logarithmic axis; {at_end:.2e} {unit} at the end.");
+    let at_end = if at_end == 0.0 { "0".to_owned() } else { format!("{at_end:.2e}") };
+    let description = format!("The {what} over time on a logarithmic axis; {at_end} {unit} at the end.");
     chart.figure(name, title, &description)
 }

@@ -4,11 +4,13 @@ use nalgebra::Vector3;
 
 use super::Figure;
 use super::axis::Axis;
-use super::chart::{Chart, Line, Mark, TITLE, WIDTH};
+use super::chart::{Chart, Line, Mark, Shape, TITLE, WIDTH};
 use super::distances::evenly;
+use super::outlines::{Window, outline};
 use super::spans::Spans;
-use super::svg::{Align, Canvas, Colour, GRID, Marker, PALETTE, Point, SOFT_INK, Stroke, thinned};
+use super::svg::{Align, Canvas, Colour, GRID, INK, Marker, OBSTACLE, PALETTE, Point, SOFT_INK, Stroke, thinned};
 use crate::flight_log::{FEW_VEHICLES, FlightLog};
+use tautline_audit::Obstacle;
 use tautline_core::swarm::row;
 
 /// Free share of the extent on each side.
@@ -18,20 +20,14 @@ const MOST_PATHS: usize = 300;
 
 /// Draws the paths from above: x and y \[m\] in equal units, a cross at each start and a ring at each end. Up to 12
 /// vehicles have colours and numbers. Of more than 300 vehicles, 300 are drawn: the two of the closest approach, and
-/// others chosen evenly.
+/// others chosen evenly. Obstacles are drawn at their first position.
 #[must_use]
-pub fn paths(log: &FlightLog, title: &str) -> Figure {
+pub fn paths(log: &FlightLog, obstacles: &[Obstacle], title: &str) -> Figure {
     let spans = Spans::of(log);
-    let axis = |axis: usize, label: &str| {
-        let (low, high) = spans.extent(axis).unwrap_or((0.0, 1.0));
-        let margin = MARGIN * (high - low);
-        Axis::linear(label, [low - margin, high + margin], false)
-    };
-    let mut chart = Chart::new(axis(0, "x [m]"), axis(1, "y [m]"));
-    chart.equal = true;
-    for (k, &i) in drawn(log).iter().enumerate() {
+    let mut chart = from_above(&spans, &[], obstacles);
+    for (k, &i) in drawn(log, MOST_PATHS).iter().enumerate() {
         let look = Look::of(i, log.count());
-        let points: Vec<_> = spans.iter().map(|span| (span.positions_m[(i, 0)], span.positions_m[(i, 1)])).collect();
+        let points = path(&spans, i);
         let mark = |at: Option<&(f64, f64)>, marker, colour, label: &str| {
             let label = (k == 0).then(|| label.to_owned());
             at.map(|&at| Mark { at, marker, colour, radius: look.radius, text: look.number.clone(), label })
@@ -43,14 +39,79 @@ pub fn paths(log: &FlightLog, title: &str) -> Figure {
     chart.figure("paths", title, &description(log, "from above"))
 }
 
-/// Returns the vehicles whose paths are drawn.
-fn drawn(log: &FlightLog) -> Vec<usize> {
+/// Largest number of paths of a still picture.
+const STILL_PATHS: usize = 40;
+
+/// Draws the paths from above with the vehicles at the time of the closest approach \[s\], and the closest two, from 0,
+/// joined. This still picture replaces a replay that cannot be drawn. The title begins with the name of the flight, unless
+/// it is empty. Flights `beside` it widen the axes.
+#[must_use]
+pub fn at_closest(
+    name: &str,
+    log: &FlightLog,
+    obstacles: &[Obstacle],
+    closest: Option<([usize; 2], f64)>,
+    beside: &[FlightLog],
+) -> Figure {
+    let spans = Spans::of(log);
+    let beside: Vec<_> = beside.iter().map(Spans::of).collect();
+    let mut chart = from_above(&spans, &beside, obstacles);
+    let time_s = closest.map_or(log.range_s()[0], |(_, time_s)| time_s);
+    let now = log.positions_m(time_s);
+    let place = |i: usize| now.as_ref().map(|now| (now[(i, 0)], now[(i, 1)]));
+    let mut shown = drawn(log, STILL_PATHS);
+    shown.extend(closest.iter().flat_map(|(pair, _)| *pair).filter(|&i| i < log.count()));
+    shown.sort_unstable();
+    shown.dedup();
+    for i in shown {
+        let look = Look::of(i, log.count());
+        chart.lines.push(Line { points: path(&spans, i), stroke: look.path.faint(0.45), label: None });
+        let mark = |at| Mark { text: look.number.clone(), ..Mark::ring(at, look.path.colour, None) };
+        chart.marks.extend(place(i).map(mark));
+    }
+    let title = closest.map_or("Paths from above".to_owned(), |_| format!("Closest approach, at {time_s:.2} s"));
+    let title = if name.is_empty() { title } else { format!("{name}: {title}") };
+    if let Some([Some(one), Some(other)]) = closest.map(|(pair, _)| pair.map(place)) {
+        chart.line(vec![one, other], Stroke::solid(INK, 2.6), "closest two");
+    }
+    chart.figure("still", &title, &format!("{} Rings: the vehicles at {time_s:.2} s.", description(log, "from above")))
+}
+
+/// Returns an empty chart of x and y \[m\] in equal units, with the obstacles.
+fn from_above(spans: &Spans<'_>, beside: &[Spans<'_>], obstacles: &[Obstacle]) -> Chart {
+    let axis = |axis: usize, label: &str| {
+        let extents = beside.iter().chain([spans]).filter_map(|spans| spans.extent(axis));
+        let (low, high) = extents.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or((0.0, 1.0));
+        let margin = MARGIN * (high - low);
+        Axis::linear(label, [low - margin, high + margin], false)
+    };
+    let mut chart = Chart::new(axis(0, "x [m]"), axis(1, "y [m]"));
+    chart.make_equal();
+    let window = Window { low: (chart.x.from, chart.y.from), high: (chart.x.to, chart.y.to) };
+    let outlines = obstacles.iter().map(|obstacle| outline(obstacle, window)).filter(|outline| !outline.is_empty());
+    for (k, corners) in outlines.enumerate() {
+        chart.shapes.push(Shape {
+            corners,
+            colour: OBSTACLE,
+            opacity: 0.45,
+            label: (k == 0).then(|| "obstacle".to_owned()),
+        });
+    }
+    chart
+}
+
+fn path(spans: &Spans<'_>, vehicle: usize) -> Vec<(f64, f64)> {
+    spans.iter().map(|span| (span.positions_m[(vehicle, 0)], span.positions_m[(vehicle, 1)])).collect()
+}
+
+/// Returns the vehicles whose paths are drawn, about `most`.
+fn drawn(log: &FlightLog, most: usize) -> Vec<usize> {
     let count = log.count();
-    if count <= MOST_PATHS {
+    if count <= most {
         return (0..count).collect();
     }
     let closest = log.closest().map(|closest| [closest.pair.first(), closest.pair.second()]);
-    let spread = (0..MOST_PATHS).map(|k| evenly(k, count));
+    let spread = (0..most).map(|k| evenly(k, count));
     let mut drawn: Vec<_> = spread.chain(closest.into_iter().flatten().filter(|&i| i < count)).collect();
     drawn.sort_unstable();
     drawn.dedup();
@@ -81,7 +142,7 @@ impl Look {
 
 fn description(log: &FlightLog, from: &str) -> String {
     let (count, end_s) = (log.count(), log.range_s()[1]);
-    let of_all = match drawn(log).len() {
+    let of_all = match drawn(log, MOST_PATHS).len() {
         drawn if drawn < count => format!("{drawn} of {count} vehicles, chosen evenly,"),
         _ => format!("{count} vehicles"),
     };
@@ -106,7 +167,7 @@ pub fn paths_in_space(log: &FlightLog, title: &str) -> Figure {
     let view = View::of(&spans);
     let mut canvas = Canvas::new((WIDTH, TITLE + HEIGHT), title, WIDTH / 2.0);
     view.draw_axes(&mut canvas);
-    let lines = drawn(log).into_iter().map(|i| {
+    let lines = drawn(log, MOST_PATHS).into_iter().map(|i| {
         let look = Look::of(i, log.count());
         let places = spans.iter().map(|span| row(span.positions_m, i)).filter(|place| view.shows(place));
         (look, places.map(|place| view.on_paper(place)).collect())

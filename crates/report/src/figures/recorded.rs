@@ -106,7 +106,7 @@ pub fn closest_approach(encounter: &Encounter, title: &str) -> Figure {
     let x = Axis::linear("x [m]", points().map(|point| point.0), false);
     let y = Axis::linear("y [m]", points().map(|point| point.1), false);
     let mut chart = Chart::new(x, y);
-    chart.equal = true;
+    chart.make_equal();
     let nearest = encounter.nearest();
     let places = encounter.paths_m.each_ref().map(|path| nearest.and_then(|k| path.get(k).copied()));
     for (k, (path, name)) in encounter.paths_m.iter().zip(&encounter.names).enumerate() {

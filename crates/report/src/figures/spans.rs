@@ -60,9 +60,9 @@ impl<'a> Spans<'a> {
         (0..most).map(|k| &self.all[k * (self.all.len() - 1) / (most - 1)]).collect()
     }
 
-    /// Returns whether every vehicle stays at a constant z, up to rounding.
+    /// Returns whether heights differ by at most a hundredth of the horizontal extent.
     pub(super) fn is_level(&self) -> bool {
-        const FLATNESS: f64 = 1e-6;
+        const FLATNESS: f64 = 0.01;
         let [x, y, z] = [0, 1, 2].map(|axis| self.extent(axis).map_or(0.0, |(low, high)| high - low));
         z <= FLATNESS * x.max(y)
     }

@@ -4,7 +4,7 @@ use super::Figure;
 use super::axis::Axis;
 use super::chart::{Chart, Mark};
 use super::svg::{INK, PALETTE, SOFT_INK, Stroke};
-use tautline_core::text::{exact, metres};
+use tautline_core::text::{exact, metres, significant};
 
 /// Draws the smallest separation found so far \[m\] over the `flights` of a search, with delta and the separation of
 /// the flight of the unchanged scenario. `found` holds each flight, numbered from 1, that was worse than all before.
@@ -70,7 +70,10 @@ pub fn margin(
         chart.upright(*value, Stroke::dashed(PALETTE[1 + k % 2], 1.5), Some(format!("predicted {what}")));
     }
     let description = match bracket {
-        Some([low, high]) => format!("The share that {does} over {key}; the verdict turns between {low} and {high}."),
+        Some([low, high]) => {
+            let [low, high] = [low, high].map(|value| significant(value, 4));
+            format!("The share that {does} over {key}; the verdict turns between {low} and {high}.")
+        }
         None => format!("The share that {does} over {key}; the verdict does not turn."),
     };
     chart.figure("margin", &format!("Share that {does}"), &description)
@@ -112,18 +115,25 @@ pub struct Separation {
 
 /// Draws smallest separations of flights over the values of a key, with the safety distance delta \[m\].
 #[must_use]
-pub fn separations(name: &str, key: &str, flights: &[Separation], delta_m: f64) -> Figure {
+pub fn separations(name: &str, key: &str, flights: &[Separation], delta_m: f64, logarithmic: bool) -> Figure {
     let lengths = flights
         .iter()
         .flat_map(|of| [of.smallest_m, of.median_m].into_iter().chain(of.interval_m.into_iter().flatten()));
-    let x = Axis::linear(key, flights.iter().map(|of| of.value), false);
+    let values = flights.iter().map(|of| of.value);
+    let x = if logarithmic { Axis::log(key, values) } else { Axis::linear(key, values, false) };
     let mut chart = Chart::new(x, Axis::linear("smallest separation [m]", lengths.chain([delta_m]), true));
     for of in flights {
         chart.interval(of.value, of.interval_m, Stroke::of_line(0));
     }
     let curve = |of: fn(&Separation) -> f64| flights.iter().map(|flight| (flight.value, of(flight))).collect();
-    chart.line(curve(|of| of.median_m), Stroke::of_line(0), "median of the flights");
+    if flights.iter().any(|of| of.median_m != of.smallest_m) {
+        chart.line(curve(|of| of.median_m), Stroke::of_line(0), "median of the flights");
+    }
     chart.line(curve(|of| of.smallest_m), Stroke::of_line(1), "smallest of all flights");
+    for flight in flights {
+        let at = (flight.value, flight.smallest_m);
+        chart.marks.push(Mark { radius: 3.5, ..Mark::ring(at, Stroke::of_line(1).colour, None) });
+    }
     chart.level(delta_m, Stroke::dashed(INK, 1.3), format!("delta = {} m", exact(delta_m)));
     let title = format!("Smallest separation over {key}");
     chart.figure(

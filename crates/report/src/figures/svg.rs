@@ -11,45 +11,49 @@ use crate::simplify::needed;
 pub(super) type Point = (f64, f64);
 
 /// Font sizes \[px\].
-pub(super) const TEXT: f64 = 13.0;
-const HEADING: f64 = 14.0;
+pub(super) const TEXT: f64 = 13.5;
+const HEADING: f64 = 14.5;
 /// Baseline of the title \[px\].
 const TITLE_BASELINE: f64 = 19.0;
 const MARK_WIDTH: f64 = 1.6;
 
-/// A colour on light paper and on dark paper.
+/// A colour on white paper, and the variable of a page's style sheet that replaces it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Colour {
     light: &'static str,
-    dark: &'static str,
+    variable: &'static str,
 }
 
-const fn colour(light: &'static str, dark: &'static str) -> Colour {
-    Colour { light, dark }
+const fn colour(light: &'static str, variable: &'static str) -> Colour {
+    Colour { light, variable }
 }
 
-const PAPER: Colour = colour("#FFFFFF", "#14191F");
-pub(super) const INK: Colour = colour("#1B1F24", "#E6EAEF");
-pub(super) const SOFT_INK: Colour = colour("#57606A", "#9AA4AF");
-pub(super) const GRID: Colour = colour("#E1E4E8", "#2A323B");
+const PAPER: Colour = colour("#FFFFFF", "--plot");
+pub(super) const INK: Colour = colour("#1B1F24", "--ink");
+pub(super) const SOFT_INK: Colour = colour("#57606A", "--soft");
+pub(super) const GRID: Colour = colour("#E1E4E8", "--grid");
+/// Obstacles, and violations.
+pub(super) const OBSTACLE: Colour = colour("#8A6D3B", "--thing");
+pub(super) const ALARM: Colour = colour("#D40014", "--alarm");
 
 /// Colours that colour-blind readers can distinguish (after Okabe and Ito), each with a contrast of at least 3 on both
 /// papers.
 pub(super) const PALETTE: [Colour; 6] = [
-    colour("#0072B2", "#56A8E0"),
-    colour("#D55E00", "#F07F2E"),
-    colour("#00936C", "#2FBF94"),
-    colour("#B85F95", "#DB8DBB"),
-    colour("#9A7600", "#CBA42B"),
-    colour("#7D858E", "#A5ADB6"),
+    colour("#0072B2", "--c1"),
+    colour("#D55E00", "--c2"),
+    colour("#00936C", "--c3"),
+    colour("#B85F95", "--c4"),
+    colour("#9A7600", "--c5"),
+    colour("#7D858E", "--c6"),
 ];
 
-/// Returns the style sheet that switches the colours on dark pages.
-fn style() -> String {
-    let exchange = [PAPER, INK, SOFT_INK, GRID].into_iter().chain(PALETTE).flat_map(|Colour { light, dark }| {
-        ["fill", "stroke"].map(|paint| format!(".tautline-figure [{paint}=\"{light}\"]{{{paint}:{dark}}}"))
+/// Returns the rules that give the figures of a page its colours. A file has none and stays readable on white paper.
+pub(crate) fn page_rules() -> String {
+    let all = [PAPER, INK, SOFT_INK, GRID, OBSTACLE, ALARM].into_iter().chain(PALETTE);
+    let rules = all.flat_map(|Colour { light, variable }| {
+        ["fill", "stroke"].map(|paint| format!(".tautline-figure [{paint}=\"{light}\"]{{{paint}:var({variable})}}"))
     });
-    format!("@media (prefers-color-scheme:dark){{{}}}", exchange.collect::<String>())
+    rules.collect()
 }
 
 /// Stroke of a line.
@@ -80,6 +84,11 @@ impl Stroke {
         Self { dashes, ..Self::solid(PALETTE[k % PALETTE.len()], 1.5) }
     }
 
+    /// Returns the stroke of lines that are not told apart.
+    pub(super) fn of_others() -> Self {
+        Self::solid(SOFT_INK, 0.9).faint(0.45)
+    }
+
     /// Returns the same stroke with this opacity.
     pub(super) fn faint(self, opacity: f64) -> Self {
         Self { opacity, ..self }
@@ -94,6 +103,7 @@ impl Stroke {
 pub(super) enum Marker {
     Cross,
     Ring,
+    Dot,
 }
 
 /// Anchor of a text: left, centre or right, and below (first letter), middle or above.
@@ -148,6 +158,9 @@ impl Canvas {
 
     /// Fills a polygon.
     pub(super) fn area(&mut self, points: &[Point], colour: Colour, opacity: f64) {
+        if points.is_empty() {
+            return;
+        }
         let shape = html! { polygon points=(corners(points)) fill=(colour.light) opacity=(opacity) {} };
         self.shapes += &shape.into_string();
     }
@@ -176,6 +189,10 @@ impl Canvas {
                 };
                 self.shapes += &shape.into_string();
             }
+            Marker::Dot => {
+                let shape = html! { circle cx=(px(x)) cy=(px(y)) r=(radius) fill=(colour.light) {} };
+                self.shapes += &shape.into_string();
+            }
             Marker::Cross => {
                 for down in [radius, -radius] {
                     self.line(&[(x - radius, y - down), (x + radius, y + down)], Stroke::solid(colour, MARK_WIDTH));
@@ -199,12 +216,20 @@ impl Canvas {
         self.shapes += &window.into_string();
     }
 
+    /// Draws into a group of a class.
+    pub(super) fn group(&mut self, class: &str, draw: impl FnOnce(&mut Self)) {
+        let around = std::mem::take(&mut self.shapes);
+        draw(self);
+        let within = std::mem::replace(&mut self.shapes, around);
+        self.shapes += &html! { g class=(class) { (PreEscaped(within)) } }.into_string();
+    }
+
     /// Draws a text beside a marker: to the lower left of a cross, and to the upper right of a ring. The texts of a
     /// vehicle that ends at its start do not overlap.
     pub(super) fn text_beside(&mut self, marker: Marker, (x, y): Point, words: &str) {
         match marker {
             Marker::Cross => self.text((x - 5.0, y + 4.0), Align::RIGHT_ABOVE, words),
-            Marker::Ring => self.text((x + 6.0, y - 3.0), Align::LEFT_BELOW, words),
+            Marker::Ring | Marker::Dot => self.text((x + 6.0, y - 3.0), Align::LEFT_BELOW, words),
         }
     }
 
@@ -232,7 +257,6 @@ impl Canvas {
                 role="img" aria-label=(label) {
                 title { (title) }
                 desc { (description) }
-                style { (PreEscaped(style())) }
                 (PreEscaped(shapes))
             }
         };
@@ -312,6 +336,16 @@ fn distance(point: Point, from: Point, to: Point) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pages_have_the_colours_of_files_in_the_light() {
+        let sheet = include_str!("../report/page/style.css").to_lowercase();
+        for colour in [PAPER, INK, SOFT_INK, GRID, OBSTACLE, ALARM].into_iter().chain(PALETTE) {
+            let light = colour.light.to_lowercase();
+            let short = if light == "#ffffff" { "#fff".to_owned() } else { light };
+            assert!(sheet.contains(&format!("{}:light-dark({short},", colour.variable)), "{colour:?}");
+        }
+    }
 
     fn thinned_line(points: &[Point]) -> Vec<Point> {
         thinned(vec![((), points.to_vec())]).remove(0).1

@@ -2,13 +2,21 @@
 
 use std::fmt::Write as _;
 
-use super::{Kind, Moment};
+use super::{JudgementContext, Kind, Moment};
+use crate::figures::time_ticks;
 use tautline_audit::Slice;
+use tautline_core::text::at_least;
 
 /// Width and height.
 const SIZE: [f64; 2] = [1000.0, 100.0];
 /// Amount by which a band is widened on either side, so that it stays visible.
 const MARGIN: f64 = 1.5;
+
+/// Largest distance, relative to the limit, up to which heights are proportional to distances.
+const LOW: f64 = 6.0;
+
+/// Smallest distance of two labels.
+const LABEL: f64 = 30.0;
 
 /// Lines and bands of the chart.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -17,6 +25,10 @@ pub struct Chart {
     pub distance: String,
     /// Height of the limit, from above.
     pub limit: Option<f64>,
+    /// Heights with their distances in words: the largest distance, and the limit.
+    pub levels: Vec<(f64, String)>,
+    /// Ticks of the axis of time: place and label.
+    pub ticks: Vec<(f64, String)>,
     /// Bands of findings: start, end, and whether the finding is a violation (otherwise undecided). Bands of one kind
     /// do not overlap.
     pub bands: Vec<(f64, f64, bool)>,
@@ -25,14 +37,23 @@ pub struct Chart {
 }
 
 impl Chart {
-    pub(super) fn of(near: &[Slice], moments: &[Moment], limit: Option<f64>, [first_s, last_s]: [f64; 2]) -> Self {
+    /// Returns the chart of a flight with these slices and findings. Heights grow with the distance, or with its square
+    /// root if the limit would be low beside the largest distance.
+    pub(super) fn of(
+        near: &[Slice],
+        moments: &[Moment],
+        judged: JudgementContext,
+        [first_s, last_s]: [f64; 2],
+    ) -> Self {
+        let JudgementContext { limit, unit, .. } = judged;
         let x = |time_s: f64| ((time_s - first_s) / (last_s - first_s).max(1e-300)).clamp(0.0, 1.0) * SIZE[0];
         let mut sorted: Vec<f64> = near.iter().map(|slice| slice.closest.certain_m()).collect();
         sorted.sort_unstable_by(f64::total_cmp);
-        // Nine tenths of the slices are inside the chart, and the limit always is.
-        let usual = sorted.get(sorted.len() * 9 / 10).copied().unwrap_or(1.0);
-        let most = limit.map_or(usual, |limit| usual.clamp(2.0 * limit, 5.0 * limit)).max(1e-300);
-        let y = |distance: f64| SIZE[1] * (1.0 - 0.96 * (distance / most).clamp(0.0, 1.0));
+        let largest = sorted.last().copied().filter(|largest| largest.is_finite());
+        let most = largest.unwrap_or(1.0).max(limit.map_or(0.0, |limit| 1.25 * limit)).max(1e-300);
+        let is_low = limit.is_some_and(|limit| limit > 0.0 && most > LOW * limit);
+        let share = |distance: f64| (distance / most).clamp(0.0, 1.0);
+        let y = |distance: f64| SIZE[1] * (1.0 - 0.96 * if is_low { share(distance).sqrt() } else { share(distance) });
         let mut distance = String::new();
         let mut end_s = f64::NEG_INFINITY;
         for slice in near {
@@ -46,6 +67,10 @@ impl Chart {
             let _ = write!(distance, "H{:.1}", x(to_s));
             end_s = to_s;
         }
+        let unit = if unit == "m" { " m" } else { "" };
+        let limit_label = limit.map(|limit| (y(limit), format!("{limit}{unit}")));
+        let largest = largest.map(|most| (y(most), format!("{}{unit}", at_least(most, 1))));
+        let levels = [largest.filter(|at| limit_label.as_ref().is_none_or(|of| of.0 - at.0 > LABEL)), limit_label];
         let of_pairs = moments.iter().find(|moment| moment.kind == Kind::Closest && moment.obstacle.is_none());
         let mut bands = Vec::new();
         for violation in [false, true] {
@@ -57,6 +82,8 @@ impl Chart {
         Self {
             distance,
             limit: limit.map(y),
+            levels: levels.into_iter().flatten().collect(),
+            ticks: time_ticks(first_s, last_s).into_iter().map(|(time_s, label)| (x(time_s), label)).collect(),
             bands,
             closest: of_pairs.zip(sorted.first()).map(|(of, &least)| [x(of.span.at_s), y(least)]),
         }
@@ -100,9 +127,12 @@ mod tests {
             moment(Kind::Violation, 1.5, 3.0),
             moment(Kind::Unseen, 2.0, 4.0),
         ];
+        let judged = JudgementContext { is_else_known: true, limit: None, unit: "m" };
         let in_parts = Slice { to_s: 7.0, is_whole: false, ..slice(5.0) };
-        let chart = Chart::of(&[slice(0.0), slice(1.0), in_parts, slice(8.0)], &moments, None, [0.0, 10.0]);
+        let chart = Chart::of(&[slice(0.0), slice(1.0), in_parts, slice(8.0)], &moments, judged, [0.0, 10.0]);
         assert_eq!(chart.bands, [(198.5, 401.5, false), (98.5, 301.5, true), (398.5, 501.5, true)]);
         assert_eq!(chart.distance, "M0.0 4.0H100.0V4.0H200.0M500.0 4.0H500.0M800.0 4.0H900.0");
+        let labels: Vec<_> = chart.levels.iter().map(|(_, label)| label.as_str()).collect();
+        assert_eq!((labels, chart.ticks.len()), (vec!["2.0 m"], 6));
     }
 }

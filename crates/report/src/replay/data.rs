@@ -7,11 +7,12 @@ use super::chart::Chart;
 use super::decimate::{MOST_INSTANTS, Span, around_worst, breaks, chosen, place_of_weightiest, present, shown};
 use super::motion::PackedMotion;
 use super::obstacle_meshes::{POINT_BYTES, Thing, ground};
-use super::stage::{Extent, Targets, targets_of};
+use super::stage::{Extent, Rotors, Targets, targets_of, turn_bytes};
 use super::statements::{self, Statement, Words};
 use super::{
     Kind, LONGEST_NAME, LONGEST_SENTENCE, Moment, NoReplay, Stage, base64_bytes, base64_of, cut, doubles, singles,
 };
+use crate::figures::{Figure, at_closest};
 use crate::flight_log::FlightLog;
 use tautline_audit::{Obstacle, Shape};
 use tautline_core::swarm::{Rows, row};
@@ -28,7 +29,7 @@ const MOST_POINTS: usize = 5000;
 /// Relative rounding error of a number in single precision.
 const SINGLE: f64 = 0.5 * f32::EPSILON as f64;
 /// Version of the data.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// A flight as data of a page.
 #[derive(Clone, Debug, PartialEq)]
@@ -38,6 +39,8 @@ pub struct Replay {
     pub json: String,
     /// Smallest separation of all pairs over time.
     pub chart: Chart,
+    /// Picture of the closest approach, for browsers that cannot draw the replay.
+    pub still: Figure,
     /// Largest error of a drawn coordinate \[m\].
     pub rounding_m: f64,
     /// Number of kept instants, and number of samples.
@@ -71,9 +74,8 @@ struct Data<'a> {
     decimals: usize,
     /// Whether vehicles rest between two instants.
     holds: bool,
-    /// Origin of all drawn positions, and relative to it the middle and half of the box around everything \[m\].
+    /// Origin of all drawn positions, and half of the box around everything \[m\].
     origin_m: [f64; 3],
-    look_m: [f64; 3],
     half_m: [f64; 3],
     /// Side of the squares on the ground, and their lines relative to the origin, in single precision.
     square_m: f64,
@@ -86,6 +88,9 @@ struct Data<'a> {
     points: usize,
     starts: String,
     steps: String,
+    /// Rotors of every vehicle. Attitudes are three signed bytes for each vehicle, instant by instant.
+    rotors: Option<Rotors>,
+    turns: String,
     /// Instants and vehicles, as 16-bit indices: vehicles that were absent at some time since the previous instant.
     breaks: String,
     /// Times \[s\], as doubles, from which a pair is the closest by the audit. The pairs are 16-bit indices in the list
@@ -178,7 +183,6 @@ impl Replay {
             decimals: decimals(end_s - begin_s),
             holds,
             origin_m: origin_m.into(),
-            look_m: (extent.middle_m() - origin_m).into(),
             half_m: extent.half_m().into(),
             square_m,
             ground: singles(&lines.iter().map(|at| at - origin_m).collect::<Vec<_>>()),
@@ -188,6 +192,8 @@ impl Replay {
             points: shown.len() + guides.count(),
             starts: String::new(),
             steps: String::new(),
+            rotors: stage.rotors,
+            turns: String::new(),
             breaks: String::new(),
             near_s,
             near_who,
@@ -202,7 +208,8 @@ impl Replay {
         // end.
         let most_breaks = log.gaps.len().min(room_bytes / 10 / BREAK_BYTES);
         let fixed = written(&data).len() + base64_bytes(12 * data.points) + BREAK_BYTES * most_breaks + NUMBERS;
-        let of_an_instant = base64_bytes(8 + 6 * data.points);
+        let turns = if stage.rotors.is_some() { 3 * shown.len() } else { 0 };
+        let of_an_instant = base64_bytes(8 + 6 * data.points + turns);
         let most = room_bytes.saturating_sub(fixed) / of_an_instant.max(1);
         if most < 2 {
             return Err(no_room);
@@ -224,6 +231,8 @@ impl Replay {
         (data.middle_m, data.cell_m, data.rounding_m) = (motion.middle_m, motion.cell_m, rounding_m);
         data.starts = base64_of(motion.start_bytes().into_iter());
         data.steps = base64_of(motion.step_bytes().into_iter());
+        let turned = kept.iter().flat_map(|&k| turn_bytes(&log.keyframes()[k].attitudes, &shown));
+        data.turns = base64_of(turned.take(turns * kept.len()));
         let json = written(&data);
         if json.len() > room_bytes {
             return Err(no_room);
@@ -232,7 +241,8 @@ impl Replay {
             |of: &Moment| is_kept(log, &times_s, &kept, &of.span) && of.vehicles.iter().all(|&k| place(k).is_some());
         let is_exact = |of: &&Moment| of.kind == Kind::Unseen || is_drawn(of);
         Ok(Self {
-            chart: Chart::of(&near, &moments, judged.limit, [begin_s, end_s]),
+            chart: Chart::of(&near, &moments, judged, [begin_s, end_s]),
+            still: still(stage, log, &moments),
             json,
             rounding_m,
             instants: [kept.len(), log.samples()],
@@ -244,6 +254,13 @@ impl Replay {
             obstacles_off_m,
         })
     }
+}
+
+/// Returns a picture of the closest approach of two vehicles, or of the start.
+fn still(stage: &Stage, log: &FlightLog, moments: &[Moment]) -> Figure {
+    let closest = moments.iter().find(|of| of.kind == Kind::Closest && of.vehicles.len() == 2);
+    let closest = closest.map(|of| ([of.vehicles[0], of.vehicles[1]], of.span.at_s));
+    at_closest("", log, &stage.obstacles, closest, &[])
 }
 
 /// Size of the numbers of the grid, which is chosen later \[bytes\].

@@ -18,7 +18,7 @@ mod statements;
 pub use chart::Chart;
 pub use data::{JudgementContext, Replay};
 pub use decimate::{MOST_INSTANTS, MOST_VEHICLES, Span, chosen};
-pub use stage::Stage;
+pub use stage::{Rotors, Stage};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;

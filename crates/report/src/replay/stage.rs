@@ -1,6 +1,6 @@
 //! Contents of a replay besides motion: vehicles, obstacles, links and slots, and the box around everything.
 
-use nalgebra::Vector3;
+use nalgebra::{UnitQuaternion, Vector3};
 use serde::Serialize;
 
 use super::{base64_of, singles};
@@ -22,8 +22,32 @@ pub struct Stage {
     pub shell_m: Option<[f64; 3]>,
     /// Formations and graph, if known.
     pub plan: Option<Plan>,
+    /// Rotors of every vehicle, if the vehicles are quadrotors.
+    pub rotors: Option<Rotors>,
     /// Obstacles.
     pub obstacles: Vec<Obstacle>,
+}
+
+/// Rotors of a quadrotor.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Rotors {
+    /// Centres relative to the centre of the body, x ahead and y to the left \[m\].
+    pub at_m: [[f64; 2]; 4],
+    /// Radius of each rotor \[m\].
+    pub radius_m: f64,
+}
+
+/// Returns the attitudes of some vehicles as three signed bytes each: the vector part of the quaternion with a positive
+/// scalar part, times 127. A vehicle with unknown attitude is upright.
+pub(super) fn turn_bytes(attitudes: &[Option<UnitQuaternion<f64>>], shown: &[usize]) -> Vec<u8> {
+    #[expect(clippy::cast_possible_truncation, reason = "between -127 and 127")]
+    let byte = |part: f64| (127.0 * part).round() as i8;
+    let turn = |&vehicle: &usize| {
+        let turn = attitudes.get(vehicle).copied().flatten().unwrap_or_default();
+        let sign = if turn.w < 0.0 { -1.0 } else { 1.0 };
+        [turn.i, turn.j, turn.k].map(|part| byte(sign * part).to_le_bytes()[0])
+    };
+    shown.iter().flat_map(turn).collect()
 }
 
 /// Largest drawn radius of a vehicle with unknown radius \[m\].
@@ -62,6 +86,10 @@ impl Stage {
             radius_m: scenario.hull_radius_m.iter().copied().map(Some).collect(),
             shell_m: Some(scenario.half_axes_m().unwrap_or([0.5 * scenario.delta_m; 3])),
             plan: Some(Plan::of(scenario)),
+            rotors: scenario
+                .airframe
+                .quadrotor()
+                .map(|of| Rotors { at_m: of.model.rotor_positions_m, radius_m: of.model.rotor_radius_m }),
             obstacles,
         }
     }

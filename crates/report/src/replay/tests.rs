@@ -20,6 +20,7 @@ fn stage(vehicles: usize) -> Stage {
         radius_m: vec![Some(0.2); vehicles],
         shell_m: Some([0.5; 3]),
         plan: None,
+        rotors: None,
         obstacles: Vec::new(),
     }
 }

@@ -49,15 +49,35 @@ impl Report {
         page.reasons.clone_from(&self.verdict.reasons);
         let warnings = about.preflight.warnings.iter();
         page.warnings = warnings.map(|of| (of.code.name().to_owned(), of.message.clone())).collect();
-        page.add("Replay", [page::replay(&self.scenario.name, about.replay, Start::AtOnce)]);
+        page.replay = Some(page::replay(&self.scenario.name, about.replay, Start::AtOnce));
         let rows = self.rows().into_iter().map(<[String; 2]>::from);
-        page.add("Findings", [page::words("Findings", &["Part", "Finding"], rows)]);
+        page.add(
+            "Findings",
+            "What the flight and its audit gave, part by part; report.json has all numbers.",
+            [page::words("Findings by part", &["Part", "Finding"], rows)],
+        );
         page.sections.extend(self.sections().iter().map(|section| section.html(LISTED)));
-        page.add("Pictures", [page::pictures(about.pictures)]);
-        page.add("Figures", [page::figures(about.figures)]);
-        page.add("Assumptions", [page::list(&self.assumptions(about.scenario))]);
-        page.add("Reproduce", [self.repetition(about)]);
-        page.add("Performance", self.performance.map(|times| page::list(&[times.line()])));
+        page.add(
+            "Pictures",
+            "The vehicles at some moments of the flight, each in the shell that must stay free.",
+            [page::pictures(about.pictures)],
+        );
+        page.add(
+            "Figures",
+            "Quantities over the flight; bold and dashed lines across a chart are limits.",
+            [page::figures(about.figures)],
+        );
+        page.add(
+            "Assumptions",
+            "The verdict holds under these assumptions.",
+            [page::list(&self.assumptions(about.scenario))],
+        );
+        page.add("Reproduce", "This command flies the same flight again.", [self.repetition(about)]);
+        page.add(
+            "Performance",
+            "Times on the clock of the computer that flew; they do not affect the result.",
+            self.performance.map(|times| page::list(&[times.line()])),
+        );
         page.render()
     }
 

@@ -23,6 +23,8 @@ pub use export::{ExportRequest, export_file};
 pub use failure::{Failure, blanked, in_range};
 pub use monitor::{Monitor, NamedPicture, PICTURES_BYTES, Pictures, Quiet, Silent};
 pub use outputs::{OutFolder, try_to_write_in};
-pub use run::{RECORDING, RunFiles, RunRequest, flight_page, replay_of_run, run_into, svg_files, threads, write_files};
+pub use run::{
+    RECORDING, RunFiles, RunRequest, figure_files, flight_page, replay_of_run, run_into, threads, write_files,
+};
 pub use scenario::{ScenarioRequest, command_line};
 pub use tautline_recordings::read::ReadOptions;

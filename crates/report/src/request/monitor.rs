@@ -98,12 +98,6 @@ pub trait Pictures: Sync {
         monitor: &dyn Monitor,
     ) -> Result<Vec<NamedPicture>, Failure>;
 
-    /// Flies the scenario and draws the instant `at_s` \[s\]. Returns an image as a data URI of about `room_bytes`.
-    ///
-    /// # Errors
-    /// [`Failure`] if the scenario cannot be flown or the machine cannot draw.
-    fn shot(&self, scenario: &Scenario, at_s: f64, room_bytes: usize) -> Result<String, Failure>;
-
     /// Returns a topic that is recorded beside positions, so that other viewers can show the flight.
     fn topic(&self, _scenario: &Scenario) -> Option<Box<dyn ExtraTopic>> {
         None
@@ -119,9 +113,5 @@ impl Pictures for () {
         _monitor: &dyn Monitor,
     ) -> Result<Vec<NamedPicture>, Failure> {
         Ok(Vec::new())
-    }
-
-    fn shot(&self, _scenario: &Scenario, _at_s: f64, _room_bytes: usize) -> Result<String, Failure> {
-        Err(Failure::machine("pictures/none", "this build cannot draw"))
     }
 }

@@ -7,10 +7,11 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use rayon::ThreadPool;
+use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 
 use super::audit::run_audit;
 use super::{Failure, Monitor, NamedPicture, OutFolder, Pictures};
-use crate::figures::{self, Criteria, Figure};
+use crate::figures::{self, Criteria, Figure, Format};
 use crate::flight_log::FlightLog;
 use crate::replay::{NoReplay, PAGE_BYTES, Replay, Stage};
 use crate::report::{INTERRUPTED, Report, RunPage, write_atomically};
@@ -42,6 +43,8 @@ pub struct RunRequest<'a> {
     pub force: bool,
     /// Whether figures are drawn.
     pub figures: bool,
+    /// Formats of the files of figures.
+    pub formats: Vec<Format>,
     /// Whether the scenario is flown again at half the step.
     pub verify: bool,
     /// Number of threads; a flight uses at most two. By default the number of cores. The recording has the same
@@ -55,7 +58,8 @@ impl<'a> RunRequest<'a> {
     /// Returns a request with figures and times, into `out/NAME`.
     #[must_use]
     pub fn new(scenario: &'a Scenario, command: String) -> Self {
-        Self { scenario, command, out: None, force: false, figures: true, verify: false, threads: None, is_timed: true }
+        let (out, threads, formats) = (None, None, vec![Format::Svg]);
+        Self { scenario, command, out, force: false, figures: true, formats, verify: false, threads, is_timed: true }
     }
 
     /// Returns a request that overwrites its folder and writes the same bytes each time.
@@ -77,7 +81,7 @@ pub struct RunFiles {
     pub page: PathBuf,
 }
 
-/// Flies a scenario and writes its folder: `run.mcap`, `report.html`, `figures/*.svg`, `snapshots/*.png` and
+/// Flies a scenario and writes its folder: `run.mcap`, `report.html`, `figures/*`, `snapshots/*.png` and
 /// `report.json`. The report is written last, so a folder with a report is complete.
 ///
 /// # Errors
@@ -122,7 +126,7 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
         pictures: &pictures.iter().map(|(_, picture)| picture.clone()).collect::<Vec<_>>(),
         command: &request.command,
     };
-    let page = write_page(folder.path(), &report, &page)?;
+    let page = write_page(folder.path(), &report, &page, &request.formats)?;
     report.write(&folder.report())?;
 
     monitor.say(&format!("{}\n{}", report.headline(), report.text()));
@@ -197,6 +201,7 @@ pub fn replay_of_run(
 
 /// Returns the charts of a run.
 fn figures(scenario: &Scenario, log: &FlightLog, report: &Report) -> Vec<Figure> {
+    let obstacles: Vec<_> = scenario.obstacles.iter().map(sim::audit_obstacle).collect();
     let criteria = Criteria {
         delta_m: scenario.delta_m,
         certified_m: report.separation.certified_m,
@@ -204,6 +209,7 @@ fn figures(scenario: &Scenario, log: &FlightLog, report: &Report) -> Vec<Figure>
         edge_error_m: Some(scenario.arrival.edge_error_m),
         disagreement_m_s: Some(scenario.arrival.disagreement_m_s),
         most_thrust_n: scenario.airframe.quadrotor().map(|quadrotor| quadrotor.model.max_thrust_n),
+        obstacles: &obstacles,
     };
     figures::of_run(log, &criteria)
 }
@@ -226,11 +232,11 @@ pub fn flight_page(
     report.to_html(&page)
 }
 
-/// Writes `figures/*.svg` and `report.html` into the folder of a run, and removes figures of an earlier run. Returns
-/// the path of the page.
-fn write_page(folder: &Path, report: &Report, page: &RunPage<'_>) -> Result<PathBuf, Failure> {
-    let names = figures::NAMES_OF_RUN.map(|name| format!("{name}.svg"));
-    write_files(&folder.join("figures"), &names, &svg_files(page.figures))?;
+/// Writes figures and `report.html` into the folder of a run, and removes figures of an earlier run. Returns the path
+/// of the page.
+fn write_page(folder: &Path, report: &Report, page: &RunPage<'_>, formats: &[Format]) -> Result<PathBuf, Failure> {
+    let all = figures::NAMES_OF_RUN.iter().flat_map(|name| Format::ALL.map(|of| format!("{name}.{}", of.name())));
+    write_files(&folder.join("figures"), &all.collect::<Vec<_>>(), &figure_files(page.figures, formats))?;
     let path = folder.join("report.html");
     write_atomically(&path, report.to_html(page).as_bytes())?;
     Ok(path)
@@ -238,8 +244,11 @@ fn write_page(folder: &Path, report: &Report, page: &RunPage<'_>) -> Result<Path
 
 /// Returns names and contents of the files of figures.
 #[must_use]
-pub fn svg_files(figures: &[Figure]) -> Vec<(String, Vec<u8>)> {
-    figures.iter().map(|figure| (format!("{}.svg", figure.name), figure.svg.clone().into_bytes())).collect()
+pub fn figure_files(figures: &[Figure], formats: &[Format]) -> Vec<(String, Vec<u8>)> {
+    let file =
+        |(figure, format): (&Figure, &Format)| (format!("{}.{}", figure.name, format.name()), figure.file(*format));
+    let files: Vec<_> = figures.iter().flat_map(|figure| formats.iter().map(move |format| (figure, format))).collect();
+    files.into_par_iter().map(file).collect()
 }
 
 /// Writes files into a folder, and removes the files of `names` that are not among them.

@@ -491,8 +491,16 @@ impl Study for Attack {
             .column("", "Worst", Kind::Exact, |(k, _)| worst(*k))
             .build();
         vec![
-            Section::new("How the search went", [Block::Figures(vec![chart]), Block::Table(flights)]),
-            Section::new("Bounds and the worst within them", [Block::Table(bounds)]),
+            Section::new(
+                "How the search went",
+                "The smallest separation that the search found, flight by flight.",
+                [Block::Figures(vec![chart]), Block::Table(flights)],
+            ),
+            Section::new(
+                "Bounds and the worst within them",
+                "The searched keys, and their values in the worst flight.",
+                [Block::Table(bounds)],
+            ),
         ]
     }
 

@@ -207,7 +207,11 @@ impl Summary {
         let are_numbers = varied.bins.iter().all(|bin| bin.low.is_some());
         let figures =
             are_numbers.then(|| Block::Figures(vec![figure("violated", violated), figure("reached", reached)]));
-        Section::detail(format!("Over {}", varied.key), figures.into_iter().chain([Block::Table(table.build())]))
+        Section::detail(
+            format!("Over {}", varied.key),
+            "Shares of the flights over the values of a key, with 95 % intervals.",
+            figures.into_iter().chain([Block::Table(table.build())]),
+        )
     }
 }
 
@@ -283,14 +287,30 @@ impl Study for Summary {
 
     fn sections(&self) -> Vec<Section> {
         if self.is_of_estimates() {
-            return vec![Section::new("Probability of a violation", [Block::Table(self.estimates_table())])];
+            return vec![Section::new(
+                "Probability of a violation",
+                "Estimated from flights that are split near a violation.",
+                [Block::Table(self.estimates_table())],
+            )];
         }
         let mut sections = vec![
-            Section::new("How flights ended", [Block::Table(self.shares_table()), Block::Figures(self.histograms())]),
-            Section::new("Quantiles", [Block::Table(self.numbers_table())]),
+            Section::new(
+                "How flights ended",
+                "Outcome of the flights of each law, with how close and how late they were.",
+                [Block::Table(self.shares_table()), Block::Figures(self.histograms())],
+            ),
+            Section::new(
+                "Quantiles",
+                "A quantile of 5 % is the number below which 5 % of the flights lie.",
+                [Block::Table(self.numbers_table())],
+            ),
         ];
         if !self.pairs.is_empty() {
-            sections.push(Section::new("Laws on the same runs", [Block::Table(self.pairs_table())]));
+            sections.push(Section::new(
+                "Laws on the same runs",
+                "Runs that differ between two laws; a small p means more than chance.",
+                [Block::Table(self.pairs_table())],
+            ));
         }
         sections.extend(self.varied.iter().map(|varied| self.varied_section(varied)));
         sections

@@ -65,7 +65,11 @@ impl WorstFlight {
             blocks.extend(replay.map(|replay| page::replay(&flight.description, replay, Start::OnDemand)));
             blocks.push(page::command(&flight.command));
         }
-        Section::new("The worst flights", blocks.into_iter().map(Block::Page))
+        Section::new(
+            "The worst flights",
+            "The flights that came closest, each with its replay and command.",
+            blocks.into_iter().map(Block::Page),
+        )
     }
 }
 

@@ -10,13 +10,18 @@ use maud::{DOCTYPE, PreEscaped, html};
 pub use maud::{Markup, Render};
 pub use replay::{Start, replay};
 
-use crate::figures::Figure;
+use crate::figures::{Figure, page_rules};
 use tautline_core::text::in_order;
 
+/// Style sheet with the colours of light and dark pages.
 const STYLE: &str = include_str!("style.css");
 /// Content security policy: no loading. A script is admitted by its hash, on pages with a replay only.
 const POLICY: &str =
     "default-src 'none'; style-src 'unsafe-inline'; img-src data:; base-uri 'none'; form-action 'none'";
+
+/// Sentence below the heading of a replay.
+const ABOUT_REPLAY: &str =
+    "The flight, drawn in this page: the round button plays it, dragging turns it, and the key H lists all keys.";
 
 /// A page.
 #[derive(Clone, Debug)]
@@ -31,6 +36,8 @@ pub struct Page {
     pub verdict: String,
     /// Reasons against a better verdict, a sentence each.
     pub reasons: Vec<String>,
+    /// Replay before warnings and sections, see [`replay`].
+    pub replay: Option<Markup>,
     /// Warnings, each with its stable name, such as `start-on-line`, and a sentence or two.
     pub warnings: Vec<(String, String)>,
     /// Sections, see [`section`].
@@ -90,21 +97,22 @@ impl Page {
     /// Returns a page without reasons, warnings and sections.
     #[must_use]
     pub fn new(kind: &'static str, title: String, badge: Badge, verdict: String) -> Self {
-        Self { title, kind, badge, verdict, reasons: Vec::new(), warnings: Vec::new(), sections: Vec::new() }
+        let (reasons, warnings, sections) = (Vec::new(), Vec::new(), Vec::new());
+        Self { title, kind, badge, verdict, reasons, replay: None, warnings, sections }
     }
 
     /// Adds a [`section`], unless its content is empty.
-    pub fn add(&mut self, heading: &str, content: impl IntoIterator<Item = Markup>) {
+    pub fn add(&mut self, heading: &str, about: &str, content: impl IntoIterator<Item = Markup>) {
         let content: Vec<_> = content.into_iter().filter(|block| !block.0.is_empty()).collect();
         if !content.is_empty() {
-            self.sections.push(section(heading, &content));
+            self.sections.push(section(heading, about, &content));
         }
     }
 
     /// Returns the page as HTML. It has a script only if a section holds a [`replay`].
     #[must_use]
     pub fn render(&self) -> String {
-        let replays = self.sections.iter().any(|section| section.0.contains(replay::ELEMENT));
+        let replays = self.replay.iter().chain(&self.sections).any(|section| section.0.contains(replay::ELEMENT));
         let policy = if replays { format!("{POLICY}; {}", replay::script_source()) } else { POLICY.to_owned() };
         let page = html! {
             (DOCTYPE)
@@ -117,10 +125,18 @@ impl Page {
                     title { (self.title) " - " (self.badge.word) }
                     // An empty icon, because browsers request one otherwise.
                     link rel="icon" href="data:,";
-                    style { (PreEscaped(STYLE)) @if replays { (PreEscaped(replay::STYLE)) } }
+                    style { (PreEscaped(STYLE)) (PreEscaped(page_rules())) @if replays { (PreEscaped(replay::STYLE)) } }
                 }
                 body {
                     header {
+                        label.theme {
+                            "Theme "
+                            select autocomplete="off" {
+                                option value="auto" { "automatic" }
+                                option value="light" { "light" }
+                                option value="dark" { "dark" }
+                            }
+                        }
                         p.kind { (self.kind) }
                         h1 { (self.title) }
                         p.verdict { (self.badge) " " (self.verdict) }
@@ -129,9 +145,13 @@ impl Page {
                         }
                     }
                     main {
+                        @if let Some(replay) = &self.replay {
+                            section.replays { h2 { "Replay" } p.about { (ABOUT_REPLAY) } (replay) }
+                        }
                         @if !self.warnings.is_empty() {
                             section.warnings aria-label="Warnings" {
                                 h2 { "Warnings" }
+                                p { "The check before the first step found these limits of the result." }
                                 ul { @for (code, message) in &self.warnings { li { code { (code) } " " (message) } } }
                             }
                         }
@@ -146,12 +166,13 @@ impl Page {
     }
 }
 
-/// Returns a part of a page under a heading.
+/// Returns a part of a page under a heading and a sentence on its content for a first reader.
 #[must_use]
-pub fn section(heading: &str, content: &[Markup]) -> Markup {
+pub fn section(heading: &str, about: &str, content: &[Markup]) -> Markup {
     html! {
         section {
             h2 { (heading) }
+            @if !about.is_empty() { p.about { (about) } }
             @for block in content { (block) }
         }
     }
@@ -174,7 +195,7 @@ pub fn figures(figures: &[Figure]) -> Markup {
 #[must_use]
 pub fn pictures(pictures: &[Picture]) -> Markup {
     side_by_side(pictures.iter().map(|Picture { description, data_uri }| {
-        (html! { img src=(data_uri) alt=(description); }, description.clone())
+        (html! { img.snapshot src=(data_uri) alt=(description); }, description.clone())
     }))
 }
 
@@ -228,12 +249,23 @@ fn table<R: IntoIterator<Item: Render>>(
                 } } }
                 tbody { @for row in rows { tr {
                     @for (k, cell) in row.into_iter().enumerate() {
-                        @if k == 0 { th scope="row" { (cell) } } @else { td class=[class(k)] { (cell) } }
+                        @if k == 0 {
+                            th scope="row" { (cell) }
+                        } @else {
+                            td class=[class(k)] data-label=[class(k).and_then(|_| columns.get(k))] { (cell) }
+                        }
                     }
                 } } }
             }
         }
     }
+}
+
+/// Returns a cell with a background of a tone, the stronger the larger its share from 0 to 1.
+#[must_use]
+pub fn tinted(content: &Markup, tone: Tone, share: f64) -> Markup {
+    let class = if tone == Tone::Bad { "tint bad" } else { "tint" };
+    html! { span class=(class) style=(format!("--share:{:.0}%", 100.0 * share)) { (content) } }
 }
 
 /// Returns a cell with a remark in small print below.

@@ -267,18 +267,22 @@ impl RecordedReport {
         };
         let badge = Badge { tone, word: self.verdict() };
         let mut page = Page::new("Audit of a recording", self.source.recording.clone(), badge, self.finding());
-        page.add("Replay", [page::replay(&self.source.recording, replay, Start::AtOnce)]);
-        page.add("Figures", [page::figures(figures)]);
+        page.replay = Some(page::replay(&self.source.recording, replay, Start::AtOnce));
+        page.add(
+            "Figures",
+            "Distances over the recording; a bold line across a chart is the limit.",
+            [page::figures(figures)],
+        );
         page.sections.extend(self.sections().iter().map(|section| section.html(LISTED_ON_PAGE)));
-        page.add("How it was read", [page::list(&self.source.notes)]);
+        page.add("How it was read", "Decisions of the reader of this file format.", [page::list(&self.source.notes)]);
         let known = if self.audit.assumes.is_some() { "assumed" } else { "as recorded" };
         let assumed = [
             format!("Motion: {} ({known}).", self.motion),
             "A distance strictly below its limit is a violation; equality is not.".to_owned(),
             format!("Time 0 s is {} ns on the recording's clock.", self.source.clock.epoch_ns),
         ];
-        page.add("Assumptions", [page::list(&assumed)]);
-        page.add("Reproduce", [page::command(command)]);
+        page.add("Assumptions", "The verdict holds under these assumptions.", [page::list(&assumed)]);
+        page.add("Reproduce", "This command judges the recording again.", [page::command(command)]);
         page.render()
     }
 }

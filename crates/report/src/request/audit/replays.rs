@@ -95,6 +95,7 @@ pub(super) fn of_recording(
         radius_m: places.radius_m(),
         shell_m: ellipsoid.or(settings.delta_m.map(half)),
         plan: None,
+        rotors: None,
         obstacles: settings.obstacles.clone(),
     };
     let gaps = places.gaps().iter().map(|gap| (gap.vehicle, [gap.from_s, gap.to_s])).collect();
