@@ -7,13 +7,12 @@ use std::sync::{Arc, Mutex, PoisonError};
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
 use crate::scene::metres;
-use crate::{
-    CameraSpec, Extent, FoxgloveScene, Picture, RenderError, Renderer, Scene, Theme, Timeline, View, data_uri,
-};
+use crate::{Extent, FoxgloveScene, Picture, RenderError, Renderer, Scene, Theme, Timeline, View, data_uri};
+use tautline_core::record::Event;
 use tautline_core::swarm::Pair;
 use tautline_recordings::mcap::ExtraTopic;
 use tautline_report::flight_log::{FlightLog, PICTURED};
-use tautline_report::report::page;
+use tautline_report::report::{Report, page};
 use tautline_report::request::{Failure, Monitor, NamedPicture, PICTURES_BYTES, Pictures, write_files};
 use tautline_report::run::run_while;
 use tautline_sim::preflight::Preflight;
@@ -42,8 +41,13 @@ impl RunPictures {
 }
 
 impl RunPictures {
-    fn snapshots(&self, scenario: &Scenario, log: &Arc<FlightLog>) -> Result<Vec<Snapshot>, RenderError> {
-        let timeline = Timeline::flown(scenario, Arc::clone(log));
+    fn snapshots(
+        &self,
+        scenario: &Scenario,
+        report: &Report,
+        log: &Arc<FlightLog>,
+    ) -> Result<Vec<Snapshot>, RenderError> {
+        let timeline = Timeline::flown(scenario, Arc::clone(log)).judged(report.audit.status);
         if log.keyframes().is_empty() {
             return Err(RenderError::Empty(timeline.name));
         }
@@ -57,11 +61,12 @@ impl Pictures for RunPictures {
     fn draw(
         &self,
         scenario: &Scenario,
+        report: &Report,
         log: &Arc<FlightLog>,
         folder: &Path,
         monitor: &dyn Monitor,
     ) -> Result<Vec<NamedPicture>, Failure> {
-        let snapshots = if self.takes_snapshots { self.snapshots(scenario, log) } else { Ok(Vec::new()) };
+        let snapshots = if self.takes_snapshots { self.snapshots(scenario, report, log) } else { Ok(Vec::new()) };
         let snapshots = snapshots.unwrap_or_else(|error| {
             monitor.warn(&format!("no pictures were taken: {}", Failure::from(error).in_words()));
             Vec::new()
@@ -123,12 +128,12 @@ pub struct Snapshot {
 /// Returns the names of all pictures that [`snapshots_of_run`] can take.
 #[must_use]
 pub fn snapshot_names() -> Vec<String> {
-    let violations = (1..=PICTURED).map(|k| format!("violation-{k}"));
-    ["start", "closest", "end", "obstacle"].map(str::to_owned).into_iter().chain(violations).collect()
+    let numbered = ["leg", "violation"].into_iter().flat_map(|name| (1..=PICTURED).map(move |k| format!("{name}-{k}")));
+    ["start", "closest", "end", "obstacle"].map(str::to_owned).into_iter().chain(numbered).collect()
 }
 
-/// Draws the start, the closest approach, the end, the first violation of an obstacle's clearance, and the first ten
-/// violations of two vehicles. Returns no picture for a flight without samples.
+/// Draws the start, the closest approach, the ends of the first ten legs, the end, the first violation of an obstacle's
+/// clearance, and the first ten violations of two vehicles. Returns no picture for a flight without samples.
 ///
 /// # Errors
 /// [`RenderError`] if the adapter fails.
@@ -138,13 +143,12 @@ pub fn snapshots_of_run(
     view: &View,
 ) -> Result<Vec<Snapshot>, RenderError> {
     let extent = Extent::of(timeline);
-    let view = View { camera: CameraSpec::Iso, ..view.clone() };
     let mut snapshots = Vec::new();
     // The camera frames the whole flight, or the pair if one is given.
     let mut shoot = |name: &str, description: String, time_s: f64, pair: Option<Pair>| {
         let Some(frame) = timeline.log.at(time_s) else { return Ok(()) };
         let camera = match pair {
-            Some(pair) => extent.close_up(timeline, &frame, pair, view.size_px),
+            Some(pair) => extent.close_up(timeline, &frame, pair, &view),
             None => extent.camera(timeline, &frame, &view)?,
         };
         let picture = renderer.paint(&Scene::compose(timeline, &extent, &frame, &view, camera))?;
@@ -157,6 +161,14 @@ pub fn snapshots_of_run(
         let (pair, time_s, apart) = (closest.pair, closest.time_s, metres(closest.separation_m));
         let what = format!("The closest approach of the flight: vehicles {pair} at {time_s:.2} s, {apart} apart.");
         shoot("closest", what, time_s, None)?;
+    }
+    // A leg ends when the next one begins.
+    let legs = timeline.log.targets().iter().filter_map(|event| match event {
+        Event::LegBegan { leg, time_s } if (1..=PICTURED).contains(leg) && *time_s > start_s => Some((*leg, *time_s)),
+        _ => None,
+    });
+    for (leg, time_s) in legs {
+        shoot(&format!("leg-{leg}"), format!("The end of leg {leg}, at {time_s:.2} s."), time_s.next_down(), None)?;
     }
     shoot("end", format!("The end, at {end_s:.2} s."), end_s, None)?;
     if let Some((near, [vehicle, obstacle])) = timeline.log.violations().of_obstacles().next() {

@@ -10,6 +10,8 @@ use tautline_core::text::decimals_of;
 
 /// Largest number of ground lines in each direction.
 const MAX_LINES: u32 = 60;
+/// Opacity of the lines of a ground that is an obstacle.
+const HARD: f32 = 0.45;
 /// Sine of the elevation below which the ground is seen edge-on.
 const EDGE_ON: f64 = 0.05;
 /// Length of the axes in units of the line distance.
@@ -24,13 +26,15 @@ impl SceneBuilder<'_> {
     pub(super) fn ground(&self, lines: &mut Vec<Line>) {
         let ([low, high], step) = (self.extent.ground_m, self.extent.grid_m);
         let width_px = self.view.unit_px().max(0.7);
+        let theme = self.view.theme;
+        let colour = if self.extent.has_hard_ground { theme.obstacle().at(HARD) } else { theme.grid() };
         for (along, across) in [(0, 1), (1, 0)] {
             for k in 0..=steps(high[along] - low[along], step) {
                 let mut ends_m = [low, low];
                 ends_m[0][along] = low[along] + f64::from(k) * step;
                 ends_m[1] = ends_m[0];
                 ends_m[1][across] = high[across];
-                lines.push(Line::new(ends_m, self.view.theme.grid(), width_px));
+                lines.push(Line::new(ends_m, colour, width_px));
             }
         }
         for (axis, colour) in self.axes().into_iter().enumerate() {
@@ -44,7 +48,7 @@ impl SceneBuilder<'_> {
 
     /// Draws coordinates in metres along the two edges of the ground nearest to the camera, and the names of the axes.
     pub(super) fn scale(&self, labels: &mut LabelLayout) {
-        let ([low, high], step, origin_m) = (self.extent.ground_m, self.extent.grid_m, self.extent.origin_m());
+        let ([low, high], step) = (self.extent.ground_m, self.extent.grid_m);
         let (size_px, soft) = (self.view.text_px(0.8), self.view.theme.soft_ink());
         for (axis, colour) in self.axes().into_iter().enumerate() {
             let tip = low + Vector3::ith(axis, (AXIS + 0.22) * step);
@@ -61,7 +65,6 @@ impl SceneBuilder<'_> {
                 ((x - at_x).abs() - half[0]).max(0.0).hypot(((y - at_y).abs() - half[1]).max(0.0)) < *radius
             })
         };
-        let centre = (low + high) / 2.0;
         for axis in 0..2 {
             let other = 1 - axis;
             // Edge-on there is no edge to write along.
@@ -70,37 +73,46 @@ impl SceneBuilder<'_> {
             {
                 continue;
             }
-            let edge = [low[other], high[other]].into_iter().max_by(|&a, &b| {
-                let height = |at: f64| {
-                    let mut point = centre;
-                    point[other] = at;
-                    self.camera.project(point).map_or(f64::NEG_INFINITY, |projected| projected.at_px[1])
-                };
-                height(a).total_cmp(&height(b))
+            // The lower of the two edges, or the other one if more of it is in the picture.
+            let mut edges = [low[other], high[other]].map(|edge| {
+                let numbers = self.numbers(axis, edge, size_px);
+                let visible = numbers.iter().filter(|(at, text)| labels.is_free(*at, size_px, text)).count();
+                let lowest = numbers.iter().fold(f64::NEG_INFINITY, |lowest, (at, _)| lowest.max(at[1]));
+                (visible, lowest, numbers)
             });
-            let Some(edge) = edge else { continue };
-            let outwards = if edge > centre[other] { 1.0 } else { -1.0 };
-            // Edge-on the numbers are below the line of the ground.
-            let (anchor, below_px) = if self.camera.back.z.abs() < EDGE_ON {
-                ([0.5, 0.0], 0.4 * f64::from(size_px))
-            } else {
-                ([0.5; 2], 0.0)
-            };
+            if edges[1].1 > edges[0].1 {
+                edges.swap(0, 1);
+            }
+            if edges[1].0 > 2 * edges[0].0 {
+                edges.swap(0, 1);
+            }
             // Only the last number that fits has the unit.
             let mut unit = " m";
-            for k in (0..=steps(high[axis] - low[axis], step)).rev() {
-                let mut point = low;
-                point[axis] += f64::from(k) * step;
-                point[other] = edge + outwards * 0.42 * step;
-                let text = format!("{}{unit}", format_multiple(point[axis] + origin_m[axis], step));
-                let Some(at) = self.camera.project(point) else { continue };
-                let [x, y] = at.at_px;
-                let middle = [x, y + below_px + (0.5 - f64::from(anchor[1])) * f64::from(size_px)];
-                if !is_covered(middle, &text) && labels.put_if_free([x, y + below_px], anchor, size_px, soft, &text) {
+            for (at, number) in &edges[0].2 {
+                let text = format!("{number}{unit}");
+                if !is_covered(*at, &text) && labels.put_if_free(*at, [0.5; 2], size_px, soft, &text) {
                     unit = "";
                 }
             }
         }
+    }
+
+    /// Returns the coordinates along an edge of the ground, from the largest one, with the middles of their texts
+    /// \[pixels\].
+    fn numbers(&self, axis: usize, edge: f64, size_px: f32) -> Vec<([f64; 2], String)> {
+        let ([low, high], step, origin_m) = (self.extent.ground_m, self.extent.grid_m, self.extent.origin_m());
+        let other = 1 - axis;
+        let outwards = if edge > f64::midpoint(low[other], high[other]) { 1.0 } else { -1.0 };
+        // Edge-on the numbers are below the line of the ground.
+        let below_px = if self.camera.back.z.abs() < EDGE_ON { 0.9 * f64::from(size_px) } else { 0.0 };
+        let number = |k: u32| {
+            let mut point = low;
+            point[axis] += f64::from(k) * step;
+            point[other] = edge + outwards * 0.42 * step;
+            let [x, y] = self.camera.project(point)?.at_px;
+            Some(([x, y + below_px], format_multiple(point[axis] + origin_m[axis], step)))
+        };
+        (0..=steps(high[axis] - low[axis], step)).rev().filter_map(number).collect()
     }
 }
 

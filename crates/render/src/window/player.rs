@@ -94,6 +94,32 @@ impl Player {
         self.time_s = time_s.clamp(first_s, last_s.max(first_s));
     }
 
+    /// Returns the times of the closest approach and of the worst instants of violations, in order \[s\].
+    pub(super) fn marks_s(&self) -> Vec<f64> {
+        let violations = self.timeline.log.violations();
+        let closest_s = self.timeline.log.closest().map(|closest| closest.time_s);
+        let mut marks_s: Vec<f64> = violations.of_vehicles().map(|found| found.min_at_s).chain(closest_s).collect();
+        marks_s.extend(violations.of_obstacles().map(|(found, _)| found.min_at_s));
+        marks_s.sort_by(f64::total_cmp);
+        marks_s.dedup();
+        marks_s
+    }
+
+    /// Pauses at the next or previous mark.
+    pub(super) fn seek_mark(&mut self, is_next: bool) {
+        let marks_s = self.marks_s();
+        let now_s = self.time_s;
+        let found = if is_next {
+            marks_s.into_iter().find(|&at_s| at_s > now_s)
+        } else {
+            marks_s.into_iter().rev().find(|&at_s| at_s < now_s)
+        };
+        if let Some(at_s) = found {
+            self.playing = false;
+            self.seek(at_s);
+        }
+    }
+
     /// Steps by a number of samples, forward or back.
     pub(super) fn step(&mut self, samples: isize) {
         self.playing = false;
@@ -171,6 +197,24 @@ mod tests {
         assert_eq!((player.time_s, player.playing), (0.0, false));
         player.step(100);
         assert_eq!(player.time_s, 2.0);
+    }
+
+    #[test]
+    fn marks_are_visited_in_order() {
+        use tautline_core::swarm::Pair;
+
+        let mut player = player();
+        for (from_s, to_s) in [(1.2, 1.4), (0.4, 0.6)] {
+            player.timeline.note(&Event::ViolationBegan { pair: Pair::new(0, 1), time_s: from_s });
+            player.timeline.note(&Event::ViolationEnded { pair: Pair::new(0, 1), time_s: to_s, min_m: 0.1 });
+        }
+        let mut visit = |is_next| {
+            player.seek_mark(is_next);
+            player.time_s
+        };
+        let visited = [true, true, true, false, false].map(&mut visit);
+        let expected = [0.5, 1.3, 1.3, 0.5, 0.5];
+        assert!(visited.iter().zip(expected).all(|(at, expected)| (at - expected).abs() < 1e-9), "{visited:?}");
     }
 
     #[test]
