@@ -18,8 +18,8 @@ const MAX_NAMED: usize = 24;
 const MAX_LABELLED: usize = 3;
 /// Number of colours on each side of the legend's scale.
 const SHADES: i16 = 16;
-/// Largest number of vehicles whose area stays free of texts.
-const MAX_RESERVED: usize = 300;
+/// Number of vehicles up to which the areas of all stay free of texts; in a larger swarm only those of named vehicles.
+const MAX_RESERVED: usize = 60;
 /// Opacity of the name of the farthest vehicle.
 const FAINT: f32 = 0.45;
 /// Longest name that is drawn in full \[characters\].
@@ -27,7 +27,7 @@ const LONGEST_NAME: usize = 40;
 /// Smallest number of letters to which a name is cut.
 const MIN_LETTERS: usize = 4;
 /// Opacity of the background of text.
-const BACKING: f32 = 0.72;
+const BACKING: f32 = 0.88;
 
 impl SceneBuilder<'_> {
     pub(super) fn caption(&self, labels: &mut LabelLayout) {
@@ -209,7 +209,8 @@ impl SceneBuilder<'_> {
         };
         // Draws a scale with texts above its ends and its middle; returns the start of the next text.
         let scale = |labels: &mut LabelLayout, x: f32, texts: [&str; 3], colour: &dyn Fn(f32) -> Colour| {
-            let width_px = 9.0 * size_px;
+            let texts_px = texts.iter().map(|text| width(size_px, text) + 0.6 * size_px).sum::<f32>();
+            let width_px = texts_px.max(9.0 * size_px);
             let colours = (-SHADES..=SHADES).map(|k| colour(f32::from(k) / f32::from(SHADES))).collect();
             let corners_px = [[x, y - 0.6 * size_px], [x + width_px, y]];
             labels.draw(Annotation::Scale { corners_px, colours });
@@ -276,10 +277,15 @@ impl SceneBuilder<'_> {
         labels.insert_background(taken, bottom, theme.background().at(BACKING), 0.3 * size_px);
     }
 
-    /// Reserves the area of vehicles, unless they are too many.
+    /// Reserves the areas of vehicles.
     pub(super) fn reserve_vehicles(&self, labels: &mut LabelLayout) {
-        let reserved = (0..self.timeline.count()).filter(|_| self.timeline.count() <= MAX_RESERVED);
-        for (k, at) in reserved.filter_map(|k| Some((k, self.projected(k)?))) {
+        let count = self.timeline.count();
+        let reserved = if count <= MAX_RESERVED {
+            (0..count).filter_map(|k| Some((k, self.projected(k)?))).collect()
+        } else {
+            self.labelled_vehicles()
+        };
+        for (k, at) in reserved {
             let least = f64::from(self.view.text_px(0.4));
             let radius = (self.timeline.radius_m[k] * at.px_per_m).max(least);
             let [x, y, radius] = pixels([at.at_px[0], at.at_px[1], radius]);

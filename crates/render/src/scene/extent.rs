@@ -45,6 +45,14 @@ const OBSTACLE_ROOM: f64 = 0.2;
 /// Smallest z of the unit normal of an obstacle that is the ground.
 const LEVEL: f64 = 0.999;
 
+/// Box around all vehicles at a time.
+#[derive(Clone, Copy, Debug)]
+struct SwarmBox {
+    time_s: f64,
+    centre: Vector3<f64>,
+    half: Vector3<f64>,
+}
+
 /// Extent of a flight, origin of its scene coordinates, and ground.
 #[derive(Debug)]
 pub struct Extent {
@@ -55,8 +63,8 @@ pub struct Extent {
     /// Directions of the cameras `Auto` and `Perspective`.
     auto: Direction,
     oblique: Direction,
-    /// Times \[s\] with a ball around all vehicles, smoothed over time.
-    swarm: Vec<(f64, Vector3<f64>, f64)>,
+    /// Boxes around all vehicles, smoothed over time.
+    swarm: Vec<SwarmBox>,
     /// Last computed framing; it is the same for all pictures of a film.
     framed: Mutex<Option<(Direction, Area, Camera)>>,
     /// Largest speed of a vehicle between two samples \[m/s\].
@@ -82,7 +90,7 @@ impl Extent {
     #[must_use]
     pub fn of_all(timelines: &[&Timeline]) -> Self {
         let mut balls: Vec<(Vector3<f64>, f64)> = Vec::new();
-        let mut swarm: Vec<(f64, Vector3<f64>, f64)> = Vec::new();
+        let mut swarm: Vec<SwarmBox> = Vec::new();
         let mut max_speed_m_s = 0.0_f64;
         for timeline in timelines {
             let keyframes = timeline.log.keyframes();
@@ -102,11 +110,16 @@ impl Extent {
                         max_speed_m_s = max_speed_m_s.max(moved_m / (keyframe.time_s - before.time_s));
                     }
                 }
-                swarm.extend(around(&balls[first..]).map(|(centre, radius_m)| (keyframe.time_s, centre, radius_m)));
+                let radius_m = balls[first..].iter().fold(0.0, |largest: f64, (_, radius)| largest.max(*radius));
+                swarm.extend(bounds(&balls[first..]).map(|[low, high]| SwarmBox {
+                    time_s: keyframe.time_s,
+                    centre: low / 2.0 + high / 2.0,
+                    half: (high / 2.0 - low / 2.0).add_scalar(radius_m),
+                }));
                 before = Some(keyframe);
             }
         }
-        swarm.sort_by(|a, b| a.0.total_cmp(&b.0));
+        swarm.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
         let mut largest = balls.iter().fold(0.0_f64, |largest, (_, radius)| largest.max(*radius));
         let [lowest, highest] = bounds(&balls).unwrap_or([Vector3::zeros(); 2]);
         let (mut low, mut high) = (lowest, highest);
@@ -125,7 +138,7 @@ impl Extent {
         // Halved first: the difference of the largest doubles overflows.
         let origin_m = low / 2.0 + high / 2.0;
         balls.iter_mut().for_each(|(place, _)| *place -= origin_m);
-        swarm.iter_mut().for_each(|(_, centre, _)| *centre -= origin_m);
+        swarm.iter_mut().for_each(|around| around.centre -= origin_m);
         let hard_z = obstacles.iter().find_map(|obstacle| match obstacle.shape {
             Shape::HalfSpace { normal } if is_level(normal) => Some(obstacle.place_m.z),
             _ => None,
@@ -206,7 +219,7 @@ impl Extent {
                 }
             }
             CameraSpec::Follow(None) => match self.swarm_at(frame.time_s) {
-                Some(ball) => Camera::framing(self.auto, &[ball], area),
+                Some(corners) => Camera::framing(self.auto, &corners, area),
                 None => self.framing(self.auto, area),
             },
             CameraSpec::Closest => match frame.nearest {
@@ -241,12 +254,17 @@ impl Extent {
         }
     }
 
-    /// Returns the ball around all vehicles at a time \[s\].
-    fn swarm_at(&self, time_s: f64) -> Option<(Vector3<f64>, f64)> {
-        let next = self.swarm.partition_point(|(at_s, ..)| *at_s <= time_s);
+    /// Returns the corners of the box around all vehicles at a time \[s\].
+    fn swarm_at(&self, time_s: f64) -> Option<[(Vector3<f64>, f64); 8]> {
+        let next = self.swarm.partition_point(|around| around.time_s <= time_s);
         let (from, to) = (self.swarm.get(next.saturating_sub(1))?, self.swarm.get(next).or(self.swarm.last())?);
-        let part = if to.0 > from.0 { ((time_s - from.0) / (to.0 - from.0)).clamp(0.0, 1.0) } else { 0.0 };
-        Some((from.1.lerp(&to.1, part), from.2 + (to.2 - from.2) * part))
+        let span_s = to.time_s - from.time_s;
+        let part = if span_s > 0.0 { ((time_s - from.time_s) / span_s).clamp(0.0, 1.0) } else { 0.0 };
+        let (centre, half) = (from.centre.lerp(&to.centre, part), from.half.lerp(&to.half, part));
+        Some(std::array::from_fn(|k| {
+            let side = |axis: usize| if k >> axis & 1 == 0 { -half[axis] } else { half[axis] };
+            (centre + Vector3::from_fn(|axis, _| side(axis)), 0.0)
+        }))
     }
 
     /// Returns the smallest and largest depth of the content for a camera \[m\].
@@ -269,26 +287,20 @@ fn bounds(balls: &[(Vector3<f64>, f64)]) -> Option<[Vector3<f64>; 2]> {
     places.reduce(|[low, high], [place, _]| [low.inf(&place), high.sup(&place)])
 }
 
-/// Returns a ball around balls.
-fn around(balls: &[(Vector3<f64>, f64)]) -> Option<(Vector3<f64>, f64)> {
-    let [low, high] = bounds(balls)?;
-    let centre = low / 2.0 + high / 2.0;
-    Some((centre, balls.iter().fold(0.0, |most, (place, radius)| most.max((place - centre).norm() + radius))))
-}
-
-/// Smooths balls over time. Each result contains the ball of its time.
-fn smoothed(swarm: &[(f64, Vector3<f64>, f64)]) -> Vec<(f64, Vector3<f64>, f64)> {
+/// Smooths boxes over time. Each result contains the box of its time.
+fn smoothed(swarm: &[SwarmBox]) -> Vec<SwarmBox> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a length")]
-    let half = (SMOOTHED * swarm.len() as f64) as usize;
-    let near = |k: usize| k.saturating_sub(half)..(k + half + 1).min(swarm.len());
+    let reach = (SMOOTHED * swarm.len() as f64) as usize;
+    let near = |k: usize| k.saturating_sub(reach)..(k + reach + 1).min(swarm.len());
     let mean =
-        |k: usize| swarm[near(k)].iter().map(|(_, centre, _)| centre).sum::<Vector3<f64>>() / near(k).len() as f64;
+        |k: usize| swarm[near(k)].iter().map(|around| around.centre).sum::<Vector3<f64>>() / near(k).len() as f64;
     let centres: Vec<_> = (0..swarm.len()).map(mean).collect();
-    let radius = |k: usize| swarm[k].2 + (swarm[k].1 - centres[k]).norm();
-    let largest = |k: usize| near(k).map(radius).fold(0.0, f64::max);
-    let largest: Vec<f64> = (0..swarm.len()).map(largest).collect();
-    let radius = |k: usize| largest[near(k)].iter().sum::<f64>() / near(k).len() as f64;
-    (0..swarm.len()).map(|k| (swarm[k].0, centres[k], radius(k))).collect()
+    let half = |k: usize| swarm[k].half + (swarm[k].centre - centres[k]).abs();
+    let largest = |k: usize| near(k).map(half).fold(Vector3::zeros(), |most: Vector3<f64>, half| most.sup(&half));
+    let largest: Vec<_> = (0..swarm.len()).map(largest).collect();
+    let half = |k: usize| largest[near(k)].iter().sum::<Vector3<f64>>() / near(k).len() as f64;
+    let smooth = |k: usize| SwarmBox { time_s: swarm[k].time_s, centre: centres[k], half: half(k) };
+    (0..swarm.len()).map(smooth).collect()
 }
 
 /// Returns the corners of a box around an obstacle \[m\]; empty for an unbounded one.
@@ -335,11 +347,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_smoothed_ball_contains_the_ball_of_its_time() {
-        let ball = |k: u32| (f64::from(k), Vector3::new(f64::from(k * k % 13), 0.0, 0.0), 1.0 + f64::from(k % 3));
-        let swarm: Vec<_> = (0..100).map(ball).collect();
-        for (ball, smooth) in swarm.iter().zip(smoothed(&swarm)) {
-            assert!((ball.1 - smooth.1).norm() + ball.2 <= smooth.2 + 1e-12, "{ball:?} {smooth:?}");
+    fn a_smoothed_box_contains_the_box_of_its_time() {
+        let at = |k: u32| SwarmBox {
+            time_s: f64::from(k),
+            centre: Vector3::new(f64::from(k * k % 13), 0.0, f64::from(k)),
+            half: Vector3::repeat(1.0 + f64::from(k % 3)),
+        };
+        let swarm: Vec<_> = (0..100).map(at).collect();
+        for (around, smooth) in swarm.iter().zip(smoothed(&swarm)) {
+            let beyond = (around.centre - smooth.centre).abs() + around.half - smooth.half;
+            assert!(beyond.max() <= 1e-12, "{around:?} {smooth:?}");
         }
     }
 

@@ -186,7 +186,12 @@ impl SceneBuilder<'_> {
         let start = |k| {
             let place = self.extent.place(&first.positions_m, k)?;
             let arm = self.at_least(place, self.timeline.radius_m[k] * 0.8, MIN_RADIUS_PX[1]);
-            let is_left = self.vehicle(k).is_none_or(|now| (now - place).norm() > 2.0 * arm);
+            let (start, now) = (self.camera.project(place)?, self.projected(k));
+            let is_left = now.is_none_or(|now| {
+                let apart_px = (now.at_px[0] - start.at_px[0]).hypot(now.at_px[1] - start.at_px[1]);
+                let hull_px = (self.timeline.radius_m[k] * now.px_per_m).max(f64::from(self.view.text_px(0.7)));
+                apart_px > hull_px + arm * start.px_per_m
+            });
             is_left.then_some((k, place, arm))
         };
         (0..count).filter_map(start).collect()

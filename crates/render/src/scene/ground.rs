@@ -1,11 +1,9 @@
 //! Ground with its scale, and coordinate axes.
 
-use nalgebra::Vector3;
-
-use super::Line;
 use super::colour::{Colour, Theme};
 use super::compose::SceneBuilder;
 use super::labels::{LabelLayout, width};
+use super::{Annotation, Line};
 use tautline_core::text::decimals_of;
 
 /// Largest number of ground lines in each direction.
@@ -14,8 +12,13 @@ const MAX_LINES: u32 = 60;
 const HARD: f32 = 0.45;
 /// Sine of the elevation below which the ground is seen edge-on.
 const EDGE_ON: f64 = 0.05;
-/// Length of the axes in units of the line distance.
-const AXIS: f64 = 1.0;
+/// Distance of numbers from the ground in units of the line distance.
+const OUTWARDS: f64 = 0.42;
+/// Number of positions along a line at which its number may be.
+const CROSSINGS: u32 = 240;
+/// Length of the axes in a picture 720 pixels high \[pixels\], and part of it below which an axis is not drawn.
+const TRIAD_PX: f32 = 30.0;
+const FORESHORTENED: f32 = 0.15;
 /// Colours of x, y and z on dark and on light background.
 const AXES: [[Colour; 3]; 2] = [
     [Colour::hex(0xE0_6C_75), Colour::hex(0x7F_C9_7F), Colour::hex(0x61_AF_EF)],
@@ -37,25 +40,19 @@ impl SceneBuilder<'_> {
                 lines.push(Line::new(ends_m, colour, width_px));
             }
         }
-        for (axis, colour) in self.axes().into_iter().enumerate() {
-            lines.push(Line::new([low, low + Vector3::ith(axis, AXIS * step)], colour, 2.4 * width_px));
-        }
     }
 
     fn axes(&self) -> [Colour; 3] {
         AXES[usize::from(self.view.theme != Theme::Dark)]
     }
 
-    /// Draws coordinates in metres along the two edges of the ground nearest to the camera, and the names of the axes.
+    /// Draws the directions of the axes in the lower right corner, and coordinates in metres where ground lines end or
+    /// leave the picture.
     pub(super) fn scale(&self, labels: &mut LabelLayout) {
-        let ([low, high], step) = (self.extent.ground_m, self.extent.grid_m);
+        let [low, high] = self.extent.ground_m;
         let (size_px, soft) = (self.view.text_px(0.8), self.view.theme.soft_ink());
-        for (axis, colour) in self.axes().into_iter().enumerate() {
-            let tip = low + Vector3::ith(axis, (AXIS + 0.22) * step);
-            let foreshortened = self.camera.back[axis].abs() > 0.97;
-            if let Some(at) = self.camera.project(tip).filter(|_| !foreshortened) {
-                labels.put_if_free(at.at_px, [0.5, 0.5], size_px, colour, ["x", "y", "z"][axis]);
-            }
+        if self.view.has_legend() {
+            self.triad(labels);
         }
         // A number on a ball would look like its name.
         let covered_px = self.covered_areas_px();
@@ -73,46 +70,73 @@ impl SceneBuilder<'_> {
             {
                 continue;
             }
-            // The lower of the two edges, or the other one if more of it is in the picture.
-            let mut edges = [low[other], high[other]].map(|edge| {
-                let numbers = self.numbers(axis, edge, size_px);
-                let visible = numbers.iter().filter(|(at, text)| labels.is_free(*at, size_px, text)).count();
-                let lowest = numbers.iter().fold(f64::NEG_INFINITY, |lowest, (at, _)| lowest.max(at[1]));
-                (visible, lowest, numbers)
-            });
-            if edges[1].1 > edges[0].1 {
-                edges.swap(0, 1);
-            }
-            if edges[1].0 > 2 * edges[0].0 {
-                edges.swap(0, 1);
-            }
+            // The lower of the two edges.
+            let height = |edge: f64| {
+                let mut point = (low + high) / 2.0;
+                point[other] = edge;
+                self.camera.project(point).map_or(f64::INFINITY, |projected| projected.at_px[1])
+            };
+            let is_high = height(high[other]) > height(low[other]);
             // Only the last number that fits has the unit.
             let mut unit = " m";
-            for (at, number) in &edges[0].2 {
+            for (at, number) in self.numbers(axis, is_high, size_px) {
                 let text = format!("{number}{unit}");
-                if !is_covered(*at, &text) && labels.put_if_free(*at, [0.5; 2], size_px, soft, &text) {
+                if !is_covered(at, &text) && labels.put_if_free(at, [0.5; 2], size_px, soft, &text) {
                     unit = "";
                 }
             }
         }
     }
 
-    /// Returns the coordinates along an edge of the ground, from the largest one, with the middles of their texts
-    /// \[pixels\].
-    fn numbers(&self, axis: usize, edge: f64, size_px: f32) -> Vec<([f64; 2], String)> {
+    /// Returns the coordinates of ground lines across an axis, from the largest one, with the middles of their texts:
+    /// beyond the ends of the lines, or where they leave the picture \[pixels\].
+    fn numbers(&self, axis: usize, is_high: bool, size_px: f32) -> Vec<([f64; 2], String)> {
         let ([low, high], step, origin_m) = (self.extent.ground_m, self.extent.grid_m, self.extent.origin_m());
         let other = 1 - axis;
-        let outwards = if edge > f64::midpoint(low[other], high[other]) { 1.0 } else { -1.0 };
+        let (from, to) = if is_high { (high[other], low[other]) } else { (low[other], high[other]) };
+        let from = from + OUTWARDS * step * (from - to).signum();
         // Edge-on the numbers are below the line of the ground.
         let below_px = if self.camera.back.z.abs() < EDGE_ON { 0.9 * f64::from(size_px) } else { 0.0 };
+        let area = self.view.area(self.timeline);
+        let [width_px, height_px] = area.size_px.map(f64::from);
+        let [top, bottom] = area.texts_px;
         let number = |k: u32| {
             let mut point = low;
             point[axis] += f64::from(k) * step;
-            point[other] = edge + outwards * 0.42 * step;
-            let [x, y] = self.camera.project(point)?.at_px;
-            Some(([x, y + below_px], format_multiple(point[axis] + origin_m[axis], step)))
+            let text = format_multiple(point[axis] + origin_m[axis], step);
+            let half = f64::from(width(size_px, &text) + size_px) / 2.0;
+            let line = f64::from(size_px);
+            let place = |n: u32| {
+                point[other] = from + (to - from) * f64::from(n) / f64::from(CROSSINGS);
+                let [x, y] = self.camera.project(point)?.at_px;
+                let at = [x, y + below_px];
+                let is_inside = (half..=width_px - half).contains(&at[0])
+                    && (top + line..=height_px - bottom.max(line)).contains(&at[1]);
+                is_inside.then_some(at)
+            };
+            Some(((0..=CROSSINGS).find_map(place)?, text))
         };
         (0..=steps(high[axis] - low[axis], step)).rev().filter_map(number).collect()
+    }
+
+    /// Draws the directions of the axes.
+    fn triad(&self, labels: &mut LabelLayout) {
+        let (size_px, unit_px) = (self.view.text_px(0.8), self.view.unit_px());
+        let (arm, reach) = (TRIAD_PX * unit_px, TRIAD_PX * unit_px + size_px);
+        let middle = self.view.size_px.map(|side| side as f32 - reach - self.view.margin_px());
+        for (axis, colour) in self.axes().into_iter().enumerate() {
+            #[expect(clippy::cast_possible_truncation, reason = "pixels")]
+            let [x, y] = [self.camera.right[axis] as f32, -self.camera.up[axis] as f32];
+            if x.hypot(y) < FORESHORTENED {
+                continue;
+            }
+            let tip = [middle[0] + x * arm, middle[1] + y * arm];
+            labels.draw(Annotation::Stroke { ends_px: [middle, tip], colour, width_px: 2.0 * unit_px.max(0.5) });
+            let beyond = (arm + 0.6 * size_px) / arm;
+            let at_px = [middle[0] + x * arm * beyond, middle[1] + y * arm * beyond];
+            labels.put(at_px, [0.5, 0.5], size_px, colour, ["x", "y", "z"][axis]);
+        }
+        labels.reserve([middle.map(|at| at - 0.2 * arm), middle.map(|at| at + 0.2 * arm)]);
     }
 }
 

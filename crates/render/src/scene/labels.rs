@@ -75,11 +75,6 @@ impl LabelLayout {
         room
     }
 
-    /// Returns whether there is room for text around a point.
-    pub(super) fn is_free(&self, at_px: [f64; 2], size_px: f32, text: &str) -> bool {
-        self.has_room(area(pixels(at_px), [0.5; 2], size_px, text))
-    }
-
     /// Returns the number of annotations and the number of occupied boxes.
     pub(super) fn placed(&self) -> (usize, usize) {
         (self.annotations.len(), self.taken.len())
