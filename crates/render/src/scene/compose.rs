@@ -112,12 +112,10 @@ impl View {
         self.layers.caption && std::iter::zip(self.size_px, NO_LEGEND_PX).all(|(side, least)| side >= least)
     }
 
-    /// Returns the picture with the heights of its texts.
-    pub(super) fn area(&self, timeline: &Timeline) -> Area {
+    /// Returns the picture with the heights of its texts, of which a flight with violations has more.
+    pub(super) fn area(&self, has_violations: bool) -> Area {
         let (margin, line) = (self.margin_px(), self.text_px(1.0));
-        let violations = timeline.log.violations();
-        let has_banner = violations.of_vehicles().next().is_some() || violations.of_obstacles().next().is_some();
-        let top = if has_banner { self.banner_px() + 0.6 * margin } else { margin };
+        let top = if has_violations { self.banner_px() + 0.6 * margin } else { margin };
         let top = if self.layers.caption { top + 2.9 * line } else { 0.0 };
         let bottom = if self.has_legend() { margin + 1.7 * line } else { 0.0 };
         Area { size_px: self.size_px, texts_px: [top, bottom].map(f64::from) }

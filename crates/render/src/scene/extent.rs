@@ -69,6 +69,8 @@ pub struct Extent {
     framed: Mutex<Option<(Direction, Area, Camera)>>,
     /// Largest speed of a vehicle between two samples \[m/s\].
     pub(super) max_speed_m_s: f64,
+    /// Whether a flight has a violation.
+    pub(super) has_violations: bool,
     /// Whether the ground is an obstacle.
     pub(super) has_hard_ground: bool,
     /// Corners of the ground, in scene coordinates \[m\].
@@ -172,6 +174,7 @@ impl Extent {
             swarm: smoothed(&swarm),
             framed: Mutex::new(None),
             max_speed_m_s,
+            has_violations: timelines.iter().any(|timeline| timeline.has_violations()),
             has_hard_ground: hard_z.is_some(),
             ground_m,
             grid_m,
@@ -201,7 +204,7 @@ impl Extent {
     /// # Errors
     /// [`RenderError::NoVehicle`] if the camera follows a vehicle that the flight does not have.
     pub fn camera(&self, timeline: &Timeline, frame: &Frame, view: &View) -> Result<Camera, RenderError> {
-        let area = view.area(timeline);
+        let area = view.area(self.has_violations);
         let camera = match &view.camera {
             CameraSpec::Auto => self.framing(self.auto, area),
             CameraSpec::Perspective => self.framing(self.oblique, area),
@@ -232,7 +235,7 @@ impl Extent {
 
     /// Returns a camera near a pair, or one that frames the flight if a vehicle of the pair is absent.
     pub(crate) fn close_up(&self, timeline: &Timeline, frame: &Frame, pair: Pair, view: &View) -> Camera {
-        let area = view.area(timeline);
+        let area = view.area(self.has_violations);
         let [first, second] = [pair.first(), pair.second()].map(|k| self.place(&frame.positions_m, k));
         let (Some(first), Some(second)) = (first, second) else { return self.framing(self.auto, area) };
         let distance_m = (second - first).norm();

@@ -97,7 +97,7 @@ impl SceneBuilder<'_> {
         let from = from + OUTWARDS * step * (from - to).signum();
         // Edge-on the numbers are below the line of the ground.
         let below_px = if self.camera.back.z.abs() < EDGE_ON { 0.9 * f64::from(size_px) } else { 0.0 };
-        let area = self.view.area(self.timeline);
+        let area = self.view.area(self.extent.has_violations);
         let [width_px, height_px] = area.size_px.map(f64::from);
         let [top, bottom] = area.texts_px;
         let number = |k: u32| {

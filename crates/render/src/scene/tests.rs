@@ -64,7 +64,9 @@ fn camera(text: &str) -> View {
 #[test]
 fn every_vehicle_is_in_the_list_once_for_any_camera() {
     let timeline = timeline();
-    for text in ["iso", "top", "front", "side", "closest", "follow:3", "10,80,5", "200,-30,100"] {
+    for text in
+        ["auto", "perspective", "top", "front", "side", "closest", "follow", "follow:3", "10,80,5", "200,-30,100"]
+    {
         let scene = scene(&timeline, 2.0, &camera(text));
         assert_eq!((scene.balls.len(), scene.shells.len()), (4, 4), "{text}");
         assert!(scene.balls.iter().all(|ball| ball.radius_m == 0.25), "{text}");
@@ -75,7 +77,7 @@ fn every_vehicle_is_in_the_list_once_for_any_camera() {
 #[test]
 fn shells_are_sorted_along_every_line_of_sight() {
     for (text, ratio) in
-        ["iso", "front", "40,20,9"].into_iter().flat_map(|text| [1.0, 3.0, 0.5].map(|ratio| (text, ratio)))
+        ["perspective", "front", "40,20,9"].into_iter().flat_map(|text| [1.0, 3.0, 0.5].map(|ratio| (text, ratio)))
     {
         let metric = Metric::of_ratio(ratio);
         let timeline = timeline_in(metric);
@@ -288,7 +290,7 @@ fn a_vehicle_too_small_to_see_is_a_dot() {
 #[test]
 fn the_scale_is_below_the_ground_edge_on_and_its_last_number_has_the_unit() {
     let timeline = timeline();
-    for text in ["iso", "front", "side", "top"] {
+    for text in ["perspective", "front", "side", "top"] {
         let scene = scene(&timeline, 2.0, &camera(text));
         let unit = words(&scene).iter().filter(|text| text.ends_with(" m") && !text.contains('.')).count();
         assert!((1..=2).contains(&unit), "{text}: {:?}", words(&scene));

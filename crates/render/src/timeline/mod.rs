@@ -212,6 +212,12 @@ impl Timeline {
         self.log.violations().of_obstacles().filter(move |(found, _)| found.from_s <= until_s)
     }
 
+    /// Returns whether the flight has a violation so far.
+    pub(crate) fn has_violations(&self) -> bool {
+        let violations = self.log.violations();
+        violations.of_vehicles().next().is_some() || violations.of_obstacles().next().is_some()
+    }
+
     fn until_s(&self, time_s: f64) -> f64 {
         if time_s < self.log.range_s()[1] { time_s } else { f64::INFINITY }
     }
