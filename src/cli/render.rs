@@ -87,7 +87,7 @@ pub(super) struct RenderArguments {
     /// Theme: dark or light.
     #[arg(long, default_value = "dark", value_parser = drawing::theme)]
     theme: Theme,
-    /// Graphics adapter: best, hardware, software, or a part of its name.
+    /// Graphics adapter: best, hardware, software, none, or a part of its name.
     #[arg(long, value_name = "NAME", default_value = "best")]
     adapter: String,
     /// Print no summary and no progress.

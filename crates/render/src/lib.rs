@@ -30,6 +30,7 @@ pub mod gpu;
 mod picture;
 mod run_pictures;
 pub mod scene;
+mod software;
 mod timeline;
 #[cfg(feature = "window")]
 mod window;

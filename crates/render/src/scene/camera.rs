@@ -262,7 +262,7 @@ impl Camera {
     }
 
     /// Transforms a point to camera coordinates: right, up, back \[m\].
-    pub(super) fn in_camera_frame(&self, point_m: Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn in_camera_frame(&self, point_m: Vector3<f64>) -> Vector3<f64> {
         let from_eye = point_m - self.eye_m;
         Vector3::new(self.right.dot(&from_eye), self.up.dot(&from_eye), self.back.dot(&from_eye))
     }

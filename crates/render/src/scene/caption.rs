@@ -20,6 +20,8 @@ const MAX_LABELLED: usize = 3;
 const SHADES: i16 = 16;
 /// Number of vehicles up to which the areas of all stay free of texts; in a larger swarm only those of named vehicles.
 const MAX_RESERVED: usize = 60;
+/// Smallest radius of the area of a vehicle that stays free of texts, relative to the height of a line.
+const LEAST_ROOM: f32 = 0.4;
 /// Opacity of the name of the farthest vehicle.
 const FAINT: f32 = 0.45;
 /// Longest name that is drawn in full \[characters\].
@@ -286,7 +288,7 @@ impl SceneBuilder<'_> {
             self.labelled_vehicles()
         };
         for (k, at) in reserved {
-            let least = f64::from(self.view.text_px(0.4));
+            let least = f64::from(self.view.text_px(LEAST_ROOM));
             let radius = (self.timeline.radius_m[k] * at.px_per_m).max(least);
             let [x, y, radius] = pixels([at.at_px[0], at.at_px[1], radius]);
             labels.reserve([[x - radius, y - radius], [x + radius, y + radius]]);
@@ -358,7 +360,7 @@ impl SceneBuilder<'_> {
                 labels.draw(Annotation::Words { at_px, anchor, size_px: fitting, colour, text: name });
                 continue;
             }
-            let offset = f64::from(radius + 0.2 * size_px);
+            let offset = f64::from(radius.max(self.view.text_px(LEAST_ROOM)) + 0.2 * size_px);
             let colour = if self.alarmed[k] { theme.alarm() } else { self.colour(k).at(strength) };
             // First free position of: above right, above left, below right, below left.
             for [left, above] in [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0], [1.0, 0.0]] {

@@ -298,7 +298,7 @@ fn the_scale_is_below_the_ground_edge_on_and_its_last_number_has_the_unit() {
     let front = scene(&timeline, 2.0, &camera("front"));
     let ground = front.camera.project(Extent::of(&timeline).ground_m[0]).expect("ahead").at_px[1];
     let numbers = front.annotations.iter().filter_map(|annotation| match annotation {
-        Annotation::Words { at_px, anchor: [_, 0.0], text, .. }
+        Annotation::Words { at_px, anchor: [0.5, 0.5], text, .. }
             if text.trim_end_matches(" m").parse::<f64>().is_ok() =>
         {
             Some(at_px[1])
@@ -519,8 +519,8 @@ mod quadrotors {
     #[test]
     fn a_small_vehicle_or_one_without_attitude_is_a_ball() {
         let level = timeline(Some(UnitQuaternion::identity()));
-        let small = scene(&level, [64, 36]);
-        let unknown = scene(&timeline(None), [64, 36]);
+        let small = scene(&level, [28, 16]);
+        let unknown = scene(&timeline(None), [28, 16]);
         assert_eq!((small.balls, small.discs.len(), small.lines.len()), (unknown.balls, 0, 0));
         let large = scene(&timeline(None), [1280, 720]);
         assert_eq!((large.balls.len(), large.discs.len(), large.lines.len()), (2, 0, 0));
