@@ -96,10 +96,12 @@ impl SceneBuilder<'_> {
         let (from, to) = if is_high { (high[other], low[other]) } else { (low[other], high[other]) };
         let from = from + OUTWARDS * step * (from - to).signum();
         // Edge-on the numbers are below the line of the ground.
-        let below_px = if self.camera.back.z.abs() < EDGE_ON { 0.9 * f64::from(size_px) } else { 0.0 };
+        let is_edge_on = self.camera.back.z.abs() < EDGE_ON;
+        let below_px = if is_edge_on { 0.9 * f64::from(size_px) } else { 0.0 };
         let area = self.view.area(self.extent.has_violations);
         let [width_px, height_px] = area.size_px.map(f64::from);
         let [top, bottom] = area.texts_px;
+        let bottom = if is_edge_on { 0.0 } else { bottom };
         let number = |k: u32| {
             let mut point = low;
             point[axis] += f64::from(k) * step;
@@ -110,13 +112,21 @@ impl SceneBuilder<'_> {
                 point[other] = from + (to - from) * f64::from(n) / f64::from(CROSSINGS);
                 let [x, y] = self.camera.project(point)?.at_px;
                 let at = [x, y + below_px];
-                let is_inside = (half..=width_px - half).contains(&at[0])
-                    && (top + line..=height_px - bottom.max(line)).contains(&at[1]);
-                is_inside.then_some(at)
+                // Distances from the sides of the free area.
+                let free_px =
+                    [at[0] - half, width_px - half - at[0], at[1] - top - line, height_px - bottom.max(line) - at[1]];
+                let side = (0..4).min_by(|&a, &b| free_px[a].total_cmp(&free_px[b])).filter(|_| n > 0);
+                free_px.iter().all(|&free_px| free_px >= 0.0).then_some((side, at))
             };
-            Some(((0..=CROSSINGS).find_map(place)?, text))
+            let (side, at) = (0..=CROSSINGS).find_map(place)?;
+            Some((side, at, text))
         };
-        (0..=steps(high[axis] - low[axis], step)).rev().filter_map(number).collect()
+        let numbers: Vec<_> = (0..=steps(high[axis] - low[axis], step)).rev().filter_map(number).collect();
+        // Numbers of one axis at several sides of the picture would be taken for those of the other axis.
+        let count = |side| numbers.iter().filter(|(at, ..)| *at == side).count();
+        let commonest = numbers.iter().map(|(side, ..)| *side).max_by_key(|&side| count(side));
+        let kept = numbers.iter().filter(|(side, ..)| Some(*side) == commonest);
+        kept.map(|(_, at, text)| (*at, text.clone())).collect()
     }
 
     /// Draws the directions of the axes.
