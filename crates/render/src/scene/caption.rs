@@ -1,6 +1,6 @@
 //! Text of a picture: caption, verdict, legend, names of vehicles, and separations of pairs.
 
-use super::camera::Projected;
+use super::camera::{Lens, Projected};
 use super::colour::{Colour, Colouring};
 use super::compose::SceneBuilder;
 use super::geometry::has_few_edges;
@@ -9,6 +9,7 @@ use super::{Annotation, pixels};
 use tautline_audit::{Status, Violation};
 use tautline_core::swarm::{Bounce, Pair};
 use tautline_core::text::at_least;
+use tautline_laws::space::Shape;
 use tautline_sim::plan::Plan;
 
 /// Number of vehicles up to which all names are drawn; in a larger swarm only those of the picked vehicle, of the closest
@@ -28,6 +29,8 @@ const FAINT: f32 = 0.45;
 const LONGEST_NAME: usize = 40;
 /// Smallest number of letters to which a name is cut.
 const MIN_LETTERS: usize = 4;
+/// Number of steps along a line of sight.
+const SIGHT_STEPS: u32 = 100;
 /// Opacity of the background of text.
 const BACKING: f32 = 0.88;
 
@@ -211,8 +214,8 @@ impl SceneBuilder<'_> {
         };
         // Draws a scale with texts above its ends and its middle; returns the start of the next text.
         let scale = |labels: &mut LabelLayout, x: f32, texts: [&str; 3], colour: &dyn Fn(f32) -> Colour| {
-            let texts_px = texts.iter().map(|text| width(size_px, text) + 0.6 * size_px).sum::<f32>();
-            let width_px = texts_px.max(9.0 * size_px);
+            let [first, middle, last] = texts.map(|text| width(size_px, text));
+            let width_px = (2.0 * first.max(last) + middle + 1.2 * size_px).max(9.0 * size_px);
             let colours = (-SHADES..=SHADES).map(|k| colour(f32::from(k) / f32::from(SHADES))).collect();
             let corners_px = [[x, y - 0.6 * size_px], [x + width_px, y]];
             labels.draw(Annotation::Scale { corners_px, colours });
@@ -375,12 +378,43 @@ impl SceneBuilder<'_> {
         }
     }
 
-    /// Returns whether another vehicle covers the centre of this one.
+    /// Returns whether another vehicle or an obstacle covers the centre of this one.
     fn is_hidden(&self, k: usize, own: Projected) -> bool {
+        if self.is_behind_obstacle(k) {
+            return true;
+        }
         let others = (0..self.timeline.count()).filter(|&other| other != k);
         others.filter_map(|other| Some((other, self.projected(other)?))).any(|(other, at)| {
             let apart = (at.at_px[0] - own.at_px[0]).hypot(at.at_px[1] - own.at_px[1]);
             at.depth_m < own.depth_m && apart < self.timeline.radius_m[other] * at.px_per_m
+        })
+    }
+
+    /// Returns whether a round obstacle is between the camera and a vehicle; only these are drawn solid.
+    fn is_behind_obstacle(&self, k: usize) -> bool {
+        let Some(place) = self.vehicle(k) else { return false };
+        let distance_m = self.camera.project(place).map_or(0.0, |at| at.depth_m);
+        let towards = match self.camera.lens {
+            Lens::Perspective(_) => self.camera.eye_m - place,
+            Lens::Parallel(_) => self.camera.back * distance_m,
+        };
+        let is_round = |shape: &Shape| matches!(shape, Shape::Ball { .. } | Shape::Capsule { .. });
+        let obstacles = self.timeline.plan.iter().flat_map(|plan| &plan.obstacles);
+        obstacles.filter(|obstacle| is_round(&obstacle.shape)).any(|obstacle| {
+            // Steps of the distance to the surface end beyond the obstacle, inside it or at the camera.
+            let (mut along, length) = (0.0, towards.norm());
+            for _ in 0..SIGHT_STEPS {
+                let at = place + self.extent.origin_m() + towards * (along / length);
+                let (free_m, _) = obstacle.shape.signed_distance_m(at - obstacle.place_m);
+                if free_m <= 0.0 {
+                    return true;
+                }
+                along += free_m.max(length / f64::from(SIGHT_STEPS));
+                if along >= length {
+                    break;
+                }
+            }
+            false
         })
     }
 

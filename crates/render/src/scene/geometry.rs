@@ -19,9 +19,9 @@ const MAX_EDGES: usize = 2100;
 /// Largest number of line pieces of all trails together, and of one trail.
 const MAX_TRAIL_PIECES: usize = 60_000;
 const MAX_PIECES_PER_TRAIL: usize = 400;
-/// Fraction of a flight after which a trail has faded, and its opacity then.
+/// Fraction of a flight after which a trail has faded, and its opacity then on dark and on light background.
 const FADED_AFTER: f64 = 0.25;
-const FADED: f32 = 0.16;
+const FADED: [f32; 2] = [0.16, 0.4];
 const FRESH: f32 = 0.95;
 /// Smallest opacity of the part of a trail that was a violation.
 const VIOLATED: f32 = 0.75;
@@ -140,8 +140,9 @@ impl SceneBuilder<'_> {
         while last.saturating_sub(first) / stride > most {
             stride *= 2;
         }
+        let faded = FADED[usize::from(self.view.theme == Theme::Light)];
         #[expect(clippy::cast_possible_truncation, reason = "an opacity")]
-        let opacity = |time_s: f64| FADED + (FRESH - FADED) * (1.0 - (now_s - time_s) / fading_s).max(0.0) as f32;
+        let opacity = |time_s: f64| faded + (FRESH - faded) * (1.0 - (now_s - time_s) / fading_s).max(0.0) as f32;
         let width_px = if count < 50 { 2.0 } else { 1.3 } * self.view.unit_px();
         let begins = self.timeline.log.positions_m(since_s).filter(|_| since_s > first_s);
         let recorded = (first..=last).filter(|k| k.is_multiple_of(stride)).map(|k| &keyframes[k]);

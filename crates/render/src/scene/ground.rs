@@ -62,6 +62,7 @@ impl SceneBuilder<'_> {
                 ((x - at_x).abs() - half[0]).max(0.0).hypot(((y - at_y).abs() - half[1]).max(0.0)) < *radius
             })
         };
+        let mut taken = None;
         for axis in 0..2 {
             let other = 1 - axis;
             // Edge-on there is no edge to write along.
@@ -79,7 +80,7 @@ impl SceneBuilder<'_> {
             let is_high = height(high[other]) > height(low[other]);
             // Only the last number that fits has the unit.
             let mut unit = " m";
-            for (at, number) in self.numbers(axis, is_high, size_px) {
+            for (at, number) in self.numbers(axis, is_high, size_px, &mut taken) {
                 let text = format!("{number}{unit}");
                 if !is_covered(at, &text) && labels.put_if_free(at, [0.5; 2], size_px, soft, &text) {
                     unit = "";
@@ -89,8 +90,8 @@ impl SceneBuilder<'_> {
     }
 
     /// Returns the coordinates of ground lines across an axis, from the largest one, with the middles of their texts:
-    /// beyond the ends of the lines, or where they leave the picture \[pixels\].
-    fn numbers(&self, axis: usize, is_high: bool, size_px: f32) -> Vec<([f64; 2], String)> {
+    /// beyond the ends of the lines, or where they leave the picture, at one side that is not taken \[pixels\].
+    fn numbers(&self, axis: usize, is_high: bool, size_px: f32, taken: &mut Option<usize>) -> Vec<([f64; 2], String)> {
         let ([low, high], step, origin_m) = (self.extent.ground_m, self.extent.grid_m, self.extent.origin_m());
         let other = 1 - axis;
         let (from, to) = if is_high { (high[other], low[other]) } else { (low[other], high[other]) };
@@ -122,11 +123,14 @@ impl SceneBuilder<'_> {
             Some((side, at, text))
         };
         let numbers: Vec<_> = (0..=steps(high[axis] - low[axis], step)).rev().filter_map(number).collect();
-        // Numbers of one axis at several sides of the picture would be taken for those of the other axis.
+        // Numbers at several sides of the picture would be taken for those of the other axis.
         let count = |side| numbers.iter().filter(|(at, ..)| *at == side).count();
-        let commonest = numbers.iter().map(|(side, ..)| *side).max_by_key(|&side| count(side));
+        let sides = numbers.iter().map(|(side, ..)| *side).filter(|side| side.is_none() || side != taken);
+        let commonest = sides.max_by_key(|&side| count(side));
         let kept = numbers.iter().filter(|(side, ..)| Some(*side) == commonest);
-        kept.map(|(_, at, text)| (*at, text.clone())).collect()
+        let numbers = kept.map(|(_, at, text)| (*at, text.clone())).collect();
+        *taken = commonest.flatten();
+        numbers
     }
 
     /// Draws the directions of the axes.
