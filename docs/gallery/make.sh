@@ -15,7 +15,7 @@ fly obstacles obstacles
 fly show show
 draw() { target/release/tautline render "$@" --size 960x540 --quiet; }
 draw "$out/sphere" --out "$out/ball" --at end --camera follow --theme light
-draw "$out/obstacles" --out "$out/among" --at 3 --camera follow
+draw "$out/obstacles" --out "$out/among" --at 10 --camera follow
 draw "$out/show" --out "$out/word" --at 15.5 --theme light
 target/release/tautline render pentagon-laplacian --beside pentagon --film docs/gallery/first.gif \
     --size 800x400 --fps 12 --until 16 --speed 2 --quiet
@@ -25,5 +25,5 @@ for moment in start closest end; do
 done
 cp "$out/laplacian/snapshots/violation-1.png" docs/gallery/laplacian-violation.png
 cp "$out/ball/end.png" docs/gallery/sphere.png
-cp "$out/among/at-3.000s.png" docs/gallery/obstacles.png
+cp "$out/among/at-10.000s.png" docs/gallery/obstacles.png
 cp "$out/word/at-15.500s.png" docs/gallery/show.png

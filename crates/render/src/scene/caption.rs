@@ -29,6 +29,8 @@ const FAINT: f32 = 0.45;
 const LONGEST_NAME: usize = 40;
 /// Smallest number of letters to which a name is cut.
 const MIN_LETTERS: usize = 4;
+/// Width of the frame of a violation in a picture 720 pixels high \[pixels\].
+const FRAME_PX: f32 = 5.0;
 /// Number of steps along a line of sight.
 const SIGHT_STEPS: u32 = 100;
 /// Opacity of the background of text.
@@ -40,6 +42,9 @@ impl SceneBuilder<'_> {
         let width_px = self.view.size_px[0] as f32;
         let mut y = self.banner(labels);
         let (ground, room_px) = (theme.background().at(BACKING), 0.3 * size_px);
+        let has_banner = y > margin;
+        let [top_px, _] = self.bands_px();
+        self.band([if has_banner { self.view.banner_px() } else { 0.0 }, top_px], has_banner, labels);
         let (bottom, taken) = labels.placed();
         // Without room texts are left out in this order: closest approach, name, verdict, time.
         let large_px = 1.35 * size_px;
@@ -68,6 +73,26 @@ impl SceneBuilder<'_> {
         if let Some(text) = self.closest_so_far().iter().find(|text| width(size_px, text) <= free_px) {
             labels.put([margin, y], [0.0, 0.0], size_px, theme.soft_ink(), text);
             labels.insert_background(taken, bottom, ground, room_px);
+        }
+    }
+
+    /// Returns the lower end of the caption and the upper end of the legend \[pixels\].
+    fn bands_px(&self) -> [f32; 2] {
+        let [top_px, bottom_px] = pixels(self.view.area(self.extent.has_violations).texts_px);
+        [top_px, self.view.size_px[1] as f32 - bottom_px]
+    }
+
+    /// Covers a band of the picture if a vehicle is in it, so that texts do not lie on vehicles.
+    fn band(&self, [from_px, to_px]: [f32; 2], is_framed: bool, labels: &mut LabelLayout) {
+        let width_px = self.view.size_px[0] as f32;
+        let is_inside = |([x, y], radius): &([f64; 2], f64)| {
+            let [x, y, radius] = pixels([*x, *y, *radius]);
+            y + radius > from_px && y - radius < to_px && x + radius > 0.0 && x - radius < width_px
+        };
+        if self.covered_areas_px().iter().any(is_inside) {
+            let inset = if is_framed { FRAME_PX * self.view.unit_px() } else { 0.0 };
+            let corners_px = [[inset, from_px], [width_px - inset, to_px - inset.min(to_px - from_px)]];
+            labels.draw(Annotation::Box { corners_px, colour: self.view.theme.background(), round_px: 0.0 });
         }
     }
 
@@ -119,7 +144,7 @@ impl SceneBuilder<'_> {
         let bottom = self.view.banner_px();
         labels.draw(Annotation::Box { corners_px: [[0.0, 0.0], [width_px, bottom]], colour: alarm, round_px: 0.0 });
         let corners_px = [[0.0, 0.0], [width_px, height_px]];
-        labels.draw(Annotation::Outline { corners_px, colour: alarm, width_px: 5.0 * self.view.unit_px() });
+        labels.draw(Annotation::Outline { corners_px, colour: alarm, width_px: FRAME_PX * self.view.unit_px() });
         let ink = self.view.theme.on_alarm();
         labels.put([width_px / 2.0, bottom / 2.0], [0.5, 0.5], size_px, ink, text);
         labels.reserve([[0.0, 0.0], [width_px, bottom]]);
@@ -206,6 +231,9 @@ impl SceneBuilder<'_> {
         let (theme, size_px, margin) = (self.view.theme, self.view.text_px(0.85), self.view.margin_px());
         let (layers, plan, ink) = (self.view.layers, self.timeline.plan.as_ref(), self.view.theme.soft_ink());
         let (mut x, y) = (margin, height_px - margin);
+        let [_, bottom_px] = self.bands_px();
+        let is_framed = !self.violated.is_empty() || !self.too_close_to_obstacle.is_empty();
+        self.band([bottom_px, height_px], is_framed, labels);
         let (bottom, taken) = labels.placed();
         let fits = |x: f32, text: &str| x + width(size_px, text) <= width_px - margin;
         // Draws text from the left; returns the start of the next text.

@@ -221,6 +221,22 @@ fn cameras_frame_all_vehicles_between_the_texts() {
 }
 
 #[test]
+fn no_vehicle_is_under_the_texts() {
+    let timeline = timeline();
+    // A camera near a vehicle sees others behind the caption.
+    for (text, has_band) in [("-90,20,4", true), ("perspective", false)] {
+        let scene = scene(&timeline, 0.0, &camera(text));
+        let band = scene.annotations.iter().any(|annotation| match annotation {
+            Annotation::Box { corners_px: [[left, _], [right, _]], colour, .. } => {
+                *left == 0.0 && *right == 1280.0 && *colour == Theme::Dark.background()
+            }
+            _ => false,
+        });
+        assert_eq!(band, has_band, "{text}");
+    }
+}
+
+#[test]
 fn a_violation_after_the_last_sample_is_in_the_last_picture() {
     let mut timeline = timeline();
     timeline.note(&Event::ViolationBegan { pair: Pair::new(2, 3), time_s: 10.01 });
