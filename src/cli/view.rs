@@ -123,3 +123,15 @@ pub(super) fn lose_display() -> Exit {
     let message = "the display is gone, and the window with it";
     console::show(&Failure::machine("render/no-display", message).with_help(help))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_book_lists_the_keys_of_the_window() {
+        let book = include_str!("../../docs/viewer.md");
+        let rows: Vec<String> = WINDOW_KEYS.iter().map(|(keys, effect)| format!("| {keys} | {effect} |")).collect();
+        assert!(book.contains(&rows.join("\n")), "{}", rows.join("\n"));
+    }
+}

@@ -151,7 +151,7 @@ fn every_kind_of_picture_is_written_to_its_target() {
     let at = |name: &str| folder.path().join(name);
     render(&[]);
     assert_eq!(names(&at("out/snapshots")), ["closest.png", "end.png", "start.png"]);
-    render(&["--at", "start,1.5", "--out", "a", "--camera", "top", "--theme", "paper"]);
+    render(&["--at", "start,1.5", "--out", "a", "--camera", "top", "--theme", "light"]);
     assert_eq!(names(&at("a")), ["at-1.500s.png", "start.png"]);
     assert_eq!(size_of(&at("a/start.png")), [160, 90]);
     render(&["--every", "1", "--out", "b", "--camera", "-60,30,25"]);

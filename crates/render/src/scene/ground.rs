@@ -107,7 +107,8 @@ impl SceneBuilder<'_> {
             let mut point = low;
             point[axis] += f64::from(k) * step;
             let text = format_multiple(point[axis] + origin_m[axis], step);
-            let half = f64::from(width(size_px, &text) + size_px) / 2.0;
+            // Any number may get the unit.
+            let half = f64::from(width(size_px, &format!("{text} m")) + 0.6 * size_px) / 2.0;
             let line = f64::from(size_px);
             let place = |n: u32| {
                 point[other] = from + (to - from) * f64::from(n) / f64::from(CROSSINGS);
