@@ -149,9 +149,9 @@ pub fn snapshots_of_run(
         let Some(frame) = timeline.log.at(time_s) else { return Ok(()) };
         let camera = match pair {
             Some(pair) => extent.close_up(timeline, &frame, pair, &view),
-            None => extent.camera(timeline, &frame, &view)?,
+            None => extent.camera(timeline, &frame, view)?,
         };
-        let picture = renderer.paint(&Scene::compose(timeline, &extent, &frame, &view, camera))?;
+        let picture = renderer.paint(&Scene::compose(timeline, &extent, &frame, view, camera))?;
         snapshots.push(Snapshot { name: name.to_owned(), description, picture });
         Ok::<(), RenderError>(())
     };

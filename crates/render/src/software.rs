@@ -65,10 +65,18 @@ impl Software {
         rgba.par_chunks_mut(width * 4 * BAND).enumerate().for_each(|(k, rows)| {
             let rows_px = k * BAND..k * BAND + rows.len() / (width * 4);
             let mut band = Band::new(&view, rows_px, scene.background);
-            scene.balls.iter().for_each(|ball| band.ball(ball));
-            lines.iter().for_each(|line| band.line(line));
-            scene.discs.iter().for_each(|disc| band.disc(disc));
-            scene.shells.iter().for_each(|shell| band.shell(shell, scene.shell_ratio));
+            for ball in &scene.balls {
+                band.ball(ball);
+            }
+            for line in &lines {
+                band.line(line);
+            }
+            for disc in &scene.discs {
+                band.disc(disc);
+            }
+            for shell in &scene.shells {
+                band.shell(shell, scene.shell_ratio);
+            }
             band.resolve(rows);
         });
         let mut picture = Picture { size_px, rgba };

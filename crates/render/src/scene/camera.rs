@@ -232,7 +232,7 @@ impl Camera {
         let [right, up, back] = axes(azimuth_deg, elevation_deg);
         let (lens, focus_m) = match self.lens {
             Lens::Parallel(half) => (Lens::Parallel(half.map(|half| half * zoom)), self.focus_m),
-            perspective => (perspective, (self.focus_m * zoom).max(MIN_DISTANCE_M)),
+            perspective @ Lens::Perspective(_) => (perspective, (self.focus_m * zoom).max(MIN_DISTANCE_M)),
         };
         Self { eye_m: target_m + back * focus_m, right, up, back, lens, focus_m, ..*self }
     }

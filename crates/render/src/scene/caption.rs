@@ -12,8 +12,8 @@ use tautline_core::text::at_least;
 use tautline_laws::space::Shape;
 use tautline_sim::plan::Plan;
 
-/// Number of vehicles up to which all names are drawn; in a larger swarm only those of the picked vehicle, of the closest
-/// pair and of the worst violations.
+/// Number of vehicles up to which all names are drawn. A larger swarm has only those of the picked vehicle, of the
+/// closest pair and of the worst violations.
 const MAX_NAMED: usize = 24;
 /// Largest number of pairs closer than delta whose separation is drawn; the closest pairs are chosen.
 const MAX_LABELLED: usize = 3;

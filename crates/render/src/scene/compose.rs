@@ -112,7 +112,7 @@ impl View {
         self.layers.caption && std::iter::zip(self.size_px, NO_LEGEND_PX).all(|(side, least)| side >= least)
     }
 
-    /// Returns the picture with the heights of its texts, of which a flight with violations has more.
+    /// Returns the picture with the heights of its texts; a flight with violations has one text more.
     pub(super) fn area(&self, has_violations: bool) -> Area {
         let (margin, line) = (self.margin_px(), self.text_px(1.0));
         let top = if has_violations { self.banner_px() + 0.6 * margin } else { margin };

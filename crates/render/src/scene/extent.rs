@@ -139,8 +139,12 @@ impl Extent {
         }
         // Halved first: the difference of the largest doubles overflows.
         let origin_m = low / 2.0 + high / 2.0;
-        balls.iter_mut().for_each(|(place, _)| *place -= origin_m);
-        swarm.iter_mut().for_each(|around| around.centre -= origin_m);
+        for (place, _) in &mut balls {
+            *place -= origin_m;
+        }
+        for around in &mut swarm {
+            around.centre -= origin_m;
+        }
         let hard_z = obstacles.iter().find_map(|obstacle| match obstacle.shape {
             Shape::HalfSpace { normal } if is_level(normal) => Some(obstacle.place_m.z),
             _ => None,

@@ -164,8 +164,7 @@ impl SceneBuilder<'_> {
                 }
                 let colour = match self.view.colouring {
                     Colouring::Speed => self.view.theme.ramp(self.speed_part(k, [from, to], to_s - from_s)),
-                    Colouring::Clearance if by_clearance => self.view.theme.ramp(clearances[n + 1][k]),
-                    _ => self.colour(k),
+                    _ => clearances.get(n + 1).map_or(self.colour(k), |parts| self.view.theme.ramp(parts[k])),
                 };
                 for ([from_s, to_s], is_violation) in cut([from_s, to_s], &self.violating_s[k]) {
                     let at = |time_s: f64| single(start.lerp(&end, (time_s - pair[0].0) / (pair[1].0 - pair[0].0)));

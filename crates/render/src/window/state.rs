@@ -44,7 +44,6 @@ enum Trails {
 }
 
 /// State of the window that the user controls.
-#[expect(clippy::struct_excessive_bools, reason = "each is on or off by itself")]
 pub(super) struct WindowState {
     camera: CameraSpec,
     adjustment: Adjustment,

@@ -52,9 +52,9 @@ impl Frame {
 
     /// Returns the distance of a pair \[m\], scaled with ellipsoids; NaN if a vehicle of the pair is absent.
     ///
-    /// If the judge measured the pair at exactly this time, the distance is the smallest one of the judge. Otherwise it is the
-    /// distance on straight lines between samples, but at least the closest approach that the judge measured around
-    /// this time.
+    /// If the judge measured the pair at exactly this time, the distance is the smallest one of the judge. Otherwise
+    /// it is the distance on straight lines between samples, but at least the closest approach that the judge measured
+    /// around this time.
     #[must_use]
     pub fn distance_m(&self, pair: Pair) -> f64 {
         let measured = self.measured.iter().filter(|measured| measured.pair == pair);
