@@ -148,7 +148,7 @@ pub fn snapshots_of_run(
     let mut shoot = |name: &str, description: String, time_s: f64, pair: Option<Pair>| {
         let Some(frame) = timeline.log.at(time_s) else { return Ok(()) };
         let camera = match pair {
-            Some(pair) => extent.close_up(timeline, &frame, pair, &view),
+            Some(pair) => extent.close_up(timeline, &frame, pair, view),
             None => extent.camera(timeline, &frame, view)?,
         };
         let picture = renderer.paint(&Scene::compose(timeline, &extent, &frame, view, camera))?;

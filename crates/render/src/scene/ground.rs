@@ -90,8 +90,8 @@ impl SceneBuilder<'_> {
     }
 
     /// Returns the coordinates of ground lines across an axis, from the largest one, with the middles of their texts
-    /// \[pixels\]. The texts are beyond the ends of the lines, or where the lines leave the picture. All are at one side
-    /// of the picture that is not taken.
+    /// \[pixels\]. The texts are beyond the ends of the lines, or where the lines leave the picture. All are at one
+    /// side of the picture that is not taken.
     fn numbers(&self, axis: usize, is_high: bool, size_px: f32, taken: &mut Option<usize>) -> Vec<([f64; 2], String)> {
         let ([low, high], step, origin_m) = (self.extent.ground_m, self.extent.grid_m, self.extent.origin_m());
         let other = 1 - axis;
