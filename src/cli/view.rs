@@ -36,7 +36,7 @@ pub(super) struct ViewArguments {
     /// Theme: dark or light.
     #[arg(long, default_value = "dark", value_parser = drawing::theme)]
     theme: Theme,
-    /// Graphics adapter: best, hardware, software, none, or a part of its name.
+    /// Graphics adapter: best, hardware, software, or a part of its name.
     #[arg(long, value_name = "NAME", default_value = "best")]
     adapter: String,
     // Last, because its help heading also applies to all later arguments.

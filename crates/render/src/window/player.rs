@@ -94,25 +94,15 @@ impl Player {
         self.time_s = time_s.clamp(first_s, last_s.max(first_s));
     }
 
-    /// Returns the times of the closest approach and of the worst instants of violations, in order \[s\].
-    pub(super) fn marks_s(&self) -> Vec<f64> {
-        let violations = self.timeline.log.violations();
-        let closest_s = self.timeline.log.closest().map(|closest| closest.time_s);
-        let mut marks_s: Vec<f64> = violations.of_vehicles().map(|found| found.min_at_s).chain(closest_s).collect();
-        marks_s.extend(violations.of_obstacles().map(|(found, _)| found.min_at_s));
-        marks_s.sort_by(f64::total_cmp);
-        marks_s.dedup();
-        marks_s
-    }
-
-    /// Pauses at the next or previous mark.
-    pub(super) fn seek_mark(&mut self, is_next: bool) {
-        let marks_s = self.marks_s();
-        let now_s = self.time_s;
+    /// Pauses at the worst instant of the next or previous violation.
+    pub(super) fn seek_violation(&mut self, is_next: bool) {
+        let (violations, now_s) = (self.timeline.log.violations(), self.time_s);
+        let obstacles = violations.of_obstacles().map(|(found, _)| found.min_at_s);
+        let worst_s = violations.of_vehicles().map(|found| found.min_at_s).chain(obstacles);
         let found = if is_next {
-            marks_s.into_iter().find(|&at_s| at_s > now_s)
+            worst_s.filter(|&at_s| at_s > now_s).min_by(f64::total_cmp)
         } else {
-            marks_s.into_iter().rev().find(|&at_s| at_s < now_s)
+            worst_s.filter(|&at_s| at_s < now_s).max_by(f64::total_cmp)
         };
         if let Some(at_s) = found {
             self.playing = false;
@@ -200,7 +190,7 @@ mod tests {
     }
 
     #[test]
-    fn marks_are_visited_in_order() {
+    fn violations_are_visited_in_order() {
         use tautline_core::swarm::Pair;
 
         let mut player = player();
@@ -209,7 +199,7 @@ mod tests {
             player.timeline.note(&Event::ViolationEnded { pair: Pair::new(0, 1), time_s: to_s, min_m: 0.1 });
         }
         let mut visit = |is_next| {
-            player.seek_mark(is_next);
+            player.seek_violation(is_next);
             player.time_s
         };
         let visited = [true, true, true, false, false].map(&mut visit);

@@ -14,12 +14,13 @@ const ZOOM: [f64; 2] = [1e-3, 1e3];
 const SHORT_TRAIL: f64 = 0.1;
 
 /// Keys and mouse of the window with their effects.
-pub const WINDOW_KEYS: [(&str, &str); 18] = [
+pub const WINDOW_KEYS: [(&str, &str); 19] = [
     ("Space", "play, pause"),
     ("Left, Right", "previous, next sample"),
     ("Home, End", "start, end"),
     ("Up, Down or +, -", "faster, slower"),
-    ("N, Shift+N", "next, previous mark: closest approach or violation"),
+    ("N", "closest approach"),
+    ("B, Shift+B", "next, previous violation"),
     ("1, 2, 3", "perspective, top, front"),
     ("F", "follow the picked vehicle or the swarm; again: the whole flight"),
     ("T", "trails: whole, short, none"),
@@ -29,7 +30,7 @@ pub const WINDOW_KEYS: [(&str, &str); 18] = [
     ("right drag", "move the camera"),
     ("Page Up, Page Down or wheel", "zoom"),
     ("click, V", "pick a vehicle, the next vehicle"),
-    ("B", "dark or light background"),
+    ("M", "dark or light background"),
     ("P", "save a picture in the working folder"),
     ("H", "help"),
     ("Q", "quit"),
@@ -161,7 +162,13 @@ impl WindowState {
             Key::ArrowRight => player.step(1),
             Key::Home => player.seek(f64::NEG_INFINITY),
             Key::End => player.seek(f64::INFINITY),
-            Key::N => player.seek_mark(!shift),
+            Key::N => {
+                if let Some(closest) = player.timeline.log.closest() {
+                    player.playing = false;
+                    player.seek(closest.time_s);
+                }
+            }
+            Key::B => player.seek_violation(!shift),
             Key::ArrowDown | Key::Minus => player.change_speed(false),
             Key::ArrowUp | Key::Plus | Key::Equals => player.change_speed(true),
             Key::Num1 => self.look(CameraSpec::Perspective),
@@ -191,7 +198,7 @@ impl WindowState {
                 let next = self.picked.map_or(0, |picked| picked + 1);
                 self.picked = (next < player.timeline.count()).then_some(next);
             }
-            Key::B => self.theme = next(&Theme::ALL, self.theme),
+            Key::M => self.theme = next(&Theme::ALL, self.theme),
             Key::P => self.wants_picture = true,
             Key::H | Key::F1 | Key::Questionmark => self.help = !self.help,
             Key::Escape if self.help => self.help = false,
