@@ -121,7 +121,7 @@ impl Letters {
             (self.size, self.pixels) = ([width, height], pixels.to_vec());
             return;
         };
-        for (y, row) in pixels.chunks_exact(width).enumerate().take(height) {
+        for (y, row) in pixels.chunks_exact(width.max(1)).enumerate().take(height) {
             let from = (top + y) * self.size[0] + left;
             if let Some(old) = self.pixels.get_mut(from..from + width) {
                 old.copy_from_slice(row);
