@@ -11,7 +11,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         return Err("usage: snapshot RECORDING TIME_S PICTURE".into());
     };
     let timeline = Timeline::read_mcap(Path::new(recording))?;
-    let view = View { camera: CameraSpec::Top, theme: Theme::Paper, size_px: [1600, 900], ..View::default() };
+    let view = View { camera: CameraSpec::Top, theme: Theme::Light, size_px: [1600, 900], ..View::default() };
     let mut renderer = Renderer::open(&AdapterChoice::Best)?;
     std::fs::write(picture, renderer.shoot(&timeline, time_s.parse()?, &view)?.to_png()?)?;
     println!("{picture}, drawn by {}", renderer.adapter());

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Draws the pictures of the README anew. From anywhere: sh docs/gallery/make.sh
+# Draws the pictures of the README and the book anew. From anywhere: sh docs/gallery/make.sh
 set -eu
 cd "$(dirname "$0")/../.."
 cargo build --release
@@ -13,18 +13,17 @@ fly pentagon-laplacian laplacian
 fly examples/sphere.toml sphere
 fly obstacles obstacles
 fly show show
-target/release/tautline render "$out/sphere/run.mcap" --out "$out/ball" --at end --camera 35,22,38 --theme light \
-    --size 960x540 --quiet
-
-target/release/tautline render "$out/obstacles/run.mcap" --out "$out/among" --at 3 --size 960x540 --quiet
-target/release/tautline render "$out/show/run.mcap" --out "$out/word" \
-    --at 23.8 --camera top --theme light --size 960x540 \
-    --quiet
+draw() { target/release/tautline render "$@" --size 960x540 --quiet; }
+draw "$out/sphere" --out "$out/ball" --at end --camera follow --theme light
+draw "$out/obstacles" --out "$out/among" --at 10 --camera follow
+draw "$out/show" --out "$out/word" --at 23.8 --theme light
+target/release/tautline render pentagon-laplacian --beside pentagon --film docs/gallery/first.gif \
+    --size 800x400 --fps 12 --until 16 --speed 2 --quiet
 
 for moment in start closest end; do
     cp "$out/pentagon/snapshots/$moment.png" "docs/gallery/pentagon-$moment.png"
 done
 cp "$out/laplacian/snapshots/violation-1.png" docs/gallery/laplacian-violation.png
 cp "$out/ball/end.png" docs/gallery/sphere.png
-cp "$out/among/at-3.000s.png" docs/gallery/obstacles.png
+cp "$out/among/at-10.000s.png" docs/gallery/obstacles.png
 cp "$out/word/at-23.800s.png" docs/gallery/show.png

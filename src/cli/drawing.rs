@@ -3,12 +3,15 @@
 use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
+use std::sync::Arc;
 
 use super::console::Console;
 use tautline_recordings::mcap::McapRecording;
 use tautline_recordings::read::{self, Fault, Format, ReadError, ReadOptions};
-use tautline_render::{FARTHEST_M, RenderError, Theme, Timeline, TracksError};
-use tautline_report::request::Failure;
+use tautline_render::{Colouring, FARTHEST_M, FlightLog, RenderError, Theme, Timeline, TracksError};
+use tautline_report::request::{Failure, ScenarioRequest};
+use tautline_report::run::run;
+use tautline_sim::scenario::builtin;
 
 /// Number of bytes at the start of an MCAP file that contain the name of its writer.
 const FIRST_BYTES: u64 = 64;
@@ -16,7 +19,53 @@ const FIRST_BYTES: u64 = 64;
 /// Parses the name of a theme.
 pub(super) fn theme(name: &str) -> Result<Theme, String> {
     let known = Theme::ALL.iter().find(|(known, _)| *known == name);
-    known.map(|(_, theme)| *theme).ok_or_else(|| "give dark, light or paper".to_owned())
+    known.map(|(_, theme)| *theme).ok_or_else(|| "give dark or light".to_owned())
+}
+
+/// Parses the name of a colouring.
+pub(super) fn colouring(name: &str) -> Result<Colouring, String> {
+    let known = Colouring::ALL.iter().find(|(known, _)| *known == name);
+    known.map(|(_, colouring)| *colouring).ok_or_else(|| "give vehicle, speed or clearance".to_owned())
+}
+
+/// Returns whether a path names a scenario: a TOML file, or the name of a built-in one and of no file.
+pub(super) fn is_scenario(path: &Path) -> bool {
+    let is_toml = path.extension().is_some_and(|extension| extension == "toml") && !path.is_dir();
+    is_toml || !path.exists() && path.to_str().is_some_and(|name| builtin::find(name).is_some())
+}
+
+/// Reads a recording to draw it, or flies a scenario.
+pub(super) fn flight(
+    path: &Path,
+    reading: &ReadOptions,
+    delta_m: Option<f64>,
+    console: Console,
+) -> Result<Timeline, Failure> {
+    if !is_scenario(path) {
+        return timeline(path, reading, delta_m, console);
+    }
+    refuse_for_scenario(reading, delta_m)?;
+    let scenario = ScenarioRequest::named(&path.to_string_lossy(), &[])?.read()?;
+    let mut log = FlightLog::of(&scenario);
+    let report = run(&scenario, &mut log)?;
+    if let Some(closest) = report.separation.closest() {
+        log.conclude(closest.separation_m, closest.time_s);
+    }
+    Ok(Timeline::flown(&scenario, Arc::new(log)).judged(report.audit.status))
+}
+
+/// Refuses options of recordings for a scenario.
+pub(super) fn refuse_for_scenario(reading: &ReadOptions, delta_m: Option<f64>) -> Result<(), Failure> {
+    let no_effect = |message: &str, help: &str| Err(Failure::input("usage/no-effect", message, help));
+    if delta_m.is_some() {
+        let help = "leave --delta out, or set the key with --set law.delta_m=METRES";
+        return no_effect("--delta: has no effect on a scenario, which has its own safety distance", help);
+    }
+    if *reading != ReadOptions::default() {
+        let help = "leave these options out, or give a recording";
+        return no_effect("options for reading: have no effect on a scenario", help);
+    }
+    Ok(())
 }
 
 /// Parses width and height in pixels, such as 1280x720.

@@ -13,9 +13,11 @@ use super::console::Console;
 use super::drawing;
 use super::reading::{self, ReadArguments};
 use tautline_render::{
-    CameraSpec, Extent, Film, FilmFormat, Picture, RenderError, Renderer, Scene, Theme, Timeline, View, contact_sheet,
+    CameraSpec, Colouring, Extent, Film, FilmFormat, Picture, RenderError, Renderer, Scene, Theme, Timeline, View,
+    contact_sheet,
 };
 use tautline_report::report::{write_atomically, write_atomically_with};
+use tautline_report::request::audit::recording_in;
 use tautline_report::request::outputs::{self, NamedPath};
 use tautline_report::request::{Failure, try_to_write_in};
 
@@ -32,6 +34,10 @@ const WAITING_BYTES: usize = 256 << 20;
 #[derive(Debug, Args)]
 // `--fps` is the frame rate of the film here.
 #[command(mut_arg("frames_per_s", |frames_per_s| frames_per_s.long("recording-fps")))]
+#[command(mut_arg("recording", |what| {
+    let help = "Recording, scenario file, or name of a built-in scenario, which is flown without a recording";
+    what.value_name("RECORDING|SCENARIO").help(help).long_help(help)
+}))]
 pub(super) struct RenderArguments {
     /// Safety distance for a recording without one [m]: vehicles get shells of half of it, and violations are those of
     /// straight lines between samples.
@@ -50,7 +56,13 @@ pub(super) struct RenderArguments {
     /// Write a contact sheet with C columns and R rows.
     #[arg(long, value_name = "CxR", value_parser = drawing::sheet)]
     sheet: Option<[u32; 2]>,
-    /// Folder for the pictures [default: `snapshots` beside the recording].
+    /// Draw another recording or scenario to the right, on the same scale and at the same times.
+    #[arg(long, value_name = "RECORDING|SCENARIO")]
+    beside: Option<PathBuf>,
+    /// Last time of films, sheets and --every [s] [default: the end].
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    until: Option<f64>,
+    /// Folder for the pictures [default: `snapshots` beside the recording, or in out/NAME for a scenario].
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Width and height of a picture, or of the whole sheet, in pixels.
@@ -62,16 +74,20 @@ pub(super) struct RenderArguments {
     /// Seconds of flight per second of film [default: 1, or more to keep the film below 20 s].
     #[arg(long, value_name = "X", allow_negative_numbers = true, requires = "film")]
     speed: Option<f64>,
-    /// Camera: iso, top, front, side, follow:ID, closest, or AZIMUTH,ELEVATION,DISTANCE in degrees and metres.
-    #[arg(long, default_value = "iso", allow_hyphen_values = true)]
+    /// Camera: auto, perspective, top, front, side, follow, follow:ID, closest, or AZIMUTH,ELEVATION,DISTANCE in
+    /// degrees and metres.
+    #[arg(long, default_value = "auto", allow_hyphen_values = true)]
     camera: String,
+    /// Colour of vehicles and trails: vehicle, speed or clearance.
+    #[arg(long, default_value = "vehicle", value_parser = drawing::colouring)]
+    colour: Colouring,
     /// Length of trails [s] [default: from the start].
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     trail: Option<f64>,
-    /// Theme: dark, light, or paper (white, for print).
+    /// Theme: dark or light.
     #[arg(long, default_value = "dark", value_parser = drawing::theme)]
     theme: Theme,
-    /// Graphics adapter: best, hardware, software, or a part of its name.
+    /// Graphics adapter: best, hardware, software, none, or a part of its name.
     #[arg(long, value_name = "NAME", default_value = "best")]
     adapter: String,
     /// Print no summary and no progress.
@@ -93,7 +109,8 @@ struct Still {
 
 /// Renderer of the pictures of a flight.
 struct Batch<'a> {
-    timeline: &'a Timeline,
+    /// Flights, side by side.
+    flights: &'a [Timeline],
     extent: Extent,
     renderer: Renderer,
     view: View,
@@ -107,20 +124,32 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let fps = arguments.fps.unwrap_or(FPS);
     let reading = arguments.reading.options(arguments.input_format);
     let recording = arguments.reading.only("drawn")?;
-    let timeline = drawing::timeline(recording, &reading, arguments.delta, console)?;
-    let beside = || recording.parent().unwrap_or(Path::new("")).join("snapshots");
-    let folder = arguments.out.clone().unwrap_or_else(beside);
-    let stills = stills(arguments, &timeline, &folder)?;
-    let frames = film.map_or(Ok(Vec::new()), |_| film_times(fps, arguments.speed, &timeline))?;
-    let sheet = arguments.sheet.map(|sheet| sheet_plan(sheet, arguments.size, &timeline)).transpose()?;
+    let paths: Vec<&Path> = std::iter::once(recording).chain(arguments.beside.as_deref()).collect();
+    let read = |path: &&Path| drawing::flight(&recording_in(path), &reading, arguments.delta, console);
+    let flights = paths.iter().map(read).collect::<Result<Vec<_>, _>>()?;
+    let timeline = &flights[0];
+    let default_folder = || match recording.parent() {
+        _ if drawing::is_scenario(recording) => Path::new("out").join(&timeline.name).join("snapshots"),
+        parent => parent.unwrap_or(Path::new("")).join("snapshots"),
+    };
+    let folder = arguments.out.clone().unwrap_or_else(default_folder);
+    let range_s = range_s(&flights, arguments.until)?;
+    let stills = stills(arguments, timeline, range_s, &folder)?;
+    let frames = film.map_or(Ok(Vec::new()), |_| film_times(fps, arguments.speed, range_s))?;
+    let sheet = arguments.sheet.map(|sheet| sheet_plan(sheet, arguments.size, range_s)).transpose()?;
     let sheet_path = folder.join("sheet.png");
     let outputs: Vec<NamedPath<'_>> = (stills.iter().map(|still| ("the picture", still.path.as_path())))
         .chain(sheet.iter().map(|_| ("the sheet", sheet_path.as_path())))
         .chain(film.map(|(path, _)| ("--film", path)))
         .collect();
-    outputs::check(&[("the recording", recording)], &outputs)?;
+    let inputs: Vec<NamedPath<'_>> = paths.iter().map(|path| ("the recording", *path)).collect();
+    outputs::check(&inputs, &outputs)?;
     let trail_s = arguments.trail.map(|trail_s| positive(trail_s, "--trail")).transpose()?;
-    let view = View { camera, theme: arguments.theme, size_px: arguments.size, trail_s, ..View::default() };
+    let (theme, colouring, [width, height]) = (arguments.theme, arguments.colour, arguments.size);
+    // Pictures side by side have the same width.
+    let columns = u32::try_from(flights.len()).unwrap_or(1);
+    let size_px = [(width / columns).max(1) * columns, height];
+    let view = View { camera, theme, colouring, size_px, trail_s, ..View::default() };
     if let Some((path, format)) = film {
         if path.is_dir() {
             let message = format!("--film: {} is a folder", path.display());
@@ -131,9 +160,11 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     }
     let renderer = Renderer::open(&arguments.adapter.as_str().into())?;
     renderer.check_size(view.size_px)?;
-    let extent = Extent::of(&timeline);
-    let start = timeline.log.at(f64::NEG_INFINITY).ok_or_else(|| RenderError::Empty(timeline.name.clone()))?;
-    extent.camera(&timeline, &start, &view)?;
+    let extent = Extent::of_all(&flights.iter().collect::<Vec<_>>());
+    for timeline in &flights {
+        let start = timeline.log.at(f64::NEG_INFINITY).ok_or_else(|| RenderError::Empty(timeline.name.clone()))?;
+        extent.camera(timeline, &start, &view)?;
+    }
     // Outputs are checked before the work.
     if !stills.is_empty() || sheet.is_some() {
         writable(&folder)?;
@@ -143,7 +174,7 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     }
     let tiles = sheet.as_ref().map_or(0, |(times, _)| times.len());
     let progress = console.progress(Some((stills.len() + frames.len() + tiles) as u64), timeline.name.clone());
-    let mut batch = Batch { extent, timeline: &timeline, renderer, view, progress };
+    let mut batch = Batch { extent, flights: &flights, renderer, view, progress };
 
     let times: Vec<f64> = stills.iter().map(|still| still.time_s).collect();
     batch.shoot(&times, |first, pictures| {
@@ -210,11 +241,17 @@ impl Batch<'_> {
     }
 
     fn picture(&mut self, time_s: f64) -> Result<Picture, Failure> {
-        let frame = self.timeline.log.at(time_s).ok_or_else(|| RenderError::Empty(self.timeline.name.clone()))?;
-        let camera = self.extent.camera(self.timeline, &frame, &self.view)?;
-        let picture = self.renderer.paint(&Scene::compose(self.timeline, &self.extent, &frame, &self.view, camera))?;
+        let [width, height] = self.view.size_px;
+        let columns = u32::try_from(self.flights.len()).unwrap_or(1);
+        let view = View { size_px: [width / columns, height], ..self.view.clone() };
+        let mut pictures = Vec::new();
+        for timeline in self.flights {
+            let frame = timeline.log.at(time_s).ok_or_else(|| RenderError::Empty(timeline.name.clone()))?;
+            let camera = self.extent.camera(timeline, &frame, &view)?;
+            pictures.push(self.renderer.paint(&Scene::compose(timeline, &self.extent, &frame, &view, camera))?);
+        }
         self.progress.inc(1);
-        Ok(picture)
+        Ok(contact_sheet(&pictures, columns)?)
     }
 }
 
@@ -231,7 +268,12 @@ fn writable(folder: &Path) -> Result<(), Failure> {
 }
 
 /// Returns the requested pictures, each with its file.
-fn stills(arguments: &RenderArguments, timeline: &Timeline, folder: &Path) -> Result<Vec<Still>, Failure> {
+fn stills(
+    arguments: &RenderArguments,
+    timeline: &Timeline,
+    range_s: [f64; 2],
+    folder: &Path,
+) -> Result<Vec<Still>, Failure> {
     let [start_s, end_s] = timeline.log.range_s();
     let nothing_else = arguments.every.is_none() && arguments.film.is_none() && arguments.sheet.is_none();
     let mut wanted: Vec<&str> = arguments.at.iter().map(|text| text.trim()).collect();
@@ -274,16 +316,15 @@ fn stills(arguments: &RenderArguments, timeline: &Timeline, folder: &Path) -> Re
         }
     }
     if let Some(every_s) = arguments.every {
-        let times = even_times(timeline, every_s, "--every")?;
+        let times = even_times(range_s, every_s, "--every")?;
         let path = |k: usize| folder.join(format!("frame-{:05}.png", k + 1));
         stills.extend(times.into_iter().enumerate().map(|(k, time_s)| Still { time_s, path: path(k) }));
     }
     Ok(stills)
 }
 
-/// Returns times from the start of a flight to its end, `apart_s` apart \[s\].
-fn even_times(timeline: &Timeline, apart_s: f64, option: &str) -> Result<Vec<f64>, Failure> {
-    let [start_s, end_s] = timeline.log.range_s();
+/// Returns times from a start to an end, `apart_s` apart \[s\].
+fn even_times([start_s, end_s]: [f64; 2], apart_s: f64, option: &str) -> Result<Vec<f64>, Failure> {
     positive(apart_s, option)?;
     let count = ((end_s - start_s) / apart_s + 1e-6).floor() + 1.0;
     if count > MOST_PICTURES {
@@ -306,22 +347,35 @@ fn positive(number: f64, option: &str) -> Result<f64, Failure> {
     Err(Failure::input("render/out-of-range", message, format!("give a positive number with {option}")))
 }
 
-fn film_times(fps: u32, speed: Option<f64>, timeline: &Timeline) -> Result<Vec<f64>, Failure> {
-    let [start_s, end_s] = timeline.log.range_s();
+/// Returns the common range of time of flights \[s\], with an earlier end if given.
+fn range_s(flights: &[Timeline], until_s: Option<f64>) -> Result<[f64; 2], Failure> {
+    let ranges = flights.iter().map(|timeline| timeline.log.range_s());
+    let [start_s, end_s] = ranges.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]).unwrap_or_default();
+    match until_s {
+        Some(until_s) if !(start_s..=end_s).contains(&until_s) => Err(Failure::input(
+            "render/out-of-range",
+            format!("--until: must be from {start_s} s to {end_s} s, got {until_s} s"),
+            "give a time within the recording with --until",
+        )),
+        until_s => Ok([start_s, until_s.unwrap_or(end_s)]),
+    }
+}
+
+fn film_times(fps: u32, speed: Option<f64>, [start_s, end_s]: [f64; 2]) -> Result<Vec<f64>, Failure> {
     let fps = f64::from(fps.max(1));
     let speed = match speed {
         Some(speed) => positive(speed, "--speed")?,
         // The last picture is shown for one frame.
         None => ((end_s - start_s) / (LONGEST_FILM_S - 1.0 / fps)).max(1.0),
     };
-    even_times(timeline, speed / fps, "--speed")
+    even_times([start_s, end_s], speed / fps, "--speed")
 }
 
 /// Returns the times of the pictures of a sheet, and their size.
 fn sheet_plan(
     [columns, rows]: [u32; 2],
     [width, height]: [u32; 2],
-    timeline: &Timeline,
+    [start_s, end_s]: [f64; 2],
 ) -> Result<(Vec<f64>, [u32; 2]), Failure> {
     let size_px = [width / columns, height / rows];
     if size_px.contains(&0) {
@@ -331,7 +385,6 @@ fn sheet_plan(
             "give fewer pictures with --sheet, or a larger --size",
         ));
     }
-    let [start_s, end_s] = timeline.log.range_s();
     let last = (u64::from(columns) * u64::from(rows) - 1).max(1) as f64;
     if last > MOST_PICTURES {
         return Err(Failure::input(

@@ -75,7 +75,7 @@ pub(super) struct RunArguments {
     /// Take no pictures.
     #[arg(long)]
     no_snapshots: bool,
-    /// Graphics adapter: best, hardware, software, or a part of its name.
+    /// Graphics adapter: best, hardware, software, none, or a part of its name.
     #[arg(long, value_name = "NAME", default_value = "best")]
     adapter: String,
     /// Repeat the flight at half the step, and report the differences.

@@ -38,7 +38,7 @@ pub(super) struct StudyArguments {
     /// Overwrite existing files, and a folder with a finished run.
     #[arg(long)]
     force: bool,
-    /// Graphics adapter: best, hardware, software, or a part of its name.
+    /// Graphics adapter: best, hardware, software, none, or a part of its name.
     #[arg(long, value_name = "NAME", default_value = "best")]
     adapter: String,
     /// Print no table and no progress.

@@ -11,8 +11,8 @@ use super::console::{self, Console};
 use super::drawing;
 use super::reading::{self, ReadArguments};
 use tautline_core::record::{Event, RecordError, Sample, Sink};
-use tautline_recordings::read::{Format, ReadOptions};
-use tautline_render::{LiveUpdate, Theme, Timeline, show};
+use tautline_recordings::read::Format;
+use tautline_render::{LiveUpdate, Theme, Timeline, WINDOW_KEYS, show};
 use tautline_report::request::{Failure, ScenarioRequest};
 use tautline_sim::scenario::Scenario;
 use tautline_sim::sim::{self, Components};
@@ -25,7 +25,7 @@ const WAITING: usize = 256;
 #[command(mut_arg("recording", |what| {
     let help = "Recording, scenario file, or name of a built-in scenario";
     what.required(false).default_value("pentagon").value_name("RECORDING|SCENARIO").help(help)
-}))]
+}), after_help = keys())]
 pub(super) struct ViewArguments {
     /// Set a key of the scenario; repeatable.
     #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
@@ -33,7 +33,7 @@ pub(super) struct ViewArguments {
     /// Safety distance for a recording without one [m].
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     delta: Option<f64>,
-    /// Theme: dark, light, or paper.
+    /// Theme: dark or light.
     #[arg(long, default_value = "dark", value_parser = drawing::theme)]
     theme: Theme,
     /// Graphics adapter: best, hardware, software, or a part of its name.
@@ -47,26 +47,25 @@ pub(super) struct ViewArguments {
     input_format: Option<Format>,
 }
 
+/// Returns the keys of the window for the help.
+fn keys() -> String {
+    let row = |(keys, effect): &(&str, &str)| format!("  {keys:28}{effect}\n");
+    format!("Keys and mouse:\n{}", WINDOW_KEYS.iter().map(row).collect::<String>())
+}
+
 pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
     let path = arguments.reading.only("shown")?;
     let reading = arguments.reading.options(arguments.input_format);
     let console = Console { data_on_stdout: true, quiet: false };
-    let is_recording = path.is_dir() || path.is_file() && path.extension().is_none_or(|extension| extension != "toml");
-    let no_effect = |message: &str, help: &str| Err(Failure::input("usage/no-effect", message, help));
+    let is_recording = path.exists() && !drawing::is_scenario(path);
     let (timeline, live) = if is_recording {
         if !arguments.overrides.is_empty() {
-            return no_effect("--set: has no effect on a recording", "leave --set out, or give a scenario");
+            let (message, help) = ("--set: has no effect on a recording", "leave --set out, or give a scenario");
+            return Err(Failure::input("usage/no-effect", message, help));
         }
         (drawing::timeline(path, &reading, arguments.delta, console)?, None)
     } else {
-        if arguments.delta.is_some() {
-            let help = "leave --delta out, or set the key with --set law.delta_m=METRES";
-            return no_effect("--delta: has no effect on a scenario, which has its own safety distance", help);
-        }
-        if reading != ReadOptions::default() {
-            let help = "leave these options out, or give a recording";
-            return no_effect("options for reading: have no effect on a scenario", help);
-        }
+        drawing::refuse_for_scenario(&reading, arguments.delta)?;
         let scenario = ScenarioRequest::named(&path.to_string_lossy(), &arguments.overrides)?.read()?;
         (Timeline::of(&scenario), Some(take_off(scenario)?))
     };
@@ -123,4 +122,16 @@ pub(super) fn lose_display() -> Exit {
     let help = "open the window again, or draw without a display: tautline render RECORDING";
     let message = "the display is gone, and the window with it";
     console::show(&Failure::machine("render/no-display", message).with_help(help))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_book_lists_the_keys_of_the_window() {
+        let book = include_str!("../../docs/viewer.md");
+        let rows: Vec<String> = WINDOW_KEYS.iter().map(|(keys, effect)| format!("| {keys} | {effect} |")).collect();
+        assert!(book.contains(&rows.join("\n")), "{}", rows.join("\n"));
+    }
 }

@@ -39,6 +39,7 @@ LONG = {
     ("docs/campaigns.md", "tautline campaign merge"): "of the shards above",
     ("docs/compare.md", "tautline compare"): "sixty flights",
     ("docs/viewer.md", "tautline render out/pentagon/run.mcap --film"): "six hundred pictures",
+    ("docs/viewer.md", "tautline render pentagon-laplacian"): "two hundred pictures",
 }
 
 # Built programs that run in place of cargo.

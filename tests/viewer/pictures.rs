@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 use tautline::record::{Event, Sample};
 use tautline::render::gpu::Renderer;
 use tautline::render::scene::{Ball, Camera, Colour, Lens, Line, Orbit};
-use tautline::render::{AdapterChoice, Layers, Picture, RenderError, Scene, Theme, Timeline, View};
+use tautline::render::{AdapterChoice, Colouring, Layers, Picture, RenderError, Scene, Theme, Timeline, View};
 use tautline::scenario::{Scenario, Source};
 use tautline::swarm::{ClosestApproach, Pair, Rows, Swarm};
 
@@ -283,6 +283,10 @@ fn small() -> View {
     View { size_px: [320, 180], ..View::default() }
 }
 
+fn medium() -> View {
+    View { size_px: [480, 270], ..View::default() }
+}
+
 fn reference_folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/pictures")
 }
@@ -339,10 +343,32 @@ fn pictures_match_their_references() {
     let mut shoot = |name: &str, time_s: f64, view: View| {
         assert_looks_like(name, &renderer.shoot(&timeline, time_s, &view).expect(name));
     };
+    let camera = |text: &str| text.parse().expect("a camera");
     shoot("start", 0.0, small());
-    shoot("violation", 2.5, View { theme: Theme::Light, ..small() });
-    shoot("top", 4.0, View { camera: "top".parse().expect("a camera"), theme: Theme::Paper, ..small() });
+    shoot("violation", 2.5, View { theme: Theme::Light, camera: camera("perspective"), ..small() });
+    shoot("top", 4.0, View { camera: camera("top"), theme: Theme::Light, ..medium() });
+    shoot("speed", 2.5, View { camera: camera("follow"), colouring: Colouring::Speed, ..medium() });
     shoot("vehicles", 4.0, View { layers: Layers::NONE, ..small() });
+}
+
+/// Largest mean FLIP of the pictures of an adapter and of the processor.
+const MAX_FLIP_OF_SOFTWARE: f32 = 0.02;
+
+#[test]
+fn pictures_without_an_adapter_look_like_those_of_an_adapter() {
+    let (mut software, mut renderer) = (Renderer::open(&AdapterChoice::None).expect("no adapter needed"), renderer());
+    assert!(software.adapter().contains("without a graphics adapter"));
+    let timeline = crossing();
+    for camera in ["perspective", "top", "closest", "30,-20,4"] {
+        let view = View { camera: camera.parse().expect("a camera"), ..medium() };
+        let [with, without] =
+            [&mut renderer, &mut software].map(|renderer| renderer.shoot(&timeline, 2.5, &view).expect("a picture"));
+        let (difference, _) = flip(&with, &without);
+        assert!(difference < MAX_FLIP_OF_SOFTWARE, "{camera}: {difference}");
+        assert!(without == software.shoot(&timeline, 2.5, &view).expect("a picture"), "{camera}: the same bytes");
+    }
+    let refused = software.check_size([0, 10]).expect_err("too small").to_string();
+    assert!(refused.contains("pixels a side"), "{refused}");
 }
 
 #[test]

@@ -87,20 +87,56 @@ fn a_run_without_an_adapter_flies_with_a_warning() {
 }
 
 #[test]
-fn render_without_a_driver_names_a_package() {
+fn render_without_a_driver_draws_by_itself() {
     let folder = flown("pentagon", &["--no-snapshots"]);
-    let done = std::process::Command::new(TAUTLINE)
-        .args(["render", "out/run.mcap"])
-        .current_dir(folder.path())
-        // The loader finds no Vulkan driver; OpenGL is not enough.
-        .env("VK_DRIVER_FILES", "/nonexistent.json")
-        .env("VK_ICD_FILENAMES", "/nonexistent.json")
-        .output()
-        .expect("the program runs");
-    let err = String::from_utf8_lossy(&done.stderr);
-    assert_eq!(done.status.code(), MACHINE_FAILED, "{err}");
-    assert!(err.contains("no graphics adapter") && err.contains("mesa-vulkan-drivers"), "{err}");
-    assert!(!folder.path().join("out/snapshots/start.png").exists());
+    let run = |more: &[&str]| {
+        let done = std::process::Command::new(TAUTLINE)
+            .args([&["render", "out/run.mcap", "--size", "320x180"], more].concat())
+            .current_dir(folder.path())
+            // The loader finds no Vulkan driver; OpenGL is not enough.
+            .env("VK_DRIVER_FILES", "/nonexistent.json")
+            .env("VK_ICD_FILENAMES", "/nonexistent.json")
+            .output()
+            .expect("the program runs");
+        (
+            done.status.code(),
+            [done.stdout, done.stderr].map(|text| String::from_utf8_lossy(&text).into_owned()).concat(),
+        )
+    };
+    let (exit, text) = run(&[]);
+    assert_eq!(exit, GOOD, "{text}");
+    assert!(text.contains("drawn by the program itself, without a graphics adapter"), "{text}");
+    assert_eq!(size_of(&folder.path().join("out/snapshots/start.png")), [320, 180]);
+    let (exit, text) = run(&["--adapter", "hardware"]);
+    assert_eq!(exit, MACHINE_FAILED, "{text}");
+    assert!(text.contains("no graphics adapter") && text.contains("mesa-vulkan-drivers"), "{text}");
+}
+
+#[test]
+fn two_scenarios_are_drawn_side_by_side() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let flights = ["render", "pentagon-laplacian", "--beside", "pentagon", "--size", "321x90", "--adapter", "none"];
+    let film = ["--film", "both.gif", "--fps", "5", "--until", "2", "--at", "2"];
+    let Ran { exit, err, .. } = ran(folder.path(), &[&flights[..], &film].concat());
+    assert_eq!(exit, GOOD, "{err}");
+    let gif = fs::File::open(folder.path().join("both.gif")).expect("a film");
+    let mut decoder = gif::DecodeOptions::new().read_info(gif).expect("a GIF");
+    let mut frames = 0;
+    while decoder.read_next_frame().expect("a frame").is_some() {
+        frames += 1;
+    }
+    assert_eq!(([decoder.width(), decoder.height()], frames), ([320, 90], 11));
+    assert_eq!(size_of(&folder.path().join("out/pentagon-laplacian/snapshots/at-2.000s.png")), [320, 90]);
+    let Ran { exit, err, .. } = ran(folder.path(), &["render", "pentagon", "--until", "1e9", "--film", "a.gif"]);
+    assert_eq!(exit, WRONG_INPUT);
+    assert!(err.contains("--until: must be from 0 s to 120 s"), "{err}");
+}
+
+#[test]
+fn a_mission_has_a_picture_of_each_leg() {
+    let folder = flown("obstacles", &["--adapter", "none", "--set", "time.duration_s=60"]);
+    let names = names(&folder.path().join("out/snapshots"));
+    assert_eq!(names, ["closest.png", "end.png", "leg-1.png", "start.png"]);
 }
 
 #[test]
@@ -114,7 +150,7 @@ fn every_kind_of_picture_is_written_to_its_target() {
     let at = |name: &str| folder.path().join(name);
     render(&[]);
     assert_eq!(names(&at("out/snapshots")), ["closest.png", "end.png", "start.png"]);
-    render(&["--at", "start,1.5", "--out", "a", "--camera", "top", "--theme", "paper"]);
+    render(&["--at", "start,1.5", "--out", "a", "--camera", "top", "--theme", "light"]);
     assert_eq!(names(&at("a")), ["at-1.500s.png", "start.png"]);
     assert_eq!(size_of(&at("a/start.png")), [160, 90]);
     render(&["--every", "1", "--out", "b", "--camera", "-60,30,25"]);
@@ -151,7 +187,7 @@ fn invalid_requests_are_refused_with_a_remedy() {
         (&["out/run.mcap", "--camera", "isometric"], WRONG_INPUT, "`isometric` is not a camera"),
         (&["out/run.mcap", "--camera", "follow:9"], WRONG_INPUT, "there is no vehicle `9` to follow"),
         (&["out/run.mcap", "--camera", "0,100,5"], WRONG_INPUT, "an elevation that is not between"),
-        (&["out/run.mcap", "--theme", "pink"], WRONG_INPUT, "give dark, light or paper"),
+        (&["out/run.mcap", "--theme", "pink"], WRONG_INPUT, "give dark or light"),
         (&["out/run.mcap", "--at", "5"], WRONG_INPUT, "--at: must be from 0 s to 4 s, got 5 s"),
         (&["out/run.mcap", "--at", "soon"], WRONG_INPUT, "`soon` is not a time"),
         (&["out/run.mcap", "--at", "nan"], WRONG_INPUT, "`nan` is not a time"),

@@ -8,8 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use tautline::render::Timeline;
-use tautline::render::scene::{Camera, Extent};
+use tautline::render::{Extent, Timeline, View};
 
 /// Longest wait on a slow machine.
 const MAX_WAIT: Duration = Duration::from_mins(1);
@@ -218,30 +217,30 @@ fn fly(folder: &Path) {
 }
 
 #[test]
-fn layers_themes_and_camera_movements_change_the_picture_reversibly() {
+fn keys_and_camera_movements_change_the_picture_reversibly() {
     let (folder, screen) = (tempfile::tempdir().expect("a folder"), Screen::new());
     let (program, window) = OpenWindow::at_the_end(&screen, folder.path());
     // The first picture may precede the final size of the window.
     window.picture();
     let whole = window.picture();
     assert_eq!(window.picture(), whole, "without input the picture is the same; the message takes no room from it");
-    for layer in ["1", "2", "3", "4", "5", "6", "7", "8"] {
-        window.key(layer);
-        assert!(window.picture() != whole, "layer {layer} off");
-        window.key(layer);
-        assert!(window.picture() == whole, "layer {layer} on again");
+    // Each key returns to the first picture after this number of presses.
+    for (what, key, presses) in [("labels", "l", 2), ("trails", "t", 3), ("colours", "c", 3), ("theme", "m", 2)] {
+        for press in 1..=presses {
+            window.key(key);
+            assert_eq!(window.picture() == whole, press == presses, "{what} after {press}");
+        }
     }
-    for theme in ["light", "paper"] {
-        window.key("t");
-        assert!(window.picture() != whole, "{theme}");
+    // The flight is planar, so that the first camera is that from the top.
+    for (what, key, is_same) in [("perspective", "1", false), ("front", "3", false), ("top", "2", true)] {
+        window.key(key);
+        assert_eq!(window.picture() == whole, is_same, "{what}");
     }
-    window.key("t");
-    assert!(window.picture() == whole, "dark again");
     // Framing undoes every camera movement.
-    for (what, key) in [("A", "a"), ("W", "w"), ("Page Up", "Prior"), ("Page Down", "Next")] {
+    for (what, key) in [("A", "a"), ("W", "s"), ("Page Up", "Prior"), ("Page Down", "Next")] {
         window.key(key);
         assert!(window.picture() != whole, "{what}");
-        window.key("f");
+        window.key("2");
         assert!(window.picture() == whole, "framed after {what}");
     }
     let drags: [(&str, &[&str]); 4] = [
@@ -256,9 +255,13 @@ fn layers_themes_and_camera_movements_change_the_picture_reversibly() {
     for (what, act) in drags {
         window.mouse(400, 300, act);
         assert!(window.picture() != whole, "{what}");
-        window.key("f");
+        window.key("2");
         assert!(window.picture() == whole, "framed after {what}");
     }
+    window.key("f");
+    assert!(window.picture() != whole, "the camera follows the swarm");
+    window.key("f");
+    assert!(window.picture() == whole, "the whole flight again");
     // Another size, then the previous one.
     screen.xdotool(&["windowsize", "--sync", &window.window, "900", "600"]);
     window.picture();
@@ -272,10 +275,10 @@ fn layers_themes_and_camera_movements_change_the_picture_reversibly() {
 fn first_vehicle(recording: &Path, size_px: [u32; 2]) -> [u32; 2] {
     let timeline = Timeline::read_mcap(recording).expect("a recording");
     let extent = Extent::of(&timeline);
-    let (orbit, target_m) = extent.orbit(size_px);
     let frame = timeline.log.at(f64::INFINITY).expect("a frame");
+    let camera = extent.camera(&timeline, &frame, &View { size_px, ..View::default() }).expect("a camera");
     let place = frame.positions_m.row(0).transpose().fixed_rows::<3>(0) - extent.origin_m();
-    let at = Camera::orbiting(orbit, target_m, size_px).project(place).expect("before the camera");
+    let at = camera.project(place).expect("before the camera");
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "pixels of the picture")]
     let at_px = at.at_px.map(|pixels| pixels.round() as u32);
     at_px

@@ -109,8 +109,8 @@ impl RenderError {
             E::Empty(_) => "give a recording that holds at least one sample, such as a run's run.mcap",
             E::NoVehicle(_) => "give the name of a vehicle of the recording",
             E::Camera(_) => {
-                "give iso, top, front, side, follow:ID, closest, or AZIMUTH,ELEVATION,DISTANCE in degrees and metres \
-                 such as -60,30,25"
+                "give auto, perspective, top, front, side, follow, follow:ID, closest, or \
+                 AZIMUTH,ELEVATION,DISTANCE in degrees and metres such as -60,30,25"
             }
             E::NoAdapter => {
                 "install a driver; Debian has one in software: apt-get install mesa-vulkan-drivers libvulkan1"

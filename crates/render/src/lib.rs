@@ -30,6 +30,7 @@ pub mod gpu;
 mod picture;
 mod run_pictures;
 pub mod scene;
+mod software;
 mod timeline;
 #[cfg(feature = "window")]
 mod window;
@@ -40,9 +41,9 @@ pub use foxglove_scene::{FoxgloveScene, SCENE_HZ};
 pub use gpu::{AdapterChoice, Renderer, adapters};
 pub use picture::{Picture, contact_sheet, data_uri};
 pub use run_pictures::{RunPictures, Snapshot, snapshot_names, snapshots_of_run};
-pub use scene::{CameraSpec, Extent, Layers, Scene, Theme, View};
+pub use scene::{Adjustment, CameraSpec, Colouring, Extent, Layers, Scene, Theme, View};
 pub use tautline_report::flight_log::{FlightLog, Frame, Keyframe};
 pub use tautline_sim::plan::Plan;
 pub use timeline::{QuadrotorShape, Timeline, TracksError};
 #[cfg(feature = "window")]
-pub use window::{LiveUpdate, is_in_window_library, show};
+pub use window::{LiveUpdate, WINDOW_KEYS, is_in_window_library, show};

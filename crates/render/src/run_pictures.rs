@@ -6,13 +6,12 @@ use std::sync::Arc;
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
 use crate::scene::metres;
-use crate::{
-    CameraSpec, Extent, FoxgloveScene, Picture, RenderError, Renderer, Scene, Theme, Timeline, View, data_uri,
-};
+use crate::{Extent, FoxgloveScene, Picture, RenderError, Renderer, Scene, Theme, Timeline, View, data_uri};
+use tautline_core::record::Event;
 use tautline_core::swarm::Pair;
 use tautline_recordings::mcap::ExtraTopic;
 use tautline_report::flight_log::{FlightLog, PICTURED};
-use tautline_report::report::page;
+use tautline_report::report::{Report, page};
 use tautline_report::request::{Failure, Monitor, NamedPicture, PICTURES_BYTES, Pictures, write_files};
 use tautline_sim::scenario::Scenario;
 
@@ -38,8 +37,13 @@ impl RunPictures {
 }
 
 impl RunPictures {
-    fn snapshots(&self, scenario: &Scenario, log: &Arc<FlightLog>) -> Result<Vec<Snapshot>, RenderError> {
-        let timeline = Timeline::flown(scenario, Arc::clone(log));
+    fn snapshots(
+        &self,
+        scenario: &Scenario,
+        report: &Report,
+        log: &Arc<FlightLog>,
+    ) -> Result<Vec<Snapshot>, RenderError> {
+        let timeline = Timeline::flown(scenario, Arc::clone(log)).judged(report.audit.status);
         if log.keyframes().is_empty() {
             return Err(RenderError::Empty(timeline.name));
         }
@@ -53,11 +57,12 @@ impl Pictures for RunPictures {
     fn draw(
         &self,
         scenario: &Scenario,
+        report: &Report,
         log: &Arc<FlightLog>,
         folder: &Path,
         monitor: &dyn Monitor,
     ) -> Result<Vec<NamedPicture>, Failure> {
-        let snapshots = if self.takes_snapshots { self.snapshots(scenario, log) } else { Ok(Vec::new()) };
+        let snapshots = if self.takes_snapshots { self.snapshots(scenario, report, log) } else { Ok(Vec::new()) };
         let snapshots = snapshots.unwrap_or_else(|error| {
             monitor.warn(&format!("no pictures were taken: {}", Failure::from(error).in_words()));
             Vec::new()
@@ -96,12 +101,12 @@ pub struct Snapshot {
 /// Returns the names of all pictures that [`snapshots_of_run`] can take.
 #[must_use]
 pub fn snapshot_names() -> Vec<String> {
-    let violations = (1..=PICTURED).map(|k| format!("violation-{k}"));
-    ["start", "closest", "end", "obstacle"].map(str::to_owned).into_iter().chain(violations).collect()
+    let numbered = ["leg", "violation"].into_iter().flat_map(|name| (1..=PICTURED).map(move |k| format!("{name}-{k}")));
+    ["start", "closest", "end", "obstacle"].map(str::to_owned).into_iter().chain(numbered).collect()
 }
 
-/// Draws the start, the closest approach, the end, the first violation of an obstacle's clearance, and the first ten
-/// violations of two vehicles. Returns no picture for a flight without samples.
+/// Draws the start, the closest approach, the ends of the first ten legs, the end, the first violation of an obstacle's
+/// clearance, and the first ten violations of two vehicles. Returns no picture for a flight without samples.
 ///
 /// # Errors
 /// [`RenderError`] if the adapter fails.
@@ -111,16 +116,15 @@ pub fn snapshots_of_run(
     view: &View,
 ) -> Result<Vec<Snapshot>, RenderError> {
     let extent = Extent::of(timeline);
-    let view = View { camera: CameraSpec::Iso, ..view.clone() };
     let mut snapshots = Vec::new();
     // The camera frames the whole flight, or the pair if one is given.
     let mut shoot = |name: &str, description: String, time_s: f64, pair: Option<Pair>| {
         let Some(frame) = timeline.log.at(time_s) else { return Ok(()) };
         let camera = match pair {
-            Some(pair) => extent.close_up(timeline, &frame, pair, view.size_px),
-            None => extent.camera(timeline, &frame, &view)?,
+            Some(pair) => extent.close_up(timeline, &frame, pair, view),
+            None => extent.camera(timeline, &frame, view)?,
         };
-        let picture = renderer.paint(&Scene::compose(timeline, &extent, &frame, &view, camera))?;
+        let picture = renderer.paint(&Scene::compose(timeline, &extent, &frame, view, camera))?;
         snapshots.push(Snapshot { name: name.to_owned(), description, picture });
         Ok::<(), RenderError>(())
     };
@@ -130,6 +134,14 @@ pub fn snapshots_of_run(
         let (pair, time_s, apart) = (closest.pair, closest.time_s, metres(closest.separation_m));
         let what = format!("The closest approach of the flight: vehicles {pair} at {time_s:.2} s, {apart} apart.");
         shoot("closest", what, time_s, None)?;
+    }
+    // A leg ends when the next one begins.
+    let legs = timeline.log.targets().iter().filter_map(|event| match event {
+        Event::LegBegan { leg, time_s } if (1..=PICTURED).contains(leg) && *time_s > start_s => Some((*leg, *time_s)),
+        _ => None,
+    });
+    for (leg, time_s) in legs {
+        shoot(&format!("leg-{leg}"), format!("The end of leg {leg}, at {time_s:.2} s."), time_s.next_down(), None)?;
     }
     shoot("end", format!("The end, at {end_s:.2} s."), end_s, None)?;
     if let Some((near, [vehicle, obstacle])) = timeline.log.violations().of_obstacles().next() {
@@ -154,4 +166,36 @@ fn encode(picture: &Picture, max_bytes: usize) -> Result<[Vec<u8>; 2], RenderErr
         small = smaller.to_png()?;
     }
     Ok([png, small])
+}
+
+#[cfg(test)]
+mod tests {
+    use tautline_report::run::run;
+    use tautline_sim::scenario::Source;
+
+    use super::*;
+
+    #[test]
+    fn a_flight_until_its_closest_approach_shows_the_distance_of_the_judge() {
+        for name in ["swap", "pentagon-laplacian"] {
+            let mut scenario = Scenario::read(&Source::Builtin(name.to_owned()), &[]).expect("built in");
+            scenario.time.duration_s = 10.0;
+            let mut log = FlightLog::of(&scenario);
+            run(&scenario, &mut log).expect("a flight");
+            let closest = log.closest().expect("two vehicles");
+            let timeline = fly_until(&scenario, closest.time_s).expect("a flight");
+            let (pair, distance_m) = timeline.log.at(closest.time_s).expect("a frame").nearest.expect("a pair");
+            assert_eq!(pair, closest.pair, "{name}");
+            assert_eq!(metres(distance_m), metres(closest.separation_m), "{name}");
+        }
+    }
+
+    #[test]
+    fn pictures_of_a_run_have_known_names() {
+        let names = snapshot_names();
+        for name in ["start", "closest", "end", "obstacle", "leg-1", "leg-10", "violation-10"] {
+            assert!(names.iter().any(|known| known == name), "{name}");
+        }
+        assert_eq!(names.len(), 4 + 2 * PICTURED);
+    }
 }

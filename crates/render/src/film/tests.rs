@@ -29,6 +29,24 @@ fn a_gif_holds_every_picture_and_has_the_right_duration() {
     assert_eq!((delays.len(), delays.iter().sum::<u16>()), (6, 20));
 }
 
+#[test]
+fn a_gif_holds_only_changes_and_shows_every_picture() {
+    let size_px = [20, 10];
+    let plain = |colour: [u8; 4]| Picture { size_px, rgba: colour.repeat(200) };
+    let mut dotted = plain([9, 9, 9, 255]);
+    let at = 4 * (5 * 20 + 7);
+    dotted.rgba[at..at + 8].copy_from_slice(&[200, 0, 0, 255, 0, 200, 0, 255]);
+    let same = dotted.clone();
+    let bytes = film(FilmFormat::Gif, 10, &[plain([9, 9, 9, 255]), dotted.clone(), same]);
+    let mut decoder = gif_decoder(&bytes);
+    let mut rectangles = Vec::new();
+    while let Some(frame) = decoder.read_next_frame().expect("a frame") {
+        assert_eq!(frame.dispose, ::gif::DisposalMethod::Keep);
+        rectangles.push([frame.left, frame.top, frame.width, frame.height]);
+    }
+    assert_eq!(rectangles, [[0, 0, 20, 10], [7, 5, 2, 1], [0, 0, 1, 1]]);
+}
+
 fn gif_decoder(bytes: &[u8]) -> ::gif::Decoder<&[u8]> {
     ::gif::DecodeOptions::new().read_info(bytes).expect("a GIF")
 }

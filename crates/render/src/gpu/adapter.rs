@@ -9,13 +9,15 @@ use crate::error::RenderError;
 /// Choice of the adapter.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum AdapterChoice {
-    /// Best adapter: hardware first, then software.
+    /// Best adapter: hardware first, then software drivers, then none.
     #[default]
     Best,
     /// Hardware only.
     Hardware,
     /// Software drivers only.
     Software,
+    /// No adapter: the program draws on the processor.
+    None,
     /// First adapter whose name contains this text, case-insensitive.
     Named(String),
 }
@@ -26,6 +28,7 @@ impl From<&str> for AdapterChoice {
             "" | "best" => Self::Best,
             "hardware" => Self::Hardware,
             "software" => Self::Software,
+            "none" => Self::None,
             name => Self::Named(name.to_owned()),
         }
     }
@@ -158,12 +161,13 @@ fn pick(
         AdapterChoice::Best => true,
         AdapterChoice::Hardware => device_type(adapter) != DeviceType::Cpu,
         AdapterChoice::Software => device_type(adapter) == DeviceType::Cpu,
+        AdapterChoice::None => false,
         AdapterChoice::Named(wanted) => name(adapter).to_lowercase().contains(&wanted.to_lowercase()),
     });
     chosen.ok_or_else(|| {
         let wanted = match choice {
             _ if found.is_empty() => return RenderError::NoAdapter,
-            AdapterChoice::Best => "usable",
+            AdapterChoice::Best | AdapterChoice::None => "usable",
             AdapterChoice::Hardware => "hardware",
             AdapterChoice::Software => "software",
             AdapterChoice::Named(name) => &format!("`{name}`"),

@@ -17,42 +17,48 @@ pub(crate) use adapter::lost;
 #[cfg(feature = "window")]
 pub(crate) use adapter::unusable;
 pub(crate) use adapter::{Gpu, instance};
-#[cfg(feature = "window")]
 pub(crate) use overlay::paint;
 
 use super::error::RenderError;
 use super::picture::Picture;
 use super::scene::{Extent, Scene, View};
+use super::software::Software;
 use super::timeline::Timeline;
 use overlay::Overlay;
 use pipelines::Pipelines;
 
 /// Renderer of scenes to pictures.
-pub struct Renderer {
-    pub(crate) gpu: Gpu,
-    pipelines: Pipelines,
-    overlay: Overlay,
-    target: Option<Target>,
+pub struct Renderer(Backend);
+
+enum Backend {
+    Gpu(Box<GpuRenderer>),
+    Software(Box<Software>),
 }
 
 impl Renderer {
-    /// Starts an adapter.
+    /// Starts an adapter. Without any adapter, [`AdapterChoice::Best`] draws on the processor.
     ///
     /// # Errors
     /// [`RenderError`] if no adapter matches the choice.
     pub fn open(choice: &AdapterChoice) -> Result<Self, RenderError> {
-        Ok(Self::on(Gpu::open(&instance(None), choice, None)?))
-    }
-
-    pub(crate) fn on(gpu: Gpu) -> Self {
-        let (pipelines, overlay) = (Pipelines::new(&gpu.device), Overlay::new(&gpu.device));
-        Self { gpu, pipelines, overlay, target: None }
+        let software = || Self(Backend::Software(Box::default()));
+        if *choice == AdapterChoice::None {
+            return Ok(software());
+        }
+        match Gpu::open(&instance(None), choice, None) {
+            Ok(gpu) => Ok(Self(Backend::Gpu(Box::new(GpuRenderer::on(gpu))))),
+            Err(RenderError::NoAdapter) if *choice == AdapterChoice::Best => Ok(software()),
+            Err(error) => Err(error),
+        }
     }
 
     /// Returns name, device type and graphics API of the adapter.
     #[must_use]
     pub fn adapter(&self) -> &str {
-        &self.gpu.name
+        match &self.0 {
+            Backend::Gpu(renderer) => &renderer.gpu.name,
+            Backend::Software(_) => Software::NAME,
+        }
     }
 
     /// Checks that pictures of this width and height \[pixels\] can be drawn.
@@ -60,7 +66,10 @@ impl Renderer {
     /// # Errors
     /// [`RenderError::PictureSize`] if a side is not between 1 and the adapter's maximum.
     pub fn check_size(&self, size_px: [u32; 2]) -> Result<(), RenderError> {
-        self.gpu.check_size(size_px)
+        match &self.0 {
+            Backend::Gpu(renderer) => renderer.gpu.check_size(size_px),
+            Backend::Software(_) => Software::check_size(size_px),
+        }
     }
 
     /// Draws a scene into a picture.
@@ -68,10 +77,10 @@ impl Renderer {
     /// # Errors
     /// [`RenderError`] if the adapter cannot draw a picture of this size, or fails.
     pub fn paint(&mut self, scene: &Scene) -> Result<Picture, RenderError> {
-        let gpu = self.gpu.clone();
-        let picture = self.draw(scene, true)?.read(&gpu)?;
-        gpu.check()?;
-        Ok(picture)
+        match &mut self.0 {
+            Backend::Gpu(renderer) => renderer.paint(scene),
+            Backend::Software(software) => software.paint(scene),
+        }
     }
 
     /// Draws a flight at a time \[s\], which is clamped to its range.
@@ -83,6 +92,28 @@ impl Renderer {
         let extent = Extent::of(timeline);
         let camera = extent.camera(timeline, &frame, view)?;
         self.paint(&Scene::compose(timeline, &extent, &frame, view, camera))
+    }
+}
+
+/// Renderer of scenes with an adapter.
+pub(crate) struct GpuRenderer {
+    pub(crate) gpu: Gpu,
+    pipelines: Pipelines,
+    overlay: Overlay,
+    target: Option<Target>,
+}
+
+impl GpuRenderer {
+    pub(crate) fn on(gpu: Gpu) -> Self {
+        let (pipelines, overlay) = (Pipelines::new(&gpu.device), Overlay::new(&gpu.device));
+        Self { gpu, pipelines, overlay, target: None }
+    }
+
+    pub(crate) fn paint(&mut self, scene: &Scene) -> Result<Picture, RenderError> {
+        let gpu = self.gpu.clone();
+        let picture = self.draw(scene, true)?.read(&gpu)?;
+        gpu.check()?;
+        Ok(picture)
     }
 
     /// Draws a scene into a texture, with or without its annotations.

@@ -7,29 +7,31 @@ use nalgebra::Vector3;
 use crate::error::RenderError;
 
 /// Tangent of half the vertical angle of view, which is 35 degrees.
-pub(crate) const TAN_HALF_VIEW: f64 = 0.315_298_788_878_983_7;
-/// Margins that framing leaves for captions, relative to half the width or height: left, right, bottom, top.
-const MARGINS: [f64; 4] = [0.02, 0.02, 0.15, 0.21];
+const TAN_HALF_VIEW: f64 = 0.315_298_788_878_983_7;
 /// Smallest distance of a camera from its target \[m\].
 const MIN_DISTANCE_M: f64 = 1e-3;
-/// Azimuth and elevation of `iso` \[degrees\].
-pub(crate) const ISO_DEG: [f64; 2] = [-62.0, 32.0];
+/// Margin beside the content, relative to half the width, and above and below the texts, relative to half the height.
+const MARGIN: f64 = 0.03;
+/// Largest sum of the heights of texts above and below the content, relative to the height.
+const MAX_TEXTS: f64 = 0.4;
 
 /// Choice of the camera.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum CameraSpec {
-    /// View from above at an angle that frames the whole flight.
+    /// The parallel view across the plane of a planar flight, else `Perspective`.
     #[default]
-    Iso,
+    Auto,
+    /// View from above at an angle that frames all vehicles over the whole flight.
+    Perspective,
     /// View straight down, x to the right and y up, in parallel projection, framing the whole flight.
     Top,
     /// View along +y, x to the right and z up, in parallel projection, framing the whole flight.
     Front,
     /// View along -x, y to the right and z up, in parallel projection, framing the whole flight.
     Side,
-    /// View at the angle of `iso` that follows the vehicle of this name.
-    Follow(String),
-    /// View at the angle of `iso`, near the closest pair.
+    /// View in the direction of `Auto` that follows the vehicle of this name, or the whole swarm.
+    Follow(Option<String>),
+    /// View in the direction of `Auto`, near the closest pair.
     Closest,
     /// View from a given direction and distance of the centre of the flight.
     Orbit(Orbit),
@@ -51,7 +53,9 @@ impl FromStr for CameraSpec {
 
     fn from_str(text: &str) -> Result<Self, RenderError> {
         match text {
-            "iso" => return Ok(Self::Iso),
+            "auto" => return Ok(Self::Auto),
+            "perspective" => return Ok(Self::Perspective),
+            "follow" => return Ok(Self::Follow(None)),
             "top" => return Ok(Self::Top),
             "front" => return Ok(Self::Front),
             "side" => return Ok(Self::Side),
@@ -59,7 +63,7 @@ impl FromStr for CameraSpec {
             _ => {}
         }
         if let Some(name) = text.strip_prefix("follow:").filter(|name| !name.is_empty()) {
-            return Ok(Self::Follow(name.to_owned()));
+            return Ok(Self::Follow(Some(name.to_owned())));
         }
         let numbers: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
         let Ok([azimuth_deg, elevation_deg, distance_m]) = numbers.as_deref() else {
@@ -103,6 +107,64 @@ pub struct Camera {
     pub lens: Lens,
     /// Width and height of the picture \[pixels\].
     pub size_px: [u32; 2],
+    /// Distance of the point around which the camera turns, ahead of the position \[m\].
+    pub focus_m: f64,
+}
+
+/// Changes of a camera by hand: turned about its focus, zoomed and moved.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Adjustment {
+    /// Change of azimuth and elevation \[degrees\].
+    pub turn_deg: [f64; 2],
+    /// Factor of the distance, or of the height of a parallel view.
+    pub zoom: f64,
+    /// Movement of the focus \[m\].
+    pub move_m: Vector3<f64>,
+}
+
+impl Adjustment {
+    /// No change.
+    pub const NONE: Self = Self { turn_deg: [0.0; 2], zoom: 1.0, move_m: Vector3::new(0.0, 0.0, 0.0) };
+}
+
+/// Direction and projection of a camera.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Direction {
+    pub(super) azimuth_deg: f64,
+    pub(super) elevation_deg: f64,
+    pub(super) is_parallel: bool,
+}
+
+impl Direction {
+    pub(super) const TOP: Self = Self::parallel(-90.0, 90.0);
+    pub(super) const FRONT: Self = Self::parallel(-90.0, 0.0);
+    pub(super) const SIDE: Self = Self::parallel(0.0, 0.0);
+
+    const fn parallel(azimuth_deg: f64, elevation_deg: f64) -> Self {
+        Self { azimuth_deg, elevation_deg, is_parallel: true }
+    }
+
+    pub(super) const fn perspective(azimuth_deg: f64, elevation_deg: f64) -> Self {
+        Self { azimuth_deg, elevation_deg, is_parallel: false }
+    }
+}
+
+/// Picture with the heights that texts need \[pixels\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Area {
+    pub(super) size_px: [u32; 2],
+    /// Heights of the texts at the top and at the bottom.
+    pub(super) texts_px: [f64; 2],
+}
+
+impl Area {
+    /// Returns the margins relative to half the width or height: left, right, bottom, top.
+    fn margins(&self) -> [f64; 4] {
+        let height = f64::from(self.size_px[1].max(1));
+        let [top, bottom] = self.texts_px.map(|text_px| text_px / height);
+        let scale = (MAX_TEXTS / (top + bottom)).min(1.0);
+        [MARGIN, MARGIN, 2.0 * bottom * scale + MARGIN, 2.0 * top * scale + MARGIN]
+    }
 }
 
 /// Projection of a point.
@@ -117,32 +179,30 @@ pub struct Projected {
 }
 
 impl Camera {
-    /// Returns the nearest camera that sees all balls (centre and radius \[m\]).
-    pub(super) fn framing(spec: &CameraSpec, balls: &[(Vector3<f64>, f64)], size_px: [u32; 2]) -> Self {
-        let ([azimuth_deg, elevation_deg], parallel) = match spec {
-            CameraSpec::Top => ([-90.0, 90.0], true),
-            CameraSpec::Front => ([-90.0, 0.0], true),
-            CameraSpec::Side => ([0.0, 0.0], true),
-            CameraSpec::Orbit(orbit) => ([orbit.azimuth_deg, orbit.elevation_deg], false),
-            _ => (ISO_DEG, false),
-        };
+    /// Returns the nearest camera of a direction that sees all balls (centre and radius \[m\]) between the texts.
+    pub(super) fn framing(direction: Direction, balls: &[(Vector3<f64>, f64)], area: Area) -> Self {
+        let Direction { azimuth_deg, elevation_deg, is_parallel } = direction;
+        let size_px = area.size_px;
         let [right, up, back] = axes(azimuth_deg, elevation_deg);
-        let half = if parallel { 1.0 } else { TAN_HALF_VIEW };
+        let half = if is_parallel { 1.0 } else { TAN_HALF_VIEW };
         let across = half * aspect(size_px);
-        let room = [across, across, half, half];
-        let slopes = [0, 1, 2, 3].map(|side| room[side] * (1.0 - MARGINS[side]));
-        // Required reach of each side of the view.
+        let (room, margins) = ([across, across, half, half], area.margins());
+        let slopes = [0, 1, 2, 3].map(|side| room[side] * (1.0 - margins[side]));
+        // Required reach of each side of the view, and the range along the line of sight.
         let mut reaches = [f64::NEG_INFINITY; 4];
+        let (mut nearest, mut farthest) = (f64::NEG_INFINITY, f64::INFINITY);
         for (centre, radius) in balls {
             let (x, y, ahead) = (right.dot(centre), up.dot(centre), -back.dot(centre));
             for (side, offset) in [-x, x, -y, y].into_iter().enumerate() {
                 let slope = slopes[side];
-                let reach = if parallel { offset + radius } else { offset + radius * slope.hypot(1.0) - ahead * slope };
+                let reach =
+                    if is_parallel { offset + radius } else { offset + radius * slope.hypot(1.0) - ahead * slope };
                 reaches[side] = reaches[side].max(reach);
             }
+            (nearest, farthest) = (nearest.max(-ahead + radius), farthest.min(-ahead - radius));
         }
         if reaches.iter().any(|reach| !reach.is_finite()) {
-            reaches = [half; 4];
+            (reaches, nearest, farthest) = ([half; 4], 0.0, 0.0);
         }
         let need = |low: usize, high: usize| (reaches[low] + reaches[high]) / (slopes[low] + slopes[high]);
         let distance_m = need(0, 1).max(need(2, 3)).max(MIN_DISTANCE_M);
@@ -150,14 +210,40 @@ impl Camera {
             let (least, most) = (reaches[high] - slopes[high] * distance_m, slopes[low] * distance_m - reaches[low]);
             f64::midpoint(least, most)
         };
-        let behind = if parallel { far_behind(back, balls) } else { distance_m };
+        // A parallel view may be turned about its focus, so its camera is behind everything from all sides.
+        let centre = f64::midpoint(nearest, farthest);
+        let behind = if is_parallel { centre + 2.0 * distance_m + (nearest - farthest).max(1.0) } else { distance_m };
         let eye_m = right * middle(0, 1) + up * middle(2, 3) + back * behind;
-        let lens = if parallel {
+        let lens = if is_parallel {
             Lens::Parallel([across * distance_m, distance_m])
         } else {
             Lens::Perspective([across, half])
         };
-        Self { eye_m, right, up, back, lens, size_px }
+        Self { eye_m, right, up, back, lens, size_px, focus_m: (behind - centre).max(MIN_DISTANCE_M) }
+    }
+
+    /// Returns the camera after changes by hand.
+    #[must_use]
+    pub fn adjusted(&self, change: &Adjustment) -> Self {
+        let Adjustment { turn_deg, zoom, move_m } = change;
+        let target_m = self.eye_m - self.back * self.focus_m + move_m;
+        let azimuth_deg = (-self.right.x).atan2(self.right.y).to_degrees() + turn_deg[0];
+        let elevation_deg = (self.back.z.clamp(-1.0, 1.0).asin().to_degrees() + turn_deg[1]).clamp(-90.0, 90.0);
+        let [right, up, back] = axes(azimuth_deg, elevation_deg);
+        let (lens, focus_m) = match self.lens {
+            Lens::Parallel(half) => (Lens::Parallel(half.map(|half| half * zoom)), self.focus_m),
+            perspective @ Lens::Perspective(_) => (perspective, (self.focus_m * zoom).max(MIN_DISTANCE_M)),
+        };
+        Self { eye_m: target_m + back * focus_m, right, up, back, lens, focus_m, ..*self }
+    }
+
+    /// Returns half the height of the view at the focus \[m\].
+    #[cfg(feature = "window")]
+    pub(crate) fn half_height_m(&self) -> f64 {
+        match self.lens {
+            Lens::Perspective([_, half]) => half * self.focus_m,
+            Lens::Parallel([_, half]) => half,
+        }
     }
 
     /// Returns a perspective camera that looks at a target \[m\].
@@ -171,19 +257,12 @@ impl Camera {
             back,
             lens: Lens::Perspective([TAN_HALF_VIEW * aspect(size_px), TAN_HALF_VIEW]),
             size_px,
+            focus_m: orbit.distance_m,
         }
     }
 
-    /// Returns a camera at the angle of `iso` from which a ball of this radius \[m\] fills the height of the picture.
-    pub(super) fn close_up(target_m: Vector3<f64>, radius_m: f64, size_px: [u32; 2]) -> Self {
-        let narrow = TAN_HALF_VIEW * aspect(size_px).min(1.0);
-        let distance_m = (radius_m * narrow.hypot(1.0) / narrow).max(MIN_DISTANCE_M);
-        let orbit = Orbit { azimuth_deg: ISO_DEG[0], elevation_deg: ISO_DEG[1], distance_m };
-        Self::orbiting(orbit, target_m, size_px)
-    }
-
     /// Transforms a point to camera coordinates: right, up, back \[m\].
-    pub(super) fn in_camera_frame(&self, point_m: Vector3<f64>) -> Vector3<f64> {
+    pub(crate) fn in_camera_frame(&self, point_m: Vector3<f64>) -> Vector3<f64> {
         let from_eye = point_m - self.eye_m;
         Vector3::new(self.right.dot(&from_eye), self.up.dot(&from_eye), self.back.dot(&from_eye))
     }
@@ -233,16 +312,6 @@ fn aspect([width, height]: [u32; 2]) -> f64 {
     f64::from(width) / f64::from(height.max(1))
 }
 
-/// Returns a distance behind all balls, for parallel projection.
-fn far_behind(back: Vector3<f64>, balls: &[(Vector3<f64>, f64)]) -> f64 {
-    let (mut nearest, mut farthest) = (f64::NEG_INFINITY, f64::INFINITY);
-    for (centre, radius) in balls {
-        nearest = nearest.max(back.dot(centre) + radius);
-        farthest = farthest.min(back.dot(centre) - radius);
-    }
-    if nearest.is_finite() { nearest + (nearest - farthest).max(1.0) } else { 1.0 }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -279,14 +348,15 @@ mod tests {
     fn framing_shows_every_ball_and_is_tight() {
         let balls = [([0.0, 0.0, 0.0], 1.0), ([12.0, 3.0, 0.0], 0.5), ([5.0, -4.0, 2.0], 1.5)]
             .map(|(centre, radius)| (Vector3::from(centre), radius));
-        let specs = ["iso", "top", "front", "side", "20,70,9"].map(|text| CameraSpec::from_str(text).expect(text));
-        for spec in &specs {
+        let oblique = [Direction::perspective(-62.0, 32.0), Direction::perspective(20.0, 70.0)];
+        for spec in [Direction::TOP, Direction::FRONT, Direction::SIDE].into_iter().chain(oblique) {
             for size_px in [[1280, 720], [300, 900], [64, 64]] {
-                let camera = Camera::framing(spec, &balls, size_px);
+                let area = Area { size_px, texts_px: [60.0, 40.0] };
+                let (camera, margins) = (Camera::framing(spec, &balls, area), area.margins());
                 let [left, right, top, bottom] = edges(&camera, &balls);
                 let [width, height] = size_px.map(f64::from);
                 let free = [left, width - right, height - bottom, top];
-                let wanted = [0, 1, 2, 3].map(|side| MARGINS[side] * if side < 2 { width } else { height } / 2.0);
+                let wanted = [0, 1, 2, 3].map(|side| margins[side] * if side < 2 { width } else { height } / 2.0);
                 let spare = [0, 1, 2, 3].map(|side| free[side] - wanted[side]);
                 // The outline is sampled every half degree: 1e-4 of a ball's size.
                 let tolerance = ROUNDING_PX + 2e-4 * width.max(height);
@@ -300,8 +370,8 @@ mod tests {
     #[test]
     fn a_ray_through_a_projected_point_meets_the_point() {
         let balls = [(Vector3::new(1.0, 2.0, 3.0), 2.0), (Vector3::new(-4.0, 0.0, 1.0), 1.0)];
-        for spec in [CameraSpec::Iso, CameraSpec::Top] {
-            let camera = Camera::framing(&spec, &balls, [640, 480]);
+        for spec in [Direction::perspective(-62.0, 32.0), Direction::TOP] {
+            let camera = Camera::framing(spec, &balls, Area { size_px: [640, 480], texts_px: [0.0; 2] });
             let [origin, direction] = camera.ray(camera.project(balls[0].0).expect("ahead").at_px);
             let miss = (balls[0].0 - origin).cross(&direction).norm();
             assert!(miss < 1e-9, "{spec:?}: {miss} m");
@@ -309,9 +379,24 @@ mod tests {
     }
 
     #[test]
+    fn a_camera_turns_about_its_focus_and_zooms() {
+        let balls = [(Vector3::new(1.0, 2.0, 3.0), 2.0), (Vector3::new(-4.0, 0.0, 1.0), 1.0)];
+        for spec in [Direction::perspective(-62.0, 32.0), Direction::TOP] {
+            let camera = Camera::framing(spec, &balls, Area { size_px: [640, 480], texts_px: [0.0; 2] });
+            let same = camera.adjusted(&Adjustment::NONE);
+            assert!((same.eye_m - camera.eye_m).norm() < 1e-9 && (same.up - camera.up).norm() < 1e-9, "{spec:?}");
+            let change = Adjustment { turn_deg: [30.0, -20.0], zoom: 0.5, ..Adjustment::NONE };
+            let (focus, turned) = (camera.eye_m - camera.back * camera.focus_m, camera.adjusted(&change));
+            let [before, after] = [camera, turned].map(|camera| camera.project(focus).expect("ahead"));
+            let apart = (before.at_px[0] - after.at_px[0]).hypot(before.at_px[1] - after.at_px[1]);
+            assert!(apart < 1e-6 && (after.px_per_m / before.px_per_m - 2.0).abs() < 1e-9, "{spec:?}: {apart}");
+        }
+    }
+
+    #[test]
     fn framing_without_finite_balls_works() {
         for balls in [vec![], vec![(Vector3::zeros(), 0.0)], vec![(Vector3::repeat(f64::NAN), 1.0)]] {
-            let camera = Camera::framing(&CameraSpec::Iso, &balls, [10, 10]);
+            let camera = Camera::framing(Direction::TOP, &balls, Area { size_px: [10, 10], texts_px: [0.0; 2] });
             assert!(camera.project(Vector3::zeros()).is_some(), "{balls:?}");
         }
     }
@@ -327,6 +412,6 @@ mod tests {
             let message = CameraSpec::from_str(text).expect_err(text).to_string();
             assert!(message.starts_with(&format!("the camera `{text}` has a")), "{message}");
         }
-        assert_eq!(CameraSpec::from_str("follow:cf 7").ok(), Some(CameraSpec::Follow("cf 7".to_owned())));
+        assert_eq!(CameraSpec::from_str("follow:cf 7").ok(), Some(CameraSpec::Follow(Some("cf 7".to_owned()))));
     }
 }

@@ -1,38 +1,50 @@
 //! Text of a picture: caption, verdict, legend, names of vehicles, and separations of pairs.
 
-use super::camera::Projected;
-use super::colour::Colour;
+use super::camera::{Lens, Projected};
+use super::colour::{Colour, Colouring};
 use super::compose::SceneBuilder;
 use super::geometry::has_few_edges;
 use super::labels::{LabelLayout, width};
 use super::{Annotation, pixels};
-use tautline_audit::Violation;
+use tautline_audit::{Status, Violation};
 use tautline_core::swarm::{Bounce, Pair};
 use tautline_core::text::{at_least, beside_limit, exact};
+use tautline_laws::space::Shape;
 use tautline_sim::plan::Plan;
 
-/// Number of vehicles up to which all names are drawn; in a larger swarm only those of vehicles closer than delta to
-/// another.
-const MAX_NAMED: usize = 64;
+/// Number of vehicles up to which all names are drawn. A larger swarm has only those of the picked vehicle, of the
+/// closest pair and of the worst violations.
+const MAX_NAMED: usize = 24;
 /// Largest number of pairs closer than delta whose separation is drawn; the closest pairs are chosen.
 const MAX_LABELLED: usize = 3;
 /// Number of colours on each side of the legend's scale.
 const SHADES: i16 = 16;
-/// Largest width, and largest height, of a picture without a legend \[pixels\].
-const NO_LEGEND_PX: [u32; 2] = [420, 260];
+/// Number of vehicles up to which the areas of all stay free of texts; in a larger swarm only those of named vehicles.
+const MAX_RESERVED: usize = 60;
+/// Smallest radius of the area of a vehicle that stays free of texts, relative to the height of a line.
+const LEAST_ROOM: f32 = 0.4;
+/// Opacity of the name of the farthest vehicle.
+const FAINT: f32 = 0.45;
 /// Longest name that is drawn in full \[characters\].
 const LONGEST_NAME: usize = 40;
 /// Smallest number of letters to which a name is cut.
 const MIN_LETTERS: usize = 4;
+/// Width of the frame of a violation in a picture 720 pixels high \[pixels\].
+const FRAME_PX: f32 = 5.0;
+/// Number of steps along a line of sight.
+const SIGHT_STEPS: u32 = 100;
 /// Opacity of the background of text.
-const BACKING: f32 = 0.72;
+const BACKING: f32 = 0.88;
 
 impl SceneBuilder<'_> {
     pub(super) fn caption(&self, labels: &mut LabelLayout) {
-        let (theme, size_px, margin) = (self.view.theme, self.view.text_px(1.0), self.margin());
+        let (theme, size_px, margin) = (self.view.theme, self.view.text_px(1.0), self.view.margin_px());
         let width_px = self.view.size_px[0] as f32;
         let mut y = self.banner(labels);
         let (ground, room_px) = (theme.background().at(BACKING), 0.3 * size_px);
+        let has_banner = y > margin;
+        let [top_px, _] = self.bands_px();
+        self.band([if has_banner { self.view.banner_px() } else { 0.0 }, top_px], has_banner, labels);
         let (bottom, taken) = labels.placed();
         // Without room texts are left out in this order: closest approach, name, verdict, time.
         let large_px = 1.35 * size_px;
@@ -64,6 +76,26 @@ impl SceneBuilder<'_> {
         }
     }
 
+    /// Returns the lower end of the caption and the upper end of the legend \[pixels\].
+    fn bands_px(&self) -> [f32; 2] {
+        let [top_px, bottom_px] = pixels(self.view.area(self.extent.has_violations).texts_px);
+        [top_px, self.view.size_px[1] as f32 - bottom_px]
+    }
+
+    /// Covers a band of the picture if a vehicle is in it, so that texts do not lie on vehicles.
+    fn band(&self, [from_px, to_px]: [f32; 2], is_framed: bool, labels: &mut LabelLayout) {
+        let width_px = self.view.size_px[0] as f32;
+        let is_inside = |([x, y], radius): &([f64; 2], f64)| {
+            let [x, y, radius] = pixels([*x, *y, *radius]);
+            y + radius > from_px && y - radius < to_px && x + radius > 0.0 && x - radius < width_px
+        };
+        if self.covered_areas_px().iter().any(is_inside) {
+            let inset = if is_framed { FRAME_PX * self.view.unit_px() } else { 0.0 };
+            let corners_px = [[inset, from_px], [width_px - inset, to_px - inset.min(to_px - from_px)]];
+            labels.draw(Annotation::Box { corners_px, colour: self.view.theme.background(), round_px: 0.0 });
+        }
+    }
+
     /// Draws a banner for a current violation, and a frame around the picture; returns the top of the caption.
     fn banner(&self, labels: &mut LabelLayout) -> f32 {
         let Some(&(violation, distance_m)) = self.violated.first() else { return self.obstacle_banner(labels) };
@@ -90,7 +122,7 @@ impl SceneBuilder<'_> {
 
     /// Draws the banner of a vehicle too close to an obstacle, if no two vehicles are too close.
     fn obstacle_banner(&self, labels: &mut LabelLayout) -> f32 {
-        let Some(&[vehicle, obstacle]) = self.too_close_to_obstacle.first() else { return self.margin() };
+        let Some(&[vehicle, obstacle]) = self.too_close_to_obstacle.first() else { return self.view.margin_px() };
         let (vehicle, obstacle) = (&self.timeline.vehicles[vehicle], self.timeline.obstacle(obstacle));
         let more = match self.too_close_to_obstacle.len() - 1 {
             0 => String::new(),
@@ -109,17 +141,22 @@ impl SceneBuilder<'_> {
         let (alarm, size_px) = (self.view.theme.alarm(), self.view.text_px(1.1));
         let [width_px, height_px] = self.view.size_px.map(|size| size as f32);
         let text = texts.iter().find(|text| width(size_px, text) <= width_px).unwrap_or(&texts[2]);
-        let bottom = 1.9 * size_px;
+        let bottom = self.view.banner_px();
         labels.draw(Annotation::Box { corners_px: [[0.0, 0.0], [width_px, bottom]], colour: alarm, round_px: 0.0 });
         let corners_px = [[0.0, 0.0], [width_px, height_px]];
-        labels.draw(Annotation::Outline { corners_px, colour: alarm, width_px: 5.0 * self.view.unit_px() });
+        labels.draw(Annotation::Outline { corners_px, colour: alarm, width_px: FRAME_PX * self.view.unit_px() });
         let ink = self.view.theme.on_alarm();
         labels.put([width_px / 2.0, bottom / 2.0], [0.5, 0.5], size_px, ink, text);
         labels.reserve([[0.0, 0.0], [width_px, bottom]]);
-        bottom + 0.6 * self.margin()
+        bottom + 0.6 * self.view.margin_px()
     }
 
-    /// Returns the verdict so far, from the longest wording to the shortest.
+    /// Returns whether the frame is the last one of a flight that was judged to its end.
+    fn is_end(&self) -> bool {
+        self.timeline.status.is_some() && self.frame.time_s >= self.timeline.log.range_s()[1]
+    }
+
+    /// Returns the verdict so far, or the final one at the end, from the longest wording to the shortest.
     fn verdict(&self) -> (Vec<String>, Colour) {
         let (theme, now_s) = (self.view.theme, self.frame.time_s);
         if let Some(why) = self.timeline.unjudged() {
@@ -136,12 +173,22 @@ impl SceneBuilder<'_> {
             return (texts, theme.alarm());
         }
         match (began.first(), undecided_s) {
-            (None, None) if self.timeline.assumes_straight => {
-                let texts =
-                    ["clear so far, if straight between samples", "clear so far, if straight", "if straight: clear"];
-                (texts.map(str::to_owned).to_vec(), theme.good())
+            (None, None) if self.is_end() && self.timeline.status == Some(Status::Undecided) => {
+                (vec!["undecided".to_owned()], theme.soft_ink())
             }
-            (None, None) => (vec!["clear so far".to_owned()], theme.good()),
+            (None, None) => {
+                let clear = if self.is_end() {
+                    let [from_s, to_s] = self.timeline.log.range_s();
+                    format!("clear from {from_s:.2} s to {to_s:.2} s")
+                } else {
+                    "clear so far".to_owned()
+                };
+                if !self.timeline.assumes_straight {
+                    return (vec![clear], theme.good());
+                }
+                let texts = [" between samples", ""].map(|between| format!("{clear}, if straight{between}"));
+                (texts.into_iter().chain(["if straight: clear".to_owned()]).collect(), theme.good())
+            }
             (None, Some(from_s)) => {
                 let since = format!("undecided from {:.2} s on", from_s.max(self.timeline.log.range_s()[0]));
                 (vec![since, "undecided".to_owned()], theme.soft_ink())
@@ -172,80 +219,111 @@ impl SceneBuilder<'_> {
         let scaled = if self.timeline.log.metric().is_metres() { "" } else { ", scaled" };
         let delta = |delta_m| format!("  (delta {} m{scaled})", exact(delta_m));
         let delta = self.timeline.delta_m.map_or(String::new(), delta);
+        let closest = if self.is_end() { "closest" } else { "closest so far" };
         vec![
-            format!("closest so far {separation}, vehicles {pair} at {at}{delta}"),
-            format!("closest so far {separation}, {pair}{delta}"),
-            format!("closest so far {separation}"),
+            format!("{closest} {separation}, vehicles {pair} at {at}{delta}"),
+            format!("{closest} {separation}, {pair}{delta}"),
+            format!("{closest} {separation}"),
         ]
     }
 
+    /// Draws the legend of what is in the picture.
     pub(super) fn legend(&self, labels: &mut LabelLayout) {
-        let [width_px, height_px] = self.view.size_px;
-        if width_px < NO_LEGEND_PX[0] || height_px < NO_LEGEND_PX[1] {
-            return;
-        }
-        let (theme, size_px, margin) = (self.view.theme, self.view.text_px(0.85), self.margin());
+        let [width_px, height_px] = self.view.size_px.map(|size| size as f32);
+        let (theme, size_px, margin) = (self.view.theme, self.view.text_px(0.85), self.view.margin_px());
         let (layers, plan, ink) = (self.view.layers, self.timeline.plan.as_ref(), self.view.theme.soft_ink());
-        let (mut x, y) = (margin, height_px as f32 - margin);
+        let (mut x, y) = (margin, height_px - margin);
+        let [_, bottom_px] = self.bands_px();
+        let is_framed = !self.violated.is_empty() || !self.too_close_to_obstacle.is_empty();
+        self.band([bottom_px, height_px], is_framed, labels);
         let (bottom, taken) = labels.placed();
-        let fits = |x: f32, text: &str| x + width(size_px, text) <= width_px as f32 - margin;
+        let fits = |x: f32, text: &str| x + width(size_px, text) <= width_px - margin;
         // Draws text from the left; returns the start of the next text.
         let write = |labels: &mut LabelLayout, x: f32, text: &str| {
             labels.put([x, y], [0.0, 1.0], size_px, ink, text)[1][0] + 1.5 * size_px
         };
-        if let Some(plan) = plan.filter(|_| layers.edges) {
+        // Draws a scale with texts above its ends and its middle; returns the start of the next text.
+        let scale = |labels: &mut LabelLayout, x: f32, texts: [&str; 3], colour: &dyn Fn(f32) -> Colour| {
+            let [first, middle, last] = texts.map(|text| width(size_px, text));
+            let width_px = (2.0 * first.max(last) + middle + 1.2 * size_px).max(9.0 * size_px);
+            let colours = (-SHADES..=SHADES).map(|k| colour(f32::from(k) / f32::from(SHADES))).collect();
+            let corners_px = [[x, y - 0.6 * size_px], [x + width_px, y]];
+            labels.draw(Annotation::Scale { corners_px, colours });
+            labels.reserve(corners_px);
+            for (text, part) in texts.into_iter().zip([0.0, 0.5, 1.0]) {
+                labels.put([x + part * width_px, y - 0.9 * size_px], [part, 1.0], size_px, ink, text);
+            }
+            x + width_px + 2.0 * size_px
+        };
+        match self.view.colouring {
+            Colouring::Vehicle => {}
+            Colouring::Speed => {
+                let most = format!("{:.2} m/s", self.extent.max_speed_m_s);
+                x = scale(labels, x, ["0", "speed", &most], &|part| theme.ramp(f32::midpoint(1.0, part)));
+            }
+            Colouring::Clearance => {
+                let most = format!("{:.1} m", self.max_clearance_m());
+                x = scale(labels, x, ["0", "clearance", &most], &|part| theme.ramp(f32::midpoint(1.0, -part)));
+            }
+        }
+        if let Some(plan) = plan.filter(|plan| layers.edges && plan.graph.edge_count() > 0) {
             let hidden = format!("{} edges, not drawn", plan.graph.edge_count());
             if has_few_edges(plan) {
-                let [left, scale] = [x, 9.0 * size_px];
-                let colours = (-SHADES..=SHADES).map(|k| theme.tension(f32::from(k) / f32::from(SHADES))).collect();
-                let corners_px = [[left, y - 0.6 * size_px], [left + scale, y]];
-                labels.draw(Annotation::Scale { corners_px, colours });
-                labels.reserve(corners_px);
-                for (text, part) in [("push", 0.0), ("rest", 0.5), ("pull", 1.0)] {
-                    labels.put([left + part * scale, y - 0.9 * size_px], [part, 1.0], size_px, ink, text);
-                }
-                x += scale + 2.0 * size_px;
+                x = scale(labels, x, ["push", "rest", "pull"], &|part| theme.tension(part));
             } else if fits(x, &hidden) {
                 x = write(labels, x, &hidden);
             }
         }
-        let (width_px, arm, middle) = (1.6 * self.view.unit_px(), 0.32 * size_px, y - size_px / 2.0);
+        let (stroke_px, arm, middle) = (1.6 * self.view.unit_px(), 0.32 * size_px, y - size_px / 2.0);
+        let strokes = |labels: &mut LabelLayout, ends: &[[[f32; 2]; 2]], colour, width_px| {
+            for &ends_px in ends {
+                labels.draw(Annotation::Stroke { ends_px, colour, width_px });
+            }
+        };
         let ring =
             |x, radius_px, colour, width_px| Annotation::Ring { at_px: [x, middle], radius_px, colour, width_px };
-        if layers.marks && fits(x + size_px, "start") {
-            for down in [arm, -arm] {
-                let ends_px = [[x, middle - down], [x + 2.0 * arm, middle + down]];
-                labels.draw(Annotation::Stroke { ends_px, colour: ink, width_px });
-            }
+        if layers.marks && !self.starts().is_empty() && fits(x + size_px, "start") {
+            let cross = [arm, -arm].map(|down| [[x, middle - down], [x + 2.0 * arm, middle + down]]);
+            strokes(labels, &cross, ink, stroke_px);
             x = write(labels, x + size_px, "start");
         }
-        if layers.marks && plan.is_some() && fits(x + size_px, "goal slot") {
-            labels.draw(ring(x + arm, 1.1 * arm, ink, width_px));
+        if layers.marks && self.slots().is_some() && fits(x + size_px, "goal slot") {
+            labels.draw(ring(x + arm, 1.1 * arm, ink, stroke_px));
             x = write(labels, x + size_px, "goal slot");
         }
         let has_reference = plan.is_some_and(|plan| plan.reference_at(self.frame.time_s).is_some());
         if layers.marks && has_reference && fits(x + size_px, "reference") {
             let middle_x = x + arm;
             let corners = [[middle_x, middle - arm], [middle_x + arm, middle], [middle_x, middle + arm], [x, middle]];
-            for side in 0..4 {
-                let ends_px = [corners[side], corners[(side + 1) % 4]];
-                labels.draw(Annotation::Stroke { ends_px, colour: ink, width_px });
-            }
+            strokes(labels, &[0, 1, 2, 3].map(|side| [corners[side], corners[(side + 1) % 4]]), ink, stroke_px);
             x = write(labels, x + size_px, "reference");
         }
         let is_ball = self.timeline.log.metric().is_metres();
         let shell = if is_ball { "keep-out shell, radius delta/2" } else { "keep-out shell, delta wide" };
         if layers.shells && self.timeline.delta_m.is_some() && fits(x + size_px, shell) {
-            labels.draw(ring(x + arm, 1.4 * arm, theme.shell(), 1.6 * width_px));
-            write(labels, x + 1.2 * size_px, shell);
+            labels.draw(ring(x + arm, 1.4 * arm, theme.shell(), 1.6 * stroke_px));
+            x = write(labels, x + 1.2 * size_px, shell);
+        }
+        let is_red = layers.trails && self.violating_s.iter().any(|violating_s| !violating_s.is_empty());
+        if is_red && fits(x + 2.0 * size_px, "violation") {
+            strokes(labels, &[[[x, middle], [x + 1.4 * size_px, middle]]], theme.alarm(), 2.0 * stroke_px);
+            write(labels, x + 2.0 * size_px, "violation");
         }
         labels.insert_background(taken, bottom, theme.background().at(BACKING), 0.3 * size_px);
     }
 
-    /// Reserves the area of named vehicles.
+    /// Reserves the areas of vehicles.
     pub(super) fn reserve_vehicles(&self, labels: &mut LabelLayout) {
-        for (k, at) in self.labelled_vehicles() {
-            let [x, y, radius] = pixels([at.at_px[0], at.at_px[1], self.timeline.radius_m[k] * at.px_per_m]);
+        let count = self.timeline.count();
+        let reserved = if count <= MAX_RESERVED {
+            (0..count).filter_map(|k| Some((k, self.projected(k)?))).collect()
+        } else {
+            self.labelled_vehicles()
+        };
+        for (k, at) in reserved {
+            let least = f64::from(self.view.text_px(LEAST_ROOM));
+            let radius = (self.timeline.radius_m[k] * at.px_per_m).max(least);
+            let [x, y, radius] = pixels([at.at_px[0], at.at_px[1], radius]);
             labels.reserve([[x - radius, y - radius], [x + radius, y + radius]]);
         }
     }
@@ -260,7 +338,8 @@ impl SceneBuilder<'_> {
         let nearest = self.closest_clear_pair().map(|(pair, distance_m)| (pair, distance_m, false));
         for (pair, distance_m, alarm) in alarmed.chain(nearest) {
             let middle = self.ends(pair).and_then(|[first, second]| self.camera.project((first + second) / 2.0));
-            let text = metres(distance_m);
+            let is_closest = self.frame.so_far.is_none_or(|so_far| distance_m <= so_far.separation_m);
+            let text = metres(distance_m) + if alarm || is_closest { "" } else { " now" };
             let distances_px = [1.1 * size_px, 1.8 * size_px, 3.0 * size_px];
             let at = middle.and_then(|middle| labels.find(middle.at_px, &distances_px, size_px, &text));
             let Some(at) = at else { continue };
@@ -274,26 +353,32 @@ impl SceneBuilder<'_> {
         }
     }
 
-    /// Returns the vehicles with names and their projections: all vehicles of a small swarm, else those of the closest
-    /// violations.
-    fn labelled_vehicles(&self) -> impl Iterator<Item = (usize, Projected)> {
-        let mut labelled: Vec<usize> = Vec::new();
+    /// Returns the vehicles with names and their projections: all vehicles of a small swarm, else the picked one, the
+    /// closest pair and the worst violations.
+    fn labelled_vehicles(&self) -> Vec<(usize, Projected)> {
+        let mut labelled: Vec<usize> = self.view.picked.into_iter().filter(|&k| k < self.timeline.count()).collect();
+        let violated = self.violated.iter().take(MAX_LABELLED).map(|(violation, _)| violation.pair);
+        let nearest = self.closest_clear_pair().filter(|_| self.view.layers.closest).map(|(pair, _)| pair);
+        labelled.extend(violated.chain(nearest).flat_map(|pair| [pair.first(), pair.second()]));
         if self.timeline.count() <= MAX_NAMED {
             labelled.extend(0..self.timeline.count());
-        } else {
-            for k in self.violated.iter().flat_map(|(Violation { pair, .. }, _)| [pair.first(), pair.second()]) {
-                if labelled.len() < MAX_NAMED && !labelled.contains(&k) {
-                    labelled.push(k);
-                }
-            }
         }
-        labelled.into_iter().filter_map(|k| Some((k, self.projected(k)?)))
+        let mut seen = vec![false; self.timeline.count()];
+        labelled.retain(|&k| !std::mem::replace(&mut seen[k], true));
+        labelled.into_iter().filter_map(|k| Some((k, self.projected(k)?))).collect()
     }
 
     /// Draws the names of vehicles: on vehicles that are large enough, else beside them.
     pub(super) fn names(&self, labels: &mut LabelLayout) {
         let (theme, size_px) = (self.view.theme, self.view.text_px(0.85));
-        for (k, at) in self.labelled_vehicles() {
+        let labelled = self.labelled_vehicles();
+        let depths = || labelled.iter().map(|(_, at)| at.depth_m);
+        let [near, far] = [depths().fold(f64::INFINITY, f64::min), depths().fold(0.0, f64::max)];
+        for &(k, at) in &labelled {
+            #[expect(clippy::cast_possible_truncation, reason = "an opacity")]
+            let part = ((at.depth_m - near) / far.max(1e-9)).clamp(0.0, 1.0) as f32;
+            let strength =
+                if self.alarmed[k] || self.view.picked == Some(k) { 1.0 } else { 1.0 - (1.0 - FAINT) * part };
             // A vehicle too close to another is often hidden by it, and is named anyway.
             let is_hidden = self.is_hidden(k, at);
             if is_hidden && !self.alarmed[k] {
@@ -308,8 +393,8 @@ impl SceneBuilder<'_> {
                 labels.draw(Annotation::Words { at_px, anchor, size_px: fitting, colour, text: name });
                 continue;
             }
-            let offset = f64::from(radius + 0.2 * size_px);
-            let colour = if self.alarmed[k] { theme.alarm() } else { self.colour(k) };
+            let offset = f64::from(radius.max(self.view.text_px(LEAST_ROOM)) + 0.2 * size_px);
+            let colour = if self.alarmed[k] { theme.alarm() } else { self.colour(k).at(strength) };
             // First free position of: above right, above left, below right, below left.
             for [left, above] in [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0], [1.0, 0.0]] {
                 let beside = [
@@ -323,8 +408,11 @@ impl SceneBuilder<'_> {
         }
     }
 
-    /// Returns whether another vehicle covers the centre of this one.
+    /// Returns whether another vehicle or an obstacle covers the centre of this one.
     fn is_hidden(&self, k: usize, own: Projected) -> bool {
+        if self.is_behind_obstacle(k) {
+            return true;
+        }
         let others = (0..self.timeline.count()).filter(|&other| other != k);
         others.filter_map(|other| Some((other, self.projected(other)?))).any(|(other, at)| {
             let apart = (at.at_px[0] - own.at_px[0]).hypot(at.at_px[1] - own.at_px[1]);
@@ -332,14 +420,38 @@ impl SceneBuilder<'_> {
         })
     }
 
+    /// Returns whether a round obstacle is between the camera and a vehicle; only these are drawn solid.
+    fn is_behind_obstacle(&self, k: usize) -> bool {
+        let Some(place) = self.vehicle(k) else { return false };
+        let distance_m = self.camera.project(place).map_or(0.0, |at| at.depth_m);
+        let towards = match self.camera.lens {
+            Lens::Perspective(_) => self.camera.eye_m - place,
+            Lens::Parallel(_) => self.camera.back * distance_m,
+        };
+        let is_round = |shape: &Shape| matches!(shape, Shape::Ball { .. } | Shape::Capsule { .. });
+        let obstacles = self.timeline.plan.iter().flat_map(|plan| &plan.obstacles);
+        obstacles.filter(|obstacle| is_round(&obstacle.shape)).any(|obstacle| {
+            // Steps of the distance to the surface end beyond the obstacle, inside it or at the camera.
+            let (mut along, length) = (0.0, towards.norm());
+            for _ in 0..SIGHT_STEPS {
+                let at = place + self.extent.origin_m() + towards * (along / length);
+                let (free_m, _) = obstacle.shape.signed_distance_m(at - obstacle.place_m);
+                if free_m <= 0.0 {
+                    return true;
+                }
+                along += free_m.max(length / f64::from(SIGHT_STEPS));
+                if along >= length {
+                    break;
+                }
+            }
+            false
+        })
+    }
+
     /// Returns the names of the two vehicles of a pair.
     fn pair(&self, pair: Pair) -> String {
         let name = |k: usize| self.timeline.vehicles.get(k).map_or_else(|| (k + 1).to_string(), |name| shortened(name));
         format!("{}-{}", name(pair.first()), name(pair.second()))
-    }
-
-    fn margin(&self) -> f32 {
-        16.0 * self.view.unit_px()
     }
 }
 

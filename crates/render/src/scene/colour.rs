@@ -61,11 +61,31 @@ pub enum Theme {
     /// Light on nearly black, for screens.
     #[default]
     Dark,
-    /// Dark on light grey, for screens.
+    /// Dark on white, for pages and print.
     Light,
-    /// Dark on white, for print.
-    Paper,
 }
+
+/// What the colours of vehicles and trails show.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Colouring {
+    /// The vehicle.
+    #[default]
+    Vehicle,
+    /// The speed.
+    Speed,
+    /// The distance to the nearest vehicle, less delta.
+    Clearance,
+}
+
+impl Colouring {
+    /// All choices with their names.
+    pub const ALL: [(&'static str, Self); 3] =
+        [("vehicle", Self::Vehicle), ("speed", Self::Speed), ("clearance", Self::Clearance)];
+}
+
+/// Colours of a quantity from small to large.
+const RAMP_ON_LIGHT: [u32; 4] = [0x2A_4C_C8, 0x8F_2F_B5, 0xC8_3B_6B, 0xC2_5A_00];
+const RAMP_ON_DARK: [u32; 4] = [0x5B_8D_EF, 0xB9_7A_E0, 0xF0_72_8F, 0xFF_C2_3D];
 
 /// Number of vehicles from which on all have one colour.
 const ONE_COLOUR: usize = 200;
@@ -75,34 +95,30 @@ const ON_DARK: [u32; 6] = [0x56_A8_E0, 0xF0_7F_2E, 0x2F_BF_94, 0xDB_8D_BB, 0xCB_
 
 impl Theme {
     /// All themes with their names.
-    pub const ALL: [(&'static str, Self); 3] = [("dark", Self::Dark), ("light", Self::Light), ("paper", Self::Paper)];
+    pub const ALL: [(&'static str, Self); 2] = [("dark", Self::Dark), ("light", Self::Light)];
 
-    fn pick(self, dark: u32, light: u32, paper: u32) -> Colour {
-        Colour::hex(match self {
-            Self::Dark => dark,
-            Self::Light => light,
-            Self::Paper => paper,
-        })
+    fn pick(self, dark: u32, light: u32) -> Colour {
+        Colour::hex(if self == Self::Dark { dark } else { light })
     }
 
     /// Background.
     pub(crate) fn background(self) -> Colour {
-        self.pick(0x14_19_1F, 0xEC_EF_F3, 0xFF_FF_FF)
+        self.pick(0x14_19_1F, 0xFF_FF_FF)
     }
 
     /// Text.
     pub(crate) fn ink(self) -> Colour {
-        self.pick(0xE6_EA_EF, 0x1B_22_2B, 0x00_00_00)
+        self.pick(0xE6_EA_EF, 0x1B_1F_24)
     }
 
     /// Secondary text.
     pub(crate) fn soft_ink(self) -> Colour {
-        self.pick(0x9A_A4_AF, 0x55_60_6C, 0x4A_4A_4A)
+        self.pick(0x9A_A4_AF, 0x57_60_6A)
     }
 
     /// Lines on the ground.
     pub(crate) fn grid(self) -> Colour {
-        self.pick(0x2E_37_42, 0xCB_D2_DA, 0xDA_DA_DA)
+        self.pick(0x31_3A_44, 0xD5_DA_E0)
     }
 
     /// Returns the colour of vehicle `k`; the colours repeat.
@@ -118,36 +134,47 @@ impl Theme {
 
     /// Keep-out shells.
     pub(crate) fn shell(self) -> Colour {
-        self.pick(0x8F_B4_D9, 0x5C_7F_A3, 0x6E_8A_A8)
+        self.pick(0x8F_B4_D9, 0x5C_7F_A3)
     }
 
     /// Obstacles.
     pub(crate) fn obstacle(self) -> Colour {
-        self.pick(0xB8_A0_78, 0x8A_6D_3B, 0x7A_60_34)
+        self.pick(0xB8_A0_78, 0x8A_6D_3B)
     }
 
     /// Violations.
     pub(crate) fn alarm(self) -> Colour {
-        self.pick(0xFF_2F_3C, 0xD4_00_14, 0xD4_00_14)
+        self.pick(0xFF_2F_3C, 0xD4_00_14)
     }
 
     /// Text on the colour of violations.
     pub(crate) fn on_alarm(self) -> Colour {
-        self.pick(0x14_00_02, 0xFF_FF_FF, 0xFF_FF_FF)
+        self.pick(0x14_00_02, 0xFF_FF_FF)
     }
 
     /// Clear verdicts.
     pub(crate) fn good(self) -> Colour {
-        self.pick(0x35_C0_8A, 0x00_7A_56, 0x00_6B_4B)
+        self.pick(0x6F_DD_8B, 0x11_63_29)
     }
 
     /// Returns the colour of an edge: orange pushes (-1), grey is at rest (0), blue pulls (1). Colour-blind readers can
     /// tell the three apart.
     pub(crate) fn tension(self, tension: f32) -> Colour {
-        let push = self.pick(0xFF_9E_2C, 0xD9_6B_00, 0xC8_5A_00);
-        let rest = self.pick(0x6B_75_80, 0xA6_AE_B7, 0xB4_B4_B4);
-        let pull = self.pick(0x4F_A3_FF, 0x12_5F_C4, 0x0A_4F_B0);
+        let push = self.pick(0xFF_9E_2C, 0xC8_5A_00);
+        let rest = self.pick(0x6B_75_80, 0xA6_AE_B7);
+        let pull = self.pick(0x4F_A3_FF, 0x0A_5E_A8);
         rest.towards(if tension < 0.0 { push } else { pull }, tension.abs())
+    }
+}
+
+impl Theme {
+    /// Returns the colour of a quantity relative to its range, from 0 to 1.
+    pub(crate) fn ramp(self, part: f32) -> Colour {
+        let ramp = if self == Self::Dark { RAMP_ON_DARK } else { RAMP_ON_LIGHT };
+        let at = part.clamp(0.0, 1.0) * (ramp.len() - 1) as f32;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the ramp")]
+        let from = (at as usize).min(ramp.len() - 2);
+        Colour::hex(ramp[from]).towards(Colour::hex(ramp[from + 1]), at - from as f32)
     }
 }
 
@@ -178,6 +205,8 @@ mod tests {
                 ("pulling", theme.tension(1.0), 3.0),
                 ("vehicle", theme.vehicle(0), 3.0),
                 ("obstacle", theme.obstacle(), 3.0),
+                ("small quantity", theme.ramp(0.0), 3.0),
+                ("large quantity", theme.ramp(1.0), 3.0),
             ] {
                 let found = contrast(colour, theme.background());
                 assert!(found >= least, "{what} in {name}: {found}");

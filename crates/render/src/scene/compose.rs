@@ -2,15 +2,19 @@
 
 use nalgebra::Vector3;
 
-use super::camera::{Camera, CameraSpec, Projected};
-use super::colour::{Colour, Theme};
+use super::camera::{Adjustment, Area, Camera, CameraSpec, Projected};
+use super::colour::{Colour, Colouring, Theme};
 use super::extent::Extent;
 use super::labels::LabelLayout;
 use super::{Line, Scene};
 use crate::timeline::Timeline;
+use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use tautline_audit::Violation;
-use tautline_core::swarm::Pair;
+use tautline_core::swarm::{Pair, Rows, row};
 use tautline_report::flight_log::Frame;
+
+/// Largest width, and largest height, of a picture without a legend \[pixels\].
+const NO_LEGEND_PX: [u32; 2] = [420, 260];
 
 /// Layers of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,6 +54,10 @@ impl Layers {
 pub struct View {
     /// Camera.
     pub camera: CameraSpec,
+    /// Changes of the camera by hand.
+    pub adjustment: Adjustment,
+    /// What the colours of vehicles and trails show.
+    pub colouring: Colouring,
     /// Colours.
     pub theme: Theme,
     /// Width and height \[pixels\].
@@ -58,12 +66,22 @@ pub struct View {
     pub layers: Layers,
     /// Length of trails \[s\]; `None` for the whole flight.
     pub trail_s: Option<f64>,
+    /// Vehicle that always has its name.
+    pub picked: Option<usize>,
 }
 
 impl Default for View {
     fn default() -> Self {
-        let (camera, theme, layers) = (CameraSpec::Iso, Theme::Dark, Layers::ALL);
-        Self { camera, theme, size_px: [1280, 720], layers, trail_s: None }
+        Self {
+            camera: CameraSpec::Auto,
+            adjustment: Adjustment::NONE,
+            colouring: Colouring::Vehicle,
+            theme: Theme::Dark,
+            size_px: [1280, 720],
+            layers: Layers::ALL,
+            trail_s: None,
+            picked: None,
+        }
     }
 }
 
@@ -77,6 +95,30 @@ impl View {
     /// Returns the size of text \[pixels\] relative to the normal size.
     pub(super) fn text_px(&self, units: f32) -> f32 {
         (17.0 * self.unit_px()).max(9.0) * units
+    }
+
+    /// Returns the distance of texts from the sides \[pixels\].
+    pub(super) fn margin_px(&self) -> f32 {
+        16.0 * self.unit_px()
+    }
+
+    /// Returns the height of the bar of a violation \[pixels\].
+    pub(super) fn banner_px(&self) -> f32 {
+        1.9 * self.text_px(1.1)
+    }
+
+    /// Returns whether the picture is large enough for a legend.
+    pub(super) fn has_legend(&self) -> bool {
+        self.layers.caption && std::iter::zip(self.size_px, NO_LEGEND_PX).all(|(side, least)| side >= least)
+    }
+
+    /// Returns the picture with the heights of its texts; a flight with violations has one text more.
+    pub(super) fn area(&self, has_violations: bool) -> Area {
+        let (margin, line) = (self.margin_px(), self.text_px(1.0));
+        let top = if has_violations { self.banner_px() + 0.6 * margin } else { margin };
+        let top = if self.layers.caption { top + 2.9 * line } else { 0.0 };
+        let bottom = if self.has_legend() { margin + 1.7 * line } else { 0.0 };
+        Area { size_px: self.size_px, texts_px: [top, bottom].map(f64::from) }
     }
 }
 
@@ -114,8 +156,8 @@ impl Scene {
         ];
         let texts: [Part<'_, LabelLayout>; 6] = [
             (layers.caption, SceneBuilder::caption),
-            (layers.caption, SceneBuilder::legend),
-            (layers.labels, SceneBuilder::reserve_vehicles),
+            (view.has_legend(), SceneBuilder::legend),
+            (layers.labels || layers.closest, SceneBuilder::reserve_vehicles),
             (layers.closest, SceneBuilder::separations),
             (layers.ground, SceneBuilder::scale),
             (layers.labels, SceneBuilder::names),
@@ -140,6 +182,10 @@ pub(super) struct SceneBuilder<'a> {
     pub(super) too_close_to_obstacle: Vec<[usize; 2]>,
     /// Whether each vehicle is closer than delta to another, or too close to an obstacle.
     pub(super) alarmed: Vec<bool>,
+    /// Intervals of each vehicle's violations so far \[s\].
+    pub(super) violating_s: Vec<Vec<[f64; 2]>>,
+    /// Colour of each vehicle.
+    colours: Vec<Colour>,
 }
 
 impl<'a> SceneBuilder<'a> {
@@ -166,7 +212,75 @@ impl<'a> SceneBuilder<'a> {
         for (Violation { pair, .. }, _) in &violated {
             (alarmed[pair.first()], alarmed[pair.second()]) = (true, true);
         }
-        Self { timeline, extent, frame, view, camera, violated, too_close_to_obstacle, alarmed }
+        let mut violating_s = vec![Vec::new(); timeline.count()];
+        for Violation { pair, from_s, to_s, .. } in timeline.violations_by(now_s) {
+            for k in [pair.first(), pair.second()] {
+                violating_s[k].push([from_s, to_s]);
+            }
+        }
+        for (found, [vehicle, _]) in timeline.obstacle_violations_by(now_s) {
+            violating_s[vehicle].push([found.from_s, found.to_s]);
+        }
+        let builder = Self {
+            timeline,
+            extent,
+            frame,
+            view,
+            camera,
+            violated,
+            too_close_to_obstacle,
+            alarmed,
+            violating_s,
+            colours: Vec::new(),
+        };
+        let colours = builder.colours();
+        Self { colours, ..builder }
+    }
+
+    /// Returns the colours of the vehicles.
+    fn colours(&self) -> Vec<Colour> {
+        let (count, frame) = (self.timeline.count(), self.frame);
+        let keyframes = self.timeline.log.keyframes();
+        let before = &keyframes[frame.keyframe.min(keyframes.len() - 1)];
+        let [from, to] = match keyframes.get(frame.keyframe + 1) {
+            Some(after) => [before, after],
+            None => [&keyframes[frame.keyframe.saturating_sub(1)], before],
+        };
+        let quantities = match self.view.colouring {
+            Colouring::Speed if from.time_s < to.time_s => (0..count)
+                .map(|k| self.speed_part(k, [&from.positions_m, &to.positions_m], to.time_s - from.time_s))
+                .collect(),
+            Colouring::Clearance => self.clearance_parts(&frame.positions_m),
+            _ => return (0..count).map(|k| self.view.theme.vehicle_among(k, count)).collect(),
+        };
+        quantities.into_iter().map(|part| self.view.theme.ramp(part)).collect()
+    }
+
+    /// Returns the speed of a vehicle between two instants, relative to the largest one of the flight.
+    pub(super) fn speed_part(&self, k: usize, [from, to]: [&Rows; 2], seconds: f64) -> f32 {
+        let speed_m_s = (row(to, k) - row(from, k)).norm() / seconds;
+        #[expect(clippy::cast_possible_truncation, reason = "a colour")]
+        let part = (speed_m_s / self.extent.max_speed_m_s.max(1e-9)) as f32;
+        if part.is_finite() { part } else { 0.0 }
+    }
+
+    /// Returns the clearance that has the last colour of the ramp \[m\].
+    pub(super) fn max_clearance_m(&self) -> f64 {
+        self.timeline.delta_m.unwrap_or_else(|| 10.0 * self.timeline.radius_m.iter().copied().fold(0.0, f64::max))
+    }
+
+    /// Returns the clearance of each vehicle to the nearest other one: 1 for none, 0 for at least the largest one.
+    pub(super) fn clearance_parts(&self, positions_m: &Rows) -> Vec<f32> {
+        let scaled = self.timeline.log.metric().scaled_rows(positions_m);
+        let count = scaled.nrows();
+        let nearest_m = |k: usize| {
+            let others = (0..count).filter(|&other| other != k);
+            others.map(|other| (row(&scaled, other) - row(&scaled, k)).norm()).fold(f64::INFINITY, f64::min)
+        };
+        let clearance_m = |k: usize| nearest_m(k) - self.timeline.delta_m.unwrap_or(0.0);
+        #[expect(clippy::cast_possible_truncation, reason = "a colour")]
+        let part = |k: usize| (1.0 - clearance_m(k) / self.max_clearance_m()).clamp(0.0, 1.0) as f32;
+        (0..count).into_par_iter().map(part).collect()
     }
 
     /// Returns the position of a vehicle in scene coordinates \[m\]; `None` if it is absent.
@@ -186,7 +300,7 @@ impl<'a> SceneBuilder<'a> {
 
     /// Returns the colour of a vehicle.
     pub(super) fn colour(&self, k: usize) -> Colour {
-        self.view.theme.vehicle_among(k, self.timeline.count())
+        self.colours[k]
     }
 
     /// Returns the colour of a vehicle's body: that of a violation during one.

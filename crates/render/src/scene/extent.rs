@@ -4,13 +4,13 @@ use std::sync::{Mutex, PoisonError};
 
 use nalgebra::Vector3;
 
-use super::camera::{Camera, CameraSpec, ISO_DEG, Orbit};
+use super::camera::{Area, Camera, CameraSpec, Direction};
 use super::compose::View;
 use crate::error::RenderError;
 use crate::timeline::Timeline;
 use tautline_core::swarm::{Pair, Rows, row};
 use tautline_laws::space::{Obstacle, Shape};
-use tautline_report::flight_log::Frame;
+use tautline_report::flight_log::{Frame, Keyframe};
 
 /// Largest number of vehicle positions that framing uses.
 const FRAMED_PLACES: usize = 200_000;
@@ -26,22 +26,53 @@ const FOLLOWED_DELTAS: f64 = 3.0;
 const FOLLOWED_RADII: f64 = 20.0;
 /// Radius of the view around the closest pair, in units of its separation.
 const CLOSEST_DISTANCES: f64 = 1.1;
+/// Part of a flight over which a camera that follows the swarm smooths its movement.
+const SMOOTHED: f64 = 0.04;
+/// Largest number of times at which a camera that follows the swarm is computed.
+const FOLLOWED_TIMES: usize = 2000;
+/// Largest thickness of a planar flight, in units of its extent.
+const PLANAR: f64 = 0.02;
+/// Largest height of a flat flight, in units of its extent; it is seen from higher up.
+const FLAT: f64 = 0.3;
+/// Azimuth of the oblique view for a flight along x and along y, and elevation for a flat and any other flight
+/// \[degrees\].
+const AZIMUTH_DEG: [f64; 2] = [-66.0, -24.0];
+const ELEVATION_DEG: [f64; 2] = [46.0, 28.0];
 /// Smallest depth that is drawn, in units of the largest: centimetres in a flight of tens of kilometres.
 const NEAREST: f64 = 1e-6;
 /// Distance around the flight up to which obstacles are framed, in units of its extent.
-const OBSTACLE_ROOM: f64 = 0.5;
-/// Margin around the ground for its scale, in units of the line distance.
-const SCALE_ROOM: f64 = 0.6;
+const OBSTACLE_ROOM: f64 = 0.2;
+/// Smallest z of the unit normal of an obstacle that is the ground.
+const LEVEL: f64 = 0.999;
+
+/// Box around all vehicles at a time.
+#[derive(Clone, Copy, Debug)]
+struct SwarmBox {
+    time_s: f64,
+    centre: Vector3<f64>,
+    half: Vector3<f64>,
+}
 
 /// Extent of a flight, origin of its scene coordinates, and ground.
 #[derive(Debug)]
 pub struct Extent {
     origin_m: Vector3<f64>,
-    /// Positions of vehicles over the flight with the radius that must be visible around them, and corners of the
-    /// ground.
-    positions: Vec<(Vector3<f64>, f64)>,
+    /// Positions of vehicles over the flight and of obstacles near it, with the radius that must be visible around
+    /// them.
+    balls: Vec<(Vector3<f64>, f64)>,
+    /// Directions of the cameras `Auto` and `Perspective`.
+    auto: Direction,
+    oblique: Direction,
+    /// Boxes around all vehicles, smoothed over time.
+    swarm: Vec<SwarmBox>,
     /// Last computed framing; it is the same for all pictures of a film.
-    framed: Mutex<Option<(CameraSpec, Camera)>>,
+    framed: Mutex<Option<(Direction, Area, Camera)>>,
+    /// Largest speed of a vehicle between two samples \[m/s\].
+    pub(super) max_speed_m_s: f64,
+    /// Whether a flight has a violation.
+    pub(super) has_violations: bool,
+    /// Whether the ground is an obstacle.
+    pub(super) has_hard_ground: bool,
     /// Corners of the ground, in scene coordinates \[m\].
     pub(super) ground_m: [Vector3<f64>; 2],
     /// Distance of ground lines \[m\].
@@ -54,40 +85,80 @@ impl Extent {
     /// Computes the extent of a flight so far.
     #[must_use]
     pub fn of(timeline: &Timeline) -> Self {
-        let keyframes = timeline.log.keyframes();
-        let stride = keyframes.len().div_ceil((FRAMED_PLACES / timeline.count().max(1)).max(2)).max(1);
-        let mut positions: Vec<(Vector3<f64>, f64)> = Vec::new();
-        for keyframe in keyframes.iter().step_by(stride).chain(keyframes.last()) {
-            let there = (0..keyframe.positions_m.nrows()).map(|k| (k, row(&keyframe.positions_m, k)));
-            let there = there.filter(|(_, place)| place.iter().all(|x| x.is_finite()));
-            positions.extend(there.map(|(k, place)| (place, timeline.keep_out_m(k))));
-        }
-        let (mut low, mut high) = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
-        let mut largest = 0.0_f64;
-        for (place, radius) in &positions {
-            (low, high, largest) = (low.inf(place), high.sup(place), largest.max(*radius));
-        }
-        let flight_bounds = if positions.is_empty() { [Vector3::zeros(); 2] } else { [low, high] };
-        if !positions.is_empty() {
-            let room = Vector3::repeat(OBSTACLE_ROOM * (high - low).max().max(largest));
-            let [least, most] = [low - room, high + room];
-            let obstacles = timeline.plan.iter().flat_map(|plan| &plan.obstacles);
-            for corner in obstacles.flat_map(corners).map(|corner| corner.sup(&least).inf(&most)) {
-                (low, high) = (low.inf(&corner), high.sup(&corner));
-                positions.push((corner, 0.0));
+        Self::of_all(&[timeline])
+    }
+
+    /// Computes the common extent of flights, for pictures side by side.
+    #[must_use]
+    pub fn of_all(timelines: &[&Timeline]) -> Self {
+        let mut balls: Vec<(Vector3<f64>, f64)> = Vec::new();
+        let mut swarm: Vec<SwarmBox> = Vec::new();
+        let mut max_speed_m_s = 0.0_f64;
+        for timeline in timelines {
+            let keyframes = timeline.log.keyframes();
+            let most = (FRAMED_PLACES / timeline.count().max(1)).clamp(2, FOLLOWED_TIMES);
+            let stride = keyframes.len().div_ceil(most).max(1);
+            let mut before: Option<&Keyframe> = None;
+            for keyframe in keyframes.iter().step_by(stride).chain(keyframes.last()) {
+                let first = balls.len();
+                for k in 0..keyframe.positions_m.nrows() {
+                    let place = row(&keyframe.positions_m, k);
+                    if !place.iter().all(|x| x.is_finite()) {
+                        continue;
+                    }
+                    balls.push((place, timeline.keep_out_m(k)));
+                    if let Some(before) = before.filter(|before| before.time_s < keyframe.time_s) {
+                        let moved_m = (place - row(&before.positions_m, k)).norm();
+                        max_speed_m_s = max_speed_m_s.max(moved_m / (keyframe.time_s - before.time_s));
+                    }
+                }
+                let radius_m = balls[first..].iter().fold(0.0, |largest: f64, (_, radius)| largest.max(*radius));
+                swarm.extend(bounds(&balls[first..]).map(|[low, high]| SwarmBox {
+                    time_s: keyframe.time_s,
+                    centre: low / 2.0 + high / 2.0,
+                    half: (high / 2.0 - low / 2.0).add_scalar(radius_m),
+                }));
+                before = Some(keyframe);
             }
         }
-        if positions.is_empty() {
-            (low, high, largest) = (Vector3::zeros(), Vector3::zeros(), 1.0);
+        swarm.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        let mut largest = balls.iter().fold(0.0_f64, |largest, (_, radius)| largest.max(*radius));
+        let [lowest, highest] = bounds(&balls).unwrap_or([Vector3::zeros(); 2]);
+        let (mut low, mut high) = (lowest, highest);
+        let obstacles: Vec<&Obstacle> =
+            timelines.iter().flat_map(|timeline| &timeline.plan).flat_map(|plan| &plan.obstacles).collect();
+        if balls.is_empty() {
+            largest = 1.0;
+        } else {
+            let room = Vector3::repeat(OBSTACLE_ROOM * (high - low).max() + largest);
+            let [least, most] = [low - room, high + room];
+            for corner in obstacles.iter().copied().flat_map(corners).map(|corner| corner.sup(&least).inf(&most)) {
+                (low, high) = (low.inf(&corner), high.sup(&corner));
+                balls.push((corner, 0.0));
+            }
         }
         // Halved first: the difference of the largest doubles overflows.
         let origin_m = low / 2.0 + high / 2.0;
-        for (place, _) in &mut positions {
+        for (place, _) in &mut balls {
             *place -= origin_m;
         }
-        let [lowest, highest] = flight_bounds;
+        for around in &mut swarm {
+            around.centre -= origin_m;
+        }
+        let hard_z = obstacles.iter().find_map(|obstacle| match obstacle.shape {
+            Shape::HalfSpace { normal } if is_level(normal) => Some(obstacle.place_m.z),
+            _ => None,
+        });
         let is_near = lowest.z >= 0.0 && lowest.z <= NEAR_GROUND * (highest - lowest).norm() + largest;
-        let z = if is_near { 0.0 } else { low.z - largest } - origin_m.z;
+        let z = hard_z.unwrap_or(if is_near { 0.0 } else { low.z - largest }) - origin_m.z;
+        let flown = highest - lowest;
+        let oblique = Direction::perspective(
+            AZIMUTH_DEG[usize::from(flown.y > flown.x)],
+            ELEVATION_DEG[usize::from(high.z - low.z > FLAT * (high - low).xy().max())],
+        );
+        let thin = |axis: usize| flown[axis] <= PLANAR * flown.max() && flown.max() > 0.0 && obstacles.is_empty();
+        let planes = [(2, Direction::TOP), (1, Direction::FRONT), (0, Direction::SIDE)];
+        let auto = planes.into_iter().find(|(axis, _)| thin(*axis)).map_or(oblique, |(_, direction)| direction);
         let (low, high) = (low - origin_m, high - origin_m);
         let span = (high.x - low.x).max(high.y - low.y).max(2.0 * largest) + 2.0 * largest;
         let grid_m = round_step(span / GROUND_LINES);
@@ -97,13 +168,22 @@ impl Extent {
         };
         let margin = Vector3::repeat(largest);
         let ground_m = [corner(low - margin, f64::floor), corner(high + margin, f64::ceil)];
-        let room = SCALE_ROOM * grid_m;
-        for x in [ground_m[0].x - room, ground_m[1].x + room] {
-            positions.extend([ground_m[0].y - room, ground_m[1].y + room].map(|y| (Vector3::new(x, y, z), 0.0)));
-        }
         let (lowest, highest) = (ground_m[0].inf(&low), ground_m[1].sup(&high));
         let reach = ((lowest + highest) / 2.0, (highest - lowest).norm() / 2.0 + largest + grid_m);
-        Self { origin_m, positions, framed: Mutex::new(None), ground_m, grid_m, reach }
+        Self {
+            origin_m,
+            balls,
+            auto,
+            oblique,
+            swarm: smoothed(&swarm),
+            framed: Mutex::new(None),
+            max_speed_m_s,
+            has_violations: timelines.iter().any(|timeline| timeline.has_violations()),
+            has_hard_ground: hard_z.is_some(),
+            ground_m,
+            grid_m,
+            reach,
+        }
     }
 
     /// Returns the bounding ball of everything in scene coordinates: centre \[m\] and radius \[m\].
@@ -128,53 +208,70 @@ impl Extent {
     /// # Errors
     /// [`RenderError::NoVehicle`] if the camera follows a vehicle that the flight does not have.
     pub fn camera(&self, timeline: &Timeline, frame: &Frame, view: &View) -> Result<Camera, RenderError> {
-        let framing = |spec| self.framing(spec, view.size_px);
-        Ok(match &view.camera {
+        let area = view.area(self.has_violations);
+        let camera = match &view.camera {
+            CameraSpec::Auto => self.framing(self.auto, area),
+            CameraSpec::Perspective => self.framing(self.oblique, area),
+            CameraSpec::Top => self.framing(Direction::TOP, area),
+            CameraSpec::Front => self.framing(Direction::FRONT, area),
+            CameraSpec::Side => self.framing(Direction::SIDE, area),
             CameraSpec::Orbit(orbit) => Camera::orbiting(*orbit, Vector3::zeros(), view.size_px),
-            CameraSpec::Follow(name) => {
+            CameraSpec::Follow(Some(name)) => {
                 let vehicle = find(timeline, name)?;
                 let radius_m = FOLLOWED_RADII * timeline.radius_m[vehicle];
                 let around_m = timeline.delta_m.map_or(radius_m, |delta_m| FOLLOWED_DELTAS * delta_m);
-                let place = self.place(&frame.positions_m, vehicle);
-                place.map_or_else(|| framing(&CameraSpec::Iso), |place| Camera::close_up(place, around_m, view.size_px))
+                match self.place(&frame.positions_m, vehicle) {
+                    Some(place) => Camera::framing(self.auto, &[(place, around_m)], area),
+                    None => self.framing(self.auto, area),
+                }
             }
-            CameraSpec::Closest => match frame.nearest {
-                Some((pair, _)) => self.close_up(timeline, frame, pair, view.size_px),
-                None => framing(&CameraSpec::Iso),
+            CameraSpec::Follow(None) => match self.swarm_at(frame.time_s) {
+                Some(corners) => Camera::framing(self.auto, &corners, area),
+                None => self.framing(self.auto, area),
             },
-            spec => framing(spec),
-        })
+            CameraSpec::Closest => match frame.nearest {
+                Some((pair, _)) => self.close_up(timeline, frame, pair, view),
+                None => self.framing(self.auto, area),
+            },
+        };
+        Ok(camera.adjusted(&view.adjustment))
     }
 
     /// Returns a camera near a pair, or one that frames the flight if a vehicle of the pair is absent.
-    pub(crate) fn close_up(&self, timeline: &Timeline, frame: &Frame, pair: Pair, size_px: [u32; 2]) -> Camera {
+    pub(crate) fn close_up(&self, timeline: &Timeline, frame: &Frame, pair: Pair, view: &View) -> Camera {
+        let area = view.area(self.has_violations);
         let [first, second] = [pair.first(), pair.second()].map(|k| self.place(&frame.positions_m, k));
-        let (Some(first), Some(second)) = (first, second) else { return self.framing(&CameraSpec::Iso, size_px) };
+        let (Some(first), Some(second)) = (first, second) else { return self.framing(self.auto, area) };
         let distance_m = (second - first).norm();
         // The hulls of two vehicles at one position are visible too, for any delta.
         let keep_out_m = 2.0 * timeline.keep_out_m(pair.first()).max(timeline.keep_out_m(pair.second()));
-        Camera::close_up((first + second) / 2.0, CLOSEST_DISTANCES * distance_m.max(keep_out_m), size_px)
+        let ball = ((first + second) / 2.0, CLOSEST_DISTANCES * distance_m.max(keep_out_m));
+        Camera::framing(self.auto, &[ball], area)
     }
 
-    fn framing(&self, spec: &CameraSpec, size_px: [u32; 2]) -> Camera {
+    fn framing(&self, direction: Direction, area: Area) -> Camera {
         let mut framed = self.framed.lock().unwrap_or_else(PoisonError::into_inner);
         match &*framed {
-            Some((known, camera)) if known == spec && camera.size_px == size_px => *camera,
+            Some((known, of, camera)) if *known == direction && *of == area => *camera,
             _ => {
-                let camera = Camera::framing(spec, &self.positions, size_px);
-                *framed = Some((spec.clone(), camera));
+                let camera = Camera::framing(direction, &self.balls, area);
+                *framed = Some((direction, area, camera));
                 camera
             }
         }
     }
 
-    /// Returns the orbit and the target \[m\] of a camera that frames the flight as [`CameraSpec::Iso`] does: the
-    /// initial camera of the window.
-    #[must_use]
-    pub fn orbit(&self, size_px: [u32; 2]) -> (Orbit, Vector3<f64>) {
-        let Camera { eye_m, back, .. } = self.framing(&CameraSpec::Iso, size_px);
-        let ([azimuth_deg, elevation_deg], ahead_m) = (ISO_DEG, back.dot(&eye_m));
-        (Orbit { azimuth_deg, elevation_deg, distance_m: ahead_m.max(self.grid_m) }, eye_m - back * ahead_m)
+    /// Returns the corners of the box around all vehicles at a time \[s\].
+    fn swarm_at(&self, time_s: f64) -> Option<[(Vector3<f64>, f64); 8]> {
+        let next = self.swarm.partition_point(|around| around.time_s <= time_s);
+        let (from, to) = (self.swarm.get(next.saturating_sub(1))?, self.swarm.get(next).or(self.swarm.last())?);
+        let span_s = to.time_s - from.time_s;
+        let part = if span_s > 0.0 { ((time_s - from.time_s) / span_s).clamp(0.0, 1.0) } else { 0.0 };
+        let (centre, half) = (from.centre.lerp(&to.centre, part), from.half.lerp(&to.half, part));
+        Some(std::array::from_fn(|k| {
+            let side = |axis: usize| if k >> axis & 1 == 0 { -half[axis] } else { half[axis] };
+            (centre + Vector3::from_fn(|axis, _| side(axis)), 0.0)
+        }))
     }
 
     /// Returns the smallest and largest depth of the content for a camera \[m\].
@@ -184,6 +281,33 @@ impl Extent {
         let far = (middle + radius).max(1e-2);
         [(middle - radius).max(NEAREST * far), far]
     }
+}
+
+/// Returns whether a plane with this normal is level, with free space above.
+pub(super) fn is_level(normal: Vector3<f64>) -> bool {
+    normal.z >= LEVEL * normal.norm()
+}
+
+/// Returns the lowest and highest coordinates of balls' centres.
+fn bounds(balls: &[(Vector3<f64>, f64)]) -> Option<[Vector3<f64>; 2]> {
+    let places = balls.iter().map(|(place, _)| [*place; 2]);
+    places.reduce(|[low, high], [place, _]| [low.inf(&place), high.sup(&place)])
+}
+
+/// Smooths boxes over time. Each result contains the box of its time.
+fn smoothed(swarm: &[SwarmBox]) -> Vec<SwarmBox> {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a length")]
+    let reach = (SMOOTHED * swarm.len() as f64) as usize;
+    let near = |k: usize| k.saturating_sub(reach)..(k + reach + 1).min(swarm.len());
+    let mean =
+        |k: usize| swarm[near(k)].iter().map(|around| around.centre).sum::<Vector3<f64>>() / near(k).len() as f64;
+    let centres: Vec<_> = (0..swarm.len()).map(mean).collect();
+    let half = |k: usize| swarm[k].half + (swarm[k].centre - centres[k]).abs();
+    let largest = |k: usize| near(k).map(half).fold(Vector3::zeros(), |most: Vector3<f64>, half| most.sup(&half));
+    let largest: Vec<_> = (0..swarm.len()).map(largest).collect();
+    let half = |k: usize| largest[near(k)].iter().sum::<Vector3<f64>>() / near(k).len() as f64;
+    let smooth = |k: usize| SwarmBox { time_s: swarm[k].time_s, centre: centres[k], half: half(k) };
+    (0..swarm.len()).map(smooth).collect()
 }
 
 /// Returns the corners of a box around an obstacle \[m\]; empty for an unbounded one.
@@ -228,6 +352,20 @@ fn round_step(length_m: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_smoothed_box_contains_the_box_of_its_time() {
+        let at = |k: u32| SwarmBox {
+            time_s: f64::from(k),
+            centre: Vector3::new(f64::from(k * k % 13), 0.0, f64::from(k)),
+            half: Vector3::repeat(1.0 + f64::from(k % 3)),
+        };
+        let swarm: Vec<_> = (0..100).map(at).collect();
+        for (around, smooth) in swarm.iter().zip(smoothed(&swarm)) {
+            let beyond = (around.centre - smooth.centre).abs() + around.half - smooth.half;
+            assert!(beyond.max() <= 1e-12, "{around:?} {smooth:?}");
+        }
+    }
 
     #[test]
     fn ground_steps_are_round_numbers() {

@@ -5,8 +5,9 @@
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
 use super::camera::Lens;
-use super::colour::{Colour, Theme};
+use super::colour::{Colour, Colouring, Theme};
 use super::compose::SceneBuilder;
+use super::extent::is_level;
 use super::{Ball, Disc, Line, Scene, single};
 use crate::timeline::QuadrotorShape;
 use tautline_core::swarm::Pair;
@@ -18,10 +19,14 @@ const MAX_EDGES: usize = 2100;
 /// Largest number of line pieces of all trails together, and of one trail.
 const MAX_TRAIL_PIECES: usize = 60_000;
 const MAX_PIECES_PER_TRAIL: usize = 400;
-/// Fraction of a flight after which a trail has faded, and its opacity then.
+/// Fraction of a flight after which a trail has faded, and its opacity then on dark and on light background.
 const FADED_AFTER: f64 = 0.25;
-const FADED: f32 = 0.16;
+const FADED: [f32; 2] = [0.16, 0.4];
 const FRESH: f32 = 0.95;
+/// Smallest opacity of the part of a trail that was a violation.
+const VIOLATED: f32 = 0.75;
+/// Largest number of distances that colour trails by clearance.
+const MAX_DISTANCES: usize = 100_000_000;
 /// Number of corners of a ring.
 const RING: u32 = 28;
 /// Radius of a goal slot over that of the hull.
@@ -78,7 +83,7 @@ impl SceneBuilder<'_> {
                 }
             }
             if let Some(radius_m) = self.shell_m(k) {
-                let strength = if theme == Theme::Paper { 0.75 } else { 0.6 };
+                let strength = if theme == Theme::Light { 0.75 } else { 0.6 };
                 let colour = if alarm { theme.alarm().at(0.85) } else { theme.shell().at(strength) };
                 let ball = ball(radius_m, colour);
                 // In parallel projection all lines of sight are parallel to the view.
@@ -135,53 +140,83 @@ impl SceneBuilder<'_> {
         while last.saturating_sub(first) / stride > most {
             stride *= 2;
         }
+        let faded = FADED[usize::from(self.view.theme == Theme::Light)];
         #[expect(clippy::cast_possible_truncation, reason = "an opacity")]
-        let opacity = |time_s: f64| FADED + (FRESH - FADED) * (1.0 - (now_s - time_s) / fading_s).max(0.0) as f32;
+        let opacity = |time_s: f64| faded + (FRESH - faded) * (1.0 - (now_s - time_s) / fading_s).max(0.0) as f32;
         let width_px = if count < 50 { 2.0 } else { 1.3 } * self.view.unit_px();
         let begins = self.timeline.log.positions_m(since_s).filter(|_| since_s > first_s);
         let recorded = (first..=last).filter(|k| k.is_multiple_of(stride)).map(|k| &keyframes[k]);
-        let corners: Vec<_> = (begins.iter().map(|positions_m| (positions_m, opacity(since_s))))
-            .chain(recorded.map(|corner| (&corner.positions_m, opacity(corner.time_s))))
-            .chain([(&self.frame.positions_m, FRESH)])
+        let corners: Vec<_> = (begins.iter().map(|positions_m| (since_s, positions_m)))
+            .chain(recorded.map(|corner| (corner.time_s, &corner.positions_m)))
+            .chain([(now_s, &self.frame.positions_m)])
             .collect();
+        let by_clearance =
+            self.view.colouring == Colouring::Clearance && corners.len() * count * count <= MAX_DISTANCES;
+        let clearances: Vec<_> =
+            corners.iter().filter(|_| by_clearance).map(|(_, at)| self.clearance_parts(at)).collect();
         lines.reserve(count * corners.len());
         for k in 0..count {
-            let colour = self.colour(k);
-            let corner = |positions_m, strength| Some((single(self.extent.place(positions_m, k)?), strength));
-            let mut from: Option<([f32; 3], f32)> = None;
-            for &(positions_m, strength) in &corners {
-                let to = corner(positions_m, strength);
-                if let (Some((start, faint)), Some((end, strong))) = (from, to)
-                    && start != end
-                {
-                    let colours = [colour.at(faint), colour.at(strong)];
-                    lines.push(Line { ends_m: [start, end], colours, width_px });
+            for (n, pair) in corners.windows(2).enumerate() {
+                let [(from_s, from), (to_s, to)] = [pair[0], pair[1]];
+                let (Some(start), Some(end)) = (self.extent.place(from, k), self.extent.place(to, k)) else { continue };
+                if start == end || from_s >= to_s {
+                    continue;
                 }
-                from = to;
+                let colour = match self.view.colouring {
+                    Colouring::Speed => self.view.theme.ramp(self.speed_part(k, [from, to], to_s - from_s)),
+                    _ => clearances.get(n + 1).map_or(self.colour(k), |parts| self.view.theme.ramp(parts[k])),
+                };
+                for ([from_s, to_s], is_violation) in cut([from_s, to_s], &self.violating_s[k]) {
+                    let at = |time_s: f64| single(start.lerp(&end, (time_s - pair[0].0) / (pair[1].0 - pair[0].0)));
+                    let (colour, least) =
+                        if is_violation { (self.view.theme.alarm(), VIOLATED) } else { (colour, 0.0) };
+                    let colours = [from_s, to_s].map(|time_s| colour.at(opacity(time_s).max(least)));
+                    lines.push(Line { ends_m: [at(from_s), at(to_s)], colours, width_px });
+                }
             }
         }
     }
 
-    /// Draws crosses at the start positions and rings at the goal slots: the formation of the current leg at the
-    /// best-fitting motion that the law allows.
+    /// Returns the start positions of vehicles that have left them, with the half sizes of their marks \[m\].
+    pub(super) fn starts(&self) -> Vec<(usize, Vector3<f64>, f64)> {
+        let count = self.timeline.count();
+        let Some(first) = self.timeline.log.keyframes().first().filter(|_| count <= MAX_MARKS) else {
+            return Vec::new();
+        };
+        let start = |k| {
+            let place = self.extent.place(&first.positions_m, k)?;
+            let arm = self.at_least(place, self.timeline.radius_m[k] * 0.8, MIN_RADIUS_PX[1]);
+            let (start, now) = (self.camera.project(place)?, self.projected(k));
+            let is_left = now.is_none_or(|now| {
+                let apart_px = (now.at_px[0] - start.at_px[0]).hypot(now.at_px[1] - start.at_px[1]);
+                let hull_px = (self.timeline.radius_m[k] * now.px_per_m).max(f64::from(self.view.text_px(0.7)));
+                apart_px > hull_px + arm * start.px_per_m
+            });
+            is_left.then_some((k, place, arm))
+        };
+        (0..count).filter_map(start).collect()
+    }
+
+    /// Returns the goal slots: the formation of the current leg at the best-fitting motion that the law allows.
+    pub(super) fn slots(&self) -> Option<Vec<Vector3<f64>>> {
+        let plan = self.timeline.plan.as_ref().filter(|_| self.timeline.count() <= MAX_MARKS)?;
+        let slots_m = plan.slots_at(self.frame.time_s, &self.frame.positions_m)?;
+        Some(slots_m.into_iter().map(|slot_m| slot_m - self.extent.origin_m()).collect())
+    }
+
+    /// Draws crosses at the start positions, rings at the goal slots, and the reference.
     pub(super) fn starts_and_goals(&self, lines: &mut Vec<Line>) {
         let count = self.timeline.count();
-        let Some(first) = self.timeline.log.keyframes().first().filter(|_| count <= MAX_MARKS) else { return };
         let (right, up) = (self.camera.right, self.camera.up);
         let width_px = 1.8 * self.view.unit_px();
         // Many opaque marks would hide the vehicles.
         let opacity = (40.0 / count.max(1) as f32).clamp(0.05, 0.9);
-        for k in 0..count {
-            let Some(place) = self.extent.place(&first.positions_m, k) else { continue };
-            let arm = self.at_least(place, self.timeline.radius_m[k] * 0.8, MIN_RADIUS_PX[1]);
+        for (k, place, arm) in self.starts() {
             for across in [(right + up) * arm, (right - up) * arm] {
                 lines.push(Line::new([place - across, place + across], self.colour(k).at(opacity), width_px));
             }
         }
-        let Some(plan) = &self.timeline.plan else { return };
-        let Some(slots_m) = plan.slots_at(self.frame.time_s, &self.frame.positions_m) else { return };
-        for (k, slot_m) in slots_m.into_iter().enumerate().take(count) {
-            let centre = slot_m - self.extent.origin_m();
+        for (k, centre) in self.slots().into_iter().flatten().enumerate().take(count) {
             let radius = self.at_least(centre, self.timeline.radius_m[k] * SLOT, MIN_RADIUS_PX[2]);
             let corner = |n: u32| {
                 let (sin, cos) = (f64::from(n % RING) / f64::from(RING) * std::f64::consts::TAU).sin_cos();
@@ -190,7 +225,7 @@ impl SceneBuilder<'_> {
             let colour = self.colour(k).at(opacity);
             lines.extend((0..RING).map(|n| Line::new([corner(n), corner(n + 1)], colour, width_px)));
         }
-        if let Some(place_m) = plan.reference_at(self.frame.time_s) {
+        if let Some(place_m) = self.timeline.plan.as_ref().and_then(|plan| plan.reference_at(self.frame.time_s)) {
             self.diamond(place_m - self.extent.origin_m(), width_px, lines);
         }
     }
@@ -203,6 +238,17 @@ impl SceneBuilder<'_> {
         let side = |k: usize| Line::new([corners[k], corners[(k + 1) % 4]], self.view.theme.ink(), width_px);
         lines.extend((0..4).map(side));
     }
+}
+
+/// Cuts an interval of time where violations begin and end; returns the parts, and whether each is a violation.
+fn cut([from_s, to_s]: [f64; 2], violating_s: &[[f64; 2]]) -> Vec<([f64; 2], bool)> {
+    let mut at_s: Vec<f64> =
+        violating_s.iter().flatten().copied().filter(|&at_s| from_s < at_s && at_s < to_s).collect();
+    at_s.extend([from_s, to_s]);
+    at_s.sort_by(f64::total_cmp);
+    at_s.dedup();
+    let is_violation = |middle_s: f64| violating_s.iter().any(|[from_s, to_s]| (*from_s..=*to_s).contains(&middle_s));
+    at_s.windows(2).map(|part| ([part[0], part[1]], is_violation(f64::midpoint(part[0], part[1])))).collect()
 }
 
 /// Number of balls of a capsule per radius of length, and largest number in all.
@@ -255,6 +301,8 @@ impl SceneBuilder<'_> {
                         self.hatched([RIM, HATCH], place + of(axis, sign), of(u, 1.0), of(v, 1.0), lines);
                     }
                 }
+                // The grid of the ground shows a level plane.
+                Shape::HalfSpace { normal } if is_level(normal) => {}
                 Shape::HalfSpace { normal } => {
                     let normal = normal.normalize();
                     let (centre, reach_m) = self.extent.reach();
@@ -291,9 +339,10 @@ impl SceneBuilder<'_> {
     }
 }
 
-/// Smallest radius of a hull that is drawn with arms, in a picture 720 pixels high and in any \[pixels\]. A smaller
-/// hull is drawn as a ball.
-const MIN_HULL_PX: [f64; 2] = [9.0, 6.0];
+/// Radius of a hull below which it is drawn as a ball \[pixels\], and smallest radius with arms in a picture 720
+/// pixels high \[pixels\].
+const BALL_PX: f64 = 3.0;
+const MIN_HULL_PX: f64 = 13.0;
 /// Lengths relative to the arm: radii of the body and the mark ahead, distance of the mark, height of the rotors above
 /// the body's centre, width of an arm.
 const BODY: f64 = 0.3;
@@ -356,11 +405,13 @@ impl SceneBuilder<'_> {
         let place = self.vehicle(k)?;
         let radius_m = self.timeline.radius_m[k];
         let radius_px = radius_m * self.camera.project(place)?.px_per_m;
-        let [at_720, least] = MIN_HULL_PX;
-        if radius_px < least.max(at_720 * f64::from(self.view.unit_px())) {
+        if radius_px < BALL_PX {
             return None;
         }
-        let shape = self.timeline.shape.unwrap_or_else(|| QuadrotorShape::within(radius_m));
+        let enlarged = (MIN_HULL_PX * f64::from(self.view.unit_px()) / radius_px).max(1.0);
+        let mut shape = self.timeline.shape.unwrap_or_else(|| QuadrotorShape::within(radius_m));
+        shape.rotors_m = shape.rotors_m.map(|rotor_m| rotor_m * enlarged);
+        shape.rotor_radius_m *= enlarged;
         Some(Quadrotor { place, attitude, shape, arm_m: shape.arm_m() })
     }
 

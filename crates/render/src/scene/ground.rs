@@ -1,19 +1,24 @@
 //! Ground with its scale, and coordinate axes.
 
-use nalgebra::Vector3;
-
-use super::Line;
 use super::colour::{Colour, Theme};
 use super::compose::SceneBuilder;
 use super::labels::{LabelLayout, width};
+use super::{Annotation, Line};
 use tautline_core::text::decimals_of;
 
 /// Largest number of ground lines in each direction.
 const MAX_LINES: u32 = 60;
+/// Opacity of the lines of a ground that is an obstacle.
+const HARD: f32 = 0.45;
 /// Sine of the elevation below which the ground is seen edge-on.
 const EDGE_ON: f64 = 0.05;
-/// Length of the axes in units of the line distance.
-const AXIS: f64 = 1.0;
+/// Distance of numbers from the ground in units of the line distance.
+const OUTWARDS: f64 = 0.42;
+/// Number of positions along a line at which its number may be.
+const CROSSINGS: u32 = 240;
+/// Length of the axes in a picture 720 pixels high \[pixels\], and part of it below which an axis is not drawn.
+const TRIAD_PX: f32 = 30.0;
+const FORESHORTENED: f32 = 0.15;
 /// Colours of x, y and z on dark and on light background.
 const AXES: [[Colour; 3]; 2] = [
     [Colour::hex(0xE0_6C_75), Colour::hex(0x7F_C9_7F), Colour::hex(0x61_AF_EF)],
@@ -24,17 +29,16 @@ impl SceneBuilder<'_> {
     pub(super) fn ground(&self, lines: &mut Vec<Line>) {
         let ([low, high], step) = (self.extent.ground_m, self.extent.grid_m);
         let width_px = self.view.unit_px().max(0.7);
+        let theme = self.view.theme;
+        let colour = if self.extent.has_hard_ground { theme.obstacle().at(HARD) } else { theme.grid() };
         for (along, across) in [(0, 1), (1, 0)] {
             for k in 0..=steps(high[along] - low[along], step) {
                 let mut ends_m = [low, low];
                 ends_m[0][along] = low[along] + f64::from(k) * step;
                 ends_m[1] = ends_m[0];
                 ends_m[1][across] = high[across];
-                lines.push(Line::new(ends_m, self.view.theme.grid(), width_px));
+                lines.push(Line::new(ends_m, colour, width_px));
             }
-        }
-        for (axis, colour) in self.axes().into_iter().enumerate() {
-            lines.push(Line::new([low, low + Vector3::ith(axis, AXIS * step)], colour, 2.4 * width_px));
         }
     }
 
@@ -42,16 +46,13 @@ impl SceneBuilder<'_> {
         AXES[usize::from(self.view.theme != Theme::Dark)]
     }
 
-    /// Draws coordinates in metres along the two edges of the ground nearest to the camera, and the names of the axes.
+    /// Draws the directions of the axes in the lower right corner, and coordinates in metres where ground lines end or
+    /// leave the picture.
     pub(super) fn scale(&self, labels: &mut LabelLayout) {
-        let ([low, high], step, origin_m) = (self.extent.ground_m, self.extent.grid_m, self.extent.origin_m());
+        let [low, high] = self.extent.ground_m;
         let (size_px, soft) = (self.view.text_px(0.8), self.view.theme.soft_ink());
-        for (axis, colour) in self.axes().into_iter().enumerate() {
-            let tip = low + Vector3::ith(axis, (AXIS + 0.22) * step);
-            let foreshortened = self.camera.back[axis].abs() > 0.97;
-            if let Some(at) = self.camera.project(tip).filter(|_| !foreshortened) {
-                labels.put_if_free(at.at_px, [0.5, 0.5], size_px, colour, ["x", "y", "z"][axis]);
-            }
+        if self.view.has_legend() {
+            self.triad(labels);
         }
         // A number on a ball would look like its name.
         let covered_px = self.covered_areas_px();
@@ -61,7 +62,7 @@ impl SceneBuilder<'_> {
                 ((x - at_x).abs() - half[0]).max(0.0).hypot(((y - at_y).abs() - half[1]).max(0.0)) < *radius
             })
         };
-        let centre = (low + high) / 2.0;
+        let mut taken = None;
         for axis in 0..2 {
             let other = 1 - axis;
             // Edge-on there is no edge to write along.
@@ -70,37 +71,88 @@ impl SceneBuilder<'_> {
             {
                 continue;
             }
-            let edge = [low[other], high[other]].into_iter().max_by(|&a, &b| {
-                let height = |at: f64| {
-                    let mut point = centre;
-                    point[other] = at;
-                    self.camera.project(point).map_or(f64::NEG_INFINITY, |projected| projected.at_px[1])
-                };
-                height(a).total_cmp(&height(b))
-            });
-            let Some(edge) = edge else { continue };
-            let outwards = if edge > centre[other] { 1.0 } else { -1.0 };
-            // Edge-on the numbers are below the line of the ground.
-            let (anchor, below_px) = if self.camera.back.z.abs() < EDGE_ON {
-                ([0.5, 0.0], 0.4 * f64::from(size_px))
-            } else {
-                ([0.5; 2], 0.0)
+            // The lower of the two edges.
+            let height = |edge: f64| {
+                let mut point = (low + high) / 2.0;
+                point[other] = edge;
+                self.camera.project(point).map_or(f64::INFINITY, |projected| projected.at_px[1])
             };
+            let is_high = height(high[other]) > height(low[other]);
             // Only the last number that fits has the unit.
             let mut unit = " m";
-            for k in (0..=steps(high[axis] - low[axis], step)).rev() {
-                let mut point = low;
-                point[axis] += f64::from(k) * step;
-                point[other] = edge + outwards * 0.42 * step;
-                let text = format!("{}{unit}", format_multiple(point[axis] + origin_m[axis], step));
-                let Some(at) = self.camera.project(point) else { continue };
-                let [x, y] = at.at_px;
-                let middle = [x, y + below_px + (0.5 - f64::from(anchor[1])) * f64::from(size_px)];
-                if !is_covered(middle, &text) && labels.put_if_free([x, y + below_px], anchor, size_px, soft, &text) {
+            for (at, number) in self.numbers(axis, is_high, size_px, &mut taken) {
+                let text = format!("{number}{unit}");
+                if !is_covered(at, &text) && labels.put_if_free(at, [0.5; 2], size_px, soft, &text) {
                     unit = "";
                 }
             }
         }
+    }
+
+    /// Returns the coordinates of ground lines across an axis, from the largest one, with the middles of their texts
+    /// \[pixels\]. The texts are beyond the ends of the lines, or where the lines leave the picture. All are at one
+    /// side of the picture that is not taken.
+    fn numbers(&self, axis: usize, is_high: bool, size_px: f32, taken: &mut Option<usize>) -> Vec<([f64; 2], String)> {
+        let ([low, high], step, origin_m) = (self.extent.ground_m, self.extent.grid_m, self.extent.origin_m());
+        let other = 1 - axis;
+        let (from, to) = if is_high { (high[other], low[other]) } else { (low[other], high[other]) };
+        let from = from + OUTWARDS * step * (from - to).signum();
+        // Edge-on the numbers are below the line of the ground.
+        let is_edge_on = self.camera.back.z.abs() < EDGE_ON;
+        let below_px = if is_edge_on { 0.9 * f64::from(size_px) } else { 0.0 };
+        let area = self.view.area(self.extent.has_violations);
+        let [width_px, height_px] = area.size_px.map(f64::from);
+        let [top, bottom] = area.texts_px;
+        let bottom = if is_edge_on { 0.0 } else { bottom };
+        let number = |k: u32| {
+            let mut point = low;
+            point[axis] += f64::from(k) * step;
+            let text = format_multiple(point[axis] + origin_m[axis], step);
+            // Any number may get the unit.
+            let half = f64::from(width(size_px, &format!("{text} m")) + 0.6 * size_px) / 2.0;
+            let line = f64::from(size_px);
+            let place = |n: u32| {
+                point[other] = from + (to - from) * f64::from(n) / f64::from(CROSSINGS);
+                let [x, y] = self.camera.project(point)?.at_px;
+                let at = [x, y + below_px];
+                // Distances from the sides of the free area.
+                let free_px =
+                    [at[0] - half, width_px - half - at[0], at[1] - top - line, height_px - bottom.max(line) - at[1]];
+                let side = (0..4).min_by(|&a, &b| free_px[a].total_cmp(&free_px[b])).filter(|_| n > 0);
+                free_px.iter().all(|&free_px| free_px >= 0.0).then_some((side, at))
+            };
+            let (side, at) = (0..=CROSSINGS).find_map(place)?;
+            Some((side, at, text))
+        };
+        let numbers: Vec<_> = (0..=steps(high[axis] - low[axis], step)).rev().filter_map(number).collect();
+        // Numbers at several sides of the picture would be taken for those of the other axis.
+        let count = |side| numbers.iter().filter(|(at, ..)| *at == side).count();
+        let sides = numbers.iter().map(|(side, ..)| *side).filter(|side| side.is_none() || side != taken);
+        let commonest = sides.max_by_key(|&side| count(side));
+        let kept = numbers.iter().filter(|(side, ..)| Some(*side) == commonest);
+        let numbers = kept.map(|(_, at, text)| (*at, text.clone())).collect();
+        *taken = commonest.flatten();
+        numbers
+    }
+
+    /// Draws the directions of the axes.
+    fn triad(&self, labels: &mut LabelLayout) {
+        let (size_px, unit_px) = (self.view.text_px(0.8), self.view.unit_px());
+        let (arm, reach) = (TRIAD_PX * unit_px, TRIAD_PX * unit_px + size_px);
+        let middle = self.view.size_px.map(|side| side as f32 - reach - self.view.margin_px());
+        for (axis, colour) in self.axes().into_iter().enumerate() {
+            #[expect(clippy::cast_possible_truncation, reason = "pixels")]
+            let [x, y] = [self.camera.right[axis] as f32, -self.camera.up[axis] as f32];
+            if x.hypot(y) < FORESHORTENED {
+                continue;
+            }
+            let tip = [middle[0] + x * arm, middle[1] + y * arm];
+            labels.draw(Annotation::Stroke { ends_px: [middle, tip], colour, width_px: 2.0 * unit_px.max(0.5) });
+            let beyond = (arm + 0.6 * size_px) / arm;
+            let at_px = [middle[0] + x * arm * beyond, middle[1] + y * arm * beyond];
+            labels.put(at_px, [0.5, 0.5], size_px, colour, ["x", "y", "z"][axis]);
+        }
+        labels.reserve([middle.map(|at| at - 0.2 * arm), middle.map(|at| at + 0.2 * arm)]);
     }
 }
 

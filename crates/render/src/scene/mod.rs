@@ -13,11 +13,9 @@ mod geometry;
 mod ground;
 mod labels;
 
-#[cfg(feature = "window")]
-pub(super) use camera::TAN_HALF_VIEW;
-pub use camera::{Camera, CameraSpec, Lens, Orbit, Projected};
+pub use camera::{Adjustment, Camera, CameraSpec, Lens, Orbit, Projected};
 pub(super) use caption::metres;
-pub use colour::{Colour, Theme};
+pub use colour::{Colour, Colouring, Theme};
 pub use compose::{Layers, View};
 pub use extent::Extent;
 #[cfg(test)]
@@ -168,7 +166,15 @@ impl Scene {
     /// A picture of nothing.
     #[cfg(feature = "window")]
     pub(crate) fn blank(size_px: [u32; 2]) -> Self {
-        Self::empty(Camera::framing(&CameraSpec::Iso, &[], size_px), [0.1, 1.0], Theme::Dark.background())
+        Self::empty(
+            Camera::orbiting(
+                Orbit { azimuth_deg: 0.0, elevation_deg: 0.0, distance_m: 1.0 },
+                Vector3::zeros(),
+                size_px,
+            ),
+            [0.1, 1.0],
+            Theme::Dark.background(),
+        )
     }
 }
 

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::*;
 use crate::timeline::Timeline;
+use tautline_audit::Status;
 use tautline_core::record::{Event, Sample};
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm, row};
 use tautline_laws::formation::Formation;
@@ -64,7 +65,9 @@ fn camera(text: &str) -> View {
 #[test]
 fn every_vehicle_is_in_the_list_once_for_any_camera() {
     let timeline = timeline();
-    for text in ["iso", "top", "front", "side", "closest", "follow:3", "10,80,5", "200,-30,100"] {
+    for text in
+        ["auto", "perspective", "top", "front", "side", "closest", "follow", "follow:3", "10,80,5", "200,-30,100"]
+    {
         let scene = scene(&timeline, 2.0, &camera(text));
         assert_eq!((scene.balls.len(), scene.shells.len()), (4, 4), "{text}");
         assert!(scene.balls.iter().all(|ball| ball.radius_m == 0.25), "{text}");
@@ -75,7 +78,7 @@ fn every_vehicle_is_in_the_list_once_for_any_camera() {
 #[test]
 fn shells_are_sorted_along_every_line_of_sight() {
     for (text, ratio) in
-        ["iso", "front", "40,20,9"].into_iter().flat_map(|text| [1.0, 3.0, 0.5].map(|ratio| (text, ratio)))
+        ["perspective", "front", "40,20,9"].into_iter().flat_map(|text| [1.0, 3.0, 0.5].map(|ratio| (text, ratio)))
     {
         let metric = Metric::of_ratio(ratio);
         let timeline = timeline_in(metric);
@@ -148,6 +151,89 @@ fn a_violation_between_samples_shows_the_audited_separation() {
     assert!(words(&scene).contains(&banner) && words(&scene).contains(&label), "{:?}", words(&scene));
     let closest = words(&scene).into_iter().find(|words| words.starts_with("closest so far")).expect("a caption");
     assert!(closest.starts_with("closest so far 1.250 m, vehicles 3-4 at 8.30 s"), "{closest}");
+}
+
+#[test]
+fn label_banner_and_caption_show_the_number_of_the_judge() {
+    // A sample at the same time has a larger distance of the pair than the judge.
+    let timeline = timeline();
+    let violation = timeline.log.violations().of_vehicles().next().expect("a violation");
+    let scene = scene(&timeline, violation.min_at_s, &View::default());
+    let number = metres(violation.min_m);
+    let said = words(&scene);
+    assert!(said.contains(&number.as_str()), "{number}: {said:?}");
+    let with_number = |start: &str| said.iter().any(|text| text.starts_with(start) && text.contains(&number));
+    assert!(with_number("VIOLATION") && with_number("closest so far"), "{number}: {said:?}");
+}
+
+#[test]
+fn the_last_picture_has_the_final_verdict() {
+    let clear = |status: Option<Status>| {
+        let start = Swarm::at_rest(Rows::from_row_slice(&[0.0, 0.0, 1.0, 3.0, 0.0, 1.0]));
+        let mut timeline = Timeline::new("two", 2);
+        timeline.delta_m = Some(1.0);
+        for time_s in [0.0, 4.0] {
+            timeline.take(&Sample::new(time_s, 0, &start, &Rows::zeros(2)));
+        }
+        timeline.status = status;
+        let said = |time_s: f64| {
+            let scene = scene(&timeline, time_s, &View::default());
+            words(&scene)
+                .into_iter()
+                .rev()
+                .find(|text| text.contains("clear") || text.contains("undecided"))
+                .map(str::to_owned)
+        };
+        [said(2.0), said(4.0)].map(|text| text.expect("a verdict"))
+    };
+    assert_eq!(clear(Some(Status::Clear)), ["clear so far", "clear from 0.00 s to 4.00 s"]);
+    assert_eq!(clear(Some(Status::Undecided)), ["clear so far", "undecided"]);
+    assert_eq!(clear(None), ["clear so far"; 2], "the flight goes on");
+}
+
+#[test]
+fn only_the_part_of_a_trail_in_violation_is_red() {
+    let timeline = timeline();
+    let trails = View { layers: Layers { trails: true, ..Layers::NONE }, ..View::default() };
+    let scene = scene(&timeline, 10.0, &trails);
+    let alarm = Theme::Dark.alarm().rgba;
+    let red = scene.lines.iter().filter(|line| line.colours[0].rgba[..3] == alarm[..3]);
+    let length_m = |line: &Line| f64::from(line.ends_m[1][0] - line.ends_m[0][0]);
+    let red_m: f64 = red.map(length_m).sum();
+    // Two vehicles at 1 m/s for two seconds.
+    assert!((red_m - 4.0).abs() < 1e-3, "{red_m} m");
+}
+
+#[test]
+fn cameras_frame_all_vehicles_between_the_texts() {
+    let timeline = timeline();
+    let area = View::default().area(true);
+    for text in ["auto", "perspective", "top", "front", "side", "follow"] {
+        for time_s in [0.0, 5.0, 10.0] {
+            let scene = scene(&timeline, time_s, &camera(text));
+            for ball in &scene.balls {
+                let at = scene.camera.project(Vector3::from(ball.centre_m.map(f64::from))).expect("ahead").at_px;
+                let [top, bottom] = [area.texts_px[0], 720.0 - area.texts_px[1]];
+                assert!((0.0..1280.0).contains(&at[0]) && (top..bottom).contains(&at[1]), "{text}, {time_s} s: {at:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn no_vehicle_is_under_the_texts() {
+    let timeline = timeline();
+    // A camera near a vehicle sees others behind the caption.
+    for (text, has_band) in [("-90,20,4", true), ("perspective", false)] {
+        let scene = scene(&timeline, 0.0, &camera(text));
+        let band = scene.annotations.iter().any(|annotation| match annotation {
+            Annotation::Box { corners_px: [[left, _], [right, _]], colour, .. } => {
+                *left == 0.0 && *right == 1280.0 && *colour == Theme::Dark.background()
+            }
+            _ => false,
+        });
+        assert_eq!(band, has_band, "{text}");
+    }
 }
 
 #[test]
@@ -250,7 +336,7 @@ fn the_closest_pair_is_named_first_and_few_are_labelled() {
         timeline.note(&Event::ViolationBegan { pair: Pair::new(i, j), time_s: 1.0 });
     }
     let scene = scene(&timeline, 5.0, &View::default());
-    let banner = "VIOLATION  vehicles 1-2 1.500 m apart at 5.00 s, delta 2.000 m and 5 more";
+    let banner = "VIOLATION  vehicles 1-2 1.500 m apart, delta 2.000 m and 5 more";
     assert!(words(&scene).contains(&banner), "{:?}", words(&scene));
     let labels = words(&scene).iter().filter(|text| text.ends_with(".000 m") || text.ends_with(".500 m")).count();
     assert!((1..=3).contains(&labels), "{:?}", words(&scene));
@@ -288,15 +374,16 @@ fn a_vehicle_too_small_to_see_is_a_dot() {
 #[test]
 fn the_scale_is_below_the_ground_edge_on_and_its_last_number_has_the_unit() {
     let timeline = timeline();
-    for text in ["iso", "front", "side", "top"] {
+    for text in ["perspective", "front", "side", "top"] {
         let scene = scene(&timeline, 2.0, &camera(text));
         let unit = words(&scene).iter().filter(|text| text.ends_with(" m") && !text.contains('.')).count();
         assert!((1..=2).contains(&unit), "{text}: {:?}", words(&scene));
     }
-    let front = scene(&timeline, 2.0, &camera("front"));
+    let layers = Layers { ground: true, ..Layers::NONE };
+    let front = scene(&timeline, 2.0, &View { layers, ..camera("front") });
     let ground = front.camera.project(Extent::of(&timeline).ground_m[0]).expect("ahead").at_px[1];
     let numbers = front.annotations.iter().filter_map(|annotation| match annotation {
-        Annotation::Words { at_px, anchor: [_, 0.0], text, .. }
+        Annotation::Words { at_px, anchor: [0.5, 0.5], text, .. }
             if text.trim_end_matches(" m").parse::<f64>().is_ok() =>
         {
             Some(at_px[1])
@@ -517,8 +604,8 @@ mod quadrotors {
     #[test]
     fn a_small_vehicle_or_one_without_attitude_is_a_ball() {
         let level = timeline(Some(UnitQuaternion::identity()));
-        let small = scene(&level, [64, 36]);
-        let unknown = scene(&timeline(None), [64, 36]);
+        let small = scene(&level, [28, 16]);
+        let unknown = scene(&timeline(None), [28, 16]);
         assert_eq!((small.balls, small.discs.len(), small.lines.len()), (unknown.balls, 0, 0));
         let large = scene(&timeline(None), [1280, 720]);
         assert_eq!((large.balls.len(), large.discs.len(), large.lines.len()), (2, 0, 0));

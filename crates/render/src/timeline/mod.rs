@@ -6,7 +6,7 @@ use std::sync::Arc;
 use nalgebra::Vector3;
 
 use crate::error::{RenderError, check_lengths};
-use tautline_audit::{ObjectPair, Violation};
+use tautline_audit::{ObjectPair, Status, Violation};
 use tautline_core::record::{Event, Sample};
 use tautline_laws::space::Metric;
 use tautline_recordings::mcap::{Entry, McapRecording, StoredAudit};
@@ -78,6 +78,8 @@ pub struct Timeline {
     pub notes: Vec<String>,
     /// Motion, closest approaches and violations.
     pub log: Arc<FlightLog>,
+    /// Status of the whole flight, once it was judged to its end.
+    pub(crate) status: Option<Status>,
     /// Time from which on the audit is undecided \[s\].
     pub(crate) undecided_s: Option<f64>,
     /// Whether the recording has a radius for every vehicle; without delta the radii are the limits.
@@ -101,6 +103,7 @@ impl Timeline {
             plan: None,
             notes: Vec::new(),
             log: Arc::default(),
+            status: None,
             undecided_s: None,
             by_radii: false,
             assumes_straight: false,
@@ -129,6 +132,12 @@ impl Timeline {
         }
     }
 
+    /// Returns the flight with the status of its audit, which the last picture shows.
+    #[must_use]
+    pub fn judged(self, status: Status) -> Self {
+        Self { status: Some(status), ..self }
+    }
+
     /// Reads a recording of this program. If its scenario cannot be read, formation and graph are unknown.
     ///
     /// The result may have no keyframes.
@@ -153,7 +162,15 @@ impl Timeline {
                 Entry::Event(event) => timeline.note(&event),
             }
         }
-        if let StoredAudit::AsWritten(audit) = recording.stored_audit()
+        let stored = recording.stored_audit();
+        if let StoredAudit::AsWritten(audit) = &stored {
+            timeline.status = match audit.status.as_str() {
+                "clear" => Some(Status::Clear),
+                "violation" => Some(Status::Violation),
+                _ => Some(Status::Undecided),
+            };
+        }
+        if let StoredAudit::AsWritten(audit) = stored
             && let Some(closest) = audit.closest.iter().find(|approach| approach.other_vehicle > 0)
         {
             // The audit of ellipsoids counts in half axes, and its limit is 2. The log counts in units of delta.
@@ -193,6 +210,12 @@ impl Timeline {
     ) -> impl Iterator<Item = (&Violation<ObjectPair>, [usize; 2])> {
         let until_s = self.until_s(time_s);
         self.log.violations().of_obstacles().filter(move |(found, _)| found.from_s <= until_s)
+    }
+
+    /// Returns whether the flight has a violation so far.
+    pub(crate) fn has_violations(&self) -> bool {
+        let violations = self.log.violations();
+        violations.of_vehicles().next().is_some() || violations.of_obstacles().next().is_some()
     }
 
     fn until_s(&self, time_s: f64) -> f64 {

@@ -227,6 +227,7 @@ impl Timeline {
         let violations = outcome.violations.into_iter().filter(|found| is_judged && found.pair.vehicles().is_some());
         log.judge(closest, Violations::judged(violations.collect()));
         if is_judged {
+            self.status = Some(outcome.status);
             let undecided = outcome.undecided.iter().map(|undecided| undecided.from_s);
             let open_s = undecided.chain(outcome.gaps.iter().map(|gap| gap.from_s)).reduce(f64::min);
             let open_s = open_s.or((outcome.status == Status::Undecided).then_some(f64::NEG_INFINITY));

@@ -23,7 +23,9 @@ use open_window::OpenWindow;
 use panels::Viewport;
 pub use player::LiveUpdate;
 use player::Player;
+pub use state::WINDOW_KEYS;
 use state::WindowState;
+use tautline_report::flight_log::Frame;
 
 /// Longest time between two pictures that is played \[s\], so that a window that was hidden does not jump.
 const LONGEST_PAUSE_S: f64 = 0.1;
@@ -132,14 +134,14 @@ impl App {
             player.receive();
             player.advance(passed_s);
             open.update_extent(&player.timeline);
-            if state.framed {
-                state.frame(&open.extent, open.picture_px);
-            }
-            let (view, camera) = (state.view(open.picture_px), state.camera(open.picture_px));
-            let drawn = player.timeline.log.at(player.time_s).map(|frame| {
+            let [first_s, last_s] = player.timeline.log.range_s();
+            let view = state.view(open.picture_px, last_s - first_s);
+            let compose = |frame: Frame| {
+                let camera = open.extent.camera(&player.timeline, &frame, &view)?;
                 let scene = Scene::compose(&player.timeline, &open.extent, &frame, &view, camera);
-                (frame, scene)
-            });
+                Ok::<_, RenderError>((frame, scene))
+            };
+            let drawn = player.timeline.log.at(player.time_s).map(compose).transpose()?;
             if let Some((_, scene)) = &drawn {
                 open.show_picture(scene)?;
             }

@@ -12,7 +12,7 @@ use winit::event_loop::ActiveEventLoop;
 use winit::window::Window;
 
 use crate::error::RenderError;
-use crate::gpu::{AdapterChoice, Gpu, Renderer, instance, lost, unusable};
+use crate::gpu::{AdapterChoice, Gpu, GpuRenderer, instance, lost, unusable};
 use crate::scene::{Extent, Scene};
 use crate::timeline::Timeline;
 
@@ -25,7 +25,7 @@ const MIN_PX: u32 = 16;
 pub(super) struct OpenWindow {
     painter: Painter,
     panels: RenderState,
-    renderer: Renderer,
+    renderer: GpuRenderer,
     pub(super) input: egui_winit::State,
     pub(super) extent: Extent,
     /// Number of keyframes in the extent.
@@ -62,7 +62,7 @@ impl OpenWindow {
         let scale = window.scale_factor() as f32;
         let side = Some(gpu.largest_px as usize);
         let input = egui_winit::State::new(context, ViewportId::ROOT, &window, Some(scale), None, side);
-        let mut renderer = Renderer::on(gpu);
+        let mut renderer = GpuRenderer::on(gpu);
         let picture_px = clamped_size(window.inner_size().into(), &renderer);
         let view = &renderer.draw(&Scene::blank(picture_px), false)?.words_view;
         let nearest = wgpu::FilterMode::Nearest;
@@ -160,6 +160,6 @@ fn start(
     Ok((gpu, painter))
 }
 
-fn clamped_size(size_px: [u32; 2], renderer: &Renderer) -> [u32; 2] {
+fn clamped_size(size_px: [u32; 2], renderer: &GpuRenderer) -> [u32; 2] {
     size_px.map(|side| side.clamp(MIN_PX, renderer.gpu.largest_px))
 }

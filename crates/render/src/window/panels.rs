@@ -7,7 +7,7 @@ use egui::{
 use nalgebra::{UnitQuaternion, Vector3};
 
 use super::player::Player;
-use super::state::WindowState;
+use super::state::{WINDOW_KEYS, WindowState};
 use crate::gpu::paint;
 use crate::scene::{Extent, Projected, Scene, metres};
 use tautline_core::swarm::{Pair, row};
@@ -18,26 +18,10 @@ use tautline_sim::plan::Plan;
 const DRAG_TURN_DEG: f64 = 0.35;
 /// Largest number of neighbours that are listed for the picked vehicle.
 const MAX_NEIGHBOURS: usize = 8;
+/// Colour of violations and of delta.
+const ALARM: Color32 = Color32::from_rgb(0xE0, 0x30, 0x3C);
 /// Height of the help button \[points\].
 const HELP_HEIGHT: f32 = 28.0;
-
-/// Keys and their effects, for the help.
-const HELP: [(&str, &str); 14] = [
-    ("Space", "play, pause"),
-    ("Left, Right", "previous, next sample"),
-    ("Home, End", "start, end"),
-    ("N", "closest approach"),
-    ("- , +", "slower, faster"),
-    ("drag, W A S D", "turn the camera"),
-    ("right drag", "move the camera"),
-    ("wheel, Page Up, Page Down", "zoom"),
-    ("click, V", "pick a vehicle, the next vehicle"),
-    ("F, T", "frame everything, change theme"),
-    ("1 to 8", "shells, edges, trails, marks, ground, names, closest pair, caption"),
-    ("Tab", "next button"),
-    ("P", "save a picture in the working folder"),
-    ("H, Q", "this help, quit"),
-];
 
 /// Picture and its content.
 pub(super) struct Viewport<'a> {
@@ -119,7 +103,7 @@ fn sides(ui: &mut Ui, state: &mut WindowState, player: &Player, viewport: &Viewp
     ui.label(RichText::new("Layers").strong());
     ui.columns(2, |columns| {
         for (k, (name, shown)) in state.layers().into_iter().enumerate() {
-            columns[k % 2].checkbox(shown, format!("{} {name}", k + 1));
+            columns[k % 2].checkbox(shown, name);
         }
     });
     ui.separator();
@@ -154,19 +138,20 @@ fn controls(ui: &mut Ui, state: &mut WindowState, player: &mut Player) {
         ];
         for (button, what, key) in buttons {
             if ui.add(button).on_hover_text(what).clicked() {
-                state.press(key, player);
+                state.press(key, false, player);
             }
         }
         let [first_s, last_s] = player.timeline.log.range_s();
         let mut time_s = player.time_s;
         ui.spacing_mut().slider_width = (ui.available_width() - 230.0).max(60.0);
-        let slider = Slider::new(&mut time_s, first_s..=last_s.max(first_s + 1e-9))
-            .custom_formatter(|time_s, _| format!("{time_s:.2}"))
-            .suffix(" s");
-        if ui.add(slider).changed() {
+        let end_s = last_s.max(first_s + 1e-9);
+        let response = ui.add(Slider::new(&mut time_s, first_s..=end_s).show_value(false));
+        if response.changed() {
             player.playing = false;
             player.seek(time_s);
         }
+        marks(ui, response.rect, [first_s, end_s], player);
+        ui.label(format!("{:.2} s", player.time_s));
         if ui.small_button("-").on_hover_text("slower (-)").clicked() {
             player.change_speed(false);
         }
@@ -181,6 +166,30 @@ fn controls(ui: &mut Ui, state: &mut WindowState, player: &mut Player) {
     // The message line is always present, so that the picture keeps its size.
     ui.add(egui::Label::new(player.end_message.as_deref().or(state.message.as_deref()).unwrap_or(" ")).truncate());
     ui.add_space(2.0);
+}
+
+/// Draws marks on the time slider: a bar for each violation, a triangle at the closest approach.
+fn marks(ui: &Ui, slider: Rect, [first_s, last_s]: [f64; 2], player: &Player) {
+    // The handle stays within the slider.
+    let handle = slider.height() / 2.5;
+    let x = |time_s: f64| {
+        #[expect(clippy::cast_possible_truncation, reason = "points")]
+        let part = ((time_s - first_s) / (last_s - first_s)).clamp(0.0, 1.0) as f32;
+        slider.left() + handle + part * (slider.width() - 2.0 * handle)
+    };
+    let (painter, log) = (ui.painter(), &player.timeline.log);
+    let obstacles = log.violations().of_obstacles().map(|(found, _)| [found.from_s, found.to_s]);
+    for [from_s, to_s] in log.violations().of_vehicles().map(|found| [found.from_s, found.to_s]).chain(obstacles) {
+        let (from, to) = (x(from_s), x(to_s.min(last_s)).max(x(from_s) + 2.0));
+        let bar = Rect::from_min_max(pos2(from, slider.bottom() - 3.0), pos2(to, slider.bottom()));
+        painter.rect_filled(bar, 0.0, ALARM);
+    }
+    if let Some(closest) = log.closest() {
+        let (at, top) = (x(closest.time_s), slider.top());
+        let corners = vec![pos2(at - 4.0, top - 1.0), pos2(at + 4.0, top - 1.0), pos2(at, top + 5.0)];
+        let colour = ui.visuals().strong_text_color();
+        painter.add(egui::Shape::convex_polygon(corners, colour, Stroke::NONE));
+    }
 }
 
 /// Draws the state of a vehicle at a time.
@@ -249,7 +258,7 @@ fn describe_tension(plan: &Plan, pair: Pair, distance_m: f64, time_s: f64) -> St
 fn help(context: &egui::Context, open: &mut bool) {
     egui::Window::new("Keys and mouse").open(open).collapsible(false).resizable(false).show(context, |ui| {
         egui::Grid::new("help").num_columns(2).spacing([18.0, 4.0]).show(ui, |ui| {
-            for (keys, what) in HELP {
+            for (keys, what) in WINDOW_KEYS {
                 ui.label(RichText::new(keys).strong());
                 ui.label(what);
                 ui.end_row();
@@ -286,7 +295,7 @@ fn plot(ui: &mut Ui, player: &Player) {
         pos2(area.left() + x as f32 * area.width(), area.bottom() - y as f32 * area.height())
     };
     if let Some(delta_m) = delta_m {
-        let stroke = Stroke::new(1.5, Color32::from_rgb(0xE0, 0x30, 0x3C));
+        let stroke = Stroke::new(1.5, ALARM);
         painter.line_segment([at(first_s, delta_m), at(last_s, delta_m)], stroke);
         let font = egui::FontId::proportional(11.0);
         painter.text(at(last_s, delta_m), Align2::RIGHT_BOTTOM, format!("delta {delta_m} m "), font, stroke.color);

@@ -94,6 +94,22 @@ impl Player {
         self.time_s = time_s.clamp(first_s, last_s.max(first_s));
     }
 
+    /// Pauses at the worst instant of the next or previous violation.
+    pub(super) fn seek_violation(&mut self, is_next: bool) {
+        let (violations, now_s) = (self.timeline.log.violations(), self.time_s);
+        let obstacles = violations.of_obstacles().map(|(found, _)| found.min_at_s);
+        let worst_s = violations.of_vehicles().map(|found| found.min_at_s).chain(obstacles);
+        let found = if is_next {
+            worst_s.filter(|&at_s| at_s > now_s).min_by(f64::total_cmp)
+        } else {
+            worst_s.filter(|&at_s| at_s < now_s).max_by(f64::total_cmp)
+        };
+        if let Some(at_s) = found {
+            self.playing = false;
+            self.seek(at_s);
+        }
+    }
+
     /// Steps by a number of samples, forward or back.
     pub(super) fn step(&mut self, samples: isize) {
         self.playing = false;
@@ -171,6 +187,24 @@ mod tests {
         assert_eq!((player.time_s, player.playing), (0.0, false));
         player.step(100);
         assert_eq!(player.time_s, 2.0);
+    }
+
+    #[test]
+    fn violations_are_visited_in_order() {
+        use tautline_core::swarm::Pair;
+
+        let mut player = player();
+        for (from_s, to_s) in [(1.2, 1.4), (0.4, 0.6)] {
+            player.timeline.note(&Event::ViolationBegan { pair: Pair::new(0, 1), time_s: from_s });
+            player.timeline.note(&Event::ViolationEnded { pair: Pair::new(0, 1), time_s: to_s, min_m: 0.1 });
+        }
+        let mut visit = |is_next| {
+            player.seek_violation(is_next);
+            player.time_s
+        };
+        let visited = [true, true, true, false, false].map(&mut visit);
+        let expected = [0.5, 1.3, 1.3, 0.5, 0.5];
+        assert!(visited.iter().zip(expected).all(|(at, expected)| (at - expected).abs() < 1e-9), "{visited:?}");
     }
 
     #[test]

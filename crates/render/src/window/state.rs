@@ -1,25 +1,59 @@
 //! State of the window that the user controls, and keyboard input.
 
 use egui::{Key, Vec2};
-use nalgebra::Vector3;
 
 use super::player::Player;
-use crate::scene::{Camera, Extent, Layers, Orbit, TAN_HALF_VIEW, Theme, View};
+use crate::scene::{Adjustment, Camera, CameraSpec, Colouring, Layers, Theme, View};
 
 /// Rotation of the camera per key press \[degrees\].
 const KEY_TURN_DEG: f64 = 5.0;
 
+/// Limits of the zoom.
+const ZOOM: [f64; 2] = [1e-3, 1e3];
+/// Length of short trails relative to the flight.
+const SHORT_TRAIL: f64 = 0.1;
+
+/// Keys and mouse of the window with their effects.
+pub const WINDOW_KEYS: [(&str, &str); 19] = [
+    ("Space", "play, pause"),
+    ("Left, Right", "previous, next sample"),
+    ("Home, End", "start, end"),
+    ("Up, Down or +, -", "faster, slower"),
+    ("N", "closest approach"),
+    ("B, Shift+B", "next, previous violation"),
+    ("1, 2, 3", "perspective, top, front"),
+    ("F", "follow the picked vehicle or the swarm; again: the whole flight"),
+    ("T", "trails: whole, short, none"),
+    ("C", "colour by vehicle, speed, clearance"),
+    ("L", "labels"),
+    ("W, A, S, D or drag", "turn the camera"),
+    ("right drag", "move the camera"),
+    ("Page Up, Page Down or wheel", "zoom"),
+    ("click, V", "pick a vehicle, the next vehicle"),
+    ("M", "dark or light background"),
+    ("P", "save a picture in the working folder"),
+    ("H", "help"),
+    ("Q", "quit"),
+];
+
+/// Length of trails.
+#[derive(Clone, Copy, PartialEq)]
+enum Trails {
+    Whole,
+    Short,
+    None,
+}
+
 /// State of the window that the user controls.
-#[expect(clippy::struct_excessive_bools, reason = "each is on or off by itself")]
 pub(super) struct WindowState {
-    orbit: Orbit,
-    target_m: Vector3<f64>,
+    camera: CameraSpec,
+    adjustment: Adjustment,
     layers: Layers,
+    trails: Trails,
+    colouring: Colouring,
     pub(super) theme: Theme,
     pub(super) picked: Option<usize>,
     pub(super) help: bool,
-    /// Whether the camera frames the whole flight; a camera movement ends it.
-    pub(super) framed: bool,
     pub(super) message: Option<String>,
     /// Whether a picture is to be saved.
     pub(super) wants_picture: bool,
@@ -30,51 +64,56 @@ pub(super) struct WindowState {
 impl WindowState {
     pub(super) fn new(theme: Theme) -> Self {
         Self {
-            orbit: Orbit { azimuth_deg: 0.0, elevation_deg: 0.0, distance_m: 20.0 },
-            target_m: Vector3::zeros(),
+            camera: CameraSpec::Auto,
+            adjustment: Adjustment::NONE,
             layers: Layers::ALL,
+            trails: Trails::Whole,
+            colouring: Colouring::Vehicle,
             theme,
             picked: None,
             help: false,
-            framed: true,
             message: None,
             wants_picture: false,
             is_closing: false,
         }
     }
 
-    pub(super) fn view(&self, size_px: [u32; 2]) -> View {
-        View { theme: self.theme, size_px, layers: self.layers, ..View::default() }
+    /// Returns the view of a flight of this duration \[s\].
+    pub(super) fn view(&self, size_px: [u32; 2], duration_s: f64) -> View {
+        View {
+            camera: self.camera.clone(),
+            adjustment: self.adjustment,
+            colouring: self.colouring,
+            theme: self.theme,
+            size_px,
+            layers: Layers { trails: self.layers.trails && self.trails != Trails::None, ..self.layers },
+            trail_s: (self.trails == Trails::Short).then_some(SHORT_TRAIL * duration_s),
+            picked: self.picked,
+        }
     }
 
-    pub(super) fn camera(&self, size_px: [u32; 2]) -> Camera {
-        Camera::orbiting(self.orbit, self.target_m, size_px)
-    }
-
-    /// Frames the whole flight.
-    pub(super) fn frame(&mut self, extent: &Extent, size_px: [u32; 2]) {
-        (self.orbit, self.target_m) = extent.orbit(size_px);
+    /// Selects a camera and drops changes by hand.
+    fn look(&mut self, camera: CameraSpec) {
+        (self.camera, self.adjustment) = (camera, Adjustment::NONE);
     }
 
     pub(super) fn turn(&mut self, azimuth_deg: f64, elevation_deg: f64) {
-        self.orbit.azimuth_deg = (self.orbit.azimuth_deg + azimuth_deg).rem_euclid(360.0);
-        self.orbit.elevation_deg = (self.orbit.elevation_deg + elevation_deg).clamp(-90.0, 90.0);
-        self.framed = false;
+        let [azimuth, elevation] = &mut self.adjustment.turn_deg;
+        *azimuth = (*azimuth + azimuth_deg).rem_euclid(360.0);
+        *elevation = (*elevation + elevation_deg).clamp(-180.0, 180.0);
     }
 
     pub(super) fn approach(&mut self, factor: f64) {
-        self.orbit.distance_m = (self.orbit.distance_m * factor).clamp(1e-2, 1e7);
-        self.framed = false;
+        self.adjustment.zoom = (self.adjustment.zoom * factor).clamp(ZOOM[0], ZOOM[1]);
     }
 
     /// Moves the target with the mouse, in a picture of this height \[points\].
     pub(super) fn pan(&mut self, drag: Vec2, camera: &Camera, height: f32) {
-        let metres = 2.0 * TAN_HALF_VIEW * self.orbit.distance_m / f64::from(height.max(1.0));
-        self.target_m += (camera.up * f64::from(drag.y) - camera.right * f64::from(drag.x)) * metres;
-        self.framed = false;
+        let metres = 2.0 * camera.half_height_m() / f64::from(height.max(1.0));
+        self.adjustment.move_m += (camera.up * f64::from(drag.y) - camera.right * f64::from(drag.x)) * metres;
     }
 
-    /// Returns the layers with their names, in the order of their keys.
+    /// Returns the layers with their names.
     pub(super) fn layers(&mut self) -> [(&'static str, &mut bool); 8] {
         let layers = &mut self.layers;
         [
@@ -98,9 +137,11 @@ impl WindowState {
         let operates_focus = |key: Key| {
             matches!(key, Key::Space | Key::Enter | Key::ArrowLeft | Key::ArrowRight | Key::Escape) && focus.is_some()
         };
-        let pressed: Vec<Key> = context.input(|input| {
+        let pressed: Vec<(Key, bool)> = context.input(|input| {
             let pressed = |event: &egui::Event| match event {
-                egui::Event::Key { key, pressed: true, modifiers, .. } if !modifiers.command => Some(*key),
+                egui::Event::Key { key, pressed: true, modifiers, .. } if !modifiers.command => {
+                    Some((*key, modifiers.shift))
+                }
                 _ => None,
             };
             input.events.iter().filter_map(pressed).collect()
@@ -109,11 +150,12 @@ impl WindowState {
         if !pressed.is_empty() {
             self.message = None;
         }
-        pressed.into_iter().filter(|&key| !operates_focus(key)).for_each(|key| self.press(key, player));
+        let acting = pressed.into_iter().filter(|(key, _)| !operates_focus(*key));
+        acting.for_each(|(key, shift)| self.press(key, shift, player));
     }
 
     /// Performs the action of a key or of its button.
-    pub(super) fn press(&mut self, key: Key, player: &mut Player) {
+    pub(super) fn press(&mut self, key: Key, shift: bool, player: &mut Player) {
         match key {
             Key::Space => player.toggle(),
             Key::ArrowLeft => player.step(-1),
@@ -126,8 +168,26 @@ impl WindowState {
                     player.seek(closest.time_s);
                 }
             }
-            Key::Minus => player.change_speed(false),
-            Key::Plus | Key::Equals => player.change_speed(true),
+            Key::B => player.seek_violation(!shift),
+            Key::ArrowDown | Key::Minus => player.change_speed(false),
+            Key::ArrowUp | Key::Plus | Key::Equals => player.change_speed(true),
+            Key::Num1 => self.look(CameraSpec::Perspective),
+            Key::Num2 => self.look(CameraSpec::Top),
+            Key::Num3 => self.look(CameraSpec::Front),
+            Key::F if matches!(self.camera, CameraSpec::Follow(_)) => self.look(CameraSpec::Auto),
+            Key::F => {
+                let picked = self.picked.and_then(|picked| player.timeline.vehicles.get(picked).cloned());
+                self.look(CameraSpec::Follow(picked));
+            }
+            Key::T => {
+                self.trails = match self.trails {
+                    Trails::Whole => Trails::Short,
+                    Trails::Short => Trails::None,
+                    Trails::None => Trails::Whole,
+                }
+            }
+            Key::C => self.colouring = next(&Colouring::ALL, self.colouring),
+            Key::L => self.layers.labels = !self.layers.labels,
             Key::A => self.turn(-KEY_TURN_DEG, 0.0),
             Key::D => self.turn(KEY_TURN_DEG, 0.0),
             Key::W => self.turn(0.0, KEY_TURN_DEG),
@@ -138,21 +198,18 @@ impl WindowState {
                 let next = self.picked.map_or(0, |picked| picked + 1);
                 self.picked = (next < player.timeline.count()).then_some(next);
             }
-            Key::F => self.framed = true,
-            Key::T => {
-                let at = Theme::ALL.iter().position(|(_, theme)| *theme == self.theme).unwrap_or(0);
-                self.theme = Theme::ALL[(at + 1) % Theme::ALL.len()].1;
-            }
+            Key::M => self.theme = next(&Theme::ALL, self.theme),
             Key::P => self.wants_picture = true,
             Key::H | Key::F1 | Key::Questionmark => self.help = !self.help,
             Key::Escape if self.help => self.help = false,
             Key::Q | Key::Escape => self.is_closing = true,
-            digit => {
-                if let Ok(number @ 1..=8) = digit.name().parse::<usize>() {
-                    let (_, shown) = &mut self.layers()[number - 1];
-                    **shown = !**shown;
-                }
-            }
+            _ => {}
         }
     }
+}
+
+/// Returns the choice after this one; the first follows the last.
+fn next<T: Copy + PartialEq, const N: usize>(all: &[(&str, T); N], this: T) -> T {
+    let at = all.iter().position(|(_, choice)| *choice == this).unwrap_or(N - 1);
+    all[(at + 1) % N].1
 }

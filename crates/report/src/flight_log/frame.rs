@@ -52,13 +52,14 @@ impl Frame {
 
     /// Returns the distance of a pair \[m\], scaled with ellipsoids; NaN if a vehicle of the pair is absent.
     ///
-    /// If the judge measured the pair at exactly this time, the distance is that of the judge. Otherwise it is the
-    /// distance on straight lines between samples, but at least the closest approach that the judge measured around
-    /// this time.
+    /// If the judge measured the pair at exactly this time, the distance is the smallest one of the judge. Otherwise
+    /// it is the distance on straight lines between samples, but at least the closest approach that the judge measured
+    /// around this time.
     #[must_use]
     pub fn distance_m(&self, pair: Pair) -> f64 {
-        if let Some(measured) = self.measured.iter().find(|measured| measured.pair == pair) {
-            return measured.separation_m;
+        let measured = self.measured.iter().filter(|measured| measured.pair == pair);
+        if let Some(measured_m) = measured.map(|measured| measured.separation_m).reduce(f64::min) {
+            return measured_m;
         }
         let drawn_m = apart(&self.positions_m, pair, self.metric).norm();
         self.around.map_or(drawn_m, |around| if drawn_m < around.separation_m { around.separation_m } else { drawn_m })

@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::Failure;
 use crate::flight_log::FlightLog;
+use crate::report::Report;
 use crate::report::page::Picture;
 use tautline_recordings::mcap::ExtraTopic;
 use tautline_sim::scenario::Scenario;
@@ -93,6 +94,7 @@ pub trait Pictures: Sync {
     fn draw(
         &self,
         scenario: &Scenario,
+        report: &Report,
         log: &Arc<FlightLog>,
         folder: &Path,
         monitor: &dyn Monitor,
@@ -108,6 +110,7 @@ impl Pictures for () {
     fn draw(
         &self,
         _scenario: &Scenario,
+        _report: &Report,
         _log: &Arc<FlightLog>,
         _folder: &Path,
         _monitor: &dyn Monitor,

@@ -115,7 +115,7 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
     if request.verify && report.run.ended_early.as_deref() != Some(INTERRUPTED) {
         report.verification = Some(threads.install(|| verify(scenario, &report))?);
     }
-    let pictures = pictures.draw(scenario, &log, folder.path(), monitor)?;
+    let pictures = pictures.draw(scenario, &report, &log, folder.path(), monitor)?;
     let figures = if request.figures { figures(scenario, &log, &report) } else { Vec::new() };
     let replay = replay_of_run(scenario, &log, &report, PAGE_BYTES);
     let page = RunPage {
