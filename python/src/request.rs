@@ -75,6 +75,7 @@ impl ReadOptions {
                 return Err(wrong_input(format!("scale: one number or three are needed, not {}", numbers.len())));
             }
         };
+        let given = layout.clone().unwrap_or_default();
         let layout = layout.map(|layout| ArrayAxis::layout_of(&layout)).transpose();
         Ok(Self(read::ReadOptions {
             format: choice("format", format, &formats())?,
@@ -88,7 +89,7 @@ impl ReadOptions {
             one_vehicle,
             starts: start.into_iter().collect(),
             columns,
-            layout: layout.map_err(|error| wrong_input(format!("layout: {error}")))?,
+            layout: layout.map_err(|error| wrong_input(format!("layout: {error}, got `{given}`")))?,
             frame,
             topics: topic,
             origin,

@@ -377,7 +377,7 @@ fn a_table_is_printed_unless_quiet() {
     let headings =
         ["Law ", "Violated ", "Unknown ", "Reached ", "Time to reach, median [s] ", "Clearance, smallest [m]"];
     let table: Vec<_> =
-        out.lines().skip_while(|line| !line.starts_with("Law ")).take_while(|line| *line != "").collect();
+        out.lines().skip_while(|line| !line.starts_with("Law ")).take_while(|line| !line.is_empty()).collect();
     assert!(headings.iter().all(|heading| table[0].contains(heading)), "{out}");
     assert_eq!(out.lines().filter(|line| line.starts_with("laplacian ")).count(), 1, "{out}");
     assert!(table[1].starts_with("edge-tension ") && table[2].starts_with("laplacian "), "{out}");
