@@ -170,25 +170,7 @@ fn encode(picture: &Picture, max_bytes: usize) -> Result<[Vec<u8>; 2], RenderErr
 
 #[cfg(test)]
 mod tests {
-    use tautline_report::run::run;
-    use tautline_sim::scenario::Source;
-
     use super::*;
-
-    #[test]
-    fn a_flight_until_its_closest_approach_shows_the_distance_of_the_judge() {
-        for name in ["swap", "pentagon-laplacian"] {
-            let mut scenario = Scenario::read(&Source::Builtin(name.to_owned()), &[]).expect("built in");
-            scenario.time.duration_s = 10.0;
-            let mut log = FlightLog::of(&scenario);
-            run(&scenario, &mut log).expect("a flight");
-            let closest = log.closest().expect("two vehicles");
-            let timeline = fly_until(&scenario, closest.time_s).expect("a flight");
-            let (pair, distance_m) = timeline.log.at(closest.time_s).expect("a frame").nearest.expect("a pair");
-            assert_eq!(pair, closest.pair, "{name}");
-            assert_eq!(metres(distance_m), metres(closest.separation_m), "{name}");
-        }
-    }
 
     #[test]
     fn pictures_of_a_run_have_known_names() {
