@@ -51,12 +51,14 @@ const COLOURS = ["sky", "ink", "floor", "shell", "thing", "alarm", "push", "rest
   "c6"];
 // Layers in the order of their keys 1 to 8.
 const LAYERS = ["shells", "links", "trails", "slots", "ground", "names", "closest", "caption"];
-const HELP = [["Space", "play or pause"], ["Left, Right", "previous or next instant; with Shift one second"],
-  ["Home, End", "start, end"], ["N", "closest approach"], ["B, Shift+B", "next, previous violation"],
-  ["U", "next undecided time"], ["-, +", "slower, faster"], ["Drag, W A S D", "turn"],
-  ["Right drag", "move"], ["Wheel, Page Up, Page Down", "zoom"], ["Click, V", "pick a vehicle"],
-  ["F", "show everything"], ["T", "change the theme"], ["1 to 8", LAYERS.join(", ")], ["P", "save a picture"],
-  ["H", "this help"]];
+const HELP = [["Space", "play, pause"], ["Left, Right", "previous, next instant; with Shift one second"],
+  ["Home, End", "start, end"], ["Up, Down or +, -", "faster, slower"], ["N", "closest approach"],
+  ["B, Shift+B", "next, previous violation"], ["U", "next undecided time"], ["1, 2, 3", "perspective, top, front"],
+  ["F", "follow the picked vehicle or the swarm; again: the whole flight"], ["T", "trails: whole, short, none"],
+  ["C", "colour by vehicle, speed, clearance"], ["L", "labels"], ["W, A, S, D or drag", "turn the camera"],
+  ["right drag", "move the camera"], ["Page Up, Page Down or wheel", "zoom"],
+  ["click, V", "pick a vehicle, the next vehicle"], ["M", "dark or light background"], ["P", "save a picture"],
+  ["H", "help"]];
 
 const bytes = (/** @type {Packed} */ packed) => Uint8Array.from(atob(packed), letter => letter.charCodeAt(0)).buffer;
 /** @param {number[]} colour Red, green and blue from 0 to 255. @param {number} [alpha] */
@@ -191,8 +193,8 @@ const play = (root, data) => {
     ["Next violation", "B", "violation", 1], ["Next undecided", "U", "undecided", 1]])
     .filter(([,, kind]) => moments.some(moment => moment.kind === kind))
     .map(([text, keys, kind, way]) => button(text, keys, () => jump(kind, way)));
-  const views = [button("Top", "", () => view(-UPRIGHT, UPRIGHT)), button("Front", "", () => view(-UPRIGHT, 0)),
-    button("Perspective", "", () => view(...slant)), button("Show all", "F", () => { fit(); ask(); })];
+  const views = [button("Perspective", "1", () => look(0)), button("Top", "2", () => look(1)), button("Front", "3", () => look(2)),
+    button("Show all", "", () => { fit(); ask(); })];
   /** @type {Object<string, boolean>} */
   const shows = { shells: !!data.shell_m, links: !!data.links, trails: !data.holds, slots: data.axes !== null,
     ground: true, names: true, closest: count > 1, caption: true };
@@ -347,6 +349,8 @@ const play = (root, data) => {
   };
   /** Shows everything from a direction [rad]. @param {number} to @param {number} lift */
   const view = (to, lift) => { [yaw, pitch] = [to, lift]; fit(); ask(); };
+  /** Shows everything in perspective (0), from the top (1) or from the front (2). @param {number} k */
+  const look = k => view(.../** @type {[number, number][]} */ ([slant, [-UPRIGHT, UPRIGHT], [-UPRIGHT, 0]])[k]);
   /** Centre of the vehicles that are there [m]. */
   const centre = () => {
     const all = radius.map((_, k) => place(k)).filter(at => at[3]);
@@ -439,6 +443,11 @@ const play = (root, data) => {
   }, { passive: false });
   const faster = (/** @type {number} */ by) =>
     speeds.selectedIndex = clamp(speeds.selectedIndex + by, 0, SPEEDS.length - 1);
+  /** Chooses the next entry of a list. @param {HTMLSelectElement} list */
+  const cycle = list => {
+    list.selectedIndex = (list.selectedIndex + 1) % list.length;
+    list.dispatchEvent(new Event("change"));
+  };
   /** Changes the theme of the page. */
   const theme = () => {
     const choice = /** @type {HTMLSelectElement | null} */ (document.querySelector(".theme select"));
@@ -456,17 +465,28 @@ const play = (root, data) => {
   };
   /** @type {Object<string, (shift: boolean) => void>} */
   const keys = {
-    " ": toggle, Home: () => go(first), End: () => go(last), n: () => jump("closest", 1), f: fit,
+    " ": toggle, Home: () => go(first), End: () => go(last), n: () => jump("closest", 1),
     b: shift => jump("violation", shift ? -1 : 1), u: shift => jump("undecided", shift ? -1 : 1),
+    1: () => look(0), 2: () => look(1), 3: () => look(2), c: () => cycle(colouring), m: theme,
+    l: () => boxes.get("names")?.click(), f: () => {
+      if (follow.value) return fit();
+      follow.value = picked === null ? "swarm" : "picked";
+      approach();
+    }, t: () => {
+      const box = boxes.get("trails");
+      if (!box) return;
+      // Whole, short, none.
+      if (box.checked && !tail.selectedIndex && tail.length > 1) tail.selectedIndex = 1;
+      else { if (!box.checked) tail.selectedIndex = 0; box.click(); }
+    },
     v: () => { picked = picked === null ? 0 : picked + 1 < count ? picked + 1 : null; },
     ArrowLeft: shift => go(shift ? t - 1 : [...times].findLast(time => time < t) ?? first),
     ArrowRight: shift => go(shift ? t + 1 : times[upTo(times, t)] ?? last),
     a: () => turn(-0.1, 0), d: () => turn(0.1, 0), w: () => turn(0, 0.1), s: () => turn(0, -0.1),
     PageUp: () => zoom(0.8), PageDown: () => zoom(1.25),
-    "+": () => faster(1), "=": () => faster(1), "-": () => faster(-1),
-    t: theme, p: save, h: () => question.click(), "?": () => question.click(),
+    ArrowUp: () => faster(1), ArrowDown: () => faster(-1),
+    "+": () => faster(1), "=": () => faster(1), "-": () => faster(-1), p: save, h: () => question.click(), "?": () => question.click(),
   };
-  LAYERS.forEach((name, k) => { keys[`${k + 1}`] = () => boxes.get(name)?.click(); });
   panel.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
     const on = /** @type {HTMLElement} */ (event.target);
     const key = event.key.length > 1 ? event.key : event.key.toLowerCase();

@@ -404,15 +404,33 @@ fn views_fit_the_vehicles_and_the_camera_follows() {
          choose(1, ''); const none = doc.querySelector('.replay-scale').textContent;
          const fps = doc.querySelector('.replay-rate').textContent;
          const help = doc.querySelector('.replay-help'), hidden = [help.hidden]; key('h'); hidden.push(help.hidden);
-         key('t'); const theme = win.getComputedStyle(doc.documentElement).colorScheme;
-         key('6'); const names = player.seen().names;
-         return { views, first, off, picked, scale, none, fps, hidden, theme, names };",
+         key('m'); const theme = win.getComputedStyle(doc.documentElement).colorScheme;
+         key('l'); const names = player.seen().names;
+         const values = () => lists.slice(0, 3).map(list => list.value).join();
+         const walked = ['f', 'f', 'c', 't', 't', 't'].map(name => { key(name); return values(); });
+         const angles = ['1', '2', '3'].map(name => { key(name); return player.seen().pitch.toFixed(2); });
+         return { walked, angles, views, first, off, picked, scale, none, fps, hidden, theme, names };",
     );
     assert!(said.is_empty(), "{said:?}");
     for (view, pitch) in [("Top", "1.571"), ("Front", "0.000")] {
         assert_eq!(found["views"][view], serde_json::json!([pitch, "0,0,0,0"]), "{found}");
     }
     assert_eq!(found["views"]["Perspective"][1], "0,0,0,0", "{found}");
+    let [perspective, top, front] = [0, 1, 2].map(|k| text(&found["angles"][k]));
+    assert!(top == "1.57" && front == "0.00" && perspective != top && perspective != front, "{found}");
+    let walked: Vec<_> = found["walked"].as_array().expect("a list").iter().map(text).collect();
+    assert_eq!(
+        walked,
+        [
+            ",,Infinity",
+            "picked,,Infinity",
+            "picked,speed,Infinity",
+            "picked,speed,1",
+            "picked,speed,1",
+            "picked,speed,Infinity"
+        ],
+        "the camera follows, and F again shows the whole flight: {found}"
+    );
     assert_eq!(found["first"], 0, "{found}");
     assert!(found["off"].as_f64() < Some(1.0), "the picked vehicle is in the middle: {found}");
     assert!(text(&found["picked"]).starts_with("vehicle 2 · ") && text(&found["picked"]).ends_with(" m/s"), "{found}");

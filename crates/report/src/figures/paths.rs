@@ -43,8 +43,8 @@ pub fn paths(log: &FlightLog, obstacles: &[Obstacle], title: &str) -> Figure {
 const STILL_PATHS: usize = 40;
 
 /// Draws the paths from above with the vehicles at the time of the closest approach \[s\], and the closest two, from 0,
-/// joined. This still picture replaces a replay that cannot be drawn. The title begins with the name of the flight, unless
-/// it is empty. Flights `beside` it widen the axes.
+/// joined. This still picture replaces a replay that cannot be drawn. The title begins with the name of the flight,
+/// unless it is empty. Flights `beside` it widen the axes.
 #[must_use]
 pub fn at_closest(
     name: &str,
