@@ -193,8 +193,8 @@ const play = (root, data) => {
     ["Next violation", "B", "violation", 1], ["Next undecided", "U", "undecided", 1]])
     .filter(([,, kind]) => moments.some(moment => moment.kind === kind))
     .map(([text, keys, kind, way]) => button(text, keys, () => jump(kind, way)));
-  const views = [button("Perspective", "1", () => look(0)), button("Top", "2", () => look(1)), button("Front", "3", () => look(2)),
-    button("Show all", "", () => { fit(); ask(); })];
+  const views = [button("Perspective", "1", () => look(0)), button("Top", "2", () => look(1)),
+    button("Front", "3", () => look(2)), button("Show all", "", () => { fit(); ask(); })];
   /** @type {Object<string, boolean>} */
   const shows = { shells: !!data.shell_m, links: !!data.links, trails: !data.holds, slots: data.axes !== null,
     ground: true, names: true, closest: count > 1, caption: true };
@@ -485,7 +485,8 @@ const play = (root, data) => {
     a: () => turn(-0.1, 0), d: () => turn(0.1, 0), w: () => turn(0, 0.1), s: () => turn(0, -0.1),
     PageUp: () => zoom(0.8), PageDown: () => zoom(1.25),
     ArrowUp: () => faster(1), ArrowDown: () => faster(-1),
-    "+": () => faster(1), "=": () => faster(1), "-": () => faster(-1), p: save, h: () => question.click(), "?": () => question.click(),
+    "+": () => faster(1), "=": () => faster(1), "-": () => faster(-1),
+    p: save, h: () => question.click(), "?": () => question.click(),
   };
   panel.addEventListener("keydown", (/** @type {KeyboardEvent} */ event) => {
     const on = /** @type {HTMLElement} */ (event.target);
