@@ -101,6 +101,8 @@ impl Flight {
 pub(super) struct World {
     pub(super) fleet: Fleet,
     pub(super) states: Vec<State>,
+    /// True states at the instants of each vehicle, for measurements that are late.
+    past: Vec<Vec<State>>,
     commands: Vec<Vector3<f64>>,
     accelerations: Vec<Vector3<f64>>,
     /// Seconds from the last instant of each vehicle.
@@ -133,6 +135,7 @@ impl World {
         Self {
             fleet,
             states: states.collect(),
+            past: vec![vec![]; count],
             commands: vec![Vector3::zeros(); count],
             accelerations: vec![Vector3::zeros(); count],
             since_s: vec![0.0; count],
@@ -195,8 +198,10 @@ impl World {
     }
 
     fn instant(&mut self, i: usize, of: &Flight) {
-        let truth = self.states[i];
         let settings = *of.limits[i].settings();
+        self.past[i].push(self.states[i]);
+        let late = self.past[i].len().saturating_sub(1 + settings.measurement_delay_periods);
+        let truth = self.past[i][late];
         let towards = self.nearest(i);
         let errors = [settings.position_error_m, settings.velocity_error_m_s].map(|bound| {
             // A vehicle that believes to be farther from the nearest one than it is flies towards it.

@@ -70,7 +70,7 @@ fn worst_sequence(of: &TrackerLoop, periods: usize) -> (f64, f64) {
     };
     // The largest of some steps of the last period, and the feedback of the last period.
     let mut largest = [0.0_f64; 2];
-    for (kind, ends) in [(0, (0..STEPS).step_by(5).collect::<Vec<_>>()), (1, vec![0])] {
+    for (kind, ends) in [(0, (0..STEPS).step_by(10).collect::<Vec<_>>()), (1, vec![0])] {
         for end in ends {
             let answer = |inputs: &Inputs| {
                 let (errors, feedbacks) = simulate(of, inputs);
@@ -142,8 +142,7 @@ fn the_worst_sequence_of_signs_comes_within_a_per_cent_of_the_bound() {
     for of in loops {
         let tube = of.tube().expect("stable");
         // The largest over the first periods, because a start error decays.
-        let found: Vec<_> =
-            [1, 2, 3, 5, 8, 13, 21, 100].into_iter().map(|periods| worst_sequence(&of, periods)).collect();
+        let found: Vec<_> = [1, 3, 8, 21, 100].into_iter().map(|periods| worst_sequence(&of, periods)).collect();
         let error = found.iter().map(|found| found.0).fold(0.0, f64::max);
         let feedback = found.iter().map(|found| found.1).fold(0.0, f64::max);
         // The integrator has an error of some 1e-4 of its own.
