@@ -253,6 +253,22 @@ impl Limits {
         }
     }
 
+    /// Returns the certificate of a fleet with these limits in words, with its assumptions.
+    #[must_use]
+    pub fn certificate(&self) -> String {
+        let Settings { delta_m, accel_m_s2, position_error_m, velocity_error_m_s, disturbance_m_s2, .. } = self.settings;
+        let tube = match self.settings.tracking_error_m {
+            Some(_) => "assumed tube",
+            None => "tube",
+        };
+        format!(
+            "certified never closer than {delta_m:.3} m, whatever the law commands and whatever the radio loses, while \
+             commands up to {accel_m_s2} m/s^2 are carried out, own position is known to {position_error_m} m and \
+             {velocity_error_m_s} m/s, pushes stay below {disturbance_m_s2} m/s^2 ({tube} {:.3} m)",
+            self.tube.error_m
+        )
+    }
+
     /// Returns the start of a vehicle, which all vehicles must know. The true state may differ by the errors of
     /// measurement.
     ///
@@ -341,6 +357,12 @@ mod tests {
         assert_eq!(limits.brake().deceleration_m_s2(), 3.0);
         assert!((limits.margin_m() - 0.5 - 5e-7 - limits.tube().error_m).abs() < 1e-12);
         assert_eq!(limits.ease_m(), 0.2);
+        assert_eq!(
+            limits.certificate(),
+            "certified never closer than 1.000 m, whatever the law commands and whatever the radio loses, while commands \
+             up to 5 m/s^2 are carried out, own position is known to 0.03 m and 0.05 m/s, pushes stay below 0.3 m/s^2 \
+             (tube 0.158 m)"
+        );
         // The assumed tube takes the place of the computed one; the feedback is still that of the loop.
         let assumed = Settings { tracking_error_m: Some(0.25), path_error_m: 0.125, ..settings }.limits().expect("ok");
         assert_eq!(assumed.tube(), Tube { error_m: 0.375, feedback_m_s2: limits.tube().feedback_m_s2 });
