@@ -1,7 +1,7 @@
 //! Time of the shield: one period of all vehicles, and their messages through a radio without loss.
 //!
-//! Run with `cargo bench --bench shield`; compare times of one run only. Divide by the number of vehicles for the cost of
-//! a vehicle and period.
+//! Run with `cargo bench --bench shield`; compare times of one run only. Divide by the number of vehicles for the cost
+//! of a vehicle and period.
 
 use std::hint::black_box;
 

@@ -57,6 +57,12 @@ pub struct Nearest {
 }
 
 impl HalfSpaces {
+    /// Returns no half-spaces, with memory for this many.
+    #[must_use]
+    pub fn with_capacity(count: usize) -> Self {
+        Self { given: Vec::with_capacity(count), no_worse: Vec::new() }
+    }
+
     /// Removes all half-spaces and keeps their memory.
     pub fn clear(&mut self) {
         self.given.clear();
@@ -83,8 +89,8 @@ impl HalfSpaces {
         }
     }
 
-    /// Returns the point nearest to `wish` in all half-spaces and in the ball of this radius about the origin. `None` if
-    /// no point is in all of them up to rounding.
+    /// Returns the point nearest to `wish` in all half-spaces and in the ball of this radius about the origin. `None`
+    /// if no point is in all of them up to rounding.
     #[must_use]
     pub fn nearest_inside(&self, wish: Vector3<f64>, radius: f64) -> Option<Vector3<f64>> {
         Search::near(wish, radius).best(&self.given, &Subspace::space()).ok()

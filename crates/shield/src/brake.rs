@@ -39,7 +39,8 @@ impl State {
 /// left of the speed in the last period.
 ///
 /// # Stop point
-/// From (p, v) the brake ends at s = p + v G(|v|), where m = floor(|v| / (b h)), b is the deceleration and h the period:
+/// From (p, v) the brake ends at s = p + v G(|v|). Let b be the deceleration, h the period and
+/// m = floor(|v| / (b h)):
 ///
 /// ```text
 /// G(0) = h/2,   G(|v|) = h (m + 1/2) - b h^2 m (m + 1) / (2 |v|)
@@ -50,18 +51,18 @@ impl State {
 ///
 /// # Reservation
 /// Lemma 1: the brake runs along the segment from p to s, and the segment after a period of brake is a part of it.
-/// If |v| > b h, a period leads to p' = p + v h (1 - b h / (2 |v|)) and v' = v (1 - b h / |v|), which has m - 1 whole
-/// periods left. Its stop point is s again:
+/// If |v| > b h, a period leads to a state with m - 1 whole periods left, and with the same stop point s:
 ///
 /// ```text
+/// p' = p + v h (1 - b h / (2 |v|)),   v' = v (1 - b h / |v|)
 /// v h - v b h^2 / (2 |v|) + v' G(|v'|) = v G(|v|)
 /// ```
 ///
 /// Otherwise the vehicle stops at p + v h / 2 = s.
 ///
-/// After a period of any command u the path of that period is a quadratic Bezier curve with the control points p,
-/// p + v h / 2 and p+. The second point lies in the segment from p to s because G >= h/2. A half-space with p, s, p+ and
-/// the stop point after the period therefore contains the path of the period and the whole brake after it.
+/// After a period of any command u the path of that period is a quadratic Bezier curve with the control points p, p + v
+/// h / 2 and p+. The second point lies in the segment from p to s because G >= h/2. A half-space with p, s, p+ and the
+/// stop point after the period therefore contains the path of the period and the whole brake after it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Brake {
     /// Deceleration \[m/s^2\].

@@ -1,7 +1,7 @@
 //! Choice of the reference's acceleration: the wish of the law where it is accepted, otherwise a command near it.
 //!
-//! The certificate depends on [`Reach::accepts`] alone: a command that it accepts, or the command of the brake, is safe.
-//! Everything else here decides how soon vehicles arrive.
+//! The certificate depends on `Reach::accepts` alone: a command that it accepts, or the command of the brake, is
+//! safe. Everything else here decides how soon vehicles arrive.
 
 use nalgebra::Vector3;
 use tautline_core::half_spaces::{HalfSpace, HalfSpaces};
@@ -40,7 +40,8 @@ pub enum Choice {
         /// Share of the cut that is turned to the right, from -1 (left) to 1; 0 for none.
         turn: f64,
     },
-    /// The accepted command on the line from the brake to the wish, nearest to the wish. Vehicles stop before each other.
+    /// The accepted command on the line from the brake to the wish, nearest to the wish. Vehicles stop before each
+    /// other.
     Scale,
 }
 
@@ -103,6 +104,15 @@ pub(crate) struct Reach {
 }
 
 impl Reach {
+    /// Returns memory for this many planes.
+    pub(crate) fn with_capacity(count: usize) -> Self {
+        Self {
+            planes: Vec::with_capacity(count),
+            hard: HalfSpaces::with_capacity(count),
+            soft: HalfSpaces::with_capacity(count),
+        }
+    }
+
     pub(crate) fn clear(&mut self) {
         self.planes.clear();
     }
@@ -194,7 +204,7 @@ impl Reach {
     ///
     /// ```text
     /// hard   r = min( (b - a.p - a.v h) / (h^2/2), (b - a.p - a.v (h + g)) / (h^2/2 + h g) )
-    /// soft   min( r, max( -4 (ease/2 - R) - 4 max(a.v, 0), -A/2 ) )   where the room R of the stop point is below ease/2
+    /// soft   min( r, max( -4 (ease/2 - R) - 4 max(a.v, 0), -A/2 ) )   where the room R of the stop point is < ease/2
     /// ```
     fn bound(&mut self, envelope: &Envelope, state: &State, glide: f64, glide_now: f64, ease_m: f64) {
         let h = envelope.period_s;

@@ -2,12 +2,12 @@
 //!
 //! The vehicle with the smaller number is the owner of the pair, the other one is the follower. The owner proposes a
 //! plane under a number that grows. It holds the proposed plane beside the old one until it hears the decision on that
-//! number. The follower decides once on each number: it accepts the plane if its own segment is inside, and then holds it
-//! in the place of the old one.
+//! number. The follower decides once on each number: it accepts the plane if its own segment is inside, and then holds
+//! it in the place of the old one.
 //!
 //! # Lemma 3
-//! At every time the two hold a common plane. The follower holds exactly one plane X; claim: the owner holds X at all
-//! times. The follower changes from X to Y only on a proposal of Y. The owner has held X and Y since before that message
+//! At every time the two hold a common plane. The follower holds exactly one plane X. Claim: the owner always holds
+//! X. The follower changes from X to Y only on a proposal of Y. The owner has held X and Y since before that message
 //! was sent. It gives one of them up only on the decision on that very number, which the follower takes once. On "yes"
 //! the owner keeps Y, and the follower held Y before it sent the message. On "no" the owner keeps X, and the follower
 //! never decides on that number again. A new number is given only after that. The argument uses no clock, order,
@@ -72,128 +72,141 @@ pub(crate) struct Decided {
 /// Side of a vehicle in the contract with one other vehicle, and the newest message heard from it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Contract {
-    /// The other vehicle.
-    other: u32,
-    /// Whether this vehicle is the owner of the pair.
-    is_owner: bool,
-    /// Whether the newest message has not been read.
-    is_fresh: bool,
-    /// Distance that this vehicle keeps from the divider \[m\].
-    margin_m: f64,
-    /// Distance that the other vehicle keeps \[m\].
-    other_margin_m: f64,
     /// Plane that both vehicles hold.
     held: Plane,
     /// Period in which the held plane was taken on.
     held_since: u64,
-    /// Proposed plane that the owner holds beside the other one until it hears the decision.
-    pending: Option<(Plane, Proposal)>,
-    /// Number of the last proposal that the owner made.
-    proposed: u64,
-    /// Last decision that the follower took.
-    decided: Option<Decision>,
+    role: Role,
     /// Segment of the other vehicle, from the start or the newest message.
     heard: Segment,
     /// Stamp of the newest message.
     stamp: u64,
-    /// Proposal and decision of the newest message.
-    news: (Option<Proposal>, Option<Decision>),
+    /// Distance that the other vehicle keeps from the divider \[m\].
+    other_margin_m: f64,
+    /// The other vehicle.
+    other: u32,
+    /// Whether the newest message has not been read.
+    is_fresh: bool,
 }
 
+/// Role in a pair, with what was sent and heard in it. Number 0 stands for no proposal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Role {
+    Owner {
+        /// Last proposal, held beside the other plane while its decision is pending.
+        proposed: Proposal,
+        is_pending: bool,
+        /// Decision of the newest message.
+        heard: Decision,
+    },
+    Follower {
+        /// Last decision.
+        decided: Decision,
+        /// Proposal of the newest message.
+        heard: Proposal,
+    },
+}
+
+const NO_DECISION: Decision = Decision { number: 0, accepted: false };
+const NO_PROPOSAL: Proposal = Proposal { number: 0, divider: Divider { normal: [0.0; 3], offset_m: 0.0 } };
+
 impl Contract {
-    /// Returns the contract at the start: both vehicles hold the divider of their announced segments. `None` if these are
-    /// closer than the margins.
+    /// Returns the contract at the start: both vehicles hold the divider of their announced segments. Each vehicle is
+    /// its number, segment and margin \[m\]. `None` if the segments are closer than the margins.
     pub(crate) fn new(own: (u32, Segment, f64), other: (u32, Segment, f64)) -> Option<Self> {
         let ((number, segment, margin_m), (other, heard, other_margin_m)) = (own, other);
-        let is_owner = number < other;
         // Both vehicles compute the same numbers.
-        let held = if is_owner {
-            Divider::between(&segment, &heard, margin_m, other_margin_m)?.owner_plane(margin_m)
+        let (held, role) = if number < other {
+            let divider = Divider::between(&segment, &heard, margin_m, other_margin_m)?;
+            let role = Role::Owner { proposed: NO_PROPOSAL, is_pending: false, heard: NO_DECISION };
+            (divider.owner_plane(margin_m), role)
         } else {
-            Divider::between(&heard, &segment, other_margin_m, margin_m)?.follower_plane(margin_m)
+            let divider = Divider::between(&heard, &segment, other_margin_m, margin_m)?;
+            (divider.follower_plane(margin_m), Role::Follower { decided: NO_DECISION, heard: NO_PROPOSAL })
         };
-        Some(Self {
-            other,
-            is_owner,
-            is_fresh: false,
-            margin_m,
-            other_margin_m,
-            held,
-            held_since: 0,
-            pending: None,
-            proposed: 0,
-            decided: None,
-            heard,
-            stamp: 0,
-            news: (None, None),
-        })
+        Some(Self { held, held_since: 0, role, heard, stamp: 0, other_margin_m, other, is_fresh: false })
     }
 
     /// Stores a message of the other vehicle unless a later one was heard or its numbers are invalid.
     #[inline]
     pub(crate) fn hear(&mut self, message: &Message) {
-        if message.stamp > self.stamp && message.is_valid() {
-            self.stamp = message.stamp;
-            self.heard = message.segment;
-            self.news = (message.proposal, message.decision);
-            self.is_fresh = true;
+        if message.stamp <= self.stamp || !message.is_valid() {
+            return;
+        }
+        self.stamp = message.stamp;
+        self.heard = message.segment;
+        self.is_fresh = true;
+        match &mut self.role {
+            Role::Owner { heard, .. } => *heard = message.decision.unwrap_or(NO_DECISION),
+            Role::Follower { heard, .. } => *heard = message.proposal.unwrap_or(NO_PROPOSAL),
         }
     }
 
-    /// Reads the newest message at an instant of this vehicle, with its segment from this instant on.
+    /// Reads the newest message at an instant of this vehicle, with its segment from this instant on and its margin.
     #[inline]
-    pub(crate) fn read(&mut self, own: &Segment, period: u64, decided: &mut Decided) {
-        if !self.is_fresh {
+    pub(crate) fn read(&mut self, own: &Segment, margin_m: f64, period: u64, counted: &mut Decided) {
+        if !std::mem::take(&mut self.is_fresh) {
             return;
         }
-        self.is_fresh = false;
-        if self.is_owner {
-            let Some((plane, proposal)) = self.pending else { return };
-            let Some(decision) = self.news.1.filter(|decision| decision.number == proposal.number) else { return };
-            if decision.accepted {
-                (self.held, self.held_since) = (plane, period);
+        match &mut self.role {
+            Role::Owner { proposed, is_pending, heard } => {
+                if *is_pending && heard.number == proposed.number {
+                    *is_pending = false;
+                    if heard.accepted {
+                        (self.held, self.held_since) = (proposed.divider.owner_plane(margin_m), period);
+                    }
+                }
             }
-            self.pending = None;
-        } else {
-            let last = self.decided.map_or(0, |decision| decision.number);
-            let Some(proposal) = self.news.0.filter(|proposal| proposal.number > last) else { return };
-            let plane = proposal.divider.follower_plane(self.margin_m);
-            let accepted = plane.contains(own);
-            if accepted {
-                (self.held, self.held_since) = (plane, period);
-                decided.accepted += 1;
-            } else {
-                decided.refused += 1;
+            Role::Follower { decided, heard } => {
+                if heard.number > decided.number {
+                    let plane = heard.divider.follower_plane(margin_m);
+                    let accepted = plane.contains(own);
+                    *decided = Decision { number: heard.number, accepted };
+                    counted.accepted += u32::from(accepted);
+                    counted.refused += u32::from(!accepted);
+                    if accepted {
+                        (self.held, self.held_since) = (plane, period);
+                    }
+                }
             }
-            self.decided = Some(Decision { number: proposal.number, accepted });
         }
     }
 
     /// Proposes the divider of the present segments, as the owner without a pending proposal.
     #[inline]
-    pub(crate) fn propose(&mut self, own: &Segment) {
-        if !self.is_owner || self.pending.is_some() {
-            return;
-        }
-        let Some(divider) = Divider::between(own, &self.heard, self.margin_m, self.other_margin_m) else { return };
-        let plane = divider.owner_plane(self.margin_m);
-        if plane.contains(own) {
-            self.proposed += 1;
-            self.pending = Some((plane, Proposal { number: self.proposed, divider }));
+    pub(crate) fn propose(&mut self, own: &Segment, margin_m: f64) {
+        if let Role::Owner { proposed, is_pending: is_pending @ false, .. } = &mut self.role
+            && let Some(divider) = Divider::between(own, &self.heard, margin_m, self.other_margin_m)
+            && divider.owner_plane(margin_m).contains(own)
+        {
+            *proposed = Proposal { number: proposed.number + 1, divider };
+            *is_pending = true;
         }
     }
 
-    /// Returns the planes that this vehicle holds against the other one.
+    /// Returns the plane that both vehicles hold.
     #[inline]
-    pub(crate) fn planes(&self) -> (Plane, Option<Plane>) {
-        (self.held, self.pending.map(|(plane, _)| plane))
+    pub(crate) fn held(&self) -> Plane {
+        self.held
+    }
+
+    /// Returns the proposed plane that is held beside the other one.
+    #[inline]
+    pub(crate) fn pending(&self, margin_m: f64) -> Option<Plane> {
+        match &self.role {
+            Role::Owner { proposed, is_pending: true, .. } => Some(proposed.divider.owner_plane(margin_m)),
+            _ => None,
+        }
     }
 
     /// Returns the message to the other vehicle.
     #[inline]
     pub(crate) fn message(&self, from: u32, stamp: u64, segment: Segment) -> Message {
-        let proposal = self.pending.map(|(_, proposal)| proposal);
-        Message { from, to: self.other, stamp, segment, proposal, decision: self.decided }
+        let (proposal, decision) = match self.role {
+            Role::Owner { proposed, is_pending, .. } => (is_pending.then_some(proposed), None),
+            Role::Follower { decided, .. } => (None, (decided.number > 0).then_some(decided)),
+        };
+        Message { from, to: self.other, stamp, segment, proposal, decision }
     }
 
     /// Returns the number of periods since the held plane was taken on.
@@ -205,9 +218,97 @@ impl Contract {
     /// Defect for tests: holds the divider of the present segment and the one heard last, without the contract. Returns
     /// whether there is one.
     #[cfg(test)]
-    pub(crate) fn hold_heard(&mut self, own: &Segment) -> bool {
-        self.is_owner = false;
-        let divider = Divider::between(own, &self.heard, self.margin_m, self.other_margin_m);
-        divider.map(|divider| self.held = divider.owner_plane(self.margin_m)).is_some()
+    pub(crate) fn hold_heard(&mut self, own: &Segment, margin_m: f64) -> bool {
+        self.role = Role::Follower { decided: NO_DECISION, heard: NO_PROPOSAL };
+        let divider = Divider::between(own, &self.heard, margin_m, self.other_margin_m);
+        divider.map(|divider| self.held = divider.owner_plane(margin_m)).is_some()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+
+    const MARGIN_M: f64 = 0.5;
+
+    fn at(x: f64) -> Segment {
+        Segment::new(Vector3::new(x, 0.0, 0.0), Vector3::new(x, 0.0, 0.0))
+    }
+
+    /// Returns the owner at 0 and the follower at `x`.
+    fn pair(x: f64) -> (Contract, Contract) {
+        let contract = |own, other| Contract::new(own, other).expect("apart");
+        let (owner, follower) = ((0, at(0.0), MARGIN_M), (1, at(x), MARGIN_M));
+        (contract(owner, follower), contract(follower, owner))
+    }
+
+    #[test]
+    fn a_pair_that_starts_too_near_has_no_contract() {
+        assert!(Contract::new((0, at(0.0), MARGIN_M), (1, at(0.9), MARGIN_M)).is_none());
+        assert!(Contract::new((1, at(0.0), MARGIN_M), (0, at(1.0), MARGIN_M)).is_some());
+    }
+
+    #[test]
+    fn the_owner_holds_both_planes_until_it_hears_the_decision_on_that_number() {
+        let (mut owner, mut follower) = pair(4.0);
+        let mut counted = Decided::default();
+        let old = owner.held();
+        assert_eq!(old, Plane { normal: Vector3::x(), offset_m: 1.5 });
+        // The follower has moved to 3; the owner hears it and proposes a plane at 1.5.
+        owner.hear(&follower.message(1, 1, at(3.0)));
+        owner.read(&at(0.0), MARGIN_M, 1, &mut counted);
+        owner.propose(&at(0.0), MARGIN_M);
+        let sent = owner.message(0, 1, at(0.0));
+        assert_eq!((owner.held(), owner.pending(MARGIN_M).map(|plane| plane.offset_m)), (old, Some(1.0)));
+        // No second proposal while one is pending, and a decision on another number has no effect.
+        owner.propose(&at(0.2), MARGIN_M);
+        assert_eq!(owner.message(0, 1, at(0.0)), sent);
+        let mut stale = follower.message(1, 2, at(3.0));
+        stale.decision = Some(Decision { number: 7, accepted: true });
+        owner.hear(&stale);
+        owner.read(&at(0.0), MARGIN_M, 2, &mut counted);
+        assert_eq!((owner.held(), owner.pending(MARGIN_M).is_some()), (old, true));
+
+        follower.hear(&sent);
+        follower.read(&at(3.0), MARGIN_M, 2, &mut counted);
+        assert_eq!(follower.held(), Plane { normal: -Vector3::x(), offset_m: -2.0 });
+        // A copy that arrives again has no effect.
+        follower.hear(&sent);
+        follower.read(&at(9.0), MARGIN_M, 3, &mut counted);
+        assert_eq!(counted, Decided { accepted: 1, refused: 0 });
+
+        owner.hear(&follower.message(1, 3, at(3.0)));
+        owner.read(&at(0.0), MARGIN_M, 4, &mut counted);
+        assert_eq!((owner.held().offset_m, owner.pending(MARGIN_M), owner.age(6)), (1.0, None, 2));
+    }
+
+    #[test]
+    fn a_follower_outside_refuses_and_the_owner_keeps_the_old_plane() {
+        let (mut owner, mut follower) = pair(4.0);
+        let mut counted = Decided::default();
+        let (old, kept) = (owner.held(), follower.held());
+        owner.propose(&at(0.5), MARGIN_M);
+        follower.hear(&owner.message(0, 1, at(0.5)));
+        // The follower is at 2.6: inside the old plane, outside the proposed one at 2.25 plus 0.5.
+        follower.read(&at(2.6), MARGIN_M, 1, &mut counted);
+        assert_eq!((counted, follower.held()), (Decided { accepted: 0, refused: 1 }, kept));
+        owner.hear(&follower.message(1, 1, at(2.6)));
+        owner.read(&at(0.5), MARGIN_M, 2, &mut counted);
+        assert_eq!((owner.held(), owner.pending(MARGIN_M)), (old, None));
+    }
+
+    #[test]
+    fn older_and_invalid_messages_are_ignored() {
+        let (mut owner, follower) = pair(4.0);
+        owner.hear(&follower.message(1, 5, at(3.0)));
+        let heard = owner;
+        owner.hear(&follower.message(1, 4, at(2.0)));
+        owner.hear(&follower.message(1, 6, at(f64::NAN)));
+        let divider = Divider { normal: [2.0, 0.0, 0.0], offset_m: 0.0 };
+        let forged = Some(Proposal { number: 1, divider });
+        owner.hear(&Message { proposal: forged, ..follower.message(1, 7, at(3.0)) });
+        assert_eq!(owner, heard);
     }
 }

@@ -103,7 +103,7 @@ impl Fleet {
         if let Some(worst) = closest_starts(&starts).filter(|worst| worst.room_m() < 0.0) {
             return Err(worst.too_near());
         }
-        let shields = limits.iter().enumerate().map(|(index, limits)| Shield::new(*limits, index, &starts));
+        let shields = limits.iter().enumerate().map(|(index, limits)| Shield::new(limits, index, &starts));
         Ok(Self { shields: shields.collect::<Result<_, _>>()? })
     }
 
@@ -166,10 +166,10 @@ mod tests {
              (-0.16750100000000034); move them apart, start slower or lower the errors"
         );
         let starts: Vec<_> = states.iter().map(|state| limits[0].start(*state).expect("slow enough")).collect();
-        let error = Shield::new(limits[0], 1, &starts).expect_err("too near").to_string();
+        let error = Shield::new(&limits[0], 1, &starts).expect_err("too near").to_string();
         assert!(error.starts_with("start: vehicles 2 and 3 reserve"), "{error}");
-        assert!(Shield::new(limits[0], 0, &starts).is_ok());
-        assert!(Shield::new(limits[0], 3, &starts).expect_err("no such vehicle").to_string().starts_with("index: "));
+        assert!(Shield::new(&limits[0], 0, &starts).is_ok());
+        assert!(Shield::new(&limits[0], 3, &starts).expect_err("no such vehicle").to_string().starts_with("index: "));
         assert!(
             Fleet::new(&limits, &states[..2]).expect_err("lengths").to_string().starts_with("start: 2 states for 3")
         );

@@ -1,8 +1,9 @@
 //! A stage between a control law and its vehicle that certifies the separation of every pair, under any law.
 //!
 //! Each vehicle flies a *reference* that it makes up itself and keeps the path of the reference, and of a full brake
-//! from it, inside planes. Each pair agrees on its plane by a contract of two messages. The law's command is changed only
-//! where the planes require it. Nothing is assumed of the law, of latency, loss or order of messages, or of clocks.
+//! from it, inside planes. Each pair agrees on its plane by a contract of two messages. The law's command is changed
+//! only where the planes require it. Nothing is assumed of the law, of latency, loss or order of messages, or of
+//! clocks.
 //!
 //! | module | holds |
 //! | --- | --- |
@@ -31,34 +32,34 @@
 //! # Algorithm
 //! At each instant the vehicle, with its reference at (p, v) and the stop point s of its brake:
 //!
-//! 1. reads the newest message of each other vehicle: as a follower it decides on a new proposal, as an owner it takes a
-//!    decision;
-//! 2. as an owner without a pending proposal, proposes the plane between the segments \[p, s\] of the pair, if they are
-//!    at least m1 + m2 apart, and holds it beside the old one;
+//! 1. reads the newest message of each other vehicle: as a follower it decides on a new proposal, as an owner it takes
+//!    a decision;
+//! 2. as an owner without a pending proposal, proposes the plane between the two segments \[p, s\]. It holds the plane
+//!    beside the old one. The segments must be at least m1 + m2 apart;
 //! 3. chooses the acceleration of the reference: a command that is *accepted*, or that of the brake;
 //! 4. sends its next segment, pending proposals and last decisions to all.
 //!
-//! A command is accepted if it and the next speed are within the limits, and if the next position and the next stop
-//! point are inside all planes that are held. A plane between two vehicles leaves each of them a margin
+//! A command is accepted if it and the next speed are within the limits. The next position and the next stop point must
+//! also be inside all planes held. A plane between two vehicles leaves each of them a margin
 //! m = delta / 2 + e, where e is the bound of the [`tube`].
 //!
 //! # Proof
-//! **Lemma 1** ([`brake::Brake`]). With p, s, the next position and the next stop point inside a half-space, the path of
-//! the period and the whole brake after it are inside.
+//! **Lemma 1** ([`brake::Brake`]). With p, s, the next position and the next stop point inside a half-space, the path
+//!  of the period and the whole brake after it are inside.
 //!
-//! **Lemma 2** (a choice always exists). At each instant, after steps 1 and 2, p and s are inside all planes held, so the
-//! brake is a choice. Both are inside at the start. The last command was accepted, or was that of the brake, so the next p
-//! and s are inside all planes held over the period (Lemma 1). A plane is taken on only after p and s were tested
-//! against it. Dropping a plane changes nothing.
+//! **Lemma 2** (a choice always exists). At each instant, after steps 1 and 2, p and s are inside all planes held, so
+//!  the brake is a choice. Both are inside at the start. The last command was accepted, or was that of the brake, so
+//!  the next p and s are inside all planes held over the period (Lemma 1). A plane is taken on only after p and s were
+//!  tested against it. Dropping a plane changes nothing.
 //!
 //! **Lemma 3** ([`contract`]). At every time the two vehicles of a pair hold a common plane.
 //!
-//! **Theorem.** Under A1 to A5, if at the start the segments of each pair are at least delta + e1 + e2 apart, then any
-//! two vehicles are at least delta apart at all times, at instants and between, under every law, latency and loss.
+//! **Theorem.** Let A1 to A5 hold, and let the segments of each pair be at least delta + e1 + e2 apart at the start.
+//!  Then any two vehicles are at least delta apart at all times, under every law, latency and loss.
 //!
-//! *Proof.* Take the common plane of Lemma 3 at a time t. By Lemmas 1 and 2 both references are inside it, one on its side
-//! by m1 and the other one by m2. They are at least m1 + m2 = delta + e1 + e2 apart. Each vehicle is within its e of its
-//! reference.
+//! *Proof.* Take the common plane of Lemma 3 at a time t. By Lemmas 1 and 2 both references are inside it, one on its
+//!  side by m1 and the other one by m2. They are at least m1 + m2 = delta + e1 + e2 apart. Each vehicle is within its e
+//!  of its reference.
 //!
 //! Doubles round: margins contain 1e-6 m for it ([`settings::ROUNDING_M`]), which covers positions up to 1e6 m.
 //!

@@ -48,8 +48,8 @@ impl Segment {
     /// Returns the closest points of this segment and of another one.
     ///
     /// The squared distance of the points at the fractions s and t is a convex quadratic. Its minimum over all s and t
-    /// is clamped to the ends, then the best point of one segment for the clamped point of the other is taken
-    /// (Ericson, Real-Time Collision Detection, section 5.1.9). Segments below 1e-9 m count as points.
+    /// is clamped to the ends of one segment. Then the best point of the other segment is taken (Ericson, Real-Time
+    /// Collision Detection, section 5.1.9). Segments below 1e-9 m count as points.
     #[inline]
     pub(crate) fn closest_points(&self, other: &Self) -> (Vector3<f64>, Vector3<f64>) {
         /// Square of the length below which a segment is a point \[m^2\].

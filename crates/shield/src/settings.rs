@@ -45,13 +45,13 @@ pub struct Settings {
     pub tracker_per_s: f64,
     /// Age of a measurement when it is used, in periods.
     pub measurement_delay_periods: usize,
-    /// Time constant of the actuator \[s\]; 0 for none.
+    /// Time constant of the actuator \[s\], which is at zero at the start; 0 for none.
     pub actuator_lag_s: f64,
     /// Assumed bound on the distance to the reference \[m\], in the place of the computed one. For vehicles other than
     /// points, such as quadrotors.
     pub tracking_error_m: Option<f64>,
-    /// Distance between the path of the plant and the path that its acceleration gives \[m\], added to the tube. A plant
-    /// that moves on the chords of its steps dt needs A dt^2 / 8.
+    /// Distance between the path of the plant and the path that its acceleration gives \[m\], added to the tube. A
+    /// plant that moves on the chords of its steps dt needs A dt^2 / 8.
     pub path_error_m: f64,
     /// Gap that two vehicles keep by choice \[m\]; default 0.2 of the safety distance.
     pub ease_m: Option<f64>,
@@ -138,7 +138,7 @@ impl Settings {
             period_s: self.period_s,
             brake: Brake::new(brake, self.period_s),
         };
-        let margin_m = (self.delta_m + ROUNDING_M) / 2.0 + tube.error_m;
+        let margin_m = f64::midpoint(self.delta_m, ROUNDING_M) + tube.error_m;
         Ok(Limits { settings: *self, tube, envelope, choice, margin_m })
     }
 
@@ -187,7 +187,8 @@ impl Settings {
             TubeError::Unstable => ShieldError::new(
                 "tracker_per_s",
                 format!(
-                    "the tracker is unstable with `tracker_per_s2` {}, a period of {} s and measurements {} periods old",
+                    "the tracker is unstable with `tracker_per_s2` {}, a period of {} s and measurements {} periods \
+                     old",
                     self.tracker_per_s2, self.period_s, self.measurement_delay_periods
                 ),
                 self.tracker_per_s,
@@ -256,15 +257,23 @@ impl Limits {
     /// Returns the certificate of a fleet with these limits in words, with its assumptions.
     #[must_use]
     pub fn certificate(&self) -> String {
-        let Settings { delta_m, accel_m_s2, position_error_m, velocity_error_m_s, disturbance_m_s2, .. } = self.settings;
-        let tube = match self.settings.tracking_error_m {
-            Some(_) => "assumed tube",
-            None => "tube",
+        let of = &self.settings;
+        let delay = match of.measurement_delay_periods {
+            0 => String::new(),
+            periods => format!(", measurements are {periods} periods old"),
         };
+        let lag =
+            if of.actuator_lag_s > 0.0 { format!(", actuators lag by {} s", of.actuator_lag_s) } else { String::new() };
+        let tube = if of.tracking_error_m.is_some() { "assumed tube" } else { "tube" };
         format!(
-            "certified never closer than {delta_m:.3} m, whatever the law commands and whatever the radio loses, while \
-             commands up to {accel_m_s2} m/s^2 are carried out, own position is known to {position_error_m} m and \
-             {velocity_error_m_s} m/s, pushes stay below {disturbance_m_s2} m/s^2 ({tube} {:.3} m)",
+            "certified never closer than {:.3} m, whatever the law commands and whatever the radio loses. This holds \
+             while commands up to {} m/s^2 are carried out, own position is known to {} m and {} m/s, pushes stay \
+             below {} m/s^2{delay}{lag} ({tube} {:.3} m)",
+            of.delta_m,
+            of.accel_m_s2,
+            of.position_error_m,
+            of.velocity_error_m_s,
+            of.disturbance_m_s2,
             self.tube.error_m
         )
     }
@@ -359,10 +368,13 @@ mod tests {
         assert_eq!(limits.ease_m(), 0.2);
         assert_eq!(
             limits.certificate(),
-            "certified never closer than 1.000 m, whatever the law commands and whatever the radio loses, while commands \
-             up to 5 m/s^2 are carried out, own position is known to 0.03 m and 0.05 m/s, pushes stay below 0.3 m/s^2 \
-             (tube 0.158 m)"
+            "certified never closer than 1.000 m, whatever the law commands and whatever the radio loses. This holds \
+             while commands up to 5 m/s^2 are carried out, own position is known to 0.03 m and 0.05 m/s, pushes stay \
+             below 0.3 m/s^2 (tube 0.158 m)"
         );
+        let late = Settings { measurement_delay_periods: 2, actuator_lag_s: 0.05, ..settings };
+        let late = late.limits().expect("certified").certificate();
+        assert!(late.contains("0.3 m/s^2, measurements are 2 periods old, actuators lag by 0.05 s (tube"), "{late}");
         // The assumed tube takes the place of the computed one; the feedback is still that of the loop.
         let assumed = Settings { tracking_error_m: Some(0.25), path_error_m: 0.125, ..settings }.limits().expect("ok");
         assert_eq!(assumed.tube(), Tube { error_m: 0.375, feedback_m_s2: limits.tube().feedback_m_s2 });

@@ -15,11 +15,14 @@ use crate::settings::{Limits, ShieldError, Start};
 /// Smallest change of a command that is counted \[m/s^2\].
 const CHANGED_M_S2: f64 = 1e-9;
 
+/// Number of planes within reach for which memory is reserved.
+const REACHED: usize = 128;
+
 /// Shield of one vehicle.
 ///
 /// At each instant of the vehicle call [`Shield::filter`], send the [`Shield::messages`], and hold the command over the
-/// period. Give each message to [`Shield::hear`] when it arrives, at any time. Messages may be late, lost, doubled or out
-/// of order; their numbers must arrive bit for bit.
+/// period. Give each message to [`Shield::hear`] when it arrives, at any time. Messages may be late, lost, doubled or
+/// out of order; their numbers must arrive bit for bit.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -28,7 +31,7 @@ const CHANGED_M_S2: f64 = 1e-9;
 /// let limits = Settings::new(1.0, 0.05).limits()?;
 /// let start = |x: f64| limits.start(State::at_rest(Vector3::new(x, 0.0, 0.0)));
 /// let starts = [start(-2.0)?, start(2.0)?];
-/// let mut shields = [Shield::new(limits, 0, &starts)?, Shield::new(limits, 1, &starts)?];
+/// let mut shields = [Shield::new(&limits, 0, &starts)?, Shield::new(&limits, 1, &starts)?];
 ///
 /// // The plant is exact here, so the state is the reference.
 /// for _ in 0..200 {
@@ -68,7 +71,7 @@ impl Shield {
     ///
     /// # Errors
     /// If the number is not in the list, or the vehicle starts too near to another one.
-    pub fn new(limits: Limits, index: usize, starts: &[Start]) -> Result<Self, ShieldError> {
+    pub fn new(limits: &Limits, index: usize, starts: &[Start]) -> Result<Self, ShieldError> {
         let count = starts.len();
         let Some(own) = starts.get(index).filter(|_| u32::try_from(count).is_ok()) else {
             let problem = format!("the number of the vehicle is not among {count} starts");
@@ -89,7 +92,7 @@ impl Shield {
             ));
         };
         Ok(Self {
-            limits,
+            limits: *limits,
             index: u32::try_from(index).unwrap_or(u32::MAX),
             period: 0,
             reference: own.state,
@@ -98,7 +101,8 @@ impl Shield {
             segment: own.segment,
             past: VecDeque::with_capacity(limits.settings().measurement_delay_periods + 1),
             contracts,
-            reach: Reach::default(),
+            // Two planes per other vehicle, but few are within reach.
+            reach: Reach::with_capacity((2 * count).min(REACHED)),
             counters: Counters::default(),
         })
     }
@@ -116,11 +120,12 @@ impl Shield {
         }
     }
 
-    /// Returns the command for the next period \[m/s^2\]: reads messages, proposes planes, chooses the acceleration of the
-    /// reference, and adds drag and feedback.
+    /// Returns the command for the next period \[m/s^2\]: reads messages, proposes planes, chooses the acceleration of
+    /// the reference, and adds drag and feedback.
     ///
-    /// `measured` is the vehicle's own state, [`measurement_delay_periods`] periods old. A measurement that is not finite
-    /// leaves the feedback out and is counted. `wanted` is the command of the law. One that is not finite brakes.
+    /// `measured` is the vehicle's own state, [`measurement_delay_periods`] periods old. A measurement that is not
+    /// finite leaves the feedback out and is counted. `wanted` is the command of the law. One that is not finite
+    /// brakes.
     ///
     /// [`measurement_delay_periods`]: crate::Settings::measurement_delay_periods
     pub fn filter(&mut self, measured: State, wanted: Vector3<f64>) -> Vector3<f64> {
@@ -130,14 +135,17 @@ impl Shield {
         let (mut decided, mut oldest) = (Decided::default(), 0);
         self.reach.clear();
         for contract in &mut self.contracts {
-            contract.read(&self.segment, self.period, &mut decided);
-            contract.propose(&self.segment);
+            contract.read(&self.segment, limits.margin_m(), self.period, &mut decided);
+            contract.propose(&self.segment, limits.margin_m());
             oldest = oldest.max(contract.age(self.period));
-            let (held, pending) = contract.planes();
-            for plane in [Some(held), pending].into_iter().flatten() {
-                if plane.room_m(&reference.position_m) <= reach {
-                    self.reach.push(plane);
-                }
+            let held = contract.held();
+            if held.room_m(&reference.position_m) <= reach {
+                self.reach.push(held);
+            }
+            if let Some(pending) = contract.pending(limits.margin_m())
+                && pending.room_m(&reference.position_m) <= reach
+            {
+                self.reach.push(pending);
             }
         }
         self.counters.decided(decided, oldest);
@@ -259,7 +267,9 @@ impl Shield {
     /// Defect for tests: holds the planes of the segments heard last. Returns whether every pair has one.
     #[cfg(test)]
     pub(crate) fn hold_heard(&mut self) -> bool {
-        let segment = self.segment;
-        self.contracts.iter_mut().fold(true, |all, contract| contract.hold_heard(&segment) && all)
+        let (segment, margin_m) = (self.segment, self.limits.margin_m());
+        let missing =
+            self.contracts.iter_mut().filter_map(|contract| (!contract.hold_heard(&segment, margin_m)).then_some(()));
+        missing.count() == 0
     }
 }

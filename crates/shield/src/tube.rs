@@ -3,8 +3,8 @@
 //! # The sampled loop
 //! The reference has p^'' = u^ with u^ held over each period h. The vehicle has p'' = a22 p' + r + w. Its command is
 //! `u = u^ - a22 v^ + f` with the feedback f held too. The actuator carries it out, r = u, or with a lag
-//! r' = (u - r) / lag. The feedback is -kp (p_m - p^) - kd (v_m - v^) of a measurement that is a whole number of periods
-//! old. With e = p - p^ and d = u^ - a22 v^ at the last instant, s seconds after it:
+//! r' = (u - r) / lag from r = 0 at the start. The feedback is `-kp (p_m - p^) - kd (v_m - v^)` of a measurement that
+//! is a whole number of periods old. With e = p - p^ and d = u^ - a22 v^ at the last instant, s seconds after it:
 //!
 //! ```text
 //! e'' = a22 e' + f + q            without lag,   |q(s)| <= W + |a22| A s
@@ -12,19 +12,19 @@
 //! ```
 //!
 //! q contains the push w and a22 times the change of v^ since the instant. Gains are equal on all axes, so each impulse
-//! response is a scalar. By the triangle inequality |e| is at most the sum of the absolute responses times the bounds of
-//! their inputs: noise (kp eps_p + kd eps_v in f), push, d, and the error at the start (eps_p, eps_v).
+//! response is a scalar. By the triangle inequality |e| is at most the sum of the absolute responses times the bounds
+//! of their inputs. These are noise (`kp eps_p + kd eps_v` in f), push, d, and the start error (`eps_p`, `eps_v`).
 //!
 //! # Enclosure
 //! With n cells of length c = h / n in a period, each bound holds between the grid points too:
 //!
-//! - A response is twice differentiable in time. On a cell its absolute value is at most the linear interpolation of the
-//!   absolute values at the ends plus c^2 / 8 times a bound of its second derivative. A sum of such functions is at most
-//!   the larger of its two ends plus the sum of these terms.
+//! - A response is twice differentiable in time. On a cell its absolute value is at most the linear interpolation of
+//!   the absolute values at the ends plus c^2 / 8 times a bound of its second derivative. A sum of such functions is at
+//!   most the larger of its two ends plus the sum of these terms.
 //! - The integral over the time of a push uses the same interpolation, times the linear bound of q, in closed form. The
 //!   part of a push in its own period is convex in time.
-//! - With a power L of the loop whose norm n_L is below 1, the norms of all later powers sum to at most
-//!   n_L / (1 - n_L) times the sum of the norms before. This bounds the tail, and proves that the loop is stable.
+//! - Let the power L of the loop have a norm n below 1. The norms of this and all later powers sum to at most
+//!   n / (1 - n) times the sum of the norms before. This bounds the tail, and proves that the loop is stable.
 //! - Rounding is bounded by a relative term that grows with the sum of the norms.
 
 use nalgebra::{DMatrix, DVector, RowDVector, SMatrix};
@@ -168,8 +168,8 @@ struct Sampled {
     positions: DMatrix<f64>,
     /// Map from the state at an instant to the feedback.
     feedback: RowDVector<f64>,
-    /// States at the end of the period of an input: noise, held command, push at each grid point, and the unit states of
-    /// the components with an error of interpolation.
+    /// States at the end of the period of an input: noise, held command, push at each grid point, and the unit states
+    /// of the components with an error of interpolation.
     inputs: DMatrix<f64>,
     /// Unit errors of position and velocity.
     starts: DMatrix<f64>,
@@ -197,7 +197,7 @@ impl Sampled {
         let magnitude = dynamics.map(f64::abs);
         let rate = magnitude.row_iter().map(|row| row.sum()).fold(0.0, f64::max);
         let cells = (rate * of.period_s / CELL_RATE).ceil();
-        if !(cells <= MAX_CELLS as f64) {
+        if cells > MAX_CELLS as f64 {
             return Err(TubeError::ShortLag);
         }
         // In 0..=MAX_CELLS.

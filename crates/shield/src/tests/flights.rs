@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::random::Random;
 use super::world::{Flight, Law, Radio, STEPS, World, flat};
-use crate::{Fleet, Settings, State};
+use crate::{Fleet, Limits, Settings, State};
 
 /// Safety distance of the random flights \[m\].
 const DELTA_M: f64 = 1.0;
@@ -67,7 +67,7 @@ pub(super) fn random_flight(seed: u64, ranges: Ranges) -> Flight {
     let limits: Vec<_> =
         instants.iter().map(|steps| of_steps[steps + 1 - STEPS].expect("periods that are used")).collect();
     let moves = random.chance(0.5);
-    let largest = limits.iter().map(|limits| limits.margin_m()).fold(0.0, f64::max);
+    let largest = limits.iter().map(Limits::margin_m).fold(0.0, f64::max);
     let least = 2.0 * largest + if moves { 0.6 } else { 0.02 };
     let starts = loop {
         let starts: Vec<_> = places(&mut random, count, least, planar)
@@ -93,7 +93,7 @@ pub(super) fn random_flight(seed: u64, ranges: Ranges) -> Flight {
         planar,
         adversarial: random.chance(0.5),
         seed: seed ^ 0x5EED,
-        ..Flight::new(common, starts, slots)
+        ..Flight::new(&common, starts, slots)
     }
 }
 
@@ -144,7 +144,7 @@ fn a_dive_at_the_nearest_vehicle_comes_to_the_safety_distance_and_no_closer() {
 fn head_on(settings: Settings) -> Flight {
     let starts = [-4.0, 4.0].map(|x| State::at_rest(Vector3::new(x, 0.0, 0.0))).to_vec();
     let slots = [4.0, -4.0].map(|x| Vector3::new(x, 0.0, 0.0)).to_vec();
-    Flight { duration_s: 20.0, planar: true, ..Flight::new(settings.limits().expect("valid"), starts, slots) }
+    Flight { duration_s: 20.0, planar: true, ..Flight::new(&settings.limits().expect("valid"), starts, slots) }
 }
 
 #[test]
@@ -183,6 +183,30 @@ fn a_crowd_is_clear_under_a_second_of_latency_and_nine_of_ten_messages_lost() {
             let world = Flight { radio, ..random_flight(seed, ranges) }.fly();
             assert!(world.closest_m >= DELTA_M, "{seed} {radio:?}: {}", world.closest_m);
         }
+    }
+}
+
+#[test]
+fn circles_and_crossing_crowds_arrive() {
+    let limits = Settings::new(DELTA_M, 0.05).limits().expect("valid");
+    for seed in 0..8 {
+        let mut random = Random::new(seed);
+        let (starts, slots): (Vec<_>, Vec<_>) = if seed % 2 == 0 {
+            // Opposite places of a circle, up to 0.1 m beside it.
+            let place = |k: usize| Vector3::from([[4.0, 0.0, 0.0], [2.0, 3.4, 0.0], [-2.0, 3.4, 0.0]][k % 3]);
+            let place = |k: usize| if k < 3 { place(k) } else { -place(k) };
+            (0..6).map(|k| (place(k) + flat(random.vector(0.1), true), place((k + 3) % 6))).unzip()
+        } else {
+            let starts = places(&mut random, 10, 2.4, true);
+            starts.into_iter().zip(places(&mut random, 10, 2.4, true)).unzip()
+        };
+        let starts: Vec<_> = starts.into_iter().map(State::at_rest).collect();
+        let radio = Radio { latency_s: 0.1, loss: 0.3, burst: 3.0, ..Radio::default() };
+        let flight = Flight { duration_s: 60.0, planar: true, radio, ..Flight::new(&limits, starts, slots) };
+        let world = flight.fly();
+        assert!(world.closest_m >= DELTA_M, "{seed}: {}", world.closest_m);
+        let left = world.states.iter().zip(&flight.slots).map(|(state, slot)| (state.position_m - slot).norm());
+        assert!(left.fold(0.0, f64::max) < 0.1, "{seed}: {:?}", world.states);
     }
 }
 

@@ -24,7 +24,7 @@ fn flight(stop_only: bool, starts: &[[f64; 6]], slots: &[[f64; 3]], duration_s: 
         velocity_m_s: Vector3::new(*vx, *vy, *vz),
     });
     let slots = slots.iter().map(|slot| Vector3::from(*slot)).collect();
-    Flight { duration_s, ..Flight::new(limits(stop_only), starts.collect(), slots) }
+    Flight { duration_s, ..Flight::new(&limits(stop_only), starts.collect(), slots) }
 }
 
 fn check(world: &World, closest: (f64, f64), ends: &[[f64; 3]], [changed, answered, refused]: [u64; 3]) {

@@ -67,10 +67,10 @@ pub(super) struct Flight {
 
 impl Flight {
     /// Returns a flight to slots with a clean radio.
-    pub(super) fn new(limits: Limits, starts: Vec<State>, slots: Vec<Vector3<f64>>) -> Self {
+    pub(super) fn new(limits: &Limits, starts: Vec<State>, slots: Vec<Vector3<f64>>) -> Self {
         let count = starts.len();
         Self {
-            limits: vec![limits; count],
+            limits: vec![*limits; count],
             starts,
             slots,
             law: Law::Slot,
@@ -124,7 +124,7 @@ impl World {
         let mut random = Random::new(of.seed);
         let fleet = Fleet::new(&of.limits, &of.starts).expect("starts are apart");
         let count = of.starts.len();
-        // True states err by as much as a measurement.
+        // True states may err like a measurement.
         let states = of.starts.iter().zip(&of.limits).map(|(start, limits)| {
             let settings = limits.settings();
             State {
@@ -301,8 +301,8 @@ pub(super) fn flat(vector: Vector3<f64>, planar: bool) -> Vector3<f64> {
 
 /// Returns the minimum of |r + v t + a t^2 / 2| over a step, and its time.
 ///
-/// The derivative of the square is a cubic. Between its extrema it is monotone, so each change of sign from minus to plus
-/// has one minimum, found by bisection.
+/// The derivative of the square is a cubic. Between its extrema it is monotone, so each change of sign from minus to
+/// plus has one minimum, found by bisection.
 fn least_separation(r: &Vector3<f64>, v: &Vector3<f64>, a: &Vector3<f64>, step_s: f64) -> (f64, f64) {
     let at = |t: f64| (r + v * t + a * (t * t / 2.0)).norm();
     let slope = |t: f64| {

@@ -59,8 +59,8 @@ fn simulate(of: &TrackerLoop, inputs: &Inputs) -> (Vec<f64>, Vec<f64>) {
     (errors, feedbacks)
 }
 
-/// Returns the largest error of position and the largest feedback at the end of some periods under the worst sequence of
-/// signs: the sign of each impulse response, by superposition of simulated impulses.
+/// Returns the largest error of position and the largest feedback at the end under the worst sequence of signs. The
+/// signs are those of the impulse responses, which are simulated one by one.
 fn worst_sequence(of: &TrackerLoop, periods: usize) -> (f64, f64) {
     let noise_bound = of.tracker_per_s2 * of.position_error_m + of.tracker_per_s * of.velocity_error_m_s;
     let held_bound = if of.actuator_lag_s > 0.0 { of.accel_m_s2 } else { 0.0 };

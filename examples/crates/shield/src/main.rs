@@ -24,7 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let mut states = [0.0, 3.0, 6.0, 9.0].map(|x| State::at_rest(Vector3::new(x, 0.1 * x * x, 0.0)));
     let starts = states.iter().map(|state| limits.start(*state)).collect::<Result<Vec<_>, _>>()?;
-    let shields = (0..states.len()).map(|own| Shield::new(limits, own, &starts));
+    let shields = (0..states.len()).map(|own| Shield::new(&limits, own, &starts));
     let mut shields = shields.collect::<Result<Vec<_>, _>>()?;
 
     let (mut nearest_m, mut sent) = (f64::INFINITY, 0_u32);
