@@ -24,6 +24,7 @@ pub struct Counters {
     /// Longest sequence of commands of the brake, in periods.
     pub longest_brake: u64,
     /// Length of the present sequence of commands of the brake.
+    #[serde(skip)]
     present_brake: u64,
     /// Proposals that this vehicle accepted.
     pub accepted: u64,

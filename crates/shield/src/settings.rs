@@ -239,6 +239,12 @@ impl Limits {
         self.envelope.brake
     }
 
+    /// Rule by which a command is chosen.
+    #[must_use]
+    pub fn choice(&self) -> Choice {
+        self.choice
+    }
+
     /// Distance that the reference keeps from the plane between a pair \[m\]: delta / 2 + e, and rounding.
     #[must_use]
     pub fn margin_m(&self) -> f64 {
