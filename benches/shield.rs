@@ -23,7 +23,7 @@ struct Crowd {
 impl Crowd {
     fn new(count: usize, spacing_m: f64) -> Self {
         let limits = Settings::new(1.0, PERIOD_S).limits().expect("defaults are valid");
-        let side = (1..).find(|side| side * side >= count).expect("a square");
+        let side = (1..=count).find(|side| side * side >= count).expect("a square");
         let place = |i: usize| Vector3::new((i % side) as f64, (i / side) as f64, 0.0) * spacing_m;
         let states: Vec<_> = (0..count).map(|i| State::at_rest(place(i))).collect();
         let fleet = Fleet::new(&vec![limits; count], &states).expect("starts are apart");
