@@ -45,6 +45,7 @@ pub use tautline_recordings::{export, mcap, read};
 #[cfg(feature = "viewer")]
 pub use tautline_render as render;
 pub use tautline_report::{figures, flight_log, replay, report, request, run};
+pub use tautline_shield as shield;
 pub use tautline_sim::{continuous, link, metrics, plan, plant, preflight, scenario, sim, vehicle};
 pub use tautline_studies as studies;
 pub use tautline_studies::{attack, campaign, compare, margin, splitting, statistics, sweep};

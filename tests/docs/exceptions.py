@@ -45,6 +45,7 @@ LONG = {
 # Built programs that run in place of cargo.
 INSTEAD = {
     "cargo run --release --example own_law": "debug/examples/own_law",
+    "cargo run --release --package example-shield": "debug/example-shield",
 }
 
 # (page, beginning of a text block): reason why it differs from the output of the command above.

@@ -204,7 +204,7 @@ fn a_number_that_is_shown_twice_is_the_same_number() {
         (&html, "closest so far "),
         (&html, ">closest "),
         (&html, " Closest: "),
-        (&html, "vehicles 4-5 at 3.63 s, "),
+        (&html, "vehicles 4 and 5 at 3.63 s, "),
     ];
     let (mut found, mut decimals) = (0, std::collections::BTreeSet::new());
     for (place, words) in least {

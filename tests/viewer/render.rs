@@ -66,7 +66,7 @@ fn a_run_writes_pictures_and_shows_them_on_its_page() {
     assert_eq!(size_of(&out.join("snapshots/closest.png")), [1280, 720]);
     let page = fs::read_to_string(out.join("report.html")).expect("a page");
     assert_eq!(page.matches("data:image/png;base64,").count(), 4);
-    assert!(page.contains("Vehicles 4-5 were closer than delta from"), "the violation is described in words");
+    assert!(page.contains("Vehicles 4 and 5 were closer than delta from"), "the violation is described in words");
 
     // A run without pictures removes those of the run before.
     let again = ["run", "pentagon", "--out", "out", "--force", "--no-snapshots", "--set", "time.duration_s=1"];

@@ -1,4 +1,4 @@
-//! Plain data shared by all crates of tautline: the state of a swarm, recorded motion, samples.
+//! Plain data shared by all crates of tautline: the state of a swarm, recorded motion, samples; and a projection.
 //!
 //! | module | holds |
 //! | --- | --- |
@@ -6,12 +6,14 @@
 //! | [`track`] | recorded motion of any origin: instants, pieces of curves, clocks |
 //! | [`record`] | a flight's samples as they are made, and the traits that receive them |
 //! | [`text`] | formatting of numbers |
+//! | [`half_spaces`] | the point nearest to a wish in half-spaces and a ball, for laws and the shield |
 //!
 //! SI units; each name ends with its unit (`clearance_m`). One inertial frame, z up. Vehicles count from 0 in code and
 //! from 1 in all output.
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
+pub mod half_spaces;
 pub mod record;
 pub mod swarm;
 pub mod text;

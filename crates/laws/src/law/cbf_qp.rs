@@ -7,13 +7,13 @@ use serde::{Deserialize, Serialize};
 use super::certificate::{Certificate, VoidReason};
 use super::consensus::{check_observation, check_range};
 use super::error::{LawError, ParameterError};
-use super::half_spaces::{HalfSpace, HalfSpaces};
 use super::interface::LawContext;
 use super::interface::ReferenceUse;
 use super::interface::{Capabilities, Law, RateQuery, Rates};
 use crate::formation::Formation;
 use crate::observation::Observation;
 use crate::space::NearLists;
+use tautline_core::half_spaces::{HalfSpace, HalfSpaces};
 use tautline_core::swarm::{Pair, Rows, row, set_row};
 
 /// Smallest clearance used for a pair, as a fraction of delta: the slope of the barrier is infinite at clearance 0.

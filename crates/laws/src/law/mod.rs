@@ -13,7 +13,6 @@ mod edge_tension;
 mod energy;
 mod error;
 mod flocking;
-mod half_spaces;
 mod interface;
 mod kernel;
 mod laplacian;

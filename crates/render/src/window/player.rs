@@ -191,12 +191,10 @@ mod tests {
 
     #[test]
     fn violations_are_visited_in_order() {
-        use tautline_core::swarm::Pair;
-
         let mut player = player();
-        for (from_s, to_s) in [(1.2, 1.4), (0.4, 0.6)] {
-            player.timeline.note(&Event::ViolationBegan { pair: Pair::new(0, 1), time_s: from_s });
-            player.timeline.note(&Event::ViolationEnded { pair: Pair::new(0, 1), time_s: to_s, min_m: 0.1 });
+        for (time_s, to_s) in [(1.2, 1.4), (0.4, 0.6)] {
+            player.timeline.note(&Event::ObstacleViolationBegan { vehicle: 0, obstacle: 0, time_s });
+            player.timeline.note(&Event::ObstacleViolationEnded { vehicle: 0, obstacle: 0, time_s: to_s, min_m: 0.1 });
         }
         let mut visit = |is_next| {
             player.seek_violation(is_next);

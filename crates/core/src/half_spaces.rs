@@ -10,10 +10,11 @@ const ROUNDING: [f64; 4] = [1e-12, 1e-10, 1e-8, 1e-6];
 
 /// Set of all x with `normal . x >= offset`.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct HalfSpace {
+pub struct HalfSpace {
     /// Unit normal.
-    pub(super) normal: Vector3<f64>,
-    pub(super) offset: f64,
+    pub normal: Vector3<f64>,
+    /// Smallest extent along the normal.
+    pub offset: f64,
 }
 
 impl HalfSpace {
@@ -40,7 +41,7 @@ impl HalfSpace {
 /// O(n^3) at worst, plus the same for each half-space that cannot be satisfied. Nothing is allocated once the lists
 /// have grown. If target point and normals lie in the plane z = 0, the result does too, exactly.
 #[derive(Clone, Debug, Default)]
-pub(super) struct HalfSpaces {
+pub struct HalfSpaces {
     given: Vec<HalfSpace>,
     /// Scratch: half-spaces in which other half-spaces are violated no more than the worst one.
     no_worse: Vec<HalfSpace>,
@@ -48,26 +49,35 @@ pub(super) struct HalfSpaces {
 
 /// Result of a projection.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Nearest {
-    pub(super) point: Vector3<f64>,
+pub struct Nearest {
+    /// The point.
+    pub point: Vector3<f64>,
     /// Largest violation of the point; 0 if the point is in all half-spaces up to rounding.
-    pub(super) violation: f64,
+    pub violation: f64,
 }
 
 impl HalfSpaces {
-    pub(super) fn clear(&mut self) {
+    /// Returns no half-spaces, with memory for this many.
+    #[must_use]
+    pub fn with_capacity(count: usize) -> Self {
+        Self { given: Vec::with_capacity(count), no_worse: Vec::new() }
+    }
+
+    /// Removes all half-spaces and keeps their memory.
+    pub fn clear(&mut self) {
         self.given.clear();
     }
 
-    pub(super) fn push(&mut self, half_space: HalfSpace) {
+    /// Adds a half-space.
+    pub fn push(&mut self, half_space: HalfSpace) {
         self.given.push(half_space);
     }
 
     /// Returns the point nearest to `wish` in all half-spaces and in the ball of this radius about the origin. If there
     /// is no such point, returns the nearest point of minimal largest violation. Violations are accurate to 1e-12 of
     /// the radius and the offsets, and to 1e-6 with nearly parallel planes.
-    pub(super) fn nearest(&mut self, wish: Vector3<f64>, radius: f64) -> Nearest {
-        let search = Search { objective: Objective::Near(wish), radius, slack: 0.0, rounding: ROUNDING[0] };
+    pub fn nearest(&mut self, wish: Vector3<f64>, radius: f64) -> Nearest {
+        let search = Search::near(wish, radius);
         match search.best(&self.given, &Subspace::space()) {
             Ok(point) => Nearest { point, violation: 0.0 },
             Err(Infeasible { place, last }) => {
@@ -77,6 +87,13 @@ impl HalfSpaces {
                 Nearest { point, violation: self.largest_violation(&point) }
             }
         }
+    }
+
+    /// Returns the point nearest to `wish` in all half-spaces and in the ball of this radius about the origin. `None`
+    /// if no point is in all of them up to rounding.
+    #[must_use]
+    pub fn nearest_inside(&self, wish: Vector3<f64>, radius: f64) -> Option<Vector3<f64>> {
+        Search::near(wish, radius).best(&self.given, &Subspace::space()).ok()
     }
 
     /// Returns a point of minimal largest violation. `point` must lie in all half-spaces before `place`.
@@ -137,6 +154,10 @@ struct Search {
 }
 
 impl Search {
+    fn near(wish: Vector3<f64>, radius: f64) -> Self {
+        Self { objective: Objective::Near(wish), radius, slack: 0.0, rounding: ROUNDING[0] }
+    }
+
     /// Returns the best point in an affine subspace.
     fn best(&self, within: &[HalfSpace], subspace: &Subspace) -> Result<Vector3<f64>, Infeasible> {
         let mut point =

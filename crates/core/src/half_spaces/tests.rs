@@ -113,7 +113,11 @@ fn wishes() -> impl Strategy<Value = Vector3<f64>> {
 proptest! {
     #[test]
     fn the_answer_matches_clarabel(given in general(), wish in wishes(), radius in 0.3..2.0_f64) {
-        check(&given, wish, radius, nearest(&given, wish, radius)).map_err(TestCaseError::fail)?;
+        let found = nearest(&given, wish, radius);
+        check(&given, wish, radius, found).map_err(TestCaseError::fail)?;
+        let inside = HalfSpaces { given, ..HalfSpaces::default() }.nearest_inside(wish, radius);
+        // A violation of rounding only may be either.
+        prop_assert!(inside == (found.violation == 0.0).then_some(found.point) || found.violation.abs() < 1e-9);
     }
 
     #[test]

@@ -1,0 +1,181 @@
+//! Shields of all vehicles of a simulation, and the condition on their starts.
+
+use nalgebra::Vector3;
+
+use crate::brake::State;
+use crate::contract::Message;
+use crate::report::Counters;
+use crate::settings::{Limits, ShieldError, Start};
+use crate::shield::Shield;
+
+/// Two vehicles and the distance of their reserved segments.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PairRoom {
+    /// The two vehicles, counted from 0.
+    pub pair: (usize, usize),
+    /// Distance of their segments \[m\].
+    pub distance_m: f64,
+    /// Smallest distance with a certificate \[m\]: the sum of the two margins.
+    pub required_m: f64,
+}
+
+impl PairRoom {
+    /// Returns the distance of two starts.
+    #[must_use]
+    pub(crate) fn of(starts: &[Start], i: usize, j: usize) -> Self {
+        let (one, other) = (&starts[i], &starts[j]);
+        let distance_m = one.segment.distance_m(&other.segment);
+        Self { pair: (i, j), distance_m, required_m: one.margin_m + other.margin_m }
+    }
+
+    /// Distance beyond the required one \[m\]; negative without a certificate.
+    #[must_use]
+    pub fn room_m(&self) -> f64 {
+        self.distance_m - self.required_m
+    }
+
+    /// Returns the error for a pair that starts too near.
+    pub(crate) fn too_near(&self) -> ShieldError {
+        let (i, j) = (self.pair.0 + 1, self.pair.1 + 1);
+        let problem = format!(
+            "vehicles {i} and {j} reserve segments {:.6} m apart; their margins need {:.6} m, the room is",
+            self.distance_m, self.required_m
+        );
+        ShieldError::new("start", problem, self.room_m(), "move them apart, start slower or lower the errors")
+    }
+}
+
+/// Returns the pair of starts with the least room. `None` for fewer than two starts.
+///
+/// For starts, room 0 is required. For slots ([`Limits::slot`]) it is required too, because vehicles never come nearer;
+/// with less room than the ease, vehicles may not reach them.
+#[must_use]
+pub fn closest_starts(starts: &[Start]) -> Option<PairRoom> {
+    let pairs = (0..starts.len()).flat_map(|i| (i + 1..starts.len()).map(move |j| (i, j)));
+    pairs.map(|(i, j)| PairRoom::of(starts, i, j)).min_by(|a, b| a.room_m().total_cmp(&b.room_m()))
+}
+
+/// Shields of all vehicles of a simulation.
+///
+/// ```
+/// use nalgebra::Vector3;
+/// use tautline_shield::{Fleet, Settings, State};
+///
+/// let limits = [Settings::new(1.0, 0.05).limits()?; 2];
+/// let mut states = [-3.0, 3.0].map(|x| State::at_rest(Vector3::new(x, 0.0, 0.0)));
+/// let mut fleet = Fleet::new(&limits, &states)?;
+/// let mut commands = [Vector3::zeros(); 2];
+/// let mut sent = vec![];
+/// for _ in 0..400 {
+///     // Each vehicle flies to the start of the other one.
+///     let wanted = [3.0, -3.0].map(|x| Vector3::new(x, 0.0, 0.0));
+///     let wanted = [0, 1].map(|i| wanted[i] - states[i].position_m - states[i].velocity_m_s * 2.0);
+///     fleet.filter(&states, &wanted, &mut commands);
+///     sent.clear();
+///     sent.extend(fleet.messages());
+///     sent.iter().for_each(|message| fleet.hear(message));
+///     for (state, command) in states.iter_mut().zip(commands) {
+///         *state = state.after(command, 0.05);
+///     }
+/// }
+/// assert!((states[0].position_m.x - 3.0).abs() < 0.1);
+/// assert_eq!(fleet.report().exceeded(), None);
+/// # Ok::<(), tautline_shield::ShieldError>(())
+/// ```
+#[derive(Clone, Debug)]
+pub struct Fleet {
+    shields: Vec<Shield>,
+}
+
+impl Fleet {
+    /// Returns the shields of vehicles with these limits and announced states.
+    ///
+    /// # Errors
+    /// If the two lists have different lengths, a start is invalid, or two vehicles start too near to each other. The
+    /// error names the pair with the least room.
+    pub fn new(limits: &[Limits], starts: &[State]) -> Result<Self, ShieldError> {
+        if limits.len() != starts.len() {
+            let problem = format!("{} states for {} vehicles", starts.len(), limits.len());
+            return Err(ShieldError::new("start", problem, starts.len() as f64, "give one state per vehicle"));
+        }
+        let starts: Vec<_> =
+            limits.iter().zip(starts).map(|(limits, state)| limits.start(*state)).collect::<Result<_, _>>()?;
+        if let Some(worst) = closest_starts(&starts).filter(|worst| worst.room_m() < 0.0) {
+            return Err(worst.too_near());
+        }
+        let shields = limits.iter().enumerate().map(|(index, limits)| Shield::new(limits, index, &starts));
+        Ok(Self { shields: shields.collect::<Result<_, _>>()? })
+    }
+
+    /// Stores a message for its receiver.
+    pub fn hear(&mut self, message: &Message) {
+        if let Some(shield) = self.shields.get_mut(message.to as usize) {
+            shield.hear(message);
+        }
+    }
+
+    /// Writes the commands of all vehicles at a common instant \[m/s^2\]. Lists that are too short leave the other
+    /// vehicles out; these must [`brake`](Shield::brake).
+    pub fn filter(&mut self, measured: &[State], wanted: &[Vector3<f64>], commands: &mut [Vector3<f64>]) {
+        let inputs = measured.iter().zip(wanted).zip(commands);
+        for (shield, ((measured, wanted), command)) in self.shields.iter_mut().zip(inputs) {
+            *command = shield.filter(*measured, *wanted);
+        }
+    }
+
+    /// Messages of all vehicles, by sender and then by receiver.
+    pub fn messages(&self) -> impl Iterator<Item = Message> + '_ {
+        self.shields.iter().flat_map(Shield::messages)
+    }
+
+    /// Shields, in the order of the vehicles.
+    #[must_use]
+    pub fn shields(&self) -> &[Shield] {
+        &self.shields
+    }
+
+    /// Shields, in the order of the vehicles.
+    pub fn shields_mut(&mut self) -> &mut [Shield] {
+        &mut self.shields
+    }
+
+    /// Returns the numbers of all vehicles together.
+    #[must_use]
+    pub fn report(&self) -> Counters {
+        let mut report = Counters::default();
+        self.shields.iter().for_each(|shield| report.merge(shield.counters()));
+        report
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::settings::Settings;
+
+    #[test]
+    fn the_worst_pair_of_starts_is_named_with_its_room() {
+        let limits = [Settings::new(1.0, 0.05).limits().expect("defaults"); 3];
+        let mut states = [0.0, 4.0, 5.5].map(|x| State::at_rest(Vector3::new(x, 0.0, 0.0)));
+        assert!(Fleet::new(&limits, &states).is_ok());
+        // 2 m/s stop within 0.6675 m.
+        states[2].velocity_m_s = Vector3::new(-2.0, 0.0, 0.0);
+        assert_eq!(
+            Fleet::new(&limits, &states).expect_err("too near").to_string(),
+            "start: vehicles 2 and 3 reserve segments 0.832500 m apart; their margins need 1.000001 m, the room is \
+             (-0.16750100000000034); move them apart, start slower or lower the errors"
+        );
+        let starts: Vec<_> = states.iter().map(|state| limits[0].start(*state).expect("slow enough")).collect();
+        let error = Shield::new(&limits[0], 1, &starts).expect_err("too near").to_string();
+        assert!(error.starts_with("start: vehicles 2 and 3 reserve"), "{error}");
+        assert!(Shield::new(&limits[0], 0, &starts).is_ok());
+        assert!(Shield::new(&limits[0], 3, &starts).expect_err("no such vehicle").to_string().starts_with("index: "));
+        assert!(
+            Fleet::new(&limits, &states[..2]).expect_err("lengths").to_string().starts_with("start: 2 states for 3")
+        );
+        assert_eq!(closest_starts(&starts[..1]), None);
+        let slots = [limits[0].slot(Vector3::zeros()), limits[0].slot(Vector3::x() * 1.1)];
+        let closest = closest_starts(&slots).expect("two");
+        assert!((closest.room_m() - 0.099_999).abs() < 1e-12 && closest.room_m() < limits[0].ease_m());
+    }
+}

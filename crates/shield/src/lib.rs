@@ -1,0 +1,93 @@
+//! A stage between a control law and its vehicle that certifies the separation of every pair, under any law.
+//!
+//! Each vehicle flies a *reference* that it makes up itself and keeps the path of the reference, and of a full brake
+//! from it, inside planes. Each pair agrees on its plane by a contract of two messages. The law's command is changed
+//! only where the planes require it. Nothing is assumed of the law, of latency, loss or order of messages, or of
+//! clocks.
+//!
+//! | module | holds |
+//! | --- | --- |
+//! | [`brake`] | stop point and command of the brake; the reservation (Lemma 1) |
+//! | [`tube`] | rigorous bounds on the distance to the reference and on the feedback |
+//! | [`plane`] | reserved segments and the plane between two of them |
+//! | [`contract`] | messages, proposals and decisions (Lemma 3) |
+//! | [`choice`] | which commands are accepted, and which one is taken |
+//! | [`settings`] | settings, defaults, errors, limits of the reference |
+//! | [`shield`] | [`Shield`] of one vehicle, for real vehicles and simulators |
+//! | [`fleet`] | [`Fleet`] of all vehicles of a simulation; the condition on starts |
+//! | [`report`] | numbers of a flight, and whether the assumptions held |
+//!
+//! # Model
+//! Vehicle i has p' = v and v' = a22 v + u + w. Its command u is held over its own period h. Lengths are in m, times in
+//! s, and |.| is the Euclidean norm. Periods, errors and margins may differ between vehicles. Assumptions:
+//!
+//! - **A1** Every u with |u| <= A is carried out. |w(t)| <= W at all times. The reference is at most V fast.
+//! - **A2** The own state is measured at the own instants within `eps_p` and `eps_v`. At the start the state is within
+//!   the same of the announced one.
+//! - **A3** The shield runs at every instant. Where it is missed, the brake goes on ([`Shield::brake`]).
+//! - **A4** A message that arrives is what was sent, and arrives after it was sent. It may be late, lost, doubled or
+//!   overtaken.
+//! - **A5** All vehicles use one frame and know all announced starts. The first instant is at the start.
+//!
+//! # Algorithm
+//! At each instant the vehicle, with its reference at (p, v) and the stop point s of its brake:
+//!
+//! 1. reads the newest message of each other vehicle: as a follower it decides on a new proposal, as an owner it takes
+//!    a decision;
+//! 2. as an owner without a pending proposal, proposes the plane between the two segments \[p, s\]. It holds the plane
+//!    beside the old one. The segments must be at least m1 + m2 apart;
+//! 3. chooses the acceleration of the reference: a command that is *accepted*, or that of the brake;
+//! 4. sends its next segment, pending proposals and last decisions to all.
+//!
+//! A command is accepted if it and the next speed are within the limits. The next position and the next stop point must
+//! also be inside all planes held. A plane between two vehicles leaves each of them a margin
+//! m = delta / 2 + e, where e is the bound of the [`tube`].
+//!
+//! # Proof
+//! **Lemma 1** ([`brake::Brake`]). With p, s, the next position and the next stop point inside a half-space, the path
+//!  of the period and the whole brake after it are inside.
+//!
+//! **Lemma 2** (a choice always exists). At each instant, after steps 1 and 2, p and s are inside all planes held, so
+//!  the brake is a choice. Both are inside at the start. The last command was accepted, or was that of the brake, so
+//!  the next p and s are inside all planes held over the period (Lemma 1). A plane is taken on only after p and s were
+//!  tested against it. Dropping a plane changes nothing.
+//!
+//! **Lemma 3** ([`contract`]). At every time the two vehicles of a pair hold a common plane.
+//!
+//! **Theorem.** Let A1 to A5 hold, and let the segments of each pair be at least delta + e1 + e2 apart at the start.
+//!  Then any two vehicles are at least delta apart at all times, under every law, latency and loss.
+//!
+//! *Proof.* Take the common plane of Lemma 3 at a time t. By Lemmas 1 and 2 both references are inside it, one on its
+//!  side by m1 and the other one by m2. They are at least m1 + m2 = delta + e1 + e2 apart. Each vehicle is within its e
+//!  of its reference.
+//!
+//! Doubles round: margins contain 1e-6 m for it ([`settings::ROUNDING_M`]), which covers positions up to 1e6 m.
+//!
+//! # What breaks it
+//! A vehicle that is dead, frozen or weaker than A; a push or an error beyond its bound; forged or altered messages; a
+//! vehicle without a contract. A vehicle that is silent for good is avoided for ever.
+//! [`Counters::exceeded`](report::Counters::exceeded) names an assumption that did not hold in a flight.
+//!
+//! Arrival is not proved. Planes that are not renewed stay safe, and vehicles wait behind them.
+
+#![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
+
+pub mod brake;
+pub mod choice;
+pub mod contract;
+pub mod fleet;
+pub mod plane;
+pub mod report;
+pub mod settings;
+pub mod shield;
+pub mod tube;
+
+pub use brake::State;
+pub use contract::Message;
+pub use fleet::Fleet;
+pub use report::Counters;
+pub use settings::{Limits, Settings, ShieldError, Start};
+pub use shield::Shield;
+
+#[cfg(test)]
+mod tests;

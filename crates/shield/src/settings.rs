@@ -1,0 +1,421 @@
+//! Settings of a shielded vehicle, and the limits of its reference that follow from them.
+
+use std::fmt;
+
+use nalgebra::Vector3;
+
+use crate::brake::{Brake, State};
+use crate::choice::{Choice, Envelope};
+use crate::plane::Segment;
+use crate::tube::{TrackerLoop, Tube, TubeError};
+
+/// Part of the safety distance that is added because of rounding \[m\]. It covers positions up to 1e6 m.
+pub const ROUNDING_M: f64 = 1e-6;
+/// Default deceleration of the brake, as a share of the largest command.
+const BRAKE_SHARE: f64 = 0.6;
+/// Default ease, as a share of the safety distance.
+const EASE_SHARE: f64 = 0.2;
+/// Largest age of a measurement, in periods.
+const MAX_DELAY: usize = 20;
+
+/// Settings of one vehicle. [`Settings::new`] fills in the defaults.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Settings {
+    /// Smallest separation of any pair that is certified \[m\]; the same for all vehicles.
+    pub delta_m: f64,
+    /// Period h over which a command is held \[s\].
+    pub period_s: f64,
+    /// Largest command A that the vehicle carries out \[m/s^2\].
+    pub accel_m_s2: f64,
+    /// Deceleration of the brake \[m/s^2\]; default 0.6 A, at most what is left for the reference.
+    pub brake_m_s2: Option<f64>,
+    /// Largest speed V of the reference \[m/s\].
+    pub max_speed_m_s: f64,
+    /// Bound on the error of the measured position \[m\].
+    pub position_error_m: f64,
+    /// Bound on the error of the measured velocity \[m/s\].
+    pub velocity_error_m_s: f64,
+    /// Bound on the push of wind or of a model error \[m/s^2\].
+    pub disturbance_m_s2: f64,
+    /// Drag a22 \[1/s\]; negative slows.
+    pub a22_per_s: f64,
+    /// Gain of the tracker on position \[1/s^2\].
+    pub tracker_per_s2: f64,
+    /// Gain of the tracker on velocity \[1/s\].
+    pub tracker_per_s: f64,
+    /// Age of a measurement when it is used, in periods.
+    pub measurement_delay_periods: usize,
+    /// Time constant of the actuator \[s\], which is at zero at the start; 0 for none.
+    pub actuator_lag_s: f64,
+    /// Assumed bound on the distance to the reference \[m\], in the place of the computed one. For vehicles other than
+    /// points, such as quadrotors.
+    pub tracking_error_m: Option<f64>,
+    /// Distance between the path of the plant and the path that its acceleration gives \[m\], added to the tube. A
+    /// plant that moves on the chords of its steps dt needs A dt^2 / 8.
+    pub path_error_m: f64,
+    /// Gap that two vehicles keep by choice \[m\]; default 0.2 of the safety distance.
+    pub ease_m: Option<f64>,
+    /// Share of a cut command that is turned to the right, from -1 to 1; 0 for none.
+    pub turn: f64,
+    /// Whether vehicles stop before each other instead of giving way; `ease_m` and `turn` have no effect then.
+    pub stop_only: bool,
+}
+
+impl Settings {
+    /// Returns the defaults for a safety distance \[m\] and a period \[s\]: commands up to 5 m/s^2, speed up to 2 m/s,
+    /// exact measurements and no push.
+    #[must_use]
+    pub fn new(delta_m: f64, period_s: f64) -> Self {
+        Self {
+            delta_m,
+            period_s,
+            accel_m_s2: 5.0,
+            brake_m_s2: None,
+            max_speed_m_s: 2.0,
+            position_error_m: 0.0,
+            velocity_error_m_s: 0.0,
+            disturbance_m_s2: 0.0,
+            a22_per_s: 0.0,
+            tracker_per_s2: 4.0,
+            tracker_per_s: 4.0,
+            measurement_delay_periods: 0,
+            actuator_lag_s: 0.0,
+            tracking_error_m: None,
+            path_error_m: 0.0,
+            ease_m: None,
+            turn: 1.0,
+            stop_only: false,
+        }
+    }
+
+    /// Returns the limits of the reference.
+    ///
+    /// # Errors
+    /// If a value is out of range, the tracker is unstable, or nothing is left for the reference or its brake.
+    pub fn limits(&self) -> Result<Limits, ShieldError> {
+        self.check_ranges()?;
+        let tracker = TrackerLoop {
+            period_s: self.period_s,
+            tracker_per_s2: self.tracker_per_s2,
+            tracker_per_s: self.tracker_per_s,
+            position_error_m: self.position_error_m,
+            velocity_error_m_s: self.velocity_error_m_s,
+            disturbance_m_s2: self.disturbance_m_s2,
+            a22_per_s: self.a22_per_s,
+            accel_m_s2: self.accel_m_s2,
+            measurement_delay_periods: self.measurement_delay_periods,
+            actuator_lag_s: self.actuator_lag_s,
+        };
+        let mut tube = tracker.tube().map_err(|error| self.no_tube(error))?;
+        tube.error_m = self.tracking_error_m.unwrap_or(tube.error_m) + self.path_error_m;
+        let drag = self.a22_per_s.abs() * self.max_speed_m_s;
+        let reference = self.accel_m_s2 - tube.feedback_m_s2 - drag;
+        if reference <= 0.0 {
+            return Err(ShieldError::new(
+                "accel_m_s2",
+                format!("feedback takes up to {:.4} and drag {drag:.4}; nothing is left", tube.feedback_m_s2),
+                self.accel_m_s2,
+                "raise it, or lower the errors, `disturbance_m_s2` or the gains of the tracker",
+            ));
+        }
+        let brake = self.brake_m_s2.unwrap_or((BRAKE_SHARE * self.accel_m_s2).min(reference));
+        if brake > reference {
+            return Err(ShieldError::new(
+                "brake_m_s2",
+                format!("must be at most {reference:.4}, which is what feedback and drag leave of `accel_m_s2`"),
+                brake,
+                "lower it or leave it out",
+            ));
+        }
+        let choice = if self.stop_only {
+            Choice::Scale
+        } else {
+            Choice::GiveWay { ease_m: self.ease_m.unwrap_or(EASE_SHARE * self.delta_m), turn: self.turn }
+        };
+        let envelope = Envelope {
+            accel_m_s2: reference,
+            speed_m_s: self.max_speed_m_s,
+            period_s: self.period_s,
+            brake: Brake::new(brake, self.period_s),
+        };
+        let margin_m = f64::midpoint(self.delta_m, ROUNDING_M) + tube.error_m;
+        Ok(Limits { settings: *self, tube, envelope, choice, margin_m })
+    }
+
+    fn check_ranges(&self) -> Result<(), ShieldError> {
+        let positive = [
+            ("delta_m", self.delta_m),
+            ("period_s", self.period_s),
+            ("accel_m_s2", self.accel_m_s2),
+            ("brake_m_s2", self.brake_m_s2.unwrap_or(1.0)),
+            ("max_speed_m_s", self.max_speed_m_s),
+            ("tracker_per_s2", self.tracker_per_s2),
+            ("tracker_per_s", self.tracker_per_s),
+        ];
+        let not_negative = [
+            ("position_error_m", self.position_error_m),
+            ("velocity_error_m_s", self.velocity_error_m_s),
+            ("disturbance_m_s2", self.disturbance_m_s2),
+            ("actuator_lag_s", self.actuator_lag_s),
+            ("tracking_error_m", self.tracking_error_m.unwrap_or(0.0)),
+            ("path_error_m", self.path_error_m),
+            ("ease_m", self.ease_m.unwrap_or(0.0)),
+        ];
+        let fails = |place, problem: &str, value, remedy| Err(ShieldError::new(place, problem.into(), value, remedy));
+        if let Some((place, value)) = positive.into_iter().find(|(_, value)| !(value.is_finite() && *value > 0.0)) {
+            return fails(place, "must be above 0", value, "give a positive number");
+        }
+        if let Some((place, value)) = not_negative.into_iter().find(|(_, value)| !(value.is_finite() && *value >= 0.0))
+        {
+            return fails(place, "must not be negative", value, "give 0 or a positive number");
+        }
+        if !self.a22_per_s.is_finite() {
+            return fails("a22_per_s", "must be a number", self.a22_per_s, "give the drag in 1/s");
+        }
+        if !(-1.0..=1.0).contains(&self.turn) {
+            return fails("turn", "must be from -1 to 1", self.turn, "give 1 for the right hand, 0 for none");
+        }
+        if self.measurement_delay_periods > MAX_DELAY {
+            let value = self.measurement_delay_periods as f64;
+            return fails("measurement_delay_periods", "must be at most 20", value, "use a longer period");
+        }
+        Ok(())
+    }
+
+    fn no_tube(&self, error: TubeError) -> ShieldError {
+        match error {
+            TubeError::Unstable => ShieldError::new(
+                "tracker_per_s",
+                format!(
+                    "the tracker is unstable with `tracker_per_s2` {}, a period of {} s and measurements {} periods \
+                     old",
+                    self.tracker_per_s2, self.period_s, self.measurement_delay_periods
+                ),
+                self.tracker_per_s,
+                "lower both gains or shorten the period",
+            ),
+            TubeError::ShortLag => ShieldError::new(
+                "actuator_lag_s",
+                format!("must be 0 or at least a fortieth of the period of {} s", self.period_s),
+                self.actuator_lag_s,
+                "round it up",
+            ),
+        }
+    }
+}
+
+/// Limits of the reference of a vehicle, from checked [`Settings`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    settings: Settings,
+    tube: Tube,
+    pub(crate) envelope: Envelope,
+    pub(crate) choice: Choice,
+    margin_m: f64,
+}
+
+impl Limits {
+    /// Settings that these limits follow from.
+    #[must_use]
+    pub fn settings(&self) -> &Settings {
+        &self.settings
+    }
+
+    /// Bounds on the distance to the reference and on the feedback.
+    #[must_use]
+    pub fn tube(&self) -> Tube {
+        self.tube
+    }
+
+    /// Largest acceleration `A_n` of the reference \[m/s^2\].
+    #[must_use]
+    pub fn reference_m_s2(&self) -> f64 {
+        self.envelope.accel_m_s2
+    }
+
+    /// Brake of the reference.
+    #[must_use]
+    pub fn brake(&self) -> Brake {
+        self.envelope.brake
+    }
+
+    /// Rule by which a command is chosen.
+    #[must_use]
+    pub fn choice(&self) -> Choice {
+        self.choice
+    }
+
+    /// Distance that the reference keeps from the plane between a pair \[m\]: delta / 2 + e, and rounding.
+    #[must_use]
+    pub fn margin_m(&self) -> f64 {
+        self.margin_m
+    }
+
+    /// Gap that two vehicles keep by choice \[m\].
+    #[must_use]
+    pub fn ease_m(&self) -> f64 {
+        match self.choice {
+            Choice::GiveWay { ease_m, .. } => ease_m,
+            Choice::Scale => 0.0,
+        }
+    }
+
+    /// Returns the certificate of a fleet with these limits in words, with its assumptions.
+    #[must_use]
+    pub fn certificate(&self) -> String {
+        let of = &self.settings;
+        let delay = match of.measurement_delay_periods {
+            0 => String::new(),
+            periods => format!(", measurements are {periods} periods old"),
+        };
+        let lag =
+            if of.actuator_lag_s > 0.0 { format!(", actuators lag by {} s", of.actuator_lag_s) } else { String::new() };
+        let tube = if of.tracking_error_m.is_some() { "assumed tube" } else { "tube" };
+        format!(
+            "certified never closer than {:.3} m, whatever the law commands and whatever the radio loses. This holds \
+             while commands up to {} m/s^2 are carried out, own position is known to {} m and {} m/s, pushes stay \
+             below {} m/s^2{delay}{lag} ({tube} {:.3} m)",
+            of.delta_m,
+            of.accel_m_s2,
+            of.position_error_m,
+            of.velocity_error_m_s,
+            of.disturbance_m_s2,
+            self.tube.error_m
+        )
+    }
+
+    /// Returns the start of a vehicle, which all vehicles must know. The true state may differ by the errors of
+    /// measurement.
+    ///
+    /// # Errors
+    /// If a number is not finite or the speed is above the largest one.
+    pub fn start(&self, state: State) -> Result<Start, ShieldError> {
+        if !state.is_finite() {
+            return Err(ShieldError::new("start", "must be finite".into(), f64::NAN, "give a position and a velocity"));
+        }
+        let speed = state.velocity_m_s.norm();
+        if speed > self.settings.max_speed_m_s {
+            let problem = format!("starts faster than `max_speed_m_s` = {}", self.settings.max_speed_m_s);
+            return Err(ShieldError::new("start", problem, speed, "raise `max_speed_m_s` or start slower"));
+        }
+        let segment = Segment::new(state.position_m, self.envelope.brake.stop_m(&state));
+        Ok(Start { state, segment, margin_m: self.margin_m })
+    }
+
+    /// Returns a slot: a start at rest, for [`closest_starts`](crate::fleet::closest_starts).
+    #[must_use]
+    pub fn slot(&self, position_m: Vector3<f64>) -> Start {
+        let segment = Segment::new(position_m, position_m);
+        Start { state: State::at_rest(position_m), segment, margin_m: self.margin_m }
+    }
+}
+
+/// Start of a vehicle as announced to all.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Start {
+    /// State of the reference.
+    pub state: State,
+    /// Reserved segment.
+    pub segment: Segment,
+    /// Distance that the vehicle keeps from the plane between a pair \[m\].
+    pub margin_m: f64,
+}
+
+/// Settings or starts that cannot be certified: `PLACE: PROBLEM (VALUE); REMEDY`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShieldError {
+    /// Name of the setting, or `start`.
+    pub place: &'static str,
+    /// What is wrong.
+    pub problem: String,
+    /// The value.
+    pub value: f64,
+    /// What helps.
+    pub remedy: &'static str,
+}
+
+impl ShieldError {
+    pub(crate) fn new(place: &'static str, problem: String, value: f64, remedy: &'static str) -> Self {
+        Self { place, problem, value, remedy }
+    }
+}
+
+impl fmt::Display for ShieldError {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(out, "{}: {} ({}); {}", self.place, self.problem, self.value, self.remedy)
+    }
+}
+
+impl std::error::Error for ShieldError {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(change: impl Fn(&mut Settings)) -> String {
+        let mut settings = Settings::new(1.0, 0.05);
+        change(&mut settings);
+        settings.limits().expect_err("refused").to_string()
+    }
+
+    #[test]
+    fn limits_of_the_page() {
+        let settings = Settings {
+            position_error_m: 0.03,
+            velocity_error_m_s: 0.05,
+            disturbance_m_s2: 0.3,
+            a22_per_s: -0.1,
+            ..Settings::new(1.0, 0.05)
+        };
+        let limits = settings.limits().expect("certified");
+        assert!((limits.reference_m_s2() - (5.0 - limits.tube().feedback_m_s2 - 0.2)).abs() < 1e-12);
+        assert_eq!(limits.brake().deceleration_m_s2(), 3.0);
+        assert!((limits.margin_m() - 0.5 - 5e-7 - limits.tube().error_m).abs() < 1e-12);
+        assert_eq!(limits.ease_m(), 0.2);
+        assert_eq!(
+            limits.certificate(),
+            "certified never closer than 1.000 m, whatever the law commands and whatever the radio loses. This holds \
+             while commands up to 5 m/s^2 are carried out, own position is known to 0.03 m and 0.05 m/s, pushes stay \
+             below 0.3 m/s^2 (tube 0.158 m)"
+        );
+        let late = Settings { measurement_delay_periods: 2, actuator_lag_s: 0.05, ..settings };
+        let late = late.limits().expect("certified").certificate();
+        assert!(late.contains("0.3 m/s^2, measurements are 2 periods old, actuators lag by 0.05 s (tube"), "{late}");
+        // The assumed tube takes the place of the computed one; the feedback is still that of the loop.
+        let assumed = Settings { tracking_error_m: Some(0.25), path_error_m: 0.125, ..settings }.limits().expect("ok");
+        assert_eq!(assumed.tube(), Tube { error_m: 0.375, feedback_m_s2: limits.tube().feedback_m_s2 });
+    }
+
+    #[test]
+    fn errors_name_place_value_and_remedy() {
+        assert_eq!(
+            refused(|settings| settings.brake_m_s2 = Some(6.0)),
+            "brake_m_s2: must be at most 5.0000, which is what feedback and drag leave of `accel_m_s2` (6); \
+             lower it or leave it out"
+        );
+        assert_eq!(
+            refused(|settings| settings.tracker_per_s = 50.0),
+            "tracker_per_s: the tracker is unstable with `tracker_per_s2` 4, a period of 0.05 s and measurements 0 \
+             periods old (50); lower both gains or shorten the period"
+        );
+        assert!(
+            refused(|settings| settings.disturbance_m_s2 = 9.0).starts_with("accel_m_s2: feedback takes up to 11.")
+        );
+        assert!(refused(|settings| settings.a22_per_s = -3.0).contains("drag 6.0000; nothing is left (5); raise it"));
+        assert!(refused(|settings| settings.period_s = 0.0).starts_with("period_s: must be above 0 (0)"));
+        assert!(refused(|settings| settings.delta_m = f64::NAN).starts_with("delta_m: must be above 0 (NaN)"));
+        assert!(refused(|settings| settings.ease_m = Some(-0.1)).starts_with("ease_m: must not be negative (-0.1)"));
+        assert!(refused(|settings| settings.turn = 2.0).starts_with("turn: must be from -1 to 1 (2)"));
+        assert!(refused(|settings| settings.measurement_delay_periods = 99).contains("at most 20 (99)"));
+        assert!(refused(|settings| settings.measurement_delay_periods = 12).starts_with("tracker_per_s: "));
+        assert!(refused(|settings| settings.actuator_lag_s = 1e-5).starts_with("actuator_lag_s: "));
+        assert!(refused(|settings| settings.a22_per_s = f64::INFINITY).starts_with("a22_per_s: "));
+        let limits = Settings::new(1.0, 0.05).limits().expect("defaults");
+        let fast = State { position_m: Vector3::zeros(), velocity_m_s: Vector3::x() * 3.0 };
+        assert_eq!(
+            limits.start(fast).expect_err("fast").to_string(),
+            "start: starts faster than `max_speed_m_s` = 2 (3); raise `max_speed_m_s` or start slower"
+        );
+        assert!(limits.start(State::at_rest(Vector3::x() * f64::NAN)).is_err());
+    }
+}

@@ -1,0 +1,349 @@
+//! Plant, radio, laws and an exact minimum of the separation, for flights in tests.
+
+use nalgebra::Vector3;
+
+use super::random::Random;
+use crate::{Counters, Fleet, Limits, Message, State};
+
+/// Steps of the plant in a common period.
+pub(super) const STEPS: usize = 4;
+
+/// Law that a vehicle flies under.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Law {
+    /// To its slot, with 1/s^2 and 2/s.
+    Slot,
+    /// At the nearest vehicle, with the largest command.
+    DiveAtNearest,
+    /// At the origin, with random jerks.
+    DiveAtCentre,
+    /// A random command, held for up to a second.
+    Random,
+}
+
+/// Radio: latency up to a bound, loss in bursts, and duplicates.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Radio {
+    pub(super) latency_s: f64,
+    pub(super) loss: f64,
+    /// Mean length of a burst of lost messages; up to 1 for independent losses.
+    pub(super) burst: f64,
+    pub(super) duplicates: f64,
+    /// Period and vehicle of lost broadcasts of the reference case D.
+    pub(super) every_third: bool,
+}
+
+/// Defect of a negative twin that acts in the flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Defect {
+    None,
+    /// Planes come from the segments heard last.
+    PlanesAsHeard,
+    /// The owner takes its own proposal as accepted.
+    OwnerDropsOldPlane,
+}
+
+/// A flight to be flown.
+#[derive(Clone, Debug)]
+pub(super) struct Flight {
+    pub(super) limits: Vec<Limits>,
+    pub(super) starts: Vec<State>,
+    pub(super) slots: Vec<Vector3<f64>>,
+    pub(super) law: Law,
+    pub(super) radio: Radio,
+    /// Common period \[s\]; the plant makes [`STEPS`] steps in it.
+    pub(super) period_s: f64,
+    /// Steps between two instants of each vehicle.
+    pub(super) instants: Vec<usize>,
+    pub(super) duration_s: f64,
+    pub(super) planar: bool,
+    /// Whether noise and pushes are at their bounds and towards the nearest vehicle.
+    pub(super) adversarial: bool,
+    /// Largest command that the plant carries out, if it is not that of the limits.
+    pub(super) plant_m_s2: f64,
+    pub(super) defect: Defect,
+    pub(super) seed: u64,
+}
+
+impl Flight {
+    /// Returns a flight to slots with a clean radio.
+    pub(super) fn new(limits: &Limits, starts: Vec<State>, slots: Vec<Vector3<f64>>) -> Self {
+        let count = starts.len();
+        Self {
+            limits: vec![*limits; count],
+            starts,
+            slots,
+            law: Law::Slot,
+            radio: Radio::default(),
+            period_s: limits.settings().period_s,
+            instants: vec![STEPS; count],
+            duration_s: 8.0,
+            planar: false,
+            adversarial: false,
+            plant_m_s2: f64::INFINITY,
+            defect: Defect::None,
+            seed: 1,
+        }
+    }
+
+    /// Flies to the end.
+    pub(super) fn fly(&self) -> World {
+        let mut world = World::new(self);
+        while world.time_s() < self.duration_s - 1e-9 {
+            world.step(self);
+        }
+        world
+    }
+}
+
+/// State of a flight.
+#[derive(Clone)]
+pub(super) struct World {
+    pub(super) fleet: Fleet,
+    pub(super) states: Vec<State>,
+    /// True states at the instants of each vehicle, for measurements that are late.
+    past: Vec<Vec<State>>,
+    commands: Vec<Vector3<f64>>,
+    accelerations: Vec<Vector3<f64>>,
+    /// Seconds from the last instant of each vehicle.
+    since_s: Vec<f64>,
+    held: Vec<(f64, Vector3<f64>)>,
+    /// Messages on their way, with the time of arrival.
+    flying: Vec<(f64, Message)>,
+    /// Whether the last message of each pair was lost.
+    lost: Vec<bool>,
+    random: Random,
+    step: usize,
+    step_s: f64,
+    pub(super) closest_m: f64,
+    pub(super) closest_s: f64,
+}
+
+impl World {
+    pub(super) fn new(of: &Flight) -> Self {
+        let mut random = Random::new(of.seed);
+        let fleet = Fleet::new(&of.limits, &of.starts).expect("starts are apart");
+        let count = of.starts.len();
+        // True states may err like a measurement.
+        let states = of.starts.iter().zip(&of.limits).map(|(start, limits)| {
+            let settings = limits.settings();
+            State {
+                position_m: start.position_m + flat(random.vector(settings.position_error_m), of.planar),
+                velocity_m_s: start.velocity_m_s + flat(random.vector(settings.velocity_error_m_s), of.planar),
+            }
+        });
+        Self {
+            fleet,
+            states: states.collect(),
+            past: vec![vec![]; count],
+            commands: vec![Vector3::zeros(); count],
+            accelerations: vec![Vector3::zeros(); count],
+            since_s: vec![0.0; count],
+            held: vec![(0.0, Vector3::zeros()); count],
+            flying: vec![],
+            lost: vec![false; count * count],
+            random,
+            step: 0,
+            step_s: of.period_s / STEPS as f64,
+            closest_m: f64::INFINITY,
+            closest_s: 0.0,
+        }
+    }
+
+    pub(super) fn time_s(&self) -> f64 {
+        self.step as f64 * self.step_s
+    }
+
+    pub(super) fn report(&self) -> Counters {
+        self.fleet.report()
+    }
+
+    /// Makes one step of the plant, with the instants at its start.
+    pub(super) fn step(&mut self, of: &Flight) {
+        self.deliver(of);
+        for i in 0..self.states.len() {
+            if self.step.is_multiple_of(of.instants[i]) {
+                self.instant(i, of);
+            }
+        }
+        self.push(of);
+        self.judge();
+        for i in 0..self.states.len() {
+            self.states[i] = self.states[i].after(self.accelerations[i], self.step_s);
+            self.since_s[i] += self.step_s;
+            let truth = self.states[i];
+            self.fleet.shields_mut()[i].observe(self.since_s[i], &truth);
+        }
+        self.step += 1;
+    }
+
+    fn deliver(&mut self, of: &Flight) {
+        let now = self.time_s() + 1e-12;
+        let mut place = 0;
+        while place < self.flying.len() {
+            if self.flying[place].0 > now {
+                place += 1;
+                continue;
+            }
+            let (_, mut message) = self.flying.swap_remove(place);
+            if of.defect == Defect::OwnerDropsOldPlane {
+                let owner = &self.fleet.shields()[message.to as usize];
+                let pending = owner.messages().find(|sent| sent.to == message.from).and_then(|sent| sent.proposal);
+                if let Some(proposal) = pending {
+                    message.decision = Some(crate::contract::Decision { number: proposal.number, accepted: true });
+                }
+            }
+            self.fleet.hear(&message);
+        }
+    }
+
+    fn instant(&mut self, i: usize, of: &Flight) {
+        let settings = *of.limits[i].settings();
+        self.past[i].push(self.states[i]);
+        let late = self.past[i].len().saturating_sub(1 + settings.measurement_delay_periods);
+        let truth = self.past[i][late];
+        let towards = self.nearest(i);
+        let errors = [settings.position_error_m, settings.velocity_error_m_s].map(|bound| {
+            // A vehicle that believes to be farther from the nearest one than it is flies towards it.
+            let error = if of.adversarial { -towards * bound } else { self.random.vector(bound) };
+            flat(error, of.planar)
+        });
+        let measured = State { position_m: truth.position_m + errors[0], velocity_m_s: truth.velocity_m_s + errors[1] };
+        let wanted = flat(self.wanted(i, &measured, of), of.planar);
+        let shield = &mut self.fleet.shields_mut()[i];
+        shield.observe_measurement(&measured, &truth);
+        let brakes = of.defect == Defect::PlanesAsHeard && !shield.hold_heard();
+        self.commands[i] = if brakes { shield.brake(measured) } else { shield.filter(measured, wanted) };
+        self.since_s[i] = 0.0;
+        self.send(i, of);
+    }
+
+    fn send(&mut self, i: usize, of: &Flight) {
+        let (now, count) = (self.time_s(), self.states.len());
+        let broadcast_is_lost = of.radio.every_third && (self.step / of.instants[i] + i).is_multiple_of(3);
+        let messages: Vec<_> = self.fleet.shields()[i].messages().collect();
+        for message in messages {
+            let burst = of.radio.burst.max(1.0);
+            let lost = &mut self.lost[i * count + message.to as usize];
+            *lost = if *lost {
+                !self.random.chance(1.0 / burst)
+            } else {
+                of.radio.loss > 0.0 && self.random.chance(of.radio.loss / ((1.0 - of.radio.loss) * burst))
+            };
+            if *lost || broadcast_is_lost {
+                continue;
+            }
+            let copies = 1 + usize::from(self.random.chance(of.radio.duplicates));
+            for _ in 0..copies {
+                self.flying.push((now + 1e-6 + of.radio.latency_s * self.random.unit(), message));
+            }
+        }
+    }
+
+    /// Returns the direction to the nearest vehicle.
+    fn nearest(&self, i: usize) -> Vector3<f64> {
+        let others = (0..self.states.len()).filter(|j| *j != i);
+        let apart = others.map(|j| self.states[j].position_m - self.states[i].position_m);
+        apart
+            .min_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))
+            .map_or_else(Vector3::zeros, |to| to.normalize())
+    }
+
+    fn wanted(&mut self, i: usize, measured: &State, of: &Flight) -> Vector3<f64> {
+        let largest = of.limits[i].settings().accel_m_s2;
+        match of.law {
+            Law::Slot => -(measured.position_m - of.slots[i]) - measured.velocity_m_s * 2.0,
+            Law::DiveAtNearest => self.nearest(i) * largest,
+            Law::DiveAtCentre if self.random.chance(0.1) => self.random.direction() * largest,
+            Law::DiveAtCentre => measured.position_m * -10.0,
+            Law::Random => {
+                if self.time_s() >= self.held[i].0 {
+                    let until = self.time_s() + self.random.between(0.1, 1.0);
+                    self.held[i] = (until, self.random.direction() * largest);
+                }
+                self.held[i].1
+            }
+        }
+    }
+
+    fn push(&mut self, of: &Flight) {
+        for i in 0..self.states.len() {
+            let settings = of.limits[i].settings();
+            let bound = settings.disturbance_m_s2;
+            let push = if of.adversarial { self.nearest(i) * bound } else { self.random.vector(bound) };
+            let command = self.commands[i].cap_magnitude(of.plant_m_s2);
+            self.accelerations[i] = command + flat(push, of.planar) + self.states[i].velocity_m_s * settings.a22_per_s;
+        }
+    }
+
+    fn judge(&mut self) {
+        for i in 0..self.states.len() {
+            for j in i + 1..self.states.len() {
+                let apart = self.states[i].position_m - self.states[j].position_m;
+                let closing = self.states[i].velocity_m_s - self.states[j].velocity_m_s;
+                let bend = self.accelerations[i] - self.accelerations[j];
+                let moved = closing.norm() * self.step_s + bend.norm() * self.step_s * self.step_s / 2.0;
+                if apart.norm() - moved < self.closest_m {
+                    let (separation, at) = least_separation(&apart, &closing, &bend, self.step_s);
+                    if separation < self.closest_m {
+                        (self.closest_m, self.closest_s) = (separation, self.time_s() + at);
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Removes the vertical component in the plane.
+pub(super) fn flat(vector: Vector3<f64>, planar: bool) -> Vector3<f64> {
+    if planar { Vector3::new(vector.x, vector.y, 0.0) } else { vector }
+}
+
+/// Returns the minimum of |r + v t + a t^2 / 2| over a step, and its time.
+///
+/// The derivative of the square is a cubic. Between its extrema it is monotone, so each change of sign from minus to
+/// plus has one minimum, found by bisection.
+fn least_separation(r: &Vector3<f64>, v: &Vector3<f64>, a: &Vector3<f64>, step_s: f64) -> (f64, f64) {
+    let at = |t: f64| (r + v * t + a * (t * t / 2.0)).norm();
+    let slope = |t: f64| {
+        let (point, speed) = (r + v * t + a * (t * t / 2.0), v + a * t);
+        point.dot(&speed)
+    };
+    // Derivative of the slope: |v|^2 + r.a + 3 v.a t + 1.5 |a|^2 t^2.
+    let (c, b, q) = (v.norm_squared() + r.dot(a), 3.0 * v.dot(a), 1.5 * a.norm_squared());
+    let root = (b * b - 4.0 * q * c).max(0.0).sqrt();
+    let mut ends = [0.0, 0.0, 0.0, step_s];
+    if q > 0.0 {
+        ends[1] = ((-b - root) / (2.0 * q)).clamp(0.0, step_s);
+        ends[2] = ((-b + root) / (2.0 * q)).clamp(0.0, step_s);
+    }
+    let mut best = if at(0.0) <= at(step_s) { (at(0.0), 0.0) } else { (at(step_s), step_s) };
+    for piece in ends.windows(2) {
+        let (mut low, mut high) = (piece[0], piece[1]);
+        if slope(low) < 0.0 && slope(high) > 0.0 {
+            for _ in 0..60 {
+                let middle = 0.5 * (low + high);
+                if slope(middle) < 0.0 { low = middle } else { high = middle }
+            }
+            if at(low) < best.0 {
+                best = (at(low), low);
+            }
+        }
+    }
+    best
+}
+
+#[test]
+fn the_least_separation_is_no_larger_than_any_sample() {
+    let mut random = Random::new(8);
+    for _ in 0..2_000 {
+        let (r, v, a) = (random.vector(2.0), random.vector(5.0), random.vector(20.0));
+        let (separation, at) = least_separation(&r, &v, &a, 0.5);
+        let samples = (0..=1_000).map(|k| f64::from(k) * 5e-4).map(|t| (r + v * t + a * (t * t / 2.0)).norm());
+        let sampled = samples.fold(f64::INFINITY, f64::min);
+        assert!(
+            separation <= sampled + 1e-12 && separation > sampled - 0.01,
+            "{r} {v} {a}: {separation} {sampled} {at}"
+        );
+    }
+}

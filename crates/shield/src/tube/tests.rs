@@ -1,0 +1,196 @@
+use super::*;
+use crate::tests::random::Random;
+
+/// Loop of the docs.
+const BASE: TrackerLoop = TrackerLoop {
+    period_s: 0.05,
+    tracker_per_s2: 4.0,
+    tracker_per_s: 4.0,
+    position_error_m: 0.03,
+    velocity_error_m_s: 0.05,
+    disturbance_m_s2: 0.3,
+    a22_per_s: 0.0,
+    accel_m_s2: 5.0,
+    measurement_delay_periods: 0,
+    actuator_lag_s: 0.0,
+};
+
+/// Steps of the integrator in a period.
+const STEPS: usize = 20;
+
+/// Inputs of a simulated loop, each as a function of the step or of the period.
+struct Inputs {
+    start: [f64; 2],
+    noise: Vec<f64>,
+    held: Vec<f64>,
+    push: Vec<f64>,
+}
+
+impl Inputs {
+    fn zero(periods: usize) -> Self {
+        Self { start: [0.0; 2], noise: vec![0.0; periods], held: vec![0.0; periods], push: vec![0.0; periods * STEPS] }
+    }
+}
+
+/// Integrates the loop by the midpoint rule, independently of the exponential. Returns the error of position after each
+/// step, and the feedback of each period.
+fn simulate(of: &TrackerLoop, inputs: &Inputs) -> (Vec<f64>, Vec<f64>) {
+    let step_s = of.period_s / STEPS as f64;
+    let (mut errors, mut feedbacks) = (vec![], vec![]);
+    let mut state = [inputs.start[0], inputs.start[1], 0.0];
+    let mut measured = vec![];
+    for (period, noise) in inputs.noise.iter().enumerate() {
+        measured.push(of.tracker_per_s2 * state[0] + of.tracker_per_s * state[1]);
+        let delayed = period.checked_sub(of.measurement_delay_periods).map_or(0.0, |at| measured[at]);
+        let (feedback, held) = (-delayed + noise, inputs.held[period]);
+        feedbacks.push(feedback);
+        for push in &inputs.push[period * STEPS..(period + 1) * STEPS] {
+            let rates = |state: [f64; 3]| {
+                let lag = of.actuator_lag_s;
+                let thrust = if lag > 0.0 { state[2] - held } else { feedback };
+                let actuator = if lag > 0.0 { (feedback + held - state[2]) / lag } else { 0.0 };
+                [state[1], of.a22_per_s * state[1] + thrust + push, actuator]
+            };
+            let moved = |by: [f64; 3], seconds: f64| std::array::from_fn(|k| state[k] + by[k] * seconds);
+            state = moved(rates(moved(rates(state), step_s / 2.0)), step_s);
+            errors.push(state[0]);
+        }
+    }
+    (errors, feedbacks)
+}
+
+/// Returns the largest error of position and the largest feedback at the end under the worst sequence of signs. The
+/// signs are those of the impulse responses, which are simulated one by one.
+fn worst_sequence(of: &TrackerLoop, periods: usize) -> (f64, f64) {
+    let noise_bound = of.tracker_per_s2 * of.position_error_m + of.tracker_per_s * of.velocity_error_m_s;
+    let held_bound = if of.actuator_lag_s > 0.0 { of.accel_m_s2 } else { 0.0 };
+    let push_bound = |step: usize| {
+        let since = (step % STEPS) as f64 + 0.5;
+        of.disturbance_m_s2 + of.a22_per_s.abs() * of.accel_m_s2 * since * of.period_s / STEPS as f64
+    };
+    // The largest of some steps of the last period, and the feedback of the last period.
+    let mut largest = [0.0_f64; 2];
+    for (kind, ends) in [(0, (0..STEPS).step_by(10).collect::<Vec<_>>()), (1, vec![0])] {
+        for end in ends {
+            let answer = |inputs: &Inputs| {
+                let (errors, feedbacks) = simulate(of, inputs);
+                if kind == 0 { errors[errors.len() - 1 - end] } else { feedbacks[feedbacks.len() - 1] }
+            };
+            let mut worst = Inputs::zero(periods);
+            for period in 0..periods {
+                let mut impulse = Inputs::zero(periods);
+                impulse.noise[period] = 1.0;
+                worst.noise[period] = noise_bound * answer(&impulse).signum();
+                impulse = Inputs::zero(periods);
+                impulse.held[period] = 1.0;
+                worst.held[period] = held_bound * answer(&impulse).signum();
+            }
+            for step in 0..periods * STEPS {
+                let mut impulse = Inputs::zero(periods);
+                impulse.push[step] = 1.0;
+                worst.push[step] = push_bound(step) * answer(&impulse).signum();
+            }
+            for (k, bound) in [of.position_error_m, of.velocity_error_m_s].into_iter().enumerate() {
+                let mut impulse = Inputs::zero(periods);
+                impulse.start[k] = 1.0;
+                worst.start[k] = bound * answer(&impulse).signum();
+            }
+            largest[kind] = largest[kind].max(answer(&worst));
+        }
+    }
+    (largest[0], largest[1])
+}
+
+fn close(value: f64, expected: f64, digit: f64) {
+    assert!((value - expected).abs() <= 0.5 * digit, "{value} is not {expected}");
+}
+
+#[test]
+fn quadrature_with_the_worst_start_after_the_sum_gives_the_numbers_of_the_page() {
+    let tube = |of: TrackerLoop| of.tube().expect("stable");
+    // Push alone: W / kp.
+    close(tube(TrackerLoop { position_error_m: 0.0, velocity_error_m_s: 0.0, ..BASE }).error_m, 0.075, 1e-5);
+    // A simpler bound adds the largest start term to the whole sum and 0.1 %.
+    let sampled = Sampled::new(&BASE).expect("a lag");
+    let mut sums = Sums::own_period(&sampled);
+    let (mut inputs, mut starts, mut start) = (sampled.inputs.clone(), sampled.starts.clone(), [0.0_f64; 2]);
+    for _ in 0..2_000 {
+        let of_start = Sums::of_start(&sampled, &starts);
+        start = [start[0].max(of_start.positions.max()), start[1].max(of_start.feedback)];
+        sums.add(&sampled, &inputs);
+        (inputs, starts) = (&sampled.step * inputs, &sampled.step * starts);
+    }
+    close(1.001 * (sums.positions.max() + start[0]), 0.1897, 1e-4);
+    close(1.001 * (sums.feedback + start[1]), 1.4416, 1e-4);
+    // The start term decays while the sum grows.
+    let tight = tube(BASE);
+    assert!(tight.error_m < 0.1551 && tight.feedback_m_s2 < 1.13, "{tight:?}");
+}
+
+#[test]
+fn the_worst_sequence_of_signs_comes_within_a_per_cent_of_the_bound() {
+    let oscillating = TrackerLoop { tracker_per_s2: 9.0, tracker_per_s: 3.0, ..BASE };
+    let loops = [
+        BASE,
+        TrackerLoop { a22_per_s: -0.3, ..BASE },
+        TrackerLoop { a22_per_s: 0.1, period_s: 0.1, ..BASE },
+        oscillating,
+        TrackerLoop { measurement_delay_periods: 2, ..oscillating },
+        TrackerLoop { actuator_lag_s: 0.08, ..BASE },
+        TrackerLoop { measurement_delay_periods: 1, actuator_lag_s: 0.02, a22_per_s: -0.2, ..BASE },
+    ];
+    for of in loops {
+        let tube = of.tube().expect("stable");
+        // The largest over the first periods, because a start error decays.
+        let found: Vec<_> = [1, 3, 8, 21, 100].into_iter().map(|periods| worst_sequence(&of, periods)).collect();
+        let error = found.iter().map(|found| found.0).fold(0.0, f64::max);
+        let feedback = found.iter().map(|found| found.1).fold(0.0, f64::max);
+        // The integrator has an error of some 1e-4 of its own.
+        assert!(error <= tube.error_m * 1.0005 && error >= 0.99 * tube.error_m, "{of:?}: {error} {tube:?}");
+        assert!(feedback <= tube.feedback_m_s2 * 1.0005, "{of:?}: {feedback} {tube:?}");
+        assert!(feedback >= 0.99 * tube.feedback_m_s2, "{of:?}: {feedback} {tube:?}");
+    }
+}
+
+#[test]
+fn random_inputs_at_their_bounds_stay_within_the_tube() {
+    let mut random = Random::new(5);
+    for _ in 0..40 {
+        let of = TrackerLoop {
+            tracker_per_s2: random.between(1.0, 9.0),
+            tracker_per_s: random.between(1.5, 6.0),
+            period_s: random.between(0.02, 0.1),
+            a22_per_s: random.between(-0.3, 0.1),
+            measurement_delay_periods: random.index(3),
+            actuator_lag_s: if random.chance(0.5) { random.between(0.02, 0.1) } else { 0.0 },
+            ..BASE
+        };
+        let Ok(tube) = of.tube() else { continue };
+        let mut sign = |bound: f64| if random.chance(0.5) { bound } else { -bound };
+        let mut inputs = Inputs::zero(60);
+        inputs.start = [sign(of.position_error_m), sign(of.velocity_error_m_s)];
+        let noise = of.tracker_per_s2 * of.position_error_m + of.tracker_per_s * of.velocity_error_m_s;
+        inputs.noise.fill_with(|| sign(noise));
+        inputs.held.fill_with(|| sign(if of.actuator_lag_s > 0.0 { of.accel_m_s2 } else { 0.0 }));
+        inputs.push.fill_with(|| sign(of.disturbance_m_s2));
+        let (errors, feedbacks) = simulate(&of, &inputs);
+        let largest = |of: &[f64]| of.iter().fold(0.0_f64, |largest, value| largest.max(value.abs()));
+        assert!(largest(&errors) <= tube.error_m, "{of:?}");
+        assert!(largest(&feedbacks) <= tube.feedback_m_s2, "{of:?}");
+    }
+}
+
+#[test]
+fn loops_that_do_not_contract_are_refused() {
+    let of = |tracker_per_s2, tracker_per_s, delay| {
+        TrackerLoop { tracker_per_s2, tracker_per_s, measurement_delay_periods: delay, ..BASE }.tube()
+    };
+    // The product of the eigenvalues is 1 - kd h + kp h^2 / 2, here -1.5.
+    assert_eq!(of(4.0, 50.0, 0), Err(TubeError::Unstable));
+    assert_eq!(of(4.0, 4.0, 12), Err(TubeError::Unstable));
+    assert_eq!(of(f64::NAN, 4.0, 0), Err(TubeError::Unstable));
+    assert_eq!(TrackerLoop { actuator_lag_s: 1e-6, ..BASE }.tube(), Err(TubeError::ShortLag));
+    // Slow but stable: poles near 0.05 and 1 per second.
+    let slow = of(0.05, 1.0, 0).expect("stable");
+    assert!(slow.error_m >= 0.3 / 0.05, "{slow:?}");
+}
