@@ -46,7 +46,7 @@ fn limits_are_in_every_answer() {
     let events = read("e.csv");
     let rows: Vec<_> =
         events.lines().skip(1).map(|line| line.split(',').take(3).collect::<Vec<_>>().join(" ")).collect();
-    assert_eq!(rows, ["violation a speed_m_s", "violation a climb_m_s", "violation a fence_room_m"]);
+    assert_eq!(rows, ["violation a speed_m_s", "violation a climb_m_s", "violation a fence_margin_m"]);
     let junit = read("j.xml");
     assert!(junit.contains(r#"tests="3""#) && junit.contains(r#"failures="3""#), "{junit}");
     assert!(!junit.contains("separation"), "it was not asked how close two came");

@@ -69,14 +69,14 @@ fn json(ran: &Ran) -> Value {
 fn obstacles_are_in_check_run_report_and_audit() {
     let folder = folder(SCENARIO);
     let checked = json(&ran(&folder, &["check", "among.toml", "--json"]));
-    let promised_m = checked["certified_room_m"].as_f64().expect("a promise");
-    assert!(promised_m > 0.0 && checked["start_room_m"].as_f64().expect("room") > 3.9, "{checked}");
+    let promised_m = checked["certified_clearance_margin_m"].as_f64().expect("a promise");
+    assert!(promised_m > 0.0 && checked["start_clearance_margin_m"].as_f64().expect("room") > 3.9, "{checked}");
     let flown = ran(&folder, &["run", "among.toml", "--json", "--no-figures", "--no-snapshots"]);
     assert_eq!(flown.exit, Some(0), "{}", flown.err);
     let report = json(&flown);
     assert_eq!((report["verdict"]["pass"].as_bool(), report["audit"]["status"].as_str()), (Some(true), Some("clear")));
     let obstacles = &report["obstacles"];
-    assert_eq!(obstacles["certified_room_m"].as_f64(), Some(promised_m));
+    assert_eq!(obstacles["certified_clearance_margin_m"].as_f64(), Some(promised_m));
     let nearest = &obstacles["closest"][0];
     let (min_m, clearance_m) = (nearest["min_m"].as_f64().expect("m"), nearest["clearance_m"].as_f64().expect("m"));
     assert!(nearest["obstacle"] == "tower" && clearance_m == 0.5 && min_m >= clearance_m + promised_m, "{nearest}");

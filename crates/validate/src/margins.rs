@@ -236,8 +236,8 @@ fn with_tension(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
 
 pub(super) fn judge(progress: &Progress<'_>) -> ClaimsResult {
     Ok(vec![
-        free("margin-known-late", Kind::SensingDelayed, progress)?,
-        free("margin-heard-late", Kind::MessagesDelayed, progress)?,
+        free("margin-sensing-delayed", Kind::SensingDelayed, progress)?,
+        free("margin-messages-delayed", Kind::MessagesDelayed, progress)?,
         free("margin-commands-held", Kind::Held, progress)?,
         with_tension(progress)?,
     ])

@@ -46,7 +46,7 @@ impl Quantity {
             Self::Acceleration => ["accel", "accel_m_s2", "m/s^2"],
             Self::Height => ["height", "height_m", "m"],
             Self::Floor => ["floor", "floor_m", "m"],
-            Self::Fence => ["fence", "fence_room_m", "m"],
+            Self::Fence => ["fence", "fence_margin_m", "m"],
         }
     }
 

@@ -51,7 +51,7 @@ pub(crate) const SERIES: [Series; COUNT] = [
     },
     Series {
         name: "message-age",
-        title: "Age of what is heard",
+        title: "Age of received states",
         what: "age of the oldest message",
         unit: "s",
         channel: "message_age",

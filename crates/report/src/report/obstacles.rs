@@ -16,7 +16,7 @@ pub struct Obstacles {
     /// early.
     pub status: Status,
     /// Distance beyond the clearance of every obstacle that the law certifies for every vehicle \[m\].
-    pub certified_room_m: Option<f64>,
+    pub certified_clearance_margin_m: Option<f64>,
     /// Closest approaches of different vehicles and obstacles, at most ten, the closest first.
     pub closest: Vec<ObstacleApproach>,
     /// Intervals in which a vehicle was closer to an obstacle than its clearance.
@@ -75,7 +75,7 @@ impl Obstacles {
         let of_closest = |found: &Approach| approach(found.pair, found.limit_m, found.certain_m(), found.time_s);
         Some(Self {
             status: if result.flight.ending == Ending::Completed { *status } else { status.and(Status::Undecided) },
-            certified_room_m: result.flight.certificate.certified_clearance_margin_m.and_then(finite),
+            certified_clearance_margin_m: result.flight.certificate.certified_clearance_margin_m.and_then(finite),
             closest: closest.iter().filter_map(of_closest).collect(),
             violations: violations.iter().filter_map(of_violation).collect(),
             undecided: undecided.len() as u64 + unresolved + refused,
@@ -111,7 +111,7 @@ impl Obstacles {
     /// Returns the certified distance beyond every clearance \[m\] and the approach that breaks it by more than the
     /// error of integration.
     fn certified_and_tightest(&self) -> Option<(f64, &ObstacleApproach)> {
-        let certified_m = self.certified_room_m?;
+        let certified_m = self.certified_clearance_margin_m?;
         let (clearance_margin_m, tightest) = self.tightest()?;
         (clearance_margin_m < certified_m * (1.0 - INTEGRATION)).then_some((certified_m, tightest))
     }
@@ -162,7 +162,7 @@ impl Obstacles {
             let near = shown(*min_m, *clearance_m);
             [vehicle.to_string(), obstacle.clone(), exact(*clearance_m), near, seconds(*min_at_s)]
         };
-        let certified = match self.certified_room_m {
+        let certified = match self.certified_clearance_margin_m {
             Some(clearance_margin_m) => {
                 format!("closest approaches; certified {} m beyond every clearance", at_least(clearance_margin_m, 6))
             }
@@ -196,7 +196,7 @@ impl Obstacles {
                 exact(*clearance_m)
             )
         });
-        let certified = match self.certified_room_m {
+        let certified = match self.certified_clearance_margin_m {
             Some(clearance_margin_m) => format!("certified {} m beyond it", at_least(clearance_margin_m, 6)),
             None => "not certified".to_owned(),
         };

@@ -65,13 +65,12 @@ pub enum StalePolicy {
 
 /// How a vehicle knows near vehicles.
 #[derive(Clone, Copy, Debug, Default, Deserialize, Eq, PartialEq, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
 pub enum NearStates {
     /// With a sensor on board, independent of the network.
     #[default]
-    #[serde(rename = "seen")]
     Sensed,
     /// By messages that each vehicle sends to all others.
-    #[serde(rename = "heard")]
     Received,
 }
 

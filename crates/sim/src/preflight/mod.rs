@@ -72,10 +72,10 @@ pub struct Preflight {
     /// Certified lower bound of the distance of every vehicle beyond the clearance of every obstacle \[m\]; only with
     /// obstacles.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub certified_room_m: Option<f64>,
+    pub certified_clearance_margin_m: Option<f64>,
     /// Smallest distance of a vehicle beyond the clearance of an obstacle at the start \[m\]; only with obstacles.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub start_room_m: Option<f64>,
+    pub start_clearance_margin_m: Option<f64>,
     /// Certificate of each leg, in order; only for several legs.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub legs: Vec<LegCertificate>,
@@ -200,8 +200,8 @@ impl Preflight {
             energy_initial: certificate.energy_initial,
             certified_m: certificate.certified_m,
             certified_until_s: certificate.certified_until_s,
-            certified_room_m: certificate.certified_clearance_margin_m,
-            start_room_m: smallest_clearance_margin(&scenario.obstacles, &scenario.start.positions_m)
+            certified_clearance_margin_m: certificate.certified_clearance_margin_m,
+            start_clearance_margin_m: smallest_clearance_margin(&scenario.obstacles, &scenario.start.positions_m)
                 .map(|(clearance_margin_m, ..)| clearance_margin_m),
             legs: certificate
                 .legs

@@ -148,7 +148,7 @@ impl Preflight {
             vec![("stability".to_owned(), self.stability_line()), ("certificate".to_owned(), self.certificate_line())];
         rows.extend(self.vehicle.iter().map(|quadrotor| ("vehicle".to_owned(), vehicle_line(quadrotor))));
         rows.extend(
-            self.start_room_m
+            self.start_clearance_margin_m
                 .map(|clearance_margin_m| ("obstacles".to_owned(), self.obstacles_line(clearance_margin_m))),
         );
         rows.extend(self.legs.iter().enumerate().map(|(leg, promise)| (format!("leg {}", leg + 1), leg_line(promise))));
@@ -200,14 +200,14 @@ impl Preflight {
         }
     }
 
-    fn obstacles_line(&self, start_room_m: f64) -> String {
-        let certified = match self.certified_room_m {
+    fn obstacles_line(&self, start_clearance_margin_m: f64) -> String {
+        let certified = match self.certified_clearance_margin_m {
             Some(clearance_margin_m) => {
                 format!("certified {} m beyond every clearance", at_least(clearance_margin_m, 6))
             }
             None => "not certified".to_owned(),
         };
-        format!("{certified}, {start_room_m:.6} m at the start")
+        format!("{certified}, {start_clearance_margin_m:.6} m at the start")
     }
 
     fn needs_line(&self) -> String {

@@ -61,7 +61,7 @@ fn a_saved_and_loaded_flight_with_every_imperfection_has_the_same_bits() {
 fn a_scenario_with_every_imperfection_is_written_and_read_back() {
     let more = [
         "sensing.near_latency_s=0.005",
-        "network.near=heard",
+        "network.near=received",
         "network.failure=[{link=[1, 3], from_s=1, to_s=2.5}, {link=[4, 2], from_s=3}]",
         "failure=[{vehicle=2, at_s=1, kind=\"dead\"}, {vehicle=5, at_s=2, kind=\"silent\"}, {vehicle=1, at_s=3, \
          kind=\"frozen\"}]",

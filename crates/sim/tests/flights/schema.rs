@@ -16,7 +16,7 @@ fn the_schema_describes_every_key_and_refuses_null() {
     let default = |of: &str| &schema.pointer(of).expect("a key")["default"];
     assert_eq!(default("/$defs/TimeSpec/properties/max_rate_dt"), 0.3);
     assert_eq!(default("/$defs/NetworkSpec/properties/missing"), "hold");
-    assert_eq!(default("/$defs/NetworkSpec/properties/near"), "seen");
+    assert_eq!(default("/$defs/NetworkSpec/properties/near"), "sensed");
     assert!(!text.contains("null") && !text.contains("\\["), "{schema:#}");
     assert_eq!(schema["required"], serde_json::json!(["start", "formation", "law", "time"]));
     assert!(described(&schema["properties"]));

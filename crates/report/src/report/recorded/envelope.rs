@@ -13,7 +13,7 @@ use tautline_core::text::{at_least, at_most, counted, exact, fixed, seconds};
 pub struct LimitFindings {
     /// Limited quantity with its unit, such as `speed_m_s`.
     pub quantity: &'static str,
-    /// Limit: an upper bound, but a lower bound for `floor_m` and `fence_room_m`.
+    /// Limit: an upper bound, but a lower bound for `floor_m` and `fence_margin_m`.
     pub allowed: f64,
     /// Status of the limit.
     pub status: Status,
