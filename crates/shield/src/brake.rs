@@ -124,7 +124,7 @@ impl Brake {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tests::random::Random;
+    use crate::tests::Random;
 
     /// Steps the brake to rest; returns the rest point and the largest distance from the segment to the stop point.
     fn stepped(brake: &Brake, start: State) -> (Vector3<f64>, f64) {

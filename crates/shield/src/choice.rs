@@ -245,7 +245,7 @@ fn right_hand(cut: Vector3<f64>) -> Vector3<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tests::random::Random;
+    use crate::tests::Random;
 
     const ENVELOPE: fn() -> Envelope =
         || Envelope { accel_m_s2: 5.0, speed_m_s: 2.0, period_s: 0.05, brake: Brake::new(3.0, 0.05) };

@@ -162,7 +162,7 @@ impl Divider {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tests::random::Random;
+    use crate::tests::Random;
 
     fn segment(random: &mut Random) -> Segment {
         let from = random.vector(3.0);

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::random::Random;
+use super::Random;
 use super::world::{Flight, Law, Radio, STEPS, World, flat};
 use crate::{Fleet, Limits, Settings, State};
 

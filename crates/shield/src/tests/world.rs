@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::random::Random;
+use super::Random;
 use crate::{Counters, Fleet, Limits, Message, State};
 
 /// Steps of the plant in a common period.

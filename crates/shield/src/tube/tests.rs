@@ -1,5 +1,5 @@
 use super::*;
-use crate::tests::random::Random;
+use crate::tests::Random;
 
 /// Loop of the docs.
 const BASE: TrackerLoop = TrackerLoop {
