@@ -28,7 +28,7 @@ pub(super) struct Console {
 }
 
 /// Words of verdicts with their colours. Of words with a common beginning the longest comes first.
-const VERDICTS: [(&str, AnsiColor); 15] = [
+const VERDICTS: [(&str, AnsiColor); 18] = [
     ("CERTIFICATE BROKEN", AnsiColor::Red),
     ("CLEAR", AnsiColor::Green),
     ("DEFECT", AnsiColor::Red),
@@ -42,34 +42,47 @@ const VERDICTS: [(&str, AnsiColor); 15] = [
     ("PROVED CLEAR", AnsiColor::Green),
     ("PROVED", AnsiColor::Green),
     ("REACHED", AnsiColor::Green),
+    ("READY", AnsiColor::Green),
+    ("REFUSED BY CHECK", AnsiColor::Red),
+    ("REFUSED", AnsiColor::Red),
     ("UNDECIDED", AnsiColor::Yellow),
     ("VIOLATION", AnsiColor::Red),
 ];
 
-/// Returns a text with colours for the words of verdicts, and for counts of unknown flights such as `2 unknown`.
+/// Returns a text with colours for the verdict that begins a line, or follows its first `: `, and for counts of unknown
+/// flights such as `2 unknown`. Other words may be names of the user.
 fn coloured(text: &str) -> String {
-    let is_word = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-' | '/');
-    let verdict = |rest: &str| {
-        let end = |word: &str| rest.strip_prefix(word).is_some_and(|after| !after.starts_with(is_word));
-        let unknown = || {
-            let digits = rest.find(|c: char| !c.is_ascii_digit() && c != ',')?;
-            let is_count = !matches!(&rest[..digits], "" | "0") && rest[digits..].starts_with(" unknown");
-            is_count.then_some((digits + " unknown".len(), AnsiColor::Yellow))
-        };
-        VERDICTS.iter().find(|(word, _)| end(word)).map(|(word, colour)| (word.len(), *colour)).or_else(unknown)
+    text.split_inclusive('\n').map(coloured_line).collect()
+}
+
+fn coloured_line(line: &str) -> String {
+    let starts_word = |c: char| c.is_alphanumeric() || matches!(c, '_' | '-' | '/' | '.');
+    // A row of a table may begin with the name of a vehicle.
+    let is_name = |after: &str| after.starts_with(" and ") || after.starts_with("  ");
+    let verdict_at = |at: usize| {
+        let ends = |after: &str| !after.starts_with(starts_word) && !is_name(after);
+        let is_verdict = |word: &str| line[at..].strip_prefix(word).is_some_and(ends);
+        VERDICTS.iter().find(|(word, _)| is_verdict(word)).map(|(word, colour)| (at, word.len(), *colour))
     };
-    let (mut shown, mut at) = (String::with_capacity(text.len()), 0);
-    while let Some(c) = text[at..].chars().next() {
-        if let Some((length, colour)) = verdict(&text[at..]).filter(|_| !text[..at].ends_with(is_word)) {
-            let style = Style::new().bold().fg_color(Some(colour.into()));
-            shown.extend([&style.render().to_string(), &text[at..at + length], &style.render_reset().to_string()]);
-            at += length;
-        } else {
-            shown.push(c);
-            at += c.len_utf8();
+    let unknown = || {
+        let end = line.find(" unknown")?;
+        let digits = line[..end].trim_end_matches(|c: char| c.is_ascii_digit() || c == ',').len();
+        let is_count = !matches!(&line[digits..end], "" | "0");
+        is_count.then_some((digits, end + " unknown".len() - digits, AnsiColor::Yellow))
+    };
+    let later = line.find(": ").and_then(|colon| verdict_at(colon + 2));
+    let found = [verdict_at(0).or(later), unknown()];
+    let (mut shown, mut done) = (String::with_capacity(line.len()), 0);
+    for (at, length, colour) in found.into_iter().flatten().filter(|(at, ..)| *at < line.len()) {
+        if at < done {
+            continue;
         }
+        let style = Style::new().bold().fg_color(Some(colour.into()));
+        shown.push_str(&line[done..at]);
+        shown.extend([&style.render().to_string(), &line[at..at + length], &style.render_reset().to_string()]);
+        done = at + length;
     }
-    shown
+    shown + &line[done..]
 }
 
 impl Console {
@@ -286,7 +299,17 @@ mod tests {
             assert!(shown.contains(colour), "{shown:?}");
             assert_eq!(shown.matches("\u{1b}[0m").count(), 1, "{shown:?}");
         }
-        for text in ["clear", "CLEARANCE", "out/CLEAR.csv", "UNCLEAR", "PASSED", "0 unknown", "no unknown key", ""] {
+        let names = ["VIOLATION and b  2.000 m", "VIOLATION  1.5 s", "between VIOLATION and b"];
+        for text in names.into_iter().chain([
+            "clear",
+            "CLEARANCE",
+            "out/CLEAR.csv",
+            "UNCLEAR",
+            "PASSED",
+            "0 unknown",
+            "no unknown key",
+            "",
+        ]) {
             assert_eq!(coloured(text), text);
         }
     }

@@ -31,7 +31,8 @@ pub(super) fn new(arguments: &NewArguments) -> Result<Exit, Failure> {
         }
     };
     let name = path.file_stem().and_then(OsStr::to_str).unwrap_or_default();
-    let text = builtin::new_scenario(name).ok_or_else(|| wrong_name(name))?;
+    // A leading hyphen would read as an option.
+    let text = builtin::new_scenario(name).filter(|_| !name.starts_with('-')).ok_or_else(|| wrong_name(name))?;
     if path.exists() && !arguments.force {
         let message = format!("{} exists already", path.display());
         return Err(Failure::input("files/exists", message, "give another name, or overwrite it with --force"));
@@ -48,6 +49,6 @@ fn flight(path: &Path) -> String {
 }
 
 fn wrong_name(name: &str) -> Failure {
-    let message = format!("NAME: must have 1 to 64 letters, digits, `-` or `_`, got `{name}`");
+    let message = format!("NAME: must have 1 to 64 letters, digits, `-` or `_`, and not begin with `-`, got `{name}`");
     Failure::input("usage/name", message, "give a name such as `ring`, or a path such as scenarios/ring.toml")
 }

@@ -118,6 +118,16 @@ fn fly(arguments: &RunArguments, force: bool, opens: bool, terminal: &Terminal) 
     let scenario = flown.read()?;
     let plant = arguments.plant.iter().flat_map(|kind| ["--plant", kind]);
     let sets = what.overrides.iter().flat_map(|text| ["--set", text.as_str()]);
+    let repeat = |words: &[&str]| match (&*what.argument, &arguments.out) {
+        ("-", out) => {
+            // Standard input is gone, but the recording holds the scenario with its overrides.
+            let folder = out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name));
+            let recording = folder.join("run.mcap");
+            let show = command_line(["list", "--show", &recording.to_string_lossy()].into_iter());
+            format!("{show} | {}", command_line(["run", "-"].into_iter()))
+        }
+        _ => command_line(words.iter().copied()),
+    };
     let words: Vec<_> = ["run", &what.argument].into_iter().chain(sets).chain(plant).collect();
     let request = RunRequest {
         out: arguments.out.clone(),
@@ -126,7 +136,7 @@ fn fly(arguments: &RunArguments, force: bool, opens: bool, terminal: &Terminal) 
         formats: Format::ALL.into_iter().filter(|of| arguments.figures.iter().any(|name| name == of.name())).collect(),
         verify: arguments.verify,
         threads: arguments.threads.map(usize::from),
-        ..RunRequest::new(&scenario, command_line(words.iter().copied()))
+        ..RunRequest::new(&scenario, repeat(&words))
     };
     let pictures = pictures(&arguments.adapter, !arguments.no_snapshots);
     let left = run_into(&request, &*pictures, terminal)?;
@@ -158,11 +168,7 @@ fn watch(arguments: &RunArguments, terminal: &Terminal) -> Result<Exit, Failure>
     }
     // Read before the flight, so that a change during the flight is noticed.
     let mut flown = content(path);
-    let mut exit = match fly(arguments, arguments.force, arguments.open, terminal) {
-        // Without --force a finished run of another time is kept.
-        Err(failure) if failure.code() == "files/finished" => return Err(failure),
-        first => shown(first),
-    };
+    let mut exit = shown(fly(arguments, true, arguments.open, terminal));
     while !terminal.is_interrupted() {
         terminal.warn(&format!("waiting for a change of {}; Ctrl-C ends", path.display()));
         while !terminal.is_interrupted() && content(path) == flown {

@@ -347,10 +347,9 @@ pub fn answer<E: Experiment>(
         monitor.say(&format!("wrote {}", file.display()));
     }
     if monitor.is_interrupted() {
-        let files = if files.outputs().next().is_none() { "" } else { ", and its files were written" };
-        monitor.warn(&format!(
-            "interrupted: the answer counts the flights up to here{files}; the same command begins again"
-        ));
+        let wrote_files = files.outputs().any(|(_, file)| !is_standard_output(file));
+        let again = if wrote_files { " with --force begins again and replaces the files" } else { " begins again" };
+        monitor.warn(&format!("interrupted: the answer counts the flights up to here; the same command{again}"));
     }
     options.conclude(scenario, &study, pictures, monitor)?;
     Ok(Some(study))

@@ -137,6 +137,8 @@ impl Settings {
         const FINITE: (f64, &str) = (-LARGEST, "a finite number");
         let check_of = |option, of: Option<&str>, value: Option<f64>, (least, range): (f64, &'static str)| match value {
             Some(value) if !(least..=LARGEST).contains(&value) => {
+                let is_of_range = value.is_finite() && value > 0.0 || value < -LARGEST;
+                let range = if is_of_range { "a number of a size between 1e-70 and 1e70" } else { range };
                 Err(RecordedError::OutOfRange { option, of: of.map(str::to_owned), range, value })
             }
             _ => Ok(()),

@@ -134,7 +134,7 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
         monitor.say(reason);
     }
     monitor.say(&format!("wrote {}: {RECORDING}, report.json and report.html", folder.path().display()));
-    if monitor.is_interrupted() {
+    if report.run.ended_early.as_deref() == Some(INTERRUPTED) {
         let at = seconds(report.run.duration_s);
         monitor.warn(&format!(
             "interrupted: the files hold the flight up to {at}; the same command begins again and replaces them"

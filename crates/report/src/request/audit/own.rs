@@ -209,9 +209,17 @@ impl OwnRecording {
         request: &AuditRequest<'_>,
         notes: &mut Vec<String>,
     ) -> RunAnswer {
+        if self.is_independent {
+            if let StoredAudit::AsWritten(audit) = &self.audit
+                && audit.violations_count > 0
+            {
+                let count = counted(audit.violations_count, "violation", "violations");
+                notes.push(format!("--independent leaves out the audit of the run, which found {count}"));
+            }
+            return RunAnswer::Samples;
+        }
         let mut note = |why: &str| notes.push(format!("the samples are judged: {why}"));
         let audit = match &self.audit {
-            _ if self.is_independent => return RunAnswer::Samples,
             StoredAudit::None => {
                 note("the recording holds no audit of its run, which a run writes at its end");
                 return self.of_samples(outcome, settings, &[&self.run_findings]);
