@@ -307,12 +307,15 @@ impl Study for Margin {
         let [low, high] = [self.range[0].min(self.range[1]), self.range[0].max(self.range[1])];
         match (self.turn, self.sides()) {
             (Some(turn), Some([holds, fails])) => {
-                let [up, from] = if turn.holds_below { ["up to", "from"] } else { ["from", "up to"] };
+                let up = if turn.holds_below { "up to" } else { "from" };
                 let runs = match self.runs {
-                    1 => "the flight".to_owned(),
-                    _ => format!("{} of {}", fails.held.of - fails.held.count, fails.held.of),
+                    1 => "it".to_owned(),
+                    _ => {
+                        let failed = fails.held.of - fails.held.count;
+                        format!("in {} of {} it", failed, counted(fails.held.of, "flight", "flights"))
+                    }
                 };
-                format!("{name} {does} with {key} {up} {}; {runs} {does_not} {from} {}", holds.value, fails.value)
+                format!("{name} {does} with {key} {up} {}; {runs} {does_not} at {}", holds.value, fails.value)
             }
             _ if self.holds_everywhere() => {
                 format!("{name} {does} at every value of {key} tried, from {low} to {high}")
@@ -342,7 +345,7 @@ impl Study for Margin {
         Table::of(if self.runs == 1 { "One flight each" } else { "With 95 % intervals" }, &self.probes)
             .column(&self.key, &self.key, Kind::Exact, |probe| probe.value)
             .column("runs", "", Kind::Count, |probe| probe.held.of)
-            .column("held", &does, Kind::Share, |probe| probe.held)
+            .column("held", &does, if self.runs == 1 { Kind::OneFlight } else { Kind::Share }, |probe| probe.held)
             .column("min", "Smallest separation [m]", Kind::AtLeast, |probe| probe.min_m)
             .build()
     }

@@ -380,7 +380,12 @@ impl Study for Sweep {
     }
 
     fn headline(&self) -> String {
-        let holds = |point: &&Point| point.held.of == self.runs && point.held.count == self.runs;
+        let holds = |point: &&Point| point.held.of > 0 && point.held.count == point.held.of && point.refused == 0;
+        let refused: u64 = self.points.iter().map(|point| point.refused).sum();
+        let refused = match refused {
+            0 => String::new(),
+            count => format!(", {} could not be flown", counted(count, "run", "runs")),
+        };
         let interrupted = if self.interrupted { format!("INTERRUPTED after {}: ", self.size()) } else { String::new() };
         let every = if self.runs == 1 { String::new() } else { format!(" in each of {} runs", self.runs) };
         let worst = self.worst().and_then(|(point, flight)| Some((point, flight.min_m?))).map(|(point, min_m)| {
@@ -388,7 +393,7 @@ impl Study for Sweep {
             format!("; the smallest separation is {shown} m with {}", sets(&self.keys, &point.values).join(", "))
         });
         format!(
-            "{interrupted}{} {}{every} at {} of {}{}",
+            "{interrupted}{} {}{every} at {} of {}{refused}{}",
             self.about.scenario.name,
             self.question.words()[0],
             self.points.iter().filter(holds).count(),
@@ -411,15 +416,16 @@ impl Study for Sweep {
         let does = self.question.words()[0];
         let does = format!("{}{}", does[..1].to_uppercase(), &does[1..]);
         let table = Table::of(if self.runs == 1 { "One flight each" } else { "With 95 % intervals" }, &self.points);
-        // The median of one flight is its separation.
-        let median = if self.runs == 1 { "" } else { "Separation, median [m]" };
+        let share = if self.runs == 1 { Kind::OneFlight } else { Kind::Share };
+        // The median of one flight is its separation, so only files have it.
+        let median = if self.runs == 1 { " [m]" } else { "Separation, median [m]" };
         let keys = self.keys.iter().enumerate();
         let table = keys.fold(table, |table, (k, SweptKey { key, .. })| {
             table.column(key, key, Kind::Exact, |point| point.values.get(k).copied())
         });
         let table = table
-            .column("held", &does, Kind::Share, |point| point.held)
-            .column("violated", "Violated", Kind::Share, |point| point.violated)
+            .column("held", &does, share, |point| point.held)
+            .column("violated", "Violated", share, |point| point.violated)
             .column("min_smallest", "Separation, smallest [m]", Kind::AtLeast, |point| point.min_smallest_m)
             .column("min_median", median, Kind::Estimate, |point| point.min_median_m)
             .column("reached_median", "Time to reach, median [s]", Kind::Estimate, |point| point.reached_median_s);

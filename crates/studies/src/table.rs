@@ -64,6 +64,8 @@ pub enum Kind {
     Rare,
     /// `count of total` with the interval of the share in per cent; the share alone if the unit of the column is %.
     Share,
+    /// A share of one flight: yes or no.
+    OneFlight,
 }
 
 /// A cell.
@@ -86,7 +88,8 @@ pub enum Cell {
 }
 
 impl Column {
-    /// Returns a column with its name in files and its heading in texts and pages; either may be empty.
+    /// Returns a column with its name in files and its heading in texts and pages; either may be empty. A heading of
+    /// a unit alone, ` [m]`, gives a file the unit.
     #[must_use]
     pub fn new(name: &str, heading: &str, kind: Kind) -> Self {
         Self { name: name.to_owned(), heading: heading.to_owned(), kind }
@@ -115,7 +118,7 @@ impl Column {
             unit => format!("_{}", unit.replace('/', "_").replace('^', "")),
         };
         match self.kind {
-            Kind::Share => ["count", "share", "low", "high"]
+            Kind::Share | Kind::OneFlight => ["count", "share", "low", "high"]
                 .map(|part| (format!("{name}_{part}"), if part == "count" { Kind::Count } else { Kind::Exact }))
                 .to_vec(),
             Kind::Estimate => ["", "_low", "_high"].map(|part| (format!("{name}{part}{unit}"), Kind::Exact)).to_vec(),
@@ -160,7 +163,9 @@ impl Column {
             (Some(value), "%") => {
                 (fixed(100.0 * value, decimals(value).into()), interval.map(|of| of.replace(" %", "")))
             }
-            (Some(_), _) if share.of == 1 => (if share.count == 1 { "yes" } else { "no" }.to_owned(), None),
+            (Some(_), _) if self.kind == Kind::OneFlight => {
+                (if share.count == 1 { "yes" } else { "no" }.to_owned(), None)
+            }
             (Some(_), _) => (format!("{} of {}", separated(share.count), separated(share.of)), interval),
         }
     }
@@ -170,10 +175,10 @@ impl Cell {
     /// Returns the cells of the columns of a file.
     fn scalars(&self, kind: Kind) -> Vec<Self> {
         match (kind, self) {
-            (Kind::Share, Self::Share(Proportion { count, share, low, high, .. })) => {
+            (Kind::Share | Kind::OneFlight, Self::Share(Proportion { count, share, low, high, .. })) => {
                 vec![(*count).into(), (*share).into(), (*low).into(), (*high).into()]
             }
-            (Kind::Share, _) => vec![Self::Empty; 4],
+            (Kind::Share | Kind::OneFlight, _) => vec![Self::Empty; 4],
             (Kind::Estimate, Self::Estimate(Estimate { value, low, high })) => {
                 [value, low, high].map(|&x| x.into()).to_vec()
             }
@@ -265,11 +270,11 @@ impl Table {
 
     /// Returns the columns with a heading, each with its cell in a row.
     fn shown<'a>(&'a self, row: &'a [Cell]) -> impl Iterator<Item = (&'a Column, &'a Cell)> + 'a {
-        self.columns.iter().zip(row).filter(|(column, _)| !column.heading.is_empty())
+        self.columns.iter().zip(row).filter(|(column, _)| !column.title().0.is_empty())
     }
 
     fn headings(&self) -> Vec<&Column> {
-        self.columns.iter().filter(|column| !column.heading.is_empty()).collect()
+        self.columns.iter().filter(|column| !column.title().0.is_empty()).collect()
     }
 
     /// Returns the table for a terminal, intervals in brackets.
@@ -531,7 +536,9 @@ mod tests {
         let interval = |low: f64, high: f64| interval_of(&Proportion { low, high, ..Proportion::new(1, 2) });
         assert_eq!(interval(0.0, 0.000_368_9), "[0 %, 0.037 %]");
         assert_eq!(interval(0.123_9, 0.123_1), "[12 %, 13 %]");
-        assert_eq!(column.shown(&Cell::Share(Proportion::new(1, 1))), ("yes".to_owned(), None));
+        assert!(column.shown(&Cell::Share(Proportion::new(1, 1))).1.is_some(), "one flight of several has an interval");
+        let flight = Column::new("x", "X", Kind::OneFlight);
+        assert_eq!(flight.shown(&Cell::Share(Proportion::new(1, 1))), ("yes".to_owned(), None));
         assert_eq!(column.shown(&Cell::Share(Proportion::new(0, 0))), ("-".to_owned(), None));
         let percent = Column::new("x", "X [%]", Kind::Share);
         assert_eq!(percent.shown(&Cell::Share(Proportion::new(99_987, 100_000))).0, "99.987");

@@ -12,7 +12,7 @@ use tautline_audit::recorded::{Approach, ObjectPair, Outcome, Settings, TOUCHING
 use tautline_audit::{LISTED, Obstacle, ParryEvidence, Status, Tally, Violation};
 use tautline_core::record::Event;
 use tautline_core::swarm::Pair;
-use tautline_core::text::{at_least, exact, seconds};
+use tautline_core::text::{at_least, counted, exact, seconds};
 use tautline_recordings::mcap::{Entry, RunAudit, RunFinding, StoredAudit};
 use tautline_recordings::read;
 use tautline_recordings::read::ReadOptions;
