@@ -276,13 +276,10 @@ const play = (root, data) => {
     const moment = all[(next + all.length) % all.length];
     go(moment.at_s);
     announce(moment);
-    // The camera turns to the vehicles of the moment.
+    // The camera shows everything unless it already shows the vehicles of the moment.
     seek();
-    const [a, b = a] = moment.who.map(place).filter(at => at[3]);
-    if (!a) return;
-    follow.value = "";
-    target = [0, 1, 2].map(axis => (a[axis] + b[axis]) / 2);
-    distance = Math.min(distance, 40 * (Math.hypot(a[0] - b[0], a[1] - b[1], a[2] - b[2]) + least_m));
+    const [across, high] = [canvas.clientWidth, canvas.clientHeight], there = moment.who.filter(k => place(k)[3]);
+    if (there.map(project).some(([x, y, away]) => away <= 0 || x < 0 || y < 0 || x > across || y > high)) fit();
   };
   /** Draws a frame and, while playing, advances the time. @param {number} now Time of the browser [ms]. */
   const frame = now => {
@@ -311,7 +308,7 @@ const play = (root, data) => {
   };
 
   // The camera looks at `target` [m] from `distance` [m]. Angles are in rad.
-  let yaw = 0, pitch = 0, distance = 1, target = [0, 0, 0], kept = { yaw, pitch, distance, target };
+  let yaw = 0, pitch = 0, distance = 1, target = [0, 0, 0], kept = { yaw, pitch, distance, target }, fitted = kept;
   // Positions of the vehicles that the camera fits, with the radius around each [m].
   /** @type {number[][]} */
   const cloud = [];
@@ -346,6 +343,7 @@ const play = (root, data) => {
       });
       target = target.map((x, k) => x + right[k] * middle[0] + up[k] * middle[1]);
     }
+    fitted = { yaw, pitch, distance, target };
   };
   /** Shows everything from a direction [rad]. @param {number} to @param {number} lift */
   const view = (to, lift) => { [yaw, pitch] = [to, lift]; fit(); ask(); };
@@ -899,7 +897,15 @@ const play = (root, data) => {
   });
   dark.addEventListener("change", themed);
   document.addEventListener("change", themed);
-  const sized = new ResizeObserver(draw);
+  // A camera as `fit` left it fits again. Any other one keeps what it shows along the shorter side.
+  const narrow = () => Math.min(canvas.clientWidth / canvas.clientHeight || 1, 1);
+  let narrowed = narrow();
+  const sized = new ResizeObserver(() => {
+    const before = narrowed, alike = yaw === fitted.yaw && pitch === fitted.pitch && distance === fitted.distance;
+    narrowed = narrow();
+    if (alike && target === fitted.target) fit(); else distance *= before / narrowed;
+    draw();
+  });
   sized.observe(stage);
   themed();
   view(...level ? /** @type {[number, number]} */ ([-UPRIGHT, UPRIGHT]) : slant);

@@ -41,7 +41,9 @@ pub fn distances(log: &FlightLog, delta_m: f64, certified_m: Option<f64>, title:
     let marked = closest.map(|closest| closest.separation_m);
     let numbers: Vec<f64> = drawn.chain(bands).chain(marked).chain([delta_m]).chain(certified_m).collect();
     chart.y = Axis::distances("m", &numbers, delta_m);
-    chart.panel = panel(&chart.y, closest.map_or(f64::NAN, |closest| closest.separation_m), delta_m);
+    let least_m = closest.map_or(f64::NAN, |closest| closest.separation_m);
+    let last_m = chart.lines.iter().filter_map(|line| line.points.last()).map(|&(_, y)| y).fold(f64::NAN, f64::min);
+    chart.panel = panel(&chart.y, [least_m, last_m], delta_m);
     chart.level(delta_m, Stroke::solid(INK, 2.0), format!("safety distance δ = {delta_m} m"));
     if let Some(certified_m) = certified_m {
         chart.level(
@@ -83,14 +85,20 @@ fn pair_label(pair: Pair) -> String {
     format!("{first}-{second}")
 }
 
-/// Returns the plot of the clearance \[m\], unless the chart shows it as well.
-fn panel(y: &Axis, least_m: f64, delta_m: f64) -> Option<Panel> {
+/// Returns the plot of the clearance \[m\], unless the chart shows it as well. `last_m` is the smallest distance at the
+/// end.
+fn panel(y: &Axis, [least_m, last_m]: [f64; 2], delta_m: f64) -> Option<Panel> {
     /// Smallest enlargement.
     const LEAST: f64 = 2.5;
+    /// Height of the plot relative to the clearance at the end, unless that is far above.
+    const SPACE: f64 = 1.15;
     let clearance_m = least_m - delta_m;
     let top_m = if clearance_m > 0.0 { 2.0 * clearance_m } else { -clearance_m };
     let top_m = top_m.max(0.25 * delta_m);
-    let near = Axis::linear("clearance [m]", [clearance_m.min(0.0), top_m], true);
+    let to = |top_m: f64| Axis::linear("clearance [m]", [clearance_m.min(0.0), top_m], true);
+    let near = to(top_m);
+    let end_m = SPACE * (last_m - delta_m);
+    let near = if end_m > near.to && end_m < SPACE * SPACE * near.to { to(end_m) } else { near };
     let is_enlarged = y.scale == Scale::Log || (near.to - near.from) * LEAST < y.to - y.from;
     (delta_m > 0.0 && clearance_m.is_finite() && is_enlarged).then_some(Panel { y: near, limit: delta_m })
 }

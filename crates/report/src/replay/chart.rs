@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use super::{JudgementContext, Kind, Moment};
 use crate::figures::time_ticks;
 use tautline_audit::Slice;
-use tautline_core::text::at_least;
+use tautline_core::text::significant;
 
 /// Width and height.
 const SIZE: [f64; 2] = [1000.0, 100.0];
@@ -69,7 +69,9 @@ impl Chart {
         }
         let unit = if unit == "m" { " m" } else { "" };
         let limit_label = limit.map(|limit| (y(limit), format!("{limit}{unit}")));
-        let largest = largest.map(|most| (y(most), format!("{}{unit}", at_least(most, 1))));
+        // The label stands at the height of the number that it shows.
+        let largest = largest.map(|most| significant(most, 3));
+        let largest = largest.and_then(|shown| Some((y(shown.parse().ok()?), format!("{shown}{unit}"))));
         let levels = [largest.filter(|at| limit_label.as_ref().is_none_or(|of| of.0 - at.0 > LABEL)), limit_label];
         let of_pairs = moments.iter().find(|moment| moment.kind == Kind::Closest && moment.obstacle.is_none());
         let mut bands = Vec::new();
@@ -133,6 +135,6 @@ mod tests {
         assert_eq!(chart.bands, [(198.5, 401.5, false), (98.5, 301.5, true), (398.5, 501.5, true)]);
         assert_eq!(chart.distance, "M0.0 4.0H100.0V4.0H200.0M500.0 4.0H500.0M800.0 4.0H900.0");
         let labels: Vec<_> = chart.levels.iter().map(|(_, label)| label.as_str()).collect();
-        assert_eq!((labels, chart.ticks.len()), (vec!["2.0 m"], 6));
+        assert_eq!((labels, chart.ticks.len()), (vec!["2.00 m"], 6));
     }
 }

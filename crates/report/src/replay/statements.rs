@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 
 use super::{Kind, Moment, base64_of, doubles};
 use tautline_audit::{Approach, Slice, Slices};
-use tautline_core::text::{at_most, beside_limit, seconds};
+use tautline_core::text::{beside_limit, seconds};
 
 /// Number of decimals of a distance.
 const DECIMALS: u8 = 3;
@@ -27,7 +27,7 @@ pub(super) struct Words<'a, N> {
 }
 
 /// Returns the statements on the closest pair so far, at most `most` (at least two). Slices are merged until they fit.
-/// Within a slice with a new minimum, the statement gives an upper bound.
+/// Within a slice with a new minimum, the statement is empty until the minimum, or to the end if its time is unknown.
 pub(super) fn so_far<N: Fn(usize) -> Option<String>>(
     slices: &Slices,
     words: &Words<'_, N>,
@@ -54,14 +54,14 @@ impl<N: Fn(usize) -> Option<String>> Words<'_, N> {
             if least.is_some_and(|least| least.certain_m() <= closest.certain_m()) {
                 continue;
             }
-            if let Some(before) = least {
-                say(*from_s, self.at_most(&before));
+            if least.is_some() {
+                say(*from_s, String::new());
             }
             // A later minimum belongs to a later slice.
             if closest.time_s > *to_s {
                 continue;
             }
-            say(*to_s, self.so_far(closest));
+            say(if closest.is_known() { closest.time_s.max(*from_s) } else { *to_s }, self.so_far(closest));
             least = Some(*closest);
         }
         said
@@ -77,14 +77,6 @@ impl<N: Fn(usize) -> Option<String>> Words<'_, N> {
         let bound = if of.is_known() { "" } else { "at least " };
         let shown = beside_limit(of.certain_m(), self.limit.unwrap_or(of.limit_m), DECIMALS);
         format!("{} {bound}{shown} {}{who}", self.begin(), self.unit)
-    }
-
-    fn at_most(&self, of: &Approach) -> String {
-        if of.upper_m.is_finite() {
-            format!("{} at most {} {}", self.begin(), at_most(of.upper_m, DECIMALS), self.unit)
-        } else {
-            String::new()
-        }
     }
 }
 
@@ -222,18 +214,19 @@ mod tests {
     }
 
     #[test]
-    fn open_slices_give_an_upper_bound() {
+    fn the_smallest_separation_is_said_from_its_time_on() {
         let slices = [[4.0; 2], [2.0; 2], [3.0; 2], [1.0; 2]];
         let slices: Vec<_> = slices.into_iter().zip(0..).map(|(of, k)| slice(f64::from(k), of)).collect();
         let so_far = |metres: &str| format!("closest so far {metres} m, 1 and 2");
         let expected = [
-            (1.0, "closest so far at most 4.000 m".to_owned()),
-            (2.0, so_far("2.000")),
-            (3.0, "closest so far at most 2.000 m".to_owned()),
-            (4.0, so_far("1.000")),
+            (0.5, so_far("4.000")),
+            (1.0, String::new()),
+            (1.5, so_far("2.000")),
+            (3.0, String::new()),
+            (3.5, so_far("1.000")),
         ];
         assert_eq!(nearest_said(&slices, false), expected);
-        assert_eq!(nearest_said(&slices[..1], true), [(1.0, "closest known so far 4.000 m, 1 and 2".to_owned())]);
+        assert_eq!(nearest_said(&slices[..1], true), [(0.5, "closest known so far 4.000 m, 1 and 2".to_owned())]);
     }
 
     #[test]
@@ -252,7 +245,7 @@ mod tests {
         let words = Words { unit: "m", limit: None, has_gaps: false, name: |_| None };
         let said = so_far(&slices, &words, 40);
         assert!(said.len() <= 40 && said.len() > 24, "{}", said.len());
-        assert_eq!(said.last(), Some(&(4000.0, "closest so far 1001.000 m".to_owned())));
+        assert_eq!(said.last(), Some(&(3999.5, "closest so far 1001.000 m".to_owned())));
     }
 
     fn moment(kind: Kind, from_s: f64, to_s: f64, brief: &str) -> Moment {

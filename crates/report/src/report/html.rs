@@ -64,7 +64,7 @@ impl Report {
         );
         page.add(
             "Figures",
-            "Quantities over the flight; bold and dashed lines across a chart are limits.",
+            "Quantities over the flight; horizontal lines across a chart are limits.",
             [page::figures(about.figures)],
         );
         page.add(

@@ -191,7 +191,7 @@ impl Obstacles {
             let ObstacleApproach { vehicle, obstacle, clearance_m, min_m, min_at_s } = tightest;
             let at = seconds(*min_at_s);
             format!(
-                "{} m at {at}, vehicle {vehicle} from `{obstacle}` (clearance {} m",
+                "{} m at {at}, vehicle {vehicle} from obstacle {obstacle} (clearance {} m",
                 shown(*min_m, *clearance_m),
                 exact(*clearance_m)
             )
@@ -211,10 +211,10 @@ impl ObstacleApproach {
         let (clearance, at) = (exact(*clearance_m), seconds(*min_at_s));
         if *min_m < 0.0 {
             let deep = metres(-min_m);
-            return format!("vehicle {vehicle} was {deep} m inside `{obstacle}` at {at} (clearance {clearance} m)");
+            return format!("vehicle {vehicle} was {deep} m inside obstacle {obstacle} at {at} (clearance {clearance} m)");
         }
         let near = beside_limit(*min_m, *clearance_m, 3);
-        format!("vehicle {vehicle} came to {near} m from `{obstacle}` at {at} (clearance {clearance} m)")
+        format!("vehicle {vehicle} came to {near} m from obstacle {obstacle} at {at} (clearance {clearance} m)")
     }
 }
 
