@@ -211,7 +211,8 @@ impl ObstacleApproach {
         let (clearance, at) = (exact(*clearance_m), seconds(*min_at_s));
         if *min_m < 0.0 {
             let deep = metres(-min_m);
-            return format!("vehicle {vehicle} was {deep} m inside obstacle {obstacle} at {at} (clearance {clearance} m)");
+            let clearance = format!("clearance {clearance} m");
+            return format!("vehicle {vehicle} was {deep} m inside obstacle {obstacle} at {at} ({clearance})");
         }
         let near = beside_limit(*min_m, *clearance_m, 3);
         format!("vehicle {vehicle} came to {near} m from obstacle {obstacle} at {at} (clearance {clearance} m)")

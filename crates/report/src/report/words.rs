@@ -273,7 +273,8 @@ impl Report {
         let contacts = audit
             .rapier
             .contact_pairs
-            .map(|pairs| format!(", {} seen by the engine", counted(pairs, "contact pair of keep-out shells", "contact pairs of keep-out shells")));
+            .map(|pairs| counted(pairs, "contact pair of keep-out shells", "contact pairs of keep-out shells"))
+            .map(|pairs| format!(", {pairs} seen by the engine"));
         format!(
             "{} in {}, {} swept; {detectors}{}",
             counted(audit.violations.len() as u64, "violation", "violations"),
