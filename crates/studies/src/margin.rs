@@ -308,12 +308,11 @@ impl Study for Margin {
         match (self.turn, self.sides()) {
             (Some(turn), Some([holds, fails])) => {
                 let up = if turn.holds_below { "up to" } else { "from" };
-                let runs = match self.runs {
-                    1 => "it".to_owned(),
-                    _ => {
-                        let failed = fails.held.of - fails.held.count;
-                        format!("in {} of {} it", failed, counted(fails.held.of, "flight", "flights"))
-                    }
+                let runs = if self.runs == 1 {
+                    "it".to_owned()
+                } else {
+                    let failed = fails.held.of - fails.held.count;
+                    format!("in {failed} of {} it", counted(fails.held.of, "flight", "flights"))
                 };
                 format!("{name} {does} with {key} {up} {}; {runs} {does_not} at {}", holds.value, fails.value)
             }
