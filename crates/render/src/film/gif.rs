@@ -48,7 +48,7 @@ struct Patch {
 }
 
 impl Patch {
-    /// Returns the changes from what is shown, and updates it. Changes of at most [`SAME`] are not visible.
+    /// Returns the rectangle of changed pixels and copies it into `shown`. Changes of at most [`SAME`] are left out.
     fn take(picture: &Picture, shown: &mut Vec<u8>) -> Self {
         let [width, height] = picture.size_px.map(|side| side as usize);
         if shown.is_empty() {
