@@ -35,7 +35,7 @@ impl PairRoom {
     }
 
     /// Returns the error for a pair that starts too near.
-    pub(crate) fn too_near(&self) -> ShieldError {
+    pub fn too_near(&self) -> ShieldError {
         let (i, j) = (self.pair.0 + 1, self.pair.1 + 1);
         let problem = format!(
             "vehicles {i} and {j} reserve segments {:.6} m apart; their margins need {:.6} m, the room is",

@@ -29,6 +29,7 @@ pub mod plan;
 pub mod plant;
 pub mod preflight;
 pub mod scenario;
+pub mod shield;
 pub mod sim;
 pub mod vehicle;
 

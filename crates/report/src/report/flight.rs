@@ -8,6 +8,7 @@ use super::artefact::{ArtefactError, write_atomically};
 use super::hulls::Hulls;
 use super::legs::LegNumbers;
 use super::obstacles::Obstacles;
+use super::shield::ShieldNumbers;
 use super::verdict::{UnmetCriterion, Verdict, at_rest, energy_rises};
 use tautline_audit::{self as audit, Status};
 use tautline_core::record::{DeadlockRecovery, Reassignment};
@@ -43,6 +44,9 @@ pub struct Report {
     /// Statistics of the network, if messages are sent one by one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub network: Option<Traffic>,
+    /// Numbers of the shield, if the scenario has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub shield: Option<ShieldNumbers>,
     /// Vehicles with a failed part, in the order of the scenario.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub failures: Vec<FailedVehicle>,
@@ -420,7 +424,8 @@ impl FlightResult<'_> {
                     | VoidReason::Unresolved
             )
         };
-        self.scenario.wind.is_still()
+        self.scenario.shield.is_none()
+            && self.scenario.wind.is_still()
             && self.preflight.velocity_margin_per_s.is_some_and(|margin_per_s| margin_per_s >= 0.0)
             && self.flight.certificate.void.iter().all(holds)
     }
@@ -534,6 +539,7 @@ impl Report {
             audit: result.audit(),
             vehicle: result.vehicle(),
             network: flight.traffic,
+            shield: flight.shield.as_ref().map(ShieldNumbers::from),
             failures: failed.map(FailedVehicle::from).collect(),
             obstacles: Obstacles::of(result),
             hulls: Hulls::of(result),

@@ -102,7 +102,9 @@ impl Report {
     }
 
     fn assumptions(&self, scenario: &Scenario) -> Vec<String> {
-        let certificate = if self.separation.certified_m.is_some() {
+        let certificate = if let (Some(shield), Some(_)) = (&self.shield, self.separation.certified_m) {
+            format!("The shield between law and vehicles keeps a certificate: {}.", shield.certificate)
+        } else if self.separation.certified_m.is_some() {
             scenario.law().map_or_else(|error| error.to_string(), |law| law.capabilities().assumptions.to_owned())
         } else {
             format!("No distance is certified. {}", self.separation.certificate_void.join(" "))

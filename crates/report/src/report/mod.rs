@@ -14,6 +14,7 @@ mod obstacles;
 pub mod page;
 pub mod recorded;
 mod section;
+mod shield;
 mod verdict;
 mod words;
 
@@ -27,6 +28,7 @@ pub use html::RunPage;
 pub use hulls::{Hulls, PassedThrough};
 pub use legs::LegNumbers;
 pub use obstacles::{ObstacleApproach, ObstacleViolation, Obstacles};
+pub use shield::ShieldNumbers;
 pub use tautline_audit::Status;
 pub use verdict::{UnmetCriterion, Verdict};
 

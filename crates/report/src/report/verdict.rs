@@ -6,6 +6,7 @@ use super::flight::{FailedVehicle, FlightResult, Report};
 use super::hulls::vehicles;
 use super::legs;
 use super::obstacles::Obstacles;
+use super::shield::ShieldNumbers;
 use tautline_audit::Status;
 use tautline_core::record::EnergyRise;
 use tautline_core::text::{below_bound, beside_limit, counted, exact, metres, seconds};
@@ -38,6 +39,7 @@ impl Verdict {
             disagreement(result),
             undecided(result),
             broken_certificate(report),
+            report.shield.as_ref().and_then(ShieldNumbers::reason),
             steps_too_long(result),
             risen_energy(result),
             ended_early(report),
@@ -232,6 +234,13 @@ fn broken_certificate(report: &Report) -> Option<String> {
     let (certified_m, closest) = (report.separation.certified_m?, report.separation.closest()?);
     report.breaks_certificate().then(|| {
         let [min, certified] = below_bound(closest.separation_m, certified_m);
+        if report.shield.is_some() {
+            return format!(
+                "The shield certifies {certified} m, but {} came to {min} m: the flown motion is not the one that the \
+                 proof covers.",
+                vehicles(closest.pair),
+            );
+        }
         format!(
             "The law certifies {certified} m in continuous time, but {} came to {min} m: the flown motion is not the \
              one that the proof covers. Shorten time.dt_s, and look for positions so large that their differences lose \

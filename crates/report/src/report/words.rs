@@ -2,6 +2,7 @@
 
 use super::flight::{Ellipsoid, FailedVehicle, Performance, Report, VehicleNumbers, Verification};
 use super::obstacles::Obstacles;
+use super::shield::ShieldNumbers;
 use super::verdict::{UnmetCriterion, breaks_certificate, is_unresolved_by_step};
 use tautline_audit::Status;
 use tautline_core::text::{at_least, below_bound, beside_limit, counted, exact, metres, seconds, table};
@@ -69,6 +70,7 @@ impl Report {
             refused,
             past_obstacles,
             self.hulls.brief(),
+            self.shield.as_ref().and_then(ShieldNumbers::brief),
             broken,
             overlong,
             rose.filter(|_| has_no_violation),
@@ -226,6 +228,7 @@ impl Report {
             ("ellipsoids", self.separation.ellipsoid.as_ref().map(Ellipsoid::line)),
             ("obstacles", self.obstacles.as_ref().map(Obstacles::line)),
             ("network", self.network.as_ref().map(network_line)),
+            ("shield", self.shield.as_ref().map(ShieldNumbers::line)),
             ("failed", failed),
             ("vehicle", self.vehicle.as_ref().map(VehicleNumbers::line)),
         ];

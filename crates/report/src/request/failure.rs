@@ -210,9 +210,12 @@ impl From<SimError> for Failure {
         match error {
             SimError::Record(error) => error.into(),
             SimError::Law(error) => error.into(),
-            SimError::NoLeg | SimError::Obstacle(_) | SimError::Vehicles { .. } | SimError::Commands { .. } => {
-                Self::new("simulation/inconsistent", false, error.to_string())
-            }
+            SimError::NoLeg
+            | SimError::Obstacle(_)
+            | SimError::Vehicles { .. }
+            | SimError::Commands { .. }
+            | SimError::ShieldedCommands => Self::new("simulation/inconsistent", false, error.to_string()),
+            SimError::Shield(error) => error.into(),
             SimError::Audit(error) => Self::input(
                 "simulation/cannot-judge",
                 error.to_string(),

@@ -44,49 +44,37 @@ struct LinkOutage {
     to_s: f64,
 }
 
-/// Network of a flight: messages under way, and the last message received over each link.
-///
-/// All vehicles send message k to all neighbours k/`rate_hz` after the first measurement is available. It holds the
-/// sender's knowledge of its own state at that time. Its delay and loss depend only on the seed, the link and k.
+/// User of a radio. Each has its own random numbers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum RadioUse {
+    /// States of vehicles, for laws.
+    States,
+    /// Contracts of shields.
+    Contracts,
+}
+
+/// Fate of single messages: delay, loss, links that are down and vehicles that are silent. It depends only on the seed,
+/// the use, the link and the number of the message.
 #[derive(Clone, Debug)]
-pub(super) struct Messages {
-    links: Links,
-    rate_hz: f64,
-    begins_s: f64,
+pub(crate) struct Radio {
     latency_s: f64,
     jitter_s: f64,
     loss: Option<Loss>,
     noise: Noise,
+    used_for: RadioUse,
     down: Vec<LinkOutage>,
     silent_from_s: Vec<f64>,
-    /// Number of the next message, from 1.
-    next: u64,
-    under_way: VecDeque<Broadcast>,
-    spare: Vec<Broadcast>,
-    received: Vec<ReceivedMessage>,
     /// Whether the last message on each link was lost; `None` before the first.
     lost_before: Vec<Option<bool>>,
     sent: u64,
     lost: u64,
-    ages: Ages,
 }
 
-impl Messages {
-    pub(super) fn new(scenario: &Scenario, sensing: &StateSensor, rate_hz: f64) -> Self {
-        let NetworkSpec { latency_s, jitter_s, loss, loss_burst, near, .. } = scenario.network;
+impl Radio {
+    /// Returns the radio of a scenario with this number of directed links.
+    pub(crate) fn new(scenario: &Scenario, links: usize, used_for: RadioUse) -> Self {
+        let NetworkSpec { latency_s, jitter_s, loss, loss_burst, .. } = scenario.network;
         let count = scenario.count();
-        let links = match near {
-            NearStates::Sensed => Links::of(&scenario.graph),
-            NearStates::Received => Links::of(&Graph::complete(count)),
-        };
-        let mut known = scenario.start.clone();
-        sensing.measure(&History::new(0.0), 0.0, Some(&scenario.start), &mut known);
-        let mut received = Vec::with_capacity(links.len());
-        for sender in 0..count {
-            let start =
-                ReceivedMessage { number: 0, neighbour: NeighbourState::of(&known, sender, 0.0), measured_s: 0.0 };
-            received.extend(links.from(sender).map(|_| start));
-        }
         let index = |number: u64| usize::try_from(number.saturating_sub(1)).unwrap_or(usize::MAX);
         let down = scenario.network.failure.iter().map(|failure| LinkOutage {
             ends: failure.link.map(index),
@@ -98,33 +86,116 @@ impl Messages {
             silent_from_s[failure.index()] = failure.at_s.min(silent_from_s[failure.index()]);
         }
         Self {
-            rate_hz,
-            begins_s: sensing.latency_s(),
             latency_s,
             jitter_s,
             loss: (loss > 0.0).then(|| Loss::new(loss, loss_burst)),
             noise: Noise::new(scenario.noise_seed, NoiseSource::Messages),
+            used_for,
             down: down.collect(),
             silent_from_s,
+            lost_before: vec![None; links],
+            sent: 0,
+            lost: 0,
+        }
+    }
+
+    /// Changes the seed for messages after number `made`.
+    pub(crate) fn reseed(&mut self, seed: u64, made: u64) {
+        self.noise.reseed(seed, made);
+    }
+
+    /// Returns the numbers of messages sent and lost.
+    pub(crate) fn counts(&self) -> (u64, u64) {
+        (self.sent, self.lost)
+    }
+
+    /// Returns the longest delay of a message that arrives \[s\].
+    pub(crate) fn longest_s(&self) -> f64 {
+        self.latency_s + self.jitter_s
+    }
+
+    /// Writes the arrival times \[s\] of a message of a sender, its number counted from 1, over its links, each with its
+    /// receiver. A message that is lost arrives at infinity.
+    pub(crate) fn send(
+        &mut self,
+        (sender, number, sent_s): (usize, u64, f64),
+        links: impl ExactSizeIterator<Item = (usize, usize)>,
+        arrives_s: &mut [f64],
+    ) {
+        if sent_s + SAME_S >= self.silent_from_s[sender] {
+            links.for_each(|(link, _)| arrives_s[link] = f64::INFINITY);
+            return;
+        }
+        let is_random = self.loss.is_some() || self.jitter_s > 0.0;
+        let mut draw = is_random.then(|| self.noise.draw(sender, self.used_for as usize, number, DRAWS * links.len()));
+        for (link, receiver) in links {
+            let [unit, jitter] = draw.as_mut().map_or([0.0; DRAWS], |draw| [draw.unit(), draw.unit()]);
+            let by_chance = self.loss.is_some_and(|loss| {
+                let is_lost = loss.next(self.lost_before[link], unit);
+                self.lost_before[link] = Some(is_lost);
+                is_lost
+            });
+            let is_lost = by_chance || self.down.iter().any(|down| down.blocks(sender, receiver, sent_s));
+            self.sent += 1;
+            self.lost += u64::from(is_lost);
+            arrives_s[link] = if is_lost { f64::INFINITY } else { sent_s + self.latency_s + self.jitter_s * jitter };
+        }
+    }
+}
+
+/// Network of a flight: messages under way, and the last message received over each link.
+///
+/// All vehicles send message k to all neighbours k/`rate_hz` after the first measurement is available. It holds the
+/// sender's knowledge of its own state at that time. Its delay and loss depend only on the seed, the link and k.
+#[derive(Clone, Debug)]
+pub(super) struct Messages {
+    links: Links,
+    rate_hz: f64,
+    begins_s: f64,
+    radio: Radio,
+    /// Number of the next message, from 1.
+    next: u64,
+    under_way: VecDeque<Broadcast>,
+    spare: Vec<Broadcast>,
+    received: Vec<ReceivedMessage>,
+    ages: Ages,
+}
+
+impl Messages {
+    pub(super) fn new(scenario: &Scenario, sensing: &StateSensor, rate_hz: f64) -> Self {
+        let count = scenario.count();
+        let links = match scenario.network.near {
+            NearStates::Sensed => Links::of(&scenario.graph),
+            NearStates::Received => Links::of(&Graph::complete(count)),
+        };
+        let mut known = scenario.start.clone();
+        sensing.measure(&History::new(0.0), 0.0, Some(&scenario.start), &mut known);
+        let mut received = Vec::with_capacity(links.len());
+        for sender in 0..count {
+            let start =
+                ReceivedMessage { number: 0, neighbour: NeighbourState::of(&known, sender, 0.0), measured_s: 0.0 };
+            received.extend(links.from(sender).map(|_| start));
+        }
+        Self {
+            rate_hz,
+            begins_s: sensing.latency_s(),
+            radio: Radio::new(scenario, links.len(), RadioUse::States),
             next: 1,
             under_way: VecDeque::new(),
             spare: Vec::new(),
-            lost_before: vec![None; links.len()],
             received,
             links,
-            sent: 0,
-            lost: 0,
             ages: Ages::default(),
         }
     }
 
     pub(super) fn reseed(&mut self, seed: u64) {
-        self.noise.reseed(seed, self.next - 1);
+        self.radio.reseed(seed, self.next - 1);
     }
 
     /// Returns the numbers of messages sent and lost.
     pub(super) fn counts(&self) -> (u64, u64) {
-        (self.sent, self.lost)
+        self.radio.counts()
     }
 
     /// Returns the ages of received states, over all links and messages.
@@ -156,40 +227,18 @@ impl Messages {
         broadcast.measured_s = sensing.measured_s(sent_s);
         sensing.measure(history, sent_s, None, &mut broadcast.states);
         for sender in 0..self.links.count() {
-            if sent_s + SAME_S < self.silent_from_s[sender] {
-                self.send_from(sender, &mut broadcast);
-            } else {
-                self.links.from(sender).for_each(|(link, _)| broadcast.arrives_s[link] = f64::INFINITY);
-            }
+            let links = self.links.from(sender);
+            self.radio.send((sender, self.next, sent_s), links, &mut broadcast.arrives_s);
         }
         self.received.iter().for_each(|received| self.ages.take(sent_s - received.measured_s));
         self.next += 1;
         self.under_way.push_back(broadcast);
     }
 
-    fn send_from(&mut self, sender: usize, broadcast: &mut Broadcast) {
-        let receivers = self.links.from(sender).len();
-        let is_random = self.loss.is_some() || self.jitter_s > 0.0;
-        let mut draw = is_random.then(|| self.noise.draw(sender, 0, self.next, DRAWS * receivers));
-        for (link, receiver) in self.links.from(sender) {
-            let [unit, jitter] = draw.as_mut().map_or([0.0; DRAWS], |draw| [draw.unit(), draw.unit()]);
-            let by_chance = self.loss.is_some_and(|loss| {
-                let is_lost = loss.next(self.lost_before[link], unit);
-                self.lost_before[link] = Some(is_lost);
-                is_lost
-            });
-            let is_lost = by_chance || self.down.iter().any(|down| down.blocks(sender, receiver, broadcast.sent_s));
-            self.sent += 1;
-            self.lost += u64::from(is_lost);
-            broadcast.arrives_s[link] =
-                if is_lost { f64::INFINITY } else { broadcast.sent_s + self.latency_s + self.jitter_s * jitter };
-        }
-    }
-
     /// Delivers messages that have arrived; an older message never replaces a newer one.
     fn deliver(&mut self, time_s: f64) {
         for broadcast in &self.under_way {
-            if broadcast.sent_s + self.latency_s > time_s + SAME_S {
+            if broadcast.sent_s + self.radio.latency_s > time_s + SAME_S {
                 break;
             }
             for sender in 0..self.links.count() {
@@ -204,7 +253,7 @@ impl Messages {
                 }
             }
         }
-        let longest_s = self.latency_s + self.jitter_s;
+        let longest_s = self.radio.longest_s();
         while self.under_way.front().is_some_and(|first| first.sent_s + longest_s <= time_s + SAME_S) {
             self.spare.extend(self.under_way.pop_front());
         }

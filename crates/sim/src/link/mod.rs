@@ -20,8 +20,10 @@ mod sensing;
 pub use actuation::ActuationSpec;
 pub use failure::{Failure, FailureKind};
 pub use history::History;
+pub(crate) use messages::{Radio, RadioUse};
 pub use network::{LinkFailure, NearStates, NetworkSpec, StalePolicy};
 pub use sensing::SensingSpec;
+pub(crate) use sensing::period;
 
 use actuation::Actuation;
 use dyn_clone::DynClone;

@@ -167,7 +167,7 @@ impl Scenario {
         let index = |number: u64| usize::try_from(number).unwrap_or(usize::MAX).checked_sub(1);
         let is_link = match (index(a), index(b)) {
             (Some(i), Some(j)) if i != j && i.max(j) < self.count() => {
-                self.network.near == NearStates::Received || self.graph.has_edge(i, j)
+                self.shield.is_some() || self.network.near == NearStates::Received || self.graph.has_edge(i, j)
             }
             _ => false,
         };

@@ -101,7 +101,7 @@ impl ImperfectionSpec for SensingSpec {
 pub(super) const SAME_S: f64 = 1e-9;
 
 /// Returns the number of the current period of a rate that began at time 0; 0 also before it.
-pub(super) fn period(time_s: f64, rate_hz: f64) -> u64 {
+pub(crate) fn period(time_s: f64, rate_hz: f64) -> u64 {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 0; a flight is bounded")]
     let number = ((time_s + SAME_S) * rate_hz).floor().max(0.0) as u64;
     number

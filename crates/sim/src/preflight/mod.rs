@@ -6,6 +6,7 @@
 
 mod margins;
 mod peak;
+mod shield;
 mod stability;
 mod warning;
 
@@ -20,6 +21,7 @@ use tautline_laws::law::{Controls, Law, LegBound, ParameterError, RateQuery, Vel
 use tautline_laws::space::{closest_pair, smallest_clearance_margin};
 
 pub use margins::{Bound, ContactState, PredictedMargin};
+pub use shield::ShieldCheck;
 pub use stability::{FLATNESS, MOST_RANKED, RANK_TOLERANCE, Rigidity};
 pub use warning::{Code, Warning};
 
@@ -87,6 +89,9 @@ pub struct Preflight {
     pub needs: Vec<&'static str>,
     /// Reasons why no separation is certified, one sentence each.
     pub certificate_void: Vec<String>,
+    /// Shield of the scenario, whose certificate replaces that of the law.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub shield: Option<ShieldCheck>,
     /// Certified lower bound of the separation of pairs joined by an edge \[m\], on a graph that is not complete, if
     /// the energy decays. Other pairs have no bound.
     pub certified_edges_m: Option<f64>,
@@ -165,7 +170,10 @@ impl Preflight {
     pub fn of(scenario: &Scenario) -> Result<Self, ParameterError> {
         let mut law = scenario.law()?;
         let mut found = Self::with_law(scenario, law.as_ref());
-        found.start_peak_m_s2 = peak::start_peak_m_s2(scenario, law.as_mut());
+        // The shield limits the commands of the law.
+        if scenario.shield.is_none() {
+            found.start_peak_m_s2 = peak::start_peak_m_s2(scenario, law.as_mut());
+        }
         let message = found.start_peak_m_s2.and_then(peak::extreme_acceleration);
         found.warnings.extend(message.map(|message| Warning { code: Code::ExtremeAcceleration, message }));
         Ok(found)
@@ -180,7 +188,7 @@ impl Preflight {
         let capabilities = law.capabilities();
         let rates = law.rates(&RateQuery {
             a22_per_s: scenario.velocity_coefficient_per_s(),
-            nearest_m: certificate.certified_m,
+            nearest_m: certificate.certified_m.filter(|_| scenario.shield.is_none()),
             obstacle_margin_m: certificate.certified_clearance_margin_m,
             connectivity,
         });
@@ -214,6 +222,7 @@ impl Preflight {
                 && scenario.legs.iter().any(|leg| leg.interchangeable),
             needs: capabilities.needs.to_vec(),
             certificate_void: certificate.void.iter().map(ToString::to_string).collect(),
+            shield: ShieldCheck::of(scenario),
             certified_edges_m: None,
             drift_m: drift.distance_m,
             spacing_m: drift.spacing_m,
@@ -257,6 +266,8 @@ impl Preflight {
             (trap, found.start_too_flat()),
             (Code::StepTooLong, step_too_long(law, scenario)),
             (Code::DriftUnresolved, found.drift_unresolved(scenario)),
+            (Code::SlotsTooNear, found.shield.as_ref().and_then(ShieldCheck::slots_too_near)),
+            (Code::SlotsWithinEase, found.shield.as_ref().and_then(ShieldCheck::slots_within_ease)),
             (Code::BeyondMargin, margins::exceeded_margin(&found.margins, scenario)),
             (Code::NoCertificate, found.no_certificate()),
             (Code::NotRigid, found.not_rigid(scenario)),
@@ -285,9 +296,11 @@ impl Preflight {
     }
 
     /// Returns the dimension of the affine hull of the start if the law cannot leave it but the formation requires it.
+    /// A shield turns commands, so vehicles leave it.
     #[must_use]
     pub fn trap_dimension(&self) -> Option<usize> {
-        (self.controls_distances() && self.start_dimension < self.formation_dimension).then_some(self.start_dimension)
+        (self.shield.is_none() && self.controls_distances() && self.start_dimension < self.formation_dimension)
+            .then_some(self.start_dimension)
     }
 
     fn start_too_flat(&self) -> Option<String> {
@@ -353,7 +366,7 @@ impl Preflight {
 /// require shorter ones.
 fn step_too_long(law: &dyn Law, scenario: &Scenario) -> Option<String> {
     let shortest_s = scenario.time.shortest_step_s();
-    let needed_s = scenario.links_step_s(law)?;
+    let needed_s = scenario.links_step_s(law).filter(|_| scenario.shield.is_none())?;
     (shortest_s > needed_s).then(|| {
         format!(
             "The law's links require steps of {} s, but time.dt_s and time.max_halvings allow at least {} s: the \

@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{Connectivity, LegCertificate, Preflight, margins};
 use crate::vehicle::Quadrotor;
 use tautline_core::text;
-use tautline_core::text::{at_least, beside_limit, counted, metres, seconds, table};
+use tautline_core::text::{at_least, beside_limit, counted, exact, metres, seconds, table};
 
 /// Warning about a scenario.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -30,6 +30,10 @@ pub enum Code {
     StepTooLong,
     /// The swarm drifts so far that numbers no longer resolve its positions.
     DriftUnresolved,
+    /// Slots are nearer than the shield lets vehicles come.
+    SlotsTooNear,
+    /// Slots are nearer than the gap that vehicles under a shield keep by choice.
+    SlotsWithinEase,
     /// A delay or command rate is beyond a predicted margin.
     BeyondMargin,
     /// No separation is certified.
@@ -44,12 +48,14 @@ pub enum Code {
 
 impl Code {
     /// All codes, the most severe first.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::RelativeVelocityUnstable,
         Self::StartOnLine,
         Self::StartInPlane,
         Self::StepTooLong,
         Self::DriftUnresolved,
+        Self::SlotsTooNear,
+        Self::SlotsWithinEase,
         Self::BeyondMargin,
         Self::NoCertificate,
         Self::NotRigid,
@@ -68,6 +74,7 @@ impl Code {
                 | Self::StartInPlane
                 | Self::StepTooLong
                 | Self::DriftUnresolved
+                | Self::SlotsTooNear
         )
     }
 
@@ -80,6 +87,8 @@ impl Code {
             Self::StartInPlane => "start-in-plane",
             Self::StepTooLong => "step-too-long",
             Self::DriftUnresolved => "drift-unresolved",
+            Self::SlotsTooNear => "slots-too-near",
+            Self::SlotsWithinEase => "slots-within-ease",
             Self::BeyondMargin => "beyond-margin",
             Self::NoCertificate => "no-certificate",
             Self::NotRigid => "not-rigid",
@@ -120,6 +129,9 @@ impl Preflight {
             return format!("REFUSED: {}", refusing.join(", "));
         }
         let certificate = match self.certified_m {
+            Some(certified_m) if self.shield.is_some() => {
+                format!("certified never closer than {} m by the shield", exact(certified_m))
+            }
             Some(certified_m) => {
                 format!(
                     "certified never closer than {} m in continuous time (delta {} m){}",
@@ -185,6 +197,9 @@ impl Preflight {
     }
 
     fn certificate_line(&self) -> String {
+        if let (Some(shield), Some(_)) = (&self.shield, self.certified_m) {
+            return shield.line();
+        }
         let energy = self.energy_initial.map(|energy| format!("E(0) = {energy:.6} m^2/s^2")).unwrap_or_default();
         match self.certified_m {
             Some(certified_m) => {
@@ -221,6 +236,9 @@ impl Preflight {
             Some(links_s) if links_s < self.dt_s => format!("; the links require at most {} s", significant(links_s)),
             _ => String::new(),
         };
+        if let Some(shield) = &self.shield {
+            return format!("{dt_s} s, commands are held for {} s", significant(shield.period_s));
+        }
         match self.dt_max_s {
             Some(dt_max_s) if dt_max_s >= self.dt_s => format!("{dt_s} s, short enough for the law"),
             Some(dt_max_s) => {

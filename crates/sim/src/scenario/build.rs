@@ -15,6 +15,7 @@ use super::spec::{Safety, Scenario, Space};
 use super::start;
 use super::time::bounded_record_hz;
 use super::vehicle::{QUADROTOR_CONTROL_HZ, QUADROTOR_DT_S};
+use crate::shield::SHIELD_CONTROL_HZ;
 use crate::vehicle::Quadrotor;
 use tautline_core::swarm::{Rows, Swarm, set_row};
 
@@ -55,6 +56,9 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         time.dt_s = if gives_step { time.dt_s } else { QUADROTOR_DT_S };
         time.control_hz = time.control_hz.or(Some(QUADROTOR_CONTROL_HZ));
     }
+    if document.shield.is_some() {
+        time.control_hz = time.control_hz.or(Some(SHIELD_CONTROL_HZ));
+    }
     let mut scenario = Scenario {
         start,
         mass_kg: per_vehicle(mass_kg, count),
@@ -71,6 +75,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         sensing: document.sensing,
         network: document.network,
         actuation: document.actuation,
+        shield: document.shield,
         failures: document.failure,
         arrival: document.arrival,
         deadlock: document.deadlock,

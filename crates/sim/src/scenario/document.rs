@@ -17,6 +17,7 @@ use super::template::Laws;
 use super::time::TimeSpec;
 use super::vehicle::VehicleTable;
 use crate::link::{ActuationSpec, Failure, NetworkSpec, SensingSpec};
+use crate::shield::ShieldSpec;
 use tautline_core::swarm::{Rows, set_row};
 use tautline_laws::formation::Ink;
 use tautline_laws::law::LawSpec;
@@ -90,6 +91,10 @@ pub(super) struct Document {
     /// Conversion of commands into accelerations.
     #[serde(default, skip_serializing_if = "is_default")]
     pub(super) actuation: ActuationSpec,
+    /// Stage between law and vehicles that certifies separations under any law: none unless the table exists.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "ShieldSpec")]
+    pub(super) shield: Option<ShieldSpec>,
     /// Vehicles with a failed part.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub(super) failure: Vec<Failure>,

@@ -31,6 +31,7 @@ mod vehicle;
 pub use crate::link::{
     ActuationSpec, Failure, FailureKind, LinkFailure, NearStates, NetworkSpec, SensingSpec, StalePolicy,
 };
+pub use crate::shield::ShieldSpec;
 pub use error::{Field, Place, ScenarioError, edit_distance};
 pub use limits::{
     BYTES_PER_EDGE, BYTES_PER_VEHICLE, CONTACT_PREDICTION_M, LARGEST, MAX_HALVINGS, MAX_MEMORY_BYTES, MAX_NAME_CHARS,

@@ -57,9 +57,12 @@ impl Scenario {
     }
 
     /// Returns the certificate of a law from the start through all legs, void where the scenario violates its
-    /// assumptions.
+    /// assumptions. A shield replaces it by its own, which holds under any law.
     #[must_use]
     pub fn certificate(&self, law: &dyn Law) -> Certificate {
+        if let Some(certificate) = self.shield_certificate() {
+            return certificate;
+        }
         let ignored = !self.obstacles.is_empty() && !law.capabilities().avoids_obstacles;
         let is_uncounted = !self.wind.is_still() && !law.capabilities().certifies_under_wind;
         self.with_scenario_limits(self.certificate_of_legs(law))

@@ -112,6 +112,7 @@ impl From<&Scenario> for Document {
             sensing: scenario.sensing,
             network: scenario.network.clone(),
             actuation: scenario.actuation,
+            shield: scenario.shield,
             failure: scenario.failures.clone(),
             noise: NoiseTable { seed: scenario.noise_seed },
             given: TimeKeys::default(),

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::time::TimeSpec;
 use crate::link::{ActuationSpec, Failure, NetworkSpec, SensingSpec};
+use crate::shield::ShieldSpec;
 use crate::vehicle::Airframe;
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::formation::Formation;
@@ -72,6 +73,8 @@ pub struct Scenario {
     pub network: NetworkSpec,
     /// Conversion of commands into accelerations.
     pub actuation: ActuationSpec,
+    /// Stage between law and vehicles that certifies separations under any law.
+    pub shield: Option<ShieldSpec>,
     /// Vehicles with a failed part.
     pub failures: Vec<Failure>,
     /// Seed of all random numbers in flight.
@@ -153,6 +156,7 @@ impl Scenario {
             sensing: SensingSpec::default(),
             network: NetworkSpec::default(),
             actuation: ActuationSpec::default(),
+            shield: None,
             failures: Vec::new(),
             noise_seed: 0,
             start,

@@ -68,7 +68,8 @@ impl Scenario {
         self.check_wind()?;
         self.check_arrival()?;
         self.check_deadlock()?;
-        self.imperfections().into_iter().try_for_each(|imperfection| imperfection.check(self))
+        self.imperfections().into_iter().try_for_each(|imperfection| imperfection.check(self))?;
+        self.check_shield()
     }
 
     fn check_noise(&self) -> Result<(), ScenarioError> {

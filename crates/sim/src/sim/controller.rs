@@ -4,6 +4,7 @@ use super::ending::SimError;
 use crate::link::Imperfections;
 use crate::plant::Feedback;
 use crate::scenario::Scenario;
+use crate::shield::ShieldStage;
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::graph::Graph;
 use tautline_laws::law::{Certificate, Law, LawError, certificate_through};
@@ -24,7 +25,8 @@ pub(super) struct Controller {
     /// Metric of separations.
     metric: Metric,
     near: VerletList,
-    /// Last command of the law, N x 3 \[m/s^2\].
+    pub(super) shield: Option<ShieldStage>,
+    /// Last command of the law, as the shield changed it, N x 3 \[m/s^2\].
     commanded: Rows,
 }
 
@@ -40,7 +42,8 @@ impl Controller {
         let (obstacles, near) = (scenario.obstacles.clone(), VerletList::default());
         let commanded = Rows::zeros(scenario.count());
         let metric = scenario.metric();
-        Ok(Self { law, link, supervisor, target, guidance, links, obstacles, metric, near, commanded })
+        let shield = ShieldStage::of(scenario)?;
+        Ok(Self { law, link, supervisor, target, guidance, links, obstacles, metric, near, shield, commanded })
     }
 
     /// Senses at an instant of the flight, lets the supervisor change the target, and writes the law's command if
@@ -82,7 +85,14 @@ impl Controller {
             near: self.near.pairs(),
             obstacles: &self.obstacles,
         };
-        let commanded = self.law.command(&at, &mut self.commanded);
+        let mut commanded = self.law.command(&at, &mut self.commanded);
+        if let Some(shield) = &mut self.shield {
+            if commanded.is_err() {
+                shield.note_undefined(&mut self.commanded);
+                commanded = Ok(());
+            }
+            shield.filter(time_s, truth, sensed.own, &mut self.commanded);
+        }
         commanded.map_err(|error| error.with_true_distance(truth, self.metric, &self.obstacles))?;
         self.actuate(time_s, command);
         Ok(())
@@ -113,6 +123,9 @@ impl Controller {
         self.law.reseed(seed);
         self.link.reseed(seed);
         self.supervisor.reseed(seed);
+        if let Some(shield) = &mut self.shield {
+            shield.reseed(seed);
+        }
     }
 
     /// Returns the law's energy of a true state, for the current target.

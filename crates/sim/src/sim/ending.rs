@@ -3,6 +3,8 @@
 use std::time::Duration;
 
 use crate::link::Traffic;
+use crate::scenario::ScenarioError;
+use crate::shield::ShieldReport;
 use tautline_audit::{AuditError, AuditOutcome, ClearanceOutcome, ObstacleError, Status};
 use tautline_core::record::{DeadlockRecovery, EnergyRise, Reassignment, RecordError};
 use tautline_core::swarm::{Bounce, Pair, Swarm};
@@ -55,6 +57,8 @@ pub struct Flight {
     pub assignments: Vec<Reassignment>,
     /// Counts of messages, if the network sends single messages.
     pub traffic: Option<Traffic>,
+    /// Numbers of the shield, if the scenario has one.
+    pub shield: Option<ShieldReport>,
     /// State at the end.
     pub last: Swarm,
     /// Wall-clock time by kind of work.
@@ -187,6 +191,15 @@ pub enum SimError {
     /// The parameters give no law.
     #[error(transparent)]
     Law(#[from] ParameterError),
+    /// The scenario does not fit its shield.
+    #[error(transparent)]
+    Shield(#[from] ScenarioError),
+    /// Accelerations are given to a scenario with a shield.
+    #[error(
+        "the shield filters the commands of a law at its own instants, not accelerations of a step; write a law, or use \
+         the shield outside of the simulation"
+    )]
+    ShieldedCommands,
     /// The scenario has no formation.
     #[error("the scenario has no leg")]
     NoLeg,

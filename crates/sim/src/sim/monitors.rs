@@ -154,7 +154,9 @@ impl EnergyMonitor {
         events.extend((self.leg + 1..=leg).map(|leg| Event::LegBegan { leg, time_s }));
         self.leg = leg;
         let Some((change, promise)) = controller.change(time_s, state) else { return };
-        certificate.renew(&scenario.with_scenario_limits(promise), leg);
+        if scenario.shield.is_none() {
+            certificate.renew(&scenario.with_scenario_limits(promise), leg);
+        }
         let certified_m = certificate.certified_m;
         events.push(match change {
             Change::Spread { scale } => {

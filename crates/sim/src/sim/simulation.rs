@@ -10,6 +10,7 @@ use super::monitors::{IntegrationError, RoundingBound};
 use crate::link::{self, Imperfections};
 use crate::plant::{self, Plant, StepPath};
 use crate::scenario::Scenario;
+use crate::shield::ShieldStage;
 use tautline_core::record::{Channel, Event, Peaks, Sample};
 use tautline_core::swarm::{ClosestApproach, Rows, Swarm, first_row_beyond};
 use tautline_laws::law::{Certificate, Law, VoidReason};
@@ -95,11 +96,12 @@ impl Simulation {
         if plant.count() != count {
             return Err(SimError::Vehicles { expected: count, found: plant.count() });
         }
-        let certificate = scenario
-            .certificate(law.as_ref())
-            .void_where(!supervisor.follows_legs(&scenario.legs), VoidReason::TargetChanges);
+        let certificate = scenario.certificate(law.as_ref()).void_where(
+            scenario.shield.is_none() && !supervisor.follows_legs(&scenario.legs),
+            VoidReason::TargetChanges,
+        );
         // The scenario's own imperfections already void the certificate.
-        let is_void = !scenario.is_exact() && !certificate.void.is_empty();
+        let is_void = !scenario.is_exact() && (scenario.shield.is_some() || !certificate.void.is_empty());
         let certificate = certificate.void_where(!link.is_exact() && !is_void, VoidReason::InexactLink);
         let mut state = scenario.start.clone();
         plant.observe(&mut state);
@@ -166,10 +168,13 @@ impl Simulation {
     /// for the barrier or the rate of the law.
     ///
     /// # Errors
-    /// [`SimError::Commands`] unless each vehicle has a finite row; then nothing is flown. Does nothing after the end
-    /// of the flight. The law's certificate is void from then on.
+    /// [`SimError::Commands`] unless each vehicle has a finite row, and [`SimError::ShieldedCommands`] under a shield;
+    /// then nothing is flown. Does nothing after the end of the flight. The law's certificate is void from then on.
     pub fn step_with(&mut self, commands: &Rows) -> Result<(), SimError> {
         let count = self.state.count();
+        if self.controller.shield.is_some() {
+            return Err(SimError::ShieldedCommands);
+        }
         if commands.nrows() != count || first_row_beyond(commands, MAX_COMMAND_M_S2).is_some() {
             return Err(SimError::Commands { expected: count, found: commands.nrows() });
         }
@@ -322,6 +327,7 @@ impl Simulation {
             deadlock_recoveries: self.energy_monitor.deadlock_recoveries,
             assignments: self.energy_monitor.assignments,
             traffic: self.controller.link.traffic(),
+            shield: self.controller.shield.as_ref().map(ShieldStage::report),
             last: self.state,
             performance: Performance { airframe: self.plant.airframe_time(), ..self.performance },
         }

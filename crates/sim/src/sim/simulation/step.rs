@@ -52,9 +52,9 @@ impl Simulation {
     }
 
     /// Returns the fastest rate of the law in the present state \[1/s\]. It is 0 in continuous time, which chooses its
-    /// own steps, and under given commands.
+    /// own steps, and under given commands or a shield.
     fn rate_per_s(&self, length_s: f64) -> f64 {
-        if self.overruled || !self.plant.holds_commands() {
+        if self.overruled || self.controller.shield.is_some() || !self.plant.holds_commands() {
             return 0.0;
         }
         let Self { controller: Controller { law, links, .. }, scenario, judge, state, .. } = self;
@@ -165,7 +165,7 @@ impl Simulation {
     /// that at the start if the law has no barrier or is not evaluated.
     fn is_step_too_long(&mut self, length_s: f64, at_start_per_s: f64) -> (bool, f64) {
         let Self {
-            controller: Controller { law, links, link, .. },
+            controller: Controller { law, links, link, shield, .. },
             judge,
             state,
             path,
@@ -176,7 +176,7 @@ impl Simulation {
             ..
         } = self;
         let (of, moves) = ((law.as_ref(), &*links), (&*state, &*path, &*next));
-        let Some(barrier_m) = law.capabilities().barrier_m.filter(|_| !*overruled) else {
+        let Some(barrier_m) = law.capabilities().barrier_m.filter(|_| !*overruled && shield.is_none()) else {
             return (false, at_start_per_s);
         };
         let moved_m = longest_move_m(state, path, next);
@@ -207,6 +207,9 @@ impl Simulation {
             self.judge.sweep(from_s + after_s, positions_m, bend_m, &mut self.events).map_err(refused)?;
         }
         self.controller.accept(self.time_s, &self.state);
+        if let Some(shield) = &mut self.controller.shield {
+            shield.observe(self.time_s, &self.state);
+        }
         self.controller.link.settle(self.time_s);
         let time = &self.scenario.time;
         let is_asked = !self.overruled && (time.control_hz.is_none() || (is_whole && time.commands(number)));

@@ -1,0 +1,107 @@
+//! Numbers of a shielded flight, and the reason against a pass if an assumption of the shield did not hold.
+
+use serde::{Deserialize, Serialize};
+
+use tautline_core::text::{counted, metres, seconds};
+use tautline_sim::shield::ShieldReport;
+
+/// Numbers of the shield, of all vehicles together.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ShieldNumbers {
+    /// Certificate in words, with its assumptions.
+    pub certificate: String,
+    /// Bound on the distance of a vehicle to its reference \[m\].
+    pub tube_m: f64,
+    /// Assumption that did not hold, with its vehicle; the flight is then not the one that the proof is about. Null if
+    /// all of them held.
+    pub exceeded: Option<String>,
+    /// Number of commands.
+    pub commands: u64,
+    /// Share of commands that the shield changed.
+    pub changed_share: f64,
+    /// Largest change of a command \[m/s^2\].
+    pub largest_change_m_s2: f64,
+    /// Share of commands that are those of the brake.
+    pub brake_share: f64,
+    /// Longest time that a vehicle braked \[s\].
+    pub longest_brake_s: f64,
+    /// Largest distance of a vehicle to its reference, as a share of the tube.
+    pub tube_share: f64,
+    /// Largest command of a vehicle, as a share of the largest one that it carries out.
+    pub command_share: f64,
+    /// Largest error of a measured own state, as a share of its bound.
+    pub measurement_share: f64,
+    /// Number of proposed planes that were accepted.
+    pub proposals_accepted: u64,
+    /// Number of proposed planes that were refused.
+    pub proposals_refused: u64,
+    /// Largest age of a plane \[s\].
+    pub oldest_plane_s: f64,
+    /// Number of instants at which the law was undefined and all vehicles braked.
+    pub law_undefined: u64,
+    /// Number of messages of the shield, one for each receiver.
+    pub messages_sent: u64,
+    /// Number of them that were lost.
+    pub messages_lost: u64,
+}
+
+impl From<&ShieldReport> for ShieldNumbers {
+    fn from(of: &ShieldReport) -> Self {
+        let counters = &of.counters;
+        let periods_s = |periods: u64| periods as f64 * of.period_s;
+        // A share of a bound of 0 is rounding, or infinite.
+        let share = |share: f64| if share.is_finite() { share } else { f64::MAX };
+        Self {
+            certificate: of.certificate.clone(),
+            tube_m: of.tube_m,
+            exceeded: of.breach.map(|breach| format!("vehicle {}: {}", breach.vehicle + 1, breach.exceeded)),
+            commands: counters.commands,
+            changed_share: counters.changed_share(),
+            largest_change_m_s2: counters.largest_change_m_s2,
+            brake_share: counters.brake_share(),
+            longest_brake_s: periods_s(counters.longest_brake),
+            tube_share: share(counters.tracking_share),
+            command_share: share(counters.command_share),
+            measurement_share: share(counters.measurement_share),
+            proposals_accepted: counters.accepted,
+            proposals_refused: counters.refused,
+            oldest_plane_s: periods_s(counters.oldest_plane),
+            law_undefined: of.undefined,
+            messages_sent: of.sent,
+            messages_lost: of.lost,
+        }
+    }
+}
+
+impl ShieldNumbers {
+    /// Returns the reason against a pass.
+    pub(super) fn reason(&self) -> Option<String> {
+        let exceeded = self.exceeded.as_ref()?;
+        Some(format!(
+            "A bound that the shield assumes was exceeded ({exceeded}), so its certificate does not cover this flight. \
+             Raise the bound in [shield], or reduce the errors, the wind or the lag."
+        ))
+    }
+
+    /// Returns the same in a few words.
+    pub(super) fn brief(&self) -> Option<String> {
+        self.exceeded.as_ref().map(|exceeded| format!("bound of the shield exceeded: {exceeded}"))
+    }
+
+    /// Returns the numbers in one line.
+    pub(super) fn line(&self) -> String {
+        let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+        format!(
+            "changed {} of commands by up to {} m/s^2, braked in {} (longest {}); used {} of the tube of {} m; {} \
+             accepted, {} refused",
+            percent(self.changed_share),
+            metres(self.largest_change_m_s2),
+            percent(self.brake_share),
+            seconds(self.longest_brake_s),
+            percent(self.tube_share),
+            metres(self.tube_m),
+            counted(self.proposals_accepted, "plane", "planes"),
+            self.proposals_refused,
+        )
+    }
+}

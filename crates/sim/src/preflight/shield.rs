@@ -1,0 +1,96 @@
+//! Findings on the shield of a scenario: its tube, the room of starts and slots, and warnings about slots.
+
+use serde::Serialize;
+
+use crate::scenario::Scenario;
+use tautline_core::text::{metres, significant};
+use tautline_shield::fleet::PairRoom;
+
+/// Shield of a scenario, in SI units.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ShieldCheck {
+    /// Certificate in words, with its assumptions.
+    pub certificate: String,
+    /// Bound on the distance of a vehicle to its reference \[m\].
+    pub tube_m: f64,
+    /// Bound on the feedback of the tracker \[m/s^2\].
+    pub feedback_m_s2: f64,
+    /// Largest acceleration left for the reference \[m/s^2\].
+    pub reference_m_s2: f64,
+    /// Deceleration of the brake \[m/s^2\].
+    pub brake_m_s2: f64,
+    /// Period of held commands \[s\].
+    pub period_s: f64,
+    /// Distance that the reserved segments of two vehicles must keep \[m\].
+    pub required_m: f64,
+    /// Pair of starts with the least room, counted from 1.
+    pub start_pair: [usize; 2],
+    /// Distance of their reserved segments beyond the required one \[m\].
+    pub start_room_m: f64,
+    /// Pair of slots with the least room, counted from 1.
+    pub slot_pair: [usize; 2],
+    /// Distance of these slots beyond the required one \[m\].
+    pub slot_room_m: f64,
+    /// Gap that vehicles keep by choice \[m\].
+    pub ease_m: f64,
+}
+
+impl ShieldCheck {
+    /// Returns the findings; `None` without a shield, or for a scenario that is not valid.
+    pub(super) fn of(scenario: &Scenario) -> Option<Self> {
+        let limits = scenario.shield_limits().ok()??;
+        let (start, slot) = scenario.shield_rooms()?;
+        let numbers = |of: &PairRoom| [of.pair.0 + 1, of.pair.1 + 1];
+        Some(Self {
+            certificate: limits.certificate(),
+            tube_m: limits.tube().error_m,
+            feedback_m_s2: limits.tube().feedback_m_s2,
+            reference_m_s2: limits.reference_m_s2(),
+            brake_m_s2: limits.brake().deceleration_m_s2(),
+            period_s: limits.settings().period_s,
+            required_m: start.required_m,
+            start_pair: numbers(&start),
+            start_room_m: start.room_m(),
+            slot_pair: numbers(&slot),
+            slot_room_m: slot.room_m(),
+            ease_m: limits.ease_m(),
+        })
+    }
+
+    /// Returns the certificate and the worst pairs, one line.
+    pub(super) fn line(&self) -> String {
+        let [i, j] = self.start_pair;
+        format!(
+            "{}; commands of the reference up to {} m/s^2, starts of vehicles {i} and {j} have {} m of room",
+            self.certificate,
+            significant(self.reference_m_s2, 4),
+            metres(self.start_room_m)
+        )
+    }
+
+    /// Returns a warning about slots that vehicles never reach: the shield keeps them farther apart.
+    pub(super) fn slots_too_near(&self) -> Option<String> {
+        let [i, j] = self.slot_pair;
+        (self.slot_room_m < 0.0).then(|| {
+            format!(
+                "The shield keeps vehicles {} m apart, and the slots of vehicles {i} and {j} are {} m closer: they \
+                 are never reached. Enlarge the formation, or lower the errors that the shield assumes.",
+                metres(self.required_m),
+                metres(-self.slot_room_m)
+            )
+        })
+    }
+
+    /// Returns a warning about slots that vehicles may not reach, because they keep a gap by choice.
+    pub(super) fn slots_within_ease(&self) -> Option<String> {
+        let [i, j] = self.slot_pair;
+        (0.0..self.ease_m).contains(&self.slot_room_m).then(|| {
+            format!(
+                "The slots of vehicles {i} and {j} leave {} m beyond what the shield requires, less than its ease of \
+                 {} m: vehicles may wait near them. Enlarge the formation, or reduce shield.ease_m.",
+                metres(self.slot_room_m),
+                metres(self.ease_m)
+            )
+        })
+    }
+}

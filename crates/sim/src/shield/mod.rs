@@ -1,0 +1,340 @@
+//! `[shield]`: a stage between law and actuators that certifies separations under any law ([`tautline_shield`]).
+//!
+//! [`ShieldSpec`] holds the keys of the table. [`Scenario::shield_limits`] derives the settings of the shield from the
+//! whole scenario: its period from `time.control_hz`, its delay from `[sensing]`, its lag from `[actuation]`. In flight
+//! `ShieldStage` filters the commands of the law. Contracts travel over the radio of `[network]`, between all pairs.
+//!
+//! # What the plant adds to the bounds
+//! The proof is about motion in continuous time. Rapier moves a vehicle along the chord of each step dt, and integrates
+//! drag and lag by a rule of second order. With the reference at most V fast and commands up to A, both are covered by
+//!
+//! ```text
+//! path error   A dt^2/8 + (|a22| dt)^2 (V + A dt) (1 + kd)/(12 kp)
+//! push         ((|a22| dt)^2 (|a22| V + A) + A (dt/lag)^2)/6
+//! ```
+//!
+//! The flight measures the distance to the reference at each step and reports it as a share of the tube.
+
+mod stage;
+
+pub(crate) use stage::ShieldStage;
+pub use stage::{ShieldBreach, ShieldReport};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::scenario::{MAX_MEMORY_BYTES, Safety, Scenario, ScenarioError};
+use tautline_core::swarm::row;
+use tautline_laws::law::{Certificate, LawSpec, VoidReason};
+use tautline_shield::fleet::{PairRoom, closest_starts};
+use tautline_shield::{Limits, Settings, ShieldError, Start, State};
+
+/// Default rate of held commands under a shield \[Hz\].
+pub(crate) const SHIELD_CONTROL_HZ: f64 = 20.0;
+/// Default of the largest command and of the largest speed, without limits in other tables.
+const ACCEL_M_S2: f64 = 5.0;
+const SPEED_M_S: f64 = 2.0;
+/// Relative difference of two rates or times that counts as rounding.
+const SAME: f64 = 1e-9;
+/// Expected memory of a contract with the last message of the other vehicle \[bytes\].
+const BYTES_PER_CONTRACT: u128 = 320;
+/// Expected memory of a message under way \[bytes\].
+const BYTES_PER_MESSAGE: u128 = 176;
+
+/// Shield: changes commands of the law only where this is needed to certify that no two vehicles come closer than
+/// `law.delta_m`. Commands are held over the periods of `time.control_hz`, 20 Hz unless given. Messages of the shield
+/// use the latency, loss and rate of `[network]`, between all pairs of vehicles.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ShieldSpec {
+    /// Largest command in m/s^2 that each vehicle carries out; `actuation.max_accel_m_s2` unless given, or 5 without.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub accel_m_s2: Option<f64>,
+    /// Deceleration of the brake in m/s^2; 0.6 times `accel_m_s2` unless given, at most what feedback and drag leave.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub brake_m_s2: Option<f64>,
+    /// Largest speed in m/s of the reference that a vehicle follows; that of the law unless given, or 2 without.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub max_speed_m_s: Option<f64>,
+    /// Bound in m on the error of the measured own position.
+    #[serde(skip_serializing_if = "is_zero")]
+    #[schemars(extend("default" = 0.0, "minimum" = 0))]
+    pub position_error_m: f64,
+    /// Bound in m/s on the error of the measured own velocity.
+    #[serde(skip_serializing_if = "is_zero")]
+    #[schemars(extend("default" = 0.0, "minimum" = 0))]
+    pub velocity_error_m_s: f64,
+    /// Bound in m/s^2 on the push of wind and model errors, at least `vehicle.drag_per_s` times the fastest wind.
+    #[serde(skip_serializing_if = "is_zero")]
+    #[schemars(extend("default" = 0.0, "minimum" = 0))]
+    pub disturbance_m_s2: f64,
+    /// Gain in 1/s^2 of the tracker on the distance to the reference.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub tracker_per_s2: f64,
+    /// Gain in 1/s of the tracker on the velocity relative to the reference.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub tracker_per_s: f64,
+    /// Assumed bound in m on the distance to the reference, in place of the computed one. Quadrotors need it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub tracking_error_m: Option<f64>,
+    /// Gap in m that vehicles keep by choice, so that they can pass each other; 0.2 times `law.delta_m` unless given.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 0))]
+    pub ease_m: Option<f64>,
+    /// Share of a cut command that is turned to the right, from -1 to 1; 0 for none.
+    #[schemars(extend("minimum" = -1, "maximum" = 1))]
+    pub turn: f64,
+}
+
+impl Default for ShieldSpec {
+    fn default() -> Self {
+        Self {
+            accel_m_s2: None,
+            brake_m_s2: None,
+            max_speed_m_s: None,
+            position_error_m: 0.0,
+            velocity_error_m_s: 0.0,
+            disturbance_m_s2: 0.0,
+            tracker_per_s2: 4.0,
+            tracker_per_s: 4.0,
+            tracking_error_m: None,
+            ease_m: None,
+            turn: 1.0,
+        }
+    }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_zero(number: &f64) -> bool {
+    *number == 0.0
+}
+
+impl Scenario {
+    /// Returns the limits of the reference of each vehicle; `None` without a shield.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] if the scenario does not fit the shield's assumptions, or nothing is left for the reference.
+    pub fn shield_limits(&self) -> Result<Option<Limits>, ScenarioError> {
+        let Some(spec) = &self.shield else { return Ok(None) };
+        let Some(control_hz) = self.time.control_hz else {
+            return Err(ScenarioError::new("the shield holds commands over periods, but no rate of commands is given")
+                .coded("scenario/missing-key")
+                .with_help(format!("set time.control_hz, such as {SHIELD_CONTROL_HZ}"))
+                .at("shield"));
+        };
+        let dt_s = self.time.dt_s;
+        let most_m_s2 = self.actuation.max_accel_m_s2;
+        let accel_m_s2 = spec.accel_m_s2.or(most_m_s2).unwrap_or(ACCEL_M_S2);
+        if most_m_s2.is_some_and(|most_m_s2| accel_m_s2 > most_m_s2) {
+            return Err(refused("shield.accel_m_s2 is more than actuation.max_accel_m_s2 carries out", accel_m_s2)
+                .with_help(format!("reduce it to at most {}", most_m_s2.unwrap_or_default()))
+                .at_keys(["shield.accel_m_s2", "actuation.max_accel_m_s2"]));
+        }
+        let max_speed_m_s = spec.max_speed_m_s.unwrap_or(match &self.law {
+            LawSpec::Orca(keys) => keys.max_speed_m_s,
+            LawSpec::CbfQp(keys) => keys.max_speed_m_s,
+            _ => SPEED_M_S,
+        });
+        let a22_per_s = self.velocity_coefficient_per_s();
+        let mut settings = Settings {
+            accel_m_s2,
+            brake_m_s2: spec.brake_m_s2,
+            max_speed_m_s,
+            position_error_m: spec.position_error_m,
+            velocity_error_m_s: spec.velocity_error_m_s,
+            disturbance_m_s2: spec.disturbance_m_s2,
+            a22_per_s,
+            tracker_per_s2: spec.tracker_per_s2,
+            tracker_per_s: spec.tracker_per_s,
+            measurement_delay_periods: self.measurement_delay_periods(control_hz)?,
+            actuator_lag_s: self.actuation.lag_s,
+            tracking_error_m: spec.tracking_error_m,
+            ease_m: spec.ease_m,
+            turn: spec.turn,
+            ..Settings::new(self.delta_m, 1.0 / control_hz)
+        };
+        if self.has_engine() {
+            let decay = (a22_per_s * dt_s).powi(2);
+            let lag = if self.actuation.lag_s > 0.0 { accel_m_s2 * (dt_s / self.actuation.lag_s).powi(2) } else { 0.0 };
+            settings.disturbance_m_s2 += (decay * (a22_per_s.abs() * max_speed_m_s + accel_m_s2) + lag) / 6.0;
+            let gains = (1.0 + spec.tracker_per_s) / (12.0 * spec.tracker_per_s2);
+            settings.path_error_m =
+                accel_m_s2 * dt_s * dt_s / 8.0 + decay * (max_speed_m_s + accel_m_s2 * dt_s) * gains;
+        }
+        settings.limits().map(Some).map_err(|error| of_shield(&error))
+    }
+
+    /// Returns the age of a measurement of the own state at an instant of command, in periods.
+    fn measurement_delay_periods(&self, control_hz: f64) -> Result<usize, ScenarioError> {
+        let (rate_hz, latency_s) = (self.sensing.rate_hz, self.sensing.latency_s);
+        let per_period = rate_hz.map_or(1.0, |rate_hz| rate_hz / control_hz);
+        let age_s = rate_hz.map_or(latency_s, |rate_hz| (latency_s * rate_hz - SAME).ceil().max(0.0) / rate_hz);
+        let periods = age_s * control_hz;
+        if is_whole(per_period) && per_period > 0.5 && is_whole(periods) {
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 0; more saturates")]
+            return Ok(periods.round() as usize);
+        }
+        Err(refused("measurements must have a constant age of whole periods of time.control_hz; periods", periods)
+            .with_help(format!("set sensing.rate_hz to {control_hz}, or a latency of whole periods"))
+            .at_keys(["sensing.rate_hz", "sensing.latency_s", "time.control_hz"]))
+    }
+
+    /// Returns the starts of all vehicles under a shield.
+    pub(crate) fn shield_starts(&self, limits: &Limits) -> Result<Vec<Start>, ScenarioError> {
+        let start = |i: usize| {
+            let state =
+                State { position_m: row(&self.start.positions_m, i), velocity_m_s: row(&self.start.velocities_m_s, i) };
+            limits.start(state).map_err(|error| of_shield(&error).at_entry("start.positions_m", i))
+        };
+        (0..self.count()).map(start).collect()
+    }
+
+    /// Returns the pair of starts with the least room, and the pair of slots of any leg; `None` without a shield.
+    #[must_use]
+    pub fn shield_rooms(&self) -> Option<(PairRoom, PairRoom)> {
+        let limits = self.shield_limits().ok()??;
+        let starts = closest_starts(&self.shield_starts(&limits).ok()?)?;
+        let slots = self.legs.iter().filter_map(|leg| {
+            let slots_m = &leg.formation.slots_m;
+            let slots: Vec<_> = (0..slots_m.nrows()).map(|i| limits.slot(row(slots_m, i))).collect();
+            closest_starts(&slots)
+        });
+        Some((starts, slots.min_by(|a, b| a.room_m().total_cmp(&b.room_m()))?))
+    }
+
+    /// Returns the certificate of the shield, which holds under any law; `None` without a shield.
+    pub(crate) fn shield_certificate(&self) -> Option<Certificate> {
+        self.shield.as_ref()?;
+        let fails = self.failures.iter().any(|failure| !failure.is_silent());
+        let certificate = Certificate { certified_m: Some(self.delta_m), ..Certificate::default() };
+        Some(certificate.void_where(fails, VoidReason::VehicleFails))
+    }
+
+    /// Checks that the scenario fits the shield.
+    pub(crate) fn check_shield(&self) -> Result<(), ScenarioError> {
+        let Some(spec) = &self.shield else { return Ok(()) };
+        if self.airframe.unicycle().is_some() {
+            return Err(refused_with("the shield has no contract for unicycles", "use points or quadrotors")
+                .at_keys(["vehicle.model", "shield"]));
+        }
+        if self.safety != Safety::Ball {
+            return Err(refused_with("the shield certifies balls only", "leave out safety.shape")
+                .at_keys(["safety.shape", "shield"]));
+        }
+        if !self.obstacles.is_empty() {
+            return Err(refused_with("the shield does not certify obstacles", "leave out the obstacles or the shield")
+                .at_keys(["obstacle", "shield"]));
+        }
+        if let Some(control_hz) = self.time.control_hz {
+            let steps = 1.0 / (control_hz * self.time.dt_s);
+            if !is_whole(steps) {
+                return Err(refused("a period of the shield must be a whole number of steps, which is", steps)
+                    .with_help("change time.control_hz or time.dt_s")
+                    .at_keys(["time.control_hz", "time.dt_s"]));
+            }
+        }
+        if self.airframe.quadrotor().is_some() && spec.tracking_error_m.is_none() {
+            return Err(refused_with(
+                "the distance of a quadrotor to its reference has no computed bound",
+                "measure it with `tautline check --identify`, and set shield.tracking_error_m",
+            )
+            .at_keys(["shield.tracking_error_m", "vehicle.model"]));
+        }
+        let noise_m = self.sensing.position_noise_m + self.sensing.position_bias_m;
+        let noises = [
+            ("shield.position_error_m", "sensing.position_noise_m", noise_m, spec.position_error_m),
+            (
+                "shield.velocity_error_m_s",
+                "sensing.velocity_noise_m_s",
+                self.sensing.velocity_noise_m_s,
+                spec.velocity_error_m_s,
+            ),
+        ];
+        for (key, of, noise, bound) in noises {
+            if noise > bound {
+                return Err(refused(
+                    &format!("{key} must be more than {of}, the deviation of a noise without bound"),
+                    bound,
+                )
+                .with_help(format!("give {}, which a flight rarely exceeds", 5.0 * noise))
+                .at_keys([key, of]));
+            }
+        }
+        let push_m_s2 = self.drag_per_s * self.wind.fastest_m_s();
+        if push_m_s2 > spec.disturbance_m_s2 && self.airframe.is_point() {
+            return Err(refused(
+                &format!("shield.disturbance_m_s2 must be at least {push_m_s2}, which is drag times the fastest wind"),
+                spec.disturbance_m_s2,
+            )
+            .with_help("raise it, or reduce the wind")
+            .at_keys(["shield.disturbance_m_s2", "vehicle.drag_per_s"]));
+        }
+        self.check_shield_memory()?;
+        let Some(limits) = self.shield_limits()? else { return Ok(()) };
+        let starts = self.shield_starts(&limits)?;
+        match closest_starts(&starts).filter(|worst| worst.room_m() < 0.0) {
+            None => Ok(()),
+            Some(worst) => {
+                let (i, j) = worst.pair;
+                let error = of_shield(&worst.too_near());
+                Err(error.at_entry("start.positions_m", i).at_entry("start.positions_m", j))
+            }
+        }
+    }
+
+    fn check_shield_memory(&self) -> Result<(), ScenarioError> {
+        let pairs = self.count() as u128 * self.count().saturating_sub(1) as u128;
+        let rate_hz = self.time.control_hz.unwrap_or_default();
+        let under_way = ((self.network.latency_s + self.network.jitter_s) * rate_hz).ceil() + 1.0;
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "more than 1; too many saturate")]
+        let bytes = pairs.saturating_mul(BYTES_PER_CONTRACT + BYTES_PER_MESSAGE * under_way as u128);
+        if bytes <= MAX_MEMORY_BYTES {
+            return Ok(());
+        }
+        let gib = MAX_MEMORY_BYTES >> 30;
+        Err(ScenarioError::new(format!(
+            "contracts of {} vehicles need {} GiB of memory, more than the limit of {gib} GiB",
+            self.count(),
+            bytes >> 30
+        ))
+        .coded("scenario/memory")
+        .with_help("use fewer vehicles or a shorter network.latency_s")
+        .at_keys(["shield", "network.latency_s"]))
+    }
+}
+
+fn is_whole(number: f64) -> bool {
+    number.is_finite() && (number - number.round()).abs() <= SAME * number.abs().max(1.0)
+}
+
+/// Returns an error about a value: `PROBLEM (VALUE)`.
+fn refused(problem: &str, value: f64) -> ScenarioError {
+    ScenarioError::new(format!("{problem} ({value})")).coded("scenario/shield")
+}
+
+fn refused_with(problem: &str, help: &str) -> ScenarioError {
+    ScenarioError::new(problem).coded("scenario/shield").with_help(help)
+}
+
+/// Returns an error of the shield at the key of the scenario.
+fn of_shield(error: &ShieldError) -> ScenarioError {
+    let key = match error.place {
+        "delta_m" => "law.delta_m",
+        "period_s" => "time.control_hz",
+        "a22_per_s" => "swarm.a22_per_s",
+        "actuator_lag_s" => "actuation.lag_s",
+        "measurement_delay_periods" => "sensing.latency_s",
+        "accel_m_s2" => "shield.accel_m_s2",
+        "brake_m_s2" => "shield.brake_m_s2",
+        "max_speed_m_s" => "shield.max_speed_m_s",
+        "tracker_per_s" => "shield.tracker_per_s",
+        "disturbance_m_s2" => "shield.disturbance_m_s2",
+        _ => "shield",
+    };
+    let found = refused(&error.problem, error.value).with_help(error.remedy);
+    if error.place == "start" { found } else { found.at(key) }
+}

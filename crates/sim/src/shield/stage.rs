@@ -1,0 +1,234 @@
+//! The shield in flight: filters commands, carries contracts over the radio, observes the bounds.
+
+use std::collections::VecDeque;
+
+use nalgebra::Vector3;
+
+use crate::link::{Radio, RadioUse, period};
+use crate::scenario::{Scenario, ScenarioError};
+use tautline_core::swarm::{Rows, Swarm, row, set_row};
+use tautline_shield::report::Exceeded;
+use tautline_shield::{Counters, Fleet, Message, State};
+
+/// Tolerance of equal instants \[s\].
+const SAME_S: f64 = 1e-9;
+
+/// Numbers of a shielded flight.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ShieldReport {
+    /// Certificate in words, with its assumptions.
+    pub certificate: String,
+    /// Bound on the distance of a vehicle to its reference \[m\].
+    pub tube_m: f64,
+    /// Period of the shield \[s\].
+    pub period_s: f64,
+    /// Numbers of all vehicles together.
+    pub counters: Counters,
+    /// First vehicle for which an assumption did not hold. The flight is then not the one that the proof is about.
+    pub breach: Option<ShieldBreach>,
+    /// Number of instants at which the law was undefined and all vehicles braked.
+    pub undefined: u64,
+    /// Number of messages of contracts, one for each receiver.
+    pub sent: u64,
+    /// Number of them that never arrive.
+    pub lost: u64,
+}
+
+/// Assumption of the shield that did not hold for a vehicle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShieldBreach {
+    /// The vehicle, from 0.
+    pub vehicle: usize,
+    /// The assumption.
+    pub exceeded: Exceeded,
+}
+
+/// Shields of all vehicles of a flight, with their messages under way.
+#[derive(Clone)]
+pub(crate) struct ShieldStage {
+    fleet: Fleet,
+    certificate: String,
+    period_s: f64,
+    radio: Radio,
+    /// Rate of messages \[Hz\]; each period unless given.
+    rate_hz: Option<f64>,
+    /// Number of broadcasts so far.
+    broadcasts: u64,
+    /// Next period of the rate of messages.
+    next_period: u64,
+    under_way: VecDeque<Broadcast>,
+    spare: Vec<Broadcast>,
+    /// Time of the last instant of command \[s\].
+    begun_s: f64,
+    /// True states at the last instants, oldest first, for measurements of that age.
+    truths: VecDeque<Swarm>,
+    /// Time from which a vehicle no longer flies its reference \[s\].
+    failed_from_s: Vec<f64>,
+    measured: Vec<State>,
+    wanted: Vec<Vector3<f64>>,
+    commands: Vec<Vector3<f64>>,
+    /// Number of instants at which the law was undefined and all vehicles braked.
+    undefined: u64,
+}
+
+/// Messages of all vehicles at one instant, by sender and then by receiver.
+#[derive(Clone, Debug, Default)]
+struct Broadcast {
+    messages: Vec<Message>,
+    /// Arrival of each \[s\]; infinite for a lost message.
+    arrives_s: Vec<f64>,
+    /// Time from which no message of the broadcast arrives any more \[s\].
+    over_s: f64,
+}
+
+impl ShieldStage {
+    /// Returns the shields of a scenario, at its start; `None` without a shield.
+    pub(crate) fn of(scenario: &Scenario) -> Result<Option<Self>, ScenarioError> {
+        let Some(limits) = scenario.shield_limits()? else { return Ok(None) };
+        let count = scenario.count();
+        let starts: Vec<_> = scenario.shield_starts(&limits)?.iter().map(|start| start.state).collect();
+        let fleet = Fleet::new(&vec![limits; count], &starts)
+            .map_err(|error| ScenarioError::new(error.to_string()).coded("scenario/shield").at("start.positions_m"))?;
+        let mut failed_from_s = vec![f64::INFINITY; count];
+        for failure in scenario.failures.iter().filter(|failure| !failure.is_silent()) {
+            failed_from_s[failure.index()] = failed_from_s[failure.index()].min(failure.at_s);
+        }
+        Ok(Some(Self {
+            fleet,
+            certificate: limits.certificate(),
+            period_s: limits.settings().period_s,
+            radio: Radio::new(scenario, count * (count - 1), RadioUse::Contracts),
+            rate_hz: scenario.network.rate_hz,
+            broadcasts: 0,
+            next_period: 0,
+            under_way: VecDeque::new(),
+            spare: Vec::new(),
+            begun_s: 0.0,
+            truths: VecDeque::new(),
+            failed_from_s,
+            measured: starts,
+            wanted: vec![Vector3::zeros(); count],
+            commands: vec![Vector3::zeros(); count],
+            undefined: 0,
+        }))
+    }
+
+    /// Notes that the law is undefined at an instant; the shield then brakes.
+    pub(crate) fn note_undefined(&mut self, command: &mut Rows) {
+        self.undefined += 1;
+        command.fill(f64::NAN);
+    }
+
+    /// Replaces the law's commands at an instant \[m/s^2\], N x 3, by those of the shields. `own` is the knowledge of each
+    /// vehicle of its own state.
+    pub(crate) fn filter(&mut self, time_s: f64, truth: &Swarm, own: &Swarm, command: &mut Rows) {
+        self.begun_s = time_s;
+        self.deliver(time_s);
+        for i in 0..command.nrows() {
+            self.measured[i] = state(own, i);
+            self.wanted[i] = row(command, i);
+        }
+        self.observe_measurements(time_s, truth);
+        self.fleet.filter(&self.measured, &self.wanted, &mut self.commands);
+        for (i, shielded) in self.commands.iter().enumerate() {
+            set_row(command, i, *shielded);
+        }
+        self.send(time_s);
+    }
+
+    /// Compares the measurements with the true states that they measured.
+    fn observe_measurements(&mut self, time_s: f64, truth: &Swarm) {
+        let delay =
+            self.fleet.shields().first().map_or(0, |shield| shield.limits().settings().measurement_delay_periods);
+        if self.truths.len() > delay {
+            if let Some(mut oldest) = self.truths.pop_front() {
+                oldest.copy_from(truth);
+                self.truths.push_back(oldest);
+            }
+        } else {
+            self.truths.push_back(truth.clone());
+        }
+        let Some(then) = self.truths.front().filter(|_| self.truths.len() > delay) else { return };
+        for (i, shield) in self.fleet.shields_mut().iter_mut().enumerate() {
+            if time_s < self.failed_from_s[i] {
+                shield.observe_measurement(&self.measured[i], &state(then, i));
+            }
+        }
+    }
+
+    /// Compares a true state with the references.
+    pub(crate) fn observe(&mut self, time_s: f64, truth: &Swarm) {
+        let since_s = time_s - self.begun_s;
+        for (i, shield) in self.fleet.shields_mut().iter_mut().enumerate() {
+            if time_s < self.failed_from_s[i] {
+                shield.observe(since_s, &state(truth, i));
+            }
+        }
+    }
+
+    fn deliver(&mut self, time_s: f64) {
+        for broadcast in &mut self.under_way {
+            for (message, arrives_s) in broadcast.messages.iter().zip(&mut broadcast.arrives_s) {
+                if *arrives_s <= time_s + SAME_S {
+                    self.fleet.hear(message);
+                    *arrives_s = f64::INFINITY;
+                }
+            }
+        }
+        while self.under_way.front().is_some_and(|first| first.over_s <= time_s + SAME_S) {
+            self.spare.extend(self.under_way.pop_front());
+        }
+    }
+
+    /// Sends the messages of an instant, if the rate of messages has one for it.
+    fn send(&mut self, time_s: f64) {
+        let period = self.rate_hz.map_or(self.next_period, |rate_hz| period(time_s, rate_hz));
+        if period < self.next_period {
+            return;
+        }
+        // A rate above that of the instants sends one broadcast an instant.
+        self.next_period = period + 1;
+        self.broadcasts += 1;
+        let count = self.commands.len();
+        let mut broadcast = self.spare.pop().unwrap_or_default();
+        broadcast.messages.clear();
+        broadcast.messages.extend(self.fleet.messages());
+        broadcast.arrives_s.resize(broadcast.messages.len(), f64::INFINITY);
+        broadcast.over_s = time_s + self.radio.longest_s();
+        for sender in 0..count {
+            let links = (0..count - 1).map(|k| (sender * (count - 1) + k, k + usize::from(k >= sender)));
+            self.radio.send((sender, self.broadcasts, time_s), links, &mut broadcast.arrives_s);
+        }
+        self.under_way.push_back(broadcast);
+    }
+
+    /// Changes the seed of later messages.
+    pub(crate) fn reseed(&mut self, seed: u64) {
+        self.radio.reseed(seed, self.broadcasts);
+    }
+
+    /// Returns the numbers of the flight so far.
+    pub(crate) fn report(&self) -> ShieldReport {
+        let counters = self.fleet.report();
+        let breach = self.fleet.shields().iter().enumerate().find_map(|(vehicle, shield)| {
+            let exceeded = shield.counters().exceeded()?;
+            Some(ShieldBreach { vehicle, exceeded })
+        });
+        let (sent, lost) = self.radio.counts();
+        let first = self.fleet.shields().first().map(tautline_shield::Shield::limits);
+        ShieldReport {
+            certificate: self.certificate.clone(),
+            tube_m: first.map_or(0.0, |limits| limits.tube().error_m),
+            period_s: self.period_s,
+            counters,
+            breach,
+            undefined: self.undefined,
+            sent,
+            lost,
+        }
+    }
+}
+
+fn state(swarm: &Swarm, i: usize) -> State {
+    State { position_m: row(&swarm.positions_m, i), velocity_m_s: row(&swarm.velocities_m_s, i) }
+}
