@@ -211,7 +211,8 @@ impl ShieldStage {
     pub(crate) fn report(&self) -> ShieldReport {
         let counters = self.fleet.report();
         let breach = self.fleet.shields().iter().enumerate().find_map(|(vehicle, shield)| {
-            let exceeded = shield.counters().exceeded()?;
+            // A vehicle that fails voids the certificate by itself.
+            let exceeded = shield.counters().exceeded().filter(|_| self.failed_from_s[vehicle].is_infinite())?;
             Some(ShieldBreach { vehicle, exceeded })
         });
         let (sent, lost) = self.radio.counts();

@@ -22,6 +22,7 @@ mod scenario_files;
 mod scenario_keys;
 mod schema;
 mod shapes;
+mod shield;
 mod simulation;
 mod symmetry;
 mod unicycles;

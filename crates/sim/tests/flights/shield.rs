@@ -1,0 +1,307 @@
+//! Random flights under a shield: every law and three adversaries, in the engine and on the ideal plant, with every
+//! imperfection within its bound. None may violate, and a flight in which a bound was exceeded must say so.
+//!
+//! `TAUTLINE_LONG=1 cargo test --release -p tautline-sim --test flights shield::` flies 5,000 of them, with up to 40
+//! vehicles, and prints the smallest room.
+
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
+
+use nalgebra::Vector3;
+use tautline_audit::Status;
+use tautline_core::swarm::{Rows, Swarm, row, set_row};
+use tautline_laws::formation::Formation;
+use tautline_laws::law::{Law, LawError, LawSpec};
+use tautline_laws::observation::Observation;
+use tautline_sim::plant;
+use tautline_sim::scenario::{PlantSpec, Scenario, ShieldSpec};
+use tautline_sim::shield::ShieldReport;
+
+use super::flight::{fly, fly_with, read};
+
+/// Deviations of a Gaussian error up to its assumed bound.
+const SIGMAS: f64 = 6.0;
+
+struct Random(ChaCha8Rng);
+
+impl Random {
+    fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * (self.0.next_u64() >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    fn index(&mut self, count: usize) -> usize {
+        usize::try_from(self.0.next_u64() % count as u64).expect("small")
+    }
+
+    fn one_of<T: Copy>(&mut self, of: &[T]) -> T {
+        of[self.index(of.len())]
+    }
+
+    fn vector(&mut self, axes: usize, extent: f64) -> Vector3<f64> {
+        Vector3::from_fn(|axis, _| if axis < axes { self.between(-extent, extent) } else { 0.0 })
+    }
+}
+
+/// Law that tries to make vehicles collide.
+#[derive(Clone)]
+enum Adversary {
+    /// Each vehicle flies at its nearest neighbour.
+    Dive,
+    /// Each vehicle flies at the centre of the swarm.
+    Centre,
+    /// Each vehicle gets a random command at each instant.
+    Random(ChaCha8Rng),
+    /// The law is undefined everywhere.
+    Undefined,
+}
+
+impl Law for Adversary {
+    fn name(&self) -> &'static str {
+        "adversary"
+    }
+
+    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        let positions = &at.own.positions_m;
+        let count = positions.nrows();
+        for i in 0..count {
+            let own = row(positions, i);
+            let others = (0..count).filter(|j| *j != i).map(|j| row(positions, j) - own);
+            let wanted = match self {
+                Self::Dive => others.min_by(|a, b| a.norm().total_cmp(&b.norm())).unwrap_or_default() * 50.0,
+                Self::Centre => others.sum::<Vector3<f64>>(),
+                Self::Random(random) => Random(random.clone()).vector(2, 20.0),
+                Self::Undefined => return Err(LawError::NotFinite { vehicle: i }),
+            };
+            if let Self::Random(random) = self {
+                (0..3).for_each(|_| drop(random.next_u64()));
+            }
+            set_row(command, i, wanted);
+        }
+        Ok(())
+    }
+}
+
+/// Returns a random scenario and its law, unless the draw cannot be flown.
+fn draw(seed: u64, most: usize) -> Option<(Scenario, Box<dyn Law>)> {
+    let mut random = Random(ChaCha8Rng::seed_from_u64(seed));
+    let count = 2 + random.index(most - 1);
+    let axes = random.one_of(&[2, 3]);
+    let extent = 2.2 * (count as f64).powf(1.0 / axes as f64) + 1.0;
+    let mut points: Vec<Vector3<f64>> = Vec::new();
+    let spread = |points: &mut Vec<Vector3<f64>>, random: &mut Random, apart: f64| {
+        for _ in 0..20_000 {
+            let point = random.vector(axes, extent);
+            if points.iter().all(|other| (point - other).norm() > apart) {
+                points.push(point);
+            }
+            if points.len() == count {
+                return Some(());
+            }
+        }
+        None
+    };
+    spread(&mut points, &mut random, random_apart(seed))?;
+    let mut slots = Vec::new();
+    spread(&mut slots, &mut random, 1.5)?;
+    let rows = |points: &[Vector3<f64>]| Rows::from_fn(count, |i, axis| points[i][axis]);
+    let mut start = Swarm::at_rest(rows(&points));
+    for i in 0..count {
+        let velocity = random.vector(axes, 0.4);
+        set_row(&mut start.velocities_m_s, i, velocity);
+    }
+    let mut scenario = Scenario::new("random", start, Formation::points(rows(&slots)), 1.0, 8.0);
+    let period_s = random.one_of(&[0.02, 0.05, 0.1]);
+    scenario.time.control_hz = Some(1.0 / period_s);
+    scenario.time.dt_s = period_s / random.one_of(&[2.0, 5.0, 10.0]);
+    scenario.noise_seed = seed;
+    let mut shield = ShieldSpec { accel_m_s2: Some(random.one_of(&[4.0, 6.0])), ..ShieldSpec::default() };
+    if random.between(0.0, 1.0) < 0.5 {
+        scenario.plant = PlantSpec::Ideal;
+    } else if random.between(0.0, 1.0) < 0.3 {
+        scenario.actuation.lag_s = random.between(0.02, 0.05);
+    }
+    scenario.actuation.max_accel_m_s2 = shield.accel_m_s2;
+    if random.between(0.0, 1.0) < 0.7 {
+        scenario.network.rate_hz = Some(1.0 / period_s);
+        scenario.network.latency_s = random.between(0.0, 0.3);
+        scenario.network.jitter_s = random.between(0.0, 0.2);
+        scenario.network.loss = random.between(0.0, 0.5);
+        scenario.network.loss_burst = Some(random.between(2.0, 5.0));
+    }
+    if random.between(0.0, 1.0) < 0.6 {
+        let (position_m, velocity_m_s) = (random.between(0.0, 0.005), random.between(0.0, 0.01));
+        scenario.sensing.rate_hz = Some(1.0 / period_s);
+        scenario.sensing.position_noise_m = position_m;
+        scenario.sensing.velocity_noise_m_s = velocity_m_s;
+        (shield.position_error_m, shield.velocity_error_m_s) = (SIGMAS * position_m, SIGMAS * velocity_m_s);
+        scenario.sensing.latency_s = random.one_of(&[0.0, 1.0]) * period_s;
+    }
+    scenario.a22_per_s = random.one_of(&[0.0, -0.3, 0.1]);
+    if random.between(0.0, 1.0) < 0.5 {
+        scenario.drag_per_s = 0.1;
+        scenario.wind.mean_m_s = random.vector(axes, 2.0);
+        shield.disturbance_m_s2 = 0.1 * scenario.wind.mean_m_s.norm() + 1e-12;
+    }
+    if random.between(0.0, 1.0) < 0.3 {
+        shield.ease_m = Some(0.0);
+        shield.turn = 0.0;
+    }
+    scenario.shield = Some(shield);
+    let laws = LawSpec::all();
+    let law: Box<dyn Law> = match random.index(laws.len() + 3) {
+        0 => Box::new(Adversary::Dive),
+        1 => Box::new(Adversary::Centre),
+        2 => Box::new(Adversary::Random(ChaCha8Rng::seed_from_u64(seed))),
+        k => {
+            scenario.law = laws[k - 3].clone();
+            scenario.validate().ok()?;
+            scenario.law().ok()?
+        }
+    };
+    scenario.validate().ok()?;
+    Some((scenario, law))
+}
+
+/// Returns the least distance of two starts of a draw \[m\]: some begin as near as the tube allows.
+fn random_apart(seed: u64) -> f64 {
+    if seed.is_multiple_of(3) { 1.35 } else { 2.4 }
+}
+
+fn report(flight: &tautline_sim::sim::Flight) -> &ShieldReport {
+    flight.shield.as_ref().expect("a shield")
+}
+
+#[test]
+fn random_flights_never_violate_while_the_bounds_hold() {
+    let long = std::env::var_os("TAUTLINE_LONG").is_some();
+    let (flights, most) = if long { (5_000, 40) } else { (60, 12) };
+    let (mut flown, mut exceeded, mut least_m, mut changed) = (0, 0, f64::INFINITY, 0.0);
+    for seed in 0.. {
+        if flown == flights {
+            break;
+        }
+        let Some((scenario, law)) = draw(seed, most) else { continue };
+        let (flight, _) = fly_with(&scenario, law, plant::of(&scenario));
+        let flight = flight.unwrap_or_else(|error| panic!("{seed}: {error}"));
+        let shield = report(&flight);
+        flown += 1;
+        assert_eq!(flight.ending.reason(), None, "{seed}");
+        if shield.breach.is_some() {
+            exceeded += 1;
+            continue;
+        }
+        let room_m = flight.audit.closest.expect("two vehicles").separation_m - scenario.delta_m;
+        assert!(flight.audit.status == Status::Clear && room_m > 0.0, "{seed}: {room_m} {:?}", flight.audit.status);
+        assert_eq!(flight.certificate.certified_m, Some(1.0), "{seed}: {:?}", flight.certificate.void);
+        assert!(shield.counters.command_share <= 1.0 && shield.counters.tracking_share <= 1.0, "{seed}: {shield:?}");
+        least_m = least_m.min(room_m);
+        changed += shield.counters.changed_share();
+    }
+    println!("{flown} flights: {exceeded} with a bound exceeded, smallest room {least_m:.3e} m");
+    assert!(exceeded * 20 <= flights, "{exceeded} of {flights} exceeded a bound");
+    assert!(changed / f64::from(flights) > 0.1 && least_m < 0.1, "{changed} {least_m}");
+}
+
+const SWAP: &str = r#"
+    [start]
+    positions_m = [[-3, 0], [3, 0]]
+    [formation]
+    shape = "points"
+    points_m = [[3, 0], [-3, 0]]
+    [law]
+    kind = "laplacian"
+    delta_m = 1.0
+    [time]
+    duration_s = 20
+"#;
+
+#[test]
+fn without_the_shield_the_swap_violates_and_with_it_the_certificate_is_kept() {
+    let (flight, _) = fly(&read(SWAP));
+    assert_eq!(flight.audit.status, Status::Violation);
+    let (flight, _) = fly(&read(&format!("{SWAP}\n[shield]")));
+    assert_eq!((flight.audit.status, flight.certificate.certified_m), (Status::Clear, Some(1.0)));
+    assert_eq!(report(&flight).breach, None);
+    assert!(report(&flight).counters.changed > 0);
+}
+
+#[test]
+fn exceeded_bounds_are_named_with_their_vehicle() {
+    // The wind blows harder than the shield assumes after a change of the scenario in code.
+    let mut scenario = read(&format!("{SWAP}\n[shield]\ndisturbance_m_s2 = 0.2\n[vehicle]\ndrag_per_s = 0.1"));
+    scenario.wind.mean_m_s = Vector3::new(0.0, 60.0, 0.0);
+    assert!(scenario.validate().is_err());
+    let (flight, _) = fly(&scenario);
+    let breach = report(&flight).breach.expect("a breach");
+    assert!(breach.exceeded.to_string().contains("of the tube"), "{breach:?}");
+    // A dead vehicle voids the certificate.
+    let dead = "[shield]\n[[failure]]\nvehicle = 1\nat_s = 1.0\nkind = \"dead\"";
+    let (flight, _) = fly(&read(&format!("{SWAP}\n{dead}")));
+    assert_eq!(flight.certificate.certified_m, None);
+    assert_eq!(report(&flight).breach, None);
+    // A silent one does not.
+    let silent = "[network]\nrate_hz = 20\n[shield]\n[[failure]]\nvehicle = 1\nat_s = 1.0\nkind = \"silent\"";
+    let (flight, _) = fly(&read(&format!("{SWAP}\n{silent}")));
+    assert_eq!((flight.audit.status, flight.certificate.certified_m), (Status::Clear, Some(1.0)));
+}
+
+#[test]
+fn a_law_that_is_undefined_makes_the_shield_brake() {
+    let mut scenario = read(&format!("{SWAP}\n[shield]"));
+    scenario.start.velocities_m_s[(0, 0)] = 1.0;
+    let (flight, log) = fly_with(&scenario, Box::new(Adversary::Undefined), plant::of(&scenario));
+    let flight = flight.expect("a flight");
+    assert_eq!((flight.ending.reason(), flight.audit.status), (None, Status::Clear));
+    assert_eq!(report(&flight).undefined, 401);
+    assert!(log.samples.last().expect("samples").swarm.velocities_m_s.amax() < 1e-9, "both have stopped");
+}
+
+#[test]
+fn a_saved_flight_continues_with_the_same_bits() {
+    let (scenario, _) =
+        (0..).find_map(|seed| draw(seed, 12).filter(|(scenario, _)| scenario.network.loss > 0.1)).expect("one");
+    let whole = fly(&scenario).0;
+    let mut simulation = tautline_sim::Simulation::new(&scenario).expect("a flight");
+    let mut saved = None;
+    while simulation.ending().is_none() {
+        simulation.step();
+        if simulation.steps() == 77 {
+            saved = Some(simulation.save());
+        }
+    }
+    let first = simulation.state().clone();
+    simulation.load(&saved.expect("77 steps"), None);
+    while simulation.ending().is_none() {
+        simulation.step();
+    }
+    assert_eq!((simulation.state(), &whole.last), (&first, &first));
+    assert_eq!(report(&simulation.finish()), report(&whole));
+}
+
+#[test]
+fn scenarios_that_do_not_fit_the_shield_are_refused_with_place_value_and_remedy() {
+    let refused = |shield: &str| {
+        let source = tautline_sim::scenario::Source::Text { name: "test".into(), text: format!("{SWAP}{shield}") };
+        let error = Scenario::read(&source, &[]).expect_err(shield);
+        format!("{}: {error}", error.field().map(|field| field.to_string()).unwrap_or_default())
+    };
+    for (shield, place, says) in [
+        ("[shield]\nbrake_m_s2 = 6", "shield.brake_m_s2", "must be at most 5.0000"),
+        ("[shield]\ntracker_per_s = 80", "shield.tracker_per_s", "the tracker is unstable"),
+        ("[shield]\naccel_m_s2 = 6\n[actuation]\nmax_accel_m_s2 = 5", "shield.accel_m_s2", "(6)"),
+        (
+            "[shield]\ndisturbance_m_s2 = 0.1\n[vehicle]\ndrag_per_s = 0.1\n[wind]\nmean_m_s = [3, 0]",
+            "disturbance",
+            "(0.1)",
+        ),
+        ("[shield]\n[sensing]\nrate_hz = 20\nposition_noise_m = 0.01", "shield.position_error_m", "give 0.05"),
+        ("[shield]\n[sensing]\nrate_hz = 30", "sensing.rate_hz", "set sensing.rate_hz to 20"),
+        ("[shield]\n[vehicle]\nmodel = \"crazyflie\"", "shield.tracking_error_m", "--identify"),
+        ("[shield]\nposition_error_m = 3\naccel_m_s2 = 40", "start.positions_m", "reserve segments"),
+        ("[shield]\nbrake = 3", "brake", "brake_m_s2"),
+        ("control_hz = 33\n[shield]", "time.control_hz", "a whole number of steps"),
+    ] {
+        let error = refused(shield);
+        assert!(error.contains(place) && error.contains(says), "{shield}: {error}");
+    }
+}
