@@ -93,6 +93,9 @@ pub(super) struct CompareArguments {
     /// table].
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     laws: Option<Vec<String>>,
+    /// Fly each law twice: without the shield (NAME+bare) and under it (NAME+shield), with the keys of [shield].
+    #[arg(long)]
+    shield: bool,
 }
 
 impl CompareArguments {
@@ -105,7 +108,7 @@ impl CompareArguments {
     pub(super) fn run(&self) -> Result<Exit, Failure> {
         let default = compare::Options::default();
         let runs = self.runs.runs.unwrap_or(default.runs);
-        self.study.answer(compare::Options { laws: self.laws.clone(), runs, seed: self.runs.seed })
+        self.study.answer(compare::Options { laws: self.laws.clone(), shield: self.shield, runs, seed: self.runs.seed })
     }
 }
 

@@ -36,7 +36,10 @@ const ASSUMED: [&str; 5] = [
 pub struct Options {
     /// Kinds of laws, or names of tables `[laws.NAME]`. By default the names of all such tables, or all kinds if the
     /// scenario has no such table.
+    /// `NAME+shield` flies a law under the shield, `NAME+bare` without it.
     pub laws: Option<Vec<String>>,
+    /// Whether each law is flown twice, without and under the shield.
+    pub shield: bool,
     /// Starts under each law: 1 to [`crate::MOST_RUNS`].
     pub runs: u64,
     /// Seed of the first run. Run k, from 0, has this seed plus k as `start.seed` and, if the flight is random, as
@@ -46,7 +49,7 @@ pub struct Options {
 
 impl Default for Options {
     fn default() -> Self {
-        Self { laws: None, runs: 20, seed: 0 }
+        Self { laws: None, shield: false, runs: 20, seed: 0 }
     }
 }
 
@@ -216,6 +219,7 @@ impl Options {
     /// Returns the laws to compare, without repetition.
     fn laws(&self, template: &Template) -> Result<Vec<NamedLaw>, Failure> {
         let names = self.laws.clone().unwrap_or_else(|| template.compared_laws());
+        let names = if self.shield { Template::with_and_without_shield(&names) } else { names };
         if names.is_empty() {
             let help = "give the kind of a law, such as edge-tension";
             return Err(Failure::input("compare/no-law", "--laws: must name at least one law", help));
@@ -265,7 +269,7 @@ fn closest_approaches(base: &BaseScenario, study: &Comparison) -> Result<Vec<Fig
         let figure = at_closest(&law.name, log, &obstacles, Some(([a - 1, b - 1], *at_s)), &logs);
         let runs = study.runs;
         Figure {
-            name: format!("closest-{}", law.name),
+            name: format!("closest-{}", law.name.replace('+', "-")),
             description: format!(
                 "{}: {} m apart at {at_s:.2} s, vehicles {a} and {b}, the closest of {runs} flights \
                  (start.seed {seed}).",

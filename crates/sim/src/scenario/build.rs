@@ -56,7 +56,8 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         time.dt_s = if gives_step { time.dt_s } else { QUADROTOR_DT_S };
         time.control_hz = time.control_hz.or(Some(QUADROTOR_CONTROL_HZ));
     }
-    if document.shield.is_some() {
+    let shield = document.shield.filter(|shield| shield.enabled);
+    if shield.is_some() {
         time.control_hz = time.control_hz.or(Some(SHIELD_CONTROL_HZ));
     }
     let mut scenario = Scenario {
@@ -75,7 +76,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         sensing: document.sensing,
         network: document.network,
         actuation: document.actuation,
-        shield: document.shield,
+        shield,
         failures: document.failure,
         arrival: document.arrival,
         deadlock: document.deadlock,

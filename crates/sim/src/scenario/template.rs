@@ -15,6 +15,7 @@ use super::source::{Source, decoded, finish};
 use super::spec::Scenario;
 use super::text::Override;
 use super::text::Text;
+use crate::shield::ShieldSpec;
 use tautline_laws::law::LawSpec;
 
 /// Validated scenario file from which many flights are made. [`Template::scenario`] builds each flight from the file,
@@ -37,7 +38,12 @@ pub struct NamedLaw {
     pub name: String,
     /// Law with all keys, defaults included.
     pub law: LawSpec,
+    /// Whether the law flies under the shield, whatever the scenario says; `None` for the scenario's choice.
+    pub shield: Option<bool>,
 }
+
+/// Endings of a law's name that fly it with and without the shield.
+const SHIELD: [(&str, bool); 2] = [("+shield", true), ("+bare", false)];
 
 impl NamedLaw {
     /// Returns the name of its kind.
@@ -46,10 +52,13 @@ impl NamedLaw {
         kind(&self.law)
     }
 
-    /// Returns the overrides that select the law: one for its kind and one for each key.
+    /// Returns the overrides that select the law: one for its kind, one for each key, and one for the shield if the
+    /// name tells it.
     #[must_use]
     pub fn overrides(&self) -> Vec<String> {
-        law_overrides(&self.law)
+        let mut overrides = law_overrides(&self.law);
+        overrides.extend(self.shield.map(|enabled| format!("shield.enabled={enabled}")));
+        overrides
     }
 }
 
@@ -101,7 +110,7 @@ impl Template {
     /// Returns the law of the file.
     #[must_use]
     pub fn own_law(&self) -> NamedLaw {
-        NamedLaw { name: kind(&self.own.law), law: self.own.law.clone() }
+        NamedLaw { name: kind(&self.own.law), law: self.own.law.clone(), shield: None }
     }
 
     /// Returns the names of all available laws: those of `[laws.NAME]`, then the kinds that are not among them.
@@ -112,6 +121,12 @@ impl Template {
         named.into_iter().chain(kinds).collect()
     }
 
+    /// Returns each name twice: for the law without and under the shield.
+    #[must_use]
+    pub fn with_and_without_shield(names: &[String]) -> Vec<String> {
+        names.iter().flat_map(|name| SHIELD.iter().rev().map(move |(end, _)| format!("{name}{end}"))).collect()
+    }
+
     /// Returns the names of the laws to compare by default: those of `[laws.NAME]`, or else every kind.
     #[must_use]
     pub fn compared_laws(&self) -> Vec<String> {
@@ -120,11 +135,15 @@ impl Template {
     }
 
     /// Returns the law of `[laws.NAME]`; else that of the file, if its kind has this name; else the law of this kind
-    /// with default keys.
+    /// with default keys. `NAME+shield` flies the law under the shield, `NAME+bare` without it.
     ///
     /// # Errors
     /// [`ScenarioError`] if no law has this name.
     pub fn law(&self, name: &str) -> Result<NamedLaw, ScenarioError> {
+        let ending = SHIELD.into_iter().find_map(|(end, with)| Some((name.strip_suffix(end)?, with)));
+        if let Some((name_of_law, with)) = ending {
+            return Ok(NamedLaw { name: name.to_owned(), shield: Some(with), ..self.law(name_of_law)? });
+        }
         let listed = self.laws.iter().find(|(listed, _)| listed == name).map(|(_, law)| law.clone());
         let own = || (kind(&self.own.law) == name).then(|| self.own.law.clone());
         let default = || LawSpec::all().into_iter().find(|law| kind(law) == name);
@@ -139,7 +158,8 @@ impl Template {
             };
             return Err(ScenarioError::new(problem).coded("scenario/unknown-choice").with_help(help));
         };
-        Ok(NamedLaw { name: name.to_owned(), law: law.complete(self.own.velocity_coefficient_per_s()) })
+        let law = law.complete(self.own.velocity_coefficient_per_s());
+        Ok(NamedLaw { name: name.to_owned(), law, shield: None })
     }
 
     /// Returns the scenario under a law, from a drawn start.
@@ -150,6 +170,9 @@ impl Template {
         let text = Text { name: &self.name, toml: &self.toml, overrides: &self.overrides };
         let mut document = decoded(&text, &self.folder)?;
         document.law.kind = law.law.clone();
+        if let Some(enabled) = law.shield {
+            document.shield = Some(ShieldSpec { enabled, ..document.shield.unwrap_or_default() });
+        }
         document.start.seed = draw.seed;
         if self.flight_is_random() {
             document.noise.seed = draw.seed;

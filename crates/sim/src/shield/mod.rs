@@ -47,6 +47,10 @@ const BYTES_PER_MESSAGE: u128 = 176;
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ShieldSpec {
+    /// Whether the shield is used; the table alone means true.
+    #[serde(skip_serializing_if = "is_true")]
+    #[schemars(extend("default" = true))]
+    pub enabled: bool,
     /// Largest command in m/s^2 that each vehicle carries out; `actuation.max_accel_m_s2` unless given, or 5 without.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
@@ -93,6 +97,7 @@ pub struct ShieldSpec {
 impl Default for ShieldSpec {
     fn default() -> Self {
         Self {
+            enabled: true,
             accel_m_s2: None,
             brake_m_s2: None,
             max_speed_m_s: None,
@@ -111,6 +116,11 @@ impl Default for ShieldSpec {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
 fn is_zero(number: &f64) -> bool {
     *number == 0.0
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
+fn is_true(value: &bool) -> bool {
+    *value
 }
 
 impl Scenario {
