@@ -16,6 +16,7 @@ mod program;
 mod read;
 mod request;
 mod scenario;
+mod shield;
 mod simulation;
 mod studies;
 mod work;
@@ -41,6 +42,8 @@ mod _native {
     use super::request::{AuditOptions, ReadOptions};
     #[pymodule_export]
     use super::scenario::Scenario;
+    #[pymodule_export]
+    use super::shield::Shield;
     #[pymodule_export]
     use super::simulation::Simulation;
     #[pymodule_export]

@@ -97,11 +97,12 @@ pub(crate) fn compare(
     py: Python<'_>,
     scenario: &Scenario,
     laws: Option<Vec<String>>,
+    shield: bool,
     runs: u64,
     seed: u64,
     outputs: Outputs,
 ) -> PyResult<Answer> {
-    study(py, scenario, tautline::compare::Options { laws, runs, seed }, outputs)
+    study(py, scenario, tautline::compare::Options { laws, shield, runs, seed }, outputs)
 }
 
 /// Searches for the two values of a key between which a verdict turns.

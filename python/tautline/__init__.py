@@ -20,6 +20,7 @@ from ._native import Error, Observation
 from ._program import Answer, attack, compare, export, margin, sweep, validate
 from ._recording import Recording, read
 from ._scenario import Check, Scenario, check, scenarios
+from ._shield import Shield
 from ._simulation import Simulation
 from ._tables import Finding, Findings
 
@@ -36,6 +37,7 @@ __all__ = [
     "Observation",
     "Recording",
     "Scenario",
+    "Shield",
     "Simulation",
     "ViolationError",
     "attack",

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _display, _native
-from ._arguments import PathLike, path
+from ._arguments import PathLike, boolean, path
 from ._audit import Audit, audit
 from ._law import Law, check_law
 from ._native import Error
@@ -151,6 +151,7 @@ def fly(
     record: PathLike | None = None,
     html: PathLike | None = None,
     set: Mapping[str, Any] | None = None,
+    shield: bool | None = None,
     keep: bool = True,
 ) -> Flight:
     """Flies a scenario to its end, under its own law or under ``law``.
@@ -158,6 +159,8 @@ def fly(
     * ``record``: file ``*.mcap`` to write, also over an existing one. `tautline audit` and Foxglove open it.
     * ``html``: page to write, also over an existing one.
     * ``set``: overrides of scenario keys, such as ``{"time.duration_s": 60}``.
+    * ``shield``: True certifies separations under any law, with the keys of ``[shield]`` or their defaults; False
+      flies without a shield. By default the scenario decides.
     * ``keep``: False leaves the arrays empty, for flights that do not fit into memory.
 
     Other Python threads run during the flight. Ctrl-C ends it and keeps the recording.
@@ -165,6 +168,8 @@ def fly(
     Raises :class:`Error` for a wrong scenario and for commands that are not finite. An exception of the law ends the
     flight and is raised again.
     """
+    if shield is not None:
+        set = {**(set or {}), "shield.enabled": boolean(shield, "shield")}
     flown = to_scenario(scenario, set)
     check_law(law)
     check_outputs(flown, {"record": record, "html": html})

@@ -115,6 +115,35 @@ class Scenario:
     def check(self) -> tuple[bool, str, str, str]: ...
 
 @final
+class Shield:
+    def __new__(
+        cls,
+        positions_m: NDArray[np.float64],
+        velocities_m_s: NDArray[np.float64],
+        delta_m: float,
+        period_s: float,
+        delay_periods: int,
+        others: list[tuple[str, float]],
+        index: int | None,
+    ) -> Shield: ...
+    def filter(
+        self,
+        positions_m: NDArray[np.float64],
+        velocities_m_s: NDArray[np.float64],
+        wanted_m_s2: NDArray[np.float64],
+    ) -> NDArray[np.float64]: ...
+    def exchange(self, lost: NDArray[np.bool_] | None) -> None: ...
+    def messages(self) -> list[tuple[int, bytes]]: ...
+    def hear(self, message: bytes) -> None: ...
+    @property
+    def count(self) -> int: ...
+    @property
+    def certificate(self) -> str: ...
+    @property
+    def tube_m(self) -> float: ...
+    def report(self) -> tuple[str, str | None]: ...
+
+@final
 class Simulation:
     def __new__(cls, scenario: Scenario, law: object | None) -> Simulation: ...
     def step(self, commands: NDArray[np.float64] | None, steps: int) -> None: ...
@@ -290,6 +319,7 @@ def campaign(
 def compare(
     scenario: Scenario,
     laws: Sequence[str] | None,
+    shield: bool,
     runs: int,
     seed: int,
     outputs: dict[str, str | bool | int | None],

@@ -112,6 +112,7 @@ def compare(
     scenario: Scenario | PathLike,
     laws: Sequence[str] | None = None,
     *,
+    shield: bool = False,
     runs: int = 20,
     seed: int = 0,
     set: Mapping[str, Any] | None = None,
@@ -123,13 +124,15 @@ def compare(
 ) -> Answer:
     """Flies laws from the same starts, on all cores. ``answer.laws.to_pandas()`` has a row for each law.
 
-    ``laws`` are kinds or names of tables ``[laws.NAME]``, by default all that the scenario has. ``force`` overwrites
+    ``laws`` are kinds or names of tables ``[laws.NAME]``, by default all that the scenario has. ``shield`` flies each
+    law twice, as ``NAME+bare`` and under the shield as ``NAME+shield``. ``force`` overwrites
     existing files. More in docs/compare.md.
     """
     return Answer(
         *_native.compare(
             study_scenario(scenario, set),
             laws=None if laws is None else name_list(laws, "laws"),
+            shield=boolean(shield, "shield"),
             runs=count(runs, "runs"),
             seed=count(seed, "seed"),
             outputs=outputs(csv, latex, html, force, threads),
