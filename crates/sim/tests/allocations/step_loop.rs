@@ -112,10 +112,21 @@ pub(crate) fn the_loop_allocates_nothing_per_step() {
             "actuation={max_accel_m_s2=2, lag_s=0.05}",
         ],
     );
+    let shielded = builtin(
+        "pentagon-laplacian",
+        &[
+            "time.control_hz=240",
+            "shield.enabled=true",
+            "network={latency_s=0.01, jitter_s=0.01, loss=0.2, loss_burst=2, rate_hz=240}",
+        ],
+    );
     let threads = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("two threads");
-    for (name, scenario) in
-        [("five vehicles", &pentagon), ("law and audit side by side", &crowd), ("every imperfection", &imperfect)]
-    {
+    for (name, scenario) in [
+        ("five vehicles", &pentagon),
+        ("law and audit side by side", &crowd),
+        ("every imperfection", &imperfect),
+        ("a shield", &shielded),
+    ] {
         let law = || scenario.law().expect("a law");
         let euler = || {
             let (state, held) = (scenario.start.clone(), Rows::zeros(scenario.count()));
