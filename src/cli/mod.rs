@@ -1,7 +1,7 @@
 //! Command line: one file for each command or group of commands. Only this module prints.
 //!
-//! All commands have the same exit codes: 0 good, 1 bad, 2 wrong input, 3 failure of the machine. Text goes to standard
-//! output, or to standard error if standard output carries data.
+//! All commands have the same exit codes: 0 good, 1 bad, 2 wrong input, 3 failure of the machine, 130 interrupted before
+//! a result. Text goes to standard output, or to standard error if standard output carries data.
 
 mod audit;
 mod audit_formats;
@@ -51,8 +51,7 @@ pub fn entry(arguments: &[OsString]) -> u8 {
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(usage) => {
-            // The reader may close the pipe.
-            let _ = usage.print();
+            console::usage(&usage);
             return if usage.use_stderr() { Exit::WrongInput } else { Exit::Good } as u8;
         }
     };
@@ -77,7 +76,10 @@ pub fn entry(arguments: &[OsString]) -> u8 {
 #[derive(Debug, Parser)]
 #[command(
     version,
-    after_help = "Exit codes: 0 good, 1 bad (such as a violation), 2 wrong input, 3 failure of the machine."
+    after_help = "\
+Exit codes: 0 good, 1 bad (such as a violation), 2 wrong input, 3 failure of the machine, 130 interrupted before a \
+result.
+Environment: NO_COLOR=1 switches colours off; CLICOLOR_FORCE=1 keeps them in files and pipes."
 )]
 struct Arguments {
     #[command(subcommand)]

@@ -21,7 +21,7 @@ pub(super) struct ScenarioArguments {
     #[arg(default_value = "pentagon", add = completions::scenario())]
     pub(super) scenario: String,
     /// Set a key of the scenario; repeatable.
-    #[arg(long = "set", value_name = "KEY.PATH=VALUE", add = completions::key("="))]
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE", add = completions::setting())]
     pub(super) overrides: Vec<String>,
 }
 
