@@ -152,15 +152,25 @@ fn a_missing_file_or_folder_is_named_with_a_remedy() {
     for (arguments, code, says, remedy) in [
         (&["--obstacles", "no.toml"][..], "files/cannot-read", "no.toml: cannot read the file", "check the path"),
         (&["--fence", "no.toml"], "files/cannot-read", "no.toml: cannot read the file", "check the path"),
-        (&["--html", "a/b.html"], "files/no-folder", "a/b.html: the folder a does not exist", "create the folder"),
+        (&["--html", "two.csv/b.html"], "files/no-folder", "two.csv is not a folder", "create the folder"),
+        (&["--html", "a/b.html"], "files/no-folder", "a/b.html: a does not exist", "create the folder"),
     ] {
         let refused = ran(folder.path(), &[&audit[..], arguments].concat());
         assert_eq!((refused.exit, refused.code()), (WRONG_INPUT, code), "{}", refused.err);
         assert!(refused.err.contains(says) && refused.err.contains(remedy), "{}", refused.err);
     }
+    let refused = ran(folder.path(), &["run", "--out", "two.csv"]);
+    assert_eq!((refused.exit, refused.code()), (WRONG_INPUT, "files/no-folder"), "{}", refused.err);
+    assert!(refused.err.contains("--out: two.csv is a file"), "{}", refused.err);
+    assert_eq!(ran(folder.path(), &["new", "ring"]).exit, GOOD);
+    let refused = ran(folder.path(), &["run", "ring"]);
+    assert_eq!((refused.exit, refused.code()), (WRONG_INPUT, "scenario/not-found"), "{}", refused.err);
+    assert!(refused.err.contains("did you mean the file `ring.toml`?"), "{}", refused.err);
+    let refused = ran(folder.path(), &["new", "a/"]);
+    assert!(refused.exit == WRONG_INPUT && refused.err.contains("got `a/`"), "{}", refused.err);
     let refused = ran(folder.path(), &["new", "a/b"]);
     assert_eq!((refused.exit, refused.code()), (WRONG_INPUT, "files/no-folder"), "{}", refused.err);
-    assert!(refused.err.contains("a/b.toml: the folder a does not exist"), "{}", refused.err);
+    assert!(refused.err.contains("a/b.toml: a does not exist"), "{}", refused.err);
 }
 
 #[test]

@@ -187,9 +187,10 @@ impl From<RecordError> for Failure {
 impl From<ArtefactError> for Failure {
     fn from(error: ArtefactError) -> Self {
         let parent = Path::new(&error.path).parent().filter(|parent| !parent.as_os_str().is_empty());
-        match parent.filter(|parent| !parent.exists()) {
+        match parent.filter(|parent| !parent.is_dir()) {
             Some(parent) => {
-                let message = format!("{}: the folder {} does not exist", error.path, parent.display());
+                let problem = if parent.exists() { "is not a folder" } else { "does not exist" };
+                let message = format!("{}: {} {problem}", error.path, parent.display());
                 Self::input("files/no-folder", message, "create the folder first, or give a path in another folder")
             }
             None => Self::machine("files/cannot-write", error.to_string())
