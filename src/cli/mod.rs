@@ -77,9 +77,16 @@ pub fn entry(arguments: &[OsString]) -> u8 {
 #[command(
     version,
     after_help = "\
-Exit codes: 0 good, 1 bad (such as a violation), 2 wrong input, 3 failure of the machine, 130 interrupted before a \
-result.
-Environment: NO_COLOR=1 switches colours off; CLICOLOR_FORCE=1 keeps them in files and pipes."
+Exit codes:
+  0    good
+  1    bad, such as a violation
+  2    wrong input
+  3    failure of the machine
+  130  interrupted before a result
+
+Environment:
+  NO_COLOR=1        no colours, also on a terminal
+  CLICOLOR_FORCE=1  colours, also in files and pipes; 0 is the default"
 )]
 struct Arguments {
     #[command(subcommand)]

@@ -141,10 +141,11 @@ fn an_export_that_is_interrupted_leaves_no_file() {
 }
 
 #[test]
-fn an_unwritable_folder_exits_with_3() {
+fn a_missing_folder_is_wrong_input() {
     let folder = folder();
     let failed = ran(folder.path(), &["export", "flight.csv", "-o", "missing/out.npz"]);
-    assert_eq!(failed.exit, Some(3), "{}", said(&failed));
+    assert_eq!(failed.exit, Some(2), "{}", said(&failed));
+    assert!(said(&failed).contains("missing/out.npz: cannot write the file: missing does not exist"), "{}", said(&failed));
 }
 
 #[test]

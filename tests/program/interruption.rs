@@ -257,7 +257,9 @@ fn an_interrupted_command_says_what_is_kept_and_how_to_continue() {
     let folder = tempfile::tempdir().expect("a folder");
     let spec = "scenario = \"pentagon\"\nruns = 4000\n[vary]\nstart.jitter_m = { uniform = [0.0, 0.3] }\n";
     fs::write(folder.path().join("spec.toml"), spec).expect("written");
-    let forever = "name = \"forever\"\n[time]\nduration_s = 1e5\n[swarm]\na22_per_s = -0.1\n";
+    let forever = ran_by(TAUTLINE, folder.path(), &["list", "--show", "pentagon"]).out;
+    let forever =
+        forever.replace("a22_per_s = 0.1", "a22_per_s = -0.1").replace("duration_s = 120.0", "duration_s = 1e5");
     fs::write(folder.path().join("forever.toml"), forever).expect("written");
     let rows: String = (0..40_000).flat_map(|k| (0..50).map(move |id| format!("{k},{id},{id}0,0,0\n"))).collect();
     fs::write(folder.path().join("long.csv"), format!("t_s,id,x,y,z\n{rows}")).expect("written");

@@ -320,7 +320,7 @@ fn the_closest_picture_is_at_the_closest_approach_between_samples() {
     assert!(closest == halfway, "they are closest halfway");
     let near = ["render", "headon.csv", "--delta", "1", "--size", "320x180", "--at", "0.1,0.10001", "--out", "b"];
     assert_eq!(ran(folder.path(), &near).exit, GOOD);
-    assert_eq!(names(&folder.path().join("b")), ["at-0.100s.png", "at-0.10001s.png"], "two times have two pictures");
+    assert_eq!(names(&folder.path().join("b")), ["at-0.10001s.png", "at-0.100s.png"], "two times have two pictures");
     let until = ran(folder.path(), &["render", "headon.csv", "--at", "0.1", "--until", "0.5"]);
     assert_eq!(until.exit, WRONG_INPUT, "{}", until.err);
     assert!(until.err.contains("--until: has no effect without --film, --sheet or --every"), "{}", until.err);

@@ -190,7 +190,7 @@ impl From<ArtefactError> for Failure {
         match parent.filter(|parent| !parent.is_dir()) {
             Some(parent) => {
                 let problem = if parent.exists() { "is not a folder" } else { "does not exist" };
-                let message = format!("{}: {} {problem}", error.path, parent.display());
+                let message = format!("{}: cannot write the file: {} {problem}", error.path, parent.display());
                 Self::input("files/no-folder", message, "create the folder first, or give a path in another folder")
             }
             None => Self::machine("files/cannot-write", error.to_string())
