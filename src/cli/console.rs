@@ -268,7 +268,7 @@ pub(super) enum Exit {
     WrongInput = 2,
     /// Failure of the machine: input and output, no adapter.
     MachineFailed = 3,
-    /// Ctrl-C before there was a result, with the code of shells for it.
+    /// Ctrl-C, with the code of shells for it.
     Interrupted = 130,
 }
 

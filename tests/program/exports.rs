@@ -145,7 +145,11 @@ fn a_missing_folder_is_wrong_input() {
     let folder = folder();
     let failed = ran(folder.path(), &["export", "flight.csv", "-o", "missing/out.npz"]);
     assert_eq!(failed.exit, Some(2), "{}", said(&failed));
-    assert!(said(&failed).contains("missing/out.npz: cannot write the file: missing does not exist"), "{}", said(&failed));
+    assert!(
+        said(&failed).contains("missing/out.npz: cannot write the file: missing does not exist"),
+        "{}",
+        said(&failed)
+    );
 }
 
 #[test]
