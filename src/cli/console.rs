@@ -174,7 +174,9 @@ impl Terminal {
             let message = *locked(&abandonment);
             if flag.swap(true, Ordering::Relaxed) || message.is_some() {
                 locked(&bar).finish_and_clear();
-                message.into_iter().for_each(|message| console.warn(message));
+                if let Some(message) = message {
+                    console.warn(message);
+                }
                 std::process::exit(Exit::Interrupted as i32);
             }
         };

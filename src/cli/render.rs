@@ -122,8 +122,16 @@ struct Outputs<'a> {
     stills: Vec<Still>,
     /// Path, format and frame rate of the film, and the times of its pictures.
     film: Option<(&'a Path, FilmFormat, u32, Vec<f64>)>,
-    /// Path of the sheet, its number of columns, and the times and size of its pictures.
-    sheet: Option<(PathBuf, u32, (Vec<f64>, [u32; 2]))>,
+    sheet: Option<Sheet>,
+}
+
+/// Contact sheet to write.
+struct Sheet {
+    path: PathBuf,
+    columns: u32,
+    /// Times and size of its pictures.
+    times_s: Vec<f64>,
+    size_px: [u32; 2],
 }
 
 pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
@@ -198,7 +206,12 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let done = batch.write_all(&Outputs {
         stills,
         film: film.map(|(path, format)| (path, format, fps, frames)),
-        sheet: sheet.zip(arguments.sheet).map(|(plan, [columns, _])| (sheet_path, columns, plan)),
+        sheet: sheet.zip(arguments.sheet).map(|((times_s, size_px), [columns, _])| Sheet {
+            path: sheet_path,
+            columns,
+            times_s,
+            size_px,
+        }),
     });
     terminal.finish();
     if done.is_err() && terminal.is_interrupted() {
@@ -240,10 +253,10 @@ impl Batch<'_> {
             })?;
             self.written.push(path.to_path_buf());
         }
-        if let Some((path, columns, (times, size_px))) = &outputs.sheet {
+        if let Some(Sheet { path, columns, times_s, size_px }) = &outputs.sheet {
             self.view.size_px = *size_px;
             let mut tiles = Vec::new();
-            self.shoot(times, |_, pictures| {
+            self.shoot(times_s, |_, pictures| {
                 tiles.extend_from_slice(pictures);
                 Ok(())
             })?;
