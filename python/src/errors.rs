@@ -39,7 +39,8 @@ pub(crate) trait IntoException {
 impl IntoException for Failure {
     fn into_exception(self) -> PyErr {
         let text = self.to_string();
-        with_code(if self.is_machine() { PyOSError::new_err(text) } else { wrong_input(text) }, self.code())
+        let is_of_system = self.is_machine() || self.code() == "files/no-folder";
+        with_code(if is_of_system { PyOSError::new_err(text) } else { wrong_input(text) }, self.code())
     }
 }
 

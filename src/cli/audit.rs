@@ -47,7 +47,8 @@ pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, 
     complete.try_for_each(|asked| asked.check_outputs(&arguments.outputs()))?;
     // A log that the system searches for annotations contains no other lines with untrusted names.
     let quiet = arguments.quiet || arguments.annotations.is_some();
-    let monitor = Terminal::without_signals(Console { data_on_stdout: arguments.json, quiet });
+    let console = Console { data_on_stdout: arguments.json, quiet };
+    let monitor = Terminal::that_abandons(console, "interrupted: the audit is incomplete; give the command again")?;
     let (mut judged, mut failures) = (Vec::new(), Vec::new());
     for (name, asked) in asked {
         if !is_one {

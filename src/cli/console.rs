@@ -3,9 +3,11 @@
 use std::io::{self, IsTerminal as _, Write as _};
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use anstream::stream::RawStream;
+use anstream::{AutoStream, ColorChoice};
 use anstyle::{AnsiColor, Style};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use miette::{GraphicalReportHandler, LabeledSpan, MietteDiagnostic, NamedSource, Report};
@@ -15,8 +17,6 @@ use tautline_report::request::{Failure, Monitor, blanked};
 
 /// Refresh rate of a progress bar \[Hz\].
 const PROGRESS_HZ: u8 = 10;
-/// Exit code of a process that Ctrl-C ends, as shells give it.
-const INTERRUPTED: i32 = 130;
 
 /// Output settings of a command.
 #[derive(Clone, Copy, Debug)]
@@ -85,6 +85,13 @@ fn coloured_line(line: &str) -> String {
     shown + &line[done..]
 }
 
+/// Returns whether a stream has colours. `CLICOLOR_FORCE=0` asks for no more than the default, but `anstream` forces
+/// colours for any value.
+fn colour_choice(stream: &impl RawStream) -> ColorChoice {
+    let forces_nothing = std::env::var_os("CLICOLOR_FORCE").is_some_and(|value| value == "0");
+    if forces_nothing && !stream.is_terminal() { ColorChoice::Never } else { AutoStream::choice(stream) }
+}
+
 impl Console {
     /// Prints text without control characters. A closed stream is ignored.
     pub(super) fn say(self, text: &str) {
@@ -94,9 +101,9 @@ impl Console {
         let text = coloured(&blanked(text.trim_end()));
         // These streams remove the colours unless they are a terminal; they observe NO_COLOR and CLICOLOR_FORCE.
         let _ = if self.data_on_stdout {
-            writeln!(anstream::stderr().lock(), "{text}")
+            writeln!(AutoStream::new(io::stderr(), colour_choice(&io::stderr())), "{text}")
         } else {
-            writeln!(anstream::stdout().lock(), "{text}")
+            writeln!(AutoStream::new(io::stdout(), colour_choice(&io::stdout())), "{text}")
         };
     }
 
@@ -131,48 +138,60 @@ pub(super) struct Terminal {
     console: Console,
     bar: Arc<Mutex<ProgressBar>>,
     interruption: Arc<AtomicBool>,
+    /// Message of the first Ctrl-C while work cannot be interrupted: it ends the process.
+    abandonment: Arc<Mutex<Option<&'static str>>>,
 }
 
 impl Terminal {
     /// Returns a terminal that handles Ctrl-C.
     pub(super) fn new(console: Console) -> Result<Self, Failure> {
-        let terminal = Self::without_signals(console);
-        let (flag, bar) = (Arc::clone(&terminal.interruption), Arc::clone(&terminal.bar));
-        listen(move || {
-            if flag.swap(true, Ordering::Relaxed) {
-                bar.lock().unwrap_or_else(PoisonError::into_inner).finish_and_clear();
-                std::process::exit(INTERRUPTED);
-            }
-        })?;
-        Ok(terminal)
+        Self::listening(console, None)
     }
 
     /// Returns a terminal for work that cannot be continued: the first Ctrl-C prints `message` and ends the process.
     pub(super) fn that_abandons(console: Console, message: &'static str) -> Result<Self, Failure> {
-        let terminal = Self::without_signals(console);
-        let bar = Arc::clone(&terminal.bar);
-        listen(move || {
-            bar.lock().unwrap_or_else(PoisonError::into_inner).finish_and_clear();
-            console.warn(message);
-            std::process::exit(INTERRUPTED);
-        })?;
-        Ok(terminal)
+        Self::listening(console, Some(message))
     }
 
     /// Returns a terminal that leaves Ctrl-C to the system, which ends the program.
     pub(super) fn without_signals(console: Console) -> Self {
-        Self { console, bar: Arc::new(Mutex::new(ProgressBar::hidden())), interruption: Arc::default() }
+        let bar = Arc::new(Mutex::new(ProgressBar::hidden()));
+        Self { console, bar, interruption: Arc::default(), abandonment: Arc::default() }
+    }
+
+    /// From now on the first Ctrl-C interrupts the work and does not end the process.
+    #[cfg(feature = "viewer")]
+    pub(super) fn abandons_no_more(&self) {
+        *locked(&self.abandonment) = None;
+    }
+
+    fn listening(console: Console, abandonment: Option<&'static str>) -> Result<Self, Failure> {
+        let terminal = Self::without_signals(console);
+        *locked(&terminal.abandonment) = abandonment;
+        let (flag, bar) = (Arc::clone(&terminal.interruption), Arc::clone(&terminal.bar));
+        let abandonment = Arc::clone(&terminal.abandonment);
+        let handler = move || {
+            let message = *locked(&abandonment);
+            if flag.swap(true, Ordering::Relaxed) || message.is_some() {
+                locked(&bar).finish_and_clear();
+                if let Some(message) = message {
+                    console.warn(message);
+                }
+                std::process::exit(Exit::Interrupted as i32);
+            }
+        };
+        ctrlc::set_handler(handler)
+            .map_err(|error| Failure::machine("machine/signals", format!("cannot listen to Ctrl-C: {error}")))?;
+        Ok(terminal)
     }
 
     fn bar(&self) -> ProgressBar {
-        self.bar.lock().unwrap_or_else(PoisonError::into_inner).clone()
+        locked(&self.bar).clone()
     }
 }
 
-/// Calls `handler` at each Ctrl-C and request to terminate.
-fn listen(handler: impl FnMut() + Send + 'static) -> Result<(), Failure> {
-    ctrlc::set_handler(handler)
-        .map_err(|error| Failure::machine("machine/signals", format!("cannot listen to Ctrl-C: {error}")))
+fn locked<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Monitor for Terminal {
@@ -193,7 +212,7 @@ impl Monitor for Terminal {
     }
 
     fn begin(&self, task: &str, total: Option<u64>) {
-        *self.bar.lock().unwrap_or_else(PoisonError::into_inner) = self.console.progress(total, task.to_owned());
+        *locked(&self.bar) = self.console.progress(total, task.to_owned());
     }
 
     fn advance(&self, units: u64) {
@@ -203,6 +222,16 @@ impl Monitor for Terminal {
     fn finish(&self) {
         self.bar().finish_and_clear();
     }
+}
+
+/// Prints the help, the version, or an error of the arguments. A closed stream is ignored.
+pub(super) fn usage(usage: &clap::Error) {
+    let text = usage.render().ansi().to_string();
+    let _ = if usage.use_stderr() {
+        write!(AutoStream::new(io::stderr(), colour_choice(&io::stderr())), "{text}")
+    } else {
+        write!(AutoStream::new(io::stdout(), colour_choice(&io::stdout())), "{text}")
+    };
 }
 
 /// Writes data to standard output.
@@ -241,12 +270,18 @@ pub(super) enum Exit {
     WrongInput = 2,
     /// Failure of the machine: input and output, no adapter.
     MachineFailed = 3,
+    /// Ctrl-C, with the code of shells for it.
+    Interrupted = 130,
 }
 
 impl Exit {
     /// Returns the exit code of a failure.
     pub(super) fn of(failure: &Failure) -> Self {
-        if failure.is_machine() { Self::MachineFailed } else { Self::WrongInput }
+        match failure.code() {
+            Failure::INTERRUPTED => Self::Interrupted,
+            _ if failure.is_machine() => Self::MachineFailed,
+            _ => Self::WrongInput,
+        }
     }
 
     /// Returns the exit code of a verdict.

@@ -5,7 +5,10 @@ use std::io::Read as _;
 use std::path::Path;
 use std::sync::Arc;
 
+use clap::builder::TypedValueParser;
+
 use super::console::Console;
+use super::reading::one_of;
 use tautline_recordings::mcap::McapRecording;
 use tautline_recordings::read::{self, Fault, Format, ReadError, ReadOptions};
 use tautline_render::{Colouring, FARTHEST_M, FlightLog, RenderError, Theme, Timeline, TracksError};
@@ -16,16 +19,14 @@ use tautline_sim::scenario::builtin;
 /// Number of bytes at the start of an MCAP file that contain the name of its writer.
 const FIRST_BYTES: u64 = 64;
 
-/// Parses the name of a theme.
-pub(super) fn theme(name: &str) -> Result<Theme, String> {
-    let known = Theme::ALL.iter().find(|(known, _)| *known == name);
-    known.map(|(_, theme)| *theme).ok_or_else(|| "give dark or light".to_owned())
+/// Returns a parser of the name of a theme.
+pub(super) fn theme() -> impl TypedValueParser<Value = Theme> {
+    one_of(Theme::ALL.map(|(name, theme)| (name.into(), theme)).into())
 }
 
-/// Parses the name of a colouring.
-pub(super) fn colouring(name: &str) -> Result<Colouring, String> {
-    let known = Colouring::ALL.iter().find(|(known, _)| *known == name);
-    known.map(|(_, colouring)| *colouring).ok_or_else(|| "give vehicle, speed or clearance".to_owned())
+/// Returns a parser of the name of a colouring.
+pub(super) fn colouring() -> impl TypedValueParser<Value = Colouring> {
+    one_of(Colouring::ALL.map(|(name, colouring)| (name.into(), colouring)).into())
 }
 
 /// Returns whether a path names a scenario: a TOML file, or the name of a built-in one and of no file.

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use clap::Args;
 
-use super::{Exit, console};
+use super::{Exit, completions, console};
 use tautline_core::text::aligned;
 use tautline_recordings::mcap::McapRecording;
 use tautline_report::request::Failure;
@@ -14,7 +14,7 @@ use tautline_sim::scenario::{self, Scenario, Source, builtin};
 #[derive(Debug, Args)]
 pub(super) struct ListArguments {
     /// Print this built-in scenario as TOML, or the scenario in a recording of `tautline run` with all defaults.
-    #[arg(long, value_name = "NAME|RECORDING")]
+    #[arg(long, value_name = "NAME|RECORDING", add = completions::scenario())]
     show: Option<String>,
 }
 

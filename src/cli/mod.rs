@@ -1,7 +1,8 @@
 //! Command line: one file for each command or group of commands. Only this module prints.
 //!
-//! All commands have the same exit codes: 0 good, 1 bad, 2 wrong input, 3 failure of the machine. Text goes to standard
-//! output, or to standard error if standard output carries data.
+//! All commands have the same exit codes: 0 good, 1 bad, 2 wrong input, 3 failure of the machine, 130 interrupted. An
+//! interrupted flight or study is bad. Text goes to standard output, or to standard error if standard output carries
+//! data.
 
 mod audit;
 mod audit_formats;
@@ -51,8 +52,7 @@ pub fn entry(arguments: &[OsString]) -> u8 {
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(usage) => {
-            // The reader may close the pipe.
-            let _ = usage.print();
+            console::usage(&usage);
             return if usage.use_stderr() { Exit::WrongInput } else { Exit::Good } as u8;
         }
     };
@@ -77,7 +77,17 @@ pub fn entry(arguments: &[OsString]) -> u8 {
 #[derive(Debug, Parser)]
 #[command(
     version,
-    after_help = "Exit codes: 0 good, 1 bad (such as a violation), 2 wrong input, 3 failure of the machine."
+    after_help = "\
+Exit codes:
+  0    Good.
+  1    Bad, such as a violation, or an interrupted flight or study.
+  2    Wrong input.
+  3    Failure of the machine.
+  130  Another interrupted command.
+
+Environment:
+  NO_COLOR=1        No colours, also on a terminal.
+  CLICOLOR_FORCE=1  Colours, also in files and pipes; 0 is the default."
 )]
 struct Arguments {
     #[command(subcommand)]

@@ -32,7 +32,8 @@ pub(super) fn new(arguments: &NewArguments) -> Result<Exit, Failure> {
     };
     let name = path.file_stem().and_then(OsStr::to_str).unwrap_or_default();
     // A leading hyphen would read as an option.
-    let text = builtin::new_scenario(name).filter(|_| !name.starts_with('-')).ok_or_else(|| wrong_name(name))?;
+    let text =
+        builtin::new_scenario(name).filter(|_| !name.starts_with('-')).ok_or_else(|| wrong_name(&arguments.name))?;
     if path.exists() && !arguments.force {
         let message = format!("{} exists already", path.display());
         return Err(Failure::input("files/exists", message, "give another name, or overwrite it with --force"));
@@ -48,7 +49,8 @@ fn flight(path: &Path) -> String {
     command_line(["run", &path.to_string_lossy(), "--open"].into_iter())
 }
 
-fn wrong_name(name: &str) -> Failure {
+fn wrong_name(name: &Path) -> Failure {
+    let name = name.display();
     let message = format!("NAME: must have 1 to 64 letters, digits, `-` or `_`, and not begin with `-`, got `{name}`");
     Failure::input("usage/name", message, "give a name such as `ring`, or a path such as scenarios/ring.toml")
 }

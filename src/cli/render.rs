@@ -5,13 +5,11 @@ use std::io::{BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use indicatif::ProgressBar;
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
-use super::Exit;
-use super::console::Console;
-use super::drawing;
+use super::console::{Console, Terminal};
 use super::reading::{self, ReadArguments};
+use super::{Exit, completions, drawing};
 use tautline_render::{
     CameraSpec, Colouring, Extent, Film, FilmFormat, Picture, RenderError, Renderer, Scene, Theme, Timeline, View,
     contact_sheet,
@@ -19,7 +17,7 @@ use tautline_render::{
 use tautline_report::report::{write_atomically, write_atomically_with};
 use tautline_report::request::audit::recording_in;
 use tautline_report::request::outputs::{self, NamedPath};
-use tautline_report::request::{Failure, try_to_write_in};
+use tautline_report::request::{Failure, Monitor as _, try_to_write_in};
 
 /// Largest number of pictures of one command.
 const MOST_PICTURES: f64 = 100_000.0;
@@ -36,7 +34,7 @@ const WAITING_BYTES: usize = 256 << 20;
 #[command(mut_arg("frames_per_s", |frames_per_s| frames_per_s.long("recording-fps")))]
 #[command(mut_arg("recording", |what| {
     let help = "Recording, scenario file, or name of a built-in scenario, which is flown without a recording";
-    what.value_name("RECORDING|SCENARIO").help(help).long_help(help)
+    what.value_name("RECORDING|SCENARIO").help(help).long_help(help).add(completions::scenario())
 }))]
 pub(super) struct RenderArguments {
     /// Safety distance for a recording without one [m]: vehicles get shells of half of it, and violations are those of
@@ -57,7 +55,7 @@ pub(super) struct RenderArguments {
     #[arg(long, value_name = "CxR", value_parser = drawing::sheet)]
     sheet: Option<[u32; 2]>,
     /// Draw another recording or scenario to the right, on the same scale and at the same times.
-    #[arg(long, value_name = "RECORDING|SCENARIO")]
+    #[arg(long, value_name = "RECORDING|SCENARIO", add = completions::scenario())]
     beside: Option<PathBuf>,
     /// Last time of films, sheets and --every [s] [default: the end].
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
@@ -76,16 +74,16 @@ pub(super) struct RenderArguments {
     speed: Option<f64>,
     /// Camera: auto, perspective, top, front, side, follow, follow:ID, closest, or AZIMUTH,ELEVATION,DISTANCE in
     /// degrees and metres.
-    #[arg(long, default_value = "auto", allow_hyphen_values = true)]
+    #[arg(long, default_value = "auto", allow_hyphen_values = true, add = completions::camera())]
     camera: String,
-    /// Colour of vehicles and trails: vehicle, speed or clearance.
-    #[arg(long, default_value = "vehicle", value_parser = drawing::colouring)]
+    /// Colour of vehicles and trails.
+    #[arg(long, default_value = "vehicle", value_parser = drawing::colouring())]
     colour: Colouring,
     /// Length of trails [s] [default: from the start].
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     trail: Option<f64>,
-    /// Theme: dark or light.
-    #[arg(long, default_value = "dark", value_parser = drawing::theme)]
+    /// Theme.
+    #[arg(long, default_value = "dark", value_parser = drawing::theme())]
     theme: Theme,
     /// Graphics adapter: best, hardware, software, none, or a part of its name.
     #[arg(long, value_name = "NAME", default_value = "best")]
@@ -114,11 +112,39 @@ struct Batch<'a> {
     extent: Extent,
     renderer: Renderer,
     view: View,
-    progress: ProgressBar,
+    terminal: &'a Terminal,
+    /// Complete files, in the order in which they were written.
+    written: Vec<PathBuf>,
+}
+
+/// Files to write.
+struct Outputs<'a> {
+    stills: Vec<Still>,
+    /// Path, format and frame rate of the film, and the times of its pictures.
+    film: Option<(&'a Path, FilmFormat, u32, Vec<f64>)>,
+    sheet: Option<Sheet>,
+}
+
+/// Contact sheet to write.
+struct Sheet {
+    path: PathBuf,
+    columns: u32,
+    /// Times and size of its pictures.
+    times_s: Vec<f64>,
+    size_px: [u32; 2],
 }
 
 pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: false, quiet: arguments.quiet };
+    let terminal = Terminal::that_abandons(console, "interrupted: nothing was written; give the command again")?;
+    if arguments.until.is_some() && arguments.film.is_none() && arguments.sheet.is_none() && arguments.every.is_none() {
+        let help = "give one of these options too, or leave --until out";
+        return Err(Failure::input(
+            "usage/no-effect",
+            "--until: has no effect without --film, --sheet or --every",
+            help,
+        ));
+    }
     let camera: CameraSpec = arguments.camera.parse()?;
     let film = arguments.film.as_deref().map(|path| Ok::<_, Failure>((path, FilmFormat::of(path)?))).transpose()?;
     let fps = arguments.fps.unwrap_or(FPS);
@@ -173,42 +199,73 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
         writable(path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new(".")))?;
     }
     let tiles = sheet.as_ref().map_or(0, |(times, _)| times.len());
-    let progress = console.progress(Some((stills.len() + frames.len() + tiles) as u64), timeline.name.clone());
-    let mut batch = Batch { extent, flights: &flights, renderer, view, progress };
+    // From here on an interruption keeps the complete files and removes the temporary one.
+    terminal.abandons_no_more();
+    terminal.begin(&timeline.name, Some((stills.len() + frames.len() + tiles) as u64));
+    let mut batch = Batch { extent, flights: &flights, renderer, view, terminal: &terminal, written: Vec::new() };
+    let done = batch.write_all(&Outputs {
+        stills,
+        film: film.map(|(path, format)| (path, format, fps, frames)),
+        sheet: sheet.zip(arguments.sheet).map(|((times_s, size_px), [columns, _])| Sheet {
+            path: sheet_path,
+            columns,
+            times_s,
+            size_px,
+        }),
+    });
+    terminal.finish();
+    if done.is_err() && terminal.is_interrupted() {
+        let kept = if batch.written.is_empty() { "nothing".to_owned() } else { names(&batch.written) };
+        let failure = Failure::machine(Failure::INTERRUPTED, format!("interrupted: {kept} was kept"));
+        return Err(failure.with_help("give the command again; it draws all pictures again"));
+    }
+    done?;
+    terminal.say(&format!("wrote {}\ndrawn by {}", names(&batch.written), batch.renderer.adapter()));
+    Ok(Exit::Good)
+}
 
-    let times: Vec<f64> = stills.iter().map(|still| still.time_s).collect();
-    batch.shoot(&times, |first, pictures| {
-        let jobs: Vec<_> = stills[first..].iter().zip(pictures).collect();
-        jobs.par_iter().map(|(still, picture)| write(&still.path, picture)).collect::<Result<(), Failure>>()
-    })?;
-    if let Some((path, format)) = film {
-        write_atomically_with(path, |file| batch.film(file, format, fps, &frames).map_err(|failure| failure.of(path)))?;
-    }
-    if let (Some((times, size_px)), Some([columns, _])) = (&sheet, arguments.sheet) {
-        batch.view.size_px = *size_px;
-        let mut tiles = Vec::new();
-        batch.shoot(times, |_, pictures| {
-            tiles.extend_from_slice(pictures);
-            Ok(())
-        })?;
-        write(&sheet_path, &contact_sheet(&tiles, columns)?)?;
-    }
-    batch.progress.finish_and_clear();
-    let written: Vec<&Path> = (stills.iter().map(|still| still.path.as_path()))
-        .chain(film.map(|(path, _)| path))
-        .chain(sheet.iter().map(|_| sheet_path.as_path()))
-        .collect();
-    let names = match written.as_slice() {
+/// Returns the names of files in words.
+fn names(written: &[PathBuf]) -> String {
+    match written {
         [first, .., last] if written.len() > 4 => {
             format!("{} pictures from {} to {}", written.len(), first.display(), last.display())
         }
         _ => written.iter().map(|path| path.display().to_string()).collect::<Vec<_>>().join(", "),
-    };
-    console.say(&format!("wrote {names}\ndrawn by {}", batch.renderer.adapter()));
-    Ok(Exit::Good)
+    }
 }
 
 impl Batch<'_> {
+    /// Writes all files.
+    fn write_all(&mut self, outputs: &Outputs<'_>) -> Result<(), Failure> {
+        let times: Vec<f64> = outputs.stills.iter().map(|still| still.time_s).collect();
+        let mut written = Vec::new();
+        let shot = self.shoot(&times, |first, pictures| {
+            let jobs: Vec<_> = outputs.stills[first..].iter().zip(pictures).collect();
+            jobs.par_iter().try_for_each(|(still, picture)| write(&still.path, picture))?;
+            written.extend(jobs.iter().map(|(still, _)| still.path.clone()));
+            Ok(())
+        });
+        self.written.append(&mut written);
+        shot?;
+        if let Some((path, format, fps, times)) = &outputs.film {
+            write_atomically_with(path, |file| {
+                self.film(file, *format, *fps, times).map_err(|failure| failure.of(path))
+            })?;
+            self.written.push(path.to_path_buf());
+        }
+        if let Some(Sheet { path, columns, times_s, size_px }) = &outputs.sheet {
+            self.view.size_px = *size_px;
+            let mut tiles = Vec::new();
+            self.shoot(times_s, |_, pictures| {
+                tiles.extend_from_slice(pictures);
+                Ok(())
+            })?;
+            write(path, &contact_sheet(&tiles, *columns)?)?;
+            self.written.push(path.clone());
+        }
+        Ok(())
+    }
+
     /// Takes pictures at these times and passes them on in order, in chunks; the next chunk is drawn meanwhile.
     fn shoot(
         &mut self,
@@ -241,6 +298,9 @@ impl Batch<'_> {
     }
 
     fn picture(&mut self, time_s: f64) -> Result<Picture, Failure> {
+        if self.terminal.is_interrupted() {
+            return Err(Failure::interrupted());
+        }
         let [width, height] = self.view.size_px;
         let columns = u32::try_from(self.flights.len()).unwrap_or(1);
         let view = View { size_px: [width / columns, height], ..self.view.clone() };
@@ -250,7 +310,7 @@ impl Batch<'_> {
             let camera = self.extent.camera(timeline, &frame, &view)?;
             pictures.push(self.renderer.paint(&Scene::compose(timeline, &self.extent, &frame, &view, camera))?);
         }
-        self.progress.inc(1);
+        self.terminal.advance(1);
         Ok(contact_sheet(&pictures, columns)?)
     }
 }
@@ -299,7 +359,10 @@ fn stills(
                 let time_s = seconds.parse().ok().filter(|time: &f64| time.is_finite());
                 let time_s = time_s
                     .ok_or_else(|| Failure::input("render/time", format!("--at: `{text}` is not a time"), help))?;
-                (time_s, format!("at-{time_s:.3}s"))
+                // Two times have two names.
+                let rounded = format!("{time_s:.3}");
+                let digits = if rounded.parse() == Ok(time_s) { rounded } else { format!("{time_s:?}") };
+                (time_s, format!("at-{digits}s"))
             }
         };
         if !(start_s..=end_s).contains(&time_s) {

@@ -12,7 +12,7 @@ use tautline_report::request::{Failure, Monitor as _, Pictures, RunRequest, Scen
 use tautline_sim::preflight::Preflight;
 
 /// Time between two looks at a watched file.
-const WATCH_INTERVAL: Duration = Duration::from_millis(200);
+const WATCH_INTERVAL: Duration = Duration::from_millis(150);
 
 /// Scenario with its overrides.
 #[derive(Debug, Args)]
@@ -21,7 +21,7 @@ pub(super) struct ScenarioArguments {
     #[arg(default_value = "pentagon", add = completions::scenario())]
     pub(super) scenario: String,
     /// Set a key of the scenario; repeatable.
-    #[arg(long = "set", value_name = "KEY.PATH=VALUE", add = completions::key("="))]
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE", add = completions::setting())]
     pub(super) overrides: Vec<String>,
 }
 
@@ -171,15 +171,27 @@ fn watch(arguments: &RunArguments, terminal: &Terminal) -> Result<Exit, Failure>
     let mut exit = shown(fly(arguments, true, arguments.open, terminal));
     while !terminal.is_interrupted() {
         terminal.warn(&format!("waiting for a change of {}; Ctrl-C ends", path.display()));
-        while !terminal.is_interrupted() && content(path) == flown {
-            std::thread::sleep(WATCH_INTERVAL);
-        }
-        if !terminal.is_interrupted() {
-            flown = content(path);
+        if let Some(changed) = next_content(path, flown.as_deref(), terminal) {
+            flown = Some(changed);
             exit = shown(fly(arguments, true, false, terminal));
         }
     }
     Ok(exit)
+}
+
+/// Waits for another content of a file that two looks agree on, because an editor may empty the file before it writes.
+/// Returns `None` after an interruption.
+fn next_content(path: &Path, flown: Option<&[u8]>, terminal: &Terminal) -> Option<Vec<u8>> {
+    let mut seen = None;
+    while !terminal.is_interrupted() {
+        let now = content(path);
+        if now.is_some() && now.as_deref() != flown && now == seen {
+            return now;
+        }
+        seen = now;
+        std::thread::sleep(WATCH_INTERVAL);
+    }
+    None
 }
 
 /// Returns the exit code of a flight, and prints its failure.

@@ -91,7 +91,7 @@ pub(super) struct CompareArguments {
     runs: RunArguments,
     /// Laws to compare: kinds, or names of tables [laws.NAME] [default: all such tables, or all kinds if there is no
     /// table].
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', add = completions::choice("law.kind"))]
     laws: Option<Vec<String>>,
     /// Fly each law twice: without the shield (NAME+bare) and under it (NAME+shield), with the keys of [shield].
     #[arg(long)]

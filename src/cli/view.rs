@@ -6,10 +6,9 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 
 use clap::Args;
 
-use super::Exit;
 use super::console::{self, Console};
-use super::drawing;
 use super::reading::{self, ReadArguments};
+use super::{Exit, completions, drawing};
 use tautline_core::record::{Event, RecordError, Sample, Sink};
 use tautline_recordings::read::Format;
 use tautline_render::{LiveUpdate, Theme, Timeline, WINDOW_KEYS, show};
@@ -25,16 +24,17 @@ const WAITING: usize = 256;
 #[command(mut_arg("recording", |what| {
     let help = "Recording, scenario file, or name of a built-in scenario";
     what.required(false).default_value("pentagon").value_name("RECORDING|SCENARIO").help(help)
+        .add(completions::scenario())
 }), after_help = keys())]
 pub(super) struct ViewArguments {
     /// Set a key of the scenario; repeatable.
-    #[arg(long = "set", value_name = "KEY.PATH=VALUE")]
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE", add = completions::setting())]
     overrides: Vec<String>,
     /// Safety distance for a recording without one [m].
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     delta: Option<f64>,
-    /// Theme: dark or light.
-    #[arg(long, default_value = "dark", value_parser = drawing::theme)]
+    /// Theme.
+    #[arg(long, default_value = "dark", value_parser = drawing::theme())]
     theme: Theme,
     /// Graphics adapter: best, hardware, software, or a part of its name.
     #[arg(long, value_name = "NAME", default_value = "best")]

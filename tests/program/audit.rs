@@ -243,7 +243,8 @@ fn a_separation_just_above_its_limit_is_shown_above_it() {
 #[test]
 fn an_unwritable_file_exits_with_3() {
     let folder = folder(&[("pass.csv", PASS)]);
-    let ran = audit(folder.path(), &["pass.csv", "--delta", "2", "--html", "none/a.html"]);
+    let too_long = format!("{}.html", "a".repeat(300));
+    let ran = audit(folder.path(), &["pass.csv", "--delta", "2", "--html", &too_long]);
     assert_eq!(ran.exit, Some(3), "{ran:?}");
     assert!(ran.out.starts_with("VIOLATION: alpha and bravo"), "the verdict is said all the same: {ran:?}");
 }

@@ -135,16 +135,21 @@ fn an_export_that_is_interrupted_leaves_no_file() {
     assert!(Command::new("kill").args(["-s", "INT", &child.id().to_string()]).status().expect("kill").success());
     let ended = child.wait_with_output().expect("an end");
     let said = String::from_utf8_lossy(&ended.stderr).into_owned();
-    assert_eq!(ended.status.code(), Some(3), "{said}");
-    assert!(said.contains("interrupted"), "{said}");
+    assert_eq!(ended.status.code(), Some(130), "{said}");
+    assert!(said.contains("interrupted: `out.npz` was not written"), "{said}");
     assert_eq!(names().len(), 3, "{:?}", names());
 }
 
 #[test]
-fn an_unwritable_folder_exits_with_3() {
+fn a_missing_folder_is_wrong_input() {
     let folder = folder();
     let failed = ran(folder.path(), &["export", "flight.csv", "-o", "missing/out.npz"]);
-    assert_eq!(failed.exit, Some(3), "{}", said(&failed));
+    assert_eq!(failed.exit, Some(2), "{}", said(&failed));
+    assert!(
+        said(&failed).contains("missing/out.npz: cannot write the file: missing does not exist"),
+        "{}",
+        said(&failed)
+    );
 }
 
 #[test]

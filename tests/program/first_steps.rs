@@ -101,6 +101,76 @@ fn completion_knows_scenarios_files_and_keys() {
     assert_eq!(completed(folder.path(), &["tautline", "run", "--set", "law.delta"]), ["law.delta_m="]);
     assert_eq!(completed(folder.path(), &["tautline", "margin", "--key", "time.dt"]), ["time.dt_s"]);
     assert_eq!(completed(folder.path(), &["tautline", "run", "--set", "nowhere"]), [] as [&str; 0]);
+    for (words, candidates) in [
+        (&["render", "--camera", "fr"][..], &["front"][..]),
+        (&["render", "--colour", "s"], &["speed"]),
+        (&["view", "--theme", ""], &["dark", "light"]),
+        (&["compare", "--laws", "orca,lap"], &["orca,laplacian"]),
+        (&["list", "--show", "gus"], &["gusts"]),
+        (&["view", "circ"], &["circle", "circus.toml"]),
+        (&["render", "circ"], &["circle", "circus.toml"]),
+        (&["run", "--set", "law.kind=lap"], &["law.kind=laplacian"]),
+        (&["run", "--set=law.ki"], &["--set=law.kind="]),
+        (&["run", "--set=law.kind=lap"], &["--set=law.kind=laplacian"]),
+        (&["view", "--set", "plant.kind=r"], &["plant.kind=rapier"]),
+    ] {
+        assert_eq!(completed(folder.path(), &[&["tautline"], words].concat()), candidates, "{words:?}");
+    }
+}
+
+#[cfg(unix)]
+#[test]
+fn bash_completes_words_that_it_splits() {
+    let folder = folder();
+    let script = ran(folder.path(), &["completions", "bash"]);
+    fs::write(folder.path().join("script"), script.out).expect("written");
+    // Bash gives the pieces of the line, the number of the current piece, and the typed part of it.
+    for (pieces, typed, reply) in [
+        ("tautline run --set law.ki", "law.ki", "law.kind="),
+        ("tautline run --set = law.ki", "law.ki", "law.kind="),
+        ("tautline run --set law.kind = lap", "lap", "laplacian"),
+        ("tautline run --set law.kind = orca --set plant.kind =", "", "rapier ideal"),
+        ("tautline render --theme =", "", "dark light"),
+        ("tautline run circl", "circl", "circle"),
+    ] {
+        let line = format!(
+            "tautline() {{ {TAUTLINE} \"$@\"; }}; source ./script; COMP_WORDS=({pieces}); COMP_TYPE=9; \
+             COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); _clap_complete_tautline tautline '{typed}' ''; \
+             echo \"${{COMPREPLY[@]}}\""
+        );
+        let bash = Command::new("bash").args(["-c", &line]).current_dir(folder.path()).output().expect("bash");
+        let (out, err) = (String::from_utf8_lossy(&bash.stdout), String::from_utf8_lossy(&bash.stderr));
+        assert_eq!((out.trim_end(), err.as_ref()), (reply, ""), "{pieces}");
+    }
+}
+
+#[test]
+fn a_missing_file_or_folder_is_named_with_a_remedy() {
+    let folder = folder();
+    fs::write(folder.path().join("two.csv"), "t,id,x,y,z\n0,a,0,0,0\n0,b,9,0,0\n").expect("written");
+    let audit = ["audit", "two.csv", "--delta", "1"];
+    for (arguments, code, says, remedy) in [
+        (&["--obstacles", "no.toml"][..], "files/cannot-read", "no.toml: cannot read the file", "check the path"),
+        (&["--fence", "no.toml"], "files/cannot-read", "no.toml: cannot read the file", "check the path"),
+        (&["--html", "two.csv/b.html"], "files/no-folder", "two.csv is not a folder", "create the folder"),
+        (&["--html", "a/b.html"], "files/no-folder", "a/b.html: cannot write the file: a does", "create the folder"),
+    ] {
+        let refused = ran(folder.path(), &[&audit[..], arguments].concat());
+        assert_eq!((refused.exit, refused.code()), (WRONG_INPUT, code), "{}", refused.err);
+        assert!(refused.err.contains(says) && refused.err.contains(remedy), "{}", refused.err);
+    }
+    let refused = ran(folder.path(), &["run", "--out", "two.csv"]);
+    assert_eq!((refused.exit, refused.code()), (WRONG_INPUT, "files/no-folder"), "{}", refused.err);
+    assert!(refused.err.contains("--out: two.csv is a file"), "{}", refused.err);
+    assert_eq!(ran(folder.path(), &["new", "ring"]).exit, GOOD);
+    let refused = ran(folder.path(), &["run", "ring"]);
+    assert_eq!((refused.exit, refused.code()), (WRONG_INPUT, "scenario/not-found"), "{}", refused.err);
+    assert!(refused.err.contains("did you mean the file `ring.toml`?"), "{}", refused.err);
+    let refused = ran(folder.path(), &["new", "a/"]);
+    assert!(refused.exit == WRONG_INPUT && refused.err.contains("got `a/`"), "{}", refused.err);
+    let refused = ran(folder.path(), &["new", "a/b"]);
+    assert_eq!((refused.exit, refused.code()), (WRONG_INPUT, "files/no-folder"), "{}", refused.err);
+    assert!(refused.err.contains("a/b.toml: cannot write the file: a does not exist"), "{}", refused.err);
 }
 
 #[test]

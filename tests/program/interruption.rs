@@ -203,6 +203,38 @@ fn a_stopped_run_writes_a_report_on_its_flight() {
     }
 }
 
+#[test]
+#[cfg(feature = "viewer")]
+fn an_interrupted_film_leaves_no_file_and_names_the_kept_pictures() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let names = || -> Vec<String> {
+        let entries = fs::read_dir(folder.path()).expect("a folder");
+        let mut names: Vec<_> = entries.map(|of| of.expect("one").file_name().to_string_lossy().into_owned()).collect();
+        names.sort();
+        names
+    };
+    let film = ["render", "pentagon", "--at", "start", "--film", "film.gif", "--fps", "50", "--adapter", "none"];
+    let child = Command::new(TAUTLINE)
+        .args(film)
+        .args(["--speed", "0.1", "--out", "."])
+        .current_dir(folder.path())
+        .env("XDG_RUNTIME_DIR", folder.path())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program");
+    let began = Instant::now();
+    while !names().iter().any(|name| name.starts_with(".film.gif") && name.ends_with(".partial")) {
+        assert!(began.elapsed() < PATIENCE, "the film does not begin: {:?}", names());
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    assert!(Command::new("kill").args(["-s", "INT", &child.id().to_string()]).status().expect("kill").success());
+    let ended = child.wait_with_output().expect("an end");
+    let err = String::from_utf8_lossy(&ended.stderr);
+    assert_eq!(ended.status.code(), Some(130), "{err}");
+    assert!(err.contains("interrupted: ./start.png was kept"), "{err}");
+    assert_eq!(names(), ["start.png"]);
+}
+
 /// Starts a command that does not end, interrupts it after `after`, and returns its result.
 fn interrupted(folder: &Path, arguments: &[&str], after: Duration) -> Output {
     let child = Command::new(TAUTLINE)
@@ -225,6 +257,12 @@ fn an_interrupted_command_says_what_is_kept_and_how_to_continue() {
     let folder = tempfile::tempdir().expect("a folder");
     let spec = "scenario = \"pentagon\"\nruns = 4000\n[vary]\nstart.jitter_m = { uniform = [0.0, 0.3] }\n";
     fs::write(folder.path().join("spec.toml"), spec).expect("written");
+    let forever = ran_by(TAUTLINE, folder.path(), &["list", "--show", "pentagon"]).out;
+    let forever =
+        forever.replace("a22_per_s = 0.1", "a22_per_s = -0.1").replace("duration_s = 120.0", "duration_s = 1e5");
+    fs::write(folder.path().join("forever.toml"), forever).expect("written");
+    let rows: String = (0..40_000).flat_map(|k| (0..50).map(move |id| format!("{k},{id},{id}0,0,0\n"))).collect();
+    fs::write(folder.path().join("long.csv"), format!("t_s,id,x,y,z\n{rows}")).expect("written");
     let begins = "nothing was kept; give the command again";
     for (arguments, exit, says) in [
         (&["run", "--no-snapshots", "--set", DRAG, "--set", FOREVER][..], 1, "the same command begins again"),
@@ -234,6 +272,8 @@ fn an_interrupted_command_says_what_is_kept_and_how_to_continue() {
         (&["margin", "--key", "law.alpha", "--from", "1", "--to", "2", "--set", DRAG, "--set", FOREVER], 1, begins),
         (&["attack", "--start", "0.1", "--set", DRAG, "--set", FOREVER], 1, begins),
         (&["validate"], 130, "interrupted: nothing was written; give the command again"),
+        (&["render", "forever.toml"], 130, "interrupted: nothing was written; give the command again"),
+        (&["audit", "long.csv", "--delta", "1"], 130, "interrupted: the audit is incomplete; give the command again"),
     ] {
         let ended = interrupted(folder.path(), arguments, Duration::from_secs(3));
         let err = String::from_utf8_lossy(&ended.stderr);

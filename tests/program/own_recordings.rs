@@ -361,6 +361,11 @@ fn violations_between_samples_are_in_the_audit_of_the_recording() {
         let part = audit(folder.path(), &[&["flown"], more].concat());
         assert!(part.exit == Some(0) && part.out.starts_with("CLEAR if straight"), "{more:?}: {part:?}");
     }
+    // A run that is cut off keeps its findings, and the note says that they count.
+    altered(folder.path(), "flown/run.mcap", |bytes| bytes.truncate(bytes.len() - 200));
+    let cut = audit(folder.path(), &["flown", "--allow-unfinished"]);
+    assert!(cut.out.starts_with("UNDECIDED: the run's audit of every step found "), "{cut:?}");
+    assert!(cut.err.contains("the run recorded ") && cut.err.contains(" but no audit"), "{cut:?}");
 }
 
 #[test]

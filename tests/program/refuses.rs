@@ -138,15 +138,16 @@ mod machine {
     fn a_folder_that_cannot_be_written_to_is_named() {
         let folder = folder();
         fs::write(folder.path().join("file"), b"").expect("a file");
-        assert_failed(run_into(folder.path(), "file", &[]), "cannot write file:");
+        let validated = |out: &str| ran(folder.path(), &["validate", "--out", out]);
+        for refused in [run_into(folder.path(), "file", &[]), validated("file")] {
+            assert_eq!((refused.exit, refused.code()), (Some(2), "files/no-folder"), "{}", refused.err);
+        }
         assert_failed(run_into(folder.path(), "file/out", &[]), "cannot write file/out:");
         assert_failed(run_into(folder.path(), "/dev/null/out", &[]), "cannot write /dev/null/out:");
         fs::create_dir_all(folder.path().join("taken/run.mcap")).expect("a folder");
         assert_failed(run_into(folder.path(), "taken", &[]), "cannot write taken/run.mcap:");
         fs::create_dir_all(folder.path().join("kept/report.json/inside")).expect("a folder");
         assert_failed(run_into(folder.path(), "kept", &["--force"]), "cannot write kept/report.json:");
-        let validated = |out: &str| ran(folder.path(), &["validate", "--out", out]);
-        assert_failed(validated("file"), "cannot write file:");
         assert_failed(validated("/proc"), "cannot write /proc:");
     }
 

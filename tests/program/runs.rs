@@ -398,4 +398,13 @@ fn verdicts_have_colours_only_if_forced_or_on_a_terminal() {
     assert!(colours(&[("CLICOLOR_FORCE", "1")]));
     assert!(!colours(&[]), "a pipe is no terminal");
     assert!(!colours(&[("NO_COLOR", "1")]));
+    assert!(!colours(&[("CLICOLOR_FORCE", "0")]));
+    let help = |value: &str| {
+        let mut command = std::process::Command::new(crate::program::TAUTLINE);
+        let ran = command.arg("--help").env_remove("NO_COLOR").env("CLICOLOR_FORCE", value).output();
+        String::from_utf8(ran.expect("the program").stdout).expect("text")
+    };
+    assert!(help("1").contains('\u{1b}') && !help("0").contains('\u{1b}'));
+    let said = help("0");
+    assert!(said.contains("130  Another interrupted command.") && said.contains("NO_COLOR=1"), "{said}");
 }

@@ -187,7 +187,7 @@ fn invalid_requests_are_refused_with_a_remedy() {
         (&["out/run.mcap", "--camera", "isometric"], WRONG_INPUT, "`isometric` is not a camera"),
         (&["out/run.mcap", "--camera", "follow:9"], WRONG_INPUT, "there is no vehicle `9` to follow"),
         (&["out/run.mcap", "--camera", "0,100,5"], WRONG_INPUT, "an elevation that is not between"),
-        (&["out/run.mcap", "--theme", "pink"], WRONG_INPUT, "give dark or light"),
+        (&["out/run.mcap", "--theme", "pink"], WRONG_INPUT, "[possible values: dark, light]"),
         (&["out/run.mcap", "--at", "5"], WRONG_INPUT, "--at: must be from 0 s to 4 s, got 5 s"),
         (&["out/run.mcap", "--at", "soon"], WRONG_INPUT, "`soon` is not a time"),
         (&["out/run.mcap", "--at", "nan"], WRONG_INPUT, "`nan` is not a time"),
@@ -318,6 +318,12 @@ fn the_closest_picture_is_at_the_closest_approach_between_samples() {
     let [closest, halfway] =
         ["closest.png", "at-0.500s.png"].map(|name| fs::read(folder.path().join("a").join(name)).expect(name));
     assert!(closest == halfway, "they are closest halfway");
+    let near = ["render", "headon.csv", "--delta", "1", "--size", "320x180", "--at", "0.1,0.10001", "--out", "b"];
+    assert_eq!(ran(folder.path(), &near).exit, GOOD);
+    assert_eq!(names(&folder.path().join("b")), ["at-0.10001s.png", "at-0.100s.png"], "two times have two pictures");
+    let until = ran(folder.path(), &["render", "headon.csv", "--at", "0.1", "--until", "0.5"]);
+    assert_eq!(until.exit, WRONG_INPUT, "{}", until.err);
+    assert!(until.err.contains("--until: has no effect without --film, --sheet or --every"), "{}", until.err);
 }
 
 /// Returns the pixels of a picture: red, green and blue.

@@ -48,19 +48,25 @@ pub struct Orbit {
     pub distance_m: f64,
 }
 
+impl CameraSpec {
+    /// All cameras that are given by a name alone, with their names.
+    pub const NAMED: [(&'static str, Self); 7] = [
+        ("auto", Self::Auto),
+        ("perspective", Self::Perspective),
+        ("top", Self::Top),
+        ("front", Self::Front),
+        ("side", Self::Side),
+        ("follow", Self::Follow(None)),
+        ("closest", Self::Closest),
+    ];
+}
+
 impl FromStr for CameraSpec {
     type Err = RenderError;
 
     fn from_str(text: &str) -> Result<Self, RenderError> {
-        match text {
-            "auto" => return Ok(Self::Auto),
-            "perspective" => return Ok(Self::Perspective),
-            "follow" => return Ok(Self::Follow(None)),
-            "top" => return Ok(Self::Top),
-            "front" => return Ok(Self::Front),
-            "side" => return Ok(Self::Side),
-            "closest" => return Ok(Self::Closest),
-            _ => {}
+        if let Some((_, camera)) = Self::NAMED.into_iter().find(|(name, _)| *name == text) {
+            return Ok(camera);
         }
         if let Some(name) = text.strip_prefix("follow:").filter(|name| !name.is_empty()) {
             return Ok(Self::Follow(Some(name.to_owned())));

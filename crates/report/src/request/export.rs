@@ -103,7 +103,7 @@ pub fn export_file(request: &ExportRequest, monitor: &dyn Monitor) -> Result<(),
     });
     let file = output.display();
     if exported.is_err() && monitor.is_interrupted() {
-        return Err(Failure::machine("interrupted", format!("interrupted: `{file}` was not written")));
+        return Err(Failure::machine(Failure::INTERRUPTED, format!("interrupted: `{file}` was not written")));
     }
     let exported = exported?;
     for note in exported.notes.iter().chain(&lost(request, monitor)) {

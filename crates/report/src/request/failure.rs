@@ -31,6 +31,9 @@ pub struct Failure {
 }
 
 impl Failure {
+    /// Code of the failure after an interruption.
+    pub const INTERRUPTED: &'static str = "interrupted";
+
     /// Returns a failure of the input. `code` is stable, such as `audit/no-limit`.
     #[must_use]
     pub fn input(code: &'static str, message: impl AsRef<str>, help: impl AsRef<str>) -> Self {
@@ -46,7 +49,7 @@ impl Failure {
     /// Returns the failure after an interruption.
     #[must_use]
     pub fn interrupted() -> Self {
-        Self::machine("interrupted", "interrupted")
+        Self::machine(Self::INTERRUPTED, "interrupted")
     }
 
     /// Returns a failure of either kind, without a remedy.
@@ -183,7 +186,16 @@ impl From<RecordError> for Failure {
 
 impl From<ArtefactError> for Failure {
     fn from(error: ArtefactError) -> Self {
-        Self::machine("files/cannot-write", error.to_string()).with_help("free some space or write to another folder")
+        let parent = Path::new(&error.path).parent().filter(|parent| !parent.as_os_str().is_empty());
+        match parent.filter(|parent| !parent.is_dir()) {
+            Some(parent) => {
+                let problem = if parent.exists() { "is not a folder" } else { "does not exist" };
+                let message = format!("{}: cannot write the file: {} {problem}", error.path, parent.display());
+                Self::input("files/no-folder", message, "create the folder first, or give a path in another folder")
+            }
+            None => Self::machine("files/cannot-write", error.to_string())
+                .with_help("free some space or write to another folder"),
+        }
     }
 }
 

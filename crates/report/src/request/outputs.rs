@@ -171,7 +171,13 @@ impl OutFolder {
             Failure::machine("files/cannot-write", format!("cannot write {}: {error}", path.display()))
                 .with_help("give a writable folder with --out")
         };
-        fs::create_dir_all(&self.path).map_err(|error| machine(&self.path, &error))?;
+        fs::create_dir_all(&self.path).map_err(|error| match error.kind() {
+            io::ErrorKind::AlreadyExists => {
+                let message = format!("--out: {} is a file", self.path.display());
+                Failure::input("files/no-folder", message, "give a folder with --out")
+            }
+            _ => machine(&self.path, &error),
+        })?;
         let lock = File::open(&self.path).ok();
         if let Some(Err(TryLockError::WouldBlock)) = lock.as_ref().map(File::try_lock) {
             return Err(Failure::input(

@@ -39,7 +39,7 @@ pub use limits::{
 };
 pub use obstacles::{OBSTACLE_HELP, ObstacleTable, Solid};
 pub use resolution::Drift;
-pub use schema::{TomlSchema, key_paths, schema, takes_integers_only};
+pub use schema::{TomlSchema, key_choices, key_paths, schema, takes_integers_only};
 pub use source::{MAX_FILE_BYTES, Source};
 pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Safety, Scenario, Space};
 pub use start::{offset, random, scatter};

@@ -280,6 +280,23 @@ fn collect_paths(table: Node, prefix: &str, paths: &mut BTreeSet<String>) {
     }
 }
 
+/// Returns the words that a key of the scenario file admits, such as those of `law.kind`; empty for other values.
+#[must_use]
+pub fn key_choices(path: &str) -> Vec<&'static str> {
+    let mut nodes = vec![Node::root()];
+    for key in path.split('.') {
+        let child = |part: Node| part.property(key).or_else(|| part.values()).or_else(|| part.items());
+        let parts = nodes.into_iter().flat_map(|node| std::iter::once(node).chain(node.alternatives()));
+        nodes = parts.filter_map(child).collect();
+    }
+    let words = nodes.into_iter().flat_map(|node| match node.kind() {
+        "boolean" => vec!["true", "false"],
+        _ => node.keyword("const").as_str().into_iter().chain(node.words()).collect(),
+    });
+    let mut seen = BTreeSet::new();
+    words.filter(|word| seen.insert(*word)).collect()
+}
+
 /// Returns the tables of a file that have a key of this name, such as `[swarm]`, or
 /// `[law] with kind = "laplacian" or "orca"`.
 pub(super) fn tables_with(file: Node, key: &str) -> Vec<String> {
@@ -323,6 +340,18 @@ mod tests {
             assert!(paths.iter().any(|known| known == path), "{path}: {paths:?}");
         }
         assert!(!paths.iter().any(|path| path == "law" || path.ends_with('.')), "{paths:?}");
+    }
+
+    #[test]
+    fn keys_with_choices_have_words() {
+        assert!(key_choices("law.kind").starts_with(&["edge-tension"]), "{:?}", key_choices("law.kind"));
+        assert_eq!(key_choices("plant.kind"), ["rapier", "ideal"]);
+        assert_eq!(key_choices("laws.mine.kind"), key_choices("law.kind"));
+        assert!(key_choices("failure.1.kind").contains(&"silent"), "{:?}", key_choices("failure.1.kind"));
+        assert_eq!(key_choices("start.shuffle"), ["true", "false"]);
+        for path in ["law.alpha", "law", "nowhere", "name", ""] {
+            assert_eq!(key_choices(path), [] as [&str; 0], "{path}");
+        }
     }
 
     fn takes_integers(builtin: &str, sets: &[&str], key: &str) -> bool {

@@ -139,9 +139,11 @@ fn find_files(document: &mut Document, folder: &Path) -> Result<(), ScenarioErro
 
 fn unknown_builtin(name: &str) -> ScenarioError {
     let names: Vec<_> = builtin::all().iter().map(|builtin| builtin.name).collect();
+    let file = format!("{name}.toml");
+    let is_file = Path::new(&file).is_file();
     ScenarioError::new(format!("`{name}` is neither a built-in scenario nor a file"))
         .coded("scenario/not-found")
-        .with_help(suggest(name, &names))
+        .with_help(if is_file { format!("did you mean the file `{file}`?") } else { suggest(name, &names) })
 }
 
 /// Replaces characters that a name may not contain by `-`.

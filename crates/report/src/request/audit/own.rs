@@ -221,7 +221,14 @@ impl OwnRecording {
         let mut note = |why: &str| notes.push(format!("the samples are judged: {why}"));
         let audit = match &self.audit {
             StoredAudit::None => {
-                note("the recording holds no audit of its run, which a run writes at its end");
+                note(&match self.run_findings.len() as u64 {
+                    0 => "the recording holds no audit of its run, which a run writes at its end".to_owned(),
+                    count => format!(
+                        "the run recorded {} but no audit, which a run writes at its end; an approach closer than the \
+                         samples counts",
+                        counted(count, "finding", "findings")
+                    ),
+                });
                 return self.of_samples(outcome, settings, &[&self.run_findings]);
             }
             StoredAudit::Altered => {

@@ -1,7 +1,7 @@
 //! Small TOML files: settings, obstacles, a fence.
 
 use std::fs::File;
-use std::io::Read as _;
+use std::io::{ErrorKind, Read as _};
 use std::path::Path;
 
 use serde::de::DeserializeOwned;
@@ -22,7 +22,9 @@ impl TomlFile {
     /// Returns the text of a file. Rejects files above the size limit, and endless ones such as a device.
     pub(super) fn read(&self, path: &Path) -> Result<String, Failure> {
         let cannot = |error: std::io::Error| {
-            Failure::input("files/cannot-read", format!("cannot read {}: {error}", path.display()), self.help)
+            let help = if error.kind() == ErrorKind::NotFound { "check the path" } else { self.help };
+            let message = format!("{}: cannot read the file: {error}", path.display());
+            Failure::input("files/cannot-read", message, help)
         };
         let file = File::open(path).map_err(cannot)?;
         let mut text = String::new();
