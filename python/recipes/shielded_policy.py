@@ -20,7 +20,8 @@ def policy(p: NDArray[np.float64], random: np.random.Generator) -> NDArray[np.fl
     """Returns accelerations (N, 3): random ones, or towards the nearest vehicle."""
     away = np.linalg.norm(p[:, None] - p[None], axis=2) + 1e9 * np.eye(len(p))
     dive = 10.0 * (p[away.argmin(axis=1)] - p)
-    return np.where(random.random((len(p), 1)) < 0.5, dive, random.normal(0.0, ACCEL_M_S2, p.shape))
+    wanted = np.where(random.random((len(p), 1)) < 0.5, dive, random.normal(0.0, ACCEL_M_S2, p.shape))
+    return wanted / np.maximum(1.0, np.linalg.norm(wanted, axis=1, keepdims=True) / ACCEL_M_S2)
 
 
 def fly(shielded: bool, steps: int = 600, seed: int = 0) -> tuple[tl.Audit, str | None]:
@@ -31,7 +32,7 @@ def fly(shielded: bool, steps: int = 600, seed: int = 0) -> tuple[tl.Audit, str 
     shield = tl.Shield(p, delta_m=DELTA_M, period_s=PERIOD_S, accel_m_s2=ACCEL_M_S2)
     positions, velocities = [p], [v]
     for _ in range(steps):
-        u = np.clip(policy(p, random), -ACCEL_M_S2, ACCEL_M_S2)
+        u = policy(p, random)
         if shielded:
             # A third of all messages is lost.
             u = shield.filter(p, v, u, lost=random.random((len(p), len(p))) < 1 / 3)
@@ -40,11 +41,15 @@ def fly(shielded: bool, steps: int = 600, seed: int = 0) -> tuple[tl.Audit, str 
         positions.append(p)
         velocities.append(v)
     t = np.arange(steps + 1) * PERIOD_S
-    audit = tl.audit(t, np.stack(positions), velocities=np.stack(velocities), delta=DELTA_M)
+    # Accelerations are bounded, so the audit needs no assumption on the motion between samples.
+    bounded = {"motion": "bounded", "max_accel": ACCEL_M_S2 + 1e-9}
+    audit = tl.audit(t, np.stack(positions), velocities=np.stack(velocities), delta=DELTA_M, **bounded)
     return audit, shield.report()["exceeded"] if shielded else None
 
 
 if __name__ == "__main__":
-    judged, exceeded = fly(shielded="--bare" not in sys.argv[1:])
+    shielded = "--bare" not in sys.argv[1:]
+    judged, exceeded = fly(shielded)
     print(judged)
-    print("every bound of the shield was kept" if exceeded is None else exceeded)
+    if shielded:
+        print("every bound of the shield was kept" if exceeded is None else exceeded)
