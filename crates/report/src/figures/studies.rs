@@ -3,7 +3,7 @@
 use super::Figure;
 use super::axis::Axis;
 use super::chart::{Chart, Mark};
-use super::svg::{INK, PALETTE, SOFT_INK, Stroke};
+use super::svg::{ALARM, INK, PALETTE, SOFT_INK, Stroke};
 use tautline_core::text::{exact, metres, significant};
 
 /// Draws the smallest separation found so far \[m\] over the `flights` of a search, with delta and the separation of
@@ -45,22 +45,32 @@ pub struct Share {
 }
 
 /// Draws shares of flights with a property (`does`) over the values of a key, with 95 % intervals, the bracket in which
-/// the verdict changes, and `predicted` values with their labels. The axis is logarithmic on request.
+/// the verdict changes, and `predicted` values with their labels. Without intervals each value has one flight, which
+/// has the property or does not. The axis is logarithmic on request.
 #[must_use]
 pub fn margin(
     shares: &[Share],
     key: &str,
-    does: &str,
+    [does, does_not]: [&str; 2],
     bracket: Option<[f64; 2]>,
     predicted: &[(f64, String)],
     logarithmic: bool,
 ) -> Figure {
     let mut chart = chart_of_shares(key, does, shares.iter(), logarithmic);
+    let is_single = shares.iter().all(|share| share.interval.is_none());
+    if is_single {
+        chart.y = Axis::choice([does_not, does]);
+    }
+    let what = if is_single { format!("Whether the flight {does}") } else { format!("Share that {does}") };
     for (k, share) in shares.iter().enumerate() {
         chart.interval(share.value, share.interval, Stroke::solid(PALETTE[0], 1.2));
-        let flights = if share.interval.is_some() { "with its 95 % interval" } else { "one flight" };
-        let ring = Mark::ring((share.value, share.share), PALETTE[0], (k == 0).then(|| flights.to_owned()));
-        chart.marks.push(Mark { radius: 3.5, ..ring });
+        let at = (share.value, share.share);
+        if is_single && share.share == 0.0 {
+            chart.marks.push(Mark { radius: 3.5, ..Mark::cross(at, ALARM, None) });
+            continue;
+        }
+        let label = (k == 0 && !is_single).then(|| "with its 95 % interval".to_owned());
+        chart.marks.push(Mark { radius: 3.5, ..Mark::ring(at, PALETTE[0], label) });
     }
     for (k, side) in bracket.into_iter().flatten().enumerate() {
         let label = (k == 0).then(|| "the verdict turns in between".to_owned());
@@ -72,11 +82,11 @@ pub fn margin(
     let description = match bracket {
         Some([low, high]) => {
             let [low, high] = [low, high].map(|value| significant(value, 4));
-            format!("The share that {does} over {key}; the verdict turns between {low} and {high}.")
+            format!("{what} over {key}; the verdict turns between {low} and {high}.")
         }
-        None => format!("The share that {does} over {key}; the verdict does not turn."),
+        None => format!("{what} over {key}; the verdict does not turn."),
     };
-    chart.figure("margin", &format!("Share that {does}"), &description)
+    chart.figure("margin", &what, &description)
 }
 
 /// Returns an empty chart of shares over the values of a key.
@@ -97,7 +107,9 @@ pub fn shares(name: &str, key: &str, does: &str, series: &[(String, Vec<Share>)]
         chart.line(shares.iter().map(|share| (share.value, share.share)).collect(), Stroke::of_line(k), law.clone());
     }
     let title = format!("Share that {does} over {key}");
-    chart.figure(name, &title, &format!("{title}, with 95 % intervals."))
+    let has_intervals = series.iter().flat_map(|(_, shares)| shares).any(|share| share.interval.is_some());
+    let about = if has_intervals { "with 95 % intervals" } else { "one flight for each value" };
+    chart.figure(name, &title, &format!("{title}, {about}."))
 }
 
 /// Smallest separations of the flights at one value of a key.
@@ -105,6 +117,8 @@ pub fn shares(name: &str, key: &str, does: &str, series: &[(String, Vec<Share>)]
 pub struct Separation {
     /// Value of the key.
     pub value: f64,
+    /// Number of flights.
+    pub flights: u64,
     /// Smallest over all flights \[m\].
     pub smallest_m: f64,
     /// Median of the flights \[m\].
@@ -129,18 +143,29 @@ pub fn separations(name: &str, key: &str, flights: &[Separation], delta_m: f64, 
     if flights.iter().any(|of| of.median_m != of.smallest_m) {
         chart.line(curve(|of| of.median_m), Stroke::of_line(0), "median of the flights");
     }
-    chart.line(curve(|of| of.smallest_m), Stroke::of_line(1), "smallest of all flights");
+    let is_single = flights.iter().all(|of| of.flights <= 1);
+    let smallest = if is_single { "one flight for each value" } else { "smallest of all flights" };
+    chart.line(curve(|of| of.smallest_m), Stroke::of_line(1), smallest);
     for flight in flights {
         let at = (flight.value, flight.smallest_m);
-        chart.marks.push(Mark { radius: 3.5, ..Mark::ring(at, Stroke::of_line(1).colour, None) });
+        // A cross marks a violation.
+        let mark = if flight.smallest_m < delta_m {
+            Mark::cross(at, ALARM, None)
+        } else {
+            Mark::ring(at, Stroke::of_line(1).colour, None)
+        };
+        chart.marks.push(Mark { radius: 3.5, ..mark });
     }
     chart.level(delta_m, Stroke::dashed(INK, 1.3), format!("delta = {} m", exact(delta_m)));
     let title = format!("Smallest separation over {key}");
-    chart.figure(
-        name,
-        &title,
-        &format!("{title}: the median of the flights with its 95 % interval, and the smallest of all."),
-    )
+    let about = if is_single {
+        "one flight for each value"
+    } else if flights.iter().any(|of| of.interval_m.is_some()) {
+        "the median of the flights with its 95 % interval, and the smallest of all"
+    } else {
+        "the median of the flights, whose interval needs more flights, and the smallest of all"
+    };
+    chart.figure(name, &title, &format!("{title}: {about}."))
 }
 
 /// Counts of values in intervals of equal width.
