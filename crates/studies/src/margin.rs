@@ -11,7 +11,7 @@ use crate::statistics::{CONFIDENCE, Estimate, Proportion};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
 use tautline_core::text::{as_toml, counted, significant};
-use tautline_report::figures::{Separation, Share, margin as figure, separations};
+use tautline_report::figures::{Separation, Share, margin as figure, separations, verdicts};
 use tautline_report::report::page::{Badge, Tone};
 use tautline_report::request::{Failure, ScenarioRequest, in_range};
 use tautline_sim::preflight::{Bound, ContactState, PredictedMargin, Preflight};
@@ -351,19 +351,6 @@ impl Study for Margin {
     }
 
     fn sections(&self) -> Vec<Section> {
-        let shares = self.probes.iter().map(|probe| Share {
-            value: probe.value,
-            share: probe.held.share.unwrap_or(f64::NAN),
-            interval: (self.runs > 1).then_some([probe.held.low, probe.held.high]),
-        });
-        let chart = figure(
-            &shares.collect::<Vec<_>>(),
-            &self.key,
-            self.question.words(),
-            self.turn.map(|turn| turn.bracket),
-            &self.predicted.iter().filter_map(|margin| Some((margin.value?, prediction(margin)))).collect::<Vec<_>>(),
-            self.logarithmic,
-        );
         let lengths = self.probes.iter().filter_map(|probe| {
             let median_m = Estimate::quantile(&probe.flights.iter().filter_map(|of| of.min_m).collect::<Vec<_>>(), 0.5);
             let interval_m = median_m.low.zip(median_m.high).map(|(low, high)| [low, high]);
@@ -371,9 +358,26 @@ impl Study for Margin {
             Some(Separation { value, flights, smallest_m: probe.min_m?, median_m: median_m.value?, interval_m })
         });
         let lengths: Vec<_> = lengths.collect();
-        let separation = (!lengths.is_empty())
-            .then(|| separations("separation", &self.key, &lengths, self.about.delta_m, self.logarithmic));
-        let figures = std::iter::once(chart).chain(separation).collect();
+        let (delta_m, bracket, words) =
+            (self.about.delta_m, self.turn.map(|turn| turn.bracket), self.question.words());
+        let predicted = self.predicted.iter().filter_map(|margin| Some((margin.value?, prediction(margin))));
+        let predicted = predicted.collect::<Vec<_>>();
+        // A share of one flight is its verdict, which the marks of the separations show.
+        let figures = if self.runs == 1 && lengths.len() == self.probes.len() {
+            let flights: Vec<_> = lengths.into_iter().zip(self.probes.iter().map(Probe::holds)).collect();
+            vec![verdicts(&flights, &self.key, words, delta_m, bracket, &predicted, self.logarithmic)]
+        } else {
+            let shares = self.probes.iter().map(|probe| Share {
+                value: probe.value,
+                share: probe.held.share.unwrap_or(f64::NAN),
+                interval: (self.runs > 1).then_some([probe.held.low, probe.held.high]),
+            });
+            let shares = shares.collect::<Vec<_>>();
+            let chart = figure(&shares, &self.key, words[0], bracket, &predicted, self.logarithmic);
+            let separation = (!lengths.is_empty())
+                .then(|| separations("separation", &self.key, &lengths, delta_m, self.logarithmic));
+            std::iter::once(chart).chain(separation).collect()
+        };
         vec![
             Section::new("Where the verdict turns", ABOUT, [Block::Figures(figures)]),
             Section::new(

@@ -134,7 +134,7 @@ impl Axis {
     pub(super) fn tick_label(&self, place: f64) -> String {
         match self.scale {
             Scale::Linear => number_label(place, self.step),
-            Scale::Log => power_label(place),
+            Scale::Log => power_label(place, self.ticks.iter().any(|tick| tick.abs() > MOST_ZEROS)),
         }
     }
 }
@@ -179,11 +179,15 @@ fn number_label(number: f64, step: f64) -> String {
     text.replace('-', "\u{2212}")
 }
 
-/// Formats a power of ten by its exponent.
-fn power_label(exponent: f64) -> String {
+/// Largest magnitude of an exponent on an axis of plain numbers.
+const MOST_ZEROS: f64 = 3.0;
+
+/// Formats a power of ten by its exponent: as `10⁻³`, or as a plain number. All ticks of an axis have one notation.
+fn power_label(exponent: f64, as_power: bool) -> String {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
-    if exponent.abs() <= 2.0 {
-        return 10.0_f64.powf(exponent).to_string();
+    if !as_power {
+        let decimals = decimals_of(10.0_f64.powf(exponent), 17);
+        return format!("{:.decimals$}", 10.0_f64.powf(exponent));
     }
     let raised = |c: char| c.to_digit(10).map_or('⁻', |digit| DIGITS[digit as usize]);
     format!("10{}", format!("{exponent:.0}").chars().map(raised).collect::<String>())
@@ -211,12 +215,12 @@ mod tests {
     fn a_logarithmic_axis_has_whole_decades() {
         let axis = Axis::log("error [m]", [3.2e-3, 0.5, 8.0, 0.0, -1.0, f64::NAN]);
         assert_eq!((axis.from, axis.to), (-3.0, 1.0));
-        assert_eq!(labels(&axis), ["10⁻³", "0.01", "0.1", "1", "10"]);
+        assert_eq!(labels(&axis), ["0.001", "0.01", "0.1", "1", "10"]);
         assert_eq!((axis.place(0.0), axis.place(-1.0), axis.place(f64::NAN)), (None, None, None));
         assert_eq!(axis.place(0.01), Some(-2.0));
         let axis = Axis::log("error [m]", [1e-300, 1.0]);
         assert_eq!((axis.from, axis.to), (-18.0, 0.0));
-        assert_eq!(labels(&axis), ["10⁻¹⁸", "10⁻¹⁵", "10⁻¹²", "10⁻⁹", "10⁻⁶", "10⁻³", "1"]);
+        assert_eq!(labels(&axis), ["10⁻¹⁸", "10⁻¹⁵", "10⁻¹²", "10⁻⁹", "10⁻⁶", "10⁻³", "10⁰"]);
     }
 
     #[test]

@@ -18,6 +18,7 @@
 //! | [`convergence`] | an integrator's error over its step |
 //! | [`attack`] | the smallest separation found so far over the flights of a search |
 //! | [`margin`] | the share of flights with a property over the values of a key |
+//! | [`verdicts`] | the smallest separation and the verdict of single flights over the values of a key |
 //! | [`by_law`] | a number of each law with its interval |
 //! | [`shares`] | such shares of several laws |
 //! | [`separations`] | the smallest separation of flights over the values of a key |
@@ -54,7 +55,7 @@ pub use over_time::{channels, control, disagreement, energy, shape_error};
 pub use paper::Format;
 pub use paths::{at_closest, paths, paths_in_space};
 pub use recorded::{Encounter, closest_approach, encounters, smallest};
-pub use studies::{Histogram, Separation, Share, attack, histograms, margin, separations, shares};
+pub use studies::{Histogram, Separation, Share, attack, histograms, margin, separations, shares, verdicts};
 pub use validation::{Step, convergence, tension_curve};
 
 use spans::Spans;

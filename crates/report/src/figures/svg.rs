@@ -173,7 +173,7 @@ impl Canvas {
             rect x=(px(x)) y=(px(y)) width=(px(width + 0.3)) height=(px(height + 0.3)) fill=(fill) {}
             @if let Some((words, ink)) = words {
                 text x=(px(x + width / 2.0)) y=(px(y + height / 2.0)) text-anchor="middle" dy="0.35em" fill=(ink) {
-                    (words)
+                    (printable(&words))
                 }
             }
         };
@@ -264,9 +264,20 @@ impl Canvas {
     }
 }
 
-/// Returns the text without control characters, which XML forbids.
+/// Returns the text without control characters, which XML forbids, and with a typographic minus sign before numbers and
+/// in exponents.
 fn printable(text: &str) -> String {
-    text.chars().filter(|c| !c.is_control()).collect()
+    let is_number = |c: &char| c.is_ascii_digit() || *c == '.';
+    let chars: Vec<_> = text.chars().filter(|c| !c.is_control()).collect();
+    let is_minus = |k: usize| {
+        let before = match chars[..k] {
+            [.., digit, 'e'] => is_number(&digit),
+            [.., before] => matches!(before, ' ' | '(' | '[' | ',' | '='),
+            [] => true,
+        };
+        chars[k] == '-' && before && chars.get(k + 1).is_some_and(is_number)
+    };
+    chars.iter().enumerate().map(|(k, &c)| if is_minus(k) { '\u{2212}' } else { c }).collect()
 }
 
 /// Returns an upper estimate of the width of words by the font size \[px\].
