@@ -443,7 +443,7 @@ fn no_recording_makes_a_figure_fail_or_contain_nan() {
                     assert!(!value.contains("NaN") && !value.contains("inf"), "{name}, {}: {value}", figure.name);
                 }
             }
-            let space = figures::paths_in_space(history, "Paths");
+            let space = figures::paths_in_space(history, &[], "Paths");
             Drawing::of(&space);
         }
     }
@@ -464,7 +464,7 @@ fn a_recording_gives_the_same_figures_as_its_run() {
 fn a_figure_escapes_its_title_and_is_self_contained() {
     let hostile = "</title><script>alert('1')</script>\u{0} & \"quoted\"";
     let mut figures = all_of(&history(3), DELTA_M);
-    figures.push(figures::paths_in_space(&history(3), hostile));
+    figures.push(figures::paths_in_space(&history(3), &[], hostile));
     figures.push(figures::energy(&history(3), hostile));
     for figure in &figures {
         let drawing = Drawing::of(figure);

@@ -84,6 +84,21 @@ impl Axis {
         (place >= self.from - slack && place <= self.to + slack).then(|| place.clamp(self.from, self.to))
     }
 
+    /// Returns the number at the upper end.
+    pub(super) fn end(&self) -> f64 {
+        if self.scale == Scale::Log { 10.0_f64.powf(self.to) } else { self.to }
+    }
+
+    /// Returns whether two lines with the same abscissae lie on each other: they are apart by less than a line's width.
+    pub(super) fn draws_alike(&self, one: &[(f64, f64)], other: &[(f64, f64)]) -> bool {
+        const WIDTH: f64 = 2e-3;
+        let is_near = |(a, b): (&(f64, f64), &(f64, f64))| {
+            let places = [a.1, b.1].map(|y| self.place(y).map(|place| self.share(place)));
+            a.0 == b.0 && places[0].zip(places[1]).map_or(places[0] == places[1], |(a, b)| (a - b).abs() <= WIDTH)
+        };
+        one.len() == other.len() && !one.is_empty() && one.iter().zip(other).all(is_near)
+    }
+
     /// Returns the share of the axis up to a position, from 0 to 1.
     pub(super) fn share(&self, place: f64) -> f64 {
         (place - self.from) / (self.to - self.from)

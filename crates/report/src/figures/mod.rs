@@ -37,12 +37,14 @@ mod axis;
 mod chart;
 mod distances;
 mod heat_map;
+mod labels;
 mod laws;
 mod outlines;
 mod over_time;
 mod paper;
 mod paths;
 mod recorded;
+mod space;
 mod spans;
 mod studies;
 mod svg;
@@ -53,8 +55,9 @@ pub use heat_map::{GridAxis, heat_map};
 pub use laws::{OfLaw, by_law};
 pub use over_time::{channels, control, disagreement, energy, shape_error};
 pub use paper::Format;
-pub use paths::{at_closest, paths, paths_in_space};
+pub use paths::{at_closest, paths};
 pub use recorded::{Encounter, closest_approach, encounters, smallest};
+pub use space::paths_in_space;
 pub use studies::{Histogram, Separation, Share, attack, histograms, margin, separations, shares, verdicts};
 pub use validation::{Step, convergence, tension_curve};
 
@@ -104,7 +107,7 @@ pub fn of_run(log: &FlightLog, criteria: &Criteria<'_>) -> Vec<Figure> {
     let spans = Spans::of(log);
     let mut figures = vec![paths(log, criteria.obstacles, "Paths from above")];
     if !spans.is_level() {
-        figures.push(paths_in_space(log, "Paths in space"));
+        figures.push(paths_in_space(log, criteria.obstacles, "Paths in space"));
     }
     if log.count() > 1 {
         let scaled = if log.metric().is_metres() { "" } else { ", scaled to ellipsoids" };

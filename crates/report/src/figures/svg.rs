@@ -10,6 +10,9 @@ use crate::simplify::needed;
 /// A position on the drawing, to the right and down \[px\].
 pub(super) type Point = (f64, f64);
 
+/// A rectangle of the drawing: left, top, right and bottom \[px\].
+pub(super) type Rect = [f64; 4];
+
 /// Font sizes \[px\].
 pub(super) const TEXT: f64 = 13.5;
 const HEADING: f64 = 14.5;
@@ -111,8 +114,8 @@ pub(super) enum Marker {
 pub(super) struct Align(&'static str, &'static str);
 
 impl Align {
-    pub(super) const LEFT_BELOW: Self = Self("start", "0");
     pub(super) const LEFT: Self = Self("start", "0.35em");
+    pub(super) const CENTRE: Self = Self("middle", "0.35em");
     pub(super) const CENTRE_BELOW: Self = Self("middle", "0");
     pub(super) const CENTRE_ABOVE: Self = Self("middle", "0.76em");
     pub(super) const RIGHT: Self = Self("end", "0.35em");
@@ -224,13 +227,9 @@ impl Canvas {
         self.shapes += &html! { g class=(class) { (PreEscaped(within)) } }.into_string();
     }
 
-    /// Draws a text beside a marker: to the lower left of a cross, and to the upper right of a ring. The texts of a
-    /// vehicle that ends at its start do not overlap.
-    pub(super) fn text_beside(&mut self, marker: Marker, (x, y): Point, words: &str) {
-        match marker {
-            Marker::Cross => self.text((x - 5.0, y + 4.0), Align::RIGHT_ABOVE, words),
-            Marker::Ring | Marker::Dot => self.text((x + 6.0, y - 3.0), Align::LEFT_BELOW, words),
-        }
+    /// Returns whether a rectangle is on the drawing, below the title.
+    pub(super) fn contains(&self, [left, top, right, bottom]: Rect) -> bool {
+        left >= 0.0 && top >= TITLE_BASELINE && right <= self.size.0 && bottom <= self.size.1
     }
 
     pub(super) fn text(&mut self, (x, y): Point, Align(anchor, dy): Align, words: &str) {
@@ -284,6 +283,18 @@ fn printable(text: &str) -> String {
 pub(super) fn text_px(words: &str) -> f64 {
     let narrow = words.chars().filter(|c| matches!(c, '.' | ' ' | '[' | ']')).count();
     TEXT * (0.6 * words.chars().count() as f64 - 0.3 * narrow as f64)
+}
+
+/// Returns the rectangle of a text, which contains its letters.
+pub(super) fn text_rect((x, y): Point, Align(anchor, dy): Align, words: &str) -> Rect {
+    let width = text_px(words);
+    let left = match anchor {
+        "start" => x,
+        "end" => x - width,
+        _ => x - width / 2.0,
+    };
+    let baseline = y + TEXT * dy.trim_end_matches("em").parse().unwrap_or(0.0);
+    [left, baseline - 0.76 * TEXT, left + width, baseline + 0.2 * TEXT]
 }
 
 /// Rounds a length to a tenth of a pixel.
