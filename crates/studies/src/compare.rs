@@ -382,7 +382,13 @@ impl Comparison {
         vec![
             share("violated", "Violated", |law| law.violated),
             share("reached", "Reached the formation", |law| law.reached),
-            measured("time", "Time to reach the formation, median", "time to reach [s]", &|law| law.reached_median_s, None),
+            measured(
+                "time",
+                "Time to reach the formation, median",
+                "time to reach [s]",
+                &|law| law.reached_median_s,
+                None,
+            ),
             measured(
                 "clearance",
                 "Smallest separation less delta, median",

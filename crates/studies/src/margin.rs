@@ -358,8 +358,7 @@ impl Study for Margin {
             Some(Separation { value, flights, smallest_m: probe.min_m?, median_m: median_m.value?, interval_m })
         });
         let lengths: Vec<_> = lengths.collect();
-        let (delta_m, bracket, words) =
-            (self.about.delta_m, self.turn.map(|turn| turn.bracket), self.question.words());
+        let (delta_m, bracket, words) = (self.about.delta_m, self.turn.map(|turn| turn.bracket), self.question.words());
         let predicted = self.predicted.iter().filter_map(|margin| Some((margin.value?, prediction(margin))));
         let predicted = predicted.collect::<Vec<_>>();
         // A share of one flight is its verdict, which the marks of the separations show.

@@ -162,7 +162,8 @@ impl Chart {
         for k in 1..self.lines.len() {
             let (before, rest) = self.lines.split_at_mut(k);
             let line = &mut rest[0];
-            let equal = before.iter_mut().find(|other| other.label.is_some() && self.y.draws_alike(&other.points, &line.points));
+            let alike = |other: &&mut Line| other.label.is_some() && self.y.draws_alike(&other.points, &line.points);
+            let equal = before.iter_mut().find(alike);
             if let (Some(other), Some(label)) = (equal, line.label.as_ref()) {
                 other.label = other.label.take().map(|first| joined(&first, label));
                 line.label = None;
@@ -226,7 +227,7 @@ impl Chart {
         draw_legend(&mut canvas, &legend, end + BELOW);
         match self.cut_note() {
             Some(note) => {
-                labels.text(&mut canvas, (RIGHT - 4.0, bottom - 9.0), Align::RIGHT, &note);
+                canvas.text((RIGHT, end + BELOW - 11.0), Align::RIGHT, &note);
                 canvas.figure(name, &format!("{description} Values {note}."))
             }
             None => canvas.figure(name, description),

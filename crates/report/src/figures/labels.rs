@@ -61,7 +61,8 @@ impl Labels {
             let along = (place.0 - at.0, place.1 - at.1);
             let length = along.0.hypot(along.1);
             let on = |part_px: f64| (at.0 + part_px / length * along.0, at.1 + part_px / length * along.1);
-            canvas.line(&[on(MARK), on((length - half_width.max(HALF_HEIGHT)).max(MARK))], Stroke::solid(SOFT_INK, 0.6));
+            canvas
+                .line(&[on(MARK), on((length - half_width.max(HALF_HEIGHT)).max(MARK))], Stroke::solid(SOFT_INK, 0.6));
         }
         canvas.text(place, Align::CENTRE, words);
         self.taken.push(rect(place));

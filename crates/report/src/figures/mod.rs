@@ -132,6 +132,9 @@ pub(crate) fn time_ticks(from_s: f64, to_s: f64) -> Vec<(f64, String)> {
     axis.ticks.iter().map(|&tick| (tick, axis.tick_label(tick))).collect()
 }
 
+/// Names of all figures of an audit of a recording.
+pub const NAMES_OF_AUDIT: [&str; 4] = ["encounters", "closest-approach", "smallest", "obstacles"];
+
 /// Names of all figures that [`of_run`] can draw.
 pub const NAMES_OF_RUN: [&str; 11] = [
     "paths",

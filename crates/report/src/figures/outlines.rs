@@ -98,9 +98,8 @@ impl Room {
 
     /// Returns the corners of the section of the box by a plane through a position, in order around their middle.
     fn section(&self, place: Vector3<f64>, normal: Vector3<f64>) -> Vec<Vector3<f64>> {
-        let corner = |k: usize| {
-            Vector3::from_fn(|axis, _| if k >> axis & 1 == 0 { self.low[axis] } else { self.high[axis] })
-        };
+        let corner =
+            |k: usize| Vector3::from_fn(|axis, _| if k >> axis & 1 == 0 { self.low[axis] } else { self.high[axis] });
         let edges = (0..8_usize).flat_map(|k| (0..3).map(move |axis| (k, k | 1 << axis))).filter(|(k, to)| k != to);
         let mut corners: Vec<_> = edges
             .filter_map(|(k, to)| {

@@ -11,7 +11,7 @@ use super::paths::{Look, MOST_PATHS, description, drawn};
 use super::spans::Spans;
 use super::svg::{Align, Canvas, GRID, Marker, OBSTACLE, Point, SOFT_INK, Stroke, thinned};
 use crate::flight_log::FlightLog;
-use tautline_audit::Obstacle;
+use tautline_audit::{Obstacle, Shape};
 use tautline_core::swarm::row;
 
 /// Angles of the view \[rad\].
@@ -85,7 +85,9 @@ impl View {
             low: Vector3::from(paths.map(|(low, _)| low - reach)),
             high: Vector3::from(paths.map(|(_, high)| high + reach)),
         };
-        let places: Vec<_> = obstacles.iter().flat_map(|obstacle| wires(obstacle, &around)).flatten().collect();
+        // A half-space has no size of its own.
+        let sized = obstacles.iter().filter(|obstacle| !matches!(obstacle.shape, Shape::HalfSpace { .. }));
+        let places: Vec<_> = sized.flat_map(|obstacle| wires(obstacle, &around)).flatten().collect();
         let axes = [(0, "x [m]"), (1, "y [m]"), (2, "z [m]")].map(|(axis, label)| {
             let (low, high) = paths[axis];
             Axis::linear(label, places.iter().map(|place| place[axis]).chain([low, high]), true)

@@ -113,9 +113,9 @@ pub fn verdicts(
     };
     for (verdict, word) in [true, false].into_iter().zip(words) {
         let marked = flights.iter().filter(|&&(_, holds)| holds == verdict);
-        chart.marks.extend(
-            marked.enumerate().map(|(k, (of, holds))| mark(of, *holds, (k == 0).then(|| word.to_owned()))),
-        );
+        chart
+            .marks
+            .extend(marked.enumerate().map(|(k, (of, holds))| mark(of, *holds, (k == 0).then(|| word.to_owned()))));
     }
     chart.level(delta_m, Stroke::dashed(INK, 1.3), format!("delta = {} m", exact(delta_m)));
     let turn = draw_turn(&mut chart, bracket, predicted);
