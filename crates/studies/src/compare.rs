@@ -473,8 +473,8 @@ impl Study for Comparison {
         vec![
             Section::new(
                 "Laws side by side",
-                "Each law flew from the same starts; dots are estimates, and lines are their 95 % intervals. A dot without a \
-                 line has no interval, because an interval needs more flights.",
+                "Each law flew from the same starts; dots are estimates, and lines are their 95 % intervals. A dot \
+                 without a line has no interval, because an interval needs more flights.",
                 [
                     Block::Figures(self.figures()),
                     part("How flights ended, with 95 % intervals", 1..9),

@@ -124,8 +124,8 @@ fn beside(along: Vector3<f64>) -> [Vector3<f64>; 2] {
     [across, along.cross(&across)]
 }
 
-/// Returns the outline of an obstacle at its first position as lines within a box: the edges of a box, great circles of
-/// a ball, and rings and two lengthwise sections of a capsule.
+/// Returns the outline of an obstacle at its first position as lines within a box. A box has its edges, and a ball has
+/// great circles. A capsule has rings and two lengthwise sections.
 pub(super) fn wires(obstacle: &Obstacle, room: &Room) -> Vec<Vec<Vector3<f64>>> {
     let Some(&(_, place)) = obstacle.path.first() else { return Vec::new() };
     let closed: Vec<Vec<Vector3<f64>>> = match obstacle.shape {
