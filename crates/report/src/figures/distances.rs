@@ -49,7 +49,9 @@ pub fn distances(log: &FlightLog, delta_m: f64, certified_m: Option<f64>, title:
     };
     let typical_m = chart.lines.iter().map(median_m).fold(f64::NAN, f64::min);
     chart.panel = panel(&chart.y, [least_m, typical_m], delta_m);
-    chart.merge_equal_lines();
+    if spans.vehicles() <= FEW_VEHICLES {
+        chart.merge_equal_lines();
+    }
     let is_equal = certified_m == Some(delta_m);
     let both = if is_equal { " = certified" } else { "" };
     chart.level(delta_m, Stroke::solid(INK, 2.0), format!("safety distance δ{both} = {delta_m} m"));
