@@ -17,7 +17,7 @@ const DELTA_M: f64 = 2.0;
 const CERTIFIED_M: f64 = 2.5;
 /// Stroke and width of the line at delta.
 const DELTA_LINE: (&str, &str) = ("#1B1F24", "2");
-pub(crate) const CERTIFIED_LINE: (&str, &str) = ("#00936C", "1.6");
+const CERTIFIED_LINE: (&str, &str) = ("#00936C", "1.6");
 
 /// Parsed figure.
 pub(crate) struct Drawing<'a>(Document<'a>);
@@ -169,7 +169,8 @@ fn the_lines_at_delta_and_at_the_certified_distance_are_correct() {
     let drawing = Drawing::of(&figure);
     let expected = drawing.place(true, CERTIFIED_M);
     assert!((drawing.level(CERTIFIED_LINE) - expected).abs() <= TOLERANCE_PX);
-    let equal = Drawing::of(&figures::distances(&history, DELTA_M, Some(DELTA_M), "Distances"));
+    let figure = figures::distances(&history, DELTA_M, Some(DELTA_M), "Distances");
+    let equal = Drawing::of(&figure);
     assert!(equal.words().iter().any(|word| word == "safety distance δ = certified = 2 m"), "{:?}", equal.words());
     assert!(equal.polylines(CERTIFIED_LINE).is_empty(), "one line for both");
 }

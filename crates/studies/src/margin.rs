@@ -432,7 +432,7 @@ fn shortened(value: f64, step: f64) -> f64 {
     // Doubles hold powers of ten up to 10^22 exactly, so the result is the double nearest to the decimal number.
     const EXACT: f64 = 22.0;
     let exponent = step.log10().floor();
-    if !(exponent.abs() <= EXACT) {
+    if exponent.is_nan() || exponent.abs() > EXACT {
         return value;
     }
     let power = libm::pow(10.0, exponent.abs()).round();

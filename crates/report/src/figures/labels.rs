@@ -85,7 +85,9 @@ mod tests {
         let mut canvas = Canvas::new((400.0, 300.0), "title", 200.0);
         let mut labels = Labels::default();
         let marks: Vec<_> = (0..8).map(|k| (200.0 + 3.0 * f64::from(k % 4), 150.0 + 4.0 * f64::from(k / 4))).collect();
-        marks.iter().for_each(|&at| labels.avoid_mark(at));
+        for &at in &marks {
+            labels.avoid_mark(at);
+        }
         for (k, &at) in marks.iter().enumerate() {
             labels.beside(&mut canvas, Marker::Ring, at, &format!("{}", k + 8));
         }
