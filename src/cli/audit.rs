@@ -10,6 +10,7 @@ use serde::Serialize;
 
 use super::console::{Console, Terminal};
 use super::reading::{ReadArguments, one_of};
+use super::run::figure_formats;
 use super::{Exit, audit_formats, console, reading};
 use tautline_audit::envelope::{Envelope, Limit, Quantity};
 use tautline_audit::recorded::{Interpolation, Settings, VehicleSettings};
@@ -237,6 +238,11 @@ pub(super) struct AuditArguments {
     /// Write a report page with figures.
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(super) html: Option<PathBuf>,
+    /// Write the figures of the page into the folder NAME-figures beside NAME.html, in these formats; PDF and PNG have
+    /// the width of a paper's column, 85 mm.
+    #[arg(long, value_name = "FORMAT,...", value_delimiter = ',', requires = "html", help_heading = "Output")]
+    #[arg(value_parser = ["svg", "pdf", "png"])]
+    pub(super) figures: Vec<String>,
     /// Write a proof of the verdict that `check_proof.py` checks in exact arithmetic without this program; only for a
     /// CSV table with --delta.
     #[arg(long, value_name = "FILE", help_heading = "Output")]
@@ -343,6 +349,7 @@ impl AuditArguments {
             config,
             command: command.to_owned(),
             html: self.html.clone(),
+            formats: figure_formats(&self.figures),
             proof: self.proof.clone(),
             ..AuditRequest::new(Subject::Files { paths, options: Box::new(self.reading.options(self.format)) })
         };

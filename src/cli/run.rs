@@ -32,6 +32,11 @@ impl ScenarioArguments {
     }
 }
 
+/// Returns the formats of figures with these names.
+pub(super) fn figure_formats(names: &[String]) -> Vec<Format> {
+    Format::ALL.into_iter().filter(|of| names.iter().any(|name| name == of.name())).collect()
+}
+
 /// Returns the renderer of pictures on an adapter. A build without the viewer draws nothing.
 #[cfg(feature = "viewer")]
 pub(super) fn pictures(adapter: &str, takes_snapshots: bool) -> Box<dyn Pictures> {
@@ -133,7 +138,7 @@ fn fly(arguments: &RunArguments, force: bool, opens: bool, terminal: &Terminal) 
         out: arguments.out.clone(),
         force,
         figures: !arguments.no_figures,
-        formats: Format::ALL.into_iter().filter(|of| arguments.figures.iter().any(|name| name == of.name())).collect(),
+        formats: figure_formats(&arguments.figures),
         verify: arguments.verify,
         threads: arguments.threads.map(usize::from),
         ..RunRequest::new(&scenario, repeat(&words))

@@ -121,6 +121,19 @@ fn junit_events_and_page_are_written() {
 }
 
 #[test]
+fn figures_are_written_beside_the_page() {
+    let folder = folder(&[("pass.csv", PASS)]);
+    let ran = audit(folder.path(), &["pass.csv", "--delta", "0.5", "--html", "a.html", "--figures", "svg,pdf"]);
+    assert_eq!(ran.exit, Some(0), "{}", ran.err);
+    for (file, begins) in [("encounters.svg", "<svg"), ("closest-approach.pdf", "%PDF")] {
+        let bytes = fs::read(folder.path().join("a-figures").join(file)).expect(file);
+        assert!(bytes.starts_with(begins.as_bytes()), "{file}");
+    }
+    assert!(!folder.path().join("a-figures/encounters.png").exists());
+    assert_eq!(audit(folder.path(), &["pass.csv", "--delta", "0.5", "--figures", "svg"]).exit, Some(2), "needs --html");
+}
+
+#[test]
 fn every_option_of_judging_works() {
     let tower = "[[obstacle]]\nname = \"tower\"\nball = { radius_m = 1.0 }\nat_m = [0.0, -2.0, 0.0]\n";
     let folder = folder(&[("pass.csv", PASS), ("tower.toml", tower)]);

@@ -290,6 +290,44 @@ fn wrong_input_is_refused_with_key_and_remedy() {
 }
 
 #[test]
+fn missing_runs_and_bounds_of_keys_have_their_place() {
+    let refused = |spec: &str| {
+        let ran = Place::of(spec).campaign(&["run", "spec.toml", "--worst", "0"]);
+        assert_eq!(ran.exit, Some(2), "{}", ran.err);
+        ran.err
+    };
+    let runs = refused("scenario = 'pentagon'\n[vary]\n'start.jitter_m' = { uniform = [0.0, 0.1] }\n");
+    assert!(runs.contains("spec.toml:1:1") && runs.contains("runs: missing key"), "{runs}");
+    let scenario = refused("scenario = 'pentagn'\nruns = 2\n");
+    assert!(scenario.contains("spec.toml:1:1") && scenario.contains("scenario: `pentagn` is neither"), "{scenario}");
+    let loss = "scenario = 'pentagon'\nruns = 3\n[set]\nnetwork.rate_hz = 50\ntime.duration_s = 1\n[vary]\n\
+                'network.loss' = { uniform = [0.0, 1.5] }\n";
+    let loss = refused(loss);
+    assert!(loss.contains("spec.toml:7:1") && loss.contains("network.loss = 1.5"), "{loss}");
+    assert!(loss.contains("scenario/out-of-range"), "{loss}");
+}
+
+#[test]
+fn a_campaign_with_most_draws_refused_exits_with_1() {
+    let near = "[start]\npositions_m = [[0.0, 0.0], [1.02, 0.0]]\n[formation]\nshape = 'line'\nspacing_m = 3.0\n\
+                [law]\nkind = 'displacement'\ndelta_m = 1.0\n[time]\nduration_s = 1\n";
+    let spec = |widest: f64| {
+        let place = Place::of(&format!(
+            "scenario = 'near.toml'\nruns = 40\n[vary]\n'start.positions_m.2.x' = {{ uniform = [0.5, {widest:?}] }}\n"
+        ));
+        fs::write(place.path("near.toml"), near).expect("written");
+        place.campaign(&["run", "spec.toml", "--worst", "0"])
+    };
+    let mostly = spec(1.2);
+    assert_eq!(mostly.exit, Some(1), "{}", mostly.err);
+    let said = mostly.out + &mostly.err;
+    assert!(said.contains("MOST DRAWS REFUSED") && said.contains("narrow [vary]"), "{said}");
+    let rarely = spec(5.0);
+    assert_eq!(rarely.exit, Some(0), "{}", rarely.err);
+    assert!(!rarely.out.contains("MOST DRAWS REFUSED"), "{}", rarely.out);
+}
+
+#[test]
 fn journals_of_other_campaigns_and_changed_rows_are_ignored() {
     let place = Place::of(SPEC);
     let whole = place.run("whole", &["--shards", "1"]);

@@ -5,7 +5,10 @@ use tautline::flight_log::FlightLog;
 use tautline::record::{Channel, Sample};
 use tautline::swarm::{Rows, Swarm};
 
-use crate::figures::{CERTIFIED_LINE, Drawing, TOLERANCE_PX};
+use crate::figures::{Drawing, TOLERANCE_PX};
+
+/// Stroke of the line of a limit.
+const LIMIT_LINE: (&str, &str) = ("#1B1F24", "1.3");
 
 const MAX_THRUST_N: f64 = 0.12;
 const NAMES: [&str; 4] = ["attitude", "rotors", "wind", "message-age"];
@@ -71,7 +74,7 @@ fn every_channel_has_a_figure_with_a_line_per_vehicle() {
         assert!(figure.description.contains(&peak), "{}", figure.description);
     }
     let rotors = Drawing::of(&figures[1]);
-    assert!((rotors.level(CERTIFIED_LINE) - rotors.place(true, MAX_THRUST_N)).abs() <= TOLERANCE_PX);
+    assert!((rotors.level(LIMIT_LINE) - rotors.place(true, MAX_THRUST_N)).abs() <= TOLERANCE_PX);
 }
 
 #[test]

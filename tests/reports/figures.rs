@@ -17,7 +17,7 @@ const DELTA_M: f64 = 2.0;
 const CERTIFIED_M: f64 = 2.5;
 /// Stroke and width of the line at delta.
 const DELTA_LINE: (&str, &str) = ("#1B1F24", "2");
-pub(crate) const CERTIFIED_LINE: (&str, &str) = ("#1B1F24", "1.3");
+const CERTIFIED_LINE: (&str, &str) = ("#00936C", "1.6");
 
 /// Parsed figure.
 pub(crate) struct Drawing<'a>(Document<'a>);
@@ -169,6 +169,10 @@ fn the_lines_at_delta_and_at_the_certified_distance_are_correct() {
     let drawing = Drawing::of(&figure);
     let expected = drawing.place(true, CERTIFIED_M);
     assert!((drawing.level(CERTIFIED_LINE) - expected).abs() <= TOLERANCE_PX);
+    let figure = figures::distances(&history, DELTA_M, Some(DELTA_M), "Distances");
+    let equal = Drawing::of(&figure);
+    assert!(equal.words().iter().any(|word| word == "safety distance δ = certified = 2 m"), "{:?}", equal.words());
+    assert!(equal.polylines(CERTIFIED_LINE).is_empty(), "one line for both");
 }
 
 #[test]
@@ -443,7 +447,7 @@ fn no_recording_makes_a_figure_fail_or_contain_nan() {
                     assert!(!value.contains("NaN") && !value.contains("inf"), "{name}, {}: {value}", figure.name);
                 }
             }
-            let space = figures::paths_in_space(history, "Paths");
+            let space = figures::paths_in_space(history, &[], "Paths");
             Drawing::of(&space);
         }
     }
@@ -464,7 +468,7 @@ fn a_recording_gives_the_same_figures_as_its_run() {
 fn a_figure_escapes_its_title_and_is_self_contained() {
     let hostile = "</title><script>alert('1')</script>\u{0} & \"quoted\"";
     let mut figures = all_of(&history(3), DELTA_M);
-    figures.push(figures::paths_in_space(&history(3), hostile));
+    figures.push(figures::paths_in_space(&history(3), &[], hostile));
     figures.push(figures::energy(&history(3), hostile));
     for figure in &figures {
         let drawing = Drawing::of(figure);

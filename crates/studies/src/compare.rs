@@ -386,7 +386,13 @@ impl Comparison {
         vec![
             share("violated", "Violated", |law| law.violated),
             share("reached", "Reached the formation", |law| law.reached),
-            measured("time", "Time to reach the formation, median", "time [s]", &|law| law.reached_median_s, None),
+            measured(
+                "time",
+                "Time to reach the formation, median",
+                "time to reach [s]",
+                &|law| law.reached_median_s,
+                None,
+            ),
             measured(
                 "clearance",
                 "Smallest separation less delta, median",
@@ -444,7 +450,7 @@ impl Study for Comparison {
             .column("refused_count", "Refused by check", Kind::Count, |law| law.refused)
             .column("reached", "Reached [%]", Kind::Share, |law| law.reached)
             .column("reached_median", "Time to reach, median [s]", Kind::Estimate, |law| law.reached_median_s)
-            .column("reached_p95", "Time to reach, 95 % [s]", Kind::Estimate, |law| law.reached_p95_s)
+            .column("reached_p95", "Time to reach, 95th percentile [s]", Kind::Estimate, |law| law.reached_p95_s)
             .column("min_smallest", "Separation, smallest [m]", Kind::AtLeast, |law| law.min_smallest_m)
             .column("min_smallest_seed", "", Kind::Integer, |law| law.min_smallest_seed)
             .column("min_median", "Separation, median [m]", Kind::Estimate, |law| law.min_median_m)
@@ -471,7 +477,8 @@ impl Study for Comparison {
         vec![
             Section::new(
                 "Laws side by side",
-                "Each law flew from the same starts; dots are estimates, and lines are their 95 % intervals.",
+                "Each law flew from the same starts; dots are estimates, and lines are their 95 % intervals. A dot \
+                 without a line has no interval, because an interval needs more flights.",
                 [
                     Block::Figures(self.figures()),
                     part("How flights ended, with 95 % intervals", 1..9),

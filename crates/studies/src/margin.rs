@@ -11,7 +11,7 @@ use crate::statistics::{CONFIDENCE, Estimate, Proportion};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
 use tautline_core::text::{as_toml, counted, significant};
-use tautline_report::figures::{Separation, Share, margin as figure, separations};
+use tautline_report::figures::{Separation, Share, margin as figure, separations, verdicts};
 use tautline_report::report::page::{Badge, Tone};
 use tautline_report::request::{Failure, ScenarioRequest, in_range};
 use tautline_sim::preflight::{Bound, ContactState, PredictedMargin, Preflight};
@@ -28,8 +28,9 @@ const HALVINGS: RangeInclusive<u32> = 0..=50;
 const ASSUMED: [&str; 3] = [
     "The verdict holds at a value of the key if every run at the value shows it. More runs therefore find a smaller \
      margin.",
-    "The range is scanned at a few values first; then the first interval in which the verdict turns is halved. Two \
-     turns between neighbouring scanned values stay unnoticed.",
+    "The range is scanned at a few values first; then the first interval in which the verdict turns is halved. Values \
+     are rounded by at most 1 % of the distance to the next. Two turns between neighbouring scanned values stay \
+     unnoticed.",
     "Shares have the interval of Clopper and Pearson for a number of runs that was fixed before the first.",
 ];
 
@@ -350,28 +351,32 @@ impl Study for Margin {
     }
 
     fn sections(&self) -> Vec<Section> {
-        let shares = self.probes.iter().map(|probe| Share {
-            value: probe.value,
-            share: probe.held.share.unwrap_or(f64::NAN),
-            interval: (self.runs > 1).then_some([probe.held.low, probe.held.high]),
-        });
-        let chart = figure(
-            &shares.collect::<Vec<_>>(),
-            &self.key,
-            self.question.words()[0],
-            self.turn.map(|turn| turn.bracket),
-            &self.predicted.iter().filter_map(|margin| Some((margin.value?, prediction(margin)))).collect::<Vec<_>>(),
-            self.logarithmic,
-        );
         let lengths = self.probes.iter().filter_map(|probe| {
             let median_m = Estimate::quantile(&probe.flights.iter().filter_map(|of| of.min_m).collect::<Vec<_>>(), 0.5);
             let interval_m = median_m.low.zip(median_m.high).map(|(low, high)| [low, high]);
-            Some(Separation { value: probe.value, smallest_m: probe.min_m?, median_m: median_m.value?, interval_m })
+            let (value, flights) = (probe.value, probe.held.of);
+            Some(Separation { value, flights, smallest_m: probe.min_m?, median_m: median_m.value?, interval_m })
         });
         let lengths: Vec<_> = lengths.collect();
-        let separation = (!lengths.is_empty())
-            .then(|| separations("separation", &self.key, &lengths, self.about.delta_m, self.logarithmic));
-        let figures = std::iter::once(chart).chain(separation).collect();
+        let (delta_m, bracket, words) = (self.about.delta_m, self.turn.map(|turn| turn.bracket), self.question.words());
+        let predicted = self.predicted.iter().filter_map(|margin| Some((margin.value?, prediction(margin))));
+        let predicted = predicted.collect::<Vec<_>>();
+        // A share of one flight is its verdict, which the marks of the separations show.
+        let figures = if self.runs == 1 && lengths.len() == self.probes.len() {
+            let flights: Vec<_> = lengths.into_iter().zip(self.probes.iter().map(Probe::holds)).collect();
+            vec![verdicts(&flights, &self.key, words, delta_m, bracket, &predicted, self.logarithmic)]
+        } else {
+            let shares = self.probes.iter().map(|probe| Share {
+                value: probe.value,
+                share: probe.held.share.unwrap_or(f64::NAN),
+                interval: (self.runs > 1).then_some([probe.held.low, probe.held.high]),
+            });
+            let shares = shares.collect::<Vec<_>>();
+            let chart = figure(&shares, &self.key, words[0], bracket, &predicted, self.logarithmic);
+            let separation = (!lengths.is_empty())
+                .then(|| separations("separation", &self.key, &lengths, delta_m, self.logarithmic));
+            std::iter::once(chart).chain(separation).collect()
+        };
         vec![
             Section::new("Where the verdict turns", ABOUT, [Block::Figures(figures)]),
             Section::new(
@@ -418,6 +423,22 @@ enum Bisection {
     },
 }
 
+/// Largest rounding of a value, relative to its distance from the neighbouring values.
+const ROUNDING: f64 = 0.01;
+
+/// Rounds a value to a multiple of the largest power of ten that is at most `step`. The result has few digits, so
+/// texts show it exactly.
+fn shortened(value: f64, step: f64) -> f64 {
+    // Doubles hold powers of ten up to 10^22 exactly, so the result is the double nearest to the decimal number.
+    const EXACT: f64 = 22.0;
+    let exponent = step.log10().floor();
+    if exponent.is_nan() || exponent.abs() > EXACT {
+        return value;
+    }
+    let power = libm::pow(10.0, exponent.abs()).round();
+    if exponent < 0.0 { (value * power).round() / power } else { (value / power).round() * power }
+}
+
 /// Calls `ask` at evenly spaced values, then halves the first interval in which the answer turns. With `integers`,
 /// calls `ask` only at integers, at each at most once.
 ///
@@ -428,16 +449,20 @@ fn search<E>(
     integers: bool,
     ask: &mut dyn FnMut(f64) -> Result<Option<bool>, E>,
 ) -> Result<Option<Bisection>, E> {
-    let between = |from: f64, to: f64, share: f64| {
-        let ratio = || from * libm::pow(to / from, share);
-        let value = if range.logarithmic { ratio() } else { from + (to - from) * share };
-        if integers { value.round() } else { value }
+    // `part` is the share between neighbouring values.
+    let between = |from: f64, to: f64, share: f64, part: f64| {
+        let at = |share: f64| {
+            if range.logarithmic { from * libm::pow(to / from, share) } else { from + (to - from) * share }
+        };
+        let value = at(share);
+        let gap = (value - at(share - part)).abs().min((at(share + part) - value).abs());
+        if integers { value.round() } else { shortened(value, ROUNDING * gap) }
     };
     let last = range.scan.max(2) - 1;
     let value = |k: usize| match k {
         0 => range.from,
         _ if k == last => range.to,
-        _ => between(range.from, range.to, k as f64 / last as f64),
+        _ => between(range.from, range.to, k as f64 / last as f64, 1.0 / last as f64),
     };
     let mut values: Vec<_> = (0..=last).map(value).collect();
     values.dedup();
@@ -455,7 +480,7 @@ fn search<E>(
     };
     let (mut before, mut after) = (turn[0].0, turn[1].0);
     for _ in 0..range.halvings {
-        let middle = between(before, after, 0.5);
+        let middle = between(before, after, 0.5, 0.5);
         // `before` and `after` are neighbouring numbers.
         if middle == before || middle == after {
             break;

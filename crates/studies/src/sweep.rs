@@ -1,5 +1,7 @@
 //! How flights depend on one or two keys: shares and separations over a grid of their values.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use crate::attack::{Bound, FLIGHTS};
@@ -138,6 +140,11 @@ impl SweptKey {
             }
             _ => Err(wrong(&format!("--key {text}: is neither KEY=FROM:TO:COUNT nor a list"))),
         }
+    }
+
+    /// Returns whether the key is a seed.
+    fn is_seed(&self) -> bool {
+        self.key.rsplit('.').next() == Some("seed")
     }
 
     /// Returns a key with these values.
@@ -318,6 +325,26 @@ impl Sweep {
         format!("{}, {flights}", counted(flown, "point", "points"))
     }
 
+    /// Returns whether points that differ only in the key at `place` all have the same flights, and there are such
+    /// points.
+    fn is_inert(&self, place: usize) -> bool {
+        let mut flown: BTreeMap<Vec<u64>, &Point> = BTreeMap::new();
+        let mut compared = 0;
+        let hashes = |point: &Point| point.flights.iter().map(|flight| flight.state_hash.clone()).collect::<Vec<_>>();
+        for point in self.points.iter().filter(|point| point.refused == 0) {
+            let others = point.values.iter().enumerate().filter(|&(k, _)| k != place);
+            let first = *flown.entry(others.map(|(_, value)| value.to_bits()).collect()).or_insert(point);
+            if first.values == point.values {
+                continue;
+            }
+            compared += 1;
+            if hashes(first) != hashes(point) {
+                return false;
+            }
+        }
+        compared > 0
+    }
+
     /// Returns the worst flight and its point.
     fn worst(&self) -> Option<(&Point, &FlightSummary)> {
         let flights = self.points.iter().flat_map(|point| point.flights.iter().map(move |flight| (point, flight)));
@@ -336,8 +363,8 @@ impl Sweep {
                 let separation = |point: &Point| {
                     let Estimate { value, low, high } = point.min_median_m;
                     let interval_m = low.zip(high).map(|(low, high)| [low, high]);
-                    let (smallest_m, median_m) = (point.min_smallest_m?, value?);
-                    Some(Separation { value: point.values[0], smallest_m, median_m, interval_m })
+                    let (smallest_m, median_m, flights) = (point.min_smallest_m?, value?, point.held.of);
+                    Some(Separation { value: point.values[0], flights, smallest_m, median_m, interval_m })
                 };
                 let mut points: Vec<_> = self.points.iter().collect();
                 points.sort_by(|a, b| a.values[0].total_cmp(&b.values[0]));
@@ -409,7 +436,14 @@ impl Study for Sweep {
             let (runs, with) = (counted(runs, "run", "runs"), sets(&self.keys, &point.values).join(", "));
             format!("{runs} could not be flown and count in no share, the first with {with}: {why}")
         });
-        [refused, self.jitter_m.map(jitter_note)].into_iter().flatten().collect()
+        let inert = self.keys.iter().enumerate().filter(|&(place, of)| of.is_seed() && self.is_inert(place));
+        let inert = inert.map(|(_, SweptKey { key, .. })| {
+            format!(
+                "{key} changes no flight, because the scenario draws nothing from it: its rows are the same flight; \
+                 {JITTER_KEY} gives random starts, and [wind], [sensing] and [network] have noise"
+            )
+        });
+        [refused, self.jitter_m.map(jitter_note)].into_iter().flatten().chain(inert).collect()
     }
 
     fn records(&self) -> Table {

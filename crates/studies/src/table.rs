@@ -338,6 +338,9 @@ impl Table {
             let (value, interval) = column.shown(cell);
             let shown = interval.map_or_else(|| value.render(), |interval| noted(&value, &interval));
             match (cell, column.tone()) {
+                (Cell::Share(share), Some(Tone::Good)) if column.kind == Kind::OneFlight && share.count == 0 => {
+                    tinted(&shown, Tone::Bad, share.of as f64)
+                }
                 (Cell::Share(share), Some(tone)) => tinted(&shown, tone, share.share.unwrap_or(0.0)),
                 _ => shown,
             }

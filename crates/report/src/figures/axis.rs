@@ -84,6 +84,21 @@ impl Axis {
         (place >= self.from - slack && place <= self.to + slack).then(|| place.clamp(self.from, self.to))
     }
 
+    /// Returns the number at the upper end.
+    pub(super) fn end(&self) -> f64 {
+        if self.scale == Scale::Log { 10.0_f64.powf(self.to) } else { self.to }
+    }
+
+    /// Returns whether two lines with the same abscissae lie on each other: they are apart by less than a line's width.
+    pub(super) fn draws_alike(&self, one: &[(f64, f64)], other: &[(f64, f64)]) -> bool {
+        const WIDTH: f64 = 2e-3;
+        let is_near = |(a, b): (&(f64, f64), &(f64, f64))| {
+            let places = [a.1, b.1].map(|y| self.place(y).map(|place| self.share(place)));
+            a.0 == b.0 && places[0].zip(places[1]).map_or(places[0] == places[1], |(a, b)| (a - b).abs() <= WIDTH)
+        };
+        one.len() == other.len() && !one.is_empty() && one.iter().zip(other).all(is_near)
+    }
+
     /// Returns the share of the axis up to a position, from 0 to 1.
     pub(super) fn share(&self, place: f64) -> f64 {
         (place - self.from) / (self.to - self.from)
@@ -134,7 +149,7 @@ impl Axis {
     pub(super) fn tick_label(&self, place: f64) -> String {
         match self.scale {
             Scale::Linear => number_label(place, self.step),
-            Scale::Log => power_label(place),
+            Scale::Log => power_label(place, self.ticks.iter().any(|tick| tick.abs() > MOST_ZEROS)),
         }
     }
 }
@@ -179,11 +194,15 @@ fn number_label(number: f64, step: f64) -> String {
     text.replace('-', "\u{2212}")
 }
 
-/// Formats a power of ten by its exponent.
-fn power_label(exponent: f64) -> String {
+/// Largest magnitude of an exponent on an axis of plain numbers.
+const MOST_ZEROS: f64 = 3.0;
+
+/// Formats a power of ten by its exponent: as `10⁻³`, or as a plain number. All ticks of an axis have one notation.
+fn power_label(exponent: f64, as_power: bool) -> String {
     const DIGITS: [char; 10] = ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'];
-    if exponent.abs() <= 2.0 {
-        return 10.0_f64.powf(exponent).to_string();
+    if !as_power {
+        let decimals = decimals_of(10.0_f64.powf(exponent), 17);
+        return format!("{:.decimals$}", 10.0_f64.powf(exponent));
     }
     let raised = |c: char| c.to_digit(10).map_or('⁻', |digit| DIGITS[digit as usize]);
     format!("10{}", format!("{exponent:.0}").chars().map(raised).collect::<String>())
@@ -211,12 +230,12 @@ mod tests {
     fn a_logarithmic_axis_has_whole_decades() {
         let axis = Axis::log("error [m]", [3.2e-3, 0.5, 8.0, 0.0, -1.0, f64::NAN]);
         assert_eq!((axis.from, axis.to), (-3.0, 1.0));
-        assert_eq!(labels(&axis), ["10⁻³", "0.01", "0.1", "1", "10"]);
+        assert_eq!(labels(&axis), ["0.001", "0.01", "0.1", "1", "10"]);
         assert_eq!((axis.place(0.0), axis.place(-1.0), axis.place(f64::NAN)), (None, None, None));
         assert_eq!(axis.place(0.01), Some(-2.0));
         let axis = Axis::log("error [m]", [1e-300, 1.0]);
         assert_eq!((axis.from, axis.to), (-18.0, 0.0));
-        assert_eq!(labels(&axis), ["10⁻¹⁸", "10⁻¹⁵", "10⁻¹²", "10⁻⁹", "10⁻⁶", "10⁻³", "1"]);
+        assert_eq!(labels(&axis), ["10⁻¹⁸", "10⁻¹⁵", "10⁻¹²", "10⁻⁹", "10⁻⁶", "10⁻³", "10⁰"]);
     }
 
     #[test]

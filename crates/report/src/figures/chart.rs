@@ -1,7 +1,8 @@
 //! Charts as plain data, and their drawing.
 
 use super::Figure;
-use super::axis::Axis;
+use super::axis::{Axis, Scale};
+use super::labels::Labels;
 use super::svg::{Align, Canvas, Colour, GRID, Marker, Point, SOFT_INK, Stroke, TEXT, text_px, thinned};
 
 /// Largest number of entries of a legend.
@@ -156,6 +157,21 @@ impl Chart {
         self.lines.push(Line { points, stroke, label: None });
     }
 
+    /// Gives lines that lie on each other one entry in the legend, with all their names: the first would be hidden.
+    pub(super) fn merge_equal_lines(&mut self) {
+        for k in 1..self.lines.len() {
+            let (before, rest) = self.lines.split_at_mut(k);
+            let line = &mut rest[0];
+            let alike = |other: &&mut Line| other.label.is_some() && self.y.draws_alike(&other.points, &line.points);
+            let equal = before.iter_mut().find(alike);
+            if let (Some(other), Some(label)) = (equal, line.label.as_ref()) {
+                other.label = other.label.take().map(|first| joined(&first, label));
+                line.label = None;
+                line.points.clear();
+            }
+        }
+    }
+
     /// Draws the chart under a title.
     pub(super) fn figure(mut self, name: &str, title: &str, description: &str) -> Figure {
         let mut height = if self.equal { self.make_axes_equal() } else { HEIGHT };
@@ -189,11 +205,15 @@ impl Chart {
                 Paint::Area(colour, opacity) => canvas.area(&points, colour, opacity),
             }
         }
-        for mark in &self.marks {
-            let Some(at) = self.place(mark.at).map(on_paper) else { continue };
+        let mut labels = Labels::default();
+        let marks = || self.marks.iter().filter_map(|mark| Some((mark, on_paper(self.place(mark.at)?))));
+        for (mark, at) in marks() {
             canvas.marker(mark.marker, at, mark.radius, mark.colour);
+            labels.avoid_mark(at);
+        }
+        for (mark, at) in marks() {
             if let Some(words) = &mark.text {
-                canvas.text_beside(mark.marker, at, words);
+                labels.beside(&mut canvas, mark.marker, at, words);
             }
         }
         if let Some(inset) =
@@ -205,7 +225,20 @@ impl Chart {
             canvas.group("panel", |canvas| self.draw_panel(canvas, panel, end));
         }
         draw_legend(&mut canvas, &legend, end + BELOW);
-        canvas.figure(name, description)
+        match self.cut_note() {
+            Some(note) => {
+                canvas.text((RIGHT, end + BELOW - 11.0), Align::RIGHT, &note);
+                canvas.figure(name, &format!("{description} Values {note}."))
+            }
+            None => canvas.figure(name, description),
+        }
+    }
+
+    /// Returns a note on numbers below a logarithmic axis.
+    fn cut_note(&self) -> Option<String> {
+        let is_cut = |&(_, y): &(f64, f64)| y.is_finite() && self.y.place(y).is_none() && y < self.y.end();
+        let has_cut = self.y.scale == Scale::Log && self.lines.iter().flat_map(|line| &line.points).any(is_cut);
+        has_cut.then(|| format!("below {} not shown", self.y.tick_label(self.y.from)))
     }
 
     /// Draws lines and marks around the middle of an inset, enlarged, in the upper corner that is farther from the
@@ -362,6 +395,13 @@ fn draw_frame(canvas: &mut Canvas, [x, y]: [&Axis; 2], on_paper: impl Fn(Point) 
     canvas.text_upwards((LABEL, f64::midpoint(corner.1, top.1)), &y.label);
 }
 
+/// Returns two names of the legend as one: `vehicle 1` and `vehicle 2` as `vehicle 1, 2`.
+fn joined(first: &str, second: &str) -> String {
+    let shared = first.split_once(' ').map(|(word, _)| format!("{word} "));
+    let short = shared.and_then(|word| second.strip_prefix(&word));
+    format!("{first}, {}", short.unwrap_or(second))
+}
+
 /// Returns the parts of a line whose ordinates are between two numbers.
 fn within(points: &[(f64, f64)], [low, high]: [f64; 2]) -> Vec<Vec<(f64, f64)>> {
     let mut parts: Vec<Vec<(f64, f64)>> = Vec::new();
@@ -437,6 +477,31 @@ fn draw_legend(canvas: &mut Canvas, rows: &[Vec<Entry<'_>>], top: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn equal_lines_share_an_entry_of_the_legend() {
+        let mut chart = Chart::new(Axis::time(0.0, 1.0), Axis::linear("y", [0.0, 100.0], true));
+        for (k, top) in [1.0, 50.0, 1.01, 1.0].into_iter().enumerate() {
+            chart.line(vec![(0.0, 0.0), (1.0, top)], Stroke::of_line(k), format!("vehicle {}", k + 1));
+        }
+        chart.merge_equal_lines();
+        let svg = chart.figure("name", "Title", "Description.").svg;
+        assert!(svg.contains(">vehicle 1, 3, 4<") && svg.contains(">vehicle 2<"), "{svg}");
+        assert_eq!(joined("1-2", "2-3"), "1-2, 2-3");
+    }
+
+    #[test]
+    fn a_note_names_the_end_of_a_logarithmic_axis_that_cuts_numbers() {
+        let figure = |least: f64| {
+            let mut chart = Chart::new(Axis::time(0.0, 1.0), Axis::log("error [m]", [1e-4, 1.0]));
+            chart.line(vec![(0.0, 1.0), (1.0, least)], Stroke::of_line(0), "error");
+            chart.figure("name", "Title", "Description.")
+        };
+        let cut = figure(1e-5);
+        assert!(cut.svg.contains(">below 10⁻⁴ not shown<"), "{}", cut.svg);
+        assert!(cut.description.ends_with("Values below 10⁻⁴ not shown."), "{}", cut.description);
+        assert!(figure(0.0).svg.contains("not shown") && !figure(1e-4).svg.contains("not shown"));
+    }
 
     #[test]
     fn lines_are_cut_where_they_leave_a_range() {

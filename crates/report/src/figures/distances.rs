@@ -15,8 +15,9 @@ const RANKED_PAIRS: usize = 20_000;
 const RANKED_INSTANTS: usize = 400;
 /// Number of pairs of a large swarm that are drawn one by one, the closest.
 const CLOSEST_PAIRS: usize = 5;
-/// Palette index of the colour of collisions.
+/// Palette indices of the colours of collisions and of the certified distance.
 const HIT: usize = 1;
+const CERTIFIED: usize = 2;
 
 /// Draws distances of pairs \[m\] over time \[s\], with the safety distance delta and the certified one, and below the
 /// clearance: the distances less delta, near delta. Up to 12 vehicles, every pair has a line; the closest ones have
@@ -42,15 +43,22 @@ pub fn distances(log: &FlightLog, delta_m: f64, certified_m: Option<f64>, title:
     let numbers: Vec<f64> = drawn.chain(bands).chain(marked).chain([delta_m]).chain(certified_m).collect();
     chart.y = Axis::distances("m", &numbers, delta_m);
     let least_m = closest.map_or(f64::NAN, |closest| closest.separation_m);
-    let last_m = chart.lines.iter().filter_map(|line| line.points.last()).map(|&(_, y)| y).fold(f64::NAN, f64::min);
-    chart.panel = panel(&chart.y, [least_m, last_m], delta_m);
-    chart.level(delta_m, Stroke::solid(INK, 2.0), format!("safety distance δ = {delta_m} m"));
-    if let Some(certified_m) = certified_m {
-        chart.level(
-            certified_m,
-            Stroke::dashed(INK, 1.3),
-            format!("certified {} m", beside_limit(certified_m, delta_m, 3)),
-        );
+    let median_m = |line: &Line| {
+        let mut known: Vec<_> = line.points.iter().map(|&(_, y)| y).filter(|y| y.is_finite()).collect();
+        quantile(&mut known, 0.5)
+    };
+    let typical_m = chart.lines.iter().map(median_m).fold(f64::NAN, f64::min);
+    chart.panel = panel(&chart.y, [least_m, typical_m], delta_m);
+    if spans.vehicles() <= FEW_VEHICLES {
+        chart.merge_equal_lines();
+    }
+    let is_equal = certified_m == Some(delta_m);
+    let both = if is_equal { " = certified" } else { "" };
+    chart.level(delta_m, Stroke::solid(INK, 2.0), format!("safety distance δ{both} = {delta_m} m"));
+    if let Some(certified_m) = certified_m.filter(|_| !is_equal) {
+        // Its dashes remain visible on the line of delta.
+        let stroke = Stroke::dashed(PALETTE[CERTIFIED], 1.6);
+        chart.level(certified_m, stroke, format!("certified {} m", beside_limit(certified_m, delta_m, 3)));
     }
     let scale = if chart.y.scale == Scale::Log { " on a logarithmic axis" } else { "" };
     let of = if log.metric().is_metres() { "" } else { ", scaled to the ellipsoids that must stay empty," };
@@ -85,21 +93,23 @@ fn pair_label(pair: Pair) -> String {
     format!("{first}-{second}")
 }
 
-/// Returns the plot of the clearance \[m\], unless the chart shows it as well. `last_m` is the smallest distance at the
-/// end.
-fn panel(y: &Axis, [least_m, last_m]: [f64; 2], delta_m: f64) -> Option<Panel> {
+/// Returns the plot of the clearance \[m\], unless the chart shows it as well. `typical_m` is the median over time of
+/// the closest pair's distance. The plot shows it besides the smallest distance, which may be a short spike.
+fn panel(y: &Axis, [least_m, typical_m]: [f64; 2], delta_m: f64) -> Option<Panel> {
     /// Smallest enlargement.
     const LEAST: f64 = 2.5;
-    /// Height of the plot relative to the clearance at the end, unless that is far above.
+    /// Height of the plot relative to the typical clearance.
     const SPACE: f64 = 1.15;
+    /// Largest height relative to the smallest clearance, which must remain visible.
+    const MOST: f64 = 10.0;
     let clearance_m = least_m - delta_m;
     let top_m = if clearance_m > 0.0 { 2.0 * clearance_m } else { -clearance_m };
     let top_m = top_m.max(0.25 * delta_m);
     let to = |top_m: f64| Axis::linear("clearance [m]", [clearance_m.min(0.0), top_m], true);
-    let near = to(top_m);
-    let end_m = SPACE * (last_m - delta_m);
-    let near = if end_m > near.to && end_m < SPACE * SPACE * near.to { to(end_m) } else { near };
-    let is_enlarged = y.scale == Scale::Log || (near.to - near.from) * LEAST < y.to - y.from;
+    let is_enlarged = |near: &Axis| y.scale == Scale::Log || (near.to - near.from) * LEAST < y.to - y.from;
+    let whole = to(top_m.max((SPACE * (typical_m - delta_m)).min(MOST * clearance_m.abs())));
+    let near = if is_enlarged(&whole) { whole } else { to(top_m) };
+    let is_enlarged = is_enlarged(&near);
     (delta_m > 0.0 && clearance_m.is_finite() && is_enlarged).then_some(Panel { y: near, limit: delta_m })
 }
 

@@ -79,16 +79,19 @@ pub fn by_law(
     }
     canvas.line(&[(left, top), (left, bottom), (RIGHT, bottom)], Stroke::solid(SOFT_INK, 0.8));
     canvas.text((f64::midpoint(left, RIGHT), bottom + BELOW - 6.0), Align::CENTRE_BELOW, label);
+    let unit = label.rsplit_once(" [").and_then(|(_, unit)| unit.strip_suffix(']')).unwrap_or_default();
     let said = rows.iter().map(|row| match row.value {
-        Some(value) => format!("{} {}", row.law, trimmed(value)),
+        Some(value) => format!("{} {} {unit}", row.law, trimmed(value)).trim_end().to_owned(),
         None => format!("{} none", row.law),
     });
-    canvas.figure(name, &format!("{title}: {}.", said.collect::<Vec<_>>().join(", ")))
+    let lacks_interval = known().any(|row| row.interval == [None; 2]);
+    let note = if lacks_interval { " A dot without a line: an interval needs more flights." } else { "" };
+    canvas.figure(name, &format!("{title}: {}.{note}", said.collect::<Vec<_>>().join(", ")))
 }
 
-/// Formats a number with four significant digits, without zeros at the end.
+/// Formats a number with three significant digits, without zeros at the end.
 fn trimmed(number: f64) -> String {
-    let text = significant(number, 4);
+    let text = significant(number, 3);
     if text.contains('.') { text.trim_end_matches('0').trim_end_matches('.').to_owned() } else { text }
 }
 

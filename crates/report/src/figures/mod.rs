@@ -18,6 +18,7 @@
 //! | [`convergence`] | an integrator's error over its step |
 //! | [`attack`] | the smallest separation found so far over the flights of a search |
 //! | [`margin`] | the share of flights with a property over the values of a key |
+//! | [`verdicts`] | the smallest separation and the verdict of single flights over the values of a key |
 //! | [`by_law`] | a number of each law with its interval |
 //! | [`shares`] | such shares of several laws |
 //! | [`separations`] | the smallest separation of flights over the values of a key |
@@ -36,12 +37,14 @@ mod axis;
 mod chart;
 mod distances;
 mod heat_map;
+mod labels;
 mod laws;
 mod outlines;
 mod over_time;
 mod paper;
 mod paths;
 mod recorded;
+mod space;
 mod spans;
 mod studies;
 mod svg;
@@ -52,9 +55,10 @@ pub use heat_map::{GridAxis, heat_map};
 pub use laws::{OfLaw, by_law};
 pub use over_time::{channels, control, disagreement, energy, shape_error};
 pub use paper::Format;
-pub use paths::{at_closest, paths, paths_in_space};
+pub use paths::{at_closest, paths};
 pub use recorded::{Encounter, closest_approach, encounters, smallest};
-pub use studies::{Histogram, Separation, Share, attack, histograms, margin, separations, shares};
+pub use space::paths_in_space;
+pub use studies::{Histogram, Separation, Share, attack, histograms, margin, separations, shares, verdicts};
 pub use validation::{Step, convergence, tension_curve};
 
 use spans::Spans;
@@ -103,7 +107,7 @@ pub fn of_run(log: &FlightLog, criteria: &Criteria<'_>) -> Vec<Figure> {
     let spans = Spans::of(log);
     let mut figures = vec![paths(log, criteria.obstacles, "Paths from above")];
     if !spans.is_level() {
-        figures.push(paths_in_space(log, "Paths in space"));
+        figures.push(paths_in_space(log, criteria.obstacles, "Paths in space"));
     }
     if log.count() > 1 {
         let scaled = if log.metric().is_metres() { "" } else { ", scaled to ellipsoids" };
@@ -127,6 +131,9 @@ pub(crate) fn time_ticks(from_s: f64, to_s: f64) -> Vec<(f64, String)> {
     let axis = axis::Axis::time(from_s, to_s);
     axis.ticks.iter().map(|&tick| (tick, axis.tick_label(tick))).collect()
 }
+
+/// Names of all figures of an audit of a recording.
+pub const NAMES_OF_AUDIT: [&str; 4] = ["encounters", "closest-approach", "smallest", "obstacles"];
 
 /// Names of all figures that [`of_run`] can draw.
 pub const NAMES_OF_RUN: [&str; 11] = [

@@ -1,6 +1,6 @@
-//! Outlines of obstacles from above.
+//! Outlines of obstacles, from above and in space.
 
-use nalgebra::{Rotation2, Vector2};
+use nalgebra::{Rotation2, Rotation3, Vector2, Vector3};
 
 use tautline_audit::{Obstacle, Shape};
 
@@ -69,10 +69,147 @@ fn clipped(mut corners: Vec<(f64, f64)>, Window { low, high }: Window) -> Vec<(f
     corners
 }
 
+/// An upright box: smallest and largest coordinates \[m\].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Room {
+    pub(super) low: Vector3<f64>,
+    pub(super) high: Vector3<f64>,
+}
+
+impl Room {
+    /// Returns the part of a segment within the box (Liang and Barsky).
+    fn clip(&self, from: Vector3<f64>, to: Vector3<f64>) -> Option<[Vector3<f64>; 2]> {
+        let along = to - from;
+        let (mut first, mut last) = (0.0_f64, 1.0_f64);
+        for axis in 0..3 {
+            if along[axis] == 0.0 {
+                if !(self.low[axis]..=self.high[axis]).contains(&from[axis]) {
+                    return None;
+                }
+                continue;
+            }
+            let [one, other] = [self.low, self.high].map(|end| (end[axis] - from[axis]) / along[axis]);
+            (first, last) = (first.max(one.min(other)), last.min(one.max(other)));
+        }
+        // Ends within the box stay exact, so that the segments of a line join.
+        let at = |share: f64| if share == 1.0 { to } else { from + along * share };
+        (first <= last).then(|| [first, last].map(at))
+    }
+
+    /// Returns the corners of the section of the box by a plane through a position, in order around their middle.
+    fn section(&self, place: Vector3<f64>, normal: Vector3<f64>) -> Vec<Vector3<f64>> {
+        let corner =
+            |k: usize| Vector3::from_fn(|axis, _| if k >> axis & 1 == 0 { self.low[axis] } else { self.high[axis] });
+        let edges = (0..8_usize).flat_map(|k| (0..3).map(move |axis| (k, k | 1 << axis))).filter(|(k, to)| k != to);
+        let mut corners: Vec<_> = edges
+            .filter_map(|(k, to)| {
+                let (from, to) = (corner(k), corner(to));
+                let [near, far] = [from, to].map(|at| (at - place).dot(&normal));
+                ((near < 0.0) != (far < 0.0)).then(|| from + (to - from) * (near / (near - far)))
+            })
+            .collect();
+        let middle = corners.iter().sum::<Vector3<f64>>() / corners.len().max(1) as f64;
+        let [across, up] = beside(normal);
+        let angle = |at: &Vector3<f64>| (at - middle).dot(&up).atan2((at - middle).dot(&across));
+        corners.sort_by(|a, b| angle(a).total_cmp(&angle(b)));
+        corners
+    }
+}
+
+/// Returns two unit vectors that are perpendicular to a vector and to each other.
+fn beside(along: Vector3<f64>) -> [Vector3<f64>; 2] {
+    let along = along.try_normalize(1e-12).unwrap_or(Vector3::z());
+    let other = if along.z.abs() > 0.9 { Vector3::x() } else { Vector3::z() };
+    let across = along.cross(&other).normalize();
+    [across, along.cross(&across)]
+}
+
+/// Returns the outline of an obstacle at its first position as lines within a box. A box has its edges, and a ball has
+/// great circles. A capsule has rings and two lengthwise sections.
+pub(super) fn wires(obstacle: &Obstacle, room: &Room) -> Vec<Vec<Vector3<f64>>> {
+    let Some(&(_, place)) = obstacle.path.first() else { return Vec::new() };
+    let closed: Vec<Vec<Vector3<f64>>> = match obstacle.shape {
+        Shape::Ball { radius_m } => capsule(Vector3::zeros(), Vector3::zeros(), radius_m),
+        Shape::Capsule { from_m, to_m, radius_m } => capsule(from_m, to_m, radius_m),
+        Shape::Box { half_m, yaw_rad } => {
+            let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_rad);
+            let face = |axis: usize, side: f64| {
+                let [one, other] = [(axis + 1) % 3, (axis + 2) % 3];
+                let corner = |(a, b): (f64, f64)| {
+                    let mut at = Vector3::zeros();
+                    (at[axis], at[one], at[other]) = (side * half_m[axis], a * half_m[one], b * half_m[other]);
+                    turn * at
+                };
+                [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)].map(corner).to_vec()
+            };
+            // The faces below and above, and two sides: every edge is among theirs.
+            [(2, -1.0), (2, 1.0), (0, -1.0), (0, 1.0)].map(|(axis, side)| face(axis, side)).to_vec()
+        }
+        Shape::HalfSpace { normal } => {
+            let section = room.section(place, normal);
+            vec![section.into_iter().map(|at| at - place).collect()]
+        }
+    };
+    let mut wires: Vec<Vec<Vector3<f64>>> = Vec::new();
+    for corners in closed {
+        let next = corners.iter().cycle().skip(1);
+        let mut is_joined = false;
+        for (&from, &to) in corners.iter().zip(next) {
+            let Some([from, to]) = room.clip(place + from, place + to) else {
+                is_joined = false;
+                continue;
+            };
+            match wires.last_mut().filter(|wire| is_joined && wire.last() == Some(&from)) {
+                Some(wire) => wire.push(to),
+                None => wires.push(vec![from, to]),
+            }
+            is_joined = true;
+        }
+    }
+    wires
+}
+
+/// Returns two lengthwise sections of a capsule, and rings around its ends.
+fn capsule(from: Vector3<f64>, to: Vector3<f64>, radius: f64) -> Vec<Vec<Vector3<f64>>> {
+    let along = (to - from).try_normalize(1e-12).unwrap_or(Vector3::z());
+    let [across, up] = beside(along);
+    let ring = |one: Vector3<f64>, other: Vector3<f64>, ends: [Vector3<f64>; 2]| -> Vec<Vector3<f64>> {
+        let corner = |k: u32| {
+            let (sin, cos) = (std::f64::consts::TAU * (f64::from(k) + 0.5) / f64::from(CORNERS)).sin_cos();
+            (if cos > 0.0 { ends[1] } else { ends[0] }) + (one * cos + other * sin) * radius
+        };
+        (0..CORNERS).map(corner).collect()
+    };
+    let mut lines = vec![ring(along, across, [from, to]), ring(along, up, [from, to]), ring(across, up, [from; 2])];
+    if from != to {
+        lines.push(ring(across, up, [to; 2]));
+    }
+    lines
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use nalgebra::Vector3;
+
+    #[test]
+    fn wires_stay_within_the_box_and_on_the_surface() {
+        let room = Room { low: Vector3::repeat(-10.0), high: Vector3::repeat(10.0) };
+        let at = |shape, place_m| {
+            wires(&Obstacle { name: String::new(), shape, clearance_m: None, path: vec![(0.0, place_m)] }, &room)
+        };
+        let ball = at(Shape::Ball { radius_m: 2.0 }, Vector3::new(9.0, 0.0, 0.0));
+        let places = || ball.iter().flatten();
+        assert!(places().all(|place| place.x <= 10.0 + 1e-9), "{ball:?}");
+        assert!(places().any(|place| (place.x - 10.0).abs() < 1e-9), "cut by a wall");
+        assert!(places().all(|place| (place - Vector3::new(9.0, 0.0, 0.0)).norm() < 2.0 + 1e-9));
+        let house = at(Shape::Box { half_m: Vector3::new(1.0, 2.0, 3.0), yaw_rad: 0.3 }, Vector3::zeros());
+        assert_eq!(house.iter().map(Vec::len).collect::<Vec<_>>(), [5, 5, 5, 5], "four closed faces");
+        let ground = at(Shape::HalfSpace { normal: Vector3::z() }, Vector3::zeros());
+        assert_eq!(ground.iter().map(Vec::len).collect::<Vec<_>>(), [5], "a rectangle");
+        assert!(at(Shape::Ball { radius_m: 2.0 }, Vector3::new(30.0, 0.0, 0.0)).is_empty());
+        let cable = Shape::Capsule { from_m: -Vector3::x() * 3.0, to_m: Vector3::x() * 3.0, radius_m: 0.5 };
+        assert_eq!(at(cable, Vector3::zeros()).len(), 4);
+    }
 
     const WINDOW: Window = Window { low: (-10.0, -10.0), high: (10.0, 10.0) };
 

@@ -113,6 +113,7 @@ fn of_each(chart: &mut Chart, spans: &Spans<'_>, numbers: impl for<'b> Fn(&'b Sp
         for i in coloured {
             chart.line(points(i), Stroke::of_line(i), format!("vehicle {}", i + 1));
         }
+        chart.merge_equal_lines();
         if !others.is_empty() {
             chart.lines.push(grey(Vec::new(), Some(format!("{} other vehicles", others.len()))));
         }

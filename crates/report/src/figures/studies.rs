@@ -2,8 +2,8 @@
 
 use super::Figure;
 use super::axis::Axis;
-use super::chart::{Chart, Mark};
-use super::svg::{INK, PALETTE, SOFT_INK, Stroke};
+use super::chart::{Chart, Line, Mark};
+use super::svg::{ALARM, INK, PALETTE, SOFT_INK, Stroke};
 use tautline_core::text::{exact, metres, significant};
 
 /// Draws the smallest separation found so far \[m\] over the `flights` of a search, with delta and the separation of
@@ -62,21 +62,77 @@ pub fn margin(
         let ring = Mark::ring((share.value, share.share), PALETTE[0], (k == 0).then(|| flights.to_owned()));
         chart.marks.push(Mark { radius: 3.5, ..ring });
     }
+    let turn = draw_turn(&mut chart, bracket, predicted);
+    chart.figure("margin", &format!("Share that {does}"), &format!("The share that {does} over {key}; {turn}."))
+}
+
+/// Draws the bracket in which a verdict changes, and `predicted` values with their labels. Returns the bracket in
+/// words.
+fn draw_turn(chart: &mut Chart, bracket: Option<[f64; 2]>, predicted: &[(f64, String)]) -> String {
     for (k, side) in bracket.into_iter().flatten().enumerate() {
         let label = (k == 0).then(|| "the verdict turns in between".to_owned());
         chart.upright(side, Stroke::dashed(SOFT_INK, 1.0), label);
     }
     for (k, (value, what)) in predicted.iter().enumerate() {
-        chart.upright(*value, Stroke::dashed(PALETTE[1 + k % 2], 1.5), Some(format!("predicted {what}")));
+        let stroke = Stroke::dashed(PALETTE[1 + k % 2], 1.5);
+        // A prediction beyond the axis has an entry in the legend only if the entry says so.
+        let label = if chart.x.place(*value).is_some() {
+            format!("predicted {what}")
+        } else {
+            format!("predicted {what}, not in this range")
+        };
+        chart.upright(*value, stroke, Some(label));
     }
-    let description = match bracket {
-        Some([low, high]) => {
-            let [low, high] = [low, high].map(|value| significant(value, 4));
-            format!("The share that {does} over {key}; the verdict turns between {low} and {high}.")
-        }
-        None => format!("The share that {does} over {key}; the verdict does not turn."),
+    let shown = |value| significant(value, 4);
+    bracket.map_or_else(
+        || "the verdict does not turn".to_owned(),
+        |[low, high]| format!("the verdict turns between {} and {}", shown(low), shown(high)),
+    )
+}
+
+/// Draws the smallest separations of single flights over the values of a key, with the safety distance delta \[m\]. A
+/// flight `holds` if it shows the verdict; `words` are the predicates of a flight that does and of one that does not.
+/// Bracket and predictions are those of [`margin`].
+#[must_use]
+pub fn verdicts(
+    flights: &[(Separation, bool)],
+    key: &str,
+    words: [&str; 2],
+    delta_m: f64,
+    bracket: Option<[f64; 2]>,
+    predicted: &[(f64, String)],
+    logarithmic: bool,
+) -> Figure {
+    let separations: Vec<_> = flights.iter().map(|&(of, _)| of).collect();
+    let mut chart = chart_of_separations(key, &separations, delta_m, logarithmic);
+    let points = separations.iter().map(|of| (of.value, of.smallest_m)).collect();
+    chart.lines.push(Line { points, stroke: Stroke::solid(SOFT_INK, 1.0), label: None });
+    let at = |of: &Separation| (of.value, of.smallest_m);
+    let mark = |of: &Separation, holds: bool, label| {
+        if holds { Mark::ring(at(of), PALETTE[0], label) } else { Mark::cross(at(of), ALARM, label) }
     };
-    chart.figure("margin", &format!("Share that {does}"), &description)
+    for (verdict, word) in [true, false].into_iter().zip(words) {
+        let marked = flights.iter().filter(|&&(_, holds)| holds == verdict);
+        chart
+            .marks
+            .extend(marked.enumerate().map(|(k, (of, holds))| mark(of, *holds, (k == 0).then(|| word.to_owned()))));
+    }
+    chart.level(delta_m, Stroke::dashed(INK, 1.3), format!("delta = {} m", exact(delta_m)));
+    let turn = draw_turn(&mut chart, bracket, predicted);
+    let title = format!("Smallest separation over {key}");
+    let [does, does_not] = words;
+    let description = format!("{title}, one flight for each value: a ring {does}, a cross {does_not}; {turn}.");
+    chart.figure("margin", &title, &description)
+}
+
+/// Returns an empty chart of smallest separations over the values of a key.
+fn chart_of_separations(key: &str, flights: &[Separation], delta_m: f64, logarithmic: bool) -> Chart {
+    let lengths = flights
+        .iter()
+        .flat_map(|of| [of.smallest_m, of.median_m].into_iter().chain(of.interval_m.into_iter().flatten()));
+    let values = flights.iter().map(|of| of.value);
+    let x = if logarithmic { Axis::log(key, values) } else { Axis::linear(key, values, false) };
+    Chart::new(x, Axis::linear("smallest separation [m]", lengths.chain([delta_m]), true))
 }
 
 /// Returns an empty chart of shares over the values of a key.
@@ -97,7 +153,9 @@ pub fn shares(name: &str, key: &str, does: &str, series: &[(String, Vec<Share>)]
         chart.line(shares.iter().map(|share| (share.value, share.share)).collect(), Stroke::of_line(k), law.clone());
     }
     let title = format!("Share that {does} over {key}");
-    chart.figure(name, &title, &format!("{title}, with 95 % intervals."))
+    let has_intervals = series.iter().flat_map(|(_, shares)| shares).any(|share| share.interval.is_some());
+    let about = if has_intervals { "with 95 % intervals" } else { "one flight for each value" };
+    chart.figure(name, &title, &format!("{title}, {about}."))
 }
 
 /// Smallest separations of the flights at one value of a key.
@@ -105,6 +163,8 @@ pub fn shares(name: &str, key: &str, does: &str, series: &[(String, Vec<Share>)]
 pub struct Separation {
     /// Value of the key.
     pub value: f64,
+    /// Number of flights.
+    pub flights: u64,
     /// Smallest over all flights \[m\].
     pub smallest_m: f64,
     /// Median of the flights \[m\].
@@ -116,12 +176,7 @@ pub struct Separation {
 /// Draws smallest separations of flights over the values of a key, with the safety distance delta \[m\].
 #[must_use]
 pub fn separations(name: &str, key: &str, flights: &[Separation], delta_m: f64, logarithmic: bool) -> Figure {
-    let lengths = flights
-        .iter()
-        .flat_map(|of| [of.smallest_m, of.median_m].into_iter().chain(of.interval_m.into_iter().flatten()));
-    let values = flights.iter().map(|of| of.value);
-    let x = if logarithmic { Axis::log(key, values) } else { Axis::linear(key, values, false) };
-    let mut chart = Chart::new(x, Axis::linear("smallest separation [m]", lengths.chain([delta_m]), true));
+    let mut chart = chart_of_separations(key, flights, delta_m, logarithmic);
     for of in flights {
         chart.interval(of.value, of.interval_m, Stroke::of_line(0));
     }
@@ -129,18 +184,23 @@ pub fn separations(name: &str, key: &str, flights: &[Separation], delta_m: f64, 
     if flights.iter().any(|of| of.median_m != of.smallest_m) {
         chart.line(curve(|of| of.median_m), Stroke::of_line(0), "median of the flights");
     }
-    chart.line(curve(|of| of.smallest_m), Stroke::of_line(1), "smallest of all flights");
+    let is_single = flights.iter().all(|of| of.flights <= 1);
+    let smallest = if is_single { "one flight for each value" } else { "smallest of all flights" };
+    chart.line(curve(|of| of.smallest_m), Stroke::of_line(1), smallest);
     for flight in flights {
         let at = (flight.value, flight.smallest_m);
         chart.marks.push(Mark { radius: 3.5, ..Mark::ring(at, Stroke::of_line(1).colour, None) });
     }
     chart.level(delta_m, Stroke::dashed(INK, 1.3), format!("delta = {} m", exact(delta_m)));
     let title = format!("Smallest separation over {key}");
-    chart.figure(
-        name,
-        &title,
-        &format!("{title}: the median of the flights with its 95 % interval, and the smallest of all."),
-    )
+    let about = if is_single {
+        "one flight for each value"
+    } else if flights.iter().any(|of| of.interval_m.is_some()) {
+        "the median of the flights with its 95 % interval, and the smallest of all"
+    } else {
+        "the median of the flights, whose interval needs more flights, and the smallest of all"
+    };
+    chart.figure(name, &title, &format!("{title}: {about}."))
 }
 
 /// Counts of values in intervals of equal width.

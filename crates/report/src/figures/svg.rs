@@ -10,6 +10,9 @@ use crate::simplify::needed;
 /// A position on the drawing, to the right and down \[px\].
 pub(super) type Point = (f64, f64);
 
+/// A rectangle of the drawing: left, top, right and bottom \[px\].
+pub(super) type Rect = [f64; 4];
+
 /// Font sizes \[px\].
 pub(super) const TEXT: f64 = 13.5;
 const HEADING: f64 = 14.5;
@@ -111,8 +114,8 @@ pub(super) enum Marker {
 pub(super) struct Align(&'static str, &'static str);
 
 impl Align {
-    pub(super) const LEFT_BELOW: Self = Self("start", "0");
     pub(super) const LEFT: Self = Self("start", "0.35em");
+    pub(super) const CENTRE: Self = Self("middle", "0.35em");
     pub(super) const CENTRE_BELOW: Self = Self("middle", "0");
     pub(super) const CENTRE_ABOVE: Self = Self("middle", "0.76em");
     pub(super) const RIGHT: Self = Self("end", "0.35em");
@@ -173,7 +176,7 @@ impl Canvas {
             rect x=(px(x)) y=(px(y)) width=(px(width + 0.3)) height=(px(height + 0.3)) fill=(fill) {}
             @if let Some((words, ink)) = words {
                 text x=(px(x + width / 2.0)) y=(px(y + height / 2.0)) text-anchor="middle" dy="0.35em" fill=(ink) {
-                    (words)
+                    (printable(&words))
                 }
             }
         };
@@ -224,13 +227,9 @@ impl Canvas {
         self.shapes += &html! { g class=(class) { (PreEscaped(within)) } }.into_string();
     }
 
-    /// Draws a text beside a marker: to the lower left of a cross, and to the upper right of a ring. The texts of a
-    /// vehicle that ends at its start do not overlap.
-    pub(super) fn text_beside(&mut self, marker: Marker, (x, y): Point, words: &str) {
-        match marker {
-            Marker::Cross => self.text((x - 5.0, y + 4.0), Align::RIGHT_ABOVE, words),
-            Marker::Ring | Marker::Dot => self.text((x + 6.0, y - 3.0), Align::LEFT_BELOW, words),
-        }
+    /// Returns whether a rectangle is on the drawing, below the title.
+    pub(super) fn contains(&self, [left, top, right, bottom]: Rect) -> bool {
+        left >= 0.0 && top >= TITLE_BASELINE && right <= self.size.0 && bottom <= self.size.1
     }
 
     pub(super) fn text(&mut self, (x, y): Point, Align(anchor, dy): Align, words: &str) {
@@ -264,15 +263,38 @@ impl Canvas {
     }
 }
 
-/// Returns the text without control characters, which XML forbids.
+/// Returns the text without control characters, which XML forbids, and with a typographic minus sign before numbers and
+/// in exponents.
 fn printable(text: &str) -> String {
-    text.chars().filter(|c| !c.is_control()).collect()
+    let is_number = |c: &char| c.is_ascii_digit() || *c == '.';
+    let chars: Vec<_> = text.chars().filter(|c| !c.is_control()).collect();
+    let is_minus = |k: usize| {
+        let before = match chars[..k] {
+            [.., digit, 'e'] => is_number(&digit),
+            [.., before] => matches!(before, ' ' | '(' | '[' | ',' | '='),
+            [] => true,
+        };
+        chars[k] == '-' && before && chars.get(k + 1).is_some_and(is_number)
+    };
+    chars.iter().enumerate().map(|(k, &c)| if is_minus(k) { '\u{2212}' } else { c }).collect()
 }
 
 /// Returns an upper estimate of the width of words by the font size \[px\].
 pub(super) fn text_px(words: &str) -> f64 {
     let narrow = words.chars().filter(|c| matches!(c, '.' | ' ' | '[' | ']')).count();
     TEXT * (0.6 * words.chars().count() as f64 - 0.3 * narrow as f64)
+}
+
+/// Returns the rectangle of a text, which contains its letters.
+pub(super) fn text_rect((x, y): Point, Align(anchor, dy): Align, words: &str) -> Rect {
+    let width = text_px(words);
+    let left = match anchor {
+        "start" => x,
+        "end" => x - width,
+        _ => x - width / 2.0,
+    };
+    let baseline = y + TEXT * dy.trim_end_matches("em").parse().unwrap_or(0.0);
+    [left, baseline - 0.76 * TEXT, left + width, baseline + 0.2 * TEXT]
 }
 
 /// Rounds a length to a tenth of a pixel.

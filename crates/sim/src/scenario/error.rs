@@ -101,6 +101,18 @@ impl ScenarioError {
         self
     }
 
+    /// Adds `start.jitter_m` to the causes of two starts within delta, if the jitter moved the starts.
+    pub(super) fn with_jitter(mut self, jitter_m: f64) -> Self {
+        let is_of_starts = self.fields.first().is_some_and(|field| field.key == "start.positions_m");
+        if jitter_m == 0.0 || self.code != "scenario/within-delta" || !is_of_starts {
+            return self;
+        }
+        self.message = format!("{}; start.jitter_m moved each coordinate by up to {jitter_m} m", self.message).into();
+        self.help = Some("reduce start.jitter_m, move one of the vehicles away, or reduce law.delta_m".into());
+        self.fields.insert(0, Field { key: "start.jitter_m".into(), entry: None, leg: 0 });
+        self
+    }
+
     pub(super) fn with_place(mut self, place: Place) -> Self {
         self.place = Some(Box::new(place));
         self

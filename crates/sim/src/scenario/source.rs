@@ -118,8 +118,9 @@ pub(super) fn finish(mut document: Document, text: &Text<'_>) -> Result<Scenario
     let stem = || Path::new(text.name).file_stem().unwrap_or_default().to_string_lossy().into_owned();
     document.name = document.name.or_else(|| Some(as_name(&stem())));
     template::check_laws(&document.laws).map_err(|(law, error)| text.place_in_law(law, error))?;
+    let jitter_m = document.start.jitter_m;
     let scenario = build::scenario(document).map_err(|error| text.place(error))?;
-    scenario.check().map_err(|error| text.place(error))?;
+    scenario.check().map_err(|error| text.place(error.with_jitter(jitter_m)))?;
     Ok(scenario)
 }
 

@@ -47,6 +47,12 @@ impl LawSummary {
         if of == 0 {
             return "no flight was flown".to_owned();
         }
+        let refused = if self.is_mostly_refused() {
+            let runs = separated(self.not_flown + of);
+            format!("MOST DRAWS REFUSED, {} of {runs} could not be flown: ", separated(self.not_flown))
+        } else {
+            String::new()
+        };
         // An upper bound of 1 is no information.
         let bound = self.violated_below.filter(|bound| bound.share < 1.0).map(|bound| {
             let kind = match bound.kind {
@@ -65,7 +71,14 @@ impl LawSummary {
         };
         let counts = outcomes(count, self.unknown, self.clear.count, &format!("{} {flights}", separated(of)));
         let bound = bound.unwrap_or_default();
-        format!("{broken}{counts}{bound}")
+        format!("{refused}{broken}{counts}{bound}")
+    }
+
+    /// Returns whether more than half of the runs cannot be flown as drawn. The answer is then of a small part of what
+    /// the specification describes.
+    #[must_use]
+    pub fn is_mostly_refused(&self) -> bool {
+        self.not_flown > self.violated.of
     }
 }
 
@@ -231,6 +244,7 @@ impl Study for Summary {
             (true, _) => (Tone::Good, "no violation"),
             (false, true) => (Tone::Bad, "violations"),
             (false, false) if is_broken => (Tone::Bad, "certificate broken"),
+            (false, false) if self.laws.iter().any(LawSummary::is_mostly_refused) => (Tone::Bad, "most draws refused"),
             (false, false) if self.is_of_estimates() => (Tone::Bad, "no result"),
             (false, false) => (Tone::Bad, "unknown flights"),
         };
@@ -271,7 +285,12 @@ impl Study for Summary {
         };
         each(|law| law.not_flown, ["run", "runs"], &|law| {
             let why = law.not_flown_because.as_deref().unwrap_or("unknown reason");
-            format!(" could not be flown and count in no share ({why})")
+            let advice = if law.is_mostly_refused() {
+                "; more than half of the draws, so narrow [vary] until most can be flown"
+            } else {
+                ""
+            };
+            format!(" could not be flown and count in no share ({why}){advice}")
         });
         each(|law| law.certificates_broken, ["flight", "flights"], &|_| {
             ": CERTIFICATE BROKEN, two vehicles came closer than certified, because of a step too long for the law or \
@@ -327,7 +346,11 @@ impl Study for Summary {
 
     fn is_good(&self) -> bool {
         self.laws.iter().all(|law| {
-            law.violated.count == 0 && law.unknown == 0 && law.certificates_broken == 0 && law.splitting.is_none()
+            law.violated.count == 0
+                && law.unknown == 0
+                && law.certificates_broken == 0
+                && law.splitting.is_none()
+                && !law.is_mostly_refused()
         })
     }
 }

@@ -25,6 +25,8 @@ const RUNS_OF_A_SHARD: u64 = 250;
 const MOST_TRIED: usize = 1000;
 /// Number of first runs that are searched for one that can be flown.
 const FIRST_TRIED: u64 = 100;
+/// Code of a value outside the bounds of its key.
+const OUT_OF_RANGE: &str = "scenario/out-of-range";
 /// Seeds that each run draws unless the specification sets them.
 const START_SEED: &str = "start.seed";
 const NOISE_SEED: &str = "noise.seed";
@@ -69,7 +71,7 @@ impl Campaign {
         shards: Option<u64>,
         program: Program,
     ) -> Result<Self, Failure> {
-        let plain = |error| spec.scenario("scenario", "", error);
+        let plain = |error| spec.scenario("scenario", "scenario", error);
         let file = folder.join(&spec.scenario);
         let source =
             if file.is_file() { Source::File(file) } else { Source::resolve(&spec.scenario).map_err(plain)? };
@@ -215,10 +217,11 @@ impl Campaign {
                 self.read_with(law, &drawn).map_err(|error| spec.scenario(&format!("vary.{key}"), &situation(), error))
             });
             let (flown, refused): (Vec<_>, Vec<_>) = tried.partition(Result::is_ok);
-            // A range may contain values that cannot be flown, which are counted; a listed value must be valid.
-            if (variation.is_listed() || flown.is_empty())
-                && let Some(Err(failure)) = refused.into_iter().next()
-            {
+            let mut refused = refused.into_iter().filter_map(Result::err);
+            // A range may contain values that cannot be flown, which are counted. A listed value must be valid, and
+            // the ends of a range must be within the bounds of the key.
+            let must_fly = variation.is_listed() || flown.is_empty();
+            if let Some(failure) = refused.find(|failure| must_fly || failure.code() == OUT_OF_RANGE) {
                 return Err(failure);
             }
         }
@@ -407,7 +410,10 @@ fn runs(spec: &Spec) -> Result<u64, Failure> {
         spec.refuse("vary", format!("vary: the grids have more than {MOST_RUNS} points together"), remedy)
     })?;
     match spec.runs {
-        None if grids.is_empty() => Err(spec.refuse("runs", "missing key `runs`", "add runs = 1000")),
+        None if grids.is_empty() => {
+            let problem = "runs: missing key, which only grids can replace";
+            Err(spec.at_beginning(refused(problem, "add the number of runs, such as runs = 1000")))
+        }
         None => Ok(points),
         Some(runs) if runs == 0 || runs > MOST_RUNS => {
             let problem = format!("runs: must be from 1 to {MOST_RUNS}, got {runs}");

@@ -168,6 +168,11 @@ impl Spec {
         span.map_or(failure.clone(), |span| failure.at(&self.place(span)))
     }
 
+    /// Returns the failure with the beginning of the file as its place, for a missing key.
+    pub(super) fn at_beginning(&self, failure: Failure) -> Failure {
+        failure.at(&self.place(0..0))
+    }
+
     fn place(&self, span: Range<usize>) -> Place {
         Place::new(&self.source.name, &self.source.text, span)
     }

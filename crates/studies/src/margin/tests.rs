@@ -25,7 +25,8 @@ fn the_bracket_contains_the_turn_and_each_halving_halves_it() {
         let Some(Bisection::VerdictChange { before, after, was, turns }) = turn else { panic!("{turn:?}") };
         assert_eq!((was, turns, asked), (from < to, 1, 15));
         assert!((before - 1.2345) * (after - 1.2345) <= 0.0, "{before} {after}");
-        assert_eq!((after - before).abs(), 2.0_f64.powi(-10));
+        // Each value is rounded by at most 1 % of its distance to the next.
+        assert!(((after - before).abs() * 2.0_f64.powi(10) - 1.0).abs() < 0.1, "{before} {after}");
     }
 }
 
@@ -80,6 +81,22 @@ fn an_interrupted_search_returns_only_known_brackets() {
     assert_eq!(broken(1), Ok(None), "one value is no bracket");
     let Ok(Some(Bisection::VerdictChange { before, after, .. })) = broken(2) else { panic!("two values are one") };
     assert_eq!((before, after), (0.0, 0.5));
+}
+
+#[test]
+fn values_have_few_digits() {
+    let mut asked = Vec::new();
+    let found = search(range(0.0, 0.3, 4, 6), false, &mut |value: f64| {
+        asked.push(value);
+        Ok::<_, ()>(Some(value < 0.123_456_789))
+    });
+    assert!(matches!(found, Ok(Some(Bisection::VerdictChange { .. }))), "{found:?}");
+    assert_eq!(asked[..4], [0.0, 0.1, 0.2, 0.3]);
+    assert!(asked.iter().all(|value| value.to_string().len() <= 8), "{asked:?}");
+    for (value, step, short) in [(0.075_000_000_000_000_01, 1e-3, 0.075), (12_345.0, 150.0, 12_300.0), (0.1, 0.0, 0.1)]
+    {
+        assert_eq!(super::shortened(value, step), short);
+    }
 }
 
 fn options(key: &str, range: Range, question: Criterion, runs: u64, seed: u64) -> Options {

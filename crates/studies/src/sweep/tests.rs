@@ -111,6 +111,15 @@ fn swept_seeds_and_jitters_override_the_defaults() {
 }
 
 #[test]
+fn a_seed_that_changes_no_flight_has_a_note() {
+    let notes = |keys: &[&str]| swept(&options(keys, 1)).notes().join("; ");
+    assert!(notes(&["start.seed=1,2,3"]).starts_with("start.seed changes no flight"));
+    assert!(notes(&["start.seed=1,2", "law.alpha=0.5,1"]).starts_with("start.seed changes no flight"));
+    assert_eq!(notes(&["start.seed=1,2", "start.jitter_m=0.2"]), "");
+    assert_eq!(notes(&["law.alpha=0.5,1"]), "");
+}
+
+#[test]
 fn wrong_grids_are_refused() {
     let refused = |options: &Options| {
         let flown = options.check().and_then(|()| batch(1, &mut |batch| options.fly(&base(pair(), &[]), batch)));

@@ -162,7 +162,8 @@ impl Page {
                 }
             }
         };
-        in_order(&page.into_string())
+        // Texts for a terminal have ASCII units; a page has one notation with its figures.
+        in_order(&page.into_string()).replace("m^2/s^2", "m²/s²").replace("m/s^2", "m/s²")
     }
 }
 

@@ -16,7 +16,9 @@ use nalgebra::Vector3;
 pub use own::{OwnRecording, run_audit};
 
 use self::own::RunAnswer;
+use super::run::{figure_files, write_files};
 use super::{Failure, Monitor, RECORDING, outputs};
+use crate::figures::{self, Format as FigureFormat};
 use crate::report::recorded::{AssumedMotion, Basis, Clock, RecordedReport, Source};
 use crate::report::{Status, write_atomically};
 use replays::Instants;
@@ -107,6 +109,12 @@ impl Subject<'_> {
     }
 }
 
+/// Returns the folder of the figures of a page.
+fn figures_beside(html: &Path) -> PathBuf {
+    let stem = html.file_stem().unwrap_or_default().to_string_lossy();
+    html.with_file_name(format!("{stem}-figures"))
+}
+
 /// Opens files or folders as one recording.
 ///
 /// # Errors
@@ -177,6 +185,8 @@ pub struct AuditRequest<'a> {
     pub command: String,
     /// Path of the page with figures.
     pub html: Option<PathBuf>,
+    /// Formats of the files of figures, in the folder `NAME-figures` beside the page `NAME.html`.
+    pub formats: Vec<FigureFormat>,
     /// Path of the proof, which `check_proof.py` confirms. Available for one CSV table and a safety distance alone.
     pub proof: Option<PathBuf>,
 }
@@ -196,6 +206,7 @@ impl<'a> AuditRequest<'a> {
             config: ConfigFile::default(),
             command: String::new(),
             html: None,
+            formats: Vec::new(),
             proof: None,
         }
     }
@@ -512,6 +523,12 @@ impl ConfiguredAudit<'_> {
         if let Some((html, instants)) = request.html.as_ref().zip(instants) {
             let (replay, figures) = replays::of_recording(open, monitor, &settings, &outcome, &report, instants)?;
             write_atomically(html, report.to_html(&replay, &figures, &request.command).as_bytes())?;
+            if !request.formats.is_empty() {
+                let folder = figures_beside(html);
+                let names = figures::NAMES_OF_AUDIT.iter();
+                let names = names.flat_map(|name| FigureFormat::ALL.map(|of| format!("{name}.{}", of.name())));
+                write_files(&folder, &names.collect::<Vec<_>>(), &figure_files(&figures, &request.formats))?;
+            }
         }
         if let Some((file, (path, _))) = request.proof.as_ref().zip(request.subject.only_file()) {
             let recording = &report.source.recording;
