@@ -77,6 +77,9 @@ struct Data<'a> {
     /// Origin of all drawn positions, and half of the box around everything \[m\].
     origin_m: [f64; 3],
     half_m: [f64; 3],
+    /// Azimuth and elevation of the oblique view \[rad\], and the axis along which a planar flight is seen.
+    oblique: [f64; 2],
+    across: Option<usize>,
     /// Side of the squares on the ground, and their lines relative to the origin, in single precision.
     square_m: f64,
     ground: String,
@@ -162,7 +165,9 @@ impl Replay {
         let (targets, guides) = targets_of(plan.as_ref(), &shown, begin_s, room_bytes / 4);
         let (nearest, holds) = (log.nearest(), log.holds);
         let near = nearest.clone().finish(MOST_SLICES.min(room_bytes / 10 / base64_bytes(SLICE_BYTES)));
-        let [near_s, near_who] = statements::pairs(&near, end_s, place);
+        let first = log.at(begin_s).and_then(|frame| frame.nearest).map(|(pair, _)| (begin_s, pair));
+        let [near_s, near_who] = statements::pairs(&near, first, end_s, place);
+        let viewpoint = stage.viewpoint(log);
         let extent = Extent::of(stage, log, &shown);
         let origin_m = place_of_weightiest(log, listed).unwrap_or(extent.middle_m());
         let level_m = stage.obstacles.iter().find_map(ground_m).unwrap_or(extent.low_m.z);
@@ -184,6 +189,8 @@ impl Replay {
             holds,
             origin_m: origin_m.into(),
             half_m: extent.half_m().into(),
+            oblique: [viewpoint.azimuth_deg, viewpoint.elevation_deg].map(f64::to_radians),
+            across: viewpoint.across,
             square_m,
             ground: singles(&lines.iter().map(|at| at - origin_m).collect::<Vec<_>>()),
             middle_m: [0.0; 3],

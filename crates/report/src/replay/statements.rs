@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 
 use super::{Kind, Moment, base64_of, doubles};
 use tautline_audit::{Approach, Slice, Slices};
+use tautline_core::swarm::Pair;
 use tautline_core::text::{beside_limit, seconds};
 
 /// Number of decimals of a distance.
@@ -81,16 +82,24 @@ impl<N: Fn(usize) -> Option<String>> Words<'_, N> {
 }
 
 /// Returns the times \[s\] from which a pair is the closest, as doubles, and the pairs, as two 16-bit indices each;
-/// 65535 is a vehicle that is not drawn.
-pub(super) fn pairs(slices: &[Slice], end_s: f64, place: impl Fn(usize) -> Option<usize>) -> [String; 2] {
+/// 65535 is a vehicle that is not drawn. `first` is the closest pair at the first instant alone, with its time.
+pub(super) fn pairs(
+    slices: &[Slice],
+    first: Option<(f64, Pair)>,
+    end_s: f64,
+    place: impl Fn(usize) -> Option<usize>,
+) -> [String; 2] {
     let place = |vehicle: usize| place(vehicle).and_then(|at| u16::try_from(at).ok()).unwrap_or(NOT_DRAWN);
+    let two = |pair: Option<Pair>| pair.map_or([NOT_DRAWN; 2], |two| [place(two.first()), place(two.second())]);
+    let after_s = first.map_or(f64::NEG_INFINITY, |(at_s, _)| at_s.next_up());
     let begins = slices.iter().skip(1).map(|slice| slice.from_s).chain([f64::INFINITY]);
     let pairs = slices.iter().zip(begins).flat_map(|(slice, next_s)| {
-        let two = slice.closest.pair.vehicles().map_or([NOT_DRAWN; 2], |two| [place(two.first()), place(two.second())]);
         let none = (slice.to_s < next_s && slice.to_s < end_s).then_some((slice.to_s.next_up(), [NOT_DRAWN; 2]));
-        [Some((slice.from_s, two)), none].into_iter().flatten()
+        let begin = (slice.from_s.max(after_s), two(slice.closest.pair.vehicles()));
+        [Some(begin), none].into_iter().flatten()
     });
-    let (from_s, who): (Vec<_>, Vec<_>) = pairs.unzip();
+    let first = first.map(|(at_s, pair)| (at_s, two(Some(pair))));
+    let (from_s, who): (Vec<_>, Vec<_>) = first.into_iter().chain(pairs).unzip();
     [doubles(from_s.into_iter()), base64_of(who.iter().flatten().flat_map(|at| at.to_le_bytes()))]
 }
 
