@@ -24,7 +24,7 @@ const ELEVATION_DEG: [f64; 2] = [46.0, 28.0];
 /// Number of azimuths in a full turn among which the view with the fewest hidden vehicles is chosen.
 const AZIMUTHS: u32 = 24;
 /// Share of hidden vehicles that outweighs half a turn away from the usual azimuth.
-const HALF_TURN: f64 = 0.2;
+const HALF_TURN: f64 = 0.1;
 /// Distance of the eye from the middle of a flight, in units of its half diagonal.
 const EYE: f64 = 3.0;
 
@@ -54,13 +54,18 @@ impl Viewpoint {
         let elevation_deg = ELEVATION_DEG[usize::from(flown.z > FLAT * flown.xy().max())];
         let solid: Vec<_> = obstacles.iter().filter(|(shape, _)| !matches!(shape, Shape::HalfSpace { .. })).collect();
         let sights = (SIGHTS / solid.len().max(1)).max(FEWEST_SIGHTS);
-        let seen: Vec<_> = places.iter().step_by(places.len().div_ceil(sights).max(1)).collect();
+        // A replay opens at the start, which therefore counts as much as the whole flight.
+        let start = &places[..logs.first().map_or(0, |log| log.count()).min(places.len())];
+        let seen = [start, &places].map(|all| (all, all.len().div_ceil(sights).max(1)));
         let cost = |turn_deg: f64| {
             let back = back(usual_deg + turn_deg, elevation_deg);
             let eye = low / 2.0 + high / 2.0 + back * (EYE * flown.norm() / 2.0);
             let hides = |place: &Vector3<f64>| solid.iter().any(|(shape, at)| is_between(shape, *at, *place, eye));
-            let hidden = seen.iter().filter(|place| hides(place)).count();
-            hidden as f64 / seen.len().max(1) as f64 + HALF_TURN * turn_deg.abs() / 180.0
+            let hidden = seen.map(|(all, step)| {
+                let count = all.iter().step_by(step).filter(|place| hides(place)).count();
+                count as f64 / all.len().div_ceil(step).max(1) as f64
+            });
+            hidden[0] + hidden[1] + HALF_TURN * turn_deg.abs() / 180.0
         };
         // From small turns to large ones, so that the first of equal costs is the nearest.
         let step_deg = 360.0 / f64::from(AZIMUTHS);
