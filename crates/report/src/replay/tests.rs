@@ -305,3 +305,20 @@ fn findings_are_cut_to_the_flight_and_gaps_end_the_closest_pair() {
     let who = BASE64.decode(data["near_who"].as_str().expect("base64")).expect("base64");
     assert_eq!(who, [0, 0, 1, 0, 255, 255, 255, 255, 0, 0, 1, 0]);
 }
+
+/// At the start the data name the pair that pictures show, not the closest pair of the time after it.
+#[test]
+fn the_closest_pair_at_the_start_is_that_of_the_pictures() {
+    let mut log = FlightLog::default();
+    for (time_s, pair) in [(0.0, Pair::new(0, 1)), (1.0, Pair::new(1, 2))] {
+        let places_m = Rows::from_row_slice(&[-1.0 - time_s, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+        take(&mut log, time_s, places_m, Some(ClosestApproach { pair, separation_m: 1.0, time_s }));
+    }
+    let (_, data) = packed(&stage(3), &log, &[], PAGE_BYTES);
+    let bytes = |key: &str| BASE64.decode(data[key].as_str().expect("text")).expect("base64");
+    let who: Vec<_> = bytes("near_who").chunks_exact(2).map(|two| u16::from_le_bytes([two[0], two[1]])).collect();
+    let from: Vec<_> = bytes("near_s").chunks_exact(8).map(|of| f64::from_le_bytes(of.try_into().expect("8"))).collect();
+    assert_eq!(who[..2], [0, 1], "{who:?}");
+    assert_eq!((who.last(), from[0]), (Some(&2), 0.0), "{who:?}");
+    assert!(from[1..].iter().all(|&from_s| from_s > 0.0), "{from:?}");
+}
