@@ -313,8 +313,8 @@ const play = (root, data) => {
     if (playing) ask();
   };
 
-  // The camera looks at `target` [m] from `distance` [m]. Angles are in rad. A parallel view shows as much as a view in
-  // perspective shows at the target.
+  // The camera looks at `target` [m] from `distance` [m]. Angles are in rad. A parallel view has the scale that a
+  // view in perspective has at the target.
   let parallel = false;
   let yaw = 0, pitch = 0, distance = 1, target = [0, 0, 0], kept = { yaw, pitch, distance, target }, fitted = kept;
   // Positions of the vehicles that the camera fits, with the radius around each [m].

@@ -109,7 +109,7 @@ fn a_replay_draws_and_jumps_to_the_findings_of_the_audit() {
     assert_eq!(found["steps"], "0.03 s", "two samples of 60 a second");
 }
 
-/// The outline of a ball at a corner of the picture is an ellipse in perspective and a circle in a parallel view: every
+/// The outline of a ball at a corner of the picture is an ellipse in perspective and a circle in a parallel view. Every
 /// pixel off its edge is compared with the ray through it.
 #[test]
 fn a_ball_is_exact_to_the_pixel_anywhere_in_the_picture() {

@@ -81,7 +81,8 @@ impl Pictures for RunPictures {
         let (files, on_page): (Vec<_>, Vec<_>) = std::iter::zip(snapshots, encoded)
             .map(|(Snapshot { name, description, .. }, [png, small])| {
                 let file = file(&name);
-                let picture = page::Picture { description, data_uri: data_uri(&small), file: format!("snapshots/{file}") };
+                let picture =
+                    page::Picture { description, data_uri: data_uri(&small), file: format!("snapshots/{file}") };
                 ((file, png), (name, picture))
             })
             .unzip();

@@ -47,7 +47,8 @@ impl SceneBuilder<'_> {
         let (bottom, taken) = labels.placed();
         // Without room texts are left out in this order: closest approach, name, verdict, time.
         let large_px = 1.35 * size_px;
-        let (time_s, leg_at) = (self.frame.time_s, |time_s| self.timeline.plan.as_ref().map(|plan| plan.leg_at(time_s)));
+        let (time_s, leg_at) =
+            (self.frame.time_s, |time_s| self.timeline.plan.as_ref().map(|plan| plan.leg_at(time_s)));
         let leg = leg_at(time_s);
         // The last instant of a leg shows the time at which the next leg begins.
         let shown_s = if leg_at(time_s.next_up()) == leg { time_s } else { time_s.next_up() };
@@ -436,7 +437,8 @@ impl SceneBuilder<'_> {
             Lens::Parallel(_) => self.camera.back * distance_m,
         };
         let is_round = |shape: &Shape| matches!(shape, Shape::Ball { .. } | Shape::Capsule { .. });
-        let (from_m, obstacles) = (place + self.extent.origin_m(), self.timeline.plan.iter().flat_map(|of| &of.obstacles));
+        let (from_m, obstacles) =
+            (place + self.extent.origin_m(), self.timeline.plan.iter().flat_map(|of| &of.obstacles));
         obstacles
             .filter(|obstacle| is_round(&obstacle.shape))
             .any(|obstacle| is_between(&obstacle.shape, obstacle.place_m, from_m, from_m + towards))

@@ -44,7 +44,8 @@ impl SceneBuilder<'_> {
         for axis in 0..2 {
             // Along the line of sight the ground keeps its length.
             if reach[axis] > 1e-3 * half {
-                let beyond = [low[axis] - camera.eye_m[axis] + reach[axis], camera.eye_m[axis] + reach[axis] - high[axis]];
+                let beyond =
+                    [low[axis] - camera.eye_m[axis] + reach[axis], camera.eye_m[axis] + reach[axis] - high[axis]];
                 let most = f64::from(MAX_LINES) / 3.0;
                 let [before, after] = beyond.map(|beyond_m| (beyond_m / step).ceil().clamp(0.0, most) * step);
                 (corners[0][axis], corners[1][axis]) = (low[axis] - before, high[axis] + after);

@@ -284,7 +284,11 @@ fn the_end_of_a_leg_has_the_time_of_the_report() {
     }
     timeline.note(&Event::LegBegan { leg: 1, time_s: end_s });
     let shown = |time_s: f64| words(&scene(&timeline, time_s, &View::default())).join("; ");
-    assert!(shown(end_s.next_down()).contains(&format!("leg 1 of 2, t = {end_s:.2} s")), "{}", shown(end_s.next_down()));
+    assert!(
+        shown(end_s.next_down()).contains(&format!("leg 1 of 2, t = {end_s:.2} s")),
+        "{}",
+        shown(end_s.next_down())
+    );
     assert!(shown(end_s).contains(&format!("leg 2 of 2, t = {end_s:.2} s")), "{}", shown(end_s));
 }
 

@@ -13,8 +13,8 @@ pub use violations::Violations;
 
 use std::collections::BTreeMap;
 
-use frame::{apart, first_of_ties};
 pub(crate) use frame::nearest_present;
+use frame::{apart, first_of_ties};
 use tautline_audit::{Approach, ObjectPair, Slice, Slices};
 use tautline_core::record::{Event, RecordError, Sample, Sink};
 use tautline_core::swarm::{Bounce, ClosestApproach, Rows, row, separation};

@@ -317,7 +317,8 @@ fn the_closest_pair_at_the_start_is_that_of_the_pictures() {
     let (_, data) = packed(&stage(3), &log, &[], PAGE_BYTES);
     let bytes = |key: &str| BASE64.decode(data[key].as_str().expect("text")).expect("base64");
     let who: Vec<_> = bytes("near_who").chunks_exact(2).map(|two| u16::from_le_bytes([two[0], two[1]])).collect();
-    let from: Vec<_> = bytes("near_s").chunks_exact(8).map(|of| f64::from_le_bytes(of.try_into().expect("8"))).collect();
+    let from: Vec<_> =
+        bytes("near_s").chunks_exact(8).map(|of| f64::from_le_bytes(of.try_into().expect("8"))).collect();
     assert_eq!(who[..2], [0, 1], "{who:?}");
     assert_eq!((who.last(), from[0]), (Some(&2), 0.0), "{who:?}");
     assert!(from[1..].iter().all(|&from_s| from_s > 0.0), "{from:?}");

@@ -54,9 +54,10 @@ impl Viewpoint {
         let elevation_deg = ELEVATION_DEG[usize::from(flown.z > FLAT * flown.xy().max())];
         let solid: Vec<_> = obstacles.iter().filter(|(shape, _)| !matches!(shape, Shape::HalfSpace { .. })).collect();
         let sights = (SIGHTS / solid.len().max(1)).max(FEWEST_SIGHTS);
-        // A replay opens at the start, which therefore counts as much as the whole flight.
+        // The start, at which a replay opens, the closest approach and the whole flight have the same weight.
         let start = &places[..logs.first().map_or(0, |log| log.count()).min(places.len())];
-        let seen = [start, &places].map(|all| (all, all.len().div_ceil(sights).max(1)));
+        let closest: Vec<_> = logs.iter().flat_map(|log| closest_places(log)).collect();
+        let seen = [start, &closest, &places].map(|all| (all, all.len().div_ceil(sights).max(1)));
         let cost = |turn_deg: f64| {
             let back = back(usual_deg + turn_deg, elevation_deg);
             let eye = low / 2.0 + high / 2.0 + back * (EYE * flown.norm() / 2.0);
@@ -65,12 +66,13 @@ impl Viewpoint {
                 let count = all.iter().step_by(step).filter(|place| hides(place)).count();
                 count as f64 / all.len().div_ceil(step).max(1) as f64
             });
-            hidden[0] + hidden[1] + HALF_TURN * turn_deg.abs() / 180.0
+            hidden.iter().sum::<f64>() + HALF_TURN * turn_deg.abs() / 180.0
         };
         // From small turns to large ones, so that the first of equal costs is the nearest.
         let step_deg = 360.0 / f64::from(AZIMUTHS);
         let turns = (0..=AZIMUTHS / 2).flat_map(|k| [1.0, -1.0].map(|sign| sign * step_deg * f64::from(k)));
-        let costs = turns.take(if solid.is_empty() { 1 } else { usize::MAX }).map(|turn_deg| (cost(turn_deg), turn_deg));
+        let costs =
+            turns.take(if solid.is_empty() { 1 } else { usize::MAX }).map(|turn_deg| (cost(turn_deg), turn_deg));
         let turn_deg = costs.reduce(|best, next| if next.0 < best.0 { next } else { best }).map_or(0.0, |best| best.1);
         let azimuth_deg = usual_deg + turn_deg;
         let azimuth_deg = azimuth_deg - 360.0 * (azimuth_deg / 360.0).round();
@@ -95,6 +97,16 @@ fn places(logs: &[&FlightLog]) -> Vec<Vector3<f64>> {
         }
     }
     places
+}
+
+/// Returns the positions of the two vehicles at their closest approach \[m\].
+fn closest_places(log: &FlightLog) -> Vec<Vector3<f64>> {
+    let closest = log.closest().and_then(|of| Some((of.pair, log.positions_m(of.time_s)?)));
+    let places = closest.into_iter().flat_map(|(pair, at)| {
+        let there = [pair.first(), pair.second()].into_iter().filter(|k| *k < at.nrows());
+        there.map(|k| row(&at, k)).collect::<Vec<_>>()
+    });
+    places.filter(|place| place.iter().all(|x| x.is_finite())).collect()
 }
 
 /// Returns whether a shape at a position is on the straight line between two points \[m\].

@@ -1,8 +1,8 @@
 //! Self-contained HTML pages.
 //!
 //! A [`Page`] has a verdict and sections. Every text is escaped. A page needs no other file, and its policy forbids the
-//! browser to load anything. Pictures link to their files in full size. If it holds replays, a single script of this crate may run. The page follows the
-//! browser's light or dark theme and fits a phone. Equal parts give equal bytes.
+//! browser to load anything. Pictures link to their files in full size. If it holds replays, a single script of this
+//! crate may run. The page follows the browser's light or dark theme and fits a phone. Equal parts give equal bytes.
 
 mod replay;
 
