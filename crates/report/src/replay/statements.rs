@@ -91,12 +91,16 @@ pub(super) fn pairs(
 ) -> [String; 2] {
     let place = |vehicle: usize| place(vehicle).and_then(|at| u16::try_from(at).ok()).unwrap_or(NOT_DRAWN);
     let two = |pair: Option<Pair>| pair.map_or([NOT_DRAWN; 2], |two| [place(two.first()), place(two.second())]);
-    let after_s = first.map_or(f64::NEG_INFINITY, |(at_s, _)| at_s.next_up());
+    // The first pair replaces a slice of the first instant alone, and begins one of the same pair.
+    let begin_s = first.map_or(f64::NEG_INFINITY, |(at_s, _)| at_s);
+    let slices = &slices[slices.iter().take_while(|slice| slice.to_s <= begin_s).count()..];
+    let first =
+        first.filter(|(_, pair)| slices.first().is_none_or(|slice| slice.closest.pair.vehicles() != Some(*pair)));
     let begins = slices.iter().skip(1).map(|slice| slice.from_s).chain([f64::INFINITY]);
     let pairs = slices.iter().zip(begins).flat_map(|(slice, next_s)| {
         let none = (slice.to_s < next_s && slice.to_s < end_s).then_some((slice.to_s.next_up(), [NOT_DRAWN; 2]));
-        let begin = (slice.from_s.max(after_s), two(slice.closest.pair.vehicles()));
-        [Some(begin), none].into_iter().flatten()
+        let from_s = if first.is_some() { slice.from_s.max(begin_s.next_up()) } else { slice.from_s };
+        [Some((from_s, two(slice.closest.pair.vehicles()))), none].into_iter().flatten()
     });
     let first = first.map(|(at_s, pair)| (at_s, two(Some(pair))));
     let (from_s, who): (Vec<_>, Vec<_>) = first.into_iter().chain(pairs).unzip();
