@@ -54,10 +54,9 @@ impl Viewpoint {
         let elevation_deg = ELEVATION_DEG[usize::from(flown.z > FLAT * flown.xy().max())];
         let solid: Vec<_> = obstacles.iter().filter(|(shape, _)| !matches!(shape, Shape::HalfSpace { .. })).collect();
         let sights = (SIGHTS / solid.len().max(1)).max(FEWEST_SIGHTS);
-        // The start, at which a replay opens, the closest approach and the whole flight have the same weight.
+        // A replay opens at the start, which therefore has the weight of the whole flight.
         let start = &places[..logs.first().map_or(0, |log| log.count()).min(places.len())];
-        let closest: Vec<_> = logs.iter().flat_map(|log| closest_places(log)).collect();
-        let seen = [start, &closest, &places].map(|all| (all, all.len().div_ceil(sights).max(1)));
+        let seen = [start, &places].map(|all| (all, all.len().div_ceil(sights).max(1)));
         let cost = |turn_deg: f64| {
             let back = back(usual_deg + turn_deg, elevation_deg);
             let eye = low / 2.0 + high / 2.0 + back * (EYE * flown.norm() / 2.0);
@@ -97,16 +96,6 @@ fn places(logs: &[&FlightLog]) -> Vec<Vector3<f64>> {
         }
     }
     places
-}
-
-/// Returns the positions of the two vehicles at their closest approach \[m\].
-fn closest_places(log: &FlightLog) -> Vec<Vector3<f64>> {
-    let closest = log.closest().and_then(|of| Some((of.pair, log.positions_m(of.time_s)?)));
-    let places = closest.into_iter().flat_map(|(pair, at)| {
-        let there = [pair.first(), pair.second()].into_iter().filter(|k| *k < at.nrows());
-        there.map(|k| row(&at, k)).collect::<Vec<_>>()
-    });
-    places.filter(|place| place.iter().all(|x| x.is_finite())).collect()
 }
 
 /// Returns whether a shape at a position is on the straight line between two points \[m\].
