@@ -550,7 +550,7 @@ fn the_closest_approach_is_the_same_in_report_figure_replay_and_picture() {
     let timeline = Timeline::flown(&scenario, Arc::new(log));
     let scene = scene(&timeline, at_s, &View::default());
     let caption = words(&scene).into_iter().find(|words| words.starts_with("closest so far")).expect("a caption");
-    assert!(caption.starts_with(&format!("closest so far {metres}, vehicles {first}-{second}")), "{caption}");
+    assert!(caption.starts_with(&format!("closest so far {metres}, vehicles {first} and {second}")), "{caption}");
     assert!(words(&scene).contains(&metres.as_str()), "{:?}", words(&scene));
     assert!(report.headline().contains(&metres), "{}", report.headline());
 }
