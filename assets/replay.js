@@ -27,7 +27,8 @@
 /**
  * Data of a page: struct `Data` in crates/report/src/replay/data.rs says more.
  * @typedef {{vehicles: string[], radius_m: number[], shell_m: number[] | null, times_s: Packed, middle_m: number[],
- *   origin_m: number[], half_m: number[], oblique: number[], across: number | null, cell_m: number,
+ *   origin_m: number[], half_m: number[], cell_m: number,
+ *   viewpoint: {azimuth_deg: number, elevation_deg: number, across: number | null},
  *   points: number, starts: Packed,
  *   steps: Packed, breaks: Packed, near_s: Packed, near_who: Packed, holds: boolean, nearest: [number, string][],
  *   verdicts: Verdict[], decimals: number, moments: Moment[], things: Thing[], ground: Packed, square_m: number,
@@ -326,9 +327,10 @@ const play = (root, data) => {
   }
   const bounds = [0, 1, 2].map(axis => cloud.reduce(([low, high], at) => [Math.min(low, at[axis]),
     Math.max(high, at[axis])], [Infinity, -Infinity]));
+  const from = data.viewpoint;
   /** Directions and projections: perspective, top, front, side. @type {[number, number, boolean][]} */
-  const VIEWS = [[data.oblique[0], data.oblique[1], false], [-UPRIGHT, UPRIGHT, true], [-UPRIGHT, 0, true],
-    [0, 0, true]];
+  const VIEWS = [[from.azimuth_deg * UPRIGHT / 90, from.elevation_deg * UPRIGHT / 90, false],
+    [-UPRIGHT, UPRIGHT, true], [-UPRIGHT, 0, true], [0, 0, true]];
   /** Moves the camera along its direction and across until all positions of the vehicles fit into the picture. */
   const fit = () => {
     follow.value = "";
@@ -943,7 +945,7 @@ const play = (root, data) => {
   });
   sized.observe(stage);
   themed();
-  look(data.across === null ? 0 : 3 - data.across);
+  look(from.across === null ? 0 : 3 - from.across);
   return {
     root, draw,
     /** What is drawn, for tests: camera, places [CSS px], boxes around names [px], picked vehicle, arm [m]. */

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::{Kind, Moment, base64_of, doubles};
+use crate::flight_log::FlightLog;
 use tautline_audit::{Approach, Slice, Slices};
 use tautline_core::swarm::Pair;
 use tautline_core::text::{beside_limit, seconds};
@@ -82,18 +83,14 @@ impl<N: Fn(usize) -> Option<String>> Words<'_, N> {
 }
 
 /// Returns the times \[s\] from which a pair is the closest, as doubles, and the pairs, as two 16-bit indices each;
-/// 65535 is a vehicle that is not drawn. `first` is the closest pair at the first instant alone, with its time.
-pub(super) fn pairs(
-    slices: &[Slice],
-    first: Option<(f64, Pair)>,
-    end_s: f64,
-    place: impl Fn(usize) -> Option<usize>,
-) -> [String; 2] {
+/// 65535 is a vehicle that is not drawn. The first pair is that of the log at its first instant.
+pub(super) fn pairs(slices: &[Slice], log: &FlightLog, place: impl Fn(usize) -> Option<usize>) -> [String; 2] {
     let place = |vehicle: usize| place(vehicle).and_then(|at| u16::try_from(at).ok()).unwrap_or(NOT_DRAWN);
     let two = |pair: Option<Pair>| pair.map_or([NOT_DRAWN; 2], |two| [place(two.first()), place(two.second())]);
+    let [begin_s, end_s] = log.range_s();
+    let first = log.at(begin_s).and_then(|frame| frame.nearest).map(|(pair, _)| (begin_s, pair));
     // The first pair replaces a slice of the first instant alone, and begins one of the same pair.
-    let begin_s = first.map_or(f64::NEG_INFINITY, |(at_s, _)| at_s);
-    let slices = &slices[slices.iter().take_while(|slice| slice.to_s <= begin_s).count()..];
+    let slices = &slices[slices.iter().take_while(|slice| first.is_some() && slice.to_s <= begin_s).count()..];
     let first =
         first.filter(|(_, pair)| slices.first().is_none_or(|slice| slice.closest.pair.vehicles() != Some(*pair)));
     let begins = slices.iter().skip(1).map(|slice| slice.from_s).chain([f64::INFINITY]);

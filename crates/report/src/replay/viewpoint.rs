@@ -1,6 +1,7 @@
 //! Direction from which replay and pictures of a flight show it first.
 
 use nalgebra::Vector3;
+use serde::Serialize;
 
 use crate::flight_log::FlightLog;
 use tautline_core::swarm::row;
@@ -29,7 +30,7 @@ const HALF_TURN: f64 = 0.1;
 const EYE: f64 = 3.0;
 
 /// Direction from which a flight is seen first.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Viewpoint {
     /// Azimuth of the oblique view, from the x axis towards the y axis \[degrees\].
     pub azimuth_deg: f64,
