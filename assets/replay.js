@@ -27,7 +27,9 @@
 /**
  * Data of a page: struct `Data` in crates/report/src/replay/data.rs says more.
  * @typedef {{vehicles: string[], radius_m: number[], shell_m: number[] | null, times_s: Packed, middle_m: number[],
- *   origin_m: number[], half_m: number[], cell_m: number, points: number, starts: Packed,
+ *   origin_m: number[], half_m: number[], cell_m: number,
+ *   viewpoint: {azimuth_deg: number, elevation_deg: number, across: number | null},
+ *   points: number, starts: Packed,
  *   steps: Packed, breaks: Packed, near_s: Packed, near_who: Packed, holds: boolean, nearest: [number, string][],
  *   verdicts: Verdict[], decimals: number, moments: Moment[], things: Thing[], ground: Packed, square_m: number,
  *   rotors: {at_m: number[][], radius_m: number} | null, turns: Packed, links: Packed, tension: boolean,
@@ -51,10 +53,13 @@ const COLOURS = ["sky", "ink", "floor", "shell", "thing", "alarm", "push", "rest
   "c6"];
 // Layers in the order of their keys 1 to 8.
 const LAYERS = ["shells", "links", "trails", "slots", "ground", "names", "closest", "caption"];
+// An entry with a third word is there if the flight has such a moment or layer.
 const HELP = [["Space", "play, pause"], ["Left, Right", "previous, next instant; with Shift one second"],
-  ["Home, End", "start, end"], ["Up, Down or +, -", "faster, slower"], ["N", "closest approach"],
-  ["B, Shift+B", "next, previous violation"], ["U", "next undecided time"], ["1, 2, 3", "perspective, top, front"],
-  ["F", "follow the picked vehicle or the swarm; again: the whole flight"], ["T", "trails: whole, short, none"],
+  ["Home, End", "start, end"], ["Up, Down or +, -", "faster, slower"], ["N", "closest approach", "closest"],
+  ["B, Shift+B", "next, previous violation", "violation"], ["U", "next undecided time", "undecided"],
+  ["1, 2, 3", "perspective, top, front"],
+  ["F", "follow the picked vehicle or the swarm; again: the whole flight"],
+  ["T", "trails: whole, short, none", "trails"],
   ["C", "colour by vehicle, speed, clearance"], ["L", "labels"], ["W, A, S, D or drag", "turn the camera"],
   ["right drag", "move the camera"], ["Page Up, Page Down or wheel", "zoom"],
   ["click, V", "pick a vehicle, the next vehicle"], ["M", "dark or light background"], ["P", "save a picture"],
@@ -205,7 +210,7 @@ const play = (root, data) => {
     slots: "radial-gradient(circle closest-side,transparent 65%,var(--c1) 66% 85%,transparent 86%)",
     closest: "linear-gradient(transparent 35%,var(--ink) 35% 65%,transparent 65%)" };
   /** @type {Object<string, string>} */
-  const words = { shells: "keep-out shells", links: data.tension ? "links push, pull" : "links short, long",
+  const words = { shells: "keep-out shells", links: "links: push, rest, pull",
     slots: "slots", ground: `squares of ${data.square_m} m`, closest: "closest two" };
   const swatch = (/** @type {string} */ background) =>
     make("i", { class: "replay-swatch", style: "background:" + background });
@@ -216,13 +221,15 @@ const play = (root, data) => {
   }));
   const legend = [...boxes].map(([name, box]) =>
     make("label", {}, box, ...samples[name] ? [swatch(samples[name])] : [], words[name] ?? name));
-  for (const [drawn, background, text] of /** @type {[boolean, string, string][]} */ ([
-    [data.things.length > 0, "var(--thing)", data.things.length > 1 ? "obstacles" : "obstacle"],
-    [data.reference !== null, "conic-gradient(var(--ink) 0 0)", "reference"],
-    [moments.some(moment => moment.kind === "violation"), "var(--alarm)", "violation"]]))
-    if (drawn) legend.push(make("span", { class: "replay-key" }, swatch(background), text));
+  const has = (/** @type {string} */ kind) => moments.some(moment => moment.kind === kind);
+  for (const [drawn, sample, text] of /** @type {[boolean, Node, string][]} */ ([
+    [data.things.length > 0, swatch("var(--thing)"), data.things.length > 1 ? "obstacles" : "obstacle"],
+    [data.reference !== null, make("i", { class: "replay-diamond" }), "reference"],
+    [has("violation"), swatch("var(--alarm)"), "violation"]]))
+    if (drawn) legend.push(make("span", { class: "replay-key" }, sample, text));
   const help = make("div", { class: "replay-help", hidden: "" },
-    ...HELP.map(([keys, what]) => make("div", {}, make("kbd", {}, keys), what)));
+    ...HELP.filter(([,, of]) => !of || has(of) || boxes.has(of)).map(([keys, what]) =>
+      make("div", {}, make("kbd", {}, keys), what)));
   const question = button("?", "H", () => { help.hidden = !help.hidden; });
   question.setAttribute("aria-label", "Keys");
   const graph = /** @type {HTMLElement | null} */ (root.querySelector(".replay-graph"));
@@ -307,7 +314,9 @@ const play = (root, data) => {
     if (playing) ask();
   };
 
-  // The camera looks at `target` [m] from `distance` [m]. Angles are in rad.
+  // The camera looks at `target` [m] from `distance` [m]. Angles are in rad. A parallel view has the scale that a
+  // view in perspective has at the target.
+  let parallel = false;
   let yaw = 0, pitch = 0, distance = 1, target = [0, 0, 0], kept = { yaw, pitch, distance, target }, fitted = kept;
   // Positions of the vehicles that the camera fits, with the radius around each [m].
   /** @type {number[][]} */
@@ -317,11 +326,11 @@ const play = (root, data) => {
     if (path[from + 3]) cloud.push([path[from], path[from + 1], path[from + 2], Math.max(shell, outer[vehicle])]);
   }
   const bounds = [0, 1, 2].map(axis => cloud.reduce(([low, high], at) => [Math.min(low, at[axis]),
-    Math.max(high, at[axis])], [Infinity, -Infinity])), sizes = bounds.map(([low, high]) => high - low);
-  // A flight at one height is seen from the top, any other from a corner with its longer side across.
-  const level = sizes[2] <= 1e-3 * Math.max(sizes[0], sizes[1]);
-  const slant = /** @type {[number, number]} */ ([sizes[0] < sizes[1] ? -0.35 : -1.22,
-    sizes[2] < 0.3 * Math.max(sizes[0], sizes[1]) ? 0.8 : 0.45]);
+    Math.max(high, at[axis])], [Infinity, -Infinity]));
+  const from = data.viewpoint;
+  /** Directions and projections: perspective, top, front, side. @type {[number, number, boolean][]} */
+  const VIEWS = [[from.azimuth_deg * UPRIGHT / 90, from.elevation_deg * UPRIGHT / 90, false],
+    [-UPRIGHT, UPRIGHT, true], [-UPRIGHT, 0, true], [0, 0, true]];
   /** Moves the camera along its direction and across until all positions of the vehicles fit into the picture. */
   const fit = () => {
     follow.value = "";
@@ -334,21 +343,21 @@ const play = (root, data) => {
         return [dot(from, right), dot(from, up), dot(from, back), at[3]];
       });
       distance = 0;
-      for (const [x, y, z, r] of seen)
-        distance = Math.max(distance, (Math.abs(x) + r) / wide + z, (Math.abs(y) + r) / TANGENT / 0.84 + z,
-          1.01 * r + z);
+      for (const [x, y, z, r] of seen) {
+        const ahead = parallel ? 0 : z;
+        distance = Math.max(distance, (Math.abs(x) + r) / wide + ahead, (Math.abs(y) + r) / TANGENT / 0.84 + ahead,
+          1.01 * r + ahead);
+      }
       const middle = [0, 1].map(axis => {
-        const places = seen.map(at => at[axis] / (distance - at[2]));
+        const places = seen.map(at => at[axis] / (parallel ? distance : distance - at[2]));
         return (Math.max(...places) + Math.min(...places)) / 2 * distance;
       });
       target = target.map((x, k) => x + right[k] * middle[0] + up[k] * middle[1]);
     }
     fitted = { yaw, pitch, distance, target };
   };
-  /** Shows everything from a direction [rad]. @param {number} to @param {number} lift */
-  const view = (to, lift) => { [yaw, pitch] = [to, lift]; fit(); ask(); };
-  /** Shows everything in perspective (0), from the top (1) or from the front (2). @param {number} k */
-  const look = k => view(.../** @type {[number, number][]} */ ([slant, [-UPRIGHT, UPRIGHT], [-UPRIGHT, 0]])[k]);
+  /** Shows everything in perspective (0), from the top (1), the front (2) or the side (3). @param {number} k */
+  const look = k => { [yaw, pitch, parallel] = VIEWS[k]; fit(); ask(); };
   /** Centre of the vehicles that are there [m]. */
   const centre = () => {
     const all = radius.map((_, k) => place(k)).filter(at => at[3]);
@@ -366,11 +375,13 @@ const play = (root, data) => {
       distance = 1.15 * (far + Math.max(shell, outer[0])) / TANGENT;
     }
   };
+  /** How far the eye of a parallel view is moved back [m], so that everything is ahead of it. */
+  const behind = () => parallel ? 12 * reach : 0;
   /** Axes of the camera, and its position. */
   const axes = () => {
     const [cy, sy, cp, sp] = [Math.cos(yaw), Math.sin(yaw), Math.cos(pitch), Math.sin(pitch)];
     const back = [cp * cy, cp * sy, sp];
-    const eye = back.map((x, k) => target[k] + x * distance);
+    const eye = back.map((x, k) => target[k] + x * (distance + behind()));
     return { right: [-sy, cy, 0], up: [-sp * cy, -sp * sy, cp], back, eye };
   };
   const turn = (/** @type {number} */ by, /** @type {number} */ lift) => {
@@ -566,7 +577,8 @@ const play = (root, data) => {
   const bodies = mesh([3], 1, 1, Float32Array.from(radius, of => rotors ? 0.34 * arm : of));
   const shells = mesh([3], 1, 1, Float32Array.from(radius)), slots = mesh([0], 3, 1);
   const links = mesh([2], 3, 1), pairs = mesh([2], 3, 1);
-  const ground = mesh([0, 1], 3, 1, new Float32Array(bytes(data.ground)));
+  const squares = new Float32Array(bytes(data.ground)), ground = mesh([0, 1], 3, 1, squares);
+  const filled = mesh([0, 1], 3, 1);
   const things = data.things.map(({ solid, rims, ...rest }) => ({ ...rest,
     solid: mesh([0, 1], 3, 0, new Float32Array(bytes(solid))),
     rims: mesh([0, 1], 3, 1, new Float32Array(bytes(rims))) }));
@@ -589,7 +601,7 @@ const play = (root, data) => {
   // Drawing. The time lies between the instants `row` and `next`, at the share `part` of the interval. `painted` lists
   // the vehicles in red, `shape` is the number of the formation in the meshes.
   const dark = matchMedia("(prefers-color-scheme: dark)");
-  let painted = "", shape = -1, row = 0, next = 0, part = 0;
+  let painted = "", shape = -1, row = 0, next = 0, part = 0, near = /** @type {number[]} */ ([]);
   /** Colours by name. @type {Object<string, number[]>} */
   let colours = {};
   /** Smallest and largest number of the colour scale; equal where vehicles have colours of their own. */
@@ -675,10 +687,11 @@ const play = (root, data) => {
   /** Place of a vehicle in the picture [CSS px], its depth [m], or 0 where it is absent, and pixels per metre. */
   const project = (/** @type {number} */ k) => {
     const [x, y, z, there] = place(k), { right, up, back, eye } = axes();
-    const [across, above, behind] = [right, up, back].map(axis =>
+    const [across, above, ahead] = [right, up, back].map(axis =>
       (x - eye[0]) * axis[0] + (y - eye[1]) * axis[1] + (z - eye[2]) * axis[2]);
-    const [wide, high] = [canvas.clientWidth, canvas.clientHeight], scale = high / 2 / TANGENT / -behind;
-    return [wide / 2 + across * scale, high / 2 - above * scale, there ? -behind : 0, scale];
+    const [wide, high] = [canvas.clientWidth, canvas.clientHeight];
+    const scale = high / 2 / TANGENT / (parallel ? distance : -ahead);
+    return [wide / 2 + across * scale, high / 2 - above * scale, there ? -ahead : 0, scale];
   };
   /** Position of an obstacle from the origin [m]. @param {number[][]} way */
   const thingAt = way => {
@@ -702,6 +715,27 @@ const play = (root, data) => {
     }
     refill(links, Float32Array.from(joined));
   };
+  const spans = [0, 1].map(axis => {
+    const all = squares.filter((_, k) => k % 3 === axis);
+    return [Math.min(...all), Math.max(...all)];
+  });
+  /**
+   * Fills the ground of a parallel view, whose squares reach the edges of the picture.
+   * @param {number[]} right @param {number[]} up @param {number} aspect
+   */
+  const fill = (right, up, aspect) => {
+    const side = data.square_m, ends = spans.map(([low, high], axis) => {
+      const by = TANGENT * distance * (Math.abs(right[axis]) * aspect + Math.abs(up[axis]));
+      const more = (/** @type {number} */ gap) => clamp(Math.ceil(gap / side), 0, 99) * side;
+      return by < 1e-3 * distance ? [low, high]
+        : [low - more(low - target[axis] + by), high + more(target[axis] + by - high)];
+    });
+    const numbers = [];
+    for (const axis of [0, 1]) for (let at = ends[axis][0]; at < ends[axis][1] + side / 2; at += side)
+      for (const end of ends[1 - axis]) numbers.push(...axis ? [end, at] : [at, end], squares[2]);
+    refill(filled, Float32Array.from(numbers));
+    filled.count = numbers.length / 6;
+  };
   const draw = () => {
     const ratio = sizeOf(canvas);
     if (!ratio || ended) return;
@@ -709,7 +743,7 @@ const play = (root, data) => {
     if (follow.value === "swarm") target = centre();
     else if (follow.value === "picked" && picked !== null && place(picked)[3]) target = place(picked).slice(0, 3);
     const size = [canvas.width, canvas.height], { right, up, back, eye } = axes();
-    const lens = [TANGENT * size[0] / size[1], TANGENT, distance * 0.02, distance + reach * 12];
+    const lens = [TANGENT * size[0] / size[1], TANGENT, distance * 0.02, distance + behind() + reach * 12];
     // Violations of this time, and their vehicles.
     const [, alarm, verdict, named, thing] = latest(data.verdicts, t) ?? [0, false, "", [], null];
     const wrong = [...moments.filter(of => of.kind === "violation" && of.from_s <= t && t <= of.to_s),
@@ -751,8 +785,9 @@ const play = (root, data) => {
       };
       const ends = [colours.pull, colours.push].map(colour => rgba(colour).slice(0, 3));
       if (colouring.value === "clearance") ends.reverse();
-      set({ right, up, back, eye, lens, size, path: 0, paint: 1, value: 2, turn: 3, row, next, part, points: count,
-        spanned, low: ends[0], mid: rgba(colours.rest).slice(0, 3), high: ends[1], arm, armLeast: 8 * ratio,
+      set({ right, up, back, eye, lens, size, parallel: parallel ? distance : 0, path: 0, paint: 1, value: 2, turn: 3,
+        row, next, part, points: count, spanned, low: ends[0], mid: rgba(colours.rest).slice(0, 3),
+        high: ends[1], arm, armLeast: 8 * ratio,
         "arms[0]": arms, shell: [0, 0, 0], offset: [0, 0, 0], fixedAt: [0, 0, 0, 0], fixedPaint: [0, 0, 0, 0],
         ...values });
     };
@@ -761,9 +796,9 @@ const play = (root, data) => {
       gl.bindVertexArray(of?.vao ?? null);
       if (copies > 0) gl.drawArraysInstanced(gl.TRIANGLE_STRIP, 0, 4, copies);
     };
-    const near = new Set(wrong.map(of => of.thing));
+    const hit = new Set(wrong.map(of => of.thing));
     const solids = (/** @type {boolean} */ opaque) => things.forEach((thing, k) => {
-      const colour = near.has(k) ? colours.alarm : colours.thing, offset = thingAt(thing.path);
+      const colour = hit.has(k) ? colours.alarm : colours.thing, offset = thingAt(thing.path);
       if (thing.radius_m !== null && opaque) {
         use(ball, { fixedAt: [...offset, thing.radius_m], fixedPaint: rgba(colour) });
         quads(null, 1);
@@ -787,7 +822,8 @@ const play = (root, data) => {
     gl.enable(gl.BLEND);
     gl.depthMask(false);
     use(line, { kind: 0, width: ratio, tint: rgba(colours.floor) });
-    if (shows.ground) quads(ground);
+    if (parallel) fill(right, up, size[0] / size[1]);
+    if (shows.ground) quads(parallel ? filled : ground);
     if (shows.trails) {
       const tailed = +tail.value;
       let stride = 1;
@@ -805,7 +841,7 @@ const play = (root, data) => {
     if (shows.links) quads(links);
     // Lines of the closest pair, as the page's data names it, and of all pairs in violation.
     const k = 2 * upTo(nearS, t) - 2, slice = [nearWho[k], nearWho[k + 1]].filter(vehicle => vehicle < count);
-    const closest = current?.kind === "closest" && current.who.length === 2 ? current.who : slice;
+    const closest = near = current?.kind === "closest" && current.who.length === 2 ? current.who : slice;
     for (const [two, colour, width] of /** @type {[number[][], number[], number][]} */ ([
       [shows.closest ? [closest] : [], colours.ink, 2.6], [wrong.map(of => of.who), colours.alarm, 5]])) {
       set({ tint: rgba(colour), width: width * ratio });
@@ -861,7 +897,7 @@ const play = (root, data) => {
       const wanted = !shows.names ? [] : [...count <= NAMED ? radius.keys() : urgent].map(vehicle =>
         ({ vehicle, seen: project(vehicle) })).filter(({ seen }) => seen[2] > lens[2]);
       wanted.sort((a, b) => +urgent.has(b.vehicle) - +urgent.has(a.vehicle) || a.seen[2] - b.seen[2]);
-      const depths = wanted.map(({ seen }) => seen[2]), near = Math.min(...depths), far = Math.max(...depths);
+      const depths = wanted.map(({ seen }) => seen[2]), nearest = Math.min(...depths), far = Math.max(...depths);
       /** @type {number[][]} */
       const taken = [];
       labelled = taken;
@@ -873,7 +909,8 @@ const play = (root, data) => {
             Math.abs(of[0] - px) > of[2] + half || Math.abs(of[1] - py) > of[3] + high));
         if (!free) continue;
         taken.push([...free, half, high]);
-        pen.globalAlpha = urgent.has(vehicle) || far - near < 0.2 * far ? 1 : 1 - 0.6 * (away - near) / (far - near);
+        pen.globalAlpha = urgent.has(vehicle) || far - nearest < 0.2 * far ? 1
+          : 1 - 0.6 * (away - nearest) / (far - nearest);
         pen.fillStyle = css(who.has(vehicle) ? colours.alarm : colours.ink);
         pen.strokeText(text, free[0], free[1] + 4 * ratio);
         pen.fillText(text, free[0], free[1] + 4 * ratio);
@@ -908,18 +945,18 @@ const play = (root, data) => {
   });
   sized.observe(stage);
   themed();
-  view(...level ? /** @type {[number, number]} */ ([-UPRIGHT, UPRIGHT]) : slant);
+  look(from.across === null ? 0 : 3 - from.across);
   return {
     root, draw,
     /** What is drawn, for tests: camera, places [CSS px], boxes around names [px], picked vehicle, arm [m]. */
-    seen: () => ({ pitch, picked, boxes: labelled, names: shows.names, arm,
+    seen: () => ({ yaw, pitch, parallel, closest: near, picked, boxes: labelled, names: shows.names, arm,
       places: [...radius.keys()].map(project).filter(at => at[2] > 0) }),
     /**
      * Draws a view at once, for tests: angles in rad, lengths in m, the time in s. Returns the camera.
-     * @param {{yaw: number, pitch: number, distance: number, target: number[], t: number}} view
+     * @param {{yaw: number, pitch: number, distance: number, target: number[], t: number, parallel?: boolean}} view
      */
     look(view) {
-      ({ yaw, pitch, distance, target } = view);
+      ({ yaw, pitch, distance, target, parallel = false } = view);
       follow.value = "";
       t = view.t;
       draw();

@@ -3,18 +3,21 @@
 //
 // Every vertex shader draws a quad of four vertices, many times; only SOLID draws triangles.
 // Lengths are in m. `lens` holds the tangents of half the angles of view, and the nearest and farthest depth.
+// `parallel` is 0 in perspective. A parallel view has the size of a perspective one at this depth.
 @ COMMON
 #version 300 es
 precision highp float; precision highp int; precision highp sampler2D;
-uniform vec3 right, up, back, eye; uniform vec4 lens; uniform vec2 size;
+uniform vec3 right, up, back, eye; uniform vec4 lens; uniform vec2 size; uniform float parallel;
 const vec3 LIGHT = vec3(-.408, .577, .707);
 // Axes of the camera (view space): right, up, towards the camera.
 vec3 turned(vec3 v) { return vec3(dot(right, v), dot(up, v), dot(back, v)); }
 vec3 view(vec3 p) { return turned(p - eye); }
+// Depth that scales a position in view space.
+float depth(vec3 p) { return parallel > 0. ? parallel : -p.z; }
 // Clip coordinates of a position in view space.
 vec4 toClip(vec3 p) {
-  float n = lens.z, f = lens.w;
-  return vec4(p.xy / lens.xy, (-p.z * (f + n) - 2. * f * n) / (f - n), -p.z);
+  float n = lens.z, f = lens.w, w = depth(p);
+  return vec4(p.xy / lens.xy, (parallel > 0. ? w * (-2. * p.z - f - n) : -p.z * (f + n) - 2. * f * n) / (f - n), w);
 }
 @ VERTEX COMMON
 // `path` has a row for each instant and a column for each point (assets/replay.js); `part` is the share of the interval
@@ -46,7 +49,7 @@ vec3 rotated(int k, vec3 v) {
   vec4 q = normalize(mix(a, dot(a, b) < 0. ? -b : b, part));
   return v + 2. * cross(q.xyz, cross(q.xyz, v) + q.w * v);
 }
-float enlarged(vec3 at) { return max(1., armLeast * 2. * lens.y / size.y * max(-view(at).z, 0.) / arm); }
+float enlarged(vec3 at) { return max(1., armLeast * 2. * lens.y / size.y * max(depth(view(at)), 0.) / arm); }
 // Outside of the picture.
 const vec4 NOWHERE = vec4(2, 2, 2, 1);
 @ BALL VERTEX
@@ -60,11 +63,15 @@ void main() {
   centre = at.xyz;
   vec3 c = view(centre);
   float pixel = 2. * lens.y / size.y, away = length(c);
-  axes = shell.x > 0. ? shell : vec3(max(fixedAt.w > 0. ? fixedAt.w : radius, least * pixel * max(-c.z, 0.)));
+  axes = shell.x > 0. ? shell : vec3(max(fixedAt.w > 0. ? fixedAt.w : radius, least * pixel * max(depth(c), 0.)));
   float r = max(axes.x, max(axes.y, axes.z));
   vec2 side = vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2. - 1.;
   // Absent, or behind the camera; the camera within the ball or beside it: the whole picture.
   if (at.w < .5 || c.z >= r) gl_Position = NOWHERE;
+  else if (parallel > 0.) {
+    gl_Position = toClip(c + vec3(side, 0) * (r + 2. * pixel * parallel));
+    gl_Position.z = 0.;
+  }
   else if (away < 1.001 * r || -c.z < r) gl_Position = vec4(side, 0, 1);
   else {
     // Circle in which the cone of sight around the ball cuts the plane through its centre, and two pixels more.
@@ -79,7 +86,8 @@ flat in vec3 centre, axes; flat in vec4 colour; uniform vec3 shell; out vec4 pix
 void main() {
   // Ray through the pixel, in lengths in which the ellipsoid is a unit ball.
   vec2 plane = (gl_FragCoord.xy / size * 2. - 1.) * lens.xy;
-  vec3 ray = right * plane.x + up * plane.y - back, to = (eye - centre) / axes, d = ray / axes;
+  vec3 across = right * plane.x + up * plane.y, from = eye + across * parallel;
+  vec3 ray = parallel > 0. ? -back : across - back, to = (from - centre) / axes, d = ray / axes;
   float dd = dot(d, d), middle = -dot(to, d) / dd;
   vec3 foot = to + d * middle;
   float chord = 1. - dot(foot, foot);
@@ -87,16 +95,17 @@ void main() {
   float halfway = sqrt(max(chord, 0.) / dd);
   float along = middle - halfway < 0. ? middle + halfway : middle - halfway;
   if (edge <= 0. || along < 0.) discard;
-  vec3 hit = eye + ray * along, n = normalize((hit - centre) / (axes * axes));
+  vec3 hit = from + ray * along, n = normalize((hit - centre) / (axes * axes));
   n = turned(n);
+  vec3 towards = parallel > 0. ? vec3(0, 0, 1) : normalize(-view(hit));
   vec4 clip = toClip(view(hit));
   gl_FragDepth = clamp(clip.z / clip.w * .5 + .5, 0., 1.);
   if (shell.x > 0.) {
-    float rim = 1. - abs(dot(n, normalize(-view(hit))));
+    float rim = 1. - abs(dot(n, towards));
     pixel = vec4(colour.rgb, colour.a * edge * (.1 + .9 * rim * rim * rim));
   } else {
     float lit = .5 + .5 * max(dot(n, LIGHT), 0.);
-    float gloss = .16 * pow(max(dot(n, normalize(LIGHT + normalize(-view(hit)))), 0.), 48.);
+    float gloss = .16 * pow(max(dot(n, normalize(LIGHT + towards)), 0.), 48.);
     pixel = vec4(colour.rgb * lit + gloss, edge);
   }
 }
@@ -188,7 +197,7 @@ void main() {
     colour = vec4(texelFetch(paint, ivec2(gl_InstanceID, 1), 0).rgb, tint.a);
   }
   vec3 s = view(p);
-  float pixel = 2. * lens.y / size.y * -s.z, r = mark == 0 ? max(size_m, least * pixel) : least * pixel;
+  float pixel = 2. * lens.y / size.y * depth(s), r = mark == 0 ? max(size_m, least * pixel) : least * pixel;
   at = (vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2. - 1.) * (1. + 2. * pixel / r);
   thin = r / pixel;
   gl_Position = c.w < .5 || -s.z < lens.z ? NOWHERE : toClip(s + vec3(at * r, 0));

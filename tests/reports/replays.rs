@@ -7,6 +7,8 @@ use std::process::Command;
 
 use serde_json::Value;
 
+use tautline::render::{Extent, Timeline, View};
+
 use crate::browser::WITHOUT_WEBGL;
 use crate::replays_in_browser::{steer, steer_with};
 
@@ -107,8 +109,8 @@ fn a_replay_draws_and_jumps_to_the_findings_of_the_audit() {
     assert_eq!(found["steps"], "0.03 s", "two samples of 60 a second");
 }
 
-/// The outline of a ball at a corner of the picture is an ellipse: every pixel off its edge is compared with the ray
-/// through it.
+/// The outline of a ball at a corner of the picture is an ellipse in perspective and a circle in a parallel view. Every
+/// pixel off its edge is compared with the ray through it.
 #[test]
 fn a_ball_is_exact_to_the_pixel_anywhere_in_the_picture() {
     let folder = tempfile::tempdir().expect("a folder");
@@ -126,9 +128,9 @@ fn a_ball_is_exact_to_the_pixel_anywhere_in_the_picture() {
            willReadFrequently: true });
          [pen.canvas.width, pen.canvas.height] = [view.width, view.height];
          const shots = [];
-         for (const [yaw, pitch, distance, target] of [[0, 0, 5, [0, 0, 0]], [0.4, 0.3, 6, [1, 1.5, 0.9]], [2, 0.5, 4,
-           [-0.5, 0.7, 0.8]]]) {
-           const camera = root.player.look({ yaw, pitch, distance, target, t: 0.5 });
+         for (const [yaw, pitch, distance, target, parallel] of [[0, 0, 5, [0, 0, 0]], [0.4, 0.3, 6, [1, 1.5, 0.9]],
+           [2, 0.5, 4, [-0.5, 0.7, 0.8]], [2, 0.5, 4, [-0.5, 0.7, 0.8], true]]) {
+           const camera = root.player.look({ yaw, pitch, distance, target, t: 0.5, parallel });
            pen.drawImage(view, 0, 0);
            const all = pen.getImageData(0, 0, view.width, view.height).data, corner = all.slice(0, 3);
            let wrong = 0, inside = 0, edge = 0;
@@ -138,9 +140,11 @@ fn a_ball_is_exact_to_the_pixel_anywhere_in_the_picture() {
              for (const [dx, dy] of [[0.5, 0.5], [-0.4, -0.4], [1.4, -0.4], [-0.4, 1.4], [1.4, 1.4]]) {
                const u = ((x + dx) / view.width * 2 - 1) * camera.tangent * view.width / view.height,
                  v = (1 - (y + dy) / view.height * 2) * camera.tangent;
-               const ray = [0, 1, 2].map(k => camera.right[k] * u + camera.up[k] * v - camera.back[k]);
+               const across = [0, 1, 2].map(k => camera.right[k] * u + camera.up[k] * v);
+               const ray = [0, 1, 2].map(k => (parallel ? 0 : across[k]) - camera.back[k]);
+               const eye = [0, 1, 2].map(k => camera.eye[k] + (parallel ? across[k] * distance : 0));
                hits.add([0].some(ball => {
-                 const at = camera.place(ball), to = [0, 1, 2].map(k => at[k] - camera.eye[k]);
+                 const at = camera.place(ball), to = [0, 1, 2].map(k => at[k] - eye[k]);
                  const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2], along = dot(to, ray) / dot(ray, ray);
                  return along > 0 && dot(to, to) - along * along * dot(ray, ray) < RADIUS * RADIUS;
                }));
@@ -154,6 +158,7 @@ fn a_ball_is_exact_to_the_pixel_anywhere_in_the_picture() {
          }
          return shots;";
     let (found, _) = steer(folder.path(), &page, (800, false), &script.replace("RADIUS", "0.5"));
+    assert_eq!(found.as_array().map(Vec::len), Some(4), "{found}");
     for shot in found.as_array().expect("pictures") {
         assert!(shot["inside"].as_u64() > Some(1500) && shot["edge"].as_u64() < Some(1500), "{found}");
         assert_eq!(shot["wrong"], 0, "{found}");
@@ -393,7 +398,8 @@ fn views_fit_the_vehicles_and_the_camera_follows() {
              x < 0 || y < 0 || x > view.clientWidth || y > view.clientHeight).length; });
          const views = {};
          for (const name of ['Top', 'Front', 'Perspective']) {
-           press(name); const { pitch } = player.seen(); views[name] = [pitch.toFixed(3), outside().join()]; }
+           press(name); const { pitch, parallel } = player.seen();
+           views[name] = [pitch.toFixed(3), outside().join(), parallel]; }
          scrub.value = 0; scrub.oninput();
          key('Home'); key('v'); const first = player.seen().picked; key('v');
          choose(0, 'picked'); scrub.value = 5; scrub.oninput(); player.draw();
@@ -413,9 +419,10 @@ fn views_fit_the_vehicles_and_the_camera_follows() {
     );
     assert!(said.is_empty(), "{said:?}");
     for (view, pitch) in [("Top", "1.571"), ("Front", "0.000")] {
-        assert_eq!(found["views"][view], serde_json::json!([pitch, "0,0,0,0"]), "{found}");
+        assert_eq!(found["views"][view], serde_json::json!([pitch, "0,0,0,0", true]), "{found}");
     }
     assert_eq!(found["views"]["Perspective"][1], "0,0,0,0", "{found}");
+    assert_eq!(found["views"]["Perspective"][2], false, "{found}");
     let [perspective, top, front] = [0, 1, 2].map(|k| text(&found["angles"][k]));
     assert!(top == "1.57" && front == "0.00" && perspective != top && perspective != front, "{found}");
     let walked: Vec<_> = found["walked"].as_array().expect("a list").iter().map(text).collect();
@@ -437,6 +444,34 @@ fn views_fit_the_vehicles_and_the_camera_follows() {
     assert!(text(&found["scale"]).starts_with("clearance 0.0") && found["none"] == "", "{found}");
     assert_eq!((&found["fps"], &found["hidden"]), (&Value::from(""), &serde_json::json!([true, false])), "{found}");
     assert_eq!((&found["theme"], &found["names"]), (&Value::from("light"), &Value::from(false)), "{found}");
+}
+
+/// A replay opens on the view of the pictures, names the same closest pair, and lists only keys of what it has.
+#[test]
+fn a_replay_opens_like_the_pictures_and_lists_its_own_keys() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let script = "const seen = player.seen();
+         return { ...seen, help: doc.querySelector('.replay-help').textContent,
+           poster: doc.querySelector('.replay-poster').getBoundingClientRect().width,
+           legend: doc.querySelectorAll('.replay-diamond').length };";
+    let page = fly(folder.path(), &["obstacles", "--set", "time.duration_s=6"]);
+    let (found, said) = steer(folder.path(), &page, DESKTOP, script);
+    assert!(said.is_empty(), "{said:?}");
+    let timeline = Timeline::read_mcap(&folder.path().join("run/run.mcap")).expect("a recording");
+    let camera = Extent::of(&timeline)
+        .camera(&timeline, &timeline.log.at(0.0).expect("a frame"), &View::default())
+        .expect("a camera");
+    let azimuth_rad = camera.back.y.atan2(camera.back.x);
+    let [yaw, pitch] = ["yaw", "pitch"].map(|key| found[key].as_f64().expect("an angle"));
+    assert!((yaw - azimuth_rad).sin().abs() < 1e-9 && (pitch - camera.back.z.asin()).abs() < 1e-9, "{found}");
+    assert_eq!((&found["closest"], &found["legend"]), (&serde_json::json!([0, 1]), &Value::from(1)), "{found}");
+    assert!(found["poster"].as_f64() < Some(60.0), "{found}");
+    let help = text(&found["help"]);
+    assert!(help.contains("closest approach") && !help.contains("violation") && !help.contains("undecided"), "{help}");
+    let page = fly(folder.path(), &["pentagon-laplacian", "--force", "--set", "time.duration_s=5"]);
+    let (found, _) = steer(folder.path(), &page, DESKTOP, script);
+    assert_eq!((&found["parallel"], &found["legend"]), (&Value::from(true), &Value::from(0)), "{found}");
+    assert!(text(&found["help"]).contains("next, previous violation"), "{found}");
 }
 
 /// Of a trail only the part within a violation is red, names do not cover each other, and quadrotors have rotors.

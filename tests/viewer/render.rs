@@ -63,7 +63,7 @@ fn a_run_writes_pictures_and_shows_them_on_its_page() {
     let folder = flown("pentagon-laplacian", &[]);
     let out = folder.path().join("out");
     assert_eq!(names(&out.join("snapshots")), ["closest.png", "end.png", "start.png", "violation-1.png"]);
-    assert_eq!(size_of(&out.join("snapshots/closest.png")), [1280, 720]);
+    assert_eq!(size_of(&out.join("snapshots/closest.png")), [1280, 800]);
     let page = fs::read_to_string(out.join("report.html")).expect("a page");
     assert_eq!(page.matches("data:image/png;base64,").count(), 4);
     assert!(page.contains("Vehicles 4 and 5 were closer than delta from"), "the violation is described in words");

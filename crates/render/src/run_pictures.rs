@@ -15,6 +15,11 @@ use tautline_report::report::{Report, page};
 use tautline_report::request::{Failure, Monitor, NamedPicture, PICTURES_BYTES, Pictures, write_files};
 use tautline_sim::scenario::Scenario;
 
+/// Size of the pictures of a run \[pixels\]. A page shows them at less than half of it.
+const SIZE_PX: [u32; 2] = [1280, 800];
+/// Size of the texts of these pictures, so that they can be read in the page.
+const TEXT_SCALE: f32 = 1.75;
+
 /// Draws pictures of runs with a graphics adapter.
 pub struct RunPictures {
     adapter: String,
@@ -48,7 +53,8 @@ impl RunPictures {
             return Err(RenderError::Empty(timeline.name));
         }
         let mut renderer = Renderer::open(&self.adapter.as_str().into())?;
-        snapshots_of_run(&mut renderer, &timeline, &View { theme: Theme::Light, ..View::default() })
+        let view = View { theme: Theme::Light, size_px: SIZE_PX, text_scale: TEXT_SCALE, ..View::default() };
+        snapshots_of_run(&mut renderer, &timeline, &view)
     }
 }
 
@@ -74,8 +80,10 @@ impl Pictures for RunPictures {
         let names: Vec<_> = snapshot_names().iter().map(|name| file(name)).collect();
         let (files, on_page): (Vec<_>, Vec<_>) = std::iter::zip(snapshots, encoded)
             .map(|(Snapshot { name, description, .. }, [png, small])| {
-                let picture = page::Picture { description, data_uri: data_uri(&small) };
-                ((file(&name), png), (name.clone(), picture))
+                let file = file(&name);
+                let picture =
+                    page::Picture { description, data_uri: data_uri(&small), file: format!("snapshots/{file}") };
+                ((file, png), (name, picture))
             })
             .unzip();
         write_files(&folder.join("snapshots"), &names, &files)?;

@@ -10,6 +10,7 @@ use tautline_audit::{Status, Violation};
 use tautline_core::swarm::{Bounce, Pair};
 use tautline_core::text::{at_least, beside_limit, exact};
 use tautline_laws::space::Shape;
+use tautline_report::replay::is_between;
 use tautline_sim::plan::Plan;
 
 /// Number of vehicles up to which all names are drawn. A larger swarm has only those of the picked vehicle, of the
@@ -31,8 +32,6 @@ const LONGEST_NAME: usize = 40;
 const MIN_LETTERS: usize = 4;
 /// Width of the frame of a violation in a picture 720 pixels high \[pixels\].
 const FRAME_PX: f32 = 5.0;
-/// Number of steps along a line of sight.
-const SIGHT_STEPS: u32 = 100;
 /// Opacity of the background of text.
 const BACKING: f32 = 0.88;
 
@@ -48,9 +47,14 @@ impl SceneBuilder<'_> {
         let (bottom, taken) = labels.placed();
         // Without room texts are left out in this order: closest approach, name, verdict, time.
         let large_px = 1.35 * size_px;
-        let time = match self.timeline.plan.as_ref().map(|plan| plan.leg_at(self.frame.time_s)) {
-            Some((leg, legs)) if legs > 1 => format!("leg {} of {legs}, t = {:.2} s", leg + 1, self.frame.time_s),
-            _ => format!("t = {:.2} s", self.frame.time_s),
+        let (time_s, leg_at) =
+            (self.frame.time_s, |time_s| self.timeline.plan.as_ref().map(|plan| plan.leg_at(time_s)));
+        let leg = leg_at(time_s);
+        // The last instant of a leg shows the time at which the next leg begins.
+        let shown_s = if leg_at(time_s.next_up()) == leg { time_s } else { time_s.next_up() };
+        let time = match leg {
+            Some((leg, legs)) if legs > 1 => format!("leg {} of {legs}, t = {shown_s:.2} s", leg + 1),
+            _ => format!("t = {shown_s:.2} s"),
         };
         let mut free_px = width_px - 2.0 * margin;
         if width(large_px, &time) > free_px {
@@ -100,7 +104,7 @@ impl SceneBuilder<'_> {
     fn banner(&self, labels: &mut LabelLayout) -> f32 {
         let Some(&(violation, distance_m)) = self.violated.first() else { return self.obstacle_banner(labels) };
         let Violation { min_m, min_at_s, limit_m, .. } = violation;
-        let pair = self.pair(violation.pair);
+        let [pair, short] = self.pair(violation.pair);
         let apart = if distance_m < limit_m {
             format!("{} m apart", beside_limit(distance_m, limit_m, 3))
         } else if min_m < limit_m {
@@ -114,7 +118,7 @@ impl SceneBuilder<'_> {
         };
         let texts = [
             format!("VIOLATION  vehicles {pair} {apart}, delta {} m{more}", exact(limit_m)),
-            format!("VIOLATION {pair} {apart}"),
+            format!("VIOLATION {short} {apart}"),
             "VIOLATION".to_owned(),
         ];
         self.draw_banner(labels, &texts)
@@ -198,10 +202,12 @@ impl SceneBuilder<'_> {
                     1 => format!("violated at {:.2} s", span.from_s),
                     many => format!("{many} violations, the first at {:.2} s", span.from_s),
                 };
-                let mut texts = vec![format!("{at} by {}", self.pair(span.pair)), at, "violated".to_owned()];
+                let [pair, short] = self.pair(span.pair).map(|pair| format!("{at} by {pair}"));
+                let mut texts = vec![pair, short, at, "violated".to_owned()];
                 let hit = self.timeline.log.hits().0.first().filter(|hit| hit.time_s <= now_s);
                 if let Some(&Bounce { time_s: hit_s, pair, closing_m_s }) = hit {
-                    let hit = format!("hulls of {} hit at {hit_s:.2} s, {closing_m_s:.2} m/s", self.pair(pair));
+                    let [pair, _] = self.pair(pair);
+                    let hit = format!("hulls of {pair} hit at {hit_s:.2} s, {closing_m_s:.2} m/s");
                     texts.splice(..0, [format!("{}; {hit}", texts[0]), hit, "violated, hulls hit".to_owned()]);
                 }
                 (texts, theme.alarm())
@@ -214,7 +220,7 @@ impl SceneBuilder<'_> {
         let Some(approach) = self.frame.so_far else { return Vec::new() };
         let shown_m = |delta_m| beside_limit(approach.separation_m, delta_m, 3);
         let separation = self.timeline.delta_m.map_or(metres(approach.separation_m), |delta_m| shown_m(delta_m) + " m");
-        let pair = self.pair(approach.pair);
+        let [pair, short] = self.pair(approach.pair);
         let at = format!("{:.2} s", approach.time_s);
         let scaled = if self.timeline.log.metric().is_metres() { "" } else { ", scaled" };
         let delta = |delta_m| format!("  (delta {} m{scaled})", exact(delta_m));
@@ -222,7 +228,8 @@ impl SceneBuilder<'_> {
         let closest = if self.is_end() { "closest" } else { "closest so far" };
         vec![
             format!("{closest} {separation}, vehicles {pair} at {at}{delta}"),
-            format!("{closest} {separation}, {pair}{delta}"),
+            format!("{closest} {separation}, vehicles {pair} at {at}"),
+            format!("{closest} {separation}, {short}"),
             format!("{closest} {separation}"),
         ]
     }
@@ -300,7 +307,8 @@ impl SceneBuilder<'_> {
         }
         let is_ball = self.timeline.log.metric().is_metres();
         let shell = if is_ball { "keep-out shell, radius delta/2" } else { "keep-out shell, delta wide" };
-        if layers.shells && self.timeline.delta_m.is_some() && fits(x + size_px, shell) {
+        let shell = [shell, "keep-out shell"].into_iter().find(|shell| fits(x + size_px, shell));
+        if let Some(shell) = shell.filter(|_| layers.shells && self.timeline.delta_m.is_some()) {
             labels.draw(ring(x + arm, 1.4 * arm, theme.shell(), 1.6 * stroke_px));
             x = write(labels, x + 1.2 * size_px, shell);
         }
@@ -429,29 +437,17 @@ impl SceneBuilder<'_> {
             Lens::Parallel(_) => self.camera.back * distance_m,
         };
         let is_round = |shape: &Shape| matches!(shape, Shape::Ball { .. } | Shape::Capsule { .. });
-        let obstacles = self.timeline.plan.iter().flat_map(|plan| &plan.obstacles);
-        obstacles.filter(|obstacle| is_round(&obstacle.shape)).any(|obstacle| {
-            // Steps of the distance to the surface end beyond the obstacle, inside it or at the camera.
-            let (mut along, length) = (0.0, towards.norm());
-            for _ in 0..SIGHT_STEPS {
-                let at = place + self.extent.origin_m() + towards * (along / length);
-                let (free_m, _) = obstacle.shape.signed_distance_m(at - obstacle.place_m);
-                if free_m <= 0.0 {
-                    return true;
-                }
-                along += free_m.max(length / f64::from(SIGHT_STEPS));
-                if along >= length {
-                    break;
-                }
-            }
-            false
-        })
+        let (from_m, obstacles) =
+            (place + self.extent.origin_m(), self.timeline.plan.iter().flat_map(|of| &of.obstacles));
+        obstacles
+            .filter(|obstacle| is_round(&obstacle.shape))
+            .any(|obstacle| is_between(&obstacle.shape, obstacle.place_m, from_m, from_m + towards))
     }
 
-    /// Returns the names of the two vehicles of a pair.
-    fn pair(&self, pair: Pair) -> String {
+    /// Returns the names of the two vehicles of a pair, in words and in short.
+    fn pair(&self, pair: Pair) -> [String; 2] {
         let name = |k: usize| self.timeline.vehicles.get(k).map_or_else(|| (k + 1).to_string(), |name| shortened(name));
-        format!("{}-{}", name(pair.first()), name(pair.second()))
+        [" and ", "-"].map(|between| format!("{}{between}{}", name(pair.first()), name(pair.second())))
     }
 }
 

@@ -62,6 +62,8 @@ pub struct View {
     pub theme: Theme,
     /// Width and height \[pixels\].
     pub size_px: [u32; 2],
+    /// Size of texts and widths of lines, relative to their usual part of the height.
+    pub text_scale: f32,
     /// Layers.
     pub layers: Layers,
     /// Length of trails \[s\]; `None` for the whole flight.
@@ -78,6 +80,7 @@ impl Default for View {
             colouring: Colouring::Vehicle,
             theme: Theme::Dark,
             size_px: [1280, 720],
+            text_scale: 1.0,
             layers: Layers::ALL,
             trail_s: None,
             picked: None,
@@ -86,10 +89,10 @@ impl Default for View {
 }
 
 impl View {
-    /// Returns the length in pixels of one pixel in a picture 720 pixels high.
+    /// Returns the length in pixels of one pixel in a picture 720 pixels high with the usual size of texts.
     pub(super) fn unit_px(&self) -> f32 {
         let [width, height] = self.size_px.map(|size| size as f32);
-        (height.min(0.75 * width) / 720.0).max(0.3)
+        self.text_scale * (height.min(0.75 * width) / 720.0).max(0.3)
     }
 
     /// Returns the size of text \[pixels\] relative to the normal size.

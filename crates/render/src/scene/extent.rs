@@ -11,6 +11,7 @@ use crate::timeline::Timeline;
 use tautline_core::swarm::{Pair, Rows, row};
 use tautline_laws::space::{Obstacle, Shape};
 use tautline_report::flight_log::{Frame, Keyframe};
+use tautline_report::replay::Viewpoint;
 
 /// Largest number of vehicle positions that framing uses.
 const FRAMED_PLACES: usize = 200_000;
@@ -30,14 +31,6 @@ const CLOSEST_DISTANCES: f64 = 1.1;
 const SMOOTHED: f64 = 0.04;
 /// Largest number of times at which a camera that follows the swarm is computed.
 const FOLLOWED_TIMES: usize = 2000;
-/// Largest thickness of a planar flight, in units of its extent.
-const PLANAR: f64 = 0.02;
-/// Largest height of a flat flight, in units of its extent; it is seen from higher up.
-const FLAT: f64 = 0.3;
-/// Azimuth of the oblique view for a flight along x and along y, and elevation for a flat and any other flight
-/// \[degrees\].
-const AZIMUTH_DEG: [f64; 2] = [-66.0, -24.0];
-const ELEVATION_DEG: [f64; 2] = [46.0, 28.0];
 /// Smallest depth that is drawn, in units of the largest: centimetres in a flight of tens of kilometres.
 const NEAREST: f64 = 1e-6;
 /// Distance around the flight up to which obstacles are framed, in units of its extent.
@@ -151,14 +144,11 @@ impl Extent {
         });
         let is_near = lowest.z >= 0.0 && lowest.z <= NEAR_GROUND * (highest - lowest).norm() + largest;
         let z = hard_z.unwrap_or(if is_near { 0.0 } else { low.z - largest }) - origin_m.z;
-        let flown = highest - lowest;
-        let oblique = Direction::perspective(
-            AZIMUTH_DEG[usize::from(flown.y > flown.x)],
-            ELEVATION_DEG[usize::from(high.z - low.z > FLAT * (high - low).xy().max())],
-        );
-        let thin = |axis: usize| flown[axis] <= PLANAR * flown.max() && flown.max() > 0.0 && obstacles.is_empty();
-        let planes = [(2, Direction::TOP), (1, Direction::FRONT), (0, Direction::SIDE)];
-        let auto = planes.into_iter().find(|(axis, _)| thin(*axis)).map_or(oblique, |(_, direction)| direction);
+        let logs: Vec<_> = timelines.iter().map(|timeline| &*timeline.log).collect();
+        let solids: Vec<_> = obstacles.iter().map(|obstacle| (obstacle.shape, obstacle.place_m)).collect();
+        let Viewpoint { azimuth_deg, elevation_deg, across } = Viewpoint::of(&logs, &solids);
+        let oblique = Direction::perspective(azimuth_deg, elevation_deg);
+        let auto = across.map_or(oblique, |axis| [Direction::SIDE, Direction::FRONT, Direction::TOP][axis]);
         let (low, high) = (low - origin_m, high - origin_m);
         let span = (high.x - low.x).max(high.y - low.y).max(2.0 * largest) + 2.0 * largest;
         let grid_m = round_step(span / GROUND_LINES);

@@ -1,5 +1,8 @@
 //! Ground with its scale, and coordinate axes.
 
+use nalgebra::Vector3;
+
+use super::camera::Lens;
 use super::colour::{Colour, Theme};
 use super::compose::SceneBuilder;
 use super::labels::{LabelLayout, width};
@@ -25,9 +28,34 @@ const AXES: [[Colour; 3]; 2] = [
     [Colour::hex(0xB0_2A_37), Colour::hex(0x2B_7A_2B), Colour::hex(0x1F_5F_B0)],
 ];
 
+/// Smallest component of the direction of a parallel camera along an axis that it looks along.
+const ALONG_AXIS: f64 = 0.999_999;
+
 impl SceneBuilder<'_> {
+    /// Returns the corners of the ground \[m\], which fills the picture of a parallel camera along an axis.
+    fn ground_m(&self) -> [Vector3<f64>; 2] {
+        let ([low, high], step, camera) = (self.extent.ground_m, self.extent.grid_m, &self.camera);
+        let Lens::Parallel([across, half]) = camera.lens else { return [low, high] };
+        if camera.back.amax() < ALONG_AXIS {
+            return [low, high];
+        }
+        let reach = (camera.right * across).abs() + (camera.up * half).abs();
+        let mut corners = [low, high];
+        for axis in 0..2 {
+            // Along the line of sight the ground keeps its length.
+            if reach[axis] > 1e-3 * half {
+                let beyond =
+                    [low[axis] - camera.eye_m[axis] + reach[axis], camera.eye_m[axis] + reach[axis] - high[axis]];
+                let most = f64::from(MAX_LINES) / 3.0;
+                let [before, after] = beyond.map(|beyond_m| (beyond_m / step).ceil().clamp(0.0, most) * step);
+                (corners[0][axis], corners[1][axis]) = (low[axis] - before, high[axis] + after);
+            }
+        }
+        corners
+    }
+
     pub(super) fn ground(&self, lines: &mut Vec<Line>) {
-        let ([low, high], step) = (self.extent.ground_m, self.extent.grid_m);
+        let ([low, high], step) = (self.ground_m(), self.extent.grid_m);
         let width_px = self.view.unit_px().max(0.7);
         let theme = self.view.theme;
         let colour = if self.extent.has_hard_ground { theme.obstacle().at(HARD) } else { theme.grid() };
@@ -49,7 +77,7 @@ impl SceneBuilder<'_> {
     /// Draws the directions of the axes in the lower right corner, and coordinates in metres where ground lines end or
     /// leave the picture.
     pub(super) fn scale(&self, labels: &mut LabelLayout) {
-        let [low, high] = self.extent.ground_m;
+        let [low, high] = self.ground_m();
         let (size_px, soft) = (self.view.text_px(0.8), self.view.theme.soft_ink());
         if self.view.has_legend() {
             self.triad(labels);
@@ -93,7 +121,7 @@ impl SceneBuilder<'_> {
     /// \[pixels\]. The texts are beyond the ends of the lines, or where the lines leave the picture. All are at one
     /// side of the picture that is not taken.
     fn numbers(&self, axis: usize, is_high: bool, size_px: f32, taken: &mut Option<usize>) -> Vec<([f64; 2], String)> {
-        let ([low, high], step, origin_m) = (self.extent.ground_m, self.extent.grid_m, self.extent.origin_m());
+        let ([low, high], step, origin_m) = (self.ground_m(), self.extent.grid_m, self.extent.origin_m());
         let other = 1 - axis;
         let (from, to) = if is_high { (high[other], low[other]) } else { (low[other], high[other]) };
         let from = from + OUTWARDS * step * (from - to).signum();

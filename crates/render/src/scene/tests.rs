@@ -125,13 +125,13 @@ fn a_violation_is_shown_while_it_lasts_and_in_the_verdict_after() {
     let [before, during, after] = [3.9, 5.0, 6.1].map(|time_s| scene(&timeline, time_s, &View::default()));
     assert_eq!([&before, &during, &after].map(red), [0, 2, 0]);
     assert!(says(&before, "clear so far") && !says(&before, "VIOLATION"), "{:?}", words(&before));
-    assert!(says(&during, "VIOLATION") && says(&during, "violated at 4.00 s by 1-2"), "{:?}", words(&during));
+    assert!(says(&during, "VIOLATION") && says(&during, "violated at 4.00 s by 1 and 2"), "{:?}", words(&during));
     assert!(!says(&after, "VIOLATION") && says(&after, "violated at 4.00 s"), "{:?}", words(&after));
     // Several violations are shown by their number and the first one.
     let mut again = timeline;
     again.note(&Event::ViolationBegan { pair: Pair::new(2, 3), time_s: 7.0 });
     let twice = scene(&again, 8.0, &View::default());
-    assert!(says(&twice, "2 violations, the first at 4.00 s by 1-2"), "{:?}", words(&twice));
+    assert!(says(&twice, "2 violations, the first at 4.00 s by 1 and 2"), "{:?}", words(&twice));
     let timeline = self::timeline();
     // A vehicle in violation has its shell even with every layer off.
     let bare = scene(&timeline, 5.0, &View { layers: Layers::NONE, ..View::default() });
@@ -147,10 +147,10 @@ fn a_violation_between_samples_shows_the_audited_separation() {
     let violation = timeline.log.violations().of_vehicles().nth(1).expect("a violation");
     assert_eq!((violation.min_m, violation.min_at_s), (1.25, 0.5 * (8.2 + 8.4)));
     let scene = scene(&timeline, violation.min_at_s, &View::default());
-    let (banner, label) = ("VIOLATION  vehicles 3-4 1.250 m apart, delta 2.000 m", "1.250 m");
+    let (banner, label) = ("VIOLATION  vehicles 3 and 4 1.250 m apart, delta 2.000 m", "1.250 m");
     assert!(words(&scene).contains(&banner) && words(&scene).contains(&label), "{:?}", words(&scene));
     let closest = words(&scene).into_iter().find(|words| words.starts_with("closest so far")).expect("a caption");
-    assert!(closest.starts_with("closest so far 1.250 m, vehicles 3-4 at 8.30 s"), "{closest}");
+    assert!(closest.starts_with("closest so far 1.250 m, vehicles 3 and 4 at 8.30 s"), "{closest}");
 }
 
 #[test]
@@ -242,7 +242,7 @@ fn a_violation_after_the_last_sample_is_in_the_last_picture() {
     timeline.note(&Event::ViolationBegan { pair: Pair::new(2, 3), time_s: 10.01 });
     let says = |time_s: f64| {
         let scene = scene(&timeline, time_s, &View::default());
-        words(&scene).iter().any(|text| text.starts_with("VIOLATION  vehicles 3-4"))
+        words(&scene).iter().any(|text| text.starts_with("VIOLATION  vehicles 3 and 4"))
     };
     assert_eq!([9.9, 10.0, 10.5].map(says), [false, true, true]);
 }
@@ -267,8 +267,45 @@ fn an_undecided_flight_is_not_shown_as_clear() {
 fn the_caption_shows_the_smallest_separation_so_far() {
     let timeline = timeline();
     let scene = scene(&timeline, 3.0, &View::default());
-    assert!(words(&scene).iter().any(|text| text.starts_with("closest so far 2.700 m, vehicles 1-2 at 3.00 s")));
+    assert!(words(&scene).iter().any(|text| text.starts_with("closest so far 2.700 m, vehicles 1 and 2 at 3.00 s")));
     assert!(words(&scene).contains(&"t = 3.00 s") && words(&scene).contains(&"square"));
+}
+
+/// The last instant of a leg is drawn with the time of its end, which the report shows.
+#[test]
+fn the_end_of_a_leg_has_the_time_of_the_report() {
+    let scenario = Scenario::read(&Source::Builtin("obstacles".to_owned()), &[]).expect("built in");
+    let mut timeline = Timeline::of(&scenario);
+    let swarm = Swarm::at_rest(scenario.start.positions_m.clone());
+    // Half of a hundredth of a second: a time just before it is rounded down.
+    let end_s = 30.925;
+    for (step, time_s) in [0.0, end_s, 40.0].into_iter().enumerate() {
+        timeline.take(&Sample::new(time_s, step as u64, &swarm, &Rows::zeros(8)));
+    }
+    timeline.note(&Event::LegBegan { leg: 1, time_s: end_s });
+    let shown = |time_s: f64| words(&scene(&timeline, time_s, &View::default())).join("; ");
+    assert!(
+        shown(end_s.next_down()).contains(&format!("leg 1 of 2, t = {end_s:.2} s")),
+        "{}",
+        shown(end_s.next_down())
+    );
+    assert!(shown(end_s).contains(&format!("leg 2 of 2, t = {end_s:.2} s")), "{}", shown(end_s));
+}
+
+/// Pillars stand around the start of this flight; the automatic camera looks past them. Hidden vehicles have no names.
+#[test]
+fn the_automatic_camera_shows_every_vehicle_at_the_start_among_obstacles() {
+    let scenario = Scenario::read(&Source::Builtin("obstacles".to_owned()), &[]).expect("built in");
+    let mut timeline = Timeline::of(&scenario);
+    for (step, along_m) in [0.0, 10.0, 20.0].into_iter().enumerate() {
+        let mut swarm = Swarm::at_rest(scenario.start.positions_m.clone());
+        swarm.positions_m.column_mut(0).add_scalar_mut(along_m);
+        timeline.take(&Sample::new(step as f64, step as u64, &swarm, &Rows::zeros(8)));
+    }
+    let layers = Layers { labels: true, ..Layers::NONE };
+    let named = |text: &str| words(&scene(&timeline, 0.0, &View { layers, ..camera(text) })).len();
+    assert_eq!(named("auto"), 8);
+    assert!(named("-66,28,40") < 8, "a pillar hides vehicles from the usual direction");
 }
 
 #[test]
@@ -336,7 +373,7 @@ fn the_closest_pair_is_named_first_and_few_are_labelled() {
         timeline.note(&Event::ViolationBegan { pair: Pair::new(i, j), time_s: 1.0 });
     }
     let scene = scene(&timeline, 5.0, &View::default());
-    let banner = "VIOLATION  vehicles 1-2 1.500 m apart, delta 2.000 m and 5 more";
+    let banner = "VIOLATION  vehicles 1 and 2 1.500 m apart, delta 2.000 m and 5 more";
     assert!(words(&scene).contains(&banner), "{:?}", words(&scene));
     let labels = words(&scene).iter().filter(|text| text.ends_with(".000 m") || text.ends_with(".500 m")).count();
     assert!((1..=3).contains(&labels), "{:?}", words(&scene));
@@ -513,7 +550,7 @@ fn the_closest_approach_is_the_same_in_report_figure_replay_and_picture() {
     let timeline = Timeline::flown(&scenario, Arc::new(log));
     let scene = scene(&timeline, at_s, &View::default());
     let caption = words(&scene).into_iter().find(|words| words.starts_with("closest so far")).expect("a caption");
-    assert!(caption.starts_with(&format!("closest so far {metres}, vehicles {first}-{second}")), "{caption}");
+    assert!(caption.starts_with(&format!("closest so far {metres}, vehicles {first} and {second}")), "{caption}");
     assert!(words(&scene).contains(&metres.as_str()), "{:?}", words(&scene));
     assert!(report.headline().contains(&metres), "{}", report.headline());
 }

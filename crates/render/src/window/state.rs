@@ -86,6 +86,7 @@ impl WindowState {
             colouring: self.colouring,
             theme: self.theme,
             size_px,
+            text_scale: 1.0,
             layers: Layers { trails: self.layers.trails && self.trails != Trails::None, ..self.layers },
             trail_s: (self.trails == Trails::Short).then_some(SHORT_TRAIL * duration_s),
             picked: self.picked,

@@ -12,6 +12,8 @@ const SEARCHED_VEHICLES: usize = 2000;
 /// Name and columns of the channel of attitudes: quaternions that turn body into world.
 const CHANNEL: &str = "attitude";
 const COLUMNS: [&str; 4] = ["qw", "qx", "qy", "qz"];
+/// Distances that differ by less, relative to their size, are equal up to rounding.
+const ROUNDING: f64 = 1e-9;
 /// Smallest norm of a valid quaternion.
 const LEAST_NORM: f64 = 1e-6;
 
@@ -87,6 +89,7 @@ impl FlightLog {
             (_, Some(before)) if self.count() > SEARCHED_VEHICLES => Some(before.pair),
             _ => nearest_present(&positions_m, self.metric()).map(|(pair, _)| pair),
         };
+        let pair = pair.map(|pair| first_of_ties(&positions_m, pair, self.metric()));
         let worst = self.violations().of_vehicles().filter(|found| found.min_m.is_finite());
         let worst = worst.map(|v| ClosestApproach { pair: v.pair, separation_m: v.min_m, time_s: v.min_at_s });
         let worst: Vec<_> = worst.filter(|worst| worst.time_s <= time_s).collect();
@@ -156,6 +159,16 @@ pub fn attitudes_of(sample: &Sample<'_>) -> Attitudes {
 /// Returns the scaled vector from the first vehicle of a pair to the second.
 pub(super) fn apart(positions_m: &Rows, pair: Pair, metric: Metric) -> Vector3<f64> {
     metric.scaled(row(positions_m, pair.second()) - row(positions_m, pair.first()))
+}
+
+/// Returns the first pair, in the order of vehicles, whose distance is that of `pair` or smaller, up to rounding. A
+/// swarm of more than [`SEARCHED_VEHICLES`] is not searched.
+pub(super) fn first_of_ties(positions_m: &Rows, pair: Pair, metric: Metric) -> Pair {
+    let count = positions_m.nrows();
+    let most_m = apart(positions_m, pair, metric).norm() * (1.0 + ROUNDING);
+    let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| Pair::new(i, j)));
+    let mut ties = pairs.take_while(|other| *other < pair && count <= SEARCHED_VEHICLES);
+    ties.find(|other| apart(positions_m, *other, metric).norm() <= most_m).unwrap_or(pair)
 }
 
 /// Returns the nearest two present vehicles and their scaled distance \[m\].

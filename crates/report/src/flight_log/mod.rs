@@ -13,8 +13,8 @@ pub use violations::Violations;
 
 use std::collections::BTreeMap;
 
-use frame::apart;
 pub(crate) use frame::nearest_present;
+use frame::{apart, first_of_ties};
 use tautline_audit::{Approach, ObjectPair, Slice, Slices};
 use tautline_core::record::{Event, RecordError, Sample, Sink};
 use tautline_core::swarm::{Bounce, ClosestApproach, Rows, row, separation};
@@ -358,6 +358,10 @@ impl FlightLog {
         }
         if self.keyframes.is_empty() {
             self.violations.keep_within(keyframe.positions_m.nrows());
+            // Starts are often symmetric: the closest of several pairs is the first one.
+            if let Some(closest) = &mut keyframe.closest {
+                closest.pair = first_of_ties(&keyframe.positions_m, closest.pair, self.metric);
+            }
         }
         let (time_s, before) = (keyframe.time_s, self.closest());
         keyframe.number = self.samples;

@@ -94,6 +94,23 @@ fn interpolates_positions_linearly() {
     assert_eq!((beyond.time_s, beyond.positions_m[(1, 0)]), (1.0, 2.0));
 }
 
+/// The sides of a square are equal up to rounding. The first pair in the order of vehicles is the closest.
+#[test]
+fn the_first_of_several_closest_pairs_is_the_closest() {
+    let mut log = FlightLog::default();
+    let square = Rows::from_row_slice(&[0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0, 1.0 - 1e-15, 0.0, 0.0, 1.0, 0.0]);
+    let separation = Some(ClosestApproach { pair: Pair::new(1, 2), separation_m: 1.0 - 1e-15, time_s: 0.0 });
+    for time_s in [0.0, 1.0] {
+        let swarm = Swarm::at_rest(square.clone());
+        log.take(&Sample { separation, ..Sample::new(time_s, 0, &swarm, &Rows::zeros(0)) });
+    }
+    let pair = |time_s| {
+        let frame = log.at(time_s).expect("a frame");
+        [frame.nearest.map(|nearest| nearest.0), frame.so_far.map(|closest| closest.pair)]
+    };
+    assert_eq!([0.0, 0.5].map(pair), [[Some(Pair::new(0, 1)); 2]; 2]);
+}
+
 /// A flight of one vehicle with these attitudes (w, x, y, z), a second apart.
 fn turning(attitudes: &[[f64; 4]]) -> FlightLog {
     let mut log = FlightLog::default();

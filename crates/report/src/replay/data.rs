@@ -9,6 +9,7 @@ use super::motion::PackedMotion;
 use super::obstacle_meshes::{POINT_BYTES, Thing, ground};
 use super::stage::{Extent, Rotors, Targets, targets_of, turn_bytes};
 use super::statements::{self, Statement, Words};
+use super::viewpoint::Viewpoint;
 use super::{
     Kind, LONGEST_NAME, LONGEST_SENTENCE, Moment, NoReplay, Stage, base64_bytes, base64_of, cut, doubles, singles,
 };
@@ -77,6 +78,8 @@ struct Data<'a> {
     /// Origin of all drawn positions, and half of the box around everything \[m\].
     origin_m: [f64; 3],
     half_m: [f64; 3],
+    /// First view.
+    viewpoint: Viewpoint,
     /// Side of the squares on the ground, and their lines relative to the origin, in single precision.
     square_m: f64,
     ground: String,
@@ -162,7 +165,7 @@ impl Replay {
         let (targets, guides) = targets_of(plan.as_ref(), &shown, begin_s, room_bytes / 4);
         let (nearest, holds) = (log.nearest(), log.holds);
         let near = nearest.clone().finish(MOST_SLICES.min(room_bytes / 10 / base64_bytes(SLICE_BYTES)));
-        let [near_s, near_who] = statements::pairs(&near, end_s, place);
+        let [near_s, near_who] = statements::pairs(&near, log, place);
         let extent = Extent::of(stage, log, &shown);
         let origin_m = place_of_weightiest(log, listed).unwrap_or(extent.middle_m());
         let level_m = stage.obstacles.iter().find_map(ground_m).unwrap_or(extent.low_m.z);
@@ -173,7 +176,6 @@ impl Replay {
         let name = |vehicle: usize| stage.vehicles.get(vehicle).map(|name| cut(name, LONGEST_NAME));
         let words = Words { unit: judged.unit, limit: judged.limit, has_gaps, name };
         let things = obstacle_meshes(stage, &extent, listed, room_bytes);
-        let obstacles_off_m = things.iter().map(|thing| thing.off_m).fold(0.0, f64::max);
         let mut data = Data {
             version: VERSION,
             vehicles: shown.iter().map(|&k| cut(&stage.vehicles[k], LONGEST_NAME)).collect(),
@@ -184,6 +186,7 @@ impl Replay {
             holds,
             origin_m: origin_m.into(),
             half_m: extent.half_m().into(),
+            viewpoint: stage.viewpoint(log),
             square_m,
             ground: singles(&lines.iter().map(|at| at - origin_m).collect::<Vec<_>>()),
             middle_m: [0.0; 3],
@@ -251,7 +254,7 @@ impl Replay {
             holds,
             inexact: moments.len() - moments.iter().filter(is_exact).count(),
             unknown_radius: stage.unknown_radii(&shown),
-            obstacles_off_m,
+            obstacles_off_m: data.things.iter().map(|thing| thing.off_m).fold(0.0, f64::max),
         })
     }
 }

@@ -14,11 +14,13 @@ mod motion;
 mod obstacle_meshes;
 mod stage;
 mod statements;
+mod viewpoint;
 
 pub use chart::Chart;
 pub use data::{JudgementContext, Replay};
 pub use decimate::{MOST_INSTANTS, MOST_VEHICLES, Span, chosen};
 pub use stage::{Rotors, Stage};
+pub use viewpoint::{Viewpoint, is_between};
 
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;

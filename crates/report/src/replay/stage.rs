@@ -3,11 +3,12 @@
 use nalgebra::{UnitQuaternion, Vector3};
 use serde::Serialize;
 
-use super::{base64_of, singles};
+use super::{Viewpoint, base64_of, singles};
 use crate::flight_log::FlightLog;
 use tautline_audit::{Obstacle, Shape};
 use tautline_core::swarm::{Rows, mean_row, row};
 use tautline_laws::formation::Formation;
+use tautline_laws::space;
 use tautline_sim::plan::Plan;
 use tautline_sim::scenario::Scenario;
 
@@ -71,6 +72,19 @@ impl Stage {
         let unknown =
             vehicles.iter().filter(|&&vehicle| self.radius_m.get(vehicle).copied().flatten().is_none()).count();
         (unknown > 0).then(|| (unknown, self.unknown_radius_m()))
+    }
+
+    /// Returns the direction from which the replay shows a flight first. Moving obstacles do not count.
+    pub(super) fn viewpoint(&self, log: &FlightLog) -> Viewpoint {
+        let shape = |shape: &Shape| match *shape {
+            Shape::Ball { radius_m } => space::Shape::Ball { radius_m },
+            Shape::Box { half_m, yaw_rad } => space::Shape::Box { half_m, yaw_deg: yaw_rad.to_degrees() },
+            Shape::Capsule { from_m, to_m, radius_m } => space::Shape::Capsule { from_m, to_m, radius_m },
+            Shape::HalfSpace { normal } => space::Shape::HalfSpace { normal },
+        };
+        let at_rest = |of: &Obstacle| matches!(*of.path, [(_, at_m)] if at_m.iter().all(|x| x.is_finite()));
+        let obstacles = self.obstacles.iter().filter(|of| at_rest(of));
+        Viewpoint::of(&[log], &obstacles.map(|of| (shape(&of.shape), of.path[0].1)).collect::<Vec<_>>())
     }
 
     pub(super) fn drawn_radius_m(&self, vehicle: usize) -> f64 {

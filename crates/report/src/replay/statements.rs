@@ -3,7 +3,9 @@
 use std::collections::BTreeSet;
 
 use super::{Kind, Moment, base64_of, doubles};
+use crate::flight_log::FlightLog;
 use tautline_audit::{Approach, Slice, Slices};
+use tautline_core::swarm::Pair;
 use tautline_core::text::{beside_limit, seconds};
 
 /// Number of decimals of a distance.
@@ -81,16 +83,24 @@ impl<N: Fn(usize) -> Option<String>> Words<'_, N> {
 }
 
 /// Returns the times \[s\] from which a pair is the closest, as doubles, and the pairs, as two 16-bit indices each;
-/// 65535 is a vehicle that is not drawn.
-pub(super) fn pairs(slices: &[Slice], end_s: f64, place: impl Fn(usize) -> Option<usize>) -> [String; 2] {
+/// 65535 is a vehicle that is not drawn. The first pair is that of the log at its first instant.
+pub(super) fn pairs(slices: &[Slice], log: &FlightLog, place: impl Fn(usize) -> Option<usize>) -> [String; 2] {
     let place = |vehicle: usize| place(vehicle).and_then(|at| u16::try_from(at).ok()).unwrap_or(NOT_DRAWN);
+    let two = |pair: Option<Pair>| pair.map_or([NOT_DRAWN; 2], |two| [place(two.first()), place(two.second())]);
+    let [begin_s, end_s] = log.range_s();
+    let first = log.at(begin_s).and_then(|frame| frame.nearest).map(|(pair, _)| (begin_s, pair));
+    // The first pair replaces a slice of the first instant alone, and begins one of the same pair.
+    let slices = &slices[slices.iter().take_while(|slice| first.is_some() && slice.to_s <= begin_s).count()..];
+    let first =
+        first.filter(|(_, pair)| slices.first().is_none_or(|slice| slice.closest.pair.vehicles() != Some(*pair)));
     let begins = slices.iter().skip(1).map(|slice| slice.from_s).chain([f64::INFINITY]);
     let pairs = slices.iter().zip(begins).flat_map(|(slice, next_s)| {
-        let two = slice.closest.pair.vehicles().map_or([NOT_DRAWN; 2], |two| [place(two.first()), place(two.second())]);
         let none = (slice.to_s < next_s && slice.to_s < end_s).then_some((slice.to_s.next_up(), [NOT_DRAWN; 2]));
-        [Some((slice.from_s, two)), none].into_iter().flatten()
+        let from_s = if first.is_some() { slice.from_s.max(begin_s.next_up()) } else { slice.from_s };
+        [Some((from_s, two(slice.closest.pair.vehicles()))), none].into_iter().flatten()
     });
-    let (from_s, who): (Vec<_>, Vec<_>) = pairs.unzip();
+    let first = first.map(|(at_s, pair)| (at_s, two(Some(pair))));
+    let (from_s, who): (Vec<_>, Vec<_>) = first.into_iter().chain(pairs).unzip();
     [doubles(from_s.into_iter()), base64_of(who.iter().flatten().flat_map(|at| at.to_le_bytes()))]
 }
 

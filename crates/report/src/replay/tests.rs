@@ -73,8 +73,7 @@ fn keeps_a_short_flight_completely() {
     assert_eq!((replay.instants, replay.vehicles, replay.moments), ([100, 100], [3, 3], [1, 1]));
     let times: Vec<f64> = (0..100).map(|k| 0.1 * f64::from(k)).collect();
     assert_eq!(doubles(&data["times_s"]), times);
-    // The first slice is the first instant.
-    assert_eq!(doubles(&data["near_s"]), [&[0.0, 0.0][..], &times[1..99]].concat());
+    assert_eq!(doubles(&data["near_s"]), times[..99]);
     assert_eq!(data["nearest"], serde_json::json!([[0.0, "closest so far 2.000 m, 1 and 2"]]));
     let verdicts = data["verdicts"].as_array().expect("verdicts");
     let said: Vec<_> = verdicts.iter().map(|told| (&told[1], told[2].as_str().expect("words"))).collect();
@@ -304,4 +303,22 @@ fn findings_are_cut_to_the_flight_and_gaps_end_the_closest_pair() {
     assert_eq!(doubles(&data["near_s"]), [0.0, 3.0_f64.next_up(), 5.0]);
     let who = BASE64.decode(data["near_who"].as_str().expect("base64")).expect("base64");
     assert_eq!(who, [0, 0, 1, 0, 255, 255, 255, 255, 0, 0, 1, 0]);
+}
+
+/// At the start the data name the pair that pictures show, not the closest pair of the time after it.
+#[test]
+fn the_closest_pair_at_the_start_is_that_of_the_pictures() {
+    let mut log = FlightLog::default();
+    for (time_s, pair) in [(0.0, Pair::new(0, 1)), (1.0, Pair::new(1, 2))] {
+        let places_m = Rows::from_row_slice(&[-1.0 - time_s, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0]);
+        take(&mut log, time_s, places_m, Some(ClosestApproach { pair, separation_m: 1.0, time_s }));
+    }
+    let (_, data) = packed(&stage(3), &log, &[], PAGE_BYTES);
+    let bytes = |key: &str| BASE64.decode(data[key].as_str().expect("text")).expect("base64");
+    let who: Vec<_> = bytes("near_who").chunks_exact(2).map(|two| u16::from_le_bytes([two[0], two[1]])).collect();
+    let from: Vec<_> =
+        bytes("near_s").chunks_exact(8).map(|of| f64::from_le_bytes(of.try_into().expect("8"))).collect();
+    assert_eq!(who[..2], [0, 1], "{who:?}");
+    assert_eq!((who.last(), from[0]), (Some(&2), 0.0), "{who:?}");
+    assert!(from[1..].iter().all(|&from_s| from_s > 0.0), "{from:?}");
 }

@@ -46,7 +46,7 @@ impl Report {
     pub fn to_html(&self, about: &RunPage<'_>) -> String {
         let badge = Badge::judged(self.verdict.pass);
         let mut page = Page::new("Flight report", self.scenario.name.clone(), badge, self.headline());
-        page.reasons.clone_from(&self.verdict.reasons);
+        page.reasons = self.reasons_beside_headline();
         let warnings = about.preflight.warnings.iter();
         page.warnings = warnings.map(|of| (of.code.name().to_owned(), of.message.clone())).collect();
         page.replay = Some(page::replay(&self.scenario.name, about.replay, Start::AtOnce));

@@ -32,7 +32,7 @@ impl Verdict {
     pub(super) fn of(report: &Report, result: &FlightResult<'_>) -> Self {
         let reasons: Vec<_> = [
             refused(result),
-            violation(result),
+            violation(report, result),
             unresolved_by_step(result),
             report.obstacles.as_ref().and_then(Obstacles::reason),
             report.hulls.reason(),
@@ -129,27 +129,40 @@ fn refused(result: &FlightResult<'_>) -> Option<String> {
     (!codes.is_empty()).then(|| format!("The check refuses the flight: {codes}."))
 }
 
-fn violation(result: &FlightResult<'_>) -> Option<String> {
+fn violation(report: &Report, result: &FlightResult<'_>) -> Option<String> {
     if result.flight.audit.status != Status::Violation {
         return None;
     }
-    let delta_m = result.scenario.delta_m;
-    let violations = &result.flight.audit.violations;
-    let Some(deepest) = violations.iter().min_by(|a, b| a.min_m.total_cmp(&b.min_m)) else {
-        return Some(format!("Two vehicles came closer than {} m.", exact(delta_m)));
-    };
-    let [first, second] = deepest.pair.numbers();
-    let others = match violations.len() - 1 {
+    let others = match report.audit.violations.len().saturating_sub(1) {
         0 => String::new(),
         1 => " There is 1 other violation.".to_owned(),
         n => format!(" There are {n} other violations."),
     };
-    Some(format!(
-        "Vehicles {first} and {second} came to {} m at {}; the safety distance is {} m.{others}",
-        beside_limit(deepest.min_m, delta_m, 3),
-        seconds(deepest.min_at_s),
-        exact(delta_m),
-    ))
+    Some(report.deepest_violation() + &others)
+}
+
+impl Report {
+    /// Returns the reasons without the deepest violation of two vehicles, which the headline has.
+    pub(super) fn reasons_beside_headline(&self) -> Vec<String> {
+        let deepest = self.deepest_violation();
+        let rest = self.verdict.reasons.iter().map(|reason| reason.strip_prefix(&deepest).unwrap_or(reason).trim());
+        rest.filter(|reason| !reason.is_empty()).map(str::to_owned).collect()
+    }
+
+    /// Returns the violation of two vehicles with the smallest separation, in a sentence.
+    fn deepest_violation(&self) -> String {
+        let delta_m = self.separation.delta_m;
+        match self.audit.violations.iter().min_by(|a, b| a.min_m.total_cmp(&b.min_m)) {
+            None => format!("Two vehicles came closer than {} m.", exact(delta_m)),
+            Some(deepest) => format!(
+                "Vehicles {} came to {} m at {}; the safety distance is {} m.",
+                deepest.pair,
+                beside_limit(deepest.min_m, delta_m, 3),
+                seconds(deepest.min_at_s),
+                exact(delta_m),
+            ),
+        }
+    }
 }
 
 /// Returns whether integration may have caused all violations: a step was too long for the law before or within the

@@ -293,8 +293,11 @@ fn shown(flight: FlightId<'_>, campaign: &Campaign, worst: &Worst, left: &RunFil
         if worst.clearance_m < 0.0 { "below" } else { "above" }
     );
     let closest = left.pictures.iter().find(|(name, _)| name == "closest");
-    let picture =
-        closest.map(|(_, picture)| Picture { description: description.clone(), data_uri: picture.data_uri.clone() });
+    let picture = closest.map(|(_, picture)| Picture {
+        description: description.clone(),
+        data_uri: picture.data_uri.clone(),
+        file: format!("worst/{}/{}", flight.name(), picture.file),
+    });
     WorstFlight {
         run: flight.run,
         law: flight.law.name.clone(),

@@ -1,8 +1,8 @@
 //! Self-contained HTML pages.
 //!
-//! A [`Page`] has a verdict and sections. Every text is escaped. A page refers to no other file, and its policy forbids
-//! the browser to load anything. If it holds replays, a single script of this crate may run. The page follows the
-//! browser's light or dark theme and fits a phone. Equal parts give equal bytes.
+//! A [`Page`] has a verdict and sections. Every text is escaped. A page needs no other file, and its policy forbids the
+//! browser to load anything. Pictures link to their files in full size. If it holds replays, a single script of this
+//! crate may run. The page follows the browser's light or dark theme and fits a phone. Equal parts give equal bytes.
 
 mod replay;
 
@@ -21,7 +21,7 @@ const POLICY: &str =
 
 /// Sentence below the heading of a replay.
 const ABOUT_REPLAY: &str =
-    "The flight, drawn in this page: the round button plays it, dragging turns it, and the key H lists all keys.";
+    "The flight, drawn in this page: the round button plays it, dragging turns it, and the button ? lists all keys.";
 
 /// A page.
 #[derive(Clone, Debug)]
@@ -71,6 +71,8 @@ pub struct Picture {
     pub description: String,
     /// Picture as a `data:` address.
     pub data_uri: String,
+    /// Path of the picture in full size, relative to the page.
+    pub file: String,
 }
 
 impl Badge {
@@ -192,11 +194,11 @@ pub fn figures(figures: &[Figure]) -> Markup {
     side_by_side(figures.iter().map(figure))
 }
 
-/// Returns pictures side by side in rows; empty without pictures.
+/// Returns pictures side by side in rows, each a link to its file in full size; empty without pictures.
 #[must_use]
 pub fn pictures(pictures: &[Picture]) -> Markup {
-    side_by_side(pictures.iter().map(|Picture { description, data_uri }| {
-        (html! { img.snapshot src=(data_uri) alt=(description); }, description.clone())
+    side_by_side(pictures.iter().map(|Picture { description, data_uri, file }| {
+        (html! { a href=(file) { img src=(data_uri) alt=(description); } }, description.clone())
     }))
 }
 
