@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use crate::brake::State;
 use crate::contract::Message;
+use crate::obstacle::Obstacle;
 use crate::report::Counters;
 use crate::settings::{Limits, ShieldError, Start};
 use crate::shield::Shield;
@@ -104,6 +105,16 @@ impl Fleet {
             return Err(worst.too_near());
         }
         let shields = limits.iter().enumerate().map(|(index, limits)| Shield::new(limits, index, &starts));
+        Ok(Self { shields: shields.collect::<Result<_, _>>()? })
+    }
+
+    /// Returns these shields with planes before these obstacles, see [`Shield::with_obstacles`].
+    ///
+    /// # Errors
+    /// If a clearance is invalid, or a vehicle is too near to an obstacle. The error names the vehicle, the obstacle
+    /// and the room.
+    pub fn with_obstacles(self, obstacles: &[Obstacle]) -> Result<Self, ShieldError> {
+        let shields = self.shields.into_iter().map(|shield| shield.with_obstacles(obstacles));
         Ok(Self { shields: shields.collect::<Result<_, _>>()? })
     }
 

@@ -8,6 +8,7 @@ use crate::brake::State;
 use crate::choice::{Chosen, Reach};
 use crate::contract::{Contract, Decided, Message};
 use crate::fleet::{PairRoom, closest_starts};
+use crate::obstacle::{KeepOut, Obstacle};
 use crate::plane::Segment;
 use crate::report::Counters;
 use crate::settings::{Limits, ShieldError, Start};
@@ -62,6 +63,7 @@ pub struct Shield {
     /// References at the last instants, oldest first, for measurements of that age.
     past: VecDeque<State>,
     contracts: Vec<Contract>,
+    keep_outs: Vec<KeepOut>,
     reach: Reach,
     counters: Counters,
 }
@@ -101,10 +103,20 @@ impl Shield {
             segment: own.segment,
             past: VecDeque::with_capacity(limits.settings().measurement_delay_periods + 1),
             contracts,
+            keep_outs: vec![],
             // Two planes per other vehicle, but few are within reach.
             reach: Reach::with_capacity((2 * count).min(REACHED)),
             counters: Counters::default(),
         })
+    }
+
+    /// Returns this shield with planes before these obstacles, in the place of earlier ones. Obstacles must not move.
+    ///
+    /// # Errors
+    /// If a clearance is invalid, or the vehicle is too near to an obstacle to stop before it.
+    pub fn with_obstacles(mut self, obstacles: &[Obstacle]) -> Result<Self, ShieldError> {
+        self.keep_outs = KeepOut::all(obstacles, self.index, self.limits.tube().error_m, &self.segment)?;
+        Ok(self)
     }
 
     /// Stores a message to this vehicle until the next instant. Messages to other vehicles have no effect.
@@ -146,6 +158,11 @@ impl Shield {
                 && pending.room_m(&reference.position_m) <= reach
             {
                 self.reach.push(pending);
+            }
+        }
+        for keep_out in &mut self.keep_outs {
+            if let Some(plane) = keep_out.within(&self.segment, reach) {
+                self.reach.push(plane);
             }
         }
         self.counters.decided(decided, oldest);

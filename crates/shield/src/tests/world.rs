@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use super::Random;
-use crate::{Counters, Fleet, Limits, Message, State};
+use crate::{Counters, Fleet, Limits, Message, Obstacle, State};
 
 /// Steps of the plant in a common period.
 pub(super) const STEPS: usize = 4;
@@ -13,7 +13,7 @@ pub(super) const STEPS: usize = 4;
 pub(super) enum Law {
     /// To its slot, with 1/s^2 and 2/s.
     Slot,
-    /// At the nearest vehicle, with the largest command.
+    /// At the nearest vehicle or obstacle, with the largest command.
     DiveAtNearest,
     /// At the origin, with random jerks.
     DiveAtCentre,
@@ -49,6 +49,7 @@ pub(super) struct Flight {
     pub(super) limits: Vec<Limits>,
     pub(super) starts: Vec<State>,
     pub(super) slots: Vec<Vector3<f64>>,
+    pub(super) obstacles: Vec<Obstacle>,
     pub(super) law: Law,
     pub(super) radio: Radio,
     /// Common period \[s\]; the plant makes [`STEPS`] steps in it.
@@ -57,7 +58,7 @@ pub(super) struct Flight {
     pub(super) instants: Vec<usize>,
     pub(super) duration_s: f64,
     pub(super) planar: bool,
-    /// Whether noise and pushes are at their bounds and towards the nearest vehicle.
+    /// Whether noise and pushes are at their bounds and towards the nearest vehicle or obstacle.
     pub(super) adversarial: bool,
     /// Largest command that the plant carries out, if it is not that of the limits.
     pub(super) plant_m_s2: f64,
@@ -73,6 +74,7 @@ impl Flight {
             limits: vec![*limits; count],
             starts,
             slots,
+            obstacles: vec![],
             law: Law::Slot,
             radio: Radio::default(),
             period_s: limits.settings().period_s,
@@ -117,12 +119,15 @@ pub(super) struct World {
     step_s: f64,
     pub(super) closest_m: f64,
     pub(super) closest_s: f64,
+    /// Least distance from an obstacle beyond its clearance.
+    pub(super) obstacle_room_m: f64,
 }
 
 impl World {
     pub(super) fn new(of: &Flight) -> Self {
         let mut random = Random::new(of.seed);
         let fleet = Fleet::new(&of.limits, &of.starts).expect("starts are apart");
+        let fleet = fleet.with_obstacles(&of.obstacles).expect("starts are before obstacles");
         let count = of.starts.len();
         // True states may err like a measurement.
         let states = of.starts.iter().zip(&of.limits).map(|(start, limits)| {
@@ -147,6 +152,7 @@ impl World {
             step_s: of.period_s / STEPS as f64,
             closest_m: f64::INFINITY,
             closest_s: 0.0,
+            obstacle_room_m: f64::INFINITY,
         }
     }
 
@@ -168,6 +174,7 @@ impl World {
         }
         self.push(of);
         self.judge();
+        self.judge_obstacles(of);
         for i in 0..self.states.len() {
             self.states[i] = self.states[i].after(self.accelerations[i], self.step_s);
             self.since_s[i] += self.step_s;
@@ -202,7 +209,7 @@ impl World {
         self.past[i].push(self.states[i]);
         let late = self.past[i].len().saturating_sub(1 + settings.measurement_delay_periods);
         let truth = self.past[i][late];
-        let towards = self.nearest(i);
+        let towards = self.nearest(i, of);
         let errors = [settings.position_error_m, settings.velocity_error_m_s].map(|bound| {
             // A vehicle that believes to be farther from the nearest one than it is flies towards it.
             let error = if of.adversarial { -towards * bound } else { self.random.vector(bound) };
@@ -240,11 +247,14 @@ impl World {
         }
     }
 
-    /// Returns the direction to the nearest vehicle.
-    fn nearest(&self, i: usize) -> Vector3<f64> {
-        let others = (0..self.states.len()).filter(|j| *j != i);
-        let apart = others.map(|j| self.states[j].position_m - self.states[i].position_m);
-        apart
+    /// Returns the direction to the nearest vehicle or obstacle.
+    fn nearest(&self, i: usize, of: &Flight) -> Vector3<f64> {
+        let own = self.states[i].position_m;
+        let others = (0..self.states.len()).filter(|j| *j != i).map(|j| self.states[j].position_m);
+        let bodies = of.obstacles.iter().filter_map(|obstacle| obstacle.body.closest_point_m(&own));
+        others
+            .chain(bodies)
+            .map(|other| other - own)
             .min_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))
             .map_or_else(Vector3::zeros, |to| to.normalize())
     }
@@ -253,7 +263,7 @@ impl World {
         let largest = of.limits[i].settings().accel_m_s2;
         match of.law {
             Law::Slot => -(measured.position_m - of.slots[i]) - measured.velocity_m_s * 2.0,
-            Law::DiveAtNearest => self.nearest(i) * largest,
+            Law::DiveAtNearest => self.nearest(i, of) * largest,
             Law::DiveAtCentre if self.random.chance(0.1) => self.random.direction() * largest,
             Law::DiveAtCentre => measured.position_m * -10.0,
             Law::Random => {
@@ -270,9 +280,36 @@ impl World {
         for i in 0..self.states.len() {
             let settings = of.limits[i].settings();
             let bound = settings.disturbance_m_s2;
-            let push = if of.adversarial { self.nearest(i) * bound } else { self.random.vector(bound) };
+            let push = if of.adversarial { self.nearest(i, of) * bound } else { self.random.vector(bound) };
             let command = self.commands[i].cap_magnitude(of.plant_m_s2);
             self.accelerations[i] = command + flat(push, of.planar) + self.states[i].velocity_m_s * settings.a22_per_s;
+        }
+    }
+
+    /// Finds the least distance from obstacles over a step to 1e-9 m. Halves an interval of time while the path within
+    /// it may come closer than found so far. Its distance is at least that of both ends from the plane before the body
+    /// at its middle, less the bend of the path.
+    fn judge_obstacles(&mut self, of: &Flight) {
+        for (state, acceleration) in self.states.iter().zip(&self.accelerations) {
+            let at = |seconds: f64| state.after(*acceleration, seconds).position_m;
+            for obstacle in &of.obstacles {
+                let mut open = vec![(0.0, self.step_s)];
+                while let Some((from, to)) = open.pop() {
+                    let middle = f64::midpoint(from, to);
+                    let Some(closest) = obstacle.body.closest_point_m(&at(middle)) else {
+                        self.obstacle_room_m = self.obstacle_room_m.min(-obstacle.clearance_m);
+                        continue;
+                    };
+                    let (outward, distance) = ((at(middle) - closest).normalize(), (at(middle) - closest).norm());
+                    self.obstacle_room_m = self.obstacle_room_m.min(distance - obstacle.clearance_m);
+                    let ends = [from, to].map(|end| outward.dot(&(at(end) - closest)));
+                    let bend = acceleration.norm() * (to - from) * (to - from) / 8.0;
+                    let least = (ends[0].min(ends[1]) - bend).max(0.0) - obstacle.clearance_m;
+                    if least < self.obstacle_room_m - 1e-9 {
+                        open.extend([(from, middle), (middle, to)]);
+                    }
+                }
+            }
         }
     }
 
