@@ -18,7 +18,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::plane::{Divider, Plane, Segment};
+use crate::plane::{Divider, Metric, Plane, Segment};
+use crate::settings::Start;
 
 /// Proposal of a plane by the owner of a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -59,6 +60,23 @@ impl Message {
     /// Whether all numbers are finite and a proposed normal has length 1.
     fn is_valid(&self) -> bool {
         self.segment.is_finite() && self.proposal.is_none_or(|proposal| proposal.divider.is_valid())
+    }
+}
+
+/// Margin of a vehicle from a divider, and the lengths of both.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Side {
+    pub(crate) margin_m: f64,
+    pub(crate) metric: Metric,
+}
+
+impl Side {
+    fn owner_plane(&self, divider: &Divider) -> Plane {
+        divider.owner_plane(self.metric, self.margin_m)
+    }
+
+    fn follower_plane(&self, divider: &Divider) -> Plane {
+        divider.follower_plane(self.metric, self.margin_m)
     }
 }
 
@@ -112,18 +130,20 @@ const NO_PROPOSAL: Proposal = Proposal { number: 0, divider: Divider { normal: [
 
 impl Contract {
     /// Returns the contract at the start: both vehicles hold the divider of their announced segments. Each vehicle is
-    /// its number, segment and margin \[m\]. `None` if the segments are closer than the margins.
-    pub(crate) fn new(own: (u32, Segment, f64), other: (u32, Segment, f64)) -> Option<Self> {
-        let ((number, segment, margin_m), (other, heard, other_margin_m)) = (own, other);
+    /// its number and start. `None` if the segments are closer than the margins.
+    pub(crate) fn new(own: (u32, &Start), other: (u32, &Start)) -> Option<Self> {
+        let ((number, own), (other, start)) = (own, other);
+        let (metric, margin_m, other_margin_m) = (own.metric, own.margin_m, start.margin_m);
         // Both vehicles compute the same numbers.
         let (held, role) = if number < other {
-            let divider = Divider::between(&segment, &heard, margin_m, other_margin_m)?;
+            let divider = Divider::between(metric, &own.segment, &start.segment, margin_m, other_margin_m)?;
             let role = Role::Owner { proposed: NO_PROPOSAL, is_pending: false, heard: NO_DECISION };
-            (divider.owner_plane(margin_m), role)
+            (divider.owner_plane(metric, margin_m), role)
         } else {
-            let divider = Divider::between(&heard, &segment, other_margin_m, margin_m)?;
-            (divider.follower_plane(margin_m), Role::Follower { decided: NO_DECISION, heard: NO_PROPOSAL })
+            let divider = Divider::between(metric, &start.segment, &own.segment, other_margin_m, margin_m)?;
+            (divider.follower_plane(metric, margin_m), Role::Follower { decided: NO_DECISION, heard: NO_PROPOSAL })
         };
+        let heard = start.segment;
         Some(Self { held, held_since: 0, role, heard, stamp: 0, other_margin_m, other, is_fresh: false })
     }
 
@@ -144,7 +164,7 @@ impl Contract {
 
     /// Reads the newest message at an instant of this vehicle, with its segment from this instant on and its margin.
     #[inline]
-    pub(crate) fn read(&mut self, own: &Segment, margin_m: f64, period: u64, counted: &mut Decided) {
+    pub(crate) fn read(&mut self, own: &Segment, side: &Side, period: u64, counted: &mut Decided) {
         if !std::mem::take(&mut self.is_fresh) {
             return;
         }
@@ -153,13 +173,13 @@ impl Contract {
                 if *is_pending && heard.number == proposed.number {
                     *is_pending = false;
                     if heard.accepted {
-                        (self.held, self.held_since) = (proposed.divider.owner_plane(margin_m), period);
+                        (self.held, self.held_since) = (side.owner_plane(&proposed.divider), period);
                     }
                 }
             }
             Role::Follower { decided, heard } => {
                 if heard.number > decided.number {
-                    let plane = heard.divider.follower_plane(margin_m);
+                    let plane = side.follower_plane(&heard.divider);
                     let accepted = plane.contains(own);
                     *decided = Decision { number: heard.number, accepted };
                     counted.accepted += u32::from(accepted);
@@ -174,10 +194,10 @@ impl Contract {
 
     /// Proposes the divider of the present segments, as the owner without a pending proposal.
     #[inline]
-    pub(crate) fn propose(&mut self, own: &Segment, margin_m: f64) {
+    pub(crate) fn propose(&mut self, own: &Segment, side: &Side) {
         if let Role::Owner { proposed, is_pending: is_pending @ false, .. } = &mut self.role
-            && let Some(divider) = Divider::between(own, &self.heard, margin_m, self.other_margin_m)
-            && divider.owner_plane(margin_m).contains(own)
+            && let Some(divider) = Divider::between(side.metric, own, &self.heard, side.margin_m, self.other_margin_m)
+            && side.owner_plane(&divider).contains(own)
         {
             *proposed = Proposal { number: proposed.number + 1, divider };
             *is_pending = true;
@@ -192,9 +212,9 @@ impl Contract {
 
     /// Returns the proposed plane that is held beside the other one.
     #[inline]
-    pub(crate) fn pending(&self, margin_m: f64) -> Option<Plane> {
+    pub(crate) fn pending(&self, side: &Side) -> Option<Plane> {
         match &self.role {
-            Role::Owner { proposed, is_pending: true, .. } => Some(proposed.divider.owner_plane(margin_m)),
+            Role::Owner { proposed, is_pending: true, .. } => Some(side.owner_plane(&proposed.divider)),
             _ => None,
         }
     }
@@ -218,10 +238,10 @@ impl Contract {
     /// Defect for tests: holds the divider of the present segment and the one heard last, without the contract. Returns
     /// whether there is one.
     #[cfg(test)]
-    pub(crate) fn hold_heard(&mut self, own: &Segment, margin_m: f64) -> bool {
+    pub(crate) fn hold_heard(&mut self, own: &Segment, side: &Side) -> bool {
         self.role = Role::Follower { decided: NO_DECISION, heard: NO_PROPOSAL };
-        let divider = Divider::between(own, &self.heard, margin_m, self.other_margin_m);
-        divider.map(|divider| self.held = divider.owner_plane(margin_m)).is_some()
+        let divider = Divider::between(side.metric, own, &self.heard, side.margin_m, self.other_margin_m);
+        divider.map(|divider| self.held = side.owner_plane(&divider)).is_some()
     }
 }
 
@@ -230,24 +250,35 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
+    use crate::Limits;
+    use crate::settings::{ROUNDING_M, Settings};
 
-    const MARGIN_M: f64 = 0.5;
+    /// Margin 0.5 m.
+    fn limits() -> Limits {
+        Settings::new(1.0 - ROUNDING_M, 0.05).limits().expect("defaults")
+    }
+
+    const SIDE: Side = Side { margin_m: 0.5, metric: Metric::BALL };
 
     fn at(x: f64) -> Segment {
         Segment::new(Vector3::new(x, 0.0, 0.0), Vector3::new(x, 0.0, 0.0))
     }
 
+    fn slot(x: f64) -> Start {
+        limits().slot(Vector3::x() * x)
+    }
+
     /// Returns the owner at 0 and the follower at `x`.
     fn pair(x: f64) -> (Contract, Contract) {
         let contract = |own, other| Contract::new(own, other).expect("apart");
-        let (owner, follower) = ((0, at(0.0), MARGIN_M), (1, at(x), MARGIN_M));
-        (contract(owner, follower), contract(follower, owner))
+        let (owner, follower) = (slot(0.0), slot(x));
+        (contract((0, &owner), (1, &follower)), contract((1, &follower), (0, &owner)))
     }
 
     #[test]
     fn a_pair_that_starts_too_near_has_no_contract() {
-        assert!(Contract::new((0, at(0.0), MARGIN_M), (1, at(0.9), MARGIN_M)).is_none());
-        assert!(Contract::new((1, at(0.0), MARGIN_M), (0, at(1.0), MARGIN_M)).is_some());
+        assert!(Contract::new((0, &slot(0.0)), (1, &slot(0.9))).is_none());
+        assert!(Contract::new((1, &slot(0.0)), (0, &slot(1.0))).is_some());
     }
 
     #[test]
@@ -258,30 +289,30 @@ mod tests {
         assert_eq!(old, Plane { normal: Vector3::x(), offset_m: 1.5 });
         // The follower has moved to 3; the owner hears it and proposes a plane at 1.5.
         owner.hear(&follower.message(1, 1, at(3.0)));
-        owner.read(&at(0.0), MARGIN_M, 1, &mut counted);
-        owner.propose(&at(0.0), MARGIN_M);
+        owner.read(&at(0.0), &SIDE, 1, &mut counted);
+        owner.propose(&at(0.0), &SIDE);
         let sent = owner.message(0, 1, at(0.0));
-        assert_eq!((owner.held(), owner.pending(MARGIN_M).map(|plane| plane.offset_m)), (old, Some(1.0)));
+        assert_eq!((owner.held(), owner.pending(&SIDE).map(|plane| plane.offset_m)), (old, Some(1.0)));
         // No second proposal while one is pending, and a decision on another number has no effect.
-        owner.propose(&at(0.2), MARGIN_M);
+        owner.propose(&at(0.2), &SIDE);
         assert_eq!(owner.message(0, 1, at(0.0)), sent);
         let mut stale = follower.message(1, 2, at(3.0));
         stale.decision = Some(Decision { number: 7, accepted: true });
         owner.hear(&stale);
-        owner.read(&at(0.0), MARGIN_M, 2, &mut counted);
-        assert_eq!((owner.held(), owner.pending(MARGIN_M).is_some()), (old, true));
+        owner.read(&at(0.0), &SIDE, 2, &mut counted);
+        assert_eq!((owner.held(), owner.pending(&SIDE).is_some()), (old, true));
 
         follower.hear(&sent);
-        follower.read(&at(3.0), MARGIN_M, 2, &mut counted);
+        follower.read(&at(3.0), &SIDE, 2, &mut counted);
         assert_eq!(follower.held(), Plane { normal: -Vector3::x(), offset_m: -2.0 });
         // A copy that arrives again has no effect.
         follower.hear(&sent);
-        follower.read(&at(9.0), MARGIN_M, 3, &mut counted);
+        follower.read(&at(9.0), &SIDE, 3, &mut counted);
         assert_eq!(counted, Decided { accepted: 1, refused: 0 });
 
         owner.hear(&follower.message(1, 3, at(3.0)));
-        owner.read(&at(0.0), MARGIN_M, 4, &mut counted);
-        assert_eq!((owner.held().offset_m, owner.pending(MARGIN_M), owner.age(6)), (1.0, None, 2));
+        owner.read(&at(0.0), &SIDE, 4, &mut counted);
+        assert_eq!((owner.held().offset_m, owner.pending(&SIDE), owner.age(6)), (1.0, None, 2));
     }
 
     #[test]
@@ -289,14 +320,14 @@ mod tests {
         let (mut owner, mut follower) = pair(4.0);
         let mut counted = Decided::default();
         let (old, kept) = (owner.held(), follower.held());
-        owner.propose(&at(0.5), MARGIN_M);
+        owner.propose(&at(0.5), &SIDE);
         follower.hear(&owner.message(0, 1, at(0.5)));
         // The follower is at 2.6: inside the old plane, outside the proposed one at 2.25 plus 0.5.
-        follower.read(&at(2.6), MARGIN_M, 1, &mut counted);
+        follower.read(&at(2.6), &SIDE, 1, &mut counted);
         assert_eq!((counted, follower.held()), (Decided { accepted: 0, refused: 1 }, kept));
         owner.hear(&follower.message(1, 1, at(2.6)));
-        owner.read(&at(0.5), MARGIN_M, 2, &mut counted);
-        assert_eq!((owner.held(), owner.pending(MARGIN_M)), (old, None));
+        owner.read(&at(0.5), &SIDE, 2, &mut counted);
+        assert_eq!((owner.held(), owner.pending(&SIDE)), (old, None));
     }
 
     #[test]

@@ -14,7 +14,7 @@ use crate::shield::Shield;
 pub struct PairRoom {
     /// The two vehicles, counted from 0.
     pub pair: (usize, usize),
-    /// Distance of their segments \[m\].
+    /// Distance of their segments \[m\], in the scaled lengths of ellipsoids.
     pub distance_m: f64,
     /// Smallest distance with a certificate \[m\]: the sum of the two margins.
     pub required_m: f64,
@@ -25,7 +25,7 @@ impl PairRoom {
     #[must_use]
     pub(crate) fn of(starts: &[Start], i: usize, j: usize) -> Self {
         let (one, other) = (&starts[i], &starts[j]);
-        let distance_m = one.segment.distance_m(&other.segment);
+        let distance_m = one.metric.distance_m(&one.segment, &other.segment);
         Self { pair: (i, j), distance_m, required_m: one.margin_m + other.margin_m }
     }
 
@@ -101,6 +101,7 @@ impl Fleet {
         }
         let starts: Vec<_> =
             limits.iter().zip(starts).map(|(limits, state)| limits.start(*state)).collect::<Result<_, _>>()?;
+        limits.iter().try_for_each(|limits| limits.check_bodies(&starts))?;
         if let Some(worst) = closest_starts(&starts).filter(|worst| worst.room_m() < 0.0) {
             return Err(worst.too_near());
         }

@@ -79,10 +79,10 @@ impl Shield {
             let problem = format!("the number of the vehicle is not among {count} starts");
             return Err(ShieldError::new("index", problem, index as f64, "count vehicles from 0"));
         };
+        limits.check_bodies(starts)?;
         let contracts = starts.iter().enumerate().filter(|(other, _)| *other != index).map(|(other, start)| {
             let number = |k: usize| u32::try_from(k).unwrap_or(u32::MAX);
-            let (own, other) = ((number(index), *own), (number(other), *start));
-            Contract::new((own.0, own.1.segment, own.1.margin_m), (other.0, other.1.segment, other.1.margin_m))
+            Contract::new((number(index), own), (number(other), start))
         });
         let Some(contracts) = contracts.collect() else {
             let apart = |other: usize| PairRoom::of(starts, index.min(other), index.max(other));
@@ -142,19 +142,19 @@ impl Shield {
     /// [`measurement_delay_periods`]: crate::Settings::measurement_delay_periods
     pub fn filter(&mut self, measured: State, wanted: Vector3<f64>) -> Vector3<f64> {
         self.advance();
-        let (limits, reference) = (self.limits, self.reference);
+        let (limits, reference, side) = (self.limits, self.reference, self.limits.side());
         let reach = limits.envelope.reach_m(&reference, limits.choice);
         let (mut decided, mut oldest) = (Decided::default(), 0);
         self.reach.clear();
         for contract in &mut self.contracts {
-            contract.read(&self.segment, limits.margin_m(), self.period, &mut decided);
-            contract.propose(&self.segment, limits.margin_m());
+            contract.read(&self.segment, &side, self.period, &mut decided);
+            contract.propose(&self.segment, &side);
             oldest = oldest.max(contract.age(self.period));
             let held = contract.held();
             if held.room_m(&reference.position_m) <= reach {
                 self.reach.push(held);
             }
-            if let Some(pending) = contract.pending(limits.margin_m())
+            if let Some(pending) = contract.pending(&side)
                 && pending.room_m(&reference.position_m) <= reach
             {
                 self.reach.push(pending);
@@ -284,9 +284,9 @@ impl Shield {
     /// Defect for tests: holds the planes of the segments heard last. Returns whether every pair has one.
     #[cfg(test)]
     pub(crate) fn hold_heard(&mut self) -> bool {
-        let (segment, margin_m) = (self.segment, self.limits.margin_m());
+        let (segment, side) = (self.segment, self.limits.side());
         let missing =
-            self.contracts.iter_mut().filter_map(|contract| (!contract.hold_heard(&segment, margin_m)).then_some(()));
+            self.contracts.iter_mut().filter_map(|contract| (!contract.hold_heard(&segment, &side)).then_some(()));
         missing.count() == 0
     }
 }

@@ -1,5 +1,6 @@
 //! Flights of shielded vehicles on the ideal plant, and random numbers with the same values on every platform.
 
+mod ellipsoids;
 mod flights;
 mod obstacles;
 mod reference;

@@ -63,6 +63,8 @@ pub(super) struct Flight {
     /// Largest command that the plant carries out, if it is not that of the limits.
     pub(super) plant_m_s2: f64,
     pub(super) defect: Defect,
+    /// Factor of vertical lengths in the separation that is judged.
+    pub(super) judge_vertical: f64,
     pub(super) seed: u64,
 }
 
@@ -84,8 +86,14 @@ impl Flight {
             adversarial: false,
             plant_m_s2: f64::INFINITY,
             defect: Defect::None,
+            judge_vertical: 1.0,
             seed: 1,
         }
+    }
+
+    /// Returns a vector in the lengths that are judged.
+    fn scaled(&self, vector: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::new(vector.x, vector.y, vector.z * self.judge_vertical)
     }
 
     /// Flies to the end.
@@ -173,7 +181,7 @@ impl World {
             }
         }
         self.push(of);
-        self.judge();
+        self.judge(of);
         self.judge_obstacles(of);
         for i in 0..self.states.len() {
             self.states[i] = self.states[i].after(self.accelerations[i], self.step_s);
@@ -255,7 +263,7 @@ impl World {
         others
             .chain(bodies)
             .map(|other| other - own)
-            .min_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))
+            .min_by(|a, b| of.scaled(a).norm_squared().total_cmp(&of.scaled(b).norm_squared()))
             .map_or_else(Vector3::zeros, |to| to.normalize())
     }
 
@@ -313,12 +321,12 @@ impl World {
         }
     }
 
-    fn judge(&mut self) {
+    fn judge(&mut self, of: &Flight) {
         for i in 0..self.states.len() {
             for j in i + 1..self.states.len() {
-                let apart = self.states[i].position_m - self.states[j].position_m;
-                let closing = self.states[i].velocity_m_s - self.states[j].velocity_m_s;
-                let bend = self.accelerations[i] - self.accelerations[j];
+                let apart = of.scaled(&(self.states[i].position_m - self.states[j].position_m));
+                let closing = of.scaled(&(self.states[i].velocity_m_s - self.states[j].velocity_m_s));
+                let bend = of.scaled(&(self.accelerations[i] - self.accelerations[j]));
                 let moved = closing.norm() * self.step_s + bend.norm() * self.step_s * self.step_s / 2.0;
                 if apart.norm() - moved < self.closest_m {
                     let (separation, at) = least_separation(&apart, &closing, &bend, self.step_s);
