@@ -15,6 +15,8 @@
 //!
 //! Every message repeats the present segment, the pending proposal and the last decision. A message with a larger stamp
 //! therefore contains all that an older one can still say, and the newest message of a sender is the only one stored.
+//!
+//! A plane from which both vehicles are far is not renewed. The owner may propose or not at any instant.
 
 use serde::{Deserialize, Serialize};
 
@@ -87,120 +89,90 @@ pub(crate) struct Decided {
     pub(crate) refused: u32,
 }
 
-/// Side of a vehicle in the contract with one other vehicle, and the newest message heard from it.
+const NO_DECISION: Decision = Decision { number: 0, accepted: false };
+const NO_PROPOSAL: Proposal = Proposal { number: 0, divider: Divider { normal: [0.0; 3], offset_m: 0.0 } };
+
+/// Room, in the reach of a period at full speed, beyond which a plane is not renewed. A vehicle needs several periods
+/// for this distance, and planes beyond reach do not limit its choice.
+const RENEWED: f64 = 4.0;
+
+/// Returns the plane between an owner and a follower at their starts, which both compute with the same numbers.
+fn divider_of_starts(owner: &Start, follower: &Start) -> Option<Divider> {
+    Divider::between(owner.metric, &owner.segment, &follower.segment, owner.margin_m, follower.margin_m)
+}
+
+/// Contract of a vehicle as the owner, with the newest message heard from the follower. Number 0 stands for no
+/// proposal.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Contract {
+pub(crate) struct Owned {
+    /// Stamp, segment and decision of the newest message; at first the segment of the start.
+    stamp: u64,
+    segment: Segment,
+    decision: Decision,
     /// Plane that both vehicles hold.
     held: Plane,
     /// Period in which the held plane was taken on.
     held_since: u64,
-    role: Role,
-    /// Segment of the other vehicle, from the start or the newest message.
-    heard: Segment,
-    /// Stamp of the newest message.
-    stamp: u64,
-    /// Distance that the other vehicle keeps from the divider \[m\].
-    other_margin_m: f64,
-    /// The other vehicle.
-    other: u32,
-    /// Whether the newest message has not been read.
-    is_fresh: bool,
+    /// Last proposal, held beside the other plane while its decision is pending.
+    proposed: Proposal,
+    is_pending: bool,
+    /// Distance that the follower keeps from the divider \[m\].
+    follower_margin_m: f64,
+    /// Distances of the two vehicles from the owner's plane beyond which the plane is not renewed \[m\].
+    far_m: [f64; 2],
 }
 
-/// Role in a pair, with what was sent and heard in it. Number 0 stands for no proposal.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Role {
-    Owner {
-        /// Last proposal, held beside the other plane while its decision is pending.
-        proposed: Proposal,
-        is_pending: bool,
-        /// Decision of the newest message.
-        heard: Decision,
-    },
-    Follower {
-        /// Last decision.
-        decided: Decision,
-        /// Proposal of the newest message.
-        heard: Proposal,
-    },
-}
-
-const NO_DECISION: Decision = Decision { number: 0, accepted: false };
-const NO_PROPOSAL: Proposal = Proposal { number: 0, divider: Divider { normal: [0.0; 3], offset_m: 0.0 } };
-
-impl Contract {
-    /// Returns the contract at the start: both vehicles hold the divider of their announced segments. Each vehicle is
-    /// its number and start. `None` if the segments are closer than the margins.
-    pub(crate) fn new(own: (u32, &Start), other: (u32, &Start)) -> Option<Self> {
-        let ((number, own), (other, start)) = (own, other);
-        let (metric, margin_m, other_margin_m) = (own.metric, own.margin_m, start.margin_m);
-        // Both vehicles compute the same numbers.
-        let (held, role) = if number < other {
-            let divider = Divider::between(metric, &own.segment, &start.segment, margin_m, other_margin_m)?;
-            let role = Role::Owner { proposed: NO_PROPOSAL, is_pending: false, heard: NO_DECISION };
-            (divider.owner_plane(metric, margin_m), role)
-        } else {
-            let divider = Divider::between(metric, &start.segment, &own.segment, other_margin_m, margin_m)?;
-            (divider.follower_plane(metric, margin_m), Role::Follower { decided: NO_DECISION, heard: NO_PROPOSAL })
-        };
-        let heard = start.segment;
-        Some(Self { held, held_since: 0, role, heard, stamp: 0, other_margin_m, other, is_fresh: false })
+impl Owned {
+    /// Returns the contract at the start. `None` if the segments are closer than the margins.
+    pub(crate) fn new(own: &Start, follower: &Start) -> Option<Self> {
+        let held = divider_of_starts(own, follower)?.owner_plane(own.metric, own.margin_m);
+        let renewed = RENEWED * own.reach_m.max(follower.reach_m);
+        let between = (own.margin_m + follower.margin_m) * own.metric.widest();
+        Some(Self {
+            stamp: 0,
+            segment: follower.segment,
+            decision: NO_DECISION,
+            held,
+            held_since: 0,
+            proposed: NO_PROPOSAL,
+            is_pending: false,
+            follower_margin_m: follower.margin_m,
+            far_m: [renewed, renewed + between],
+        })
     }
 
-    /// Stores a message of the other vehicle unless a later one was heard or its numbers are invalid.
+    /// Stores a message of the follower unless a later one was heard or its numbers are invalid.
     #[inline]
     pub(crate) fn hear(&mut self, message: &Message) {
-        if message.stamp <= self.stamp || !message.is_valid() {
-            return;
-        }
-        self.stamp = message.stamp;
-        self.heard = message.segment;
-        self.is_fresh = true;
-        match &mut self.role {
-            Role::Owner { heard, .. } => *heard = message.decision.unwrap_or(NO_DECISION),
-            Role::Follower { heard, .. } => *heard = message.proposal.unwrap_or(NO_PROPOSAL),
+        if message.stamp > self.stamp && message.is_valid() {
+            self.stamp = message.stamp;
+            self.segment = message.segment;
+            self.decision = message.decision.unwrap_or(NO_DECISION);
         }
     }
 
-    /// Reads the newest message at an instant of this vehicle, with its segment from this instant on and its margin.
+    /// Reads the newest message at an instant of this vehicle, with its segment from this instant on. Then proposes the
+    /// divider of the present segments unless a proposal is pending or both vehicles are far from the plane.
     #[inline]
-    pub(crate) fn read(&mut self, own: &Segment, side: &Side, period: u64, counted: &mut Decided) {
-        if !std::mem::take(&mut self.is_fresh) {
+    pub(crate) fn renew(&mut self, own: &Segment, side: &Side, period: u64) {
+        if self.is_pending {
+            if self.decision.number != self.proposed.number {
+                return;
+            }
+            self.is_pending = false;
+            if self.decision.accepted {
+                (self.held, self.held_since) = (side.owner_plane(&self.proposed.divider), period);
+            }
+        }
+        let rooms = [self.held.room_m(&own.position()), -self.held.room_m(&self.segment.position())];
+        if rooms[0] > self.far_m[0] && rooms[1] > self.far_m[1] {
             return;
         }
-        match &mut self.role {
-            Role::Owner { proposed, is_pending, heard } => {
-                if *is_pending && heard.number == proposed.number {
-                    *is_pending = false;
-                    if heard.accepted {
-                        (self.held, self.held_since) = (side.owner_plane(&proposed.divider), period);
-                    }
-                }
-            }
-            Role::Follower { decided, heard } => {
-                if heard.number > decided.number {
-                    let plane = side.follower_plane(&heard.divider);
-                    let accepted = plane.contains(own);
-                    *decided = Decision { number: heard.number, accepted };
-                    counted.accepted += u32::from(accepted);
-                    counted.refused += u32::from(!accepted);
-                    if accepted {
-                        (self.held, self.held_since) = (plane, period);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Proposes the divider of the present segments, as the owner without a pending proposal.
-    #[inline]
-    pub(crate) fn propose(&mut self, own: &Segment, side: &Side) {
-        if let Role::Owner { proposed, is_pending: is_pending @ false, .. } = &mut self.role
-            && let Some(divider) = Divider::between(side.metric, own, &self.heard, side.margin_m, self.other_margin_m)
+        if let Some(divider) = Divider::between(side.metric, own, &self.segment, side.margin_m, self.follower_margin_m)
             && side.owner_plane(&divider).contains(own)
         {
-            *proposed = Proposal { number: proposed.number + 1, divider };
-            *is_pending = true;
+            self.proposed = Proposal { number: self.proposed.number + 1, divider };
+            self.is_pending = true;
         }
     }
 
@@ -213,20 +185,13 @@ impl Contract {
     /// Returns the proposed plane that is held beside the other one.
     #[inline]
     pub(crate) fn pending(&self, side: &Side) -> Option<Plane> {
-        match &self.role {
-            Role::Owner { proposed, is_pending: true, .. } => Some(side.owner_plane(&proposed.divider)),
-            _ => None,
-        }
+        self.is_pending.then(|| side.owner_plane(&self.proposed.divider))
     }
 
-    /// Returns the message to the other vehicle.
+    /// Returns the pending proposal.
     #[inline]
-    pub(crate) fn message(&self, from: u32, stamp: u64, segment: Segment) -> Message {
-        let (proposal, decision) = match self.role {
-            Role::Owner { proposed, is_pending, .. } => (is_pending.then_some(proposed), None),
-            Role::Follower { decided, .. } => (None, (decided.number > 0).then_some(decided)),
-        };
-        Message { from, to: self.other, stamp, segment, proposal, decision }
+    pub(crate) fn proposal(&self) -> Option<Proposal> {
+        self.is_pending.then_some(self.proposed)
     }
 
     /// Returns the number of periods since the held plane was taken on.
@@ -234,14 +199,89 @@ impl Contract {
     pub(crate) fn age(&self, period: u64) -> u64 {
         period - self.held_since
     }
+}
 
-    /// Defect for tests: holds the divider of the present segment and the one heard last, without the contract. Returns
-    /// whether there is one.
-    #[cfg(test)]
-    pub(crate) fn hold_heard(&mut self, own: &Segment, side: &Side) -> bool {
-        self.role = Role::Follower { decided: NO_DECISION, heard: NO_PROPOSAL };
-        let divider = Divider::between(side.metric, own, &self.heard, side.margin_m, self.other_margin_m);
-        divider.map(|divider| self.held = side.owner_plane(&divider)).is_some()
+/// Contract of a vehicle as the follower, with the newest message heard from the owner.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Followed {
+    /// Stamp and proposal of the newest message.
+    stamp: u64,
+    proposal: Proposal,
+    /// Plane that both vehicles hold.
+    held: Plane,
+    /// Period in which the held plane was taken on.
+    held_since: u64,
+    /// Last decision.
+    decided: Decision,
+}
+
+impl Followed {
+    /// Returns the contract at the start. `None` if the segments are closer than the margins.
+    pub(crate) fn new(own: &Start, owner: &Start) -> Option<Self> {
+        let held = divider_of_starts(owner, own)?.follower_plane(own.metric, own.margin_m);
+        Some(Self { stamp: 0, proposal: NO_PROPOSAL, held, held_since: 0, decided: NO_DECISION })
+    }
+
+    /// Stores a message of the owner unless a later one was heard or its numbers are invalid.
+    #[inline]
+    pub(crate) fn hear(&mut self, message: &Message) {
+        if message.stamp > self.stamp && message.is_valid() {
+            self.stamp = message.stamp;
+            self.proposal = message.proposal.unwrap_or(NO_PROPOSAL);
+        }
+    }
+
+    /// Decides on a new proposal at an instant of this vehicle, with its segment from this instant on.
+    #[inline]
+    pub(crate) fn decide(&mut self, own: &Segment, side: &Side, period: u64, counted: &mut Decided) {
+        if self.proposal.number <= self.decided.number {
+            return;
+        }
+        let plane = side.follower_plane(&self.proposal.divider);
+        let accepted = plane.contains(own);
+        self.decided = Decision { number: self.proposal.number, accepted };
+        counted.accepted += u32::from(accepted);
+        counted.refused += u32::from(!accepted);
+        if accepted {
+            (self.held, self.held_since) = (plane, period);
+        }
+    }
+
+    /// Returns the plane that both vehicles hold.
+    #[inline]
+    pub(crate) fn held(&self) -> Plane {
+        self.held
+    }
+
+    /// Returns the last decision.
+    #[inline]
+    pub(crate) fn decision(&self) -> Option<Decision> {
+        (self.decided.number > 0).then_some(self.decided)
+    }
+
+    /// Returns the number of periods since the held plane was taken on.
+    #[inline]
+    pub(crate) fn age(&self, period: u64) -> u64 {
+        period - self.held_since
+    }
+}
+
+/// Defect for tests: holds planes without the contract.
+#[cfg(test)]
+impl Owned {
+    /// Holds a plane and proposes none from now on.
+    pub(crate) fn hold(&mut self, plane: Plane) {
+        self.held = plane;
+        self.is_pending = false;
+        self.far_m = [f64::NEG_INFINITY; 2];
+    }
+}
+
+#[cfg(test)]
+impl Followed {
+    /// Holds a plane.
+    pub(crate) fn hold(&mut self, plane: Plane) {
+        self.held = plane;
     }
 }
 
@@ -269,16 +309,24 @@ mod tests {
     }
 
     /// Returns the owner at 0 and the follower at `x`.
-    fn pair(x: f64) -> (Contract, Contract) {
-        let contract = |own, other| Contract::new(own, other).expect("apart");
-        let (owner, follower) = (slot(0.0), slot(x));
-        (contract((0, &owner), (1, &follower)), contract((1, &follower), (0, &owner)))
+    fn pair(x: f64) -> (Owned, Followed) {
+        (Owned::new(&slot(0.0), &slot(x)).expect("apart"), Followed::new(&slot(x), &slot(0.0)).expect("apart"))
+    }
+
+    /// Returns the message of vehicle 0, the owner.
+    fn proposes(owner: &Owned, stamp: u64, x: f64) -> Message {
+        Message { from: 0, to: 1, stamp, segment: at(x), proposal: owner.proposal(), decision: None }
+    }
+
+    /// Returns the message of vehicle 1, the follower.
+    fn decides(follower: &Followed, stamp: u64, x: f64) -> Message {
+        Message { from: 1, to: 0, stamp, segment: at(x), proposal: None, decision: follower.decision() }
     }
 
     #[test]
     fn a_pair_that_starts_too_near_has_no_contract() {
-        assert!(Contract::new((0, &slot(0.0)), (1, &slot(0.9))).is_none());
-        assert!(Contract::new((1, &slot(0.0)), (0, &slot(1.0))).is_some());
+        assert!(Owned::new(&slot(0.0), &slot(0.9)).is_none() && Followed::new(&slot(0.0), &slot(0.9)).is_none());
+        assert!(Owned::new(&slot(0.0), &slot(1.0)).is_some() && Followed::new(&slot(0.0), &slot(1.0)).is_some());
     }
 
     #[test]
@@ -288,31 +336,31 @@ mod tests {
         let old = owner.held();
         assert_eq!(old, Plane { normal: Vector3::x(), offset_m: 1.5 });
         // The follower has moved to 3; the owner hears it and proposes a plane at 1.5.
-        owner.hear(&follower.message(1, 1, at(3.0)));
-        owner.read(&at(0.0), &SIDE, 1, &mut counted);
-        owner.propose(&at(0.0), &SIDE);
-        let sent = owner.message(0, 1, at(0.0));
+        owner.hear(&decides(&follower, 1, 3.0));
+        owner.renew(&at(0.0), &SIDE, 1);
+        let sent = proposes(&owner, 1, 0.0);
         assert_eq!((owner.held(), owner.pending(&SIDE).map(|plane| plane.offset_m)), (old, Some(1.0)));
         // No second proposal while one is pending, and a decision on another number has no effect.
-        owner.propose(&at(0.2), &SIDE);
-        assert_eq!(owner.message(0, 1, at(0.0)), sent);
-        let mut stale = follower.message(1, 2, at(3.0));
+        owner.renew(&at(0.2), &SIDE, 1);
+        assert_eq!(proposes(&owner, 1, 0.0), sent);
+        let mut stale = decides(&follower, 2, 3.0);
         stale.decision = Some(Decision { number: 7, accepted: true });
         owner.hear(&stale);
-        owner.read(&at(0.0), &SIDE, 2, &mut counted);
+        owner.renew(&at(0.0), &SIDE, 2);
         assert_eq!((owner.held(), owner.pending(&SIDE).is_some()), (old, true));
 
         follower.hear(&sent);
-        follower.read(&at(3.0), &SIDE, 2, &mut counted);
+        follower.decide(&at(3.0), &SIDE, 2, &mut counted);
         assert_eq!(follower.held(), Plane { normal: -Vector3::x(), offset_m: -2.0 });
         // A copy that arrives again has no effect.
         follower.hear(&sent);
-        follower.read(&at(9.0), &SIDE, 3, &mut counted);
+        follower.decide(&at(9.0), &SIDE, 3, &mut counted);
         assert_eq!(counted, Decided { accepted: 1, refused: 0 });
 
-        owner.hear(&follower.message(1, 3, at(3.0)));
-        owner.read(&at(0.0), &SIDE, 4, &mut counted);
-        assert_eq!((owner.held().offset_m, owner.pending(&SIDE), owner.age(6)), (1.0, None, 2));
+        owner.hear(&decides(&follower, 3, 3.0));
+        owner.renew(&at(0.0), &SIDE, 4);
+        assert_eq!((owner.held().offset_m, owner.age(6)), (1.0, 2));
+        assert_eq!(owner.proposal().map(|proposal| proposal.number), Some(2));
     }
 
     #[test]
@@ -320,26 +368,45 @@ mod tests {
         let (mut owner, mut follower) = pair(4.0);
         let mut counted = Decided::default();
         let (old, kept) = (owner.held(), follower.held());
-        owner.propose(&at(0.5), &SIDE);
-        follower.hear(&owner.message(0, 1, at(0.5)));
+        owner.renew(&at(0.5), &SIDE, 1);
+        follower.hear(&proposes(&owner, 1, 0.5));
         // The follower is at 2.6: inside the old plane, outside the proposed one at 2.25 plus 0.5.
-        follower.read(&at(2.6), &SIDE, 1, &mut counted);
+        follower.decide(&at(2.6), &SIDE, 1, &mut counted);
         assert_eq!((counted, follower.held()), (Decided { accepted: 0, refused: 1 }, kept));
-        owner.hear(&follower.message(1, 1, at(2.6)));
-        owner.read(&at(0.5), &SIDE, 2, &mut counted);
-        assert_eq!((owner.held(), owner.pending(&SIDE)), (old, None));
+        owner.hear(&decides(&follower, 1, 2.6));
+        owner.renew(&at(0.5), &SIDE, 2);
+        assert_eq!((owner.held(), owner.proposal().map(|proposal| proposal.number)), (old, Some(2)));
+    }
+
+    #[test]
+    fn a_plane_is_renewed_when_one_of_the_two_comes_near() {
+        let reach = limits().envelope.largest_reach_m(limits().choice);
+        let (mut owner, follower) = pair(20.0);
+        owner.renew(&at(0.0), &SIDE, 1);
+        assert_eq!(owner.proposal(), None);
+        // The plane is at 10.
+        let mut near = owner;
+        near.hear(&decides(&follower, 1, 10.6 + 4.0 * reach));
+        near.renew(&at(0.0), &SIDE, 1);
+        assert_eq!(near.proposal(), None);
+        near.hear(&decides(&follower, 2, 10.4 + 4.0 * reach));
+        near.renew(&at(0.0), &SIDE, 1);
+        assert!(near.proposal().is_some());
+        owner.renew(&at(9.6 - 4.0 * reach), &SIDE, 1);
+        assert!(owner.proposal().is_some());
     }
 
     #[test]
     fn older_and_invalid_messages_are_ignored() {
-        let (mut owner, follower) = pair(4.0);
-        owner.hear(&follower.message(1, 5, at(3.0)));
+        let (mut owner, mut follower) = pair(4.0);
+        owner.hear(&decides(&follower, 5, 3.0));
         let heard = owner;
-        owner.hear(&follower.message(1, 4, at(2.0)));
-        owner.hear(&follower.message(1, 6, at(f64::NAN)));
-        let divider = Divider { normal: [2.0, 0.0, 0.0], offset_m: 0.0 };
-        let forged = Some(Proposal { number: 1, divider });
-        owner.hear(&Message { proposal: forged, ..follower.message(1, 7, at(3.0)) });
+        owner.hear(&decides(&follower, 4, 2.0));
+        owner.hear(&decides(&follower, 6, f64::NAN));
         assert_eq!(owner, heard);
+        let unheard = follower;
+        let divider = Divider { normal: [2.0, 0.0, 0.0], offset_m: 0.0 };
+        follower.hear(&Message { proposal: Some(Proposal { number: 1, divider }), ..proposes(&owner, 7, 3.0) });
+        assert_eq!(follower, unheard);
     }
 }

@@ -40,6 +40,11 @@ impl Metric {
         self.vertical.max(1.0)
     }
 
+    /// Largest true length of a scaled length of 1.
+    pub(crate) fn widest(&self) -> f64 {
+        1.0 / self.vertical.min(1.0)
+    }
+
     /// Returns the distance of two segments in scaled lengths \[m\].
     #[must_use]
     pub fn distance_m(&self, one: &Segment, other: &Segment) -> f64 {

@@ -30,7 +30,7 @@ pub struct Counters {
     pub accepted: u64,
     /// Proposals that this vehicle refused.
     pub refused: u64,
-    /// Largest age of a plane, in periods.
+    /// Largest age of a plane of a pair within reach of a period, in periods.
     pub oldest_plane: u64,
     /// Instants without a measurement.
     pub missing_measurements: u64,

@@ -347,7 +347,8 @@ impl Limits {
 
     fn announced(&self, state: State, segment: Segment) -> Start {
         let Side { margin_m, metric } = self.side;
-        Start { state, segment, margin_m, delta_m: self.settings.delta_m, metric }
+        let reach_m = self.envelope.largest_reach_m(self.choice);
+        Start { state, segment, margin_m, delta_m: self.settings.delta_m, metric, reach_m }
     }
 }
 
@@ -362,6 +363,8 @@ pub struct Start {
     pub margin_m: f64,
     pub(crate) delta_m: f64,
     pub(crate) metric: Metric,
+    /// Reach of a period at the largest speed \[m\].
+    pub(crate) reach_m: f64,
 }
 
 /// Settings or starts that cannot be certified: `PLACE: PROBLEM (VALUE); REMEDY`.

@@ -6,9 +6,11 @@ use nalgebra::Vector3;
 
 use crate::brake::State;
 use crate::choice::{Chosen, Reach};
-use crate::contract::{Contract, Decided, Message};
+use crate::contract::{Decided, Followed, Message, Owned};
 use crate::fleet::{PairRoom, closest_starts};
 use crate::obstacle::{KeepOut, Obstacle};
+#[cfg(test)]
+use crate::plane::Divider;
 use crate::plane::Segment;
 use crate::report::Counters;
 use crate::settings::{Limits, ShieldError, Start};
@@ -62,7 +64,9 @@ pub struct Shield {
     segment: Segment,
     /// References at the last instants, oldest first, for measurements of that age.
     past: VecDeque<State>,
-    contracts: Vec<Contract>,
+    /// Contracts with the vehicles of smaller numbers, in their order, and with those of larger numbers.
+    followed: Vec<Followed>,
+    owned: Vec<Owned>,
     keep_outs: Vec<KeepOut>,
     reach: Reach,
     counters: Counters,
@@ -80,11 +84,9 @@ impl Shield {
             return Err(ShieldError::new("index", problem, index as f64, "count vehicles from 0"));
         };
         limits.check_bodies(starts)?;
-        let contracts = starts.iter().enumerate().filter(|(other, _)| *other != index).map(|(other, start)| {
-            let number = |k: usize| u32::try_from(k).unwrap_or(u32::MAX);
-            Contract::new((number(index), own), (number(other), start))
-        });
-        let Some(contracts) = contracts.collect() else {
+        let followed = starts[..index].iter().map(|owner| Followed::new(own, owner)).collect();
+        let owned = starts[index + 1..].iter().map(|follower| Owned::new(own, follower)).collect();
+        let (Some(followed), Some(owned)) = (followed, owned) else {
             let apart = |other: usize| PairRoom::of(starts, index.min(other), index.max(other));
             let others = (0..count).filter(|other| *other != index).map(apart);
             let worst = others.min_by(|a, b| a.room_m().total_cmp(&b.room_m())).or_else(|| closest_starts(starts));
@@ -102,7 +104,8 @@ impl Shield {
             next: own.state,
             segment: own.segment,
             past: VecDeque::with_capacity(limits.settings().measurement_delay_periods + 1),
-            contracts,
+            followed,
+            owned,
             keep_outs: vec![],
             // Two planes per other vehicle, but few are within reach.
             reach: Reach::with_capacity((2 * count).min(REACHED)),
@@ -122,12 +125,15 @@ impl Shield {
     /// Stores a message to this vehicle until the next instant. Messages to other vehicles have no effect.
     #[inline]
     pub fn hear(&mut self, message: &Message) {
-        if message.to != self.index || message.from == self.index {
+        if message.to != self.index {
             return;
         }
-        // Contracts are in the order of the other vehicles, without this one.
-        let place = message.from as usize - usize::from(message.from > self.index);
-        if let Some(contract) = self.contracts.get_mut(place) {
+        let (from, own) = (message.from as usize, self.index as usize);
+        if let Some(contract) = self.followed.get_mut(from) {
+            contract.hear(message);
+        } else if from > own
+            && let Some(contract) = self.owned.get_mut(from - own - 1)
+        {
             contract.hear(message);
         }
     }
@@ -146,12 +152,19 @@ impl Shield {
         let reach = limits.envelope.reach_m(&reference, limits.choice);
         let (mut decided, mut oldest) = (Decided::default(), 0);
         self.reach.clear();
-        for contract in &mut self.contracts {
-            contract.read(&self.segment, &side, self.period, &mut decided);
-            contract.propose(&self.segment, &side);
-            oldest = oldest.max(contract.age(self.period));
+        for contract in &mut self.followed {
+            contract.decide(&self.segment, &side, self.period, &mut decided);
             let held = contract.held();
             if held.room_m(&reference.position_m) <= reach {
+                oldest = oldest.max(contract.age(self.period));
+                self.reach.push(held);
+            }
+        }
+        for contract in &mut self.owned {
+            contract.renew(&self.segment, &side, self.period);
+            let held = contract.held();
+            if held.room_m(&reference.position_m) <= reach {
+                oldest = oldest.max(contract.age(self.period));
                 self.reach.push(held);
             }
             if let Some(pending) = contract.pending(&side)
@@ -228,7 +241,19 @@ impl Shield {
 
     /// Messages to all other vehicles, to be sent after [`Shield::filter`].
     pub fn messages(&self) -> impl Iterator<Item = Message> + '_ {
-        self.contracts.iter().map(|contract| contract.message(self.index, self.period, self.segment))
+        let message = |to: usize| Message {
+            from: self.index,
+            to: u32::try_from(to).unwrap_or(u32::MAX),
+            stamp: self.period,
+            segment: self.segment,
+            proposal: None,
+            decision: None,
+        };
+        let own = self.index as usize;
+        let followed = self.followed.iter().zip(0..);
+        let owned = self.owned.iter().zip(own + 1..);
+        let decisions = followed.map(move |(contract, to)| Message { decision: contract.decision(), ..message(to) });
+        decisions.chain(owned.map(move |(contract, to)| Message { proposal: contract.proposal(), ..message(to) }))
     }
 
     /// Records a true state, `since_s` after the instant of the last command, for the report of a simulation.
@@ -281,12 +306,24 @@ impl Shield {
         &self.counters
     }
 
-    /// Defect for tests: holds the planes of the segments heard last. Returns whether every pair has one.
+    /// Defect for tests: holds the planes between its own segment and these segments of all vehicles, with the margins of
+    /// equal vehicles and without the contract. Returns whether every pair has one.
     #[cfg(test)]
-    pub(crate) fn hold_heard(&mut self) -> bool {
-        let (segment, side) = (self.segment, self.limits.side());
-        let missing =
-            self.contracts.iter_mut().filter_map(|contract| (!contract.hold_heard(&segment, &side)).then_some(()));
-        missing.count() == 0
+    pub(crate) fn hold_heard(&mut self, heard: &[Segment]) -> bool {
+        let (own, side) = (self.segment, self.limits.side());
+        let plane = |other: &Segment| {
+            let divider = Divider::between(side.metric, &own, other, side.margin_m, side.margin_m);
+            divider.map(|divider| divider.owner_plane(side.metric, side.margin_m))
+        };
+        let mut planes = heard.iter().map(plane);
+        let mut has_all = true;
+        for contract in &mut self.followed {
+            planes.next().flatten().map_or_else(|| has_all = false, |plane| contract.hold(plane));
+        }
+        planes.next();
+        for contract in &mut self.owned {
+            planes.next().flatten().map_or_else(|| has_all = false, |plane| contract.hold(plane));
+        }
+        has_all
     }
 }

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::Random;
+use crate::plane::Segment;
 use crate::{Counters, Fleet, Limits, Message, Obstacle, State};
 
 /// Steps of the plant in a common period.
@@ -120,6 +121,8 @@ pub(super) struct World {
     held: Vec<(f64, Vector3<f64>)>,
     /// Messages on their way, with the time of arrival.
     flying: Vec<(f64, Message)>,
+    /// Stamp and segment of the newest message, by receiver and sender.
+    heard: Vec<Vec<(u64, Segment)>>,
     /// Whether the last message of each pair was lost.
     lost: Vec<bool>,
     random: Random,
@@ -145,6 +148,7 @@ impl World {
                 velocity_m_s: start.velocity_m_s + flat(random.vector(settings.velocity_error_m_s), of.planar),
             }
         });
+        let segments: Vec<_> = fleet.shields().iter().map(|shield| (0, shield.segment())).collect();
         Self {
             fleet,
             states: states.collect(),
@@ -154,6 +158,7 @@ impl World {
             since_s: vec![0.0; count],
             held: vec![(0.0, Vector3::zeros()); count],
             flying: vec![],
+            heard: vec![segments; count],
             lost: vec![false; count * count],
             random,
             step: 0,
@@ -208,6 +213,10 @@ impl World {
                     message.decision = Some(crate::contract::Decision { number: proposal.number, accepted: true });
                 }
             }
+            let heard = &mut self.heard[message.to as usize][message.from as usize];
+            if message.stamp > heard.0 {
+                *heard = (message.stamp, message.segment);
+            }
             self.fleet.hear(&message);
         }
     }
@@ -227,7 +236,8 @@ impl World {
         let wanted = flat(self.wanted(i, &measured, of), of.planar);
         let shield = &mut self.fleet.shields_mut()[i];
         shield.observe_measurement(&measured, &truth);
-        let brakes = of.defect == Defect::PlanesAsHeard && !shield.hold_heard();
+        let heard: Vec<_> = self.heard[i].iter().map(|(_, segment)| *segment).collect();
+        let brakes = of.defect == Defect::PlanesAsHeard && !shield.hold_heard(&heard);
         self.commands[i] = if brakes { shield.brake(measured) } else { shield.filter(measured, wanted) };
         self.since_s[i] = 0.0;
         self.send(i, of);
