@@ -65,6 +65,36 @@ impl Message {
     }
 }
 
+/// Messages from one vehicle to all others, with the segment once. It may arrive at each of them late, never, twice or
+/// after a later one.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Broadcast {
+    /// Sender, counted from 0.
+    pub from: u32,
+    /// Number of the sender's period, from 1.
+    pub stamp: u64,
+    /// Segment that the sender holds from its next instant on.
+    pub segment: Segment,
+    /// Last decisions, to the vehicles with smaller numbers than the sender, in their order.
+    pub decisions: Vec<Option<Decision>>,
+    /// Pending proposals, to the vehicles with larger numbers, in their order.
+    pub proposals: Vec<Option<Proposal>>,
+}
+
+impl Broadcast {
+    /// Returns the message to a vehicle. `None` if it contains none to that vehicle.
+    #[inline]
+    #[must_use]
+    pub fn message(&self, to: u32) -> Option<Message> {
+        let (decision, proposal) = if to < self.from {
+            (*self.decisions.get(to as usize)?, None)
+        } else {
+            (None, *self.proposals.get((to - self.from).checked_sub(1)? as usize)?)
+        };
+        Some(Message { from: self.from, to, stamp: self.stamp, segment: self.segment, proposal, decision })
+    }
+}
+
 /// Margin of a vehicle from a divider, and the lengths of both.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Side {

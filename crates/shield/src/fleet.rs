@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::brake::State;
-use crate::contract::Message;
+use crate::contract::{Broadcast, Message};
 use crate::obstacle::Obstacle;
 use crate::report::Counters;
 use crate::settings::{Limits, ShieldError, Start};
@@ -124,6 +124,11 @@ impl Fleet {
         if let Some(shield) = self.shields.get_mut(message.to as usize) {
             shield.hear(message);
         }
+    }
+
+    /// Stores a broadcast for all vehicles but its sender.
+    pub fn hear_broadcast(&mut self, broadcast: &Broadcast) {
+        self.shields.iter_mut().for_each(|shield| shield.hear_broadcast(broadcast));
     }
 
     /// Writes the commands of all vehicles at a common instant \[m/s^2\]. Lists that are too short leave the other

@@ -89,7 +89,7 @@ pub mod shield;
 pub mod tube;
 
 pub use brake::State;
-pub use contract::Message;
+pub use contract::{Broadcast, Message};
 pub use fleet::Fleet;
 pub use obstacle::{ConvexBody, Obstacle};
 pub use report::Counters;

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use crate::brake::State;
 use crate::choice::{Chosen, Reach};
-use crate::contract::{Decided, Followed, Message, Owned};
+use crate::contract::{Broadcast, Decided, Followed, Message, Owned};
 use crate::fleet::{PairRoom, closest_starts};
 use crate::obstacle::{KeepOut, Obstacle};
 #[cfg(test)]
@@ -138,6 +138,14 @@ impl Shield {
         }
     }
 
+    /// Stores the message to this vehicle in a broadcast until the next instant.
+    #[inline]
+    pub fn hear_broadcast(&mut self, broadcast: &Broadcast) {
+        if let Some(message) = broadcast.message(self.index) {
+            self.hear(&message);
+        }
+    }
+
     /// Returns the command for the next period \[m/s^2\]: reads messages, proposes planes, chooses the acceleration of
     /// the reference, and adds drag and feedback.
     ///
@@ -239,7 +247,7 @@ impl Shield {
         command
     }
 
-    /// Messages to all other vehicles, to be sent after [`Shield::filter`].
+    /// Messages to all other vehicles, to be sent after [`Shield::filter`]. [`Shield::write_broadcast`] is shorter.
     pub fn messages(&self) -> impl Iterator<Item = Message> + '_ {
         let message = |to: usize| Message {
             from: self.index,
@@ -254,6 +262,16 @@ impl Shield {
         let owned = self.owned.iter().zip(own + 1..);
         let decisions = followed.map(move |(contract, to)| Message { decision: contract.decision(), ..message(to) });
         decisions.chain(owned.map(move |(contract, to)| Message { proposal: contract.proposal(), ..message(to) }))
+    }
+
+    /// Writes the messages to all other vehicles as one, to be sent after [`Shield::filter`]. The lists of `broadcast` are
+    /// used again.
+    pub fn write_broadcast(&self, broadcast: &mut Broadcast) {
+        (broadcast.from, broadcast.stamp, broadcast.segment) = (self.index, self.period, self.segment);
+        broadcast.decisions.clear();
+        broadcast.decisions.extend(self.followed.iter().map(Followed::decision));
+        broadcast.proposals.clear();
+        broadcast.proposals.extend(self.owned.iter().map(Owned::proposal));
     }
 
     /// Records a true state, `since_s` after the instant of the last command, for the report of a simulation.

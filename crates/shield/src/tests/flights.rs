@@ -226,6 +226,29 @@ fn a_saved_flight_continues_with_the_same_bits() {
 }
 
 #[test]
+fn a_broadcast_contains_the_messages_and_is_heard_like_them() {
+    let ranges = Ranges { most_vehicles: 6, laws: &[Law::Slot], imperfect: true };
+    let flight = random_flight(3, ranges);
+    let mut world = World::new(&flight);
+    (0..101).for_each(|_| world.step(&flight));
+    let (mut by_message, mut by_broadcast) = (world.fleet.clone(), world.fleet.clone());
+    let mut broadcast = crate::Broadcast::default();
+    for shield in world.fleet.shields() {
+        shield.write_broadcast(&mut broadcast);
+        let sent: Vec<_> = shield.messages().collect();
+        let count = u32::try_from(world.states.len()).expect("few");
+        let contained: Vec<_> = (0..count + 2).filter_map(|to| broadcast.message(to)).collect();
+        assert_eq!(contained, sent);
+        sent.iter().for_each(|message| by_message.hear(message));
+        by_broadcast.hear_broadcast(&broadcast);
+        let json = serde_json::to_string(&broadcast).expect("plain data");
+        assert_eq!(serde_json::from_str::<crate::Broadcast>(&json).expect("plain data"), broadcast);
+    }
+    assert_ne!(format!("{by_message:?}"), format!("{:?}", world.fleet));
+    assert_eq!(format!("{by_broadcast:?}"), format!("{by_message:?}"));
+}
+
+#[test]
 fn invalid_numbers_and_messages_leave_the_reference_finite_and_are_counted() {
     let limits = [Settings::new(DELTA_M, 0.05).limits().expect("valid"); 2];
     let states = [-1.0, 1.0].map(|x| State::at_rest(Vector3::new(x, 0.0, 0.0)));
