@@ -111,6 +111,22 @@ impl Fleet {
 
     /// Returns these shields with planes before these obstacles, see [`Shield::with_obstacles`].
     ///
+    /// ```
+    /// use nalgebra::Vector3;
+    /// use tautline_shield::obstacle::{Ball, SolidHalfSpace};
+    /// use tautline_shield::{Fleet, Obstacle, Settings, State};
+    ///
+    /// let limits = [Settings::new(1.0, 0.05).limits()?; 2];
+    /// let states = [-3.0, 3.0].map(|x| State::at_rest(Vector3::new(x, 0.0, 2.0)));
+    /// let obstacles = [
+    ///     Obstacle::new(Ball { centre_m: Vector3::zeros(), radius_m: 1.0 }, 0.5),
+    ///     Obstacle::new(SolidHalfSpace { normal: Vector3::z_axis(), offset_m: 0.0 }, 0.5),
+    /// ];
+    /// let fleet = Fleet::new(&limits, &states)?.with_obstacles(&obstacles)?;
+    /// # assert_eq!(fleet.shields().len(), 2);
+    /// # Ok::<(), tautline_shield::ShieldError>(())
+    /// ```
+    ///
     /// # Errors
     /// If a clearance is invalid, or a vehicle is too near to an obstacle. The error names the vehicle, the obstacle
     /// and the room.

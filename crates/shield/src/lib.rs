@@ -36,14 +36,15 @@
 //! 1. reads the newest message of each other vehicle: as a follower it decides on a new proposal, as an owner it takes
 //!    a decision;
 //! 2. as an owner without a pending proposal, proposes the plane between the two segments \[p, s\]. It holds the plane
-//!    beside the old one. The segments must be at least m1 + m2 apart;
+//!    beside the old one. The segments must be at least m1 + m2 apart. Planes far from both vehicles are not renewed;
 //! 3. renews its planes before obstacles within reach, and chooses the acceleration of the reference: a command that is
 //!    *accepted*, or that of the brake;
 //! 4. sends its next segment, pending proposals and last decisions to all.
 //!
 //! A command is accepted if it and the next speed are within the limits. The next position and the next stop point must
 //! also be inside all planes held. A plane between two vehicles leaves each of them a margin
-//! m = delta / 2 + e, where e is the bound of the [`tube`].
+//! m = delta / 2 + e, where e is the bound of the [`tube`]. With upright ellipsoids all of this holds in the scaled
+//! lengths of a [`plane::Metric`].
 //!
 //! # Proof
 //! **Lemma 1** ([`brake::Brake`]). With p, s, the next position and the next stop point inside a half-space, the path
