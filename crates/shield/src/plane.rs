@@ -30,37 +30,37 @@ impl Metric {
     /// Returns a vector in scaled lengths.
     #[inline]
     #[must_use]
-    pub fn scaled(&self, vector: &Vector3<f64>) -> Vector3<f64> {
+    pub fn scaled(self, vector: &Vector3<f64>) -> Vector3<f64> {
         Vector3::new(vector.x, vector.y, vector.z * self.vertical)
     }
 
     /// Largest factor by which a length grows.
     #[must_use]
-    pub fn stretch(&self) -> f64 {
+    pub fn stretch(self) -> f64 {
         self.vertical.max(1.0)
     }
 
     /// Largest true length of a scaled length of 1.
-    pub(crate) fn widest(&self) -> f64 {
+    pub(crate) fn widest(self) -> f64 {
         1.0 / self.vertical.min(1.0)
     }
 
     /// Returns the distance of two segments in scaled lengths \[m\].
     #[must_use]
-    pub fn distance_m(&self, one: &Segment, other: &Segment) -> f64 {
+    pub fn distance_m(self, one: &Segment, other: &Segment) -> f64 {
         self.segment(one).distance_m(&self.segment(other))
     }
 
     #[inline]
-    fn segment(&self, of: &Segment) -> Segment {
+    fn segment(self, of: &Segment) -> Segment {
         Segment::new(self.scaled(&of.position()), self.scaled(&of.stop()))
     }
 
     /// Returns the true plane of a plane in scaled lengths.
     #[inline]
-    fn true_plane(&self, normal: Vector3<f64>, offset_m: f64) -> Plane {
+    fn true_plane(self, normal: Vector3<f64>, offset_m: f64) -> Plane {
         // A normal of length 1 would be rounded.
-        if *self == Self::BALL {
+        if self == Self::BALL {
             return Plane { normal, offset_m };
         }
         let scaled = self.scaled(&normal);

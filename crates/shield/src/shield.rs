@@ -264,8 +264,8 @@ impl Shield {
         decisions.chain(owned.map(move |(contract, to)| Message { proposal: contract.proposal(), ..message(to) }))
     }
 
-    /// Writes the messages to all other vehicles as one, to be sent after [`Shield::filter`]. The lists of `broadcast` are
-    /// used again.
+    /// Writes the messages to all other vehicles as one, to be sent after [`Shield::filter`]. The memory of `broadcast`
+    /// is used again.
     pub fn write_broadcast(&self, broadcast: &mut Broadcast) {
         (broadcast.from, broadcast.stamp, broadcast.segment) = (self.index, self.period, self.segment);
         broadcast.decisions.clear();
@@ -324,8 +324,8 @@ impl Shield {
         &self.counters
     }
 
-    /// Defect for tests: holds the planes between its own segment and these segments of all vehicles, with the margins of
-    /// equal vehicles and without the contract. Returns whether every pair has one.
+    /// Defect for tests: holds the planes between its own segment and these segments of all vehicles, as for equal
+    /// vehicles and without the contract. Returns whether every pair has one.
     #[cfg(test)]
     pub(crate) fn hold_heard(&mut self, heard: &[Segment]) -> bool {
         let (own, side) = (self.segment, self.limits.side());

@@ -239,7 +239,9 @@ fn a_broadcast_contains_the_messages_and_is_heard_like_them() {
         let count = u32::try_from(world.states.len()).expect("few");
         let contained: Vec<_> = (0..count + 2).filter_map(|to| broadcast.message(to)).collect();
         assert_eq!(contained, sent);
-        sent.iter().for_each(|message| by_message.hear(message));
+        for message in &sent {
+            by_message.hear(message);
+        }
         by_broadcast.hear_broadcast(&broadcast);
         let json = serde_json::to_string(&broadcast).expect("plain data");
         assert_eq!(serde_json::from_str::<crate::Broadcast>(&json).expect("plain data"), broadcast);

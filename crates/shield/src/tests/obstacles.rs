@@ -10,7 +10,7 @@ use crate::brake::Brake;
 use crate::obstacle::{Ball, Cuboid, SolidHalfSpace};
 use crate::{Fleet, Obstacle, Settings, Shield, State};
 
-/// Returns a random flight between random bodies with clearances, of which starts keep away.
+/// Returns a random flight between random bodies with clearances, in which each start has its room.
 fn among_bodies(seed: u64, laws: &'static [Law], imperfect: bool) -> Flight {
     let mut flight = random_flight(seed, Ranges { most_vehicles: 6, laws, imperfect });
     let mut random = Random::new(seed ^ 0xB0D1);
