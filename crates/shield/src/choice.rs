@@ -131,6 +131,11 @@ impl Reach {
         self.planes.push(plane);
     }
 
+    /// Whether a point is inside all planes.
+    pub(crate) fn contains(&self, point_m: &Vector3<f64>) -> bool {
+        self.planes.iter().all(|plane| plane.room_m(point_m) >= 0.0)
+    }
+
     /// Whether the reference may take this command: it is within the limits, and the position after the period and its
     /// stop point are inside all planes.
     pub(crate) fn accepts(&self, envelope: &Envelope, state: &State, command: Vector3<f64>) -> bool {

@@ -20,8 +20,10 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::choice::Reach;
+use crate::fleet::{PairRoom, closest_starts};
 use crate::plane::{Divider, Metric, Plane, Segment};
-use crate::settings::Start;
+use crate::settings::{ShieldError, Start};
 
 /// Proposal of a plane by the owner of a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -112,11 +114,12 @@ impl Side {
     }
 }
 
-/// Decisions that a vehicle took or heard in one period.
+/// Decisions that a vehicle took at an instant, and the largest age of a plane within reach, in periods.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Decided {
+pub(crate) struct Renewed {
     pub(crate) accepted: u32,
     pub(crate) refused: u32,
+    pub(crate) oldest: u64,
 }
 
 const NO_DECISION: Decision = Decision { number: 0, accepted: false };
@@ -263,7 +266,7 @@ impl Followed {
 
     /// Decides on a new proposal at an instant of this vehicle, with its segment from this instant on.
     #[inline]
-    pub(crate) fn decide(&mut self, own: &Segment, side: &Side, period: u64, counted: &mut Decided) {
+    pub(crate) fn decide(&mut self, own: &Segment, side: &Side, period: u64, counted: &mut Renewed) {
         if self.proposal.number <= self.decided.number {
             return;
         }
@@ -296,6 +299,130 @@ impl Followed {
     }
 }
 
+/// Contracts of a vehicle with all others.
+#[derive(Clone, Debug)]
+pub(crate) struct Contracts {
+    index: u32,
+    /// With the vehicles of smaller numbers, in their order.
+    followed: Vec<Followed>,
+    /// With the vehicles of larger numbers, in their order.
+    owned: Vec<Owned>,
+}
+
+impl Contracts {
+    /// Returns the contracts at the start.
+    ///
+    /// # Errors
+    /// If the number is not in the list, or the vehicle starts too near to another one.
+    pub(crate) fn new(index: usize, starts: &[Start]) -> Result<Self, ShieldError> {
+        let count = starts.len();
+        let (Some(own), Ok(number)) = (starts.get(index), u32::try_from(index)) else {
+            let problem = format!("the number of the vehicle is not among {count} starts");
+            return Err(ShieldError::new("index", problem, index as f64, "count vehicles from 0"));
+        };
+        let followed = starts[..index].iter().map(|owner| Followed::new(own, owner)).collect();
+        let owned = starts[index + 1..].iter().map(|follower| Owned::new(own, follower)).collect();
+        if let (Some(followed), Some(owned)) = (followed, owned) {
+            return Ok(Self { index: number, followed, owned });
+        }
+        let apart = |other: usize| PairRoom::of(starts, index.min(other), index.max(other));
+        let others = (0..count).filter(|other| *other != index).map(apart);
+        let worst = others.min_by(|a, b| a.room_m().total_cmp(&b.room_m())).or_else(|| closest_starts(starts));
+        Err(worst.map_or_else(
+            || ShieldError::new("start", "a vehicle has no pair".into(), 0.0, "give two starts"),
+            |worst| worst.too_near(),
+        ))
+    }
+
+    /// Number of the vehicle.
+    pub(crate) fn index(&self) -> u32 {
+        self.index
+    }
+
+    /// Stores a message to this vehicle. Messages to other vehicles have no effect.
+    #[inline]
+    pub(crate) fn hear(&mut self, message: &Message) {
+        if message.to != self.index {
+            return;
+        }
+        let (from, own) = (message.from as usize, self.index as usize);
+        if let Some(contract) = self.followed.get_mut(from) {
+            contract.hear(message);
+        } else if from > own
+            && let Some(contract) = self.owned.get_mut(from - own - 1)
+        {
+            contract.hear(message);
+        }
+    }
+
+    /// Reads the newest messages, decides and proposes, with the segment from this instant on. Adds the planes within
+    /// reach \[m\].
+    pub(crate) fn renew(&mut self, own: &Segment, side: &Side, period: u64, reach_m: f64, near: &mut Reach) -> Renewed {
+        let (mut renewed, position) = (Renewed::default(), own.position());
+        for contract in &mut self.followed {
+            contract.decide(own, side, period, &mut renewed);
+            let held = contract.held();
+            if held.room_m(&position) <= reach_m {
+                renewed.oldest = renewed.oldest.max(contract.age(period));
+                near.push(held);
+            }
+        }
+        for contract in &mut self.owned {
+            contract.renew(own, side, period);
+            let held = contract.held();
+            if held.room_m(&position) <= reach_m {
+                renewed.oldest = renewed.oldest.max(contract.age(period));
+                near.push(held);
+            }
+            if let Some(pending) = contract.pending(side)
+                && pending.room_m(&position) <= reach_m
+            {
+                near.push(pending);
+            }
+        }
+        renewed
+    }
+
+    /// Returns the messages to all other vehicles.
+    pub(crate) fn messages(&self, stamp: u64, segment: Segment) -> impl Iterator<Item = Message> + '_ {
+        let from = self.index;
+        let message = move |to: u32| Message { from, to, stamp, segment, proposal: None, decision: None };
+        let followed = self.followed.iter().zip(0..);
+        let owned = self.owned.iter().zip(from.saturating_add(1)..);
+        let decisions = followed.map(move |(contract, to)| Message { decision: contract.decision(), ..message(to) });
+        decisions.chain(owned.map(move |(contract, to)| Message { proposal: contract.proposal(), ..message(to) }))
+    }
+
+    /// Writes the messages to all other vehicles as one.
+    pub(crate) fn write_broadcast(&self, stamp: u64, segment: Segment, broadcast: &mut Broadcast) {
+        (broadcast.from, broadcast.stamp, broadcast.segment) = (self.index, stamp, segment);
+        broadcast.decisions.clear();
+        broadcast.decisions.extend(self.followed.iter().map(Followed::decision));
+        broadcast.proposals.clear();
+        broadcast.proposals.extend(self.owned.iter().map(Owned::proposal));
+    }
+
+    /// Defect for tests: holds the planes between its own segment and these segments of all vehicles, as for equal
+    /// vehicles and without the contract. Returns whether every pair has one.
+    #[cfg(test)]
+    pub(crate) fn hold_heard(&mut self, own: &Segment, side: &Side, heard: &[Segment]) -> bool {
+        let plane = |other: &Segment| {
+            let divider = Divider::between(side.metric, own, other, side.margin_m, side.margin_m);
+            divider.map(|divider| side.owner_plane(&divider))
+        };
+        let mut planes = heard.iter().map(plane);
+        let mut has_all = true;
+        for contract in &mut self.followed {
+            planes.next().flatten().map_or_else(|| has_all = false, |plane| contract.held = plane);
+        }
+        planes.next();
+        for contract in &mut self.owned {
+            planes.next().flatten().map_or_else(|| has_all = false, |plane| contract.hold(plane));
+        }
+        has_all
+    }
+}
+
 /// Defect for tests: holds planes without the contract.
 #[cfg(test)]
 impl Owned {
@@ -304,14 +431,6 @@ impl Owned {
         self.held = plane;
         self.is_pending = false;
         self.far_m = [f64::NEG_INFINITY; 2];
-    }
-}
-
-#[cfg(test)]
-impl Followed {
-    /// Holds a plane.
-    pub(crate) fn hold(&mut self, plane: Plane) {
-        self.held = plane;
     }
 }
 
@@ -362,7 +481,7 @@ mod tests {
     #[test]
     fn the_owner_holds_both_planes_until_it_hears_the_decision_on_that_number() {
         let (mut owner, mut follower) = pair(4.0);
-        let mut counted = Decided::default();
+        let mut counted = Renewed::default();
         let old = owner.held();
         assert_eq!(old, Plane { normal: Vector3::x(), offset_m: 1.5 });
         // The follower has moved to 3; the owner hears it and proposes a plane at 1.5.
@@ -385,7 +504,7 @@ mod tests {
         // A copy that arrives again has no effect.
         follower.hear(&sent);
         follower.decide(&at(9.0), &SIDE, 3, &mut counted);
-        assert_eq!(counted, Decided { accepted: 1, refused: 0 });
+        assert_eq!(counted, Renewed { accepted: 1, ..Renewed::default() });
 
         owner.hear(&decides(&follower, 3, 3.0));
         owner.renew(&at(0.0), &SIDE, 4);
@@ -396,13 +515,13 @@ mod tests {
     #[test]
     fn a_follower_outside_refuses_and_the_owner_keeps_the_old_plane() {
         let (mut owner, mut follower) = pair(4.0);
-        let mut counted = Decided::default();
+        let mut counted = Renewed::default();
         let (old, kept) = (owner.held(), follower.held());
         owner.renew(&at(0.5), &SIDE, 1);
         follower.hear(&proposes(&owner, 1, 0.5));
         // The follower is at 2.6: inside the old plane, outside the proposed one at 2.25 plus 0.5.
         follower.decide(&at(2.6), &SIDE, 1, &mut counted);
-        assert_eq!((counted, follower.held()), (Decided { accepted: 0, refused: 1 }, kept));
+        assert_eq!((counted, follower.held()), (Renewed { refused: 1, ..Renewed::default() }, kept));
         owner.hear(&decides(&follower, 1, 2.6));
         owner.renew(&at(0.5), &SIDE, 2);
         assert_eq!((owner.held(), owner.proposal().map(|proposal| proposal.number)), (old, Some(2)));

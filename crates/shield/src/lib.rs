@@ -15,6 +15,7 @@
 //! | [`choice`] | which commands are accepted, and which one is taken |
 //! | [`settings`] | settings, defaults, errors, limits of the reference |
 //! | [`shield`] | [`Shield`] of one vehicle, for real vehicles and simulators |
+//! | [`unicycle`] | shield of a vehicle that cannot stop (Lemma 5) |
 //! | [`fleet`] | [`Fleet`] of all vehicles of a simulation; the condition on starts |
 //! | [`report`] | numbers of a flight, and whether the assumptions held |
 //!
@@ -88,6 +89,7 @@ pub mod report;
 pub mod settings;
 pub mod shield;
 pub mod tube;
+pub mod unicycle;
 
 pub use brake::State;
 pub use contract::{Broadcast, Message};

@@ -115,7 +115,7 @@ impl Obstacle {
             let point = start + along * fraction;
             let closest = self.body.closest_point_m(&point)?;
             let distance = (closest - point).norm();
-            if !(distance >= LEAST_M && distance < f64::INFINITY) {
+            if !(LEAST_M..f64::INFINITY).contains(&distance) {
                 return None;
             }
             let normal = (closest - point) / distance;

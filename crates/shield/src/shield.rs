@@ -6,11 +6,8 @@ use nalgebra::Vector3;
 
 use crate::brake::State;
 use crate::choice::{Chosen, Reach};
-use crate::contract::{Broadcast, Decided, Followed, Message, Owned};
-use crate::fleet::{PairRoom, closest_starts};
+use crate::contract::{Broadcast, Contracts, Message};
 use crate::obstacle::{KeepOut, Obstacle};
-#[cfg(test)]
-use crate::plane::Divider;
 use crate::plane::Segment;
 use crate::report::Counters;
 use crate::settings::{Limits, ShieldError, Start};
@@ -53,7 +50,6 @@ const REACHED: usize = 128;
 #[derive(Clone, Debug)]
 pub struct Shield {
     limits: Limits,
-    index: u32,
     /// Number of calls so far; the reference is that of the instant of the last call.
     period: u64,
     /// Reference at the instant of the last call, and its acceleration since.
@@ -64,9 +60,7 @@ pub struct Shield {
     segment: Segment,
     /// References at the last instants, oldest first, for measurements of that age.
     past: VecDeque<State>,
-    /// Contracts with the vehicles of smaller numbers, in their order, and with those of larger numbers.
-    followed: Vec<Followed>,
-    owned: Vec<Owned>,
+    contracts: Contracts,
     keep_outs: Vec<KeepOut>,
     reach: Reach,
     counters: Counters,
@@ -78,37 +72,22 @@ impl Shield {
     /// # Errors
     /// If the number is not in the list, or the vehicle starts too near to another one.
     pub fn new(limits: &Limits, index: usize, starts: &[Start]) -> Result<Self, ShieldError> {
-        let count = starts.len();
-        let Some(own) = starts.get(index).filter(|_| u32::try_from(count).is_ok()) else {
-            let problem = format!("the number of the vehicle is not among {count} starts");
-            return Err(ShieldError::new("index", problem, index as f64, "count vehicles from 0"));
-        };
         limits.check_bodies(starts)?;
-        let followed = starts[..index].iter().map(|owner| Followed::new(own, owner)).collect();
-        let owned = starts[index + 1..].iter().map(|follower| Owned::new(own, follower)).collect();
-        let (Some(followed), Some(owned)) = (followed, owned) else {
-            let apart = |other: usize| PairRoom::of(starts, index.min(other), index.max(other));
-            let others = (0..count).filter(|other| *other != index).map(apart);
-            let worst = others.min_by(|a, b| a.room_m().total_cmp(&b.room_m())).or_else(|| closest_starts(starts));
-            return Err(worst.map_or_else(
-                || ShieldError::new("start", "a vehicle has no pair".into(), 0.0, "give two starts"),
-                |worst| worst.too_near(),
-            ));
-        };
+        let contracts = Contracts::new(index, starts)?;
+        // The index is in the list.
+        let own = &starts[index];
         Ok(Self {
             limits: *limits,
-            index: u32::try_from(index).unwrap_or(u32::MAX),
             period: 0,
             reference: own.state,
             acceleration: Vector3::zeros(),
             next: own.state,
             segment: own.segment,
             past: VecDeque::with_capacity(limits.settings().measurement_delay_periods + 1),
-            followed,
-            owned,
+            contracts,
             keep_outs: vec![],
             // Two planes per other vehicle, but few are within reach.
-            reach: Reach::with_capacity((2 * count).min(REACHED)),
+            reach: Reach::with_capacity((2 * starts.len()).min(REACHED)),
             counters: Counters::default(),
         })
     }
@@ -118,30 +97,20 @@ impl Shield {
     /// # Errors
     /// If a clearance is invalid, or the vehicle is too near to an obstacle to stop before it.
     pub fn with_obstacles(mut self, obstacles: &[Obstacle]) -> Result<Self, ShieldError> {
-        self.keep_outs = KeepOut::all(obstacles, self.index, self.limits.tube().error_m, &self.segment)?;
+        self.keep_outs = KeepOut::all(obstacles, self.contracts.index(), self.limits.tube().error_m, &self.segment)?;
         Ok(self)
     }
 
     /// Stores a message to this vehicle until the next instant. Messages to other vehicles have no effect.
     #[inline]
     pub fn hear(&mut self, message: &Message) {
-        if message.to != self.index {
-            return;
-        }
-        let (from, own) = (message.from as usize, self.index as usize);
-        if let Some(contract) = self.followed.get_mut(from) {
-            contract.hear(message);
-        } else if from > own
-            && let Some(contract) = self.owned.get_mut(from - own - 1)
-        {
-            contract.hear(message);
-        }
+        self.contracts.hear(message);
     }
 
     /// Stores the message to this vehicle in a broadcast until the next instant.
     #[inline]
     pub fn hear_broadcast(&mut self, broadcast: &Broadcast) {
-        if let Some(message) = broadcast.message(self.index) {
+        if let Some(message) = broadcast.message(self.contracts.index()) {
             self.hear(&message);
         }
     }
@@ -156,37 +125,16 @@ impl Shield {
     /// [`measurement_delay_periods`]: crate::Settings::measurement_delay_periods
     pub fn filter(&mut self, measured: State, wanted: Vector3<f64>) -> Vector3<f64> {
         self.advance();
-        let (limits, reference, side) = (self.limits, self.reference, self.limits.side());
+        let (limits, reference) = (self.limits, self.reference);
         let reach = limits.envelope.reach_m(&reference, limits.choice);
-        let (mut decided, mut oldest) = (Decided::default(), 0);
         self.reach.clear();
-        for contract in &mut self.followed {
-            contract.decide(&self.segment, &side, self.period, &mut decided);
-            let held = contract.held();
-            if held.room_m(&reference.position_m) <= reach {
-                oldest = oldest.max(contract.age(self.period));
-                self.reach.push(held);
-            }
-        }
-        for contract in &mut self.owned {
-            contract.renew(&self.segment, &side, self.period);
-            let held = contract.held();
-            if held.room_m(&reference.position_m) <= reach {
-                oldest = oldest.max(contract.age(self.period));
-                self.reach.push(held);
-            }
-            if let Some(pending) = contract.pending(&side)
-                && pending.room_m(&reference.position_m) <= reach
-            {
-                self.reach.push(pending);
-            }
-        }
+        let renewed = self.contracts.renew(&self.segment, &limits.side(), self.period, reach, &mut self.reach);
         for keep_out in &mut self.keep_outs {
             if let Some(plane) = keep_out.within(&self.segment, reach) {
                 self.reach.push(plane);
             }
         }
-        self.counters.decided(decided, oldest);
+        self.counters.renewed(renewed);
         let drag = reference.velocity_m_s * limits.settings().a22_per_s;
         let wish = limits.envelope.cut(&reference.velocity_m_s, wanted + drag);
         let chosen = if wish.iter().all(|value| value.is_finite()) {
@@ -249,29 +197,13 @@ impl Shield {
 
     /// Messages to all other vehicles, to be sent after [`Shield::filter`]. [`Shield::write_broadcast`] is shorter.
     pub fn messages(&self) -> impl Iterator<Item = Message> + '_ {
-        let message = |to: usize| Message {
-            from: self.index,
-            to: u32::try_from(to).unwrap_or(u32::MAX),
-            stamp: self.period,
-            segment: self.segment,
-            proposal: None,
-            decision: None,
-        };
-        let own = self.index as usize;
-        let followed = self.followed.iter().zip(0..);
-        let owned = self.owned.iter().zip(own + 1..);
-        let decisions = followed.map(move |(contract, to)| Message { decision: contract.decision(), ..message(to) });
-        decisions.chain(owned.map(move |(contract, to)| Message { proposal: contract.proposal(), ..message(to) }))
+        self.contracts.messages(self.period, self.segment)
     }
 
     /// Writes the messages to all other vehicles as one, to be sent after [`Shield::filter`]. The memory of `broadcast`
     /// is used again.
     pub fn write_broadcast(&self, broadcast: &mut Broadcast) {
-        (broadcast.from, broadcast.stamp, broadcast.segment) = (self.index, self.period, self.segment);
-        broadcast.decisions.clear();
-        broadcast.decisions.extend(self.followed.iter().map(Followed::decision));
-        broadcast.proposals.clear();
-        broadcast.proposals.extend(self.owned.iter().map(Owned::proposal));
+        self.contracts.write_broadcast(self.period, self.segment, broadcast);
     }
 
     /// Records a true state, `since_s` after the instant of the last command, for the report of a simulation.
@@ -324,24 +256,9 @@ impl Shield {
         &self.counters
     }
 
-    /// Defect for tests: holds the planes between its own segment and these segments of all vehicles, as for equal
-    /// vehicles and without the contract. Returns whether every pair has one.
+    /// Defect for tests: see [`Contracts::hold_heard`].
     #[cfg(test)]
     pub(crate) fn hold_heard(&mut self, heard: &[Segment]) -> bool {
-        let (own, side) = (self.segment, self.limits.side());
-        let plane = |other: &Segment| {
-            let divider = Divider::between(side.metric, &own, other, side.margin_m, side.margin_m);
-            divider.map(|divider| divider.owner_plane(side.metric, side.margin_m))
-        };
-        let mut planes = heard.iter().map(plane);
-        let mut has_all = true;
-        for contract in &mut self.followed {
-            planes.next().flatten().map_or_else(|| has_all = false, |plane| contract.hold(plane));
-        }
-        planes.next();
-        for contract in &mut self.owned {
-            planes.next().flatten().map_or_else(|| has_all = false, |plane| contract.hold(plane));
-        }
-        has_all
+        self.contracts.hold_heard(&self.segment, &self.limits.side(), heard)
     }
 }

@@ -5,6 +5,7 @@ mod flights;
 mod obstacles;
 mod reference;
 mod twins;
+mod unicycles;
 mod world;
 
 use nalgebra::{Isometry3, Unit, Vector3};
