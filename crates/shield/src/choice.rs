@@ -131,6 +131,10 @@ impl Reach {
         self.planes.push(plane);
     }
 
+    pub(crate) fn extend(&mut self, planes: impl Iterator<Item = Plane>) {
+        self.planes.extend(planes);
+    }
+
     /// Whether a point is inside all planes.
     pub(crate) fn contains(&self, point_m: &Vector3<f64>) -> bool {
         self.planes.iter().all(|plane| plane.room_m(point_m) >= 0.0)

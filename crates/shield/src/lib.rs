@@ -98,6 +98,7 @@ pub use obstacle::{ConvexBody, Obstacle};
 pub use report::Counters;
 pub use settings::{Limits, Settings, ShieldError, Start};
 pub use shield::Shield;
+pub use unicycle::UnicycleShield;
 
 #[cfg(test)]
 mod tests;

@@ -147,11 +147,12 @@ pub(crate) struct KeepOut {
 }
 
 impl KeepOut {
-    /// Returns the planes of a vehicle, by its number, tube \[m\] and reserved segment.
+    /// Returns the planes of a vehicle, by its number, its reserved segment, and its largest distance from the segment
+    /// \[m\].
     pub(crate) fn all(
         obstacles: &[Obstacle],
         vehicle: u32,
-        tube_m: f64,
+        around_m: f64,
         segment: &Segment,
     ) -> Result<Vec<Self>, ShieldError> {
         let vehicle = u64::from(vehicle) + 1;
@@ -161,7 +162,7 @@ impl KeepOut {
                 let problem = format!("the clearance of obstacle {number} must not be negative");
                 return Err(ShieldError::new("clearance_m", problem, clearance_m, "give 0 or a positive number"));
             }
-            let margin_m = clearance_m + tube_m + ROUNDING_M / 2.0;
+            let margin_m = clearance_m + around_m + ROUNDING_M / 2.0;
             match obstacle.plane_before(segment, margin_m) {
                 Some((held, room_m)) if room_m >= 0.0 => Ok(Self { obstacle: obstacle.clone(), margin_m, held }),
                 Some((_, room_m)) => {

@@ -129,11 +129,8 @@ impl Shield {
         let reach = limits.envelope.reach_m(&reference, limits.choice);
         self.reach.clear();
         let renewed = self.contracts.renew(&self.segment, &limits.side(), self.period, reach, &mut self.reach);
-        for keep_out in &mut self.keep_outs {
-            if let Some(plane) = keep_out.within(&self.segment, reach) {
-                self.reach.push(plane);
-            }
-        }
+        let segment = self.segment;
+        self.reach.extend(self.keep_outs.iter_mut().filter_map(|keep_out| keep_out.within(&segment, reach)));
         self.counters.renewed(renewed);
         let drag = reference.velocity_m_s * limits.settings().a22_per_s;
         let wish = limits.envelope.cut(&reference.velocity_m_s, wanted + drag);

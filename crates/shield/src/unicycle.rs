@@ -1,8 +1,9 @@
 //! Shield of a vehicle that cannot stop: a unicycle, for example an aircraft with a least speed.
 //!
 //! # Model
-//! The reference has a position p in a level plane, a heading with the unit vector t, and a speed v. Both rates are held
-//! over a period h: v' = a and heading' = w, with v in \[`v_min`, V\], `v_min` > 0, |a| <= A and |w| <= `w_max`.
+//! The reference has a position p in a level plane, a heading with the unit vector t, and a speed v. Both rates v' = a
+//! and heading' = w are held over a period h. The limits are `v_min` <= v <= V with `v_min` > 0, |a| <= A and
+//! |w| <= `w_max`.
 //!
 //! # Reservation
 //! The fallback slows down straight ahead to `v_min` and then turns at `w_max` on the loiter side, on a circle of the
@@ -26,15 +27,16 @@
 //! q' is never backwards. The path of q then lies in the triangle of both q and the corner, where the two tangents
 //! meet. After the period, the fallback keeps q on the segment from the next q to the next c.
 //!
-//! With this lemma in the place of Lemma 1, Lemma 2 holds: the fallback keeps its own segment, and a plane is taken on
-//! only after q and c were tested. Lemma 3 and the theorem are unchanged. The tube e is an assumption here, since the
-//! tracker of a unicycle is the user's.
+//! This lemma takes the place of Lemma 1. Lemma 2 holds: the fallback keeps its own segment, and a plane is taken on
+//! only after q and c were tested. Lemmas 3 and 4 and the theorem are unchanged, with r in the margins. The tube e is
+//! an assumption here, since the tracker of a unicycle is the user's.
 
 use nalgebra::Vector3;
 
 use crate::State;
 use crate::choice::Reach;
 use crate::contract::{Broadcast, Contracts, Message, Side};
+use crate::obstacle::{KeepOut, Obstacle};
 use crate::plane::{Metric, Segment};
 use crate::report::Counters;
 use crate::settings::{ROUNDING_M, ShieldError, Start};
@@ -245,6 +247,7 @@ pub struct UnicycleShield {
     loiter: Loiter,
     side: Side,
     contracts: Contracts,
+    keep_outs: Vec<KeepOut>,
     period: u64,
     reference: Pose,
     next: Pose,
@@ -274,6 +277,7 @@ impl UnicycleShield {
             loiter: *loiter,
             side: Side { margin_m: loiter.margin_m(), metric: Metric::BALL },
             contracts,
+            keep_outs: vec![],
             period: 0,
             reference: *pose,
             next: *pose,
@@ -281,6 +285,18 @@ impl UnicycleShield {
             near: Reach::with_capacity(2 * starts.len()),
             counters: Counters::default(),
         })
+    }
+
+    /// Returns this shield with planes before these obstacles, see [`Shield::with_obstacles`].
+    ///
+    /// [`Shield::with_obstacles`]: crate::Shield::with_obstacles
+    ///
+    /// # Errors
+    /// If a clearance is invalid, or the vehicle is too near to an obstacle.
+    pub fn with_obstacles(mut self, obstacles: &[Obstacle]) -> Result<Self, ShieldError> {
+        let around = self.loiter.tracking_error_m + self.loiter.radius_m();
+        self.keep_outs = KeepOut::all(obstacles, self.contracts.index(), around, &self.fallback.segment)?;
+        Ok(self)
     }
 
     /// Stores a message to this vehicle until the next instant.
@@ -296,6 +312,7 @@ impl UnicycleShield {
         self.near.clear();
         let segment = self.fallback.segment;
         self.counters.renewed(self.contracts.renew(&segment, &self.side, self.period, reach, &mut self.near));
+        self.near.extend(self.keep_outs.iter_mut().filter_map(|keep_out| keep_out.within(&segment, reach)));
         if !(wanted.accel_m_s2.is_finite() && wanted.turn_rad_s.is_finite()) {
             self.counters.chosen(true, 1.0);
             return self.fall_back();

@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::Random;
 use crate::fleet::closest_starts;
+use crate::obstacle::{Obstacle, SolidHalfSpace};
 use crate::unicycle::{Loiter, Pose, Steering, UnicycleShield};
 use crate::{Message, Settings, Shield, State};
 
@@ -216,6 +217,32 @@ fn unicycles_and_points_that_dive_at_each_other_keep_the_safety_distance() {
 fn with_the_radius_of_the_loiter_circle_left_out() {
     let found = (0..60).filter(|seed| dive(*seed, true) < 1.0).count();
     assert!(found > 15, "{found}");
+}
+
+#[test]
+fn a_unicycle_that_flies_at_a_wall_keeps_its_clearance() {
+    let wall = SolidHalfSpace { normal: Vector3::x_axis(), offset_m: 0.0 };
+    let mut closest = f64::INFINITY;
+    for seed in 0..60 {
+        let mut random = Random::new(seed);
+        let of = loiter(&mut random);
+        let mut start = pose(&mut random, &of, 2.0);
+        start.position_m.x += 8.0;
+        let announced = of.start(&start).expect("valid");
+        let alone = || UnicycleShield::new(&of, 0, &start, &[announced]).expect("alone");
+        let mut shield = alone().with_obstacles(&[Obstacle::new(wall, 0.5)]).expect("far");
+        let error = alone().with_obstacles(&[Obstacle::new(wall, 20.0)]).expect_err("near").to_string();
+        assert!(error.starts_with("start: vehicle 1 reserves a segment"), "{error}");
+        for _ in 0..300 {
+            let turn_rad_s = (std::f64::consts::PI - shield.next_reference().heading_rad).sin() * 4.0;
+            let command = shield.filter(Steering { accel_m_s2: 9.0, turn_rad_s });
+            for k in 0..SAMPLES {
+                let after = shield.reference().after(command, PERIOD_S * k as f64 / SAMPLES as f64);
+                closest = closest.min(after.position_m.x);
+            }
+        }
+    }
+    assert!((0.5..0.6).contains(&closest), "{closest}");
 }
 
 #[test]
