@@ -47,6 +47,8 @@ const MAX_TURN_RAD: f64 = 1.5;
 const STRAIGHT: f64 = 1e-9;
 /// Turn rates that are tried in the place of a refused one, on each side of 0.
 const RATES: i32 = 4;
+/// Largest number of periods of slowing down.
+const MAX_PERIODS: u32 = 1_000_000;
 /// Part of a period of slowing down that is rounding.
 const ROUNDING: f64 = 1e-9;
 
@@ -161,6 +163,10 @@ impl Loiter {
         if self.turn_rad_s * self.period_s > MAX_TURN_RAD {
             return fails("turn_rad_s", "must be at most 1.5 rad in a period", self.turn_rad_s, "shorten the period");
         }
+        if self.slowing(self.max_speed_m_s).0 > MAX_PERIODS {
+            let problem = "slowing down must take at most a million periods";
+            return fails("accel_m_s2", problem, self.accel_m_s2, "raise it or lower `max_speed_m_s`");
+        }
         if !pose.is_finite() {
             return fails("start", "must be finite", f64::NAN, "give a position, a heading and a speed");
         }
@@ -194,7 +200,7 @@ impl Loiter {
     fn slowing(&self, speed_m_s: f64) -> (u32, f64) {
         let above = (speed_m_s - self.min_speed_m_s).max(0.0);
         let periods = (above / (self.accel_m_s2 * self.period_s) - ROUNDING).ceil().max(0.0);
-        // At most 2^32 periods; more would exceed any flight.
+        // Above 0, and at most MAX_PERIODS after the check.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let count = periods as u32;
         (count, periods * self.period_s * (speed_m_s + self.min_speed_m_s) / 2.0)

@@ -2,7 +2,7 @@
 
 use nalgebra::Vector3;
 
-use super::flights::{Ranges, random_flight};
+use super::flights::{Ranges, long, random_flight};
 use super::twins::with_settings;
 use super::world::{Flight, Law};
 use crate::plane::Metric;
@@ -29,7 +29,8 @@ fn with_ellipsoids(seed: u64, half_height_m: f64, laws: &'static [Law], imperfec
 fn random_flights_with_ellipsoids_keep_the_safety_distance_in_scaled_lengths() {
     let laws = &[Law::Slot, Law::DiveAtNearest, Law::DiveAtCentre, Law::Random];
     for half_height in [TALL_M, FLAT_M] {
-        let flights = (0..80).filter_map(|seed| with_ellipsoids(seed, half_height, laws, seed % 2 == 0));
+        let flights = (0..if long() { 800 } else { 80 })
+            .filter_map(|seed| with_ellipsoids(seed, half_height, laws, seed % 2 == 0));
         let (mut flown, mut closest) = (0, f64::INFINITY);
         for flight in flights {
             let world = flight.fly();

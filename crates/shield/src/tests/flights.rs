@@ -10,7 +10,7 @@ use crate::{Fleet, Limits, Settings, State};
 const DELTA_M: f64 = 1.0;
 
 /// Whether the environment asks for more flights.
-fn long() -> bool {
+pub(super) fn long() -> bool {
     std::env::var_os("TAUTLINE_LONG").is_some()
 }
 

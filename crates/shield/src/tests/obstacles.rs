@@ -2,7 +2,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 
-use super::flights::{Ranges, random_flight};
+use super::flights::{Ranges, long, random_flight};
 use super::twins::with_settings;
 use super::world::{Flight, Law};
 use super::{Random, random_body};
@@ -32,7 +32,7 @@ fn among_bodies(seed: u64, laws: &'static [Law], imperfect: bool) -> Flight {
 fn random_flights_between_bodies_keep_their_clearance() {
     let laws = &[Law::Slot, Law::DiveAtNearest, Law::DiveAtCentre, Law::Random];
     let (mut least, mut near) = (f64::INFINITY, 0);
-    for seed in 0..100 {
+    for seed in 0..if long() { 1_000 } else { 100 } {
         let world = among_bodies(seed, laws, seed % 2 == 0).fly();
         assert!(world.closest_m >= 1.0, "flight {seed}: {}", world.closest_m);
         assert!(world.obstacle_room_m >= 0.0, "flight {seed}: {}", world.obstacle_room_m);

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::Random;
+use super::flights::long;
 use crate::fleet::closest_starts;
 use crate::obstacle::{Obstacle, SolidHalfSpace};
 use crate::unicycle::{Loiter, Pose, Steering, UnicycleShield};
@@ -207,7 +208,7 @@ fn dive(seed: u64, has_defect: bool) -> f64 {
 
 #[test]
 fn unicycles_and_points_that_dive_at_each_other_keep_the_safety_distance() {
-    let separations: Vec<_> = (0..150).map(|seed| dive(seed, false)).collect();
+    let separations: Vec<_> = (0..if long() { 10_000 } else { 150 }).map(|seed| dive(seed, false)).collect();
     let closest = separations.iter().copied().fold(f64::INFINITY, f64::min);
     assert!(closest >= 1.0, "{closest}");
     assert!(closest < 1.05, "{closest}");
@@ -253,6 +254,9 @@ fn invalid_unicycles_are_refused_and_a_wish_that_is_not_finite_falls_back() {
     let refused = |of: Loiter, pose: Pose| of.start(&pose).expect_err("refused").to_string();
     assert!(refused(Loiter { min_speed_m_s: 0.0, ..of }, start).starts_with("min_speed_m_s: must be above 0 (0)"));
     assert!(refused(Loiter { turn_rad_s: 20.0, ..of }, start).starts_with("turn_rad_s: must be at most 1.5 rad"));
+    assert!(
+        refused(Loiter { accel_m_s2: 1e-9, ..of }, start).starts_with("accel_m_s2: slowing down must take at most")
+    );
     assert!(refused(Loiter { tracking_error_m: -1.0, ..of }, start).starts_with("tracking_error_m: must not be neg"));
     assert!(refused(of, Pose { speed_m_s: 9.0, ..start }).starts_with("start: the speed must be from"));
     assert!(refused(of, Pose { heading_rad: f64::NAN, ..start }).starts_with("start: must be finite"));
