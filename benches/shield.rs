@@ -1,4 +1,4 @@
-//! Time of the shield: one period of all vehicles, and their messages through a radio without loss.
+//! Time of the shield: one period of all vehicles, and their broadcasts through a radio without loss.
 //!
 //! Run with `cargo bench --bench shield`; compare times of one run only. Divide by the number of vehicles for the cost
 //! of a vehicle and period.
@@ -7,7 +7,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::Vector3;
-use tautline::shield::{Fleet, Message, Settings, State};
+use tautline::shield::{Broadcast, Fleet, Settings, State};
 
 const PERIOD_S: f64 = 0.05;
 
@@ -17,7 +17,7 @@ struct Crowd {
     states: Vec<State>,
     slots: Vec<Vector3<f64>>,
     commands: Vec<Vector3<f64>>,
-    sent: Vec<Message>,
+    sent: Vec<Broadcast>,
 }
 
 impl Crowd {
@@ -28,7 +28,7 @@ impl Crowd {
         let states: Vec<_> = (0..count).map(|i| State::at_rest(place(i))).collect();
         let fleet = Fleet::new(&vec![limits; count], &states).expect("starts are apart");
         let slots = (0..count).map(|i| place((i * 37 + 11) % count)).collect();
-        Self { fleet, states, slots, commands: vec![Vector3::zeros(); count], sent: vec![] }
+        Self { fleet, states, slots, commands: vec![Vector3::zeros(); count], sent: vec![Broadcast::default(); count] }
     }
 
     fn filter(&mut self) {
@@ -40,9 +40,10 @@ impl Crowd {
     }
 
     fn exchange(&mut self) {
-        self.sent.clear();
-        self.sent.extend(self.fleet.messages());
-        self.sent.iter().for_each(|message| self.fleet.hear(message));
+        for (shield, broadcast) in self.fleet.shields().iter().zip(&mut self.sent) {
+            shield.write_broadcast(broadcast);
+        }
+        self.sent.iter().for_each(|broadcast| self.fleet.hear_broadcast(broadcast));
     }
 }
 

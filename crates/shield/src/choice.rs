@@ -83,7 +83,16 @@ impl Envelope {
     /// With w = |v| + A h, the position after a period is at most w h away and its stop point at most w G(w) more,
     /// because G does not decrease. The same bounds hold for the half-spaces of the command.
     pub(crate) fn reach_m(&self, state: &State, choice: Choice) -> f64 {
-        let fastest = state.velocity_m_s.norm() + self.accel_m_s2 * self.period_s;
+        self.reach_at_m(state.velocity_m_s.norm(), choice)
+    }
+
+    /// Returns the reach at the largest speed \[m\].
+    pub(crate) fn largest_reach_m(&self, choice: Choice) -> f64 {
+        self.reach_at_m(self.speed_m_s, choice)
+    }
+
+    fn reach_at_m(&self, speed_m_s: f64, choice: Choice) -> f64 {
+        let fastest = speed_m_s + self.accel_m_s2 * self.period_s;
         let ease = if let Choice::GiveWay { ease_m, .. } = choice { ease_m / 2.0 } else { 0.0 };
         fastest * (self.period_s + self.brake.glide_s(fastest)) + ease + SLACK_M
     }
@@ -120,6 +129,15 @@ impl Reach {
     #[inline]
     pub(crate) fn push(&mut self, plane: Plane) {
         self.planes.push(plane);
+    }
+
+    pub(crate) fn extend(&mut self, planes: impl Iterator<Item = Plane>) {
+        self.planes.extend(planes);
+    }
+
+    /// Whether a point is inside all planes.
+    pub(crate) fn contains(&self, point_m: &Vector3<f64>) -> bool {
+        self.planes.iter().all(|plane| plane.room_m(point_m) >= 0.0)
     }
 
     /// Whether the reference may take this command: it is within the limits, and the position after the period and its

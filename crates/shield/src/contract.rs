@@ -15,10 +15,15 @@
 //!
 //! Every message repeats the present segment, the pending proposal and the last decision. A message with a larger stamp
 //! therefore contains all that an older one can still say, and the newest message of a sender is the only one stored.
+//!
+//! A plane from which both vehicles are far is not renewed. The owner may propose or not at any instant.
 
 use serde::{Deserialize, Serialize};
 
-use crate::plane::{Divider, Plane, Segment};
+use crate::choice::Reach;
+use crate::fleet::{PairRoom, closest_starts};
+use crate::plane::{Divider, Metric, Plane, Segment};
+use crate::settings::{ShieldError, Start};
 
 /// Proposal of a plane by the owner of a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -62,125 +67,145 @@ impl Message {
     }
 }
 
-/// Decisions that a vehicle took or heard in one period.
+/// Messages from one vehicle to all others, with the segment once. It may arrive at each of them late, never, twice or
+/// after a later one.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Broadcast {
+    /// Sender, counted from 0.
+    pub from: u32,
+    /// Number of the sender's period, from 1.
+    pub stamp: u64,
+    /// Segment that the sender holds from its next instant on.
+    pub segment: Segment,
+    /// Last decisions, to the vehicles with smaller numbers than the sender, in their order.
+    pub decisions: Vec<Option<Decision>>,
+    /// Pending proposals, to the vehicles with larger numbers, in their order.
+    pub proposals: Vec<Option<Proposal>>,
+}
+
+impl Broadcast {
+    /// Returns the message to a vehicle. `None` if it contains none to that vehicle.
+    #[inline]
+    #[must_use]
+    pub fn message(&self, to: u32) -> Option<Message> {
+        let (decision, proposal) = if to < self.from {
+            (*self.decisions.get(to as usize)?, None)
+        } else {
+            (None, *self.proposals.get((to - self.from).checked_sub(1)? as usize)?)
+        };
+        Some(Message { from: self.from, to, stamp: self.stamp, segment: self.segment, proposal, decision })
+    }
+}
+
+/// Margin of a vehicle from a divider, and the lengths of both.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Side {
+    pub(crate) margin_m: f64,
+    pub(crate) metric: Metric,
+}
+
+impl Side {
+    fn owner_plane(&self, divider: &Divider) -> Plane {
+        divider.owner_plane(self.metric, self.margin_m)
+    }
+
+    fn follower_plane(&self, divider: &Divider) -> Plane {
+        divider.follower_plane(self.metric, self.margin_m)
+    }
+}
+
+/// Decisions that a vehicle took at an instant, and the largest age of a plane within reach, in periods.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(crate) struct Decided {
+pub(crate) struct Renewed {
     pub(crate) accepted: u32,
     pub(crate) refused: u32,
-}
-
-/// Side of a vehicle in the contract with one other vehicle, and the newest message heard from it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Contract {
-    /// Plane that both vehicles hold.
-    held: Plane,
-    /// Period in which the held plane was taken on.
-    held_since: u64,
-    role: Role,
-    /// Segment of the other vehicle, from the start or the newest message.
-    heard: Segment,
-    /// Stamp of the newest message.
-    stamp: u64,
-    /// Distance that the other vehicle keeps from the divider \[m\].
-    other_margin_m: f64,
-    /// The other vehicle.
-    other: u32,
-    /// Whether the newest message has not been read.
-    is_fresh: bool,
-}
-
-/// Role in a pair, with what was sent and heard in it. Number 0 stands for no proposal.
-#[derive(Clone, Copy, Debug, PartialEq)]
-enum Role {
-    Owner {
-        /// Last proposal, held beside the other plane while its decision is pending.
-        proposed: Proposal,
-        is_pending: bool,
-        /// Decision of the newest message.
-        heard: Decision,
-    },
-    Follower {
-        /// Last decision.
-        decided: Decision,
-        /// Proposal of the newest message.
-        heard: Proposal,
-    },
+    pub(crate) oldest: u64,
 }
 
 const NO_DECISION: Decision = Decision { number: 0, accepted: false };
 const NO_PROPOSAL: Proposal = Proposal { number: 0, divider: Divider { normal: [0.0; 3], offset_m: 0.0 } };
 
-impl Contract {
-    /// Returns the contract at the start: both vehicles hold the divider of their announced segments. Each vehicle is
-    /// its number, segment and margin \[m\]. `None` if the segments are closer than the margins.
-    pub(crate) fn new(own: (u32, Segment, f64), other: (u32, Segment, f64)) -> Option<Self> {
-        let ((number, segment, margin_m), (other, heard, other_margin_m)) = (own, other);
-        // Both vehicles compute the same numbers.
-        let (held, role) = if number < other {
-            let divider = Divider::between(&segment, &heard, margin_m, other_margin_m)?;
-            let role = Role::Owner { proposed: NO_PROPOSAL, is_pending: false, heard: NO_DECISION };
-            (divider.owner_plane(margin_m), role)
-        } else {
-            let divider = Divider::between(&heard, &segment, other_margin_m, margin_m)?;
-            (divider.follower_plane(margin_m), Role::Follower { decided: NO_DECISION, heard: NO_PROPOSAL })
-        };
-        Some(Self { held, held_since: 0, role, heard, stamp: 0, other_margin_m, other, is_fresh: false })
+/// Room, in the reach of a period at full speed, beyond which a plane is not renewed. A vehicle needs several periods
+/// for this distance, and planes beyond reach do not limit its choice.
+const RENEWED: f64 = 4.0;
+
+/// Returns the plane between an owner and a follower at their starts, which both compute with the same numbers.
+fn divider_of_starts(owner: &Start, follower: &Start) -> Option<Divider> {
+    Divider::between(owner.metric, &owner.segment, &follower.segment, owner.margin_m, follower.margin_m)
+}
+
+/// Contract of a vehicle as the owner, with the newest message heard from the follower. Number 0 stands for no
+/// proposal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Owned {
+    /// Stamp, segment and decision of the newest message; at first the segment of the start.
+    stamp: u64,
+    segment: Segment,
+    decision: Decision,
+    /// Plane that both vehicles hold.
+    held: Plane,
+    /// Period in which the held plane was taken on.
+    held_since: u64,
+    /// Last proposal, held beside the other plane while its decision is pending.
+    proposed: Proposal,
+    is_pending: bool,
+    /// Distance that the follower keeps from the divider \[m\].
+    follower_margin_m: f64,
+    /// Distances of the two vehicles from the owner's plane beyond which the plane is not renewed \[m\].
+    far_m: [f64; 2],
+}
+
+impl Owned {
+    /// Returns the contract at the start. `None` if the segments are closer than the margins.
+    pub(crate) fn new(own: &Start, follower: &Start) -> Option<Self> {
+        let held = divider_of_starts(own, follower)?.owner_plane(own.metric, own.margin_m);
+        let renewed = RENEWED * own.reach_m.max(follower.reach_m);
+        let between = (own.margin_m + follower.margin_m) * own.metric.widest();
+        Some(Self {
+            stamp: 0,
+            segment: follower.segment,
+            decision: NO_DECISION,
+            held,
+            held_since: 0,
+            proposed: NO_PROPOSAL,
+            is_pending: false,
+            follower_margin_m: follower.margin_m,
+            far_m: [renewed, renewed + between],
+        })
     }
 
-    /// Stores a message of the other vehicle unless a later one was heard or its numbers are invalid.
+    /// Stores a message of the follower unless a later one was heard or its numbers are invalid.
     #[inline]
     pub(crate) fn hear(&mut self, message: &Message) {
-        if message.stamp <= self.stamp || !message.is_valid() {
-            return;
-        }
-        self.stamp = message.stamp;
-        self.heard = message.segment;
-        self.is_fresh = true;
-        match &mut self.role {
-            Role::Owner { heard, .. } => *heard = message.decision.unwrap_or(NO_DECISION),
-            Role::Follower { heard, .. } => *heard = message.proposal.unwrap_or(NO_PROPOSAL),
+        if message.stamp > self.stamp && message.is_valid() {
+            self.stamp = message.stamp;
+            self.segment = message.segment;
+            self.decision = message.decision.unwrap_or(NO_DECISION);
         }
     }
 
-    /// Reads the newest message at an instant of this vehicle, with its segment from this instant on and its margin.
+    /// Reads the newest message at an instant of this vehicle, with its segment from this instant on. Then proposes the
+    /// divider of the present segments unless a proposal is pending or both vehicles are far from the plane.
     #[inline]
-    pub(crate) fn read(&mut self, own: &Segment, margin_m: f64, period: u64, counted: &mut Decided) {
-        if !std::mem::take(&mut self.is_fresh) {
+    pub(crate) fn renew(&mut self, own: &Segment, side: &Side, period: u64) {
+        if self.is_pending {
+            if self.decision.number != self.proposed.number {
+                return;
+            }
+            self.is_pending = false;
+            if self.decision.accepted {
+                (self.held, self.held_since) = (side.owner_plane(&self.proposed.divider), period);
+            }
+        }
+        let rooms = [self.held.room_m(&own.position()), -self.held.room_m(&self.segment.position())];
+        if rooms[0] > self.far_m[0] && rooms[1] > self.far_m[1] {
             return;
         }
-        match &mut self.role {
-            Role::Owner { proposed, is_pending, heard } => {
-                if *is_pending && heard.number == proposed.number {
-                    *is_pending = false;
-                    if heard.accepted {
-                        (self.held, self.held_since) = (proposed.divider.owner_plane(margin_m), period);
-                    }
-                }
-            }
-            Role::Follower { decided, heard } => {
-                if heard.number > decided.number {
-                    let plane = heard.divider.follower_plane(margin_m);
-                    let accepted = plane.contains(own);
-                    *decided = Decision { number: heard.number, accepted };
-                    counted.accepted += u32::from(accepted);
-                    counted.refused += u32::from(!accepted);
-                    if accepted {
-                        (self.held, self.held_since) = (plane, period);
-                    }
-                }
-            }
-        }
-    }
-
-    /// Proposes the divider of the present segments, as the owner without a pending proposal.
-    #[inline]
-    pub(crate) fn propose(&mut self, own: &Segment, margin_m: f64) {
-        if let Role::Owner { proposed, is_pending: is_pending @ false, .. } = &mut self.role
-            && let Some(divider) = Divider::between(own, &self.heard, margin_m, self.other_margin_m)
-            && divider.owner_plane(margin_m).contains(own)
+        if let Some(divider) = Divider::between(side.metric, own, &self.segment, side.margin_m, self.follower_margin_m)
+            && side.owner_plane(&divider).contains(own)
         {
-            *proposed = Proposal { number: proposed.number + 1, divider };
-            *is_pending = true;
+            self.proposed = Proposal { number: self.proposed.number + 1, divider };
+            self.is_pending = true;
         }
     }
 
@@ -192,21 +217,14 @@ impl Contract {
 
     /// Returns the proposed plane that is held beside the other one.
     #[inline]
-    pub(crate) fn pending(&self, margin_m: f64) -> Option<Plane> {
-        match &self.role {
-            Role::Owner { proposed, is_pending: true, .. } => Some(proposed.divider.owner_plane(margin_m)),
-            _ => None,
-        }
+    pub(crate) fn pending(&self, side: &Side) -> Option<Plane> {
+        self.is_pending.then(|| side.owner_plane(&self.proposed.divider))
     }
 
-    /// Returns the message to the other vehicle.
+    /// Returns the pending proposal.
     #[inline]
-    pub(crate) fn message(&self, from: u32, stamp: u64, segment: Segment) -> Message {
-        let (proposal, decision) = match self.role {
-            Role::Owner { proposed, is_pending, .. } => (is_pending.then_some(proposed), None),
-            Role::Follower { decided, .. } => (None, (decided.number > 0).then_some(decided)),
-        };
-        Message { from, to: self.other, stamp, segment, proposal, decision }
+    pub(crate) fn proposal(&self) -> Option<Proposal> {
+        self.is_pending.then_some(self.proposed)
     }
 
     /// Returns the number of periods since the held plane was taken on.
@@ -214,14 +232,205 @@ impl Contract {
     pub(crate) fn age(&self, period: u64) -> u64 {
         period - self.held_since
     }
+}
 
-    /// Defect for tests: holds the divider of the present segment and the one heard last, without the contract. Returns
-    /// whether there is one.
+/// Contract of a vehicle as the follower, with the newest message heard from the owner.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Followed {
+    /// Stamp and proposal of the newest message.
+    stamp: u64,
+    proposal: Proposal,
+    /// Plane that both vehicles hold.
+    held: Plane,
+    /// Period in which the held plane was taken on.
+    held_since: u64,
+    /// Last decision.
+    decided: Decision,
+}
+
+impl Followed {
+    /// Returns the contract at the start. `None` if the segments are closer than the margins.
+    pub(crate) fn new(own: &Start, owner: &Start) -> Option<Self> {
+        let held = divider_of_starts(owner, own)?.follower_plane(own.metric, own.margin_m);
+        Some(Self { stamp: 0, proposal: NO_PROPOSAL, held, held_since: 0, decided: NO_DECISION })
+    }
+
+    /// Stores a message of the owner unless a later one was heard or its numbers are invalid.
+    #[inline]
+    pub(crate) fn hear(&mut self, message: &Message) {
+        if message.stamp > self.stamp && message.is_valid() {
+            self.stamp = message.stamp;
+            self.proposal = message.proposal.unwrap_or(NO_PROPOSAL);
+        }
+    }
+
+    /// Decides on a new proposal at an instant of this vehicle, with its segment from this instant on.
+    #[inline]
+    pub(crate) fn decide(&mut self, own: &Segment, side: &Side, period: u64, counted: &mut Renewed) {
+        if self.proposal.number <= self.decided.number {
+            return;
+        }
+        let plane = side.follower_plane(&self.proposal.divider);
+        let accepted = plane.contains(own);
+        self.decided = Decision { number: self.proposal.number, accepted };
+        counted.accepted += u32::from(accepted);
+        counted.refused += u32::from(!accepted);
+        if accepted {
+            (self.held, self.held_since) = (plane, period);
+        }
+    }
+
+    /// Returns the plane that both vehicles hold.
+    #[inline]
+    pub(crate) fn held(&self) -> Plane {
+        self.held
+    }
+
+    /// Returns the last decision.
+    #[inline]
+    pub(crate) fn decision(&self) -> Option<Decision> {
+        (self.decided.number > 0).then_some(self.decided)
+    }
+
+    /// Returns the number of periods since the held plane was taken on.
+    #[inline]
+    pub(crate) fn age(&self, period: u64) -> u64 {
+        period - self.held_since
+    }
+}
+
+/// Contracts of a vehicle with all others.
+#[derive(Clone, Debug)]
+pub(crate) struct Contracts {
+    index: u32,
+    /// With the vehicles of smaller numbers, in their order.
+    followed: Vec<Followed>,
+    /// With the vehicles of larger numbers, in their order.
+    owned: Vec<Owned>,
+}
+
+impl Contracts {
+    /// Returns the contracts at the start.
+    ///
+    /// # Errors
+    /// If the number is not in the list, or the vehicle starts too near to another one.
+    pub(crate) fn new(index: usize, starts: &[Start]) -> Result<Self, ShieldError> {
+        let count = starts.len();
+        let (Some(own), Ok(number)) = (starts.get(index), u32::try_from(index)) else {
+            let problem = format!("the number of the vehicle is not among {count} starts");
+            return Err(ShieldError::new("index", problem, index as f64, "count vehicles from 0"));
+        };
+        let followed = starts[..index].iter().map(|owner| Followed::new(own, owner)).collect();
+        let owned = starts[index + 1..].iter().map(|follower| Owned::new(own, follower)).collect();
+        if let (Some(followed), Some(owned)) = (followed, owned) {
+            return Ok(Self { index: number, followed, owned });
+        }
+        let apart = |other: usize| PairRoom::of(starts, index.min(other), index.max(other));
+        let others = (0..count).filter(|other| *other != index).map(apart);
+        let worst = others.min_by(|a, b| a.room_m().total_cmp(&b.room_m())).or_else(|| closest_starts(starts));
+        Err(worst.map_or_else(
+            || ShieldError::new("start", "a vehicle has no pair".into(), 0.0, "give two starts"),
+            |worst| worst.too_near(),
+        ))
+    }
+
+    /// Number of the vehicle.
+    pub(crate) fn index(&self) -> u32 {
+        self.index
+    }
+
+    /// Stores a message to this vehicle. Messages to other vehicles have no effect.
+    #[inline]
+    pub(crate) fn hear(&mut self, message: &Message) {
+        if message.to != self.index {
+            return;
+        }
+        let (from, own) = (message.from as usize, self.index as usize);
+        if let Some(contract) = self.followed.get_mut(from) {
+            contract.hear(message);
+        } else if from > own
+            && let Some(contract) = self.owned.get_mut(from - own - 1)
+        {
+            contract.hear(message);
+        }
+    }
+
+    /// Reads the newest messages, decides and proposes, with the segment from this instant on. Adds the planes within
+    /// reach \[m\].
+    pub(crate) fn renew(&mut self, own: &Segment, side: &Side, period: u64, reach_m: f64, near: &mut Reach) -> Renewed {
+        let (mut renewed, position) = (Renewed::default(), own.position());
+        for contract in &mut self.followed {
+            contract.decide(own, side, period, &mut renewed);
+            let held = contract.held();
+            if held.room_m(&position) <= reach_m {
+                renewed.oldest = renewed.oldest.max(contract.age(period));
+                near.push(held);
+            }
+        }
+        for contract in &mut self.owned {
+            contract.renew(own, side, period);
+            let held = contract.held();
+            if held.room_m(&position) <= reach_m {
+                renewed.oldest = renewed.oldest.max(contract.age(period));
+                near.push(held);
+            }
+            if let Some(pending) = contract.pending(side)
+                && pending.room_m(&position) <= reach_m
+            {
+                near.push(pending);
+            }
+        }
+        renewed
+    }
+
+    /// Returns the messages to all other vehicles.
+    pub(crate) fn messages(&self, stamp: u64, segment: Segment) -> impl Iterator<Item = Message> + '_ {
+        let from = self.index;
+        let message = move |to: u32| Message { from, to, stamp, segment, proposal: None, decision: None };
+        let followed = self.followed.iter().zip(0..);
+        let owned = self.owned.iter().zip(from.saturating_add(1)..);
+        let decisions = followed.map(move |(contract, to)| Message { decision: contract.decision(), ..message(to) });
+        decisions.chain(owned.map(move |(contract, to)| Message { proposal: contract.proposal(), ..message(to) }))
+    }
+
+    /// Writes the messages to all other vehicles as one.
+    pub(crate) fn write_broadcast(&self, stamp: u64, segment: Segment, broadcast: &mut Broadcast) {
+        (broadcast.from, broadcast.stamp, broadcast.segment) = (self.index, stamp, segment);
+        broadcast.decisions.clear();
+        broadcast.decisions.extend(self.followed.iter().map(Followed::decision));
+        broadcast.proposals.clear();
+        broadcast.proposals.extend(self.owned.iter().map(Owned::proposal));
+    }
+
+    /// Defect for tests: holds the planes between its own segment and these segments of all vehicles, as for equal
+    /// vehicles and without the contract. Returns whether every pair has one.
     #[cfg(test)]
-    pub(crate) fn hold_heard(&mut self, own: &Segment, margin_m: f64) -> bool {
-        self.role = Role::Follower { decided: NO_DECISION, heard: NO_PROPOSAL };
-        let divider = Divider::between(own, &self.heard, margin_m, self.other_margin_m);
-        divider.map(|divider| self.held = divider.owner_plane(margin_m)).is_some()
+    pub(crate) fn hold_heard(&mut self, own: &Segment, side: &Side, heard: &[Segment]) -> bool {
+        let plane = |other: &Segment| {
+            let divider = Divider::between(side.metric, own, other, side.margin_m, side.margin_m);
+            divider.map(|divider| side.owner_plane(&divider))
+        };
+        let mut planes = heard.iter().map(plane);
+        let mut has_all = true;
+        for contract in &mut self.followed {
+            planes.next().flatten().map_or_else(|| has_all = false, |plane| contract.held = plane);
+        }
+        planes.next();
+        for contract in &mut self.owned {
+            planes.next().flatten().map_or_else(|| has_all = false, |plane| contract.hold(plane));
+        }
+        has_all
+    }
+}
+
+/// Defect for tests: holds planes without the contract.
+#[cfg(test)]
+impl Owned {
+    /// Holds a plane and proposes none from now on.
+    pub(crate) fn hold(&mut self, plane: Plane) {
+        self.held = plane;
+        self.is_pending = false;
+        self.far_m = [f64::NEG_INFINITY; 2];
     }
 }
 
@@ -230,85 +439,123 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
+    use crate::Limits;
+    use crate::settings::{ROUNDING_M, Settings};
 
-    const MARGIN_M: f64 = 0.5;
+    /// Margin 0.5 m.
+    fn limits() -> Limits {
+        Settings::new(1.0 - ROUNDING_M, 0.05).limits().expect("defaults")
+    }
+
+    const SIDE: Side = Side { margin_m: 0.5, metric: Metric::BALL };
 
     fn at(x: f64) -> Segment {
         Segment::new(Vector3::new(x, 0.0, 0.0), Vector3::new(x, 0.0, 0.0))
     }
 
+    fn slot(x: f64) -> Start {
+        limits().slot(Vector3::x() * x)
+    }
+
     /// Returns the owner at 0 and the follower at `x`.
-    fn pair(x: f64) -> (Contract, Contract) {
-        let contract = |own, other| Contract::new(own, other).expect("apart");
-        let (owner, follower) = ((0, at(0.0), MARGIN_M), (1, at(x), MARGIN_M));
-        (contract(owner, follower), contract(follower, owner))
+    fn pair(x: f64) -> (Owned, Followed) {
+        (Owned::new(&slot(0.0), &slot(x)).expect("apart"), Followed::new(&slot(x), &slot(0.0)).expect("apart"))
+    }
+
+    /// Returns the message of vehicle 0, the owner.
+    fn proposes(owner: &Owned, stamp: u64, x: f64) -> Message {
+        Message { from: 0, to: 1, stamp, segment: at(x), proposal: owner.proposal(), decision: None }
+    }
+
+    /// Returns the message of vehicle 1, the follower.
+    fn decides(follower: &Followed, stamp: u64, x: f64) -> Message {
+        Message { from: 1, to: 0, stamp, segment: at(x), proposal: None, decision: follower.decision() }
     }
 
     #[test]
     fn a_pair_that_starts_too_near_has_no_contract() {
-        assert!(Contract::new((0, at(0.0), MARGIN_M), (1, at(0.9), MARGIN_M)).is_none());
-        assert!(Contract::new((1, at(0.0), MARGIN_M), (0, at(1.0), MARGIN_M)).is_some());
+        assert!(Owned::new(&slot(0.0), &slot(0.9)).is_none() && Followed::new(&slot(0.0), &slot(0.9)).is_none());
+        assert!(Owned::new(&slot(0.0), &slot(1.0)).is_some() && Followed::new(&slot(0.0), &slot(1.0)).is_some());
     }
 
     #[test]
     fn the_owner_holds_both_planes_until_it_hears_the_decision_on_that_number() {
         let (mut owner, mut follower) = pair(4.0);
-        let mut counted = Decided::default();
+        let mut counted = Renewed::default();
         let old = owner.held();
         assert_eq!(old, Plane { normal: Vector3::x(), offset_m: 1.5 });
         // The follower has moved to 3; the owner hears it and proposes a plane at 1.5.
-        owner.hear(&follower.message(1, 1, at(3.0)));
-        owner.read(&at(0.0), MARGIN_M, 1, &mut counted);
-        owner.propose(&at(0.0), MARGIN_M);
-        let sent = owner.message(0, 1, at(0.0));
-        assert_eq!((owner.held(), owner.pending(MARGIN_M).map(|plane| plane.offset_m)), (old, Some(1.0)));
+        owner.hear(&decides(&follower, 1, 3.0));
+        owner.renew(&at(0.0), &SIDE, 1);
+        let sent = proposes(&owner, 1, 0.0);
+        assert_eq!((owner.held(), owner.pending(&SIDE).map(|plane| plane.offset_m)), (old, Some(1.0)));
         // No second proposal while one is pending, and a decision on another number has no effect.
-        owner.propose(&at(0.2), MARGIN_M);
-        assert_eq!(owner.message(0, 1, at(0.0)), sent);
-        let mut stale = follower.message(1, 2, at(3.0));
+        owner.renew(&at(0.2), &SIDE, 1);
+        assert_eq!(proposes(&owner, 1, 0.0), sent);
+        let mut stale = decides(&follower, 2, 3.0);
         stale.decision = Some(Decision { number: 7, accepted: true });
         owner.hear(&stale);
-        owner.read(&at(0.0), MARGIN_M, 2, &mut counted);
-        assert_eq!((owner.held(), owner.pending(MARGIN_M).is_some()), (old, true));
+        owner.renew(&at(0.0), &SIDE, 2);
+        assert_eq!((owner.held(), owner.pending(&SIDE).is_some()), (old, true));
 
         follower.hear(&sent);
-        follower.read(&at(3.0), MARGIN_M, 2, &mut counted);
+        follower.decide(&at(3.0), &SIDE, 2, &mut counted);
         assert_eq!(follower.held(), Plane { normal: -Vector3::x(), offset_m: -2.0 });
         // A copy that arrives again has no effect.
         follower.hear(&sent);
-        follower.read(&at(9.0), MARGIN_M, 3, &mut counted);
-        assert_eq!(counted, Decided { accepted: 1, refused: 0 });
+        follower.decide(&at(9.0), &SIDE, 3, &mut counted);
+        assert_eq!(counted, Renewed { accepted: 1, ..Renewed::default() });
 
-        owner.hear(&follower.message(1, 3, at(3.0)));
-        owner.read(&at(0.0), MARGIN_M, 4, &mut counted);
-        assert_eq!((owner.held().offset_m, owner.pending(MARGIN_M), owner.age(6)), (1.0, None, 2));
+        owner.hear(&decides(&follower, 3, 3.0));
+        owner.renew(&at(0.0), &SIDE, 4);
+        assert_eq!((owner.held().offset_m, owner.age(6)), (1.0, 2));
+        assert_eq!(owner.proposal().map(|proposal| proposal.number), Some(2));
     }
 
     #[test]
     fn a_follower_outside_refuses_and_the_owner_keeps_the_old_plane() {
         let (mut owner, mut follower) = pair(4.0);
-        let mut counted = Decided::default();
+        let mut counted = Renewed::default();
         let (old, kept) = (owner.held(), follower.held());
-        owner.propose(&at(0.5), MARGIN_M);
-        follower.hear(&owner.message(0, 1, at(0.5)));
+        owner.renew(&at(0.5), &SIDE, 1);
+        follower.hear(&proposes(&owner, 1, 0.5));
         // The follower is at 2.6: inside the old plane, outside the proposed one at 2.25 plus 0.5.
-        follower.read(&at(2.6), MARGIN_M, 1, &mut counted);
-        assert_eq!((counted, follower.held()), (Decided { accepted: 0, refused: 1 }, kept));
-        owner.hear(&follower.message(1, 1, at(2.6)));
-        owner.read(&at(0.5), MARGIN_M, 2, &mut counted);
-        assert_eq!((owner.held(), owner.pending(MARGIN_M)), (old, None));
+        follower.decide(&at(2.6), &SIDE, 1, &mut counted);
+        assert_eq!((counted, follower.held()), (Renewed { refused: 1, ..Renewed::default() }, kept));
+        owner.hear(&decides(&follower, 1, 2.6));
+        owner.renew(&at(0.5), &SIDE, 2);
+        assert_eq!((owner.held(), owner.proposal().map(|proposal| proposal.number)), (old, Some(2)));
+    }
+
+    #[test]
+    fn a_plane_is_renewed_when_one_of_the_two_comes_near() {
+        let reach = limits().envelope.largest_reach_m(limits().choice);
+        let (mut owner, follower) = pair(20.0);
+        owner.renew(&at(0.0), &SIDE, 1);
+        assert_eq!(owner.proposal(), None);
+        // The plane is at 10.
+        let mut near = owner;
+        near.hear(&decides(&follower, 1, 10.6 + 4.0 * reach));
+        near.renew(&at(0.0), &SIDE, 1);
+        assert_eq!(near.proposal(), None);
+        near.hear(&decides(&follower, 2, 10.4 + 4.0 * reach));
+        near.renew(&at(0.0), &SIDE, 1);
+        assert!(near.proposal().is_some());
+        owner.renew(&at(9.6 - 4.0 * reach), &SIDE, 1);
+        assert!(owner.proposal().is_some());
     }
 
     #[test]
     fn older_and_invalid_messages_are_ignored() {
-        let (mut owner, follower) = pair(4.0);
-        owner.hear(&follower.message(1, 5, at(3.0)));
+        let (mut owner, mut follower) = pair(4.0);
+        owner.hear(&decides(&follower, 5, 3.0));
         let heard = owner;
-        owner.hear(&follower.message(1, 4, at(2.0)));
-        owner.hear(&follower.message(1, 6, at(f64::NAN)));
-        let divider = Divider { normal: [2.0, 0.0, 0.0], offset_m: 0.0 };
-        let forged = Some(Proposal { number: 1, divider });
-        owner.hear(&Message { proposal: forged, ..follower.message(1, 7, at(3.0)) });
+        owner.hear(&decides(&follower, 4, 2.0));
+        owner.hear(&decides(&follower, 6, f64::NAN));
         assert_eq!(owner, heard);
+        let unheard = follower;
+        let divider = Divider { normal: [2.0, 0.0, 0.0], offset_m: 0.0 };
+        follower.hear(&Message { proposal: Some(Proposal { number: 1, divider }), ..proposes(&owner, 7, 3.0) });
+        assert_eq!(follower, unheard);
     }
 }

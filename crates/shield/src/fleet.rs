@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 
 use crate::brake::State;
-use crate::contract::Message;
+use crate::contract::{Broadcast, Message};
+use crate::obstacle::Obstacle;
 use crate::report::Counters;
 use crate::settings::{Limits, ShieldError, Start};
 use crate::shield::Shield;
@@ -13,7 +14,7 @@ use crate::shield::Shield;
 pub struct PairRoom {
     /// The two vehicles, counted from 0.
     pub pair: (usize, usize),
-    /// Distance of their segments \[m\].
+    /// Distance of their segments \[m\], in the scaled lengths of ellipsoids.
     pub distance_m: f64,
     /// Smallest distance with a certificate \[m\]: the sum of the two margins.
     pub required_m: f64,
@@ -24,7 +25,7 @@ impl PairRoom {
     #[must_use]
     pub(crate) fn of(starts: &[Start], i: usize, j: usize) -> Self {
         let (one, other) = (&starts[i], &starts[j]);
-        let distance_m = one.segment.distance_m(&other.segment);
+        let distance_m = one.metric.distance_m(&one.segment, &other.segment);
         Self { pair: (i, j), distance_m, required_m: one.margin_m + other.margin_m }
     }
 
@@ -100,10 +101,37 @@ impl Fleet {
         }
         let starts: Vec<_> =
             limits.iter().zip(starts).map(|(limits, state)| limits.start(*state)).collect::<Result<_, _>>()?;
+        limits.iter().try_for_each(|limits| limits.check_bodies(&starts))?;
         if let Some(worst) = closest_starts(&starts).filter(|worst| worst.room_m() < 0.0) {
             return Err(worst.too_near());
         }
         let shields = limits.iter().enumerate().map(|(index, limits)| Shield::new(limits, index, &starts));
+        Ok(Self { shields: shields.collect::<Result<_, _>>()? })
+    }
+
+    /// Returns these shields with planes before these obstacles, see [`Shield::with_obstacles`].
+    ///
+    /// ```
+    /// use nalgebra::Vector3;
+    /// use tautline_shield::obstacle::{Ball, SolidHalfSpace};
+    /// use tautline_shield::{Fleet, Obstacle, Settings, State};
+    ///
+    /// let limits = [Settings::new(1.0, 0.05).limits()?; 2];
+    /// let states = [-3.0, 3.0].map(|x| State::at_rest(Vector3::new(x, 0.0, 2.0)));
+    /// let obstacles = [
+    ///     Obstacle::new(Ball { centre_m: Vector3::zeros(), radius_m: 1.0 }, 0.5),
+    ///     Obstacle::new(SolidHalfSpace { normal: Vector3::z_axis(), offset_m: 0.0 }, 0.5),
+    /// ];
+    /// let fleet = Fleet::new(&limits, &states)?.with_obstacles(&obstacles)?;
+    /// # assert_eq!(fleet.shields().len(), 2);
+    /// # Ok::<(), tautline_shield::ShieldError>(())
+    /// ```
+    ///
+    /// # Errors
+    /// If a clearance is invalid, or a vehicle is too near to an obstacle. The error names the vehicle, the obstacle
+    /// and the room.
+    pub fn with_obstacles(self, obstacles: &[Obstacle]) -> Result<Self, ShieldError> {
+        let shields = self.shields.into_iter().map(|shield| shield.with_obstacles(obstacles));
         Ok(Self { shields: shields.collect::<Result<_, _>>()? })
     }
 
@@ -112,6 +140,11 @@ impl Fleet {
         if let Some(shield) = self.shields.get_mut(message.to as usize) {
             shield.hear(message);
         }
+    }
+
+    /// Stores a broadcast for all vehicles but its sender.
+    pub fn hear_broadcast(&mut self, broadcast: &Broadcast) {
+        self.shields.iter_mut().for_each(|shield| shield.hear_broadcast(broadcast));
     }
 
     /// Writes the commands of all vehicles at a common instant \[m/s^2\]. Lists that are too short leave the other

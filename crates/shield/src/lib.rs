@@ -11,9 +11,11 @@
 //! | [`tube`] | rigorous bounds on the distance to the reference and on the feedback |
 //! | [`plane`] | reserved segments and the plane between two of them |
 //! | [`contract`] | messages, proposals and decisions (Lemma 3) |
+//! | [`obstacle`] | convex obstacles and the planes before them (Lemma 4) |
 //! | [`choice`] | which commands are accepted, and which one is taken |
 //! | [`settings`] | settings, defaults, errors, limits of the reference |
 //! | [`shield`] | [`Shield`] of one vehicle, for real vehicles and simulators |
+//! | [`unicycle`] | shield of a vehicle that cannot stop (Lemma 5) |
 //! | [`fleet`] | [`Fleet`] of all vehicles of a simulation; the condition on starts |
 //! | [`report`] | numbers of a flight, and whether the assumptions held |
 //!
@@ -35,13 +37,15 @@
 //! 1. reads the newest message of each other vehicle: as a follower it decides on a new proposal, as an owner it takes
 //!    a decision;
 //! 2. as an owner without a pending proposal, proposes the plane between the two segments \[p, s\]. It holds the plane
-//!    beside the old one. The segments must be at least m1 + m2 apart;
-//! 3. chooses the acceleration of the reference: a command that is *accepted*, or that of the brake;
+//!    beside the old one. The segments must be at least m1 + m2 apart. Planes far from both vehicles are not renewed;
+//! 3. renews its planes before obstacles within reach, and chooses the acceleration of the reference: a command that is
+//!    *accepted*, or that of the brake;
 //! 4. sends its next segment, pending proposals and last decisions to all.
 //!
 //! A command is accepted if it and the next speed are within the limits. The next position and the next stop point must
 //! also be inside all planes held. A plane between two vehicles leaves each of them a margin
-//! m = delta / 2 + e, where e is the bound of the [`tube`].
+//! m = delta / 2 + e, where e is the bound of the [`tube`]. With upright ellipsoids all of this holds in the scaled
+//! lengths of a [`plane::Metric`].
 //!
 //! # Proof
 //! **Lemma 1** ([`brake::Brake`]). With p, s, the next position and the next stop point inside a half-space, the path
@@ -54,12 +58,15 @@
 //!
 //! **Lemma 3** ([`contract`]). At every time the two vehicles of a pair hold a common plane.
 //!
+//! **Lemma 4** ([`obstacle`]). The vehicle may renew a plane before a convex obstacle alone, at any instant.
+//!
 //! **Theorem.** Let A1 to A5 hold, and let the segments of each pair be at least delta + e1 + e2 apart at the start.
-//!  Then any two vehicles are at least delta apart at all times, under every law, latency and loss.
+//!  Let the segment of each vehicle be at least its clearance and e from each obstacle. Then any two vehicles are at
+//!  least delta apart at all times, and each vehicle keeps its clearance, under every law, latency and loss.
 //!
 //! *Proof.* Take the common plane of Lemma 3 at a time t. By Lemmas 1 and 2 both references are inside it, one on its
 //!  side by m1 and the other one by m2. They are at least m1 + m2 = delta + e1 + e2 apart. Each vehicle is within its e
-//!  of its reference.
+//!  of its reference. Lemma 4 gives the clearance of obstacles.
 //!
 //! Doubles round: margins contain 1e-6 m for it ([`settings::ROUNDING_M`]), which covers positions up to 1e6 m.
 //!
@@ -76,18 +83,22 @@ pub mod brake;
 pub mod choice;
 pub mod contract;
 pub mod fleet;
+pub mod obstacle;
 pub mod plane;
 pub mod report;
 pub mod settings;
 pub mod shield;
 pub mod tube;
+pub mod unicycle;
 
 pub use brake::State;
-pub use contract::Message;
+pub use contract::{Broadcast, Message};
 pub use fleet::Fleet;
+pub use obstacle::{ConvexBody, Obstacle};
 pub use report::Counters;
 pub use settings::{Limits, Settings, ShieldError, Start};
 pub use shield::Shield;
+pub use unicycle::UnicycleShield;
 
 #[cfg(test)]
 mod tests;

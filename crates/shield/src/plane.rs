@@ -1,10 +1,76 @@
 //! Reserved segments of two vehicles, and the plane between them.
+//!
+//! # Ellipsoids
+//! Around each vehicle there may be an upright ellipsoid with the half axes delta / 2, delta / 2 and k instead of a
+//! ball. Two such ellipsoids do not overlap if the distance of their centres is at least delta after S = diag(1, 1,
+//! delta / (2 k)). A [`Metric`] is this S. Planes stay planes in scaled lengths, and segments stay segments, so the
+//! proof holds for the scaled references S p^. An error of e is at most e max(1, delta / (2 k)) there. The true plane
+//! of a scaled one n . S x <= c is (S n) . x <= c, divided by |S n|. Brake, choice and reach use true planes.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+/// Scaled lengths, in which two vehicles are delta apart: level lengths as they are, vertical ones times a factor.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Metric {
+    vertical: f64,
+}
+
+impl Metric {
+    /// True lengths, for balls.
+    pub const BALL: Self = Self { vertical: 1.0 };
+
+    /// Returns the lengths in which ellipsoids with half axes of half of delta, half of delta, and this half height
+    /// are balls \[m\].
+    #[must_use]
+    pub fn ellipsoid(delta_m: f64, half_height_m: f64) -> Self {
+        Self { vertical: delta_m / (2.0 * half_height_m) }
+    }
+
+    /// Returns a vector in scaled lengths.
+    #[inline]
+    #[must_use]
+    pub fn scaled(self, vector: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::new(vector.x, vector.y, vector.z * self.vertical)
+    }
+
+    /// Largest factor by which a length grows.
+    #[must_use]
+    pub fn stretch(self) -> f64 {
+        self.vertical.max(1.0)
+    }
+
+    /// Largest true length of a scaled length of 1.
+    pub(crate) fn widest(self) -> f64 {
+        1.0 / self.vertical.min(1.0)
+    }
+
+    /// Returns the distance of two segments in scaled lengths \[m\].
+    #[must_use]
+    pub fn distance_m(self, one: &Segment, other: &Segment) -> f64 {
+        self.segment(one).distance_m(&self.segment(other))
+    }
+
+    #[inline]
+    fn segment(self, of: &Segment) -> Segment {
+        Segment::new(self.scaled(&of.position()), self.scaled(&of.stop()))
+    }
+
+    /// Returns the true plane of a plane in scaled lengths.
+    #[inline]
+    fn true_plane(self, normal: Vector3<f64>, offset_m: f64) -> Plane {
+        // A normal of length 1 would be rounded.
+        if self == Self::BALL {
+            return Plane { normal, offset_m };
+        }
+        let scaled = self.scaled(&normal);
+        let length = scaled.norm();
+        Plane { normal: scaled / length, offset_m: offset_m / length }
+    }
+}
+
 /// Part of space that a vehicle reserves: the segment from its reference to the stop point of its brake.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Segment {
     /// Position of the reference \[m\].
     pub position_m: [f64; 3],
@@ -41,8 +107,10 @@ impl Segment {
     }
 
     /// Whether all numbers are finite.
+    #[inline]
     pub(crate) fn is_finite(&self) -> bool {
-        self.position_m.iter().chain(&self.stop_m).all(|value| value.is_finite())
+        // 0 times a number is NaN unless the number is finite. One comparison takes the place of six.
+        self.position_m.iter().chain(&self.stop_m).map(|value| value * 0.0).sum::<f64>() == 0.0
     }
 
     /// Returns the closest points of this segment and of another one.
@@ -109,7 +177,8 @@ impl Plane {
     }
 }
 
-/// Plane between the owner and the follower of a pair, before the margins of the two: all x with `normal . x = offset`.
+/// Plane between the owner and the follower of a pair, before the margins of the two: all x with `normal . x = offset`
+/// in the scaled lengths of a [`Metric`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Divider {
     /// Unit normal, from the owner to the follower.
@@ -120,11 +189,17 @@ pub struct Divider {
 
 impl Divider {
     /// Returns the divider of the closest points of two segments, with the same room for both beyond their margins.
-    /// `None` if the segments are closer than the sum of the margins.
+    /// Margins and points are in scaled lengths. `None` if the segments are closer than the sum of the margins.
     #[inline]
     #[must_use]
-    pub fn between(owner: &Segment, follower: &Segment, owner_margin_m: f64, follower_margin_m: f64) -> Option<Self> {
-        let (from, to) = owner.closest_points(follower);
+    pub fn between(
+        metric: Metric,
+        owner: &Segment,
+        follower: &Segment,
+        owner_margin_m: f64,
+        follower_margin_m: f64,
+    ) -> Option<Self> {
+        let (from, to) = metric.segment(owner).closest_points(&metric.segment(follower));
         let apart = to - from;
         let distance = apart.norm();
         let room = distance - owner_margin_m - follower_margin_m;
@@ -136,18 +211,18 @@ impl Divider {
         Some(Self { normal: normal.into(), offset_m: normal.dot(&from) + owner_margin_m + room / 2.0 })
     }
 
-    /// Returns the half-space of the owner with its margin \[m\].
+    /// Returns the true half-space of the owner with its margin \[m\] in scaled lengths.
     #[inline]
     #[must_use]
-    pub fn owner_plane(&self, margin_m: f64) -> Plane {
-        Plane { normal: self.normal.into(), offset_m: self.offset_m - margin_m }
+    pub fn owner_plane(&self, metric: Metric, margin_m: f64) -> Plane {
+        metric.true_plane(self.normal.into(), self.offset_m - margin_m)
     }
 
-    /// Returns the half-space of the follower with its margin \[m\].
+    /// Returns the true half-space of the follower with its margin \[m\] in scaled lengths.
     #[inline]
     #[must_use]
-    pub fn follower_plane(&self, margin_m: f64) -> Plane {
-        Plane { normal: -Vector3::from(self.normal), offset_m: -self.offset_m - margin_m }
+    pub fn follower_plane(&self, metric: Metric, margin_m: f64) -> Plane {
+        metric.true_plane(-Vector3::from(self.normal), -self.offset_m - margin_m)
     }
 
     /// Whether the normal has length 1 up to rounding and the offset is finite.
@@ -190,18 +265,31 @@ mod tests {
     fn a_divider_has_both_segments_inside_with_the_same_room() {
         let mut random = Random::new(4);
         let mut found = 0;
-        for _ in 0..2_000 {
+        for round in 0..3_000 {
             let (owner, follower) = (segment(&mut random), segment(&mut random));
             let (mine, yours) = (random.between(0.1, 1.0), random.between(0.1, 1.0));
-            let room = owner.distance_m(&follower) - mine - yours;
-            let divider = Divider::between(&owner, &follower, mine, yours);
+            let metric = [Metric::BALL, Metric::ellipsoid(1.0, 1.5), Metric::ellipsoid(1.0, 0.2)][round % 3];
+            let room = metric.distance_m(&owner, &follower) - mine - yours;
+            let divider = Divider::between(metric, &owner, &follower, mine, yours);
             assert_eq!(divider.is_some(), room >= 0.0, "{owner:?} {follower:?}");
             let Some(divider) = divider else { continue };
             assert!(divider.is_valid());
             found += 1;
-            for (plane, segment) in [(divider.owner_plane(mine), owner), (divider.follower_plane(yours), follower)] {
-                let least = plane.room_m(&segment.position()).min(plane.room_m(&segment.stop()));
+            let planes = [divider.owner_plane(metric, mine), divider.follower_plane(metric, yours)];
+            for (plane, segment) in planes.iter().zip([owner, follower]) {
+                assert!((plane.normal.norm() - 1.0).abs() < 1e-12);
+                // Scaled lengths per metre of room.
+                let unit = metric.scaled(&Vector3::from(divider.normal)).norm();
+                let least = plane.room_m(&segment.position()).min(plane.room_m(&segment.stop())) * unit;
                 assert!((least - room / 2.0).abs() < 1e-9, "{owner:?} {follower:?}: {least} {room}");
+            }
+            // Any two points inside are as far apart as the margins, in scaled lengths.
+            for _ in 0..10 {
+                let [one, other] = [0, 1].map(|k| {
+                    let point = random.vector(5.0);
+                    point + planes[k].normal * planes[k].room_m(&point).min(0.0)
+                });
+                assert!(metric.scaled(&(one - other)).norm() >= mine + yours - 1e-9, "{metric:?}: {one} {other}");
             }
         }
         assert!(found > 500, "{found}");
@@ -212,9 +300,9 @@ mod tests {
         let point = |x: f64| Segment::new(Vector3::new(x, 0.0, 0.0), Vector3::new(x, 0.0, 0.0));
         let plane = Plane { normal: Vector3::x(), offset_m: 1.0 };
         assert!(plane.contains(&point(1.0)) && !plane.contains(&point(1.1)) && !plane.contains(&point(f64::NAN)));
-        assert_eq!(Divider::between(&point(0.0), &point(f64::NAN), 0.5, 0.5), None);
-        assert_eq!(Divider::between(&point(0.0), &point(f64::INFINITY), 0.5, 0.5), None);
-        assert_eq!(Divider::between(&point(0.0), &point(0.0), 0.0, 0.0), None);
+        assert_eq!(Divider::between(Metric::BALL, &point(0.0), &point(f64::NAN), 0.5, 0.5), None);
+        assert_eq!(Divider::between(Metric::BALL, &point(0.0), &point(f64::INFINITY), 0.5, 0.5), None);
+        assert_eq!(Divider::between(Metric::BALL, &point(0.0), &point(0.0), 0.0, 0.0), None);
         assert!(!Divider { normal: [1.0, 1.0, 0.0], offset_m: 0.0 }.is_valid());
         assert!(!Divider { normal: [1.0, 0.0, 0.0], offset_m: f64::NAN }.is_valid());
     }

@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::contract::Decided;
+use crate::contract::Renewed;
 
 /// Excess of a bound that is rounding, in the unit of the bound. The margin for rounding covers it twice for each
 /// vehicle.
@@ -30,7 +30,7 @@ pub struct Counters {
     pub accepted: u64,
     /// Proposals that this vehicle refused.
     pub refused: u64,
-    /// Largest age of a plane, in periods.
+    /// Largest age of a plane of a pair within reach of a period, in periods.
     pub oldest_plane: u64,
     /// Instants without a measurement.
     pub missing_measurements: u64,
@@ -126,10 +126,10 @@ impl Counters {
         self.longest_brake = self.longest_brake.max(self.present_brake);
     }
 
-    pub(crate) fn decided(&mut self, decided: Decided, oldest_plane: u64) {
-        self.accepted += u64::from(decided.accepted);
-        self.refused += u64::from(decided.refused);
-        self.oldest_plane = self.oldest_plane.max(oldest_plane);
+    pub(crate) fn renewed(&mut self, renewed: Renewed) {
+        self.accepted += u64::from(renewed.accepted);
+        self.refused += u64::from(renewed.refused);
+        self.oldest_plane = self.oldest_plane.max(renewed.oldest);
     }
 
     pub(crate) fn missing(&mut self) {
@@ -170,7 +170,7 @@ mod tests {
         counters.chosen(true, 0.0);
         counters.chosen(true, 2.0);
         counters.chosen(false, 0.0);
-        counters.decided(Decided { accepted: 2, refused: 1 }, 7);
+        counters.renewed(Renewed { accepted: 2, refused: 1, oldest: 7 });
         assert_eq!((counters.changed, counters.brakes, counters.longest_brake), (2, 2, 2));
         assert_eq!((counters.changed_share(), counters.brake_share()), (0.5, 0.5));
         counters.tracked(0.19, 0.19);

@@ -6,7 +6,8 @@ use nalgebra::Vector3;
 
 use crate::brake::{Brake, State};
 use crate::choice::{Choice, Envelope};
-use crate::plane::Segment;
+use crate::contract::Side;
+use crate::plane::{Metric, Segment};
 use crate::tube::{TrackerLoop, Tube, TubeError};
 
 /// Part of the safety distance that is added because of rounding \[m\]. It covers positions up to 1e6 m.
@@ -23,6 +24,9 @@ const MAX_DELAY: usize = 20;
 pub struct Settings {
     /// Smallest separation of any pair that is certified \[m\]; the same for all vehicles.
     pub delta_m: f64,
+    /// Half height of an upright ellipsoid around each vehicle \[m\], whose other half axes are `delta_m` / 2; the same
+    /// for all vehicles. `None` for a ball. Ellipsoids do not overlap.
+    pub half_height_m: Option<f64>,
     /// Period h over which a command is held \[s\].
     pub period_s: f64,
     /// Largest command A that the vehicle carries out \[m/s^2\].
@@ -68,6 +72,7 @@ impl Settings {
     pub fn new(delta_m: f64, period_s: f64) -> Self {
         Self {
             delta_m,
+            half_height_m: None,
             period_s,
             accel_m_s2: 5.0,
             brake_m_s2: None,
@@ -138,13 +143,16 @@ impl Settings {
             period_s: self.period_s,
             brake: Brake::new(brake, self.period_s),
         };
-        let margin_m = f64::midpoint(self.delta_m, ROUNDING_M) + tube.error_m;
-        Ok(Limits { settings: *self, tube, envelope, choice, margin_m })
+        let metric = self.half_height_m.map_or(Metric::BALL, |half| Metric::ellipsoid(self.delta_m, half));
+        let stretch = metric.stretch();
+        let margin_m = f64::midpoint(self.delta_m, ROUNDING_M * stretch) + tube.error_m * stretch;
+        Ok(Limits { settings: *self, tube, envelope, choice, side: Side { margin_m, metric } })
     }
 
     fn check_ranges(&self) -> Result<(), ShieldError> {
         let positive = [
             ("delta_m", self.delta_m),
+            ("half_height_m", self.half_height_m.unwrap_or(1.0)),
             ("period_s", self.period_s),
             ("accel_m_s2", self.accel_m_s2),
             ("brake_m_s2", self.brake_m_s2.unwrap_or(1.0)),
@@ -211,7 +219,7 @@ pub struct Limits {
     tube: Tube,
     pub(crate) envelope: Envelope,
     pub(crate) choice: Choice,
-    margin_m: f64,
+    side: Side,
 }
 
 impl Limits {
@@ -245,10 +253,35 @@ impl Limits {
         self.choice
     }
 
-    /// Distance that the reference keeps from the plane between a pair \[m\]: delta / 2 + e, and rounding.
+    /// Distance that the reference keeps from the plane between a pair \[m\]: delta / 2 + e, and rounding. With
+    /// ellipsoids it is in the lengths of [`Limits::metric`], and e times the factor by which a length grows there.
     #[must_use]
     pub fn margin_m(&self) -> f64 {
-        self.margin_m
+        self.side.margin_m
+    }
+
+    /// Lengths in which two vehicles are delta apart.
+    #[must_use]
+    pub fn metric(&self) -> Metric {
+        self.side.metric
+    }
+
+    pub(crate) fn side(&self) -> Side {
+        self.side
+    }
+
+    /// Returns an error unless all vehicles have the same safety distance and ellipsoid.
+    pub(crate) fn check_bodies(&self, starts: &[Start]) -> Result<(), ShieldError> {
+        let Settings { delta_m, half_height_m, .. } = self.settings;
+        let differs = starts.iter().position(|start| start.delta_m != delta_m || start.metric != self.metric());
+        let Some(vehicle) = differs else { return Ok(()) };
+        let (place, value) = if starts[vehicle].delta_m == delta_m {
+            ("half_height_m", half_height_m.unwrap_or(delta_m / 2.0))
+        } else {
+            ("delta_m", delta_m)
+        };
+        let problem = format!("vehicle {} has another value", vehicle + 1);
+        Err(ShieldError::new(place, problem, value, "give all vehicles the same"))
     }
 
     /// Gap that two vehicles keep by choice \[m\].
@@ -271,10 +304,13 @@ impl Limits {
         let lag =
             if of.actuator_lag_s > 0.0 { format!(", actuators lag by {} s", of.actuator_lag_s) } else { String::new() };
         let tube = if of.tracking_error_m.is_some() { "assumed tube" } else { "tube" };
+        let height = of.half_height_m.map_or_else(String::new, |half| {
+            format!(" on a level and {:.3} m in the vertical, outside the ellipsoid of these half axes", 2.0 * half)
+        });
         format!(
-            "certified never closer than {:.3} m, whatever the law commands and whatever the radio loses. This holds \
-             while commands up to {} m/s^2 are carried out, own position is known to {} m and {} m/s, pushes stay \
-             below {} m/s^2{delay}{lag} ({tube} {:.3} m)",
+            "certified never closer than {:.3} m{height}, whatever the law commands and whatever the radio loses. \
+             This holds while commands up to {} m/s^2 are carried out, own position is known to {} m and {} m/s, \
+             pushes stay below {} m/s^2{delay}{lag} ({tube} {:.3} m)",
             of.delta_m,
             of.accel_m_s2,
             of.position_error_m,
@@ -299,14 +335,20 @@ impl Limits {
             return Err(ShieldError::new("start", problem, speed, "raise `max_speed_m_s` or start slower"));
         }
         let segment = Segment::new(state.position_m, self.envelope.brake.stop_m(&state));
-        Ok(Start { state, segment, margin_m: self.margin_m })
+        Ok(self.announced(state, segment))
     }
 
     /// Returns a slot: a start at rest, for [`closest_starts`](crate::fleet::closest_starts).
     #[must_use]
     pub fn slot(&self, position_m: Vector3<f64>) -> Start {
         let segment = Segment::new(position_m, position_m);
-        Start { state: State::at_rest(position_m), segment, margin_m: self.margin_m }
+        self.announced(State::at_rest(position_m), segment)
+    }
+
+    fn announced(&self, state: State, segment: Segment) -> Start {
+        let Side { margin_m, metric } = self.side;
+        let reach_m = self.envelope.largest_reach_m(self.choice);
+        Start { state, segment, margin_m, delta_m: self.settings.delta_m, metric, reach_m }
     }
 }
 
@@ -317,8 +359,12 @@ pub struct Start {
     pub state: State,
     /// Reserved segment.
     pub segment: Segment,
-    /// Distance that the vehicle keeps from the plane between a pair \[m\].
+    /// Distance that the vehicle keeps from the plane between a pair \[m\], in scaled lengths.
     pub margin_m: f64,
+    pub(crate) delta_m: f64,
+    pub(crate) metric: Metric,
+    /// Reach of a period at the largest speed \[m\].
+    pub(crate) reach_m: f64,
 }
 
 /// Settings or starts that cannot be certified: `PLACE: PROBLEM (VALUE); REMEDY`.

@@ -6,8 +6,8 @@ use nalgebra::Vector3;
 
 use crate::brake::State;
 use crate::choice::{Chosen, Reach};
-use crate::contract::{Contract, Decided, Message};
-use crate::fleet::{PairRoom, closest_starts};
+use crate::contract::{Broadcast, Contracts, Message};
+use crate::obstacle::{KeepOut, Obstacle};
 use crate::plane::Segment;
 use crate::report::Counters;
 use crate::settings::{Limits, ShieldError, Start};
@@ -50,7 +50,6 @@ const REACHED: usize = 128;
 #[derive(Clone, Debug)]
 pub struct Shield {
     limits: Limits,
-    index: u32,
     /// Number of calls so far; the reference is that of the instant of the last call.
     period: u64,
     /// Reference at the instant of the last call, and its acceleration since.
@@ -61,7 +60,8 @@ pub struct Shield {
     segment: Segment,
     /// References at the last instants, oldest first, for measurements of that age.
     past: VecDeque<State>,
-    contracts: Vec<Contract>,
+    contracts: Contracts,
+    keep_outs: Vec<KeepOut>,
     reach: Reach,
     counters: Counters,
 }
@@ -72,28 +72,12 @@ impl Shield {
     /// # Errors
     /// If the number is not in the list, or the vehicle starts too near to another one.
     pub fn new(limits: &Limits, index: usize, starts: &[Start]) -> Result<Self, ShieldError> {
-        let count = starts.len();
-        let Some(own) = starts.get(index).filter(|_| u32::try_from(count).is_ok()) else {
-            let problem = format!("the number of the vehicle is not among {count} starts");
-            return Err(ShieldError::new("index", problem, index as f64, "count vehicles from 0"));
-        };
-        let contracts = starts.iter().enumerate().filter(|(other, _)| *other != index).map(|(other, start)| {
-            let number = |k: usize| u32::try_from(k).unwrap_or(u32::MAX);
-            let (own, other) = ((number(index), *own), (number(other), *start));
-            Contract::new((own.0, own.1.segment, own.1.margin_m), (other.0, other.1.segment, other.1.margin_m))
-        });
-        let Some(contracts) = contracts.collect() else {
-            let apart = |other: usize| PairRoom::of(starts, index.min(other), index.max(other));
-            let others = (0..count).filter(|other| *other != index).map(apart);
-            let worst = others.min_by(|a, b| a.room_m().total_cmp(&b.room_m())).or_else(|| closest_starts(starts));
-            return Err(worst.map_or_else(
-                || ShieldError::new("start", "a vehicle has no pair".into(), 0.0, "give two starts"),
-                |worst| worst.too_near(),
-            ));
-        };
+        limits.check_bodies(starts)?;
+        let contracts = Contracts::new(index, starts)?;
+        // The index is in the list.
+        let own = &starts[index];
         Ok(Self {
             limits: *limits,
-            index: u32::try_from(index).unwrap_or(u32::MAX),
             period: 0,
             reference: own.state,
             acceleration: Vector3::zeros(),
@@ -101,22 +85,33 @@ impl Shield {
             segment: own.segment,
             past: VecDeque::with_capacity(limits.settings().measurement_delay_periods + 1),
             contracts,
+            keep_outs: vec![],
             // Two planes per other vehicle, but few are within reach.
-            reach: Reach::with_capacity((2 * count).min(REACHED)),
+            reach: Reach::with_capacity((2 * starts.len()).min(REACHED)),
             counters: Counters::default(),
         })
+    }
+
+    /// Returns this shield with planes before these obstacles, in the place of earlier ones. Obstacles must not move.
+    ///
+    /// # Errors
+    /// If a clearance is invalid, or the vehicle is too near to an obstacle to stop before it.
+    pub fn with_obstacles(mut self, obstacles: &[Obstacle]) -> Result<Self, ShieldError> {
+        self.keep_outs = KeepOut::all(obstacles, self.contracts.index(), self.limits.tube().error_m, &self.segment)?;
+        Ok(self)
     }
 
     /// Stores a message to this vehicle until the next instant. Messages to other vehicles have no effect.
     #[inline]
     pub fn hear(&mut self, message: &Message) {
-        if message.to != self.index || message.from == self.index {
-            return;
-        }
-        // Contracts are in the order of the other vehicles, without this one.
-        let place = message.from as usize - usize::from(message.from > self.index);
-        if let Some(contract) = self.contracts.get_mut(place) {
-            contract.hear(message);
+        self.contracts.hear(message);
+    }
+
+    /// Stores the message to this vehicle in a broadcast until the next instant.
+    #[inline]
+    pub fn hear_broadcast(&mut self, broadcast: &Broadcast) {
+        if let Some(message) = broadcast.message(self.contracts.index()) {
+            self.hear(&message);
         }
     }
 
@@ -132,23 +127,11 @@ impl Shield {
         self.advance();
         let (limits, reference) = (self.limits, self.reference);
         let reach = limits.envelope.reach_m(&reference, limits.choice);
-        let (mut decided, mut oldest) = (Decided::default(), 0);
         self.reach.clear();
-        for contract in &mut self.contracts {
-            contract.read(&self.segment, limits.margin_m(), self.period, &mut decided);
-            contract.propose(&self.segment, limits.margin_m());
-            oldest = oldest.max(contract.age(self.period));
-            let held = contract.held();
-            if held.room_m(&reference.position_m) <= reach {
-                self.reach.push(held);
-            }
-            if let Some(pending) = contract.pending(limits.margin_m())
-                && pending.room_m(&reference.position_m) <= reach
-            {
-                self.reach.push(pending);
-            }
-        }
-        self.counters.decided(decided, oldest);
+        let renewed = self.contracts.renew(&self.segment, &limits.side(), self.period, reach, &mut self.reach);
+        let segment = self.segment;
+        self.reach.extend(self.keep_outs.iter_mut().filter_map(|keep_out| keep_out.within(&segment, reach)));
+        self.counters.renewed(renewed);
         let drag = reference.velocity_m_s * limits.settings().a22_per_s;
         let wish = limits.envelope.cut(&reference.velocity_m_s, wanted + drag);
         let chosen = if wish.iter().all(|value| value.is_finite()) {
@@ -209,9 +192,15 @@ impl Shield {
         command
     }
 
-    /// Messages to all other vehicles, to be sent after [`Shield::filter`].
+    /// Messages to all other vehicles, to be sent after [`Shield::filter`]. [`Shield::write_broadcast`] is shorter.
     pub fn messages(&self) -> impl Iterator<Item = Message> + '_ {
-        self.contracts.iter().map(|contract| contract.message(self.index, self.period, self.segment))
+        self.contracts.messages(self.period, self.segment)
+    }
+
+    /// Writes the messages to all other vehicles as one, to be sent after [`Shield::filter`]. The memory of `broadcast`
+    /// is used again.
+    pub fn write_broadcast(&self, broadcast: &mut Broadcast) {
+        self.contracts.write_broadcast(self.period, self.segment, broadcast);
     }
 
     /// Records a true state, `since_s` after the instant of the last command, for the report of a simulation.
@@ -264,12 +253,9 @@ impl Shield {
         &self.counters
     }
 
-    /// Defect for tests: holds the planes of the segments heard last. Returns whether every pair has one.
+    /// Defect for tests: see [`Contracts::hold_heard`].
     #[cfg(test)]
-    pub(crate) fn hold_heard(&mut self) -> bool {
-        let (segment, margin_m) = (self.segment, self.limits.margin_m());
-        let missing =
-            self.contracts.iter_mut().filter_map(|contract| (!contract.hold_heard(&segment, margin_m)).then_some(()));
-        missing.count() == 0
+    pub(crate) fn hold_heard(&mut self, heard: &[Segment]) -> bool {
+        self.contracts.hold_heard(&self.segment, &self.limits.side(), heard)
     }
 }

@@ -4,7 +4,8 @@ use std::alloc::System;
 
 use nalgebra::Vector3;
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
-use tautline_shield::{Fleet, Message, Settings, State};
+use tautline_shield::obstacle::SolidHalfSpace;
+use tautline_shield::{Fleet, Message, Obstacle, Settings, State};
 
 #[global_allocator]
 static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
@@ -41,6 +42,9 @@ fn a_period_of_warm_shields_allocates_nothing() {
     let place = |k: usize| Vector3::new((k % 5) as f64, (k / 5) as f64, 0.1 * (k % 3) as f64) * 1.5;
     let mut states: Vec<_> = (0..VEHICLES).map(|k| State::at_rest(place(k) - place(12))).collect();
     let mut fleet = Fleet::new(&[limits; VEHICLES], &states).expect("starts are apart");
+    // Within reach at all times.
+    let ground = Obstacle::new(SolidHalfSpace { normal: Vector3::z_axis(), offset_m: -0.5 }, 0.2);
+    fleet = fleet.with_obstacles(&[ground]).expect("starts are above the ground");
     let (mut commands, mut sent) = ([Vector3::zeros(); VEHICLES], vec![]);
     fly(&mut fleet, &mut states, &mut commands, &mut sent);
     let region = Region::new(ALLOCATOR);

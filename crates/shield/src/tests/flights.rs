@@ -10,7 +10,7 @@ use crate::{Fleet, Limits, Settings, State};
 const DELTA_M: f64 = 1.0;
 
 /// Whether the environment asks for more flights.
-fn long() -> bool {
+pub(super) fn long() -> bool {
     std::env::var_os("TAUTLINE_LONG").is_some()
 }
 
@@ -223,6 +223,31 @@ fn a_saved_flight_continues_with_the_same_bits() {
     assert_eq!(world.report(), loaded.report());
     let bits = |world: &World| world.fleet.messages().map(|sent| format!("{sent:?}")).collect::<Vec<_>>();
     assert_eq!(bits(&world), bits(&loaded));
+}
+
+#[test]
+fn a_broadcast_contains_the_messages_and_is_heard_like_them() {
+    let ranges = Ranges { most_vehicles: 6, laws: &[Law::Slot], imperfect: true };
+    let flight = random_flight(3, ranges);
+    let mut world = World::new(&flight);
+    (0..101).for_each(|_| world.step(&flight));
+    let (mut by_message, mut by_broadcast) = (world.fleet.clone(), world.fleet.clone());
+    let mut broadcast = crate::Broadcast::default();
+    for shield in world.fleet.shields() {
+        shield.write_broadcast(&mut broadcast);
+        let sent: Vec<_> = shield.messages().collect();
+        let count = u32::try_from(world.states.len()).expect("few");
+        let contained: Vec<_> = (0..count + 2).filter_map(|to| broadcast.message(to)).collect();
+        assert_eq!(contained, sent);
+        for message in &sent {
+            by_message.hear(message);
+        }
+        by_broadcast.hear_broadcast(&broadcast);
+        let json = serde_json::to_string(&broadcast).expect("plain data");
+        assert_eq!(serde_json::from_str::<crate::Broadcast>(&json).expect("plain data"), broadcast);
+    }
+    assert_ne!(format!("{by_message:?}"), format!("{:?}", world.fleet));
+    assert_eq!(format!("{by_broadcast:?}"), format!("{by_message:?}"));
 }
 
 #[test]

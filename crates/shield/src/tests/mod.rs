@@ -1,13 +1,18 @@
 //! Flights of shielded vehicles on the ideal plant, and random numbers with the same values on every platform.
 
+mod ellipsoids;
 mod flights;
+mod obstacles;
 mod reference;
 mod twins;
+mod unicycles;
 mod world;
 
-use nalgebra::Vector3;
+use nalgebra::{Isometry3, Unit, Vector3};
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
+
+use crate::obstacle::{Ball, Cuboid, Obstacle, SolidHalfSpace};
 
 #[derive(Clone)]
 pub(crate) struct Random(ChaCha8Rng);
@@ -48,6 +53,24 @@ impl Random {
             if (0.1..=1.0).contains(&length) {
                 return corner / length;
             }
+        }
+    }
+}
+
+/// Returns a ball, box or half-space whose surface is about so far from the origin at most.
+pub(crate) fn random_body(random: &mut Random, within_m: f64, clearance_m: f64) -> Obstacle {
+    let centre_m = random.vector(within_m);
+    match random.index(3) {
+        0 => Obstacle::new(Ball { centre_m, radius_m: random.between(0.0, 1.0) }, clearance_m),
+        1 => {
+            let pose = Isometry3::new(centre_m, random.vector(3.0));
+            // Some plates and needles.
+            let half_extents_m = Vector3::from_fn(|_, _| random.between(-0.3, 2.0).max(0.0));
+            Obstacle::new(Cuboid { pose, half_extents_m }, clearance_m)
+        }
+        _ => {
+            let normal = Unit::new_normalize(random.direction());
+            Obstacle::new(SolidHalfSpace { normal, offset_m: random.between(-within_m, 0.0) }, clearance_m)
         }
     }
 }

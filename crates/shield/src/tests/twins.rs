@@ -25,7 +25,7 @@ fn fly(laws: &'static [Law], imperfect: bool, change: impl Fn(&mut Flight)) -> (
 }
 
 /// Replaces the settings of all vehicles.
-fn with_settings(flight: &mut Flight, change: impl Fn(&mut Settings)) {
+pub(super) fn with_settings(flight: &mut Flight, change: impl Fn(&mut Settings)) {
     let mut last = None;
     for limits in &mut flight.limits {
         let mut settings = *limits.settings();

@@ -3,7 +3,8 @@
 use nalgebra::Vector3;
 
 use super::Random;
-use crate::{Counters, Fleet, Limits, Message, State};
+use crate::plane::Segment;
+use crate::{Counters, Fleet, Limits, Message, Obstacle, State};
 
 /// Steps of the plant in a common period.
 pub(super) const STEPS: usize = 4;
@@ -13,7 +14,7 @@ pub(super) const STEPS: usize = 4;
 pub(super) enum Law {
     /// To its slot, with 1/s^2 and 2/s.
     Slot,
-    /// At the nearest vehicle, with the largest command.
+    /// At the nearest vehicle or obstacle, with the largest command.
     DiveAtNearest,
     /// At the origin, with random jerks.
     DiveAtCentre,
@@ -49,6 +50,7 @@ pub(super) struct Flight {
     pub(super) limits: Vec<Limits>,
     pub(super) starts: Vec<State>,
     pub(super) slots: Vec<Vector3<f64>>,
+    pub(super) obstacles: Vec<Obstacle>,
     pub(super) law: Law,
     pub(super) radio: Radio,
     /// Common period \[s\]; the plant makes [`STEPS`] steps in it.
@@ -57,11 +59,13 @@ pub(super) struct Flight {
     pub(super) instants: Vec<usize>,
     pub(super) duration_s: f64,
     pub(super) planar: bool,
-    /// Whether noise and pushes are at their bounds and towards the nearest vehicle.
+    /// Whether noise and pushes are at their bounds and towards the nearest vehicle or obstacle.
     pub(super) adversarial: bool,
     /// Largest command that the plant carries out, if it is not that of the limits.
     pub(super) plant_m_s2: f64,
     pub(super) defect: Defect,
+    /// Factor of vertical lengths in the separation that is judged.
+    pub(super) judge_vertical: f64,
     pub(super) seed: u64,
 }
 
@@ -73,6 +77,7 @@ impl Flight {
             limits: vec![*limits; count],
             starts,
             slots,
+            obstacles: vec![],
             law: Law::Slot,
             radio: Radio::default(),
             period_s: limits.settings().period_s,
@@ -82,8 +87,14 @@ impl Flight {
             adversarial: false,
             plant_m_s2: f64::INFINITY,
             defect: Defect::None,
+            judge_vertical: 1.0,
             seed: 1,
         }
+    }
+
+    /// Returns a vector in the lengths that are judged.
+    fn scaled(&self, vector: &Vector3<f64>) -> Vector3<f64> {
+        Vector3::new(vector.x, vector.y, vector.z * self.judge_vertical)
     }
 
     /// Flies to the end.
@@ -110,6 +121,8 @@ pub(super) struct World {
     held: Vec<(f64, Vector3<f64>)>,
     /// Messages on their way, with the time of arrival.
     flying: Vec<(f64, Message)>,
+    /// Stamp and segment of the newest message, by receiver and sender.
+    heard: Vec<Vec<(u64, Segment)>>,
     /// Whether the last message of each pair was lost.
     lost: Vec<bool>,
     random: Random,
@@ -117,12 +130,15 @@ pub(super) struct World {
     step_s: f64,
     pub(super) closest_m: f64,
     pub(super) closest_s: f64,
+    /// Least distance from an obstacle beyond its clearance.
+    pub(super) obstacle_room_m: f64,
 }
 
 impl World {
     pub(super) fn new(of: &Flight) -> Self {
         let mut random = Random::new(of.seed);
         let fleet = Fleet::new(&of.limits, &of.starts).expect("starts are apart");
+        let fleet = fleet.with_obstacles(&of.obstacles).expect("starts are before obstacles");
         let count = of.starts.len();
         // True states may err like a measurement.
         let states = of.starts.iter().zip(&of.limits).map(|(start, limits)| {
@@ -132,6 +148,7 @@ impl World {
                 velocity_m_s: start.velocity_m_s + flat(random.vector(settings.velocity_error_m_s), of.planar),
             }
         });
+        let segments: Vec<_> = fleet.shields().iter().map(|shield| (0, shield.segment())).collect();
         Self {
             fleet,
             states: states.collect(),
@@ -141,12 +158,14 @@ impl World {
             since_s: vec![0.0; count],
             held: vec![(0.0, Vector3::zeros()); count],
             flying: vec![],
+            heard: vec![segments; count],
             lost: vec![false; count * count],
             random,
             step: 0,
             step_s: of.period_s / STEPS as f64,
             closest_m: f64::INFINITY,
             closest_s: 0.0,
+            obstacle_room_m: f64::INFINITY,
         }
     }
 
@@ -167,7 +186,8 @@ impl World {
             }
         }
         self.push(of);
-        self.judge();
+        self.judge(of);
+        self.judge_obstacles(of);
         for i in 0..self.states.len() {
             self.states[i] = self.states[i].after(self.accelerations[i], self.step_s);
             self.since_s[i] += self.step_s;
@@ -193,6 +213,10 @@ impl World {
                     message.decision = Some(crate::contract::Decision { number: proposal.number, accepted: true });
                 }
             }
+            let heard = &mut self.heard[message.to as usize][message.from as usize];
+            if message.stamp > heard.0 {
+                *heard = (message.stamp, message.segment);
+            }
             self.fleet.hear(&message);
         }
     }
@@ -202,7 +226,7 @@ impl World {
         self.past[i].push(self.states[i]);
         let late = self.past[i].len().saturating_sub(1 + settings.measurement_delay_periods);
         let truth = self.past[i][late];
-        let towards = self.nearest(i);
+        let towards = self.nearest(i, of);
         let errors = [settings.position_error_m, settings.velocity_error_m_s].map(|bound| {
             // A vehicle that believes to be farther from the nearest one than it is flies towards it.
             let error = if of.adversarial { -towards * bound } else { self.random.vector(bound) };
@@ -212,7 +236,8 @@ impl World {
         let wanted = flat(self.wanted(i, &measured, of), of.planar);
         let shield = &mut self.fleet.shields_mut()[i];
         shield.observe_measurement(&measured, &truth);
-        let brakes = of.defect == Defect::PlanesAsHeard && !shield.hold_heard();
+        let heard: Vec<_> = self.heard[i].iter().map(|(_, segment)| *segment).collect();
+        let brakes = of.defect == Defect::PlanesAsHeard && !shield.hold_heard(&heard);
         self.commands[i] = if brakes { shield.brake(measured) } else { shield.filter(measured, wanted) };
         self.since_s[i] = 0.0;
         self.send(i, of);
@@ -240,12 +265,15 @@ impl World {
         }
     }
 
-    /// Returns the direction to the nearest vehicle.
-    fn nearest(&self, i: usize) -> Vector3<f64> {
-        let others = (0..self.states.len()).filter(|j| *j != i);
-        let apart = others.map(|j| self.states[j].position_m - self.states[i].position_m);
-        apart
-            .min_by(|a, b| a.norm_squared().total_cmp(&b.norm_squared()))
+    /// Returns the direction to the nearest vehicle or obstacle.
+    fn nearest(&self, i: usize, of: &Flight) -> Vector3<f64> {
+        let own = self.states[i].position_m;
+        let others = (0..self.states.len()).filter(|j| *j != i).map(|j| self.states[j].position_m);
+        let bodies = of.obstacles.iter().filter_map(|obstacle| obstacle.body.closest_point_m(&own));
+        others
+            .chain(bodies)
+            .map(|other| other - own)
+            .min_by(|a, b| of.scaled(a).norm_squared().total_cmp(&of.scaled(b).norm_squared()))
             .map_or_else(Vector3::zeros, |to| to.normalize())
     }
 
@@ -253,7 +281,7 @@ impl World {
         let largest = of.limits[i].settings().accel_m_s2;
         match of.law {
             Law::Slot => -(measured.position_m - of.slots[i]) - measured.velocity_m_s * 2.0,
-            Law::DiveAtNearest => self.nearest(i) * largest,
+            Law::DiveAtNearest => self.nearest(i, of) * largest,
             Law::DiveAtCentre if self.random.chance(0.1) => self.random.direction() * largest,
             Law::DiveAtCentre => measured.position_m * -10.0,
             Law::Random => {
@@ -270,18 +298,45 @@ impl World {
         for i in 0..self.states.len() {
             let settings = of.limits[i].settings();
             let bound = settings.disturbance_m_s2;
-            let push = if of.adversarial { self.nearest(i) * bound } else { self.random.vector(bound) };
+            let push = if of.adversarial { self.nearest(i, of) * bound } else { self.random.vector(bound) };
             let command = self.commands[i].cap_magnitude(of.plant_m_s2);
             self.accelerations[i] = command + flat(push, of.planar) + self.states[i].velocity_m_s * settings.a22_per_s;
         }
     }
 
-    fn judge(&mut self) {
+    /// Finds the least distance from obstacles over a step to 1e-9 m. Halves an interval of time while the path within
+    /// it may come closer than found so far. Its distance is at least that of both ends from the plane before the body
+    /// at its middle, less the bend of the path.
+    fn judge_obstacles(&mut self, of: &Flight) {
+        for (state, acceleration) in self.states.iter().zip(&self.accelerations) {
+            let at = |seconds: f64| state.after(*acceleration, seconds).position_m;
+            for obstacle in &of.obstacles {
+                let mut open = vec![(0.0, self.step_s)];
+                while let Some((from, to)) = open.pop() {
+                    let middle = f64::midpoint(from, to);
+                    let Some(closest) = obstacle.body.closest_point_m(&at(middle)) else {
+                        self.obstacle_room_m = self.obstacle_room_m.min(-obstacle.clearance_m);
+                        continue;
+                    };
+                    let (outward, distance) = ((at(middle) - closest).normalize(), (at(middle) - closest).norm());
+                    self.obstacle_room_m = self.obstacle_room_m.min(distance - obstacle.clearance_m);
+                    let ends = [from, to].map(|end| outward.dot(&(at(end) - closest)));
+                    let bend = acceleration.norm() * (to - from) * (to - from) / 8.0;
+                    let least = (ends[0].min(ends[1]) - bend).max(0.0) - obstacle.clearance_m;
+                    if least < self.obstacle_room_m - 1e-9 {
+                        open.extend([(from, middle), (middle, to)]);
+                    }
+                }
+            }
+        }
+    }
+
+    fn judge(&mut self, of: &Flight) {
         for i in 0..self.states.len() {
             for j in i + 1..self.states.len() {
-                let apart = self.states[i].position_m - self.states[j].position_m;
-                let closing = self.states[i].velocity_m_s - self.states[j].velocity_m_s;
-                let bend = self.accelerations[i] - self.accelerations[j];
+                let apart = of.scaled(&(self.states[i].position_m - self.states[j].position_m));
+                let closing = of.scaled(&(self.states[i].velocity_m_s - self.states[j].velocity_m_s));
+                let bend = of.scaled(&(self.accelerations[i] - self.accelerations[j]));
                 let moved = closing.norm() * self.step_s + bend.norm() * self.step_s * self.step_s / 2.0;
                 if apart.norm() - moved < self.closest_m {
                     let (separation, at) = least_separation(&apart, &closing, &bend, self.step_s);
