@@ -169,6 +169,17 @@ impl Plane {
         self.offset_m - self.normal.dot(point_m)
     }
 
+    /// Returns the plane that has the same points of the level plane at a height \[m\], with a level normal. `None` if it
+    /// has all of them or none.
+    #[inline]
+    #[must_use]
+    pub fn in_level(&self, height_m: f64) -> Option<Self> {
+        let level = Vector3::new(self.normal.x, self.normal.y, 0.0);
+        let length = level.norm();
+        let offset_m = (self.offset_m - self.normal.z * height_m) / length;
+        (length > 0.0).then(|| Self { normal: level / length, offset_m })
+    }
+
     /// Whether both ends of a segment are inside. A number that is not finite is outside.
     #[inline]
     #[must_use]

@@ -57,12 +57,17 @@ pub struct Settings {
     /// Distance between the path of the plant and the path that its acceleration gives \[m\], added to the tube. A
     /// plant that moves on the chords of its steps dt needs A dt^2 / 8.
     pub path_error_m: f64,
+    /// Error of a simulated plant's acceleration \[m/s^2\], added to the push.
+    pub integration_error_m_s2: f64,
     /// Gap that two vehicles keep by choice \[m\]; default 0.2 of the safety distance.
     pub ease_m: Option<f64>,
     /// Share of a cut command that is turned to the right, from -1 to 1; 0 for none.
     pub turn: f64,
     /// Whether vehicles stop before each other instead of giving way; `ease_m` and `turn` have no effect then.
     pub stop_only: bool,
+    /// Whether all vehicles move in one level plane. The vertical part of a command is then left out, and obstacles act
+    /// by their sections with the plane.
+    pub is_level: bool,
 }
 
 impl Settings {
@@ -87,9 +92,11 @@ impl Settings {
             actuator_lag_s: 0.0,
             tracking_error_m: None,
             path_error_m: 0.0,
+            integration_error_m_s2: 0.0,
             ease_m: None,
             turn: 1.0,
             stop_only: false,
+            is_level: false,
         }
     }
 
@@ -105,7 +112,7 @@ impl Settings {
             tracker_per_s: self.tracker_per_s,
             position_error_m: self.position_error_m,
             velocity_error_m_s: self.velocity_error_m_s,
-            disturbance_m_s2: self.disturbance_m_s2,
+            disturbance_m_s2: self.disturbance_m_s2 + self.integration_error_m_s2,
             a22_per_s: self.a22_per_s,
             accel_m_s2: self.accel_m_s2,
             measurement_delay_periods: self.measurement_delay_periods,
@@ -167,6 +174,7 @@ impl Settings {
             ("actuator_lag_s", self.actuator_lag_s),
             ("tracking_error_m", self.tracking_error_m.unwrap_or(0.0)),
             ("path_error_m", self.path_error_m),
+            ("integration_error_m_s2", self.integration_error_m_s2),
             ("ease_m", self.ease_m.unwrap_or(0.0)),
         ];
         let fails = |place, problem: &str, value, remedy| Err(ShieldError::new(place, problem.into(), value, remedy));

@@ -129,10 +129,13 @@ impl Shield {
         let reach = limits.envelope.reach_m(&reference, limits.choice);
         self.reach.clear();
         let renewed = self.contracts.renew(&self.segment, &limits.side(), self.period, reach, &mut self.reach);
-        let segment = self.segment;
-        self.reach.extend(self.keep_outs.iter_mut().filter_map(|keep_out| keep_out.within(&segment, reach)));
+        let (segment, is_level) = (self.segment, limits.settings().is_level);
+        let planes = self.keep_outs.iter_mut().filter_map(|keep_out| keep_out.within(&segment, reach));
+        let height_m = reference.position_m.z;
+        self.reach.extend(planes.filter_map(|plane| if is_level { plane.in_level(height_m) } else { Some(plane) }));
         self.counters.renewed(renewed);
         let drag = reference.velocity_m_s * limits.settings().a22_per_s;
+        let wanted = if is_level { Vector3::new(wanted.x, wanted.y, 0.0) } else { wanted };
         let wish = limits.envelope.cut(&reference.velocity_m_s, wanted + drag);
         let chosen = if wish.iter().all(|value| value.is_finite()) {
             let chosen = self.reach.choose(&limits.envelope, &reference, wish, limits.choice);

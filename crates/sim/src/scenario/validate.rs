@@ -453,7 +453,8 @@ impl Scenario {
             .at_keys(["law.delta_m", key]));
         }
         let Ok(law) = self.law() else { return Ok(()) };
-        if law.capabilities().uses_ellipsoid_metric {
+        // A shield keeps the ellipsoids apart under any law.
+        if law.capabilities().uses_ellipsoid_metric || self.shield.is_some() {
             return Ok(());
         }
         Err(ScenarioError::new(format!("the law `{}` does not support ellipsoids", law.name()))

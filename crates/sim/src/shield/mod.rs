@@ -20,14 +20,17 @@ mod stage;
 pub(crate) use stage::ShieldStage;
 pub use stage::{ShieldBreach, ShieldReport};
 
+use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::scenario::{MAX_MEMORY_BYTES, Safety, Scenario, ScenarioError};
+use crate::scenario::{MAX_MEMORY_BYTES, Scenario, ScenarioError, Space};
 use tautline_core::swarm::row;
 use tautline_laws::law::{Certificate, LawSpec, VoidReason};
+use tautline_laws::space::Shape;
 use tautline_shield::fleet::{PairRoom, closest_starts};
-use tautline_shield::{Limits, Settings, ShieldError, Start, State};
+use tautline_shield::obstacle::ConvexBody;
+use tautline_shield::{Fleet, Limits, Obstacle, Settings, ShieldError, Start, State};
 
 /// Default rate of held commands under a shield \[Hz\].
 pub(crate) const SHIELD_CONTROL_HZ: f64 = 20.0;
@@ -37,9 +40,9 @@ const SPEED_M_S: f64 = 2.0;
 /// Relative difference of two rates or times that counts as rounding.
 const SAME: f64 = 1e-9;
 /// Expected memory of a contract with the last message of the other vehicle \[bytes\].
-const BYTES_PER_CONTRACT: u128 = 320;
+const BYTES_PER_CONTRACT: u128 = 256;
 /// Expected memory of a message under way \[bytes\].
-const BYTES_PER_MESSAGE: u128 = 176;
+const BYTES_PER_MESSAGE: u128 = 64;
 
 /// Shield: changes commands of the law only where this is needed to certify that no two vehicles come closer than
 /// `law.delta_m`. Commands are held over the periods of `time.control_hz`, 20 Hz unless given. Messages of the shield
@@ -165,12 +168,14 @@ impl Scenario {
             tracking_error_m: spec.tracking_error_m,
             ease_m: spec.ease_m,
             turn: spec.turn,
+            is_level: self.space == Space::Plane,
+            half_height_m: self.half_axes_m().map(|[.., half_height_m]| half_height_m),
             ..Settings::new(self.delta_m, 1.0 / control_hz)
         };
         if self.has_engine() {
             let decay = (a22_per_s * dt_s).powi(2);
             let lag = if self.actuation.lag_s > 0.0 { accel_m_s2 * (dt_s / self.actuation.lag_s).powi(2) } else { 0.0 };
-            settings.disturbance_m_s2 += (decay * (a22_per_s.abs() * max_speed_m_s + accel_m_s2) + lag) / 6.0;
+            settings.integration_error_m_s2 = (decay * (a22_per_s.abs() * max_speed_m_s + accel_m_s2) + lag) / 6.0;
             let gains = (1.0 + spec.tracker_per_s) / (12.0 * spec.tracker_per_s2);
             settings.path_error_m =
                 accel_m_s2 * dt_s * dt_s / 8.0 + decay * (max_speed_m_s + accel_m_s2 * dt_s) * gains;
@@ -203,6 +208,18 @@ impl Scenario {
         (0..self.count()).map(start).collect()
     }
 
+    /// Returns the shields of all vehicles at these starts, with planes before the obstacles.
+    pub(crate) fn shield_fleet(&self, limits: &Limits, states: &[State]) -> Result<Fleet, ScenarioError> {
+        let keep_out = |of: &tautline_laws::space::Obstacle| {
+            let clearance_m = of.clearance_m;
+            Obstacle::new(Solid { shape: of.shape, place_m: of.place_m }, clearance_m)
+        };
+        let obstacles: Vec<_> = self.obstacles.iter().map(keep_out).collect();
+        let fleet = Fleet::new(&vec![*limits; self.count()], states);
+        let fleet = fleet.and_then(|fleet| fleet.with_obstacles(&obstacles));
+        fleet.map_err(|error| of_shield(&error).at("start.positions_m"))
+    }
+
     /// Returns the pair of starts with the least room, and the pair of slots of any leg; `None` without a shield.
     #[must_use]
     pub fn shield_rooms(&self) -> Option<(PairRoom, PairRoom)> {
@@ -220,7 +237,9 @@ impl Scenario {
     pub(crate) fn shield_certificate(&self) -> Option<Certificate> {
         self.shield.as_ref()?;
         let fails = self.failures.iter().any(|failure| !failure.is_silent());
-        let certificate = Certificate { certified_m: Some(self.delta_m), ..Certificate::default() };
+        let certified_clearance_margin_m = (!self.obstacles.is_empty()).then_some(0.0);
+        let certified_m = Some(self.delta_m);
+        let certificate = Certificate { certified_m, certified_clearance_margin_m, ..Certificate::default() };
         Some(certificate.void_where(fails, VoidReason::VehicleFails))
     }
 
@@ -230,14 +249,6 @@ impl Scenario {
         if self.airframe.unicycle().is_some() {
             return Err(refused_with("the shield has no contract for unicycles", "use points or quadrotors")
                 .at_keys(["vehicle.model", "shield"]));
-        }
-        if self.safety != Safety::Ball {
-            return Err(refused_with("the shield certifies balls only", "leave out safety.shape")
-                .at_keys(["safety.shape", "shield"]));
-        }
-        if !self.obstacles.is_empty() {
-            return Err(refused_with("the shield does not certify obstacles", "leave out the obstacles or the shield")
-                .at_keys(["obstacle", "shield"]));
         }
         if let Some(control_hz) = self.time.control_hz {
             let steps = 1.0 / (control_hz * self.time.dt_s);
@@ -286,14 +297,13 @@ impl Scenario {
         self.check_shield_memory()?;
         let Some(limits) = self.shield_limits()? else { return Ok(()) };
         let starts = self.shield_starts(&limits)?;
-        match closest_starts(&starts).filter(|worst| worst.room_m() < 0.0) {
-            None => Ok(()),
-            Some(worst) => {
-                let (i, j) = worst.pair;
-                let error = of_shield(&worst.too_near());
-                Err(error.at_entry("start.positions_m", i).at_entry("start.positions_m", j))
-            }
+        if let Some(worst) = closest_starts(&starts).filter(|worst| worst.room_m() < 0.0) {
+            let (i, j) = worst.pair;
+            let error = of_shield(&worst.too_near());
+            return Err(error.at_entry("start.positions_m", i).at_entry("start.positions_m", j));
         }
+        let states: Vec<_> = starts.iter().map(|start| start.state).collect();
+        self.shield_fleet(&limits, &states).map(drop)
     }
 
     fn check_shield_memory(&self) -> Result<(), ScenarioError> {
@@ -314,6 +324,20 @@ impl Scenario {
         .coded("scenario/memory")
         .with_help("use fewer vehicles or a shorter network.latency_s")
         .at_keys(["shield", "network.latency_s"]))
+    }
+}
+
+/// Shape of an obstacle; all of them are convex.
+#[derive(Clone, Copy, Debug)]
+struct Solid {
+    shape: Shape,
+    place_m: Vector3<f64>,
+}
+
+impl ConvexBody for Solid {
+    fn closest_point_m(&self, point_m: &Vector3<f64>) -> Option<Vector3<f64>> {
+        let (distance_m, normal) = self.shape.signed_distance_m(point_m - self.place_m);
+        (distance_m > 0.0).then(|| point_m - normal * distance_m)
     }
 }
 

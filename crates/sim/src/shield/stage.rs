@@ -8,7 +8,7 @@ use crate::link::{Radio, RadioUse, period};
 use crate::scenario::{Scenario, ScenarioError};
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_shield::report::Exceeded;
-use tautline_shield::{Counters, Fleet, Message, State};
+use tautline_shield::{Broadcast, Counters, Fleet, State};
 
 /// Tolerance of equal instants \[s\].
 const SAME_S: f64 = 1e-9;
@@ -52,12 +52,12 @@ pub(crate) struct ShieldStage {
     radio: Radio,
     /// Rate of messages \[Hz\]; each period unless given.
     rate_hz: Option<f64>,
-    /// Number of broadcasts so far.
-    broadcasts: u64,
+    /// Number of rounds of messages so far.
+    rounds: u64,
     /// Next period of the rate of messages.
     next_period: u64,
-    under_way: VecDeque<Broadcast>,
-    spare: Vec<Broadcast>,
+    under_way: VecDeque<Round>,
+    spare: Vec<Round>,
     /// Time of the last instant of command \[s\].
     begun_s: f64,
     /// True states at the last instants, oldest first, for measurements of that age.
@@ -71,13 +71,14 @@ pub(crate) struct ShieldStage {
     undefined: u64,
 }
 
-/// Messages of all vehicles at one instant, by sender and then by receiver.
+/// Messages of all vehicles at one instant.
 #[derive(Clone, Debug, Default)]
-struct Broadcast {
-    messages: Vec<Message>,
-    /// Arrival of each \[s\]; infinite for a lost message.
+struct Round {
+    /// Messages of each sender.
+    broadcasts: Vec<Broadcast>,
+    /// Arrivals \[s\] by sender and then by receiver, without the sender itself; infinite for a lost message.
     arrives_s: Vec<f64>,
-    /// Time from which no message of the broadcast arrives any more \[s\].
+    /// Time from which none of them arrives any more \[s\].
     over_s: f64,
 }
 
@@ -87,8 +88,7 @@ impl ShieldStage {
         let Some(limits) = scenario.shield_limits()? else { return Ok(None) };
         let count = scenario.count();
         let starts: Vec<_> = scenario.shield_starts(&limits)?.iter().map(|start| start.state).collect();
-        let fleet = Fleet::new(&vec![limits; count], &starts)
-            .map_err(|error| ScenarioError::new(error.to_string()).coded("scenario/shield").at("start.positions_m"))?;
+        let fleet = scenario.shield_fleet(&limits, &starts)?;
         let mut failed_from_s = vec![f64::INFINITY; count];
         for failure in scenario.failures.iter().filter(|failure| !failure.is_silent()) {
             failed_from_s[failure.index()] = failed_from_s[failure.index()].min(failure.at_s);
@@ -99,7 +99,7 @@ impl ShieldStage {
             period_s: limits.settings().period_s,
             radio: Radio::new(scenario, count * (count - 1), RadioUse::Contracts),
             rate_hz: scenario.network.rate_hz,
-            broadcasts: 0,
+            rounds: 0,
             next_period: 0,
             under_way: VecDeque::new(),
             spare: Vec::new(),
@@ -167,11 +167,15 @@ impl ShieldStage {
     }
 
     fn deliver(&mut self, time_s: f64) {
-        for broadcast in &mut self.under_way {
-            for (message, arrives_s) in broadcast.messages.iter().zip(&mut broadcast.arrives_s) {
-                if *arrives_s <= time_s + SAME_S {
-                    self.fleet.hear(message);
-                    *arrives_s = f64::INFINITY;
+        let others = self.commands.len() - 1;
+        for round in &mut self.under_way {
+            for (broadcast, arrives_s) in round.broadcasts.iter().zip(round.arrives_s.chunks_exact_mut(others)) {
+                let sender = broadcast.from as usize;
+                for (k, arrives_s) in arrives_s.iter_mut().enumerate() {
+                    if *arrives_s <= time_s + SAME_S {
+                        self.fleet.shields_mut()[receiver(sender, k)].hear_broadcast(broadcast);
+                        *arrives_s = f64::INFINITY;
+                    }
                 }
             }
         }
@@ -186,25 +190,25 @@ impl ShieldStage {
         if period < self.next_period {
             return;
         }
-        // A rate above that of the instants sends one broadcast an instant.
+        // A rate above that of the instants sends one round an instant.
         self.next_period = period + 1;
-        self.broadcasts += 1;
+        self.rounds += 1;
         let count = self.commands.len();
-        let mut broadcast = self.spare.pop().unwrap_or_default();
-        broadcast.messages.clear();
-        broadcast.messages.extend(self.fleet.messages());
-        broadcast.arrives_s.resize(broadcast.messages.len(), f64::INFINITY);
-        broadcast.over_s = time_s + self.radio.longest_s();
-        for sender in 0..count {
-            let links = (0..count - 1).map(|k| (sender * (count - 1) + k, k + usize::from(k >= sender)));
-            self.radio.send((sender, self.broadcasts, time_s), links, &mut broadcast.arrives_s);
+        let mut round = self.spare.pop().unwrap_or_default();
+        round.broadcasts.resize_with(count, Broadcast::default);
+        round.arrives_s.resize(count * (count - 1), f64::INFINITY);
+        round.over_s = time_s + self.radio.longest_s();
+        for (sender, (shield, broadcast)) in self.fleet.shields().iter().zip(&mut round.broadcasts).enumerate() {
+            shield.write_broadcast(broadcast);
+            let links = (0..count - 1).map(|k| (sender * (count - 1) + k, receiver(sender, k)));
+            self.radio.send((sender, self.rounds, time_s), links, &mut round.arrives_s);
         }
-        self.under_way.push_back(broadcast);
+        self.under_way.push_back(round);
     }
 
     /// Changes the seed of later messages.
     pub(crate) fn reseed(&mut self, seed: u64) {
-        self.radio.reseed(seed, self.broadcasts);
+        self.radio.reseed(seed, self.rounds);
     }
 
     /// Returns the numbers of the flight so far.
@@ -228,6 +232,11 @@ impl ShieldStage {
             lost,
         }
     }
+}
+
+/// Returns the k-th receiver of a sender.
+fn receiver(sender: usize, k: usize) -> usize {
+    k + usize::from(k >= sender)
 }
 
 fn state(swarm: &Swarm, i: usize) -> State {

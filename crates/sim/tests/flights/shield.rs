@@ -305,3 +305,32 @@ fn scenarios_that_do_not_fit_the_shield_are_refused_with_place_value_and_remedy(
         assert!(error.contains(place) && error.contains(says), "{shield}: {error}");
     }
 }
+
+#[test]
+fn obstacles_and_ellipsoids_are_certified_too() {
+    let pillar = "[[obstacle]]\nname = \"pillar\"\nat_m = [0, 0.2, 0]\nball = { radius_m = 0.6 }\nclearance_m = 0.5";
+    let with = format!("{SWAP}\n[shield]\n{pillar}");
+    let (bare, _) = fly(&read(&format!("{SWAP}\n{pillar}")));
+    assert_eq!(bare.clearance.map(|clearance| clearance.status), Some(Status::Violation));
+    let (flight, _) = fly(&read(&with));
+    assert_eq!(flight.clearance.as_ref().map(|clearance| clearance.status), Some(Status::Clear));
+    assert_eq!((flight.status(), report(&flight).breach), (Status::Clear, None));
+    let certificate = &flight.certificate;
+    assert_eq!((certificate.certified_m, certificate.certified_clearance_margin_m), (Some(1.0), Some(0.0)));
+    // A tilted cable acts by its section with the plane in which the vehicles stay.
+    let cable = "[[obstacle]]\nname = \"cable\"\ncapsule = { from_m = [-0.5, -3, -1], to_m = [0.5, 3, 2], \
+                 radius_m = 0.1 }\nclearance_m = 0.5";
+    let (flight, log) = fly(&read(&format!("{SWAP}\n[shield]\n{cable}")));
+    assert_eq!((flight.status(), report(&flight).breach), (Status::Clear, None));
+    assert!(log.samples.iter().all(|sample| sample.swarm.positions_m.column(2).iter().all(|z| *z == 0.0)));
+
+    // Two vehicles above each other are 1 m apart, which is less than the height of the ellipsoids.
+    let stacked = SWAP
+        .replace("[[-3, 0], [3, 0]]", "[[0, 0, -2], [0, 0, 2]]")
+        .replace("[[3, 0], [-3, 0]]", "[[0, 0, 2], [0, 0, -2]]")
+        .replace("delta_m = 1.0", "")
+        + "\n[safety]\nshape = \"ellipsoid\"\nhalf_axes_m = [0.5, 0.5, 1.0]";
+    let (flight, _) = fly(&read(&format!("{stacked}\n[shield]")));
+    assert_eq!((flight.audit.status, flight.certificate.certified_m), (Status::Clear, Some(1.0)));
+    assert!(report(&flight).certificate.contains("2.000 m in the vertical"), "{}", report(&flight).certificate);
+}
