@@ -13,6 +13,8 @@
 //! push         ((|a22| dt)^2 (|a22| V + A) + A (dt/lag)^2)/6
 //! ```
 //!
+//! The ideal plant moves on curves, which bend from the chord of a step by at most 1e-5 m; that is its path error.
+//!
 //! The flight measures the distance to the reference at each step and reports it as a share of the tube.
 
 mod stage;
@@ -25,6 +27,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::scenario::{MAX_MEMORY_BYTES, Scenario, ScenarioError, Space};
+use crate::sim::MAX_BEND_M;
 use tautline_core::swarm::row;
 use tautline_laws::law::{Certificate, LawSpec, VoidReason};
 use tautline_laws::space::Shape;
@@ -172,6 +175,8 @@ impl Scenario {
             half_height_m: self.half_axes_m().map(|[.., half_height_m]| half_height_m),
             ..Settings::new(self.delta_m, 1.0 / control_hz)
         };
+        // The judge decides up to the largest bend of a path within a step.
+        settings.path_error_m = MAX_BEND_M;
         if self.has_engine() {
             let decay = (a22_per_s * dt_s).powi(2);
             let lag = if self.actuation.lag_s > 0.0 { accel_m_s2 * (dt_s / self.actuation.lag_s).powi(2) } else { 0.0 };

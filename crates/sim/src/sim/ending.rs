@@ -12,7 +12,7 @@ use tautline_laws::law::{Certificate, LawError, ParameterError};
 
 /// Largest distance of a path from the swept straight line \[m\]; of two vehicles twice that. Steps with larger bends
 /// are halved.
-pub(super) const MAX_BEND_M: f64 = 1e-5;
+pub(crate) const MAX_BEND_M: f64 = 1e-5;
 /// Largest acceleration along any axis \[m/s^2\]. Motions up to this limit stay within the range of the audit and of
 /// readers of recordings.
 pub(super) const MAX_COMMAND_M_S2: f64 = 1e30;

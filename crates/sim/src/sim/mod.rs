@@ -11,6 +11,7 @@ mod judge;
 mod monitors;
 mod simulation;
 
+pub(crate) use ending::MAX_BEND_M;
 pub use ending::{Breakdown, Ending, Flight, Performance, SimError};
 pub use judge::{audit_obstacle, audit_shape};
 pub use simulation::{Components, SavedState, Simulation};
