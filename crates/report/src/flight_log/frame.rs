@@ -87,9 +87,9 @@ impl FlightLog {
         let pair = match (around, before.closest) {
             (Some(around), _) if around.time_s == time_s => Some(around.pair),
             (_, Some(before)) if self.count() > SEARCHED_VEHICLES => Some(before.pair),
-            _ => nearest_present(&positions_m, self.metric()).map(|(pair, _)| pair),
+            _ => nearest_present(&positions_m, self.metric())
+                .map(|(pair, _)| first_of_ties(&positions_m, pair, self.metric())),
         };
-        let pair = pair.map(|pair| first_of_ties(&positions_m, pair, self.metric()));
         let worst = self.violations().of_vehicles().filter(|found| found.min_m.is_finite());
         let worst = worst.map(|v| ClosestApproach { pair: v.pair, separation_m: v.min_m, time_s: v.min_at_s });
         let worst: Vec<_> = worst.filter(|worst| worst.time_s <= time_s).collect();

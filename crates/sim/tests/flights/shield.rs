@@ -73,7 +73,7 @@ impl Law for Adversary {
                 Self::Undefined => return Err(LawError::NotFinite { vehicle: i }),
             };
             if let Self::Random(random) = self {
-                (0..3).for_each(|_| drop(random.next_u64()));
+                (0..3).for_each(|_| _ = random.next_u64());
             }
             set_row(command, i, wanted);
         }
