@@ -104,7 +104,9 @@ impl Report {
     pub fn breaks_certificate(&self) -> bool {
         let both = self.separation.min_m.zip(self.separation.certified_m);
         let breaks = |(min_m, certified_m)| breaks_certificate(min_m, certified_m, self.separation.delta_m);
-        both.is_some_and(breaks) && self.separation.is_promised()
+        // The shield certifies only while its bounds hold.
+        let holds = self.shield.as_ref().is_none_or(|shield| shield.exceeded.is_none());
+        holds && both.is_some_and(breaks) && self.separation.is_promised()
     }
 
     /// Returns why the audit is undecided, and the arrival if the formation was reached.

@@ -3,6 +3,7 @@
 use std::collections::VecDeque;
 
 use nalgebra::Vector3;
+use rayon::prelude::*;
 
 use crate::link::{Radio, RadioUse, period};
 use crate::scenario::{Scenario, ScenarioError};
@@ -58,6 +59,8 @@ pub(crate) struct ShieldStage {
     next_period: u64,
     under_way: VecDeque<Round>,
     spare: Vec<Round>,
+    /// Time up to which arrived messages have been heard \[s\].
+    heard_s: f64,
     /// Time of the last instant of command \[s\].
     begun_s: f64,
     /// True states at the last instants, oldest first, for measurements of that age.
@@ -103,6 +106,7 @@ impl ShieldStage {
             next_period: 0,
             under_way: VecDeque::new(),
             spare: Vec::new(),
+            heard_s: f64::NEG_INFINITY,
             begun_s: 0.0,
             truths: VecDeque::new(),
             failed_from_s,
@@ -129,7 +133,8 @@ impl ShieldStage {
             self.wanted[i] = row(command, i);
         }
         self.observe_measurements(time_s, truth);
-        self.fleet.filter(&self.measured, &self.wanted, &mut self.commands);
+        let Self { fleet, measured, wanted, commands, .. } = self;
+        each(fleet.shields_mut(), commands, |i, shield, command| *command = shield.filter(measured[i], wanted[i]));
         for (i, shielded) in self.commands.iter().enumerate() {
             set_row(command, i, *shielded);
         }
@@ -167,18 +172,20 @@ impl ShieldStage {
     }
 
     fn deliver(&mut self, time_s: f64) {
-        let others = self.commands.len() - 1;
-        for round in &mut self.under_way {
-            for (broadcast, arrives_s) in round.broadcasts.iter().zip(round.arrives_s.chunks_exact_mut(others)) {
-                let sender = broadcast.from as usize;
-                for (k, arrives_s) in arrives_s.iter_mut().enumerate() {
-                    if *arrives_s <= time_s + SAME_S {
-                        self.fleet.shields_mut()[receiver(sender, k)].hear_broadcast(broadcast);
-                        *arrives_s = f64::INFINITY;
+        let Self { fleet, under_way, commands, heard_s, .. } = self;
+        let (from_s, to_s) = (*heard_s, time_s + SAME_S);
+        let others = commands.len() - 1;
+        each(fleet.shields_mut(), commands, |own, shield, _| {
+            for round in &*under_way {
+                for (sender, broadcast) in round.broadcasts.iter().enumerate().filter(|(sender, _)| *sender != own) {
+                    let arrives_s = round.arrives_s[sender * others + own - usize::from(own > sender)];
+                    if arrives_s > from_s && arrives_s <= to_s {
+                        shield.hear_broadcast(broadcast);
                     }
                 }
             }
-        }
+        });
+        *heard_s = to_s;
         while self.under_way.front().is_some_and(|first| first.over_s <= time_s + SAME_S) {
             self.spare.extend(self.under_way.pop_front());
         }
@@ -198,11 +205,17 @@ impl ShieldStage {
         round.broadcasts.resize_with(count, Broadcast::default);
         round.arrives_s.resize(count * (count - 1), f64::INFINITY);
         round.over_s = time_s + self.radio.longest_s();
-        for (sender, (shield, broadcast)) in self.fleet.shields().iter().zip(&mut round.broadcasts).enumerate() {
-            shield.write_broadcast(broadcast);
-            let links = (0..count - 1).map(|k| (sender * (count - 1) + k, receiver(sender, k)));
+        each(&mut round.broadcasts, &mut self.commands, |sender, broadcast, _| {
+            self.fleet.shields()[sender].write_broadcast(broadcast);
+        });
+        for sender in 0..count {
+            let links = (0..count - 1).map(|k| (sender * (count - 1) + k, k + usize::from(k >= sender)));
             self.radio.send((sender, self.rounds, time_s), links, &mut round.arrives_s);
         }
+        // A message is heard at a later instant.
+        let soonest_s = time_s + 2.0 * SAME_S;
+        round.arrives_s.iter_mut().for_each(|arrives_s| *arrives_s = arrives_s.max(soonest_s));
+        round.over_s = round.over_s.max(soonest_s);
         self.under_way.push_back(round);
     }
 
@@ -234,9 +247,17 @@ impl ShieldStage {
     }
 }
 
-/// Returns the k-th receiver of a sender.
-fn receiver(sender: usize, k: usize) -> usize {
-    k + usize::from(k >= sender)
+/// Number of vehicles from which the shields run concurrently. Each works on its own state, so the bits are the same.
+const CONCURRENT_FROM: usize = 64;
+
+/// Calls a function for each vehicle, with an item and a command of it.
+fn each<T: Send>(items: &mut [T], commands: &mut [Vector3<f64>], of: impl Fn(usize, &mut T, &mut Vector3<f64>) + Sync) {
+    if items.len() < CONCURRENT_FROM {
+        items.iter_mut().zip(commands).enumerate().for_each(|(i, (item, command))| of(i, item, command));
+    } else {
+        let both = items.par_iter_mut().zip(commands).enumerate();
+        both.for_each(|(i, (item, command))| of(i, item, command));
+    }
 }
 
 fn state(swarm: &Swarm, i: usize) -> State {

@@ -1,0 +1,139 @@
+//! Prints the table of arrivals of docs/shield.md: laws without and under the shield, and behind a radio that loses
+//! messages, from random starts of several kinds.
+//!
+//! `cargo run --release --example arrivals [RUNS]`, 20 runs of each by default.
+
+use tautline::compare::{LawRow, Options};
+use tautline::request::{ScenarioRequest, Silent};
+use tautline::scenario::Source;
+use tautline::studies::{StudyRequest, answer};
+
+/// Kind of a flight: its name and the tables of its scenario.
+struct Kind {
+    name: String,
+    tables: String,
+}
+
+/// Laws that steer each vehicle to its slot.
+const LAWS: [&str; 4] = ["laplacian", "displacement", "orca", "cbf-qp"];
+/// Common tables: 60 s with commands up to 5 m/s^2 in steps of a quarter of the shield's period.
+const COMMON: &str = "
+    [law]
+    kind = \"displacement\"
+    delta_m = 1.0
+    [time]
+    duration_s = 60
+    dt_s = 0.0125
+    record_hz = 4
+    [arrival]
+    edge_error_m = 0.1
+    disagreement_m_s = 0.2
+    [actuation]
+    max_accel_m_s2 = 5.0
+";
+/// Radio with latency and with losses in bursts.
+const RADIO: [&str; 1] = ["network={rate_hz=20, latency_s=0.1, loss=0.3, loss_burst=3}"];
+
+/// Vehicles on a circle that change places with those opposite, with a jitter of 0.1 m.
+fn circle(count: usize, radius_m: f64) -> Kind {
+    let tables = format!(
+        "[swarm]\ncount = {count}\n[start]\nshape = \"circle\"\nradius_m = {radius_m}\njitter_m = 0.1\n\
+         [formation]\nshape = \"circle\"\nradius_m = {radius_m}\nyaw_deg = 180\n"
+    );
+    Kind { name: format!("circle of {count}"), tables }
+}
+
+/// Random starts at least 2.4 m apart, to a grid whose slots have no relation to the starts.
+fn random(count: usize, spacing_m: f64, half_extent_m: f64, dimensions: usize) -> Kind {
+    let shape = if dimensions == 2 { "grid" } else { "cube" };
+    let tables = format!(
+        "[swarm]\ncount = {count}\ndimensions = {dimensions}\n[start]\nshape = \"random\"\nhalf_extent_m = \
+         {half_extent_m}\nmin_separation_m = 2.4\n[formation]\nshape = \"{shape}\"\nspacing_m = {spacing_m}\n"
+    );
+    let place = if dimensions == 2 { "" } else { ", in space" };
+    Kind { name: format!("random, {count} to slots {spacing_m} m apart{place}"), tables }
+}
+
+/// Two groups that change sides, through each other or through a gap between two walls.
+fn groups(gap_m: Option<f64>) -> Kind {
+    let rows = |x: f64| (0..8).map(|k| [x + 2.0 * f64::from(k / 4), 2.0 * f64::from(k % 4) - 3.0]).collect::<Vec<_>>();
+    let left: Vec<_> = rows(-8.0).into_iter().chain(rows(6.0)).collect();
+    let right: Vec<_> = rows(6.0).into_iter().chain(rows(-8.0)).collect();
+    let mut tables = format!(
+        "[start]\npositions_m = {left:?}\njitter_m = 0.2\n[formation]\nshape = \"points\"\npoints_m = {right:?}\n"
+    );
+    for (name, side) in gap_m.iter().flat_map(|_| [("upper wall", 1.0), ("lower wall", -1.0)]) {
+        let centre_m = side * (0.5 * gap_m.unwrap_or_default() + 5.0);
+        tables += &format!(
+            "[[obstacle]]\nname = \"{name}\"\nbox = {{ size_m = [1.0, 10.0, 4.0] }}\nat_m = [0.0, {centre_m}, 0.0]\n\
+             clearance_m = 0.5\n"
+        );
+    }
+    let name =
+        gap_m.map_or_else(|| "two groups of 8".to_owned(), |gap_m| format!("the same through a gap of {gap_m} m"));
+    Kind { name, tables }
+}
+
+fn kinds() -> Vec<Kind> {
+    vec![
+        circle(2, 4.0),
+        circle(6, 4.0),
+        circle(12, 6.0),
+        circle(24, 10.0),
+        random(10, 2.4, 7.0, 2),
+        random(20, 2.4, 10.0, 2),
+        random(20, 1.5, 10.0, 2),
+        random(20, 2.4, 5.0, 3),
+        groups(None),
+        groups(Some(4.0)),
+    ]
+}
+
+/// Returns the rows of laws from the starts of a kind.
+fn compared(kind: &Kind, laws: &[String], sets: &[&str], runs: u64) -> Vec<LawRow> {
+    let source = Source::Text { name: "arrivals".to_owned(), text: format!("{}{COMMON}", kind.tables) };
+    let overrides = sets.iter().map(|&set| set.to_owned()).collect();
+    let scenario = ScenarioRequest { argument: "arrivals".to_owned(), source, overrides };
+    let options = Options { laws: Some(laws.to_vec()), runs, ..Options::default() };
+    let request = StudyRequest::new(scenario, options);
+    let comparison = answer(&request, &(), &Silent::default());
+    comparison.unwrap_or_else(|error| panic!("{}: {error}", kind.name)).expect("not interrupted").laws
+}
+
+/// Returns the flights that reached the formation with the interval of their share, and the median time.
+fn reached(row: &LawRow) -> String {
+    let at_s = row.reached_median_s.value.map(|at_s| format!(", {at_s:.1} s")).unwrap_or_default();
+    let percent = |share: f64| 100.0 * share;
+    let reached = &row.reached;
+    format!("{} ({:.0} to {:.0} %){at_s}", reached.count, percent(reached.low), percent(reached.high))
+}
+
+fn main() {
+    let runs = std::env::args().nth(1).and_then(|runs| runs.parse().ok()).unwrap_or(20);
+    println!(
+        "| start | law | violate, bare | reach, bare | violate, shield | reach, shield | reach, shield and radio |"
+    );
+    println!("| --- | --- | --- | --- | --- | --- | --- |");
+    for kind in kinds() {
+        // The law alone does not see obstacles unless it avoids them.
+        let bare: Vec<_> = LAWS.iter().map(|law| format!("{law}+bare")).collect();
+        let shielded: Vec<_> = LAWS.iter().map(|law| format!("{law}+shield")).collect();
+        let rows = [
+            compared(&kind, &bare, &[], runs),
+            compared(&kind, &shielded, &[], runs),
+            compared(&kind, &shielded, &RADIO, runs),
+        ];
+        for (k, law) in LAWS.iter().enumerate() {
+            let [bare, shield, radio] = [0, 1, 2].map(|study: usize| &rows[study][k]);
+            let violated = shield.violated.count + radio.violated.count;
+            println!(
+                "| {} | {law} | {} | {} | {violated} | {} | {} |",
+                kind.name,
+                bare.violated.count,
+                reached(bare),
+                reached(shield),
+                reached(radio)
+            );
+        }
+    }
+}
