@@ -72,7 +72,7 @@ class Alone(Case):
         shield = self.shield()
         shield.filter([[-3, 0, 0], [3, 0.1, 0]], np.zeros((2, 3)), np.zeros((2, 3)))
         shield.filter([[-3, 0.5, 0], [3, 0.1, 0]], np.zeros((2, 3)), np.zeros((2, 3)))
-        self.assertIn("from the reference", shield.report()["exceeded"])
+        self.assertIn("to the reference", shield.report()["exceeded"])
 
     def test_wrong_settings_starts_and_shapes_are_refused(self) -> None:
         self.refuses(tl.Error, "brake_m_s2: must be at most 5", lambda: self.shield(brake_m_s2=9))

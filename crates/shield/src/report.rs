@@ -64,10 +64,10 @@ impl fmt::Display for Exceeded {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::MissingMeasurement => write!(out, "a measurement was missing"),
-            Self::Measurement(share) => write!(out, "a measurement erred by {share:.3} of its bound"),
-            Self::Tube(share) => write!(out, "a vehicle was {share:.3} of the tube from its reference"),
-            Self::Offset(share) => write!(out, "a measured position was {share:.3} of its bound from the reference"),
-            Self::Command(share) => write!(out, "a command was {share:.3} of the largest one"),
+            Self::Measurement(share) => write!(out, "error of a measurement {share:.3} times its bound"),
+            Self::Tube(share) => write!(out, "distance to the reference {share:.3} times the tube"),
+            Self::Offset(share) => write!(out, "measured distance to the reference {share:.3} times its bound"),
+            Self::Command(share) => write!(out, "command {share:.3} times the largest one"),
         }
     }
 }
@@ -186,7 +186,7 @@ mod tests {
         assert!(matches!(all.exceeded(), Some(Exceeded::Tube(share)) if share > 1.99));
         assert_eq!(
             all.exceeded().map(|one| one.to_string()).as_deref(),
-            Some("a vehicle was 2.000 of the tube from its reference")
+            Some("distance to the reference 2.000 times the tube")
         );
         other.missing();
         assert_eq!(other.exceeded(), Some(Exceeded::MissingMeasurement));

@@ -233,7 +233,7 @@ fn exceeded_bounds_are_named_with_their_vehicle() {
     assert!(scenario.validate().is_err());
     let (flight, _) = fly(&scenario);
     let breach = report(&flight).breach.expect("a breach");
-    assert!(breach.exceeded.to_string().contains("of the tube"), "{breach:?}");
+    assert!(breach.exceeded.to_string().contains("times the tube"), "{breach:?}");
     // A dead vehicle voids the certificate.
     let dead = "[shield]\n[[failure]]\nvehicle = 1\nat_s = 1.0\nkind = \"dead\"";
     let (flight, _) = fly(&read(&format!("{SWAP}\n{dead}")));
