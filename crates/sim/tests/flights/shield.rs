@@ -140,7 +140,7 @@ fn draw(seed: u64, most: usize) -> Option<(Scenario, Box<dyn Law>)> {
     if random.between(0.0, 1.0) < 0.5 {
         scenario.drag_per_s = 0.1;
         scenario.wind.mean_m_s = random.vector(axes, 2.0);
-        shield.disturbance_m_s2 = 0.1 * scenario.wind.mean_m_s.norm() + 1e-12;
+        shield.disturbance_m_s2 = Some(0.1 * scenario.wind.mean_m_s.norm() + 1e-12);
     }
     if random.between(0.0, 1.0) < 0.3 {
         shield.ease_m = Some(0.0);

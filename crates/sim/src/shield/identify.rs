@@ -1,0 +1,478 @@
+//! Measurement of the tracking error of a quadrotor: one vehicle flies references of a shield that are hard to follow.
+//!
+//! References use the limits of the shield: its largest acceleration, speed and brake. Sequences are steps with a brake
+//! from full speed, reversals over a ladder of periods, random ones, and two made for the vehicle:
+//!
+//! - *matched*: the response g(k) of the error to a pulse of one period is measured. The sequence of full accelerations
+//!   with the signs of g(n - k) makes the largest error at period n, for a linear vehicle and without a speed limit.
+//! - *chase*: at each instant the reference accelerates away from the vehicle.
+//!
+//! All fly in still air; the worst of each direction fly again in the fastest wind of the scenario, from constant and
+//! from changing directions. Errors of measurement are at their bounds. The result is measured, not proved.
+
+use std::fmt;
+
+use nalgebra::Vector3;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
+use serde::Serialize;
+
+use super::{refused, refused_with};
+use crate::link;
+use crate::plant::{self, StepPath};
+use crate::scenario::{Scenario, ScenarioError, Space};
+use crate::vehicle::Tracking;
+use tautline_core::record::Channel;
+use tautline_core::swarm::{Rows, Swarm, row, set_row};
+use tautline_core::text::significant;
+use tautline_laws::wind::{Gust, WindSpec};
+use tautline_shield::{Limits, Shield, State};
+
+/// Recommended tracking error over the largest measured one.
+pub const TRACKING_FACTOR: f64 = 1.5;
+/// Room for feedback over the largest measured feedback.
+const FEEDBACK_FACTOR: f64 = 1.25;
+/// Duration of a measurement \[s\].
+const DURATION_S: f64 = 12.0;
+/// Duration of the response to a pulse \[s\].
+const RESPONSE_S: f64 = 8.0;
+/// Half periods of reversals \[s\].
+const REVERSALS_S: [f64; 8] = [0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0];
+/// Number of random sequences.
+const RANDOM: u64 = 6;
+/// Number of times that the push is chosen anew for the feedback.
+const ROUNDS: usize = 4;
+/// Rise time of a change of the wind \[s\].
+const RISE_S: f64 = 0.3;
+/// Wish of no acceleration, which is shorter than any other.
+const COAST: Vector3<f64> = Vector3::new(0.0, 0.0, 1e-300);
+
+/// Measured tracking error of the vehicles of a scenario.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Identification {
+    /// Name of the model.
+    pub model: String,
+    /// Largest measured distance to the reference \[m\].
+    pub largest_error_m: f64,
+    /// Time of the largest distance \[s\].
+    pub at_s: f64,
+    /// Commands and wind that show the largest distance.
+    pub sequence: String,
+    /// Recommended `tracking_error_m` over `largest_error_m`.
+    pub factor: f64,
+    /// Largest acceleration of the reference \[m/s^2\].
+    pub reference_m_s2: f64,
+    /// Largest measured feedback of the tracker \[m/s^2\].
+    pub largest_feedback_m_s2: f64,
+    /// Largest command \[m/s^2\].
+    pub largest_command_m_s2: f64,
+    /// Largest thrust of a rotor over its limit.
+    pub thrust_share: f64,
+    /// Number of flights.
+    pub flights: usize,
+    /// Recommended assumption with its conditions.
+    pub tracking: Tracking,
+}
+
+/// Sequence of wishes, in order of time.
+#[derive(Clone, Debug)]
+enum Wishes {
+    /// Direction of full acceleration until a time \[s\]; zero brakes.
+    Until(Vec<(f64, Vector3<f64>)>),
+    /// Away from the vehicle: along the error plus this time \[s\] times its rate. The first error is along a direction.
+    Chase(Vector3<f64>, f64),
+}
+
+/// Reference of a flight.
+#[derive(Clone, Debug)]
+struct Course {
+    name: String,
+    along: Vector3<f64>,
+    wishes: Wishes,
+}
+
+/// Result of a flight.
+#[derive(Clone, Debug, Default)]
+struct Flown {
+    error_m: f64,
+    at_s: f64,
+    feedback_m_s2: f64,
+    command_m_s2: f64,
+    thrust_share: f64,
+    /// Signed error along the direction at each instant \[m\].
+    errors_m: Vec<f64>,
+}
+
+impl Wishes {
+    /// Returns the wish at a time \[s\], longer than any limit; NaN brakes.
+    fn at(&self, time_s: f64, away_m: Vector3<f64>, away_m_s: Vector3<f64>) -> Vector3<f64> {
+        const FULL_M_S2: f64 = 1e3;
+        let along = match self {
+            Self::Until(list) => {
+                list.iter().find(|(until_s, _)| time_s < *until_s - 1e-9).map_or(Vector3::zeros(), |(_, along)| *along)
+            }
+            Self::Chase(first, rate_s) if time_s < 0.5 => *first * rate_s.signum(),
+            Self::Chase(first, rate_s) => (away_m + away_m_s * *rate_s).try_normalize(1e-9).unwrap_or(*first),
+        };
+        if along == Vector3::zeros() { Vector3::repeat(f64::NAN) } else { along * FULL_M_S2 }
+    }
+}
+
+impl Scenario {
+    /// Measures the tracking error of the scenario's quadrotors under its shield. Without a given push, the push is
+    /// chosen so that the shield leaves enough of its largest command to the tracker.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] without quadrotors or shield, or if the tracker does not hold the vehicle.
+    pub fn identify(&self) -> Result<Identification, ScenarioError> {
+        let Some(quadrotor) = self.airframe.quadrotor() else {
+            let help = "points have a computed bound; set vehicle.model to a quadrotor";
+            return Err(refused_with("only the tracking error of quadrotors is measured", help).at("vehicle.model"));
+        };
+        let Some(given) = self.shield else {
+            return Err(refused_with("there is no shield whose tracking error could be measured", "add [shield]")
+                .at("vehicle.model"));
+        };
+        let mut alone = self.alone();
+        let mut spec = alone.shield_keys().unwrap_or(given);
+        // Limits of the reference do not depend on it.
+        spec.tracking_error_m = Some(1.0);
+        let wind_m_s = self.wind.fastest_m_s();
+        let mut round = 0;
+        let (flown, limits) = loop {
+            alone.shield = Some(spec);
+            let limits = alone.shield_limits()?.ok_or_else(|| refused_with("there is no shield", "add [shield]"))?;
+            let flown = measure(&alone, &limits, wind_m_s);
+            if !flown.worst.error_m.is_finite() || flown.worst.error_m > 0.5 * limits.settings().max_speed_m_s * DURATION_S
+            {
+                return Err(refused("the tracker does not hold the vehicle; its largest error in m is", flown.worst.error_m)
+                    .with_help("lower shield.tracker_per_s2 and shield.tracker_per_s, or shield.accel_m_s2")
+                    .at_keys(["shield.tracker_per_s2", "shield.tracker_per_s", "shield.accel_m_s2"]));
+            }
+            let needed_m_s2 = FEEDBACK_FACTOR * flown.feedback_m_s2;
+            let is_enough = limits.tube().feedback_m_s2 >= needed_m_s2;
+            if is_enough || given.disturbance_m_s2.is_some() || round == ROUNDS {
+                break (flown, limits);
+            }
+            round += 1;
+            spec.disturbance_m_s2 = Some(push_for(&alone, &limits, needed_m_s2)?);
+        };
+        let settings = limits.settings();
+        let tracking = Tracking {
+            error_m: rounded_up(TRACKING_FACTOR * flown.worst.error_m),
+            accel_m_s2: settings.accel_m_s2,
+            disturbance_m_s2: spec.disturbance_m_s2.unwrap_or(0.0),
+            max_speed_m_s: settings.max_speed_m_s,
+            tracker_per_s2: settings.tracker_per_s2,
+            tracker_per_s: settings.tracker_per_s,
+            control_hz: alone.time.control_hz.unwrap_or_default(),
+            wind_m_s,
+            position_error_m: settings.position_error_m,
+            velocity_error_m_s: settings.velocity_error_m_s,
+        };
+        Ok(Identification {
+            model: quadrotor.model.name.clone(),
+            largest_error_m: flown.worst.error_m,
+            at_s: flown.worst.at_s,
+            sequence: flown.sequence,
+            factor: TRACKING_FACTOR,
+            reference_m_s2: limits.reference_m_s2(),
+            largest_feedback_m_s2: flown.feedback_m_s2,
+            largest_command_m_s2: flown.command_m_s2,
+            thrust_share: flown.thrust_share,
+            flights: flown.flights,
+            tracking,
+        })
+    }
+
+    /// Returns the scenario with one vehicle at rest at the origin, in still air, without errors and other bodies.
+    fn alone(&self) -> Self {
+        let mut alone = self.clone();
+        alone.start = Swarm::at_rest(Rows::zeros(1));
+        alone.mass_kg.truncate(1);
+        alone.hull_radius_m.truncate(1);
+        alone.obstacles.clear();
+        alone.failures.clear();
+        alone.wind = WindSpec::default();
+        alone
+    }
+}
+
+/// Returns the push for which the feedback of a point reaches a value \[m/s^2\].
+fn push_for(alone: &Scenario, limits: &Limits, feedback_m_s2: f64) -> Result<f64, ScenarioError> {
+    let mut settings = *limits.settings();
+    let least_m_s2 = limits.tube().feedback_m_s2;
+    settings.disturbance_m_s2 += 1e-3;
+    // The bound on the feedback is affine in the push. The feedback falls with the reference, which gets what is left.
+    let slope = settings.limits().map_or(1.0, |more| (more.tube().feedback_m_s2 - least_m_s2) / 1e-3);
+    let share = feedback_m_s2 / limits.reference_m_s2();
+    let left_m_s2 = limits.reference_m_s2() + least_m_s2;
+    let target_m_s2 = (left_m_s2 * share / (1.0 + share)).max(least_m_s2 + 0.02 * left_m_s2);
+    if target_m_s2 >= left_m_s2 || !target_m_s2.is_finite() {
+        return Err(refused("the tracker needs the whole acceleration of the shield, in m/s^2", feedback_m_s2)
+            .with_help("raise shield.accel_m_s2, or lower the gains of the tracker, the speed or the wind")
+            .at_keys(["shield.accel_m_s2", "shield.max_speed_m_s", "wind"]));
+    }
+    let given_m_s2 = alone.shield.and_then(|spec| spec.disturbance_m_s2).unwrap_or(0.0);
+    Ok(rounded_up(given_m_s2 + (target_m_s2 - least_m_s2) / slope))
+}
+
+/// Rounds up to three decimals.
+fn rounded_up(value: f64) -> f64 {
+    (value * 1e3).ceil() / 1e3
+}
+
+/// Extremes of all flights.
+struct Measured {
+    worst: Flown,
+    sequence: String,
+    feedback_m_s2: f64,
+    command_m_s2: f64,
+    thrust_share: f64,
+    flights: usize,
+}
+
+impl Measured {
+    fn add(&mut self, flown: Flown, name: impl FnOnce() -> String) {
+        self.flights += 1;
+        self.feedback_m_s2 = self.feedback_m_s2.max(flown.feedback_m_s2);
+        self.command_m_s2 = self.command_m_s2.max(flown.command_m_s2);
+        self.thrust_share = self.thrust_share.max(flown.thrust_share);
+        // A distance that is no number is the largest.
+        if self.flights == 1 || flown.error_m.is_nan() || flown.error_m > self.worst.error_m {
+            self.sequence = name();
+            self.worst = flown;
+        }
+    }
+}
+
+/// Flies all courses.
+fn measure(alone: &Scenario, limits: &Limits, wind_m_s: f64) -> Measured {
+    let mut measured = Measured {
+        worst: Flown::default(),
+        sequence: String::new(),
+        feedback_m_s2: 0.0,
+        command_m_s2: 0.0,
+        thrust_share: 0.0,
+        flights: 0,
+    };
+    let period_s = limits.settings().period_s;
+    for (direction, along) in directions(alone.space) {
+        let mut still: Vec<_> = courses(direction, along)
+            .into_iter()
+            .chain([matched(alone, limits, (direction, along), period_s)])
+            .map(|course| (fly(alone, limits, &course, DURATION_S), course))
+            .collect();
+        still.sort_by(|(a, _), (b, _)| b.error_m.total_cmp(&a.error_m));
+        let worst: Vec<_> = still.iter().take(2).map(|(flown, course)| (flown.at_s, course.clone())).collect();
+        for (flown, course) in still {
+            measured.add(flown, || course.name.clone());
+        }
+        if wind_m_s > 0.0 {
+            for (at_s, course) in worst {
+                for (name, wind) in winds(course.along, wind_m_s, at_s) {
+                    let flown = fly(&Scenario { wind, ..alone.clone() }, limits, &course, DURATION_S);
+                    measured.add(flown, || format!("{}, {name}", course.name));
+                }
+            }
+        }
+    }
+    for seed in 0..RANDOM {
+        let course = random(seed, alone.space);
+        let mut scenario = alone.clone();
+        if wind_m_s > 0.0 {
+            let turns = winds(course.along, wind_m_s, DURATION_S / 2.0);
+            scenario.wind = turns[seed as usize % turns.len()].1.clone();
+        }
+        measured.add(fly(&scenario, limits, &course, DURATION_S), || course.name.clone());
+    }
+    measured
+}
+
+/// Returns the directions of references with their names.
+fn directions(space: Space) -> Vec<(&'static str, Vector3<f64>)> {
+    let mut all = vec![("x", Vector3::x()), ("y", Vector3::y()), ("the diagonal of x and y", Vector3::new(1.0, 1.0, 0.0))];
+    if space != Space::Plane {
+        all.extend([
+            ("z", Vector3::z()),
+            ("the diagonal of x and z", Vector3::new(1.0, 0.0, 1.0)),
+            ("the diagonal of x, y and z", Vector3::new(1.0, 1.0, 1.0)),
+        ]);
+    }
+    all.into_iter().map(|(name, along)| (name, along.normalize())).collect()
+}
+
+/// Returns the courses of a direction that need no measurement.
+fn courses(direction: &str, along: Vector3<f64>) -> Vec<Course> {
+    let course = |name: String, wishes| Course { name, along, wishes };
+    let mut all = vec![
+        course(format!("step along {direction} for 4 s, then brake"), Wishes::Until(vec![(4.0, along)])),
+        course(format!("step against {direction} for 4 s, then brake"), Wishes::Until(vec![(4.0, -along)])),
+        course(format!("step along {direction} for 4 s, then reversal"), Wishes::Until(vec![(4.0, along), (8.0, -along)])),
+        course(format!("chase along {direction}"), Wishes::Chase(along, 0.3)),
+        course(format!("slow chase along {direction}"), Wishes::Chase(along, 1.0)),
+    ];
+    all.extend(REVERSALS_S.map(|half_s| {
+        let sign = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+        let mut times_s = vec![(0.5 * half_s, along)];
+        let count = (DURATION_S / half_s) as usize;
+        times_s.extend((1..=count).map(|k| ((k as f64 + 0.5) * half_s, along * sign(k))));
+        course(format!("reversals along {direction} every {half_s} s"), Wishes::Until(times_s))
+    }));
+    all
+}
+
+/// Returns the course that makes the largest error of a linear vehicle, from its measured response to a pulse.
+fn matched(alone: &Scenario, limits: &Limits, (direction, along): (&str, Vector3<f64>), period_s: f64) -> Course {
+    // The reference goes on without acceleration, so that the error is the response to the pulse alone.
+    let wishes = Wishes::Until(vec![(period_s, along), (RESPONSE_S, COAST)]);
+    let pulse = Course { name: String::new(), along, wishes };
+    let errors_m = fly(alone, limits, &pulse, RESPONSE_S).errors_m;
+    let wishes = errors_m.iter().rev().enumerate().map(|(k, error_m)| {
+        let side = if *error_m < 0.0 { -along } else { along };
+        ((k + 1) as f64 * period_s, side)
+    });
+    let mut wishes: Vec<_> = wishes.collect();
+    wishes.dedup_by(|next, last| {
+        let is_same = next.1 == last.1;
+        if is_same {
+            last.0 = next.0;
+        }
+        is_same
+    });
+    Course { name: format!("matched to the response along {direction}"), along, wishes: Wishes::Until(wishes) }
+}
+
+/// Returns a random sequence of full accelerations and brakes.
+fn random(seed: u64, space: Space) -> Course {
+    let mut numbers = ChaCha8Rng::seed_from_u64(seed);
+    let mut between = move |low: f64, high: f64| low + (high - low) * (numbers.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+    let mut time_s = 0.0;
+    let mut wishes = Vec::new();
+    while time_s < DURATION_S {
+        time_s += between(0.1, 1.5);
+        let z = if space == Space::Plane { 0.0 } else { between(-1.0, 1.0) };
+        let along = Vector3::new(between(-1.0, 1.0), between(-1.0, 1.0), z).try_normalize(1e-3).unwrap_or_default();
+        wishes.push((time_s, if between(0.0, 1.0) < 0.15 { Vector3::zeros() } else { along }));
+    }
+    Course { name: format!("random sequence {seed}"), along: Vector3::x(), wishes: Wishes::Until(wishes) }
+}
+
+/// Returns winds at their bound: constant along, against and across a direction, and turning around before a time \[s\].
+fn winds(along: Vector3<f64>, wind_m_s: f64, at_s: f64) -> [(&'static str, WindSpec); 5] {
+    let constant = |velocity: Vector3<f64>| WindSpec { mean_m_s: velocity * wind_m_s, ..WindSpec::default() };
+    let turning = |sign: f64| {
+        let gust = Gust {
+            at_s: (at_s - 1.5).max(0.0),
+            rise_s: RISE_S,
+            hold_s: DURATION_S,
+            fall_s: None,
+            velocity_m_s: along * (-2.0 * sign * wind_m_s),
+            vehicles: None,
+        };
+        WindSpec { gusts: vec![gust], ..constant(along * sign) }
+    };
+    let across = if along.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
+    [
+        ("wind along it", constant(along)),
+        ("wind against it", constant(-along)),
+        ("wind across it", constant((across - along * across.dot(&along)).normalize())),
+        ("wind that turns against it", turning(1.0)),
+        ("wind that turns along it", turning(-1.0)),
+    ]
+}
+
+/// Flies a course.
+fn fly(alone: &Scenario, limits: &Limits, course: &Course, duration_s: f64) -> Flown {
+    let settings = limits.settings();
+    let (dt_s, period_s) = (alone.time.dt_s, settings.period_s);
+    let steps = (period_s / dt_s).round().max(1.0) as usize;
+    let start = limits.slot(Vector3::zeros());
+    let mut flown = Flown::default();
+    let Ok(mut shield) = Shield::new(limits, 0, &[start]) else { return flown };
+    let (mut plant, mut actuators) = (plant::of(alone), link::of(alone, false));
+    let mut rotors = plant.channels();
+    let most_n = alone.airframe.quadrotor().map_or(f64::INFINITY, |quadrotor| quadrotor.model.max_thrust_n);
+    let mut state = alone.start.clone();
+    plant.observe(&mut state);
+    let (mut next, mut path) = (state.clone(), StepPath::default());
+    let (mut held, mut acted) = (Rows::zeros(1), Rows::zeros(1));
+    let mut past = vec![truth(&state)];
+    for instant in 0..(duration_s / period_s) as usize {
+        let time_s = instant as f64 * period_s;
+        let now = truth(&state);
+        past.push(now);
+        let then = past[past.len() - 1 - settings.measurement_delay_periods.min(past.len() - 1)];
+        let reference = shield.next_reference();
+        let (away_m, away_m_s) = (reference.position_m - now.position_m, reference.velocity_m_s - now.velocity_m_s);
+        let wish = course.wishes.at(time_s, away_m, away_m_s);
+        // The error of measurement feigns an error behind the wish, so that the feedback goes along with it.
+        let side = -wish.try_normalize(0.0).filter(|side| side.x.is_finite()).unwrap_or(course.along);
+        let measured = State {
+            position_m: then.position_m + side * settings.position_error_m,
+            velocity_m_s: then.velocity_m_s + side * settings.velocity_error_m_s,
+        };
+        let command = shield.filter(measured, wish);
+        let feedback = command - shield.reference_acceleration_m_s2() + shield.reference().velocity_m_s * settings.a22_per_s;
+        flown.feedback_m_s2 = flown.feedback_m_s2.max(feedback.norm());
+        flown.command_m_s2 = flown.command_m_s2.max(command.norm());
+        set_row(&mut held, 0, command);
+        for step in 0..steps {
+            acted.copy_from(&held);
+            actuators.actuate(time_s + step as f64 * dt_s, &mut acted);
+            plant.apply(&acted, &mut state);
+            path.begin();
+            if plant.advance(dt_s, &mut next, &mut path).is_err() {
+                flown.error_m = f64::NAN;
+                return flown;
+            }
+            std::mem::swap(&mut state, &mut next);
+            let since_s = (step + 1) as f64 * dt_s;
+            let reference = shield.reference().after(shield.reference_acceleration_m_s2(), since_s);
+            let error = reference.position_m - row(&state.positions_m, 0);
+            if !(error.norm() <= flown.error_m) {
+                (flown.error_m, flown.at_s) = (error.norm(), time_s + since_s);
+            }
+            plant.write_channels(&mut rotors);
+            flown.thrust_share = flown.thrust_share.max(largest_thrust_n(&rotors) / most_n);
+            if step + 1 == steps {
+                flown.errors_m.push(error.dot(&course.along));
+            }
+        }
+        plant.apply(&acted, &mut state);
+    }
+    flown
+}
+
+fn truth(state: &Swarm) -> State {
+    State { position_m: row(&state.positions_m, 0), velocity_m_s: row(&state.velocities_m_s, 0) }
+}
+
+fn largest_thrust_n(channels: &[Channel]) -> f64 {
+    let rotors = channels.iter().find(|channel| *channel.name == *"rotors");
+    rotors.map_or(0.0, |rotors| rotors.values.iter().fold(0.0, |most: f64, thrust_n| most.max(*thrust_n)))
+}
+
+impl fmt::Display for Identification {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let of = &self.tracking;
+        let number = |value: f64| significant(value, 3);
+        writeln!(out, "measured     {}: at most {} m from its reference in {} flights", self.model, number(self.largest_error_m), self.flights)?;
+        writeln!(out, "worst        {}, at {} s", self.sequence, number(self.at_s))?;
+        writeln!(
+            out,
+            "commands     up to {} m/s^2 of {}, feedback up to {}, reference up to {}; rotor thrust up to {} % of the maximum",
+            number(self.largest_command_m_s2),
+            of.accel_m_s2,
+            number(self.largest_feedback_m_s2),
+            number(self.reference_m_s2),
+            (100.0 * self.thrust_share).round()
+        )?;
+        write!(
+            out,
+            "recommended  tracking_error_m = {}, {} times the largest error. It is measured and not proved: the flight \
+             checks it at each step.",
+            of.error_m, self.factor
+        )
+    }
+}
