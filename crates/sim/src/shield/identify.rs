@@ -33,11 +33,12 @@ pub const TRACKING_FACTOR: f64 = 1.25;
 /// Room for feedback over the largest measured feedback.
 const FEEDBACK_FACTOR: f64 = 1.25;
 /// Duration of a measurement \[s\].
-const DURATION_S: f64 = 12.0;
+const DURATION_S: f64 = 16.0;
 /// Duration of the response to a pulse \[s\].
 const RESPONSE_S: f64 = 8.0;
-/// Half periods of reversals \[s\].
+/// Times between reversals \[s\], and the factors of the worst that are flown as well.
 const REVERSALS_S: [f64; 8] = [0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0];
+const REFINED: [f64; 4] = [0.8, 0.9, 1.1, 1.2];
 /// Number of random sequences.
 const RANDOM: u64 = 6;
 /// Most measurements, each with a push that fits the feedback of the one before.
@@ -275,11 +276,13 @@ fn measure(alone: &Scenario, limits: &Limits, wind_m_s: f64) -> Measured {
     };
     let period_s = limits.settings().period_s;
     for (direction, along) in directions(alone.space) {
-        let mut still: Vec<_> = courses(direction, along)
-            .into_iter()
-            .chain([matched(alone, limits, (direction, along), period_s)])
-            .map(|course| (fly(alone, limits, &course, DURATION_S), course))
-            .collect();
+        let flown = |course: Course| (fly(alone, limits, &course, DURATION_S), course);
+        let reversed = REVERSALS_S.map(|half_s| (half_s, flown(reversals(direction, along, half_s))));
+        let worst_s = reversed.iter().max_by(|(_, a), (_, b)| a.0.error_m.total_cmp(&b.0.error_m)).map_or(1.0, |of| of.0);
+        let refined = REFINED.map(|factor| flown(reversals(direction, along, factor * worst_s)));
+        let others = courses(direction, along).into_iter().chain([matched(alone, limits, (direction, along), period_s)]);
+        let mut still: Vec<_> =
+            others.map(flown).chain(reversed.into_iter().map(|(_, flown)| flown)).chain(refined).collect();
         still.sort_by(|(a, _), (b, _)| b.error_m.total_cmp(&a.error_m));
         let worst: Vec<_> = still.iter().take(2).map(|(flown, course)| (flown.at_s, course.clone())).collect();
         for (flown, course) in still {
@@ -322,21 +325,22 @@ fn directions(space: Space) -> Vec<(&'static str, Vector3<f64>)> {
 /// Returns the courses of a direction that need no measurement.
 fn courses(direction: &str, along: Vector3<f64>) -> Vec<Course> {
     let course = |name: String, wishes| Course { name, along, wishes };
-    let mut all = vec![
+    vec![
         course(format!("step along {direction} for 4 s, then brake"), Wishes::Until(vec![(4.0, along)])),
         course(format!("step against {direction} for 4 s, then brake"), Wishes::Until(vec![(4.0, -along)])),
         course(format!("step along {direction} for 4 s, then reversal"), Wishes::Until(vec![(4.0, along), (8.0, -along)])),
         course(format!("chase along {direction}"), Wishes::Chase(along, 0.3)),
         course(format!("slow chase along {direction}"), Wishes::Chase(along, 1.0)),
-    ];
-    all.extend(REVERSALS_S.map(|half_s| {
-        let sign = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
-        let mut times_s = vec![(0.5 * half_s, along)];
-        let count = (DURATION_S / half_s) as usize;
-        times_s.extend((1..=count).map(|k| ((k as f64 + 0.5) * half_s, along * sign(k))));
-        course(format!("reversals along {direction} every {half_s} s"), Wishes::Until(times_s))
-    }));
-    all
+    ]
+}
+
+/// Returns the course that reverses every `half_s` seconds.
+fn reversals(direction: &str, along: Vector3<f64>, half_s: f64) -> Course {
+    let sign = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
+    let count = (DURATION_S / half_s) as usize;
+    let times_s = (0..=count).map(|k| ((k as f64 + 0.5) * half_s, along * sign(k)));
+    let name = format!("reversals along {direction} every {} s", significant(half_s, 3));
+    Course { name, along, wishes: Wishes::Until(times_s.collect()) }
 }
 
 /// Returns the course that makes the largest error of a linear vehicle, from its measured response to a pulse.
@@ -421,7 +425,12 @@ fn fly(alone: &Scenario, limits: &Limits, course: &Course, duration_s: f64) -> F
         past.push(now);
         let then = past[past.len() - 1 - settings.measurement_delay_periods.min(past.len() - 1)];
         let reference = shield.next_reference();
-        let (away_m, away_m_s) = (reference.position_m - now.position_m, reference.velocity_m_s - now.velocity_m_s);
+        let (mut away_m, mut away_m_s) =
+            (reference.position_m - now.position_m, reference.velocity_m_s - now.velocity_m_s);
+        if alone.space == Space::Plane {
+            // The vehicle holds its height, and the reference stays in the plane.
+            (away_m.z, away_m_s.z) = (0.0, 0.0);
+        }
         let wish = course.wishes.at(time_s, away_m, away_m_s);
         // The error of measurement feigns an error behind the wish, so that the feedback goes along with it.
         let side = -wish.try_normalize(0.0).filter(|side| side.x.is_finite()).unwrap_or(course.along);
