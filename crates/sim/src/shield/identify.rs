@@ -53,8 +53,8 @@ const TRIAL_M_S2: f64 = 1e-3;
 const LOST_M: f64 = 5.0;
 /// Rise time of a change of the wind \[s\].
 const RISE_S: f64 = 0.3;
-/// Wish of no acceleration, which is shorter than any other.
-const COAST: Vector3<f64> = Vector3::new(0.0, 0.0, 1e-300);
+/// Wish of nearly no acceleration; zero brakes.
+const COAST: Vector3<f64> = Vector3::new(1e-300, 0.0, 0.0);
 
 /// Measured tracking error of the vehicles of a scenario.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -425,13 +425,11 @@ fn fly(alone: &Scenario, limits: &Limits, course: &Course, duration_s: f64) -> F
         past.push(now);
         let then = past[past.len() - 1 - settings.measurement_delay_periods.min(past.len() - 1)];
         let reference = shield.next_reference();
-        let (mut away_m, mut away_m_s) =
-            (reference.position_m - now.position_m, reference.velocity_m_s - now.velocity_m_s);
-        if alone.space == Space::Plane {
-            // The vehicle holds its height, and the reference stays in the plane.
-            (away_m.z, away_m_s.z) = (0.0, 0.0);
+        let (away_m, away_m_s) = (reference.position_m - now.position_m, reference.velocity_m_s - now.velocity_m_s);
+        let mut wish = course.wishes.at(time_s, away_m, away_m_s);
+        if alone.space == Space::Plane && wish.z.is_finite() {
+            wish.z = 0.0;
         }
-        let wish = course.wishes.at(time_s, away_m, away_m_s);
         // The error of measurement feigns an error behind the wish, so that the feedback goes along with it.
         let side = -wish.try_normalize(0.0).filter(|side| side.x.is_finite()).unwrap_or(course.along);
         let measured = State {
