@@ -3,8 +3,8 @@
 //! References use the limits of the shield: its largest acceleration, speed and brake. Sequences are steps with a brake
 //! from full speed, reversals over a ladder of periods, random ones, and two made for the vehicle:
 //!
-//! - *matched*: the response g(k) of the error to a pulse of one period is measured. The sequence of full accelerations
-//!   with the signs of g(n - k) makes the largest error at period n, for a linear vehicle and without a speed limit.
+//! - *matched*: the response of the error to a pulse of one period is measured. A dynamic programme finds the sequence
+//!   within the limits of acceleration and speed that makes the largest error of a linear vehicle with this response.
 //! - *chase*: at each instant the reference accelerates away from the vehicle.
 //!
 //! All fly in still air; the worst of each direction fly again in the fastest wind of the scenario, from constant and
@@ -51,6 +51,8 @@ const NOT_TIGHT: f64 = 0.85;
 const TRIAL_M_S2: f64 = 1e-3;
 /// Distance to the reference from which the vehicle is lost \[m\].
 const LOST_M: f64 = 5.0;
+/// Largest number of periods of acceleration to full speed in the search for the worst sequence.
+const MOST_SPEEDS: f64 = 500.0;
 /// Rise time of a change of the wind \[s\].
 const RISE_S: f64 = 0.3;
 /// Wish of nearly no acceleration; zero brakes.
@@ -159,7 +161,7 @@ impl Scenario {
                 let flown = measure(&alone, &limits, wind_m_s);
                 let needed_m_s2 = FEEDBACK_FACTOR * flown.feedback_m_s2;
                 let room_m_s2 = limits.tube().feedback_m_s2;
-                let is_held = flown.worst.error_m <= LOST_M;
+                let is_held = !flown.is_lost();
                 let is_tight = room_m_s2 <= needed_m_s2 / NOT_TIGHT || round > 2;
                 if is_held && (!is_free || (room_m_s2 >= needed_m_s2 && is_tight)) {
                     break 'rounds (flown, limits);
@@ -251,6 +253,12 @@ struct Measured {
 }
 
 impl Measured {
+    /// Returns whether a flight lost its reference.
+    fn is_lost(&self) -> bool {
+        // An error that is no number is lost, too.
+        !(self.worst.error_m <= LOST_M)
+    }
+
     fn add(&mut self, flown: Flown, name: impl FnOnce() -> String) {
         self.flights += 1;
         self.feedback_m_s2 = self.feedback_m_s2.max(flown.feedback_m_s2);
@@ -287,6 +295,9 @@ fn measure(alone: &Scenario, limits: &Limits, wind_m_s: f64) -> Measured {
         let worst: Vec<_> = still.iter().take(2).map(|(flown, course)| (flown.at_s, course.clone())).collect();
         for (flown, course) in still {
             measured.add(flown, || course.name.clone());
+        }
+        if measured.is_lost() {
+            return measured;
         }
         if wind_m_s > 0.0 {
             for (at_s, course) in worst {
@@ -348,12 +359,14 @@ fn matched(alone: &Scenario, limits: &Limits, (direction, along): (&str, Vector3
     // The reference goes on without acceleration, so that the error is the response to the pulse alone.
     let wishes = Wishes::Until(vec![(period_s, along), (RESPONSE_S, COAST)]);
     let pulse = Course { name: String::new(), along, wishes };
-    let errors_m = fly(alone, limits, &pulse, RESPONSE_S).errors_m;
-    let wishes = errors_m.iter().rev().enumerate().map(|(k, error_m)| {
-        let side = if *error_m < 0.0 { -along } else { along };
-        ((k + 1) as f64 * period_s, side)
-    });
-    let mut wishes: Vec<_> = wishes.collect();
+    let response_m = fly(alone, limits, &pulse, RESPONSE_S).errors_m;
+    let speeds = (limits.settings().max_speed_m_s / (limits.reference_m_s2() * period_s)).floor().min(MOST_SPEEDS);
+    let sides = worst_sides(&response_m, speeds as usize);
+    let mut wishes: Vec<_> = sides
+        .iter()
+        .enumerate()
+        .map(|(k, side)| ((k + 1) as f64 * period_s, if *side == 0 { COAST } else { along * f64::from(*side) }))
+        .collect();
     wishes.dedup_by(|next, last| {
         let is_same = next.1 == last.1;
         if is_same {
@@ -362,6 +375,34 @@ fn matched(alone: &Scenario, limits: &Limits, (direction, along): (&str, Vector3
         is_same
     });
     Course { name: format!("matched to the response along {direction}"), along, wishes: Wishes::Until(wishes) }
+}
+
+/// Returns the accelerations -1, 0 or 1 of each period whose responses add up to the most at the end. The speed starts
+/// at 0 and stays within `most` periods of acceleration: a dynamic programme over the speeds.
+fn worst_sides(response_m: &[f64], most: usize) -> Vec<i8> {
+    let count = 2 * most + 1;
+    // Most that the periods from here on add, by speed.
+    let mut best = vec![0.0_f64; count];
+    let mut choices = vec![vec![0_i8; count]; response_m.len()];
+    // The last period acts through the first number of the response.
+    for (choice, added_m) in choices.iter_mut().rev().zip(response_m) {
+        let after = best.clone();
+        for speed in 0..count {
+            let sides = [0_i8, -1, 1].into_iter().filter_map(|side| {
+                let next = speed.checked_add_signed(isize::from(side)).filter(|next| *next < count)?;
+                Some((side, after[next] + f64::from(side) * added_m))
+            });
+            let (side, value) = sides.fold((0, f64::NEG_INFINITY), |best, next| if next.1 > best.1 { next } else { best });
+            (choice[speed], best[speed]) = (side, value);
+        }
+    }
+    let mut speed = most;
+    let chosen = choices.iter().map(|choice| {
+        let side = choice[speed];
+        speed = speed.saturating_add_signed(isize::from(side));
+        side
+    });
+    chosen.collect()
 }
 
 /// Returns a random sequence of full accelerations and brakes.
@@ -456,6 +497,9 @@ fn fly(alone: &Scenario, limits: &Limits, course: &Course, duration_s: f64) -> F
             let error = reference.position_m - row(&state.positions_m, 0);
             if !(error.norm() <= flown.error_m) {
                 (flown.error_m, flown.at_s) = (error.norm(), time_s + since_s);
+                if flown.error_m > LOST_M {
+                    return flown;
+                }
             }
             plant.write_channels(&mut rotors);
             flown.thrust_share = flown.thrust_share.max(largest_thrust_n(&rotors) / most_n);
@@ -498,5 +542,63 @@ impl fmt::Display for Identification {
              checks it at each step.",
             of.error_m, self.factor
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::Source;
+
+    fn crazyflies() -> (Scenario, Limits, Tracking) {
+        let source = Source::Builtin("shielded-crazyflies".to_owned());
+        let scenario = Scenario::read(&source, &[]).expect("a built-in");
+        let tracking = scenario.airframe.quadrotor().and_then(|quadrotor| quadrotor.model.tracking).expect("a table");
+        let limits = scenario.limits_alone().expect("limits");
+        (scenario.alone(), limits, tracking)
+    }
+
+    #[test]
+    fn the_worst_sequence_of_the_table_repeats_its_error() {
+        let (alone, limits, tracking) = crazyflies();
+        let course = reversals("y", Vector3::y(), 1.54);
+        let [_, (_, wind), ..] = winds(course.along, tracking.wind_m_s, 0.0);
+        let flown = fly(&Scenario { wind, ..alone }, &limits, &course, DURATION_S);
+        let share = TRACKING_FACTOR * flown.error_m / tracking.error_m;
+        // The table was measured in space.
+        assert!((0.97..1.005).contains(&share), "{share} of the table");
+        assert!(flown.command_m_s2 < tracking.accel_m_s2, "{}", flown.command_m_s2);
+        assert!((0.5..1.0).contains(&flown.thrust_share), "{}", flown.thrust_share);
+    }
+
+    #[test]
+    fn the_matched_sequence_is_worse_than_a_step_and_within_the_table() {
+        let (alone, limits, tracking) = crazyflies();
+        let along = Vector3::x();
+        let [step, ..] = &courses("x", along)[..] else { panic!("courses") };
+        let step = fly(&alone, &limits, step, DURATION_S);
+        let matched = matched(&alone, &limits, ("x", along), limits.settings().period_s);
+        let flown = fly(&alone, &limits, &matched, DURATION_S);
+        assert!(flown.error_m > 1.2 * step.error_m, "{} {}", flown.error_m, step.error_m);
+        assert!(flown.error_m < tracking.error_m, "{}", flown.error_m);
+    }
+
+    #[test]
+    fn the_worst_sequence_of_a_response_respects_the_speed() {
+        // Without a limit of speed, the signs of the response in reverse.
+        assert_eq!(worst_sides(&[1.0, -2.0, 3.0], 5), [1, -1, 1]);
+        // With one period of acceleration to full speed, no two accelerations in a row to the same side.
+        assert_eq!(worst_sides(&[3.0, 1.0, -1.0, -2.0], 5), [-1, -1, 1, 1]);
+        assert_eq!(worst_sides(&[3.0, 1.0, -1.0, -2.0], 1), [-1, 0, 1, 1]);
+    }
+
+    #[test]
+    fn a_tracker_that_loses_the_vehicle_is_refused() {
+        let (alone, ..) = crazyflies();
+        let fast = ShieldSpec { tracker_per_s2: Some(30.0), tracker_per_s: Some(12.0), ..ShieldSpec::default() };
+        let error = Scenario { shield: Some(fast), ..alone.clone() }.identify().expect_err("lost");
+        assert!(error.to_string().contains("does not hold the vehicle"), "{error}");
+        let points = Scenario { airframe: crate::vehicle::Airframe::Point, ..alone };
+        assert!(points.identify().expect_err("points").to_string().contains("only the tracking error of quadrotors"));
     }
 }
