@@ -221,7 +221,7 @@ pub(super) fn check(arguments: &CheckArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
     if arguments.identify {
         let found = identify(&arguments.what.request()?, arguments.out.as_deref())?;
-        console.say(&format!("{}\n\n{}", found.measured, found.table));
+        console.say(&format!("{}\n{}", found.measured, found.table.trim_end()));
         if let Some(path) = &arguments.out {
             console.say(&format!("wrote {}", path.display()));
         }

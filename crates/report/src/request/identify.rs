@@ -41,20 +41,21 @@ pub fn identify(what: &ScenarioRequest, out: Option<&Path>) -> Result<Identified
 
 /// Returns the text of a model: that of the file if it holds the model, of the built-in model, or of its keys.
 fn model_text(path: &Path, model: &Model) -> Result<String, Failure> {
-    let is_same = |text: &str| vehicle::read(text).is_ok_and(|other| Model { tracking: model.tracking, ..other } == *model);
+    let is_same =
+        |text: &str| vehicle::read(text).is_ok_and(|other| Model { tracking: model.tracking, ..other } == *model);
     match std::fs::read_to_string(path) {
         Ok(text) if is_same(&text) => return Ok(text),
         Err(error) if error.kind() == ErrorKind::NotFound => {}
         _ => {
             let message = format!("{}: exists and is not the model of the scenario", path.display());
-            return Err(Failure::input("file/exists", message, "give a new file, or the file of vehicle.model"));
+            return Err(Failure::input("files/exists", message, "give a new file, or the file of vehicle.model"));
         }
     }
     if let Some((_, text)) = MODELS.iter().find(|(_, text)| is_same(text)) {
         return Ok((*text).to_owned());
     }
     let keys = Model { tracking: None, ..model.clone() };
-    toml::to_string(&keys).map_err(|error| Failure::machine("file/text", error.to_string()))
+    toml::to_string(&keys).map_err(|error| Failure::machine("files/cannot-write", error.to_string()))
 }
 
 /// Returns the text of a model without its table `[tracking]` and the comments directly above it.

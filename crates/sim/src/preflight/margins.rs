@@ -113,8 +113,7 @@ pub(super) fn lag_in_contact(law: &dyn Law, scenario: &Scenario) -> Option<Strin
     let linear = law.linear(scenario.formation())?;
     let stiffest = linear.free.iter().max_by(|a, b| a.stiffness_per_s2.total_cmp(&b.stiffness_per_s2))?;
     let contact = linear.stiffest_contact_mode?;
-    let mode =
-        Mode { stiffness_per_s2: f64::midpoint(stiffest.stiffness_per_s2, contact.stiffness_per_s2), ..contact };
+    let mode = Mode { stiffness_per_s2: f64::midpoint(stiffest.stiffness_per_s2, contact.stiffness_per_s2), ..contact };
     let drag_per_s = model.hover_drag_per_s();
     let is_stable = |damping_per_s: f64| is_damped(Mode { damping_per_s, ..mode }, model, drag_per_s);
     if is_stable(mode.damping_per_s) {

@@ -148,7 +148,7 @@ impl Scenario {
         let mut spec = alone.shield_keys().unwrap_or(given);
         // Limits of the reference do not depend on it.
         spec.tracking_error_m = Some(1.0);
-        let wind_m_s = self.wind.fastest_m_s();
+        let wind_m_s = rounded_up(self.wind.fastest_m_s());
         let is_free = given.disturbance_m_s2.is_none();
         let mut share = FIRST_SHARE;
         let (flown, limits) = 'rounds: {
@@ -286,9 +286,11 @@ fn measure(alone: &Scenario, limits: &Limits, wind_m_s: f64) -> Measured {
     for (direction, along) in directions(alone.space) {
         let flown = |course: Course| (fly(alone, limits, &course, DURATION_S), course);
         let reversed = REVERSALS_S.map(|half_s| (half_s, flown(reversals(direction, along, half_s))));
-        let worst_s = reversed.iter().max_by(|(_, a), (_, b)| a.0.error_m.total_cmp(&b.0.error_m)).map_or(1.0, |of| of.0);
+        let worst_s =
+            reversed.iter().max_by(|(_, a), (_, b)| a.0.error_m.total_cmp(&b.0.error_m)).map_or(1.0, |of| of.0);
         let refined = REFINED.map(|factor| flown(reversals(direction, along, factor * worst_s)));
-        let others = courses(direction, along).into_iter().chain([matched(alone, limits, (direction, along), period_s)]);
+        let others =
+            courses(direction, along).into_iter().chain([matched(alone, limits, (direction, along), period_s)]);
         let mut still: Vec<_> =
             others.map(flown).chain(reversed.into_iter().map(|(_, flown)| flown)).chain(refined).collect();
         still.sort_by(|(a, _), (b, _)| b.error_m.total_cmp(&a.error_m));
@@ -301,7 +303,7 @@ fn measure(alone: &Scenario, limits: &Limits, wind_m_s: f64) -> Measured {
         }
         if wind_m_s > 0.0 {
             for (at_s, course) in worst {
-                for (name, wind) in winds(course.along, wind_m_s, at_s) {
+                for (name, wind) in winds(course.along, wind_m_s, at_s).into_iter().chain(turns(&course, wind_m_s)) {
                     let flown = fly(&Scenario { wind, ..alone.clone() }, limits, &course, DURATION_S);
                     measured.add(flown, || format!("{}, {name}", course.name));
                 }
@@ -322,7 +324,8 @@ fn measure(alone: &Scenario, limits: &Limits, wind_m_s: f64) -> Measured {
 
 /// Returns the directions of references with their names.
 fn directions(space: Space) -> Vec<(&'static str, Vector3<f64>)> {
-    let mut all = vec![("x", Vector3::x()), ("y", Vector3::y()), ("the diagonal of x and y", Vector3::new(1.0, 1.0, 0.0))];
+    let mut all =
+        vec![("x", Vector3::x()), ("y", Vector3::y()), ("the diagonal of x and y", Vector3::new(1.0, 1.0, 0.0))];
     if space != Space::Plane {
         all.extend([
             ("z", Vector3::z()),
@@ -339,7 +342,10 @@ fn courses(direction: &str, along: Vector3<f64>) -> Vec<Course> {
     vec![
         course(format!("step along {direction} for 4 s, then brake"), Wishes::Until(vec![(4.0, along)])),
         course(format!("step against {direction} for 4 s, then brake"), Wishes::Until(vec![(4.0, -along)])),
-        course(format!("step along {direction} for 4 s, then reversal"), Wishes::Until(vec![(4.0, along), (8.0, -along)])),
+        course(
+            format!("step along {direction} for 4 s, then reversal"),
+            Wishes::Until(vec![(4.0, along), (8.0, -along)]),
+        ),
         course(format!("chase along {direction}"), Wishes::Chase(along, 0.3)),
         course(format!("slow chase along {direction}"), Wishes::Chase(along, 1.0)),
     ]
@@ -392,7 +398,8 @@ fn worst_sides(response_m: &[f64], most: usize) -> Vec<i8> {
                 let next = speed.checked_add_signed(isize::from(side)).filter(|next| *next < count)?;
                 Some((side, after[next] + f64::from(side) * added_m))
             });
-            let (side, value) = sides.fold((0, f64::NEG_INFINITY), |best, next| if next.1 > best.1 { next } else { best });
+            let (side, value) =
+                sides.fold((0, f64::NEG_INFINITY), |best, next| if next.1 > best.1 { next } else { best });
             (choice[speed], best[speed]) = (side, value);
         }
     }
@@ -408,7 +415,8 @@ fn worst_sides(response_m: &[f64], most: usize) -> Vec<i8> {
 /// Returns a random sequence of full accelerations and brakes.
 fn random(seed: u64, space: Space) -> Course {
     let mut numbers = ChaCha8Rng::seed_from_u64(seed);
-    let mut between = move |low: f64, high: f64| low + (high - low) * (numbers.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
+    let mut between =
+        move |low: f64, high: f64| low + (high - low) * (numbers.next_u64() >> 11) as f64 / (1_u64 << 53) as f64;
     let mut time_s = 0.0;
     let mut wishes = Vec::new();
     while time_s < DURATION_S {
@@ -442,6 +450,28 @@ fn winds(along: Vector3<f64>, wind_m_s: f64, at_s: f64) -> [(&'static str, WindS
         ("wind that turns against it", turning(1.0)),
         ("wind that turns along it", turning(-1.0)),
     ]
+}
+
+/// Returns winds that turn around whenever the reference does, along it and against it.
+fn turns(course: &Course, wind_m_s: f64) -> Vec<(&'static str, WindSpec)> {
+    let Wishes::Until(list) = &course.wishes else { return Vec::new() };
+    let begins_s = std::iter::once(0.0).chain(list.iter().map(|(until_s, _)| *until_s));
+    let parts: Vec<_> = begins_s.zip(list).map(|(from_s, (until_s, side))| (from_s, *until_s, side)).collect();
+    let with = |sign: f64| {
+        let velocity_m_s = course.along * (2.0 * sign * wind_m_s);
+        let along =
+            parts.iter().filter(|(from_s, until_s, side)| side.dot(&course.along) > 0.5 && until_s - from_s > RISE_S);
+        let gust = |&(at_s, until_s, _): &(f64, f64, &Vector3<f64>)| Gust {
+            at_s,
+            rise_s: RISE_S,
+            hold_s: until_s - at_s - RISE_S,
+            fall_s: None,
+            velocity_m_s,
+            vehicles: None,
+        };
+        WindSpec { mean_m_s: -0.5 * velocity_m_s, gusts: along.map(gust).collect(), ..WindSpec::default() }
+    };
+    vec![("wind that turns with it", with(1.0)), ("wind that turns opposite to it", with(-1.0))]
 }
 
 /// Flies a course.
@@ -478,7 +508,8 @@ fn fly(alone: &Scenario, limits: &Limits, course: &Course, duration_s: f64) -> F
             velocity_m_s: then.velocity_m_s + side * settings.velocity_error_m_s,
         };
         let command = shield.filter(measured, wish);
-        let feedback = command - shield.reference_acceleration_m_s2() + shield.reference().velocity_m_s * settings.a22_per_s;
+        let feedback =
+            command - shield.reference_acceleration_m_s2() + shield.reference().velocity_m_s * settings.a22_per_s;
         flown.feedback_m_s2 = flown.feedback_m_s2.max(feedback.norm());
         flown.command_m_s2 = flown.command_m_s2.max(command.norm());
         set_row(&mut held, 0, command);
@@ -525,7 +556,13 @@ impl fmt::Display for Identification {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let of = &self.tracking;
         let number = |value: f64| significant(value, 3);
-        writeln!(out, "measured     {}: at most {} m from its reference in {} flights", self.model, number(self.largest_error_m), self.flights)?;
+        writeln!(
+            out,
+            "measured     {}: at most {} m from its reference in {} flights",
+            self.model,
+            number(self.largest_error_m),
+            self.flights
+        )?;
         writeln!(out, "worst        {}, at {} s", self.sequence, number(self.at_s))?;
         writeln!(
             out,

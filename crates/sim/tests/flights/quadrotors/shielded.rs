@@ -79,10 +79,8 @@ fn conditions_of_a_measured_table_are_checked() {
     assert!(error.to_string().contains("which thrust and lift allow (9)"), "{error}");
     // An own assumption needs no table.
     assert!(builtin(SHIELDED, &["wind.mean_m_s=[1,0]", "shield.tracking_error_m=0.5"]).shield.is_some());
-    let again = Scenario::read(
-        &Source::Text { name: "again".to_owned(), text: builtin(SHIELDED, &[]).resolved_toml() },
-        &[],
-    );
+    let again =
+        Scenario::read(&Source::Text { name: "again".to_owned(), text: builtin(SHIELDED, &[]).resolved_toml() }, &[]);
     assert_eq!(again.expect("the same").shield_limits().expect("limits").expect("a shield").tube(), limits.tube());
 }
 
