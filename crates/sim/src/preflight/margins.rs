@@ -104,9 +104,13 @@ pub(super) fn exceeded_margin(margins: &[PredictedMargin], scenario: &Scenario) 
 
 /// Returns a message if the lag of quadrotors makes the formation oscillate with its nearest slots in contact.
 ///
-/// A quadrotor answers a command with G = w^2/(tau s^3 + s^2 + 2 zeta w s + w^2), so that a mode of stiffness K and
-/// damping C with the drag d has the characteristic equation s (s + d) + G (K + C s) = 0. A push acts on one side of
-/// its rest length only: an oscillation around it feels half of the stiffness.
+/// A mode has the stiffness K, the damping C, and the drag d and the response G of a quadrotor:
+///
+/// ```text
+/// s (s + d) + G (K + C s) = 0        G = w^2/(tau s^3 + s^2 + 2 zeta w s + w^2)
+/// ```
+///
+/// A push acts on one side of its rest length only: an oscillation around it feels half of the stiffness.
 pub(super) fn lag_in_contact(law: &dyn Law, scenario: &Scenario) -> Option<String> {
     let model = &scenario.airframe.quadrotor()?.model;
     let LawSpec::Displacement(keys) = &scenario.law else { return None };

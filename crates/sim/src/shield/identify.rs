@@ -40,7 +40,7 @@ const RESPONSE_S: f64 = 8.0;
 const REVERSALS_S: [f64; 8] = [0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0];
 const REFINED: [f64; 4] = [0.8, 0.9, 1.1, 1.2];
 /// Number of random sequences.
-const RANDOM: u64 = 6;
+const RANDOM: usize = 6;
 /// Most measurements, each with a push that fits the feedback of the one before.
 const ROUNDS: usize = 5;
 /// Share of commands that the first measurement leaves to the tracker.
@@ -51,8 +51,8 @@ const NOT_TIGHT: f64 = 0.85;
 const TRIAL_M_S2: f64 = 1e-3;
 /// Distance to the reference from which the vehicle is lost \[m\].
 const LOST_M: f64 = 5.0;
-/// Largest number of periods of acceleration to full speed in the search for the worst sequence.
-const MOST_SPEEDS: f64 = 500.0;
+/// Bound on the memory of the search for the worst sequence, as speeds times periods.
+const MOST_CHOICES: f64 = 4e6;
 /// Rise time of a change of the wind \[s\].
 const RISE_S: f64 = 0.3;
 /// Wish of nearly no acceleration; zero brakes.
@@ -90,7 +90,7 @@ pub struct Identification {
 enum Wishes {
     /// Direction of full acceleration until a time \[s\]; zero brakes.
     Until(Vec<(f64, Vector3<f64>)>),
-    /// Away from the vehicle: along the error plus this time \[s\] times its rate. The first error is along a direction.
+    /// Away from the vehicle, along the error plus this time \[s\] times its rate; first along a direction.
     Chase(Vector3<f64>, f64),
 }
 
@@ -242,6 +242,13 @@ fn rounded_up(value: f64) -> f64 {
     (value * 1e3).ceil() / 1e3
 }
 
+/// Returns the whole part of a positive number.
+fn whole(value: f64) -> usize {
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "positive; more saturates")]
+    let whole = value as usize;
+    whole
+}
+
 /// Extremes of all flights.
 struct Measured {
     worst: Flown,
@@ -255,8 +262,7 @@ struct Measured {
 impl Measured {
     /// Returns whether a flight lost its reference.
     fn is_lost(&self) -> bool {
-        // An error that is no number is lost, too.
-        !(self.worst.error_m <= LOST_M)
+        self.worst.error_m.is_nan() || self.worst.error_m > LOST_M
     }
 
     fn add(&mut self, flown: Flown, name: impl FnOnce() -> String) {
@@ -310,12 +316,12 @@ fn measure(alone: &Scenario, limits: &Limits, wind_m_s: f64) -> Measured {
             }
         }
     }
-    for seed in 0..RANDOM {
-        let course = random(seed, alone.space);
+    for number in 0..RANDOM {
+        let course = random(number as u64, alone.space);
         let mut scenario = alone.clone();
         if wind_m_s > 0.0 {
             let turns = winds(course.along, wind_m_s, DURATION_S / 2.0);
-            scenario.wind = turns[seed as usize % turns.len()].1.clone();
+            scenario.wind = turns[number % turns.len()].1.clone();
         }
         measured.add(fly(&scenario, limits, &course, DURATION_S), || course.name.clone());
     }
@@ -354,7 +360,7 @@ fn courses(direction: &str, along: Vector3<f64>) -> Vec<Course> {
 /// Returns the course that reverses every `half_s` seconds.
 fn reversals(direction: &str, along: Vector3<f64>, half_s: f64) -> Course {
     let sign = |k: usize| if k.is_multiple_of(2) { 1.0 } else { -1.0 };
-    let count = (DURATION_S / half_s) as usize;
+    let count = whole(DURATION_S / half_s);
     let times_s = (0..=count).map(|k| ((k as f64 + 0.5) * half_s, along * sign(k)));
     let name = format!("reversals along {direction} every {} s", significant(half_s, 3));
     Course { name, along, wishes: Wishes::Until(times_s.collect()) }
@@ -366,8 +372,9 @@ fn matched(alone: &Scenario, limits: &Limits, (direction, along): (&str, Vector3
     let wishes = Wishes::Until(vec![(period_s, along), (RESPONSE_S, COAST)]);
     let pulse = Course { name: String::new(), along, wishes };
     let response_m = fly(alone, limits, &pulse, RESPONSE_S).errors_m;
-    let speeds = (limits.settings().max_speed_m_s / (limits.reference_m_s2() * period_s)).floor().min(MOST_SPEEDS);
-    let sides = worst_sides(&response_m, speeds as usize);
+    let speeds = (limits.settings().max_speed_m_s / (limits.reference_m_s2() * period_s))
+        .min(MOST_CHOICES / response_m.len() as f64);
+    let sides = worst_sides(&response_m, whole(speeds));
     let mut wishes: Vec<_> = sides
         .iter()
         .enumerate()
@@ -428,7 +435,7 @@ fn random(seed: u64, space: Space) -> Course {
     Course { name: format!("random sequence {seed}"), along: Vector3::x(), wishes: Wishes::Until(wishes) }
 }
 
-/// Returns winds at their bound: constant along, against and across a direction, and turning around before a time \[s\].
+/// Returns winds at their bound: constant along, against and across a direction, or turning around before a time \[s\].
 fn winds(along: Vector3<f64>, wind_m_s: f64, at_s: f64) -> [(&'static str, WindSpec); 5] {
     let constant = |velocity: Vector3<f64>| WindSpec { mean_m_s: velocity * wind_m_s, ..WindSpec::default() };
     let turning = |sign: f64| {
@@ -478,7 +485,7 @@ fn turns(course: &Course, wind_m_s: f64) -> Vec<(&'static str, WindSpec)> {
 fn fly(alone: &Scenario, limits: &Limits, course: &Course, duration_s: f64) -> Flown {
     let settings = limits.settings();
     let (dt_s, period_s) = (alone.time.dt_s, settings.period_s);
-    let steps = (period_s / dt_s).round().max(1.0) as usize;
+    let steps = whole((period_s / dt_s).round().max(1.0));
     let start = limits.slot(Vector3::zeros());
     let mut flown = Flown::default();
     let Ok(mut shield) = Shield::new(limits, 0, &[start]) else { return flown };
@@ -490,7 +497,7 @@ fn fly(alone: &Scenario, limits: &Limits, course: &Course, duration_s: f64) -> F
     let (mut next, mut path) = (state.clone(), StepPath::default());
     let (mut held, mut acted) = (Rows::zeros(1), Rows::zeros(1));
     let mut past = vec![truth(&state)];
-    for instant in 0..(duration_s / period_s) as usize {
+    for instant in 0..whole(duration_s / period_s) {
         let time_s = instant as f64 * period_s;
         let now = truth(&state);
         past.push(now);
@@ -526,7 +533,7 @@ fn fly(alone: &Scenario, limits: &Limits, course: &Course, duration_s: f64) -> F
             let since_s = (step + 1) as f64 * dt_s;
             let reference = shield.reference().after(shield.reference_acceleration_m_s2(), since_s);
             let error = reference.position_m - row(&state.positions_m, 0);
-            if !(error.norm() <= flown.error_m) {
+            if error.norm().is_nan() || error.norm() > flown.error_m {
                 (flown.error_m, flown.at_s) = (error.norm(), time_s + since_s);
                 if flown.error_m > LOST_M {
                     return flown;
@@ -566,7 +573,8 @@ impl fmt::Display for Identification {
         writeln!(out, "worst        {}, at {} s", self.sequence, number(self.at_s))?;
         writeln!(
             out,
-            "commands     up to {} m/s^2 of {}, feedback up to {}, reference up to {}; rotor thrust up to {} % of the maximum",
+            "commands     up to {} m/s^2 of {}, feedback up to {}, reference up to {}; rotor thrust up to {} % of \
+             the maximum",
             number(self.largest_command_m_s2),
             of.accel_m_s2,
             number(self.largest_feedback_m_s2),

@@ -63,7 +63,7 @@ impl Model {
         if is_plane {
             return (thrust_m_s2.powi(2) - GRAVITY_M_S2.powi(2)).max(0.0).sqrt();
         }
-        (thrust_m_s2 - GRAVITY_M_S2).min((1.0 - LEAST_LIFT) * GRAVITY_M_S2).max(0.0)
+        (thrust_m_s2 - GRAVITY_M_S2).clamp(0.0, (1.0 - LEAST_LIFT) * GRAVITY_M_S2)
     }
 
     /// Returns the drag of the rotors over mass in level hover \[1/s\].
