@@ -17,7 +17,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng as _, SeedableRng as _};
 use serde::Serialize;
 
-use super::{ShieldSpec, refused_with};
+use super::{ShieldSpec, refused, refused_with};
 use crate::link;
 use crate::plant::{self, StepPath};
 use crate::scenario::{Scenario, ScenarioError, Space};
@@ -50,7 +50,7 @@ const NOT_TIGHT: f64 = 0.85;
 /// Push with which the slope of the feedback is computed \[m/s^2\].
 const TRIAL_M_S2: f64 = 1e-3;
 /// Distance to the reference from which the vehicle is lost \[m\].
-const LOST_M: f64 = 5.0;
+const LOST_M: f64 = 2.0;
 /// Bound on the memory of the search for the worst sequence, as speeds times periods.
 const MOST_CHOICES: f64 = 4e6;
 /// Rise time of a change of the wind \[s\].
@@ -180,6 +180,11 @@ impl Scenario {
             .at_keys(["shield.tracker_per_s2", "shield.tracker_per_s", "shield.accel_m_s2"]));
         };
         let settings = limits.settings();
+        if flown.command_m_s2 > settings.accel_m_s2 {
+            return Err(refused("the tracker commands more than shield.accel_m_s2, up to", flown.command_m_s2)
+                .with_help("raise shield.disturbance_m_s2, or leave it out")
+                .at_keys(["shield.disturbance_m_s2", "shield.accel_m_s2"]));
+        }
         let tracking = Tracking {
             error_m: rounded_up(TRACKING_FACTOR * flown.worst.error_m),
             accel_m_s2: settings.accel_m_s2,
@@ -640,9 +645,13 @@ mod tests {
     #[test]
     fn a_tracker_that_loses_the_vehicle_is_refused() {
         let (alone, ..) = crazyflies();
-        let fast = ShieldSpec { tracker_per_s2: Some(30.0), tracker_per_s: Some(12.0), ..ShieldSpec::default() };
+        let gains = ShieldSpec { tracker_per_s2: Some(30.0), tracker_per_s: Some(12.0), ..ShieldSpec::default() };
+        let fast = ShieldSpec { disturbance_m_s2: Some(0.1), ..gains };
         let error = Scenario { shield: Some(fast), ..alone.clone() }.identify().expect_err("lost");
         assert!(error.to_string().contains("does not hold the vehicle"), "{error}");
+        let no_room = ShieldSpec { disturbance_m_s2: Some(0.0), ..ShieldSpec::default() };
+        let error = Scenario { shield: Some(no_room), ..alone.clone() }.identify().expect_err("no room");
+        assert!(error.to_string().contains("commands more than shield.accel_m_s2"), "{error}");
         let points = Scenario { airframe: crate::vehicle::Airframe::Point, ..alone };
         assert!(points.identify().expect_err("points").to_string().contains("only the tracking error of quadrotors"));
     }
