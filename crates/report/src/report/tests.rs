@@ -126,6 +126,7 @@ impl Case {
             deadlock_recoveries: Vec::new(),
             assignments: Vec::new(),
             traffic: None,
+            shield: None,
             last: scenario.start.clone(),
             performance: sim::Performance { wall, ..sim::Performance::default() },
         };
