@@ -153,6 +153,6 @@ fn identify_measures_quadrotors_only_and_keeps_other_files() {
     assert!(error_m > found["largest_error_m"].as_f64().expect("a number"), "{found}");
     let table = std::fs::read_to_string(folder.path().join("own.toml")).expect("a model");
     assert!(table.starts_with("# Crazyflie 2.x") && table.contains(&format!("error_m = {error_m}")), "{table}");
-    let checked = ran(&["shielded-crazyflies", "--set", "vehicle.model=own.toml"]);
+    let checked = ran(&["shielded-crazyflies", "--set", "vehicle.model=\"own.toml\""]);
     assert!(checked.exit == Some(0) && checked.out.contains("assumed tube"), "{checked:?}");
 }
