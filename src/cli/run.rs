@@ -8,7 +8,9 @@ use clap::{Args, Parser};
 use super::console::{self, Console, Terminal};
 use super::{Exit, completions};
 use tautline_report::figures::Format;
-use tautline_report::request::{Failure, Monitor as _, Pictures, RunRequest, ScenarioRequest, command_line, run_into};
+use tautline_report::request::{
+    Failure, Monitor as _, Pictures, RunRequest, ScenarioRequest, command_line, identify, run_into,
+};
 use tautline_sim::preflight::Preflight;
 
 /// Time between two looks at a watched file.
@@ -218,6 +220,12 @@ delta.")]
 pub(super) struct CheckArguments {
     #[command(flatten)]
     what: ScenarioArguments,
+    /// Measure the tracking error of the scenario's quadrotors, which the shield assumes.
+    #[arg(long)]
+    identify: bool,
+    /// With --identify: write a model file with the measured table; comments of an existing file stay.
+    #[arg(long, value_name = "FILE", requires = "identify")]
+    out: Option<PathBuf>,
     /// Print the findings as JSON on standard output; all text goes to standard error.
     #[arg(long)]
     json: bool,
@@ -228,6 +236,17 @@ pub(super) struct CheckArguments {
 
 pub(super) fn check(arguments: &CheckArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
+    if arguments.identify {
+        let found = identify(&arguments.what.request()?, arguments.out.as_deref())?;
+        console.say(&format!("{}\n{}", found.measured, found.table.trim_end()));
+        if let Some(path) = &arguments.out {
+            console.say(&format!("wrote {}", path.display()));
+        }
+        if arguments.json {
+            console::json(&found.measured)?;
+        }
+        return Ok(Exit::Good);
+    }
     let scenario = arguments.what.request()?.read()?;
     let found = Preflight::of(&scenario)?;
     console.say(&format!("{}\n{}", found.headline(), found.text()));

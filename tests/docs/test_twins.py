@@ -36,9 +36,9 @@ tautline list
 ```
 
 ```text
-scenario            vehicles  time   steps  content
+scenario             vehicles  time   steps  content
 ...
-thousand            1000      40 s   4000   a thousand vehicles gather in space: clear and reached
+thousand             1000      40 s   4000   a thousand vehicles gather in space: clear and reached
 ```
 
 ```sh

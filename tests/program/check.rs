@@ -132,3 +132,27 @@ fn run_flies_the_ideal_plant_when_asked() {
     let (code, ..) = tautline(&["run", "pentagon", "--plant", "perfect", "--out", out]);
     assert_eq!(code, 2);
 }
+
+#[test]
+fn identify_measures_quadrotors_only_and_keeps_other_files() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let ran = |arguments: &[&str]| ran_by(TAUTLINE, folder.path(), &[&["check"], arguments].concat());
+    let points = ran(&["pentagon", "--identify"]);
+    assert!(points.exit == Some(2) && points.err.contains("only the tracking error of quadrotors"), "{points:?}");
+    assert_eq!(ran(&["pentagon", "--out", "model.toml"]).exit, Some(2), "--out needs --identify");
+    std::fs::write(folder.path().join("notes.toml"), "notes = 1\n").expect("a file");
+    let kept = ran(&["shielded-crazyflies", "--identify", "--out", "notes.toml"]);
+    assert!(kept.exit == Some(2) && kept.err.starts_with("files/exists"), "{kept:?}");
+    assert_eq!(std::fs::read_to_string(folder.path().join("notes.toml")).expect("a file"), "notes = 1\n");
+    if std::env::var_os("TAUTLINE_LONG").is_none() {
+        return;
+    }
+    let measured = ran(&["shielded-crazyflies", "--identify", "--json", "--out", "own.toml"]);
+    let found: Value = serde_json::from_str(&measured.out).expect("JSON alone");
+    let error_m = found["tracking"]["error_m"].as_f64().expect("a number");
+    assert!(error_m > found["largest_error_m"].as_f64().expect("a number"), "{found}");
+    let table = std::fs::read_to_string(folder.path().join("own.toml")).expect("a model");
+    assert!(table.starts_with("# Crazyflie 2.x") && table.contains(&format!("error_m = {error_m}")), "{table}");
+    let checked = ran(&["shielded-crazyflies", "--set", "vehicle.model=\"own.toml\""]);
+    assert!(checked.exit == Some(0) && checked.out.contains("assumed tube"), "{checked:?}");
+}

@@ -12,7 +12,7 @@ use tempfile::TempDir;
 use crate::program::{Ran, TAUTLINE, ran_by};
 
 /// Built-in scenarios with the duration of their flights in short tests \[s\].
-const BUILT_IN: [(&str, &str); 13] = [
+const BUILT_IN: [(&str, &str); 14] = [
     ("pentagon", "4"),
     ("hexagon", "2"),
     ("circle", "2"),
@@ -26,6 +26,7 @@ const BUILT_IN: [(&str, &str); 13] = [
     ("obstacles", "2"),
     ("gusts", "26"),
     ("crazyflies", "1"),
+    ("shielded-crazyflies", "1"),
 ];
 
 fn fly(folder: &Path, scenario: &str, sets: &[&str]) {

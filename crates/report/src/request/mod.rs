@@ -9,10 +9,12 @@
 //! | [`RunRequest`] | [`run_into`] | a folder with recording, report, figures and pictures |
 //! | [`AuditRequest`] | [`audit_files`] | a verdict on a recording of any origin |
 //! | [`ExportRequest`] | [`export_file`] | a recording in another format |
+//! | [`ScenarioRequest`] | [`identify`] | a measured tracking error, and a model file |
 
 pub mod audit;
 mod export;
 mod failure;
+mod identify;
 mod monitor;
 pub mod outputs;
 mod run;
@@ -21,6 +23,7 @@ mod scenario;
 pub use audit::{AuditRequest, AuditedRecording, ConfigFile, OwnRecording, Subject, audit_files, run_audit};
 pub use export::{ExportRequest, export_file};
 pub use failure::{Failure, blanked, in_range};
+pub use identify::{IdentifiedModel, identify};
 pub use monitor::{Monitor, NamedPicture, PICTURES_BYTES, Pictures, Quiet, Silent};
 pub use outputs::{OutFolder, try_to_write_in};
 pub use run::{

@@ -4,7 +4,8 @@ use serde::Serialize;
 
 use super::warning::significant;
 use crate::scenario::Scenario;
-use tautline_laws::law::{Law, Linear};
+use crate::vehicle::Model;
+use tautline_laws::law::{Law, LawSpec, Linear, Mode};
 
 /// Predicted tolerance of the formation to an imperfection.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -99,6 +100,61 @@ pub(super) fn exceeded_margin(margins: &[PredictedMargin], scenario: &Scenario) 
             )
         })
     })
+}
+
+/// Returns a message if the lag of quadrotors makes the formation oscillate with its nearest slots in contact.
+///
+/// A mode has the stiffness K, the damping C, and the drag d and the response G of a quadrotor:
+///
+/// ```text
+/// s (s + d) + G (K + C s) = 0        G = w^2/(tau s^3 + s^2 + 2 zeta w s + w^2)
+/// ```
+///
+/// A push acts on one side of its rest length only: an oscillation around it feels half of the stiffness.
+pub(super) fn lag_in_contact(law: &dyn Law, scenario: &Scenario) -> Option<String> {
+    let model = &scenario.airframe.quadrotor()?.model;
+    let LawSpec::Displacement(keys) = &scenario.law else { return None };
+    let linear = law.linear(scenario.formation())?;
+    let stiffest = linear.free.iter().max_by(|a, b| a.stiffness_per_s2.total_cmp(&b.stiffness_per_s2))?;
+    let contact = linear.stiffest_contact_mode?;
+    let mode = Mode { stiffness_per_s2: f64::midpoint(stiffest.stiffness_per_s2, contact.stiffness_per_s2), ..contact };
+    let drag_per_s = model.hover_drag_per_s();
+    let is_stable = |damping_per_s: f64| is_damped(Mode { damping_per_s, ..mode }, model, drag_per_s);
+    if is_stable(mode.damping_per_s) {
+        return None;
+    }
+    let factors = (1..=MOST_DAMPING).map(|step| 1.0 + 0.1 * f64::from(step));
+    let remedy = match factors.into_iter().find(|factor| is_stable(factor * mode.damping_per_s)) {
+        Some(factor) => format!("Raise law.zeta_per_s to {}", significant(factor * keys.zeta_per_s)),
+        None => "Lower law.k_per_s2".to_owned(),
+    };
+    Some(format!(
+        "The vehicles lag, and near the slots they push each other: a mode of stiffness {} 1/s^2 and damping {} 1/s \
+         may keep oscillating. {remedy}, or lower law.alpha.",
+        significant(mode.stiffness_per_s2),
+        significant(mode.damping_per_s)
+    ))
+}
+
+/// Largest damping that is tried, in tenths of that of the law.
+const MOST_DAMPING: u32 = 60;
+
+/// Returns whether all roots of a mode under the lag of a quadrotor have negative real parts, by the criterion of
+/// Routh.
+fn is_damped(mode: Mode, model: &Model, drag_per_s: f64) -> bool {
+    let (lag_s, omega) = (model.lag_s(), model.attitude_rad_s);
+    let (twice, square) = (2.0 * model.attitude_damping * omega, omega * omega);
+    let mut above = [lag_s, twice + drag_per_s, square * (drag_per_s + mode.damping_per_s)];
+    let mut row = [1.0 + lag_s * drag_per_s, square + twice * drag_per_s, square * mode.stiffness_per_s2];
+    for _ in 0..5 {
+        if row[0] <= 0.0 {
+            return false;
+        }
+        let ratio = above[0] / row[0];
+        let next = [above[1] - ratio * row[1], above[2] - ratio * row[2], 0.0];
+        (above, row) = (row, next);
+    }
+    true
 }
 
 /// Returns the margins in one line.

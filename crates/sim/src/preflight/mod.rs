@@ -269,6 +269,7 @@ impl Preflight {
             (Code::SlotsTooNear, found.shield.as_ref().and_then(ShieldCheck::slots_too_near)),
             (Code::SlotsWithinEase, found.shield.as_ref().and_then(ShieldCheck::slots_within_ease)),
             (Code::BeyondMargin, margins::exceeded_margin(&found.margins, scenario)),
+            (Code::BeyondMargin, margins::lag_in_contact(law, scenario)),
             (Code::NoCertificate, found.no_certificate()),
             (Code::NotRigid, found.not_rigid(scenario)),
             (Code::FlatFormationInSpace, found.flat_formation_in_space()),

@@ -70,6 +70,11 @@ const ALL: &[Builtin] = &[
         toml: include_str!("../../../../assets/crazyflies.toml"),
     },
     Builtin {
+        name: "shielded-crazyflies",
+        summary: "six quadrotors change places in wind, under a law that avoids nothing and a shield: clear, reached",
+        toml: include_str!("../../../../assets/shielded-crazyflies.toml"),
+    },
+    Builtin {
         name: "gusts",
         summary: "rings in a turbulent wind with gusts on some vehicles: a common wind changes no separation, reached",
         toml: include_str!("../../../../assets/gusts.toml"),

@@ -17,8 +17,11 @@
 //!
 //! The flight measures the distance to the reference at each step and reports it as a share of the tube.
 
+mod identify;
 mod stage;
+mod tracking;
 
+pub use identify::{Identification, TRACKING_FACTOR};
 pub(crate) use stage::ShieldStage;
 pub use stage::{ShieldBreach, ShieldReport};
 
@@ -29,7 +32,7 @@ use serde::{Deserialize, Serialize};
 use crate::scenario::{MAX_MEMORY_BYTES, Scenario, ScenarioError, Space};
 use crate::sim::MAX_BEND_M;
 use tautline_core::swarm::row;
-use tautline_laws::law::{Certificate, LawSpec, VoidReason};
+use tautline_laws::law::{Certificate, VoidReason};
 use tautline_laws::space::Shape;
 use tautline_shield::fleet::{PairRoom, closest_starts};
 use tautline_shield::obstacle::ConvexBody;
@@ -40,6 +43,8 @@ pub(crate) const SHIELD_CONTROL_HZ: f64 = 20.0;
 /// Default of the largest command and of the largest speed, without limits in other tables.
 const ACCEL_M_S2: f64 = 5.0;
 const SPEED_M_S: f64 = 2.0;
+/// Default gains of the tracker, in 1/s^2 and 1/s.
+const TRACKER: f64 = 4.0;
 /// Relative difference of two rates or times that counts as rounding.
 const SAME: f64 = 1e-9;
 /// Expected memory of a contract with the last message of the other vehicle \[bytes\].
@@ -77,17 +82,22 @@ pub struct ShieldSpec {
     #[serde(skip_serializing_if = "is_zero")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub velocity_error_m_s: f64,
-    /// Bound in m/s^2 on the push of wind and model errors, at least `vehicle.drag_per_s` times the fastest wind.
-    #[serde(skip_serializing_if = "is_zero")]
-    #[schemars(extend("default" = 0.0, "minimum" = 0))]
-    pub disturbance_m_s2: f64,
-    /// Gain in 1/s^2 of the tracker on the distance to the reference.
+    /// Bound in m/s^2 on the push of wind and model errors, at least `vehicle.drag_per_s` times the fastest wind; 0
+    /// unless given, that of the model for quadrotors.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 0))]
+    pub disturbance_m_s2: Option<f64>,
+    /// Gain in 1/s^2 of the tracker on the distance to the reference; 4 unless given, that of the model for quadrotors.
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
-    pub tracker_per_s2: f64,
-    /// Gain in 1/s of the tracker on the velocity relative to the reference.
+    pub tracker_per_s2: Option<f64>,
+    /// Gain in 1/s of the tracker on the velocity relative to the reference; 4 unless given, that of the model for
+    /// quadrotors.
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
-    pub tracker_per_s: f64,
-    /// Assumed bound in m on the distance to the reference, in place of the computed one. Quadrotors need it.
+    pub tracker_per_s: Option<f64>,
+    /// Assumed bound in m on the distance to the reference, in place of the computed one. Quadrotors need it, unless
+    /// their model has a measured one (`[tracking]`) for the conditions of the scenario.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub tracking_error_m: Option<f64>,
@@ -109,9 +119,9 @@ impl Default for ShieldSpec {
             max_speed_m_s: None,
             position_error_m: 0.0,
             velocity_error_m_s: 0.0,
-            disturbance_m_s2: 0.0,
-            tracker_per_s2: 4.0,
-            tracker_per_s: 4.0,
+            disturbance_m_s2: None,
+            tracker_per_s2: None,
+            tracker_per_s: None,
             tracking_error_m: None,
             ease_m: None,
             turn: 1.0,
@@ -135,7 +145,7 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioError`] if the scenario does not fit the shield's assumptions, or nothing is left for the reference.
     pub fn shield_limits(&self) -> Result<Option<Limits>, ScenarioError> {
-        let Some(spec) = &self.shield else { return Ok(None) };
+        let Some(spec) = &self.shield_keys() else { return Ok(None) };
         let Some(control_hz) = self.time.control_hz else {
             return Err(ScenarioError::new("the shield holds commands over periods, but no rate of commands is given")
                 .coded("scenario/missing-key")
@@ -150,22 +160,22 @@ impl Scenario {
                 .with_help(format!("reduce it to at most {}", most_m_s2.unwrap_or_default()))
                 .at_keys(["shield.accel_m_s2", "actuation.max_accel_m_s2"]));
         }
-        let max_speed_m_s = spec.max_speed_m_s.unwrap_or(match &self.law {
-            LawSpec::Orca(keys) => keys.max_speed_m_s,
-            LawSpec::CbfQp(keys) => keys.max_speed_m_s,
-            _ => SPEED_M_S,
-        });
-        let a22_per_s = self.velocity_coefficient_per_s();
+        let max_speed_m_s = spec.max_speed_m_s.or(self.law_speed_m_s()).unwrap_or(SPEED_M_S);
+        // The command compensates the drag of a quadrotor, too.
+        let drag_per_s = self.airframe.quadrotor().map_or(0.0, |quadrotor| quadrotor.model.hover_drag_per_s());
+        let a22_per_s = self.velocity_coefficient_per_s() - drag_per_s;
+        let [tracker_per_s2, tracker_per_s] =
+            [spec.tracker_per_s2, spec.tracker_per_s].map(|gain| gain.unwrap_or(TRACKER));
         let mut settings = Settings {
             accel_m_s2,
             brake_m_s2: spec.brake_m_s2,
             max_speed_m_s,
             position_error_m: spec.position_error_m,
             velocity_error_m_s: spec.velocity_error_m_s,
-            disturbance_m_s2: spec.disturbance_m_s2,
+            disturbance_m_s2: spec.disturbance_m_s2.unwrap_or(0.0),
             a22_per_s,
-            tracker_per_s2: spec.tracker_per_s2,
-            tracker_per_s: spec.tracker_per_s,
+            tracker_per_s2,
+            tracker_per_s,
             measurement_delay_periods: self.measurement_delay_periods(control_hz)?,
             actuator_lag_s: self.actuation.lag_s,
             tracking_error_m: spec.tracking_error_m,
@@ -181,7 +191,7 @@ impl Scenario {
             let decay = (a22_per_s * dt_s).powi(2);
             let lag = if self.actuation.lag_s > 0.0 { accel_m_s2 * (dt_s / self.actuation.lag_s).powi(2) } else { 0.0 };
             settings.integration_error_m_s2 = (decay * (a22_per_s.abs() * max_speed_m_s + accel_m_s2) + lag) / 6.0;
-            let gains = (1.0 + spec.tracker_per_s) / (12.0 * spec.tracker_per_s2);
+            let gains = (1.0 + tracker_per_s) / (12.0 * tracker_per_s2);
             settings.path_error_m =
                 accel_m_s2 * dt_s * dt_s / 8.0 + decay * (max_speed_m_s + accel_m_s2 * dt_s) * gains;
         }
@@ -250,7 +260,7 @@ impl Scenario {
 
     /// Checks that the scenario fits the shield.
     pub(crate) fn check_shield(&self) -> Result<(), ScenarioError> {
-        let Some(spec) = &self.shield else { return Ok(()) };
+        let Some(spec) = &self.shield_keys() else { return Ok(()) };
         if self.airframe.unicycle().is_some() {
             return Err(refused_with("the shield has no contract for unicycles", "use points or quadrotors")
                 .at_keys(["vehicle.model", "shield"]));
@@ -263,13 +273,7 @@ impl Scenario {
                     .at_keys(["time.control_hz", "time.dt_s"]));
             }
         }
-        if self.airframe.quadrotor().is_some() && spec.tracking_error_m.is_none() {
-            return Err(refused_with(
-                "the distance of a quadrotor to its reference has no computed bound",
-                "measure it with `tautline check --identify`, and set shield.tracking_error_m",
-            )
-            .at_keys(["shield.tracking_error_m", "vehicle.model"]));
-        }
+        self.check_tracking(spec)?;
         let noise_m = self.sensing.position_noise_m + self.sensing.position_bias_m;
         let noises = [
             ("shield.position_error_m", "sensing.position_noise_m", noise_m, spec.position_error_m),
@@ -291,10 +295,11 @@ impl Scenario {
             }
         }
         let push_m_s2 = self.drag_per_s * self.wind.fastest_m_s();
-        if push_m_s2 > spec.disturbance_m_s2 && self.airframe.is_point() {
+        let disturbance_m_s2 = spec.disturbance_m_s2.unwrap_or(0.0);
+        if push_m_s2 > disturbance_m_s2 && self.airframe.is_point() {
             return Err(refused(
                 &format!("shield.disturbance_m_s2 must be at least {push_m_s2}, which is drag times the fastest wind"),
-                spec.disturbance_m_s2,
+                disturbance_m_s2,
             )
             .with_help("raise it, or reduce the wind")
             .at_keys(["shield.disturbance_m_s2", "vehicle.drag_per_s"]));

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use crate::link::{Radio, RadioUse, period};
-use crate::scenario::{Scenario, ScenarioError};
+use crate::scenario::{Scenario, ScenarioError, Space};
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_shield::report::Exceeded;
 use tautline_shield::{Broadcast, Counters, Fleet, State};
@@ -50,6 +50,9 @@ pub(crate) struct ShieldStage {
     fleet: Fleet,
     certificate: String,
     period_s: f64,
+    /// Whether references stay in the plane z = 0. Quadrotors there hold their height by themselves, up to the sag of
+    /// a tilt, and ignore commands along z.
+    is_plane: bool,
     radio: Radio,
     /// Rate of messages \[Hz\]; each period unless given.
     rate_hz: Option<f64>,
@@ -100,6 +103,7 @@ impl ShieldStage {
             fleet,
             certificate: limits.certificate(),
             period_s: limits.settings().period_s,
+            is_plane: scenario.space == Space::Plane,
             radio: Radio::new(scenario, count * (count - 1), RadioUse::Contracts),
             rate_hz: scenario.network.rate_hz,
             rounds: 0,
@@ -131,6 +135,9 @@ impl ShieldStage {
         for i in 0..command.nrows() {
             self.measured[i] = state(own, i);
             self.wanted[i] = row(command, i);
+            if self.is_plane && self.wanted[i].z.is_finite() {
+                self.wanted[i].z = 0.0;
+            }
         }
         self.observe_measurements(time_s, truth);
         let Self { fleet, measured, wanted, commands, .. } = self;

@@ -12,12 +12,14 @@ mod dynamics;
 mod fleet;
 mod model;
 mod rotors;
+mod tracking;
 mod unicycle;
 
 pub use dynamics::{Attitude, Drift, Dynamics, Ground, LEAST_LIFT, State, THRUST_RESERVE, Wrench};
 pub use fleet::{Fleet, HEIGHT_RAD_S, RotorFailure};
 pub use model::{GRAVITY_M_S2, MODELS, Model, ModelError, ModelParseError, Quadrotor, RotorDirection, read};
 pub use rotors::{AIR_DENSITY_KG_M3, Downwash, Mixer, RotorCurve, RotorLag};
+pub use tracking::Tracking;
 pub use unicycle::{Heading, Steering, Unicycle};
 
 /// Kind of body of a vehicle.

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use toml::de::DeTable;
 
 use super::rotors::Mixer;
+use super::tracking::Tracking;
 
 /// Standard acceleration of gravity \[m/s^2\]. Some published models use 9.8 or 9.81.
 pub const GRAVITY_M_S2: f64 = 9.80665;
@@ -56,6 +57,10 @@ pub struct Model {
     pub attitude_rad_s: f64,
     /// Damping ratio of the attitude loop.
     pub attitude_damping: f64,
+    /// Measured distance to the reference of a shield, an assumption.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "Tracking")]
+    pub tracking: Option<Tracking>,
 }
 
 /// Direction of rotation of a rotor, seen from above.
@@ -242,6 +247,16 @@ impl Model {
         let mut from_zero = from_zero.into_iter().chain(squared).chain([("ground_effect", self.ground_effect)]);
         if let Some((key, number)) = from_zero.find(|(_, number)| !(0.0..=most).contains(number)) {
             return Err(refuse(key, format!("{key} is {number}"), format!("it must be from 0 to {most:e}")));
+        }
+        if let Some(tracking) = &self.tracking {
+            let [positive @ .., _, _, _, _] = tracking.numbers();
+            let wrong = |least: f64| move |number: &f64| !(least..=most).contains(number);
+            let found =
+                positive.into_iter().find(wrong(least)).or_else(|| tracking.numbers().into_iter().find(wrong(0.0)));
+            if let Some(number) = found {
+                let help = format!("its numbers must be from {least:e} to {most:e}; pushes, wind and errors may be 0");
+                return Err(refuse("tracking", format!("the table has the number {number}"), help));
+            }
         }
         let places = self.rotor_positions_m.iter().flatten().map(|&place| ("rotor_positions_m", place));
         let mut others = places.chain([("thrust_n_per_rpm", self.thrust_n_per_rpm)]);

@@ -140,7 +140,7 @@ fn draw(seed: u64, most: usize) -> Option<(Scenario, Box<dyn Law>)> {
     if random.between(0.0, 1.0) < 0.5 {
         scenario.drag_per_s = 0.1;
         scenario.wind.mean_m_s = random.vector(axes, 2.0);
-        shield.disturbance_m_s2 = 0.1 * scenario.wind.mean_m_s.norm() + 1e-12;
+        shield.disturbance_m_s2 = Some(0.1 * scenario.wind.mean_m_s.norm() + 1e-12);
     }
     if random.between(0.0, 1.0) < 0.3 {
         shield.ease_m = Some(0.0);
@@ -296,7 +296,7 @@ fn scenarios_that_do_not_fit_the_shield_are_refused_with_place_value_and_remedy(
         ),
         ("[shield]\n[sensing]\nrate_hz = 20\nposition_noise_m = 0.01", "shield.position_error_m", "give 0.05"),
         ("[shield]\n[sensing]\nrate_hz = 30", "sensing.rate_hz", "set sensing.rate_hz to 20"),
-        ("[shield]\n[vehicle]\nmodel = \"crazyflie\"", "shield.tracking_error_m", "--identify"),
+        ("[shield]\n[vehicle]\nmodel = \"crazyflie\"\nattitude_rad_s = 5", "shield.tracking_error_m", "--identify"),
         ("[shield]\nposition_error_m = 3\naccel_m_s2 = 40", "start.positions_m", "reserve segments"),
         ("[shield]\nbrake = 3", "brake", "brake_m_s2"),
         ("control_hz = 33\n[shield]", "time.control_hz", "a whole number of steps"),

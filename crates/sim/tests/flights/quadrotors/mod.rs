@@ -5,6 +5,7 @@ mod closed_forms;
 mod flights;
 mod rotation;
 mod scenarios;
+mod shielded;
 
 use nalgebra::{Vector3, Vector4};
 use tautline_core::swarm::{Rows, Swarm, set_row};

@@ -1,0 +1,102 @@
+//! Quadrotors under a shield: keys from the measured `[tracking]` table of their model, and its conditions.
+
+use super::{SAME, ShieldSpec, refused, refused_with};
+use crate::scenario::{Scenario, ScenarioError, Space};
+use crate::vehicle::{Quadrotor, Tracking};
+use tautline_laws::law::LawSpec;
+
+/// Default of the largest command without a measured table, as a share of what thrust and lift allow.
+const ACCEL_SHARE: f64 = 0.5;
+
+impl Scenario {
+    /// Returns the table of the shield. For quadrotors, the measured table of the model replaces keys that are not
+    /// given, and `tracking_error_m` if the scenario is within its conditions.
+    pub(super) fn shield_keys(&self) -> Option<ShieldSpec> {
+        let mut spec = self.shield?;
+        let Some(Quadrotor { model, .. }) = self.airframe.quadrotor() else { return Some(spec) };
+        let most_m_s2 = self.actuation.max_accel_m_s2.unwrap_or(f64::INFINITY);
+        let Some(tracking) = &model.tracking else {
+            let accel_m_s2 = ACCEL_SHARE * model.most_accel_m_s2(self.space == Space::Plane);
+            spec.accel_m_s2 = spec.accel_m_s2.or(Some(accel_m_s2.min(most_m_s2)));
+            return Some(spec);
+        };
+        let speed_m_s = self.law_speed_m_s().unwrap_or(f64::INFINITY).min(tracking.max_speed_m_s);
+        spec.accel_m_s2 = spec.accel_m_s2.or(Some(tracking.accel_m_s2.min(most_m_s2)));
+        spec.max_speed_m_s = spec.max_speed_m_s.or(Some(speed_m_s));
+        spec.disturbance_m_s2 = spec.disturbance_m_s2.or(Some(tracking.disturbance_m_s2));
+        spec.tracker_per_s2 = spec.tracker_per_s2.or(Some(tracking.tracker_per_s2));
+        spec.tracker_per_s = spec.tracker_per_s.or(Some(tracking.tracker_per_s));
+        if spec.tracking_error_m.is_none() && self.beyond_tracking(&spec, tracking).is_none() {
+            spec.tracking_error_m = Some(tracking.error_m);
+        }
+        Some(spec)
+    }
+
+    /// Returns the largest speed that the law commands; `None` for laws without a limit \[m/s\].
+    pub(super) fn law_speed_m_s(&self) -> Option<f64> {
+        match &self.law {
+            LawSpec::Orca(keys) => Some(keys.max_speed_m_s),
+            LawSpec::CbfQp(keys) => Some(keys.max_speed_m_s),
+            _ => None,
+        }
+    }
+
+    /// Returns the first condition of the measured table that the scenario does not meet, in words.
+    fn beyond_tracking(&self, spec: &ShieldSpec, of: &Tracking) -> Option<String> {
+        let quadrotor = self.airframe.quadrotor()?;
+        let given = |key: Option<f64>| key.unwrap_or(f64::NAN);
+        let same = [
+            ("shield.tracker_per_s2", given(spec.tracker_per_s2), of.tracker_per_s2),
+            ("shield.tracker_per_s", given(spec.tracker_per_s), of.tracker_per_s),
+            ("time.control_hz", given(self.time.control_hz), of.control_hz),
+            ("sensing.latency_s", self.sensing.latency_s, 0.0),
+            ("actuation.lag_s", self.actuation.lag_s, 0.0),
+        ];
+        let at_most = [
+            ("shield.accel_m_s2", given(spec.accel_m_s2), of.accel_m_s2),
+            ("shield.max_speed_m_s", given(spec.max_speed_m_s), of.max_speed_m_s),
+            ("shield.position_error_m", spec.position_error_m, of.position_error_m),
+            ("shield.velocity_error_m_s", spec.velocity_error_m_s, of.velocity_error_m_s),
+            ("the fastest wind in m/s", self.wind.fastest_m_s(), of.wind_m_s),
+        ];
+        // A smaller push leaves more acceleration to the reference.
+        let at_least = [("shield.disturbance_m_s2", given(spec.disturbance_m_s2), of.disturbance_m_s2)];
+        let rounding = |limit: f64| SAME * limit.abs().max(1.0);
+        let lists = [
+            (&same[..], "must be", f64::abs as fn(f64) -> f64),
+            (&at_most[..], "must be at most", |excess| excess),
+            (&at_least[..], "must be at least", |excess| -excess),
+        ];
+        let numbers = lists.into_iter().find_map(|(list, must, excess)| {
+            let is_within = |value: f64, limit: f64| excess(value - limit) <= rounding(limit);
+            let (key, value, limit) = list.iter().find(|(_, value, limit)| !is_within(*value, *limit))?;
+            Some(format!("{key} {must} {limit}, got {value}"))
+        });
+        let switches = [("vehicle.downwash", quadrotor.downwash), ("vehicle.ground_effect", quadrotor.ground_effect)];
+        numbers.or_else(|| switches.iter().find(|(_, is_on)| *is_on).map(|(key, _)| format!("{key} must be false")))
+    }
+
+    /// Checks that the vehicles can carry out the largest command, and that their tracking error is known.
+    pub(super) fn check_tracking(&self, spec: &ShieldSpec) -> Result<(), ScenarioError> {
+        let Some(Quadrotor { model, .. }) = self.airframe.quadrotor() else { return Ok(()) };
+        let most_m_s2 = model.most_accel_m_s2(self.space == Space::Plane);
+        if let Some(accel_m_s2) = spec.accel_m_s2.filter(|accel_m_s2| *accel_m_s2 > most_m_s2) {
+            let problem = format!("shield.accel_m_s2 must be at most {most_m_s2}, which thrust and lift allow");
+            return Err(refused(&problem, accel_m_s2)
+                .with_help("reduce it; the default is that of the model")
+                .at_keys(["shield.accel_m_s2", "vehicle.model"]));
+        }
+        if spec.tracking_error_m.is_some() {
+            return Ok(());
+        }
+        let beyond = model.tracking.as_ref().and_then(|of| self.beyond_tracking(spec, of));
+        let problem = match beyond {
+            None => "the distance of a quadrotor to its reference has no computed bound".to_owned(),
+            Some(beyond) => {
+                format!("the scenario is beyond the measured tracking error of {}: {beyond}", model.name)
+            }
+        };
+        let help = "measure it with `tautline check --identify`, and set shield.tracking_error_m";
+        Err(refused_with(&problem, help).at_keys(["shield.tracking_error_m", "vehicle.model"]))
+    }
+}

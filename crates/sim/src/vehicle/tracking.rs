@@ -1,0 +1,89 @@
+//! Measured tracking error of a quadrotor, an assumption of the shield.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::dynamics::{LEAST_LIFT, THRUST_RESERVE};
+use super::model::{GRAVITY_M_S2, Model};
+
+/// Distance of a quadrotor to the reference of a shield, with the conditions under which it was measured: the table
+/// `[tracking]` of a model. `tautline check --identify` measures it. It is an assumption, not a proved bound.
+#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Tracking {
+    /// Assumed bound on the distance to the reference in m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub error_m: f64,
+    /// Largest command in m/s^2.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub accel_m_s2: f64,
+    /// Push in m/s^2 for which the shield keeps commands free. Feedback of the tracker stayed within them.
+    #[schemars(extend("minimum" = 0))]
+    pub disturbance_m_s2: f64,
+    /// Largest speed of the reference in m/s.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub max_speed_m_s: f64,
+    /// Gain of the tracker in 1/s^2 on the distance to the reference.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub tracker_per_s2: f64,
+    /// Gain of the tracker in 1/s on the velocity relative to the reference.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub tracker_per_s: f64,
+    /// Rate of held commands in Hz.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub control_hz: f64,
+    /// Fastest wind in m/s.
+    #[schemars(extend("minimum" = 0))]
+    pub wind_m_s: f64,
+    /// Error of the measured own position in m.
+    #[schemars(extend("minimum" = 0))]
+    pub position_error_m: f64,
+    /// Error of the measured own velocity in m/s.
+    #[schemars(extend("minimum" = 0))]
+    pub velocity_error_m_s: f64,
+}
+
+impl Tracking {
+    /// Returns the keys with their values.
+    pub(super) fn numbers(&self) -> [f64; 10] {
+        let Self { error_m, accel_m_s2, disturbance_m_s2, max_speed_m_s, tracker_per_s2, .. } = *self;
+        let Self { tracker_per_s, control_hz, wind_m_s, position_error_m, velocity_error_m_s, .. } = *self;
+        let loops = [tracker_per_s2, tracker_per_s, control_hz, wind_m_s, position_error_m, velocity_error_m_s];
+        let [a, b, c, d, e, f] = loops;
+        [error_m, accel_m_s2, max_speed_m_s, a, b, c, disturbance_m_s2, d, e, f]
+    }
+}
+
+impl Model {
+    /// Returns the largest acceleration \[m/s^2\] that lift and thrust allow in every direction. In the plane the
+    /// rotors carry the weight, and the rest of the thrust accelerates sideways.
+    #[must_use]
+    pub fn most_accel_m_s2(&self, is_plane: bool) -> f64 {
+        let thrust_m_s2 = (1.0 - THRUST_RESERVE) * self.most_thrust_n() / self.mass_kg;
+        if is_plane {
+            return (thrust_m_s2.powi(2) - GRAVITY_M_S2.powi(2)).max(0.0).sqrt();
+        }
+        (thrust_m_s2 - GRAVITY_M_S2).clamp(0.0, (1.0 - LEAST_LIFT) * GRAVITY_M_S2)
+    }
+
+    /// Returns the drag of the rotors over mass in level hover \[1/s\].
+    #[must_use]
+    pub fn hover_drag_per_s(&self) -> f64 {
+        self.rotor_drag_n_s_m[0].max(self.rotor_drag_n_s_m[1]) / self.mass_kg
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::model::{MODELS, read};
+
+    #[test]
+    fn acceleration_in_every_direction_is_limited_by_climb_or_sinking() {
+        let most = MODELS.map(|(_, text)| {
+            let model = read(text).expect("a model");
+            [false, true].map(|is_plane| (model.most_accel_m_s2(is_plane) * 100.0).round() / 100.0)
+        });
+        // 0.9 T/m - g climbs; 0.7 g sinks; sqrt((0.9 T/m)^2 - g^2) sideways.
+        assert_eq!(most, [[3.36, 8.79], [6.78, 13.38], [6.86, 28.53]]);
+    }
+}

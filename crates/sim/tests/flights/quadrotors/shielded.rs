@@ -1,0 +1,128 @@
+//! Quadrotors under a shield: the measured tracking error of their models, its conditions, and a built-in flight.
+//!
+//! `TAUTLINE_LONG=1` repeats the measurements of the built-in models.
+
+use tautline_audit::Status;
+use tautline_laws::formation::largest_edge_error_m;
+use tautline_shield::report::Exceeded;
+use tautline_sim::preflight::{Code, Preflight};
+use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source};
+use tautline_sim::sim::Flight;
+
+use super::model;
+use crate::flight::{builtin, fly};
+
+const SHIELDED: &str = "shielded-crazyflies";
+
+fn refused(sets: &[&str]) -> ScenarioError {
+    let sets: Vec<_> = sets.iter().map(|set| Override::parse(set).expect("a key")).collect();
+    Scenario::read(&Source::Builtin(SHIELDED.to_owned()), &sets).expect_err("refused")
+}
+
+fn tube_share(flight: &Flight) -> f64 {
+    flight.shield.as_ref().expect("a shield").counters.tracking_share
+}
+
+#[test]
+fn crazyflies_change_places_below_a_shield_and_collide_without_it() {
+    let scenario = builtin(SHIELDED, &["time.duration_s=48"]);
+    let tracking = model("crazyflie").tracking.expect("a measured table");
+    assert!(scenario.wind.fastest_m_s() > 0.0 && scenario.network.loss > 0.0);
+    let (flight, _) = fly(&scenario);
+    assert_eq!((flight.audit.status, flight.certificate.certified_m), (Status::Clear, Some(0.4)));
+    let shield = flight.shield.as_ref().expect("a shield");
+    assert_eq!((shield.breach, shield.tube_m >= tracking.error_m), (None, true));
+    assert!(shield.counters.changed > 0 && shield.lost > 0);
+    assert!((0.05..0.8).contains(&tube_share(&flight)), "{} of the tube", tube_share(&flight));
+    let error_m = largest_edge_error_m(&flight.last.positions_m, scenario.formation(), &scenario.graph);
+    assert!(error_m < scenario.arrival.edge_error_m, "{error_m} m");
+    let bare = Scenario { shield: None, ..scenario };
+    assert_eq!(fly(&bare).0.audit.status, Status::Violation);
+}
+
+#[test]
+fn a_flight_beyond_its_tube_or_its_commands_says_so() {
+    let exceeded = |sets: &[&str]| {
+        let sets = [&["time.duration_s=10"], sets].concat();
+        fly(&builtin(SHIELDED, &sets)).0.shield.expect("a shield").breach.map(|breach| breach.exceeded)
+    };
+    assert!(matches!(exceeded(&["shield.tracking_error_m=0.01"]), Some(Exceeded::Tube(share)) if share > 1.0));
+    // Without room for the feedback, commands exceed what the vehicle is assumed to carry out.
+    let no_room = ["shield.tracking_error_m=0.6", "shield.disturbance_m_s2=0", "shield.accel_m_s2=0.6"];
+    assert!(matches!(exceeded(&no_room), Some(Exceeded::Command(share) | Exceeded::Tube(share)) if share > 1.0));
+}
+
+#[test]
+fn conditions_of_a_measured_table_are_checked() {
+    let tracking = model("crazyflie").tracking.expect("a measured table");
+    let limits = builtin(SHIELDED, &[]).shield_limits().expect("limits").expect("a shield");
+    let settings = limits.settings();
+    assert_eq!(settings.tracking_error_m, Some(tracking.error_m));
+    let keys = [settings.accel_m_s2, settings.tracker_per_s2, settings.tracker_per_s, settings.max_speed_m_s];
+    let table = [tracking.accel_m_s2, tracking.tracker_per_s2, tracking.tracker_per_s, tracking.max_speed_m_s];
+    assert_eq!(keys, table);
+    for (set, says) in [
+        ("wind.mean_m_s=[3,0]", "the fastest wind in m/s must be at most"),
+        ("shield.max_speed_m_s=2", "shield.max_speed_m_s must be at most"),
+        ("shield.tracker_per_s=3", "shield.tracker_per_s must be"),
+        ("shield.disturbance_m_s2=0.5", "shield.disturbance_m_s2 must be at least"),
+        ("time.control_hz=50", "time.control_hz must be 100"),
+        ("vehicle.downwash=true", "vehicle.downwash must be false"),
+        // Another attitude loop drops the table.
+        ("vehicle.attitude_rad_s=5", "has no computed bound"),
+    ] {
+        let error = refused(&[set]);
+        let help = error.help().unwrap_or_default();
+        assert!(error.to_string().contains(says) && help.contains("--identify"), "{set}: {error}");
+    }
+    let error = refused(&["shield.accel_m_s2=9"]);
+    assert!(error.to_string().contains("which thrust and lift allow (9)"), "{error}");
+    // An own assumption needs no table.
+    assert!(builtin(SHIELDED, &["wind.mean_m_s=[1,0]", "shield.tracking_error_m=0.5"]).shield.is_some());
+    let again =
+        Scenario::read(&Source::Text { name: "again".to_owned(), text: builtin(SHIELDED, &[]).resolved_toml() }, &[]);
+    assert_eq!(again.expect("the same").shield_limits().expect("limits").expect("a shield").tube(), limits.tube());
+}
+
+/// Each table covers the measured error times the stated factor, and is not far above it.
+#[test]
+fn tables_of_built_in_models_repeat_their_measurement() {
+    if std::env::var_os("TAUTLINE_LONG").is_none() {
+        return;
+    }
+    for name in ["crazyflie", "crazyflie-brushless", "hummingbird"] {
+        let tracking = model(name).tracking.expect("a measured table");
+        let conditions = [
+            format!("vehicle.model={name}"),
+            format!("wind={{mean_m_s=[{},0,0]}}", tracking.wind_m_s),
+            "law.delta_m=0.6".to_owned(),
+        ];
+        for more in [&["swarm.dimensions=2"][..], &["start={shape=\"circle\",radius_m=2.5,jitter_m=0.05}"]] {
+            let sets: Vec<_> = conditions.iter().map(String::as_str).chain(more.iter().copied()).collect();
+            let found = builtin(SHIELDED, &sets).identify().expect("a measurement");
+            assert!(found.largest_error_m * found.factor <= tracking.error_m + 1e-3, "{name}: {found}");
+            assert!(found.largest_command_m_s2 <= tracking.accel_m_s2 && found.thrust_share < 1.0, "{name}: {found}");
+        }
+    }
+}
+
+/// With the paper's gains the lag of Crazyflies feeds an oscillation of the one-sided pushes, a limit cycle of
+/// centimetres. More damping ends it; the check predicts both.
+#[test]
+fn five_crazyflies_settle_under_the_displacement_law_with_enough_damping() {
+    let sets = ["law.kind=displacement", "time.duration_s=14", "law.zeta_per_s=2"];
+    let error_m = |scenario: &Scenario| {
+        largest_edge_error_m(&fly(scenario).0.last.positions_m, scenario.formation(), &scenario.graph)
+    };
+    let warned = |scenario: &Scenario| {
+        let found = Preflight::of(scenario).expect("a law");
+        found.warnings.into_iter().find(|warning| warning.code == Code::BeyondMargin)
+    };
+    let damped = builtin("crazyflies", &sets);
+    assert!(error_m(&damped) < 0.01, "{} m", error_m(&damped));
+    assert_eq!(warned(&damped), None);
+    let cycling = builtin("crazyflies", &sets[..2]);
+    assert!(error_m(&cycling) > 0.01, "{} m", error_m(&cycling));
+    let warning = warned(&cycling).expect("a warning");
+    assert!(warning.message.contains("Raise law.zeta_per_s to 1.9"), "{}", warning.message);
+}
