@@ -55,7 +55,7 @@ fn random(count: usize, spacing_m: f64, half_extent_m: f64, dimensions: usize) -
 }
 
 /// The same with vehicles that may take each other's slots.
-fn interchangeable(kind: Kind) -> Kind {
+fn interchangeable(kind: &Kind) -> Kind {
     let tables = kind.tables.replace("[formation]\n", "[formation]\nassignment = \"optimal\"\n");
     Kind { name: format!("{}, optimal assignment", kind.name), tables }
 }
@@ -89,7 +89,7 @@ fn kinds() -> Vec<Kind> {
         random(10, 2.4, 7.0, 2),
         random(20, 2.4, 10.0, 2),
         random(20, 1.5, 10.0, 2),
-        interchangeable(random(20, 1.5, 10.0, 2)),
+        interchangeable(&random(20, 1.5, 10.0, 2)),
         random(20, 2.4, 5.0, 3),
         groups(None),
         groups(Some(6.0)),
@@ -117,9 +117,8 @@ fn main() {
     let runs = std::env::args().nth(1).and_then(|runs| runs.parse().ok()).unwrap_or(20);
     let median = |row: &LawRow| row.reached_median_s.value.map_or("-".to_owned(), |at_s| format!("{at_s:.0}"));
     println!("Of {runs} flights each, under {}:\n", LAWS.join(" / "));
-    println!(
-        "| start | bare: violate | shield: violate | bare: reach | shield: reach | median [s] | radio: reach | median [s] |"
-    );
+    let columns = ["bare: violate", "shield: violate", "bare: reach", "shield: reach", "median [s]", "radio: reach"];
+    println!("| start | {} | median [s] |", columns.join(" | "));
     println!("| --- | --- | --- | --- | --- | --- | --- | --- |");
     for kind in kinds() {
         let named = |ending: &str| LAWS.iter().map(|law| format!("{law}{ending}")).collect::<Vec<_>>();

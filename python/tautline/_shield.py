@@ -164,6 +164,6 @@ def _rows(value: ArrayLike, name: str, count: int | None) -> NDArray[np.float64]
         raise Error(f"{name}: {problem}; give rows of numbers") from None
     if rows.ndim != 2 or rows.shape[1] not in (2, 3) or (count is not None and len(rows) != count):
         wanted = "N" if count is None else count
-        raise Error(f"{name}: must have the shape ({wanted}, 3) or ({wanted}, 2), got {np.shape(value)}; give a row per "
-                    "vehicle")
+        shape = np.shape(value)
+        raise Error(f"{name}: must have the shape ({wanted}, 3) or ({wanted}, 2), got {shape}; give a row per vehicle")
     return np.ascontiguousarray(np.pad(rows, ((0, 0), (0, 3 - rows.shape[1]))))

@@ -79,7 +79,8 @@ class Alone(Case):
         self.refuses(tl.Error, "start: vehicles 1 and 2", lambda: self.shield(position_error_m=3.0, accel_m_s2=90))
         self.refuses(tl.Error, "index: ", lambda: self.shield(index=2))
         self.refuses(TypeError, "turn: a number", lambda: self.shield(turn="right"))
-        self.refuses(tl.Error, "positions: must have the shape (N, 3)", lambda: tl.Shield([1, 2], delta_m=1, period_s=1))
+        shape = "positions: must have the shape (N, 3)"
+        self.refuses(tl.Error, shape, lambda: tl.Shield([1, 2], delta_m=1, period_s=1))
         shield = self.shield()
         self.refuses(tl.Error, "wanted: ", lambda: shield.filter(np.zeros((2, 3)), np.zeros((2, 3)), np.zeros((3, 3))))
         zeros = np.zeros((2, 3))

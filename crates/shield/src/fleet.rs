@@ -36,6 +36,7 @@ impl PairRoom {
     }
 
     /// Returns the error for a pair that starts too near.
+    #[must_use]
     pub fn too_near(&self) -> ShieldError {
         let (i, j) = (self.pair.0 + 1, self.pair.1 + 1);
         let problem = format!(

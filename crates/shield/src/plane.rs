@@ -169,8 +169,8 @@ impl Plane {
         self.offset_m - self.normal.dot(point_m)
     }
 
-    /// Returns the plane that has the same points of the level plane at a height \[m\], with a level normal. `None` if it
-    /// has all of them or none.
+    /// Returns the plane that has the same points of the level plane at a height \[m\], with a level normal. `None` if
+    /// it has all of them or none.
     #[inline]
     #[must_use]
     pub fn in_level(&self, height_m: f64) -> Option<Self> {

@@ -114,8 +114,8 @@ impl Radio {
         self.latency_s + self.jitter_s
     }
 
-    /// Writes the arrival times \[s\] of a message of a sender, its number counted from 1, over its links, each with its
-    /// receiver. A message that is lost arrives at infinity.
+    /// Writes the arrival times \[s\] of a message of a sender, its number counted from 1, over its links, each with
+    /// its receiver. A message that is lost arrives at infinity.
     pub(crate) fn send(
         &mut self,
         (sender, number, sent_s): (usize, u64, f64),

@@ -127,8 +127,8 @@ impl ShieldStage {
         command.fill(f64::NAN);
     }
 
-    /// Replaces the law's commands at an instant \[m/s^2\], N x 3, by those of the shields. `own` is the knowledge of each
-    /// vehicle of its own state.
+    /// Replaces the law's commands at an instant \[m/s^2\], N x 3, by those of the shields. `own` is the knowledge of
+    /// each vehicle of its own state.
     pub(crate) fn filter(&mut self, time_s: f64, truth: &Swarm, own: &Swarm, command: &mut Rows) {
         self.begun_s = time_s;
         self.deliver(time_s);

@@ -196,8 +196,8 @@ pub enum SimError {
     Shield(#[from] ScenarioError),
     /// Accelerations are given to a scenario with a shield.
     #[error(
-        "the shield filters the commands of a law at its own instants, not accelerations of a step; write a law, or use \
-         the shield outside of the simulation"
+        "the shield filters the commands of a law at its own instants, not accelerations of a step; write a law, or \
+         use the shield outside of the simulation"
     )]
     ShieldedCommands,
     /// The scenario has no formation.
