@@ -65,16 +65,18 @@ fn groups(gap_m: Option<f64>) -> Kind {
     let rows = |x: f64| (0..8).map(|k| [x + 2.0 * f64::from(k / 4), 2.0 * f64::from(k % 4) - 3.0]).collect::<Vec<_>>();
     let left: Vec<_> = rows(-8.0).into_iter().chain(rows(6.0)).collect();
     let right: Vec<_> = rows(6.0).into_iter().chain(rows(-8.0)).collect();
-    let mut tables = format!(
+    let start = format!(
         "[start]\npositions_m = {left:?}\njitter_m = 0.2\n[formation]\nshape = \"points\"\npoints_m = {right:?}\n"
     );
-    for (name, side) in gap_m.iter().flat_map(|_| [("upper wall", 1.0), ("lower wall", -1.0)]) {
+    let wall = |(name, side): (&str, f64)| {
         let centre_m = side * (0.5 * gap_m.unwrap_or_default() + 5.0);
-        tables += &format!(
+        format!(
             "[[obstacle]]\nname = \"{name}\"\nbox = {{ size_m = [1.0, 10.0, 4.0] }}\nat_m = [0.0, {centre_m}, 0.0]\n\
              clearance_m = 0.5\n"
-        );
-    }
+        )
+    };
+    let walls = gap_m.iter().flat_map(|_| [("upper wall", 1.0), ("lower wall", -1.0)]).map(wall);
+    let tables = std::iter::once(start).chain(walls).collect();
     let name =
         gap_m.map_or_else(|| "two groups of 8".to_owned(), |gap_m| format!("the same through a gap of {gap_m} m"));
     Kind { name, tables }

@@ -50,7 +50,7 @@ enum Adversary {
     /// Each vehicle flies at the centre of the swarm.
     Centre,
     /// Each vehicle gets a random command at each instant.
-    Random(ChaCha8Rng),
+    Random(Box<ChaCha8Rng>),
     /// The law is undefined everywhere.
     Undefined,
 }
@@ -69,7 +69,7 @@ impl Law for Adversary {
             let wanted = match self {
                 Self::Dive => others.min_by(|a, b| a.norm().total_cmp(&b.norm())).unwrap_or_default() * 50.0,
                 Self::Centre => others.sum::<Vector3<f64>>(),
-                Self::Random(random) => Random(random.clone()).vector(2, 20.0),
+                Self::Random(random) => Random(*random.clone()).vector(2, 20.0),
                 Self::Undefined => return Err(LawError::NotFinite { vehicle: i }),
             };
             if let Self::Random(random) = self {
@@ -151,7 +151,7 @@ fn draw(seed: u64, most: usize) -> Option<(Scenario, Box<dyn Law>)> {
     let law: Box<dyn Law> = match random.index(laws.len() + 3) {
         0 => Box::new(Adversary::Dive),
         1 => Box::new(Adversary::Centre),
-        2 => Box::new(Adversary::Random(ChaCha8Rng::seed_from_u64(seed))),
+        2 => Box::new(Adversary::Random(Box::new(ChaCha8Rng::seed_from_u64(seed)))),
         k => {
             scenario.law = laws[k - 3].clone();
             scenario.validate().ok()?;
