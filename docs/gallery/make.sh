@@ -20,6 +20,11 @@ draw "$out/show" --out "$out/word" --at 23.8 --theme light
 target/release/tautline render pentagon-laplacian --beside pentagon --film docs/gallery/first.gif \
     --size 800x400 --fps 12 --until 16 --speed 2 --quiet
 
+target/release/tautline compare swap --laws laplacian,orca,cbf-qp,displacement --shield --runs 20 \
+    --set actuation.max_accel_m_s2=5 --html "$out/compare.html" --quiet
+# The first figure of the page.
+sed 's/<svg/\n&/; s/<\/svg>/&\n/' "$out/compare.html" | grep -m 1 '^<svg' > docs/gallery/shield.svg
+
 for moment in start closest end; do
     cp "$out/pentagon/snapshots/$moment.png" "docs/gallery/pentagon-$moment.png"
 done
