@@ -13,6 +13,7 @@ __all__ = [
     "ReadOptions",
     "Scenario",
     "FlightFindings",
+    "Shield",
     "Simulation",
     "attack",
     "audit_arrays",

@@ -116,10 +116,8 @@ class Shield:
         own = self.index is not None
         rows = 1 if own else self._native.count
         shape = np.shape(wanted)
-        given = [
-            _rows([value] if own else value, name, rows)
-            for name, value in (("positions", positions), ("velocities", velocities), ("wanted", wanted))
-        ]
+        named: dict[str, Any] = {"positions": positions, "velocities": velocities, "wanted": wanted}
+        given = [_rows([value] if own else value, name, rows) for name, value in named.items()]
         if own and lost is not None:
             raise Error("lost: only for the shields of all vehicles; leave lost messages out of inbox")
         for message in inbox:
