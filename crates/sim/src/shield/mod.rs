@@ -9,7 +9,7 @@
 //! drag and lag by a rule of second order. With the reference at most V fast and commands up to A, both are covered by
 //!
 //! ```text
-//! path error   A dt^2/8 + (|a22| dt)^2 (V + A dt) (1 + kd)/(12 kp)
+//! path error   (A + W + |a22| V) dt^2/8 + (|a22| dt)^2 (V + A dt) (1 + kd)/(12 kp)
 //! push         ((|a22| dt)^2 (|a22| V + A) + A (dt/lag)^2)/6
 //! ```
 //!
@@ -192,8 +192,9 @@ impl Scenario {
             let lag = if self.actuation.lag_s > 0.0 { accel_m_s2 * (dt_s / self.actuation.lag_s).powi(2) } else { 0.0 };
             settings.integration_error_m_s2 = (decay * (a22_per_s.abs() * max_speed_m_s + accel_m_s2) + lag) / 6.0;
             let gains = (1.0 + tracker_per_s) / (12.0 * tracker_per_s2);
+            let largest_m_s2 = accel_m_s2 + settings.disturbance_m_s2 + a22_per_s.abs() * max_speed_m_s;
             settings.path_error_m =
-                accel_m_s2 * dt_s * dt_s / 8.0 + decay * (max_speed_m_s + accel_m_s2 * dt_s) * gains;
+                largest_m_s2 * dt_s * dt_s / 8.0 + decay * (max_speed_m_s + accel_m_s2 * dt_s) * gains;
         }
         settings.limits().map(Some).map_err(|error| of_shield(&error))
     }
