@@ -59,6 +59,8 @@ pub(crate) enum RadioUse {
 pub(crate) struct Radio {
     latency_s: f64,
     jitter_s: f64,
+    /// Range \[m\]; infinite without a limit.
+    range_m: f64,
     loss: Option<Loss>,
     noise: Noise,
     used_for: RadioUse,
@@ -73,7 +75,7 @@ pub(crate) struct Radio {
 impl Radio {
     /// Returns the radio of a scenario with this number of directed links.
     pub(crate) fn new(scenario: &Scenario, links: usize, used_for: RadioUse) -> Self {
-        let NetworkSpec { latency_s, jitter_s, loss, loss_burst, .. } = scenario.network;
+        let NetworkSpec { latency_s, jitter_s, loss, loss_burst, range_m, .. } = scenario.network;
         let count = scenario.count();
         let index = |number: u64| usize::try_from(number.saturating_sub(1)).unwrap_or(usize::MAX);
         let down = scenario.network.failure.iter().map(|failure| LinkOutage {
@@ -88,6 +90,7 @@ impl Radio {
         Self {
             latency_s,
             jitter_s,
+            range_m: range_m.unwrap_or(f64::INFINITY),
             loss: (loss > 0.0).then(|| Loss::new(loss, loss_burst)),
             noise: Noise::new(scenario.noise_seed, NoiseSource::Messages),
             used_for,
@@ -115,10 +118,11 @@ impl Radio {
     }
 
     /// Writes the arrival times \[s\] of a message of a sender, its number counted from 1, over its links, each with
-    /// its receiver. A message that is lost arrives at infinity.
+    /// its receiver. A message that is lost arrives at infinity. The positions decide which vehicles are within range.
     pub(crate) fn send(
         &mut self,
         (sender, number, sent_s): (usize, u64, f64),
+        positions_m: &Rows,
         links: impl ExactSizeIterator<Item = (usize, usize)>,
         arrives_s: &mut [f64],
     ) {
@@ -135,7 +139,9 @@ impl Radio {
                 self.lost_before[link] = Some(is_lost);
                 is_lost
             });
-            let is_lost = by_chance || self.down.iter().any(|down| down.blocks(sender, receiver, sent_s));
+            let is_beyond = self.range_m < f64::INFINITY
+                && (row(positions_m, receiver) - row(positions_m, sender)).norm() > self.range_m;
+            let is_lost = by_chance || is_beyond || self.down.iter().any(|down| down.blocks(sender, receiver, sent_s));
             self.sent += 1;
             self.lost += u64::from(is_lost);
             arrives_s[link] = if is_lost { f64::INFINITY } else { sent_s + self.latency_s + self.jitter_s * jitter };
@@ -228,7 +234,8 @@ impl Messages {
         sensing.measure(history, sent_s, None, &mut broadcast.states);
         for sender in 0..self.links.count() {
             let links = self.links.from(sender);
-            self.radio.send((sender, self.next, sent_s), links, &mut broadcast.arrives_s);
+            let Broadcast { states, arrives_s, .. } = &mut broadcast;
+            self.radio.send((sender, self.next, sent_s), &states.positions_m, links, arrives_s);
         }
         self.received.iter().for_each(|received| self.ages.take(sent_s - received.measured_s));
         self.next += 1;

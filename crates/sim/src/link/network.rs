@@ -39,6 +39,11 @@ pub struct NetworkSpec {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub rate_hz: Option<f64>,
+    /// Range of the radio in m: messages between vehicles farther apart are lost; no limit unless given. Needs
+    /// `rate_hz`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub range_m: Option<f64>,
     /// Estimate of the present state of another vehicle from its last message.
     #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = StalePolicy::default()))]
@@ -93,7 +98,7 @@ impl NetworkSpec {
     /// Returns whether messages may be lost.
     #[must_use]
     pub fn loses(&self) -> bool {
-        self.loss > 0.0 || !self.failure.is_empty()
+        self.loss > 0.0 || self.range_m.is_some() || !self.failure.is_empty()
     }
 }
 
@@ -118,6 +123,7 @@ impl ImperfectionSpec for NetworkSpec {
         let needs_rate = [
             ("network.jitter_s", jitter_s > 0.0),
             ("network.loss", loss > 0.0),
+            ("network.range_m", self.range_m.is_some()),
             ("network.failure", !self.failure.is_empty()),
         ];
         for (key, _) in needs_rate.into_iter().filter(|&(_, is_used)| is_used) {

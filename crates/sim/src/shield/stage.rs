@@ -145,7 +145,7 @@ impl ShieldStage {
         for (i, shielded) in self.commands.iter().enumerate() {
             set_row(command, i, *shielded);
         }
-        self.send(time_s);
+        self.send(time_s, truth);
     }
 
     /// Compares the measurements with the true states that they measured.
@@ -199,7 +199,7 @@ impl ShieldStage {
     }
 
     /// Sends the messages of an instant, if the rate of messages has one for it.
-    fn send(&mut self, time_s: f64) {
+    fn send(&mut self, time_s: f64, truth: &Swarm) {
         let period = self.rate_hz.map_or(self.next_period, |rate_hz| period(time_s, rate_hz));
         if period < self.next_period {
             return;
@@ -217,7 +217,8 @@ impl ShieldStage {
         });
         for sender in 0..count {
             let links = (0..count - 1).map(|k| (sender * (count - 1) + k, k + usize::from(k >= sender)));
-            self.radio.send((sender, self.rounds, time_s), links, &mut round.arrives_s);
+            let sent = (sender, self.rounds, time_s);
+            self.radio.send(sent, &truth.positions_m, links, &mut round.arrives_s);
         }
         // A message is heard at a later instant.
         let soonest_s = time_s + 2.0 * SAME_S;

@@ -334,3 +334,23 @@ fn obstacles_and_ellipsoids_are_certified_too() {
     assert_eq!((flight.audit.status, flight.certificate.certified_m), (Status::Clear, Some(1.0)));
     assert!(report(&flight).certificate.contains("2.000 m in the vertical"), "{}", report(&flight).certificate);
 }
+
+#[test]
+fn a_radio_of_any_range_keeps_vehicles_apart() {
+    let text = SWAP.replace("[[-3, 0], [3, 0]]", "[[-6, 0], [6, 0]]").replace("[[3, 0], [-3, 0]]", "[[6, 0], [-6, 0]]");
+    let with = |range_m: &str| fly(&read(&format!("{text}\n[shield]\n[network]\nrate_hz = 20\n{range_m}"))).0;
+    let apart = |flight: &tautline_sim::sim::Flight| {
+        (row(&flight.last.positions_m, 0) - row(&flight.last.positions_m, 1)).norm()
+    };
+    let (far, near) = (with(""), with("range_m = 5.0"));
+    for flight in [&far, &near] {
+        assert_eq!((flight.audit.status, report(flight).breach), (Status::Clear, None));
+    }
+    assert_eq!((report(&far).lost, report(&near).lost > 0), (0, true));
+    // The first plane is halfway: both come within range of each other there, and pass.
+    assert!(apart(&far) > 11.0 && apart(&near) > 11.0, "{} {}", apart(&far), apart(&near));
+    // No contract is renewed. Vehicles stay apart whatever they do then.
+    let short = with("range_m = 0.9");
+    assert_eq!((short.audit.status, report(&short).lost), (Status::Clear, report(&short).sent));
+    assert_eq!((report(&short).breach, report(&short).counters.accepted), (None, 0));
+}
