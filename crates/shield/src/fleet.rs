@@ -197,7 +197,7 @@ mod tests {
         assert_eq!(
             Fleet::new(&limits, &states).expect_err("too near").to_string(),
             "start: vehicles 2 and 3 reserve segments 0.832500 m apart; their margins need 1.000001 m, the room is \
-             (-0.16750100000000034); move them apart, start slower or lower the errors"
+             (-0.167501); move them apart, start slower or lower the errors"
         );
         let starts: Vec<_> = states.iter().map(|state| limits[0].start(*state).expect("slow enough")).collect();
         let error = Shield::new(&limits[0], 1, &starts).expect_err("too near").to_string();

@@ -60,6 +60,17 @@ pub enum Exceeded {
     Command(f64),
 }
 
+impl Exceeded {
+    /// Factor by which a bound was exceeded; infinite for a missing measurement.
+    #[must_use]
+    pub fn factor(&self) -> f64 {
+        match *self {
+            Self::MissingMeasurement => f64::INFINITY,
+            Self::Measurement(factor) | Self::Tube(factor) | Self::Offset(factor) | Self::Command(factor) => factor,
+        }
+    }
+}
+
 impl fmt::Display for Exceeded {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {

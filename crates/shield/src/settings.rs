@@ -193,7 +193,7 @@ impl Settings {
         }
         if self.measurement_delay_periods > MAX_DELAY {
             let value = self.measurement_delay_periods as f64;
-            return fails("measurement_delay_periods", "must be at most 20", value, "use a longer period");
+            return fails("measurement_delay_periods", "must be at most 20 periods", value, "use a longer period");
         }
         Ok(())
     }
@@ -209,6 +209,15 @@ impl Settings {
                 ),
                 self.tracker_per_s,
                 "lower both gains or shorten the period",
+            ),
+            TubeError::Slow => ShieldError::new(
+                "tracker_per_s2",
+                format!(
+                    "the tracker settles too slowly or not at all with `tracker_per_s` {} and a period of {} s",
+                    self.tracker_per_s, self.period_s
+                ),
+                self.tracker_per_s2,
+                "raise the gain that is small beside 1/s, or lengthen the period",
             ),
             TubeError::ShortLag => ShieldError::new(
                 "actuator_lag_s",
@@ -307,6 +316,7 @@ impl Limits {
         let of = &self.settings;
         let delay = match of.measurement_delay_periods {
             0 => String::new(),
+            1 => ", measurements are a period old".to_owned(),
             periods => format!(", measurements are {periods} periods old"),
         };
         let lag =
@@ -396,7 +406,9 @@ impl ShieldError {
 
 impl fmt::Display for ShieldError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(out, "{}: {} ({}); {}", self.place, self.problem, self.value, self.remedy)
+        // Rounding of the last digits is left out.
+        let value = if self.value.abs() < 1e6 { (self.value * 1e9).round() / 1e9 } else { self.value };
+        write!(out, "{}: {} ({value}); {}", self.place, self.problem, self.remedy)
     }
 }
 
@@ -460,7 +472,7 @@ mod tests {
         assert!(refused(|settings| settings.delta_m = f64::NAN).starts_with("delta_m: must be above 0 (NaN)"));
         assert!(refused(|settings| settings.ease_m = Some(-0.1)).starts_with("ease_m: must not be negative (-0.1)"));
         assert!(refused(|settings| settings.turn = 2.0).starts_with("turn: must be from -1 to 1 (2)"));
-        assert!(refused(|settings| settings.measurement_delay_periods = 99).contains("at most 20 (99)"));
+        assert!(refused(|settings| settings.measurement_delay_periods = 99).contains("at most 20 periods (99)"));
         assert!(refused(|settings| settings.measurement_delay_periods = 12).starts_with("tracker_per_s: "));
         assert!(refused(|settings| settings.actuator_lag_s = 1e-5).starts_with("actuator_lag_s: "));
         assert!(refused(|settings| settings.a22_per_s = f64::INFINITY).starts_with("a22_per_s: "));

@@ -95,6 +95,8 @@ pub struct Tube {
 pub enum TubeError {
     /// The sampled loop does not contract.
     Unstable,
+    /// The sampled loop contracts too slowly, or not at all.
+    Slow,
     /// The lag is too short a part of the period for the enclosure.
     ShortLag,
 }
@@ -131,7 +133,7 @@ impl TrackerLoop {
             starts = &sampled.step * starts;
             power = &sampled.step * power;
         }
-        Err(TubeError::Unstable)
+        Err(TubeError::Slow)
     }
 
     /// Returns the integrals, from an instant over some cells, of the bound of q times the hat function of each point.

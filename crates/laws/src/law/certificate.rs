@@ -117,6 +117,9 @@ pub enum VoidReason {
     /// The law needs shorter time steps than the run was allowed to take.
     #[error("The law needs shorter time steps than the run could take: the motion flown is outside the law's proof.")]
     StepsTooLong,
+    /// A bound that the shield assumes was exceeded in flight.
+    #[error("The flight exceeded a bound that the shield assumes: its proof does not cover this flight.")]
+    ShieldExceeded,
     /// The certified separation exceeds delta by less than the resolution of positions.
     #[error("The certified separation exceeds delta by less than the position resolution: the energy is too high.")]
     Unresolved,
@@ -200,6 +203,7 @@ impl VoidReason {
             Self::ObstaclesNotAvoided => "obstacles-unknown",
             Self::ReferenceAmongObstacles => "reference-among-obstacles",
             Self::StepsTooLong => "steps-too-long",
+            Self::ShieldExceeded => "shield-exceeded",
             Self::Unresolved => "certificate-unresolved",
             Self::StartRefused(LawError::Collision { .. }) => "start-too-close",
             Self::StartRefused(_) => "start-refused",
@@ -260,6 +264,7 @@ mod tests {
             VoidReason::ObstaclesNotAvoided,
             VoidReason::ReferenceAmongObstacles,
             VoidReason::StepsTooLong,
+            VoidReason::ShieldExceeded,
             VoidReason::Unresolved,
             VoidReason::StartRefused(collision),
             VoidReason::StartRefused(LawError::NotFinite { vehicle: 2 }),
@@ -289,6 +294,7 @@ mod tests {
             "obstacles-unknown",
             "reference-among-obstacles",
             "steps-too-long",
+            "shield-exceeded",
             "certificate-unresolved",
             "start-too-close",
             "start-refused",

@@ -119,7 +119,7 @@ fn a_start_without_room_is_refused_with_vehicle_obstacle_and_room() {
     assert_eq!(
         fleet(&states).with_obstacles(&bodies).expect_err("too near").to_string(),
         "start: vehicle 2 reserves a segment 0.332500 m from obstacle 2; its margin needs 0.500000 m, the room is \
-         (-0.16750050000000005); move it away, start slower or lower the errors"
+         (-0.1675005); move it away, start slower or lower the errors"
     );
     states[1].position_m.x = 5.5;
     let error = fleet(&states).with_obstacles(&bodies).expect_err("meets").to_string();

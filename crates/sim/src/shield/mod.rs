@@ -9,7 +9,7 @@
 //! drag and lag by a rule of second order. With the reference at most V fast and commands up to A, both are covered by
 //!
 //! ```text
-//! path error   (A + W + |a22| V) dt^2/8 + (|a22| dt)^2 (V + A dt) (1 + kd)/(12 kp)
+//! path error   (A + W + |a22| V) dt^2/8 + (|a22| dt)^2 (V + A dt) (1 + kd)/(12 kp) + A dt^2/6 with a lag
 //! push         ((|a22| dt)^2 (|a22| V + A) + A (dt/lag)^2)/6
 //! ```
 //!
@@ -195,6 +195,9 @@ impl Scenario {
             let largest_m_s2 = accel_m_s2 + settings.disturbance_m_s2 + a22_per_s.abs() * max_speed_m_s;
             settings.path_error_m =
                 largest_m_s2 * dt_s * dt_s / 8.0 + decay * (max_speed_m_s + accel_m_s2 * dt_s) * gains;
+            if self.actuation.lag_s > 0.0 {
+                settings.path_error_m += accel_m_s2 * dt_s * dt_s / 6.0;
+            }
         }
         settings.limits().map(Some).map_err(|error| of_shield(&error))
     }
@@ -205,7 +208,12 @@ impl Scenario {
         let per_period = rate_hz.map_or(1.0, |rate_hz| rate_hz / control_hz);
         let age_s = rate_hz.map_or(latency_s, |rate_hz| (latency_s * rate_hz - SAME).ceil().max(0.0) / rate_hz);
         let periods = age_s * control_hz;
-        if is_whole(per_period) && per_period > 0.5 && is_whole(periods) {
+        if !is_whole(per_period) || per_period < 0.5 {
+            return Err(refused("each period of time.control_hz needs a fresh measurement; per period", per_period)
+                .with_help(format!("set sensing.rate_hz to {control_hz} or a multiple of it"))
+                .at_keys(["sensing.rate_hz", "time.control_hz"]));
+        }
+        if is_whole(periods) {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 0; more saturates")]
             return Ok(periods.round() as usize);
         }
@@ -275,9 +283,10 @@ impl Scenario {
             }
         }
         self.check_tracking(spec)?;
-        let noise_m = self.sensing.position_noise_m + self.sensing.position_bias_m;
+        let (noise_m, bias_m) = (self.sensing.position_noise_m, self.sensing.position_bias_m);
         let noises = [
             ("shield.position_error_m", "sensing.position_noise_m", noise_m, spec.position_error_m),
+            ("shield.position_error_m", "sensing.position_bias_m", bias_m, spec.position_error_m),
             (
                 "shield.velocity_error_m_s",
                 "sensing.velocity_noise_m_s",
@@ -286,7 +295,7 @@ impl Scenario {
             ),
         ];
         for (key, of, noise, bound) in noises {
-            if noise > bound {
+            if noise > 0.0 && noise >= bound {
                 return Err(refused(
                     &format!("{key} must be more than {of}, the deviation of a noise without bound"),
                     bound,
@@ -297,7 +306,7 @@ impl Scenario {
         }
         let push_m_s2 = self.drag_per_s * self.wind.fastest_m_s();
         let disturbance_m_s2 = spec.disturbance_m_s2.unwrap_or(0.0);
-        if push_m_s2 > disturbance_m_s2 && self.airframe.is_point() {
+        if push_m_s2 > disturbance_m_s2 * (1.0 + SAME) && self.airframe.is_point() {
             return Err(refused(
                 &format!("shield.disturbance_m_s2 must be at least {push_m_s2}, which is drag times the fastest wind"),
                 disturbance_m_s2,

@@ -25,7 +25,7 @@ pub struct ShieldReport {
     pub period_s: f64,
     /// Numbers of all vehicles together.
     pub counters: Counters,
-    /// First vehicle for which an assumption did not hold. The flight is then not the one that the proof is about.
+    /// Worst vehicle for which an assumption did not hold. The flight is then not the one that the proof is about.
     pub breach: Option<ShieldBreach>,
     /// Number of instants at which the law was undefined and all vehicles braked.
     pub undefined: u64,
@@ -235,10 +235,16 @@ impl ShieldStage {
     /// Returns the numbers of the flight so far.
     pub(crate) fn report(&self) -> ShieldReport {
         let counters = self.fleet.report();
-        let breach = self.fleet.shields().iter().enumerate().find_map(|(vehicle, shield)| {
-            // A vehicle that fails voids the certificate by itself.
-            let exceeded = shield.counters().exceeded().filter(|_| self.failed_from_s[vehicle].is_infinite())?;
+        // A vehicle that fails voids the certificate by itself.
+        let flying = self.fleet.shields().iter().enumerate().filter(|(i, _)| self.failed_from_s[*i].is_infinite());
+        let breaches = flying.filter_map(|(vehicle, shield)| {
+            let exceeded = shield.counters().exceeded()?;
             Some(ShieldBreach { vehicle, exceeded })
+        });
+        // The worst; the first of equal ones.
+        let breach = breaches.fold(None, |worst: Option<ShieldBreach>, one| match worst {
+            Some(worst) if worst.exceeded.factor() >= one.exceeded.factor() => Some(worst),
+            _ => Some(one),
         });
         let (sent, lost) = self.radio.counts();
         let first = self.fleet.shields().first().map(tautline_shield::Shield::limits);

@@ -309,6 +309,9 @@ impl Simulation {
     /// Returns the result of the flight. A flight in progress counts as interrupted.
     #[must_use]
     pub fn finish(self) -> Flight {
+        let shield = self.controller.shield.as_ref().map(ShieldStage::report);
+        let is_exceeded = shield.as_ref().is_some_and(|shield| shield.breach.is_some());
+        let certificate = self.certificate.void_where(is_exceeded, VoidReason::ShieldExceeded);
         let AuditResults { audit, in_metres, clearance, engine_contacts, bounces } = self.judge.finish();
         Flight {
             law: self.controller.law.name().to_owned(),
@@ -317,7 +320,7 @@ impl Simulation {
             steps: self.steps,
             refined_steps: self.refined_steps,
             overlong_steps: self.overlong_steps,
-            certificate: self.certificate,
+            certificate,
             audit,
             in_metres,
             clearance,
@@ -327,7 +330,7 @@ impl Simulation {
             deadlock_recoveries: self.energy_monitor.deadlock_recoveries,
             assignments: self.energy_monitor.assignments,
             traffic: self.controller.link.traffic(),
-            shield: self.controller.shield.as_ref().map(ShieldStage::report),
+            shield,
             last: self.state,
             performance: Performance { airframe: self.plant.airframe_time(), ..self.performance },
         }

@@ -234,6 +234,7 @@ fn exceeded_bounds_are_named_with_their_vehicle() {
     let (flight, _) = fly(&scenario);
     let breach = report(&flight).breach.expect("a breach");
     assert!(breach.exceeded.to_string().contains("times the tube"), "{breach:?}");
+    assert_eq!(flight.certificate.certified_m, None);
     // A dead vehicle voids the certificate.
     let dead = "[shield]\n[[failure]]\nvehicle = 1\nat_s = 1.0\nkind = \"dead\"";
     let (flight, _) = fly(&read(&format!("{SWAP}\n{dead}")));
@@ -353,4 +354,12 @@ fn a_radio_of_any_range_keeps_vehicles_apart() {
     let short = with("range_m = 0.9");
     assert_eq!((short.audit.status, report(&short).lost), (Status::Clear, report(&short).sent));
     assert_eq!((report(&short).breach, report(&short).counters.accepted), (None, 0));
+}
+
+#[test]
+fn a_lag_and_late_measurements_keep_the_bounds() {
+    for sensing in ["latency_s = 0.05", "rate_hz = 20", "rate_hz = 40\nlatency_s = 0.05"] {
+        let (flight, _) = fly(&read(&format!("{SWAP}\n[shield]\n[actuation]\nlag_s = 0.05\n[sensing]\n{sensing}")));
+        assert_eq!((flight.status(), report(&flight).breach), (Status::Clear, None), "{sensing}");
+    }
 }

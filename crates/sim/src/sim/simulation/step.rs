@@ -206,11 +206,9 @@ impl Simulation {
         for (after_s, positions_m) in self.path.instants() {
             self.judge.sweep(from_s + after_s, positions_m, bend_m, &mut self.events).map_err(refused)?;
         }
-        self.controller.accept(self.time_s, &self.state);
         if let Some(shield) = &mut self.controller.shield {
             shield.observe(self.time_s, &self.state);
         }
-        self.controller.link.settle(self.time_s);
         let time = &self.scenario.time;
         let is_asked = !self.overruled && (time.control_hz.is_none() || (is_whole && time.commands(number)));
         if time.control_hz.is_some() {
@@ -219,6 +217,9 @@ impl Simulation {
             }
             self.plant.apply(&self.control, &mut self.state);
         }
+        // Held commands complete the velocities before sensors measure them.
+        self.controller.accept(self.time_s, &self.state);
+        self.controller.link.settle(self.time_s);
         let Self { judge, controller, state, control, time_s, events, .. } = self;
         let may_move = !controller.law.capabilities().requires_calling_thread;
         let (state, time_s): (&Swarm, f64) = (state, *time_s);
