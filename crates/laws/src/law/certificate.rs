@@ -305,7 +305,7 @@ mod tests {
             assert!(sentence.starts_with("The ") && sentence.ends_with('.') && !sentence.ends_with(".."));
         }
         assert_eq!(
-            reasons[24].to_string(),
+            reasons[25].to_string(),
             "The law is undefined at the start: vehicles 1 and 2 are 1.500 m apart, not more than the safety distance \
              2.000 m."
         );
