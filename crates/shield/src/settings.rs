@@ -10,6 +10,8 @@ use crate::contract::Side;
 use crate::plane::{Metric, Segment};
 use crate::tube::{TrackerLoop, Tube, TubeError};
 
+/// Largest coordinate of a start \[m\].
+const FARTHEST_M: f64 = 1e6;
 /// Part of the safety distance that is added because of rounding \[m\]. It covers positions up to 1e6 m.
 pub const ROUNDING_M: f64 = 1e-6;
 /// Default deceleration of the brake, as a share of the largest command.
@@ -342,10 +344,15 @@ impl Limits {
     /// measurement.
     ///
     /// # Errors
-    /// If a number is not finite or the speed is above the largest one.
+    /// If a number is not finite, a coordinate is beyond 1e6 m, or the speed is above the largest one.
     pub fn start(&self, state: State) -> Result<Start, ShieldError> {
         if !state.is_finite() {
             return Err(ShieldError::new("start", "must be finite".into(), f64::NAN, "give a position and a velocity"));
+        }
+        let farthest_m = state.position_m.amax();
+        if farthest_m > FARTHEST_M {
+            let problem = format!("is farther than {FARTHEST_M} m from the origin along an axis");
+            return Err(ShieldError::new("start", problem, farthest_m, "move the origin near the vehicles"));
         }
         let speed = state.velocity_m_s.norm();
         if speed > self.settings.max_speed_m_s {
@@ -483,5 +490,7 @@ mod tests {
             "start: starts faster than `max_speed_m_s` = 2 (3); raise `max_speed_m_s` or start slower"
         );
         assert!(limits.start(State::at_rest(Vector3::x() * f64::NAN)).is_err());
+        let far = limits.start(State::at_rest(Vector3::x() * -2e6)).expect_err("far").to_string();
+        assert!(far.starts_with("start: is farther than 1000000 m from the origin along an axis (2000000)"), "{far}");
     }
 }

@@ -188,8 +188,9 @@ impl Preflight {
         let capabilities = law.capabilities();
         let rates = law.rates(&RateQuery {
             a22_per_s: scenario.velocity_coefficient_per_s(),
+            // The bounds of a shield are those of delta and clearances, where a law may have no rate.
             nearest_m: certificate.certified_m.filter(|_| scenario.shield.is_none()),
-            obstacle_margin_m: certificate.certified_clearance_margin_m,
+            obstacle_margin_m: certificate.certified_clearance_margin_m.filter(|_| scenario.shield.is_none()),
             connectivity,
         });
         let drift = scenario.drift(rates.common_mode_per_s);
@@ -231,7 +232,8 @@ impl Preflight {
                 .fastest_per_s
                 .map(|rate_per_s| scenario.time.stable_rate_dt() / rate_per_s.hypot(rates.obstacles_per_s2.sqrt())),
             dt_links_s: scenario.links_step_s(law),
-            margins: margins::margins(law, scenario),
+            // The tracker of a shield has limits of its own, which validation checks.
+            margins: if scenario.shield.is_none() { margins::margins(law, scenario) } else { Vec::new() },
             samples: scenario.time.samples(),
             recording_bytes: scenario.time.samples() * TimeSpec::BYTES_PER_VEHICLE * scenario.count() as u64,
             start_dimension: motion_dimension(&scenario.start),

@@ -166,10 +166,7 @@ impl Preflight {
         rows.extend(self.legs.iter().enumerate().map(|(leg, promise)| (format!("leg {}", leg + 1), leg_line(promise))));
         let rest = [
             ("needs", self.needs_line()),
-            (
-                "margins",
-                margins::line(&self.margins).unwrap_or_else(|| "unknown for this law, graph and vehicle".to_owned()),
-            ),
+            ("margins", margins::line(&self.margins).unwrap_or_else(|| self.no_margins().to_owned())),
             ("step", self.step_line()),
             ("recording", self.recording_line()),
             ("start", self.start_line()),
@@ -223,6 +220,10 @@ impl Preflight {
             None => "not certified".to_owned(),
         };
         format!("{certified}, {start_clearance_margin_m:.6} m at the start")
+    }
+
+    fn no_margins(&self) -> &'static str {
+        if self.shield.is_some() { "unknown under a shield" } else { "unknown for this law, graph and vehicle" }
     }
 
     fn needs_line(&self) -> String {
