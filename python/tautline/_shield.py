@@ -25,7 +25,7 @@ class Shield:
             safe = shield.filter(positions, velocities, policy(positions))
             ...                             # Hold `safe` (N, 3) for 0.05 s.
 
-    Example, for the computer of vehicle 2::
+    Example, for one vehicle (``index`` counts from 0; messages count vehicles from 1)::
 
         shield = tl.Shield(starts, delta_m=1.0, period_s=0.05, index=2)
         safe = shield.filter(position, velocity, wanted, inbox)
@@ -150,7 +150,7 @@ class Shield:
         return {**json.loads(counters), "exceeded": exceeded}
 
     def __repr__(self) -> str:
-        whose = f"{self._native.count} vehicles" if self.index is None else f"vehicle {self.index}"
+        whose = f"{self._native.count} vehicles" if self.index is None else f"vehicle {self.index + 1}"
         return f"<tautline.Shield of {whose}: {self.certificate}>"
 
 

@@ -215,8 +215,8 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     });
     terminal.finish();
     if done.is_err() && terminal.is_interrupted() {
-        let kept = if batch.written.is_empty() { "nothing".to_owned() } else { names(&batch.written) };
-        let failure = Failure::machine(Failure::INTERRUPTED, format!("interrupted: {kept} was kept"));
+        let kept = if batch.written.is_empty() { "no picture".to_owned() } else { names(&batch.written) };
+        let failure = Failure::machine(Failure::INTERRUPTED, format!("interrupted: kept {kept}"));
         return Err(failure.with_help("give the command again; it draws all pictures again"));
     }
     done?;

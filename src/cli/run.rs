@@ -186,7 +186,8 @@ fn watch(arguments: &RunArguments, terminal: &Terminal) -> Result<Exit, Failure>
     Ok(exit)
 }
 
-/// Waits for another content of a file that two looks agree on, because an editor may empty the file before it writes.
+/// Waits until the content of a file differs from `flown` and is the same in two successive reads. An editor may empty
+/// a file before it writes.
 /// Returns `None` after an interruption.
 fn next_content(path: &Path, flown: Option<&[u8]>, terminal: &Terminal) -> Option<Vec<u8>> {
     let mut seen = None;

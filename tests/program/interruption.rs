@@ -231,7 +231,7 @@ fn an_interrupted_film_leaves_no_file_and_names_the_kept_pictures() {
     let ended = child.wait_with_output().expect("an end");
     let err = String::from_utf8_lossy(&ended.stderr);
     assert_eq!(ended.status.code(), Some(130), "{err}");
-    assert!(err.contains("interrupted: ./start.png was kept"), "{err}");
+    assert!(err.contains("interrupted: kept ./start.png"), "{err}");
     assert_eq!(names(), ["start.png"]);
 }
 

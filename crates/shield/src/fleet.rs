@@ -39,11 +39,9 @@ impl PairRoom {
     #[must_use]
     pub fn too_near(&self) -> ShieldError {
         let (i, j) = (self.pair.0 + 1, self.pair.1 + 1);
-        let problem = format!(
-            "vehicles {i} and {j} reserve segments {:.6} m apart; their margins need {:.6} m, the room is",
-            self.distance_m, self.required_m
-        );
-        ShieldError::new("start", problem, self.room_m(), "move them apart, start slower or lower the errors")
+        let problem =
+            format!("vehicles {i} and {j} reserve segments nearer than the {:.6} m of their margins", self.required_m);
+        ShieldError::new("start", problem, self.distance_m, "move them apart, start slower or lower the errors")
     }
 }
 
@@ -196,8 +194,8 @@ mod tests {
         states[2].velocity_m_s = Vector3::new(-2.0, 0.0, 0.0);
         assert_eq!(
             Fleet::new(&limits, &states).expect_err("too near").to_string(),
-            "start: vehicles 2 and 3 reserve segments 0.832500 m apart; their margins need 1.000001 m, the room is \
-             (-0.167501); move them apart, start slower or lower the errors"
+            "start: vehicles 2 and 3 reserve segments nearer than the 1.000001 m of their margins (0.8325); \
+             move them apart, start slower or lower the errors"
         );
         let starts: Vec<_> = states.iter().map(|state| limits[0].start(*state).expect("slow enough")).collect();
         let error = Shield::new(&limits[0], 1, &starts).expect_err("too near").to_string();

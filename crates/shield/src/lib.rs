@@ -70,9 +70,10 @@
 //!
 //! Doubles round: margins contain 1e-6 m for it ([`settings::ROUNDING_M`]), which covers positions up to 1e6 m.
 //!
-//! # What breaks it
-//! A vehicle that is dead, frozen or weaker than A; a push or an error beyond its bound; forged or altered messages; a
-//! vehicle without a contract. A vehicle that is silent for good is avoided for ever.
+//! # What voids the certificate
+//! A vehicle that is dead, frozen or weaker than A voids it. So do a push or an error beyond its bound, altered
+//! messages and a vehicle without a contract. A silent vehicle does not void it: the others stay behind the last common
+//! plane.
 //! [`Counters::exceeded`](report::Counters::exceeded) names an assumption that did not hold in a flight.
 //!
 //! Arrival is not proved. Planes that are not renewed stay safe, and vehicles wait behind them.

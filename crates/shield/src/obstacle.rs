@@ -167,17 +167,15 @@ impl KeepOut {
                 Some((held, room_m)) if room_m >= 0.0 => Ok(Self { obstacle: obstacle.clone(), margin_m, held }),
                 Some((_, room_m)) => {
                     let problem = format!(
-                        "vehicle {vehicle} reserves a segment {:.6} m from obstacle {number}; its margin needs \
-                         {margin_m:.6} m, the room is",
-                        room_m + margin_m
+                        "vehicle {vehicle} reserves a segment nearer to obstacle {number} than the {margin_m:.6} m of \
+                         its margin"
                     );
                     let remedy = "move it away, start slower or lower the errors";
-                    Err(ShieldError::new("start", problem, room_m, remedy))
+                    Err(ShieldError::new("start", problem, room_m + margin_m, remedy))
                 }
                 None => {
-                    let problem =
-                        format!("vehicle {vehicle} reserves a segment that meets obstacle {number}, the room is");
-                    Err(ShieldError::new("start", problem, -margin_m, "move it away or start slower"))
+                    let problem = format!("vehicle {vehicle} reserves a segment that meets obstacle {number}");
+                    Err(ShieldError::new("start", problem, 0.0, "move it away or start slower"))
                 }
             }
         });

@@ -84,7 +84,7 @@ impl fmt::Display for Exceeded {
 }
 
 impl Counters {
-    /// Returns the first assumption that did not hold. The flight is then not the one that the certificate is about.
+    /// Returns the first assumption that did not hold. The certificate does not cover the flight then.
     #[must_use]
     pub fn exceeded(&self) -> Option<Exceeded> {
         if self.missing_measurements > 0 {

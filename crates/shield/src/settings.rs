@@ -318,19 +318,19 @@ impl Limits {
         let of = &self.settings;
         let delay = match of.measurement_delay_periods {
             0 => String::new(),
-            1 => ", measurements are a period old".to_owned(),
-            periods => format!(", measurements are {periods} periods old"),
+            1 => "; measurements are a period old".to_owned(),
+            periods => format!("; measurements are {periods} periods old"),
         };
         let lag =
-            if of.actuator_lag_s > 0.0 { format!(", actuators lag by {} s", of.actuator_lag_s) } else { String::new() };
+            if of.actuator_lag_s > 0.0 { format!("; actuators lag by {} s", of.actuator_lag_s) } else { String::new() };
         let tube = if of.tracking_error_m.is_some() { "assumed tube" } else { "tube" };
         let height = of.half_height_m.map_or_else(String::new, |half| {
             format!(" on a level and {:.3} m in the vertical, outside the ellipsoid of these half axes", 2.0 * half)
         });
         format!(
-            "certified never closer than {:.3} m{height}, whatever the law commands and whatever the radio loses. \
-             This holds while commands up to {} m/s^2 are carried out, own position is known to {} m and {} m/s, \
-             pushes stay below {} m/s^2{delay}{lag} ({tube} {:.3} m)",
+            "certified never closer than {:.3} m{height} under any law and any loss of messages. Assumed: commands up \
+             to {} m/s^2 are carried out; position errors stay below {} m and velocity errors below {} m/s; pushes \
+             stay below {} m/s^2{delay}{lag} ({tube} {:.3} m)",
             of.delta_m,
             of.accel_m_s2,
             of.position_error_m,
@@ -447,13 +447,13 @@ mod tests {
         assert_eq!(limits.ease_m(), 0.2);
         assert_eq!(
             limits.certificate(),
-            "certified never closer than 1.000 m, whatever the law commands and whatever the radio loses. This holds \
-             while commands up to 5 m/s^2 are carried out, own position is known to 0.03 m and 0.05 m/s, pushes stay \
+            "certified never closer than 1.000 m under any law and any loss of messages. Assumed: commands up to 5 \
+             m/s^2 are carried out; position errors stay below 0.03 m and velocity errors below 0.05 m/s; pushes stay \
              below 0.3 m/s^2 (tube 0.158 m)"
         );
         let late = Settings { measurement_delay_periods: 2, actuator_lag_s: 0.05, ..settings };
         let late = late.limits().expect("certified").certificate();
-        assert!(late.contains("0.3 m/s^2, measurements are 2 periods old, actuators lag by 0.05 s (tube"), "{late}");
+        assert!(late.contains("0.3 m/s^2; measurements are 2 periods old; actuators lag by 0.05 s (tube"), "{late}");
         // The assumed tube takes the place of the computed one; the feedback is still that of the loop.
         let assumed = Settings { tracking_error_m: Some(0.25), path_error_m: 0.125, ..settings }.limits().expect("ok");
         assert_eq!(assumed.tube(), Tube { error_m: 0.375, feedback_m_s2: limits.tube().feedback_m_s2 });

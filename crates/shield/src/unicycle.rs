@@ -161,7 +161,12 @@ impl Loiter {
             return fails("tracking_error_m", "must not be negative", value, "give 0 or a positive number");
         }
         if self.turn_rad_s * self.period_s > MAX_TURN_RAD {
-            return fails("turn_rad_s", "must be at most 1.5 rad in a period", self.turn_rad_s, "shorten the period");
+            return fails(
+                "turn_rad_s",
+                "must turn by at most 1.5 rad in a period",
+                self.turn_rad_s,
+                "shorten the period",
+            );
         }
         if self.slowing(self.max_speed_m_s).0 > MAX_PERIODS {
             let problem = "slowing down must take at most a million periods";
@@ -271,7 +276,7 @@ impl UnicycleShield {
         let own = loiter.start(pose)?;
         let contracts = Contracts::new(index, starts)?;
         if starts.get(index) != Some(&own) {
-            let problem = "the announced start is another one".into();
+            let problem = "the announced start differs from this pose of the vehicle counted from 0".into();
             return Err(ShieldError::new("start", problem, index as f64, "announce `Loiter::start` of this pose"));
         }
         let differs = starts.iter().position(|start| start.delta_m != loiter.delta_m || start.metric != Metric::BALL);

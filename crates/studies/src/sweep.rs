@@ -439,8 +439,8 @@ impl Study for Sweep {
         let inert = self.keys.iter().enumerate().filter(|&(place, of)| of.is_seed() && self.is_inert(place));
         let inert = inert.map(|(_, SweptKey { key, .. })| {
             format!(
-                "{key} changes no flight, because the scenario draws nothing from it: its rows are the same flight; \
-                 {JITTER_KEY} gives random starts, and [wind], [sensing] and [network] have noise"
+                "{key} changes no flight: the scenario draws no random number from this seed. Set {JITTER_KEY} for \
+                 random starts, or noise in [wind], [sensing] or [network]"
             )
         });
         [refused, self.jitter_m.map(jitter_note)].into_iter().flatten().chain(inert).collect()

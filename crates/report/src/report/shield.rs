@@ -12,8 +12,8 @@ pub struct ShieldNumbers {
     pub certificate: String,
     /// Bound on the distance of a vehicle to its reference \[m\].
     pub tube_m: f64,
-    /// Assumption that did not hold, with its vehicle; the flight is then not the one that the proof is about. Null if
-    /// all of them held.
+    /// Assumption that did not hold, with its vehicle. The certificate does not cover the flight then. Null if all of
+    /// them held.
     pub exceeded: Option<String>,
     /// Number of commands.
     pub commands: u64,
@@ -83,7 +83,7 @@ impl ShieldNumbers {
         ))
     }
 
-    /// Returns the same in a few words.
+    /// Returns a short form of the reason.
     pub(super) fn brief(&self) -> Option<String> {
         self.exceeded.as_ref().map(|exceeded| format!("bound of the shield exceeded: {exceeded}"))
     }

@@ -93,7 +93,7 @@ fn rooms_are_in_scaled_lengths_and_all_vehicles_have_one_ellipsoid() {
     assert_eq!(tall.metric(), Metric::ellipsoid(1.0, TALL_M));
     assert!(tall.certificate().starts_with(
         "certified never closer than 1.000 m on a level and 3.000 m in the vertical, outside the ellipsoid of these \
-         half axes, whatever"
+         half axes under any law"
     ));
     let slots = [0.0, 2.4].map(|z| tall.slot(Vector3::z() * z));
     let closest = closest_starts(&slots).expect("two");

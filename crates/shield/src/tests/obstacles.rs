@@ -118,13 +118,13 @@ fn a_start_without_room_is_refused_with_vehicle_obstacle_and_room() {
     states[1] = State { position_m: Vector3::x() * 5.0, velocity_m_s: Vector3::x() * 2.0 };
     assert_eq!(
         fleet(&states).with_obstacles(&bodies).expect_err("too near").to_string(),
-        "start: vehicle 2 reserves a segment 0.332500 m from obstacle 2; its margin needs 0.500000 m, the room is \
-         (-0.1675005); move it away, start slower or lower the errors"
+        "start: vehicle 2 reserves a segment nearer to obstacle 2 than the 0.500000 m of its margin (0.3325); move it \
+         away, start slower or lower the errors"
     );
     states[1].position_m.x = 5.5;
     let error = fleet(&states).with_obstacles(&bodies).expect_err("meets").to_string();
     assert!(
-        error.starts_with("start: vehicle 2 reserves a segment that meets obstacle 2, the room is (-0.5"),
+        error.starts_with("start: vehicle 2 reserves a segment that meets obstacle 2 (0); move it away"),
         "{error}"
     );
     let start = limits[0].start(states[0]).expect("slow");

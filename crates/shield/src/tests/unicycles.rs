@@ -253,7 +253,7 @@ fn invalid_unicycles_are_refused_and_a_wish_that_is_not_finite_falls_back() {
     let start = pose(&mut random, &of, 1.0);
     let refused = |of: Loiter, pose: Pose| of.start(&pose).expect_err("refused").to_string();
     assert!(refused(Loiter { min_speed_m_s: 0.0, ..of }, start).starts_with("min_speed_m_s: must be above 0 (0)"));
-    assert!(refused(Loiter { turn_rad_s: 20.0, ..of }, start).starts_with("turn_rad_s: must be at most 1.5 rad"));
+    assert!(refused(Loiter { turn_rad_s: 20.0, ..of }, start).starts_with("turn_rad_s: must turn by at most 1.5 rad"));
     assert!(
         refused(Loiter { accel_m_s2: 1e-9, ..of }, start).starts_with("accel_m_s2: slowing down must take at most")
     );

@@ -110,7 +110,7 @@ pub(super) fn exceeded_margin(margins: &[PredictedMargin], scenario: &Scenario) 
 /// s (s + d) + G (K + C s) = 0        G = w^2/(tau s^3 + s^2 + 2 zeta w s + w^2)
 /// ```
 ///
-/// A push acts on one side of its rest length only: an oscillation around it feels half of the stiffness.
+/// A repulsion acts only below its rest length, so its mean stiffness over an oscillation is half.
 pub(super) fn lag_in_contact(law: &dyn Law, scenario: &Scenario) -> Option<String> {
     let model = &scenario.airframe.quadrotor()?.model;
     let LawSpec::Displacement(keys) = &scenario.law else { return None };

@@ -61,7 +61,7 @@ impl ShieldCheck {
     pub(super) fn line(&self) -> String {
         let [i, j] = self.start_pair;
         format!(
-            "{}; commands of the reference up to {} m/s^2, starts of vehicles {i} and {j} have {} m of room",
+            "{}; reference acceleration up to {} m/s^2; starts of vehicles {i} and {j} have {} m of room",
             self.certificate,
             significant(self.reference_m_s2, 4),
             metres(self.start_room_m)

@@ -42,7 +42,7 @@ pub struct NamedLaw {
     pub shield: Option<bool>,
 }
 
-/// Endings of a law's name that fly it with and without the shield.
+/// Suffixes of a law's name that select flights with and without the shield.
 const SHIELD: [(&str, bool); 2] = [("+shield", true), ("+bare", false)];
 
 impl NamedLaw {
@@ -53,7 +53,7 @@ impl NamedLaw {
     }
 
     /// Returns the overrides that select the law: one for its kind, one for each key, and one for the shield if the
-    /// name tells it.
+    /// name ends with `+shield` or `+bare`.
     #[must_use]
     pub fn overrides(&self) -> Vec<String> {
         let mut overrides = law_overrides(&self.law);

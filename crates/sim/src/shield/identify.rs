@@ -30,7 +30,7 @@ use tautline_shield::{Limits, Shield, State};
 
 /// Recommended tracking error over the largest measured one.
 pub const TRACKING_FACTOR: f64 = 1.25;
-/// Room for feedback over the largest measured feedback.
+/// Reserved feedback over the largest measured feedback.
 const FEEDBACK_FACTOR: f64 = 1.25;
 /// Duration of a measurement \[s\].
 const DURATION_S: f64 = 16.0;
@@ -41,11 +41,11 @@ const REVERSALS_S: [f64; 8] = [0.2, 0.35, 0.5, 0.7, 1.0, 1.4, 2.0, 3.0];
 const REFINED: [f64; 4] = [0.8, 0.9, 1.1, 1.2];
 /// Number of random sequences.
 const RANDOM: usize = 6;
-/// Most measurements, each with a push that fits the feedback of the one before.
+/// Largest number of measurements. Each uses the push that the feedback of the previous one requires.
 const ROUNDS: usize = 5;
 /// Share of commands that the first measurement leaves to the tracker.
 const FIRST_SHARE: f64 = 0.6;
-/// Share of the room for feedback that must be used, or the reference gets more.
+/// Smallest used share of the reserved feedback; below it the reference gets more acceleration.
 const NOT_TIGHT: f64 = 0.85;
 /// Push with which the slope of the feedback is computed \[m/s^2\].
 const TRIAL_M_S2: f64 = 1e-3;
@@ -456,11 +456,11 @@ fn winds(along: Vector3<f64>, wind_m_s: f64, at_s: f64) -> [(&'static str, WindS
     };
     let across = if along.x.abs() < 0.9 { Vector3::x() } else { Vector3::y() };
     [
-        ("wind along it", constant(along)),
-        ("wind against it", constant(-along)),
-        ("wind across it", constant((across - along * across.dot(&along)).normalize())),
-        ("wind that turns against it", turning(1.0)),
-        ("wind that turns along it", turning(-1.0)),
+        ("wind along its axis", constant(along)),
+        ("wind against its axis", constant(-along)),
+        ("wind across its axis", constant((across - along * across.dot(&along)).normalize())),
+        ("wind that turns against its axis", turning(1.0)),
+        ("wind that turns along its axis", turning(-1.0)),
     ]
 }
 
@@ -483,7 +483,7 @@ fn turns(course: &Course, wind_m_s: f64) -> Vec<(&'static str, WindSpec)> {
         };
         WindSpec { mean_m_s: -0.5 * velocity_m_s, gusts: along.map(gust).collect(), ..WindSpec::default() }
     };
-    vec![("wind that turns with it", with(1.0)), ("wind that turns opposite to it", with(-1.0))]
+    vec![("wind that reverses with the reference", with(1.0)), ("wind that reverses against the reference", with(-1.0))]
 }
 
 /// Flies a course.
@@ -513,7 +513,7 @@ fn fly(alone: &Scenario, limits: &Limits, course: &Course, duration_s: f64) -> F
         if alone.space == Space::Plane && wish.z.is_finite() {
             wish.z = 0.0;
         }
-        // The error of measurement feigns an error behind the wish, so that the feedback goes along with it.
+        // The measurement error points against the wish, so that the feedback adds to the acceleration.
         let side = -wish.try_normalize(0.0).filter(|side| side.x.is_finite()).unwrap_or(course.along);
         let measured = State {
             position_m: then.position_m + side * settings.position_error_m,
@@ -588,7 +588,7 @@ impl fmt::Display for Identification {
         )?;
         write!(
             out,
-            "recommended  tracking_error_m = {}, {} times the largest error. It is measured and not proved: the flight \
+            "recommended  tracking_error_m = {}, {} times the largest error. This bound is measured; each flight \
              checks it at each step.",
             of.error_m, self.factor
         )

@@ -105,7 +105,7 @@ pub struct ShieldSpec {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0))]
     pub ease_m: Option<f64>,
-    /// Share of a cut command that is turned to the right, from -1 to 1; 0 for none.
+    /// Share of the removed part of a command that is added again to the right, from -1 to 1; negative for the left.
     #[schemars(extend("minimum" = -1, "maximum" = 1))]
     pub turn: f64,
 }
@@ -185,7 +185,7 @@ impl Scenario {
             half_height_m: self.half_axes_m().map(|[.., half_height_m]| half_height_m),
             ..Settings::new(self.delta_m, 1.0 / control_hz)
         };
-        // The judge decides up to the largest bend of a path within a step.
+        // The audit replaces the path within a step by its chord, with an error of at most this bend.
         settings.path_error_m = MAX_BEND_M;
         if self.has_engine() {
             let decay = (a22_per_s * dt_s).powi(2);
@@ -209,7 +209,7 @@ impl Scenario {
         let age_s = rate_hz.map_or(latency_s, |rate_hz| (latency_s * rate_hz - SAME).ceil().max(0.0) / rate_hz);
         let periods = age_s * control_hz;
         if !is_whole(per_period) || per_period < 0.5 {
-            return Err(refused("each period of time.control_hz needs a fresh measurement; per period", per_period)
+            return Err(refused("the number of measurements per control period must be whole", per_period)
                 .with_help(format!("set sensing.rate_hz to {control_hz} or a multiple of it"))
                 .at_keys(["sensing.rate_hz", "time.control_hz"]));
         }
@@ -217,7 +217,7 @@ impl Scenario {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 0; more saturates")]
             return Ok(periods.round() as usize);
         }
-        Err(refused("measurements must have a constant age of whole periods of time.control_hz; periods", periods)
+        Err(refused("the age of measurements must be a whole number of control periods", periods)
             .with_help(format!("set sensing.rate_hz to {control_hz}, or a latency of whole periods"))
             .at_keys(["sensing.rate_hz", "sensing.latency_s", "time.control_hz"]))
     }
@@ -277,7 +277,7 @@ impl Scenario {
         if let Some(control_hz) = self.time.control_hz {
             let steps = 1.0 / (control_hz * self.time.dt_s);
             if !is_whole(steps) {
-                return Err(refused("a period of the shield must be a whole number of steps, which is", steps)
+                return Err(refused("a control period must be a whole number of steps", steps)
                     .with_help("change time.control_hz or time.dt_s")
                     .at_keys(["time.control_hz", "time.dt_s"]));
             }
@@ -297,10 +297,10 @@ impl Scenario {
         for (key, of, noise, bound) in noises {
             if noise > 0.0 && noise >= bound {
                 return Err(refused(
-                    &format!("{key} must be more than {of}, the deviation of a noise without bound"),
+                    &format!("{key} must be more than {of}, the standard deviation of an unbounded error"),
                     bound,
                 )
-                .with_help(format!("give {}, which a flight rarely exceeds", 5.0 * noise))
+                .with_help(format!("raise it to {}, six deviations", 6.0 * noise))
                 .at_keys([key, of]));
             }
         }

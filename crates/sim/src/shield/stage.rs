@@ -25,7 +25,7 @@ pub struct ShieldReport {
     pub period_s: f64,
     /// Numbers of all vehicles together.
     pub counters: Counters,
-    /// Worst vehicle for which an assumption did not hold. The flight is then not the one that the proof is about.
+    /// Worst vehicle for which an assumption did not hold. The certificate does not cover the flight then.
     pub breach: Option<ShieldBreach>,
     /// Number of instants at which the law was undefined and all vehicles braked.
     pub undefined: u64,

@@ -17,7 +17,7 @@ pub struct Tracking {
     /// Largest command in m/s^2.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub accel_m_s2: f64,
-    /// Push in m/s^2 for which the shield keeps commands free. Feedback of the tracker stayed within them.
+    /// Push in m/s^2 from which the shield computes the share of commands reserved for feedback.
     #[schemars(extend("minimum" = 0))]
     pub disturbance_m_s2: f64,
     /// Largest speed of the reference in m/s.

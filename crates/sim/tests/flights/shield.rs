@@ -295,12 +295,12 @@ fn scenarios_that_do_not_fit_the_shield_are_refused_with_place_value_and_remedy(
             "disturbance",
             "(0.1)",
         ),
-        ("[shield]\n[sensing]\nrate_hz = 20\nposition_noise_m = 0.01", "shield.position_error_m", "give 0.05"),
+        ("[shield]\n[sensing]\nrate_hz = 20\nposition_noise_m = 0.01", "shield.position_error_m", "raise it to 0.06"),
         ("[shield]\n[sensing]\nrate_hz = 30", "sensing.rate_hz", "set sensing.rate_hz to 20"),
         ("[shield]\n[vehicle]\nmodel = \"crazyflie\"\nattitude_rad_s = 5", "shield.tracking_error_m", "--identify"),
         ("[shield]\nposition_error_m = 3\naccel_m_s2 = 40", "start.positions_m", "reserve segments"),
         ("[shield]\nbrake = 3", "brake", "brake_m_s2"),
-        ("control_hz = 33\n[shield]", "time.control_hz", "a whole number of steps"),
+        ("control_hz = 33\n[shield]", "time.control_hz", "must be a whole number of steps"),
     ] {
         let error = refused(shield);
         assert!(error.contains(place) && error.contains(says), "{shield}: {error}");
