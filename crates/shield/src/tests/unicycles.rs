@@ -267,7 +267,7 @@ fn invalid_unicycles_are_refused_and_a_wish_that_is_not_finite_falls_back() {
     assert!(error.starts_with("delta_m: vehicle 2 has another value"), "{error}");
     let other = Pose { speed_m_s: of.min_speed_m_s, ..start };
     let error = UnicycleShield::new(&of, 0, &other, &[announced]).expect_err("another start").to_string();
-    assert!(error.starts_with("start: the announced start is another one"), "{error}");
+    assert!(error.starts_with("start: the announced start differs"), "{error}");
     assert!(UnicycleShield::new(&of, 3, &start, &[announced]).is_err());
     let mut shield = UnicycleShield::new(&of, 0, &start, &[announced]).expect("alone");
     let command = shield.filter(Steering { accel_m_s2: f64::NAN, turn_rad_s: 0.0 });
