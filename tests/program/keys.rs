@@ -137,7 +137,8 @@ fn every_key_of_the_report_is_on_its_page() {
         "time.duration_s=1.5",
     ];
     let heard = [&["run", "pentagon", "--force"], &quick[..], &radio].concat();
-    assert_documented("report.json", &[&hit, &passed_through, &mission, &among, &assigned, &tilting, &heard]);
+    let shielded = [&["run", "pentagon", "--force", "--set", "shield.enabled=true"], &quick[..]].concat();
+    assert_documented("report.json", &[&hit, &passed_through, &mission, &among, &assigned, &tilting, &heard, &shielded]);
 }
 
 #[test]

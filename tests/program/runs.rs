@@ -406,5 +406,5 @@ fn verdicts_have_colours_only_if_forced_or_on_a_terminal() {
     };
     assert!(help("1").contains('\u{1b}') && !help("0").contains('\u{1b}'));
     let said = help("0");
-    assert!(said.contains("130  Another interrupted command.") && said.contains("NO_COLOR=1"), "{said}");
+    assert!(said.contains("130  Ctrl-C in any other command.") && said.contains("NO_COLOR=1"), "{said}");
 }
