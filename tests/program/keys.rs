@@ -138,7 +138,10 @@ fn every_key_of_the_report_is_on_its_page() {
     ];
     let heard = [&["run", "pentagon", "--force"], &quick[..], &radio].concat();
     let shielded = [&["run", "pentagon", "--force", "--set", "shield.enabled=true"], &quick[..]].concat();
-    assert_documented("report.json", &[&hit, &passed_through, &mission, &among, &assigned, &tilting, &heard, &shielded]);
+    assert_documented(
+        "report.json",
+        &[&hit, &passed_through, &mission, &among, &assigned, &tilting, &heard, &shielded],
+    );
 }
 
 #[test]
