@@ -165,7 +165,7 @@ fn wrong_curves_name_the_field_and_its_value() {
         (|m| m.4.fill(1.0), "recording/duration", "knots: the curve must end after it starts, got 1 and 1"),
         (|m| m.4[2] = f64::NAN, "recording/not-finite", "knots[2]: must be a finite number, got NaN"),
         (|m| m.5[1][2] = f64::INFINITY, "recording/not-finite", "pos_pts[5]: must be a finite number, got inf"),
-        (|m| m.5[1][2] = 1e308, "recording/overflow", ""),
+        (|m| (m.5[1][2], m.5[2][2]) = (f64::MAX, f64::MIN), "recording/overflow", ""),
     ];
     for (spoil, code, problem) in of_spline {
         let mut message = spline(1, 0, 0.0);
