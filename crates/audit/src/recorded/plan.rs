@@ -3,8 +3,12 @@
 //! The distance is bounded at every instant at which both are known, between the samples too. The difference of two
 //! curves is a polynomial, enclosed by Bernstein coefficients. A bound on the motion between samples is added.
 //!
-//! If a plan keeps the separation L + e_i + e_j for each pair, and vehicle i is never farther than e_i from its plan,
-//! then the flight keeps L: |p_i - p_j| >= |q_i - q_j| - |p_i - q_i| - |p_j - q_j|.
+//! Let p and q be the flown and the planned positions, and e the largest distance of a vehicle from its plan. If the
+//! plan keeps the separation L + e + e' of a pair, the flight keeps L:
+//!
+//! ```text
+//! |p - p'| >= |q - q'| - |p - q| - |p' - q'|
+//! ```
 
 use std::collections::BTreeMap;
 
@@ -115,7 +119,7 @@ impl PlanFindings {
         let most_m = self.deviations.iter().map(|of| of.upper_m).fold(self.tube_m.unwrap_or(0.0), f64::max);
         let above_m = settings.above_m.map(|above_m| above_m - most_m * (1.0 + ROUNDING) - ROUNDING * above_m.abs());
         let max_gap_s = (!self.has_curves).then_some(f64::INFINITY);
-        Some(Settings { vehicles, only, from_s, to_s, above_m, max_gap_s, ..Settings::default() })
+        Some(Settings { from_s, to_s, above_m, max_gap_s, vehicles, only, ..Settings::default() })
     }
 }
 

@@ -11,7 +11,7 @@
 use nalgebra::Vector3;
 
 use super::csv::TextTable;
-use super::curves::{Curves, piece};
+use super::curves::{Curves, VehicleItems, piece};
 use super::error::{Fault, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
@@ -57,10 +57,10 @@ pub(super) fn curves_of(
     left_out: Option<String>,
     options: &ReadOptions,
     mut append: impl FnMut(&mut Curve, &Source) -> Result<(), ReadError>,
-) -> Result<(Vec<(String, Vec<Item>)>, Vec<String>), ReadError> {
+) -> Result<(VehicleItems, Vec<String>), ReadError> {
     let mut notes: Vec<String> = left_out.into_iter().collect();
     let (several, mut has_sequence_note) = (vehicles.len() > 1, false);
-    let mut curves: Vec<(String, Vec<Item>)> = Vec::new();
+    let mut curves = VehicleItems::new();
     if let Some(name) = options.starts.keys().find(|name| vehicles.iter().all(|(known, _)| known != *name)) {
         let problem = format!("--start names the unknown vehicle {}", quoted(name));
         return refuse("recording/unknown-vehicle", problem, "use the names of the files without their extension");

@@ -12,6 +12,9 @@ use tautline_core::track::{Item, Metadata, Piece, Tracks};
 /// Smallest jump between two pieces of a curve that is reported \[m\]. Files round to micrometres.
 const JUMP_M: f64 = 1e-3;
 
+/// Names of vehicles, each with its items in order of time.
+pub(super) type VehicleItems = Vec<(String, Vec<Item>)>;
+
 /// Pieces of curves in order of time.
 pub(super) struct Curves {
     vehicles: Vec<String>,
@@ -21,12 +24,12 @@ pub(super) struct Curves {
 
 impl Curves {
     /// Returns the recording of these vehicles in seconds, each with its items in order of time.
-    pub(super) fn recording(vehicles: Vec<(String, Vec<Item>)>, notes: Vec<String>) -> Recording {
+    pub(super) fn recording(vehicles: VehicleItems, notes: Vec<String>) -> Recording {
         Self::with_metadata(vehicles, Metadata::in_seconds(notes))
     }
 
     /// Returns the recording of these vehicles, each with its items in order of time, and adds a note on jumps.
-    pub(super) fn with_metadata(vehicles: Vec<(String, Vec<Item>)>, mut metadata: Metadata) -> Recording {
+    pub(super) fn with_metadata(vehicles: VehicleItems, mut metadata: Metadata) -> Recording {
         metadata.notes.extend(largest_jump(&vehicles));
         let (vehicles, items): (Vec<_>, Vec<_>) = vehicles.into_iter().unzip();
         let mut items: Vec<_> = items.into_iter().flatten().collect();

@@ -153,9 +153,11 @@ mod tests {
         let of_part = |(from, to, c): &Part| {
             let jerk = derivative(&derivative(&derivative(c)));
             let t = to - from;
-            let product =
-                |(i, j): (usize, usize)| jerk[i].dot(&jerk[j]) * t.powi((i + j + 1) as i32) / (i + j + 1) as f64;
-            (0..jerk.len()).flat_map(|i| (0..jerk.len()).map(move |j| (i, j))).map(product).sum::<f64>()
+            let product = |(i, j): (u8, u8)| {
+                let order = i32::from(i) + i32::from(j) + 1;
+                jerk[usize::from(i)].dot(&jerk[usize::from(j)]) * t.powi(order) / f64::from(order)
+            };
+            (0..3).flat_map(|i| (0..3).map(move |j| (i, j))).map(product).sum::<f64>()
         };
         parts.iter().map(of_part).sum()
     }
@@ -174,7 +176,7 @@ mod tests {
             points in vectors(9),
             steps in prop::collection::vec(prop_oneof![1 => Just(0.0), 4 => 0.1..2.0], 15),
         ) {
-            let mut knots: Vec<f64> = steps[..points.len() + degree + 1].iter().scan(-1.0, |at, step| {
+            let mut knots: Vec<f64> = steps[..=points.len() + degree].iter().scan(-1.0, |at, step| {
                 *at += step;
                 Some(*at)
             }).collect();

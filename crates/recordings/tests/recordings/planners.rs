@@ -49,7 +49,7 @@ fn refused(messages: &[Message], options: &ReadOptions) -> ReadError {
 
 fn pieces(found: &Whole) -> Vec<&Piece> {
     let piece = |item| match item {
-        &Item::Piece(ref piece) => piece,
+        Item::Piece(piece) => piece,
         Item::Sample(sample) => panic!("{sample:?}"),
     };
     found.items.iter().map(piece).collect()
@@ -58,8 +58,8 @@ fn pieces(found: &Whole) -> Vec<&Piece> {
 /// Returns the position of a vehicle at a time, on its last piece that has begun.
 fn position(found: &Whole, name: &str, time_s: f64) -> [f64; 3] {
     let vehicle = found.vehicles.iter().position(|known| known == name).expect("a vehicle");
-    let of_vehicle = pieces(found).into_iter().filter(|piece| piece.vehicle == vehicle);
-    let piece = of_vehicle.filter(|piece| piece.from_s <= time_s).last().expect("a piece");
+    let mut of_vehicle = pieces(found).into_iter().filter(|piece| piece.vehicle == vehicle);
+    let piece = of_vehicle.rfind(|piece| piece.from_s <= time_s).expect("a piece");
     assert!(time_s <= piece.to_s, "{time_s} {piece:?}");
     let powers = piece.coefficients.iter().rev();
     powers.fold(Vector3::zeros(), |sum, c| sum * (time_s - piece.from_s) + c).into()
@@ -125,7 +125,7 @@ fn repeated_curves_are_read_once_and_contradictory_ones_refused() {
     let one = of(&spline(1, 0, 0.0));
     let copy = ("/broadcast_bspline", B_SPLINE, "cdr", 9, cdr(&spline(1, 0, 0.0), true));
     let found = whole("plan.mcap", &mcap_of(&[one.clone(), copy]));
-    assert_eq!(found.items, whole("plan.mcap", &mcap_of(&[one.clone()])).items);
+    assert_eq!(found.items, whole("plan.mcap", &mcap_of(std::slice::from_ref(&one))).items);
     assert!(found.notes.iter().any(|note| note.starts_with("1 curve is repeated")), "{:?}", found.notes);
     let error = refused(&[one, of(&spline(1, 0, 0.1))], &ReadOptions::default());
     assert_refused(&error, "recording/duplicate-row", &format!("curve 2 on topic `{TOPIC}`"));

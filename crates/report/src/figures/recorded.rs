@@ -128,11 +128,14 @@ pub fn closest_approach(encounter: &Encounter, title: &str) -> Figure {
 /// Largest number of vehicles with a line of their distance from the plan.
 const DRAWN: usize = 6;
 
+/// Name of a vehicle, and time \[s\], distance from its plan \[m\] and the uncertainty of the distance \[m\].
+pub type PlanLine<'a> = (String, &'a [(f64, f64, f64)]);
+
 /// Draws distances from the plan over time \[s\] with the tube \[m\], and bands where a distance is known to an
 /// interval only. `lines` holds name, time, distance and its uncertainty of each vehicle, the farthest first; the first
 /// six are drawn. A distance that is NaN breaks the line.
 #[must_use]
-pub fn plan_distances(lines: &[(String, &[(f64, f64, f64)])], tube_m: Option<f64>, title: &str) -> Figure {
+pub fn plan_distances(lines: &[PlanLine<'_>], tube_m: Option<f64>, title: &str) -> Figure {
     let all = || lines.iter().take(DRAWN).flat_map(|(_, points)| points.iter());
     let numbers = all().flat_map(|&(_, distance, slack)| [distance, distance + slack]);
     let y = Axis::linear("distance from the plan [m]", numbers.chain(tube_m).chain([0.0]), true);

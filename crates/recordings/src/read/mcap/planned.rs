@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use super::super::curves::{Curves, piece};
+use super::super::curves::{Curves, VehicleItems, piece};
 use super::super::error::{Fault, Place, ReadError, quoted, refuse};
 use super::super::options::ReadOptions;
 use super::super::order::Recording;
@@ -113,7 +113,7 @@ fn vehicles(
     epoch_ns: i64,
     scale: f64,
     notes: &mut Vec<String>,
-) -> Result<Vec<(String, Vec<Item>)>, Fault> {
+) -> Result<VehicleItems, Fault> {
     // Both times are close, so that the difference in nanoseconds is exact.
     let seconds = |ns: i64| ns.saturating_sub(epoch_ns) as f64 / NS_PER_S as f64;
     let ends_s = drones.values().flatten().map(|(start_ns, plan)| seconds(*start_ns) + plan.duration_s());

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::super::{Failure, Monitor};
 use super::{Open, open, recording_in};
 use crate::figures::{self, Figure};
-use crate::report::recorded::PlanReport;
+use crate::report::recorded::{PlanReport, RecordedReport};
 use tautline_audit::recorded::{Outcome, PlanComparison, PlanFindings, Settings, audit};
 use tautline_core::track::Item;
 use tautline_recordings::read::ReadOptions;
@@ -99,12 +99,36 @@ pub(super) fn compare(
     let asked = found.settings_of_plan(flight.settings, &flight.outcome.vehicles, shift_s + found.delay_s);
     let asked = asked.filter(|_| found.deviations.len() > 1);
     let audited = asked.map(|settings| audit(plan.vehicles(), &items, settings)).transpose().map_err(wrong)?;
-    let report = PlanReport::new(path.display().to_string(), &found, flight.outcome, audited.as_ref());
+    let mut report = PlanReport::new(path.display().to_string(), &found, flight.outcome, audited.as_ref());
+    let assumed = report.assumes.take().into_iter().chain(plan.assumed().map(|of| format!("the plan has {of}")));
+    let assumed = assumed.collect::<Vec<_>>().join(" and ");
+    report.assumes = (!assumed.is_empty()).then_some(assumed);
     let mut notes: Vec<_> = plan.notes().iter().map(|note| format!("{}: {note}", path.display())).collect();
     if is_planar {
         notes.push("flight and plan are compared in the plane of x and y".to_owned());
     }
     Ok((report, notes, figure(&found, flight.outcome)))
+}
+
+/// Adds the findings to a report; also returns the figure. The run's audit says nothing about distances from a plan
+/// between two samples (`is_by_run`).
+pub(super) fn attach(
+    report: RecordedReport,
+    compared: Option<(PlanReport, Vec<String>, Figure)>,
+    is_by_run: bool,
+    monitor: &dyn Monitor,
+) -> (RecordedReport, Option<Figure>) {
+    let Some((mut plan, notes, figure)) = compared else { return (report, None) };
+    for note in &notes {
+        monitor.warn(&format!("note: {note}"));
+    }
+    if is_by_run {
+        let between = "the flight is straight between samples".to_owned();
+        plan.assumes = Some(plan.assumes.map_or(between.clone(), |of| format!("{between} and {of}")));
+    }
+    let mut report = report.with_plan(plan);
+    report.source.notes.extend(notes);
+    (report, Some(figure))
 }
 
 /// Returns the difference of two epochs \[s\]; 0 unless both clocks have one.

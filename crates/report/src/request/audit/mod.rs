@@ -526,22 +526,9 @@ impl ConfiguredAudit<'_> {
         // An early end of the flight does not affect a window that ends before it.
         let is_beyond = |to_s: f64| outcome.span_s.is_none_or(|(_, end_s)| to_s > end_s);
         let early_end = early_end.filter(|_| settings.to_s.is_none_or(is_beyond));
-        // The run's audit says nothing about the distance from a plan between two samples.
         let is_by_run = between.basis == Basis::Run;
-        let mut report = RecordedReport::new(&outcome, &settings, source, between);
-        let mut plan_figure = None;
-        if let Some((mut plan, notes, figure)) = compared {
-            for note in &notes {
-                monitor.warn(&format!("note: {note}"));
-            }
-            if is_by_run {
-                let between = "the flight is straight between samples".to_owned();
-                plan.assumes = Some(plan.assumes.map_or(between.clone(), |of| format!("{between} and {of}")));
-            }
-            report = report.with_plan(plan);
-            report.source.notes.extend(notes);
-            plan_figure = Some(figure);
-        }
+        let report = RecordedReport::new(&outcome, &settings, source, between);
+        let (mut report, plan_figure) = against_plan::attach(report, compared, is_by_run, monitor);
         if let RunAnswer::Undecided(why) = answer {
             report.run_objection = Some(why);
         }
