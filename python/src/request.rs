@@ -6,6 +6,7 @@ use pyo3::prelude::*;
 use tautline::audit::envelope::{Envelope, Limit, Quantity};
 use tautline::audit::recorded::{self, Interpolation, VehicleSettings};
 use tautline::read::{self, ArrayAxis, ColumnNames, Dimensions, Duplicates, Format, TimeUnit};
+use tautline::request::audit::PlanQuestion;
 use tautline::request::{AuditRequest, ConfigFile, Subject};
 
 use crate::errors::{wrong_input, wrong_input_with_code};
@@ -105,6 +106,7 @@ pub(crate) struct AuditOptions {
     settings: recorded::Settings,
     obstacles: Option<PathBuf>,
     fence: Option<PathBuf>,
+    plan: Option<PlanQuestion>,
     config: ConfigFile,
     expect_vehicles: Option<usize>,
     independent: bool,
@@ -117,9 +119,9 @@ type PerVehicleValues = (Option<f64>, Vec<(String, f64)>);
 impl AuditOptions {
     #[new]
     #[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
-    #[pyo3(signature = (*, delta, motion, max_accel, radius, ellipsoid, obstacles, limit, fence, accel_window, config,
-                        has_config, from_s, to_s, above, ids, offset, expect_vehicles, max_gap, require_presence,
-                        independent))]
+    #[pyo3(signature = (*, delta, motion, max_accel, radius, ellipsoid, obstacles, limit, fence, plan, plan_delay, tube,
+                        accel_window, config, has_config, from_s, to_s, above, ids, offset, expect_vehicles, max_gap,
+                        require_presence, independent))]
     fn new(
         delta: Option<f64>,
         motion: Option<String>,
@@ -129,6 +131,9 @@ impl AuditOptions {
         obstacles: Option<PathBuf>,
         limit: Vec<(String, f64)>,
         fence: Option<PathBuf>,
+        plan: Option<PathBuf>,
+        plan_delay: Option<f64>,
+        tube: Option<f64>,
         accel_window: Option<f64>,
         config: Option<PathBuf>,
         has_config: bool,
@@ -180,7 +185,8 @@ impl AuditOptions {
             (None, true) => ConfigFile::Nearest,
             (None, false) => ConfigFile::None,
         };
-        Ok(Self { settings, obstacles, fence, config, expect_vehicles, independent })
+        let plan = plan.map(|path| PlanQuestion { path, delay_s: plan_delay, tube_m: tube });
+        Ok(Self { settings, obstacles, fence, plan, config, expect_vehicles, independent })
     }
 }
 
@@ -191,6 +197,7 @@ impl AuditOptions {
             settings: self.settings.clone(),
             obstacles: self.obstacles.clone(),
             fence: self.fence.clone(),
+            plan: self.plan.clone(),
             expect_vehicles: self.expect_vehicles,
             independent: self.independent,
             config: self.config.clone(),

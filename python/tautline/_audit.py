@@ -38,8 +38,9 @@ Outcome = tuple[str, str, str, str]
 
 #: Arguments of `audit`, in the order of the call that a page shows.
 SHOWN = (
-    "delta", "motion", "max_accel", "radius", "ellipsoid", "obstacles", "limit", "fence", "accel_window", "config",
-    "from_s", "to_s", "above", "ids", "offset", "expect_vehicles", "max_gap", "require_presence", "independent",
+    "delta", "motion", "max_accel", "radius", "ellipsoid", "obstacles", "limit", "fence", "plan", "plan_delay", "tube",
+    "accel_window", "config", "from_s", "to_s", "above", "ids", "offset", "expect_vehicles", "max_gap",
+    "require_presence", "independent",
 )  # fmt: skip
 
 
@@ -151,6 +152,13 @@ class Audit:
         return Findings(self._report["limits"])
 
     @property
+    def plan(self) -> dict[str, Any] | None:
+        """Findings against the plan: ``status``, ``delay_s``, ``tube_m``, ``vehicles``, ``unknown``, ``certificate``.
+        None without a plan."""
+        plan: dict[str, Any] | None = self._report["plan"]
+        return plan
+
+    @property
     def vehicles(self) -> list[str]:
         """Names of the vehicles."""
         return list(self._report["vehicles"])
@@ -228,6 +236,9 @@ def audit(
     obstacles: PathLike | None = None,
     limit: Mapping[str, float] | None = None,
     fence: PathLike | None = None,
+    plan: PathLike | None = None,
+    plan_delay: float | None = None,
+    tube: float | None = None,
     accel_window: float | None = None,
     config: PathLike | Literal[False] | None = None,
     from_s: float | None = None,
@@ -267,6 +278,9 @@ def audit(
       [m].
     * ``accel_window``: ``accel`` then limits means over windows of this length [s].
     * ``fence``: TOML file of a region that no vehicle may leave.
+    * ``plan``: file of the plan, whose curves are compared with the flight, vehicle by vehicle.
+    * ``plan_delay``: time of the flight at which the plan has time 0 [s], estimated unless given.
+    * ``tube``: largest allowed distance from the plan [m].
     * ``config``: ``tautline.toml`` with defaults for arguments that are not given. For a recording the default is the
       ``tautline.toml`` beside it. False reads no file.
     * ``from_s``, ``to_s``: window of the audit [s].
@@ -285,6 +299,8 @@ def audit(
     options = given_arguments(locals()) | read_as
     if unknown := [word for word in read_as if word not in inspect.signature(read_options).parameters]:
         raise TypeError(f"audit() got an unexpected keyword argument '{unknown[0]}'")
+    if plan is None and (plan_delay is not None or tube is not None):
+        raise TypeError("plan_delay, tube: only with a plan")
     if ids is not None and not ids:
         raise Error("ids: no vehicle is named; leave it out to audit all")
     # Arrays have no folder that could hold a tautline.toml.
@@ -298,6 +314,9 @@ def audit(
         obstacles=optional_path(obstacles, "obstacles"),
         limit=numbers_by_name(limit, "limit"),
         fence=optional_path(fence, "fence"),
+        plan=optional_path(plan, "plan"),
+        plan_delay=optional_number(plan_delay, "plan_delay"),
+        tube=optional_number(tube, "tube"),
         accel_window=optional_number(accel_window, "accel_window"),
         config=None if config is False else optional_path(config, "config"),
         has_config=looks_for_config,
@@ -311,7 +330,8 @@ def audit(
         require_presence=boolean(require_presence, "require_presence"),
         independent=boolean(independent, "independent"),
     )
-    files = [os.fspath(file) for file in (obstacles, fence, None if config is False else config) if file is not None]
+    more_files = (obstacles, fence, plan, None if config is False else config)
+    files = [os.fspath(file) for file in more_files if file is not None]
     if positions is None:
         has_arrays = velocities is not None or names is not None
         return audit_files(question, call_text(repr(t), options), t, read_as, files, has_arrays)

@@ -17,6 +17,7 @@ use tautline_audit::recorded::{Interpolation, Settings, VehicleSettings};
 use tautline_recordings::read::Format;
 use tautline_report::report::recorded::RecordedReport;
 use tautline_report::report::write_atomically;
+use tautline_report::request::audit::PlanQuestion;
 use tautline_report::request::outputs::NamedPath;
 use tautline_report::request::{AuditRequest, AuditedRecording, ConfigFile, Failure, Monitor as _, Subject};
 
@@ -187,6 +188,15 @@ pub(super) struct AuditArguments {
     /// TOML file of a fence that contains all vehicles.
     #[arg(long, value_name = "FILE", help_heading = "Judging")]
     pub(super) fence: Option<PathBuf>,
+    /// Plan of the flight, in any format that is read: its curves are compared with the flight, vehicle by vehicle.
+    #[arg(long, value_name = "FILE", help_heading = "Judging")]
+    pub(super) plan: Option<PathBuf>,
+    /// Time of the flight at which the plan has time 0 [s] [default: estimated within a minute].
+    #[arg(long, value_name = "SECONDS", requires = "plan", allow_negative_numbers = true, help_heading = "Judging")]
+    pub(super) plan_delay: Option<f64>,
+    /// Largest allowed distance from the plan [m].
+    #[arg(long, value_name = "METRES", requires = "plan", allow_negative_numbers = true, help_heading = "Judging")]
+    pub(super) tube: Option<f64>,
     /// Start of the judged window [s].
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) from: Option<f64>,
@@ -343,6 +353,7 @@ impl AuditArguments {
         let request = AuditRequest {
             obstacles: self.obstacles.clone(),
             fence: self.fence.clone(),
+            plan: self.plan.clone().map(|path| PlanQuestion { path, delay_s: self.plan_delay, tube_m: self.tube }),
             expect_vehicles: self.expect_vehicles,
             independent: self.independent,
             allow_undecided: self.allow_undecided,

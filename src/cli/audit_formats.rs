@@ -49,7 +49,7 @@ fn rows(report: &RecordedReport) -> impl Iterator<Item = Vec<String>> {
         let words = [kind].into_iter().chain(who).map(str::to_owned);
         (span_s, words.collect::<Vec<_>>(), numbers)
     });
-    let mut rows: Vec<_> = rows.chain(report.limits.iter().flat_map(beyond)).collect();
+    let mut rows: Vec<_> = rows.chain(report.limits.iter().flat_map(beyond)).chain(from_plan(report)).collect();
     rows.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
     rows.into_iter().map(|(span_s, words, numbers)| {
         let numbers = span_s.map(Some).into_iter().chain(numbers).map(|x| x.map_or_else(String::new, number));
@@ -68,6 +68,25 @@ fn beyond(limit: &LimitFindings) -> impl Iterator<Item = Row> + '_ {
         let words = vec![kind.to_owned(), vehicle.clone(), limit.quantity.to_owned()];
         let numbers = [Some(finding.lower), Some(finding.upper), Some(finding.at_s), Some(limit.allowed), None];
         ([finding.from_s, finding.to_s], words, numbers)
+    })
+}
+
+/// Returns the rows of distances beyond the tube around the plan, and of times in which a distance is not known. The
+/// second name is `plan`.
+fn from_plan(report: &RecordedReport) -> impl Iterator<Item = Row> + '_ {
+    report.plan.iter().flat_map(|plan| {
+        let words = |kind: &str, vehicle: &str| [kind, vehicle, "plan"].map(str::to_owned).to_vec();
+        let beyond = plan.vehicles.iter().filter_map(move |VehicleFinding { vehicle, finding }| {
+            let kind =
+                if plan.tube_m.is_some_and(|tube_m| finding.lower_m > tube_m) { "violation" } else { "undecided" };
+            let numbers = [Some(finding.lower_m), Some(finding.upper_m), Some(finding.at_s), plan.tube_m, None];
+            let is_beyond = plan.tube_m.is_some_and(|tube_m| finding.upper_m > tube_m);
+            is_beyond.then(|| ([finding.at_s; 2], words(kind, vehicle), numbers))
+        });
+        let unknown = plan.unknown.iter().map(move |VehicleFinding { vehicle, finding }| {
+            ([finding.from_s, finding.to_s], words("undecided", vehicle), [None, None, None, plan.tube_m, None])
+        });
+        beyond.chain(unknown)
     })
 }
 
@@ -120,6 +139,7 @@ fn suite(AuditedRecording { report, allows_undecided, .. }: &AuditedRecording) -
         report.separation().map(|status| TestCase::new("separation", verdict(status, &headline))).into_iter().collect();
     cases
         .extend(report.limits.iter().map(|limit| TestCase::new(limit.quantity, verdict(limit.status, &limit.brief()))));
+    cases.extend(report.plan.iter().map(|plan| TestCase::new("plan", verdict(plan.status, &plan.brief()))));
     if report.presence.required {
         let partly = report.presence.partly as u64;
         let status = if partly == 0 { Status::Clear } else { Status::Undecided };

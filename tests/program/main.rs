@@ -25,6 +25,7 @@ mod limits;
 mod margin;
 mod obstacles;
 mod own_recordings;
+mod plans;
 mod presence;
 mod proofs;
 mod reading;

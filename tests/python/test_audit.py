@@ -59,6 +59,21 @@ class Arrays(Case):
         self.assertEqual(tl.audit(t, p, limit=limit, accel_window=0.4).status, "clear")
         self.assertEqual(tl.audit(t, p, limit=limit, accel_window=0.2).status, "violation")
 
+    def test_a_flight_is_compared_with_its_plan(self) -> None:
+        t = np.array([0.0, 1.0])
+        p = np.array([[[0.0, 0, 0], [0.0, 2, 0]], [[5.0, 0.1, 0], [5.0, 2, 0]]])
+        plan = self.folder / "plan.csv"
+        plan.write_text("t,id,x,y,z\n0.0,a,0,0,0\n0.0,b,0,2,0\n1.0,a,5,0,0\n1.0,b,5,2,0\n", encoding="utf-8")
+        options = {"names": ["a", "b"], "plan": plan, "plan_delay": 0.0}
+        found = tl.audit(t, p, delta=1.0, **options).plan
+        assert found is not None
+        self.assertAlmostEqual(found["vehicles"][0]["upper_m"], 0.1, places=9)
+        self.assertTrue(found["certificate"]["holds"])
+        self.assertEqual(tl.audit(t, p, tube=0.05, **options).status, "violation")
+        self.assertIsNone(tl.audit(t, p, delta=1.0).plan)
+        with self.assertRaisesRegex(TypeError, "only with a plan"):
+            tl.audit(t, p, delta=1.0, tube=0.1)
+
     def test_a_flight_has_the_verdict_of_its_run_unless_independent(self) -> None:
         f = tl.fly("pentagon", set={"time.duration_s": 3})
         self.assertEqual(f.audit().verdict, "PROVED CLEAR by the run's audit of every step")

@@ -49,6 +49,17 @@ pub(super) struct Minimum {
     pub(super) at: f64,
 }
 
+/// Enclosure of the largest distance over a segment.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Maximum {
+    /// Lower bound, which is reached at the fraction `at`.
+    pub(super) lower: f64,
+    /// Upper bound.
+    pub(super) upper: f64,
+    /// Fraction of the segment at which the lower bound is reached.
+    pub(super) at: f64,
+}
+
 /// Search for a relative position close to a target, over a segment.
 #[derive(Debug)]
 pub(super) struct Search<'a> {
@@ -129,6 +140,41 @@ impl<'a> Search<'a> {
         }
         let lower = lower.min(upper);
         (lower < cutoff).then_some(Minimum { lower, upper, at })
+    }
+
+    /// Returns the largest distance to within [`WIDTH_M`]; the upper bound is not below `floor` if no larger distance
+    /// is searched. A straight motion is farthest at one of its ends.
+    pub(super) fn maximum(&mut self, floor: f64) -> Maximum {
+        let (start, end) = (self.distance(0.0), self.distance(1.0));
+        let (mut lower, mut at) = if end > start { (end, 1.0) } else { (start, 0.0) };
+        if self.straight().is_some() {
+            let rounding = 4.0 * self.r.len() as f64 * f64::EPSILON * self.r.iter().map(Vector3::norm).sum::<f64>();
+            return Maximum { lower, upper: (lower + rounding).next_up(), at };
+        }
+        let (mut length, mut open) = (1.0, vec![(self.enclose(0.0, 1.0).1, 0.0)]);
+        let mut upper = lower;
+        loop {
+            // A part that cannot improve the result is dropped; its upper bound is kept.
+            let enough = floor.max(lower + self.width(lower));
+            let give_up = self.left == 0;
+            open.retain(|&(high, _)| {
+                let goes_on = high > enough && !give_up;
+                upper = if goes_on { upper } else { upper.max(high) };
+                goes_on
+            });
+            if open.is_empty() {
+                return Maximum { lower, upper: upper.max(lower), at };
+            }
+            length *= 0.5;
+            for (high, start) in std::mem::take(&mut open) {
+                let middle = start + length;
+                let there = self.distance(middle);
+                if there > lower || (there == lower && middle < at) {
+                    (lower, at) = (there, middle);
+                }
+                open.extend([start, middle].map(|start| (self.enclose(start, length).1.min(high), start)));
+            }
+        }
     }
 
     /// Returns the parts of the segment below a distance, given that the distance at the fraction `at` is. Each part is
@@ -242,6 +288,21 @@ mod tests {
             // At 0.3 m the distance is flat to the root of its width.
             assert!((found.at - 1.0 / 3.0).abs() < 1e-4, "{found:?}");
         }
+    }
+
+    #[test]
+    fn the_maximum_of_a_curve_is_enclosed_to_the_width() {
+        // x = 4 u (1 - u) rises to 1 between two ends at the origin.
+        let r = [0.0, 4.0, -4.0].map(|x| Vector3::new(x, 0.0, 0.0));
+        let found = Search::new(Target::Origin, &r).maximum(0.0);
+        assert!(found.lower <= 1.0 && 1.0 <= found.upper && found.upper - found.lower <= WIDTH_M, "{found:?}");
+        assert!((found.at - 0.5).abs() < 1e-4, "{found:?}");
+        // Without a larger distance to look for, the bound stays coarse and valid.
+        let coarse = Search::new(Target::Origin, &r).maximum(5.0);
+        assert!(coarse.upper >= 1.0 && coarse.lower <= 1.0, "{coarse:?}");
+        let line = [1.0, -3.0].map(|x| Vector3::new(x, 0.0, 0.0));
+        let found = Search::new(Target::Origin, &line).maximum(0.0);
+        assert!(found.lower == 2.0 && found.at == 1.0 && found.upper >= 2.0 && found.upper < 2.0 + 1e-12, "{found:?}");
     }
 
     #[test]

@@ -241,7 +241,7 @@ impl TrackAuditor {
     fn judges_separation(&self) -> bool {
         let is_own = self.settings.is_own_limit || !self.settings.has_separation_limit();
         let mut judged = self.vehicles.iter().filter(|vehicle| vehicle.is_judged());
-        if !is_own || self.settings.envelope.is_empty() {
+        if !is_own || !self.settings.judges_single_vehicles() {
             return true;
         }
         let is_a_pair_present = match judged.clone().count() {

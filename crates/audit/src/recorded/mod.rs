@@ -41,6 +41,7 @@
 
 mod auditor;
 mod outcome;
+mod plan;
 mod second_pass;
 mod settings;
 mod smallest;
@@ -50,5 +51,6 @@ mod window;
 pub use super::outcome::{Approach, ObjectPair, WIDTH_M};
 pub use auditor::{TrackAuditor, audit};
 pub use outcome::{Absence, Contradiction, Gap, Outcome, Presence, Tallies};
+pub use plan::{Deviation as PlanDeviation, PlanComparison, PlanFindings, Unknown as PlanUnknown};
 pub use second_pass::{PairSample, PairSeries, PositionLookup, Proof, ProofBuilder, ProofWindow};
 pub use settings::{Interpolation, RecordedError, Settings, TOUCHING_ELLIPSOIDS, VehicleSettings};

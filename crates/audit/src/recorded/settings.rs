@@ -96,6 +96,8 @@ pub struct Settings {
     /// Length of the windows over which accelerations are averaged \[s\]: change of velocity over the window, divided
     /// by its length. `None` uses instantaneous accelerations, and does not compare corners of curves with a limit.
     pub accel_window_s: Option<f64>,
+    /// Whether the recording is compared with a plan. Without limits, separations are then not judged.
+    pub has_plan: bool,
     /// Whether delta or the ellipsoid comes from the recording itself. With limits on single vehicles, separations are
     /// then judged only if the recording has a pair to judge.
     pub is_own_limit: bool,
@@ -118,7 +120,12 @@ impl Settings {
         is_given.contains(&true)
             || !self.obstacles.is_empty()
             || self.vehicles.values().any(|of| of.radius_m.is_some())
-            || self.envelope.is_empty()
+            || !self.judges_single_vehicles()
+    }
+
+    /// Returns whether single vehicles are judged: by limits, or by a plan.
+    pub(super) fn judges_single_vehicles(&self) -> bool {
+        !self.envelope.is_empty() || self.has_plan
     }
 
     pub(super) fn limits(&self) -> Limits {

@@ -7,6 +7,7 @@ mod exact;
 mod findings;
 mod flown;
 mod many_findings;
+mod plan;
 mod presence;
 mod recorded;
 mod recorded_curves;

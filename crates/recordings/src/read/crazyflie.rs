@@ -11,7 +11,7 @@
 use nalgebra::Vector3;
 
 use super::csv::TextTable;
-use super::curves::{Curves, piece};
+use super::curves::{Curves, VehicleItems, piece};
 use super::error::{Fault, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
@@ -46,9 +46,21 @@ pub(super) fn open(
     left_out: Option<String>,
     options: &ReadOptions,
 ) -> Result<Recording, ReadError> {
+    let append = |curve: &mut Curve, file: &Source| curve.append(file);
+    let (curves, notes) = curves_of(vehicles, left_out, options, append)?;
+    Ok(Curves::recording(curves, notes))
+}
+
+/// Reads the curves of these vehicles with notes; `append` adds the pieces of a file to the curve of its vehicle.
+pub(super) fn curves_of(
+    vehicles: Vec<(String, Vec<Source>)>,
+    left_out: Option<String>,
+    options: &ReadOptions,
+    mut append: impl FnMut(&mut Curve, &Source) -> Result<(), ReadError>,
+) -> Result<(VehicleItems, Vec<String>), ReadError> {
     let mut notes: Vec<String> = left_out.into_iter().collect();
     let (several, mut has_sequence_note) = (vehicles.len() > 1, false);
-    let mut curves: Vec<(String, Vec<Item>)> = Vec::new();
+    let mut curves = VehicleItems::new();
     if let Some(name) = options.starts.keys().find(|name| vehicles.iter().all(|(known, _)| known != *name)) {
         let problem = format!("--start names the unknown vehicle {}", quoted(name));
         return refuse("recording/unknown-vehicle", problem, "use the names of the files without their extension");
@@ -56,7 +68,7 @@ pub(super) fn open(
     for (name, files) in vehicles {
         let mut curve = Curve { vehicle: curves.len(), time_s: 0.0, scale: options.metres(), items: Vec::new() };
         for file in &files {
-            let appended = curve.append(file).map_err(|fault| fault.of(&file.display_path()));
+            let appended = append(&mut curve, file).map_err(|fault| fault.of(&file.display_path()));
             appended.map_err(|fault| if several { fault.among_others() } else { fault })?;
         }
         if files.len() > 1 && !has_sequence_note {
@@ -79,7 +91,7 @@ pub(super) fn open(
         let note = "curves start at one position: if they are relative, set each origin with --start NAME=X,Y,Z";
         notes.push(note.to_owned());
     }
-    Ok(Curves::recording(curves, notes))
+    Ok((curves, notes))
 }
 
 /// Columns of the duration, and of x, y and z for each power.
@@ -114,7 +126,7 @@ impl Columns {
 }
 
 /// Curve of a vehicle, as read so far.
-struct Curve {
+pub(super) struct Curve {
     vehicle: usize,
     /// Start of the next piece \[s\].
     time_s: f64,
@@ -136,14 +148,20 @@ impl Curve {
     fn piece(&mut self, table: &TextTable, columns: &Columns) -> Result<(), Fault> {
         let number = |column: usize| number(table, column)?.ok_or_else(|| Fault::empty_cell(&table.header()[column]));
         let duration_s = number(columns.duration)?;
-        let to_s = self.time_s + duration_s;
-        if duration_s <= 0.0 || to_s <= self.time_s {
-            let problem = format!("the duration of the piece must be positive, got {duration_s} s");
-            return refuse("recording/duration", problem, "remove the piece");
-        }
         let mut coefficients = Vec::with_capacity(columns.powers.len());
         for &[x, y, z] in &columns.powers {
             coefficients.push(Vector3::new(number(x)?, number(y)?, number(z)?));
+        }
+        self.push(duration_s, coefficients)
+    }
+
+    /// Adds a piece of this duration \[s\] with these coefficients of the powers of time.
+    pub(super) fn push(&mut self, duration_s: f64, coefficients: Vec<Vector3<f64>>) -> Result<(), Fault> {
+        let to_s = self.time_s + duration_s;
+        // A duration that is not a number compares false.
+        if !(duration_s > 0.0 && to_s > self.time_s) {
+            let problem = format!("the duration of the piece must be positive, got {duration_s} s");
+            return refuse("recording/duration", problem, "remove the piece");
         }
         let piece = piece(self.vehicle, self.time_s, to_s, coefficients, self.scale);
         self.items.push(Item::Piece(piece.ok_or_else(Fault::out_of_range)?));

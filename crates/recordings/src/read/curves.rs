@@ -12,6 +12,9 @@ use tautline_core::track::{Item, Metadata, Piece, Tracks};
 /// Smallest jump between two pieces of a curve that is reported \[m\]. Files round to micrometres.
 const JUMP_M: f64 = 1e-3;
 
+/// Names of vehicles, each with its items in order of time.
+pub(super) type VehicleItems = Vec<(String, Vec<Item>)>;
+
 /// Pieces of curves in order of time.
 pub(super) struct Curves {
     vehicles: Vec<String>,
@@ -20,14 +23,19 @@ pub(super) struct Curves {
 }
 
 impl Curves {
-    /// Returns the recording of these vehicles, each with its items in order of time.
-    pub(super) fn recording(vehicles: Vec<(String, Vec<Item>)>, mut notes: Vec<String>) -> Recording {
-        notes.extend(largest_jump(&vehicles));
+    /// Returns the recording of these vehicles in seconds, each with its items in order of time.
+    pub(super) fn recording(vehicles: VehicleItems, notes: Vec<String>) -> Recording {
+        Self::with_metadata(vehicles, Metadata::in_seconds(notes))
+    }
+
+    /// Returns the recording of these vehicles, each with its items in order of time, and adds a note on jumps.
+    pub(super) fn with_metadata(vehicles: VehicleItems, mut metadata: Metadata) -> Recording {
+        metadata.notes.extend(largest_jump(&vehicles));
         let (vehicles, items): (Vec<_>, Vec<_>) = vehicles.into_iter().unzip();
         let mut items: Vec<_> = items.into_iter().flatten().collect();
         // The sort is stable: items with the same time stay in the order of the vehicles.
         items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
-        Box::new(Self { vehicles, items: items.into_iter(), metadata: Metadata::in_seconds(notes) })
+        Box::new(Self { vehicles, items: items.into_iter(), metadata })
     }
 }
 
@@ -87,6 +95,24 @@ pub(super) fn piece(
     })
 }
 
+/// Converts the Bezier curve of these points over a duration T to coefficients of the powers of time.
+///
+/// `c_k = C(n, k) D_k / T^k` with the k-th forward difference `D_k = sum_i (-1)^(k - i) C(k, i) P_i` of the points.
+pub(super) fn powers(points: &[Vector3<f64>], duration_s: f64) -> Vec<Vector3<f64>> {
+    let degree = points.len() - 1;
+    let mut differences = points.to_vec();
+    let mut factor = 1.0;
+    let mut coefficients = Vec::with_capacity(points.len());
+    for k in 0..=degree {
+        coefficients.push(differences[0] * factor);
+        for i in 0..degree - k {
+            differences[i] = differences[i + 1] - differences[i];
+        }
+        factor *= (degree - k) as f64 / ((k + 1) as f64 * duration_s);
+    }
+    coefficients
+}
+
 fn end_of(piece: &Piece) -> Vector3<f64> {
     let duration = piece.to_s - piece.from_s;
     piece.coefficients.iter().rev().fold(Vector3::zeros(), |sum, coefficient| sum * duration + coefficient)
@@ -103,4 +129,30 @@ fn largest_jump(vehicles: &[(String, Vec<Item>)]) -> Option<String> {
     });
     let (jump_m, name, time_s) = jumps.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|jump| jump.0 > JUMP_M)?;
     Some(format!("the largest jump of a curve is {jump_m:.4} m, of `{name}` at {time_s} s"))
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::vector;
+
+    use super::*;
+
+    /// Rounding error of a few additions of numbers around 10.
+    const ROUNDING_M: f64 = 1e-13;
+
+    #[test]
+    fn power_coefficients_agree_with_de_casteljau() {
+        let points = [vector![1.0, 2.0, 3.0], vector![-2.0, 0.5, 4.0], vector![0.0, 7.0, 1.0], vector![5.0, 5.0, 5.0]];
+        let coefficients = powers(&points, 2.5);
+        for step in 0..=10 {
+            let u = f64::from(step) / 10.0;
+            let mut level = points.to_vec();
+            while level.len() > 1 {
+                level = level.windows(2).map(|pair| pair[0] * (1.0 - u) + pair[1] * u).collect();
+            }
+            let t = 2.5 * u;
+            let power = coefficients.iter().rev().fold(Vector3::zeros(), |sum, c| sum * t + c);
+            assert!((power - level[0]).norm() < ROUNDING_M, "{u}: {power} {}", level[0]);
+        }
+    }
 }

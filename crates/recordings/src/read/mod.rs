@@ -13,6 +13,7 @@
 //! file, the place, the value and the remedy. Inferences such as the unit of time appear in the notes.
 
 mod axes;
+mod bezier;
 mod capture;
 mod clock;
 mod crazyflie;
@@ -34,6 +35,7 @@ pub(crate) mod parquet;
 mod readers;
 mod skybrush;
 mod source;
+mod spline;
 mod table;
 mod ulog;
 mod vviz;
@@ -163,10 +165,11 @@ fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, R
     let format =
         folder.first().map(|first| recognise(first, options.format).map_err(|e| with_file(e, &first.display_path())));
     let left_out = folder.note();
-    if format.transpose()? == Some(Format::CRAZYFLIE) {
-        options.refuse_unsupported_options(Format::CRAZYFLIE)?;
+    if let Some(format) = format.transpose()?.filter(|format| [Format::CRAZYFLIE, Format::BEZIER].contains(format)) {
+        options.refuse_unsupported_options(format)?;
         let alone = folder.files.into_iter().map(|file| (file.stem(), vec![file]));
-        return crazyflie::open(alone.chain(folder.folders).collect(), left_out, options);
+        let open = if format == Format::BEZIER { bezier::open } else { crazyflie::open };
+        return open(alone.chain(folder.folders).collect(), left_out, options);
     }
     if !folder.folders.is_empty() {
         return Err(folder.of_folders().into());

@@ -10,7 +10,7 @@ use super::options::ReadOptions;
 use super::order::Recording;
 use super::skybrush::SHOW;
 use super::source::{Archive, GZIP_MAGIC, Source};
-use super::{capture, crazyflie, csv, heading, mcap, npz, objects, parquet, skybrush, ulog, vviz};
+use super::{bezier, capture, crazyflie, csv, heading, mcap, npz, objects, parquet, skybrush, ulog, vviz};
 
 /// Reader of a format: a row of [`READERS`].
 pub struct Reader {
@@ -43,6 +43,7 @@ pub static READERS: &[Reader] = &[
     skybrush::READER,
     capture::MOTIVE,
     capture::VICON,
+    bezier::READER,
     crazyflie::READER,
     csv::CSV,
     csv::TRAJNET,
@@ -127,6 +128,8 @@ impl Format {
     pub const NPZ: Self = Self(&npz::READER);
     /// MCAP.
     pub const MCAP: Self = Self(&mcap::READER);
+    /// Pieces of Bezier curves.
+    pub const BEZIER: Self = Self(&bezier::READER);
     /// Crazyflie polynomials.
     pub const CRAZYFLIE: Self = Self(&crazyflie::READER);
     /// A Skybrush show.

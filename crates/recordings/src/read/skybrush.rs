@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
 
-use super::curves::{Curves, distinct, from_json, piece};
+use super::curves::{Curves, distinct, from_json, piece, powers};
 use super::error::{Fault, Place, ReadError, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
@@ -239,48 +239,4 @@ fn segment(before: &Point, point: &Point, [from_s, to_s]: [f64; 2]) -> Result<Ve
     }
     let points = std::iter::once(&before.1).chain(&point.2).chain([&point.1]);
     Ok(powers(&points.map(|&point| point.into()).collect::<Vec<_>>(), to_s - from_s))
-}
-
-/// Converts the Bezier curve of these points over a duration T to coefficients of the powers of time.
-///
-/// `c_k = C(n, k) D_k / T^k` with the k-th forward difference `D_k = sum_i (-1)^(k - i) C(k, i) P_i` of the points.
-fn powers(points: &[Vector3<f64>], duration_s: f64) -> Vec<Vector3<f64>> {
-    let degree = points.len() - 1;
-    let mut differences = points.to_vec();
-    let mut factor = 1.0;
-    let mut coefficients = Vec::with_capacity(points.len());
-    for k in 0..=degree {
-        coefficients.push(differences[0] * factor);
-        for i in 0..degree - k {
-            differences[i] = differences[i + 1] - differences[i];
-        }
-        factor *= (degree - k) as f64 / ((k + 1) as f64 * duration_s);
-    }
-    coefficients
-}
-
-#[cfg(test)]
-mod tests {
-    use nalgebra::vector;
-
-    use super::*;
-
-    /// Rounding error of a few additions of numbers around 10.
-    const ROUNDING_M: f64 = 1e-13;
-
-    #[test]
-    fn power_coefficients_agree_with_de_casteljau() {
-        let points = [vector![1.0, 2.0, 3.0], vector![-2.0, 0.5, 4.0], vector![0.0, 7.0, 1.0], vector![5.0, 5.0, 5.0]];
-        let coefficients = powers(&points, 2.5);
-        for step in 0..=10 {
-            let u = f64::from(step) / 10.0;
-            let mut level = points.to_vec();
-            while level.len() > 1 {
-                level = level.windows(2).map(|pair| pair[0] * (1.0 - u) + pair[1] * u).collect();
-            }
-            let t = 2.5 * u;
-            let power = coefficients.iter().rev().fold(Vector3::zeros(), |sum, c| sum * t + c);
-            assert!((power - level[0]).norm() < ROUNDING_M, "{u}: {power} {}", level[0]);
-        }
-    }
 }

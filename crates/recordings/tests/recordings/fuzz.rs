@@ -39,6 +39,7 @@ const TEXT: &str = "# t x1 y1 z1 x2 y2 z2\n0 1 2 3 -1.5 .25 1e-3\n.5   1.5\t2 3 
 const TUPLES: &str = "0 (1,2) (-1.5,.25)\n.5 (1.5, 2) (-1,.25)\n";
 const ONE: &str = "t,x,y,z\n0,1,2,3\n.5,1,2,4\n";
 const POLYNOMIAL: &str = "duration,x^0,x^1,y^0,y^1,z^0,z^1,\n1,0,1,0,0,1,0,\n0.5,1,1,0,0,1,0,\n";
+const BEZIER: &str = "#duration,p0x,p0y,p0z,...\n1,0,0,1,1,2,1,\n0.5,1,2,1,1,2,1\n";
 const SHOW: &str = r#"{"version": 1, "swarm": {"drones": [{"settings": {"name": "A", "trajectory": {"version": 1,
     "takeoffTime": 2, "points": [[0, [1, 2, 0], []], [4, [1, 2, 8], [[0, 0, 0]]]]}}},
     {"settings": {"trajectory": {"$ref": "./a.json#"}}}]}}"#;
@@ -113,6 +114,8 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         ("text", TEXT.into()),
         ("tuples", TUPLES.into()),
         ("polynomial", POLYNOMIAL.into()),
+        ("bezier", BEZIER.into()),
+        ("planned", planned()),
         ("show", SHOW.into()),
         ("gzip", gzip.finish().expect("finished")),
         ("skyc", zipped(&[("show.json", SHOW), ("a.json", r#"{"points": [[0, [1, 2, 3]], [1, [1, 2, 4]]]}"#)])),
@@ -138,10 +141,23 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
 
 /// Returns the options that a seed requires. MCAP seeds are also read unclosed; other formats refuse that option.
 fn options_of(seed: &str) -> ReadOptions {
-    let is_mcap =
-        ["mcap", "foreign", "zstd", "frames", "metadata.yaml", "bag_0.mcap", "bag_1.mcap.zstd"].contains(&seed);
+    let is_mcap = ["mcap", "planned", "foreign", "zstd", "frames", "metadata.yaml", "bag_0.mcap", "bag_1.mcap.zstd"]
+        .contains(&seed);
     let frame = (seed == "frames").then(|| "map".to_owned());
     ReadOptions { frame, allow_unfinished: is_mcap, ..ReadOptions::default() }
+}
+
+/// Returns a curve of each planner.
+fn planned() -> Vec<u8> {
+    let knots = [0.0, 0.0, 1.0, 2.0, 2.0];
+    let spline = (1, 1, 5_i64, (1, 5), knots.to_vec(), vec![[0.0, 1.0, 2.0], [1.0; 3], [2.0; 3]], vec![0.0], 0.1);
+    let ends = [[1.0_f32, 2.0, 3.0]; 6];
+    let minco = (2_i16, 5, (1, 5), 0.5_f32, 5_u8, ends, [vec![2.0_f32], vec![2.0], vec![2.0]], vec![1.0_f32, 0.5]);
+    let messages = [
+        ("/planning/bspline", "traj_utils/msg/Bspline", "cdr", 1, cdr(&spline, true)),
+        ("/planning/trajectory", "traj_utils/msg/MINCOTraj", "cdr", 1, cdr(&minco, false)),
+    ];
+    mcap_with(mcap::WriteOptions::new().compression(None).use_chunks(false), &messages)
 }
 
 /// Returns poses in frames connected by transforms, one message each.

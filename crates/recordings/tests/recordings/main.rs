@@ -18,6 +18,7 @@ mod heights;
 mod identity;
 mod messages;
 mod parquet;
+mod planners;
 mod refusals;
 mod ros;
 mod run_channels;

@@ -56,7 +56,7 @@ pub use laws::{OfLaw, by_law};
 pub use over_time::{channels, control, disagreement, energy, shape_error};
 pub use paper::Format;
 pub use paths::{at_closest, paths};
-pub use recorded::{Encounter, closest_approach, encounters, smallest};
+pub use recorded::{Encounter, PlanLine, closest_approach, encounters, plan_distances, smallest};
 pub use space::paths_in_space;
 pub use studies::{Histogram, Separation, Share, attack, histograms, margin, separations, shares, verdicts};
 pub use validation::{Step, convergence, tension_curve};
@@ -133,7 +133,7 @@ pub(crate) fn time_ticks(from_s: f64, to_s: f64) -> Vec<(f64, String)> {
 }
 
 /// Names of all figures of an audit of a recording.
-pub const NAMES_OF_AUDIT: [&str; 4] = ["encounters", "closest-approach", "smallest", "obstacles"];
+pub const NAMES_OF_AUDIT: [&str; 5] = ["encounters", "closest-approach", "smallest", "obstacles", "plan"];
 
 /// Names of all figures that [`of_run`] can draw.
 pub const NAMES_OF_RUN: [&str; 11] = [

@@ -125,6 +125,40 @@ pub fn closest_approach(encounter: &Encounter, title: &str) -> Figure {
     chart.figure("closest-approach", title, &description)
 }
 
+/// Largest number of vehicles with a line of their distance from the plan.
+const DRAWN: usize = 6;
+
+/// Name of a vehicle, and time \[s\], distance from its plan \[m\] and the uncertainty of the distance \[m\].
+pub type PlanLine<'a> = (String, &'a [(f64, f64, f64)]);
+
+/// Draws distances from the plan over time \[s\] with the tube \[m\], and bands where a distance is known to an
+/// interval only. `lines` holds name, time, distance and its uncertainty of each vehicle, the farthest first; the first
+/// six are drawn. A distance that is NaN breaks the line.
+#[must_use]
+pub fn plan_distances(lines: &[PlanLine<'_>], tube_m: Option<f64>, title: &str) -> Figure {
+    let all = || lines.iter().take(DRAWN).flat_map(|(_, points)| points.iter());
+    let numbers = all().flat_map(|&(_, distance, slack)| [distance, distance + slack]);
+    let y = Axis::linear("distance from the plan [m]", numbers.chain(tube_m).chain([0.0]), true);
+    let (from_s, to_s) = extent(all().map(|point| point.0)).unwrap_or((0.0, 0.0));
+    let mut chart = Chart::new(Axis::time(from_s, to_s), y);
+    for (k, (name, points)) in lines.iter().take(DRAWN).enumerate() {
+        let stroke = Stroke::of_line(k);
+        for known in points.split(|point| point.1.is_nan()).filter(|known| known.iter().any(|point| point.2 > 0.0)) {
+            let points = known.iter().map(|&(t, d, slack)| (t, (d - slack).max(0.0), d + slack)).collect();
+            chart.bands.push(Band { points, colour: stroke.colour, opacity: 0.22, label: None });
+        }
+        chart.line(points.iter().map(|&(t, d, _)| (t, d)).collect(), stroke, name.clone());
+    }
+    if let Some(tube_m) = tube_m {
+        chart.level(tube_m, Stroke::solid(INK, 2.0), format!("tube {tube_m:?} m"));
+    }
+    let most = all().map(|point| point.1 + point.2).filter(|m| m.is_finite()).fold(0.0, f64::max);
+    let (count, drawn) = (lines.len(), lines.len().min(DRAWN));
+    let description =
+        format!("{title} over time, of {drawn} of {count} vehicles with the largest; at most {most:.3} m.");
+    chart.figure("plan", title, &description)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

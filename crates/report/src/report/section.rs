@@ -27,6 +27,8 @@ fn about(heading: &str) -> &'static str {
         "Each vehicle by itself" => "Limits of single vehicles, such as speed, with the vehicle nearest to each.",
         "Presence" => "Vehicles that the recording does not contain from its start to its end.",
         "Undecided" => "Times in which the recording is too coarse to prove or refute a violation.",
+        "Against the plan" => "Largest distance of each vehicle from its planned curve, between the samples too.",
+        "Distance from the plan not known" => "Times in which only one of flight and plan has the vehicle.",
         "Gaps" => "Times in which a vehicle was not recorded.",
         _ => "",
     }

@@ -10,14 +10,19 @@ use super::super::options::{Duplicates, ReadOptions};
 use super::super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
 use super::super::source::Source;
 use super::messages::{EARTH, Observation, PoseKind, VehicleKey, is_list, reader_of_topic};
-use super::outline::{is_static, place, space};
+use super::outline::{Outline, is_static, place, space};
 use super::plan::{Conversion, ReadPlan};
+use super::planned;
 use super::tree::{FramePose, TransformAt};
 use crate::mcap::topic::{Message, Part, TopicReader};
 
 /// Opens a recording in consecutive files; `whole` is the source named in errors.
 pub(super) fn open(whole: &Source, mut splits: SplitFiles, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let plan = ReadPlan::of(&mut splits, options)?;
+    let outline = Outline::of(&mut splits, &options.topics)?;
+    if let Some(curves) = planned::open(&outline, &mut splits, options)? {
+        return Ok(curves);
+    }
+    let plan = ReadPlan::of(outline, &mut splits, options)?;
     let none = plan.none();
     let mut info = RecordingInfo::new(whole, options, Some(TimeUnit::Nanoseconds), splits.notes.clone(), none);
     info.metadata.earth_origin = plan.local().map(|local| local.measured_from(options.origin));

@@ -7,6 +7,7 @@
 //! | `foxglove.PosesInFrame`, `geometry_msgs/msg/PoseArray` | protobuf or json, cdr | its place in the list |
 //! | `foxglove.FrameTransform(s)`, `tf2_msgs/msg/TFMessage`, `geometry_msgs/msg/TransformStamped` | the same | the child frame |
 //! | `motion_capture_tracking_interfaces/msg/NamedPoseArray` | cdr | the name of the pose |
+//! | `traj_utils/msg/Bspline`, `traj_utils/msg/MINCOTraj` | cdr | the number of the drone |
 //! | `foxglove.PoseInFrame`, `geometry_msgs/msg/PoseStamped`, `PoseWithCovarianceStamped`, `PointStamped`, `nav_msgs/msg/Odometry`, `sensor_msgs/msg/NavSatFix` | the same | the topic |
 //!
 //! Times are those in the messages, or the log times if no message of a topic has one. All positions must be in one
@@ -18,6 +19,7 @@ mod messages;
 mod outline;
 pub(crate) mod own;
 mod plan;
+mod planned;
 mod tree;
 
 pub use own::Channels;
@@ -69,6 +71,7 @@ fn origin(topics: &mut TopicReader) -> Result<Option<Origin>, ReadError> {
         let origin = match name {
             SWARM_SCHEMA => Some(Origin::Run),
             _ if is_export => Some(Origin::Export),
+            _ if planned::is_curve(name) => Some(Origin::Foreign),
             _ => messages::reader_of(name).map(|_| Origin::Foreign),
         };
         if origin.is_some() {
@@ -98,8 +101,8 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     options.accept_unfinished(topics.is_complete())?;
     let remedy = "record one of the topics foxglove.PosesInFrame, foxglove.FrameTransforms, \
                   geometry_msgs/msg/PoseStamped, geometry_msgs/msg/PoseArray, nav_msgs/msg/Odometry, \
-                  sensor_msgs/msg/NavSatFix, motion_capture_tracking_interfaces/msg/NamedPoseArray or \
-                  tf2_msgs/msg/TFMessage";
+                  sensor_msgs/msg/NavSatFix, motion_capture_tracking_interfaces/msg/NamedPoseArray, \
+                  tf2_msgs/msg/TFMessage, traj_utils/msg/Bspline or traj_utils/msg/MINCOTraj";
     refuse("recording/no-positions", "it has no topic with positions", remedy)
 }
 

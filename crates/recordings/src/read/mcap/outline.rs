@@ -9,6 +9,7 @@ use super::super::error::{Fault, Place, ReadError, quoted, refuse};
 use super::super::heading::Words;
 use super::foreign::SplitFiles;
 use super::messages::{EARTH, FIXES, Observation, PoseKind, VehicleKey, is_of_transforms, reader_of_topic};
+use super::planned;
 use super::tree::{FramePose, Tree, VehicleFrame};
 use crate::mcap::topic::{DeclaredTopic, Message, Part};
 
@@ -49,6 +50,8 @@ pub(super) struct Outline {
     transforms: BTreeSet<String>,
     /// Topics with a message that has a time.
     pub(super) stamped: BTreeSet<String>,
+    /// Topics with curves of planners that are read.
+    pub(super) curves: BTreeSet<String>,
     /// First position on the Earth \[degrees, m\].
     pub(super) first_fix: Option<Vector3<f64>>,
 }
@@ -64,6 +67,13 @@ impl Outline {
         let (mut outline, mut number) = (Self { named: named.to_vec(), ..Self::default() }, 0);
         splits.visit_all(|part| {
             let Part::Message(message) = part else { return Ok(()) };
+            if planned::is_curve(&message.of.schema) {
+                let of = if outline.reads(message.of) { &mut outline.curves } else { &mut outline.unread };
+                if !of.contains(&message.of.topic) {
+                    of.insert(message.of.topic.clone());
+                }
+                return Ok(());
+            }
             if !outline.reads(message.of) && reader_of_topic(message.of).is_some() {
                 outline.unread.insert(message.of.topic.clone());
             }
@@ -168,7 +178,20 @@ impl Outline {
 
     /// Returns the names of all topics with positions, transforms last.
     pub(super) fn names(&self) -> Vec<String> {
-        self.topics.keys().chain(&self.unread).chain(&self.transforms).cloned().collect()
+        self.topics.keys().chain(&self.curves).chain(&self.unread).chain(&self.transforms).cloned().collect()
+    }
+
+    /// Returns the topics with positions that are read, transforms last.
+    pub(super) fn pose_topics(&self) -> impl Iterator<Item = &String> {
+        self.topics.keys().chain(&self.transforms)
+    }
+
+    /// Refuses a topic named by the user that the recording does not have.
+    pub(super) fn refuse_unknown(&self) -> Result<(), Fault> {
+        let known = self.names();
+        let Some(name) = self.named.iter().find(|topic| !known.contains(topic)) else { return Ok(()) };
+        let problem = format!("it has no topic {} with positions; such topics are {}", quoted(name), known.join(", "));
+        refuse("recording/unknown-topic", problem, "choose one of these with --topic")
     }
 
     /// Returns whether a topic named by the user has transforms of a namespace.

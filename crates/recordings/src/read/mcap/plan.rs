@@ -45,9 +45,8 @@ impl Conversion {
 }
 
 impl ReadPlan {
-    /// Reads all messages once and decides which are used.
-    pub(super) fn of(splits: &mut SplitFiles, options: &ReadOptions) -> Result<Self, ReadError> {
-        let outline = Outline::of(splits, &options.topics)?;
+    /// Decides which messages are used, by the outline of all.
+    pub(super) fn of(outline: Outline, splits: &mut SplitFiles, options: &ReadOptions) -> Result<Self, ReadError> {
         let first_fix = outline.first_fix;
         let origin = options.origin.map(Vector3::from).or(first_fix).filter(|_| first_fix.is_some());
         let mut plan = Self {
@@ -79,12 +78,7 @@ impl ReadPlan {
     }
 
     fn check(&self) -> Result<(), Fault> {
-        let known = self.outline.names();
-        if let Some(name) = self.outline.named.iter().find(|topic| !known.contains(topic)) {
-            let problem =
-                format!("it has no topic {} with positions; such topics are {}", quoted(name), known.join(", "));
-            return refuse("recording/unknown-topic", problem, "choose one of these with --topic");
-        }
+        self.outline.refuse_unknown()?;
         self.outline.refuse_twice()?;
         self.outline.refuse_setpoints()
     }

@@ -4,10 +4,12 @@
 
 mod envelope;
 mod moments;
+mod plan;
 mod report;
 mod words;
 
 pub use envelope::{CornerFindings, LimitFindings};
+pub use plan::{PlanCertificate, PlanDistance, PlanReport, PlanUnknown};
 pub use report::{
     AssumedMotion, Basis, Clock, EarlyEnd, Obstacles, PresenceSpan, PresenceSummary, RecordedAudit, RecordedReport,
     Source,

@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::envelope::LimitFindings;
+use super::plan::PlanReport;
 use crate::report::flight::{self, Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Separation, finite};
 use tautline_audit::recorded::{
     Absence, Approach, Contradiction, Gap, ObjectPair, Outcome, Presence, Settings, TOUCHING_ELLIPSOIDS, Tallies,
@@ -125,6 +126,8 @@ pub struct RecordedReport {
     pub undecided: Vec<PairFinding<Undecided<ObjectPair>>>,
     /// Time at which the recording contradicts the assumed bound on acceleration.
     pub contradiction: Option<VehicleFinding<Contradiction>>,
+    /// Findings against a plan; null without one.
+    pub plan: Option<PlanReport>,
     /// Early end of the flight inside the judged window. The rest of the window is unknown.
     pub ended_early: Option<EarlyEnd>,
     /// Verdict and finding up to the early end, if clear up to there.
@@ -273,6 +276,7 @@ impl RecordedReport {
             },
             violations,
             limits,
+            plan: None,
             ended_early: None,
             above_m: settings.above_m,
             until_then: None,

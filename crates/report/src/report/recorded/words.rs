@@ -1,6 +1,7 @@
 //! The report on a recording in words and as a page.
 
 use super::envelope::LimitFindings;
+use super::plan::PlanReport;
 use super::report::{EarlyEnd, PresenceSpan, RecordedReport};
 use super::report::{PairFinding, VehicleFinding};
 use crate::figures::Figure;
@@ -76,7 +77,8 @@ impl RecordedReport {
         let of_pairs = self.separation_asked && self.audit.flight.status == self.status;
         let in_plane = self.source.planar.then(|| "in the plane of x and y: no heights are known".to_owned());
         let pairs = of_pairs.then(|| self.finding_of_pairs());
-        let found = pairs.into_iter().chain(limits).collect::<Vec<_>>();
+        let against_plan = self.plan.iter().filter(|plan| plan.status == self.status).map(PlanReport::brief);
+        let found = pairs.into_iter().chain(limits).chain(against_plan).collect::<Vec<_>>();
         // All limits are kept, but a vehicle that must be present is not seen throughout.
         let nothing = found.is_empty().then(|| "not every vehicle is seen throughout".to_owned());
         found.into_iter().chain(nothing).chain(in_plane).collect::<Vec<_>>().join("; ") + &self.window()
@@ -214,7 +216,8 @@ impl RecordedReport {
             list("Undecided", undecided, open),
             list("Gaps", self.findings.gaps, self.gaps.iter().map(VehicleFinding::<Gap>::words).collect()),
         ];
-        sections.into_iter().filter(|section| !section.rows.is_empty()).collect()
+        let against_plan = self.plan.iter().flat_map(PlanReport::sections);
+        sections.into_iter().chain(against_plan).filter(|section| !section.rows.is_empty()).collect()
     }
 
     /// Returns the lists that are cut, a sentence each.

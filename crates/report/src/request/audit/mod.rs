@@ -1,5 +1,6 @@
 //! `audit_files`: judges a recording of any origin.
 
+mod against_plan;
 mod config;
 mod own;
 mod places;
@@ -13,8 +14,10 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 
+pub use against_plan::PlanQuestion;
 pub use own::{OwnRecording, run_audit};
 
+use self::against_plan::AuditedFlight;
 use self::own::RunAnswer;
 use super::run::{figure_files, write_files};
 use super::{Failure, Monitor, RECORDING, outputs};
@@ -173,6 +176,8 @@ pub struct AuditRequest<'a> {
     pub obstacles: Option<PathBuf>,
     /// TOML file of a fence.
     pub fence: Option<PathBuf>,
+    /// Plan that the recording is compared with.
+    pub plan: Option<PlanQuestion>,
     /// Number of vehicles that must be present.
     pub expect_vehicles: Option<usize>,
     /// Whether the samples of a recording of `tautline run` are judged without the run's audit.
@@ -200,6 +205,7 @@ impl<'a> AuditRequest<'a> {
             settings: Settings::default(),
             obstacles: None,
             fence: None,
+            plan: None,
             expect_vehicles: None,
             independent: false,
             allow_undecided: false,
@@ -291,12 +297,13 @@ impl<'a> AuditRequest<'a> {
     /// # Errors
     /// [`Failure`] that names both files.
     pub fn check_outputs(&self, more: &[outputs::NamedPath<'_>]) -> Result<(), Failure> {
-        let Self { subject, obstacles, fence, html, proof, .. } = self;
+        let Self { subject, obstacles, fence, plan, html, proof, .. } = self;
         let settings = config::file_of(self);
         let mut inputs: Vec<_> = subject.paths().iter().map(|path| ("the recording", path.as_path())).collect();
         inputs.extend(obstacles.as_deref().map(|path| ("the file of obstacles", path)));
         inputs.extend(settings.as_deref().map(|path| ("the file of settings", path)));
         inputs.extend(fence.as_deref().map(|path| ("the file of the fence", path)));
+        inputs.extend(plan.as_ref().map(|plan| ("the plan", plan.path.as_path())));
         let own = [("--html", html), ("--proof", proof)];
         let own = own.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?)));
         outputs::check(&inputs, &more.iter().copied().chain(own).collect::<Vec<_>>())
@@ -344,7 +351,9 @@ impl<'a> AuditRequest<'a> {
                 return Err(Failure::input("audit/limit-twice", message, "give each limit once"));
             }
         }
+        self.plan.as_ref().map_or(Ok(()), PlanQuestion::check)?;
         let mut settings = self.settings.clone();
+        settings.has_plan = self.plan.is_some();
         settings.obstacles.extend(self.obstacles.as_deref().map_or(Ok(Vec::new()), venue_file::read_obstacles)?);
         if let Some(fence) = self.fence.as_deref() {
             settings.envelope.fence = Some(venue_file::read_fence(fence)?);
@@ -369,7 +378,7 @@ impl<'a> AuditRequest<'a> {
         let asked =
             outcome.vehicles.iter().filter(|&name| settings.only.as_ref().is_none_or(|only| only.contains(name)));
         let asked = asked.count();
-        if asked < 2 && settings.obstacles.is_empty() && settings.envelope.is_empty() {
+        if asked < 2 && settings.obstacles.is_empty() && settings.envelope.is_empty() && !settings.has_plan {
             let message =
                 format!("{path}: {} to judge, but no second object", counted(asked as u64, "vehicle", "vehicles"));
             let help = "judge two vehicles or more (--ids, --frame, --column id=NAME select them), or --obstacles, \
@@ -400,6 +409,7 @@ impl<'a> AuditRequest<'a> {
             (settings.max_gap_s.is_some(), "--max-gap"),
             (settings.vehicles.values().any(|of| of.offset_s != 0.0), "--offset"),
             (settings.envelope.limits.iter().any(|limit| limit.quantity.unit() != "m"), "--limit"),
+            (settings.has_plan || self.plan.is_some(), "--plan"),
         ];
         let Some((_, option)) = asked.into_iter().find(|(is_asked, _)| *is_asked) else { return Ok(()) };
         let path = self.subject.name();
@@ -503,11 +513,22 @@ impl ConfiguredAudit<'_> {
             monitor.warn(&format!("note: {note}"));
         }
         let source = Source { recording: request.subject.name(), clock, planar: is_planar, notes };
+        let flight = AuditedFlight {
+            open,
+            name: request.subject.name(),
+            settings: &settings,
+            outcome: &outcome,
+            epoch_ns: source.clock.epoch_ns,
+            is_planar,
+        };
+        let compared = request.plan.as_ref().map(|plan| against_plan::compare(plan, &flight, monitor)).transpose()?;
         let early_end = own.as_ref().and_then(|own| own.early_end.clone());
         // An early end of the flight does not affect a window that ends before it.
         let is_beyond = |to_s: f64| outcome.span_s.is_none_or(|(_, end_s)| to_s > end_s);
         let early_end = early_end.filter(|_| settings.to_s.is_none_or(is_beyond));
-        let mut report = RecordedReport::new(&outcome, &settings, source, between);
+        let is_by_run = between.basis == Basis::Run;
+        let report = RecordedReport::new(&outcome, &settings, source, between);
+        let (mut report, plan_figure) = against_plan::attach(report, compared, is_by_run, monitor);
         if let RunAnswer::Undecided(why) = answer {
             report.run_objection = Some(why);
         }
@@ -521,7 +542,8 @@ impl ConfiguredAudit<'_> {
         // Print the verdict before writing files, so that a write error does not hide it.
         monitor.say(&format!("{}\n{}", report.headline(), report.text()));
         if let Some((html, instants)) = request.html.as_ref().zip(instants) {
-            let (replay, figures) = replays::of_recording(open, monitor, &settings, &outcome, &report, instants)?;
+            let (replay, mut figures) = replays::of_recording(open, monitor, &settings, &outcome, &report, instants)?;
+            figures.extend(plan_figure);
             write_atomically(html, report.to_html(&replay, &figures, &request.command).as_bytes())?;
             if !request.formats.is_empty() {
                 let folder = figures_beside(html);

@@ -1,0 +1,304 @@
+//! Reads curves of planners: `traj_utils/msg/Bspline` of EGO-Planner and `traj_utils/msg/MINCOTraj` of its version 2.
+//!
+//! A curve of a drone is flown from its start until the next one of that drone starts. The trajectory server of the
+//! first version holds the last point of a curve. That of the second version sends nothing after the end: the motion is
+//! unknown there.
+//!
+//! A B-spline has its degree in `order`, and its time 0 at the knot with this index. A MINCO trajectory of order 5 is
+//! the curve of least jerk through its points.
+
+use std::collections::BTreeMap;
+
+use nalgebra::Vector3;
+use serde::Deserialize;
+use serde::de::DeserializeOwned;
+
+use super::super::curves::{Curves, VehicleItems, piece};
+use super::super::error::{Fault, Place, ReadError, quoted, refuse};
+use super::super::options::ReadOptions;
+use super::super::order::Recording;
+use super::super::spline::{Part, b_spline, minimum_jerk};
+use super::foreign::SplitFiles;
+use super::messages::nanoseconds;
+use super::outline::Outline;
+use crate::mcap::topic::{CDR, Part as FilePart, decode};
+use tautline_core::text::counted;
+use tautline_core::track::{Clock, Item, Metadata};
+
+const B_SPLINE: &str = "traj_utils/msg/Bspline";
+const MINCO: &str = "traj_utils/msg/MINCOTraj";
+
+/// Highest supported degree of a B-spline.
+const HIGHEST_DEGREE: i32 = 15;
+
+const NS_PER_S: i64 = 1_000_000_000;
+
+/// Remedy for a curve that contradicts itself.
+const REPLAN: &str = "check the planner and its version, and record again; or choose other topics with --topic";
+
+/// Returns whether the messages of a schema are curves of a planner.
+pub(super) fn is_curve(schema: &str) -> bool {
+    matches!(schema, B_SPLINE | MINCO)
+}
+
+/// Opens the curves of planners; `None` if the recording has none, or the user names other topics.
+pub(super) fn open(
+    outline: &Outline,
+    splits: &mut SplitFiles,
+    options: &ReadOptions,
+) -> Result<Option<Recording>, ReadError> {
+    let Some(topic) = outline.curves.first() else { return Ok(None) };
+    outline.refuse_unknown()?;
+    if let Some(other) = outline.pose_topics().find(|other| options.topics.is_empty() || options.topics.contains(other))
+    {
+        let problem = format!("topic {} holds curves of a planner, but {} positions", quoted(topic), quoted(other));
+        return refuse("recording/ambiguous-topics", problem, "choose the topics of one kind with --topic");
+    }
+    let unused = [
+        (options.frame.is_some(), "--frame", "curves of planners name no frame"),
+        (options.origin.is_some(), "--origin", "curves of planners have no place on the Earth"),
+        (options.sort, "--sort", "curves of planners are sorted by their starts"),
+        (options.duplicates.is_some(), "--duplicates", "curves of planners are no rows"),
+    ];
+    if let Some((_, option, why)) = unused.into_iter().find(|(is_given, ..)| *is_given) {
+        return refuse("recording/unused-option", why, format!("omit {option}"));
+    }
+    let (mut drones, mut number) = (BTreeMap::<i32, BTreeMap<i64, Plan>>::new(), 0);
+    let mut repeated = 0;
+    splits.visit_all(|part| {
+        let FilePart::Message(message) = part else { return Ok(()) };
+        if !outline.curves.contains(&message.of.topic) || !is_curve(&message.of.schema) {
+            return Ok(());
+        }
+        number += 1;
+        let at = || Place::Part(format!("curve {number} on topic `{}`", message.of.topic));
+        let read = if message.of.schema == MINCO { Plan::of_minco } else { Plan::of_b_spline };
+        let (drone, plan) = read(&message.of.encoding, message.bytes).map_err(|fault| fault.at(at()))?;
+        let start_ns = plan.start_ns;
+        match drones.entry(drone).or_default().insert(start_ns, plan.clone()) {
+            None => Ok(()),
+            Some(known) if known == plan => {
+                repeated += 1;
+                Ok(())
+            }
+            Some(_) => {
+                let problem = format!("another curve of drone {drone} starts at {start_ns} ns");
+                let remedy = "record each planner on a topic of its own, and choose the topics with --topic";
+                Err(Fault::coded("recording/duplicate-row", problem, remedy).at(at()))
+            }
+        }
+    })?;
+    let first_ns = drones.values().flat_map(BTreeMap::keys).min().copied().unwrap_or(0);
+    let epoch_ns = first_ns.div_euclid(NS_PER_S).saturating_mul(NS_PER_S);
+    let mut notes = splits.notes.clone();
+    notes.push(format!(
+        "{} of planners of {}: each is judged until the next one of its drone starts",
+        counted(drones.values().map(|of| of.len() as u64).sum(), "curve", "curves"),
+        counted(drones.len() as u64, "drone", "drones")
+    ));
+    if repeated > 0 {
+        notes.push(format!(
+            "{} repeated with the same content, and read once",
+            counted(repeated, "curve is", "curves are")
+        ));
+    }
+    let vehicles = vehicles(&drones, epoch_ns, options.metres(), &mut notes)?;
+    let clock = Clock { unit: "ns", epoch_ns, ..Clock::default() };
+    Ok(Some(Curves::with_metadata(vehicles, Metadata { clock, ..Metadata::in_seconds(notes) })))
+}
+
+/// Returns the names and the pieces of all drones, and adds notes on the ends of curves.
+fn vehicles(
+    drones: &BTreeMap<i32, BTreeMap<i64, Plan>>,
+    epoch_ns: i64,
+    scale: f64,
+    notes: &mut Vec<String>,
+) -> Result<VehicleItems, Fault> {
+    // Both times are close, so that the difference in nanoseconds is exact.
+    let seconds = |ns: i64| ns.saturating_sub(epoch_ns) as f64 / NS_PER_S as f64;
+    let ends_s = drones.values().flatten().map(|(start_ns, plan)| seconds(*start_ns) + plan.duration_s());
+    let end_s = ends_s.fold(f64::NEG_INFINITY, f64::max);
+    let (mut held, mut unknown) = (0, 0);
+    let mut vehicles = Vec::new();
+    for (vehicle, (drone, plans)) in drones.iter().enumerate() {
+        let mut items = Vec::new();
+        for (start_ns, plan) in plans {
+            let start_s = seconds(*start_ns);
+            let next = plans.range(start_ns.saturating_add(1)..).next();
+            let until_s = next.map_or(f64::INFINITY, |(next_ns, _)| seconds(*next_ns));
+            let mut push = |from_s: f64, to_s: f64, coefficients: Vec<Vector3<f64>>| {
+                let piece = piece(vehicle, from_s, to_s, coefficients, scale).ok_or_else(Fault::out_of_range)?;
+                items.push(Item::Piece(piece));
+                Ok::<_, Fault>(())
+            };
+            for (from_s, to_s, coefficients) in &plan.parts {
+                let (from_s, to_s) = (start_s + from_s, (start_s + to_s).min(until_s));
+                if from_s < until_s {
+                    push(from_s, to_s, coefficients.clone())?;
+                }
+            }
+            let (stop_s, until_s) = (start_s + plan.duration_s(), until_s.min(end_s));
+            if stop_s < until_s {
+                held += u64::from(plan.is_held);
+                unknown += u64::from(!plan.is_held);
+            }
+            if plan.is_held && stop_s < until_s {
+                push(stop_s, until_s, vec![plan.last()])?;
+            }
+        }
+        vehicles.push((drone.to_string(), items));
+    }
+    if held > 0 {
+        let ends = counted(held, "curve ends", "curves end");
+        notes.push(format!(
+            "{ends} before the next one or the recording: the drone holds the last point, as EGO-Planner does"
+        ));
+    }
+    if unknown > 0 {
+        let ends = counted(unknown, "curve ends", "curves end");
+        notes.push(format!("{ends} before the next one or the recording: the motion after the end is not known"));
+    }
+    Ok(vehicles)
+}
+
+/// Curve of a planner.
+#[derive(Clone, Debug, PartialEq)]
+struct Plan {
+    start_ns: i64,
+    /// Parts in order, at least one.
+    parts: Vec<Part>,
+    /// Whether the drone holds the last point after the end.
+    is_held: bool,
+}
+
+impl Plan {
+    fn duration_s(&self) -> f64 {
+        self.parts.last().map_or(0.0, |part| part.1)
+    }
+
+    fn last(&self) -> Vector3<f64> {
+        let Some((from_s, to_s, coefficients)) = self.parts.last() else { return Vector3::zeros() };
+        coefficients.iter().rev().fold(Vector3::zeros(), |sum, coefficient| sum * (to_s - from_s) + coefficient)
+    }
+
+    /// Returns the drone and the curve of a message.
+    fn of_b_spline(encoding: &str, bytes: &[u8]) -> Result<(i32, Self), Fault> {
+        let Bspline { drone, degree, start: (sec, nanosec), knots, points, .. } = decoded(encoding, bytes)?;
+        if !(1..=HIGHEST_DEGREE).contains(&degree) {
+            let problem = format!("order: must be 1 to {HIGHEST_DEGREE}, got {degree}");
+            return refuse("recording/degree", problem, REPLAN);
+        }
+        let degree = degree.unsigned_abs() as usize;
+        refuse_not_finite("knots", &knots)?;
+        refuse_not_finite("pos_pts", points.as_flattened())?;
+        if points.len() <= degree {
+            let problem =
+                format!("pos_pts: a curve of order {degree} needs more than {degree} points, got {}", points.len());
+            return refuse("recording/knots", problem, REPLAN);
+        }
+        let expected = points.len() + degree + 1;
+        if knots.len() != expected {
+            let problem =
+                format!("knots: {} points of order {degree} need {expected} knots, got {}", points.len(), knots.len());
+            return refuse("recording/knots", problem, REPLAN);
+        }
+        if let Some(k) = (1..knots.len()).find(|&k| knots[k] < knots[k - 1]) {
+            let problem =
+                format!("knots[{k}]: must not be below the knot before it, {}, got {}", knots[k - 1], knots[k]);
+            return refuse("recording/knots", problem, REPLAN);
+        }
+        let (first, last) = (knots[degree], knots[points.len()]);
+        if first >= last {
+            let problem = format!("knots: the curve must end after it starts, got {first} and {last}");
+            return refuse("recording/duration", problem, REPLAN);
+        }
+        let points: Vec<_> = points.into_iter().map(Vector3::from).collect();
+        let parts = b_spline(degree, &knots, &points);
+        Ok((drone, Self { start_ns: nanoseconds(sec.into(), nanosec.into()), parts, is_held: true }))
+    }
+
+    /// Returns the drone and the curve of a message.
+    fn of_minco(encoding: &str, bytes: &[u8]) -> Result<(i32, Self), Fault> {
+        let minco: MincoTraj = decoded(encoding, bytes)?;
+        if minco.order != 5 {
+            return refuse("recording/degree", format!("order: must be 5, got {}", minco.order), REPLAN);
+        }
+        let wide = |of: &[f32]| of.iter().map(|&number| f64::from(number)).collect::<Vec<_>>();
+        let [x, y, z, durations] = [
+            ("inner_x", &minco.inner_x),
+            ("inner_y", &minco.inner_y),
+            ("inner_z", &minco.inner_z),
+            ("duration", &minco.durations),
+        ]
+        .map(|(name, numbers)| (name, wide(numbers)));
+        for (name, numbers) in [&x, &y, &z, &durations] {
+            refuse_not_finite(name, numbers)?;
+        }
+        let (durations, pieces) = (durations.1, minco.durations.len());
+        for (name, numbers) in [&x, &y, &z] {
+            if numbers.len() + 1 != pieces {
+                let problem = format!("{name}: {pieces} durations need one number less, got {}", numbers.len());
+                return refuse("recording/field-count", problem, REPLAN);
+            }
+        }
+        if let Some(k) = durations.iter().position(|duration_s| *duration_s <= 0.0) {
+            let problem = format!("duration[{k}]: must be positive, got {} s", durations[k]);
+            return refuse("recording/duration", problem, REPLAN);
+        }
+        for (name, states) in [("start", &minco.start), ("end", &minco.end)] {
+            for (letter, numbers) in ["p", "v", "a"].into_iter().zip(states) {
+                refuse_not_finite(&format!("{name}_{letter}"), &wide(numbers))?;
+            }
+        }
+        let state = |of: [[f32; 3]; 3]| of.map(|numbers| Vector3::from(numbers.map(f64::from)));
+        let inner: Vec<_> = x.1.iter().zip(&y.1).zip(&z.1).map(|((x, y), z)| Vector3::new(*x, *y, *z)).collect();
+        let parts = minimum_jerk(state(minco.start), &inner, state(minco.end), &durations);
+        let (sec, nanosec) = minco.start_time;
+        let start_ns = nanoseconds(sec.into(), nanosec.into());
+        Ok((minco.drone.into(), Self { start_ns, parts, is_held: false }))
+    }
+}
+
+fn decoded<T: DeserializeOwned>(encoding: &str, bytes: &[u8]) -> Result<T, Fault> {
+    if encoding != CDR {
+        return Err(Fault::Damaged("ROS 2 messages are supported in CDR only".to_owned()));
+    }
+    decode(bytes).map_err(Fault::Damaged)
+}
+
+fn refuse_not_finite(name: &str, numbers: &[f64]) -> Result<(), Fault> {
+    match numbers.iter().position(|number| !number.is_finite()) {
+        Some(k) => {
+            let problem = format!("{name}[{k}]: must be a finite number, got {}", numbers[k]);
+            refuse("recording/not-finite", problem, REPLAN)
+        }
+        None => Ok(()),
+    }
+}
+
+/// Message of EGO-Planner. The angles after the points are not read.
+#[derive(Deserialize)]
+struct Bspline {
+    drone: i32,
+    degree: i32,
+    _traj_id: i64,
+    start: (i32, u32),
+    knots: Vec<f64>,
+    points: Vec<[f64; 3]>,
+}
+
+/// Message of EGO-Planner v2: positions, velocities and accelerations at both ends, inner points and durations.
+#[derive(Deserialize)]
+struct MincoTraj {
+    drone: i16,
+    _traj_id: i32,
+    start_time: (i32, u32),
+    _clearance_m: f32,
+    order: u8,
+    start: [[f32; 3]; 3],
+    end: [[f32; 3]; 3],
+    inner_x: Vec<f32>,
+    inner_y: Vec<f32>,
+    inner_z: Vec<f32>,
+    durations: Vec<f32>,
+}

@@ -1,0 +1,269 @@
+//! Curves of planners: B-splines and MINCO trajectories in bags, and tables of Bezier curves.
+
+use std::fs;
+
+use nalgebra::Vector3;
+use tautline_core::track::{Item, Piece};
+use tautline_recordings::read::{self, Format, ReadError, ReadOptions};
+
+use crate::messages::{Message, SEC, Stamp, cdr, header, mcap_of, read_bytes, whole};
+use crate::recording::{Whole, assert_refused};
+
+const B_SPLINE: &str = "traj_utils/msg/Bspline";
+const MINCO: &str = "traj_utils/msg/MINCOTraj";
+const TOPIC: &str = "/drone_0_planning/bspline";
+const BROADCAST: &str = "/planning/broadcast_traj_send";
+const REST: [f32; 3] = [0.0; 3];
+
+type Bspline = (i32, i32, i64, Stamp, Vec<f64>, Vec<[f64; 3]>, Vec<f64>, f64);
+type Minco = (i16, i32, Stamp, f32, u8, [[f32; 3]; 6], [Vec<f32>; 3], Vec<f32>);
+
+/// Returns a uniform cubic B-spline with seven points: four intervals of 1 s, along x at 1 m/s.
+fn spline(drone: i32, nanosec: u32, y: f64) -> Bspline {
+    let points = (0..7).map(|k| [f64::from(k), y, 1.0]).collect();
+    let knots = (0..11).map(|k| f64::from(k) - 3.0).collect();
+    (drone, 3, 1, (SEC, nanosec), knots, points, vec![], 0.0)
+}
+
+/// Returns a trajectory of 2 s from rest at the origin through (1, y, 1) to rest at (2, 0, 1).
+fn minco(drone: i16, y: f32) -> Minco {
+    let states = [[0.0, 0.0, 1.0], REST, REST, [2.0, 0.0, 1.0], REST, REST];
+    (drone, 1, (SEC, 500_000_000), 0.5, 5, states, [vec![1.0], vec![y], vec![1.0]], vec![1.0, 1.0])
+}
+
+fn of(message: &Bspline) -> Message {
+    (TOPIC, B_SPLINE, "cdr", 7, cdr(message, true))
+}
+
+fn of_minco(message: &Minco) -> Message {
+    (BROADCAST, MINCO, "cdr", 7, cdr(message, true))
+}
+
+fn topics(topics: &[&str]) -> ReadOptions {
+    ReadOptions { topics: topics.iter().map(|topic| (*topic).to_owned()).collect(), ..ReadOptions::default() }
+}
+
+fn refused(messages: &[Message], options: &ReadOptions) -> ReadError {
+    read_bytes("plan.mcap", &mcap_of(messages), options).expect_err("refused")
+}
+
+fn pieces(found: &Whole) -> Vec<&Piece> {
+    let piece = |item| match item {
+        Item::Piece(piece) => piece,
+        Item::Sample(sample) => panic!("{sample:?}"),
+    };
+    found.items.iter().map(piece).collect()
+}
+
+/// Returns the position of a vehicle at a time, on its last piece that has begun.
+fn position(found: &Whole, name: &str, time_s: f64) -> [f64; 3] {
+    let vehicle = found.vehicles.iter().position(|known| known == name).expect("a vehicle");
+    let mut of_vehicle = pieces(found).into_iter().filter(|piece| piece.vehicle == vehicle);
+    let piece = of_vehicle.rfind(|piece| piece.from_s <= time_s).expect("a piece");
+    assert!(time_s <= piece.to_s, "{time_s} {piece:?}");
+    let powers = piece.coefficients.iter().rev();
+    powers.fold(Vector3::zeros(), |sum, c| sum * (time_s - piece.from_s) + c).into()
+}
+
+fn assert_near(found: [f64; 3], expected: [f64; 3]) {
+    let off = (Vector3::from(found) - Vector3::from(expected)).norm();
+    assert!(off < 1e-9, "{found:?} {expected:?}");
+}
+
+#[test]
+fn a_b_spline_is_flown_until_the_next_one_starts_and_then_held() {
+    // The first curve would last from 0.25 s to 4.25 s; the second starts at 2.25 s, 1 m to the side.
+    let mut second = spline(4, 250_000_000, 1.0);
+    second.3.0 += 2;
+    // Its points begin where the first curve is then.
+    second.5.iter_mut().for_each(|point| point[0] += 2.0);
+    let other = spline(7, 0, 5.0);
+    for little in [true, false] {
+        let message = |message: &Bspline| (TOPIC, B_SPLINE, "cdr", 7, cdr(message, little));
+        // The order of the messages does not matter.
+        let found =
+            whole("plan.mcap", &mcap_of(&[message(&second), message(&spline(4, 250_000_000, 0.0)), message(&other)]));
+        assert_eq!(found.vehicles, ["4", "7"]);
+        assert_eq!((found.clock.unit, found.clock.epoch_ns), ("ns", i64::from(SEC) * 1_000_000_000));
+        // Control points on a line: the curve begins at the second of them.
+        for (time_s, expected) in [
+            (0.25, [1.0, 0.0, 1.0]),
+            (1.75, [2.5, 0.0, 1.0]),
+            (2.25, [3.0, 1.0, 1.0]),
+            (5.0, [5.75, 1.0, 1.0]),
+            (6.25, [7.0, 1.0, 1.0]),
+        ] {
+            assert_near(position(&found, "4", time_s), expected);
+        }
+        // The other drone holds its last point from 4 s to the end of all curves.
+        assert_near(position(&found, "7", 4.0), [5.0, 5.0, 1.0]);
+        assert_near(position(&found, "7", 6.25), [5.0, 5.0, 1.0]);
+        let cut: Vec<_> =
+            pieces(&found).into_iter().filter(|piece| piece.vehicle == 0).map(|piece| piece.to_s).collect();
+        assert_eq!(cut, [1.25, 2.25, 3.25, 4.25, 5.25, 6.25], "parts after the second start are not flown");
+        let has = |words: &str| found.notes.iter().any(|note| note.contains(words));
+        assert!(has("3 curves of planners of 2 drones") && has("holds the last point"), "{:?}", found.notes);
+        assert!(has("the largest jump of a curve is 1.0000 m, of `4` at 2.25 s"), "{:?}", found.notes);
+    }
+}
+
+#[test]
+fn a_minco_trajectory_passes_its_points_and_ends_unknown() {
+    let mut next = minco(2, 0.0);
+    next.2 = (SEC + 5, 0);
+    let found = whole("plan.mcap", &mcap_of(&[of_minco(&minco(2, 0.5)), of_minco(&next)]));
+    for (time_s, expected) in [(0.5, [0.0, 0.0, 1.0]), (1.5, [1.0, 0.5, 1.0]), (2.5, [2.0, 0.0, 1.0])] {
+        assert_near(position(&found, "2", time_s), expected);
+    }
+    let spans: Vec<_> = pieces(&found).into_iter().map(|piece| (piece.from_s, piece.to_s)).collect();
+    assert_eq!(spans, [(0.5, 1.5), (1.5, 2.5), (5.0, 6.0), (6.0, 7.0)], "no piece between 2.5 s and 5 s");
+    assert!(found.notes.iter().any(|note| note.contains("is not known")), "{:?}", found.notes);
+}
+
+#[test]
+fn repeated_curves_are_read_once_and_contradictory_ones_refused() {
+    let one = of(&spline(1, 0, 0.0));
+    let copy = ("/broadcast_bspline", B_SPLINE, "cdr", 9, cdr(&spline(1, 0, 0.0), true));
+    let found = whole("plan.mcap", &mcap_of(&[one.clone(), copy]));
+    assert_eq!(found.items, whole("plan.mcap", &mcap_of(std::slice::from_ref(&one))).items);
+    assert!(found.notes.iter().any(|note| note.starts_with("1 curve is repeated")), "{:?}", found.notes);
+    let error = refused(&[one, of(&spline(1, 0, 0.1))], &ReadOptions::default());
+    assert_refused(&error, "recording/duplicate-row", &format!("curve 2 on topic `{TOPIC}`"));
+}
+
+#[test]
+fn curves_beside_positions_need_a_topic() {
+    let odometry = (
+        header(5),
+        "base_link",
+        (([1.0, 2.0, 3.0], [0.0, 0.0, 0.0, 1.0]), [[0.0; 6]; 6]),
+        ([[0.0; 3]; 2], [[0.0; 6]; 6]),
+    );
+    let odometry = ("/odom", "nav_msgs/msg/Odometry", "cdr", 7, cdr(&odometry, true));
+    let both = [of(&spline(1, 0, 0.0)), odometry];
+    assert_refused(&refused(&both, &ReadOptions::default()), "recording/ambiguous-topics", "");
+    assert_refused(&refused(&both, &topics(&[TOPIC, "/odom"])), "recording/ambiguous-topics", "");
+    assert_refused(&refused(&both, &topics(&["/plan"])), "recording/unknown-topic", "");
+    let read = |topic| read_bytes("plan.mcap", &mcap_of(&both), &topics(&[topic])).expect("read");
+    assert_eq!(read(TOPIC).vehicles, ["1"]);
+    assert_eq!(read("/odom").samples().len(), 1);
+    let framed = ReadOptions { frame: Some("map".to_owned()), ..ReadOptions::default() };
+    assert_refused(&refused(&both[..1], &framed), "recording/unused-option", "");
+}
+
+/// Change of a valid message.
+type Spoil<T> = fn(&mut T);
+
+#[test]
+fn wrong_curves_name_the_field_and_its_value() {
+    let of_spline: [(Spoil<Bspline>, &str, &str); 9] = [
+        (|m| m.1 = 0, "recording/degree", "order: must be 1 to 15, got 0"),
+        (|m| m.1 = 16, "recording/degree", "order: must be 1 to 15, got 16"),
+        (|m| m.4.truncate(10), "recording/knots", "knots: 7 points of order 3 need 11 knots, got 10"),
+        (|m| m.5.truncate(3), "recording/knots", "pos_pts: a curve of order 3 needs more than 3 points, got 3"),
+        (|m| m.4[5] = 0.5, "recording/knots", "knots[5]: must not be below the knot before it, 1, got 0.5"),
+        (|m| m.4.fill(1.0), "recording/duration", "knots: the curve must end after it starts, got 1 and 1"),
+        (|m| m.4[2] = f64::NAN, "recording/not-finite", "knots[2]: must be a finite number, got NaN"),
+        (|m| m.5[1][2] = f64::INFINITY, "recording/not-finite", "pos_pts[5]: must be a finite number, got inf"),
+        (|m| (m.5[1][2], m.5[2][2]) = (f64::MAX, f64::MIN), "recording/overflow", ""),
+    ];
+    for (spoil, code, problem) in of_spline {
+        let mut message = spline(1, 0, 0.0);
+        spoil(&mut message);
+        let error = refused(&[of(&message)], &ReadOptions::default());
+        let place = if code == "recording/overflow" { String::new() } else { format!("curve 1 on topic `{TOPIC}`") };
+        assert_refused(&error, code, &place);
+        assert!(error.to_string().contains(problem), "{error}");
+    }
+    let of_trajectory: [(Spoil<Minco>, &str, &str); 7] = [
+        (|m| m.4 = 7, "recording/degree", "order: must be 5, got 7"),
+        (|m| m.6[1].clear(), "recording/field-count", "inner_y: 2 durations need one number less, got 0"),
+        (|m| m.7.clear(), "recording/field-count", "inner_x: 0 durations need one number less, got 1"),
+        (|m| m.7[1] = 0.0, "recording/duration", "duration[1]: must be positive, got 0 s"),
+        (|m| m.7[0] = -1.0, "recording/duration", "duration[0]: must be positive, got -1 s"),
+        (|m| m.7[0] = f32::NAN, "recording/not-finite", "duration[0]: must be a finite number, got NaN"),
+        (|m| m.5[4][1] = f32::NAN, "recording/not-finite", "end_v[1]: must be a finite number, got NaN"),
+    ];
+    for (spoil, code, problem) in of_trajectory {
+        let mut message = minco(1, 0.0);
+        spoil(&mut message);
+        let error = refused(&[of_minco(&message)], &ReadOptions::default());
+        assert_refused(&error, code, &format!("curve 1 on topic `{BROADCAST}`"));
+        assert!(error.to_string().contains(problem), "{error}");
+    }
+    let cut = (TOPIC, B_SPLINE, "cdr", 7, cdr(&spline(1, 0, 0.0), true)[..60].to_vec());
+    assert_refused(
+        &refused(&[cut], &ReadOptions::default()),
+        "recording/damaged",
+        &format!("curve 1 on topic `{TOPIC}`"),
+    );
+}
+
+/// Quarter of a parabola: x = t, y = t^2 over 2 s, as a Bezier curve of degree 2.
+const PARABOLA: &str = "#duration,p0x,p0y,p0z,p1x,p1y,p1z,p2x,p2y,p2z\n2,0,0,1,1,0,1,2,4,1\n1,2,4,1,2.5,4,1,3,4,1\n";
+
+#[test]
+fn bezier_curves_have_the_motion_of_their_points() {
+    let found = whole("cf1.csv", PARABOLA.as_bytes());
+    assert_eq!((&*found.vehicles[0], found.items.len()), ("cf1", 2));
+    for (time_s, expected) in [(0.0, [0.0, 0.0, 1.0]), (1.5, [1.5, 2.25, 1.0]), (2.5, [2.5, 4.0, 1.0])] {
+        assert_near(position(&found, "cf1", time_s), expected);
+    }
+    let plane = whole("cf2.csv", b"duration,p0x,p0y,p1x,p1y\n2,0,0,2,4\n# end\n");
+    assert_near(position(&plane, "cf2", 1.0), [1.0, 2.0, 0.0]);
+    assert!(plane.notes.iter().any(|note| note.contains("in the plane")), "{:?}", plane.notes);
+    // Points of degree 7 on a line, in the plane and in space.
+    for (axes, header) in
+        [(2, "#duration,p0x,p0y,..."), (3, "#duration,p0x,p0y,..."), (3, "# duration, p0x, p0y, p0z, ...")]
+    {
+        let point = |k: i32| format!(",{k},0,1")[..2 * axes + k.to_string().len() - 1].to_owned();
+        let text = format!("{header}\n7{}\n", (0..8).map(point).collect::<String>());
+        assert_near(
+            position(&whole("cf3.csv", text.as_bytes()), "cf3", 2.0),
+            [2.0, 0.0, f64::from(u8::from(axes == 3))],
+        );
+    }
+}
+
+#[test]
+fn a_folder_holds_a_bezier_curve_of_each_vehicle() {
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["cf1.csv", "cf2.csv"] {
+        fs::write(folder.path().join(name), PARABOLA).expect("written");
+    }
+    let moved = ReadOptions { starts: [("cf2".to_owned(), [0.0, 5.0, 0.0])].into(), ..ReadOptions::default() };
+    let found = Whole::read(folder.path(), &moved).expect("read");
+    assert_eq!(found.vehicles, ["cf1", "cf2"]);
+    assert_near(position(&found, "cf2", 2.0), [2.0, 9.0, 1.0]);
+    fs::write(folder.path().join("cf2.csv"), "duration,p0x,p0y\n1,0,0\n").expect("written");
+    let flat = read::open(folder.path(), &ReadOptions::default()).expect("read");
+    assert!(flat.is_planar());
+    let found = Whole::read(folder.path(), &ReadOptions::default()).expect("read");
+    assert_near(position(&found, "cf1", 0.0), [0.0; 3]);
+}
+
+#[test]
+fn wrong_bezier_tables_name_line_and_value() {
+    let header = "duration,p0x,p0y,p1x,p1y";
+    for (text, code, place) in [
+        ("duration,p0x,p0y,p1y,p1x\n1,0,0,0,0\n".to_owned(), "recording/missing-column", "line 1"),
+        ("duration,p0x,p0y,p1x\n1,0,0,0\n".to_owned(), "recording/missing-column", "line 1"),
+        ("duration,p0x,p0y,p0yaw\n1,0,0,0\n".to_owned(), "recording/missing-column", "line 1"),
+        (format!("{header}\n"), "recording/empty", ""),
+        (format!("{header}\n1,0,0,0\n"), "recording/field-count", "line 2"),
+        (format!("{header}\n0,0,0,0,0\n"), "recording/duration", "line 2"),
+        (format!("{header}\n1,0,0,0,0\n-1,0,0,0,0\n"), "recording/duration", "line 3"),
+        (format!("{header}\n1,0,0,0,nan\n"), "recording/not-finite", "line 2"),
+        (format!("{header}\ninf,0,0,0,0\n"), "recording/not-finite", "line 2"),
+        (format!("{header}\n1,0,0,0,a\n"), "recording/not-a-number", "line 2"),
+        ("#duration,p0x,p0y,...\n1,0,0,0,0\n".to_owned(), "recording/ambiguous-layout", "line 2"),
+        ("#duration,p0x,p0y,p0z,...\n1,0,0,0,0\n".to_owned(), "recording/field-count", "line 2"),
+        (format!("#duration,p0x,p0y,p0z,...\n1{}\n", ",0".repeat(51)), "recording/degree", "line 2"),
+    ] {
+        let error = read_bytes("cf1.csv", text.as_bytes(), &ReadOptions::default()).expect_err(&text);
+        assert_refused(&error, code, place);
+    }
+    let forced = ReadOptions { format: Some(Format::BEZIER), ..ReadOptions::default() };
+    let error = read_bytes("cf1.csv", b"t,x,y,z\n0,1,2,3\n", &forced).expect_err("no header");
+    assert_refused(&error, "recording/no-header", "line 1");
+}

@@ -1,0 +1,197 @@
+//! Comparison of a recording with its plan, as `--plan` asks for.
+
+use std::path::{Path, PathBuf};
+
+use super::super::{Failure, Monitor};
+use super::{Open, open, recording_in};
+use crate::figures::{self, Figure};
+use crate::report::recorded::{PlanReport, RecordedReport};
+use tautline_audit::recorded::{Outcome, PlanComparison, PlanFindings, Settings, audit};
+use tautline_core::track::Item;
+use tautline_recordings::read::ReadOptions;
+
+/// Largest number of names in a message.
+const NAMES_LISTED: usize = 12;
+/// Largest delay that may be given \[s\]: a century.
+const MOST_DELAY_S: f64 = 3.2e9;
+
+/// Question about a plan.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlanQuestion {
+    /// File or folder of the plan, in any format that is read.
+    pub path: PathBuf,
+    /// Delay of the flight after the plan \[s\]; estimated if absent.
+    pub delay_s: Option<f64>,
+    /// Largest allowed distance from the plan \[m\].
+    pub tube_m: Option<f64>,
+}
+
+impl PlanQuestion {
+    /// Refuses numbers out of range.
+    pub(super) fn check(&self) -> Result<(), Failure> {
+        if let Some(tube_m) = self.tube_m.filter(|tube_m| !(tube_m.is_finite() && *tube_m > 0.0)) {
+            let message = format!("--tube: must be a finite number above 0, got {tube_m:?}");
+            return Err(Failure::input("audit/out-of-range", message, "give the largest allowed distance in metres"));
+        }
+        if let Some(delay_s) = self.delay_s.filter(|delay_s| delay_s.is_nan() || delay_s.abs() > MOST_DELAY_S) {
+            let message = format!("--plan-delay: must be a finite number of at most {MOST_DELAY_S} s, got {delay_s:?}");
+            return Err(Failure::input("audit/out-of-range", message, "give the delay in seconds"));
+        }
+        Ok(())
+    }
+}
+
+/// A flight that was audited.
+pub(super) struct AuditedFlight<'a> {
+    pub(super) open: &'a Open<'a>,
+    pub(super) name: String,
+    pub(super) settings: &'a Settings,
+    pub(super) outcome: &'a Outcome,
+    /// Epoch of the clock of the flight \[ns\].
+    pub(super) epoch_ns: i64,
+    pub(super) is_planar: bool,
+}
+
+/// Compares a flight with its plan; returns the findings, notes and a figure.
+pub(super) fn compare(
+    question: &PlanQuestion,
+    flight: &AuditedFlight<'_>,
+    monitor: &dyn Monitor,
+) -> Result<(PlanReport, Vec<String>, Figure), Failure> {
+    let path = recording_in(&question.path);
+    let mut plan = open(std::slice::from_ref(&path), &ReadOptions::default())?;
+    let (mut items, mut more) = (Vec::new(), true);
+    while more {
+        if monitor.is_interrupted() {
+            return Err(Failure::interrupted());
+        }
+        more = plan.read(&mut items)?;
+    }
+    if plan.clock().by_steps {
+        let message =
+            format!("{}: the unit of time of the plan is inferred from steps of whole numbers only", path.display());
+        return Err(Failure::input("audit/guessed-time-unit", message, "write the times of the plan in seconds"));
+    }
+    let is_planar = flight.is_planar || plan.is_planar();
+    if is_planar {
+        items.iter_mut().for_each(flatten);
+    }
+    let wrong = |error| Failure::from(error).of(&path);
+    let mut comparison = PlanComparison::new(flight.settings, flight.outcome);
+    comparison.push_plan(plan.vehicles(), items.clone());
+    check_names(&comparison, &flight.name, &path)?;
+    let mut recording = (flight.open)()?;
+    let (mut flown, mut more) = (Vec::new(), true);
+    while more {
+        if monitor.is_interrupted() {
+            return Err(Failure::interrupted());
+        }
+        flown.clear();
+        more = recording.read(&mut flown)?;
+        if is_planar {
+            flown.iter_mut().for_each(flatten);
+        }
+        let pushed = comparison.push_flight(&flown);
+        pushed.map_err(|error| Failure::from(error).of(Path::new(&flight.name)))?;
+    }
+    let shift_s = shift_s(plan.clock().epoch_ns, flight.epoch_ns);
+    let found = comparison.finish(shift_s, question.delay_s, question.tube_m).map_err(wrong)?;
+    let asked = found.settings_of_plan(flight.settings, &flight.outcome.vehicles, shift_s + found.delay_s);
+    let asked = asked.filter(|_| found.deviations.len() > 1);
+    let audited = asked.map(|settings| audit(plan.vehicles(), &items, settings)).transpose().map_err(wrong)?;
+    let mut report = PlanReport::new(path.display().to_string(), &found, flight.outcome, audited.as_ref());
+    let assumed = report.assumes.take().into_iter().chain(plan.assumed().map(|of| format!("the plan has {of}")));
+    let assumed = assumed.collect::<Vec<_>>().join(" and ");
+    report.assumes = (!assumed.is_empty()).then_some(assumed);
+    let mut notes: Vec<_> = plan.notes().iter().map(|note| format!("{}: {note}", path.display())).collect();
+    if is_planar {
+        notes.push("flight and plan are compared in the plane of x and y".to_owned());
+    }
+    Ok((report, notes, figure(&found, flight.outcome)))
+}
+
+/// Adds the findings to a report; also returns the figure. The run's audit says nothing about distances from a plan
+/// between two samples (`is_by_run`).
+pub(super) fn attach(
+    report: RecordedReport,
+    compared: Option<(PlanReport, Vec<String>, Figure)>,
+    is_by_run: bool,
+    monitor: &dyn Monitor,
+) -> (RecordedReport, Option<Figure>) {
+    let Some((mut plan, notes, figure)) = compared else { return (report, None) };
+    for note in &notes {
+        monitor.warn(&format!("note: {note}"));
+    }
+    if is_by_run {
+        let between = "the flight is straight between samples".to_owned();
+        plan.assumes = Some(plan.assumes.map_or(between.clone(), |of| format!("{between} and {of}")));
+    }
+    let mut report = report.with_plan(plan);
+    report.source.notes.extend(notes);
+    (report, Some(figure))
+}
+
+/// Returns the difference of two epochs \[s\]; 0 unless both clocks have one.
+fn shift_s(plan_ns: i64, flight_ns: i64) -> f64 {
+    if plan_ns == 0 || flight_ns == 0 { 0.0 } else { plan_ns.saturating_sub(flight_ns) as f64 * 1e-9 }
+}
+
+/// Moves an item to the plane of x and y.
+fn flatten(item: &mut Item) {
+    match item {
+        Item::Sample(sample) => {
+            sample.position_m.z = 0.0;
+            sample.velocity_m_s.iter_mut().for_each(|velocity| velocity.z = 0.0);
+        }
+        Item::Piece(piece) => piece.coefficients.iter_mut().for_each(|coefficient| coefficient.z = 0.0),
+    }
+}
+
+/// Refuses a plan of other vehicles.
+fn check_names(comparison: &PlanComparison, flight: &str, path: &Path) -> Result<(), Failure> {
+    let [mut flown, mut planned] = comparison.names();
+    flown.sort_unstable();
+    planned.sort_unstable();
+    if flown == planned {
+        return Ok(());
+    }
+    let listed = |names: &[&str]| {
+        let more = if names.len() > NAMES_LISTED { ", ..." } else { "" };
+        if names.is_empty() { "none".to_owned() } else { names[..names.len().min(NAMES_LISTED)].join(", ") + more }
+    };
+    let (flown, planned) = (listed(&flown), listed(&planned));
+    let message = format!("{}: the vehicles of the plan are {planned}, those of {flight} are {flown}", path.display());
+    let help = "give the plan of these vehicles, with the same names, or select common vehicles with --ids";
+    Err(Failure::input("audit/plan-vehicles", message, help))
+}
+
+fn figure(found: &PlanFindings, outcome: &Outcome) -> Figure {
+    let mut order: Vec<_> = found.deviations.iter().collect();
+    order.sort_by(|a, b| b.upper_m.total_cmp(&a.upper_m));
+    let lines = order.into_iter().map(|of| (outcome.name(of.vehicle), &of.series[..])).collect::<Vec<_>>();
+    figures::plan_distances(&lines, found.tube_m, "Distance from the plan")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_out_of_range_are_refused() {
+        let question = |delay_s, tube_m| PlanQuestion { path: PathBuf::new(), delay_s, tube_m }.check();
+        assert!(question(Some(-3.0), Some(0.15)).is_ok() && question(None, None).is_ok());
+        for tube_m in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let failure = question(None, Some(tube_m)).expect_err("refused");
+            assert!(failure.message().contains(&format!("got {tube_m:?}")), "{}", failure.message());
+        }
+        for delay_s in [f64::NAN, f64::NEG_INFINITY, 1e300] {
+            assert!(question(Some(delay_s), None).is_err(), "{delay_s}");
+        }
+    }
+
+    #[test]
+    fn clocks_are_joined_by_their_epochs() {
+        assert_eq!(shift_s(5_000_000_000, 2_000_000_000), 3.0);
+        assert_eq!(shift_s(0, 2_000_000_000), 0.0, "a plan without an epoch begins at 0");
+    }
+}

@@ -1,0 +1,152 @@
+//! `tautline audit --plan`: flights against their plans, and curves of Bezier tables.
+
+use std::fs;
+use std::path::Path;
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+use crate::program::{Ran, TAUTLINE, ran_by};
+
+const HEADER: &str = "#duration,p0x,p0y,p0z,...\n";
+
+/// Samples of both vehicles on their plans, each second, with the second one 0.1 m to the side in the middle.
+const SAMPLES: &str = "t,id,x,y,z\n0,cf1,0,0,1\n0,cf2,0,1.5,1\n1.0,cf1,1,0,1\n1.0,cf2,1,1.5,1\n2.0,cf1,2,0,1\n\
+                       2.0,cf2,2,1.6,1\n3.0,cf1,3,0,1\n3.0,cf2,3,1.5,1\n4.0,cf1,4,0,1\n4.0,cf2,4,1.5,1\n";
+
+/// Returns a folder with a plan of two vehicles 1.5 m apart, and a flight in which the first swerves by 0.2 m between
+/// two agreeing instants.
+fn folder() -> TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    let straight = |y: &str| format!("{HEADER}4,0,{y},1,2,{y},1,4,{y},1\n");
+    let swerve = format!("{HEADER}2,0,0,1,1,0.4,1,2,0,1\n2,2,0,1,3,0,1,4,0,1\n");
+    for (name, text) in [
+        ("plan/cf1.csv", straight("0")),
+        ("plan/cf2.csv", straight("1.5")),
+        ("flight/cf1.csv", swerve),
+        ("flight/cf2.csv", straight("1.5")),
+        ("other/cf1.csv", straight("0")),
+        ("other/cf9.csv", straight("1.5")),
+        ("samples.csv", SAMPLES.to_owned()),
+    ] {
+        let path = folder.path().join(name);
+        fs::create_dir_all(path.parent().expect("a parent")).expect("a folder");
+        fs::write(path, text).expect("a file");
+    }
+    folder
+}
+
+fn audit(folder: &Path, arguments: &[&str]) -> Ran {
+    ran_by(TAUTLINE, folder, &[&["audit"], arguments].concat())
+}
+
+fn json(folder: &Path, arguments: &[&str]) -> Value {
+    serde_json::from_str(&audit(folder, &[arguments, &["--json"]].concat()).out).expect("JSON alone")
+}
+
+#[test]
+fn curves_near_their_plan_are_proved_and_certified() {
+    let folder = folder();
+    let asked = ["flight", "--delta", "1", "--plan", "plan"];
+    let ran = audit(folder.path(), &asked);
+    assert_eq!(ran.exit, Some(0), "{ran:?}");
+    assert!(ran.out.starts_with("PROVED CLEAR: never closer than 1.29"), "{ran:?}");
+    for words in [
+        "within 0.200001 m of the plan, cf1 at 1.00 s (delay 0.000 s estimated)",
+        "the plan keeps delta + 2e, so the flight within e of it keeps delta (cf1 and cf2: 1.499999 m",
+        "1.200001 m needed",
+        "against the plan: plan, delay",
+    ] {
+        assert!(ran.out.contains(words), "{words}: {ran:?}");
+    }
+    let report = json(folder.path(), &asked);
+    let plan = &report["plan"];
+    assert_eq!((&plan["status"], &plan["certificate"]["holds"]), (&Value::from("clear"), &Value::from(true)));
+    assert!((plan["vehicles"][0]["upper_m"].as_f64().expect("a number") - 0.2).abs() < 1e-8, "{plan}");
+    assert!(plan["delay_s"].as_f64().expect("a number").abs() < 1e-5, "{plan}");
+    assert!(json(folder.path(), &asked[..3])["plan"].is_null());
+    // A plan that keeps less than delta + 2e certifies nothing; the verdict on the flight stands.
+    let wide = audit(folder.path(), &[&asked[..], &["--tube", "0.26"]].concat());
+    assert_eq!(wide.exit, Some(0), "{wide:?}");
+    assert!(wide.out.starts_with("PROVED CLEAR") && wide.out.contains("does not keep delta + 2e"), "{wide:?}");
+}
+
+#[test]
+fn a_flight_outside_of_its_tube_fails() {
+    let folder = folder();
+    let asked = ["flight", "--plan", "plan", "--plan-delay", "0", "--tube"];
+    let kept = audit(folder.path(), &[&asked[..], &["0.21"]].concat());
+    assert_eq!(kept.exit, Some(0), "{kept:?}");
+    assert!(kept.out.starts_with("PROVED CLEAR: within 0.200001 m of the plan"), "{kept:?}");
+    let outputs = ["0.15", "--junit", "j.xml", "--events", "e.csv", "--html", "p.html", "--figures", "svg"];
+    let left = audit(folder.path(), &[&asked[..], &outputs].concat());
+    assert_eq!(left.exit, Some(1), "{left:?}");
+    assert!(left.out.starts_with("VIOLATION: cf1 is "), "{left:?}");
+    assert!(left.out.contains("m from the plan at 1.00 s (tube 0.150 m, delay 0.000 s)"), "{left:?}");
+    let read = |name: &str| fs::read_to_string(folder.path().join(name)).expect("a file");
+    assert!(read("j.xml").contains("failures=\"1\""), "{}", read("j.xml"));
+    assert!(read("e.csv").contains("violation,cf1,plan,1.0"), "{}", read("e.csv"));
+    assert!(read("p.html").contains("Distance from the plan"));
+    assert!(read("p-figures/plan.svg").contains("tube 0.15 m"));
+}
+
+#[test]
+fn samples_are_clear_only_under_their_assumption() {
+    let folder = folder();
+    let asked = ["samples.csv", "--delta", "1", "--plan", "plan", "--plan-delay", "0"];
+    let ran = audit(folder.path(), &asked);
+    assert_eq!(ran.exit, Some(0), "{ran:?}");
+    assert!(ran.out.starts_with("CLEAR if straight between samples: "), "{ran:?}");
+    assert!(ran.out.contains("within 0.100001 m of the plan, cf2 at 2.00 s"), "{ran:?}");
+    // A plan of samples is an assumption too, also for a flight on curves.
+    let swapped = audit(folder.path(), &["flight", "--plan", "samples.csv", "--plan-delay", "0"]);
+    assert!(swapped.out.starts_with("CLEAR if the plan is straight between its samples: "), "{swapped:?}");
+    // Bounded motion may leave the tube between its samples.
+    let bounded = ["--motion", "bounded", "--max-accel", "0.5", "--tube"];
+    let status = |tube| audit(folder.path(), &[&asked[..], &bounded, &[tube]].concat());
+    let wide = status("0.2");
+    assert!(wide.out.starts_with("PROVED CLEAR"), "{wide:?}");
+    let narrow = status("0.12");
+    assert_eq!(narrow.exit, Some(1), "{narrow:?}");
+    assert!(narrow.out.starts_with("UNDECIDED: cf2 is between 0.1"), "{narrow:?}");
+    // A wrong delay is a large distance.
+    let late = audit(folder.path(), &["samples.csv", "--plan", "plan", "--plan-delay", "0.5", "--tube", "0.3"]);
+    assert!(late.exit == Some(1) && late.out.starts_with("VIOLATION: cf"), "{late:?}");
+}
+
+#[test]
+fn times_without_plan_or_flight_are_undecided() {
+    let folder = folder();
+    let late = ["samples.csv", "--plan", "plan", "--plan-delay", "-1.5"];
+    let ran = audit(folder.path(), &late);
+    assert_eq!(ran.exit, Some(1), "{ran:?}");
+    assert!(
+        ran.out.starts_with("UNDECIDED: the distance of cf1 from the plan is not known from -1.500 s to"),
+        "{ran:?}"
+    );
+    assert!(ran.out.contains("no flight") && ran.out.contains("no plan"), "{ran:?}");
+    let within = audit(folder.path(), &[&late[..], &["--from", "0", "--to", "2.5"]].concat());
+    assert_eq!(within.exit, Some(0), "{within:?}");
+}
+
+#[test]
+fn wrong_questions_about_a_plan_are_refused() {
+    let folder = folder();
+    for (arguments, words) in [
+        (
+            &["flight", "--plan", "other"][..],
+            &["other: the vehicles of the plan are cf1, cf9, those of flight are cf1, cf2", "--ids"][..],
+        ),
+        (&["flight", "--plan", "plan", "--tube", "0"], &["--tube: must be a finite number above 0, got 0.0"]),
+        (&["flight", "--plan", "plan", "--plan-delay", "1e99"], &["--plan-delay: must be a finite number"]),
+        (&["flight", "--delta", "1", "--tube", "0.1"], &["--plan"]),
+        (&["flight", "--plan", "missing.skyc"], &["missing.skyc"]),
+        (&["flight", "--plan", "plan", "--html", "plan/cf1.csv"], &["plan"]),
+    ] {
+        let ran = audit(folder.path(), arguments);
+        assert_eq!(ran.exit, Some(2), "{ran:?}");
+        assert!(words.iter().all(|words| ran.err.contains(words)), "{ran:?}");
+    }
+    let common = audit(folder.path(), &["flight", "--plan", "other", "--ids", "cf1"]);
+    assert_eq!(common.exit, Some(0), "{common:?}");
+}
