@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use super::super::{Failure, Monitor};
-use super::{Open, open, recording_in};
+use super::{FASTEST_M_S, Open, fastest_m_s, open, recording_in};
 use crate::figures::{self, Figure};
 use crate::report::recorded::{PlanReport, RecordedReport};
 use tautline_audit::recorded::{Outcome, PlanComparison, PlanFindings, Settings, audit};
@@ -67,7 +67,8 @@ pub(super) fn compare(
         }
         more = plan.read(&mut items)?;
     }
-    if plan.clock().by_steps {
+    let is_in_seconds = plan.clock().unit == "s" && 1000.0 * fastest_m_s(&items) > FASTEST_M_S;
+    if plan.clock().by_steps && !is_in_seconds {
         let message =
             format!("{}: the unit of time of the plan is inferred from steps of whole numbers only", path.display());
         return Err(Failure::input("audit/guessed-time-unit", message, "write the times of the plan in seconds"));

@@ -37,6 +37,9 @@ const OPENING: usize = 65_536;
 /// Largest number of notes on vehicles that are never present together with another vehicle.
 const MOST_ALONE: usize = 3;
 
+/// Speed of sound \[m/s\], which no vehicle of a swarm reaches.
+const FASTEST_M_S: f64 = 340.0;
+
 /// Function that opens the recording at its beginning, at each call.
 pub type Open<'a> = dyn Fn() -> Result<Box<dyn Tracks<Error = ReadError> + 'a>, ReadError> + Sync + 'a;
 
@@ -399,8 +402,6 @@ impl<'a> AuditRequest<'a> {
     /// Rejects options in seconds if the unit of time is a guess. Seconds are accepted if the unit milliseconds would
     /// make the vehicles of these first items faster than sound.
     fn refuse_guessed_seconds(&self, unit: &str, items: &[Item]) -> Result<(), Failure> {
-        /// Speed of sound \[m/s\], which no vehicle of a swarm reaches.
-        const FASTEST_M_S: f64 = 340.0;
         let settings = &self.settings;
         let asked = [
             (settings.motion == Some(Interpolation::Bounded), "--motion bounded"),
