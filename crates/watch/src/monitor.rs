@@ -301,6 +301,22 @@ impl Monitor {
         Some(Taken { vehicle, time_s })
     }
 
+    /// Moves the present to a stamp of the common clock \[s\], with [`TimeBase::Stamps`]. Returns the time by which it
+    /// moves \[s\]; a stamp of the past moves nothing.
+    pub fn advance(&mut self, t_s: f64) -> f64 {
+        let Some(clock) = self.clock.filter(|_| t_s.abs() <= LARGEST_TIME_S) else { return 0.0 };
+        let (before_s, now_s) = (self.now_s, self.now_s.max(clock.time_of(t_s)));
+        self.now_s = now_s;
+        now_s - before_s
+    }
+
+    /// Returns how far a stamp of the common clock lies after the present \[s\]; `None` before the first pose.
+    #[must_use]
+    pub fn is_ahead_s(&self, t_s: f64) -> Option<f64> {
+        let clock = self.clock.filter(|_| t_s.abs() <= LARGEST_TIME_S)?;
+        Some(clock.time_of(t_s) - self.now_s)
+    }
+
     /// Counts an error of the input at an arrival time \[s\].
     pub fn fault(&mut self, fault: Fault, vehicle: Option<u32>, arrival_s: f64) {
         let at_s = match self.settings.time_base {

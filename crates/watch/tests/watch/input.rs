@@ -246,7 +246,7 @@ proptest! {
                 prop_assert!(until.at_s.is_finite() && until.at_s >= of.now_s);
                 prop_assert_eq!(of.state, State::Clear);
             }
-            for near in of.closest {
+            if let Some(near) = of.closest {
                 prop_assert!(near.nominal_m.is_finite() && near.least_m <= near.nominal_m);
             }
         }

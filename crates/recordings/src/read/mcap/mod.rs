@@ -20,6 +20,7 @@ pub(crate) mod own;
 mod plan;
 mod tree;
 
+pub use messages::{LivePose, has_live_poses, live_poses};
 pub use own::Channels;
 
 use std::path::Path;
