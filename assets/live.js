@@ -37,7 +37,8 @@ const restart = places => {
   const cell = 1e-3, count = names.length;
   const starts = new Int32Array(3 * count), steps = new Int16Array(3 * count * INSTANTS);
   places.forEach((at, k) => {
-    for (let axis = 0; axis < 3; axis++) starts[3 * k + axis] = Math.round(((at?.[axis] ?? middle[axis]) - middle[axis]) / cell);
+    for (let axis = 0; axis < 3; axis++)
+      starts[3 * k + axis] = Math.round(((at?.[axis] ?? middle[axis]) - middle[axis]) / cell);
     if (!at) for (let row = 0; row < INSTANTS; row++) steps[3 * (row * count + k)] = -32768;
   });
   const reach = Math.max(half[0], half[1]), square = 10 ** Math.round(Math.log10(reach / 5));
@@ -78,7 +79,8 @@ const draw = frame => {
     return at ? [at[0] - from[0], at[1] - from[1], at[2] - from[2], at[3] ? 1 : 0] : [0, 0, 0, 0];
   });
   const violated = frame.state === "violation";
-  root.player?.push(flat, [-INSTANTS * PERIOD_S, violated, frame.text, frame.who ?? [], null], frame.near ?? [65535, 65535]);
+  const statement = [-INSTANTS * PERIOD_S, violated, frame.text, frame.who ?? [], null];
+  root.player?.push(flat, statement, frame.near ?? [65535, 65535]);
   root.dataset.frames = `${+(root.dataset.frames ?? 0) + 1}`;
 };
 

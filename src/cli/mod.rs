@@ -84,7 +84,7 @@ Exit codes:
   1    Bad, such as a violation, or an interrupted flight or study.
   2    Wrong input.
   3    Failure of the machine.
-  130  Ctrl-C in any other command; it ends a watch, which has code 0 or 1.
+  130  Ctrl-C in any other command.
 
 Environment:
   NO_COLOR=1        No colours, also on a terminal.

@@ -23,11 +23,10 @@ use tautline_watch::{
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Sources:
-  -                         Standard input: one JSON object a line, such as
-                            {\"t\":0,\"id\":\"a\",\"x\":0,\"y\":0,\"z\":2}, with vx, vy and vz if known.
-  mavlink:ADDRESS:PORT      MAVLink over UDP; the system id is the name of a vehicle.
-  rosbridge:HOST:PORT       Topics of ROS, with --topic.
-  foxglove:HOST:PORT        All topics with positions of a Foxglove server, or those of --topic.
+  -                     Standard input. Each line is a JSON object with t, id, x, y, z, and vx, vy, vz if known.
+  mavlink:ADDRESS:PORT  MAVLink over UDP. The system id is the name of a vehicle.
+  rosbridge:HOST:PORT   Topics of ROS, with --topic.
+  foxglove:HOST:PORT    Topics with positions of a Foxglove server, all or those of --topic.
 
 A line comes each second and at every change of state: CLEAR, NOT KNOWN or VIOLATION. A watch ends with its input or
 with Ctrl-C. Exit codes: 0 if it was CLEAR from start to end, 1 if not or if a vehicle left its plan.")]

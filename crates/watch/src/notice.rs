@@ -41,9 +41,9 @@ impl Notice {
             .map(|near| json!({ "pair": two(near.pair), "nominal_m": near.nominal_m, "least_m": near.least_m }));
         let mut text = state_text(of, monitor);
         if let Some(near) = of.closest {
-            text += &format!("; closest {} {} m", joined(&two(near.pair)), metres_down(near.nominal_m));
+            text += &format!("; closest {} {} m", joined(&two(near.pair)), down(near.nominal_m));
             if !matches!(of.state, State::Violation(..)) {
-                text += &format!(", at least {} m", metres_down(near.least_m.max(0.0)));
+                text += &format!(", at least {} m", down(near.least_m.max(0.0)));
             }
         }
         if let Some(first) = of.nominal_violation.filter(|_| !matches!(of.state, State::Violation(..))) {
@@ -52,7 +52,7 @@ impl Notice {
         if let Some(brake) = of.last_brake.filter(|_| !matches!(of.state, State::Violation(..))) {
             let left_s = brake.at_s - of.now_s;
             text += &if left_s > 0.0 {
-                format!("; brake {} by {} s", joined(&two(brake.pair)), fixed(brake.at_s))
+                format!("; brake {} by {} s", joined(&two(brake.pair)), down(brake.at_s))
             } else {
                 format!("; the last moment to brake {} has passed", joined(&two(brake.pair)))
             };
@@ -108,7 +108,7 @@ impl Notice {
                     joined(&pair),
                     fixed(of.from_s),
                     fixed(of.to_s),
-                    metres_down(of.min_m),
+                    down(of.min_m),
                     fixed(of.min_at_s),
                     settings.delta_m
                 );
@@ -158,11 +158,11 @@ fn state_text(of: &Assessment, monitor: &Monitor) -> String {
         State::Clear => {
             let at_s = of.clear_until.map_or(of.now_s, |until| until.at_s);
             let left_s = at_s - of.now_s;
-            format!("CLEAR until {} s ({} s from now)", fixed(at_s), down(left_s, 100.0, 2))
+            format!("CLEAR until {} s ({} s from now)", down(at_s), down(left_s))
         }
         State::Violation(pair, distance_m) => {
             let delta_m = monitor.settings().delta_m;
-            format!("VIOLATION {} {} m (delta {delta_m} m)", joined(&pair.map(name)), metres_down(distance_m))
+            format!("VIOLATION {} {} m (delta {delta_m} m)", joined(&pair.map(name)), down(distance_m))
         }
         State::NotKnown(reason) => {
             let why = match reason {
@@ -185,7 +185,7 @@ fn state_text(of: &Assessment, monitor: &Monitor) -> String {
                 Reason::Uncertain(pair, least_m) => format!(
                     "{} may be as near as {} m (delta {} m)",
                     joined(&pair.map(name)),
-                    metres_down(least_m.max(0.0)),
+                    down(least_m.max(0.0)),
                     monitor.settings().delta_m
                 ),
             };
@@ -233,12 +233,8 @@ pub(crate) fn fixed(time_s: f64) -> String {
     format!("{time_s:.2}")
 }
 
-/// Returns a distance that is rounded down to centimetres.
-pub(crate) fn metres_down(distance_m: f64) -> String {
-    down(distance_m, 100.0, 2)
-}
-
-fn down(x: f64, per_unit: f64, digits: usize) -> String {
+/// Returns a number with hundredths, rounded down.
+pub(crate) fn down(x: f64) -> String {
     // A sum such as 0.3 - 1e-17 stays 0.3.
-    format!("{:.digits$}", ((x + 1e-9) * per_unit).floor() / per_unit)
+    format!("{:.2}", ((x + 1e-9) * 100.0).floor() / 100.0)
 }

@@ -9,7 +9,7 @@ use serde_json::json;
 
 use crate::event::{Assessment, Event, Fault, Reason, State};
 use crate::monitor::{Monitor, Pose};
-use crate::notice::{Notice, fixed, metres_down, name};
+use crate::notice::{Notice, down, fixed, name};
 use crate::settings::TimeBase;
 use crate::source::{Input, Inputs, OwnedPose};
 
@@ -93,7 +93,7 @@ impl Summary {
             self.violations
         );
         if let Some((distance_m, [a, b])) = &self.closest {
-            text += &format!("; closest {a}-{b} {} m", metres_down(*distance_m));
+            text += &format!("; closest {a}-{b} {} m", down(*distance_m));
         }
         let closest = self.closest.as_ref().map(|(distance_m, pair)| json!({ "pair": pair, "distance_m": distance_m }));
         let more = json!({

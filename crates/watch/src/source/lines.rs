@@ -1,4 +1,6 @@
 //! JSON lines: `{"t": 1.5, "id": "a", "x": 0, "y": 0, "z": 2}`, with `vx`, `vy` and `vz` if known.
+//!
+//! Empty lines and lines that begin with `#` are skipped.
 
 use std::io::{BufRead, Read as _};
 
@@ -49,7 +51,7 @@ pub fn lines(mut from: impl BufRead, feed: &Feed) {
                 }
                 garbage(format!("longer than {LONGEST_LINE} bytes; write one pose per line"))
             }
-            Ok(_) if line.trim_ascii().is_empty() => continue,
+            Ok(_) if matches!(line.trim_ascii().first(), None | Some(b'#')) => continue,
             Ok(_) => match pose_of_line(&line) {
                 Ok(pose) => Input::Pose(pose, arrival_s),
                 Err(why) => garbage(why),

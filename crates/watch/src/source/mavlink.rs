@@ -1,7 +1,7 @@
 //! MAVLink 1 and 2 over UDP: `LOCAL_POSITION_NED` and `GLOBAL_POSITION_INT`. The system id is the name of a vehicle.
 //!
-//! Definitions of both messages are those of `common.xml` and `standard.xml` of MAVLink. `mavlink-core` reads frames and
-//! checksums. Messages with another id are skipped.
+//! Both messages are defined in `common.xml` and `standard.xml` of MAVLink. `mavlink-core` reads frames and checksums.
+//! Messages with another id are skipped.
 
 use std::io;
 use std::net::{SocketAddr, UdpSocket};

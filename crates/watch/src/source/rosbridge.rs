@@ -1,7 +1,7 @@
 //! rosbridge: topics of ROS 1 and ROS 2 as JSON over a WebSocket.
 //!
 //! The protocol needs two kinds of messages, so this is a client over `tungstenite`. `roslibrust` would bring an
-//! asynchronous runtime and generated types of messages, of which only positions are read here.
+//! asynchronous runtime and generated types of messages. Only positions are read here.
 
 use nalgebra::Vector3;
 use serde_json::{Value, json};

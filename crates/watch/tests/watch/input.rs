@@ -218,7 +218,9 @@ proptest! {
     /// Any numbers in any order give finite answers, and CLEAR only without doubt.
     #[test]
     fn any_poses_give_finite_answers(
-        poses in prop::collection::vec((0..4_usize, [number(), number(), number(), number(), number()], 0.0..0.4_f64), 1..60),
+        poses in prop::collection::vec(
+            (0..4_usize, [number(), number(), number(), number(), number()], 0.0..0.4_f64), 1..60,
+        ),
         stamps in any::<bool>(), own_clocks in any::<bool>(),
     ) {
         let mut monitor = monitor(Settings {

@@ -35,7 +35,7 @@ fn a_violation_between_two_positions_is_found() {
     let [of] = found[..] else { panic!("{found:?}") };
     assert!((of.min_m - 0.6).abs() < 1e-12 && (of.min_at_s - 0.5).abs() < 1e-12, "{of:?}");
     assert!((of.from_s - (0.5 - 0.8 / 12.0)).abs() < 1e-12, "{of:?}");
-    // Negative twin: at 1.1 m there is none.
+    // Negative twin: 1.1 m is no violation.
     let apart = poses.map(|(t_s, id, x, y)| (t_s, id, x, y * 1.1 / 0.6));
     assert_eq!(replay(&mut monitor(stamps()), &apart), []);
 }

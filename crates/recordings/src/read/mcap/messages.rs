@@ -66,7 +66,7 @@ pub struct LivePose {
     pub position: Vector3<f64>,
     /// Whether the position is a place on the Earth.
     pub is_on_earth: bool,
-    /// Whether the position is a transform between two frames, of which not all are vehicles.
+    /// Whether the position is a transform between two frames. Some frames are no vehicles.
     pub is_transform: bool,
 }
 

@@ -5,7 +5,8 @@ use maud::{DOCTYPE, PreEscaped, html};
 use super::{POLICY, STYLE, replay};
 
 /// Rules of the log of notices.
-const LOG_STYLE: &str = "#log{list-style:none;padding:0;font-variant-numeric:tabular-nums;max-height:16rem;overflow:auto}\
+const LOG_STYLE: &str = "#log{list-style:none;padding:0;max-height:16rem;overflow:auto;\
+                         font-variant-numeric:tabular-nums}\
                          #verdict{font-size:1.2rem;font-weight:700}";
 
 /// Returns the page of a live watch. It reads positions and notices from the WebSocket `live` of its server.
