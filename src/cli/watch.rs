@@ -132,7 +132,7 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<Exit, Failure> {
             Failure::machine("watch/cannot-listen", message)
                 .with_help("give a free port, such as --page=127.0.0.1:8738")
         })?;
-        console.warn(&format!("live page: {}", page.url()));
+        Console { quiet: false, ..console }.warn(&format!("live page: {}", page.url()));
         outputs.page = Some(page);
     }
     let (feed, inputs) = source::channel(Arc::clone(terminal.interruption()));

@@ -38,7 +38,7 @@ pub struct Pose<'a> {
 pub struct Taken {
     /// The vehicle.
     pub vehicle: u32,
-    /// Stamp as a time of the monitor \[s\].
+    /// Stamp as a time of the monitor \[s\]; it increases strictly for each vehicle.
     pub time_s: f64,
 }
 
@@ -50,6 +50,8 @@ struct Vehicle {
     history: History,
     /// Newest stamp of the last judgement of the past.
     judged_t_s: Option<f64>,
+    /// Time of the last pose that was taken \[s\].
+    taken_s: Option<f64>,
     /// Velocity at the newest position and the bound on its error.
     velocity: Option<(Vector3<f64>, f64)>,
     /// Whether the newest stamp has two positions.
@@ -226,9 +228,11 @@ impl Monitor {
             TimeBase::Arrival => self.settings.clocks,
             TimeBase::Stamps => ClockScope::Common,
         };
-        if self.vehicles.is_empty() && scope == ClockScope::Common {
-            // Times of the monitor are those of the first source.
+        let is_first = self.vehicles.is_empty() && scope == ClockScope::Common;
+        if is_first {
+            // Times of the monitor are those of the first source from here on.
             self.shift_s = pose.t_s - arrival_s;
+            self.now_s = f64::NEG_INFINITY;
         }
         let Some(vehicle) = self.vehicle(pose.id) else {
             self.fault(Fault::TooManyVehicles, None, arrival_s);
@@ -244,6 +248,10 @@ impl Monitor {
         };
         self.now_s = self.now_s.max(arrival_s);
         let now_s = self.now_s;
+        if is_first {
+            self.faults.iter_mut().for_each(|count| count.reported_s = None);
+            self.doubt = self.doubt.map(|(fault, _)| (fault, now_s));
+        }
         let mut clock = own.unwrap_or_else(|| SourceClock::new(pose.t_s, now_s, scope == ClockScope::Common));
         let is_same_clock = of.epoch == clock.epoch();
         let back_s = newest.filter(|_| is_same_clock).map_or(0.0, |fix| fix.t_s - pose.t_s);
@@ -296,8 +304,11 @@ impl Monitor {
             Some(velocity) => Some((velocity, self.settings.velocity_error_m_s)),
             None => of.history.velocity(eps, accel),
         };
-        let time_s = clock.time_of(pose.t_s);
-        self.compare_with_plan(vehicle, time_s, pose.position_m);
+        let at_s = clock.time_of(pose.t_s);
+        // The offset of a clock may shrink by more than the time between two stamps.
+        let time_s = of.taken_s.map_or(at_s, |last_s| at_s.max(last_s.next_up()));
+        of.taken_s = Some(time_s);
+        self.compare_with_plan(vehicle, at_s, pose.position_m);
         Some(Taken { vehicle, time_s })
     }
 
@@ -450,6 +461,7 @@ impl Monitor {
             epoch: self.clock.map_or(0, |clock| clock.epoch()),
             history: History::new(),
             judged_t_s: None,
+            taken_s: None,
             velocity: None,
             has_conflict: false,
             is_stale: false,

@@ -109,7 +109,7 @@ impl Page {
     /// Sends the positions and the state of a judgement to the viewers, at most each [`FRAME_PERIOD_S`].
     pub fn assessed(&mut self, of: &Assessment, monitor: &Monitor) {
         // Not a difference of times: times may be infinite before the first pose.
-        if !of.now_s.is_finite() || of.now_s < self.framed_s + FRAME_PERIOD_S {
+        if !of.now_s.is_finite() || (self.framed_s..self.framed_s + FRAME_PERIOD_S).contains(&of.now_s) {
             return;
         }
         self.framed_s = of.now_s;

@@ -221,7 +221,8 @@ impl Session<'_> {
         let summary = &mut self.summary;
         let before = self.last.filter(|last| last.now_s.is_finite() && of.now_s.is_finite());
         if let Some(last) = before {
-            let passed_s = of.now_s - last.now_s;
+            // The first pose may set the time of the monitor back.
+            let passed_s = (of.now_s - last.now_s).max(0.0);
             match last.state {
                 State::Clear => summary.clear_s += passed_s,
                 State::Violation(..) => summary.violation_s += passed_s,
@@ -238,7 +239,7 @@ impl Session<'_> {
         }
         let is_change = self.last.is_none_or(|last| kind(last.state) != kind(of.state));
         // Not a difference of times: times may be infinite before the first pose.
-        let is_due = of.now_s >= self.line_s + LINE_PERIOD_S;
+        let is_due = of.now_s >= self.line_s + LINE_PERIOD_S || of.now_s < self.line_s;
         if is_change || is_due {
             self.line_s = of.now_s;
             self.output.notice(&Notice::of_state(&of, &self.monitor))?;

@@ -25,6 +25,19 @@ fn nothing_is_clear_before_two_vehicles_are_heard() {
 }
 
 #[test]
+fn time_passes_from_the_first_pose_on_after_a_long_wait() {
+    let mut monitor = monitor(settings());
+    for k in 0..50 {
+        monitor.assess(0.1 * f64::from(k));
+    }
+    monitor.fault(Fault::Garbage, None, 4.9);
+    assert_eq!(both(&mut monitor, 0.0, 5.0), State::NotKnown(Reason::Doubt(Fault::Garbage)));
+    let of = monitor.assess(6.01);
+    assert!((of.now_s - 1.01).abs() < 1e-9, "{}", of.now_s);
+    assert!(matches!(of.state, State::NotKnown(Reason::Stale(..))), "{of:?}");
+}
+
+#[test]
 fn expected_vehicles_must_be_heard() {
     let mut counted = monitor(Settings { expected: Expected::Count(3), ..settings() });
     assert_eq!(both(&mut counted, 0.0, 0.0), State::NotKnown(Reason::Missing([2, 3])));

@@ -3,6 +3,7 @@
 mod bounds;
 mod input;
 mod past;
+mod session;
 
 use nalgebra::Vector3;
 use tautline_watch::{Assessment, Monitor, Plan, Pose, Settings};
