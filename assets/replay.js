@@ -962,6 +962,22 @@ const play = (root, data) => {
       draw();
       return { ...axes(), tangent: TANGENT, place };
     },
+    /**
+     * Appends an instant to a live view and drops the oldest one: x, y, z [m] and 1 or 0 for each vehicle, the verdict
+     * and the closest pair.
+     * @param {number[]} places @param {Verdict} verdict @param {number[]} pair
+     */
+    push(places, verdict, pair) {
+      path.copyWithin(0, 4 * wide);
+      path.set(places, (times.length - 1) * wide * 4);
+      times.forEach((time, row) => { path[((row + 1) * wide - 1) * 4] = time - first; });
+      gl.activeTexture(gl.TEXTURE0);
+      gl.texSubImage2D(gl.TEXTURE_2D, 0, 0, 0, wide, times.length, gl.RGBA, gl.FLOAT, path);
+      data.verdicts = [verdict];
+      nearWho.set(pair);
+      if (colouring.value) recolour();
+      ask();
+    },
     end() {
       ended = true;
       cancelAnimationFrame(queued);

@@ -50,3 +50,4 @@ pub use tautline_sim::{continuous, link, metrics, plan, plant, preflight, scenar
 pub use tautline_studies as studies;
 pub use tautline_studies::{attack, campaign, compare, margin, splitting, statistics, sweep};
 pub use tautline_validate as validate;
+pub use tautline_watch as watch;

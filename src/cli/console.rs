@@ -28,16 +28,18 @@ pub(super) struct Console {
 }
 
 /// Words of verdicts with their colours. Of words with a common beginning the longest comes first.
-const VERDICTS: [(&str, AnsiColor); 18] = [
+const VERDICTS: [(&str, AnsiColor); 20] = [
     ("CERTIFICATE BROKEN", AnsiColor::Red),
     ("CLEAR", AnsiColor::Green),
     ("DEFECT", AnsiColor::Red),
     ("DOES NOT PASS", AnsiColor::Red),
     ("INTERRUPTED", AnsiColor::Yellow),
     ("NOT FIRM", AnsiColor::Yellow),
+    ("NOT KNOWN", AnsiColor::Yellow),
     ("NOT PASSED", AnsiColor::Red),
     ("NOT REACHED", AnsiColor::Yellow),
     ("NOT VALID", AnsiColor::Red),
+    ("OFF PLAN", AnsiColor::Red),
     ("PASS", AnsiColor::Green),
     ("PROVED CLEAR", AnsiColor::Green),
     ("PROVED", AnsiColor::Green),

@@ -23,6 +23,7 @@ mod studies;
 mod validate;
 #[cfg(feature = "viewer")]
 mod view;
+mod watch;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -101,6 +102,8 @@ enum Command {
     Run(run::RunArguments),
     /// Judge a recording of any source: clear, violation, or undecided.
     Audit(audit::AuditArguments),
+    /// Watch live positions: the separation now, the time until which it is proved, and alarms.
+    Watch(watch::WatchArguments),
     /// Analyse a scenario without flying it: stability, certified separation, step, traps.
     Check(run::CheckArguments),
     /// Measure every claim of tautline and of its source paper.
@@ -157,6 +160,7 @@ fn dispatch(command: Command, line: &str) -> Result<Exit, Failure> {
     match command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Audit(arguments) => audit::audits(&arguments, line),
+        Command::Watch(arguments) => watch::watch(&arguments),
         Command::Check(arguments) => run::check(&arguments),
         Command::Validate(arguments) => validate::validate(&arguments),
         Command::Compare(arguments) => arguments.run(),

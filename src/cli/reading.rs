@@ -155,7 +155,7 @@ fn start(text: &str) -> Result<(String, [f64; 3]), String> {
     Ok((name.to_owned(), three(place)?))
 }
 
-fn origin(text: &str) -> Result<[f64; 3], String> {
+pub(super) fn origin(text: &str) -> Result<[f64; 3], String> {
     match three(text)? {
         [latitude, longitude, _] if latitude.abs() > 90.0 || longitude.abs() > 360.0 => {
             Err("the latitude must be within 90 degrees, the longitude within 360".to_owned())

@@ -36,6 +36,7 @@ mod runs;
 mod scenarios;
 mod shapes;
 mod sweep;
+mod watch;
 
 impl program::Ran {
     /// Returns the stable code of the error: the first line on standard error that is `area/problem`, or nothing.

@@ -107,6 +107,36 @@ impl LocalFrame {
     }
 }
 
+/// Frame of metres east, north and up of an origin, for positions that arrive one by one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct EarthFrame(LocalFrame);
+
+impl EarthFrame {
+    /// Returns the frame of an origin: latitude and longitude \[degrees\], and height above the ellipsoid \[m\].
+    ///
+    /// # Errors
+    /// A sentence if the place is not on the Earth.
+    pub fn new(origin: [f64; 3]) -> Result<Self, String> {
+        LocalFrame::at(origin.into()).map(Self).map_err(|fault| fault.to_string())
+    }
+
+    /// Converts a place, as in [`new`](Self::new), to metres east, north and up of the origin.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn position_m(&self, place: [f64; 3]) -> Result<Vector3<f64>, String> {
+        self.0.place(place.into()).map_err(|fault| fault.to_string())
+    }
+
+    /// Converts a direction east, north and up at a place to this frame.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn direction_at(&self, place: [f64; 3], direction: Vector3<f64>) -> Result<Vector3<f64>, String> {
+        Ok(self.0.direction_from(&LocalFrame::at(place.into()).map_err(|fault| fault.to_string())?, direction))
+    }
+}
+
 /// Returns whether a place is the output of a receiver without a fix: latitude and longitude are exactly 0.
 pub(super) fn is_no_fix(place: &Geodetic) -> bool {
     place.x == 0.0 && place.y == 0.0

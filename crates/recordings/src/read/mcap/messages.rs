@@ -51,6 +51,58 @@ pub(super) enum PoseKind {
     Transform([f64; 4]),
 }
 
+/// Position in a message of a live source.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LivePose {
+    /// Name in the message; `None` if the topic is the vehicle.
+    pub name: Option<String>,
+    /// Index in a list of poses without names, from 1.
+    pub number: Option<usize>,
+    /// Frame of the position.
+    pub frame: String,
+    /// Time since the epoch of the clock \[ns\]; 0 if the message has none.
+    pub stamp_ns: i64,
+    /// Position \[m\]; latitude, longitude \[degrees\] and height \[m\] if `is_on_earth`.
+    pub position: Vector3<f64>,
+    /// Whether the position is a place on the Earth.
+    pub is_on_earth: bool,
+    /// Whether the position is a transform between two frames. Some frames are no vehicles.
+    pub is_transform: bool,
+}
+
+/// Returns whether [`live_poses`] reads messages of a schema in an encoding.
+#[must_use]
+pub fn has_live_poses(schema: &str, encoding: &str) -> bool {
+    reader_of(schema).is_some() && matches!(encoding, "protobuf" | "json" | CDR)
+}
+
+/// Decodes the positions of one message of a live source.
+///
+/// # Errors
+/// A sentence if the message is damaged or its schema is not read.
+pub fn live_poses(schema: &str, encoding: &str, bytes: &[u8]) -> Result<Vec<LivePose>, String> {
+    let reader = reader_of(schema).ok_or_else(|| format!("messages of {schema} are not read"))?;
+    let live = |of: Observation| {
+        let (name, number) = match of.vehicle {
+            VehicleKey::Topic => (None, None),
+            VehicleKey::Listed(number) => (None, Some(number)),
+            VehicleKey::Named(name) => (Some(name), None),
+        };
+        let is_on_earth = of.frame == EARTH;
+        let is_transform = matches!(of.kind, PoseKind::Transform(_));
+        LivePose {
+            name,
+            number,
+            frame: of.frame,
+            stamp_ns: of.stamp_ns,
+            position: of.position,
+            is_on_earth,
+            is_transform,
+        }
+    };
+    Ok(reader(encoding, bytes)?.into_iter().map(live).collect())
+}
+
 pub(super) fn nanoseconds(seconds: i64, nanoseconds: i64) -> i64 {
     seconds.saturating_mul(1_000_000_000).saturating_add(nanoseconds)
 }

@@ -22,6 +22,7 @@ mod plan;
 mod planned;
 mod tree;
 
+pub use messages::{LivePose, has_live_poses, live_poses};
 pub use own::Channels;
 
 use std::path::Path;

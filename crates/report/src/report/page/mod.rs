@@ -4,8 +4,10 @@
 //! browser to load anything. Pictures link to their files in full size. If it holds replays, a single script of this
 //! crate may run. The page follows the browser's light or dark theme and fits a phone. Equal parts give equal bytes.
 
+mod live;
 mod replay;
 
+pub use live::live_page;
 use maud::{DOCTYPE, PreEscaped, html};
 pub use maud::{Markup, Render};
 pub use replay::{Start, replay};

@@ -18,6 +18,13 @@ static SCRIPT: LazyLock<String> = LazyLock::new(|| without_comments(include_str!
 static SHADERS: LazyLock<String> =
     LazyLock::new(|| without_comments(include_str!("../../../../../shaders/replay.glsl")));
 
+/// Returns a script without comments and indentation, with its source expression.
+pub(super) fn packed(source: &str) -> (String, String) {
+    let code = without_comments(source);
+    let hash = BASE64.encode(Sha256::digest(&code));
+    (code, format!("'sha256-{hash}'"))
+}
+
 /// Returns the source expression of the content security policy that admits the script alone.
 pub(super) fn script_source() -> String {
     format!("script-src 'sha256-{}'", BASE64.encode(Sha256::digest(&*SCRIPT)))
@@ -165,8 +172,8 @@ mod tests {
     }
 
     #[test]
-    fn script_and_shaders_stay_below_48_kilobytes() {
-        assert!(SCRIPT.len() + SHADERS.len() < 48_000, "{} and {}", SCRIPT.len(), SHADERS.len());
+    fn script_and_shaders_stay_below_49_kilobytes() {
+        assert!(SCRIPT.len() + SHADERS.len() < 49_000, "{} and {}", SCRIPT.len(), SHADERS.len());
         assert!(SCRIPT.len() > 10_000 && SHADERS.starts_with("@ COMMON"));
         assert!(!SCRIPT.contains("</script") && !SHADERS.contains("</script"));
     }

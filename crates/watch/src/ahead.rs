@@ -1,0 +1,120 @@
+//! Search of all pairs for the closest one, the time until which all are clear, and the first violation ahead.
+
+use nalgebra::Vector3;
+
+use crate::event::{Pair, Separation};
+use crate::pair::{Prediction, RelativeMotion};
+use crate::settings::Settings;
+
+/// Result of a search. Times count from the present \[s\].
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Found {
+    pub(crate) closest: Option<Separation>,
+    /// Pair that may be closer than delta at the present, with its smallest possible separation \[m\].
+    pub(crate) uncertain: Option<(Pair, f64)>,
+    /// Time until which all pairs are clear.
+    pub(crate) clear: Option<(Pair, f64)>,
+    pub(crate) nominal_violation: Option<(Pair, f64)>,
+    pub(crate) last_brake: Option<(Pair, f64)>,
+}
+
+/// Predictions of the vehicles, with memory that is used again.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Scratch {
+    of: Vec<(u32, Prediction)>,
+}
+
+impl Scratch {
+    pub(crate) fn clear(&mut self) {
+        self.of.clear();
+    }
+
+    pub(crate) fn reserve(&mut self, vehicles: usize) {
+        self.of.reserve(vehicles.saturating_sub(self.of.len()));
+    }
+
+    pub(crate) fn capacity(&self) -> usize {
+        self.of.capacity()
+    }
+
+    pub(crate) fn push(&mut self, vehicle: u32, prediction: Prediction) {
+        self.of.push((vehicle, prediction));
+    }
+
+    /// Searches all pairs.
+    ///
+    /// The vehicles are sorted along the axis on which they are spread widest. A pair is skipped if its distance along
+    /// this axis is too large to change any result. The limit shrinks as results are found.
+    pub(crate) fn search(&mut self, settings: &Settings) -> Found {
+        let mut found = Found::default();
+        let axis = widest_axis(self.of.iter().map(|(_, of)| of.position_m));
+        self.of.sort_unstable_by(|a, b| a.1.position_m[axis].total_cmp(&b.1.position_m[axis]).then(a.0.cmp(&b.0)));
+        let fold = |by: fn(&Prediction) -> f64| self.of.iter().map(|(_, of)| by(of)).fold(0.0, f64::max);
+        let fastest_m_s = fold(|of| of.velocity_m_s.norm());
+        let error_m = fold(|of| of.error_m);
+        let error_m_s = fold(|of| of.error_m_s);
+        let (delta_m, horizon_s) = (settings.delta_m, settings.horizon_s);
+        // Distance beyond which nothing happens within a time.
+        let reach_m = |time_s: f64| {
+            let errors_m = error_m + time_s * (error_m_s + time_s * settings.accel_m_s2 / 2.0);
+            delta_m + 1e-3 + 2.0 * (fastest_m_s * time_s + errors_m)
+        };
+        let mut clear_s = horizon_s;
+        let straight_m = delta_m + 1e-3 + 2.0 * fastest_m_s * horizon_s;
+        let mut far_m = f64::INFINITY;
+        for a in 0..self.of.len() {
+            let (first, motion) = &self.of[a];
+            for (second, other) in &self.of[a + 1..] {
+                let apart_m = other.position_m[axis] - motion.position_m[axis];
+                if apart_m > far_m {
+                    break;
+                }
+                let pair = [*first.min(second), *first.max(second)];
+                let relative = RelativeMotion::new(motion, other);
+                let nominal_m = relative.nominal_m();
+                if found.closest.is_none_or(|near: Separation| (nominal_m, pair) < (near.nominal_m, near.pair)) {
+                    found.closest = Some(Separation { pair, nominal_m, least_m: relative.least_m() });
+                    far_m = straight_m.max(nominal_m).max(reach_m(clear_s));
+                }
+                if let Some(time_s) = relative.nominal_violation_s(delta_m, horizon_s) {
+                    first_of(&mut found.nominal_violation, pair, time_s);
+                    if let Some(moment_s) = relative.last_brake_s(delta_m, settings.brake_m_s2, horizon_s) {
+                        first_of(&mut found.last_brake, pair, moment_s);
+                    }
+                }
+                if relative.is_clear_for(clear_s, delta_m) {
+                    continue;
+                }
+                match relative.clear_for_s(delta_m, horizon_s) {
+                    None => {
+                        let least_m = relative.least_m();
+                        if found.uncertain.is_none_or(|(_, of)| least_m < of) {
+                            found.uncertain = Some((pair, least_m));
+                        }
+                        clear_s = 0.0;
+                    }
+                    Some(time_s) if time_s < clear_s => (clear_s, found.clear) = (time_s, Some((pair, time_s))),
+                    Some(_) => {}
+                }
+            }
+        }
+        if found.clear.is_none() {
+            found.clear = found.closest.map(|near| (near.pair, clear_s));
+        }
+        found
+    }
+}
+
+/// Replaces a time of a pair by an earlier one. Of equal times that of the lower pair stays.
+fn first_of(best: &mut Option<(Pair, f64)>, pair: Pair, time_s: f64) {
+    if best.is_none_or(|of| (time_s, pair) < (of.1, of.0)) {
+        *best = Some((pair, time_s));
+    }
+}
+
+/// Returns the axis along which positions are spread widest.
+pub(crate) fn widest_axis(positions_m: impl Iterator<Item = Vector3<f64>>) -> usize {
+    let start = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
+    let (low, high) = positions_m.fold(start, |(low, high), at| (low.inf(&at), high.sup(&at)));
+    (high - low).imax()
+}

@@ -1,0 +1,96 @@
+//! Clock of a source, seen through the arrival of its stamps.
+//!
+//! The offset between the monitor's clock and a source's clock is unknown, and so is the delay of each message. The
+//! smallest difference of arrival and stamp so far is the offset plus the smallest delay. An age counts from there, so
+//! it holds every delay beyond the smallest one; `latency_s` of the settings adds the smallest one. The estimate may
+//! rise by [`DRIFT`], because two quartz clocks drift apart.
+
+/// Largest relative rate of two clocks.
+pub const DRIFT: f64 = 1e-4;
+/// Distance of a stamp before the newest stamp of its vehicle from which it is a step of the clock, not a late message
+/// \[s\].
+pub const STEP_S: f64 = 1.0;
+
+/// Offset of a source's clock.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct SourceClock {
+    /// Offset with which stamps become times of the monitor: constant until a step \[s\].
+    anchor_s: f64,
+    /// Smallest difference of arrival and stamp, with drift \[s\].
+    offset_s: f64,
+    /// Time of the last update of the offset \[s\].
+    updated_s: f64,
+    /// Number of steps so far.
+    epoch: u32,
+}
+
+impl SourceClock {
+    /// Returns the clock of a first stamp. Times of the monitor are those of the source if `keeps_times`.
+    pub(crate) fn new(t_s: f64, arrival_s: f64, keeps_times: bool) -> Self {
+        let offset_s = arrival_s - t_s;
+        Self { anchor_s: if keeps_times { 0.0 } else { offset_s }, offset_s, updated_s: arrival_s, epoch: 0 }
+    }
+
+    pub(crate) fn epoch(&self) -> u32 {
+        self.epoch
+    }
+
+    /// Returns the time of the monitor of a stamp \[s\].
+    pub(crate) fn time_of(&self, t_s: f64) -> f64 {
+        t_s + self.anchor_s
+    }
+
+    /// Returns the age of a stamp \[s\].
+    pub(crate) fn age_s(&self, t_s: f64, now_s: f64) -> f64 {
+        (now_s - t_s - self.offset_s).max(0.0)
+    }
+
+    /// Returns whether a stamp lies more than `most_s` after the present of its clock.
+    pub(crate) fn is_ahead(&self, t_s: f64, arrival_s: f64, most_s: f64) -> bool {
+        arrival_s - t_s < self.offset_s - most_s
+    }
+
+    /// Takes a stamp.
+    pub(crate) fn take(&mut self, t_s: f64, arrival_s: f64) {
+        let drifted_s = self.offset_s + DRIFT * (arrival_s - self.updated_s).max(0.0);
+        self.offset_s = drifted_s.min(arrival_s - t_s);
+        self.updated_s = arrival_s;
+    }
+
+    /// Moves the anchor of a clock of one vehicle to the present offset.
+    pub(crate) fn settle(&mut self) {
+        self.anchor_s = self.offset_s;
+    }
+
+    /// Starts anew after a step of the clock.
+    pub(crate) fn step(&mut self, t_s: f64, arrival_s: f64) {
+        let offset_s = arrival_s - t_s;
+        *self = Self { anchor_s: offset_s, offset_s, updated_s: arrival_s, epoch: self.epoch.wrapping_add(1) };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::SourceClock;
+
+    #[test]
+    fn a_late_stamp_is_old_and_the_fastest_one_is_the_reference() {
+        let mut clock = SourceClock::new(0.0, 100.3, false);
+        clock.take(1.0, 101.0);
+        assert!(clock.age_s(1.0, 101.0).abs() < 1e-12);
+        // Sent at 2 s, 1.4 s late.
+        clock.take(2.0, 103.4);
+        assert!((clock.age_s(2.0, 103.4) - 1.4).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_drift_of_the_clock_does_not_become_an_age() {
+        let mut clock = SourceClock::new(0.0, 0.0, false);
+        for k in 0..86_400 {
+            let arrival_s = f64::from(k);
+            let t_s = arrival_s * (1.0 - 0.5e-4);
+            clock.take(t_s, arrival_s);
+            assert!(clock.age_s(t_s, arrival_s) < 1e-3, "{k}");
+        }
+    }
+}

@@ -1,0 +1,38 @@
+//! Live monitor of separation: poses in, alarms out.
+//!
+//! | module | holds |
+//! | --- | --- |
+//! | [`Monitor`] | the core, without input, output or a clock: takes poses, judges the present and the past |
+//! | [`source`] | standard input, MAVLink, rosbridge and Foxglove, each in a thread |
+//! | [`watch`] | a watch from its first input to its end, with [`Notice`]s as text and JSON |
+//! | [`Record`] | recording of what was watched |
+//! | [`page`] | server of the live page |
+//! | [`pair`] | derivation and formulas of the time until which a pair is clear |
+
+#![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
+
+mod ahead;
+mod clock;
+mod event;
+mod history;
+mod monitor;
+mod notice;
+pub mod page;
+pub mod pair;
+mod plan;
+mod record;
+mod session;
+mod settings;
+pub mod source;
+mod violations;
+
+pub use clock::{DRIFT, STEP_S};
+pub use event::{Assessment, Event, Fault, Pair, PairTime, Reason, Separation, State, Violation};
+pub use history::HISTORY;
+pub use monitor::{LONGEST_NAME, MOST_EVENTS, Monitor, Pose, Taken};
+pub use notice::Notice;
+pub use plan::Plan;
+pub use record::Record;
+pub use session::{ASSESS_PERIOD_S, LINE_PERIOD_S, Output, Summary, watch};
+pub use settings::{ClockScope, Expected, Settings, SettingsError, TimeBase};
+pub use violations::MOST_OPEN;

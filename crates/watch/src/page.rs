@@ -1,0 +1,362 @@
+//! Live page: an HTTP server with one page and one WebSocket, on the loopback device unless another address is given.
+//!
+//! The page is a string of the caller. The WebSocket `/live` sends [frames](Page::assessed) and notices as JSON. On an
+//! address other than loopback both need the token of [`Page::url`]. A request whose `Host` is a name, or whose
+//! `Origin` is another page, is refused, so that no other site can read the positions through a browser.
+
+use std::hash::{BuildHasher as _, RandomState};
+use std::io::{self, Read as _, Write as _};
+use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+use serde_json::{Value, json};
+use tungstenite::Message;
+
+use crate::event::{Assessment, State};
+use crate::monitor::Monitor;
+use crate::notice::Notice;
+
+/// Time between two frames \[s\].
+pub const FRAME_PERIOD_S: f64 = 0.1;
+/// Largest number of viewers.
+pub const MOST_VIEWERS: usize = 16;
+/// Largest number of connections that are being answered, viewers included.
+const MOST_CONNECTIONS: usize = 64;
+/// Largest number of bytes of the head of a request.
+const LARGEST_HEAD: usize = 8192;
+/// Largest number of messages that wait for a viewer. A slower viewer loses messages.
+const MOST_WAITING: usize = 64;
+/// Time limit of a request and of a write.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Server of the live page. It ends with the process.
+pub struct Page {
+    shared: Arc<Shared>,
+    /// Time of the last frame \[s\].
+    framed_s: f64,
+    names: usize,
+}
+
+struct Shared {
+    html: String,
+    address: SocketAddr,
+    token: Option<String>,
+    viewers: Mutex<Vec<SyncSender<Arc<str>>>>,
+    /// Names of the vehicles, which every viewer needs first.
+    roster: Mutex<Arc<str>>,
+    connections: AtomicUsize,
+}
+
+impl Page {
+    /// Serves a page.
+    ///
+    /// # Errors
+    /// If the address cannot be bound.
+    pub fn serve(address: SocketAddr, html: String) -> io::Result<Self> {
+        let listener = TcpListener::bind(address)?;
+        let address = listener.local_addr()?;
+        let token = (!address.ip().is_loopback()).then(|| {
+            let word = || RandomState::new().hash_one(0_u8);
+            format!("{:016x}{:016x}", word(), word())
+        });
+        let shared = Arc::new(Shared {
+            html,
+            address,
+            token,
+            viewers: Mutex::default(),
+            roster: Mutex::new(Arc::from("{\"op\":\"roster\",\"names\":[]}")),
+            connections: AtomicUsize::new(0),
+        });
+        let server = Arc::clone(&shared);
+        std::thread::spawn(move || {
+            for stream in listener.incoming() {
+                let Ok(stream) = stream else {
+                    std::thread::sleep(Duration::from_millis(50));
+                    continue;
+                };
+                if server.connections.fetch_add(1, Ordering::Relaxed) >= MOST_CONNECTIONS {
+                    server.connections.fetch_sub(1, Ordering::Relaxed);
+                    continue;
+                }
+                let server = Arc::clone(&server);
+                std::thread::spawn(move || {
+                    // A viewer that leaves is no error.
+                    let _ = answer(stream, &server);
+                    server.connections.fetch_sub(1, Ordering::Relaxed);
+                });
+            }
+        });
+        Ok(Self { shared, framed_s: f64::NEG_INFINITY, names: 0 })
+    }
+
+    /// Returns the address of the page, with its token.
+    #[must_use]
+    pub fn url(&self) -> String {
+        let token = self.shared.token.as_ref().map_or(String::new(), |token| format!("?token={token}"));
+        format!("http://{}/{token}", self.shared.address)
+    }
+
+    /// Sends a notice to the viewers.
+    pub fn notice(&mut self, notice: &Notice) {
+        if !lock(&self.shared.viewers).is_empty() {
+            self.send(&json!({ "op": "notice", "notice": notice.json }));
+        }
+    }
+
+    /// Sends the positions and the state of a judgement to the viewers, at most each [`FRAME_PERIOD_S`].
+    pub fn assessed(&mut self, of: &Assessment, monitor: &Monitor) {
+        // Not a difference of times: times may be infinite before the first pose.
+        if !of.now_s.is_finite() || (self.framed_s..self.framed_s + FRAME_PERIOD_S).contains(&of.now_s) {
+            return;
+        }
+        self.framed_s = of.now_s;
+        if monitor.names().len() != self.names {
+            self.names = monitor.names().len();
+            let roster = json!({ "op": "roster", "names": monitor.names(), "delta_m": monitor.settings().delta_m });
+            *lock(&self.shared.roster) = Arc::from(roster.to_string());
+            self.send(&roster);
+        }
+        if lock(&self.shared.viewers).is_empty() {
+            return;
+        }
+        let most_s = monitor.settings().max_age_s;
+        let places: Vec<Value> = (0..self.names)
+            .map(|k| match monitor.newest(k) {
+                Some((at, _, age_s)) => json!([at.x, at.y, at.z, age_s <= most_s]),
+                None => Value::Null,
+            })
+            .collect();
+        let state = match of.state {
+            State::Clear => "clear",
+            State::NotKnown(_) => "not-known",
+            State::Violation(..) => "violation",
+        };
+        let who = match of.state {
+            State::Violation(pair, _) => Some(pair),
+            _ => None,
+        };
+        let text = Notice::of_state(of, monitor).text;
+        let near = of.closest.map(|near| near.pair);
+        self.send(&json!({
+            "op": "frame", "t_s": of.now_s, "state": state, "text": text, "near": near, "who": who, "places": places,
+        }));
+    }
+
+    fn send(&self, message: &Value) {
+        let text: Arc<str> = Arc::from(message.to_string());
+        let keeps = |viewer: &SyncSender<Arc<str>>| match viewer.try_send(Arc::clone(&text)) {
+            Ok(()) | Err(TrySendError::Full(_)) => true,
+            Err(TrySendError::Disconnected(_)) => false,
+        };
+        lock(&self.shared.viewers).retain(keeps);
+    }
+}
+
+fn lock<T>(of: &Mutex<T>) -> std::sync::MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Kind of a request.
+enum Request {
+    Page,
+    Live,
+}
+
+/// Answers one connection: the page, or the WebSocket until the viewer leaves.
+fn answer(mut stream: TcpStream, shared: &Shared) -> io::Result<()> {
+    stream.set_read_timeout(Some(PATIENCE))?;
+    stream.set_write_timeout(Some(PATIENCE))?;
+    stream.set_nodelay(true)?;
+    // The handshake of the WebSocket reads the same bytes again.
+    let head = peek_head(&stream)?;
+    match request(&head, shared) {
+        Ok(Request::Page) => {
+            read_head(&mut stream, head.len())?;
+            let kind = "text/html; charset=utf-8";
+            respond(&mut stream, "200 OK", kind, shared.html.as_bytes())
+        }
+        Ok(Request::Live) => {
+            let Ok(mut socket) = tungstenite::accept(stream) else { return Ok(()) };
+            let receiver = {
+                let mut viewers = lock(&shared.viewers);
+                if viewers.len() >= MOST_VIEWERS {
+                    return Ok(());
+                }
+                let (sender, receiver) = sync_channel(MOST_WAITING);
+                let _ = sender.try_send(Arc::clone(&lock(&shared.roster)));
+                viewers.push(sender);
+                receiver
+            };
+            view(&mut socket, &receiver)
+        }
+        Err(status) => {
+            read_head(&mut stream, head.len())?;
+            respond(&mut stream, status, "text/plain", status.as_bytes())
+        }
+    }
+}
+
+/// Sends messages to a viewer until it leaves.
+fn view(socket: &mut tungstenite::WebSocket<TcpStream>, receiver: &Receiver<Arc<str>>) -> io::Result<()> {
+    while let Ok(text) = receiver.recv() {
+        if socket.send(Message::text(&*text)).is_err() {
+            break;
+        }
+    }
+    Ok(())
+}
+
+/// Returns the head of a request without taking it from the stream.
+fn peek_head(stream: &TcpStream) -> io::Result<Vec<u8>> {
+    let mut bytes = vec![0; LARGEST_HEAD];
+    let until = std::time::Instant::now() + PATIENCE;
+    loop {
+        let length = stream.peek(&mut bytes)?;
+        if let Some(end) = bytes[..length].windows(4).position(|four| four == b"\r\n\r\n") {
+            bytes.truncate(end + 4);
+            return Ok(bytes);
+        }
+        if length == 0 || length == LARGEST_HEAD || std::time::Instant::now() > until {
+            return Err(io::ErrorKind::InvalidData.into());
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+}
+
+/// Takes a head from the stream.
+fn read_head(stream: &mut TcpStream, length: usize) -> io::Result<()> {
+    let mut bytes = vec![0; length];
+    stream.read_exact(&mut bytes)
+}
+
+/// Returns the kind of a request, or the status of a refusal.
+fn request(head: &[u8], shared: &Shared) -> Result<Request, &'static str> {
+    let text = std::str::from_utf8(head).map_err(|_| "400 Bad Request")?;
+    let mut lines = text.split("\r\n");
+    let mut words = lines.next().unwrap_or_default().split(' ');
+    let (method, target) = (words.next().unwrap_or_default(), words.next().unwrap_or_default());
+    let header = |name: &str| {
+        let fields = text.split("\r\n").skip(1).filter_map(|line| line.split_once(':'));
+        fields.filter(|(own, _)| own.eq_ignore_ascii_case(name)).map(|(_, value)| value.trim()).next()
+    };
+    if method != "GET" {
+        return Err("405 Method Not Allowed");
+    }
+    let host = header("host").ok_or("400 Bad Request")?;
+    if !is_address(host) || header("origin").is_some_and(|origin| origin != format!("http://{host}")) {
+        return Err("403 Forbidden");
+    }
+    let (path, query) = target.split_once('?').unwrap_or((target, ""));
+    let given = query.split('&').find_map(|part| part.strip_prefix("token="));
+    if let Some(token) = &shared.token
+        && !given.is_some_and(|given| is_equal(given.as_bytes(), token.as_bytes()))
+    {
+        return Err("403 Forbidden");
+    }
+    match (path, header("upgrade").is_some_and(|of| of.eq_ignore_ascii_case("websocket"))) {
+        ("/", false) => Ok(Request::Page),
+        ("/live", true) => Ok(Request::Live),
+        _ => Err("404 Not Found"),
+    }
+}
+
+/// Returns whether a host is `localhost` or an address of numbers, with or without a port.
+fn is_address(host: &str) -> bool {
+    let is_local = |host: &str| host.eq_ignore_ascii_case("localhost");
+    let without_port = host.rsplit_once(':').map_or(host, |(host, _)| host);
+    host.parse::<SocketAddr>().is_ok()
+        || host.trim_matches(['[', ']']).parse::<IpAddr>().is_ok()
+        || is_local(host)
+        || is_local(without_port)
+}
+
+/// Compares without an early end, whose time would tell the equal part.
+fn is_equal(a: &[u8], b: &[u8]) -> bool {
+    a.len() == b.len() && a.iter().zip(b).fold(0, |different, (a, b)| different | (a ^ b)) == 0
+}
+
+fn respond(stream: &mut TcpStream, status: &str, kind: &str, body: &[u8]) -> io::Result<()> {
+    let length = body.len();
+    write!(
+        stream,
+        "HTTP/1.1 {status}\r\nContent-Type: {kind}\r\nContent-Length: {length}\r\nCache-Control: no-store\r\n\
+         Referrer-Policy: no-referrer\r\nX-Content-Type-Options: nosniff\r\nConnection: close\r\n\r\n"
+    )?;
+    stream.write_all(body)?;
+    stream.flush()
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::{Read as _, Write as _};
+    use std::net::TcpStream;
+
+    use nalgebra::Vector3;
+    use serde_json::Value;
+
+    use super::Page;
+    use crate::monitor::{Monitor, Pose};
+    use crate::plan::Plan;
+    use crate::settings::Settings;
+
+    fn get(page: &Page, target: &str, more: &str) -> String {
+        let mut stream = TcpStream::connect(("127.0.0.1", page.shared.address.port())).expect("connects");
+        let host = page.shared.address.port();
+        write!(stream, "GET {target} HTTP/1.1\r\n{}\r\n\r\n", more.replace("PORT", &host.to_string())).expect("sends");
+        let mut text = String::new();
+        let _ = stream.read_to_string(&mut text);
+        text
+    }
+
+    #[test]
+    fn the_page_is_served_to_this_machine_only_as_itself() {
+        let page = Page::serve("127.0.0.1:0".parse().expect("an address"), "<p>live".to_owned()).expect("serves");
+        let good = get(&page, "/", "Host: 127.0.0.1:PORT");
+        assert!(good.starts_with("HTTP/1.1 200 OK") && good.ends_with("<p>live"), "{good}");
+        for (target, more, status) in [
+            ("/", "Host: evil.example:PORT", "403"),
+            ("/", "Host: 127.0.0.1:PORT\r\nOrigin: http://evil.example", "403"),
+            ("/live", "Host: 127.0.0.1:PORT", "404"),
+            ("/other", "Host: localhost:PORT", "404"),
+            ("/", "A: b", "400"),
+        ] {
+            let text = get(&page, target, more);
+            assert!(text.starts_with(&format!("HTTP/1.1 {status}")), "{more}: {text}");
+        }
+    }
+
+    #[test]
+    fn another_address_needs_the_token() {
+        let page = Page::serve("0.0.0.0:0".parse().expect("an address"), "<p>live".to_owned()).expect("serves");
+        let host = "Host: 127.0.0.1:PORT";
+        assert!(get(&page, "/", host).starts_with("HTTP/1.1 403"));
+        assert!(get(&page, "/?token=0", host).starts_with("HTTP/1.1 403"));
+        let (_, query) = page.url().split_once('?').map(|(a, b)| (a.to_owned(), b.to_owned())).expect("a token");
+        assert!(get(&page, &format!("/?{query}"), host).starts_with("HTTP/1.1 200"));
+    }
+
+    #[test]
+    fn a_viewer_gets_the_roster_and_frames() {
+        let mut page = Page::serve("127.0.0.1:0".parse().expect("an address"), String::new()).expect("serves");
+        let url = format!("ws://{}/live", page.shared.address);
+        let (mut socket, _) = tungstenite::connect(url).expect("a WebSocket");
+        let mut read = || -> Value {
+            let text = socket.read().expect("a message").into_text().expect("text");
+            serde_json::from_str(&text).expect("JSON")
+        };
+        assert_eq!(read()["op"], "roster");
+        let mut monitor = Monitor::new(Settings::default(), Plan::default()).expect("settings");
+        for (id, x) in [("a", 0.0), ("b", 0.5)] {
+            let position_m = Vector3::x() * x;
+            monitor.take(&Pose { t_s: 0.0, id, position_m, velocity_m_s: None }, 0.0);
+        }
+        page.assessed(&monitor.assess(0.0), &monitor);
+        assert_eq!(read()["names"], serde_json::json!(["a", "b"]));
+        let frame = read();
+        assert_eq!(frame["op"], "frame");
+        assert_eq!(frame["places"][1], serde_json::json!([0.5, 0.0, 0.0, true]));
+    }
+}

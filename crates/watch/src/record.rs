@@ -1,0 +1,113 @@
+//! Recording of what was watched.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write as _};
+use std::path::{Path, PathBuf};
+
+use crate::source::OwnedPose;
+
+/// Poses as CSV with the columns `t,id,x,y,z,vx,vy,vz`, in a file that has its name when it is complete.
+pub struct Record {
+    file: BufWriter<File>,
+    partial: PathBuf,
+    path: PathBuf,
+    /// Time of the last flush \[s\].
+    flushed_s: f64,
+    rows: u64,
+}
+
+/// Extension of a file that is not complete.
+const PARTIAL: &str = "partial";
+
+impl Record {
+    /// Creates the file `PATH.partial`.
+    ///
+    /// # Errors
+    /// If it cannot be created.
+    pub fn create(path: &Path) -> io::Result<Self> {
+        let mut name = path.as_os_str().to_owned();
+        name.push(".");
+        name.push(PARTIAL);
+        let partial = PathBuf::from(name);
+        let mut file = BufWriter::new(File::create(&partial)?);
+        file.write_all(b"t,id,x,y,z,vx,vy,vz\n")?;
+        Ok(Self { file, partial, path: path.to_owned(), flushed_s: f64::NEG_INFINITY, rows: 0 })
+    }
+
+    /// Appends a pose at a time of the monitor \[s\]. Numbers round-trip.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn push(&mut self, time_s: f64, pose: &OwnedPose) -> io::Result<()> {
+        let at = pose.position_m;
+        let id = quoted(&pose.id);
+        write!(self.file, "{time_s:?},{id},{:?},{:?},{:?},", at.x, at.y, at.z)?;
+        match pose.velocity_m_s {
+            Some(of) => writeln!(self.file, "{:?},{:?},{:?}", of.x, of.y, of.z)?,
+            None => writeln!(self.file, ",,")?,
+        }
+        self.rows += 1;
+        if time_s >= self.flushed_s + 1.0 {
+            self.flushed_s = time_s;
+            self.file.flush()?;
+        }
+        Ok(())
+    }
+
+    /// Returns the number of poses.
+    #[must_use]
+    pub fn rows(&self) -> u64 {
+        self.rows
+    }
+
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// If it cannot be written.
+    pub fn finish(mut self) -> io::Result<()> {
+        self.file.flush()?;
+        self.file.get_ref().sync_all()?;
+        std::fs::rename(&self.partial, &self.path)
+    }
+}
+
+/// Returns a cell of CSV.
+fn quoted(cell: &str) -> String {
+    if cell.contains([',', '"', '\n', '\r']) || cell.trim() != cell {
+        format!("\"{}\"", cell.replace('"', "\"\""))
+    } else {
+        cell.to_owned()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::Record;
+    use crate::source::OwnedPose;
+    use tautline_core::track::Item;
+    use tautline_recordings::read::{ReadOptions, open};
+
+    #[test]
+    fn a_recording_is_read_back_with_the_same_numbers() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("watch.csv");
+        let mut record = Record::create(&path).expect("a file");
+        let third = 1.0 / 3.0;
+        for (t_s, id) in [(0.1, "a, b"), (0.1, "c"), (0.2, "a, b"), (0.2, "c")] {
+            let position_m = Vector3::new(third, -t_s, 7.0);
+            let velocity_m_s = Some(Vector3::new(0.0, -1.0, third));
+            record.push(t_s, &OwnedPose { t_s, id: id.to_owned(), position_m, velocity_m_s }).expect("a row");
+        }
+        assert!(!path.exists());
+        record.finish().expect("a file");
+        let mut tracks = open(&path, &ReadOptions::default()).expect("a recording");
+        let mut items = Vec::new();
+        while tracks.read(&mut items).expect("rows") {}
+        assert_eq!(tracks.vehicles(), ["a, b", "c"]);
+        let Item::Sample(first) = &items[0] else { panic!("{items:?}") };
+        assert_eq!((first.time_s, first.position_m), (0.1, Vector3::new(third, -0.1, 7.0)));
+        assert_eq!((items.len(), first.velocity_m_s), (4, Some(Vector3::new(0.0, -1.0, third))));
+    }
+}

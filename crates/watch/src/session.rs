@@ -1,0 +1,290 @@
+//! A watch from its first input to its end: inputs of sources go to the monitor, notices to the outputs.
+
+use std::io;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{RecvTimeoutError, TryRecvError};
+use std::time::Duration;
+
+use serde_json::json;
+
+use crate::event::{Assessment, Event, Fault, Reason, State};
+use crate::monitor::{Monitor, Pose};
+use crate::notice::{Notice, down, fixed, name};
+use crate::settings::TimeBase;
+use crate::source::{Input, Inputs, OwnedPose};
+
+/// Time between two judgements \[s\]; an alarm is at most this late.
+pub const ASSESS_PERIOD_S: f64 = 0.01;
+/// Time between two lines of an unchanged state \[s\].
+pub const LINE_PERIOD_S: f64 = 1.0;
+/// Largest number of inputs between two judgements.
+const MOST_AT_ONCE: usize = 5_000;
+
+/// Output of a watch.
+pub trait Output {
+    /// Takes a notice.
+    ///
+    /// # Errors
+    /// If it cannot be written; this ends the watch.
+    fn notice(&mut self, notice: &Notice) -> io::Result<()>;
+
+    /// Takes a pose that the monitor used, with its time \[s\].
+    ///
+    /// # Errors
+    /// As [`notice`](Self::notice).
+    fn pose(&mut self, _time_s: f64, _pose: &OwnedPose) -> io::Result<()> {
+        Ok(())
+    }
+
+    /// Takes a judgement; called at most each [`ASSESS_PERIOD_S`].
+    ///
+    /// # Errors
+    /// As [`notice`](Self::notice).
+    fn assessed(&mut self, _of: &Assessment, _monitor: &Monitor) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+/// Result of a watch.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Summary {
+    /// Whether all expected vehicles were heard.
+    pub has_started: bool,
+    /// Time in the state CLEAR \[s\].
+    pub clear_s: f64,
+    /// Time in the state NOT KNOWN after the start \[s\].
+    pub not_known_s: f64,
+    /// Time in the state VIOLATION \[s\].
+    pub violation_s: f64,
+    /// Whether a judgement after the start was NOT KNOWN.
+    pub was_not_known: bool,
+    /// Whether a judgement was VIOLATION, or a measured violation was found.
+    pub was_violated: bool,
+    /// Whether a vehicle left the tube around its plan.
+    pub was_off_plan: bool,
+    /// Number of measured violations.
+    pub violations: u64,
+    /// Number of vehicles.
+    pub vehicles: usize,
+    /// Smallest separation at a judgement or in a measured violation \[m\], with the names of the pair.
+    pub closest: Option<(f64, [String; 2])>,
+}
+
+impl Summary {
+    /// Returns whether every judgement after the start was CLEAR, without a violation and within the plan.
+    #[must_use]
+    pub fn is_good(&self) -> bool {
+        self.has_started && !self.was_not_known && !self.was_violated && !self.was_off_plan
+    }
+
+    fn notice(&self, at_s: f64) -> Notice {
+        let verdict = match self {
+            _ if self.was_violated => "VIOLATION",
+            _ if !self.has_started || self.was_not_known => "NOT KNOWN",
+            _ if self.was_off_plan => "OFF PLAN",
+            _ => "CLEAR",
+        };
+        let mut text = format!(
+            "{verdict}: {} vehicles, {} s CLEAR, {} s NOT KNOWN, {} s VIOLATION, measured violations: {}",
+            self.vehicles,
+            fixed(self.clear_s),
+            fixed(self.not_known_s),
+            fixed(self.violation_s),
+            self.violations
+        );
+        if let Some((distance_m, [a, b])) = &self.closest {
+            text += &format!("; closest {a}-{b} {} m", down(*distance_m));
+        }
+        let closest = self.closest.as_ref().map(|(distance_m, pair)| json!({ "pair": pair, "distance_m": distance_m }));
+        let more = json!({
+            "good": self.is_good(),
+            "started": self.has_started,
+            "vehicles": self.vehicles,
+            "clear_s": self.clear_s,
+            "not_known_s": self.not_known_s,
+            "violation_s": self.violation_s,
+            "violations": self.violations,
+            "off_plan": self.was_off_plan,
+            "closest": closest,
+        });
+        Notice { text: text.clone(), ..Notice::new("summary", at_s, text, more) }
+    }
+}
+
+/// Watch that runs.
+struct Session<'a> {
+    monitor: Monitor,
+    output: &'a mut dyn Output,
+    summary: Summary,
+    last: Option<Assessment>,
+    /// Time of the last line \[s\].
+    line_s: f64,
+    /// Sentence of the last error of the input.
+    said: String,
+}
+
+/// Watches until the source ends or the flag of the inputs is set.
+///
+/// # Errors
+/// If an output fails.
+pub fn watch(monitor: Monitor, inputs: &Inputs, output: &mut dyn Output) -> io::Result<Summary> {
+    let uses_stamps = monitor.settings().time_base == TimeBase::Stamps;
+    let mut session = Session {
+        monitor,
+        output,
+        summary: Summary::default(),
+        last: None,
+        line_s: f64::NEG_INFINITY,
+        said: String::new(),
+    };
+    let now_s = || inputs.start.elapsed().as_secs_f64();
+    let (mut next_s, mut is_over, mut dropped) = (0.0, false, 0);
+    while !is_over && !inputs.stop.load(Ordering::Relaxed) {
+        let wait_s = if uses_stamps { 0.1 } else { (next_s - now_s()).clamp(0.0, ASSESS_PERIOD_S) };
+        match inputs.receiver.recv_timeout(Duration::from_secs_f64(wait_s)) {
+            Ok(input) => is_over |= session.take(input)?,
+            Err(RecvTimeoutError::Disconnected) => is_over = true,
+            Err(RecvTimeoutError::Timeout) => {}
+        }
+        for _ in 0..MOST_AT_ONCE {
+            match inputs.receiver.try_recv() {
+                Ok(input) => is_over |= session.take(input)?,
+                Err(TryRecvError::Empty | TryRecvError::Disconnected) => break,
+            }
+        }
+        let lost = inputs.dropped.load(Ordering::Relaxed);
+        if lost > dropped {
+            session.said = format!("{} messages were dropped", lost - dropped);
+            session.monitor.fault(Fault::Dropped, None, now_s());
+            dropped = lost;
+        }
+        if !uses_stamps && now_s() >= next_s {
+            session.assess(now_s())?;
+            next_s = now_s() + ASSESS_PERIOD_S;
+        }
+        // Standard input may be silent forever: its thread cannot be ended.
+    }
+    session.finish(now_s())
+}
+
+impl Session<'_> {
+    /// Takes an input. Returns whether the source has ended.
+    fn take(&mut self, input: Input) -> io::Result<bool> {
+        match input {
+            Input::Pose(pose, arrival_s) => self.pose(&pose, arrival_s)?,
+            Input::Fault(fault, arrival_s, said) => {
+                self.said = said;
+                self.monitor.fault(fault, None, arrival_s);
+                self.pass_events()?;
+            }
+            Input::Connected(source) => self.source("connected", format!("connected to {source}"), &source)?,
+            Input::Lost(source, why) => self.source("lost", format!("lost {source}: {why}; trying again"), &source)?,
+            Input::End => return Ok(true),
+        }
+        Ok(false)
+    }
+
+    fn pose(&mut self, pose: &OwnedPose, arrival_s: f64) -> io::Result<()> {
+        if self.monitor.settings().time_base == TimeBase::Stamps
+            && let Some(ahead_s) = self.monitor.is_ahead_s(pose.t_s)
+            && ahead_s > 0.0
+        {
+            // All poses of the instant are taken.
+            let since_s = self.last.map_or(f64::INFINITY, |last| self.monitor.now_s() - last.now_s);
+            if since_s >= ASSESS_PERIOD_S {
+                self.assess(arrival_s)?;
+            }
+            if ahead_s > self.monitor.settings().max_age_s {
+                // Nothing was heard in between.
+                self.monitor.advance(pose.t_s);
+                self.assess(arrival_s)?;
+            }
+        }
+        let of = Pose { t_s: pose.t_s, id: &pose.id, position_m: pose.position_m, velocity_m_s: pose.velocity_m_s };
+        if let Some(taken) = self.monitor.take(&of, arrival_s) {
+            self.output.pose(taken.time_s, pose)?;
+        }
+        self.pass_events()
+    }
+
+    fn source(&mut self, event: &'static str, text: String, source: &str) -> io::Result<()> {
+        self.output.notice(&Notice::new(event, self.monitor.now_s(), text, json!({ "source": source })))
+    }
+
+    fn assess(&mut self, arrival_s: f64) -> io::Result<()> {
+        let of = self.monitor.assess(arrival_s);
+        self.judged(of)
+    }
+
+    fn judged(&mut self, of: Assessment) -> io::Result<()> {
+        self.pass_events()?;
+        let summary = &mut self.summary;
+        let before = self.last.filter(|last| last.now_s.is_finite() && of.now_s.is_finite());
+        if let Some(last) = before {
+            // The first pose may set the time of the monitor back.
+            let passed_s = (of.now_s - last.now_s).max(0.0);
+            match last.state {
+                State::Clear => summary.clear_s += passed_s,
+                State::Violation(..) => summary.violation_s += passed_s,
+                State::NotKnown(_) if summary.has_started => summary.not_known_s += passed_s,
+                State::NotKnown(_) => {}
+            }
+        }
+        summary.has_started |= !matches!(of.state, State::NotKnown(reason) if reason.is_of_start());
+        summary.was_violated |= matches!(of.state, State::Violation(..));
+        summary.was_not_known |= summary.has_started && matches!(of.state, State::NotKnown(_));
+        summary.vehicles = of.heard;
+        if let Some(near) = of.closest {
+            note_closest(summary, near.nominal_m, || near.pair.map(|k| name(&self.monitor, k)));
+        }
+        let is_change = self.last.is_none_or(|last| kind(last.state) != kind(of.state));
+        // Not a difference of times: times may be infinite before the first pose.
+        let is_due = of.now_s >= self.line_s + LINE_PERIOD_S || of.now_s < self.line_s;
+        if is_change || is_due {
+            self.line_s = of.now_s;
+            self.output.notice(&Notice::of_state(&of, &self.monitor))?;
+        }
+        self.last = Some(of);
+        self.output.assessed(&of, &self.monitor)
+    }
+
+    fn pass_events(&mut self) -> io::Result<()> {
+        let events: Vec<Event> = self.monitor.drain_events().collect();
+        for event in events {
+            match event {
+                Event::Began(_) => self.summary.was_violated = true,
+                Event::Ended(of) => {
+                    note_closest(&mut self.summary, of.min_m, || of.pair.map(|k| name(&self.monitor, k)));
+                }
+                Event::Plan { is_outside: true, .. } => self.summary.was_off_plan = true,
+                _ => {}
+            }
+            self.output.notice(&Notice::of_event(&event, &self.monitor, &self.said))?;
+        }
+        Ok(())
+    }
+
+    fn finish(mut self, arrival_s: f64) -> io::Result<Summary> {
+        let of = self.monitor.finish(arrival_s);
+        self.judged(of)?;
+        self.summary.violations = self.monitor.violations();
+        self.output.notice(&self.summary.notice(self.monitor.now_s()))?;
+        Ok(self.summary)
+    }
+}
+
+fn note_closest(summary: &mut Summary, distance_m: f64, pair: impl FnOnce() -> [String; 2]) {
+    if summary.closest.as_ref().is_none_or(|(least_m, _)| distance_m < *least_m) {
+        summary.closest = Some((distance_m, pair()));
+    }
+}
+
+/// Part of a state whose change gives a line at once.
+fn kind(state: State) -> (u8, Option<u32>) {
+    match state {
+        State::Clear => (0, None),
+        State::Violation([a, _], _) => (1, Some(a)),
+        State::NotKnown(Reason::Stale(vehicle, _)) => (2, Some(vehicle)),
+        State::NotKnown(_) => (2, None),
+    }
+}

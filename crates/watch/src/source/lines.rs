@@ -1,0 +1,151 @@
+//! JSON lines: `{"t": 1.5, "id": "a", "x": 0, "y": 0, "z": 2}`, with `vx`, `vy` and `vz` if known.
+//!
+//! Empty lines and lines that begin with `#` are skipped.
+
+use std::io::{BufRead, Read as _};
+
+use nalgebra::Vector3;
+use serde::Deserialize;
+
+use super::{Feed, Input, OwnedPose};
+use crate::event::Fault;
+
+/// Largest number of bytes of a line. A longer line is an error of the input.
+pub const LONGEST_LINE: usize = 1 << 16;
+
+#[derive(Deserialize)]
+struct Line {
+    t: f64,
+    id: Name,
+    x: f64,
+    y: f64,
+    z: f64,
+    vx: Option<f64>,
+    vy: Option<f64>,
+    vz: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Name {
+    Text(String),
+    Number(i64),
+}
+
+/// Reads lines until the end of `from`.
+pub fn lines(mut from: impl BufRead, feed: &Feed) {
+    let mut line = Vec::new();
+    let mut number = 0_u64;
+    loop {
+        line.clear();
+        let mut is_error = false;
+        let read = (&mut from).take(LONGEST_LINE as u64).read_until(b'\n', &mut line);
+        number += 1;
+        let arrival_s = feed.now_s();
+        let garbage = |why: String| Input::Fault(Fault::Garbage, arrival_s, format!("line {number}: {why}"));
+        let input = match read {
+            Ok(0) => break,
+            Ok(_) if line.len() == LONGEST_LINE && line.last() != Some(&b'\n') => {
+                if skip_line(&mut from).is_err() {
+                    break;
+                }
+                garbage(format!("longer than {LONGEST_LINE} bytes; write one pose per line"))
+            }
+            Ok(_) if matches!(line.trim_ascii().first(), None | Some(b'#')) => continue,
+            Ok(_) => match pose_of_line(&line) {
+                Ok(pose) => Input::Pose(pose, arrival_s),
+                Err(why) => garbage(why),
+            },
+            Err(error) => {
+                is_error = true;
+                garbage(format!("cannot be read: {error}"))
+            }
+        };
+        if !feed.send(input) || is_error || feed.is_over() {
+            break;
+        }
+    }
+    feed.send(Input::End);
+}
+
+/// Returns the pose of a line.
+///
+/// # Errors
+/// A sentence without a full stop if the line is no pose.
+pub fn pose_of_line(line: &[u8]) -> Result<OwnedPose, String> {
+    let of: Line = serde_json::from_slice(line).map_err(|error| {
+        let shown: String = String::from_utf8_lossy(line.trim_ascii()).chars().take(60).collect();
+        let remedy = r#"write {"t":0,"id":"a","x":0,"y":0,"z":0}"#;
+        format!("not a pose: {error} ({shown:?}); {remedy}")
+    })?;
+    let velocity_m_s = match (of.vx, of.vy, of.vz) {
+        (Some(x), Some(y), Some(z)) => Some(Vector3::new(x, y, z)),
+        (None, None, None) => None,
+        _ => return Err("a part of the velocity is missing; write vx, vy and vz, or none of them".to_owned()),
+    };
+    let id = match of.id {
+        Name::Text(text) => text,
+        Name::Number(number) => number.to_string(),
+    };
+    Ok(OwnedPose { t_s: of.t, id, position_m: Vector3::new(of.x, of.y, of.z), velocity_m_s })
+}
+
+/// Skips the rest of a line.
+fn skip_line(from: &mut impl BufRead) -> std::io::Result<()> {
+    loop {
+        let bytes = from.fill_buf()?;
+        let (skipped, is_over) = match bytes.iter().position(|&byte| byte == b'\n') {
+            Some(end) => (end + 1, true),
+            None => (bytes.len(), bytes.is_empty()),
+        };
+        from.consume(skipped);
+        if is_over {
+            return Ok(());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+    use std::sync::atomic::AtomicBool;
+
+    use nalgebra::Vector3;
+
+    use super::{LONGEST_LINE, lines, pose_of_line};
+    use crate::event::Fault;
+    use crate::source::{Input, channel};
+
+    #[test]
+    fn a_line_is_a_pose_with_or_without_velocity() {
+        let pose = pose_of_line(br#"{"t":1.5,"id":7,"x":1,"y":2,"z":3e0,"more":[]}"#).expect("a pose");
+        assert_eq!((pose.id.as_str(), pose.position_m), ("7", Vector3::new(1.0, 2.0, 3.0)));
+        assert_eq!(pose.velocity_m_s, None);
+        let moving = br#"{"t":0,"id":"a","x":1,"y":2,"z":3,"vx":4,"vy":5,"vz":6}"#;
+        assert_eq!(pose_of_line(moving).expect("a pose").velocity_m_s, Some(Vector3::new(4.0, 5.0, 6.0)));
+        for wrong in [
+            r#"{"t":0,"id":"a","x":1,"y":2}"#,
+            r#"{"t":0,"id":"a","x":1,"y":2,"z":3,"vx":4}"#,
+            r#"{"t":"0","id":"a","x":1,"y":2,"z":3}"#,
+            r#"{"t":0,"id":"a","x":NaN,"y":2,"z":3}"#,
+            "t,id,x,y,z",
+            "\u{0}",
+        ] {
+            assert!(pose_of_line(wrong.as_bytes()).is_err(), "{wrong}");
+        }
+    }
+
+    #[test]
+    fn a_line_without_end_is_skipped() {
+        let good = b"{\"t\":0,\"id\":\"a\",\"x\":1,\"y\":2,\"z\":3}\n";
+        let text = [&good[..], &vec![b'x'; 3 * LONGEST_LINE], b"\n\n", good, b"\xff\xfe"].concat();
+        let (feed, inputs) = channel(Arc::new(AtomicBool::new(false)));
+        lines(&text[..], &feed);
+        drop(feed);
+        let found: Vec<_> = inputs.receiver.iter().collect();
+        let kinds: Vec<_> = found.iter().map(|input| matches!(input, Input::Pose(..))).collect();
+        assert_eq!(kinds, [true, false, true, false, false]);
+        assert!(matches!(&found[1], Input::Fault(Fault::Garbage, _, said) if said.starts_with("line 2: longer")));
+        assert_eq!(found[4], Input::End);
+    }
+}

@@ -1,0 +1,254 @@
+//! MAVLink 1 and 2 over UDP: `LOCAL_POSITION_NED` and `GLOBAL_POSITION_INT`. The system id is the name of a vehicle.
+//!
+//! Both messages are defined in `common.xml` and `standard.xml` of MAVLink. `mavlink-core` reads frames and checksums.
+//! Messages with another id are skipped.
+
+use std::io;
+use std::net::{SocketAddr, UdpSocket};
+use std::time::Duration;
+
+use mavlink_core::{MAVLinkV1MessageRaw, MAVLinkV2MessageRaw};
+use nalgebra::Vector3;
+
+use super::{Feed, Input, OwnedPose};
+use crate::event::Fault;
+use tautline_recordings::read::EarthFrame;
+
+/// Message id, payload length without extensions, and extra byte of the checksum of `LOCAL_POSITION_NED`.
+const LOCAL: (u32, usize, u8) = (32, 28, 185);
+/// The same of `GLOBAL_POSITION_INT`.
+const GLOBAL: (u32, usize, u8) = (33, 28, 104);
+/// First bytes of MAVLink 1 and 2.
+const STARTS: [u8; 2] = [0xFE, 0xFD];
+/// Largest number of bytes of a datagram.
+const LARGEST_DATAGRAM: usize = 65_536;
+/// Bit of the incompatibility flags of MAVLink 2 for a signature, whose 13 bytes follow the checksum.
+const SIGNED: u8 = 1;
+
+/// Message that positions are read from.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum MavlinkFrame {
+    /// `LOCAL_POSITION_NED`: all vehicles must have the same local origin.
+    Local,
+    /// `GLOBAL_POSITION_INT`, in metres east, north and up of this origin.
+    Global(EarthFrame),
+}
+
+/// Listens to datagrams on an address.
+///
+/// # Errors
+/// If the address cannot be bound.
+pub fn mavlink(address: SocketAddr, frame: MavlinkFrame, feed: Feed) -> io::Result<SocketAddr> {
+    let socket = UdpSocket::bind(address)?;
+    socket.set_read_timeout(Some(Duration::from_millis(100)))?;
+    let bound = socket.local_addr()?;
+    std::thread::spawn(move || {
+        let mut first = Some(socket);
+        feed.reconnect(&format!("mavlink:{bound}"), |connected| {
+            let socket = match first.take().map_or_else(|| UdpSocket::bind(bound), Ok) {
+                Ok(socket) => socket,
+                Err(error) => return error.to_string(),
+            };
+            let _ = socket.set_read_timeout(Some(Duration::from_millis(100)));
+            connected();
+            listen(&socket, &frame, &feed)
+        });
+    });
+    Ok(bound)
+}
+
+/// Reads datagrams until the socket fails; returns the reason.
+fn listen(socket: &UdpSocket, frame: &MavlinkFrame, feed: &Feed) -> String {
+    let mut bytes = vec![0; LARGEST_DATAGRAM];
+    let mut inputs = Vec::new();
+    while !feed.is_over() {
+        match socket.recv(&mut bytes) {
+            Ok(length) => {
+                inputs.clear();
+                poses_of_datagram(&bytes[..length], frame, feed.now_s(), &mut inputs);
+                if !inputs.drain(..).all(|input| feed.offer(input)) {
+                    break;
+                }
+            }
+            Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {}
+            Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+            Err(error) => return error.to_string(),
+        }
+    }
+    "the watch has ended".to_owned()
+}
+
+/// Appends the poses of the frames of a datagram, and an error for bytes that are no frame.
+pub fn poses_of_datagram(mut bytes: &[u8], frame: &MavlinkFrame, arrival_s: f64, inputs: &mut Vec<Input>) {
+    while !bytes.is_empty() {
+        let (pose, length) = match first_frame(bytes, frame) {
+            Ok(found) => found,
+            Err(why) => {
+                inputs.push(Input::Fault(Fault::Garbage, arrival_s, format!("datagram: {why}")));
+                return;
+            }
+        };
+        inputs.extend(pose.map(|pose| Input::Pose(pose, arrival_s)));
+        bytes = &bytes[length..];
+    }
+}
+
+/// Returns the pose of the first frame, if it has one, and the length of the frame.
+fn first_frame(bytes: &[u8], frame: &MavlinkFrame) -> Result<(Option<OwnedPose>, usize), String> {
+    let cut = || "it ends within a frame of MAVLink".to_owned();
+    let payload = usize::from(*bytes.get(1).ok_or_else(cut)?);
+    let (message, system, payload, length, is_whole) = match bytes[0] {
+        0xFE => {
+            let mut raw = MAVLinkV1MessageRaw::new();
+            let length = 8 + payload;
+            raw.as_mut_slice()[..length].copy_from_slice(bytes.get(..length).ok_or_else(cut)?);
+            let id = u32::from(raw.message_id());
+            let is_whole = extra_of(id).is_none_or(|extra| raw.has_valid_crc_with_extra_crc(extra));
+            (id, u32::from(raw.system_id()), raw.payload().to_vec(), length, is_whole)
+        }
+        0xFD => {
+            let flags = *bytes.get(2).ok_or_else(cut)?;
+            if flags & !SIGNED != 0 {
+                return Err(format!("a frame of MAVLink 2 has unknown incompatible flags ({flags:#04x})"));
+            }
+            let length = 12 + payload + if flags & SIGNED != 0 { 13 } else { 0 };
+            let mut raw = MAVLinkV2MessageRaw::new();
+            raw.as_mut_slice()[..length].copy_from_slice(bytes.get(..length).ok_or_else(cut)?);
+            let id = raw.message_id();
+            let is_whole = extra_of(id).is_none_or(|extra| raw.has_valid_crc_with_extra_crc(extra));
+            (id, raw.system_id(), raw.payload().to_vec(), length, is_whole)
+        }
+        other => return Err(format!("no frame of MAVLink begins with {other:#04x}, but with {STARTS:#04x?}")),
+    };
+    if !is_whole {
+        return Err(format!("the checksum of message {message} of system {system} is wrong"));
+    }
+    let pose = match (message, frame) {
+        (id, MavlinkFrame::Local) if id == LOCAL.0 => Some(local(&payload)),
+        (id, MavlinkFrame::Global(earth)) if id == GLOBAL.0 => global(&payload, earth)?,
+        _ => None,
+    };
+    let named = |(t_s, position_m, velocity): (f64, _, _)| OwnedPose {
+        t_s,
+        id: system.to_string(),
+        position_m,
+        velocity_m_s: Some(velocity),
+    };
+    Ok((pose.map(named), length))
+}
+
+fn extra_of(message: u32) -> Option<u8> {
+    [LOCAL, GLOBAL].into_iter().find(|of| of.0 == message).map(|of| of.2)
+}
+
+/// Stamp \[s\], position \[m\] and velocity \[m/s\].
+type Reading = (f64, Vector3<f64>, Vector3<f64>);
+
+fn local(payload: &[u8]) -> Reading {
+    let number = |k: usize| f64::from(f32::from_le_bytes(word(payload, 4 * k)));
+    // North, east and down become east, north and up.
+    let turned = |k: usize| Vector3::new(number(k + 1), number(k), -number(k + 2));
+    (stamp(payload), turned(1), turned(4))
+}
+
+/// Returns the reading of `GLOBAL_POSITION_INT`, `None` without a fix: latitude and longitude are 0.
+fn global(payload: &[u8], earth: &EarthFrame) -> Result<Option<Reading>, String> {
+    let number = |k: usize| f64::from(i32::from_le_bytes(word(payload, 4 * k)));
+    let speed = |k: usize| f64::from(i16::from_le_bytes(half(payload, 20 + 2 * k))) * 0.01;
+    let place = [number(1) * 1e-7, number(2) * 1e-7, number(3) * 1e-3];
+    if number(1) == 0.0 && number(2) == 0.0 {
+        return Ok(None);
+    }
+    let velocity = Vector3::new(speed(1), speed(0), -speed(2));
+    let at = earth.position_m(place)?;
+    Ok(Some((stamp(payload), at, earth.direction_at(place, velocity)?)))
+}
+
+fn stamp(payload: &[u8]) -> f64 {
+    f64::from(u32::from_le_bytes(word(payload, 0))) * 1e-3
+}
+
+/// Returns bytes of a payload, whose zeros at the end are not sent.
+fn word(payload: &[u8], from: usize) -> [u8; 4] {
+    std::array::from_fn(|k| payload.get(from + k).copied().unwrap_or(0))
+}
+
+fn half(payload: &[u8], from: usize) -> [u8; 2] {
+    std::array::from_fn(|k| payload.get(from + k).copied().unwrap_or(0))
+}
+
+#[cfg(test)]
+mod tests {
+    use mavlink_core::calculate_crc;
+    use nalgebra::Vector3;
+
+    use super::{GLOBAL, LOCAL, MavlinkFrame, poses_of_datagram};
+    use crate::source::{Input, OwnedPose};
+    use tautline_recordings::read::EarthFrame;
+
+    /// Returns a frame of MAVLink 2, or of MAVLink 1.
+    fn framed((id, _, extra): (u32, usize, u8), system: u8, payload: &[u8], is_new: bool) -> Vec<u8> {
+        let length = u8::try_from(payload.len()).expect("a short payload");
+        let header = if is_new {
+            vec![0xFD, length, 0, 0, 9, system, 1, id.to_le_bytes()[0], 0, 0]
+        } else {
+            vec![0xFE, length, 9, system, 1, id.to_le_bytes()[0]]
+        };
+        let mut bytes = [header, payload.to_vec()].concat();
+        bytes.extend(calculate_crc(&bytes[1..], extra).to_le_bytes());
+        bytes
+    }
+
+    fn local_payload() -> Vec<u8> {
+        let numbers = [1.0_f32, 2.0, -3.0, 0.5, 0.25, -0.125];
+        let numbers = numbers.iter().flat_map(|x| x.to_le_bytes());
+        1500_u32.to_le_bytes().into_iter().chain(numbers).collect()
+    }
+
+    fn read(bytes: &[u8], frame: &MavlinkFrame) -> Vec<Input> {
+        let mut inputs = Vec::new();
+        poses_of_datagram(bytes, frame, 7.0, &mut inputs);
+        inputs
+    }
+
+    #[test]
+    fn local_positions_become_east_north_up() {
+        let pose = OwnedPose {
+            t_s: 1.5,
+            id: "42".to_owned(),
+            position_m: Vector3::new(2.0, 1.0, 3.0),
+            velocity_m_s: Some(Vector3::new(0.25, 0.5, 0.125)),
+        };
+        for is_new in [true, false] {
+            let one = framed(LOCAL, 42, &local_payload(), is_new);
+            let two = [one.clone(), one].concat();
+            assert_eq!(read(&two, &MavlinkFrame::Local), vec![Input::Pose(pose.clone(), 7.0); 2]);
+        }
+    }
+
+    #[test]
+    fn global_positions_are_metres_from_the_origin() {
+        let earth = EarthFrame::new([47.0, 8.0, 400.0]).expect("an origin");
+        let numbers = [470_000_000_i32, 80_001_000, 410_000, 0].iter().flat_map(|x| x.to_le_bytes());
+        let speeds = [100_i16, 200, 300].iter().flat_map(|x| x.to_le_bytes());
+        let payload: Vec<_> = 0_u32.to_le_bytes().into_iter().chain(numbers).chain(speeds).chain([0, 0]).collect();
+        let found = read(&framed(GLOBAL, 3, &payload, true), &MavlinkFrame::Global(earth));
+        let [Input::Pose(pose, _)] = &found[..] else { panic!("{found:?}") };
+        // 1e-4 degrees of longitude at 47 degrees of latitude.
+        assert!((pose.position_m - Vector3::new(7.607, 0.0, 10.0)).norm() < 2e-3, "{}", pose.position_m);
+        assert!((pose.velocity_m_s.expect("sent") - Vector3::new(2.0, 1.0, -3.0)).norm() < 1e-4);
+    }
+
+    #[test]
+    fn damaged_frames_are_garbage_and_other_messages_are_skipped() {
+        let good = framed(LOCAL, 1, &local_payload(), true);
+        for k in 0..good.len() {
+            let mut bad = good.clone();
+            bad[k] ^= 0x10;
+            let poses = read(&bad, &MavlinkFrame::Local).iter().filter(|of| matches!(of, Input::Pose(..))).count();
+            assert_eq!(poses, 0, "byte {k}");
+            assert!(matches!(&read(&good[..k], &MavlinkFrame::Local)[..], [] | [Input::Fault(..)]));
+        }
+        assert_eq!(read(&framed((0, 9, 50), 1, &[0; 9], true), &MavlinkFrame::Local), []);
+    }
+}

@@ -1,0 +1,138 @@
+//! Sources of poses: each runs in a thread of its own and sends [`Input`]s through one bounded channel.
+
+mod foxglove;
+mod lines;
+mod mavlink;
+mod naming;
+mod rosbridge;
+mod websocket;
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::time::{Duration, Instant};
+
+use nalgebra::Vector3;
+
+use crate::event::Fault;
+
+pub use foxglove::foxglove;
+pub use lines::{LONGEST_LINE, lines, pose_of_line};
+pub use mavlink::{MavlinkFrame, mavlink, poses_of_datagram};
+pub use naming::{Naming, NamingOptions};
+pub use rosbridge::{poses_of_message, rosbridge};
+
+/// Number of inputs that wait to be read. Inputs of the network beyond it are dropped and counted.
+pub const MOST_WAITING: usize = 1 << 16;
+/// First and largest pause before a source connects again.
+const PAUSES: [Duration; 2] = [Duration::from_millis(250), Duration::from_secs(5)];
+
+/// Pose with its own name.
+#[derive(Clone, Debug, PartialEq)]
+pub struct OwnedPose {
+    /// Stamp \[s\].
+    pub t_s: f64,
+    /// Name of the vehicle.
+    pub id: String,
+    /// Position \[m\].
+    pub position_m: Vector3<f64>,
+    /// Velocity \[m/s\], if known.
+    pub velocity_m_s: Option<Vector3<f64>>,
+}
+
+/// Input of a watch.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Input {
+    /// A pose, and its arrival since the start of the watch \[s\].
+    Pose(OwnedPose, f64),
+    /// An error of the input, with its arrival \[s\] and a sentence.
+    Fault(Fault, f64, String),
+    /// A source is connected.
+    Connected(String),
+    /// A source is lost, with the reason; it connects again.
+    Lost(String, String),
+    /// The source has ended.
+    End,
+}
+
+/// Sending end of the channel of inputs.
+#[derive(Clone, Debug)]
+pub struct Feed {
+    sender: SyncSender<Input>,
+    dropped: Arc<AtomicU64>,
+    stop: Arc<AtomicBool>,
+    start: Instant,
+}
+
+/// Receiving end of the channel of inputs.
+#[derive(Debug)]
+pub struct Inputs {
+    pub(crate) receiver: Receiver<Input>,
+    pub(crate) dropped: Arc<AtomicU64>,
+    pub(crate) stop: Arc<AtomicBool>,
+    pub(crate) start: Instant,
+}
+
+/// Returns both ends of a channel of inputs. Sources end soon after `stop` is set.
+#[must_use]
+pub fn channel(stop: Arc<AtomicBool>) -> (Feed, Inputs) {
+    let (sender, receiver) = sync_channel(MOST_WAITING);
+    let (dropped, start) = (Arc::new(AtomicU64::new(0)), Instant::now());
+    let feed = Feed { sender, dropped: Arc::clone(&dropped), stop: Arc::clone(&stop), start };
+    (feed, Inputs { receiver, dropped, stop, start })
+}
+
+impl Feed {
+    /// Returns the time since the start of the watch \[s\].
+    #[must_use]
+    pub fn now_s(&self) -> f64 {
+        self.start.elapsed().as_secs_f64()
+    }
+
+    /// Returns whether the source should end.
+    #[must_use]
+    pub fn is_over(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
+    /// Sends an input and waits for room. Returns `false` at the end of the watch.
+    pub fn send(&self, input: Input) -> bool {
+        self.sender.send(input).is_ok()
+    }
+
+    /// Sends an input, or drops it if the channel is full. Returns `false` at the end of the watch.
+    pub fn offer(&self, input: Input) -> bool {
+        match self.sender.try_send(input) {
+            Ok(()) => true,
+            Err(TrySendError::Full(_)) => {
+                self.dropped.fetch_add(1, Ordering::Relaxed);
+                true
+            }
+            Err(TrySendError::Disconnected(_)) => false,
+        }
+    }
+
+    /// Connects and reads again after each loss, with pauses that double. `session` connects, calls its argument when
+    /// it is connected, and reads; its error is the reason of the loss.
+    fn reconnect(&self, name: &str, mut session: impl FnMut(&mut dyn FnMut()) -> String) {
+        let mut pause = PAUSES[0];
+        while !self.is_over() {
+            let mut is_connected = false;
+            let why = session(&mut || {
+                is_connected = true;
+                self.send(Input::Connected(name.to_owned()));
+            });
+            if is_connected {
+                pause = PAUSES[0];
+            }
+            if self.is_over() || !self.send(Input::Lost(name.to_owned(), why)) {
+                return;
+            }
+            let until = Instant::now() + pause;
+            while Instant::now() < until && !self.is_over() {
+                std::thread::sleep(Duration::from_millis(20));
+            }
+            pause = (2 * pause).min(PAUSES[1]);
+        }
+    }
+}

@@ -1,0 +1,174 @@
+//! rosbridge: topics of ROS 1 and ROS 2 as JSON over a WebSocket.
+//!
+//! The protocol needs two kinds of messages, so this is a client over `tungstenite`. `roslibrust` would bring an
+//! asynchronous runtime and generated types of messages. Only positions are read here.
+
+use nalgebra::Vector3;
+use serde_json::{Value, json};
+
+use super::websocket::{Incoming, Protocol, websocket};
+use super::{Feed, Input, Naming, NamingOptions};
+use crate::event::Fault;
+use tautline_recordings::read::LivePose;
+
+/// Connects to a server of rosbridge and subscribes to the topics of the options.
+///
+/// # Errors
+/// A sentence if the address is wrong or no topic is given.
+pub fn rosbridge(url: &str, options: NamingOptions, feed: Feed) -> Result<(), String> {
+    if options.topics.is_empty() {
+        return Err("rosbridge: no topic is given; give each with --topic, such as --topic /cf1/pose".to_owned());
+    }
+    let topics = options.topics.clone();
+    websocket(url, feed, Rosbridge { topics, naming: Naming::new(options) })
+}
+
+struct Rosbridge {
+    topics: Vec<String>,
+    naming: Naming,
+}
+
+impl Protocol for Rosbridge {
+    fn names(&self) -> &'static [&'static str] {
+        &[]
+    }
+
+    fn start(&mut self) -> Vec<String> {
+        let subscribe = |topic: &String| json!({ "op": "subscribe", "topic": topic }).to_string();
+        self.topics.iter().map(subscribe).collect()
+    }
+
+    fn take(&mut self, message: Incoming<'_>, arrival_s: f64, inputs: &mut Vec<Input>) -> Vec<String> {
+        let poses = match message {
+            Incoming::Text(text) => poses_of_message(text, &mut self.naming),
+            Incoming::Binary(_) => Err("rosbridge: a binary message is not read".to_owned()),
+        };
+        match poses {
+            Ok(poses) => inputs.extend(poses.into_iter().map(|pose| match pose {
+                Ok(pose) => Input::Pose(pose, arrival_s),
+                Err(why) => Input::Fault(Fault::Garbage, arrival_s, why),
+            })),
+            Err(why) => inputs.push(Input::Fault(Fault::Garbage, arrival_s, why)),
+        }
+        Vec::new()
+    }
+}
+
+/// Poses of a message, and a sentence for each that cannot be used.
+type Poses = Vec<Result<super::OwnedPose, String>>;
+
+/// Returns the poses of a message of the server.
+///
+/// # Errors
+/// A sentence if the message is none of rosbridge, reports an error, or has no positions.
+pub fn poses_of_message(text: &str, naming: &mut Naming) -> Result<Poses, String> {
+    let of: Value = serde_json::from_str(text).map_err(|error| format!("rosbridge: not JSON: {error}"))?;
+    let topic = of["topic"].as_str().unwrap_or_default();
+    match of["op"].as_str() {
+        Some("publish") if !topic.is_empty() => {}
+        Some("status") if of["level"] == "error" => return Err(format!("rosbridge: {}", of["msg"])),
+        Some("status") => return Ok(Vec::new()),
+        _ => return Err("rosbridge: not a message of a topic".to_owned()),
+    }
+    let poses = live_poses(&of["msg"]).ok_or_else(|| format!("{topic}: the message has no position that is read"))?;
+    Ok(poses.into_iter().filter_map(|pose| naming.pose(topic, pose).transpose()).collect())
+}
+
+/// Returns the positions of a message of ROS by its fields, as rosbridge does not send its type.
+fn live_poses(message: &Value) -> Option<Vec<LivePose>> {
+    if let Some(transforms) = message["transforms"].as_array() {
+        return transforms.iter().map(transform).collect();
+    }
+    if let Some(poses) = message["poses"].as_array() {
+        let one = |(number, of): (usize, &Value)| match of["name"].as_str() {
+            Some(name) => pose(&message["header"], &of["pose"]["position"], Some(name.to_owned()), None),
+            None => pose(&message["header"], &of["position"], None, Some(number)),
+        };
+        return (1..).zip(poses).map(one).collect();
+    }
+    if message["transform"].is_object() {
+        return Some(vec![transform(message)?]);
+    }
+    if message["latitude"].is_number() {
+        if message["status"]["status"].as_i64().is_some_and(|status| status < 0) || message["altitude"].is_null() {
+            return Some(Vec::new());
+        }
+        let place = json!({ "x": message["latitude"], "y": message["longitude"], "z": message["altitude"] });
+        return Some(vec![LivePose { is_on_earth: true, ..pose(&message["header"], &place, None, None)? }]);
+    }
+    let place = [&message["pose"]["pose"]["position"], &message["pose"]["position"], &message["point"]];
+    let place = place.into_iter().find(|of| of.is_object())?;
+    Some(vec![pose(&message["header"], place, None, None)?])
+}
+
+fn transform(of: &Value) -> Option<LivePose> {
+    let name = of["child_frame_id"].as_str()?.to_owned();
+    let pose = pose(&of["header"], &of["transform"]["translation"], Some(name), None)?;
+    Some(LivePose { is_transform: true, ..pose })
+}
+
+fn pose(header: &Value, place: &Value, name: Option<String>, number: Option<usize>) -> Option<LivePose> {
+    let stamp = &header["stamp"];
+    let part = |names: [&str; 2]| names.into_iter().find_map(|name| stamp[name].as_i64());
+    let (seconds, nanoseconds) = (part(["sec", "secs"])?, part(["nanosec", "nsecs"])?);
+    let axis = |name: &str| place[name].as_f64();
+    Some(LivePose {
+        name,
+        number,
+        frame: header["frame_id"].as_str()?.to_owned(),
+        stamp_ns: seconds.saturating_mul(1_000_000_000).saturating_add(nanoseconds),
+        position: Vector3::new(axis("x")?, axis("y")?, axis("z")?),
+        is_on_earth: false,
+        is_transform: false,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::poses_of_message;
+    use crate::source::{Naming, NamingOptions};
+
+    const HEADER: &str = r#""header":{"stamp":{"sec":3,"nanosec":500000000},"frame_id":"world"}"#;
+
+    fn read(topic: &str, body: &str) -> Vec<(String, f64, Vector3<f64>)> {
+        let mut naming = Naming::new(NamingOptions { frame: Some("world".to_owned()), ..NamingOptions::default() });
+        let text = format!(r#"{{"op":"publish","topic":"{topic}","msg":{{{body}}}}}"#);
+        let poses = poses_of_message(&text, &mut naming).expect(&text);
+        poses.into_iter().map(|of| of.expect("a pose")).map(|of| (of.id, of.t_s, of.position_m)).collect()
+    }
+
+    #[test]
+    fn positions_of_all_kinds_of_messages_are_read() {
+        let place = r#"{"x":1,"y":2,"z":3}"#;
+        let one = |id: &str| vec![(id.to_owned(), 3.5, Vector3::new(1.0, 2.0, 3.0))];
+        let odometry = format!(r#"{HEADER},"pose":{{"pose":{{"position":{place}}}}}"#);
+        let tf = format!(r#""transforms":[{{{HEADER},"child_frame_id":"cf5","transform":{{"translation":{place}}}}}]"#);
+        for (topic, body, id) in [
+            ("/cf1/pose", format!(r#"{HEADER},"pose":{{"position":{place}}}"#), "cf1"),
+            ("/cf2/odom", odometry, "cf2"),
+            ("/cf3/point", format!(r#"{HEADER},"point":{place}"#), "cf3"),
+            ("/poses", format!(r#"{HEADER},"poses":[{{"name":"cf4","pose":{{"position":{place}}}}}]"#), "cf4"),
+            ("/tf", tf, "cf5"),
+            ("/swarm/poses", format!(r#"{HEADER},"poses":[{{"position":{place}}}]"#), "swarm/1"),
+        ] {
+            assert_eq!(read(topic, &body), one(id), "{body}");
+        }
+    }
+
+    #[test]
+    fn other_messages_are_errors() {
+        let mut naming = Naming::new(NamingOptions::default());
+        for text in [
+            "",
+            "[]",
+            r#"{"op":"publish"}"#,
+            r#"{"op":"publish","topic":"/a/b","msg":{"data":1}}"#,
+            r#"{"op":"publish","topic":"/a/b","msg":{"pose":{"position":{"x":1,"y":2,"z":3}}}}"#,
+            r#"{"op":"status","level":"error","msg":"no such topic"}"#,
+        ] {
+            assert!(poses_of_message(text, &mut naming).is_err(), "{text}");
+        }
+    }
+}

@@ -1,0 +1,107 @@
+//! A watch from lines to notices, a summary and a recording.
+
+use std::io;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use crate::{monitor, settings};
+use tautline_watch::source::{OwnedPose, channel, lines};
+use tautline_watch::{Notice, Output, Settings, Summary, TimeBase, watch};
+
+#[derive(Default)]
+struct Collected {
+    texts: Vec<String>,
+    rows: Vec<f64>,
+}
+
+impl Output for Collected {
+    fn notice(&mut self, notice: &Notice) -> io::Result<()> {
+        assert_eq!(notice.json["event"], notice.event);
+        self.texts.push(notice.text.clone());
+        Ok(())
+    }
+
+    fn pose(&mut self, time_s: f64, _pose: &OwnedPose) -> io::Result<()> {
+        self.rows.push(time_s);
+        Ok(())
+    }
+}
+
+fn watched(text: &str) -> (Summary, Collected) {
+    let (feed, inputs) = channel(Arc::new(AtomicBool::new(false)));
+    lines(text.as_bytes(), &feed);
+    let settings = Settings { delta_m: 0.5, time_base: TimeBase::Stamps, ..settings() };
+    let mut collected = Collected::default();
+    let summary = watch(monitor(settings), &inputs, &mut collected).expect("outputs do not fail");
+    (summary, collected)
+}
+
+/// Returns lines of `a` at rest and `b`, which moves along x from 4 m, for 4 s at 10 Hz.
+fn approach(speed: f64, offset_m: f64) -> Vec<String> {
+    let lines = (0..=40).map(|k| f64::from(k) / 10.0).flat_map(|t| {
+        let x = 4.0 + speed * t;
+        [
+            format!(r#"{{"t":{t},"id":"a","x":0,"y":0,"z":2,"vx":0,"vy":0,"vz":0}}"#),
+            format!(r#"{{"t":{t},"id":"b","x":{x},"y":{offset_m},"z":2,"vx":{speed},"vy":0,"vz":0}}"#),
+        ]
+    });
+    lines.collect()
+}
+
+#[test]
+fn a_clear_watch_has_a_line_each_second_and_is_good() {
+    let (summary, seen) = watched(&approach(0.0, 0.0).join("\n"));
+    assert!(summary.is_good(), "{summary:?} {:?}", seen.texts);
+    assert!((summary.clear_s - 4.0).abs() < 1e-9, "{summary:?}");
+    assert_eq!(seen.texts.iter().filter(|text| text.contains(": CLEAR until")).count(), 5, "{:?}", seen.texts);
+    assert_eq!(seen.rows.len(), 82);
+}
+
+#[test]
+fn a_passing_violation_is_measured() {
+    let (summary, seen) = watched(&approach(-2.0, 0.3).join("\n"));
+    assert!(!summary.is_good() && summary.violations == 1, "{summary:?}");
+    let texts = seen.texts.join("\n");
+    assert!(texts.contains("on course to violate: a-b at 1.80 s; brake a-b by"), "{texts}");
+    assert!(texts.contains("violation of a-b from 1.80 s to 2.20 s, smallest distance 0.30 m at 2.00 s"), "{texts}");
+    assert!(texts.contains(": VIOLATION a-b 0."), "{texts}");
+    let (apart, seen) = watched(&approach(-2.0, 0.6).join("\n"));
+    assert_eq!(apart.violations, 0, "{:?}", seen.texts);
+}
+
+#[test]
+fn silence_of_one_and_of_all_is_not_known() {
+    let keep = |keep: fn(&str) -> bool| -> String {
+        approach(0.0, 0.0).into_iter().filter(|line| keep(line)).collect::<Vec<_>>().join("\n")
+    };
+    let one = keep(|line| !(line.contains("\"b\"") && (line.contains("\"t\":3") || line.contains("\"t\":2."))));
+    let all = keep(|line| !line.contains("\"t\":1.") && !line.contains("\"t\":2"));
+    for (text, why) in [(one, "NOT KNOWN: b not heard for 1."), (all, "NOT KNOWN: a not heard for 2.00 s")] {
+        let (summary, seen) = watched(&text);
+        assert!(!summary.is_good() && summary.was_not_known, "{summary:?}");
+        assert!(seen.texts.iter().any(|text| text.contains(why)), "{:?}", seen.texts);
+    }
+}
+
+#[test]
+fn garbage_in_the_middle_ends_clear_and_nothing_else_happens() {
+    let good = approach(0.0, 0.0);
+    let text = [&good[..20].join("\n"), "garbage", &good[20..].join("\n")].join("\n");
+    let (summary, seen) = watched(&text);
+    assert!(!summary.is_good() && summary.was_not_known && !summary.was_violated, "{summary:?}");
+    assert!(
+        seen.texts.iter().any(|text| text.contains("a message cannot be read: line 21: not a pose")),
+        "{:?}",
+        seen.texts
+    );
+    assert_eq!(seen.rows.len(), 82);
+}
+
+#[test]
+fn nothing_heard_is_not_good() {
+    for text in ["", "\n\n", r#"{"t":0,"id":"a","x":0,"y":0,"z":2}"#] {
+        let (summary, seen) = watched(text);
+        assert!(!summary.is_good() && !summary.has_started, "{summary:?}");
+        assert!(seen.texts.last().is_some_and(|text| text.starts_with("NOT KNOWN")), "{:?}", seen.texts);
+    }
+}

@@ -1,0 +1,364 @@
+//! `tautline watch`: a live monitor of separation.
+
+use std::io;
+use std::net::SocketAddr;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use clap::Args;
+use clap::builder::PossibleValue;
+
+use super::console::{self, Console, Exit, Terminal};
+use super::reading::{one_of, origin};
+use tautline_recordings::read::{self, EarthFrame, ReadError, ReadOptions};
+use tautline_report::report::page::live_page;
+use tautline_report::request::{ExportRequest, Failure, Monitor as _, Silent, export_file};
+use tautline_watch::page::Page;
+use tautline_watch::source::{self, Feed, MavlinkFrame, NamingOptions, OwnedPose};
+use tautline_watch::{
+    Assessment, ClockScope, Expected, Monitor, Notice, Output, Plan, Record, Settings, TimeBase, watch as watch_inputs,
+};
+
+/// Arguments of `tautline watch`.
+#[derive(Debug, Args)]
+#[command(after_help = "\
+Sources:
+  -                     Standard input. Each line is a JSON object with t, id, x, y, z, and vx, vy, vz if known.
+  mavlink:ADDRESS:PORT  MAVLink over UDP. The system id is the name of a vehicle.
+  rosbridge:HOST:PORT   Topics of ROS, with --topic.
+  foxglove:HOST:PORT    Topics with positions of a Foxglove server, all or those of --topic.
+
+A line comes each second and at every change of state: CLEAR, NOT KNOWN or VIOLATION. A watch ends with its input or
+with Ctrl-C. Exit codes: 0 if it was CLEAR from start to end, 1 if not or if a vehicle left its plan.")]
+#[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
+pub(super) struct WatchArguments {
+    /// Source of positions; several sources are not joined.
+    #[arg(value_name = "SOURCE", default_value = "-")]
+    source: String,
+    /// Safety distance of two centres [m].
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    delta: f64,
+    /// Bound on the acceleration of each vehicle [m/s^2].
+    #[arg(long, value_name = "M/S2", default_value_t = 5.0, allow_negative_numbers = true)]
+    accel: f64,
+    /// Bound on the error of each position [m], with the speed times the error of its stamp.
+    #[arg(long, value_name = "METRES", default_value_t = 0.05, allow_negative_numbers = true)]
+    position_error: f64,
+    /// Bound on the error of each velocity that is sent [m/s].
+    #[arg(long, value_name = "M/S", default_value_t = 0.1, allow_negative_numbers = true)]
+    velocity_error: f64,
+    /// Acceleration with which each vehicle can brake [m/s^2].
+    #[arg(long, value_name = "M/S2", default_value_t = 3.0, allow_negative_numbers = true)]
+    brake: f64,
+    /// Age beyond which a vehicle is stale [s].
+    #[arg(long, value_name = "SECONDS", default_value_t = 1.0, allow_negative_numbers = true)]
+    max_age: f64,
+    /// Smallest delay between a stamp and its arrival [s], which cannot be measured here.
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true)]
+    latency: f64,
+    /// Time ahead that is examined [s].
+    #[arg(long, value_name = "SECONDS", default_value_t = 10.0, allow_negative_numbers = true)]
+    horizon: f64,
+    /// Number of vehicles that must be heard before anything is clear.
+    #[arg(long, value_name = "COUNT", conflicts_with = "ids")]
+    expect: Option<usize>,
+    /// Names of vehicles that must be heard before anything is clear, separated by commas.
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    ids: Vec<String>,
+    /// Largest number of vehicles; a message of a further one is an error.
+    #[arg(long, value_name = "COUNT", default_value_t = 2000)]
+    max_vehicles: usize,
+    /// Time from which ages count: the arrival here, or the largest stamp so far, for files.
+    #[arg(long, value_name = "WHICH", default_value = "arrival", value_parser = time_base())]
+    time: TimeBase,
+    /// Clocks of the stamps: one for all, or one per vehicle [default: own for MAVLink, else common].
+    #[arg(long, value_name = "WHICH", value_parser = clocks())]
+    clocks: Option<ClockScope>,
+    /// Topic to read; repeatable.
+    #[arg(long = "topic", value_name = "NAME")]
+    topics: Vec<String>,
+    /// Frame of the positions, if messages have several frames.
+    #[arg(long, value_name = "NAME")]
+    frame: Option<String>,
+    /// Origin of geographic positions: degrees, and metres of height.
+    #[arg(long, value_name = "LAT,LON,HEIGHT", value_parser = origin, allow_hyphen_values = true)]
+    origin: Option<[f64; 3]>,
+    /// Approved plan, a recording of any format: report deviations from it, and expect its vehicles.
+    #[arg(long, value_name = "FILE")]
+    plan: Option<PathBuf>,
+    /// Stamp at which the plan has its time 0 [s].
+    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true, requires = "plan")]
+    plan_start: f64,
+    /// Largest deviation from the plan [m].
+    #[arg(long, value_name = "METRES", default_value_t = 0.5, allow_negative_numbers = true, requires = "plan")]
+    tube: f64,
+    /// Write what was watched, for `tautline audit`: a .csv or .mcap file.
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Overwrite an existing recording.
+    #[arg(long, requires = "record")]
+    force: bool,
+    /// Serve a live page on this address [default: 127.0.0.1:8737, for this machine only].
+    #[arg(
+        long,
+        value_name = "ADDRESS:PORT",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "127.0.0.1:8737"
+    )]
+    page: Option<SocketAddr>,
+    /// Write each notice to standard output as a line of JSON.
+    #[arg(long)]
+    json: bool,
+    /// Print no text.
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+/// Watches until the source ends or Ctrl-C.
+pub(super) fn watch(arguments: &WatchArguments) -> Result<Exit, Failure> {
+    let source = arguments.source()?;
+    let plan = arguments.read_plan()?;
+    let settings = arguments.settings(&source, &plan)?;
+    let monitor = Monitor::new(settings, plan).map_err(|error| {
+        Failure::input("watch/setting", error.to_string(), "give a number in this range; tautline watch --help")
+    })?;
+    let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
+    let mut outputs = Outputs { console, json: arguments.json, recorder: arguments.recorder()?, page: None };
+    let terminal = Terminal::new(console)?;
+    if let Some(address) = arguments.page {
+        let page = Page::serve(address, live_page()).map_err(|error| {
+            let message = format!("--page: cannot serve on {address}: {error}");
+            Failure::machine("watch/cannot-listen", message)
+                .with_help("give a free port, such as --page=127.0.0.1:8738")
+        })?;
+        Console { quiet: false, ..console }.warn(&format!("live page: {}", page.url()));
+        outputs.page = Some(page);
+    }
+    let (feed, inputs) = source::channel(Arc::clone(terminal.interruption()));
+    arguments.start(source, feed, console)?;
+    let summary = watch_inputs(monitor, &inputs, &mut outputs)
+        .map_err(|error| Failure::machine("files/cannot-write", format!("cannot write the watch: {error}")))?;
+    if let Some(recorder) = outputs.recorder {
+        recorder.finish(console)?;
+    }
+    Ok(Exit::good_if(summary.is_good()))
+}
+
+/// Source of the command line.
+#[derive(Debug)]
+enum Address {
+    Lines,
+    Mavlink(SocketAddr),
+    Rosbridge(String),
+    Foxglove(String),
+}
+
+impl WatchArguments {
+    fn source(&self) -> Result<Address, Failure> {
+        let refuse = |problem: &str, help: &str| {
+            let message = format!("SOURCE: {problem} ({:?})", self.source);
+            Err(Failure::input("watch/source", message, help))
+        };
+        let server = |of: &str| format!("ws://{}", of.trim_start_matches("//"));
+        let address = match self.source.split_once(':') {
+            _ if self.source == "-" => Address::Lines,
+            Some(("mavlink", of)) => match of.trim_start_matches("//").parse() {
+                Ok(address) => Address::Mavlink(address),
+                Err(_) => return refuse("is no address and port", "write mavlink:0.0.0.0:14550"),
+            },
+            Some(("rosbridge", of)) => Address::Rosbridge(server(of)),
+            Some(("foxglove", of)) => Address::Foxglove(server(of)),
+            _ => {
+                return refuse(
+                    "is no source",
+                    "write -, mavlink:0.0.0.0:14550, rosbridge:HOST:9090 or foxglove:HOST:8765",
+                );
+            }
+        };
+        if self.time == TimeBase::Stamps && !matches!(address, Address::Lines) {
+            return refuse("a live source needs --time arrival", "omit --time");
+        }
+        if self.time == TimeBase::Stamps && self.clocks == Some(ClockScope::PerVehicle) {
+            return refuse("--time stamps needs one clock for all vehicles", "omit --clocks");
+        }
+        Ok(address)
+    }
+
+    fn settings(&self, source: &Address, plan: &Plan) -> Result<Settings, Failure> {
+        let expected = match self.expect {
+            Some(count) => Expected::Count(count),
+            None if !self.ids.is_empty() => Expected::Names(self.ids.clone()),
+            None if self.plan.is_some() => Expected::Names(plan.names().map(str::to_owned).collect()),
+            None => Expected::Heard,
+        };
+        if let Some(empty) = self.ids.iter().position(String::is_empty) {
+            let message = format!("--ids: name {} is empty", empty + 1);
+            return Err(Failure::input("watch/setting", message, "separate names by one comma each"));
+        }
+        let own_clocks = matches!(source, Address::Mavlink(_));
+        let clocks = if own_clocks { ClockScope::PerVehicle } else { ClockScope::Common };
+        Ok(Settings {
+            delta_m: self.delta,
+            accel_m_s2: self.accel,
+            position_error_m: self.position_error,
+            velocity_error_m_s: self.velocity_error,
+            brake_m_s2: self.brake,
+            max_age_s: self.max_age,
+            latency_s: self.latency,
+            horizon_s: self.horizon,
+            tube_m: self.tube,
+            expected,
+            max_vehicles: self.max_vehicles,
+            time_base: self.time,
+            clocks: self.clocks.unwrap_or(clocks),
+        })
+    }
+
+    fn read_plan(&self) -> Result<Plan, Failure> {
+        let Some(path) = &self.plan else { return Ok(Plan::default()) };
+        if !self.plan_start.is_finite() {
+            let message = format!("--plan-start: must be finite ({})", self.plan_start);
+            return Err(Failure::input("watch/setting", message, "give a number of seconds"));
+        }
+        let unread = |error: ReadError| Failure::from(error).under("--plan");
+        let mut recording = read::open(path, &ReadOptions::default()).map_err(unread)?;
+        Plan::read(&mut *recording, self.plan_start).map_err(unread)?.ok_or_else(|| {
+            let message = format!("--plan: {}: too long to keep in memory", path.display());
+            Failure::input("watch/plan", message, "give a plan with at most 20 million positions")
+        })
+    }
+
+    fn recorder(&self) -> Result<Option<Recorder>, Failure> {
+        let Some(path) = &self.record else { return Ok(None) };
+        let extension = path.extension().and_then(|of| of.to_str()).unwrap_or_default();
+        let is_mcap = match extension {
+            "csv" => false,
+            "mcap" => true,
+            _ => {
+                let message = format!("--record: not a name of a recording ({:?})", path.display().to_string());
+                return Err(Failure::input("watch/record", message, "give a name that ends in .csv or .mcap"));
+            }
+        };
+        if path.exists() && !self.force {
+            let message = format!("--record: the file exists ({})", path.display());
+            return Err(Failure::input("watch/record", message, "give another name, or --force to overwrite it"));
+        }
+        let table = if is_mcap { path.with_extension("mcap.csv") } else { path.clone() };
+        let record = Record::create(&table).map_err(|error| cannot_write(&table, &error))?;
+        Ok(Some(Recorder { record, table, path: path.clone(), is_mcap }))
+    }
+
+    fn start(&self, source: Address, feed: Feed, console: Console) -> Result<(), Failure> {
+        let earth = match self.origin.map(EarthFrame::new).transpose() {
+            Ok(earth) => earth,
+            Err(why) => return Err(Failure::input("watch/source", format!("--origin: {why}"), "give degrees")),
+        };
+        let naming = || NamingOptions { topics: self.topics.clone(), frame: self.frame.clone(), earth };
+        let refused = |why: String| Failure::input("watch/source", format!("SOURCE: {why}"), "tautline watch --help");
+        match source {
+            Address::Lines => {
+                std::thread::spawn(move || source::lines(io::stdin().lock(), &feed));
+                Ok(())
+            }
+            Address::Mavlink(address) => {
+                let frame = earth.map_or(MavlinkFrame::Local, MavlinkFrame::Global);
+                let bound = source::mavlink(address, frame, feed).map_err(|error| {
+                    let message = format!("SOURCE: cannot listen on {address}: {error}");
+                    Failure::machine("watch/cannot-listen", message).with_help("give a free port")
+                })?;
+                let what = if earth.is_some() { "GLOBAL_POSITION_INT" } else { "LOCAL_POSITION_NED" };
+                console.warn(&format!("listening to {what} on {bound}"));
+                Ok(())
+            }
+            Address::Rosbridge(url) => source::rosbridge(&url, naming(), feed).map_err(refused),
+            Address::Foxglove(url) => source::foxglove(&url, naming(), feed).map_err(refused),
+        }
+    }
+}
+
+fn cannot_write(path: &Path, error: &io::Error) -> Failure {
+    let message = format!("{}: cannot write the file: {error}", path.display());
+    Failure::machine("files/cannot-write", message).with_help("write to another folder")
+}
+
+/// Recording of the watch: a table, which becomes an MCAP file at the end.
+struct Recorder {
+    record: Record,
+    table: PathBuf,
+    path: PathBuf,
+    is_mcap: bool,
+}
+
+impl Recorder {
+    fn finish(self, console: Console) -> Result<(), Failure> {
+        let rows = self.record.rows();
+        self.record.finish().map_err(|error| cannot_write(&self.table, &error))?;
+        if self.is_mcap {
+            let request = ExportRequest {
+                paths: vec![self.table.clone()],
+                options: ReadOptions { sort: true, ..ReadOptions::default() },
+                output: self.path.clone(),
+                format: None,
+                sample_hz: None,
+                force: true,
+            };
+            export_file(&request, &Silent::default()).map_err(|failure| {
+                let help = format!("the positions are in {}", self.table.display());
+                failure.under("--record").with_help(help)
+            })?;
+            let _ = std::fs::remove_file(&self.table);
+        }
+        console.warn(&format!("recorded {rows} positions in {}", self.path.display()));
+        Ok(())
+    }
+}
+
+/// All outputs of a watch.
+struct Outputs {
+    console: Console,
+    json: bool,
+    recorder: Option<Recorder>,
+    page: Option<Page>,
+}
+
+impl Output for Outputs {
+    fn notice(&mut self, notice: &Notice) -> io::Result<()> {
+        if self.json {
+            console::data(&format!("{}\n", notice.json)).map_err(|failure| io::Error::other(failure.to_string()))?;
+        } else {
+            self.console.say(&notice.text);
+        }
+        if let Some(page) = &mut self.page {
+            page.notice(notice);
+        }
+        Ok(())
+    }
+
+    fn pose(&mut self, time_s: f64, pose: &OwnedPose) -> io::Result<()> {
+        self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.record.push(time_s, pose))
+    }
+
+    fn assessed(&mut self, of: &Assessment, monitor: &Monitor) -> io::Result<()> {
+        if let Some(page) = &mut self.page {
+            page.assessed(of, monitor);
+        }
+        Ok(())
+    }
+}
+
+fn time_base() -> impl clap::builder::TypedValueParser<Value = TimeBase> {
+    let named = |name: &'static str, help: &'static str| PossibleValue::new(name).help(help);
+    one_of(vec![
+        (named("arrival", "the arrival of messages here"), TimeBase::Arrival),
+        (named("stamps", "the largest stamp so far"), TimeBase::Stamps),
+    ])
+}
+
+fn clocks() -> impl clap::builder::TypedValueParser<Value = ClockScope> {
+    let named = |name: &'static str, help: &'static str| PossibleValue::new(name).help(help);
+    one_of(vec![
+        (named("common", "one clock, or synchronised clocks"), ClockScope::Common),
+        (named("own", "a clock per vehicle"), ClockScope::PerVehicle),
+    ])
+}

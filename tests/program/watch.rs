@@ -1,0 +1,341 @@
+//! `tautline watch`: lines of JSON in, states and exit codes out.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::net::{TcpListener, TcpStream};
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+
+use assert_cmd::Command as Checked;
+use serde_json::Value;
+use tempfile::tempdir;
+
+use crate::program::{Ran, TAUTLINE, ran_by};
+
+fn watched(folder: &Path, arguments: &[&str], input: &str) -> Ran {
+    let mut command = Checked::new(TAUTLINE);
+    command.arg("watch").args(arguments).current_dir(folder).write_stdin(input);
+    let done = command.output().expect("the program runs");
+    let text = |bytes| String::from_utf8(bytes).expect("the program writes UTF-8");
+    Ran { exit: done.status.code(), out: text(done.stdout), err: text(done.stderr) }
+}
+
+const STAMPS: [&str; 4] = ["--time", "stamps", "--delta", "0.5"];
+
+/// Watches a recording by its stamps.
+fn judged(input: &str, more: &[&str]) -> Ran {
+    let folder = tempdir().expect("a folder");
+    watched(folder.path(), &[&STAMPS[..], more].concat(), input)
+}
+
+/// Returns lines of `a` at rest and `b`, which moves along x from 4 m with `speed` [m/s], for 4 s at 10 Hz.
+fn approach(speed: f64, offset_m: f64) -> String {
+    (0..=40).fold(String::new(), |mut text, k| {
+        let t = f64::from(k) / 10.0;
+        let x = 4.0 + speed * t;
+        let _ = writeln!(text, r#"{{"t":{t},"id":"a","x":0,"y":0,"z":2,"vx":0,"vy":0,"vz":0}}"#);
+        let _ = writeln!(text, r#"{{"t":{t},"id":"b","x":{x},"y":{offset_m},"z":2,"vx":{speed},"vy":0,"vz":0}}"#);
+        text
+    })
+}
+
+fn events(ran: &Ran) -> Vec<Value> {
+    ran.out.lines().map(|line| serde_json::from_str(line).expect(line)).collect()
+}
+
+#[test]
+fn two_vehicles_far_apart_are_clear() {
+    let ran = judged(&approach(0.0, 0.0), &[]);
+    assert_eq!(ran.exit, Some(0), "{ran:?}");
+    assert!(ran.out.contains("0.00 s: CLEAR until 0.80 s (0.80 s from now); closest a-b 4.00 m"), "{}", ran.out);
+    assert!(
+        ran.out.lines().last().is_some_and(|line| line.starts_with("CLEAR: 2 vehicles, 4.00 s CLEAR")),
+        "{}",
+        ran.out
+    );
+    // A line each second of the stamps.
+    assert_eq!(ran.out.matches("CLEAR until").count(), 5, "{}", ran.out);
+}
+
+#[test]
+fn a_collision_course_is_announced_and_the_violation_found() {
+    let ran = judged(&approach(-2.0, 0.3), &[]);
+    assert_eq!(ran.exit, Some(1), "{ran:?}");
+    assert!(ran.out.contains("on course to violate: a-b at 1.80 s; brake a-b by"), "{}", ran.out);
+    assert!(ran.out.contains(": VIOLATION a-b 0."), "{}", ran.out);
+    // 4 - 2 t with 0.3 m beside: below 0.5 m for 0.2 s around 2 s.
+    assert!(
+        ran.out.contains("violation of a-b from 1.80 s to 2.20 s, smallest distance 0.30 m at 2.00 s"),
+        "{}",
+        ran.out
+    );
+    assert!(ran.out.lines().last().is_some_and(|line| line.starts_with("VIOLATION: 2 vehicles")), "{}", ran.out);
+    // Negative twin: 0.6 m beside is no violation.
+    let apart = judged(&approach(-2.0, 0.6), &[]);
+    assert!(!apart.out.contains("VIOLATION a-b"), "{}", apart.out);
+}
+
+#[test]
+fn a_vehicle_that_falls_silent_is_not_known() {
+    let silent: String = approach(0.0, 0.0)
+        .lines()
+        .filter(|line| !(line.contains("\"b\"") && (line.contains("\"t\":3") || line.contains("\"t\":2."))))
+        .flat_map(|line| [line, "\n"])
+        .collect();
+    let ran = judged(&silent, &[]);
+    assert_eq!(ran.exit, Some(1), "{ran:?}");
+    assert!(ran.out.contains("NOT KNOWN: b not heard for 1."), "{}", ran.out);
+    assert!(ran.out.contains("b is stale: not heard for 1."), "{}", ran.out);
+    assert!(ran.out.lines().last().is_some_and(|line| line.starts_with("NOT KNOWN: 2 vehicles")), "{}", ran.out);
+}
+
+#[test]
+fn a_gap_of_all_vehicles_is_not_known() {
+    let gap: String = approach(0.0, 0.0)
+        .lines()
+        .filter(|line| !line.contains("\"t\":1.") && !line.contains("\"t\":2"))
+        .flat_map(|line| [line, "\n"])
+        .collect();
+    let ran = judged(&gap, &[]);
+    assert_eq!(ran.exit, Some(1), "{ran:?}");
+    assert!(ran.out.contains("NOT KNOWN: a not heard for 2.00 s"), "{}", ran.out);
+}
+
+#[test]
+fn expected_vehicles_must_be_heard() {
+    for (more, why) in [
+        (["--expect", "3"], "NOT KNOWN: 2 of 3 vehicles are heard"),
+        (["--ids", "a,b,c"], "NOT KNOWN: not heard yet: c"),
+    ] {
+        let ran = judged(&approach(0.0, 0.0), &more);
+        assert_eq!(ran.exit, Some(1), "{ran:?}");
+        assert!(ran.out.contains(why) && !ran.out.contains(": CLEAR"), "{}", ran.out);
+    }
+    assert_eq!(judged(&approach(0.0, 0.0), &["--ids", "a,b"]).exit, Some(0));
+    assert_eq!(judged("", &[]).exit, Some(1));
+    let alone = judged("{\"t\":0,\"id\":\"a\",\"x\":0,\"y\":0,\"z\":0}\n", &[]);
+    assert!(alone.out.contains("NOT KNOWN: only one vehicle is heard"), "{}", alone.out);
+}
+
+#[test]
+fn wrong_lines_are_events_and_never_clear() {
+    let good = approach(0.0, 0.0);
+    let (half, rest) = good.split_at(good.find("{\"t\":2,").expect("2 s"));
+    let again = half.lines().last().expect("a line");
+    let elsewhere = again.replace("\"x\":4", "\"x\":5");
+    for (wrong, fault) in [
+        ("garbage\n", "garbage"),
+        ("{\"t\":2,\"id\":\"a\",\"x\":0,\"y\":0}\n", "garbage"),
+        ("\u{0}\u{1}\n", "garbage"),
+        ("{\"t\":1e300,\"id\":\"a\",\"x\":0,\"y\":0,\"z\":2}\n", "out-of-range"),
+        ("{\"t\":0.5,\"id\":\"a\",\"x\":0,\"y\":0,\"z\":2}\n", "clock-step"),
+        (&format!("{elsewhere}\n"), "conflict"),
+    ] {
+        let ran = judged(&format!("{half}{wrong}{rest}"), &["--json"]);
+        assert_eq!(ran.exit, Some(1), "{wrong}: {ran:?}");
+        let events = events(&ran);
+        assert!(events.iter().any(|of| of["event"] == "fault" && of["fault"] == fault), "{wrong}: {}", ran.out);
+        assert!(events.iter().any(|of| of["state"] == "not-known"), "{wrong}: {}", ran.out);
+    }
+    // A message that comes twice, or late, is ignored.
+    for (harmless, fault) in [
+        (format!("{again}\n"), "duplicate"),
+        ("{\"t\":1.5,\"id\":\"b\",\"x\":4,\"y\":0,\"z\":2}\n".to_owned(), "reordered"),
+    ] {
+        let ran = judged(&format!("{half}{harmless}{rest}"), &["--json"]);
+        assert_eq!(ran.exit, Some(0), "{harmless}: {ran:?}");
+        assert!(events(&ran).iter().any(|of| of["fault"] == fault), "{harmless}: {}", ran.out);
+    }
+}
+
+#[test]
+fn every_line_of_json_is_an_object_with_its_text() {
+    let ran = judged(&approach(-2.0, 0.3), &["--json"]);
+    let events = events(&ran);
+    assert!(events.iter().all(|of| of["event"].is_string() && of["text"].is_string()), "{}", ran.out);
+    let state = events.iter().find(|of| of["state"] == "clear").expect("a state");
+    assert_eq!(state["clear_until"]["pair"], serde_json::json!(["a", "b"]));
+    let summary = events.last().expect("a summary");
+    assert_eq!((summary["event"].as_str(), summary["violations"].as_u64()), (Some("summary"), Some(1)));
+}
+
+#[test]
+fn the_recording_is_judged_to_the_same_violations() {
+    // Three vehicles on crossing paths, whose samples miss the violations.
+    let mut input = String::new();
+    for k in 0..=30 {
+        let t = f64::from(k) / 5.0;
+        for (id, x, y) in [("a", 6.0 - 2.0 * t, 0.1), ("b", 0.0, 0.0), ("c", 0.3, 2.0 * t - 9.0)] {
+            let _ = writeln!(input, r#"{{"t":{t},"id":"{id}","x":{x},"y":{y},"z":2}}"#);
+        }
+    }
+    let folder = tempdir().expect("a folder");
+    for file in ["watch.csv", "watch.mcap"] {
+        let arguments = [&STAMPS[..], &["--record", file, "--json"]].concat();
+        let ran = watched(folder.path(), &arguments, &input);
+        assert_eq!(ran.exit, Some(1), "{ran:?}");
+        let seen: Vec<_> = events(&ran).into_iter().filter(|of| of["event"] == "violation-end").collect();
+        assert!(seen.len() >= 2, "{}", ran.out);
+        let audit = ran_by(TAUTLINE, folder.path(), &["audit", file, "--delta", "0.5", "--json"]);
+        assert_eq!(audit.exit, Some(1), "{audit:?}");
+        let report: Value = serde_json::from_str(&audit.out).expect("JSON");
+        let found = report["violations"].as_array().expect("a list");
+        assert_eq!(found.len(), seen.len(), "{}\n{}", audit.out, ran.out);
+        for of in found {
+            let same = |seen: &&Value| {
+                [("from_s", "from_s"), ("to_s", "to_s"), ("min_m", "min_m")].iter().all(|(own, other)| {
+                    let [a, b] = [seen[own].as_f64(), of[other].as_f64()].map(|x| x.expect("a number"));
+                    (a - b).abs() < 1e-6
+                })
+            };
+            assert_eq!(seen.iter().filter(same).count(), 1, "{of}\n{}", ran.out);
+        }
+        assert!(!folder.path().join("watch.mcap.csv").exists());
+    }
+    // Negative twin: at a smaller delta both find nothing.
+    let clear = watched(folder.path(), &["--time", "stamps", "--delta", "0.05", "--json"], &input);
+    assert!(!events(&clear).iter().any(|of| of["event"] == "violation"), "{}", clear.out);
+    assert_eq!(ran_by(TAUTLINE, folder.path(), &["audit", "watch.csv", "--delta", "0.05"]).exit, Some(0));
+}
+
+#[test]
+fn deviations_from_the_plan_are_reported() {
+    let folder = tempdir().expect("a folder");
+    let plan = "t,id,x,y,z\n0,a,0,0,2\n0,b,4,0,2\n4,a,0,0,2\n4,b,4,0,2\n";
+    fs::write(folder.path().join("plan.csv"), plan).expect("a file");
+    let run =
+        |input: &str| watched(folder.path(), &[&STAMPS[..], &["--plan", "plan.csv", "--tube", "0.3"]].concat(), input);
+    assert_eq!(run(&approach(0.0, 0.0)).exit, Some(0));
+    let off = run(&approach(0.2, 0.0));
+    assert_eq!(off.exit, Some(1), "{off:?}");
+    assert!(off.out.contains("OFF PLAN b 0.32 m (tube 0.3 m)"), "{}", off.out);
+    // A vehicle of the plan that is not heard.
+    let alone: String = approach(0.0, 0.0).replace("\"b\"", "\"c\"");
+    assert!(run(&alone).out.contains("NOT KNOWN: not heard yet: b"));
+}
+
+#[test]
+fn wrong_options_end_with_code_2() {
+    let folder = tempdir().expect("a folder");
+    fs::write(folder.path().join("there.csv"), "").expect("a file");
+    for (arguments, code) in [
+        (&["--delta", "0"][..], "watch/setting"),
+        (&["--delta", "nan"], "watch/setting"),
+        (&["--delta", "1", "--max-age", "-1"], "watch/setting"),
+        (&["--delta", "1", "--expect", "1"], "watch/setting"),
+        (&["--delta", "1", "--ids", "a,,b"], "watch/setting"),
+        (&["serial:1", "--delta", "1"], "watch/source"),
+        (&["mavlink:here", "--delta", "1"], "watch/source"),
+        (&["rosbridge:localhost:9090", "--delta", "1"], "watch/source"),
+        (&["foxglove:no such host", "--delta", "1"], "watch/source"),
+        (&["mavlink:127.0.0.1:0", "--delta", "1", "--time", "stamps"], "watch/source"),
+        (&["--delta", "1", "--record", "watch.txt"], "watch/record"),
+        (&["--delta", "1", "--record", "there.csv"], "watch/record"),
+        (&["--delta", "1", "--plan", "none.csv"], "recording/not-found"),
+        (&["--delta", "1", "--origin", "95,0,0"], ""),
+    ] {
+        let ran = watched(folder.path(), arguments, "");
+        assert_eq!((ran.exit, ran.code()), (Some(2), code), "{arguments:?}: {ran:?}");
+    }
+    assert_eq!(watched(folder.path(), &[], "").exit, Some(2), "delta is required");
+}
+
+/// Starts a watch of a source.
+fn start(arguments: &[&str]) -> (Child, BufReader<std::process::ChildStdout>) {
+    let mut child = Command::new(TAUTLINE)
+        .arg("watch")
+        .args(arguments)
+        .args(["--json", "--delta", "0.5", "--max-age", "0.5"])
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program runs");
+    let out = BufReader::new(child.stdout.take().expect("a pipe"));
+    (child, out)
+}
+
+/// Reads events until one fulfils a condition.
+fn until(out: &mut impl std::io::BufRead, is_it: impl Fn(&Value) -> bool) -> Value {
+    let mut line = String::new();
+    loop {
+        line.clear();
+        assert!(out.read_line(&mut line).expect("a line") > 0, "the watch has ended");
+        let of: Value = serde_json::from_str(&line).expect("JSON");
+        if is_it(&of) {
+            return of;
+        }
+    }
+}
+
+/// Accepts a WebSocket of rosbridge and sends poses of two vehicles until `count` were sent.
+fn serve_ros(stream: TcpStream, count: u32) {
+    let mut socket = tungstenite::accept(stream).expect("a handshake");
+    for _ in 0..2 {
+        let asked = socket.read().expect("a subscription").into_text().expect("text");
+        assert!(asked.contains("subscribe"), "{asked}");
+    }
+    for k in 0..count {
+        for (id, x) in [("a", 0), ("b", 4)] {
+            let text = format!(
+                r#"{{"op":"publish","topic":"/{id}/pose","msg":{{"header":{{"stamp":{{"sec":{},"nanosec":{}}},
+                "frame_id":"world"}},"pose":{{"position":{{"x":{x},"y":0,"z":2}}}}}}}}"#,
+                100 + k / 50,
+                k % 50 * 20_000_000
+            );
+            socket.send(tungstenite::Message::text(text)).expect("sends");
+        }
+        std::thread::sleep(std::time::Duration::from_millis(20));
+    }
+}
+
+#[test]
+fn a_source_that_is_lost_connects_again_and_nothing_is_clear_meanwhile() {
+    let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+    let source = format!("rosbridge:{}", listener.local_addr().expect("an address"));
+    let (mut child, mut out) = start(&[&source, "--topic", "/a/pose", "--topic", "/b/pose"]);
+    let server = std::thread::spawn(move || {
+        for _ in 0..2 {
+            let (stream, _) = listener.accept().expect("a client");
+            serve_ros(stream, 100);
+            std::thread::sleep(std::time::Duration::from_secs(1));
+        }
+    });
+    until(&mut out, |of| of["event"] == "connected");
+    until(&mut out, |of| of["state"] == "clear");
+    until(&mut out, |of| of["event"] == "lost");
+    until(&mut out, |of| of["reason"] == "stale");
+    until(&mut out, |of| of["event"] == "connected");
+    // The stamps begin again: the clock of the source stepped.
+    until(&mut out, |of| of["fault"] == "clock-step");
+    until(&mut out, |of| of["state"] == "clear");
+    child.kill().expect("ends");
+    child.wait().expect("ends");
+    server.join().expect("served");
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_a_watch_with_the_code_of_its_verdict() {
+    for (x, code) in [(4.0, 0), (0.4, 1)] {
+        let mut child = Command::new(TAUTLINE)
+            .args(["watch", "--json", "--delta", "0.5", "--max-age", "60"])
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .spawn()
+            .expect("the program runs");
+        let mut input = child.stdin.take().expect("a pipe");
+        let mut out = BufReader::new(child.stdout.take().expect("a pipe"));
+        for (id, x) in [("a", 0.0), ("b", x)] {
+            writeln!(input, r#"{{"t":0,"id":"{id}","x":{x},"y":0,"z":2,"vx":0,"vy":0,"vz":0}}"#).expect("writes");
+        }
+        until(&mut out, |of| of["vehicles"] == 2);
+        let signal = Command::new("kill").args(["-INT", &child.id().to_string()]).status().expect("kill");
+        assert!(signal.success());
+        let summary = until(&mut out, |of| of["event"] == "summary");
+        assert_eq!(summary["good"], Value::Bool(code == 0), "{summary}");
+        assert_eq!(child.wait().expect("ends").code(), Some(code));
+        drop(input);
+    }
+}
