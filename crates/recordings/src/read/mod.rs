@@ -15,6 +15,7 @@
 mod axes;
 mod capture;
 mod clock;
+mod compressed;
 mod crazyflie;
 mod csv;
 mod curves;

@@ -244,7 +244,7 @@ fn segment(before: &Point, point: &Point, [from_s, to_s]: [f64; 2]) -> Result<Ve
 /// Converts the Bezier curve of these points over a duration T to coefficients of the powers of time.
 ///
 /// `c_k = C(n, k) D_k / T^k` with the k-th forward difference `D_k = sum_i (-1)^(k - i) C(k, i) P_i` of the points.
-fn powers(points: &[Vector3<f64>], duration_s: f64) -> Vec<Vector3<f64>> {
+pub(super) fn powers(points: &[Vector3<f64>], duration_s: f64) -> Vec<Vector3<f64>> {
     let degree = points.len() - 1;
     let mut differences = points.to_vec();
     let mut factor = 1.0;
