@@ -16,8 +16,8 @@ use rayon::prelude::*;
 
 use self::fit::{FitError, Piece};
 use self::motion::{Arc, Deviation, Motion, deviation};
-use crate::read::{ReadError, Recording};
-use tautline_core::track::{Item, Sample};
+use crate::read::ReadError;
+use tautline_core::track::{Item, Sample, Tracks};
 
 /// Format that drones fly.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -151,23 +151,38 @@ pub struct EncodedVehicle {
     pub bytes: usize,
 }
 
+/// Vehicle of a recording.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FlownVehicle {
+    /// Name.
+    pub name: String,
+    /// Motion.
+    pub motion: Motion,
+    /// Radius \[m\], if recorded.
+    pub radius_m: Option<f64>,
+}
+
 /// Reads all motions of a recording. Samples are joined by straight lines. With `holds`, a vehicle rests at each sample
 /// until the next one. Gaps are joined, too; the caller refuses them before.
 ///
 /// # Errors
 /// [`ReadError`] if the recording cannot be read.
-pub fn motions(recording: &mut Recording, holds: bool) -> Result<Vec<(String, Motion)>, ReadError> {
-    let (mut items, mut motions, mut last) = (Vec::new(), Vec::<Motion>::new(), Vec::<Option<Sample>>::new());
+pub fn motions(
+    recording: &mut dyn Tracks<Error = ReadError>,
+    holds: bool,
+) -> Result<Vec<FlownVehicle>, ReadError> {
+    let (mut items, mut flown, mut last) = (Vec::new(), Vec::<FlownVehicle>::new(), Vec::<Option<Sample>>::new());
     while recording.read(&mut items)? {
         for item in items.drain(..) {
             let vehicle = item.vehicle();
-            if motions.len() <= vehicle {
-                motions.resize_with(vehicle + 1, Motion::default);
+            if flown.len() <= vehicle {
+                flown.resize_with(vehicle + 1, FlownVehicle::default);
                 last.resize(vehicle + 1, None);
             }
-            let arcs = &mut motions[vehicle].arcs;
+            let FlownVehicle { motion: Motion { arcs }, radius_m, .. } = &mut flown[vehicle];
             match item {
                 Item::Sample(sample) => {
+                    *radius_m = sample.radius_m;
                     if let Some(before) = last[vehicle].replace(sample) {
                         let (from_s, from) = (before.time_s, before.position_m);
                         let to = if holds { from } else { sample.position_m };
@@ -184,8 +199,11 @@ pub fn motions(recording: &mut Recording, holds: bool) -> Result<Vec<(String, Mo
             }
         }
     }
-    motions.resize_with(recording.vehicles().len(), Motion::default);
-    Ok(recording.vehicles().iter().cloned().zip(motions).collect())
+    flown.resize_with(recording.vehicles().len(), FlownVehicle::default);
+    for (vehicle, name) in flown.iter_mut().zip(recording.vehicles()) {
+        vehicle.name.clone_from(name);
+    }
+    Ok(flown)
 }
 
 /// Encodes vehicles with their motions, which begin at 0 s.
@@ -340,7 +358,7 @@ pub enum DroneError {
     TooFast {
         /// Name of the vehicle.
         vehicle: String,
-        /// Time since the start of the export \[s\].
+        /// Time \[s\], from the start of the export until [`Self::later`] shifts it.
         time_s: f64,
         /// Tolerance \[m\].
         tolerance_m: f64,
@@ -353,7 +371,7 @@ pub enum DroneError {
     TooCoarse {
         /// Name of the vehicle.
         vehicle: String,
-        /// Time since the start of the export \[s\].
+        /// Time \[s\], from the start of the export until [`Self::later`] shifts it.
         time_s: f64,
         /// Proved deviation \[m\].
         found_m: f64,
@@ -386,7 +404,7 @@ pub enum DroneError {
     TooFar {
         /// Name of the vehicle.
         vehicle: String,
-        /// Time since the start of the export \[s\].
+        /// Time \[s\], from the start of the export until [`Self::later`] shifts it.
         time_s: f64,
         /// Coordinate \[m\].
         coordinate_m: f64,
@@ -413,6 +431,15 @@ pub enum DroneError {
 }
 
 impl DroneError {
+    /// Returns the error with its time counted from an earlier instant \[s\].
+    #[must_use]
+    pub fn later(mut self, by_s: f64) -> Self {
+        if let Self::TooFast { time_s, .. } | Self::TooCoarse { time_s, .. } | Self::TooFar { time_s, .. } = &mut self {
+            *time_s += by_s;
+        }
+        self
+    }
+
     /// Returns the remedy, as a sentence without a full stop.
     #[must_use]
     pub fn help(&self) -> &'static str {
