@@ -216,7 +216,7 @@ fn of_kind(units: &[f64; POINTS], start: i16, kind: usize) -> Vec<i16> {
         0 => Vec::new(),
         1 => vec![end],
         2 => {
-            // A cubic has the control points b0, b0 + 7/3 (b1 - b0), b7 + 7/3 (b6 - b7), b7 if its degree is raised to 7.
+            // A cubic raised to degree 7 has the control points b0, b0 + 7/3 (b1 - b0), b7 + 7/3 (b6 - b7), b7.
             let inner = |outer: f64, next: f64| outer + (next - outer) * DEGREE as f64 / 3.0;
             let first = whole(inner(f64::from(start), units[1]));
             vec![first, whole(inner(f64::from(end), units[DEGREE - 1])), end]

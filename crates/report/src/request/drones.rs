@@ -11,8 +11,9 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 use rayon::prelude::*;
+use serde_json::json;
 
-use super::audit::{AuditRequest, AuditedRecording, ConfigFile, Subject, recording_in};
+use super::audit::{AuditRequest, ConfigFile, Subject, recording_in};
 use super::{Failure, Monitor, Quiet, outputs};
 use crate::report::recorded::RecordedReport;
 use crate::report::{ArtefactError, Status, write_atomically};
@@ -78,8 +79,8 @@ pub struct DroneExport {
 /// Writes a flight for drones, judges the written files, and removes them if they are not clear.
 ///
 /// # Errors
-/// [`Failure`] if the request or the recording is wrong, the format cannot hold the flight, or a file cannot be written.
-/// A violation is no error: see [`DroneExport::refusal`].
+/// [`Failure`] if the request or the recording is wrong, if the format cannot hold the flight, or if no file can be
+/// written. A violation is no error: see [`DroneExport::refusal`].
 pub fn export_drones(request: &DroneExportRequest, monitor: &dyn Monitor) -> Result<DroneExport, Failure> {
     let paths = request.paths.iter().map(|path| recording_in(path)).collect();
     let request = &DroneExportRequest { paths, ..request.clone() };
@@ -88,8 +89,8 @@ pub fn export_drones(request: &DroneExportRequest, monitor: &dyn Monitor) -> Res
     for note in &flight.notes {
         monitor.warn(&format!("note: {note}"));
     }
-    if let Some(audit) = flight.audit.as_ref().filter(|audit| audit.report.status == Status::Violation) {
-        let message = format!("the flight itself is not clear: {}", audit.report.headline());
+    if flight.audit.status == Status::Violation {
+        let message = format!("the flight itself is not clear: {}", flight.audit.headline());
         let help = "fly it with a larger separation, or export a part without the violation by --from and --until";
         let refusal = Some(Failure::input("export/violation", message, help));
         return Ok(DroneExport { span_s: flight.span_s, refusal, ..DroneExport::empty() });
@@ -184,7 +185,7 @@ struct Flight {
     /// Whether there are two objects to keep apart.
     has_pair: bool,
     /// Verdict on the flight.
-    audit: Option<AuditedRecording>,
+    audit: RecordedReport,
     notes: Vec<String>,
 }
 
@@ -206,10 +207,11 @@ impl Flight {
         if !has_pair {
             audit.settings.envelope.limits = vec![Limit { quantity: Quantity::Speed, allowed: BEYOND_M_S }];
         }
-        let audited = audit.configured()?.judge(&quiet)?;
-        check_presence(&audited.report)?;
+        let report = audit.configured()?.judge(&quiet)?.report;
+        check_presence(&report)?;
         let span = |of: &FlownVehicle| of.motion.span_s();
-        let Some(spans) = vehicles.iter().map(span).collect::<Option<Vec<_>>>().filter(|spans| !spans.is_empty()) else {
+        let Some(spans) = vehicles.iter().map(span).collect::<Option<Vec<_>>>().filter(|spans| !spans.is_empty())
+        else {
             let message = format!("{}: a vehicle has fewer than two samples", audit.subject.name());
             let help = "leave it out of the recording: a drone needs a motion";
             return Err(Failure::input("export/absent", message, help));
@@ -223,13 +225,13 @@ impl Flight {
         for vehicle in &mut vehicles {
             vehicle.motion = vehicle.motion.window(from_s, until_s);
         }
-        let mut notes = audited.report.source.notes.clone();
-        if audited.report.status == Status::Undecided {
-            notes.push(format!("the flight itself is {}", audited.report.headline()));
+        let mut notes = report.source.notes.clone();
+        if report.status == Status::Undecided {
+            notes.push(format!("the flight itself is {}", report.headline()));
         }
         settings.max_gap_s = Some(f64::INFINITY);
         (settings.from_s, settings.to_s, settings.is_own_limit) = (None, None, false);
-        Ok(Self { vehicles, span_s: (from_s, until_s), settings, has_pair, audit: Some(audited), notes })
+        Ok(Self { vehicles, span_s: (from_s, until_s), settings, has_pair, audit: report, notes })
     }
 }
 
@@ -241,7 +243,8 @@ fn check_presence(report: &RecordedReport) -> Result<(), Failure> {
         let from_s = spans.clone().filter_map(|of| of.finding.from_s).fold(f64::NEG_INFINITY, f64::max);
         let to_s = spans.filter_map(|of| of.finding.to_s).fold(f64::INFINITY, f64::min);
         let (first, last) = (seen(absent.finding.from_s), seen(absent.finding.to_s));
-        let message = format!("vehicle {}: it is absent for a part of the flight (seen {first} to {last})", absent.vehicle);
+        let message =
+            format!("vehicle {}: it is absent for a part of the flight (seen {first} to {last})", absent.vehicle);
         let help = if from_s < to_s {
             format!("export the part in which all vehicles are present: --from {from_s:?} --until {to_s:?}")
         } else {
@@ -422,6 +425,29 @@ impl DroneExport {
         self.refusal.is_none()
     }
 
+    /// Returns the answer as JSON; docs/export.md lists the keys.
+    #[must_use]
+    pub fn to_json(&self) -> String {
+        let vehicle =
+            |of: &EncodedVehicle| json!({"name": of.name, "label": of.label, "parts": of.parts, "bytes": of.bytes});
+        let margin =
+            self.margin.as_ref().map(|(margin, who, at_s)| json!({"margin": margin, "who": who, "at_s": at_s}));
+        let deviation = self.deviation.as_ref().map(|(found, vehicle)| {
+            json!({"bound_m": found.bound_m, "found_m": found.found_m, "at_s": found.time_s, "vehicle": vehicle})
+        });
+        let answer = json!({
+            "verdict": self.audit.as_ref().map(RecordedReport::headline),
+            "refusal": self.refusal.as_ref().map(Failure::in_words),
+            "margin": margin,
+            "deviation": deviation,
+            "from_s": self.span_s.0,
+            "until_s": self.span_s.1,
+            "bytes": self.bytes,
+            "vehicles": self.vehicles.iter().map(vehicle).collect::<Vec<_>>(),
+        });
+        answer.to_string()
+    }
+
     /// Returns the answer in words.
     fn text(&self, request: &DroneExportRequest, flight: &Flight) -> String {
         let mut text = match &self.audit {
@@ -432,12 +458,19 @@ impl DroneExport {
         // Writing to a string cannot fail.
         if let Some((margin, [one, other], at_s)) = &self.margin {
             let left = at_least(*margin, DECIMALS);
-            let _ = writeln!(text, "margin       {left} {unit} above the limit, {one} and {other} at {} s", fixed(*at_s, 3));
+            let _ = writeln!(
+                text,
+                "margin       {left} {unit} above the limit, {one} and {other} at {} s",
+                fixed(*at_s, 3)
+            );
         }
         if let Some((found, vehicle)) = &self.deviation {
             let most = at_most(found.bound_m, DECIMALS);
             let at_s = fixed(found.time_s, 3);
-            let _ = writeln!(text, "deviation    at most {most} m from the flight at every instant, vehicle {vehicle} at {at_s} s");
+            let _ = writeln!(
+                text,
+                "deviation    at most {most} m from the flight at every instant, vehicle {vehicle} at {at_s} s"
+            );
         }
         let dialect = request.drones.dialect;
         let part = if dialect.is_sampled() { "samples" } else { "pieces" };
@@ -448,7 +481,8 @@ impl DroneExport {
         let vehicles = counted(self.vehicles.len() as u64, "vehicle", "vehicles");
         let _ = writeln!(text, "vehicles     {vehicles}, {range} {part} each, at most {bytes} bytes each");
         let (from_s, until_s) = self.span_s;
-        let shift = if from_s == 0.0 { String::new() } else { format!("; {from_s:?} s of the flight are 0 s of the files") };
+        let shift =
+            if from_s == 0.0 { String::new() } else { format!("; {from_s:?} s of the flight are 0 s of the files") };
         let _ = writeln!(text, "flight       {} s to {} s{shift}", fixed(from_s, 3), fixed(until_s, 3));
         let _ = write!(text, "wrote {}: {}, {} bytes", request.output.display(), dialect.title(), self.bytes);
         text

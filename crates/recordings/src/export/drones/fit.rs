@@ -1,11 +1,11 @@
 //! Fits the fewest polynomials of degree 7 to the motion of a vehicle, within a tolerance.
 //!
 //! Pieces are fitted one after the other, each as long as the tolerance allows. The length of a piece grows until the
-//! tolerance is exceeded and is then bisected. Position, velocity and acceleration are continuous at joints (C2), so the
-//! first three Bernstein coefficients of a piece follow from the piece before. The other five are those of least squares
-//! at instants on this piece and on a second one of the same length behind it. The second piece is dropped: it gives
-//! the joint a velocity and an acceleration with which the flight continues. A piece is accepted if its distance from
-//! the motion is proved to be within the tolerance at every instant ([`super::motion::is_within`]).
+//! tolerance is exceeded and is then bisected. Position, velocity and acceleration are continuous at joints (C2).
+//! The first three Bernstein coefficients of a piece follow from the piece before. The other five are those of
+//! least squares at instants on this piece and on a second one of the same length behind it. The second piece is
+//! dropped. It gives the joint a velocity and an acceleration with which the flight continues. A piece is accepted if
+//! its distance from the motion is proved to be within the tolerance at every instant ([`super::motion::is_within`]).
 //!
 //! Joints are at whole milliseconds, which every format of drones can hold.
 

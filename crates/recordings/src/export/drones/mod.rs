@@ -167,10 +167,7 @@ pub struct FlownVehicle {
 ///
 /// # Errors
 /// [`ReadError`] if the recording cannot be read.
-pub fn motions(
-    recording: &mut dyn Tracks<Error = ReadError>,
-    holds: bool,
-) -> Result<Vec<FlownVehicle>, ReadError> {
+pub fn motions(recording: &mut dyn Tracks<Error = ReadError>, holds: bool) -> Result<Vec<FlownVehicle>, ReadError> {
     let (mut items, mut flown, mut last) = (Vec::new(), Vec::<FlownVehicle>::new(), Vec::<Option<Sample>>::new());
     while recording.read(&mut items)? {
         for item in items.drain(..) {
@@ -365,8 +362,8 @@ pub enum DroneError {
     },
     /// Samples of a vehicle are too far from the flight.
     #[error(
-        "vehicle {vehicle} at {time_s:.3} s: its samples are up to {found_m:.4} m from the flight, and the tolerance is \
-         {tolerance_m:?} m"
+        "vehicle {vehicle} at {time_s:.3} s: its samples are up to {found_m:.4} m from the flight, and the tolerance \
+         is {tolerance_m:?} m"
     )]
     TooCoarse {
         /// Name of the vehicle.
@@ -398,8 +395,8 @@ pub enum DroneError {
     },
     /// A position exceeds the numbers of the format.
     #[error(
-        "vehicle {vehicle} at {time_s:.3} s: a coordinate of its curve is {coordinate_m:.3} m, and the format holds up to \
-         {largest_m:?} m"
+        "vehicle {vehicle} at {time_s:.3} s: a coordinate of its curve is {coordinate_m:.3} m, and the format holds up \
+         to {largest_m:?} m"
     )]
     TooFar {
         /// Name of the vehicle.

@@ -1,9 +1,9 @@
 //! Motion of a vehicle as polynomial arcs, and a proved bound on the distance between two motions.
 //!
-//! An arc holds the Bernstein coefficients of a polynomial over its interval, so the arc lies in their convex hull. Over
-//! a part of time in which two motions have one arc each, their difference is a polynomial too. Its length is at most
-//! that of its longest coefficient, which bounds the distance at every instant of the part. Halving a part tightens the
-//! bound. Rounding of each operation is added.
+//! An arc holds the Bernstein coefficients of a polynomial over its interval, so the arc lies in their convex hull.
+//! Over a part of time in which two motions have one arc each, their difference is a polynomial too. Its length is at
+//! most that of its longest coefficient, which bounds the distance at every instant of the part. Halving a part
+//! tightens the bound. Rounding of each operation is added.
 
 use nalgebra::Vector3;
 

@@ -81,8 +81,8 @@ pub(super) fn trajectory(
     Ok((DroneFile { name: format!("{label}.skyb"), bytes }, vehicle))
 }
 
-/// Calls `encode` with the smallest scale that can hold a motion. A curve may leave the range of its motion, and needs a
-/// larger scale then.
+/// Calls `encode` with the smallest scale that can hold a motion. A curve may leave the range of its motion, and needs
+/// a larger scale then.
 fn scaled<T>(motion: &Motion, encode: impl Fn(u32) -> Result<T, DroneError>) -> Result<(u32, T), DroneError> {
     let points = motion.arcs.iter().flat_map(|arc| &arc.points);
     let reach_m = points.map(|point| point.abs().max()).fold(0.0, f64::max);
