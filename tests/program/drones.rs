@@ -86,17 +86,23 @@ fn every_dialect_is_judged_and_audited_again() {
 #[test]
 fn violations_are_refused_and_leave_nothing() {
     let folder = folder();
+    // Vehicle a turns at right angles around b, 1 m from it. A loose curve cuts the corner.
+    let mut corner = "t,id,x,y,z\n".to_owned();
+    for k in 0..=80 {
+        let t = f64::from(k) / 10.0;
+        let _ = writeln!(corner, "{t},a,{},{},1\n{t},b,3,1,1", t.min(4.0), (t - 4.0).max(0.0));
+    }
+    fs::write(folder.path().join("corner.csv"), corner).expect("written");
     let before = names(folder.path());
-    // The flight keeps 2 m between its samples, and less on the chords between them. A loose curve keeps less.
     for (delta, tolerance, words) in [
-        ("2.5", "0.01", "the flight itself is not clear"),
-        ("1.99", "0.2", "the flight is clear, but not the written motion"),
+        ("1.5", "0.01", "the flight itself is not clear"),
+        ("0.99", "0.3", "the flight is clear, but not the written motion"),
     ] {
-        let arguments = ["export", "flight.csv", "--to", "crazyflie", "-o", "cf"];
+        let arguments = ["export", "corner.csv", "--to", "crazyflie", "-o", "cf"];
         let refused = ran(folder.path(), &[&arguments[..], &["--delta", delta, "--tolerance", tolerance]].concat());
         assert_eq!(refused.exit, Some(1), "{}", said(&refused));
         assert_eq!(refused.code(), "export/violation");
-        for word in [words, "VIOLATION", "a and b", "--tolerance"].iter().take(if delta == "2.5" { 3 } else { 4 }) {
+        for word in [words, "VIOLATION", "a and b", "--tolerance"].iter().take(if delta == "1.5" { 3 } else { 4 }) {
             assert!(said(&refused).contains(word), "no {word}: {}", said(&refused));
         }
         assert_eq!(names(folder.path()), before);
@@ -177,7 +183,7 @@ fn a_part_of_a_flight_counts_from_its_start() {
     let done = ran(folder.path(), &arguments);
     assert_eq!(done.exit, Some(0), "{}", said(&done));
     assert!(said(&done).contains("1.500 s to 4.250 s; 1.5 s of the flight are 0 s of the files"), "{}", said(&done));
-    let again = ran(folder.path(), &["audit", "part.skyc", "--json", "-"]);
+    let again = ran(folder.path(), &["audit", "part.skyc", "--json"]);
     assert!(again.out.contains("\"delta_m\": 1.0") && again.out.contains("2.75"), "{}", again.out);
     // An existing output needs --force, and is replaced as a whole.
     assert_eq!(ran(folder.path(), &arguments).code(), "files/exists");

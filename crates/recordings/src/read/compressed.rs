@@ -9,8 +9,8 @@ use super::curves::{Curves, piece};
 use super::error::{Fault, Place, ReadError, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::readers::{FormatOption, Packing, Reader};
-use super::skybrush::powers;
+use super::readers::{Format, FormatOption, Packing, Reader};
+use super::skybrush::{powers, stand_throughout};
 use super::source::Source;
 use crate::export::drones::fit::seconds;
 use crate::export::drones::skybrush as skyb;
@@ -48,20 +48,67 @@ pub(super) const CRAZYFLIE: Reader = Reader {
 };
 
 fn open_crazyflie(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let bytes = whole(source)?;
-    let (trajectory, length) = Trajectory::decode(&bytes, true).map_err(|fault| truncated(fault, 0))?;
+    open(&[source.clone()], crazyflie, None, options)
+}
+
+fn open_skyb(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+    open(&[source.clone()], skybrush, None, options)
+}
+
+/// Opens a folder with one vehicle in each file; `left_out` is the note on other files.
+pub(super) fn open_folder(
+    format: Format,
+    files: &[Source],
+    left_out: Option<String>,
+    options: &ReadOptions,
+) -> Result<Recording, ReadError> {
+    open(files, if format == Format::SKYB { skybrush } else { crazyflie }, left_out, options)
+}
+
+/// Returns whether files of a format hold compressed segments.
+pub(super) fn is_compressed(format: Format) -> bool {
+    format == Format::SKYB || format == Format::CRAZYFLIE_COMPRESSED
+}
+
+/// Trajectory of a file, with its unit of length \[m\].
+type Decoded = (Trajectory, f64);
+
+fn open(
+    files: &[Source],
+    decode: fn(&[u8]) -> Result<Decoded, ReadError>,
+    left_out: Option<String>,
+    options: &ReadOptions,
+) -> Result<Recording, ReadError> {
+    let mut curves = Vec::with_capacity(files.len());
+    for (vehicle, file) in files.iter().enumerate() {
+        let of_file = || {
+            let mut bytes = Vec::new();
+            file.bytes()?.read_to_end(&mut bytes)?;
+            let (trajectory, unit_m) = decode(&bytes)?;
+            items(vehicle, &trajectory, unit_m, options)
+        };
+        let items = of_file().map_err(|error| error.of(&file.display_path()));
+        curves.push((file.stem(), items.map_err(|error| if files.len() > 1 { error.among_others() } else { error })?));
+    }
+    stand_throughout(curves.iter_mut().map(|(_, items)| items));
+    Ok(Curves::recording(curves, left_out.into_iter().collect()))
+}
+
+fn crazyflie(bytes: &[u8]) -> Result<Decoded, ReadError> {
+    let (trajectory, length) = Trajectory::decode(bytes, true).map_err(|fault| truncated(fault, 0))?;
     if length < bytes.len() {
         let problem = format!("{} bytes follow the segment without a duration, which ends it", bytes.len() - length);
         let fault = Fault::coded("recording/damaged", problem, "write the trajectory again");
         return Err(fault.at(Place::Byte(length as u64)));
     }
-    recording(source, &trajectory, skyb::unit_m(1), options)
+    Ok((trajectory, skyb::unit_m(1)))
 }
 
-fn open_skyb(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let bytes = whole(source)?;
-    let at = start_of_blocks(&bytes)?;
-    let (start, body) = trajectory_block(&bytes, at)?;
+fn skybrush(bytes: &[u8]) -> Result<Decoded, ReadError> {
+    if !bytes.starts_with(skyb::MAGIC) {
+        return Err(Fault::WrongFormat(Format::SKYB).into());
+    }
+    let (start, body) = trajectory_block(bytes, start_of_blocks(bytes)?)?;
     let Some((&first, segments)) = body.split_first() else {
         return Err(truncated(Truncated { byte: 0 }, start));
     };
@@ -73,7 +120,7 @@ fn open_skyb(source: &Source, options: &ReadOptions) -> Result<Recording, ReadEr
         return Err(fault.at(Place::Byte(start as u64)));
     }
     let (trajectory, _) = Trajectory::decode(segments, false).map_err(|fault| truncated(fault, start + 1))?;
-    recording(source, &trajectory, skyb::unit_m(scale), options)
+    Ok((trajectory, skyb::unit_m(scale)))
 }
 
 /// Checks the header of a Skybrush file and returns the offset of its first block.
@@ -125,13 +172,8 @@ fn trajectory_block(bytes: &[u8], mut at: usize) -> Result<(usize, &[u8]), ReadE
     refuse("recording/no-positions", "it has no trajectory", "export the show with the paths of its drones")
 }
 
-/// Returns the recording of one vehicle.
-fn recording(
-    source: &Source,
-    trajectory: &Trajectory,
-    unit_m: f64,
-    options: &ReadOptions,
-) -> Result<Recording, ReadError> {
+/// Returns the items of a vehicle.
+fn items(vehicle: usize, trajectory: &Trajectory, unit_m: f64, options: &ReadOptions) -> Result<Vec<Item>, ReadError> {
     let (mut items, mut from_ms, scale) = (Vec::new(), 0, options.metres());
     for (duration_ms, points) in trajectory.curves(unit_m) {
         let to_ms = from_ms + u64::from(duration_ms);
@@ -139,22 +181,17 @@ fn recording(
         if duration_ms > 0 {
             let (from_s, to_s) = (seconds(from_ms), seconds(to_ms));
             let coefficients = powers(&points, to_s - from_s);
-            items.push(Item::Piece(piece(0, from_s, to_s, coefficients, scale).ok_or_else(Fault::out_of_range)?));
+            let piece = piece(vehicle, from_s, to_s, coefficients, scale).ok_or_else(Fault::out_of_range)?;
+            items.push(Item::Piece(piece));
         }
         from_ms = to_ms;
     }
     if items.is_empty() {
         let [x, y, z, _] = trajectory.start.map(|number| f64::from(number) * unit_m * scale);
         let position_m = [x, y, z].into();
-        items.push(Item::Sample(Sample { vehicle: 0, time_s: 0.0, position_m, velocity_m_s: None, radius_m: None }));
+        items.push(Item::Sample(Sample { vehicle, time_s: 0.0, position_m, velocity_m_s: None, radius_m: None }));
     }
-    Ok(Curves::recording(vec![(source.stem(), items)], Vec::new()))
-}
-
-fn whole(source: &Source) -> Result<Vec<u8>, ReadError> {
-    let mut bytes = Vec::new();
-    source.bytes()?.read_to_end(&mut bytes)?;
-    Ok(bytes)
+    Ok(items)
 }
 
 /// Returns the error of an incomplete segment of a body that begins at an offset.

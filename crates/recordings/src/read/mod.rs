@@ -164,7 +164,12 @@ fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, R
     let format =
         folder.first().map(|first| recognise(first, options.format).map_err(|e| with_file(e, &first.display_path())));
     let left_out = folder.note();
-    if format.transpose()? == Some(Format::CRAZYFLIE) {
+    let format = format.transpose()?;
+    if let Some(format) = format.filter(|format| compressed::is_compressed(*format) && !folder.files.is_empty()) {
+        options.refuse_unsupported_options(format)?;
+        return compressed::open_folder(format, &folder.files, left_out, options);
+    }
+    if format == Some(Format::CRAZYFLIE) {
         options.refuse_unsupported_options(Format::CRAZYFLIE)?;
         let alone = folder.files.into_iter().map(|file| (file.stem(), vec![file]));
         return crazyflie::open(alone.chain(folder.folders).collect(), left_out, options);

@@ -131,6 +131,10 @@ impl Format {
     pub const MCAP: Self = Self(&mcap::READER);
     /// Crazyflie polynomials.
     pub const CRAZYFLIE: Self = Self(&crazyflie::READER);
+    /// Compressed Crazyflie trajectories.
+    pub const CRAZYFLIE_COMPRESSED: Self = Self(&compressed::CRAZYFLIE);
+    /// Compiled Skybrush trajectories.
+    pub const SKYB: Self = Self(&compressed::SKYB);
     /// A Skybrush show.
     pub const SKYBRUSH: Self = Self(&skybrush::READER);
 

@@ -289,3 +289,18 @@ fn shows_state_their_distance_and_names() {
     });
     assert!(degrees.clone().count() > 1 && degrees.clone().all(|degree| [0, 1, 3, 7].contains(&degree)));
 }
+
+#[test]
+fn a_folder_of_compiled_trajectories_is_one_recording() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let stands = b"skyb\x01\x01\x09\0\x02\xe8\x03\0\0\0\0\0\0";
+    for (name, bytes) in [("d10.skyb", &v1()[..]), ("d9.skyb", &v2()), ("d2.skyb", stands), ("show.md", b"notes")] {
+        fs::write(folder.path().join(name), bytes).expect("written");
+    }
+    let found = motions(folder.path(), false);
+    assert_eq!(found.iter().map(|of| &*of.0).collect::<Vec<_>>(), ["d2", "d9", "d10"]);
+    assert!(found.iter().all(|(_, motion)| motion.span_s() == Some((0.0, 3.0))), "{found:?}");
+    fs::write(folder.path().join("d11.skyb"), b"skyb\x01").expect("written");
+    let refused = Whole::read(folder.path(), &ReadOptions::default()).expect_err("refused");
+    assert!(refused.file.ends_with("d11.skyb") && refused.help().contains("remove the file"), "{refused}");
+}

@@ -342,7 +342,8 @@ impl<'a> Written<'a> {
         }
         let mut settings = flight.settings.clone();
         for (flown, of) in flight.vehicles.iter().zip(&answer.vehicles) {
-            if flown.radius_m.is_some() {
+            // An ellipsoid replaces recorded radii.
+            if flown.radius_m.is_some() && settings.ellipsoid_m.is_none() {
                 settings.vehicles.entry(of.label.clone()).or_default().radius_m = flown.radius_m;
             }
         }
@@ -473,13 +474,14 @@ impl DroneExport {
             );
         }
         let dialect = request.drones.dialect;
-        let part = if dialect.is_sampled() { "samples" } else { "pieces" };
+        let [one, many] = if dialect.is_sampled() { ["sample", "samples"] } else { ["piece", "pieces"] };
         let parts = || self.vehicles.iter().map(|of| of.parts);
         let (fewest, most) = (parts().min().unwrap_or(0), parts().max().unwrap_or(0));
-        let range = if fewest == most { most.to_string() } else { format!("{fewest} to {most}") };
+        let range = counted(most as u64, one, many);
+        let range = if fewest == most { range } else { format!("{fewest} to {range}") };
         let bytes = self.vehicles.iter().map(|of| of.bytes).max().unwrap_or(0);
         let vehicles = counted(self.vehicles.len() as u64, "vehicle", "vehicles");
-        let _ = writeln!(text, "vehicles     {vehicles}, {range} {part} each, at most {bytes} bytes each");
+        let _ = writeln!(text, "vehicles     {vehicles}, {range} each, at most {bytes} bytes each");
         let (from_s, until_s) = self.span_s;
         let shift =
             if from_s == 0.0 { String::new() } else { format!("; {from_s:?} s of the flight are 0 s of the files") };

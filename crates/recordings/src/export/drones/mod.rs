@@ -219,6 +219,10 @@ pub fn encode(
     if !matches!(options.skyb_version, 1 | 2) {
         return Err(DroneError::SkybVersion(options.skyb_version));
     }
+    let end_s = |motion: &Motion| motion.span_s().map_or(0.0, |span| span.1);
+    if let Some((name, motion)) = flight.iter().find(|(_, motion)| end_s(motion) > LONGEST_S) {
+        return Err(DroneError::Duration { vehicle: name.clone(), duration_s: end_s(motion) });
+    }
     let labels = labels(flight, options.dialect)?;
     let work = Work { options, is_interrupted };
     let vehicles: Vec<_> = flight.iter().zip(labels).map(|((name, motion), label)| (name, label, motion)).collect();
@@ -237,6 +241,9 @@ pub fn encode(
         }
     }
 }
+
+/// Longest flight \[s\]: a day.
+const LONGEST_S: f64 = 86_400.0;
 
 /// Vehicle with its name, its name in the output and its motion.
 type Vehicle<'a> = (&'a String, String, &'a Motion);
@@ -393,6 +400,14 @@ pub enum DroneError {
         /// Whether a compressed form exists.
         compresses: bool,
     },
+    /// The flight is too long for any drone.
+    #[error("vehicle {vehicle}: its flight lasts {duration_s:?} s, and at most 86400 s are written")]
+    Duration {
+        /// Name of the vehicle.
+        vehicle: String,
+        /// Duration \[s\].
+        duration_s: f64,
+    },
     /// A position exceeds the numbers of the format.
     #[error(
         "vehicle {vehicle} at {time_s:.3} s: a coordinate of its curve is {coordinate_m:.3} m, and the format holds up \
@@ -452,6 +467,7 @@ impl DroneError {
             Self::TooLong { compresses: true, .. } => {
                 "give a larger --tolerance, a shorter flight by --from and --until, or --compressed"
             }
+            Self::Duration { .. } => "check the unit of time, or give a shorter flight by --from and --until",
             Self::TooLong { .. } => "give a larger --tolerance, or a shorter flight by --from and --until",
             Self::TooFar { .. } => "move the origin nearer to the flight, or export to skyc, px4-show or vviz",
             Self::Name { .. } => "rename the vehicle in the recording",
@@ -468,7 +484,7 @@ impl DroneError {
             Self::SkybVersion(_) => "export/skyb-version",
             Self::SampleRate(_) => "export/sample-rate",
             Self::TooFast { .. } | Self::TooCoarse { .. } => "export/too-fast",
-            Self::TooLong { .. } => "export/too-long",
+            Self::TooLong { .. } | Self::Duration { .. } => "export/too-long",
             Self::TooFar { .. } => "export/too-far",
             Self::Name { .. } => "export/name",
             Self::Write(_) => "files/cannot-write",
