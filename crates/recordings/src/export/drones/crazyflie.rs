@@ -49,6 +49,7 @@ pub(super) fn polynomials(
 /// Rounds pieces to single precision; also returns the curve of the rounded numbers.
 fn rounded(pieces: &[Piece]) -> (Vec<Polynomial>, Motion) {
     let (mut polynomials, mut arcs, mut from_s) = (Vec::with_capacity(pieces.len()), Vec::new(), 0.0);
+    let mut end_ms = 0;
     for piece in pieces {
         let arc = Arc {
             from_s: 0.0,
@@ -56,7 +57,9 @@ fn rounded(pieces: &[Piece]) -> (Vec<Polynomial>, Motion) {
             points: piece.points.to_vec(),
             rounding_m: 0.0,
         };
-        let duration_s = arc.to_s as f32;
+        // Up to the exact end of the piece, so that rounding does not add up.
+        end_ms += u64::from(piece.duration_ms);
+        let duration_s = (seconds(end_ms) - from_s) as f32;
         let mut powers = [Vector3::zeros(); POINTS];
         for (power, exact) in powers.iter_mut().zip(arc.powers()) {
             // Adding 0 turns -0 into 0.
