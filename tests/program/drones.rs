@@ -90,7 +90,7 @@ fn violations_are_refused_and_leave_nothing() {
     let mut corner = "t,id,x,y,z\n".to_owned();
     for k in 0..=80 {
         let t = f64::from(k) / 10.0;
-        let _ = writeln!(corner, "{t},a,{},{},1\n{t},b,3,1,1", t.min(4.0), (t - 4.0).max(0.0));
+        let _ = writeln!(corner, "{t},a,{},{},1\n{t},b,3,-1,1", t.min(4.0), (t - 4.0).max(0.0));
     }
     fs::write(folder.path().join("corner.csv"), corner).expect("written");
     let before = names(folder.path());
