@@ -6,8 +6,9 @@ use pyo3::prelude::*;
 use tautline::attack::Bound;
 use tautline::campaign::CampaignRequest;
 use tautline::export::WRITTEN;
+use tautline::export::drones::{Dialect, DroneOptions};
 use tautline::margin::Range;
-use tautline::request::{ExportRequest, Failure, Monitor as _, Silent, export_file};
+use tautline::request::{DroneExportRequest, ExportRequest, Failure, Monitor as _, Silent, export_drones, export_file};
 use tautline::scenario::builtin;
 use tautline::studies::{Criterion, Experiment, Study as _, StudyFiles, StudyRequest};
 use tautline::sweep::SweptKey;
@@ -42,8 +43,30 @@ pub(crate) fn scenarios() -> Vec<&'static str> {
     builtin::all().iter().map(|builtin| builtin.name).collect()
 }
 
-/// Writes a recording in another format.
+/// Options of an export for drones.
+#[derive(FromPyObject)]
+pub(crate) struct DroneKeywords {
+    #[pyo3(item)]
+    tolerance: Option<f64>,
+    #[pyo3(item)]
+    delta: Option<f64>,
+    #[pyo3(item)]
+    ellipsoid: Option<[f64; 3]>,
+    #[pyo3(item)]
+    obstacles: Option<PathBuf>,
+    #[pyo3(item)]
+    from_s: Option<f64>,
+    #[pyo3(item)]
+    until_s: Option<f64>,
+    #[pyo3(item)]
+    compressed: bool,
+    #[pyo3(item)]
+    skyb_version: u8,
+}
+
+/// Writes a recording in another format, or for drones. Returns the answer of an export for drones.
 #[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
 pub(crate) fn export(
     py: Python<'_>,
     paths: Vec<PathBuf>,
@@ -52,11 +75,37 @@ pub(crate) fn export(
     to: Option<String>,
     sample_hz: Option<f64>,
     force: bool,
-) -> PyResult<()> {
-    let written: Vec<_> = WRITTEN.iter().map(|format| (format.name, *format)).collect();
-    let format = choice("to", to, &written)?;
-    let request = ExportRequest { paths, options: options.0.clone(), output, format, sample_hz, force };
-    answered(py, |monitor| export_file(&request, monitor))
+    drones: DroneKeywords,
+) -> PyResult<Option<Answer>> {
+    let options = options.0.clone();
+    let lossless = WRITTEN.iter().map(|format| (format.name, (Some(*format), None)));
+    let of_drones = Dialect::ALL.map(|dialect| (dialect.name(), (None, Some(dialect))));
+    let (format, dialect) = choice("to", to, &lossless.chain(of_drones).collect::<Vec<_>>())?.unwrap_or_default();
+    let Some(dialect) = dialect else {
+        let request = ExportRequest { paths, options, output, format, sample_hz, force };
+        return answered(py, |monitor| export_file(&request, monitor)).map(|()| None);
+    };
+    let usual = DroneOptions::new(dialect);
+    let request = DroneExportRequest {
+        paths,
+        options,
+        output,
+        drones: DroneOptions {
+            tolerance_m: drones.tolerance.or(usual.tolerance_m),
+            is_compressed: drones.compressed,
+            skyb_version: drones.skyb_version,
+            sample_hz,
+            ..usual
+        },
+        delta_m: drones.delta,
+        ellipsoid_m: drones.ellipsoid.map(Into::into),
+        obstacles: drones.obstacles,
+        from_s: drones.from_s,
+        until_s: drones.until_s,
+        force,
+    };
+    let exported = answered(py, |monitor| export_drones(&request, monitor))?;
+    Ok(Some((exported.is_good(), exported.to_json())))
 }
 
 /// Files and threads of a study.

@@ -335,7 +335,8 @@ def export(
     to: str | None,
     sample_hz: float | None,
     force: bool,
-) -> None: ...
+    drones: dict[str, str | bool | int | float | list[float] | None],
+) -> tuple[bool, str] | None: ...
 def fly(
     scenario: Scenario, law: object | None, record: str | None, html: str | None, command: str, keep: bool
 ) -> FlightData: ...

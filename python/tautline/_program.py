@@ -21,6 +21,7 @@ from ._arguments import (
     optional_number,
     optional_path,
     optional_text,
+    optional_vector,
     path,
     paths,
     read_options,
@@ -73,19 +74,44 @@ def export(
     to: str | None = None,
     sample_hz: float | None = None,
     force: bool = False,
+    tolerance: float | None = None,
+    delta: float | None = None,
+    ellipsoid: Sequence[float] | None = None,
+    obstacles: PathLike | None = None,
+    from_s: float | None = None,
+    until_s: float | None = None,
+    compressed: bool = False,
+    skyb_version: int = 2,
     **read_as: Any,
-) -> None:
-    """Writes a recording of any format as CSV, Parquet, NPZ or MCAP, without rounding.
+) -> Answer | None:
+    """Writes a recording of any format as CSV, Parquet, NPZ or MCAP without rounding, or a flight for drones.
 
     The name of ``output`` gives the format, unless ``to`` is ``csv``, ``parquet``, ``npz`` or ``mcap``. Curves are
     sampled at ``sample_hz``. ``force`` overwrites an existing file. The options of reading are those of
     :func:`tautline.audit`. Raises the exceptions of :func:`tautline.read`, and ``OSError`` where the file cannot be
     written.
+
+    With ``to`` as ``crazyflie``, ``skyb``, ``skyc``, ``px4-show`` or ``vviz``, writes the flight within ``tolerance``
+    [m] and judges the written motion. ``delta`` [m], ``ellipsoid`` (3,) [m] and ``obstacles`` replace the limits of the
+    recording. ``from_s`` and ``until_s`` [s] select a part. ``compressed`` is for ``crazyflie``, ``skyb_version`` (1
+    or 2) for ``skyb``. Returns an :class:`Answer`; it is not good, and no file is written, where the flight or the
+    written motion is not clear.
     """
     recordings = single_recording(paths(recording, "recording"), read_as)
     options, target = read_options(**read_as), path(output, "output")
     more = optional_text(to, "to"), optional_number(sample_hz, "sample_hz"), boolean(force, "force")
-    with_files(recordings, lambda: _native.export(recordings, options, target, *more))
+    drones = {
+        "tolerance": optional_number(tolerance, "tolerance"),
+        "delta": optional_number(delta, "delta"),
+        "ellipsoid": optional_vector(ellipsoid, "ellipsoid"),
+        "obstacles": optional_path(obstacles, "obstacles"),
+        "from_s": optional_number(from_s, "from_s"),
+        "until_s": optional_number(until_s, "until_s"),
+        "compressed": boolean(compressed, "compressed"),
+        "skyb_version": count(skyb_version, "skyb_version"),
+    }
+    answer = with_files(recordings, lambda: _native.export(recordings, options, target, *more, drones))
+    return None if answer is None else Answer(*answer)
 
 
 def study_scenario(scenario: Scenario | PathLike, set: Mapping[str, Any] | None) -> _native.Scenario:

@@ -118,7 +118,7 @@ enum Command {
     Campaign(campaign::CampaignArguments),
     /// Search for the worst start, wind or loss within bounds; a search is not a proof.
     Attack(studies::AttackArguments),
-    /// Convert a recording to CSV, Parquet, NPZ or MCAP without loss.
+    /// Convert a recording to CSV, Parquet, NPZ or MCAP without loss, or write a flight for drones and judge it.
     Export(export::ExportArguments),
     /// Draw a recording without a screen: pictures, films and contact sheets.
     #[cfg(feature = "viewer")]

@@ -164,7 +164,7 @@ pub(super) fn origin(text: &str) -> Result<[f64; 3], String> {
     }
 }
 
-fn three(text: &str) -> Result<[f64; 3], String> {
+pub(super) fn three(text: &str) -> Result<[f64; 3], String> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|number| number.trim().parse().ok()).collect();
     match <[f64; 3]>::try_from(numbers.unwrap_or_default()) {
         Ok(numbers) if numbers.iter().all(|x| x.is_finite()) => Ok(numbers),

@@ -12,6 +12,7 @@ mod check;
 mod compare;
 mod determinism;
 mod doors;
+mod drones;
 mod ellipsoids;
 mod exports;
 mod first_steps;

@@ -163,6 +163,28 @@ class Recordings(Case):
         message = "has no extension of a known format"
         self.refuses(tl.Error, message, lambda: tl.export(self.folder / "run.mcap", unknown))
 
+    def test_flights_for_drones_are_judged_after_their_encoding(self) -> None:
+        t = np.arange(201) * 0.04
+        p = np.zeros((201, 2, 3))
+        p[:, 1, 0] = 2.0
+        p[:, :, 1] = np.sin(t)[:, None]
+        np.savez(self.folder / "pair.npz", t=t, positions=p)
+        answer = tl.export(self.folder / "pair.npz", self.folder / "cf", to="crazyflie", delta=1.5, tolerance=0.02)
+        assert answer is not None
+        self.assertTrue(answer.is_good)
+        self.assertIn("PROVED CLEAR", answer.verdict)
+        self.assertLessEqual(answer.deviation["bound_m"], 0.02)
+        self.assertAlmostEqual(answer.margin["margin"], 0.5, delta=0.04)
+        self.assertEqual([vehicle["label"] for vehicle in answer["vehicles"]], ["1", "2"])
+        self.assertEqual(tl.audit(self.folder / "cf", delta=1.5).verdict, "PROVED CLEAR")
+        refused = tl.export(self.folder / "pair.npz", self.folder / "no.skyc", to="skyc", delta=2.5)
+        assert refused is not None
+        self.assertFalse(refused.is_good)
+        self.assertIn("VIOLATION", refused.refusal)
+        self.assertFalse((self.folder / "no.skyc").exists())
+        unknown = lambda: tl.export(self.folder / "pair.npz", self.folder / "no", to="foo")  # noqa: E731
+        self.refuses(tl.Error, "px4-show", unknown)
+
     def test_a_rate_interpolates_except_across_gaps(self) -> None:
         file = self.folder / "a.csv"
         rows = [f"{0.1 * k:.1f},a,{k},0,0" for k in range(21) if not 8 < k < 13]

@@ -14,6 +14,7 @@
 pub mod export;
 pub mod mcap;
 pub mod read;
+mod segments;
 
 pub use read::{ReadError, ReadOptions, Recording, open};
 pub use tautline_core::track;

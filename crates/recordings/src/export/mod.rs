@@ -6,6 +6,7 @@
 //! [`ExportOptions::sample_hz`].
 
 mod csv;
+pub mod drones;
 mod mcap;
 mod npz;
 mod parquet;

@@ -11,6 +11,8 @@ use tautline_core::track::{Item, Metadata, Piece, Tracks};
 
 /// Smallest jump between two pieces of a curve that is reported \[m\]. Files round to micrometres.
 const JUMP_M: f64 = 1e-3;
+/// Largest time between the ends of two curves that end at one instant \[s\]: sums of rounded durations differ.
+const SAME_INSTANT_S: f64 = 1e-6;
 
 /// Names of vehicles, each with its items in order of time.
 pub(super) type VehicleItems = Vec<(String, Vec<Item>)>;
@@ -29,7 +31,8 @@ impl Curves {
     }
 
     /// Returns the recording of these vehicles, each with its items in order of time, and adds a note on jumps.
-    pub(super) fn with_metadata(vehicles: VehicleItems, mut metadata: Metadata) -> Recording {
+    pub(super) fn with_metadata(mut vehicles: VehicleItems, mut metadata: Metadata) -> Recording {
+        align_ends(&mut vehicles);
         metadata.notes.extend(largest_jump(&vehicles));
         let (vehicles, items): (Vec<_>, Vec<_>) = vehicles.into_iter().unzip();
         let mut items: Vec<_> = items.into_iter().flatten().collect();
@@ -113,6 +116,19 @@ pub(super) fn powers(points: &[Vector3<f64>], duration_s: f64) -> Vec<Vector3<f6
     coefficients
 }
 
+/// Extends curves that end within [`SAME_INSTANT_S`] of the latest end up to it.
+fn align_ends(vehicles: &mut [(String, Vec<Item>)]) {
+    let end_of = |item: &Item| if let Item::Piece(piece) = item { piece.to_s } else { f64::NEG_INFINITY };
+    let latest_s = vehicles.iter().filter_map(|(_, items)| items.last()).map(end_of).fold(f64::NEG_INFINITY, f64::max);
+    for (_, items) in vehicles {
+        if let Some(Item::Piece(last)) = items.last_mut()
+            && latest_s - last.to_s <= SAME_INSTANT_S
+        {
+            last.to_s = latest_s;
+        }
+    }
+}
+
 fn end_of(piece: &Piece) -> Vector3<f64> {
     let duration = piece.to_s - piece.from_s;
     piece.coefficients.iter().rev().fold(Vector3::zeros(), |sum, coefficient| sum * duration + coefficient)
@@ -154,5 +170,17 @@ mod tests {
             let power = coefficients.iter().rev().fold(Vector3::zeros(), |sum, c| sum * t + c);
             assert!((power - level[0]).norm() < ROUNDING_M, "{u}: {power} {}", level[0]);
         }
+    }
+
+    #[test]
+    fn ends_that_differ_by_rounding_are_one_instant() {
+        let curve = |to_s: f64| vec![Item::Piece(piece(0, 0.0, to_s, [Vector3::zeros()], 1.0).expect("a piece"))];
+        let mut vehicles = [10.0, 10.0 - 5e-7, 10.0 - 2e-6].map(|to_s| (String::new(), curve(to_s)));
+        align_ends(&mut vehicles);
+        let ends = vehicles.map(|(_, items)| match &items[0] {
+            Item::Piece(piece) => piece.to_s,
+            Item::Sample(_) => f64::NAN,
+        });
+        assert_eq!(ends, [10.0, 10.0, 10.0 - 2e-6]);
     }
 }

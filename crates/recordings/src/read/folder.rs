@@ -16,8 +16,8 @@ use tautline_core::track::{Clock, Item, Metadata, Tracks};
 const LONGEST_NUMBER: usize = 20;
 
 /// Extensions of tables.
-const TABLES: [&str; 12] =
-    ["csv", "tsv", "txt", "dat", "tum", "parquet", "npz", "gz", "jsonl", "ndjson", "ulg", "ulog"];
+const TABLES: [&str; 14] =
+    ["csv", "tsv", "txt", "dat", "tum", "parquet", "npz", "gz", "jsonl", "ndjson", "ulg", "ulog", "skyb", "traj"];
 
 /// Extensions of texts that may be tables or prose.
 const TEXTS: [&str; 2] = ["txt", "dat"];

@@ -16,6 +16,7 @@ mod axes;
 mod bezier;
 mod capture;
 mod clock;
+mod compressed;
 mod crazyflie;
 mod csv;
 mod curves;
@@ -166,7 +167,12 @@ fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, R
     let format =
         folder.first().map(|first| recognise(first, options.format).map_err(|e| with_file(e, &first.display_path())));
     let left_out = folder.note();
-    if let Some(format) = format.transpose()?.filter(|format| [Format::CRAZYFLIE, Format::BEZIER].contains(format)) {
+    let format = format.transpose()?;
+    if let Some(format) = format.filter(|format| compressed::is_compressed(*format) && !folder.files.is_empty()) {
+        options.refuse_unsupported_options(format)?;
+        return compressed::open_folder(format, &folder.files, left_out, options);
+    }
+    if let Some(format) = format.filter(|format| [Format::CRAZYFLIE, Format::BEZIER].contains(format)) {
         options.refuse_unsupported_options(format)?;
         let alone = folder.files.into_iter().map(|file| (file.stem(), vec![file]));
         let open = if format == Format::BEZIER { bezier::open } else { crazyflie::open };

@@ -10,7 +10,7 @@ use super::options::ReadOptions;
 use super::order::Recording;
 use super::skybrush::SHOW;
 use super::source::{Archive, GZIP_MAGIC, Source};
-use super::{bezier, capture, crazyflie, csv, heading, mcap, npz, objects, parquet, skybrush, ulog, vviz};
+use super::{bezier, capture, compressed, crazyflie, csv, heading, mcap, npz, objects, parquet, skybrush, ulog, vviz};
 
 /// Reader of a format: a row of [`READERS`].
 pub struct Reader {
@@ -38,9 +38,11 @@ pub static READERS: &[Reader] = &[
     parquet::READER,
     mcap::READER,
     npz::READER,
+    compressed::SKYB,
     objects::READER,
     vviz::READER,
     skybrush::READER,
+    compressed::CRAZYFLIE,
     capture::MOTIVE,
     capture::VICON,
     bezier::READER,
@@ -132,6 +134,10 @@ impl Format {
     pub const BEZIER: Self = Self(&bezier::READER);
     /// Crazyflie polynomials.
     pub const CRAZYFLIE: Self = Self(&crazyflie::READER);
+    /// Compressed Crazyflie trajectories.
+    pub const CRAZYFLIE_COMPRESSED: Self = Self(&compressed::CRAZYFLIE);
+    /// Compiled Skybrush trajectories.
+    pub const SKYB: Self = Self(&compressed::SKYB);
     /// A Skybrush show.
     pub const SKYBRUSH: Self = Self(&skybrush::READER);
 
@@ -249,10 +255,9 @@ fn format_of(bytes: &[u8]) -> Result<Format, Fault> {
 }
 
 /// Unsupported formats: first bytes, description and remedy.
-const UNSUPPORTED: [(&[u8], &str, &str); 12] = [
+const UNSUPPORTED: [(&[u8], &str, &str); 11] = [
     (b"#ROSBAG V", "a ROS 1 bag", BAG),
     (b"SQLite format 3\0", "an SQLite database, as ROS 2 bags are", BAG),
-    (b"skyb", "a compiled Skybrush trajectory of one drone", "give the .skyc show that it was compiled from"),
     (b"\xa3\x95", "a DataFlash log of ArduPilot", DATAFLASH),
     (b"FMT,", "a DataFlash log of ArduPilot", DATAFLASH),
     (b"FMT ", "a DataFlash log of ArduPilot", DATAFLASH),

@@ -149,7 +149,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         names.push(name);
         curves.push(items);
     }
-    stand_throughout(&mut curves);
+    stand_throughout(curves.iter_mut());
     if curves.iter().all(Vec::is_empty) {
         let remedy = "export the show with its trajectories";
         return refuse("recording/no-positions", "the show has no drone with a trajectory", remedy);
@@ -158,10 +158,11 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
 }
 
 /// Extends a drone with a single point to the end of the show.
-fn stand_throughout(curves: &mut [Vec<Item>]) {
+pub(super) fn stand_throughout<'a>(curves: impl Iterator<Item = &'a mut Vec<Item>>) {
+    let mut curves: Vec<_> = curves.collect();
     let end_of = |item: &Item| if let Item::Piece(piece) = item { piece.to_s } else { f64::NEG_INFINITY };
-    let end_s = curves.iter().flatten().map(end_of).fold(f64::NEG_INFINITY, f64::max);
-    for curve in curves {
+    let end_s = curves.iter().flat_map(|curve| curve.iter()).map(end_of).fold(f64::NEG_INFINITY, f64::max);
+    for curve in &mut curves {
         if let [Item::Sample(sample)] = curve[..]
             && sample.time_s < end_s
         {

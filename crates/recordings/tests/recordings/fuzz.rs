@@ -130,6 +130,8 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         ("dates", DATES.into()),
         ("ulog", log.bytes()),
         ("vviz", VVIZ.into()),
+        ("skyb", b"skyb\x01\x01\x10\x00\x02\0\0\0\0\0\0\0\0\x11\x60\xea\x88\x13\xa8\x61".into()),
+        ("traj", b"\0\0\0\0\xe8\x03\0\0\x01\xf4\x01\x88\x13\0\0\0".into()),
         ("motive", MOTIVE.into()),
         ("vicon", VICON.into()),
         ("earth", EARTH.into()),

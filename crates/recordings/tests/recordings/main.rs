@@ -10,6 +10,7 @@ mod clocks;
 mod columns;
 mod containers;
 mod data_sets;
+mod drones;
 mod earth;
 mod exports;
 mod formats;

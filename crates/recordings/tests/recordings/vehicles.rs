@@ -197,7 +197,6 @@ fn unsupported_formats_have_a_remedy() {
     for (bytes, said, way) in [
         (&b"#ROSBAG V2.0\n"[..], "a ROS 1 bag", "rosbags-convert"),
         (b"SQLite format 3\0\x10", "SQLite", "rosbags-convert --src BAG --dst flight --dst-storage mcap"),
-        (b"skyb\x01", "Skybrush", ".skyc"),
         (b"\xa3\x95\x80\x80", "ArduPilot", "mavlogdump"),
         (b"FMT, 128, 89, FMT, BBnNZ, Type,Length\n", "ArduPilot", "mavlogdump"),
         (b"\0\x05\xf0\0\0\0\0\0\xfd\x09", "MAVLink", "mavlogdump"),

@@ -8,6 +8,7 @@ use tautline_audit::recorded::RecordedError;
 use tautline_core::record::RecordError;
 use tautline_laws::law::ParameterError;
 use tautline_recordings::export::ExportError;
+use tautline_recordings::export::drones::DroneError;
 use tautline_recordings::read::ReadError;
 use tautline_sim::scenario::{Place, ScenarioError};
 use tautline_sim::sim::SimError;
@@ -207,6 +208,12 @@ impl From<ReadError> for Failure {
 
 impl From<ExportError> for Failure {
     fn from(error: ExportError) -> Self {
+        Self::new(error.code(), error.is_machine(), error.to_string()).with_help(error.help())
+    }
+}
+
+impl From<DroneError> for Failure {
+    fn from(error: DroneError) -> Self {
         Self::new(error.code(), error.is_machine(), error.to_string()).with_help(error.help())
     }
 }

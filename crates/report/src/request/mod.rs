@@ -9,9 +9,11 @@
 //! | [`RunRequest`] | [`run_into`] | a folder with recording, report, figures and pictures |
 //! | [`AuditRequest`] | [`audit_files`] | a verdict on a recording of any origin |
 //! | [`ExportRequest`] | [`export_file`] | a recording in another format |
+//! | [`DroneExportRequest`] | [`export_drones`] | trajectories of drones, judged after their encoding |
 //! | [`ScenarioRequest`] | [`identify`] | a measured tracking error, and a model file |
 
 pub mod audit;
+mod drones;
 mod export;
 mod failure;
 mod identify;
@@ -21,6 +23,7 @@ mod run;
 mod scenario;
 
 pub use audit::{AuditRequest, AuditedRecording, ConfigFile, OwnRecording, Subject, audit_files, run_audit};
+pub use drones::{DroneExport, DroneExportRequest, export_drones};
 pub use export::{ExportRequest, export_file};
 pub use failure::{Failure, blanked, in_range};
 pub use identify::{IdentifiedModel, identify};

@@ -364,6 +364,17 @@ impl<'a> AuditRequest<'a> {
         Ok(settings)
     }
 
+    /// Returns the settings with the limits and obstacles of the files and of the recording.
+    ///
+    /// # Errors
+    /// [`Failure`] if the request or a file is wrong, or the recording cannot be read.
+    pub fn settings_with_limits(&self, monitor: &dyn Monitor) -> Result<Settings, Failure> {
+        let mut settings = self.complete_settings()?;
+        let (own, own_limit_m) = self.subject.own(monitor)?;
+        RecordedLimits::fill(&mut settings, self, own.as_ref(), own_limit_m);
+        Ok(settings)
+    }
+
     /// Rejects a single vehicle without other limits, and a number of vehicles other than the expected one.
     fn check_count(&self, outcome: &Outcome, settings: &Settings) -> Result<(), Failure> {
         let path = self.subject.name();

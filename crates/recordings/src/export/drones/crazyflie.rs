@@ -1,0 +1,216 @@
+//! Crazyflie trajectories: a CSV of polynomials, or compressed segments.
+//!
+//! The firmware holds trajectories in 4,096 bytes. A polynomial takes 132 bytes: 4 axes of 8 coefficients and the
+//! duration, in single precision. The CSV holds these numbers as the firmware rounds them. The compressed form holds
+//! the start, segments and a last segment without a duration; see [`crate::segments`].
+
+use std::fmt::Write as _;
+
+use nalgebra::Vector3;
+
+use super::fit::{POINTS, Piece, seconds};
+use super::motion::{Arc, Motion};
+use super::{DroneError, DroneFile, EncodedVehicle, Work};
+use crate::segments::{HEAD_BYTES, LARGEST, OutOfRange, Trajectory, rounding_m};
+
+/// Memory of the firmware for trajectories \[bytes\].
+const MEMORY_BYTES: usize = 4096;
+/// Size of a polynomial in it \[bytes\].
+const PIECE_BYTES: usize = 132;
+/// Unit of length of compressed segments \[m\].
+const UNIT_M: f64 = 1e-3;
+/// Name of the memory.
+const MEMORY: &str = "the memory of a Crazyflie";
+
+/// Polynomial as the firmware holds it: duration \[s\] and coefficients of the powers of time \[m/s^k\].
+struct Polynomial {
+    duration_s: f32,
+    powers: [Vector3<f32>; POINTS],
+}
+
+/// Returns the CSV of a vehicle.
+pub(super) fn polynomials(
+    work: &Work<'_>,
+    name: &str,
+    label: &str,
+    motion: &Motion,
+) -> Result<(DroneFile, EncodedVehicle), DroneError> {
+    let found = work.within(name, motion, 0.0, |_| true, |pieces| Ok(Some(rounded(pieces))))?;
+    let bytes = found.len() * PIECE_BYTES;
+    if bytes > MEMORY_BYTES {
+        let (vehicle, pieces) = (name.to_owned(), found.len());
+        return Err(DroneError::TooLong { vehicle, pieces, bytes, what: MEMORY, most: MEMORY_BYTES, compresses: true });
+    }
+    let file = DroneFile { name: format!("{label}.csv"), bytes: csv(&found).into_bytes() };
+    let (name, label) = (name.to_owned(), label.to_owned());
+    Ok((file, EncodedVehicle { name, label, parts: found.len(), bytes }))
+}
+
+/// Rounds pieces to single precision; also returns the curve of the rounded numbers.
+fn rounded(pieces: &[Piece]) -> (Vec<Polynomial>, Motion) {
+    let (mut polynomials, mut arcs, mut from_s) = (Vec::with_capacity(pieces.len()), Vec::new(), 0.0);
+    let mut end_ms = 0;
+    for piece in pieces {
+        let arc = Arc {
+            from_s: 0.0,
+            to_s: seconds(u64::from(piece.duration_ms)),
+            points: piece.points.to_vec(),
+            rounding_m: 0.0,
+        };
+        // Up to the exact end of the piece, so that rounding does not add up.
+        end_ms += u64::from(piece.duration_ms);
+        let duration_s = (seconds(end_ms) - from_s) as f32;
+        let mut powers = [Vector3::zeros(); POINTS];
+        for (power, exact) in powers.iter_mut().zip(arc.powers()) {
+            // Adding 0 turns -0 into 0.
+            *power = exact.map(|x| x as f32 + 0.0);
+        }
+        let to_s = from_s + f64::from(duration_s);
+        arcs.push(Arc::of_powers(from_s, to_s, &powers.map(|power| power.map(f64::from))));
+        polynomials.push(Polynomial { duration_s, powers });
+        from_s = to_s;
+    }
+    (polynomials, Motion { arcs })
+}
+
+/// Returns the CSV with one polynomial in each row. Its decimals have the values of single precision.
+fn csv(polynomials: &[Polynomial]) -> String {
+    let mut text = "duration".to_owned();
+    for axis in ["x", "y", "z", "yaw"] {
+        for power in 0..POINTS {
+            // Writing to a string cannot fail.
+            let _ = write!(text, ",{axis}^{power}");
+        }
+    }
+    for polynomial in polynomials {
+        let _ = write!(text, "\n{:?}", f64::from(polynomial.duration_s));
+        for axis in 0..3 {
+            for power in &polynomial.powers {
+                let _ = write!(text, ",{:?}", f64::from(power[axis]));
+            }
+        }
+        text.push_str(&",0.0".repeat(POINTS));
+    }
+    text + "\n"
+}
+
+/// Returns the compressed segments of a vehicle.
+pub(super) fn compressed(
+    work: &Work<'_>,
+    name: &str,
+    label: &str,
+    motion: &Motion,
+) -> Result<(DroneFile, EncodedVehicle), DroneError> {
+    let found = work.within(
+        name,
+        motion,
+        rounding_m(UNIT_M),
+        |_| true,
+        |pieces| {
+            let trajectory =
+                Trajectory::of_pieces(pieces, UNIT_M, false).map_err(|error| too_far(name, error, UNIT_M))?;
+            let curve = trajectory.motion(UNIT_M);
+            Ok(Some((trajectory, curve)))
+        },
+    )?;
+    let mut bytes = Vec::new();
+    found.encode(&mut bytes);
+    bytes.extend([0; HEAD_BYTES]);
+    let (size, pieces) = (bytes.len(), found.segments.len());
+    if size > MEMORY_BYTES {
+        let vehicle = name.to_owned();
+        return Err(DroneError::TooLong {
+            vehicle,
+            pieces,
+            bytes: size,
+            what: MEMORY,
+            most: MEMORY_BYTES,
+            compresses: false,
+        });
+    }
+    let file = DroneFile { name: format!("{label}.traj"), bytes };
+    Ok((file, EncodedVehicle { name: name.to_owned(), label: label.to_owned(), parts: pieces, bytes: size }))
+}
+
+/// Returns the error of a coordinate beyond 16 bits.
+pub(super) fn too_far(name: &str, error: OutOfRange, unit_m: f64) -> DroneError {
+    DroneError::TooFar {
+        vehicle: name.to_owned(),
+        time_s: seconds(error.from_ms),
+        coordinate_m: error.coordinate_m,
+        largest_m: f64::from(LARGEST) * unit_m,
+    }
+}
+
+impl Trajectory {
+    /// Returns the motion of the segments, for a unit of length \[m\].
+    pub(super) fn motion(&self, unit_m: f64) -> Motion {
+        let (mut arcs, mut from_ms) = (Vec::with_capacity(self.segments.len()), 0);
+        for (duration_ms, points) in self.curves(unit_m) {
+            let to_ms = from_ms + u64::from(duration_ms);
+            if to_ms > from_ms {
+                arcs.push(Arc { from_s: seconds(from_ms), to_s: seconds(to_ms), points, rounding_m: 0.0 });
+            }
+            from_ms = to_ms;
+        }
+        Motion { arcs }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::vector;
+
+    use super::*;
+    use crate::export::drones::{Dialect, DroneOptions, deviation_with_rests, encode};
+
+    fn line(duration_s: f64, to: Vector3<f64>) -> Motion {
+        Motion { arcs: vec![Arc::straight(0.0, duration_s, Vector3::zeros(), to)] }
+    }
+
+    #[test]
+    fn rows_hold_the_numbers_of_the_firmware() {
+        let flight = [("cf1".to_owned(), line(2.5, vector![1.0, 0.1, -2.0]))];
+        let encoded = encode(&flight, &DroneOptions::new(Dialect::Crazyflie), &|| false).expect("encoded");
+        let text = String::from_utf8(encoded.files[0].bytes.clone()).expect("text");
+        let lines: Vec<_> = text.lines().collect();
+        assert_eq!((lines.len(), encoded.vehicles[0].parts, encoded.vehicles[0].bytes), (2, 1, 132));
+        assert!(lines[0].starts_with("duration,x^0,x^1,") && lines[0].ends_with(",yaw^7"), "{}", lines[0]);
+        let numbers: Vec<f64> = lines[1].split(',').map(|cell| cell.parse().expect("a number")).collect();
+        assert_eq!((numbers.len(), numbers[0]), (33, 2.5));
+        assert!((numbers[2] - 0.4).abs() < 1e-6 && (numbers[10] - 0.04).abs() < 1e-6, "{numbers:?}");
+        assert!(numbers.iter().all(|number| f64::from(*number as f32) == *number));
+    }
+
+    #[test]
+    fn a_wavy_flight_exceeds_the_memory() {
+        let place = |k: u32| {
+            let t = f64::from(k) / 20.0;
+            vector![libm::sin(7.0 * t), libm::cos(5.0 * t), 1.0]
+        };
+        let arc = |k: u32| Arc::straight(f64::from(k) / 20.0, f64::from(k + 1) / 20.0, place(k), place(k + 1));
+        let motion = Motion { arcs: (0..1200).map(arc).collect() };
+        let flight = [("cf1".to_owned(), motion)];
+        let options = DroneOptions { tolerance_m: Some(0.03), ..DroneOptions::new(Dialect::Crazyflie) };
+        let refused = encode(&flight, &options, &|| false).expect_err("refused");
+        assert!(matches!(refused, DroneError::TooLong { pieces: 32.., most: 4096, compresses: true, .. }), "{refused}");
+        assert!(refused.help().contains("--compressed"));
+        let options = DroneOptions { is_compressed: true, ..options };
+        let encoded = encode(&flight, &options, &|| false).expect("encoded");
+        let bytes = &encoded.files[0].bytes;
+        let (trajectory, length) = Trajectory::decode(bytes, true).expect("decoded");
+        assert_eq!((length, encoded.vehicles[0].bytes), (bytes.len(), bytes.len()));
+        assert!(deviation_with_rests(&flight[0].1, &trajectory.motion(UNIT_M)).bound_m <= 0.03);
+    }
+
+    #[test]
+    fn positions_beyond_32_m_need_another_form() {
+        let flight = [("cf1".to_owned(), line(20.0, vector![40.0, 0.0, 1.0]))];
+        let options = DroneOptions { is_compressed: true, ..DroneOptions::new(Dialect::Crazyflie) };
+        let refused = encode(&flight, &options, &|| false).expect_err("refused");
+        assert!(matches!(refused, DroneError::TooFar { largest_m: 32.767, .. }), "{refused}");
+        assert!(encode(&flight, &DroneOptions::new(Dialect::Crazyflie), &|| false).is_ok());
+        let fine = DroneOptions { tolerance_m: Some(0.001), ..options };
+        assert!(matches!(encode(&flight, &fine, &|| false), Err(DroneError::Resolution { .. })));
+    }
+}

@@ -1,0 +1,201 @@
+//! Reads compressed segments: compiled Skybrush trajectories (`.skyb`), and compressed trajectories of Crazyflies.
+//!
+//! A file holds one drone, which is named after the file. Its times count from the start of the trajectory. Lights, yaw
+//! and other blocks of a Skybrush file are not read. [`crate::segments`] describes the segments.
+
+use std::io::Read as _;
+
+use super::curves::{Curves, piece, powers};
+use super::error::{Fault, Place, ReadError, refuse};
+use super::options::ReadOptions;
+use super::order::Recording;
+use super::readers::{Format, FormatOption, Packing, Reader};
+use super::skybrush::stand_throughout;
+use super::source::Source;
+use crate::export::drones::fit::seconds;
+use crate::export::drones::skybrush as skyb;
+use crate::segments::{Trajectory, Truncated};
+use tautline_core::track::{Item, Sample};
+
+/// Reader of compiled Skybrush trajectories.
+pub(super) const SKYB: Reader = Reader {
+    name: "skyb",
+    title: "a compiled Skybrush trajectory",
+    extensions: &["skyb"],
+    docs: "Compiled Skybrush trajectory, a file for each drone in a folder",
+    magic: &[skyb::MAGIC],
+    sniff: |head| head.begins_with_any(&[skyb::MAGIC]),
+    open: open_skyb,
+    supports: &[FormatOption::Axes],
+    packing: Packing::Archive,
+};
+
+/// Reader of compressed Crazyflie trajectories.
+pub(super) const CRAZYFLIE: Reader = Reader {
+    name: "crazyflie-compressed",
+    title: "a compressed Crazyflie trajectory",
+    extensions: &["traj"],
+    docs: "Compressed Crazyflie trajectory, a file for each vehicle in a folder",
+    magic: &[],
+    // A file without magic bytes: its segments must end with the last byte.
+    sniff: |head| match Trajectory::decode(head.bytes, true) {
+        Ok((trajectory, length)) => length == head.bytes.len() && !trajectory.segments.is_empty(),
+        Err(_) => false,
+    },
+    open: open_crazyflie,
+    supports: &[FormatOption::Axes],
+    packing: Packing::Archive,
+};
+
+fn open_crazyflie(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+    open(&[source.clone()], crazyflie, None, options)
+}
+
+fn open_skyb(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+    open(&[source.clone()], skybrush, None, options)
+}
+
+/// Opens a folder with one vehicle in each file; `left_out` is the note on other files.
+pub(super) fn open_folder(
+    format: Format,
+    files: &[Source],
+    left_out: Option<String>,
+    options: &ReadOptions,
+) -> Result<Recording, ReadError> {
+    open(files, if format == Format::SKYB { skybrush } else { crazyflie }, left_out, options)
+}
+
+/// Returns whether files of a format hold compressed segments.
+pub(super) fn is_compressed(format: Format) -> bool {
+    format == Format::SKYB || format == Format::CRAZYFLIE_COMPRESSED
+}
+
+/// Trajectory of a file, with its unit of length \[m\].
+type Decoded = (Trajectory, f64);
+
+fn open(
+    files: &[Source],
+    decode: fn(&[u8]) -> Result<Decoded, ReadError>,
+    left_out: Option<String>,
+    options: &ReadOptions,
+) -> Result<Recording, ReadError> {
+    let mut curves = Vec::with_capacity(files.len());
+    for (vehicle, file) in files.iter().enumerate() {
+        let of_file = || {
+            let mut bytes = Vec::new();
+            file.bytes()?.read_to_end(&mut bytes)?;
+            let (trajectory, unit_m) = decode(&bytes)?;
+            items(vehicle, &trajectory, unit_m, options)
+        };
+        let items = of_file().map_err(|error| error.of(&file.display_path()));
+        curves.push((file.stem(), items.map_err(|error| if files.len() > 1 { error.among_others() } else { error })?));
+    }
+    stand_throughout(curves.iter_mut().map(|(_, items)| items));
+    Ok(Curves::recording(curves, left_out.into_iter().collect()))
+}
+
+fn crazyflie(bytes: &[u8]) -> Result<Decoded, ReadError> {
+    let (trajectory, length) = Trajectory::decode(bytes, true).map_err(|fault| truncated(fault, 0))?;
+    if length < bytes.len() {
+        let problem = format!("{} bytes follow the segment without a duration, which ends it", bytes.len() - length);
+        let fault = Fault::coded("recording/damaged", problem, "write the trajectory again");
+        return Err(fault.at(Place::Byte(length as u64)));
+    }
+    Ok((trajectory, skyb::unit_m(1)))
+}
+
+fn skybrush(bytes: &[u8]) -> Result<Decoded, ReadError> {
+    if !bytes.starts_with(skyb::MAGIC) {
+        return Err(Fault::WrongFormat(Format::SKYB).into());
+    }
+    let (start, body) = trajectory_block(bytes, start_of_blocks(bytes)?)?;
+    let Some((&first, segments)) = body.split_first() else {
+        return Err(truncated(Truncated { byte: 0 }, start));
+    };
+    // The eighth bit states whether the yaw is used.
+    let scale = u32::from(first & 0x7f);
+    if scale == 0 {
+        let fault =
+            Fault::coded("recording/no-positions", "the scale of its trajectory is 0", "compile the show again");
+        return Err(fault.at(Place::Byte(start as u64)));
+    }
+    let (trajectory, _) = Trajectory::decode(segments, false).map_err(|fault| truncated(fault, start + 1))?;
+    Ok((trajectory, skyb::unit_m(scale)))
+}
+
+/// Checks the header of a Skybrush file and returns the offset of its first block.
+fn start_of_blocks(bytes: &[u8]) -> Result<usize, ReadError> {
+    let version_at = skyb::MAGIC.len();
+    let again = "compile the show again, or give the .skyc show";
+    let unsupported = |problem: String, byte: usize| {
+        Err(Fault::coded("recording/unsupported-format", problem, again).at(Place::Byte(byte as u64)))
+    };
+    let missing = || Fault::Truncated("its header is incomplete".to_owned());
+    match bytes.get(version_at).ok_or_else(missing)? {
+        1 => return Ok(version_at + 1),
+        2 => {}
+        version => return unsupported(format!("the version of the file is {version}, expected 1 or 2"), version_at),
+    }
+    let features = *bytes.get(version_at + 1).ok_or_else(missing)?;
+    if features == 0 {
+        return Ok(version_at + 2);
+    }
+    if features != skyb::HAS_CHECKSUM {
+        return unsupported(format!("its features {features:#04x} are unknown, expected 0x00 or 0x01"), version_at + 1);
+    }
+    let end = skyb::CHECKSUM_AT + 4;
+    let stored = bytes.get(skyb::CHECKSUM_AT..end).and_then(|sum| sum.try_into().ok()).map(u32::from_le_bytes);
+    let (stored, sum) = (stored.ok_or_else(missing)?, skyb::checksum(bytes));
+    if stored != sum {
+        let problem = format!("its checksum is {sum:08x}, and the file states {stored:08x}");
+        return Err(Fault::Damaged(problem).at(Place::Byte(skyb::CHECKSUM_AT as u64)));
+    }
+    Ok(end)
+}
+
+/// Returns the first block with a trajectory: the offset of its body, and the body.
+fn trajectory_block(bytes: &[u8], mut at: usize) -> Result<(usize, &[u8]), ReadError> {
+    while at < bytes.len() {
+        let block = || {
+            let &[kind, low, high] = bytes.get(at..at + 3)? else { return None };
+            let body = bytes.get(at + 3..at + 3 + usize::from(u16::from_le_bytes([low, high])))?;
+            Some((kind, body))
+        };
+        let Some((kind, body)) = block() else {
+            return Err(Fault::Truncated("a block is incomplete".to_owned()).at(Place::Byte(at as u64)));
+        };
+        if kind == skyb::TRAJECTORY {
+            return Ok((at + 3, body));
+        }
+        at += 3 + body.len();
+    }
+    refuse("recording/no-positions", "it has no trajectory", "export the show with the paths of its drones")
+}
+
+/// Returns the items of a vehicle.
+fn items(vehicle: usize, trajectory: &Trajectory, unit_m: f64, options: &ReadOptions) -> Result<Vec<Item>, ReadError> {
+    let (mut items, mut from_ms, scale) = (Vec::new(), 0, options.metres());
+    for (duration_ms, points) in trajectory.curves(unit_m) {
+        let to_ms = from_ms + u64::from(duration_ms);
+        // A segment without a duration is a jump to the start of the next one.
+        if duration_ms > 0 {
+            let (from_s, to_s) = (seconds(from_ms), seconds(to_ms));
+            let coefficients = powers(&points, to_s - from_s);
+            let piece = piece(vehicle, from_s, to_s, coefficients, scale).ok_or_else(Fault::out_of_range)?;
+            items.push(Item::Piece(piece));
+        }
+        from_ms = to_ms;
+    }
+    if items.is_empty() {
+        let [x, y, z, _] = trajectory.start.map(|number| f64::from(number) * unit_m * scale);
+        let position_m = [x, y, z].into();
+        items.push(Item::Sample(Sample { vehicle, time_s: 0.0, position_m, velocity_m_s: None, radius_m: None }));
+    }
+    Ok(items)
+}
+
+/// Returns the error of an incomplete segment of a body that begins at an offset.
+fn truncated(fault: Truncated, start: usize) -> ReadError {
+    Fault::Truncated("a segment of its trajectory is incomplete".to_owned())
+        .at(Place::Byte((start + fault.byte) as u64))
+}
