@@ -94,8 +94,8 @@ pub struct PlanFindings {
 
 impl PlanFindings {
     /// Returns the settings with which the plan is audited. Its limit for a pair is that of the flight plus the
-    /// distances of both from the plan, or twice the tube. `None` if nothing follows for the flight: there is no limit, lengths
-    /// are scaled, a distance is unknown, or a vehicle may have left the tube.
+    /// distances of both from the plan, or twice the tube. `None` if nothing follows for the flight: there is no limit,
+    /// lengths are scaled, a distance is unknown, or a vehicle may have left the tube.
     ///
     /// `names` are those of the flight, and `shift_s` is added to the times of the plan.
     #[must_use]
