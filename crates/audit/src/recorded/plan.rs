@@ -93,7 +93,7 @@ pub struct PlanFindings {
 }
 
 impl PlanFindings {
-    /// Returns the settings with which the plan is audited: its limit for a pair is that of the flight plus the
+    /// Returns the settings with which the plan is audited. Its limit for a pair is that of the flight plus the
     /// distances of both from the plan, or twice the tube. `None` if nothing follows for the flight: there is no limit,
     /// lengths are scaled, a distance is unknown, or a vehicle may have left the tube.
     ///
@@ -176,9 +176,9 @@ impl PlanComparison {
         [flown.collect(), self.plan.iter().map(|(name, _)| name.as_str()).filter(|name| is_selected(name)).collect()]
     }
 
-    /// Returns the distances. `delay_s` is added to the times of the plan; `None` estimates it: of the delays within a
-    /// minute of `shift_s`, the one of least mean squared distance at the samples, and of several the smallest. Beyond
-    /// its ends a plan counts as standing for this estimate alone. `shift_s` is the difference of the epochs.
+    /// Returns the distances. `delay_s` is added to the times of the plan, and `shift_s`, the difference of the epochs.
+    /// `None` estimates the delay. Of the delays within a minute, it takes the one of least mean squared distance at
+    /// the samples, and of several the smallest. Beyond its ends a plan counts as standing for this estimate alone.
     ///
     /// # Errors
     /// [`RecordedError`] if an item of the plan is invalid.

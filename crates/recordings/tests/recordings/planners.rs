@@ -47,11 +47,14 @@ fn refused(messages: &[Message], options: &ReadOptions) -> ReadError {
     read_bytes("plan.mcap", &mcap_of(messages), options).expect_err("refused")
 }
 
-fn pieces(found: &Whole) -> Vec<&Piece> {
-    let piece = |item| match item {
+fn piece(item: &Item) -> &Piece {
+    match item {
         Item::Piece(piece) => piece,
         Item::Sample(sample) => panic!("{sample:?}"),
-    };
+    }
+}
+
+fn pieces(found: &Whole) -> Vec<&Piece> {
     found.items.iter().map(piece).collect()
 }
 
@@ -59,10 +62,10 @@ fn pieces(found: &Whole) -> Vec<&Piece> {
 fn position(found: &Whole, name: &str, time_s: f64) -> [f64; 3] {
     let vehicle = found.vehicles.iter().position(|known| known == name).expect("a vehicle");
     let mut of_vehicle = pieces(found).into_iter().filter(|piece| piece.vehicle == vehicle);
-    let piece = of_vehicle.rfind(|piece| piece.from_s <= time_s).expect("a piece");
-    assert!(time_s <= piece.to_s, "{time_s} {piece:?}");
-    let powers = piece.coefficients.iter().rev();
-    powers.fold(Vector3::zeros(), |sum, c| sum * (time_s - piece.from_s) + c).into()
+    let begun = of_vehicle.rfind(|piece| piece.from_s <= time_s).expect("a piece");
+    assert!(time_s <= begun.to_s, "{time_s} {begun:?}");
+    let powers = begun.coefficients.iter().rev();
+    powers.fold(Vector3::zeros(), |sum, c| sum * (time_s - begun.from_s) + c).into()
 }
 
 fn assert_near(found: [f64; 3], expected: [f64; 3]) {

@@ -56,7 +56,7 @@ pub struct PlanUnknown {
     pub missing: &'static str,
 }
 
-/// Separation of the flight that follows from the separations of the plan: each pair of the plan must keep the limit of
+/// Separation of the flight that follows from the separations of the plan. Each pair of the plan must keep the limit of
 /// the flight and the distances of both vehicles from the plan.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct PlanCertificate {
@@ -134,7 +134,8 @@ impl PlanReport {
                 (Some(VehicleFinding { vehicle, finding: PlanUnknown { from_s, to_s, missing } }), _) => {
                     let (from, to) = (fixed(*from_s, 3), fixed(*to_s, 3));
                     format!(
-                        "the distance of {vehicle} from the plan is not known from {from} s to {to} s: no {missing} ({delay})"
+                        "the distance of {vehicle} from the plan is not known from {from} s to {to} s: no {missing} \
+                         ({delay})"
                     )
                 }
                 (None, Some((vehicle, PlanDistance { upper_m, lower_m, .. }))) => {
@@ -203,8 +204,8 @@ impl PlanCertificate {
         let (keeps, needs, at) = (at_least(*plan_m, 6), at_most(*needs_m, 6), seconds(*at_s));
         if *holds {
             format!(
-                "the plan keeps delta + 2e, so the flight within e of it keeps delta ({first} and {second}: {keeps} m at \
-                 {at}, {needs} m needed)"
+                "the plan keeps delta + 2e, so the flight within e of it keeps delta ({first} and {second}: {keeps} m \
+                 at {at}, {needs} m needed)"
             )
         } else {
             format!("the plan does not keep delta + 2e ({first} and {second}: {keeps} m at {at}, {needs} m needed)")
