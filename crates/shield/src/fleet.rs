@@ -141,9 +141,9 @@ impl Fleet {
         }
     }
 
-    /// Stores a broadcast for all vehicles but its sender.
+    /// Stores the messages of a broadcast for their receivers.
     pub fn hear_broadcast(&mut self, broadcast: &Broadcast) {
-        self.shields.iter_mut().for_each(|shield| shield.hear_broadcast(broadcast));
+        broadcast.messages().for_each(|message| self.hear(&message));
     }
 
     /// Writes the commands of all vehicles at a common instant \[m/s^2\]. Lists that are too short leave the other
@@ -155,9 +155,9 @@ impl Fleet {
         }
     }
 
-    /// Messages of all vehicles, by sender and then by receiver.
-    pub fn messages(&self) -> impl Iterator<Item = Message> + '_ {
-        self.shields.iter().flat_map(Shield::messages)
+    /// Takes the messages of all vehicles, by sender and then by receiver. See [`Shield::messages`].
+    pub fn messages(&mut self) -> impl Iterator<Item = Message> + '_ {
+        self.shields.iter_mut().flat_map(Shield::messages)
     }
 
     /// Shields, in the order of the vehicles.

@@ -80,6 +80,7 @@
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
+mod agenda;
 pub mod brake;
 pub mod choice;
 pub mod contract;
@@ -93,7 +94,7 @@ pub mod tube;
 pub mod unicycle;
 
 pub use brake::State;
-pub use contract::{Broadcast, Message};
+pub use contract::{Broadcast, Entry, Message};
 pub use fleet::Fleet;
 pub use obstacle::{ConvexBody, Obstacle};
 pub use report::Counters;
