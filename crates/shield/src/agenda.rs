@@ -16,9 +16,9 @@
 //! is not looked at keeps its planes.
 
 /// Numbers of periods after which a contract is looked at again, while its plane has the room for it.
-const SLEEPS: [u64; 6] = [2, 4, 8, 16, 32, 64];
+const SLEEPS: [u64; 7] = [2, 4, 8, 16, 32, 64, 128];
 /// Number of periods for which contracts are noted, above the longest of [`SLEEPS`].
-const BUCKETS: usize = 128;
+const BUCKETS: usize = 256;
 /// Room that is added because of rounding \[m\].
 const SLACK_M: f64 = 1e-6;
 

@@ -18,6 +18,9 @@
 //!
 //! A plane from which both vehicles are far is not renewed. The owner may propose or not at any instant.
 
+use std::cmp::Ordering;
+use std::sync::Arc;
+
 use serde::{Deserialize, Serialize};
 
 use crate::agenda::{Agenda, Horizon};
@@ -146,7 +149,7 @@ const NO_PROPOSAL: Proposal = Proposal { number: 0, divider: Divider { normal: [
 
 /// Room, in the reach of a period at full speed, beyond which a plane is not renewed. A vehicle needs several periods
 /// for this distance, and planes beyond reach do not limit its choice.
-const RENEWED: f64 = 4.0;
+const RENEWED: f64 = 2.0;
 
 /// A contract at an instant, and what follows for the next ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -244,8 +247,7 @@ impl Owned {
                 (self.held, self.held_since) = (side.owner_plane(&self.proposed.divider), period);
             }
         }
-        let rooms = [self.held.room_m(&own.position()), -self.held.room_m(&self.segment.position())];
-        if !is_due || (rooms[0] > self.far_m[0] && rooms[1] > self.far_m[1]) {
+        if !is_due || self.is_far(own) {
             return false;
         }
         if let Some(divider) = Divider::between(side.metric, own, &self.segment, side.margin_m, self.follower_margin_m)
@@ -256,6 +258,13 @@ impl Owned {
         }
         // Without a proposal, the message asks for the follower's segment.
         true
+    }
+
+    /// Whether both vehicles are far from the plane, with the own segment.
+    #[inline]
+    fn is_far(&self, own: &Segment) -> bool {
+        let followers = -self.held.room_m(&self.segment.position());
+        self.held.room_m(&own.position()) > self.far_m[0] && followers > self.far_m[1]
     }
 
     /// Renews the plane at an instant, and adds the planes within reach.
@@ -361,7 +370,13 @@ impl Followed {
 
     /// Decides at an instant, and adds the plane if it is within reach. Each message of the owner is answered.
     #[inline]
-    fn look(&mut self, at: &Instant<'_>, [is_due, has_news]: [bool; 2], near: &mut Reach, counted: &mut Renewed) -> Seen {
+    fn look(
+        &mut self,
+        at: &Instant<'_>,
+        [is_due, has_news]: [bool; 2],
+        near: &mut Reach,
+        counted: &mut Renewed,
+    ) -> Seen {
         self.decide(at.segment, at.side, at.period, counted);
         let room = self.held.room_m(&at.segment.position());
         if room <= at.reach_m {
@@ -390,13 +405,17 @@ impl Followed {
     }
 }
 
-/// Contracts of a vehicle with all others.
+/// Contracts of a vehicle with all others. A contract has a record from the first instant or message at which it is more
+/// than the plane of the starts, which both vehicles can compute again.
 #[derive(Clone, Debug)]
 pub(crate) struct Contracts {
     index: u32,
-    /// With the vehicles of smaller numbers, in their order.
+    starts: Arc<[Start]>,
+    /// Place of the record of each other vehicle, from 1; 0 without a record.
+    places: Vec<u32>,
+    /// With vehicles of smaller numbers.
     followed: Vec<Followed>,
-    /// With the vehicles of larger numbers, in their order.
+    /// With vehicles of larger numbers.
     owned: Vec<Owned>,
     agenda: Agenda,
 }
@@ -406,20 +425,23 @@ impl Contracts {
     ///
     /// # Errors
     /// If the number is not in the list, or the vehicle starts too near to another one.
-    pub(crate) fn new(index: usize, starts: &[Start]) -> Result<Self, ShieldError> {
+    pub(crate) fn new(index: usize, starts: Arc<[Start]>) -> Result<Self, ShieldError> {
         let count = starts.len();
         let (Some(own), Ok(number)) = (starts.get(index), u32::try_from(index)) else {
             let problem = format!("the number of the vehicle is not among {count} starts");
             return Err(ShieldError::new("index", problem, index as f64, "count vehicles from 0"));
         };
-        let followed = starts[..index].iter().map(|owner| Followed::new(own, owner)).collect();
-        let owned = starts[index + 1..].iter().map(|follower| Owned::new(own, follower)).collect();
-        if let (Some(followed), Some(owned)) = (followed, owned) {
-            return Ok(Self { index: number, followed, owned, agenda: Agenda::new(count) });
+        let has_plane = |owner: &Start, follower: &Start| divider_of_starts(owner, follower).is_some();
+        let (before, after) = (&starts[..index], &starts[index + 1..]);
+        if before.iter().all(|owner| has_plane(owner, own)) && after.iter().all(|follower| has_plane(own, follower)) {
+            // Memory is used as records come.
+            let (followed, owned) = (Vec::with_capacity(index), Vec::with_capacity(count - index - 1));
+            let (places, agenda) = (vec![0; count], Agenda::new(count));
+            return Ok(Self { index: number, starts, places, followed, owned, agenda });
         }
-        let apart = |other: usize| PairRoom::of(starts, index.min(other), index.max(other));
+        let apart = |other: usize| PairRoom::of(&starts, index.min(other), index.max(other));
         let others = (0..count).filter(|other| *other != index).map(apart);
-        let worst = others.min_by(|a, b| a.room_m().total_cmp(&b.room_m())).or_else(|| closest_starts(starts));
+        let worst = others.min_by(|a, b| a.room_m().total_cmp(&b.room_m())).or_else(|| closest_starts(&starts));
         Err(worst.map_or_else(
             || ShieldError::new("start", "a vehicle has no pair".into(), 0.0, "give two starts"),
             |worst| worst.too_near(),
@@ -431,18 +453,52 @@ impl Contracts {
         self.index
     }
 
+    /// Returns the contract with a vehicle of a larger number, at the start.
+    fn owned_at_start(&self, other: usize) -> Option<Owned> {
+        Owned::new(&self.starts[self.index as usize], self.starts.get(other)?)
+    }
+
+    /// Returns the contract with a vehicle of a smaller number, at the start.
+    fn followed_at_start(&self, other: usize) -> Option<Followed> {
+        Followed::new(&self.starts[self.index as usize], self.starts.get(other)?)
+    }
+
+    /// Returns the place of the record of a vehicle, which is made if there is none; `None` for no other vehicle.
+    #[inline]
+    fn place(&mut self, other: usize) -> Option<usize> {
+        let place = *self.places.get(other)?;
+        if place == 0 { self.add(other) } else { Some(place as usize - 1) }
+    }
+
+    fn add(&mut self, other: usize) -> Option<usize> {
+        // `new` has found a plane for each pair.
+        let count = match other.cmp(&(self.index as usize)) {
+            Ordering::Less => {
+                self.followed.push(self.followed_at_start(other)?);
+                self.followed.len()
+            }
+            Ordering::Greater => {
+                self.owned.push(self.owned_at_start(other)?);
+                self.owned.len()
+            }
+            Ordering::Equal => return None,
+        };
+        self.places[other] = u32::try_from(count).ok()?;
+        Some(count - 1)
+    }
+
     /// Stores a message to this vehicle. Messages to other vehicles have no effect.
     #[inline]
     pub(crate) fn hear(&mut self, message: &Message) {
-        if message.to != self.index {
+        let from = message.from as usize;
+        if message.to != self.index || !message.is_valid() {
             return;
         }
-        let (from, own) = (message.from as usize, self.index as usize);
-        let is_new = if let Some(contract) = self.followed.get_mut(from) {
-            contract.hear(message)
+        let Some(place) = self.place(from) else { return };
+        let is_new = if message.from < self.index {
+            self.followed[place].hear(message)
         } else {
-            let contract = from.checked_sub(own + 1).and_then(|place| self.owned.get_mut(place));
-            contract.is_some_and(|contract| contract.hear(message))
+            self.owned[place].hear(message)
         };
         if is_new {
             self.agenda.hear(from);
@@ -452,58 +508,90 @@ impl Contracts {
     /// Reads the newest messages, decides and proposes at an instant, in the order of the other vehicles. Adds the
     /// planes within reach.
     pub(crate) fn renew(&mut self, at: &Instant<'_>, near: &mut Reach) -> Renewed {
-        let Self { index, followed, owned, agenda } = self;
         let mut renewed = Renewed::default();
-        for word in 0..agenda.words() {
-            let [fired, heard] = agenda.take(word, at.period);
+        for word in 0..self.agenda.words() {
+            let [fired, heard] = self.agenda.take(word, at.period);
             let mut open = fired | heard;
             while open != 0 {
                 let other = 64 * word + open.trailing_zeros() as usize;
                 let bit = open & open.wrapping_neg();
                 open ^= bit;
-                let has_news = heard & bit != 0;
-                // A period noted before a message or a proposal set another one is passed over.
-                let is_due = |due: u64| fired & bit != 0 && due <= at.period;
-                let (seen, due) = if let Some(contract) = followed.get_mut(other) {
-                    let is_due = is_due(contract.due);
-                    if !(is_due || has_news) {
-                        continue;
-                    }
-                    (contract.look(at, [is_due, has_news], near, &mut renewed), &mut contract.due)
-                } else {
-                    let place = other.checked_sub(*index as usize + 1);
-                    let Some(contract) = place.and_then(|place| owned.get_mut(place)) else { continue };
-                    let is_due = is_due(contract.due);
-                    if !(is_due || has_news) {
-                        continue;
-                    }
-                    (contract.look(at, is_due, near, &mut renewed), &mut contract.due)
-                };
-                let next = at.period + seen.sleeps;
-                if *due <= at.period || next < *due {
-                    *due = next;
-                    agenda.schedule(other, next);
-                }
-                if seen.speaks {
-                    agenda.speak(other);
-                }
+                self.look(other, [fired & bit != 0, heard & bit != 0], at, near, &mut renewed);
             }
         }
-        agenda.end(at.period);
+        self.agenda.end(at.period);
         renewed
+    }
+
+    /// Looks at the contract with a vehicle whose period has come or that has news.
+    #[inline]
+    fn look(
+        &mut self,
+        other: usize,
+        [has_come, has_news]: [bool; 2],
+        at: &Instant<'_>,
+        near: &mut Reach,
+        renewed: &mut Renewed,
+    ) {
+        if self.places.get(other) == Some(&0)
+            && let Some(room) = self.room_at_start(other, at)
+        {
+            self.agenda.schedule(other, at.period + at.horizons[0].periods(room));
+            return;
+        }
+        let Some(place) = self.place(other) else { return };
+        // A period noted before a message or a proposal set another one is passed over.
+        let is_due = |due: u64| has_come && due <= at.period;
+        let (seen, due) = if other < self.index as usize {
+            let contract = &mut self.followed[place];
+            let is_due = is_due(contract.due);
+            if !(is_due || has_news) {
+                return;
+            }
+            (contract.look(at, [is_due, has_news], near, renewed), &mut contract.due)
+        } else {
+            let contract = &mut self.owned[place];
+            let is_due = is_due(contract.due);
+            if !(is_due || has_news) {
+                return;
+            }
+            (contract.look(at, is_due, near, renewed), &mut contract.due)
+        };
+        let next = at.period + seen.sleeps;
+        if *due <= at.period || next < *due {
+            *due = next;
+            self.agenda.schedule(other, next);
+        }
+        if seen.speaks {
+            self.agenda.speak(other);
+        }
+    }
+
+    /// Returns the room of the plane of the starts \[m\], if both vehicles are far from it.
+    fn room_at_start(&self, other: usize, at: &Instant<'_>) -> Option<f64> {
+        let (held, is_far) = match other.cmp(&(self.index as usize)) {
+            Ordering::Less => {
+                let contract = self.followed_at_start(other)?;
+                (contract.held, contract.held.room_m(&at.segment.position()) > contract.far_m)
+            }
+            Ordering::Greater => {
+                let contract = self.owned_at_start(other)?;
+                (contract.held, contract.is_far(at.segment))
+            }
+            Ordering::Equal => return None,
+        };
+        is_far.then(|| held.room_m(&at.segment.position()))
     }
 
     /// Takes the next part of the messages that are to be sent.
     #[inline]
     fn next_entry(&mut self) -> Option<Entry> {
-        let (to, own) = (self.agenda.next_outgoing()?, self.index as usize);
-        let number = u32::try_from(to).ok()?;
-        Some(match self.followed.get(to) {
-            Some(contract) => Entry { to: number, proposal: None, decision: contract.decision() },
-            None => {
-                let contract = to.checked_sub(own + 1).and_then(|place| self.owned.get(place));
-                Entry { to: number, proposal: contract.and_then(Owned::proposal), decision: None }
-            }
+        let to = self.agenda.next_outgoing()?;
+        let (number, place) = (u32::try_from(to).ok()?, self.place(to)?);
+        Some(if number < self.index {
+            Entry { to: number, proposal: None, decision: self.followed[place].decision() }
+        } else {
+            Entry { to: number, proposal: self.owned[place].proposal(), decision: None }
         })
     }
 
@@ -536,16 +624,14 @@ impl Contracts {
             let divider = Divider::between(side.metric, own, other, side.margin_m, side.margin_m);
             divider.map(|divider| side.owner_plane(&divider))
         };
-        let mut planes = heard.iter().map(plane);
         let mut has_all = true;
-        for contract in &mut self.followed {
-            planes.next().flatten().map_or_else(|| has_all = false, |plane| contract.held = plane);
-        }
-        planes.next();
-        for contract in &mut self.owned {
-            planes.next().flatten().map_or_else(|| has_all = false, |plane| contract.hold(plane));
-        }
-        for other in (0..heard.len()).filter(|other| *other != self.index as usize) {
+        for (other, segment) in heard.iter().enumerate() {
+            let Some(place) = self.place(other) else { continue };
+            match plane(segment) {
+                None => has_all = false,
+                Some(plane) if other < self.index as usize => self.followed[place].held = plane,
+                Some(plane) => self.owned[place].hold(plane),
+            }
             self.agenda.hear(other);
             self.agenda.speak(other);
         }
@@ -554,8 +640,8 @@ impl Contracts {
 
     /// Returns the number of the pending proposal to a vehicle.
     pub(crate) fn pending_number(&self, to: u32) -> Option<u64> {
-        let place = to.checked_sub(self.index + 1)?;
-        Some(self.owned.get(place as usize)?.proposal()?.number)
+        let place = *self.places.get(to as usize).filter(|place| to > self.index && **place > 0)?;
+        Some(self.owned[place as usize - 1].proposal()?.number)
     }
 }
 
@@ -670,13 +756,13 @@ mod tests {
         assert_eq!(owner.proposal(), None);
         // The plane is at 10.
         let mut near = owner;
-        near.hear(&decides(&follower, 1, 10.6 + 4.0 * reach));
+        near.hear(&decides(&follower, 1, 10.6 + 2.0 * reach));
         near.renew(&at(0.0), &SIDE, 1, true);
         assert_eq!(near.proposal(), None);
-        near.hear(&decides(&follower, 2, 10.4 + 4.0 * reach));
+        near.hear(&decides(&follower, 2, 10.4 + 2.0 * reach));
         near.renew(&at(0.0), &SIDE, 1, true);
         assert!(near.proposal().is_some());
-        owner.renew(&at(9.6 - 4.0 * reach), &SIDE, 1, true);
+        owner.renew(&at(9.6 - 2.0 * reach), &SIDE, 1, true);
         assert!(owner.proposal().is_some());
     }
 

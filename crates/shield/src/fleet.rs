@@ -1,5 +1,7 @@
 //! Shields of all vehicles of a simulation, and the condition on their starts.
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
 use crate::brake::State;
@@ -104,7 +106,9 @@ impl Fleet {
         if let Some(worst) = closest_starts(&starts).filter(|worst| worst.room_m() < 0.0) {
             return Err(worst.too_near());
         }
-        let shields = limits.iter().enumerate().map(|(index, limits)| Shield::new(limits, index, &starts));
+        let starts: Arc<[Start]> = starts.into();
+        let shields = limits.iter().enumerate();
+        let shields = shields.map(|(index, limits)| Shield::of_checked(limits, index, Arc::clone(&starts)));
         Ok(Self { shields: shields.collect::<Result<_, _>>()? })
     }
 

@@ -1,6 +1,7 @@
 //! Shield of one vehicle: from a wish and a measurement to a command, by the steps of the certificate.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 
@@ -76,7 +77,12 @@ impl Shield {
     /// If the number is not in the list, or the vehicle starts too near to another one.
     pub fn new(limits: &Limits, index: usize, starts: &[Start]) -> Result<Self, ShieldError> {
         limits.check_bodies(starts)?;
-        let contracts = Contracts::new(index, starts)?;
+        Self::of_checked(limits, index, starts.into())
+    }
+
+    /// Returns the shield among starts that have the same bodies.
+    pub(crate) fn of_checked(limits: &Limits, index: usize, starts: Arc<[Start]>) -> Result<Self, ShieldError> {
+        let contracts = Contracts::new(index, Arc::clone(&starts))?;
         // The index is in the list.
         let own = &starts[index];
         Ok(Self {

@@ -293,7 +293,7 @@ impl UnicycleShield {
     /// If a setting or the start is invalid, or the vehicle starts too near to another one.
     pub fn new(loiter: &Loiter, index: usize, pose: &Pose, starts: &[Start]) -> Result<Self, ShieldError> {
         let own = loiter.start(pose)?;
-        let contracts = Contracts::new(index, starts)?;
+        let contracts = Contracts::new(index, starts.into())?;
         if starts.get(index) != Some(&own) {
             let problem = "the announced start differs from this pose of the vehicle counted from 0".into();
             return Err(ShieldError::new("start", problem, index as f64, "announce `Loiter::start` of this pose"));

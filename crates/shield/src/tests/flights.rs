@@ -230,6 +230,10 @@ fn a_broadcast_contains_the_messages_and_is_heard_like_them() {
     let flight = random_flight(3, ranges);
     let mut world = World::new(&flight);
     (0..101).for_each(|_| world.step(&flight));
+    // The messages of the last instants have been taken.
+    for shield in world.fleet.shields_mut() {
+        shield.filter(shield.next_reference(), Vector3::zeros());
+    }
     let (mut by_message, mut by_broadcast) = (world.fleet.clone(), world.fleet.clone());
     let mut broadcast = crate::Broadcast::default();
     let count = u32::try_from(world.states.len()).expect("few");
