@@ -124,3 +124,61 @@ fn bucket(period: u64) -> usize {
     let remainder = (period % BUCKETS as u64) as usize;
     remainder
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::tests::Random;
+    use crate::{Settings, State};
+
+    /// Returns how many planes came within reach before the period in which they are looked at again. Each is approached
+    /// at the largest acceleration and speed, and the rooms of the horizon are multiplied by a factor.
+    fn missed(factor: f64) -> u32 {
+        let limits = Settings::new(1.0, 0.05).limits().expect("defaults");
+        let mut random = Random::new(31);
+        let mut missed = 0;
+        for _ in 0..3_000 {
+            let velocity_m_s = Vector3::x() * random.between(-2.0, 2.0);
+            let mut state = State { position_m: Vector3::zeros(), velocity_m_s };
+            let plane_m = random.between(0.0, 16.0);
+            let mut horizon = limits.horizon(velocity_m_s.norm());
+            horizon.rooms_m.iter_mut().for_each(|room_m| *room_m *= factor);
+            for _ in 1..horizon.periods(plane_m) {
+                let command = limits.envelope.cut(&state.velocity_m_s, Vector3::x() * 9.0);
+                state = state.after(command, 0.05);
+                let reach_m = limits.envelope.reach_m(&state, limits.choice);
+                missed += u32::from(plane_m - state.position_m.x <= reach_m);
+            }
+        }
+        missed
+    }
+
+    #[test]
+    fn no_plane_comes_within_reach_before_it_is_looked_at_again() {
+        assert_eq!(missed(1.0), 0);
+        assert!(missed(0.5) > 100);
+    }
+
+    #[test]
+    fn contracts_are_taken_once_in_their_period_or_a_later_one() {
+        let mut agenda = Agenda::new(70);
+        let mut all = |agenda: &mut Agenda, period: u64| {
+            let found = [0, 1].map(|word| agenda.take(word, period));
+            agenda.end(period);
+            found
+        };
+        assert_eq!(all(&mut agenda, 1), [[u64::MAX, 0]; 2]);
+        agenda.schedule(3, 5);
+        agenda.schedule(66, 129);
+        agenda.hear(65);
+        assert_eq!(all(&mut agenda, 2), [[0, 0], [0, 2]]);
+        // Periods that passed without a call are caught up.
+        assert_eq!(all(&mut agenda, 9), [[8, 0], [0, 0]]);
+        assert_eq!(all(&mut agenda, 1_000), [[0, 0], [4, 0]]);
+        agenda.speak(66);
+        agenda.speak(4);
+        assert_eq!([(); 3].map(|()| agenda.next_outgoing()), [Some(4), Some(66), None]);
+    }
+}

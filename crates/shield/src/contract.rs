@@ -16,7 +16,16 @@
 //! Every message repeats the present segment, the pending proposal and the last decision. A message with a larger stamp
 //! therefore contains all that an older one can still say, and the newest message of a sender is the only one stored.
 //!
-//! A plane from which both vehicles are far is not renewed. The owner may propose or not at any instant.
+//! # When messages are sent
+//! Lemma 3 allows the loss of any message, so it allows that none is sent. A contract is due in the periods of
+//! `agenda`: in each one near the plane, and less often with more room.
+//!
+//! - An owner whose contract is due sends its pending proposal. Without one it proposes, unless both vehicles are far.
+//! - A follower sends its segment and last decision whenever it has heard the owner. It also sends them if its contract
+//!   is due and it is near the plane: an owner far away needs the segment.
+//!
+//! The owner repeats a proposal until it hears the decision, and each repetition is answered. A lost answer is therefore
+//! sent again.
 
 use std::cmp::Ordering;
 use std::sync::Arc;

@@ -19,8 +19,8 @@ pub const ROUNDING_M: f64 = 1e-6;
 const BRAKE_SHARE: f64 = 0.6;
 /// Default ease, as a share of the safety distance.
 const EASE_SHARE: f64 = 0.2;
-/// Distance beyond reach within which planes are renewed in each period, in periods at the largest speed. A proposal and
-/// its decision take two of them.
+/// Distance beyond reach within which planes are renewed in each period, in periods at the largest speed. A proposal
+/// and its decision take two of them.
 pub(crate) const LEAD_PERIODS: f64 = 2.0;
 /// Largest age of a measurement, in periods.
 const MAX_DELAY: usize = 20;
