@@ -12,8 +12,8 @@
 //! limits no choice (tests compare both), so the commands have the same bits as if all planes were tested. A change of
 //! the plane takes a message or a proposal, and each of them sets a new period.
 //!
-//! Lemmas 2 and 3 hold unchanged: a vehicle may propose, decide and send at any of its instants, or not. A contract that
-//! is not looked at keeps its planes.
+//! Lemmas 2 and 3 hold unchanged: a vehicle may propose, decide and send at any of its instants, or not. A contract
+//! that is not looked at keeps its planes.
 
 /// Numbers of periods after which a contract is looked at again, while its plane has the room for it.
 const SLEEPS: [u64; 7] = [2, 4, 8, 16, 32, 64, 128];
@@ -133,8 +133,8 @@ mod tests {
     use crate::tests::Random;
     use crate::{Settings, State};
 
-    /// Returns how many planes came within reach before the period in which they are looked at again. Each is approached
-    /// at the largest acceleration and speed, and the rooms of the horizon are multiplied by a factor.
+    /// Returns how many planes came within reach before the period in which they are looked at again. Each one is
+    /// approached at the largest acceleration and speed. The rooms of the horizon are multiplied by a factor.
     fn missed(factor: f64) -> u32 {
         let limits = Settings::new(1.0, 0.05).limits().expect("defaults");
         let mut random = Random::new(31);
@@ -164,7 +164,7 @@ mod tests {
     #[test]
     fn contracts_are_taken_once_in_their_period_or_a_later_one() {
         let mut agenda = Agenda::new(70);
-        let mut all = |agenda: &mut Agenda, period: u64| {
+        let all = |agenda: &mut Agenda, period: u64| {
             let found = [0, 1].map(|word| agenda.take(word, period));
             agenda.end(period);
             found

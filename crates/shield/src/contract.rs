@@ -24,8 +24,8 @@
 //! - A follower sends its segment and last decision whenever it has heard the owner. It also sends them if its contract
 //!   is due and it is near the plane: an owner far away needs the segment.
 //!
-//! The owner repeats a proposal until it hears the decision, and each repetition is answered. A lost answer is therefore
-//! sent again.
+//! The owner repeats a proposal until it hears the decision, and each repetition is answered. A lost answer is
+//! therefore sent again.
 
 use std::cmp::Ordering;
 use std::sync::Arc;
@@ -80,8 +80,8 @@ impl Message {
     }
 }
 
-/// Messages from one vehicle to others, with the segment once. It may arrive at each of them late, never, twice or after
-/// a later one.
+/// Messages from one vehicle to others, with the segment once. It may arrive at each of them late, never, twice or
+/// after a later one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Broadcast {
     /// Sender, counted from 0.
@@ -414,8 +414,8 @@ impl Followed {
     }
 }
 
-/// Contracts of a vehicle with all others. A contract has a record from the first instant or message at which it is more
-/// than the plane of the starts, which both vehicles can compute again.
+/// Contracts of a vehicle with all others. A contract has a record from the first instant or message at which it is
+/// more than the plane of the starts, which both vehicles can compute again.
 #[derive(Clone, Debug)]
 pub(crate) struct Contracts {
     index: u32,
@@ -472,7 +472,7 @@ impl Contracts {
         Followed::new(&self.starts[self.index as usize], self.starts.get(other)?)
     }
 
-    /// Returns the place of the record of a vehicle, which is made if there is none; `None` for no other vehicle.
+    /// Returns the place of the record of another vehicle. Makes the record at first.
     #[inline]
     fn place(&mut self, other: usize) -> Option<usize> {
         let place = *self.places.get(other)?;
