@@ -108,7 +108,7 @@ impl Fleet {
         }
         let starts: Arc<[Start]> = starts.into();
         let shields = limits.iter().enumerate();
-        let shields = shields.map(|(index, limits)| Shield::of_checked(limits, index, Arc::clone(&starts)));
+        let shields = shields.map(|(index, limits)| Shield::of_checked(limits, index, &starts));
         Ok(Self { shields: shields.collect::<Result<_, _>>()? })
     }
 

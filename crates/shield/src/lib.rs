@@ -11,6 +11,7 @@
 //! | [`tube`] | rigorous bounds on the distance to the reference and on the feedback |
 //! | [`plane`] | reserved segments and the plane between two of them |
 //! | [`contract`] | messages, proposals and decisions (Lemma 3) |
+//! | `contracts` | contracts of a vehicle with all others |
 //! | `agenda` | periods at which contracts are looked at |
 //! | [`obstacle`] | convex obstacles and the planes before them (Lemma 4) |
 //! | [`choice`] | which commands are accepted, and which one is taken |
@@ -88,6 +89,7 @@ mod agenda;
 pub mod brake;
 pub mod choice;
 pub mod contract;
+mod contracts;
 pub mod fleet;
 pub mod obstacle;
 pub mod plane;

@@ -8,7 +8,8 @@ use nalgebra::Vector3;
 use crate::agenda::Horizon;
 use crate::brake::State;
 use crate::choice::{Chosen, Reach};
-use crate::contract::{Broadcast, Contracts, Instant, Message};
+use crate::contract::{Broadcast, Instant, Message};
+use crate::contracts::Contracts;
 use crate::obstacle::{KeepOut, Obstacle};
 use crate::plane::Segment;
 use crate::report::Counters;
@@ -77,12 +78,12 @@ impl Shield {
     /// If the number is not in the list, or the vehicle starts too near to another one.
     pub fn new(limits: &Limits, index: usize, starts: &[Start]) -> Result<Self, ShieldError> {
         limits.check_bodies(starts)?;
-        Self::of_checked(limits, index, starts.into())
+        Self::of_checked(limits, index, &starts.into())
     }
 
     /// Returns the shield among starts that have the same bodies.
-    pub(crate) fn of_checked(limits: &Limits, index: usize, starts: Arc<[Start]>) -> Result<Self, ShieldError> {
-        let contracts = Contracts::new(index, Arc::clone(&starts))?;
+    pub(crate) fn of_checked(limits: &Limits, index: usize, starts: &Arc<[Start]>) -> Result<Self, ShieldError> {
+        let contracts = Contracts::new(index, Arc::clone(starts))?;
         // The index is in the list.
         let own = &starts[index];
         Ok(Self {
