@@ -16,7 +16,6 @@ struct Crowd {
     fleet: Fleet,
     states: Vec<State>,
     slots: Vec<Vector3<f64>>,
-    commands: Vec<Vector3<f64>>,
     sent: Vec<Broadcast>,
 }
 
@@ -28,36 +27,29 @@ impl Crowd {
         let states: Vec<_> = (0..count).map(|i| State::at_rest(place(i))).collect();
         let fleet = Fleet::new(&vec![limits; count], &states).expect("starts are apart");
         let slots = (0..count).map(|i| place((i * 37 + 11) % count)).collect();
-        Self { fleet, states, slots, commands: vec![Vector3::zeros(); count], sent: vec![Broadcast::default(); count] }
+        Self { fleet, states, slots, sent: vec![Broadcast::default(); count] }
     }
 
-    fn filter(&mut self) {
-        let wanted: Vec<_> = self.states.iter().zip(&self.slots).map(|(state, slot)| slot - state.position_m).collect();
-        self.fleet.filter(black_box(&self.states), &wanted, &mut self.commands);
-        for (state, command) in self.states.iter_mut().zip(&self.commands) {
-            *state = state.after(*command, PERIOD_S);
-        }
-    }
-
-    fn exchange(&mut self) {
-        for (shield, broadcast) in self.fleet.shields().iter().zip(&mut self.sent) {
-            shield.write_broadcast(broadcast);
+    /// Makes a period: each vehicle takes a command and writes its messages, and all of them are heard.
+    fn period(&mut self) {
+        let shields = self.fleet.shields_mut().iter_mut();
+        for (((shield, state), slot), sent) in shields.zip(&mut self.states).zip(&self.slots).zip(&mut self.sent) {
+            let command = shield.filter(black_box(*state), slot - state.position_m);
+            shield.write_broadcast(sent);
+            *state = state.after(command, PERIOD_S);
         }
         self.sent.iter().for_each(|broadcast| self.fleet.hear_broadcast(broadcast));
     }
 }
 
 fn periods(criterion: &mut Criterion) {
-    for count in [10, 30, 100] {
+    for count in [10, 30, 100, 300, 1_000] {
         let mut group = criterion.benchmark_group(format!("shield/{count}"));
         group.sample_size(20);
         for (name, spacing_m) in [("crowd", 2.4), ("apart", 50.0)] {
             let mut crowd = Crowd::new(count, spacing_m);
             group.bench_function(format!("period {name}"), |bencher| {
-                bencher.iter(|| {
-                    crowd.filter();
-                    crowd.exchange();
-                });
+                bencher.iter(|| crowd.period());
             });
         }
         group.finish();

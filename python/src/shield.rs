@@ -107,9 +107,9 @@ impl Shield {
         }
     }
 
-    /// Returns the messages to send after `filter`, each with its receiver.
-    fn messages<'py>(&self, py: Python<'py>) -> PyResult<Vec<(u32, Bound<'py, PyBytes>)>> {
-        let messages = self.shields.iter().flat_map(VehicleShield::messages);
+    /// Takes the messages to send after `filter`, each with its receiver.
+    fn messages<'py>(&mut self, py: Python<'py>) -> PyResult<Vec<(u32, Bound<'py, PyBytes>)>> {
+        let messages = self.shields.iter_mut().flat_map(VehicleShield::messages);
         let packed = messages.map(|message| {
             let bytes = serde_json::to_vec(&message).map_err(|error| internal_error(&error.to_string()))?;
             Ok((message.to, PyBytes::new(py, &bytes)))

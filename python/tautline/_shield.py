@@ -131,7 +131,7 @@ class Shield:
         return np.asarray(commands[0] if own else commands)[..., : shape[-1]]
 
     def messages(self) -> list[tuple[int, bytes]]:
-        """Returns the messages to send after ``filter``, each with its receiver."""
+        """Takes the messages to send after ``filter``, each with its receiver. Vehicles far away get none."""
         return self._native.messages()
 
     @property

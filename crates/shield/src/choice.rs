@@ -91,17 +91,26 @@ impl Envelope {
         self.reach_at_m(self.speed_m_s, choice)
     }
 
-    fn reach_at_m(&self, speed_m_s: f64, choice: Choice) -> f64 {
+    /// Returns the reach at a speed \[m\]. It does not decrease with the speed.
+    pub(crate) fn reach_at_m(&self, speed_m_s: f64, choice: Choice) -> f64 {
         let fastest = speed_m_s + self.accel_m_s2 * self.period_s;
         let ease = if let Choice::GiveWay { ease_m, .. } = choice { ease_m / 2.0 } else { 0.0 };
         fastest * (self.period_s + self.brake.glide_s(fastest)) + ease + SLACK_M
     }
 }
 
-/// Shortens a vector to a length.
+/// Shortens a vector to a length. One that is not finite stays so.
 fn cap(vector: Vector3<f64>, length: f64) -> Vector3<f64> {
     let norm = vector.norm();
-    if norm > length { vector * (length / norm) } else { vector }
+    if norm <= length {
+        vector
+    } else if norm.is_finite() {
+        vector * (length / norm)
+    } else {
+        // The square of the length is too large for a double.
+        let shorter = vector / vector.amax();
+        shorter * (length / shorter.norm())
+    }
 }
 
 /// Planes within reach of a vehicle, with scratch memory.
@@ -282,6 +291,14 @@ mod tests {
         assert_eq!(envelope.cut(&Vector3::zeros(), Vector3::x()), Vector3::x());
         assert_eq!(envelope.cut(&Vector3::zeros(), Vector3::x() * 9.0), Vector3::x() * 5.0);
         assert_eq!(envelope.cut(&(Vector3::x() * 2.0), Vector3::x()), Vector3::zeros());
+        // The squares of large wishes are infinite.
+        for size in [1e150, 1e200, f64::MAX] {
+            let cut = envelope.cut(&Vector3::zeros(), Vector3::new(size, -size, 0.0));
+            assert!((cut - Vector3::new(12.5_f64.sqrt(), -(12.5_f64.sqrt()), 0.0)).amax() < 1e-12, "{size}: {cut}");
+        }
+        for wish in [Vector3::x() * f64::INFINITY, Vector3::y() * f64::NAN] {
+            assert!(envelope.cut(&Vector3::zeros(), wish).iter().any(|value| value.is_nan()), "{wish}");
+        }
     }
 
     #[test]

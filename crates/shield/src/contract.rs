@@ -16,14 +16,23 @@
 //! Every message repeats the present segment, the pending proposal and the last decision. A message with a larger stamp
 //! therefore contains all that an older one can still say, and the newest message of a sender is the only one stored.
 //!
-//! A plane from which both vehicles are far is not renewed. The owner may propose or not at any instant.
+//! # When messages are sent
+//! Lemma 3 allows the loss of any message, so it allows that none is sent. A contract is due in the periods of
+//! `agenda`: in each one near the plane, and less often with more room.
+//!
+//! - An owner whose contract is due sends its pending proposal. Without one it proposes, unless both vehicles are far.
+//! - A follower sends its segment and last decision whenever it has heard the owner. It also sends them if its contract
+//!   is due and it is near the plane: an owner far away needs the segment.
+//!
+//! The owner repeats a proposal until it hears the decision, and each repetition is answered. A lost answer is
+//! therefore sent again.
 
 use serde::{Deserialize, Serialize};
 
+use crate::agenda::Horizon;
 use crate::choice::Reach;
-use crate::fleet::{PairRoom, closest_starts};
 use crate::plane::{Divider, Metric, Plane, Segment};
-use crate::settings::{ShieldError, Start};
+use crate::settings::Start;
 
 /// Proposal of a plane by the owner of a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -62,12 +71,12 @@ pub struct Message {
 
 impl Message {
     /// Whether all numbers are finite and a proposed normal has length 1.
-    fn is_valid(&self) -> bool {
+    pub(crate) fn is_valid(&self) -> bool {
         self.segment.is_finite() && self.proposal.is_none_or(|proposal| proposal.divider.is_valid())
     }
 }
 
-/// Messages from one vehicle to all others, with the segment once. It may arrive at each of them late, never, twice or
+/// Messages from one vehicle to others, with the segment once. It may arrive at each of them late, never, twice or
 /// after a later one.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Broadcast {
@@ -77,23 +86,41 @@ pub struct Broadcast {
     pub stamp: u64,
     /// Segment that the sender holds from its next instant on.
     pub segment: Segment,
-    /// Last decisions, to the vehicles with smaller numbers than the sender, in their order.
-    pub decisions: Vec<Option<Decision>>,
-    /// Pending proposals, to the vehicles with larger numbers, in their order.
-    pub proposals: Vec<Option<Proposal>>,
+    /// Parts for single vehicles, by their number. A broadcast has no message to the others.
+    pub entries: Vec<Entry>,
+}
+
+/// Part of a broadcast for one vehicle.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Entry {
+    /// Receiver, counted from 0.
+    pub to: u32,
+    /// Pending proposal, if the sender owns the pair.
+    pub proposal: Option<Proposal>,
+    /// Last decision, if the sender is the follower of the pair.
+    pub decision: Option<Decision>,
 }
 
 impl Broadcast {
-    /// Returns the message to a vehicle. `None` if it contains none to that vehicle.
+    /// Returns the message to a vehicle. `None` if the broadcast has none.
     #[inline]
     #[must_use]
     pub fn message(&self, to: u32) -> Option<Message> {
-        let (decision, proposal) = if to < self.from {
-            (*self.decisions.get(to as usize)?, None)
-        } else {
-            (None, *self.proposals.get((to - self.from).checked_sub(1)? as usize)?)
-        };
-        Some(Message { from: self.from, to, stamp: self.stamp, segment: self.segment, proposal, decision })
+        let place = self.entries.binary_search_by_key(&to, |entry| entry.to).ok()?;
+        Some(self.message_of(&self.entries[place]))
+    }
+
+    /// Returns the message of an entry.
+    #[inline]
+    #[must_use]
+    pub fn message_of(&self, entry: &Entry) -> Message {
+        let Entry { to, proposal, decision } = *entry;
+        Message { from: self.from, to, stamp: self.stamp, segment: self.segment, proposal, decision }
+    }
+
+    /// Messages to all vehicles with one, in their order.
+    pub fn messages(&self) -> impl Iterator<Item = Message> + '_ {
+        self.entries.iter().map(|entry| self.message_of(entry))
     }
 }
 
@@ -105,7 +132,7 @@ pub(crate) struct Side {
 }
 
 impl Side {
-    fn owner_plane(&self, divider: &Divider) -> Plane {
+    pub(crate) fn owner_plane(&self, divider: &Divider) -> Plane {
         divider.owner_plane(self.metric, self.margin_m)
     }
 
@@ -127,10 +154,31 @@ const NO_PROPOSAL: Proposal = Proposal { number: 0, divider: Divider { normal: [
 
 /// Room, in the reach of a period at full speed, beyond which a plane is not renewed. A vehicle needs several periods
 /// for this distance, and planes beyond reach do not limit its choice.
-const RENEWED: f64 = 4.0;
+const RENEWED: f64 = 2.0;
+
+/// A contract at an instant, and what follows for the next ones.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Seen {
+    /// Whether a message to the other vehicle is to be sent.
+    pub(crate) speaks: bool,
+    /// Number of periods after which the contract is due again.
+    pub(crate) sleeps: u64,
+}
+
+/// Own state at an instant, for all contracts.
+pub(crate) struct Instant<'a> {
+    pub(crate) period: u64,
+    /// Segment from this instant on.
+    pub(crate) segment: &'a Segment,
+    pub(crate) side: &'a Side,
+    /// Reach of a period from the position \[m\].
+    pub(crate) reach_m: f64,
+    /// Rooms of planes that need not be looked at, at the present speed and at the largest speed.
+    pub(crate) horizons: [Horizon; 2],
+}
 
 /// Returns the plane between an owner and a follower at their starts, which both compute with the same numbers.
-fn divider_of_starts(owner: &Start, follower: &Start) -> Option<Divider> {
+pub(crate) fn divider_of_starts(owner: &Start, follower: &Start) -> Option<Divider> {
     Divider::between(owner.metric, &owner.segment, &follower.segment, owner.margin_m, follower.margin_m)
 }
 
@@ -143,7 +191,7 @@ pub(crate) struct Owned {
     segment: Segment,
     decision: Decision,
     /// Plane that both vehicles hold.
-    held: Plane,
+    pub(crate) held: Plane,
     /// Period in which the held plane was taken on.
     held_since: u64,
     /// Last proposal, held beside the other plane while its decision is pending.
@@ -153,6 +201,8 @@ pub(crate) struct Owned {
     follower_margin_m: f64,
     /// Distances of the two vehicles from the owner's plane beyond which the plane is not renewed \[m\].
     far_m: [f64; 2],
+    /// Period in which the contract is due.
+    pub(crate) due: u64,
 }
 
 impl Owned {
@@ -171,35 +221,39 @@ impl Owned {
             is_pending: false,
             follower_margin_m: follower.margin_m,
             far_m: [renewed, renewed + between],
+            due: 0,
         })
     }
 
-    /// Stores a message of the follower unless a later one was heard or its numbers are invalid.
+    /// Stores a message of the follower unless a later one was heard or its numbers are invalid. Returns whether it was
+    /// stored.
     #[inline]
-    pub(crate) fn hear(&mut self, message: &Message) {
-        if message.stamp > self.stamp && message.is_valid() {
+    pub(crate) fn hear(&mut self, message: &Message) -> bool {
+        let is_new = message.stamp > self.stamp && message.is_valid();
+        if is_new {
             self.stamp = message.stamp;
             self.segment = message.segment;
             self.decision = message.decision.unwrap_or(NO_DECISION);
         }
+        is_new
     }
 
-    /// Reads the newest message at an instant of this vehicle, with its segment from this instant on. Then proposes the
-    /// divider of the present segments unless a proposal is pending or both vehicles are far from the plane.
+    /// Reads the newest message at an instant of this vehicle, with its segment from this instant on. If due, proposes
+    /// the divider of the present segments, unless a proposal is pending or both vehicles are far from the plane.
+    /// Returns whether the follower is to get a message.
     #[inline]
-    pub(crate) fn renew(&mut self, own: &Segment, side: &Side, period: u64) {
+    pub(crate) fn renew(&mut self, own: &Segment, side: &Side, period: u64, is_due: bool) -> bool {
         if self.is_pending {
             if self.decision.number != self.proposed.number {
-                return;
+                return is_due;
             }
             self.is_pending = false;
             if self.decision.accepted {
                 (self.held, self.held_since) = (side.owner_plane(&self.proposed.divider), period);
             }
         }
-        let rooms = [self.held.room_m(&own.position()), -self.held.room_m(&self.segment.position())];
-        if rooms[0] > self.far_m[0] && rooms[1] > self.far_m[1] {
-            return;
+        if !is_due || self.is_far(own) {
+            return false;
         }
         if let Some(divider) = Divider::between(side.metric, own, &self.segment, side.margin_m, self.follower_margin_m)
             && side.owner_plane(&divider).contains(own)
@@ -207,10 +261,41 @@ impl Owned {
             self.proposed = Proposal { number: self.proposed.number + 1, divider };
             self.is_pending = true;
         }
+        // Without a proposal, the message asks for the follower's segment.
+        true
+    }
+
+    /// Whether both vehicles are far from the plane, with the own segment.
+    #[inline]
+    pub(crate) fn is_far(&self, own: &Segment) -> bool {
+        let followers = -self.held.room_m(&self.segment.position());
+        self.held.room_m(&own.position()) > self.far_m[0] && followers > self.far_m[1]
+    }
+
+    /// Renews the plane at an instant, and adds the planes within reach.
+    #[inline]
+    pub(crate) fn look(&mut self, at: &Instant<'_>, is_due: bool, near: &mut Reach, renewed: &mut Renewed) -> Seen {
+        let speaks = self.renew(at.segment, at.side, at.period, is_due);
+        let position = at.segment.position();
+        let mut room = self.held.room_m(&position);
+        if room <= at.reach_m {
+            renewed.oldest = renewed.oldest.max(self.age(at.period));
+            near.push(self.held);
+        }
+        if let Some(pending) = self.pending(at.side) {
+            let beside = pending.room_m(&position);
+            if beside <= at.reach_m {
+                near.push(pending);
+            }
+            room = room.min(beside);
+        }
+        let followers_room = -self.held.room_m(&self.segment.position()) - (self.far_m[1] - self.far_m[0]);
+        let [own, fastest] = at.horizons;
+        Seen { speaks, sleeps: own.periods(room).min(fastest.periods(followers_room)) }
     }
 
     /// Returns the plane that both vehicles hold.
-    #[inline]
+    #[cfg(test)]
     pub(crate) fn held(&self) -> Plane {
         self.held
     }
@@ -241,27 +326,35 @@ pub(crate) struct Followed {
     stamp: u64,
     proposal: Proposal,
     /// Plane that both vehicles hold.
-    held: Plane,
+    pub(crate) held: Plane,
     /// Period in which the held plane was taken on.
     held_since: u64,
     /// Last decision.
     decided: Decision,
+    /// Distance from the plane beyond which the owner needs no segment \[m\].
+    pub(crate) far_m: f64,
+    /// Period in which the contract is due.
+    pub(crate) due: u64,
 }
 
 impl Followed {
     /// Returns the contract at the start. `None` if the segments are closer than the margins.
     pub(crate) fn new(own: &Start, owner: &Start) -> Option<Self> {
         let held = divider_of_starts(owner, own)?.follower_plane(own.metric, own.margin_m);
-        Some(Self { stamp: 0, proposal: NO_PROPOSAL, held, held_since: 0, decided: NO_DECISION })
+        let far_m = RENEWED * own.reach_m.max(owner.reach_m);
+        Some(Self { stamp: 0, proposal: NO_PROPOSAL, held, held_since: 0, decided: NO_DECISION, far_m, due: 0 })
     }
 
-    /// Stores a message of the owner unless a later one was heard or its numbers are invalid.
+    /// Stores a message of the owner unless a later one was heard or its numbers are invalid. Returns whether it was
+    /// stored.
     #[inline]
-    pub(crate) fn hear(&mut self, message: &Message) {
-        if message.stamp > self.stamp && message.is_valid() {
+    pub(crate) fn hear(&mut self, message: &Message) -> bool {
+        let is_new = message.stamp > self.stamp && message.is_valid();
+        if is_new {
             self.stamp = message.stamp;
             self.proposal = message.proposal.unwrap_or(NO_PROPOSAL);
         }
+        is_new
     }
 
     /// Decides on a new proposal at an instant of this vehicle, with its segment from this instant on.
@@ -280,8 +373,26 @@ impl Followed {
         }
     }
 
-    /// Returns the plane that both vehicles hold.
+    /// Decides at an instant, and adds the plane if it is within reach. Each message of the owner is answered.
     #[inline]
+    pub(crate) fn look(
+        &mut self,
+        at: &Instant<'_>,
+        [is_due, has_news]: [bool; 2],
+        near: &mut Reach,
+        counted: &mut Renewed,
+    ) -> Seen {
+        self.decide(at.segment, at.side, at.period, counted);
+        let room = self.held.room_m(&at.segment.position());
+        if room <= at.reach_m {
+            counted.oldest = counted.oldest.max(self.age(at.period));
+            near.push(self.held);
+        }
+        Seen { speaks: has_news || (is_due && room <= self.far_m), sleeps: at.horizons[0].periods(room) }
+    }
+
+    /// Returns the plane that both vehicles hold.
+    #[cfg(test)]
     pub(crate) fn held(&self) -> Plane {
         self.held
     }
@@ -299,131 +410,6 @@ impl Followed {
     }
 }
 
-/// Contracts of a vehicle with all others.
-#[derive(Clone, Debug)]
-pub(crate) struct Contracts {
-    index: u32,
-    /// With the vehicles of smaller numbers, in their order.
-    followed: Vec<Followed>,
-    /// With the vehicles of larger numbers, in their order.
-    owned: Vec<Owned>,
-}
-
-impl Contracts {
-    /// Returns the contracts at the start.
-    ///
-    /// # Errors
-    /// If the number is not in the list, or the vehicle starts too near to another one.
-    pub(crate) fn new(index: usize, starts: &[Start]) -> Result<Self, ShieldError> {
-        let count = starts.len();
-        let (Some(own), Ok(number)) = (starts.get(index), u32::try_from(index)) else {
-            let problem = format!("the number of the vehicle is not among {count} starts");
-            return Err(ShieldError::new("index", problem, index as f64, "count vehicles from 0"));
-        };
-        let followed = starts[..index].iter().map(|owner| Followed::new(own, owner)).collect();
-        let owned = starts[index + 1..].iter().map(|follower| Owned::new(own, follower)).collect();
-        if let (Some(followed), Some(owned)) = (followed, owned) {
-            return Ok(Self { index: number, followed, owned });
-        }
-        let apart = |other: usize| PairRoom::of(starts, index.min(other), index.max(other));
-        let others = (0..count).filter(|other| *other != index).map(apart);
-        let worst = others.min_by(|a, b| a.room_m().total_cmp(&b.room_m())).or_else(|| closest_starts(starts));
-        Err(worst.map_or_else(
-            || ShieldError::new("start", "a vehicle has no pair".into(), 0.0, "give two starts"),
-            |worst| worst.too_near(),
-        ))
-    }
-
-    /// Number of the vehicle.
-    pub(crate) fn index(&self) -> u32 {
-        self.index
-    }
-
-    /// Stores a message to this vehicle. Messages to other vehicles have no effect.
-    #[inline]
-    pub(crate) fn hear(&mut self, message: &Message) {
-        if message.to != self.index {
-            return;
-        }
-        let (from, own) = (message.from as usize, self.index as usize);
-        if let Some(contract) = self.followed.get_mut(from) {
-            contract.hear(message);
-        } else if from > own
-            && let Some(contract) = self.owned.get_mut(from - own - 1)
-        {
-            contract.hear(message);
-        }
-    }
-
-    /// Reads the newest messages, decides and proposes, with the segment from this instant on. Adds the planes within
-    /// reach \[m\].
-    pub(crate) fn renew(&mut self, own: &Segment, side: &Side, period: u64, reach_m: f64, near: &mut Reach) -> Renewed {
-        let (mut renewed, position) = (Renewed::default(), own.position());
-        for contract in &mut self.followed {
-            contract.decide(own, side, period, &mut renewed);
-            let held = contract.held();
-            if held.room_m(&position) <= reach_m {
-                renewed.oldest = renewed.oldest.max(contract.age(period));
-                near.push(held);
-            }
-        }
-        for contract in &mut self.owned {
-            contract.renew(own, side, period);
-            let held = contract.held();
-            if held.room_m(&position) <= reach_m {
-                renewed.oldest = renewed.oldest.max(contract.age(period));
-                near.push(held);
-            }
-            if let Some(pending) = contract.pending(side)
-                && pending.room_m(&position) <= reach_m
-            {
-                near.push(pending);
-            }
-        }
-        renewed
-    }
-
-    /// Returns the messages to all other vehicles.
-    pub(crate) fn messages(&self, stamp: u64, segment: Segment) -> impl Iterator<Item = Message> + '_ {
-        let from = self.index;
-        let message = move |to: u32| Message { from, to, stamp, segment, proposal: None, decision: None };
-        let followed = self.followed.iter().zip(0..);
-        let owned = self.owned.iter().zip(from.saturating_add(1)..);
-        let decisions = followed.map(move |(contract, to)| Message { decision: contract.decision(), ..message(to) });
-        decisions.chain(owned.map(move |(contract, to)| Message { proposal: contract.proposal(), ..message(to) }))
-    }
-
-    /// Writes the messages to all other vehicles as one.
-    pub(crate) fn write_broadcast(&self, stamp: u64, segment: Segment, broadcast: &mut Broadcast) {
-        (broadcast.from, broadcast.stamp, broadcast.segment) = (self.index, stamp, segment);
-        broadcast.decisions.clear();
-        broadcast.decisions.extend(self.followed.iter().map(Followed::decision));
-        broadcast.proposals.clear();
-        broadcast.proposals.extend(self.owned.iter().map(Owned::proposal));
-    }
-
-    /// Defect for tests: holds the planes between its own segment and these segments of all vehicles, as for equal
-    /// vehicles and without the contract. Returns whether every pair has one.
-    #[cfg(test)]
-    pub(crate) fn hold_heard(&mut self, own: &Segment, side: &Side, heard: &[Segment]) -> bool {
-        let plane = |other: &Segment| {
-            let divider = Divider::between(side.metric, own, other, side.margin_m, side.margin_m);
-            divider.map(|divider| side.owner_plane(&divider))
-        };
-        let mut planes = heard.iter().map(plane);
-        let mut has_all = true;
-        for contract in &mut self.followed {
-            planes.next().flatten().map_or_else(|| has_all = false, |plane| contract.held = plane);
-        }
-        planes.next();
-        for contract in &mut self.owned {
-            planes.next().flatten().map_or_else(|| has_all = false, |plane| contract.hold(plane));
-        }
-        has_all
-    }
-}
-
-/// Defect for tests: holds planes without the contract.
 #[cfg(test)]
 impl Owned {
     /// Holds a plane and proposes none from now on.
@@ -486,16 +472,16 @@ mod tests {
         assert_eq!(old, Plane { normal: Vector3::x(), offset_m: 1.5 });
         // The follower has moved to 3; the owner hears it and proposes a plane at 1.5.
         owner.hear(&decides(&follower, 1, 3.0));
-        owner.renew(&at(0.0), &SIDE, 1);
+        owner.renew(&at(0.0), &SIDE, 1, true);
         let sent = proposes(&owner, 1, 0.0);
         assert_eq!((owner.held(), owner.pending(&SIDE).map(|plane| plane.offset_m)), (old, Some(1.0)));
         // No second proposal while one is pending, and a decision on another number has no effect.
-        owner.renew(&at(0.2), &SIDE, 1);
+        owner.renew(&at(0.2), &SIDE, 1, true);
         assert_eq!(proposes(&owner, 1, 0.0), sent);
         let mut stale = decides(&follower, 2, 3.0);
         stale.decision = Some(Decision { number: 7, accepted: true });
         owner.hear(&stale);
-        owner.renew(&at(0.0), &SIDE, 2);
+        owner.renew(&at(0.0), &SIDE, 2, true);
         assert_eq!((owner.held(), owner.pending(&SIDE).is_some()), (old, true));
 
         follower.hear(&sent);
@@ -507,7 +493,7 @@ mod tests {
         assert_eq!(counted, Renewed { accepted: 1, ..Renewed::default() });
 
         owner.hear(&decides(&follower, 3, 3.0));
-        owner.renew(&at(0.0), &SIDE, 4);
+        owner.renew(&at(0.0), &SIDE, 4, true);
         assert_eq!((owner.held().offset_m, owner.age(6)), (1.0, 2));
         assert_eq!(owner.proposal().map(|proposal| proposal.number), Some(2));
     }
@@ -517,31 +503,31 @@ mod tests {
         let (mut owner, mut follower) = pair(4.0);
         let mut counted = Renewed::default();
         let (old, kept) = (owner.held(), follower.held());
-        owner.renew(&at(0.5), &SIDE, 1);
+        owner.renew(&at(0.5), &SIDE, 1, true);
         follower.hear(&proposes(&owner, 1, 0.5));
         // The follower is at 2.6: inside the old plane, outside the proposed one at 2.25 plus 0.5.
         follower.decide(&at(2.6), &SIDE, 1, &mut counted);
         assert_eq!((counted, follower.held()), (Renewed { refused: 1, ..Renewed::default() }, kept));
         owner.hear(&decides(&follower, 1, 2.6));
-        owner.renew(&at(0.5), &SIDE, 2);
+        owner.renew(&at(0.5), &SIDE, 2, true);
         assert_eq!((owner.held(), owner.proposal().map(|proposal| proposal.number)), (old, Some(2)));
     }
 
     #[test]
     fn a_plane_is_renewed_when_one_of_the_two_comes_near() {
-        let reach = limits().envelope.largest_reach_m(limits().choice);
+        let reach = slot(0.0).reach_m;
         let (mut owner, follower) = pair(20.0);
-        owner.renew(&at(0.0), &SIDE, 1);
+        owner.renew(&at(0.0), &SIDE, 1, true);
         assert_eq!(owner.proposal(), None);
         // The plane is at 10.
         let mut near = owner;
-        near.hear(&decides(&follower, 1, 10.6 + 4.0 * reach));
-        near.renew(&at(0.0), &SIDE, 1);
+        near.hear(&decides(&follower, 1, 10.6 + 2.0 * reach));
+        near.renew(&at(0.0), &SIDE, 1, true);
         assert_eq!(near.proposal(), None);
-        near.hear(&decides(&follower, 2, 10.4 + 4.0 * reach));
-        near.renew(&at(0.0), &SIDE, 1);
+        near.hear(&decides(&follower, 2, 10.4 + 2.0 * reach));
+        near.renew(&at(0.0), &SIDE, 1, true);
         assert!(near.proposal().is_some());
-        owner.renew(&at(9.6 - 4.0 * reach), &SIDE, 1);
+        owner.renew(&at(9.6 - 2.0 * reach), &SIDE, 1, true);
         assert!(owner.proposal().is_some());
     }
 

@@ -1,5 +1,7 @@
 //! Shields of all vehicles of a simulation, and the condition on their starts.
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 
 use crate::brake::State;
@@ -104,7 +106,9 @@ impl Fleet {
         if let Some(worst) = closest_starts(&starts).filter(|worst| worst.room_m() < 0.0) {
             return Err(worst.too_near());
         }
-        let shields = limits.iter().enumerate().map(|(index, limits)| Shield::new(limits, index, &starts));
+        let starts: Arc<[Start]> = starts.into();
+        let shields = limits.iter().enumerate();
+        let shields = shields.map(|(index, limits)| Shield::of_checked(limits, index, &starts));
         Ok(Self { shields: shields.collect::<Result<_, _>>()? })
     }
 
@@ -141,9 +145,9 @@ impl Fleet {
         }
     }
 
-    /// Stores a broadcast for all vehicles but its sender.
+    /// Stores the messages of a broadcast for their receivers.
     pub fn hear_broadcast(&mut self, broadcast: &Broadcast) {
-        self.shields.iter_mut().for_each(|shield| shield.hear_broadcast(broadcast));
+        broadcast.messages().for_each(|message| self.hear(&message));
     }
 
     /// Writes the commands of all vehicles at a common instant \[m/s^2\]. Lists that are too short leave the other
@@ -155,9 +159,9 @@ impl Fleet {
         }
     }
 
-    /// Messages of all vehicles, by sender and then by receiver.
-    pub fn messages(&self) -> impl Iterator<Item = Message> + '_ {
-        self.shields.iter().flat_map(Shield::messages)
+    /// Takes the messages of all vehicles, by sender and then by receiver. See [`Shield::messages`].
+    pub fn messages(&mut self) -> impl Iterator<Item = Message> + '_ {
+        self.shields.iter_mut().flat_map(Shield::messages)
     }
 
     /// Shields, in the order of the vehicles.

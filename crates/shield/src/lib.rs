@@ -11,6 +11,8 @@
 //! | [`tube`] | rigorous bounds on the distance to the reference and on the feedback |
 //! | [`plane`] | reserved segments and the plane between two of them |
 //! | [`contract`] | messages, proposals and decisions (Lemma 3) |
+//! | `contracts` | contracts of a vehicle with all others |
+//! | `agenda` | periods at which contracts are looked at |
 //! | [`obstacle`] | convex obstacles and the planes before them (Lemma 4) |
 //! | [`choice`] | which commands are accepted, and which one is taken |
 //! | [`settings`] | settings, defaults, errors, limits of the reference |
@@ -40,7 +42,10 @@
 //!    beside the old one. The segments must be at least m1 + m2 apart. Planes far from both vehicles are not renewed;
 //! 3. renews its planes before obstacles within reach, and chooses the acceleration of the reference: a command that is
 //!    *accepted*, or that of the brake;
-//! 4. sends its next segment, pending proposals and last decisions to all.
+//! 4. sends its next segment with pending proposals and last decisions to the vehicles that need them.
+//!
+//! Steps 1, 2 and 4 look only at contracts with news and at those whose plane may come within reach (`agenda`). The
+//! commands have the same bits as if all planes were tested.
 //!
 //! A command is accepted if it and the next speed are within the limits. The next position and the next stop point must
 //! also be inside all planes held. A plane between two vehicles leaves each of them a margin
@@ -80,9 +85,11 @@
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
+mod agenda;
 pub mod brake;
 pub mod choice;
 pub mod contract;
+mod contracts;
 pub mod fleet;
 pub mod obstacle;
 pub mod plane;
@@ -93,7 +100,7 @@ pub mod tube;
 pub mod unicycle;
 
 pub use brake::State;
-pub use contract::{Broadcast, Message};
+pub use contract::{Broadcast, Entry, Message};
 pub use fleet::Fleet;
 pub use obstacle::{ConvexBody, Obstacle};
 pub use report::Counters;

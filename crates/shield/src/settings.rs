@@ -4,6 +4,7 @@ use std::fmt;
 
 use nalgebra::Vector3;
 
+use crate::agenda::Horizon;
 use crate::brake::{Brake, State};
 use crate::choice::{Choice, Envelope};
 use crate::contract::Side;
@@ -18,6 +19,9 @@ pub const ROUNDING_M: f64 = 1e-6;
 const BRAKE_SHARE: f64 = 0.6;
 /// Default ease, as a share of the safety distance.
 const EASE_SHARE: f64 = 0.2;
+/// Distance beyond reach within which planes are renewed in each period, in periods at the largest speed. A proposal
+/// and its decision take two of them.
+pub(crate) const LEAD_PERIODS: f64 = 2.0;
 /// Largest age of a measurement, in periods.
 const MAX_DELAY: usize = 20;
 
@@ -155,7 +159,8 @@ impl Settings {
         let metric = self.half_height_m.map_or(Metric::BALL, |half| Metric::ellipsoid(self.delta_m, half));
         let stretch = metric.stretch();
         let margin_m = f64::midpoint(self.delta_m, ROUNDING_M * stretch) + tube.error_m * stretch;
-        Ok(Limits { settings: *self, tube, envelope, choice, side: Side { margin_m, metric } })
+        let lead_m = LEAD_PERIODS * self.max_speed_m_s * self.period_s;
+        Ok(Limits { settings: *self, tube, envelope, choice, side: Side { margin_m, metric }, lead_m })
     }
 
     fn check_ranges(&self) -> Result<(), ShieldError> {
@@ -239,6 +244,8 @@ pub struct Limits {
     pub(crate) envelope: Envelope,
     pub(crate) choice: Choice,
     side: Side,
+    /// Distance beyond reach within which planes are renewed in each period \[m\].
+    pub(crate) lead_m: f64,
 }
 
 impl Limits {
@@ -287,6 +294,16 @@ impl Limits {
 
     pub(crate) fn side(&self) -> Side {
         self.side
+    }
+
+    /// Returns the rooms of planes that need not be looked at, at a speed of the reference \[m/s\].
+    pub(crate) fn horizon(&self, speed_m_s: f64) -> Horizon {
+        let Envelope { accel_m_s2, speed_m_s: largest_m_s, period_s, .. } = self.envelope;
+        Horizon::new(|periods| {
+            let ahead_s = periods as f64 * period_s;
+            let fastest = (speed_m_s + accel_m_s2 * ahead_s).min(largest_m_s);
+            self.envelope.reach_at_m(fastest, self.choice) + fastest * ahead_s + self.lead_m
+        })
     }
 
     /// Returns an error unless all vehicles have the same safety distance and ellipsoid.
@@ -372,7 +389,7 @@ impl Limits {
 
     fn announced(&self, state: State, segment: Segment) -> Start {
         let Side { margin_m, metric } = self.side;
-        let reach_m = self.envelope.largest_reach_m(self.choice);
+        let reach_m = self.envelope.largest_reach_m(self.choice) + self.lead_m;
         Start { state, segment, margin_m, delta_m: self.settings.delta_m, metric, reach_m }
     }
 }
@@ -388,7 +405,7 @@ pub struct Start {
     pub margin_m: f64,
     pub(crate) delta_m: f64,
     pub(crate) metric: Metric,
-    /// Reach of a period at the largest speed \[m\].
+    /// Reach of a period at the largest speed, and the lead \[m\].
     pub(crate) reach_m: f64,
 }
 

@@ -1,12 +1,15 @@
 //! Shield of one vehicle: from a wish and a measurement to a command, by the steps of the certificate.
 
 use std::collections::VecDeque;
+use std::sync::Arc;
 
 use nalgebra::Vector3;
 
+use crate::agenda::Horizon;
 use crate::brake::State;
 use crate::choice::{Chosen, Reach};
-use crate::contract::{Broadcast, Contracts, Message};
+use crate::contract::{Broadcast, Instant, Message};
+use crate::contracts::Contracts;
 use crate::obstacle::{KeepOut, Obstacle};
 use crate::plane::Segment;
 use crate::report::Counters;
@@ -40,7 +43,7 @@ const REACHED: usize = 128;
 ///         let state = shield.next_reference();
 ///         shield.filter(state, wanted);
 ///     }
-///     let sent: Vec<_> = shields.iter().flat_map(|shield| shield.messages()).collect();
+///     let sent: Vec<_> = shields.iter_mut().flat_map(|shield| shield.messages()).collect();
 ///     sent.iter().for_each(|message| shields[message.to as usize].hear(message));
 /// }
 /// let apart = shields[1].reference().position_m - shields[0].reference().position_m;
@@ -61,6 +64,8 @@ pub struct Shield {
     /// References at the last instants, oldest first, for measurements of that age.
     past: VecDeque<State>,
     contracts: Contracts,
+    /// Rooms of planes that need not be looked at, at the largest speed.
+    fastest: Horizon,
     keep_outs: Vec<KeepOut>,
     reach: Reach,
     counters: Counters,
@@ -73,7 +78,12 @@ impl Shield {
     /// If the number is not in the list, or the vehicle starts too near to another one.
     pub fn new(limits: &Limits, index: usize, starts: &[Start]) -> Result<Self, ShieldError> {
         limits.check_bodies(starts)?;
-        let contracts = Contracts::new(index, starts)?;
+        Self::of_checked(limits, index, &starts.into())
+    }
+
+    /// Returns the shield among starts that have the same bodies.
+    pub(crate) fn of_checked(limits: &Limits, index: usize, starts: &Arc<[Start]>) -> Result<Self, ShieldError> {
+        let contracts = Contracts::new(index, Arc::clone(starts))?;
         // The index is in the list.
         let own = &starts[index];
         Ok(Self {
@@ -85,6 +95,7 @@ impl Shield {
             segment: own.segment,
             past: VecDeque::with_capacity(limits.settings().measurement_delay_periods + 1),
             contracts,
+            fastest: limits.horizon(limits.settings().max_speed_m_s),
             keep_outs: vec![],
             // Two planes per other vehicle, but few are within reach.
             reach: Reach::with_capacity((2 * starts.len()).min(REACHED)),
@@ -128,7 +139,14 @@ impl Shield {
         let (limits, reference) = (self.limits, self.reference);
         let reach = limits.envelope.reach_m(&reference, limits.choice);
         self.reach.clear();
-        let renewed = self.contracts.renew(&self.segment, &limits.side(), self.period, reach, &mut self.reach);
+        let at = Instant {
+            period: self.period,
+            segment: &self.segment,
+            side: &limits.side(),
+            reach_m: reach,
+            horizons: [limits.horizon(reference.velocity_m_s.norm()), self.fastest],
+        };
+        let renewed = self.contracts.renew(&at, &mut self.reach);
         let (segment, is_level) = (self.segment, limits.settings().is_level);
         let planes = self.keep_outs.iter_mut().filter_map(|keep_out| keep_out.within(&segment, reach));
         let height_m = reference.position_m.z;
@@ -195,14 +213,14 @@ impl Shield {
         command
     }
 
-    /// Messages to all other vehicles, to be sent after [`Shield::filter`]. [`Shield::write_broadcast`] is shorter.
-    pub fn messages(&self) -> impl Iterator<Item = Message> + '_ {
+    /// Takes the messages to be sent after [`Shield::filter`], by receiver. Vehicles that are far and have sent nothing
+    /// get none. A message that is taken and not sent counts as lost. [`Shield::write_broadcast`] is shorter.
+    pub fn messages(&mut self) -> impl Iterator<Item = Message> + '_ {
         self.contracts.messages(self.period, self.segment)
     }
 
-    /// Writes the messages to all other vehicles as one, to be sent after [`Shield::filter`]. The memory of `broadcast`
-    /// is used again.
-    pub fn write_broadcast(&self, broadcast: &mut Broadcast) {
+    /// Takes the messages to be sent after [`Shield::filter`], as one. The memory of `broadcast` is used again.
+    pub fn write_broadcast(&mut self, broadcast: &mut Broadcast) {
         self.contracts.write_broadcast(self.period, self.segment, broadcast);
     }
 
@@ -254,6 +272,12 @@ impl Shield {
     #[must_use]
     pub fn counters(&self) -> &Counters {
         &self.counters
+    }
+
+    /// For tests: see [`Contracts::pending_number`].
+    #[cfg(test)]
+    pub(crate) fn pending_number(&self, to: u32) -> Option<u64> {
+        self.contracts.pending_number(to)
     }
 
     /// Defect for tests: see [`Contracts::hold_heard`].

@@ -34,12 +34,14 @@
 use nalgebra::Vector3;
 
 use crate::State;
+use crate::agenda::Horizon;
 use crate::choice::Reach;
-use crate::contract::{Broadcast, Contracts, Message, Side};
+use crate::contract::{Broadcast, Instant, Message, Side};
+use crate::contracts::Contracts;
 use crate::obstacle::{KeepOut, Obstacle};
 use crate::plane::{Metric, Segment};
 use crate::report::Counters;
-use crate::settings::{ROUNDING_M, ShieldError, Start};
+use crate::settings::{LEAD_PERIODS, ROUNDING_M, ShieldError, Start};
 
 /// Largest turn in a period \[rad\].
 const MAX_TURN_RAD: f64 = 1.5;
@@ -185,8 +187,24 @@ impl Loiter {
             margin_m: self.margin_m(),
             delta_m: self.delta_m,
             metric: Metric::BALL,
-            reach_m: self.reach_m(self.max_speed_m_s),
+            reach_m: self.reach_m(self.max_speed_m_s) + self.lead_m(),
         })
+    }
+
+    /// Returns the largest way of q in a period \[m\].
+    fn way_m(&self) -> f64 {
+        (self.max_speed_m_s + self.min_speed_m_s) * self.period_s
+    }
+
+    /// Returns the distance beyond reach within which planes are renewed in each period \[m\].
+    fn lead_m(&self) -> f64 {
+        LEAD_PERIODS * self.way_m()
+    }
+
+    /// Returns the rooms of planes that need not be looked at.
+    fn horizon(&self) -> Horizon {
+        let near_m = self.reach_m(self.max_speed_m_s) + self.lead_m();
+        Horizon::new(|periods| near_m + self.way_m() * periods as f64)
     }
 
     fn margin_m(&self) -> f64 {
@@ -258,6 +276,8 @@ pub struct UnicycleShield {
     loiter: Loiter,
     side: Side,
     contracts: Contracts,
+    /// Rooms of planes that need not be looked at.
+    horizon: Horizon,
     keep_outs: Vec<KeepOut>,
     period: u64,
     reference: Pose,
@@ -274,7 +294,7 @@ impl UnicycleShield {
     /// If a setting or the start is invalid, or the vehicle starts too near to another one.
     pub fn new(loiter: &Loiter, index: usize, pose: &Pose, starts: &[Start]) -> Result<Self, ShieldError> {
         let own = loiter.start(pose)?;
-        let contracts = Contracts::new(index, starts)?;
+        let contracts = Contracts::new(index, starts.into())?;
         if starts.get(index) != Some(&own) {
             let problem = "the announced start differs from this pose of the vehicle counted from 0".into();
             return Err(ShieldError::new("start", problem, index as f64, "announce `Loiter::start` of this pose"));
@@ -288,6 +308,7 @@ impl UnicycleShield {
             loiter: *loiter,
             side: Side { margin_m: loiter.margin_m(), metric: Metric::BALL },
             contracts,
+            horizon: loiter.horizon(),
             keep_outs: vec![],
             period: 0,
             reference: *pose,
@@ -322,7 +343,14 @@ impl UnicycleShield {
         let reach = self.loiter.reach_m(self.reference.speed_m_s);
         self.near.clear();
         let segment = self.fallback.segment;
-        self.counters.renewed(self.contracts.renew(&segment, &self.side, self.period, reach, &mut self.near));
+        let at = Instant {
+            period: self.period,
+            segment: &segment,
+            side: &self.side,
+            reach_m: reach,
+            horizons: [self.horizon; 2],
+        };
+        self.counters.renewed(self.contracts.renew(&at, &mut self.near));
         self.near.extend(self.keep_outs.iter_mut().filter_map(|keep_out| keep_out.within(&segment, reach)));
         if !(wanted.accel_m_s2.is_finite() && wanted.turn_rad_s.is_finite()) {
             self.counters.chosen(true, 1.0);
@@ -395,13 +423,15 @@ impl UnicycleShield {
         self.fallback.segment
     }
 
-    /// Messages to all other vehicles, to be sent after [`UnicycleShield::filter`].
-    pub fn messages(&self) -> impl Iterator<Item = Message> + '_ {
+    /// Takes the messages to be sent after [`UnicycleShield::filter`]. See [`Shield::messages`].
+    ///
+    /// [`Shield::messages`]: crate::Shield::messages
+    pub fn messages(&mut self) -> impl Iterator<Item = Message> + '_ {
         self.contracts.messages(self.period, self.fallback.segment)
     }
 
-    /// Writes the messages to all other vehicles as one.
-    pub fn write_broadcast(&self, broadcast: &mut Broadcast) {
+    /// Takes the messages to be sent, as one.
+    pub fn write_broadcast(&mut self, broadcast: &mut Broadcast) {
         self.contracts.write_broadcast(self.period, self.fallback.segment, broadcast);
     }
 

@@ -15,7 +15,10 @@ fn limits(stop_only: bool) -> Limits {
         stop_only,
         ..Settings::new(1.0 - ROUNDING_M, 0.1)
     };
-    settings.limits().expect("settings are valid")
+    let mut limits = settings.limits().expect("settings are valid");
+    // The reference implementations renew all planes in each period.
+    limits.lead_m = f64::INFINITY;
+    limits
 }
 
 fn flight(stop_only: bool, starts: &[[f64; 6]], slots: &[[f64; 3]], duration_s: f64) -> Flight {

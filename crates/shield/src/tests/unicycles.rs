@@ -130,7 +130,7 @@ impl Vehicle {
         }
     }
 
-    fn messages(&self) -> Vec<Message> {
+    fn messages(&mut self) -> Vec<Message> {
         match self {
             Self::Unicycle(shield, _) => shield.messages().collect(),
             Self::Point(shield, _) => shield.messages().collect(),
@@ -186,7 +186,7 @@ fn dive(seed: u64, has_defect: bool) -> f64 {
             let nearest = others.min_by(|a, b| apart(a).total_cmp(&apart(b))).expect("two");
             vehicle.fly(&nearest);
         }
-        for message in vehicles.iter().flat_map(Vehicle::messages) {
+        for message in vehicles.iter_mut().flat_map(Vehicle::messages) {
             if !random.chance(loss) {
                 flying.push((period + random.index(latency + 1), message));
             }

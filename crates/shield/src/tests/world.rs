@@ -208,9 +208,8 @@ impl World {
             let (_, mut message) = self.flying.swap_remove(place);
             if of.defect == Defect::OwnerDropsOldPlane {
                 let owner = &self.fleet.shields()[message.to as usize];
-                let pending = owner.messages().find(|sent| sent.to == message.from).and_then(|sent| sent.proposal);
-                if let Some(proposal) = pending {
-                    message.decision = Some(crate::contract::Decision { number: proposal.number, accepted: true });
+                if let Some(number) = owner.pending_number(message.from) {
+                    message.decision = Some(crate::contract::Decision { number, accepted: true });
                 }
             }
             let heard = &mut self.heard[message.to as usize][message.from as usize];
@@ -246,7 +245,7 @@ impl World {
     fn send(&mut self, i: usize, of: &Flight) {
         let (now, count) = (self.time_s(), self.states.len());
         let broadcast_is_lost = of.radio.every_third && (self.step / of.instants[i] + i).is_multiple_of(3);
-        let messages: Vec<_> = self.fleet.shields()[i].messages().collect();
+        let messages: Vec<_> = self.fleet.shields_mut()[i].messages().collect();
         for message in messages {
             let burst = of.radio.burst.max(1.0);
             let lost = &mut self.lost[i * count + message.to as usize];

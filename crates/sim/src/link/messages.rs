@@ -54,7 +54,7 @@ pub(crate) enum RadioUse {
 }
 
 /// Fate of single messages: delay, loss, links that are down and vehicles that are silent. It depends only on the seed,
-/// the use, the link and the number of the message.
+/// the use, the sender, the number of the message and the place of the link in the list.
 #[derive(Clone, Debug)]
 pub(crate) struct Radio {
     latency_s: f64,
@@ -117,21 +117,22 @@ impl Radio {
         self.latency_s + self.jitter_s
     }
 
-    /// Writes the arrival times \[s\] of a message of a sender, its number counted from 1, over its links, each with
-    /// its receiver. A message that is lost arrives at infinity. The positions decide which vehicles are within range.
+    /// Adds the arrival times \[s\] of a message of a sender, its number counted from 1, over these links of at most
+    /// `most`, each with its receiver. A message that is lost arrives at infinity. The positions decide which vehicles
+    /// are within range.
     pub(crate) fn send(
         &mut self,
         (sender, number, sent_s): (usize, u64, f64),
         positions_m: &Rows,
-        links: impl ExactSizeIterator<Item = (usize, usize)>,
-        arrives_s: &mut [f64],
+        (links, most): (impl Iterator<Item = (usize, usize)>, usize),
+        arrives_s: &mut Vec<f64>,
     ) {
         if sent_s + SAME_S >= self.silent_from_s[sender] {
-            links.for_each(|(link, _)| arrives_s[link] = f64::INFINITY);
+            arrives_s.extend(links.map(|_| f64::INFINITY));
             return;
         }
         let is_random = self.loss.is_some() || self.jitter_s > 0.0;
-        let mut draw = is_random.then(|| self.noise.draw(sender, self.used_for as usize, number, DRAWS * links.len()));
+        let mut draw = is_random.then(|| self.noise.draw(sender, self.used_for as usize, number, DRAWS * most));
         for (link, receiver) in links {
             let [unit, jitter] = draw.as_mut().map_or([0.0; DRAWS], |draw| [draw.unit(), draw.unit()]);
             let by_chance = self.loss.is_some_and(|loss| {
@@ -144,7 +145,7 @@ impl Radio {
             let is_lost = by_chance || is_beyond || self.down.iter().any(|down| down.blocks(sender, receiver, sent_s));
             self.sent += 1;
             self.lost += u64::from(is_lost);
-            arrives_s[link] = if is_lost { f64::INFINITY } else { sent_s + self.latency_s + self.jitter_s * jitter };
+            arrives_s.push(if is_lost { f64::INFINITY } else { sent_s + self.latency_s + self.jitter_s * jitter });
         }
     }
 }
@@ -227,15 +228,18 @@ impl Messages {
             sent_s,
             measured_s: 0.0,
             states: Swarm::at_rest(Rows::zeros(self.links.count())),
-            arrives_s: vec![f64::INFINITY; self.links.len()],
+            arrives_s: Vec::with_capacity(self.links.len()),
         });
+        broadcast.arrives_s.clear();
         (broadcast.number, broadcast.sent_s) = (self.next, sent_s);
         broadcast.measured_s = sensing.measured_s(sent_s);
         sensing.measure(history, sent_s, None, &mut broadcast.states);
         for sender in 0..self.links.count() {
             let links = self.links.from(sender);
+            let most = links.len();
             let Broadcast { states, arrives_s, .. } = &mut broadcast;
-            self.radio.send((sender, self.next, sent_s), &states.positions_m, links, arrives_s);
+            // Links are numbered by sender.
+            self.radio.send((sender, self.next, sent_s), &states.positions_m, (links, most), arrives_s);
         }
         self.received.iter().for_each(|received| self.ages.take(sent_s - received.measured_s));
         self.next += 1;

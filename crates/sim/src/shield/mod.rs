@@ -2,7 +2,8 @@
 //!
 //! [`ShieldSpec`] holds the keys of the table. [`Scenario::shield_limits`] derives the settings of the shield from the
 //! whole scenario: its period from `time.control_hz`, its delay from `[sensing]`, its lag from `[actuation]`. In flight
-//! `ShieldStage` filters the commands of the law. Contracts travel over the radio of `[network]`, between all pairs.
+//! `ShieldStage` filters the commands of the law. Contracts travel over the radio of `[network]`, between any pair that
+//! is near its plane.
 //!
 //! # What the plant adds to the bounds
 //! The proof is about motion in continuous time. Rapier moves a vehicle along the chord of each step dt, and integrates

@@ -9,7 +9,7 @@ use crate::link::{Radio, RadioUse, period};
 use crate::scenario::{Scenario, ScenarioError, Space};
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_shield::report::Exceeded;
-use tautline_shield::{Broadcast, Counters, Fleet, State};
+use tautline_shield::{Broadcast, Counters, Fleet, Shield, State};
 
 /// Tolerance of equal instants \[s\].
 const SAME_S: f64 = 1e-9;
@@ -29,7 +29,7 @@ pub struct ShieldReport {
     pub breach: Option<ShieldBreach>,
     /// Number of instants at which the law was undefined and all vehicles braked.
     pub undefined: u64,
-    /// Number of messages of contracts, one for each receiver.
+    /// Number of messages of contracts, one for each receiver. Vehicles far from each other send none.
     pub sent: u64,
     /// Number of them that never arrive.
     pub lost: u64,
@@ -82,7 +82,7 @@ pub(crate) struct ShieldStage {
 struct Round {
     /// Messages of each sender.
     broadcasts: Vec<Broadcast>,
-    /// Arrivals \[s\] by sender and then by receiver, without the sender itself; infinite for a lost message.
+    /// Arrivals \[s\] of the messages, in their order; infinite for a lost message.
     arrives_s: Vec<f64>,
     /// Time from which none of them arrives any more \[s\].
     over_s: f64,
@@ -140,12 +140,24 @@ impl ShieldStage {
             }
         }
         self.observe_measurements(time_s, truth);
+        let sends = self.has_round(time_s);
+        let mut round = self.spare.pop().unwrap_or_default();
+        round.broadcasts.resize_with(command.nrows(), Broadcast::default);
         let Self { fleet, measured, wanted, commands, .. } = self;
-        each(fleet.shields_mut(), commands, |i, shield, command| *command = shield.filter(measured[i], wanted[i]));
+        each(fleet.shields_mut(), commands, &mut round.broadcasts, |i, shield, command, broadcast| {
+            *command = shield.filter(measured[i], wanted[i]);
+            if sends {
+                shield.write_broadcast(broadcast);
+            }
+        });
         for (i, shielded) in self.commands.iter().enumerate() {
             set_row(command, i, *shielded);
         }
-        self.send(time_s, truth);
+        if sends {
+            self.send(round, time_s, truth);
+        } else {
+            self.spare.push(round);
+        }
     }
 
     /// Compares the measurements with the true states that they measured.
@@ -179,46 +191,46 @@ impl ShieldStage {
     }
 
     fn deliver(&mut self, time_s: f64) {
-        let Self { fleet, under_way, commands, heard_s, .. } = self;
+        let Self { fleet, under_way, heard_s, .. } = self;
         let (from_s, to_s) = (*heard_s, time_s + SAME_S);
-        let others = commands.len() - 1;
-        each(fleet.shields_mut(), commands, |own, shield, _| {
-            for round in &*under_way {
-                for (sender, broadcast) in round.broadcasts.iter().enumerate().filter(|(sender, _)| *sender != own) {
-                    let arrives_s = round.arrives_s[sender * others + own - usize::from(own > sender)];
-                    if arrives_s > from_s && arrives_s <= to_s {
-                        shield.hear_broadcast(broadcast);
-                    }
+        for round in &*under_way {
+            let messages = round.broadcasts.iter().flat_map(Broadcast::messages);
+            for (message, arrives_s) in messages.zip(&round.arrives_s) {
+                if *arrives_s > from_s && *arrives_s <= to_s {
+                    fleet.hear(&message);
                 }
             }
-        });
+        }
         *heard_s = to_s;
         while self.under_way.front().is_some_and(|first| first.over_s <= time_s + SAME_S) {
             self.spare.extend(self.under_way.pop_front());
         }
     }
 
-    /// Sends the messages of an instant, if the rate of messages has one for it.
-    fn send(&mut self, time_s: f64, truth: &Swarm) {
+    /// Whether messages are sent at an instant.
+    fn has_round(&mut self, time_s: f64) -> bool {
         let period = self.rate_hz.map_or(self.next_period, |rate_hz| period(time_s, rate_hz));
         if period < self.next_period {
-            return;
+            return false;
         }
         // A rate above that of the instants sends one round an instant.
         self.next_period = period + 1;
         self.rounds += 1;
+        true
+    }
+
+    /// Sends the messages of an instant.
+    fn send(&mut self, mut round: Round, time_s: f64, truth: &Swarm) {
         let count = self.commands.len();
-        let mut round = self.spare.pop().unwrap_or_default();
-        round.broadcasts.resize_with(count, Broadcast::default);
-        round.arrives_s.resize(count * (count - 1), f64::INFINITY);
+        round.arrives_s.clear();
         round.over_s = time_s + self.radio.longest_s();
-        each(&mut round.broadcasts, &mut self.commands, |sender, broadcast, _| {
-            self.fleet.shields()[sender].write_broadcast(broadcast);
-        });
-        for sender in 0..count {
-            let links = (0..count - 1).map(|k| (sender * (count - 1) + k, k + usize::from(k >= sender)));
+        for (sender, broadcast) in round.broadcasts.iter().enumerate() {
+            let links = broadcast.entries.iter().map(|entry| {
+                let receiver = entry.to as usize;
+                (sender * (count - 1) + receiver - usize::from(receiver > sender), receiver)
+            });
             let sent = (sender, self.rounds, time_s);
-            self.radio.send(sent, &truth.positions_m, links, &mut round.arrives_s);
+            self.radio.send(sent, &truth.positions_m, (links, count - 1), &mut round.arrives_s);
         }
         // A message is heard at a later instant.
         let soonest_s = time_s + 2.0 * SAME_S;
@@ -247,7 +259,7 @@ impl ShieldStage {
             _ => Some(one),
         });
         let (sent, lost) = self.radio.counts();
-        let first = self.fleet.shields().first().map(tautline_shield::Shield::limits);
+        let first = self.fleet.shields().first().map(Shield::limits);
         ShieldReport {
             certificate: self.certificate.clone(),
             tube_m: first.map_or(0.0, |limits| limits.tube().error_m),
@@ -264,13 +276,19 @@ impl ShieldStage {
 /// Number of vehicles from which the shields run concurrently. Each works on its own state, so the bits are the same.
 const CONCURRENT_FROM: usize = 64;
 
-/// Calls a function for each vehicle, with an item and a command of it.
-fn each<T: Send>(items: &mut [T], commands: &mut [Vector3<f64>], of: impl Fn(usize, &mut T, &mut Vector3<f64>) + Sync) {
-    if items.len() < CONCURRENT_FROM {
-        items.iter_mut().zip(commands).enumerate().for_each(|(i, (item, command))| of(i, item, command));
+/// Calls a function for each vehicle, with its shield, its command and its messages.
+fn each(
+    shields: &mut [Shield],
+    commands: &mut [Vector3<f64>],
+    broadcasts: &mut [Broadcast],
+    of: impl Fn(usize, &mut Shield, &mut Vector3<f64>, &mut Broadcast) + Sync,
+) {
+    if shields.len() < CONCURRENT_FROM {
+        let all = shields.iter_mut().zip(commands).zip(broadcasts).enumerate();
+        all.for_each(|(i, ((shield, command), broadcast))| of(i, shield, command, broadcast));
     } else {
-        let both = items.par_iter_mut().zip(commands).enumerate();
-        both.for_each(|(i, (item, command))| of(i, item, command));
+        let all = shields.par_iter_mut().zip(commands).zip(broadcasts).enumerate();
+        all.for_each(|(i, ((shield, command), broadcast))| of(i, shield, command, broadcast));
     }
 }
 

@@ -1,0 +1,253 @@
+//! Contracts of a vehicle with all others, of which only a few are looked at in a period.
+
+use std::cmp::Ordering;
+use std::sync::Arc;
+
+use crate::agenda::Agenda;
+use crate::choice::Reach;
+use crate::contract::{Broadcast, Entry, Followed, Instant, Message, Owned, Renewed, divider_of_starts};
+use crate::fleet::{PairRoom, closest_starts};
+use crate::plane::Segment;
+use crate::settings::{ShieldError, Start};
+#[cfg(test)]
+use crate::{contract::Side, plane::Divider};
+
+/// Contracts of a vehicle with all others. A contract has a record from the first instant or message at which it is
+/// more than the plane of the starts, which both vehicles can compute again.
+#[derive(Clone, Debug)]
+pub(crate) struct Contracts {
+    index: u32,
+    starts: Arc<[Start]>,
+    /// Place of the record of each other vehicle, from 1; 0 without a record.
+    places: Vec<u32>,
+    /// With vehicles of smaller numbers.
+    followed: Vec<Followed>,
+    /// With vehicles of larger numbers.
+    owned: Vec<Owned>,
+    agenda: Agenda,
+}
+
+impl Contracts {
+    /// Returns the contracts at the start.
+    ///
+    /// # Errors
+    /// If the number is not in the list, or the vehicle starts too near to another one.
+    pub(crate) fn new(index: usize, starts: Arc<[Start]>) -> Result<Self, ShieldError> {
+        let count = starts.len();
+        let (Some(own), Ok(number)) = (starts.get(index), u32::try_from(index)) else {
+            let problem = format!("the number of the vehicle is not among {count} starts");
+            return Err(ShieldError::new("index", problem, index as f64, "count vehicles from 0"));
+        };
+        let has_plane = |owner: &Start, follower: &Start| divider_of_starts(owner, follower).is_some();
+        let (before, after) = (&starts[..index], &starts[index + 1..]);
+        if before.iter().all(|owner| has_plane(owner, own)) && after.iter().all(|follower| has_plane(own, follower)) {
+            // Memory is used as records come.
+            let (followed, owned) = (Vec::with_capacity(index), Vec::with_capacity(count - index - 1));
+            let (places, agenda) = (vec![0; count], Agenda::new(count));
+            return Ok(Self { index: number, starts, places, followed, owned, agenda });
+        }
+        let apart = |other: usize| PairRoom::of(&starts, index.min(other), index.max(other));
+        let others = (0..count).filter(|other| *other != index).map(apart);
+        let worst = others.min_by(|a, b| a.room_m().total_cmp(&b.room_m())).or_else(|| closest_starts(&starts));
+        Err(worst.map_or_else(
+            || ShieldError::new("start", "a vehicle has no pair".into(), 0.0, "give two starts"),
+            |worst| worst.too_near(),
+        ))
+    }
+
+    /// Number of the vehicle.
+    pub(crate) fn index(&self) -> u32 {
+        self.index
+    }
+
+    /// Returns the contract with a vehicle of a larger number, at the start.
+    fn owned_at_start(&self, other: usize) -> Option<Owned> {
+        Owned::new(&self.starts[self.index as usize], self.starts.get(other)?)
+    }
+
+    /// Returns the contract with a vehicle of a smaller number, at the start.
+    fn followed_at_start(&self, other: usize) -> Option<Followed> {
+        Followed::new(&self.starts[self.index as usize], self.starts.get(other)?)
+    }
+
+    /// Returns the place of the record of another vehicle. Makes the record at first.
+    #[inline]
+    fn place(&mut self, other: usize) -> Option<usize> {
+        let place = *self.places.get(other)?;
+        if place == 0 { self.add(other) } else { Some(place as usize - 1) }
+    }
+
+    fn add(&mut self, other: usize) -> Option<usize> {
+        // `new` has found a plane for each pair.
+        let count = match other.cmp(&(self.index as usize)) {
+            Ordering::Less => {
+                self.followed.push(self.followed_at_start(other)?);
+                self.followed.len()
+            }
+            Ordering::Greater => {
+                self.owned.push(self.owned_at_start(other)?);
+                self.owned.len()
+            }
+            Ordering::Equal => return None,
+        };
+        self.places[other] = u32::try_from(count).ok()?;
+        Some(count - 1)
+    }
+
+    /// Stores a message to this vehicle. Messages to other vehicles have no effect.
+    #[inline]
+    pub(crate) fn hear(&mut self, message: &Message) {
+        let from = message.from as usize;
+        if message.to != self.index || !message.is_valid() {
+            return;
+        }
+        let Some(place) = self.place(from) else { return };
+        let is_new = if message.from < self.index {
+            self.followed[place].hear(message)
+        } else {
+            self.owned[place].hear(message)
+        };
+        if is_new {
+            self.agenda.hear(from);
+        }
+    }
+
+    /// Reads the newest messages, decides and proposes at an instant, in the order of the other vehicles. Adds the
+    /// planes within reach.
+    pub(crate) fn renew(&mut self, at: &Instant<'_>, near: &mut Reach) -> Renewed {
+        let mut renewed = Renewed::default();
+        for word in 0..self.agenda.words() {
+            let [fired, heard] = self.agenda.take(word, at.period);
+            let mut open = fired | heard;
+            while open != 0 {
+                let other = 64 * word + open.trailing_zeros() as usize;
+                let bit = open & open.wrapping_neg();
+                open ^= bit;
+                self.look(other, [fired & bit != 0, heard & bit != 0], at, near, &mut renewed);
+            }
+        }
+        self.agenda.end(at.period);
+        renewed
+    }
+
+    /// Looks at the contract with a vehicle whose period has come or that has news.
+    #[inline]
+    fn look(
+        &mut self,
+        other: usize,
+        [has_come, has_news]: [bool; 2],
+        at: &Instant<'_>,
+        near: &mut Reach,
+        renewed: &mut Renewed,
+    ) {
+        if self.places.get(other) == Some(&0)
+            && let Some(room) = self.room_at_start(other, at)
+        {
+            self.agenda.schedule(other, at.period + at.horizons[0].periods(room));
+            return;
+        }
+        let Some(place) = self.place(other) else { return };
+        // A period noted before a message or a proposal set another one is passed over.
+        let is_due = |due: u64| has_come && due <= at.period;
+        let (seen, due) = if other < self.index as usize {
+            let contract = &mut self.followed[place];
+            let is_due = is_due(contract.due);
+            if !(is_due || has_news) {
+                return;
+            }
+            (contract.look(at, [is_due, has_news], near, renewed), &mut contract.due)
+        } else {
+            let contract = &mut self.owned[place];
+            let is_due = is_due(contract.due);
+            if !(is_due || has_news) {
+                return;
+            }
+            (contract.look(at, is_due, near, renewed), &mut contract.due)
+        };
+        let next = at.period + seen.sleeps;
+        if *due <= at.period || next < *due {
+            *due = next;
+            self.agenda.schedule(other, next);
+        }
+        if seen.speaks {
+            self.agenda.speak(other);
+        }
+    }
+
+    /// Returns the room of the plane of the starts \[m\], if both vehicles are far from it.
+    fn room_at_start(&self, other: usize, at: &Instant<'_>) -> Option<f64> {
+        let (held, is_far) = match other.cmp(&(self.index as usize)) {
+            Ordering::Less => {
+                let contract = self.followed_at_start(other)?;
+                (contract.held, contract.held.room_m(&at.segment.position()) > contract.far_m)
+            }
+            Ordering::Greater => {
+                let contract = self.owned_at_start(other)?;
+                (contract.held, contract.is_far(at.segment))
+            }
+            Ordering::Equal => return None,
+        };
+        is_far.then(|| held.room_m(&at.segment.position()))
+    }
+
+    /// Takes the next part of the messages that are to be sent.
+    #[inline]
+    fn next_entry(&mut self) -> Option<Entry> {
+        let to = self.agenda.next_outgoing()?;
+        let (number, place) = (u32::try_from(to).ok()?, self.place(to)?);
+        Some(if number < self.index {
+            Entry { to: number, proposal: None, decision: self.followed[place].decision() }
+        } else {
+            Entry { to: number, proposal: self.owned[place].proposal(), decision: None }
+        })
+    }
+
+    /// Takes the messages that are to be sent.
+    pub(crate) fn messages(&mut self, stamp: u64, segment: Segment) -> impl Iterator<Item = Message> + '_ {
+        let from = self.index;
+        std::iter::from_fn(move || {
+            let Entry { to, proposal, decision } = self.next_entry()?;
+            Some(Message { from, to, stamp, segment, proposal, decision })
+        })
+    }
+
+    /// Takes the messages that are to be sent, as one.
+    pub(crate) fn write_broadcast(&mut self, stamp: u64, segment: Segment, broadcast: &mut Broadcast) {
+        (broadcast.from, broadcast.stamp, broadcast.segment) = (self.index, stamp, segment);
+        broadcast.entries.clear();
+        while let Some(entry) = self.next_entry() {
+            broadcast.entries.push(entry);
+        }
+    }
+}
+
+/// Defects for tests: planes without the contract.
+#[cfg(test)]
+impl Contracts {
+    /// Holds the planes between its own segment and these segments of all vehicles, as for equal vehicles. Returns
+    /// whether every pair has one.
+    pub(crate) fn hold_heard(&mut self, own: &Segment, side: &Side, heard: &[Segment]) -> bool {
+        let plane = |other: &Segment| {
+            let divider = Divider::between(side.metric, own, other, side.margin_m, side.margin_m);
+            divider.map(|divider| side.owner_plane(&divider))
+        };
+        let mut has_all = true;
+        for (other, segment) in heard.iter().enumerate() {
+            let Some(place) = self.place(other) else { continue };
+            match plane(segment) {
+                None => has_all = false,
+                Some(plane) if other < self.index as usize => self.followed[place].held = plane,
+                Some(plane) => self.owned[place].hold(plane),
+            }
+            self.agenda.hear(other);
+            self.agenda.speak(other);
+        }
+        has_all
+    }
+
+    /// Returns the number of the pending proposal to a vehicle.
+    pub(crate) fn pending_number(&self, to: u32) -> Option<u64> {
+        let place = *self.places.get(to as usize).filter(|place| to > self.index && **place > 0)?;
+        Some(self.owned[place as usize - 1].proposal()?.number)
+    }
+}
