@@ -47,6 +47,7 @@ pub trait Output {
 
 /// Result of a watch.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a finding of its own")]
 pub struct Summary {
     /// Whether all expected vehicles were heard.
     pub has_started: bool,
@@ -96,10 +97,10 @@ impl Summary {
             self.violations
         );
         if let Some((distance_m, [a, b])) = &self.closest {
-            text += &format!("; closest {a}-{b} {} m", down(*distance_m));
+            text.extend([format!("; closest {a}-{b} {} m", down(*distance_m))]);
         }
         if let Some(count) = self.compared {
-            text += &format!("; positions compared with the plan: {count}");
+            text.extend([format!("; positions compared with the plan: {count}")]);
         }
         let closest = self.closest.as_ref().map(|(distance_m, pair)| json!({ "pair": pair, "distance_m": distance_m }));
         let more = json!({
