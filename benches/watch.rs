@@ -1,4 +1,6 @@
-//! A round of the live monitor: a pose of each of 1,000 vehicles, and a judgement of all pairs. At 50 Hz a round has 20 ms.
+//! A round of the live monitor: a pose of each of 1,000 vehicles, and a judgement of all pairs.
+//!
+//! At 50 Hz a round must end within 20 ms. Run with `cargo bench --bench watch`.
 
 use std::hint::black_box;
 

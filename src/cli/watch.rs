@@ -223,10 +223,16 @@ impl WatchArguments {
         }
         let unread = |error: ReadError| Failure::from(error).under("--plan");
         let mut recording = read::open(path, &ReadOptions::default()).map_err(unread)?;
-        Plan::read(&mut *recording, self.plan_start).map_err(unread)?.ok_or_else(|| {
+        let plan = Plan::read(&mut *recording, self.plan_start).map_err(unread)?.ok_or_else(|| {
             let message = format!("--plan: {}: too long to keep in memory", path.display());
             Failure::input("watch/plan", message, "give a plan with at most 20 million positions")
-        })
+        })?;
+        if recording.clock().by_steps {
+            let unit = recording.clock().unit;
+            let message = format!("--plan: {}: the unit of its times is a guess ({unit})", path.display());
+            return Err(Failure::input("watch/plan", message, "name the column of times time_s or time_ms"));
+        }
+        Ok(plan)
     }
 
     fn recorder(&self) -> Result<Option<Recorder>, Failure> {

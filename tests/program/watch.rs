@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 use std::fs;
-use std::io::{BufRead as _, BufReader, Write as _};
+use std::io::{BufReader, Write as _};
 use std::net::{TcpListener, TcpStream};
 use std::path::Path;
 use std::process::{Child, Command, Stdio};
@@ -202,7 +202,7 @@ fn the_recording_is_judged_to_the_same_violations() {
 #[test]
 fn deviations_from_the_plan_are_reported() {
     let folder = tempdir().expect("a folder");
-    let plan = "t,id,x,y,z\n0,a,0,0,2\n0,b,4,0,2\n4,a,0,0,2\n4,b,4,0,2\n";
+    let plan = "time_s,id,x,y,z\n0,a,0,0,2\n0,b,4,0,2\n4,a,0,0,2\n4,b,4,0,2\n";
     fs::write(folder.path().join("plan.csv"), plan).expect("a file");
     let run =
         |input: &str| watched(folder.path(), &[&STAMPS[..], &["--plan", "plan.csv", "--tube", "0.3"]].concat(), input);
@@ -210,6 +210,17 @@ fn deviations_from_the_plan_are_reported() {
     let off = run(&approach(0.2, 0.0));
     assert_eq!(off.exit, Some(1), "{off:?}");
     assert!(off.out.contains("OFF PLAN b 0.32 m (tube 0.3 m)"), "{}", off.out);
+    // A plan of other times is not kept, and a guessed unit is refused.
+    let late = watched(
+        folder.path(),
+        &[&STAMPS[..], &["--plan", "plan.csv", "--plan-start", "50"]].concat(),
+        &approach(0.0, 0.0),
+    );
+    assert_eq!(late.exit, Some(1), "{late:?}");
+    assert!(late.out.contains("positions compared with the plan: 0"), "{}", late.out);
+    fs::write(folder.path().join("guess.csv"), plan.replace("time_s", "t")).expect("a file");
+    let guess = watched(folder.path(), &[&STAMPS[..], &["--plan", "guess.csv"]].concat(), "");
+    assert_eq!((guess.exit, guess.code()), (Some(2), "watch/plan"), "{guess:?}");
     // A vehicle of the plan that is not heard.
     let alone: String = approach(0.0, 0.0).replace("\"b\"", "\"c\"");
     assert!(run(&alone).out.contains("NOT KNOWN: not heard yet: b"));
@@ -284,7 +295,10 @@ fn serve_ros(stream: TcpStream, count: u32) {
                 100 + k / 50,
                 k % 50 * 20_000_000
             );
-            socket.send(tungstenite::Message::text(text)).expect("sends");
+            // The watch ends before its server.
+            if socket.send(tungstenite::Message::text(text)).is_err() {
+                return;
+            }
         }
         std::thread::sleep(std::time::Duration::from_millis(20));
     }

@@ -95,6 +95,8 @@ pub struct Monitor {
     events: Vec<Event>,
     suppressed: u64,
     violations: OpenViolations,
+    /// Number of poses that were compared with the plan.
+    compared: u64,
     judgement: u64,
     ahead: ahead::Scratch,
     boxes: Vec<SweptBox>,
@@ -136,6 +138,7 @@ impl Monitor {
             events: Vec::with_capacity(MOST_EVENTS),
             suppressed: 0,
             violations: OpenViolations::new(),
+            compared: 0,
             judgement: 0,
             ahead: ahead::Scratch::default(),
             boxes: Vec::new(),
@@ -176,6 +179,12 @@ impl Monitor {
     #[must_use]
     pub fn violations(&self) -> u64 {
         self.violations.total()
+    }
+
+    /// Returns the number of poses that were compared with the plan; `None` without a plan.
+    #[must_use]
+    pub fn compared(&self) -> Option<u64> {
+        self.plan.names().next().map(|_| self.compared)
     }
 
     /// Returns the number of faults of a kind.
@@ -513,6 +522,7 @@ impl Monitor {
         let of = &mut self.vehicles[vehicle as usize];
         let planned = of.planned.and_then(|k| self.plan.position_m(k, time_s));
         of.deviation_m = planned.map(|planned| (position_m - planned).norm());
+        self.compared += u64::from(planned.is_some());
         let was_outside = of.is_off_plan;
         of.is_off_plan = of.deviation_m.is_some_and(|deviation| deviation > self.settings.tube_m);
         let (is_outside, deviation_m) = (of.is_off_plan, of.deviation_m.unwrap_or(0.0));

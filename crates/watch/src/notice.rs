@@ -41,21 +41,22 @@ impl Notice {
             .map(|near| json!({ "pair": two(near.pair), "nominal_m": near.nominal_m, "least_m": near.least_m }));
         let mut text = state_text(of, monitor);
         if let Some(near) = of.closest {
-            text += &format!("; closest {} {} m", joined(&two(near.pair)), down(near.nominal_m));
+            text.extend([format!("; closest {} {} m", joined(&two(near.pair)), down(near.nominal_m))]);
             if !matches!(of.state, State::Violation(..)) {
-                text += &format!(", at least {} m", down(near.least_m.max(0.0)));
+                text.extend([format!(", at least {} m", down(near.least_m.max(0.0)))]);
             }
         }
         if let Some(first) = of.nominal_violation.filter(|_| !matches!(of.state, State::Violation(..))) {
-            text += &format!("; on course to violate: {} at {} s", joined(&two(first.pair)), fixed(first.at_s));
+            text.extend([format!("; on course to violate: {} at {} s", joined(&two(first.pair)), fixed(first.at_s))]);
         }
         if let Some(brake) = of.last_brake.filter(|_| !matches!(of.state, State::Violation(..))) {
             let left_s = brake.at_s - of.now_s;
-            text += &if left_s > 0.0 {
+            let moment = if left_s > 0.0 {
                 format!("; brake {} by {} s", joined(&two(brake.pair)), down(brake.at_s))
             } else {
                 format!("; the last moment to brake {} has passed", joined(&two(brake.pair)))
             };
+            text.extend([moment]);
         }
         let (state, reason, pair, distance) = match of.state {
             State::Clear => ("clear", None, None, None),
@@ -131,10 +132,10 @@ impl Notice {
                 let of = vehicle.map(&name);
                 let mut text = fault_text(fault, of.as_deref());
                 if count > 1 {
-                    text += &format!(" ({count} times)");
+                    text.extend([format!(" ({count} times)")]);
                 }
                 if matches!(fault, Fault::Garbage | Fault::Dropped) && !said.is_empty() {
-                    text += &format!(": {said}");
+                    text.extend([format!(": {said}")]);
                 }
                 Self::new("fault", at_s, text, json!({ "fault": fault.name(), "count": count, "id": of }))
             }

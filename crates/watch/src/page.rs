@@ -190,7 +190,8 @@ fn answer(mut stream: TcpStream, shared: &Shared) -> io::Result<()> {
                 viewers.push(sender);
                 receiver
             };
-            view(&mut socket, &receiver)
+            view(&mut socket, &receiver);
+            Ok(())
         }
         Err(status) => {
             read_head(&mut stream, head.len())?;
@@ -200,13 +201,12 @@ fn answer(mut stream: TcpStream, shared: &Shared) -> io::Result<()> {
 }
 
 /// Sends messages to a viewer until it leaves.
-fn view(socket: &mut tungstenite::WebSocket<TcpStream>, receiver: &Receiver<Arc<str>>) -> io::Result<()> {
+fn view(socket: &mut tungstenite::WebSocket<TcpStream>, receiver: &Receiver<Arc<str>>) {
     while let Ok(text) = receiver.recv() {
         if socket.send(Message::text(&*text)).is_err() {
             break;
         }
     }
-    Ok(())
 }
 
 /// Returns the head of a request without taking it from the stream.

@@ -24,7 +24,10 @@ impl Plan {
     pub fn read<E>(tracks: &mut dyn Tracks<Error = E>, start_s: f64) -> Result<Option<Self>, E> {
         let (mut batch, mut count) = (Vec::new(), 0);
         let mut vehicles: Vec<Vec<Item>> = Vec::new();
-        while tracks.read(&mut batch)? {
+        let mut is_over = false;
+        while !is_over {
+            // The last call may append items, too.
+            is_over = !tracks.read(&mut batch)?;
             count += batch.len();
             if count > MOST_ITEMS {
                 return Ok(None);

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::source::OwnedPose;
 
-/// Poses as CSV with the columns `t,id,x,y,z,vx,vy,vz`, in a file that has its name when it is complete.
+/// Poses as CSV with the columns `time_s,id,x,y,z,vx,vy,vz`, in a file that has its name when it is complete.
 pub struct Record {
     file: BufWriter<File>,
     partial: PathBuf,
@@ -30,7 +30,7 @@ impl Record {
         name.push(PARTIAL);
         let partial = PathBuf::from(name);
         let mut file = BufWriter::new(File::create(&partial)?);
-        file.write_all(b"t,id,x,y,z,vx,vy,vz\n")?;
+        file.write_all(b"time_s,id,x,y,z,vx,vy,vz\n")?;
         Ok(Self { file, partial, path: path.to_owned(), flushed_s: f64::NEG_INFINITY, rows: 0 })
     }
 

@@ -47,6 +47,7 @@ pub trait Output {
 
 /// Result of a watch.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a finding of its own")]
 pub struct Summary {
     /// Whether all expected vehicles were heard.
     pub has_started: bool,
@@ -62,6 +63,8 @@ pub struct Summary {
     pub was_violated: bool,
     /// Whether a vehicle left the tube around its plan.
     pub was_off_plan: bool,
+    /// Number of positions that were compared with the plan, if there is a plan.
+    pub compared: Option<u64>,
     /// Number of measured violations.
     pub violations: u64,
     /// Number of vehicles.
@@ -71,16 +74,17 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Returns whether every judgement after the start was CLEAR, without a violation and within the plan.
+    /// Returns whether every judgement after the start was CLEAR, without a violation and within the plan. A plan with
+    /// other times than the positions is not kept.
     #[must_use]
     pub fn is_good(&self) -> bool {
-        self.has_started && !self.was_not_known && !self.was_violated && !self.was_off_plan
+        self.has_started && !self.was_not_known && !self.was_violated && !self.was_off_plan && self.compared != Some(0)
     }
 
     fn notice(&self, at_s: f64) -> Notice {
         let verdict = match self {
             _ if self.was_violated => "VIOLATION",
-            _ if !self.has_started || self.was_not_known => "NOT KNOWN",
+            _ if !self.has_started || self.was_not_known || self.compared == Some(0) => "NOT KNOWN",
             _ if self.was_off_plan => "OFF PLAN",
             _ => "CLEAR",
         };
@@ -93,7 +97,10 @@ impl Summary {
             self.violations
         );
         if let Some((distance_m, [a, b])) = &self.closest {
-            text += &format!("; closest {a}-{b} {} m", down(*distance_m));
+            text.extend([format!("; closest {a}-{b} {} m", down(*distance_m))]);
+        }
+        if let Some(count) = self.compared {
+            text.extend([format!("; positions compared with the plan: {count}")]);
         }
         let closest = self.closest.as_ref().map(|(distance_m, pair)| json!({ "pair": pair, "distance_m": distance_m }));
         let more = json!({
@@ -105,6 +112,7 @@ impl Summary {
             "violation_s": self.violation_s,
             "violations": self.violations,
             "off_plan": self.was_off_plan,
+            "compared_with_plan": self.compared,
             "closest": closest,
         });
         Notice { text: text.clone(), ..Notice::new("summary", at_s, text, more) }
@@ -268,6 +276,7 @@ impl Session<'_> {
         let of = self.monitor.finish(arrival_s);
         self.judged(of)?;
         self.summary.violations = self.monitor.violations();
+        self.summary.compared = self.monitor.compared();
         self.output.notice(&self.summary.notice(self.monitor.now_s()))?;
         Ok(self.summary)
     }

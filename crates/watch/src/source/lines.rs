@@ -65,7 +65,7 @@ pub fn lines(mut from: impl BufRead, feed: &Feed) {
             break;
         }
     }
-    feed.send(Input::End);
+    let _ = feed.send(Input::End);
 }
 
 /// Returns the pose of a line.

@@ -1,6 +1,8 @@
-//! MAVLink 1 and 2 over UDP: `LOCAL_POSITION_NED` and `GLOBAL_POSITION_INT`. The system id is the name of a vehicle.
+//! `MAVLink` 1 and 2 over UDP: `LOCAL_POSITION_NED` and `GLOBAL_POSITION_INT`.
 //!
-//! Both messages are defined in `common.xml` and `standard.xml` of MAVLink. `mavlink-core` reads frames and checksums.
+//! The system id is the name of a vehicle.
+//!
+//! Both messages are defined in `common.xml` and `standard.xml` of `MAVLink`. `mavlink-core` reads frames and checksums.
 //! Messages with another id are skipped.
 
 use std::io;
@@ -18,11 +20,11 @@ use tautline_recordings::read::EarthFrame;
 const LOCAL: (u32, usize, u8) = (32, 28, 185);
 /// The same of `GLOBAL_POSITION_INT`.
 const GLOBAL: (u32, usize, u8) = (33, 28, 104);
-/// First bytes of MAVLink 1 and 2.
+/// First bytes of `MAVLink` 1 and 2.
 const STARTS: [u8; 2] = [0xFE, 0xFD];
 /// Largest number of bytes of a datagram.
 const LARGEST_DATAGRAM: usize = 65_536;
-/// Bit of the incompatibility flags of MAVLink 2 for a signature, whose 13 bytes follow the checksum.
+/// Bit of the incompatibility flags of `MAVLink` 2 for a signature, whose 13 bytes follow the checksum.
 const SIGNED: u8 = 1;
 
 /// Message that positions are read from.
@@ -186,7 +188,7 @@ mod tests {
     use crate::source::{Input, OwnedPose};
     use tautline_recordings::read::EarthFrame;
 
-    /// Returns a frame of MAVLink 2, or of MAVLink 1.
+    /// Returns a frame of `MAVLink` 2, or of `MAVLink` 1.
     fn framed((id, _, extra): (u32, usize, u8), system: u8, payload: &[u8], is_new: bool) -> Vec<u8> {
         let length = u8::try_from(payload.len()).expect("a short payload");
         let header = if is_new {

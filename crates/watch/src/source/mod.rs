@@ -96,11 +96,13 @@ impl Feed {
     }
 
     /// Sends an input and waits for room. Returns `false` at the end of the watch.
+    #[must_use]
     pub fn send(&self, input: Input) -> bool {
         self.sender.send(input).is_ok()
     }
 
     /// Sends an input, or drops it if the channel is full. Returns `false` at the end of the watch.
+    #[must_use]
     pub fn offer(&self, input: Input) -> bool {
         match self.sender.try_send(input) {
             Ok(()) => true,
@@ -120,7 +122,8 @@ impl Feed {
             let mut is_connected = false;
             let why = session(&mut || {
                 is_connected = true;
-                self.send(Input::Connected(name.to_owned()));
+                // At the end of the watch the session notices it, too.
+                let _ = self.send(Input::Connected(name.to_owned()));
             });
             if is_connected {
                 pause = PAUSES[0];
