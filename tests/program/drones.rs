@@ -146,7 +146,7 @@ fn wrong_input_ends_with_2_and_leaves_nothing() {
     for (input, to, more, code, words) in [
         ("late.csv", "crazyflie", &[][..], "export/absent", ["vehicle b", "--from 2.0 --until 8.0"]),
         ("gap.csv", "skyb", &[], "export/gap", ["vehicle b", "2.96 s to 5.0 s"]),
-        ("nan.csv", "skyb", &[], "recording/not-finite", ["nan.csv, line 203", "column `x`"]),
+        ("nan.csv", "skyb", &[], "recording/not-finite", ["nan.csv, line 202", "column `x`"]),
         ("far.csv", "crazyflie", &["--compressed"], "export/too-far", ["vehicle b", "32.767 m"]),
         ("jump", "skyc", &[], "export/too-fast", ["vehicle a at ", "--tolerance"]),
         ("flat.csv", "skyc", &[], "export/no-heights", ["no heights", "--column z=NAME"]),

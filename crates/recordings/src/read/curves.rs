@@ -12,7 +12,7 @@ use tautline_core::track::{Item, Metadata, Piece, Tracks};
 /// Smallest jump between two pieces of a curve that is reported \[m\]. Files round to micrometres.
 const JUMP_M: f64 = 1e-3;
 /// Largest time between the ends of two curves that end at one instant \[s\]: sums of rounded durations differ.
-const SAME_INSTANT_S: f64 = 1e-6;
+const SAME_INSTANT_S: f64 = 1e-5;
 
 /// Names of vehicles, each with its items in order of time.
 pub(super) type VehicleItems = Vec<(String, Vec<Item>)>;
@@ -175,12 +175,12 @@ mod tests {
     #[test]
     fn ends_that_differ_by_rounding_are_one_instant() {
         let curve = |to_s: f64| vec![Item::Piece(piece(0, 0.0, to_s, [Vector3::zeros()], 1.0).expect("a piece"))];
-        let mut vehicles = [10.0, 10.0 - 5e-7, 10.0 - 2e-6].map(|to_s| (String::new(), curve(to_s)));
+        let mut vehicles = [10.0, 10.0 - 5e-6, 10.0 - 2e-5].map(|to_s| (String::new(), curve(to_s)));
         align_ends(&mut vehicles);
         let ends = vehicles.map(|(_, items)| match &items[0] {
             Item::Piece(piece) => piece.to_s,
             Item::Sample(_) => f64::NAN,
         });
-        assert_eq!(ends, [10.0, 10.0, 10.0 - 2e-6]);
+        assert_eq!(ends, [10.0, 10.0, 10.0 - 2e-5]);
     }
 }

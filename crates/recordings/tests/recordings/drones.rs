@@ -129,7 +129,7 @@ fn compressed_crazyflie_trajectories_are_recognised_by_their_end() {
 fn flight() -> Vec<(String, Motion)> {
     let place = |vehicle: u32, k: u32| {
         let t = f64::from(k) / 50.0;
-        vector![3.0 * f64::from(vehicle) + t.sin(), (0.7 * t).cos() - 20.0, 1.0 + 0.1 * t]
+        vector![f64::from(vehicle) + t.sin(), (0.7 * t).cos() - 5.0, 1.0 + 0.1 * t]
     };
     let motion = |vehicle: u32| {
         let at = |k: u32| f64::from(k) / 50.0;

@@ -236,10 +236,17 @@ pub fn encode(
                 Dialect::Px4Show => sampled::px4_show(&work, name, label, motion),
                 _ => skybrush::trajectory(&work, name, label, motion),
             });
-            let (files, vehicles) = encoded.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+            let (files, vehicles) = first_error(encoded)?.into_iter().unzip();
             Ok(Encoded { files, vehicles })
         }
     }
+}
+
+/// Returns all results in order, or the error of the first vehicle that has one, for any number of threads.
+fn first_error<T: Send>(
+    results: impl IndexedParallelIterator<Item = Result<T, DroneError>>,
+) -> Result<Vec<T>, DroneError> {
+    results.collect::<Vec<_>>().into_iter().collect()
 }
 
 /// Longest flight \[s\]: a day.

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use serde_json::json;
 
 use super::motion::{Arc, Motion};
-use super::{DroneError, DroneFile, Encoded, EncodedVehicle, Vehicle, Work, deviation_with_rests};
+use super::{DroneError, DroneFile, Encoded, EncodedVehicle, Vehicle, Work, deviation_with_rests, first_error};
 
 /// Largest number of samples of a vehicle.
 const MOST_SAMPLES: f64 = 1e7;
@@ -79,7 +79,7 @@ pub(super) fn vviz(work: &Work<'_>, vehicles: &[Vehicle<'_>]) -> Result<Encoded,
         let bytes = drone.to_string().len();
         Ok((drone, EncodedVehicle { name: (*name).clone(), label: label.clone(), parts: places.len(), bytes }))
     });
-    let (drones, vehicles): (Vec<_>, Vec<_>) = drones.collect::<Result<Vec<_>, DroneError>>()?.into_iter().unzip();
+    let (drones, vehicles): (Vec<_>, Vec<_>) = first_error(drones)?.into_iter().unzip();
     let show = json!({
         "version": "1.0",
         "coordinateFrame": "ogl",

@@ -18,7 +18,7 @@ use zip::{CompressionMethod, ZipWriter};
 use super::crazyflie::too_far;
 use super::fit::{Piece, seconds};
 use super::motion::Motion;
-use super::{DroneError, DroneFile, Encoded, EncodedVehicle, Vehicle, Work};
+use super::{DroneError, DroneFile, Encoded, EncodedVehicle, Vehicle, Work, first_error};
 use crate::segments::{LARGEST, Trajectory, rounding_m};
 
 /// First bytes of a `.skyb` file.
@@ -153,7 +153,7 @@ pub(super) fn show(work: &Work<'_>, vehicles: &[Vehicle<'_>]) -> Result<Encoded,
         let vehicle = EncodedVehicle { name: (*name).clone(), label: label.clone(), parts, bytes };
         Ok((drone(label, &found, scale), vehicle))
     });
-    let (drones, vehicles): (Vec<_>, Vec<_>) = drones.collect::<Result<Vec<_>, DroneError>>()?.into_iter().unzip();
+    let (drones, vehicles): (Vec<_>, Vec<_>) = first_error(drones)?.into_iter().unzip();
     let mut show = json!({
         "version": 1,
         "environment": {"type": "outdoor"},
