@@ -39,6 +39,7 @@ mod auditor;
 mod candidates;
 mod clearance;
 mod cross_check;
+mod cylinder;
 mod double_double;
 mod enclosure;
 pub mod envelope;
@@ -56,6 +57,7 @@ mod sweep;
 
 pub use auditor::{AuditError, Auditor};
 pub use clearance::{ClearanceAuditor, ClearanceFinding, ClearanceOutcome, swept_distance_m};
+pub use cylinder::Cylinder;
 pub use findings::{LISTED, Tally};
 pub use obstacle::{Obstacle, ObstacleError, Shape};
 pub use outcome::{

@@ -1,6 +1,7 @@
 //! Tests of the audit of flights and of recordings.
 
 mod curves_at_limits;
+mod cylinders;
 mod encounters;
 mod envelope;
 mod exact;
