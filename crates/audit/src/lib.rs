@@ -54,6 +54,7 @@ pub mod recorded;
 mod segment;
 mod slices;
 mod sweep;
+mod well_clear;
 
 pub use auditor::{AuditError, Auditor};
 pub use clearance::{ClearanceAuditor, ClearanceFinding, ClearanceOutcome, swept_distance_m};
@@ -67,3 +68,4 @@ pub use recorded::TrackAuditor;
 pub use slices::{Slice, Slices};
 pub use sweep::swept_separation_m;
 pub use tautline_core::{swarm, track};
+pub use well_clear::WellClear;

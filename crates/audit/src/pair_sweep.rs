@@ -344,7 +344,7 @@ impl Overlap<'_> {
 
     /// Returns the relative position as a polynomial of the fraction of the shared time. It has at least one
     /// coefficient; of several, the last is not zero.
-    fn relative(&self) -> Vec<Vector3<f64>> {
+    pub(super) fn relative(&self) -> Vec<Vector3<f64>> {
         let (a, b) = (self.first, self.second);
         if self.is_straight() {
             let motion = self.straight();

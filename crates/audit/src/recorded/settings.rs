@@ -10,6 +10,7 @@ use crate::enclosure::Target;
 use crate::envelope::{Envelope, Limit, Quantity};
 use crate::obstacle::{Obstacle, ObstacleError};
 use crate::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
+use crate::well_clear::WellClear;
 
 /// Largest accepted number: a length \[m\], a time \[s\] or an acceleration \[m/s^2\].
 pub(super) const LARGEST: f64 = MAX_LENGTH_M;
@@ -78,6 +79,8 @@ pub struct Settings {
     /// Upright cylinder around each vehicle that no other vehicle may enter. Distances are then scaled, and the limit
     /// is 1. It excludes delta, radii and the ellipsoid.
     pub cylinder: Option<Cylinder>,
+    /// Thresholds of well clear of air traffic. If separations have no other limit, they are not judged.
+    pub well_clear: Option<WellClear>,
     /// Start of the judged window \[s\].
     pub from_s: Option<f64>,
     /// End of the judged window \[s\].
@@ -124,7 +127,7 @@ impl Settings {
         is_given.contains(&true)
             || !self.obstacles.is_empty()
             || self.vehicles.values().any(|of| of.radius_m.is_some())
-            || self.envelope.is_empty()
+            || (self.envelope.is_empty() && self.well_clear.is_none())
     }
 
     pub(super) fn limits(&self) -> Limits {
@@ -169,6 +172,18 @@ impl Settings {
             ];
             if let Some((other, _)) = others.into_iter().find(|(_, is_given)| *is_given) {
                 return Err(RecordedError::CylinderAnd { other });
+            }
+        }
+        if let Some(WellClear { horizontal_m, vertical_m, tau_s }) = self.well_clear {
+            check("well-clear", Some(horizontal_m), POSITIVE)?;
+            check("well-clear", Some(vertical_m), POSITIVE)?;
+            check("well-clear", Some(tau_s), NOT_NEGATIVE)?;
+            let motion = self.motion.filter(|motion| matches!(motion, Interpolation::Hold | Interpolation::Bounded));
+            if let Some(motion) = motion {
+                return Err(RecordedError::WellClearMotion { motion: motion.name() });
+            }
+            if self.ellipsoid_m.is_some() {
+                return Err(RecordedError::WellClearAndEllipsoid);
             }
         }
         check("from", self.from_s, FINITE)?;
@@ -376,6 +391,15 @@ pub enum RecordedError {
         /// Name of the other setting.
         other: &'static str,
     },
+    /// Well clear of motion without velocities.
+    #[error("well-clear: needs velocities, which motion {motion} does not define")]
+    WellClearMotion {
+        /// Motion between samples.
+        motion: &'static str,
+    },
+    /// Well clear is combined with an ellipsoid.
+    #[error("well-clear: cannot be combined with an ellipsoid, which scales all lengths")]
+    WellClearAndEllipsoid,
     /// Obstacles are combined with an ellipsoid.
     #[error("obstacles cannot be combined with an ellipsoid")]
     ObstaclesAndEllipsoid,

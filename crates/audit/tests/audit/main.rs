@@ -13,3 +13,4 @@ mod recorded;
 mod recorded_curves;
 mod scenes;
 mod times;
+mod well_clear;
