@@ -290,7 +290,12 @@ impl TrackAuditor {
         if !is_separation_judged {
             self.results = Results::default();
         }
-        let envelope = self.envelope.take().map(|envelope| {
+        let envelope = self.envelope.take().map(|mut envelope| {
+            for (index, vehicle) in self.vehicles.iter().enumerate().filter(|(_, vehicle)| vehicle.is_judged()) {
+                if let Some(setpoints) = self.settings.yaw.get(&vehicle.name) {
+                    envelope.judge_yaw(index, setpoints);
+                }
+            }
             let judged: Vec<_> = self.vehicles.iter().map(Vehicle::is_judged).collect();
             envelope.finish(&judged, self.gaps.is_empty() && contradiction.is_none())
         });

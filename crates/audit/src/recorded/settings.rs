@@ -99,6 +99,8 @@ pub struct Settings {
     pub only: Option<BTreeSet<String>>,
     /// Obstacles.
     pub obstacles: Vec<Obstacle>,
+    /// Yaw setpoints of vehicles by name, for a limit of the yaw rate: times \[s\] in ascending order, and yaw \[deg\].
+    pub yaw: BTreeMap<String, Vec<[f64; 2]>>,
     /// Limits on single vehicles. If they are the only limits, separations are not judged.
     pub envelope: Envelope,
     /// Length of the windows over which accelerations are averaged \[s\]: change of velocity over the window, divided
@@ -201,7 +203,8 @@ impl Settings {
             check_of("max-accel", Some(name), of.max_accel_m_s2, NOT_NEGATIVE)?;
         }
         for Limit { quantity, allowed } in &self.envelope.limits {
-            let range = if quantity.derivative() == 0 { FINITE } else { POSITIVE };
+            let is_height = quantity.derivative() == 0 || *quantity == Quantity::NavigationFloor;
+            let range = if is_height { FINITE } else { POSITIVE };
             check_of("limit", Some(quantity.name()), Some(*allowed), range)?;
         }
         check("accel-window", self.accel_window_s, POSITIVE)?;
