@@ -5,6 +5,7 @@
 mod envelope;
 mod moments;
 mod report;
+mod well_clear;
 mod words;
 
 pub use envelope::{CornerFindings, LimitFindings};
@@ -12,5 +13,6 @@ pub use report::{
     AssumedMotion, Basis, Clock, EarlyEnd, Obstacles, PresenceSpan, PresenceSummary, RecordedAudit, RecordedReport,
     Source,
 };
-pub use report::{PairFinding, VehicleFinding};
+pub use report::{PairFinding, VehicleFinding, unit};
+pub use well_clear::WellClearFindings;
 pub use words::interval;
