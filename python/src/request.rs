@@ -120,8 +120,8 @@ impl AuditOptions {
     #[new]
     #[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
     #[pyo3(signature = (*, delta, motion, max_accel, radius, ellipsoid, obstacles, limit, fence, accel_window, config,
-                        cylinder, well_clear, rules, has_config, from_s, to_s, above, ids, offset, expect_vehicles, max_gap, require_presence,
-                        independent))]
+                        cylinder, well_clear, rules, has_config, from_s, to_s, above, ids, offset, expect_vehicles,
+                        max_gap, require_presence, independent))]
     fn new(
         delta: Option<f64>,
         motion: Option<String>,

@@ -38,8 +38,9 @@ Outcome = tuple[str, str, str, str]
 
 #: Arguments of `audit`, in the order of the call that a page shows.
 SHOWN = (
-    "delta", "motion", "max_accel", "radius", "ellipsoid", "cylinder", "well_clear", "rules", "obstacles", "limit", "fence", "accel_window", "config",
-    "from_s", "to_s", "above", "ids", "offset", "expect_vehicles", "max_gap", "require_presence", "independent",
+    "delta", "motion", "max_accel", "radius", "ellipsoid", "cylinder", "well_clear", "rules", "obstacles", "limit",
+    "fence", "accel_window", "config", "from_s", "to_s", "above", "ids", "offset", "expect_vehicles", "max_gap",
+    "require_presence", "independent",
 )  # fmt: skip
 
 

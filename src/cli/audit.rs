@@ -172,10 +172,12 @@ pub(super) struct AuditArguments {
     )]
     pub(super) ellipsoid: Option<Vector3<f64>>,
     /// Upright cylinder: a pair is too near if it is horizontally closer than R and vertically closer than H [m].
-    #[arg(long, value_name = "R,H", value_parser = rules::cylinder, allow_hyphen_values = true, help_heading = "Judging")]
+    #[arg(long, value_name = "R,H", value_parser = rules::cylinder, help_heading = "Judging")]
+    #[arg(allow_hyphen_values = true)]
     pub(super) cylinder: Option<Cylinder>,
     /// Well clear of air traffic: do-365, f3442, or D,Z,T (horizontal and vertical distance [m], modified tau [s]).
-    #[arg(long, value_name = "PRESET", value_parser = rules::well_clear, allow_hyphen_values = true, help_heading = "Judging")]
+    #[arg(long, value_name = "PRESET", value_parser = rules::well_clear, help_heading = "Judging")]
+    #[arg(allow_hyphen_values = true)]
     pub(super) well_clear: Option<WellClear>,
     /// Origin of limits that no option sets: the recording (a Skybrush show), the defaults of skybrush, or none
     /// [default: recording].

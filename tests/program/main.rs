@@ -31,6 +31,7 @@ mod reading;
 mod reads;
 mod references;
 mod refuses;
+mod rules;
 mod runs;
 mod scenarios;
 mod shapes;

@@ -100,7 +100,7 @@ impl Fence {
         Self { is_exclusion: true, ..self }
     }
 
-    /// Returns the fence with further polygons, all of which apply.
+    /// Returns the fence with further polygons. Every polygon applies.
     #[must_use]
     pub fn with(mut self, more: Vec<Self>) -> Self {
         self.more.extend(more);

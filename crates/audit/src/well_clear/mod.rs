@@ -11,7 +11,7 @@
 //!
 //! On straight segments v is constant. With the time t from the closest approach, the miss distance m, and w^2 = (D^2 -
 //! m^2) / |v|^2, the first condition is |t| < w. The second is t < 0 and t^2 + T t - w^2 < 0. Both together are the
-//! interval from -T/2 - sqrt(T^2/4 + w^2) to w; without w there is none. All ends are enclosed by interval arithmetic.
+//! interval from -T/2 - sqrt(T^2/4 + w^2) to w. It is empty if m >= D. All ends are enclosed by interval arithmetic.
 //! What lies between the enclosures is undecided.
 
 mod enclosed;

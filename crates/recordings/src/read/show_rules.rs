@@ -1,7 +1,7 @@
 //! Rules that a Skybrush show states itself: limits for its validation, geofence, and yaw of its drones.
 //!
-//! Limits are in metres, metres per second and degrees per second, and apply to each drone. Polygons of the geofence are
-//! in the flat coordinate system of the show, in metres. Yaw is in degrees, and linear between setpoints. Facts from
+//! Limits are in metres, metres per second and degrees per second, and apply to each drone. Polygons of the geofence
+//! are in the flat coordinate system of the show, in metres. Yaw is in degrees, and linear between setpoints. Facts from
 //! `skybrush-io/live`, `skybrush-io/viewer` and `skybrush-io/studio-blender`.
 
 use std::collections::BTreeMap;
@@ -29,8 +29,8 @@ pub struct ShowRules {
     pub max_yaw_rate_deg_s: Option<f64>,
     /// Polygons of the geofence.
     pub polygons: Vec<ShowPolygon>,
-    /// Yaw setpoints of drones by name: times \[s\] in ascending order, and yaw \[deg\]. A drone without yaw control, or
-    /// with automatic yaw, is absent.
+    /// Yaw setpoints of drones by name: times \[s\] in ascending order, and yaw \[deg\]. A drone without yaw control,
+    /// or with automatic yaw, is absent.
     pub yaw: BTreeMap<String, Vec<[f64; 2]>>,
     /// Rules of the file that are not read, a clause each.
     pub not_judged: Vec<String>,
@@ -168,8 +168,9 @@ mod tests {
     #[test]
     fn limits_and_polygons_of_a_show_are_read() {
         let rules = rules(
-            r#"{"validation": {"minDistance": 2.5, "maxAltitude": 100, "maxVelocityXY": 8, "maxVelocityZ": 3,
-                "maxVelocityZUp": 2, "maxAccelerationXY": 4, "maxAccelerationZ": 4, "minNavAltitude": 2.5},
+            r#"{"validation": {"minDistance": 2.5, "maxAltitude": 100, "maxVelocityXY": 8,
+                "maxVelocityZ": 3, "maxVelocityZUp": 2, "minNavAltitude": 2.5,
+                "maxAccelerationXY": 4, "maxAccelerationZ": 4},
                 "geofence": {"version": 1, "polygons": [
                     {"isInclusion": true, "points": [[0, 0, 0], [9, 0, 0], [9, 9, 0]]},
                     {"isInclusion": false, "points": [[1, 1], [2, 1], [2, 2]]}]}}"#,
