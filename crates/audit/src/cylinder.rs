@@ -1,9 +1,9 @@
 //! Upright cylinders: two vehicles are too near only if they are so horizontally and vertically at the same instant.
 //!
 //! The scaled distance of a relative position (x, y, z) is the larger of the horizontal distance over R and the
-//! vertical distance over H. It is a convex function of the position, and two vehicles touch at 1. Along a straight relative
-//! motion the vertical distance is below x H on one open interval of time. The scaled distance falls below x iff the
-//! smallest horizontal distance over the closure of this interval is strictly below x R.
+//! vertical distance over H. It is a convex function of the position, and two vehicles touch at 1. Along a straight
+//! relative motion the vertical distance is below x H on one open interval of time. The scaled distance falls below x
+//! iff the smallest horizontal distance over the closure of this interval is strictly below x R.
 //!
 //! Doubles with a bound on their rounding decide first, then integers ([`ExactMotion::enters`]).
 

@@ -1,8 +1,8 @@
 //! Rules that a Skybrush show states itself: limits for its validation, geofence, and yaw of its drones.
 //!
 //! Limits are in metres, metres per second and degrees per second, and apply to each drone. Polygons of the geofence
-//! are in the flat coordinate system of the show, in metres. Yaw is in degrees, and linear between setpoints. Facts from
-//! `skybrush-io/live`, `skybrush-io/viewer` and `skybrush-io/studio-blender`.
+//! are in the flat coordinate system of the show, in metres. Yaw is in degrees, and linear between setpoints. Facts
+//! from `skybrush-io/live`, `skybrush-io/viewer` and `skybrush-io/studio-blender`.
 
 use std::collections::BTreeMap;
 
@@ -159,22 +159,22 @@ fn point_of(point: &Value, unit: f64) -> Option<[f64; 2]> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use serde_json::json;
 
-    fn rules(text: &str) -> ShowRules {
-        ShowRules::read(&serde_json::from_str(text).expect("JSON"), 1.0, true)
-    }
+    use super::*;
 
     #[test]
     fn limits_and_polygons_of_a_show_are_read() {
-        let rules = rules(
-            r#"{"validation": {"minDistance": 2.5, "maxAltitude": 100, "maxVelocityXY": 8,
-                "maxVelocityZ": 3, "maxVelocityZUp": 2, "minNavAltitude": 2.5,
-                "maxAccelerationXY": 4, "maxAccelerationZ": 4},
-                "geofence": {"version": 1, "polygons": [
-                    {"isInclusion": true, "points": [[0, 0, 0], [9, 0, 0], [9, 9, 0]]},
-                    {"isInclusion": false, "points": [[1, 1], [2, 1], [2, 2]]}]}}"#,
-        );
+        let inside = json!({"isInclusion": true, "points": [[0, 0, 0], [9, 0, 0], [9, 9, 0]]});
+        let outside = json!({"isInclusion": false, "points": [[1, 1], [2, 1], [2, 2]]});
+        let settings = json!({
+            "validation": {
+                "minDistance": 2.5, "maxAltitude": 100, "maxVelocityXY": 8, "maxVelocityZ": 3, "maxVelocityZUp": 2,
+                "maxAccelerationXY": 4, "maxAccelerationZ": 4, "minNavAltitude": 2.5,
+            },
+            "geofence": {"version": 1, "polygons": [inside, outside]},
+        });
+        let rules = ShowRules::read(&settings, 1.0, true);
         assert_eq!((rules.min_distance_m, rules.max_height_m), (Some(2.5), Some(100.0)));
         assert_eq!((rules.max_climb_m_s, rules.max_descent_m_s), (Some(2.0), Some(3.0)));
         assert_eq!((rules.max_accel_m_s2, rules.navigation_floor_m), (Some(4.0), Some(2.5)));
@@ -185,10 +185,11 @@ mod tests {
 
     #[test]
     fn what_is_not_read_is_named() {
-        let rules = rules(
-            r#"{"validation": {"minDistance": -1, "maxJerk": 3, "maxAccelerationXY": 4},
-                "geofence": {"maxDistance": 200, "polygons": [{"points": []}]}}"#,
-        );
+        let settings = json!({
+            "validation": {"minDistance": -1, "maxJerk": 3, "maxAccelerationXY": 4},
+            "geofence": {"maxDistance": 200, "polygons": [{"points": []}]},
+        });
+        let rules = ShowRules::read(&settings, 1.0, true);
         assert_eq!(rules.min_distance_m, None);
         for expected in ["minDistance", "maxJerk", "maxAccelerationXY", "maxDistance", "polygon 1"] {
             assert!(rules.not_judged.iter().any(|what| what.contains(expected)), "{expected}: {:?}", rules.not_judged);
@@ -198,10 +199,9 @@ mod tests {
     #[test]
     fn yaw_counts_from_take_off_and_must_be_in_order() {
         let mut rules = ShowRules::default();
-        let control = |text: &str| serde_json::from_str(text).expect("JSON");
-        rules.read_yaw("a", &control(r#"{"version": 1, "setpoints": [[0, 0], [2, 90]]}"#), 5.0);
-        rules.read_yaw("b", &control(r#"{"autoYaw": true, "setpoints": []}"#), 0.0);
-        rules.read_yaw("c", &control(r#"{"setpoints": [[2, 0], [2, 90]]}"#), 0.0);
+        rules.read_yaw("a", &json!({"version": 1, "setpoints": [[0, 0], [2, 90]]}), 5.0);
+        rules.read_yaw("b", &json!({"autoYaw": true, "setpoints": []}), 0.0);
+        rules.read_yaw("c", &json!({"setpoints": [[2, 0], [2, 90]]}), 0.0);
         assert_eq!(rules.yaw.get("a"), Some(&vec![[5.0, 0.0], [7.0, 90.0]]));
         assert_eq!((rules.yaw.len(), rules.not_judged.len()), (1, 1));
     }
