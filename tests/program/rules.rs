@@ -6,20 +6,21 @@ use serde_json::Value;
 
 use crate::program::{Ran, TAUTLINE, ran_by};
 
-/// Two vehicles that pass 0.2 m aside and 0.6 m above each other, far apart at both samples.
-const PASS: &str = "t,id,x,y,z\n0,a,-5,0,5\n0,b,5,0.2,5.6\n1,a,5,0,5\n1,b,-5,0.2,5.6\n";
+/// Two vehicles that pass 0.25 m aside and 0.5 m above each other, far apart at both samples.
+const PASS: &str = "t,id,x,y,z\n0,a,-5,0,5\n0,b,5,0.25,5.5\n1,a,5,0,5\n1,b,-5,0.25,5.5\n";
 /// Head-on at 100 m/s from 20 km.
 const HEAD_ON: &str = "t,id,x,y,z\n0,a,0,0,100\n0,b,20000,0,100\n300,a,15000,0,100\n300,b,5000,0,100\n";
 
 fn audit(name: &str, text: &str, words: &[&str]) -> Ran {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join(name), text).expect("written");
-    ran_by(TAUTLINE, folder.path(), &[&["audit", name], words].concat())
+    let seconds = if name.ends_with(".csv") { ["--time-unit", "s"].as_slice() } else { &[] };
+    ran_by(TAUTLINE, folder.path(), &[&["audit", name], words, seconds].concat())
 }
 
 #[test]
 fn a_cylinder_tells_beside_from_above() {
-    let clear = audit("pass.csv", PASS, &["--cylinder", "0.5,0.6"]);
+    let clear = audit("pass.csv", PASS, &["--cylinder", "0.5,0.5"]);
     assert_eq!(clear.exit, Some(0), "{clear:?}");
     assert!(
         clear.out.starts_with("CLEAR if straight between samples: never closer than 1.000000 cylinders"),
