@@ -14,7 +14,6 @@ const MAX_PARTS: usize = 100;
 
 /// Polygon in the plane of x and y, convex or not, with an optional range of heights, in which every vehicle must stay.
 #[derive(Clone, Debug, PartialEq)]
-#[expect(clippy::struct_field_names, reason = "each is in metres")]
 pub struct Fence {
     corners_m: Vec<Vector2<f64>>,
     /// Whether vehicles must stay outside the polygon.

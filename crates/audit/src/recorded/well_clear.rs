@@ -111,7 +111,9 @@ impl Losses {
             std::mem::take(&mut self.open).into_iter().partition(|(_, loss)| loss.to_s >= before_s - AT_AN_END_S);
         self.open = open;
         let ended: BTreeMap<_, _> = ended;
-        ended.into_values().for_each(|loss| self.end(loss));
+        for loss in ended.into_values() {
+            self.end(loss);
+        }
     }
 
     fn finish(mut self) -> (Vec<WellClearLoss>, Tally) {

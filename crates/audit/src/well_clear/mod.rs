@@ -89,9 +89,9 @@ impl WellClear {
         let (s_a, v_a) = state(&a, interval.from_s);
         let (s_b, v_b) = state(&b, interval.from_s);
         let is_common = a.to - a.from == b.to - b.from && a.from_s == b.from_s && a.to_s == b.to_s;
-        let s = [0, 1, 2].map(|axis| match is_common && interval.from_s == a.from_s {
-            true => Enclosed::difference(b.from[axis], a.from[axis]),
-            false => s_b[axis] - s_a[axis],
+        let starts_at_samples = is_common && interval.from_s == a.from_s;
+        let s = [0, 1, 2].map(|axis| {
+            if starts_at_samples { Enclosed::difference(b.from[axis], a.from[axis]) } else { s_b[axis] - s_a[axis] }
         });
         let v = [0, 1, 2].map(|axis| if is_common { Enclosed::ZERO } else { v_b[axis] - v_a[axis] });
         let elapsed = Enclosed { low: 0.0, high: duration.high };
@@ -114,13 +114,14 @@ impl WellClear {
         }
         let is_certain = is_certain && from.high < to.low;
         let at = |elapsed_s: f64| (interval.from_s + elapsed_s).clamp(interval.from_s, interval.to_s);
-        let span_s = match is_certain {
+        let span_s = if is_certain {
             // An end of the interval is an end of the loss without rounding.
-            true => [
+            [
                 if from == Enclosed::ZERO { interval.from_s } else { at(from.middle()) },
                 if to == duration { interval.to_s } else { at(to.middle()) },
-            ],
-            false => [at(from.low), at(to.high)],
+            ]
+        } else {
+            [at(from.low), at(to.high)]
         };
         Some(Loss { span_s, is_certain })
     }
@@ -263,7 +264,7 @@ fn components(c: &[Vector3<f64>], basis: &BernsteinBasis, (start, length): (f64,
     rescale(&mut part, start, length);
     let low = basis.points(&part).reduce(|a, b| a.inf(&b)).unwrap_or_default();
     let high = basis.points(&part).reduce(|a, b| a.sup(&b)).unwrap_or_default();
-    let size = 4.0 * c.len() as f64 * f64::EPSILON * c.iter().map(|c| c.amax()).sum::<f64>();
+    let size = 4.0 * c.len() as f64 * f64::EPSILON * c.iter().map(Vector3::amax).sum::<f64>();
     [0, 1, 2].map(|axis| Enclosed { low: low[axis], high: high[axis] }.widened(rounding + size))
 }
 
@@ -411,13 +412,13 @@ mod tests {
     #[test]
     fn daidalus_finds_the_same_intervals() {
         for (latitudes, expected) in [
-            ([33.842767, 34.474061], [135.214585, 173.354675]),
-            ([33.907697, 34.279281], [65.089621, 103.229616]),
-            ([33.930886, 34.209715], [40.04531, 78.185284]),
+            ([33.842_767, 34.474_061], [135.214_585, 173.354_675]),
+            ([33.907_697, 34.279_281], [65.089_621, 103.229_616]),
+            ([33.930_886, 34.209_715], [40.045_31, 78.185_284]),
         ] {
             let [own, intruder] = encounter(
                 [latitudes[0], -117.0, 17_000.0, 0.0, 200.0],
-                [latitudes[1], -117.002841, 17_000.0, 180.0, 600.0],
+                [latitudes[1], -117.002_841, 17_000.0, 180.0, 600.0],
             );
             assert_span(span(DAIDALUS, &own, &intruder), expected, 5e-3);
             // The thresholds of the standard are 10 ft smaller.
