@@ -7,6 +7,7 @@ use tautline::audit::envelope::{Envelope, Limit, Quantity};
 use tautline::audit::recorded::{self, Interpolation, VehicleSettings};
 use tautline::read::{self, ArrayAxis, ColumnNames, Dimensions, Duplicates, Format, TimeUnit};
 use tautline::request::audit::PlanQuestion;
+use tautline::request::audit::rules::{self, Rules};
 use tautline::request::{AuditRequest, ConfigFile, Subject};
 
 use crate::errors::{wrong_input, wrong_input_with_code};
@@ -107,6 +108,7 @@ pub(crate) struct AuditOptions {
     obstacles: Option<PathBuf>,
     fence: Option<PathBuf>,
     plan: Option<PlanQuestion>,
+    rules: Rules,
     config: ConfigFile,
     expect_vehicles: Option<usize>,
     independent: bool,
@@ -120,14 +122,14 @@ impl AuditOptions {
     #[new]
     #[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
     #[pyo3(signature = (*, delta, motion, max_accel, radius, ellipsoid, obstacles, limit, fence, plan, plan_delay, tube,
-                        accel_window, config, has_config, from_s, to_s, above, ids, offset, expect_vehicles, max_gap,
-                        require_presence, independent))]
+                        accel_window, config, cylinder, well_clear, rules, has_config, from_s, to_s, above, ids,
+                        offset, expect_vehicles, max_gap, require_presence, independent))]
     fn new(
         delta: Option<f64>,
         motion: Option<String>,
         max_accel: PerVehicleValues,
         radius: PerVehicleValues,
-        ellipsoid: Option<[f64; 3]>,
+        ellipsoid: Option<String>,
         obstacles: Option<PathBuf>,
         limit: Vec<(String, f64)>,
         fence: Option<PathBuf>,
@@ -136,6 +138,9 @@ impl AuditOptions {
         tube: Option<f64>,
         accel_window: Option<f64>,
         config: Option<PathBuf>,
+        cylinder: Option<String>,
+        well_clear: Option<String>,
+        rules: Option<String>,
         has_config: bool,
         from_s: Option<f64>,
         to_s: Option<f64>,
@@ -153,7 +158,9 @@ impl AuditOptions {
             motion: choice("motion", motion, &motions)?,
             max_accel_m_s2: max_accel.0,
             radius_m: radius.0,
-            ellipsoid_m: ellipsoid.map(Into::into),
+            ellipsoid_m: parsed("ellipsoid", ellipsoid, rules::ellipsoid)?,
+            cylinder: parsed("cylinder", cylinder, rules::cylinder)?,
+            well_clear: parsed("well_clear", well_clear, rules::well_clear)?,
             from_s,
             to_s,
             above_m: above,
@@ -186,8 +193,14 @@ impl AuditOptions {
             (None, false) => ConfigFile::None,
         };
         let plan = plan.map(|path| PlanQuestion { path, delay_s: plan_delay, tube_m: tube });
-        Ok(Self { settings, obstacles, fence, plan, config, expect_vehicles, independent })
+        let rules = parsed("rules", rules, str::parse)?.unwrap_or_default();
+        Ok(Self { settings, obstacles, fence, plan, rules, config, expect_vehicles, independent })
     }
+}
+
+/// Parses an argument; the error names it.
+fn parsed<T>(name: &str, text: Option<String>, parse: fn(&str) -> Result<T, String>) -> PyResult<Option<T>> {
+    text.map(|text| parse(&text)).transpose().map_err(|error| wrong_input(format!("{name}: {error}")))
 }
 
 impl AuditOptions {
@@ -198,6 +211,7 @@ impl AuditOptions {
             obstacles: self.obstacles.clone(),
             fence: self.fence.clone(),
             plan: self.plan.clone(),
+            rules: self.rules,
             expect_vehicles: self.expect_vehicles,
             independent: self.independent,
             config: self.config.clone(),

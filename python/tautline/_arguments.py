@@ -56,6 +56,13 @@ def optional_vector(value: object, what: str) -> list[float] | None:
     return found
 
 
+def name_or_numbers(value: object, what: str) -> str | None:
+    """Returns a name as it is, numbers as a text with commas, or None."""
+    if value is None or isinstance(value, str):
+        return value
+    return ",".join(repr(number) for number in numbers(value, what))
+
+
 def count(value: object, what: str) -> int:
     """Returns an integer from 0 on."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, np.integer)):

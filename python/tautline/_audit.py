@@ -17,13 +17,13 @@ from ._arguments import (
     PathLike,
     boolean,
     name_list,
+    name_or_numbers,
     number_or_by_name,
     numbers_by_name,
     optional_count,
     optional_number,
     optional_path,
     optional_text,
-    optional_vector,
     path,
     paths,
     read_options,
@@ -38,8 +38,9 @@ Outcome = tuple[str, str, str, str]
 
 #: Arguments of `audit`, in the order of the call that a page shows.
 SHOWN = (
-    "delta", "motion", "max_accel", "radius", "ellipsoid", "obstacles", "limit", "fence", "plan", "plan_delay", "tube",
-    "accel_window", "config", "from_s", "to_s", "above", "ids", "offset", "expect_vehicles", "max_gap",
+    "delta", "motion", "max_accel", "radius", "ellipsoid", "cylinder", "well_clear", "rules", "obstacles", "limit",
+    "fence", "plan", "plan_delay", "tube", "accel_window", "config", "from_s", "to_s", "above", "ids", "offset",
+    "expect_vehicles", "max_gap",
     "require_presence", "independent",
 )  # fmt: skip
 
@@ -232,7 +233,10 @@ def audit(
     motion: str | None = None,
     max_accel: float | Mapping[str, float] | None = None,
     radius: float | Mapping[str, float] | None = None,
-    ellipsoid: Sequence[float] | None = None,
+    ellipsoid: Sequence[float] | str | None = None,
+    cylinder: Sequence[float] | None = None,
+    well_clear: Sequence[float] | str | None = None,
+    rules: str | None = None,
     obstacles: PathLike | None = None,
     limit: Mapping[str, float] | None = None,
     fence: PathLike | None = None,
@@ -271,7 +275,11 @@ def audit(
 
     * ``delta``: safety distance of two centres [m].
     * ``radius``: radius of all vehicles, or by name [m]; the limit of a pair is max(delta, r1 + r2).
-    * ``ellipsoid``: (3,) half axes [m] of an ellipsoid around each vehicle; they scale separations and delta.
+    * ``ellipsoid``: (3,) half axes [m] of an ellipsoid around each vehicle, or ``crazyswarm`` or
+      ``crazyflie-firmware``; they scale separations and delta.
+    * ``cylinder``: (2,) horizontal and vertical distance [m]; a pair is too near only if it is below both at once.
+    * ``well_clear``: ``do-365``, ``f3442``, or (3,) horizontal distance [m], vertical distance [m], modified tau [s].
+    * ``rules``: origin of limits that no argument sets: ``recording``, ``skybrush`` or ``none``.
     * ``motion``: motion between samples: ``linear``, ``hold``, ``polynomial``, or ``bounded`` by ``max_accel`` [m/s^2].
     * ``obstacles``: TOML file of obstacles.
     * ``limit``: limits on single vehicles, such as ``{"speed": 5, "climb": 2}`` [m/s], ``accel`` [m/s^2], ``height``
@@ -310,7 +318,10 @@ def audit(
         motion=optional_text(motion, "motion"),
         max_accel=number_or_by_name(max_accel, "max_accel"),
         radius=number_or_by_name(radius, "radius"),
-        ellipsoid=optional_vector(ellipsoid, "ellipsoid"),
+        ellipsoid=name_or_numbers(ellipsoid, "ellipsoid"),
+        cylinder=name_or_numbers(cylinder, "cylinder"),
+        well_clear=name_or_numbers(well_clear, "well_clear"),
+        rules=optional_text(rules, "rules"),
         obstacles=optional_path(obstacles, "obstacles"),
         limit=numbers_by_name(limit, "limit"),
         fence=optional_path(fence, "fence"),

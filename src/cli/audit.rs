@@ -14,10 +14,12 @@ use super::run::figure_formats;
 use super::{Exit, audit_formats, console, reading};
 use tautline_audit::envelope::{Envelope, Limit, Quantity};
 use tautline_audit::recorded::{Interpolation, Settings, VehicleSettings};
+use tautline_audit::{Cylinder, WellClear};
 use tautline_recordings::read::Format;
 use tautline_report::report::recorded::RecordedReport;
 use tautline_report::report::write_atomically;
 use tautline_report::request::audit::PlanQuestion;
+use tautline_report::request::audit::rules::{self, Rules};
 use tautline_report::request::outputs::NamedPath;
 use tautline_report::request::{AuditRequest, AuditedRecording, ConfigFile, Failure, Monitor as _, Subject};
 
@@ -159,20 +161,34 @@ pub(super) struct AuditArguments {
     /// Radius [m] of all vehicles, or of one; repeatable.
     #[arg(long, value_name = "[NAME=]R", value_parser = named, allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) radius: Vec<Named>,
-    /// Half axes [m] of an ellipsoid around each vehicle, such as its downwash; two touch at a scaled distance of 2.
+    /// Half axes [m] of an ellipsoid around each vehicle, such as its downwash, or a name (crazyswarm,
+    /// crazyflie-firmware); two touch at a scaled distance of 2.
     #[arg(
         long,
         value_name = "AX,AY,AZ",
-        value_parser = axes,
+        value_parser = rules::ellipsoid,
         allow_hyphen_values = true,
         conflicts_with_all = ["radius", "obstacles"],
         help_heading = "Judging"
     )]
     pub(super) ellipsoid: Option<Vector3<f64>>,
+    /// Upright cylinder: a pair is too near if it is horizontally closer than R and vertically closer than H [m].
+    #[arg(long, value_name = "R,H", value_parser = rules::cylinder, help_heading = "Judging")]
+    #[arg(allow_hyphen_values = true)]
+    pub(super) cylinder: Option<Cylinder>,
+    /// Well clear of air traffic: do-365, f3442, or D,Z,T (horizontal and vertical distance [m], modified tau [s]).
+    #[arg(long, value_name = "PRESET", value_parser = rules::well_clear, help_heading = "Judging")]
+    #[arg(allow_hyphen_values = true)]
+    pub(super) well_clear: Option<WellClear>,
+    /// Origin of limits that no option sets: the recording (a Skybrush show), the defaults of skybrush, or none
+    /// [default: recording].
+    #[arg(long, value_name = "ORIGIN", help_heading = "Judging")]
+    pub(super) rules: Option<Rules>,
     /// TOML file of obstacles: balls, boxes, capsules, half-spaces; static or moving.
     #[arg(long, value_name = "FILE", help_heading = "Judging")]
     pub(super) obstacles: Option<PathBuf>,
-    /// Limits of each vehicle: speed, horizontal, climb, descent [m/s], accel [m/s^2], height, floor [m].
+    /// Limits of each vehicle: speed, horizontal, climb, descent [m/s], accel [m/s^2], height, floor,
+    /// navigation-floor [m], yaw-rate [deg/s].
     #[arg(
         long,
         value_name = "LIMIT=VALUE,...",
@@ -320,12 +336,6 @@ fn offset(text: &str) -> Result<(String, f64), String> {
     Ok((name.to_owned(), number(value)?))
 }
 
-fn axes(text: &str) -> Result<Vector3<f64>, String> {
-    let numbers = text.split(',').map(number).collect::<Result<Vec<_>, _>>()?;
-    let [x, y, z] = numbers[..] else { return Err("write three half axes, such as 0.125,0.125,0.375".to_owned()) };
-    Ok(Vector3::new(x, y, z))
-}
-
 /// Parses a limit such as `speed=5`.
 fn limit(text: &str) -> Result<Limit, String> {
     let names = || Quantity::NUMBERS.map(Quantity::name).join(", ");
@@ -354,6 +364,7 @@ impl AuditArguments {
             obstacles: self.obstacles.clone(),
             fence: self.fence.clone(),
             plan: self.plan.clone().map(|path| PlanQuestion { path, delay_s: self.plan_delay, tube_m: self.tube }),
+            rules: self.rules.unwrap_or_default(),
             expect_vehicles: self.expect_vehicles,
             independent: self.independent,
             allow_undecided: self.allow_undecided,
@@ -395,6 +406,8 @@ impl AuditArguments {
             max_accel_m_s2,
             radius_m,
             ellipsoid_m: self.ellipsoid,
+            cylinder: self.cylinder,
+            well_clear: self.well_clear,
             from_s: self.from,
             to_s: self.to,
             above_m: self.above,
@@ -437,7 +450,8 @@ mod tests {
         assert_eq!((read.quantity, read.allowed), (Quantity::Climb, 2.5));
         assert_eq!(
             limit("speed").unwrap_err(),
-            "write LIMIT=VALUE with a limit of speed, horizontal, climb, descent, accel, height, floor"
+            "write LIMIT=VALUE with a limit of speed, horizontal, climb, descent, accel, height, floor, \
+             navigation-floor, yaw-rate"
         );
         assert!(limit("spee=3").unwrap_err().starts_with("unknown limit `spee`"));
         assert_eq!(limit("speed=NaN").unwrap_err(), "`NaN` is not a number");

@@ -6,7 +6,9 @@ use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
 use tautline_core::text::{beside_limit, counted, fixed};
 use tautline_report::report::Status;
-use tautline_report::report::recorded::{LimitFindings, PairFinding, RecordedReport, VehicleFinding};
+use tautline_report::report::recorded::{
+    LimitFindings, PairFinding, RecordedReport, VehicleFinding, WellClearFindings,
+};
 use tautline_report::request::{AuditedRecording, Failure};
 
 const COLUMNS: [&str; 10] =
@@ -49,7 +51,8 @@ fn rows(report: &RecordedReport) -> impl Iterator<Item = Vec<String>> {
         let words = [kind].into_iter().chain(who).map(str::to_owned);
         (span_s, words.collect::<Vec<_>>(), numbers)
     });
-    let mut rows: Vec<_> = rows.chain(report.limits.iter().flat_map(beyond)).chain(from_plan(report)).collect();
+    let rows = rows.chain(report.limits.iter().flat_map(beyond)).chain(from_plan(report));
+    let mut rows: Vec<_> = rows.chain(report.well_clear.iter().flat_map(not_well_clear)).collect();
     rows.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
     rows.into_iter().map(|(span_s, words, numbers)| {
         let numbers = span_s.map(Some).into_iter().chain(numbers).map(|x| x.map_or_else(String::new, number));
@@ -87,6 +90,17 @@ fn from_plan(report: &RecordedReport) -> impl Iterator<Item = Row> + '_ {
             ([finding.from_s, finding.to_s], words("undecided", vehicle), [None, None, None, plan.tube_m, None])
         });
         beyond.chain(unknown)
+    })
+}
+
+/// Returns the rows of losses of well clear, with horizontal distances.
+fn not_well_clear(found: &WellClearFindings) -> impl Iterator<Item = Row> + '_ {
+    let violations = found.violations.iter().map(|of| ("not-well-clear", of));
+    let undecided = found.undecided.iter().map(|of| ("undecided", of));
+    violations.chain(undecided).map(|(kind, PairFinding { who: [first, second], finding })| {
+        let words = vec![kind.to_owned(), first.clone(), second.clone()];
+        let (distance, limit) = (Some(finding.horizontal_m), Some(found.horizontal_m));
+        ([finding.from_s, finding.to_s], words, [distance, distance, None, limit, None])
     })
 }
 
@@ -140,6 +154,9 @@ fn suite(AuditedRecording { report, allows_undecided, .. }: &AuditedRecording) -
     cases
         .extend(report.limits.iter().map(|limit| TestCase::new(limit.quantity, verdict(limit.status, &limit.brief()))));
     cases.extend(report.plan.iter().map(|plan| TestCase::new("plan", verdict(plan.status, &plan.brief()))));
+    cases.extend(
+        report.well_clear.iter().map(|found| TestCase::new("well_clear", verdict(found.status, &found.brief()))),
+    );
     if report.presence.required {
         let partly = report.presence.partly as u64;
         let status = if partly == 0 { Status::Clear } else { Status::Undecided };
@@ -175,7 +192,7 @@ pub(super) fn markdown(judged: &[AuditedRecording], failures: &[(String, Failure
             .to_owned();
     for AuditedRecording { report, .. } in judged {
         let closest = report.closest.first();
-        let unit = if report.measure == "metres" { "m" } else { "ellipsoids" };
+        let unit = report.unit();
         let cells = [
             escape_markdown(&report.source.recording),
             format!("{} {}", mark(report.status), escape_markdown(&report.verdict())),

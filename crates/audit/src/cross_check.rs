@@ -6,8 +6,9 @@ use nalgebra::Vector3;
 use parry3d::math::{Pose, Vector};
 use parry3d::query::details::cast_shapes_ball_ball;
 use parry3d::query::{PointQuery as _, ShapeCastOptions};
-use parry3d::shape::{Ball, Capsule, Cuboid, HalfSpace};
+use parry3d::shape::{Ball, Capsule, Cuboid, Cylinder, HalfSpace};
 
+use super::cylinder::Cylinder as SafetyCylinder;
 use super::enclosure::{Minimum, Search, Target};
 use super::obstacle::Shape;
 use super::polynomial::{motion_deviation, value};
@@ -21,6 +22,8 @@ const CHORD_OVER_LIMIT: f64 = 1e-6;
 const PARTS: u32 = 8;
 /// Relative difference of two distances from an obstacle that rounding explains; each takes a handful of operations.
 const ROUNDING: f64 = 1e-12;
+/// Relative excess of the scaled distance of a cylinder at the rounded fraction of its minimum.
+const AT_MINIMUM: f64 = 1e-6;
 
 /// Runs the second detector on a segment and compares it with the minimum that the first found.
 pub(super) fn cross_check(search: &Search<'_>, keep_out: &KeepOut, found: &Minimum, rounding: f64) -> CrossCheck {
@@ -31,6 +34,9 @@ pub(super) fn cross_check(search: &Search<'_>, keep_out: &KeepOut, found: &Minim
             keep_out.compare(&motion, closest, is_below, keep_out.cast(&motion)).1
         }
         (Target::Origin, None) => along_chords(keep_out, search.r, found, rounding),
+        (Target::Cylinder(cylinder), _) => {
+            from_cylinder(&cylinder, keep_out.delta_m, found, rounding, |u| search.position(u))
+        }
         (Target::Shape(shape), _) => from_shape(shape, keep_out.delta_m, found, |u| search.position(u)),
     }
 }
@@ -82,6 +88,30 @@ fn from_shape(shape: &Shape, limit: f64, found: &Minimum, position: impl Fn(f64)
     });
     let contact = points.chain([found.at]).filter(|u| measured(*u).0 < limit).reduce(f64::min);
     CrossCheck { contact, agrees: same && lowest }
+}
+
+/// Tests with parry whether scaled cylinders contain the relative position, at its minimum and at points in between.
+/// `rounding` is that of the scaled distance.
+pub(super) fn from_cylinder(
+    cylinder: &SafetyCylinder,
+    limit: f64,
+    found: &Minimum,
+    rounding: f64,
+    position: impl Fn(f64) -> Vector3<f64>,
+) -> CrossCheck {
+    let is_inside = |u: f64, scale: f64| {
+        // The axis of parry's cylinder is y.
+        let at = vector(position(u).xzy());
+        scale > 0.0
+            && Cylinder::new(cylinder.vertical_m * scale, cylinder.horizontal_m * scale).contains_local_point(at)
+    };
+    let points = (0..=PARTS).map(|k| f64::from(k) / f64::from(PARTS));
+    let tolerance = ROUNDING * (found.upper + limit) + rounding;
+    let is_there = is_inside(found.at, found.upper + tolerance.max(AT_MINIMUM * found.upper));
+    let lowest = found.lower - tolerance.max(AT_MINIMUM * found.lower);
+    let is_lowest = !points.clone().any(|u| is_inside(u, lowest));
+    let contact = points.chain([found.at]).filter(|&u| is_inside(u, limit - tolerance)).reduce(f64::min);
+    CrossCheck { contact, agrees: is_there && is_lowest }
 }
 
 /// Returns the distance of a point from a shape by parry, zero inside.

@@ -7,6 +7,7 @@
 
 use nalgebra::Vector3;
 
+use super::cylinder::Cylinder;
 use super::obstacle::Shape;
 use super::outcome::WIDTH_M;
 use super::polynomial::{BernsteinBasis, classify_parts, rescale, value};
@@ -24,6 +25,8 @@ const SHORTEST_PART: f64 = 1e-10;
 pub(super) enum Target<'a> {
     /// Other vehicle: the origin of relative positions.
     Origin,
+    /// Other vehicle, with the scaled distance of a cylinder.
+    Cylinder(Cylinder),
     /// Obstacle, relative to its position.
     Shape(&'a Shape),
 }
@@ -33,8 +36,19 @@ impl Target<'_> {
     pub(super) fn distance(self, point: Vector3<f64>) -> f64 {
         match self {
             Self::Origin => point.norm(),
+            Self::Cylinder(cylinder) => cylinder.distance(point),
             Self::Shape(shape) => shape.distance(point),
         }
+    }
+
+    /// Returns whether the target is another vehicle.
+    pub(super) fn is_vehicle(self) -> bool {
+        !matches!(self, Self::Shape(_))
+    }
+
+    /// Returns the largest change of the distance by a displacement of 1 m.
+    pub(super) fn per_metre(self) -> f64 {
+        if let Self::Cylinder(cylinder) = self { cylinder.per_metre() } else { 1.0 }
     }
 }
 
@@ -66,6 +80,8 @@ pub(super) struct Search<'a> {
     pub(super) target: Target<'a>,
     pub(super) r: &'a [Vector3<f64>],
     basis: BernsteinBasis,
+    /// Basis of the degree of the position, for the heights of a cylinder.
+    position_basis: Option<BernsteinBasis>,
     part: Vec<Vector3<f64>>,
     squared: Vec<f64>,
     /// Number of parts that may still be examined.
@@ -76,10 +92,11 @@ impl<'a> Search<'a> {
     /// Creates a search along the polynomial with coefficients `r`, at least one.
     pub(super) fn new(target: Target<'a>, r: &'a [Vector3<f64>]) -> Self {
         let degree = r.len().saturating_sub(1);
-        let squared_degree = if matches!(target, Target::Origin) { 2 * degree } else { degree };
+        let squared_degree = if target.is_vehicle() { 2 * degree } else { degree };
+        let position_basis = matches!(target, Target::Cylinder(_)).then(|| BernsteinBasis::of_degree(degree));
         let basis = BernsteinBasis::of_degree(squared_degree);
         let left = MAX_PARTS.min(MAX_PRODUCTS / (squared_degree + 1).pow(2));
-        Self { target, r, basis, part: Vec::with_capacity(r.len()), squared: Vec::new(), left }
+        Self { target, r, basis, position_basis, part: Vec::with_capacity(r.len()), squared: Vec::new(), left }
     }
 
     /// Returns the motion if it is straight.
@@ -98,13 +115,13 @@ impl<'a> Search<'a> {
 
     /// Returns the smallest distance, in closed form or to within [`WIDTH_M`]; `None` if it is not below `cutoff`.
     pub(super) fn minimum(&mut self, cutoff: f64) -> Option<Minimum> {
-        let Some(motion) = self.straight() else { return self.minimum_within((0.0, 1.0), cutoff) };
-        let (lower, at) = match self.target {
-            Target::Origin => {
+        let (lower, at) = match (self.straight(), self.target) {
+            (Some(motion), Target::Origin) => {
                 let approach = motion.closest();
                 (approach.separation_m(), approach.at)
             }
-            Target::Shape(shape) => shape.closest(motion.from, motion.to),
+            (Some(motion), Target::Shape(shape)) => shape.closest(motion.from, motion.to),
+            (None, _) | (_, Target::Cylinder(_)) => return self.minimum_within((0.0, 1.0), cutoff),
         };
         (lower < cutoff).then_some(Minimum { lower, upper: lower, at })
     }
@@ -217,8 +234,21 @@ impl<'a> Search<'a> {
         rescale(&mut self.part, start, length);
         match self.target {
             Target::Origin => self.enclose_norm(),
+            Target::Cylinder(cylinder) => self.enclose_cylinder(cylinder),
             Target::Shape(shape) => self.enclose_shape(shape),
         }
+    }
+
+    /// Bounds the scaled distance of a cylinder: the larger of the bounds of its two parts.
+    fn enclose_cylinder(&mut self, cylinder: Cylinder) -> (f64, f64) {
+        let heights: Vec<_> = self.part.iter().map(|c| c.z).collect();
+        let rounding = 4.0 * heights.len() as f64 * f64::EPSILON * heights.iter().map(|z| z.abs()).sum::<f64>();
+        let (lowest, highest) = self.position_basis.as_ref().map_or((0.0, 0.0), |basis| basis.range(&heights));
+        self.part.iter_mut().for_each(|c| c.z = 0.0);
+        let (near, far) = self.enclose_norm();
+        let low = (near / cylinder.horizontal_m).max((lowest.max(-highest) - rounding) / cylinder.vertical_m);
+        let high = (far / cylinder.horizontal_m).max((highest.max(-lowest) + rounding) / cylinder.vertical_m);
+        (low.next_down().max(0.0), high.next_up())
     }
 
     fn enclose_norm(&mut self) -> (f64, f64) {
@@ -261,6 +291,7 @@ impl<'a> Search<'a> {
     fn width(&self, distance: f64) -> f64 {
         let scale = match self.target {
             Target::Origin => distance,
+            Target::Cylinder(cylinder) => self.r.iter().map(Vector3::norm).sum::<f64>() * cylinder.per_metre(),
             Target::Shape(_) => self.r.iter().map(Vector3::norm).sum(),
         };
         WIDTH_M.max(8.0 * self.r.len() as f64 * f64::EPSILON * scale)

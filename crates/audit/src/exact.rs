@@ -15,6 +15,8 @@
 //! - Integers: all coordinates in units of one power of two and all times in units of another. Both sides are
 //!   multiplied by their denominators.
 
+mod cylinder;
+
 use std::cmp::Ordering;
 
 use nalgebra::Vector3;
@@ -393,7 +395,7 @@ pub(super) fn compare_height(line: &Line, time_s: f64, height: f64) -> Ordering 
 }
 
 /// Returns the double in the middle of all doubles between two.
-fn midpoint(low: f64, high: f64) -> f64 {
+pub(super) fn midpoint(low: f64, high: f64) -> f64 {
     // Integers in the order of the doubles.
     let key = |number: f64| {
         let bits = number.to_bits().cast_signed();

@@ -39,6 +39,7 @@ mod auditor;
 mod candidates;
 mod clearance;
 mod cross_check;
+mod cylinder;
 mod double_double;
 mod enclosure;
 pub mod envelope;
@@ -53,9 +54,11 @@ pub mod recorded;
 mod segment;
 mod slices;
 mod sweep;
+mod well_clear;
 
 pub use auditor::{AuditError, Auditor};
 pub use clearance::{ClearanceAuditor, ClearanceFinding, ClearanceOutcome, swept_distance_m};
+pub use cylinder::Cylinder;
 pub use findings::{LISTED, Tally};
 pub use obstacle::{Obstacle, ObstacleError, Shape};
 pub use outcome::{
@@ -65,3 +68,4 @@ pub use recorded::TrackAuditor;
 pub use slices::{Slice, Slices};
 pub use sweep::swept_separation_m;
 pub use tautline_core::{swarm, track};
+pub use well_clear::WellClear;

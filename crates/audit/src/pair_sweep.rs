@@ -2,7 +2,8 @@
 
 use nalgebra::Vector3;
 
-use super::cross_check::{KeepOut, cross_check};
+use super::cross_check::{KeepOut, cross_check, from_cylinder};
+use super::cylinder::Cylinder;
 use super::enclosure::{Minimum, Search, Target};
 use super::exact::ExactMotion;
 use super::ledger::Results;
@@ -117,12 +118,18 @@ impl<'a> SmallestSeparation<'a> {
     }
 }
 
+/// Smallest scaled distance of a cylinder below a cutoff, and its time \[s\].
+struct SmallestScaledDistance {
+    least: f64,
+    at_s: Option<f64>,
+}
+
 impl PairSweep<'_> {
     /// Judges a pair in a window. Straight segments are judged whole, so that findings do not depend on windows; curves
     /// are judged within the window.
     pub(super) fn judge(&self, first: &[Segment], second: &[Segment], window: Interval, results: &mut Results) {
         let mut nearest = SmallestSeparation::with_cutoff(self.cutoff);
-        let vehicles = matches!(self.target, Target::Origin);
+        let mut scaled = SmallestScaledDistance { least: self.cutoff, at_s: None };
         let mut swept = 0;
         overlaps(first, second, |overlap| {
             if results.interruption.is_set() {
@@ -132,7 +139,10 @@ impl PairSweep<'_> {
             {
                 return;
             }
-            if vehicles && overlap.is_straight() {
+            if let (Target::Cylinder(cylinder), true) = (self.target, overlap.is_straight()) {
+                swept += 1;
+                self.past_cylinder(&cylinder, &overlap, &mut scaled, results);
+            } else if self.target.is_vehicle() && overlap.is_straight() {
                 swept += 1;
                 let motion = overlap.straight();
                 let closest = motion.closest();
@@ -150,7 +160,8 @@ impl PairSweep<'_> {
             }
         });
         results.swept += swept;
-        if let Some((separation_m, time_s)) = nearest.finish() {
+        let found = nearest.finish().or(scaled.at_s.map(|at_s| (scaled.least, at_s)));
+        if let Some((separation_m, time_s)) = found {
             self.offer(separation_m, separation_m, time_s, results);
         }
     }
@@ -183,28 +194,65 @@ impl PairSweep<'_> {
         }
     }
 
+    /// Judges two straight segments by the scaled distance of a cylinder, in exact arithmetic where doubles do not
+    /// decide.
+    #[inline(never)]
+    fn past_cylinder(
+        &self,
+        cylinder: &Cylinder,
+        overlap: &Overlap<'_>,
+        nearest: &mut SmallestScaledDistance,
+        results: &mut Results,
+    ) {
+        let (motion, exact) = (overlap.straight(), overlap.exact());
+        if cylinder.is_below(&motion, &exact, nearest.least) {
+            nearest.least = cylinder.separation(&motion, &exact);
+            nearest.at_s = Some(overlap.interval.at(cylinder.closest(&motion).1));
+        }
+        if !self.may_violate {
+            return;
+        }
+        let (pair, limit_m) = (self.pair, self.keep_out.delta_m);
+        let is_below = cylinder.is_below(&motion, &exact, limit_m);
+        let (nearest_m, at) = cylinder.closest(&motion);
+        let min_m = if is_below { cylinder.separation(&motion, &exact) } else { nearest_m };
+        let found = Minimum { lower: min_m, upper: min_m, at };
+        let rounding = motion.resolution_m() * cylinder.per_metre();
+        let mut check = from_cylinder(cylinder, limit_m, &found, rounding, |u| motion.from + motion.by * u);
+        check.agrees &= is_below || check.contact.is_none();
+        let span = cylinder.below(&motion, limit_m);
+        let [from_s, to_s, min_at_s] = [span.enter, span.exit, at].map(|u| overlap.interval.at(u));
+        results.ledger.add_cross_check(pair, overlap.interval, min_m, is_below.then_some(span.enter), check);
+        if is_below && !results.ledger.violations.is_from_earlier_window(to_s) {
+            let from_start = exact.starts_within(cylinder, limit_m);
+            results.ledger.add_violation(Violation { pair, from_s, to_s, min_m, min_at_s, limit_m }, from_start);
+        }
+    }
+
     /// Judges an interval in which one object is on a curve or is an obstacle.
     fn curved(&self, overlap: &Overlap<'_>, results: &mut Results) {
         let Overlap { first, second, interval } = *overlap;
         let (pair, limit_m) = (self.pair, self.keep_out.delta_m);
         let r = overlap.relative();
         let mut search = Search::new(self.target, &r);
-        let deviation = first.deviation() + second.deviation();
+        let per_metre = self.target.per_metre();
+        let deviation = (first.deviation() + second.deviation()) * per_metre;
         // The distance of a straight motion from an obstacle is a closed form, not an enclosure.
-        let rounding = if overlap.is_straight() { 0.0 } else { first.rounding() + second.rounding() };
+        let rounding = if overlap.is_straight() { 0.0 } else { (first.rounding() + second.rounding()) * per_metre };
         let matters = if self.judges { limit_m.max(self.cutoff) } else { self.cutoff };
         let Some(drawn) = search.minimum(matters + deviation + rounding) else { return };
 
-        let floor = if matches!(self.target, Target::Origin) { 0.0 } else { f64::NEG_INFINITY };
+        let floor = if self.target.is_vehicle() { 0.0 } else { f64::NEG_INFINITY };
         let lower = |lowest: &Minimum| (lowest.lower - deviation - rounding).max(floor);
-        let deviation_at = |u: f64| first.deviation_at(interval.at(u)) + second.deviation_at(interval.at(u));
+        let deviation_at =
+            |u: f64| (first.deviation_at(interval.at(u)) + second.deviation_at(interval.at(u))) * per_metre;
         // The deviation is zero at a sample, so the distance at an end may be the smaller upper bound.
         let upper = |search: &Search<'_>, from: f64, to: f64, lowest: &Minimum| {
             let [start, end] = [from, to].map(|u| search.distance(u) + deviation_at(u));
             (lowest.upper + deviation_at(lowest.at)).min(start).min(end) + rounding
         };
         let undecided = |from_s: f64, to_s: f64, lower_m: f64, upper_m: f64, lowest: &Minimum| {
-            let rate_hz = overlap.rate_hz((lowest.upper - limit_m).abs());
+            let rate_hz = overlap.rate_hz((lowest.upper - limit_m).abs() / per_metre);
             Undecided { pair, from_s, to_s, lower_m, upper_m, limit_m, rate_hz }
         };
         let (lower_m, upper_m) = (lower(&drawn), upper(&search, 0.0, 1.0, &drawn));
@@ -296,7 +344,7 @@ impl Overlap<'_> {
 
     /// Returns the relative position as a polynomial of the fraction of the shared time. It has at least one
     /// coefficient; of several, the last is not zero.
-    fn relative(&self) -> Vec<Vector3<f64>> {
+    pub(super) fn relative(&self) -> Vec<Vector3<f64>> {
         let (a, b) = (self.first, self.second);
         if self.is_straight() {
             let motion = self.straight();

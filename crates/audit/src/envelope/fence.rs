@@ -14,9 +14,12 @@ const MAX_PARTS: usize = 100;
 
 /// Polygon in the plane of x and y, convex or not, with an optional range of heights, in which every vehicle must stay.
 #[derive(Clone, Debug, PartialEq)]
-#[expect(clippy::struct_field_names, reason = "each is in metres")]
 pub struct Fence {
     corners_m: Vec<Vector2<f64>>,
+    /// Whether vehicles must stay outside the polygon.
+    is_exclusion: bool,
+    /// Further polygons, each inside or outside.
+    more: Vec<Fence>,
     height_m: Option<[f64; 2]>,
     margin_m: f64,
 }
@@ -85,9 +88,22 @@ impl Fence {
         if let Some([from_m, to_m]) = height_m.filter(|[from_m, to_m]| from_m >= to_m) {
             return Err(FenceError::Heights { from_m, to_m });
         }
-        let fence = Self { corners_m, height_m, margin_m };
+        let fence = Self { corners_m, is_exclusion: false, more: Vec::new(), height_m, margin_m };
         fence.check_edges()?;
         Ok(fence)
+    }
+
+    /// Returns the polygon, seen from above, as one that vehicles must stay outside of.
+    #[must_use]
+    pub fn as_exclusion(self) -> Self {
+        Self { is_exclusion: true, ..self }
+    }
+
+    /// Returns the fence with further polygons. Every polygon applies.
+    #[must_use]
+    pub fn with(mut self, more: Vec<Self>) -> Self {
+        self.more.extend(more);
+        self
     }
 
     fn check_edges(&self) -> Result<(), FenceError> {
@@ -147,6 +163,8 @@ impl Fence {
             return f64::INFINITY;
         }
         let across = self.margin_across(from.xy(), to.xy(), interruption);
+        let others = self.more.iter().map(|other| other.margin_until(from, to, interruption));
+        let across = others.fold(across, f64::min);
         self.height_m.map_or(across, |[low, high]| {
             let (least, most) = (from.z.min(to.z), from.z.max(to.z));
             across.min(least - low).min(high - most)
@@ -198,8 +216,13 @@ impl Fence {
         self.edges().map(|edge| from_edge(place, edge)).fold(f64::INFINITY, f64::min)
     }
 
-    /// Returns whether a position is inside: a ray along x crosses an odd number of edges.
+    /// Returns whether a position is on the allowed side of the polygon.
     fn contains(&self, place: Vector2<f64>) -> bool {
+        self.surrounds(place) != self.is_exclusion
+    }
+
+    /// Returns whether a position is inside: a ray along x crosses an odd number of edges.
+    fn surrounds(&self, place: Vector2<f64>) -> bool {
         let crosses = |[a, b]: [Vector2<f64>; 2]| {
             (a.y > place.y) != (b.y > place.y) && {
                 // The position is left of an edge that goes up, or right of one that goes down.
@@ -297,6 +320,18 @@ mod tests {
                 l_shape().clearance_margin_m(place, place).signum()
             );
         }
+    }
+
+    #[test]
+    fn all_of_several_polygons_apply() {
+        let pool = Fence::new(&[[1.0, 1.0], [3.0, 1.0], [3.0, 3.0], [1.0, 3.0]], None, 0.0).expect("a fence");
+        let fence = l_shape().with(vec![pool.as_exclusion()]);
+        let margin =
+            |x: f64, y: f64, to: f64| fence.clearance_margin_m(Vector3::new(x, y, 10.0), Vector3::new(to, y, 10.0));
+        assert_eq!((margin(4.0, 2.0, 4.0), margin(2.0, 2.0, 2.0)), (1.0, -1.0));
+        // Across the pool between two allowed positions, and past it.
+        assert!((margin(0.5, 2.0, 4.0) + 1.0).abs() < 1e-9);
+        assert_eq!(margin(0.5, 4.0, 4.0), 0.5);
     }
 
     #[test]

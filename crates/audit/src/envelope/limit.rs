@@ -27,14 +27,27 @@ pub enum Quantity {
     Height,
     /// Height z, with a lower limit \[m\].
     Floor,
+    /// Height z while the vehicle moves horizontally, with a lower limit \[m\].
+    NavigationFloor,
+    /// Rate of the yaw between setpoints \[deg/s\].
+    YawRate,
     /// Clearance margin inside the fence, with a lower limit \[m\].
     Fence,
 }
 
 impl Quantity {
     /// Quantities that are limited by a number alone.
-    pub const NUMBERS: [Self; 7] =
-        [Self::Speed, Self::HorizontalSpeed, Self::Climb, Self::Descent, Self::Acceleration, Self::Height, Self::Floor];
+    pub const NUMBERS: [Self; 9] = [
+        Self::Speed,
+        Self::HorizontalSpeed,
+        Self::Climb,
+        Self::Descent,
+        Self::Acceleration,
+        Self::Height,
+        Self::Floor,
+        Self::NavigationFloor,
+        Self::YawRate,
+    ];
 
     /// Returns the name on the command line, the key in files, and the unit.
     fn names(self) -> [&'static str; 3] {
@@ -46,6 +59,8 @@ impl Quantity {
             Self::Acceleration => ["accel", "accel_m_s2", "m/s^2"],
             Self::Height => ["height", "height_m", "m"],
             Self::Floor => ["floor", "floor_m", "m"],
+            Self::NavigationFloor => ["navigation-floor", "navigation_floor_m", "m"],
+            Self::YawRate => ["yaw-rate", "yaw_rate_deg_s", "deg/s"],
             Self::Fence => ["fence", "fence_margin_m", "m"],
         }
     }
@@ -71,26 +86,28 @@ impl Quantity {
     /// Returns whether the quantity depends on heights, and so is unknown in the plane of x and y.
     #[must_use]
     pub fn needs_height(self) -> bool {
-        matches!(self, Self::Climb | Self::Descent | Self::Height | Self::Floor)
+        matches!(self, Self::Climb | Self::Descent | Self::Height | Self::Floor | Self::NavigationFloor)
     }
 
     /// Returns whether the quantity depends on the origin of the positions.
     #[must_use]
     pub fn needs_origin(self) -> bool {
-        matches!(self, Self::Height | Self::Floor | Self::Fence)
+        matches!(self, Self::Height | Self::Floor | Self::NavigationFloor | Self::Fence)
     }
 
     /// Returns whether the quantity must not fall below its limit; the others must not exceed theirs.
     #[must_use]
     pub fn is_least(self) -> bool {
-        matches!(self, Self::Floor | Self::Fence)
+        matches!(self, Self::Floor | Self::NavigationFloor | Self::Fence)
     }
 
-    /// Returns the order of the derivative of the position that the quantity is a function of.
+    /// Returns the order of the highest derivative of the position that the quantity is a function of. The yaw is no
+    /// function of the position and counts as of order 3.
     pub(crate) fn derivative(self) -> usize {
         match self {
             Self::Height | Self::Floor | Self::Fence => 0,
             Self::Acceleration => 2,
+            Self::YawRate => 3,
             _ => 1,
         }
     }
@@ -103,7 +120,7 @@ impl Quantity {
             Self::HorizontalSpeed => derivative.xy().norm(),
             Self::Climb | Self::Height => derivative.z,
             Self::Descent | Self::Floor => -derivative.z,
-            Self::Fence => f64::NAN,
+            Self::NavigationFloor | Self::YawRate | Self::Fence => f64::NAN,
         }
     }
 }
@@ -155,9 +172,10 @@ impl Envelope {
         self.limits.iter().copied().chain(fence).collect()
     }
 
-    /// Returns a limited speed or acceleration, if any; these are undefined for vehicles that jump.
+    /// Returns a limited speed or acceleration of the position, if any; these are undefined for vehicles that jump.
     pub(crate) fn limited_motion(&self) -> Option<Quantity> {
-        self.limits.iter().map(|limit| limit.quantity).find(|quantity| quantity.derivative() > 0)
+        let mut quantities = self.limits.iter().map(|limit| limit.quantity);
+        quantities.find(|quantity| quantity.derivative() > 0 && *quantity != Quantity::YawRate)
     }
 }
 

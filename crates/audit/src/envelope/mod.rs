@@ -17,13 +17,18 @@
 //! a limit. With [`accel_window_s`](super::recorded::Settings::accel_window_s) accelerations are means over windows of
 //! that length, |v(t + w) - v(t)| / w, across corners too.
 //!
+//! A height counts for the **navigation floor** only while the horizontal speed is above [`LEVEL_MOTION_M_S`]. The
+//! **yaw** is linear between the setpoints of a show.
+//!
 //! A limit is exceeded if the excess is more than rounding: 1e-9 of the limit, or 1e-9 if the limit is below 1.
 
 mod extremum;
 mod fence;
 mod limit;
 mod monitor;
+mod navigation;
 
 pub use fence::{Fence, FenceError};
 pub use limit::{Corner, Corners, Envelope, EnvelopeOutcome, Exceedance, Limit, LimitOutcome, Quantity};
 pub(super) use monitor::{ItemContext, LimitMonitor};
+pub use navigation::LEVEL_MOTION_M_S;

@@ -7,6 +7,7 @@ use super::extremum::{
 };
 use super::fence::Fence;
 use super::limit::{Corner, Corners, Envelope, EnvelopeOutcome, Exceedance, Limit, LimitOutcome, Quantity};
+use super::navigation::{lowness_along, lowness_at, lowness_between, yaw_rates};
 use crate::findings::{Finding, LISTED, Shortlist, Tally};
 use crate::ledger::Interruption;
 use crate::outcome::Status;
@@ -117,13 +118,17 @@ impl LimitMonitor {
         let h = over.to_s - over.from_s;
         let mean = (seen.position_m - before.position_m) / h;
         let bound_m_s2 = bounded_by_m_s2.unwrap_or(0.0);
+        let rounding_m_s = 2.0 * rounding_m(&before, &seen) / h;
+        self.observe_navigation(seen.vehicle, over);
         self.each(seen.vehicle, |limit, fence, window, known| match limit.quantity.derivative() {
+            _ if limit.quantity == Quantity::NavigationFloor => {
+                lowness_between(window, (&before, &seen), mean, bound_m_s2, rounding_m_s)
+            }
             0 => position_value_between(limit, fence, window, (&before, &seen), (bound_m_s2, known)),
             1 => speed_between(limit, window, (&before, &seen), mean, bound_m_s2),
             _ => None,
         });
         if self.accel_window_s.is_some() {
-            let rounding_m_s = 2.0 * rounding_m(&before, &seen) / h;
             self.judge_mean_accelerations(seen.vehicle, &Velocity { over, coefficients: vec![mean], rounding_m_s });
         } else {
             self.judge_acceleration(&before, &seen, (last.interval, mean), bounded_by_m_s2);
@@ -183,10 +188,12 @@ impl LimitMonitor {
     /// Judges the first sample of a vehicle, or the first sample after a gap.
     fn judge_instant(&mut self, seen: &Sample) {
         let over = Interval { from_s: seen.time_s, to_s: seen.time_s };
+        self.observe_navigation(seen.vehicle, over);
         self.each(seen.vehicle, |limit, fence, window, _| {
             let is_in_window = window.from_s <= seen.time_s && seen.time_s <= window.to_s;
             let exact = match (limit.quantity, limit.quantity.derivative()) {
                 (Quantity::Fence, _) => -fence?.clearance_margin_m(seen.position_m, seen.position_m),
+                (Quantity::NavigationFloor, _) => lowness_at(seen.position_m, seen.velocity_m_s?)?,
                 (quantity, 0) => quantity.of(seen.position_m),
                 (quantity, 1) => quantity.of(seen.velocity_m_s?),
                 _ => return None,
@@ -211,6 +218,7 @@ impl LimitMonitor {
             let first = derivative(&part, clipped_s);
             let second = derivative(&first, clipped_s);
             let is_mean = self.accel_window_s.is_some();
+            self.observe_navigation(vehicle, clip);
             for of in self.of.iter_mut().filter(|of| !(is_mean && of.limit.quantity == Quantity::Acceleration)) {
                 let goal = Precision {
                     known: of.known(),
@@ -222,6 +230,10 @@ impl LimitMonitor {
                     (Quantity::Fence, _) => {
                         self.fence.as_ref().map(|fence| outside(fence, &part, Precision { coarse: COARSE, ..goal }))
                     }
+                    (Quantity::NavigationFloor, _) => {
+                        Some(lowness_along(&part, &first, goal)).filter(|found| found.upper > f64::NEG_INFINITY)
+                    }
+                    (Quantity::YawRate, _) => None,
                     (quantity, order) => Some(largest_of(quantity, [&part, &first, &second][order], goal)),
                 };
                 of.note(vehicle, found.map(|found| (clip, found)));
@@ -256,6 +268,7 @@ impl LimitMonitor {
             let lower = match limit.quantity.derivative() {
                 0 if limit.quantity == Quantity::Fence => -fence?.clearance_margin_m(before.position_m, start),
                 0 => limit.quantity.of(before.position_m).max(limit.quantity.of(start)),
+                _ if limit.quantity == Quantity::YawRate => return None,
                 _ if jumps => f64::NEG_INFINITY,
                 2 if is_separated && !is_mean && by_m_s > SMOOTH => by_m_s / apart_s,
                 _ => return None,
@@ -271,6 +284,25 @@ impl LimitMonitor {
         } else if by_m_s > SMOOTH && !is_mean && is_in(self.window) {
             let accelerations = self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::Acceleration);
             accelerations.for_each(|of| of.note_corner(vehicle, from_s, by_m_s));
+        }
+    }
+
+    /// Records that a vehicle is seen in the window, which decides the navigation floor if it never moves horizontally.
+    fn observe_navigation(&mut self, vehicle: usize, over: Interval) {
+        let is_in_window = over.from_s <= self.window.to_s && self.window.from_s <= over.to_s;
+        let floors = self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::NavigationFloor && is_in_window);
+        floors.for_each(|of| of.observe(vehicle));
+    }
+
+    /// Judges the yaw rate of a vehicle by its setpoints of time \[s\] and yaw \[deg\].
+    pub(crate) fn judge_yaw(&mut self, vehicle: usize, setpoints: &[[f64; 2]]) {
+        for of in self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::YawRate) {
+            let still = Enclosure { lower: 0.0, upper: 0.0, at: 0.0 };
+            let at_s = setpoints.first().map_or(0.0, |[time_s, _]| *time_s);
+            of.note(vehicle, Some((Interval { from_s: at_s, to_s: at_s }, still)));
+            for found in yaw_rates(setpoints, self.window) {
+                of.note(vehicle, Some(found));
+            }
         }
     }
 
@@ -404,12 +436,16 @@ impl LimitRecord {
         self.extreme.map_or(f64::NEG_INFINITY, |extreme| extreme.lower)
     }
 
-    pub(super) fn note(&mut self, vehicle: usize, found: Option<EnclosedValue>) {
-        let Some((over, Enclosure { lower, upper, at })) = found else { return };
+    fn observe(&mut self, vehicle: usize) {
         if self.observed.len() <= vehicle {
             self.observed.resize(vehicle + 1, false);
         }
         self.observed[vehicle] = true;
+    }
+
+    pub(super) fn note(&mut self, vehicle: usize, found: Option<EnclosedValue>) {
+        let Some((over, Enclosure { lower, upper, at })) = found else { return };
+        self.observe(vehicle);
         let at_s = over.from_s + at * (over.to_s - over.from_s);
         let found = Exceedance { vehicle, from_s: over.from_s, to_s: over.to_s, lower, upper, at_s };
         let bound = self.limit.bound();
@@ -454,7 +490,9 @@ impl LimitRecord {
             (list.into_iter().map(signed).collect::<Vec<_>>(), tally)
         };
         let ((violations, violations_tally), (undecided, undecided_tally)) = (listed(violations), listed(undecided));
-        let decided = is_whole && undecided.is_empty() && unknown.is_empty() && extreme.is_some();
+        // Without horizontal motion no height counts.
+        let has_value = extreme.is_some() || limit.quantity == Quantity::NavigationFloor;
+        let decided = is_whole && undecided.is_empty() && unknown.is_empty() && has_value;
         LimitOutcome {
             status: Status::new(!violations.is_empty(), decided),
             extreme: extreme.map(signed),

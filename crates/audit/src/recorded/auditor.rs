@@ -7,6 +7,7 @@ use super::outcome::{Gaps, Outcome, Rates, Tallies, absences, vehicles_without_o
 use super::settings::{LARGEST, RecordedError, Settings};
 use super::smallest::SmallestDistances;
 use super::vehicle::Vehicle;
+use super::well_clear::WellClearMonitor;
 use super::window::Windows;
 use crate::envelope::LimitMonitor;
 use crate::ledger::Interruption;
@@ -41,6 +42,7 @@ pub struct TrackAuditor {
     gaps: Gaps,
     smallest: Option<SmallestDistances>,
     envelope: Option<LimitMonitor>,
+    well_clear: Option<WellClearMonitor>,
     /// Smallest clock offset of any vehicle \[s\].
     least_offset_s: f64,
     /// Time of the last item, and the latest item time before it \[s\].
@@ -77,6 +79,7 @@ impl TrackAuditor {
             windows: Windows::new(settings.limits(), &settings.obstacles),
             envelope: (!settings.envelope.is_empty())
                 .then(|| LimitMonitor::new(&settings.envelope, settings.window(), settings.accel_window_s)),
+            well_clear: settings.well_clear.map(WellClearMonitor::new),
             settings,
             vehicles: Vec::new(),
             rates: None,
@@ -107,6 +110,9 @@ impl TrackAuditor {
         let interruption = Interruption::new(flag);
         if let Some(envelope) = &mut self.envelope {
             envelope.set_interruption(interruption.clone());
+        }
+        if let Some(well_clear) = &mut self.well_clear {
+            well_clear.set_interruption(interruption.clone());
         }
         if let Some(smallest) = &mut self.smallest {
             smallest.set_interruption(interruption.clone());
@@ -221,6 +227,9 @@ impl TrackAuditor {
         if self.has_separation_limit() {
             self.windows.judge(&self.vehicles, window, &mut self.results);
         }
+        if let Some(well_clear) = &mut self.well_clear {
+            well_clear.judge(&self.vehicles, window);
+        }
         if let Some(smallest) = &mut self.smallest {
             smallest.follow(&self.vehicles, window);
         }
@@ -281,7 +290,12 @@ impl TrackAuditor {
         if !is_separation_judged {
             self.results = Results::default();
         }
-        let envelope = self.envelope.take().map(|envelope| {
+        let envelope = self.envelope.take().map(|mut envelope| {
+            for (index, vehicle) in self.vehicles.iter().enumerate().filter(|(_, vehicle)| vehicle.is_judged()) {
+                if let Some(setpoints) = self.settings.yaw.get(&vehicle.name) {
+                    envelope.judge_yaw(index, setpoints);
+                }
+            }
             let judged: Vec<_> = self.vehicles.iter().map(Vehicle::is_judged).collect();
             envelope.finish(&judged, self.gaps.is_empty() && contradiction.is_none())
         });
@@ -289,6 +303,9 @@ impl TrackAuditor {
         let obstructed = !self.settings.obstacles.is_empty();
         let (gaps, gaps_tally, is_gapless) = self.gaps.finish(&presence, obstructed, envelope.is_some());
         let envelope = envelope.unwrap_or_default();
+        let well_clear = self.well_clear.take().map(|monitor| monitor.finish(is_gapless));
+        let has_status = |status: Status| well_clear.as_ref().is_some_and(|found| found.status == status);
+        let (is_lost, is_open) = (has_status(Status::Violation), has_status(Status::Undecided));
         let absences = absences(&self.vehicles, &self.settings, span_s);
         if self.results.interruption.is_set() {
             return Err(RecordedError::Interrupted);
@@ -304,14 +321,16 @@ impl TrackAuditor {
         let is_presence_satisfied = !self.settings.require_presence || absences.is_empty();
         Ok(Outcome {
             status: Status::new(
-                !violations.is_empty() || envelope.is_exceeded(),
-                (decided || !is_separation_judged) && envelope.is_kept() && is_presence_satisfied,
+                !violations.is_empty() || envelope.is_exceeded() || is_lost,
+                (decided || !is_separation_judged) && envelope.is_kept() && !is_open && is_presence_satisfied,
             ),
             is_else_known: (are_pairs_known || !is_separation_judged)
                 && envelope.is_else_known()
+                && !is_open
                 && !tallies.are_shortened(),
             separation: is_separation_judged.then(|| Status::new(!violations.is_empty(), decided)),
             envelope,
+            well_clear,
             max_gaps_s: self.vehicles.iter().map(|vehicle| vehicle.max_gap_s).collect(),
             vehicles: self.vehicles.into_iter().map(|vehicle| vehicle.name).collect(),
             presence,

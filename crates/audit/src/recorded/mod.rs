@@ -46,6 +46,7 @@ mod second_pass;
 mod settings;
 mod smallest;
 mod vehicle;
+mod well_clear;
 mod window;
 
 pub use super::outcome::{Approach, ObjectPair, WIDTH_M};
@@ -53,4 +54,5 @@ pub use auditor::{TrackAuditor, audit};
 pub use outcome::{Absence, Contradiction, Gap, Outcome, Presence, Tallies};
 pub use plan::{Deviation as PlanDeviation, PlanComparison, PlanFindings, Unknown as PlanUnknown};
 pub use second_pass::{PairSample, PairSeries, PositionLookup, Proof, ProofBuilder, ProofWindow};
-pub use settings::{Interpolation, RecordedError, Settings, TOUCHING_ELLIPSOIDS, VehicleSettings};
+pub use settings::{Interpolation, RecordedError, Settings, TOUCHING_CYLINDER, TOUCHING_ELLIPSOIDS, VehicleSettings};
+pub use well_clear::{WellClearLoss, WellClearOutcome};

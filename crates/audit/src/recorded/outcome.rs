@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::settings::Settings;
 use super::vehicle::Vehicle;
+use super::well_clear::WellClearOutcome;
 use crate::envelope::EnvelopeOutcome;
 use crate::findings::{Finding, LISTED, Shortlist, Tally};
 use crate::obstacle::Obstacle;
@@ -122,6 +123,8 @@ pub struct Outcome {
     pub separation: Option<Status>,
     /// Findings for the limits on single vehicles.
     pub envelope: EnvelopeOutcome,
+    /// Findings for well clear, if it was asked.
+    pub well_clear: Option<WellClearOutcome>,
     /// Names of all vehicles of the recording, including those that are not selected.
     pub vehicles: Vec<String>,
     /// Presence of each vehicle within the window; `None` if it is absent or not selected.

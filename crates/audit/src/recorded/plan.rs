@@ -100,7 +100,8 @@ impl PlanFindings {
     /// `names` are those of the flight, and `shift_s` is added to the times of the plan.
     #[must_use]
     pub fn settings_of_plan(&self, settings: &Settings, names: &[String], shift_s: f64) -> Option<Settings> {
-        let is_limited = settings.delta_m.is_some() && settings.ellipsoid_m.is_none();
+        let is_in_metres = settings.ellipsoid_m.is_none() && settings.cylinder.is_none();
+        let is_limited = settings.delta_m.is_some() && is_in_metres;
         if !is_limited || self.status != Status::Clear {
             return None;
         }

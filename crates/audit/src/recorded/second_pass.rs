@@ -130,6 +130,8 @@ pub struct PairSeries {
     /// Shape and path of the obstacle, if one of the pair is an obstacle.
     obstacle: Option<(Shape, Vec<Segment>)>,
     scale: Vector3<f64>,
+    /// Target of the distance of two vehicles.
+    target: Target<'static>,
     samples: Vec<PairSample>,
     /// Time up to which the pair was followed without a gap \[s\].
     known_s: f64,
@@ -160,6 +162,7 @@ impl PairSeries {
             vehicles,
             obstacle,
             scale: settings.ellipsoid_m.unwrap_or(Vector3::repeat(1.0)),
+            target: settings.limits().target(),
             samples: Vec::new(),
             known_s: f64::INFINITY,
             stride: 1,
@@ -192,7 +195,7 @@ impl PairSeries {
 
     fn follow(&mut self, until_s: f64) {
         let (mut found, mut known_s) = (Vec::new(), self.known_s);
-        let target = self.obstacle.as_ref().map_or(Target::Origin, |(shape, _)| Target::Shape(shape));
+        let target = self.obstacle.as_ref().map_or(self.target, |(shape, _)| Target::Shape(shape));
         let segments: Vec<&[Segment]> = self.vehicles.iter().map(|(_, vehicle)| &vehicle.segments[..]).collect();
         let (first, second) = match (&self.obstacle, &segments[..]) {
             (Some((_, path)), [vehicle]) => (&path[..], *vehicle),
@@ -251,7 +254,7 @@ fn samples(overlap: &Overlap<'_>, target: Target<'_>, found: &mut Vec<PairSample
     let Overlap { first, second, interval: Interval { from_s, to_s } } = *overlap;
     let at = |time_s: f64| {
         let positions_m = [first.position(time_s), second.position(time_s)];
-        let deviation_m = first.deviation_at(time_s) + second.deviation_at(time_s);
+        let deviation_m = (first.deviation_at(time_s) + second.deviation_at(time_s)) * target.per_metre();
         let distance_m = target.distance(positions_m[1] - positions_m[0]);
         PairSample { time_s, distance_m, deviation_m, positions_m, unseen_before: false }
     };
@@ -260,6 +263,7 @@ fn samples(overlap: &Overlap<'_>, target: Target<'_>, found: &mut Vec<PairSample
         let motion = overlap.straight();
         let closest = match target {
             Target::Origin => motion.closest().at,
+            Target::Cylinder(cylinder) => cylinder.closest(&motion).1,
             Target::Shape(shape) => shape.closest(motion.from, motion.to).1,
         };
         times_s.push(from_s + (to_s - from_s) * closest);

@@ -5,9 +5,12 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 use serde::Deserialize;
 
+use crate::cylinder::Cylinder;
+use crate::enclosure::Target;
 use crate::envelope::{Envelope, Limit, Quantity};
 use crate::obstacle::{Obstacle, ObstacleError};
 use crate::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
+use crate::well_clear::WellClear;
 
 /// Largest accepted number: a length \[m\], a time \[s\] or an acceleration \[m/s^2\].
 pub(super) const LARGEST: f64 = MAX_LENGTH_M;
@@ -73,6 +76,11 @@ pub struct Settings {
     pub radius_m: Option<f64>,
     /// Half axes of the ellipsoid around each vehicle \[m\], for example for a downwash that extends far down.
     pub ellipsoid_m: Option<Vector3<f64>>,
+    /// Upright cylinder around each vehicle that no other vehicle may enter. Distances are then scaled, and the limit
+    /// is 1. It excludes delta, radii and the ellipsoid.
+    pub cylinder: Option<Cylinder>,
+    /// Thresholds of well clear of air traffic. If separations have no other limit, they are not judged.
+    pub well_clear: Option<WellClear>,
     /// Start of the judged window \[s\].
     pub from_s: Option<f64>,
     /// End of the judged window \[s\].
@@ -91,6 +99,8 @@ pub struct Settings {
     pub only: Option<BTreeSet<String>>,
     /// Obstacles.
     pub obstacles: Vec<Obstacle>,
+    /// Yaw setpoints of vehicles by name, for a limit of the yaw rate: times \[s\] in ascending order, and yaw \[deg\].
+    pub yaw: BTreeMap<String, Vec<[f64; 2]>>,
     /// Limits on single vehicles. If they are the only limits, separations are not judged.
     pub envelope: Envelope,
     /// Length of the windows over which accelerations are averaged \[s\]: change of velocity over the window, divided
@@ -116,23 +126,26 @@ impl Settings {
 
     /// Returns whether the settings limit separations or distances from obstacles, apart from a recording's own radii.
     pub(super) fn has_separation_limit(&self) -> bool {
-        let is_given = [self.delta_m.is_some(), self.ellipsoid_m.is_some(), self.radius_m.is_some()];
+        let is_given =
+            [self.delta_m.is_some(), self.ellipsoid_m.is_some(), self.cylinder.is_some(), self.radius_m.is_some()];
         is_given.contains(&true)
             || !self.obstacles.is_empty()
             || self.vehicles.values().any(|of| of.radius_m.is_some())
             || !self.judges_single_vehicles()
     }
 
-    /// Returns whether single vehicles are judged: by limits, or by a plan.
+    /// Returns whether something else than separations is judged: limits of vehicles, a plan, or well clear.
     pub(super) fn judges_single_vehicles(&self) -> bool {
-        !self.envelope.is_empty() || self.has_plan
+        !self.envelope.is_empty() || self.has_plan || self.well_clear.is_some()
     }
 
     pub(super) fn limits(&self) -> Limits {
         let touching = self.ellipsoid_m.map_or(0.0, |_| TOUCHING_ELLIPSOIDS);
+        let touching = self.cylinder.map_or(touching, |_| TOUCHING_CYLINDER);
         Limits {
             delta: self.delta_m.unwrap_or(touching),
-            by_radii: self.ellipsoid_m.is_none(),
+            by_radii: self.ellipsoid_m.is_none() && self.cylinder.is_none(),
+            cylinder: self.cylinder,
             above: self.above_m.map(|above_m| self.ellipsoid_m.map_or(above_m, |axes| above_m / axes.z)),
         }
     }
@@ -157,6 +170,31 @@ impl Settings {
         for axis in self.ellipsoid_m.iter().flatten() {
             check("ellipsoid", Some(*axis), POSITIVE)?;
         }
+        if let Some(Cylinder { horizontal_m, vertical_m }) = self.cylinder {
+            check("cylinder", Some(horizontal_m), POSITIVE)?;
+            check("cylinder", Some(vertical_m), POSITIVE)?;
+            let others = [
+                ("delta", self.delta_m.is_some()),
+                ("ellipsoid", self.ellipsoid_m.is_some()),
+                ("radius", self.radius_m.is_some() || self.vehicles.values().any(|of| of.radius_m.is_some())),
+                ("obstacles", !self.obstacles.is_empty()),
+            ];
+            if let Some((other, _)) = others.into_iter().find(|(_, is_given)| *is_given) {
+                return Err(RecordedError::CylinderAnd { other });
+            }
+        }
+        if let Some(WellClear { horizontal_m, vertical_m, tau_s }) = self.well_clear {
+            check("well-clear", Some(horizontal_m), POSITIVE)?;
+            check("well-clear", Some(vertical_m), POSITIVE)?;
+            check("well-clear", Some(tau_s), NOT_NEGATIVE)?;
+            let motion = self.motion.filter(|motion| matches!(motion, Interpolation::Hold | Interpolation::Bounded));
+            if let Some(motion) = motion {
+                return Err(RecordedError::WellClearMotion { motion: motion.name() });
+            }
+            if self.ellipsoid_m.is_some() {
+                return Err(RecordedError::WellClearAndEllipsoid);
+            }
+        }
         check("from", self.from_s, FINITE)?;
         check("to", self.to_s, FINITE)?;
         check("above", self.above_m, FINITE)?;
@@ -172,7 +210,8 @@ impl Settings {
             check_of("max-accel", Some(name), of.max_accel_m_s2, NOT_NEGATIVE)?;
         }
         for Limit { quantity, allowed } in &self.envelope.limits {
-            let range = if quantity.derivative() == 0 { FINITE } else { POSITIVE };
+            let is_height = quantity.derivative() == 0 || *quantity == Quantity::NavigationFloor;
+            let range = if is_height { FINITE } else { POSITIVE };
             check_of("limit", Some(quantity.name()), Some(*allowed), range)?;
         }
         check("accel-window", self.accel_window_s, POSITIVE)?;
@@ -193,18 +232,38 @@ impl Settings {
 /// Scaled distance at which two equal ellipsoids touch.
 pub const TOUCHING_ELLIPSOIDS: f64 = 2.0;
 
-/// Limits on distances, in metres, or relative to the half axes of the ellipsoid.
+/// Scaled distance at which a vehicle touches the cylinder around another.
+pub const TOUCHING_CYLINDER: f64 = 1.0;
+
+/// Limits on distances, in metres, or relative to the half axes of the ellipsoid or to the cylinder.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Limits {
     /// Limit for any two vehicles.
     pub(super) delta: f64,
     /// Whether the vehicles' radii count.
     pub(super) by_radii: bool,
+    /// Cylinder by which distances are scaled.
+    pub(super) cylinder: Option<Cylinder>,
     /// Height at or below which vehicles are on the ground.
     pub(super) above: Option<f64>,
 }
 
 impl Limits {
+    /// Returns the target of the distance of two vehicles.
+    pub(super) fn target(&self) -> Target<'static> {
+        self.cylinder.map_or(Target::Origin, Target::Cylinder)
+    }
+
+    /// Returns a bound on the distance along each axis \[m\] of two vehicles at a distance.
+    pub(super) fn reach_m(&self, distance: f64) -> Vector3<f64> {
+        match self.cylinder {
+            None => Vector3::repeat(distance),
+            Some(Cylinder { horizontal_m, vertical_m }) => {
+                Vector3::new(horizontal_m, horizontal_m, vertical_m) * (distance * (1.0 + 4.0 * f64::EPSILON))
+            }
+        }
+    }
+
     /// Returns the limit for the centres of two vehicles with these radii.
     pub(super) fn of_vehicles(self, first: f64, second: f64) -> f64 {
         if self.by_radii { self.delta.max(first + second) } else { self.delta }
@@ -336,6 +395,21 @@ pub enum RecordedError {
     /// An averaging window without a limit on the acceleration, or with an assumed bound on it.
     #[error("the window of accelerations has no effect without a limit on the acceleration, or if motion is bounded")]
     NoAccelWindow,
+    /// A cylinder is combined with another measure of separations.
+    #[error("cylinder: cannot be combined with {other}; give one of them")]
+    CylinderAnd {
+        /// Name of the other setting.
+        other: &'static str,
+    },
+    /// Well clear of motion without velocities.
+    #[error("well-clear: needs velocities, which motion {motion} does not define")]
+    WellClearMotion {
+        /// Motion between samples.
+        motion: &'static str,
+    },
+    /// Well clear is combined with an ellipsoid.
+    #[error("well-clear: cannot be combined with an ellipsoid, which scales all lengths")]
+    WellClearAndEllipsoid,
     /// Obstacles are combined with an ellipsoid.
     #[error("obstacles cannot be combined with an ellipsoid")]
     ObstaclesAndEllipsoid,

@@ -95,7 +95,7 @@ impl Vehicle {
 
     /// Returns whether the vehicle has a limit on its separation.
     pub(super) fn has_limit(&self, settings: &Settings) -> bool {
-        let limited = settings.delta_m.is_some() || settings.ellipsoid_m.is_some();
+        let limited = settings.delta_m.is_some() || settings.ellipsoid_m.is_some() || settings.cylinder.is_some();
         limited || self.radius_m.is_some_and(|radius_m| radius_m >= MIN_LIMIT_M)
     }
 

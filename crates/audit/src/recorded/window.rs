@@ -14,6 +14,7 @@ use nalgebra::Vector3;
 use super::settings::Limits;
 use super::vehicle::Vehicle;
 use crate::cross_check::KeepOut;
+use crate::cylinder::Cylinder;
 use crate::enclosure::Target;
 use crate::ledger::{MAX_KEPT, Results};
 use crate::obstacle::Obstacle;
@@ -59,10 +60,12 @@ pub(super) struct Windows {
     /// Obstacles, each with its path.
     obstacles: Vec<(Obstacle, Vec<Segment>)>,
     extents: Vec<Extent>,
+    /// Axis of the sort, which is the first axis of the extents.
+    axis: usize,
     near: Vec<ExtentPair>,
 }
 
-/// Pair of extents with the smallest distance of their chords.
+/// Pair of extents with the smallest distance of their chords, which is scaled with a cylinder.
 #[derive(Clone, Copy, Debug)]
 struct ExtentPair {
     first: u32,
@@ -75,10 +78,17 @@ struct ExtentPair {
 
 impl ExtentPair {
     #[inline]
-    fn new(extents: &[Extent], first: u32, second: u32) -> Self {
+    fn new(extents: &[Extent], first: u32, second: u32, cylinder: Option<&Cylinder>) -> Self {
         let (a, b) = (&extents[first as usize].chord, &extents[second as usize].chord);
-        let squared = RelativeMotion::new(b.from - a.from, b.to - a.to).closest().squared;
-        Self { first, second, squared, motion_deviation: a.motion_deviation + b.motion_deviation }
+        let motion = RelativeMotion::new(b.from - a.from, b.to - a.to);
+        let motion_deviation = a.motion_deviation + b.motion_deviation;
+        match cylinder {
+            None => Self { first, second, squared: motion.closest().squared, motion_deviation },
+            Some(cylinder) => {
+                let squared = cylinder.lower_bound(&motion).powi(2);
+                Self { first, second, squared, motion_deviation: motion_deviation * cylinder.per_metre() }
+            }
+        }
     }
 
     /// Returns whether the two could come closer than a distance. The deviations include the rounding of positions.
@@ -96,7 +106,7 @@ impl Windows {
         let with_path =
             |obstacle: &Obstacle| (obstacle.clone(), obstacle.segments().into_iter().map(grounded).collect());
         let obstacles = obstacles.iter().map(with_path).collect();
-        Self { limits, judges: true, obstacles, extents: Vec::new(), near: Vec::new() }
+        Self { limits, judges: true, obstacles, extents: Vec::new(), axis: 0, near: Vec::new() }
     }
 
     /// Returns windows that find only the closest pairs.
@@ -154,6 +164,7 @@ impl Windows {
             (low, high) = (low.inf(&extent.low), high.sup(&extent.low));
         }
         let axis = (high - low).imax();
+        self.axis = axis;
         // From here on the first axis is the axis of the sort.
         if axis != 0 {
             for extent in &mut self.extents {
@@ -172,7 +183,12 @@ impl Windows {
         let count = self.extents.len();
         let pairs = |apart: u32| (0..).zip(apart..).take(count.saturating_sub(apart as usize));
         for (a, b) in (1..=FIRST_NEIGHBOURS).flat_map(pairs) {
-            self.sweep_vehicles(vehicles, &ExtentPair::new(&self.extents, a, b), window, &mut rough);
+            self.sweep_vehicles(
+                vehicles,
+                &ExtentPair::new(&self.extents, a, b, self.limits.cylinder.as_ref()),
+                window,
+                &mut rough,
+            );
         }
         results.closest = rough.closest;
     }
@@ -180,24 +196,22 @@ impl Windows {
     /// Lists the pairs that could matter, of the extents from `from` on with later ones, until they exceed `max_pairs`.
     /// Returns the index of the next extent.
     fn collect_pairs(&mut self, results: &Results, from: usize, max_pairs: usize) -> usize {
-        let Self { extents, near, limits, judges, .. } = self;
+        let Self { extents, near, limits, judges, axis, .. } = self;
         let limit = |first: f64, second: f64| if *judges { limits.of_vehicles(first, second) } else { 0.0 };
         near.clear();
         let radius = extents.iter().map(|extent| extent.radius).fold(0.0, f64::max);
         let threshold = results.closest.threshold;
-        let reach = threshold.max(limit(radius, radius));
+        let mut reach = limits.reach_m(threshold.max(limit(radius, radius)));
+        reach.swap_rows(0, *axis);
         for (k, a) in (0_u32..).zip(extents.iter()).skip(from) {
             if results.interruption.is_set() {
                 return extents.len();
             }
-            let until = a.high[0] + reach;
+            let until = a.high[0] + reach[0];
             for (l, b) in (k + 1..).zip(extents[k as usize + 1..].iter()).take_while(|(_, b)| b.low[0] <= until) {
-                let aside = (a.low[1] - b.high[1])
-                    .max(b.low[1] - a.high[1])
-                    .max(a.low[2] - b.high[2])
-                    .max(b.low[2] - a.high[2]);
-                if aside <= reach && !(a.grounded && b.grounded) {
-                    let of_both = ExtentPair::new(extents, k, l);
+                let aside = |axis: usize| (a.low[axis] - b.high[axis]).max(b.low[axis] - a.high[axis]);
+                if aside(1) <= reach[1] && aside(2) <= reach[2] && !(a.grounded && b.grounded) {
+                    let of_both = ExtentPair::new(extents, k, l, limits.cylinder.as_ref());
                     if of_both.may_come_within(threshold.max(limit(a.radius, b.radius))) {
                         near.push(of_both);
                     }
@@ -221,7 +235,7 @@ impl Windows {
         let cutoff = results.closest.cutoff(pair, limit);
         let may_violate = self.judges && near.may_come_within(limit);
         if may_violate || near.may_come_within(cutoff) {
-            let (target, keep_out, above) = (Target::Origin, KeepOut::new(limit), self.limits.above);
+            let (target, keep_out, above) = (self.limits.target(), KeepOut::new(limit), self.limits.above);
             PairSweep { pair, target, keep_out, cutoff, judges: self.judges, may_violate, above }.judge(
                 a.segments(vehicles),
                 b.segments(vehicles),

@@ -6,6 +6,8 @@ use tautline_audit::envelope::{Envelope, Fence, Limit, LimitOutcome, Quantity};
 use tautline_audit::recorded::{Interpolation, RecordedError, Settings, audit};
 use tautline_core::track::{Item, Piece, Sample};
 
+use super::recorded::seen;
+
 const RADIUS_M: f64 = 5.0;
 const RATE_PER_S: f64 = 2.0;
 /// Speed \[m/s\] and acceleration \[m/s^2\] on the circle.
@@ -431,4 +433,38 @@ fn limits_and_separation_have_separate_verdicts() {
     assert_eq!(of(1.0, 4.0), (Status::Clear, Status::Clear, Status::Clear));
     assert_eq!(of(1.0, 2.0), (Status::Violation, Status::Clear, Status::Violation));
     assert_eq!(of(3.0, 4.0), (Status::Violation, Status::Violation, Status::Clear));
+}
+
+#[test]
+fn horizontal_motion_below_the_navigation_floor_is_a_violation() {
+    let floor = || limits(&[(Quantity::NavigationFloor, 2.5)]);
+    // Straight up to 3 m, then along x; and along x from the start of the climb on.
+    let at = |points: &[(f64, [f64; 3])]| points.iter().map(|&(t, p)| seen(0, t, p)).collect::<Vec<_>>();
+    let up = at(&[(0.0, [0.0; 3]), (1.0, [0.0, 0.0, 3.0]), (2.0, [5.0, 0.0, 3.0])]);
+    let slanted = at(&[(0.0, [0.0; 3]), (1.0, [1.0, 0.0, 3.0]), (2.0, [5.0, 0.0, 3.0])]);
+    // Slower than the tolerance.
+    let drifting = at(&[(0.0, [0.0; 3]), (1.0, [0.009, 0.0, 0.5]), (2.0, [0.018, 0.0, 0.0])]);
+    assert_eq!(judged(&up, with_envelope(floor())).0, Status::Clear);
+    let (status, found) = judged(&slanted, with_envelope(floor()));
+    assert_eq!((status, found[0].violations[0].lower), (Status::Violation, 0.0));
+    let (status, found) = judged(&drifting, with_envelope(floor()));
+    assert_eq!((status, found[0].extreme), (Status::Clear, None));
+    // Bounded motion may move horizontally anywhere.
+    let bounded =
+        Settings { motion: Some(Interpolation::Bounded), max_accel_m_s2: Some(1.0), ..with_envelope(floor()) };
+    assert_eq!(judged(&drifting, bounded).0, Status::Undecided);
+}
+
+#[test]
+fn the_yaw_rate_is_that_of_setpoints_and_unknown_without_them() {
+    let limit = || limits(&[(Quantity::YawRate, 30.0)]);
+    let items = [seen(0, 0.0, [0.0; 3]), seen(0, 10.0, [1.0, 0.0, 0.0])];
+    let with = |setpoints: Option<&[[f64; 2]]>| {
+        let yaw = setpoints.map(|of| ("one".to_owned(), of.to_vec())).into_iter().collect();
+        judged(&items, Settings { yaw, ..with_envelope(limit()) }).0
+    };
+    assert_eq!(with(Some(&[[0.0, 0.0], [3.0, 90.0]])), Status::Clear);
+    assert_eq!(with(Some(&[[0.0, 0.0], [3.0, 91.0]])), Status::Violation);
+    assert_eq!(with(Some(&[])), Status::Clear);
+    assert_eq!(with(None), Status::Undecided);
 }

@@ -1,6 +1,7 @@
 //! Tests of the audit of flights and of recordings.
 
 mod curves_at_limits;
+mod cylinders;
 mod encounters;
 mod envelope;
 mod exact;
@@ -13,3 +14,4 @@ mod recorded;
 mod recorded_curves;
 mod scenes;
 mod times;
+mod well_clear;

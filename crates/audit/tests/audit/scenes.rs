@@ -157,7 +157,7 @@ pub(crate) fn instants(a: &[(f64, Vector3<f64>)], b: &[(f64, Vector3<f64>)]) -> 
     times
 }
 
-fn place(track: &[(f64, Vector3<f64>)], time_s: f64) -> Vector3<f64> {
+pub(crate) fn place(track: &[(f64, Vector3<f64>)], time_s: f64) -> Vector3<f64> {
     let next = track.partition_point(|seen| seen.0 < time_s);
     if track[next].0 == time_s {
         return track[next].1;

@@ -34,6 +34,7 @@ mod options;
 mod order;
 pub(crate) mod parquet;
 mod readers;
+mod show_rules;
 mod skybrush;
 mod source;
 mod spline;
@@ -51,6 +52,7 @@ pub use mcap::{Channels, LivePose, has_live_poses, live_poses};
 pub use options::{ArrayAxis, ArrayLayout, ColumnNames, Dimensions, Duplicates, ReadOptions, Scale};
 pub use order::Recording;
 pub use readers::{Format, READERS, Reader};
+pub use show_rules::{ShowPolygon, ShowRules};
 
 use std::fs;
 use std::path::Path;
@@ -123,13 +125,12 @@ pub fn recording_name(paths: &[&Path]) -> String {
     named.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
 }
 
-/// Returns the minimum separation that the recording itself defines, as Skybrush shows do \[m\].
+/// Returns the rules that the recording itself states, as Skybrush shows do; `None` for any other recording.
 #[must_use]
-pub fn own_limit_m(path: &Path, options: &ReadOptions) -> Option<f64> {
+pub fn show_rules(path: &Path, options: &ReadOptions) -> Option<ShowRules> {
     let mut source = Source::file(path);
     let is_show = path.is_file() && recognise(&mut source, options.format).ok()? == Format::SKYBRUSH;
-    let limit = if is_show { skybrush::least_distance(&source).ok()?? } else { return None };
-    Some(limit * options.metres()).filter(|limit| limit.is_finite() && *limit > 0.0)
+    if is_show { skybrush::rules(&source, options).ok() } else { None }
 }
 
 /// Returns the files of a folder or archive; `None` if the path is itself a recording.

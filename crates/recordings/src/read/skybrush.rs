@@ -10,12 +10,15 @@ use std::io::Read;
 use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
+use serde_json::Value;
 
+use super::axes::Axes;
 use super::curves::{Curves, distinct, from_json, piece, powers};
 use super::error::{Fault, Place, ReadError, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{FormatOption, Packing, Reader};
+use super::show_rules::ShowRules;
 use super::source::{Archive, Source};
 use super::{npz, readers};
 use tautline_core::track::{Item, Piece, Sample};
@@ -41,18 +44,8 @@ pub(super) const SHOW: &str = "show.json";
 #[derive(Deserialize)]
 struct Show {
     swarm: Option<Swarm>,
-    settings: Option<ShowSettings>,
-}
-
-#[derive(Deserialize)]
-struct ShowSettings {
-    validation: Option<Validation>,
-}
-
-#[derive(Deserialize)]
-struct Validation {
-    #[serde(rename = "minDistance")]
-    least_distance: Option<f64>,
+    #[serde(default)]
+    settings: Value,
 }
 
 #[derive(Deserialize)]
@@ -72,6 +65,8 @@ struct Settings {
     elsewhere: Option<String>,
     name: Option<String>,
     trajectory: Option<Trajectory>,
+    #[serde(default, rename = "yawControl")]
+    yaw: Value,
 }
 
 #[derive(Default, Deserialize)]
@@ -114,10 +109,39 @@ fn show(source: &Source) -> Result<(Show, Option<Archive>), ReadError> {
     Ok((show, archive))
 }
 
-/// Returns the minimum distance of drones that the show defines \[units of length\].
-pub(super) fn least_distance(source: &Source) -> Result<Option<f64>, ReadError> {
-    let settings = show(source)?.0.settings;
-    Ok(settings.and_then(|settings| settings.validation?.least_distance))
+/// Returns the rules that the show states itself.
+pub(super) fn rules(source: &Source, options: &ReadOptions) -> Result<ShowRules, ReadError> {
+    let (show, mut archive) = show(source)?;
+    let are_axes_kept = options.turn() == Axes::default();
+    let mut rules = ShowRules::read(&show.settings, options.metres(), are_axes_kept);
+    let Some(swarm) = show.swarm else { return Ok(rules) };
+    let drones = swarm.drones.into_iter().enumerate();
+    let drones = drones.map(|(index, drone)| resolved(index, drone, archive.as_mut()));
+    let (names, drones): (Vec<_>, Vec<_>) = drones.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+    for (name, (trajectory, mut yaw)) in distinct(names).into_iter().zip(drones) {
+        if let Some(elsewhere) = yaw.get("$ref").and_then(Value::as_str).map(str::to_owned) {
+            yaw = referenced(archive.as_mut(), &elsewhere)?;
+        }
+        rules.read_yaw(&name, &yaw, trajectory.takeoff_s);
+    }
+    Ok(rules)
+}
+
+/// Returns the name of a drone, its trajectory and its yaw control.
+fn resolved(
+    index: usize,
+    drone: Drone,
+    mut archive: Option<&mut Archive>,
+) -> Result<(String, (Trajectory, Value)), ReadError> {
+    let mut settings = drone.settings.unwrap_or_default();
+    if let Some(elsewhere) = &settings.elsewhere {
+        settings = referenced(archive.as_deref_mut(), elsewhere)?;
+    }
+    let mut trajectory = settings.trajectory.unwrap_or_default();
+    if let Some(elsewhere) = &trajectory.elsewhere {
+        trajectory = referenced(archive, elsewhere)?;
+    }
+    Ok((settings.name.unwrap_or_else(|| (index + 1).to_string()), (trajectory, settings.yaw)))
 }
 
 /// Opens a show.
@@ -133,15 +157,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let mut names = Vec::new();
     let mut curves = Vec::new();
     for (index, drone) in swarm.drones.into_iter().enumerate() {
-        let mut settings = drone.settings.unwrap_or_default();
-        if let Some(elsewhere) = &settings.elsewhere {
-            settings = referenced(archive.as_mut(), elsewhere)?;
-        }
-        let mut trajectory = settings.trajectory.unwrap_or_default();
-        if let Some(elsewhere) = &trajectory.elsewhere {
-            trajectory = referenced(archive.as_mut(), elsewhere)?;
-        }
-        let name = settings.name.unwrap_or_else(|| (index + 1).to_string());
+        let (name, (trajectory, _)) = resolved(index, drone, archive.as_mut())?;
         let items = items(&trajectory, index, options.metres()).map_err(|(point, fault)| {
             let place = point.map_or(format!("drone `{name}`"), |point| format!("drone `{name}`, point {}", point + 1));
             fault.at(Place::Part(place))

@@ -185,10 +185,12 @@ fn skybrush_show_defines_its_minimum_distance() {
         ("wrong.json", &show(r#""settings": {"validation": {"minDistance": -1}},"#)),
         ("table.csv", A),
     ]);
-    let limit = |name: &str| read::own_limit_m(&folder.path().join(name), &ReadOptions::default());
+    let rules = |name: &str, options: &ReadOptions| read::show_rules(&folder.path().join(name), options);
+    let limit = |name: &str| rules(name, &ReadOptions::default()).and_then(|rules| rules.min_distance_m);
     assert_eq!(["said.json", "silent.json", "wrong.json", "table.csv"].map(limit), [Some(2.5), None, None, None]);
     let scaled = ReadOptions { scale: Some(0.5.into()), ..ReadOptions::default() };
-    assert_eq!(read::own_limit_m(&folder.path().join("said.json"), &scaled), Some(1.25));
+    assert_eq!(rules("said.json", &scaled).and_then(|rules| rules.min_distance_m), Some(1.25));
+    assert_eq!(rules("table.csv", &scaled), None);
 }
 
 #[test]

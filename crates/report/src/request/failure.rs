@@ -250,7 +250,11 @@ impl From<RecordedError> for Failure {
             RecordedError::Interrupted => return Self::interrupted(),
             RecordedError::OutOfRange { option, of, range, .. } => {
                 let name = if of.is_some() { "NAME=" } else { "" };
-                let help = format!("give --{option} {name}NUMBER, where NUMBER is {range}");
+                let help = match *option {
+                    "cylinder" => "give --cylinder R,H with two numbers above 0, such as 2,4".to_owned(),
+                    "well-clear" => "give --well-clear PRESET, or D,Z,T such as 1219.2,137.16,35".to_owned(),
+                    _ => format!("give --{option} {name}NUMBER, where NUMBER is {range}"),
+                };
                 return Self::input("audit/out-of-range", format!("--{error}"), &help);
             }
             RecordedError::EmptyWindow { .. } => ("audit/empty-window", "give a --to that is at least --from"),
@@ -278,6 +282,14 @@ impl From<RecordedError> for Failure {
             }
             RecordedError::ObstaclesAndEllipsoid => {
                 ("audit/obstacles-and-ellipsoid", "judge obstacles by --delta or --radius, and ellipsoids without them")
+            }
+            RecordedError::CylinderAnd { other } => {
+                let help = format!("leave --cylinder or --{other} out");
+                return Self::input("audit/cylinder", format!("--{error}"), help);
+            }
+            RecordedError::WellClearMotion { .. } | RecordedError::WellClearAndEllipsoid => {
+                let help = "give --motion linear, or leave --motion out; judge ellipsoids without --well-clear";
+                return Self::input("audit/well-clear", format!("--{error}"), help);
             }
             RecordedError::Obstacle(_) => ("audit/obstacle", "correct the obstacle file"),
             RecordedError::TwoClocks { .. } => (

@@ -93,6 +93,8 @@ impl LimitFindings {
             Quantity::Acceleration => "acceleration",
             Quantity::Height => "height",
             Quantity::Floor => "lowest height",
+            Quantity::NavigationFloor => "height in horizontal motion",
+            Quantity::YawRate => "yaw rate",
             Quantity::Fence => "room to the fence",
         }
     }

@@ -6,6 +6,7 @@ mod envelope;
 mod moments;
 mod plan;
 mod report;
+mod well_clear;
 mod words;
 
 pub use envelope::{CornerFindings, LimitFindings};
@@ -14,5 +15,6 @@ pub use report::{
     AssumedMotion, Basis, Clock, EarlyEnd, Obstacles, PresenceSpan, PresenceSummary, RecordedAudit, RecordedReport,
     Source,
 };
-pub use report::{PairFinding, VehicleFinding};
+pub use report::{PairFinding, VehicleFinding, unit};
+pub use well_clear::WellClearFindings;
 pub use words::interval;

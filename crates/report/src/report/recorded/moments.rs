@@ -34,8 +34,7 @@ impl RecordedReport {
     /// Returns the limit of separations, and whether the audit decided everything else.
     #[must_use]
     pub fn judgement(&self) -> JudgementContext {
-        let unit = if self.measure == "metres" { "m" } else { "ellipsoids" };
-        JudgementContext { is_else_known: self.is_else_known, limit: self.separation.delta_m, unit }
+        JudgementContext { is_else_known: self.is_else_known, limit: self.separation.delta_m, unit: self.unit() }
     }
 
     fn moments_of_limits(&self) -> Vec<Moment> {

@@ -4,9 +4,11 @@ use serde::Serialize;
 
 use super::envelope::LimitFindings;
 use super::plan::PlanReport;
+use super::well_clear::WellClearFindings;
 use crate::report::flight::{self, Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Separation, finite};
 use tautline_audit::recorded::{
-    Absence, Approach, Contradiction, Gap, ObjectPair, Outcome, Presence, Settings, TOUCHING_ELLIPSOIDS, Tallies,
+    Absence, Approach, Contradiction, Gap, ObjectPair, Outcome, Presence, Settings, TOUCHING_CYLINDER,
+    TOUCHING_ELLIPSOIDS, Tallies,
 };
 use tautline_audit::{Status, Undecided, Violation};
 use tautline_core::swarm::Pair;
@@ -92,7 +94,7 @@ pub struct RecordedReport {
     /// The recording.
     #[serde(flatten)]
     pub source: Source,
-    /// `metres`, or `ellipsoids` if lengths are divided by the half axes of an ellipsoid.
+    /// `metres`; `ellipsoids` or `cylinders` if distances are scaled by the half axes of an ellipsoid or by a cylinder.
     pub measure: &'static str,
     /// Motion between samples in words.
     pub motion: String,
@@ -118,6 +120,8 @@ pub struct RecordedReport {
     pub obstacles: Obstacles,
     /// Findings on the limits of single vehicles.
     pub limits: Vec<LimitFindings>,
+    /// Findings on well clear of air traffic; null if it was not asked.
+    pub well_clear: Option<WellClearFindings>,
     /// Intervals in which a vehicle was not seen.
     pub gaps: Vec<VehicleFinding<Gap>>,
     /// Vehicles that are never present together with another one, with their intervals, unless an obstacle is judged.
@@ -227,7 +231,7 @@ impl RecordedReport {
             schema_version: SCHEMA_VERSION,
             status: outcome.status,
             source,
-            measure: if scaled { "ellipsoids" } else { "metres" },
+            measure: measure(settings),
             motion: between.motion,
             vehicles: outcome.vehicles.clone(),
             judged: outcome.presence.iter().flatten().count(),
@@ -236,7 +240,10 @@ impl RecordedReport {
             findings: outcome.tallies,
             deciding_rate_hz: outcome.deciding_rate_hz,
             separation: Separation {
-                delta_m: settings.delta_m.or(scaled.then_some(TOUCHING_ELLIPSOIDS)),
+                delta_m: settings
+                    .delta_m
+                    .or(scaled.then_some(TOUCHING_ELLIPSOIDS))
+                    .or(settings.cylinder.map(|_| TOUCHING_CYLINDER)),
                 min_m,
                 min_at_s: first.and_then(|first| finite(first.time_s)),
                 min_pair: first.and_then(|first| first.pair.vehicles()).map(Pair::numbers),
@@ -277,6 +284,7 @@ impl RecordedReport {
             violations,
             limits,
             plan: None,
+            well_clear: outcome.well_clear.as_ref().map(|found| WellClearFindings::new(found, outcome)),
             ended_early: None,
             above_m: settings.above_m,
             until_then: None,
@@ -300,8 +308,17 @@ impl RecordedReport {
         for limit in &mut self.limits {
             limit.status = limit.status.and(Status::Undecided);
         }
+        if let Some(well_clear) = &mut self.well_clear {
+            well_clear.status = well_clear.status.and(Status::Undecided);
+        }
         self.ended_early = Some(end);
         self
+    }
+
+    /// Returns the unit of distances.
+    #[must_use]
+    pub fn unit(&self) -> &'static str {
+        unit_of(self.measure)
     }
 
     /// Returns the status of separations alone; `None` if only limits of single vehicles were judged.
@@ -317,6 +334,26 @@ impl RecordedReport {
     pub fn to_json(&self) -> Result<String, serde_json::Error> {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }
+}
+
+/// Returns the measure of distances with these settings: `metres`, `ellipsoids` or `cylinders`.
+fn measure(settings: &Settings) -> &'static str {
+    match (settings.ellipsoid_m, settings.cylinder) {
+        (Some(_), _) => "ellipsoids",
+        (None, Some(_)) => "cylinders",
+        (None, None) => "metres",
+    }
+}
+
+/// Returns the unit of distances with these settings.
+#[must_use]
+pub fn unit(settings: &Settings) -> &'static str {
+    unit_of(measure(settings))
+}
+
+/// Returns the unit of a measure.
+pub(super) fn unit_of(measure: &'static str) -> &'static str {
+    if measure == "metres" { "m" } else { measure }
 }
 
 /// A finding on a pair of vehicles, or a vehicle and an obstacle, with their names.

@@ -4,6 +4,7 @@ use super::envelope::LimitFindings;
 use super::plan::PlanReport;
 use super::report::{EarlyEnd, PresenceSpan, RecordedReport};
 use super::report::{PairFinding, VehicleFinding};
+use super::well_clear::WellClearFindings;
 use crate::figures::Figure;
 use crate::replay::{NoReplay, Replay};
 use crate::report::page::{self, Badge, Page, Start, Tone};
@@ -19,10 +20,6 @@ const LISTED_ON_PAGE: usize = 100;
 const NAMED_IN_HEADLINE: usize = 3;
 
 impl RecordedReport {
-    fn unit(&self) -> &'static str {
-        if self.measure == "metres" { " m" } else { " ellipsoids" }
-    }
-
     /// Returns the verdict in one line, with its window and the vehicles that are not seen throughout.
     #[must_use]
     pub fn headline(&self) -> String {
@@ -74,6 +71,8 @@ impl RecordedReport {
     fn finding_of_motion(&self) -> String {
         let decides = |limit: &&LimitFindings| limit.status == self.status;
         let limits = self.limits.iter().filter(decides).map(LimitFindings::brief);
+        let well_clear = self.well_clear.iter().filter(|found| found.status == self.status);
+        let limits = limits.chain(well_clear.map(WellClearFindings::brief));
         let of_pairs = self.separation_asked && self.audit.flight.status == self.status;
         let in_plane = self.source.planar.then(|| "in the plane of x and y: no heights are known".to_owned());
         let pairs = of_pairs.then(|| self.finding_of_pairs());
@@ -85,7 +84,7 @@ impl RecordedReport {
     }
 
     fn finding_of_pairs(&self) -> String {
-        let unit = self.unit();
+        let unit = format!(" {}", self.unit());
         let delta = self.separation.delta_m.map_or("by radii".to_owned(), |m| format!("delta {}{unit}", exact(m)));
         match self.status {
             Status::Clear => {
@@ -130,7 +129,7 @@ impl RecordedReport {
     }
 
     fn why_undecided(&self) -> String {
-        let unit = self.unit();
+        let unit = format!(" {}", self.unit());
         if self.audit.flight.parry.disagreements > 0 {
             return "the two detectors disagree".to_owned();
         }
@@ -178,7 +177,7 @@ impl RecordedReport {
 
     /// Returns the sections of the text and of the page.
     fn sections(&self) -> Vec<Section> {
-        let caption = format!("smallest distances in {}", self.unit().trim());
+        let caption = format!("smallest distances in {}", self.unit());
         let closest = |heading: &'static str, closest: &[PairFinding<Approach>]| {
             let row = |PairFinding { who: [first, second], finding }: &PairFinding<Approach>| {
                 let apart = interval(finding.lower_m, finding.upper_m, finding.limit_m);
@@ -193,15 +192,20 @@ impl RecordedReport {
         let seen = format!("{} seen throughout, {} not", presence.throughout, presence.partly);
         let all = |of: Tally, tally: fn(&LimitFindings) -> Tally| self.limits.iter().map(tally).fold(of, sum);
         let unknown = self.limits.iter().map(|limit| limit.unknown.len()).sum();
+        let well_clear = || self.well_clear.iter();
         let violations = all(self.findings.violations, |limit| limit.violations_tally);
+        let violations = well_clear().map(|found| found.violations_tally).fold(violations, sum);
         let undecided = sum(all(self.findings.undecided, |limit| limit.undecided_tally), Tally::all(unknown));
+        let undecided = well_clear().map(|found| found.undecided_tally).fold(undecided, sum);
         let list = |heading: &'static str, tally: Tally, lines: Vec<String>| {
             Section::list(heading, shortened_in_words(tally), lines)
         };
         let violated = self.violations.iter().map(PairFinding::<Violation<_>>::words);
-        let violated = violated.chain(self.limits.iter().flat_map(LimitFindings::violations_in_words)).collect();
+        let violated = violated.chain(self.limits.iter().flat_map(LimitFindings::violations_in_words));
+        let violated = violated.chain(well_clear().flat_map(WellClearFindings::violations_in_words)).collect();
         let open = self.undecided.iter().map(PairFinding::<Undecided<_>>::words);
-        let open = open.chain(self.limits.iter().flat_map(LimitFindings::undecided_in_words)).collect();
+        let open = open.chain(self.limits.iter().flat_map(LimitFindings::undecided_in_words));
+        let open = open.chain(well_clear().flat_map(WellClearFindings::undecided_in_words)).collect();
         let sections = [
             closest("Closest pairs", &self.closest),
             closest("Closest to obstacles", &self.obstacles.closest),
@@ -233,7 +237,14 @@ impl RecordedReport {
                 .map(|(what, tally)| (format!("{what} of {}", limit.quantity), tally))
         });
         let all = of_pairs.map(|(what, tally)| (what.to_owned(), tally)).into_iter().chain(of_limits);
-        let shortened = all.filter(|(_, tally)| tally.is_shortened());
+        let of_traffic = self.well_clear.iter().flat_map(|found| {
+            let tallies = [
+                ("losses of well clear", found.violations_tally),
+                ("undecided times of well clear", found.undecided_tally),
+            ];
+            tallies.map(|(what, tally)| (what.to_owned(), tally))
+        });
+        let shortened = all.chain(of_traffic).filter(|(_, tally)| tally.is_shortened());
         shortened
             .map(|(what, tally)| {
                 let (count, listed) = (counted_in_words(tally), tally.listed);

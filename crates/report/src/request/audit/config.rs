@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use nalgebra::Vector3;
 use serde::Deserialize;
 
 use super::super::Failure;
+use super::rules::{self, Rules};
 use super::toml_file::TomlFile;
 use super::{AuditRequest, ConfigFile, ConfiguredAudit, Subject};
+use tautline_audit::Cylinder;
 use tautline_audit::envelope::{Limit, Quantity};
 use tautline_audit::recorded::Interpolation;
 use tautline_recordings::read::{ArrayAxis, Axes, Scale};
@@ -29,7 +30,10 @@ struct Document {
 struct AuditTable {
     delta_m: Option<f64>,
     radius_m: Option<f64>,
-    ellipsoid_m: Option<[f64; 3]>,
+    ellipsoid_m: Option<NamedShape>,
+    cylinder_m: Option<[f64; 2]>,
+    well_clear: Option<NamedShape>,
+    rules: Option<String>,
     motion: Option<Interpolation>,
     max_accel_m_s2: Option<f64>,
     obstacles: Option<PathBuf>,
@@ -44,6 +48,24 @@ struct AuditTable {
     require_presence: Option<bool>,
     accel_window_s: Option<f64>,
     limits: BTreeMap<String, f64>,
+}
+
+/// Name, or three numbers.
+#[derive(Clone, Debug, Deserialize)]
+#[serde(untagged)]
+enum NamedShape {
+    Name(String),
+    Numbers([f64; 3]),
+}
+
+impl NamedShape {
+    /// Parses a shape with the function of its option, which has the same checks.
+    fn read<T>(self, parse: fn(&str) -> Result<T, String>) -> Result<T, String> {
+        match self {
+            Self::Name(name) => parse(&name),
+            Self::Numbers([x, y, z]) => parse(&format!("{x:?},{y:?},{z:?}")),
+        }
+    }
 }
 
 /// Metres per unit of length, for all axes or for each.
@@ -118,6 +140,12 @@ impl AuditTable {
         if self.ellipsoid_m.is_some() && self.radius_m.is_some() {
             return Err(wrong("ellipsoid_m and radius_m are both given".to_owned()));
         }
+        let shape = |of: Option<NamedShape>| of.map(|of| of.read(rules::ellipsoid)).transpose();
+        let ellipsoid_m = shape(self.ellipsoid_m).map_err(|error| wrong(format!("ellipsoid_m: {error}")))?;
+        let well_clear = self.well_clear.map(|of| of.read(rules::well_clear)).transpose();
+        let well_clear = well_clear.map_err(|error| wrong(format!("well_clear: {error}")))?;
+        let rules = self.rules.map(|name| name.parse()).transpose();
+        let rules: Option<Rules> = rules.map_err(|error| wrong(format!("rules: {error}")))?;
         let numbers = [
             ("delta_m", self.delta_m),
             ("radius_m", self.radius_m),
@@ -139,8 +167,10 @@ impl AuditTable {
         if is_silent {
             settings.delta_m = self.delta_m;
             settings.radius_m = self.radius_m;
-            settings.ellipsoid_m = self.ellipsoid_m.map(Vector3::from);
+            settings.ellipsoid_m = ellipsoid_m;
+            settings.cylinder = self.cylinder_m.map(|[horizontal_m, vertical_m]| Cylinder { horizontal_m, vertical_m });
         }
+        settings.well_clear = settings.well_clear.or(well_clear);
         settings.motion = settings.motion.or(self.motion);
         if settings.motion == Some(Interpolation::Bounded) && !has_max_accel {
             settings.max_accel_m_s2 = self.max_accel_m_s2;
@@ -161,6 +191,9 @@ impl AuditTable {
         }
         request.obstacles = request.obstacles.or(self.obstacles.map(|file| folder.join(file)));
         request.fence = request.fence.or(self.fence.map(|file| folder.join(file)));
+        if request.rules == Rules::default() {
+            request.rules = rules.unwrap_or_default();
+        }
         request.expect_vehicles = request.expect_vehicles.or(self.expect_vehicles);
         request.allow_undecided |= self.allow_undecided.unwrap_or(false);
         for (key, allowed) in self.limits {
@@ -223,6 +256,9 @@ mod tests {
             ("[audit]\nscale = [1, 0, 1]", "a scale must not be 0"),
             ("[audit]\nlayout = \"time,axis\"", "layout: must be one of `time,vehicle,axis`, "),
             ("[audit]\ndelta_m = nan", "delta_m must be a finite number"),
+            ("[audit]\nellipsoid_m = \"crazyfly\"", "ellipsoid_m: `crazyfly` is no ellipsoid"),
+            ("[audit]\nwell_clear = \"do-178\"", "well_clear: `do-178` is no preset"),
+            ("[audit]\nrules = \"all\"", "rules: unknown rules `all`"),
             ("[audit]\nellipsoid_m = [1.0, 1.0, 2.0]\nradius_m = 0.1", "are both given"),
         ] {
             let message = filled(request(), text).map(drop).unwrap_err();

@@ -6,6 +6,7 @@ mod own;
 mod places;
 mod proof;
 mod replays;
+pub mod rules;
 mod toml_file;
 mod venue_file;
 
@@ -16,6 +17,7 @@ use nalgebra::Vector3;
 
 pub use against_plan::PlanQuestion;
 pub use own::{OwnRecording, run_audit};
+pub use rules::Rules;
 
 use self::against_plan::AuditedFlight;
 use self::own::RunAnswer;
@@ -29,7 +31,7 @@ use tautline_audit::Obstacle;
 use tautline_audit::recorded::{Interpolation, Outcome, Presence, Settings, TrackAuditor, VehicleSettings};
 use tautline_core::text::counted;
 use tautline_core::track::{Item, Tracks};
-use tautline_recordings::read::{self, Format, ReadError, ReadOptions};
+use tautline_recordings::read::{self, Format, ReadError, ReadOptions, ShowRules};
 
 /// Number of items that are read before the first is judged. They determine the usual sampling intervals.
 const OPENING: usize = 65_536;
@@ -103,13 +105,13 @@ impl Subject<'_> {
         }
     }
 
-    /// Returns limits, obstacles and audit of a `tautline run` recording, and the safety distance of a show file \[m\].
-    fn own(&self, monitor: &dyn Monitor) -> Result<(Option<OwnRecording>, Option<f64>), Failure> {
+    /// Returns limits, obstacles and audit of a `tautline run` recording, and the rules of a show file.
+    fn own(&self, monitor: &dyn Monitor) -> Result<(Option<OwnRecording>, Option<ShowRules>), Failure> {
         match self {
             Self::InMemory { own, .. } => Ok((own.cloned(), None)),
             Self::Files { paths, options } => {
-                let limit_m = paths.first().and_then(|path| read::own_limit_m(path, options));
-                Ok((own_recording(paths, options, monitor)?, limit_m))
+                let show = paths.first().and_then(|path| read::show_rules(path, options));
+                Ok((own_recording(paths, options, monitor)?, show))
             }
         }
     }
@@ -181,6 +183,8 @@ pub struct AuditRequest<'a> {
     pub fence: Option<PathBuf>,
     /// Plan that the recording is compared with.
     pub plan: Option<PlanQuestion>,
+    /// Origin of limits that the request leaves open.
+    pub rules: Rules,
     /// Number of vehicles that must be present.
     pub expect_vehicles: Option<usize>,
     /// Whether the samples of a recording of `tautline run` are judged without the run's audit.
@@ -209,6 +213,7 @@ impl<'a> AuditRequest<'a> {
             obstacles: None,
             fence: None,
             plan: None,
+            rules: Rules::default(),
             expect_vehicles: None,
             independent: false,
             allow_undecided: false,
@@ -324,7 +329,9 @@ impl<'a> AuditRequest<'a> {
 
     /// Returns whether no limit on distances is given.
     fn is_silent(&self) -> bool {
-        self.settings.delta_m.is_none() && !self.has_radius() && self.settings.ellipsoid_m.is_none()
+        let settings = &self.settings;
+        let has_shape = settings.ellipsoid_m.is_some() || settings.cylinder.is_some();
+        settings.delta_m.is_none() && !self.has_radius() && !has_shape
     }
 
     /// Returns the settings with the obstacles and the fence of the files.
@@ -496,10 +503,11 @@ impl ConfiguredAudit<'_> {
     pub fn judge(&self, monitor: &dyn Monitor) -> Result<AuditedRecording, Failure> {
         let request = &self.request;
         let mut settings = request.complete_settings()?;
-        let (own, own_limit_m) = request.subject.own(monitor)?;
+        let (own, show) = request.subject.own(monitor)?;
         let open: &Open<'_> = &|| request.subject.open();
         let own = if request.independent { own.map(OwnRecording::independent) } else { own };
-        let taken = RecordedLimits::fill(&mut settings, request, own.as_ref(), own_limit_m);
+        let notes_on_rules = rules::fill(&mut settings, request, show.as_ref());
+        let taken = RecordedLimits::fill(&mut settings, request, own.as_ref());
         proof::check(request, &settings)?;
         let mut auditor = TrackAuditor::new(settings.clone())?;
         if request.html.is_some() {
@@ -518,6 +526,7 @@ impl ConfiguredAudit<'_> {
         let answer = answer.unwrap_or(RunAnswer::Samples);
         let holds_every_step = own.as_ref().is_some_and(OwnRecording::holds_every_step);
         let between = request.assumed_motion(curves, holds_every_step, &answer, assumed.as_deref());
+        notes.extend(notes_on_rules);
         notes.extend(taken.notes(request, own.as_ref()));
         notes.extend(notes_on_alone(&outcome));
         notes.extend(self.asked_by.clone());
@@ -626,22 +635,19 @@ struct RecordedLimits<'a> {
 
 impl<'a> RecordedLimits<'a> {
     /// Fills the settings with the limits and obstacles of the recording.
-    fn fill(
-        settings: &mut Settings,
-        request: &AuditRequest<'_>,
-        own: Option<&'a OwnRecording>,
-        own_limit_m: Option<f64>,
-    ) -> Self {
+    fn fill(settings: &mut Settings, request: &AuditRequest<'_>, own: Option<&'a OwnRecording>) -> Self {
         let is_silent = request.is_silent();
-        let ellipsoid_m = own.and_then(|own| own.ellipsoid_m).filter(|_| is_silent);
-        let delta_m = own.map(|own| own.limit_m).or(own_limit_m).filter(|_| is_silent && ellipsoid_m.is_none());
+        let is_open = is_silent && settings.delta_m.is_none();
+        let ellipsoid_m = own.and_then(|own| own.ellipsoid_m).filter(|_| is_open);
+        let delta_m = own.map(|own| own.limit_m).filter(|_| is_open && ellipsoid_m.is_none());
         settings.delta_m = settings.delta_m.or(delta_m);
         settings.ellipsoid_m = settings.ellipsoid_m.or(ellipsoid_m);
         settings.is_own_limit = is_silent && request.obstacles.is_none();
         // Every sample of a `tautline run` recording contains all vehicles, so no vehicle is absent between two
         // samples.
         settings.max_gap_s = settings.max_gap_s.or(own.filter(|own| own.is_unaltered()).map(|_| f64::INFINITY));
-        let is_asked = request.obstacles.is_none() && settings.ellipsoid_m.is_none();
+        let is_scaled = settings.ellipsoid_m.is_some() || settings.cylinder.is_some();
+        let is_asked = request.obstacles.is_none() && !is_scaled;
         let obstacles = own.map(|own| &own.obstacles[..]).filter(|own| is_asked && !own.is_empty());
         settings.obstacles.extend_from_slice(obstacles.unwrap_or_default());
         Self { delta_m, ellipsoid_m, obstacles }
@@ -659,7 +665,7 @@ impl<'a> RecordedLimits<'a> {
             let why = if request.obstacles.is_some() {
                 "--obstacles names others"
             } else {
-                "ellipsoids and obstacles are not judged together"
+                "obstacles are not judged with ellipsoids or cylinders"
             };
             notes.push(format!("the obstacles of the recording are not judged: {why}"));
         }

@@ -261,8 +261,8 @@ impl OwnRecording {
         }
         match status {
             Status::Clear | Status::Undecided if !audit.ended_early.is_empty() => RunAnswer::Samples,
-            Status::Clear if !settings.envelope.is_empty() => {
-                note("the run's audit of every step does not cover limits of single vehicles");
+            Status::Clear if !settings.envelope.is_empty() || settings.well_clear.is_some() => {
+                note("the run's audit of every step does not cover limits of single vehicles or well clear");
                 RunAnswer::Samples
             }
             Status::Clear | Status::Violation => {
@@ -300,6 +300,7 @@ impl OwnRecording {
         // A distance in half axes is at most that in metres over the shortest axis, and at least that over the longest.
         let metres = self.ellipsoid_m.map_or(self.scale, |axes_m| axes_m.max());
         let asked = settings.ellipsoid_m.map_or(1.0, |axes_m| 1.0 / axes_m.min());
+        let asked = settings.cylinder.map_or(asked, |of| 1.0 / of.horizontal_m.min(of.vertical_m));
         let is_same_metric = settings.ellipsoid_m.is_some() && settings.ellipsoid_m == self.ellipsoid_m;
         let factor = if is_same_metric { 1.0 } else { metres * asked };
         let is_judged =

@@ -38,6 +38,12 @@ impl RequestedLimits<'_> {
         self.settings.above_m.map(|_| "--above".to_owned())
     }
 
+    /// Returns the measure of separations that needs the vertical distance of two vehicles.
+    fn vertical_distance(&self) -> Option<String> {
+        let cylinder = self.settings.cylinder.map(|_| "--cylinder".to_owned());
+        cylinder.or_else(|| self.settings.well_clear.map(|_| "--well-clear".to_owned()))
+    }
+
     fn obstacle(&self, is_asked: fn(&Obstacle) -> bool) -> Option<String> {
         let obstacle = self.settings.obstacles.iter().find(|obstacle| is_asked(obstacle));
         obstacle.map(|obstacle| format!("the obstacle `{}`", obstacle.name))
@@ -50,7 +56,11 @@ impl RequestedLimits<'_> {
             Some(format!("{tilted}, which is not upright through height 0,"))
         };
         let limit = self.limit(Quantity::needs_height);
-        limit.or_else(|| self.fence_with_heights()).or_else(|| self.above()).or_else(upright)
+        limit
+            .or_else(|| self.vertical_distance())
+            .or_else(|| self.fence_with_heights())
+            .or_else(|| self.above())
+            .or_else(upright)
     }
 
     /// Returns the part of the request that depends on the origin of the positions.
@@ -61,7 +71,8 @@ impl RequestedLimits<'_> {
 
     /// Returns the part of the request that takes z as a height above level ground.
     fn of_level(&self) -> Option<String> {
-        self.limit(Quantity::needs_origin).or_else(|| self.fence_with_heights()).or_else(|| self.above())
+        let limit = self.limit(Quantity::needs_origin);
+        limit.or_else(|| self.vertical_distance()).or_else(|| self.fence_with_heights()).or_else(|| self.above())
     }
 }
 

@@ -70,6 +70,8 @@ pub(super) fn check(request: &AuditRequest<'_>, settings: &Settings) -> Result<(
         (settings.motion.is_some_and(|motion| motion != Interpolation::Linear), "a motion that is not linear"),
         (settings.radius_m.is_some() || settings.vehicles.values().any(|of| of.radius_m.is_some()), "--radius"),
         (settings.ellipsoid_m.is_some(), "--ellipsoid"),
+        (settings.cylinder.is_some(), "--cylinder"),
+        (settings.well_clear.is_some(), "--well-clear"),
         (!settings.obstacles.is_empty(), "obstacles"),
         (!settings.envelope.is_empty(), "--limit and --fence"),
         (settings.above_m.is_some(), "--above"),

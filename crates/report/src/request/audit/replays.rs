@@ -8,7 +8,7 @@ use crate::figures;
 use crate::figures::{Encounter, Figure};
 use crate::flight_log::FlightLog;
 use crate::replay::{Kind, MOST_INSTANTS, NoReplay, PAGE_BYTES, Replay, Span, Stage, chosen};
-use crate::report::recorded::{RecordedReport, interval};
+use crate::report::recorded::{RecordedReport, interval, unit};
 use tautline_audit::recorded::{
     Approach, Interpolation, Outcome, PairSeries, PositionLookup, RecordedError, Settings, TOUCHING_ELLIPSOIDS,
 };
@@ -161,7 +161,7 @@ fn over_time(slices: &[Slice]) -> Vec<Option<(f64, f64)>> {
 
 /// Returns the data of a figure of a close pair.
 fn encounter(series: PairSeries, approach: &Approach, settings: &Settings, outcome: &Outcome) -> Encounter {
-    let unit = if settings.ellipsoid_m.is_some() { "ellipsoids" } else { "m" };
+    let unit = unit(settings);
     let mut encounter = Encounter {
         names: outcome.names(approach.pair, &settings.obstacles),
         unit,

@@ -1,0 +1,136 @@
+//! Cylinders, well clear, named ellipsoids, and the rules of shows.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::program::{Ran, TAUTLINE, ran_by};
+
+/// Two vehicles that pass 0.25 m aside and 0.5 m above each other, far apart at both samples.
+const PASS: &str = "t,id,x,y,z\n0,a,-5,0,5\n0,b,5,0.25,5.5\n1,a,5,0,5\n1,b,-5,0.25,5.5\n";
+/// Head-on at 100 m/s from 20 km.
+const HEAD_ON: &str = "t,id,x,y,z\n0,a,0,0,100\n0,b,20000,0,100\n300,a,15000,0,100\n300,b,5000,0,100\n";
+
+fn audit(name: &str, text: &str, words: &[&str]) -> Ran {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join(name), text).expect("written");
+    let seconds = if name.ends_with(".csv") { ["--time-unit", "s"].as_slice() } else { &[] };
+    ran_by(TAUTLINE, folder.path(), &[&["audit", name], words, seconds].concat())
+}
+
+#[test]
+fn a_cylinder_tells_beside_from_above() {
+    let clear = audit("pass.csv", PASS, &["--cylinder", "0.5,0.5"]);
+    assert_eq!(clear.exit, Some(0), "{clear:?}");
+    assert!(
+        clear.out.starts_with("CLEAR if straight between samples: never closer than 1.000000 cylinders"),
+        "{clear:?}"
+    );
+    assert_eq!(audit("pass.csv", PASS, &["--delta", "0.7"]).exit, Some(1));
+    let near = audit("pass.csv", PASS, &["--cylinder", "0.5,0.8", "--json"]);
+    let report: Value = serde_json::from_str(&near.out).expect("JSON");
+    assert_eq!(
+        (near.exit, &report["measure"], &report["separation"]["delta_m"]),
+        (Some(1), &"cylinders".into(), &1.0.into())
+    );
+}
+
+#[test]
+fn well_clear_is_in_every_answer() {
+    let lost = audit("traffic.csv", HEAD_ON, &["--well-clear", "do-365", "--to", "170"]);
+    assert_eq!(lost.exit, Some(1), "{lost:?}");
+    assert!(lost.out.starts_with("VIOLATION: a and b are not well clear from 161."), "{lost:?}");
+    let far = audit("traffic.csv", HEAD_ON, &["--well-clear", "f3442", "--to", "170"]);
+    assert!(far.exit == Some(0) && far.out.contains("well clear (609.600 m, 76.200 m high)"), "{far:?}");
+    let report: Value =
+        serde_json::from_str(&audit("traffic.csv", HEAD_ON, &["--well-clear", "1219.2,137.16,35", "--json"]).out)
+            .expect("JSON");
+    assert_eq!((&report["well_clear"]["status"], &report["well_clear"]["tau_s"]), (&"violation".into(), &35.0.into()));
+    assert_eq!(report["well_clear"]["violations"][0]["who"], serde_json::json!(["a", "b"]));
+}
+
+#[test]
+fn ellipsoids_have_names() {
+    let named = audit("pass.csv", PASS, &["--ellipsoid", "crazyswarm"]);
+    let given = audit("pass.csv", PASS, &["--ellipsoid", "0.125,0.125,0.375"]);
+    assert_eq!((named.exit, named.out.lines().next()), (given.exit, given.out.lines().next()));
+    assert_eq!(audit("pass.csv", PASS, &["--ellipsoid", "crazyflie-firmware"]).exit, Some(1));
+}
+
+#[test]
+fn wrong_rules_are_refused() {
+    let planar = "t,id,x,y\n0,a,0,0\n0,b,5,0\n1,a,0,0\n1,b,5,0\n";
+    for (text, words, code) in [
+        (PASS, &["--cylinder", "0,1"][..], "audit/out-of-range"),
+        (PASS, &["--cylinder", "1,-1"], "audit/out-of-range"),
+        (PASS, &["--cylinder", "1"], ""),
+        (PASS, &["--cylinder", "1,1", "--ellipsoid", "1,1,1"], "audit/cylinder"),
+        (PASS, &["--cylinder", "1,1", "--delta", "1"], "audit/cylinder"),
+        (planar, &["--cylinder", "1,1"], "audit/unknown-place"),
+        (planar, &["--well-clear", "f3442"], "audit/unknown-place"),
+        (PASS, &["--well-clear", "do-178"], ""),
+        (PASS, &["--well-clear", "f3442", "--motion", "hold"], "audit/well-clear"),
+        (PASS, &["--ellipsoid", "crazyfly"], ""),
+        (PASS, &["--rules", "all"], ""),
+    ] {
+        let ran = audit("pass.csv", text, words);
+        assert_eq!((ran.exit, ran.code()), (Some(2), code), "{words:?}: {ran:?}");
+    }
+}
+
+/// Returns a show of two drones 5 m apart that rise to 10 m in 10 s, and fly 20 m along x in 4 s.
+fn show(settings: &str, yaw: &str) -> String {
+    let drone = |name: &str, y: u32| {
+        format!(
+            r#"{{"settings": {{"name": "{name}", {yaw} "trajectory": {{"version": 1, "points":
+            [[0, [0, {y}, 0], []], [10, [0, {y}, 10], []], [14, [20, {y}, 10], []]]}}}}}}"#
+        )
+    };
+    format!(
+        r#"{{"version": 1, "settings": {settings}, "swarm": {{"drones": [{}, {}]}}}}"#,
+        drone("a", 0),
+        drone("b", 5)
+    )
+}
+
+#[test]
+fn a_show_is_judged_by_its_own_rules_and_options_override_them() {
+    let own = show(r#"{"validation": {"minDistance": 3, "maxVelocityXY": 4, "maxAltitude": 100}}"#, "");
+    let fast = audit("show.json", &own, &[]);
+    assert!(fast.exit == Some(1) && fast.out.starts_with("VIOLATION: horizontal speed"), "{fast:?}");
+    assert!(
+        fast.err.contains("limits of the show file: distance 3.0 m, horizontal 4.0 m/s, height 100.0 m"),
+        "{fast:?}"
+    );
+    assert_eq!(audit("show.json", &own, &["--limit", "horizontal=6"]).exit, Some(0));
+    assert_eq!(audit("show.json", &own, &["--rules", "none", "--delta", "3"]).exit, Some(0));
+    assert_eq!(audit("show.json", &own, &["--limit", "horizontal=6", "--delta", "6"]).exit, Some(1));
+
+    let fenced = |y: u32, inclusion: bool| {
+        let fence = format!(
+            r#"{{"geofence": {{"version": 1, "polygons": [{{"isInclusion": {inclusion}, "points":
+            [[-5, -5, 0], [25, -5, 0], [25, {y}, 0], [-5, {y}, 0]]}}]}}}}"#
+        );
+        audit("show.json", &show(&fence, ""), &["--delta", "3"])
+    };
+    assert_eq!([fenced(9, true).exit, fenced(4, true).exit, fenced(9, false).exit], [Some(0), Some(1), Some(1)]);
+    assert!(fenced(9, true).err.contains("the fence is that of the show file"));
+}
+
+#[test]
+fn the_rules_of_skybrush_are_its_defaults() {
+    let still = r#""yawControl": {"version": 1, "setpoints": [[0, 0], [2, 60]]},"#;
+    let turning = r#""yawControl": {"version": 1, "setpoints": [[0, 0], [2, 61]]},"#;
+    let judged = |yaw: &str| audit("show.json", &show("{}", yaw), &["--rules", "skybrush", "--json"]);
+    let status = |ran: &Ran, key: &str| {
+        let report: Value = serde_json::from_str(&ran.out).expect("JSON");
+        let limits = report["limits"].as_array().expect("limits").clone();
+        limits.iter().find(|limit| limit["quantity"] == key).map(|limit| limit["status"].clone())
+    };
+    assert_eq!(status(&judged(still), "yaw_rate_deg_s"), Some("clear".into()));
+    assert_eq!(status(&judged(turning), "yaw_rate_deg_s"), Some("violation".into()));
+    assert_eq!(status(&judged(still), "navigation_floor_m"), Some("clear".into()));
+    let without = judged("");
+    assert_eq!(status(&without, "yaw_rate_deg_s"), None);
+    assert!(without.err.contains("not judged: the yaw rate, since the recording has no yaw"), "{without:?}");
+}
