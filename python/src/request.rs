@@ -158,9 +158,9 @@ impl AuditOptions {
             motion: choice("motion", motion, &motions)?,
             max_accel_m_s2: max_accel.0,
             radius_m: radius.0,
-            ellipsoid_m: parsed("ellipsoid", ellipsoid, rules::ellipsoid)?,
-            cylinder: parsed("cylinder", cylinder, rules::cylinder)?,
-            well_clear: parsed("well_clear", well_clear, rules::well_clear)?,
+            ellipsoid_m: parsed_by("ellipsoid", ellipsoid, rules::ellipsoid)?,
+            cylinder: parsed_by("cylinder", cylinder, rules::cylinder)?,
+            well_clear: parsed_by("well_clear", well_clear, rules::well_clear)?,
             from_s,
             to_s,
             above_m: above,
@@ -193,13 +193,13 @@ impl AuditOptions {
             (None, false) => ConfigFile::None,
         };
         let plan = plan.map(|path| PlanQuestion { path, delay_s: plan_delay, tube_m: tube });
-        let rules = parsed("rules", rules, str::parse)?.unwrap_or_default();
+        let rules = parsed::<Rules>("rules", rules)?.unwrap_or_default();
         Ok(Self { settings, obstacles, fence, plan, rules, config, expect_vehicles, independent })
     }
 }
 
-/// Parses an argument; the error names it.
-fn parsed<T>(name: &str, text: Option<String>, parse: fn(&str) -> Result<T, String>) -> PyResult<Option<T>> {
+/// Parses an argument with a function; the error names the argument.
+fn parsed_by<T>(name: &str, text: Option<String>, parse: fn(&str) -> Result<T, String>) -> PyResult<Option<T>> {
     text.map(|text| parse(&text)).transpose().map_err(|error| wrong_input(format!("{name}: {error}")))
 }
 
