@@ -60,6 +60,11 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let due = start + Duration::from_millis(u64::from(20 * round));
             std::thread::sleep(due.saturating_duration_since(Instant::now()));
             for k in 0..VEHICLES * MESSAGES {
+                // A burst beyond the buffer of the socket would be dropped.
+                if k % 50 == 0 {
+                    let due = due + Duration::from_millis(u64::from(k / 50));
+                    std::thread::sleep(due.saturating_duration_since(Instant::now()));
+                }
                 let system = u8::try_from(k % VEHICLES + 1).unwrap_or(1);
                 // Four messages of each id in a round, 5 ms apart on its clock.
                 let time_ms = 1000 + 20 * round + 5 * (k / VEHICLES);

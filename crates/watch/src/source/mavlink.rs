@@ -2,8 +2,8 @@
 //!
 //! The system id is the name of a vehicle.
 //!
-//! Both messages are defined in `common.xml` and `standard.xml` of `MAVLink`. `mavlink-core` reads frames and checksums.
-//! Messages with another id are skipped.
+//! Both messages are defined in `common.xml` and `standard.xml`. `mavlink-core` reads frames and checksums. Messages
+//! with another id are skipped.
 
 use std::io;
 use std::net::{SocketAddr, UdpSocket};
