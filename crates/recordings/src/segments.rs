@@ -287,6 +287,7 @@ mod tests {
     }
 
     #[test]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index up to 7")]
     fn each_axis_has_the_lowest_kind_that_holds_it() {
         let wavy = |u: f64| if (0.4..0.5).contains(&u) { 1.0 } else { u };
         // The control points of a cubic 0, 1, 1, 0 whose degree is raised.

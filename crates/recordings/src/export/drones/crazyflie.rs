@@ -170,6 +170,7 @@ mod tests {
     }
 
     #[test]
+    #[expect(clippy::cast_possible_truncation, reason = "the firmware has single precision")]
     fn rows_hold_the_numbers_of_the_firmware() {
         let flight = [("cf1".to_owned(), line(2.5, vector![1.0, 0.1, -2.0]))];
         let encoded = encode(&flight, &DroneOptions::new(Dialect::Crazyflie), &|| false).expect("encoded");

@@ -337,6 +337,7 @@ mod tests {
     use super::*;
     use crate::export::drones::motion::deviation;
 
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some thousand samples")]
     fn sampled(duration_s: f64, hz: f64, place: impl Fn(f64) -> Vector3<f64>) -> Motion {
         let count = (duration_s * hz).round() as usize;
         let time = |k: usize| k as f64 / hz;
