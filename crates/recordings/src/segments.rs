@@ -73,6 +73,7 @@ impl Trajectory {
     ///
     /// # Errors
     /// [`OutOfRange`] if a control point exceeds 16 bits.
+    #[expect(clippy::cast_possible_truncation, reason = "compared with the range before")]
     pub(crate) fn of_pieces(pieces: &[Piece], unit_m: f64, is_uniform: bool) -> Result<Self, OutOfRange> {
         let mut from_ms = 0;
         let whole = |coordinate_m: f64, from_ms: u64| {
@@ -86,8 +87,8 @@ impl Trajectory {
         };
         let Some(first) = pieces.first() else { return Ok(Self::default()) };
         let mut at = [0; AXES];
-        for axis in 0..3 {
-            at[axis] = whole(first.points[0][axis], 0)?;
+        for (at, coordinate_m) in at.iter_mut().zip(&first.points[0]) {
+            *at = whole(*coordinate_m, 0)?;
         }
         let mut trajectory = Self { start: at, segments: Vec::with_capacity(pieces.len()) };
         for piece in pieces {
@@ -118,7 +119,8 @@ impl Trajectory {
         for segment in &self.segments {
             let kind = |axis: usize| {
                 let count = segment.points[axis].len();
-                POINTS_OF_KIND.iter().position(|of| *of == count).unwrap_or(0) as u8
+                let mut kinds = (0_u8..).zip(POINTS_OF_KIND);
+                kinds.find(|(_, of)| *of == count).map_or(0, |(kind, _)| kind)
             };
             bytes.push((0..AXES).map(|axis| kind(axis) << (2 * axis)).sum());
             bytes.extend(segment.duration_ms.to_le_bytes());
@@ -209,6 +211,7 @@ fn lowest_kind(units: &[f64; POINTS], start: i16) -> usize {
 }
 
 /// Returns the control points of an axis without the first, for a kind.
+#[expect(clippy::cast_possible_truncation, reason = "clamped to the range")]
 fn of_kind(units: &[f64; POINTS], start: i16, kind: usize) -> Vec<i16> {
     let whole = |unit: f64| unit.round().clamp(-f64::from(LARGEST), f64::from(LARGEST)) as i16;
     let end = whole(units[DEGREE]);
@@ -284,6 +287,7 @@ mod tests {
     }
 
     #[test]
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "an index up to 7")]
     fn each_axis_has_the_lowest_kind_that_holds_it() {
         let wavy = |u: f64| if (0.4..0.5).contains(&u) { 1.0 } else { u };
         // The control points of a cubic 0, 1, 1, 0 whose degree is raised.

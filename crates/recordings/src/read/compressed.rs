@@ -48,11 +48,11 @@ pub(super) const CRAZYFLIE: Reader = Reader {
 };
 
 fn open_crazyflie(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    open(&[source.clone()], crazyflie, None, options)
+    open(std::slice::from_ref(source), crazyflie, None, options)
 }
 
 fn open_skyb(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    open(&[source.clone()], skybrush, None, options)
+    open(std::slice::from_ref(source), skybrush, None, options)
 }
 
 /// Opens a folder with one vehicle in each file; `left_out` is the note on other files.

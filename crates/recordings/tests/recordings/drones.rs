@@ -194,7 +194,9 @@ fn firmware(points: &[f32], duration: f32, t: f32) -> f32 {
             let sign = if (i + j).is_multiple_of(2) { 1.0 } else { -1.0 };
             sign * points[i] / factorial(i) / factorial(j - i)
         };
-        (0..=j).map(term).sum::<f32>() * factorial(n) / factorial(n - j) / duration.powi(j as i32)
+        (0..=j).map(term).sum::<f32>() * factorial(n)
+            / factorial(n - j)
+            / std::iter::repeat_n(duration, j).product::<f32>()
     };
     (0..=n).rev().fold(0.0, |sum, j| sum * t + coefficient(j))
 }

@@ -302,7 +302,7 @@ impl<'a> Written<'a> {
     /// Opens the files with the reader that any user has.
     fn open(&self, options: &DroneOptions) -> Result<Box<dyn Tracks<Error = ReadError>>, ReadError> {
         let time_unit = (options.dialect == Dialect::Px4Show).then_some(TimeUnit::Seconds);
-        Ok(read::open(&self.content, &ReadOptions { time_unit, ..ReadOptions::default() })?)
+        read::open(&self.content, &ReadOptions { time_unit, ..ReadOptions::default() })
     }
 
     /// Reads the files back, compares them with the flight and judges them.

@@ -47,6 +47,7 @@ pub(super) fn polynomials(
 }
 
 /// Rounds pieces to single precision; also returns the curve of the rounded numbers.
+#[expect(clippy::cast_possible_truncation, reason = "the firmware has single precision")]
 fn rounded(pieces: &[Piece]) -> (Vec<Polynomial>, Motion) {
     let (mut polynomials, mut arcs, mut from_s) = (Vec::with_capacity(pieces.len()), Vec::new(), 0.0);
     let mut end_ms = 0;
@@ -169,6 +170,7 @@ mod tests {
     }
 
     #[test]
+    #[expect(clippy::cast_possible_truncation, reason = "the firmware has single precision")]
     fn rows_hold_the_numbers_of_the_firmware() {
         let flight = [("cf1".to_owned(), line(2.5, vector![1.0, 0.1, -2.0]))];
         let encoded = encode(&flight, &DroneOptions::new(Dialect::Crazyflie), &|| false).expect("encoded");

@@ -80,6 +80,7 @@ pub fn fit(
 
 /// Returns the first whole millisecond at or after the end of a motion; at least 1.
 #[must_use]
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
 pub fn end_ms(motion: &Motion) -> u64 {
     let end_s = motion.span_s().map_or(0.0, |(_, to_s)| to_s);
     let near = (end_s * 1e3).round();
@@ -104,6 +105,7 @@ struct Fitter {
 
 impl Fitter {
     /// Returns the longest piece from an instant within the tolerance.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a length of some seconds")]
     fn longest(&mut self, from_ms: u64, before: Option<&Piece>, guess_ms: u64) -> Option<Piece> {
         let most_ms = LONGEST_MS.min(self.end_ms - from_ms);
         let (mut good, mut bad_ms) = (None::<Piece>, most_ms + 1);
@@ -335,6 +337,7 @@ mod tests {
     use super::*;
     use crate::export::drones::motion::deviation;
 
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "some thousand samples")]
     fn sampled(duration_s: f64, hz: f64, place: impl Fn(f64) -> Vector3<f64>) -> Motion {
         let count = (duration_s * hz).round() as usize;
         let time = |k: usize| k as f64 / hz;

@@ -99,6 +99,7 @@ impl Work<'_> {
     }
 
     /// Returns the times of the samples \[s\]: regular intervals and the end.
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at most ten million")]
     fn times_s(&self, motion: &Motion) -> Result<Vec<f64>, DroneError> {
         let (hz, end_s) = (self.rate_hz()?, motion.span_s().map_or(0.0, |span| span.1));
         let end_s = rounded_number(end_s, TIME_S);

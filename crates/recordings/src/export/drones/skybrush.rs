@@ -68,8 +68,7 @@ pub(super) fn trajectory(
         };
         work.within(name, motion, rounding_m(unit_m), |_| true, encode)
     })?;
-    // The scale has at most 7 bits.
-    let mut body = vec![scale as u8];
+    let mut body = vec![scale_byte(scale)];
     found.encode(&mut body);
     let bytes = file(name, &found, &body, work.options.skyb_version)?;
     let vehicle = EncodedVehicle {
@@ -96,10 +95,16 @@ fn scaled<T>(motion: &Motion, encode: impl Fn(u32) -> Result<T, DroneError>) -> 
 }
 
 /// Returns the scale that Skybrush chooses for the largest coordinate \[m\]: for 0 to 32767 mm it is 1, and so on.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
 fn proposed_scale(reach_m: f64) -> u32 {
     let extremum_mm = (reach_m * MM_PER_M).ceil();
     // A value beyond 32 bits is clamped.
     ((extremum_mm + 1.0) / 32768.0).ceil() as u32
+}
+
+/// Returns the byte of a scale, which has at most 7 bits.
+fn scale_byte(scale: u32) -> u8 {
+    u8::try_from(scale.min(LARGEST_SCALE)).unwrap_or(u8::MAX)
 }
 
 /// Returns a file with one block.
@@ -147,7 +152,7 @@ pub(super) fn show(work: &Work<'_>, vehicles: &[Vehicle<'_>]) -> Result<Encoded,
         found.encode(&mut bytes);
         if bytes.len() >= LARGEST_BODY {
             // Skybrush would compile the drone to one block.
-            file(name, &found, &[&[scale as u8], &bytes[..]].concat(), 2)?;
+            file(name, &found, &[&[scale_byte(scale)], &bytes[..]].concat(), 2)?;
         }
         let (parts, bytes) = (found.segments.len(), bytes.len() + 1);
         let vehicle = EncodedVehicle { name: (*name).clone(), label: label.clone(), parts, bytes };
