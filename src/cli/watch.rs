@@ -30,7 +30,6 @@ Sources:
 
 A line comes each second and at every change of state: CLEAR, NOT KNOWN or VIOLATION. A watch ends with its input or
 with Ctrl-C. Exit codes: 0 if it was CLEAR from start to end, 1 if not or if a vehicle left its plan.")]
-#[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 pub(super) struct WatchArguments {
     /// Source of positions; several sources are not joined.
     #[arg(value_name = "SOURCE", default_value = "-")]
@@ -71,7 +70,7 @@ pub(super) struct WatchArguments {
     /// Time from which ages count: the arrival here, or the largest stamp so far, for files.
     #[arg(long, value_name = "WHICH", default_value = "arrival", value_parser = time_base())]
     time: TimeBase,
-    /// Clocks of the stamps: one for all, or one per vehicle [default: own for MAVLink, else common].
+    /// Clocks of the stamps: one for all, or one per vehicle [default: one per vehicle for `mavlink`, else one for all].
     #[arg(long, value_name = "WHICH", value_parser = clocks())]
     clocks: Option<ClockScope>,
     /// Topic to read; repeatable.

@@ -1,4 +1,4 @@
-//! Contracts of a vehicle with all others, of which only a few are looked at in a period.
+//! Contracts of a vehicle with all others. Each period tests only those whose planes may come within reach.
 
 use std::cmp::Ordering;
 use std::sync::Arc;

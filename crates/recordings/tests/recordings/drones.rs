@@ -283,7 +283,8 @@ fn polynomial(text: &str, time_s: f32) -> Vector3<f64> {
 #[test]
 fn shows_state_their_distance_and_names() {
     let (_folder, path) = exported(&DroneOptions { delta_m: Some(1.5), ..DroneOptions::new(Dialect::Skyc) });
-    assert_eq!(read::own_limit_m(&path, &ReadOptions::default()), Some(1.5));
+    let rules = read::show_rules(&path, &ReadOptions::default()).expect("rules");
+    assert_eq!(rules.min_distance_m, Some(1.5));
     let whole = Whole::read(&path, &ReadOptions::default()).expect("read");
     let degrees = whole.items.iter().filter_map(|item| match item {
         Item::Piece(piece) => Some(piece.coefficients.len() - 1),

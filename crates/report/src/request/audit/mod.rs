@@ -377,8 +377,9 @@ impl<'a> AuditRequest<'a> {
     /// [`Failure`] if the request or a file is wrong, or the recording cannot be read.
     pub fn settings_with_limits(&self, monitor: &dyn Monitor) -> Result<Settings, Failure> {
         let mut settings = self.complete_settings()?;
-        let (own, own_limit_m) = self.subject.own(monitor)?;
-        RecordedLimits::fill(&mut settings, self, own.as_ref(), own_limit_m);
+        let (own, show) = self.subject.own(monitor)?;
+        rules::fill(&mut settings, self, show.as_ref());
+        RecordedLimits::fill(&mut settings, self, own.as_ref());
         Ok(settings)
     }
 
