@@ -14,7 +14,7 @@ const HEAD_ON: &str = "t,id,x,y,z\n0,a,0,0,100\n0,b,20000,0,100\n300,a,15000,0,1
 fn audit(name: &str, text: &str, words: &[&str]) -> Ran {
     let folder = tempfile::tempdir().expect("a folder");
     fs::write(folder.path().join(name), text).expect("written");
-    let seconds = if name.ends_with(".csv") { ["--time-unit", "s"].as_slice() } else { &[] };
+    let seconds = if text.starts_with("t,") { ["--time-unit", "s"].as_slice() } else { &[] };
     ran_by(TAUTLINE, folder.path(), &[&["audit", name], words, seconds].concat())
 }
 
