@@ -101,7 +101,7 @@ pub(super) fn piece(
 /// Converts the Bezier curve of these points over a duration T to coefficients of the powers of time.
 ///
 /// `c_k = C(n, k) D_k / T^k` with the k-th forward difference `D_k = sum_i (-1)^(k - i) C(k, i) P_i` of the points.
-pub(super) fn powers(points: &[Vector3<f64>], duration_s: f64) -> Vec<Vector3<f64>> {
+pub(crate) fn powers(points: &[Vector3<f64>], duration_s: f64) -> Vec<Vector3<f64>> {
     let degree = points.len() - 1;
     let mut differences = points.to_vec();
     let mut factor = 1.0;

@@ -19,7 +19,7 @@ mod clock;
 mod compressed;
 mod crazyflie;
 mod csv;
-mod curves;
+pub(crate) mod curves;
 mod earth;
 mod error;
 mod folder;

@@ -7,6 +7,8 @@
 
 use nalgebra::Vector3;
 
+use crate::read::curves::powers;
+
 /// Relative excess over the largest distance found at an instant up to which a bound is not tightened.
 const RELATIVE: f64 = 0.01;
 /// Excess over that distance which is always accepted \[m\].
@@ -59,21 +61,9 @@ impl Arc {
     }
 
     /// Returns the coefficients \[m/s^k\] of the powers of the time since the start.
-    ///
-    /// `c_k = C(n, k) D_k / T^k` with the k-th forward difference `D_k` of the Bernstein coefficients.
     #[must_use]
     pub fn powers(&self) -> Vec<Vector3<f64>> {
-        let (degree, length_s) = (self.points.len() - 1, self.to_s - self.from_s);
-        let (mut differences, mut factor) = (self.points.clone(), 1.0);
-        let mut coefficients = Vec::with_capacity(degree + 1);
-        for k in 0..=degree {
-            coefficients.push(differences[0] * factor);
-            for i in 0..degree - k {
-                differences[i] = differences[i + 1] - differences[i];
-            }
-            factor *= (degree - k) as f64 / ((k + 1) as f64 * length_s);
-        }
-        coefficients
+        powers(&self.points, self.to_s - self.from_s)
     }
 
     /// Returns the position \[m\] at a time, which is clamped to the arc.

@@ -2,7 +2,7 @@
 
 use maud::{DOCTYPE, PreEscaped, html};
 
-use super::{POLICY, STYLE, replay};
+use super::{POLICY, STYLE, metadata, replay, theme_choice};
 
 /// Rules of the log of notices.
 const LOG_STYLE: &str = "#log{list-style:none;padding:0;max-height:16rem;overflow:auto;\
@@ -18,24 +18,13 @@ pub fn live_page() -> String {
         (DOCTYPE)
         html lang="en" {
             head {
-                meta charset="utf-8";
-                meta name="viewport" content="width=device-width, initial-scale=1";
-                meta name="color-scheme" content="light dark";
-                meta http-equiv="Content-Security-Policy" content=(policy);
+                (metadata(&policy))
                 title { "Live watch" }
-                link rel="icon" href="data:,";
                 style { (PreEscaped(STYLE)) (PreEscaped(replay::STYLE)) (PreEscaped(LOG_STYLE)) }
             }
             body {
                 header {
-                    label.theme {
-                        "Theme "
-                        select autocomplete="off" {
-                            option value="auto" { "automatic" }
-                            option value="light" { "light" }
-                            option value="dark" { "dark" }
-                        }
-                    }
+                    (theme_choice())
                     p.kind { "Live watch" }
                     h1 { "tautline watch" }
                     p #verdict role="status" { "NOT KNOWN: the page is not connected" }

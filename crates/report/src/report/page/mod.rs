@@ -122,25 +122,13 @@ impl Page {
             (DOCTYPE)
             html lang="en" {
                 head {
-                    meta charset="utf-8";
-                    meta name="viewport" content="width=device-width, initial-scale=1";
-                    meta name="color-scheme" content="light dark";
-                    meta http-equiv="Content-Security-Policy" content=(policy);
+                    (metadata(&policy))
                     title { (self.title) " - " (self.badge.word) }
-                    // An empty icon, because browsers request one otherwise.
-                    link rel="icon" href="data:,";
                     style { (PreEscaped(STYLE)) (PreEscaped(page_rules())) @if replays { (PreEscaped(replay::STYLE)) } }
                 }
                 body {
                     header {
-                        label.theme {
-                            "Theme "
-                            select autocomplete="off" {
-                                option value="auto" { "automatic" }
-                                option value="light" { "light" }
-                                option value="dark" { "dark" }
-                            }
-                        }
+                        (theme_choice())
                         p.kind { (self.kind) }
                         h1 { (self.title) }
                         p.verdict { (self.badge) " " (self.verdict) }
@@ -168,6 +156,32 @@ impl Page {
         };
         // Texts for a terminal have ASCII units; a page has one notation with its figures.
         in_order(&page.into_string()).replace("m^2/s^2", "m²/s²").replace("m/s^2", "m/s²")
+    }
+}
+
+/// Returns the elements of the head that all pages share, with a policy of content.
+fn metadata(policy: &str) -> Markup {
+    html! {
+        meta charset="utf-8";
+        meta name="viewport" content="width=device-width, initial-scale=1";
+        meta name="color-scheme" content="light dark";
+        meta http-equiv="Content-Security-Policy" content=(policy);
+        // An empty icon, because browsers request one otherwise.
+        link rel="icon" href="data:,";
+    }
+}
+
+/// Returns the selection of the theme.
+fn theme_choice() -> Markup {
+    html! {
+        label.theme {
+            "Theme "
+            select autocomplete="off" {
+                option value="auto" { "automatic" }
+                option value="light" { "light" }
+                option value="dark" { "dark" }
+            }
+        }
     }
 }
 
