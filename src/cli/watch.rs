@@ -52,7 +52,7 @@ pub(super) struct WatchArguments {
     /// Age beyond which a vehicle is stale [s].
     #[arg(long, value_name = "SECONDS", default_value_t = 1.0, allow_negative_numbers = true)]
     max_age: f64,
-    /// Smallest delay between a stamp and its arrival [s], which cannot be measured here.
+    /// Smallest delay between a stamp and its arrival [s], which the watch cannot measure.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true)]
     latency: f64,
     /// Time ahead that is examined [s].
@@ -64,13 +64,13 @@ pub(super) struct WatchArguments {
     /// Names of vehicles that must be heard before anything is clear, separated by commas.
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     ids: Vec<String>,
-    /// Largest number of vehicles; a message of a further one is an error.
+    /// Largest number of vehicles; a message of a further vehicle is an error.
     #[arg(long, value_name = "COUNT", default_value_t = 2000)]
     max_vehicles: usize,
-    /// Time from which ages count: the arrival here, or the largest stamp so far, for files.
+    /// Present from which ages count: the time on this machine, or the largest stamp so far, for files.
     #[arg(long, value_name = "WHICH", default_value = "arrival", value_parser = time_base())]
     time: TimeBase,
-    /// Clocks of the stamps: one for all, or one per vehicle [default: one per vehicle for `mavlink`, else one for all].
+    /// Clocks of the stamps: one for all vehicles, or one per vehicle [default: own for `mavlink`, else common].
     #[arg(long, value_name = "WHICH", value_parser = clocks())]
     clocks: Option<ClockScope>,
     /// Topic to read; repeatable.
@@ -91,7 +91,7 @@ pub(super) struct WatchArguments {
     /// Largest deviation from the plan [m].
     #[arg(long, value_name = "METRES", default_value_t = 0.5, allow_negative_numbers = true, requires = "plan")]
     tube: f64,
-    /// Write what was watched, for `tautline audit`: a .csv or .mcap file.
+    /// Write the used positions to a .csv or .mcap file for `tautline audit`.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Overwrite an existing recording.
@@ -164,13 +164,13 @@ impl WatchArguments {
             _ if self.source == "-" => Address::Lines,
             Some(("mavlink", of)) => match of.trim_start_matches("//").parse() {
                 Ok(address) => Address::Mavlink(address),
-                Err(_) => return refuse("is no address and port", "write mavlink:0.0.0.0:14550"),
+                Err(_) => return refuse("not an address and port", "write mavlink:0.0.0.0:14550"),
             },
             Some(("rosbridge", of)) => Address::Rosbridge(server(of)),
             Some(("foxglove", of)) => Address::Foxglove(server(of)),
             _ => {
                 return refuse(
-                    "is no source",
+                    "not a source",
                     "write -, mavlink:0.0.0.0:14550, rosbridge:HOST:9090 or foxglove:HOST:8765",
                 );
             }

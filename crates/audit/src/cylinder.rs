@@ -1,4 +1,4 @@
-//! Upright cylinders: two vehicles are too near only if they are so horizontally and vertically at the same instant.
+//! Upright cylinders: a pair is too near if its horizontal and vertical distances are too small at one instant.
 //!
 //! The scaled distance of a relative position (x, y, z) is the larger of the horizontal distance over R and the
 //! vertical distance over H. It is a convex function of the position, and two vehicles touch at 1. Along a straight

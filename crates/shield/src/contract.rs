@@ -156,7 +156,7 @@ const NO_PROPOSAL: Proposal = Proposal { number: 0, divider: Divider { normal: [
 /// for this distance, and planes beyond reach do not limit its choice.
 const RENEWED: f64 = 2.0;
 
-/// A contract at an instant, and what follows for the next ones.
+/// Result of a look at a contract: whether to send, and when to look again.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Seen {
     /// Whether a message to the other vehicle is to be sent.
@@ -265,7 +265,7 @@ impl Owned {
         true
     }
 
-    /// Whether both vehicles are far from the plane, with the own segment.
+    /// Returns whether both vehicles are far from the plane, with the own segment.
     #[inline]
     pub(crate) fn is_far(&self, own: &Segment) -> bool {
         let followers = -self.held.room_m(&self.segment.position());

@@ -20,9 +20,9 @@ pub(crate) struct Contracts {
     starts: Arc<[Start]>,
     /// Place of the record of each other vehicle, from 1; 0 without a record.
     places: Vec<u32>,
-    /// With vehicles of smaller numbers.
+    /// Contracts with vehicles of smaller numbers.
     followed: Vec<Followed>,
-    /// With vehicles of larger numbers.
+    /// Contracts with vehicles of larger numbers.
     owned: Vec<Owned>,
     agenda: Agenda,
 }
@@ -41,7 +41,7 @@ impl Contracts {
         let has_plane = |owner: &Start, follower: &Start| divider_of_starts(owner, follower).is_some();
         let (before, after) = (&starts[..index], &starts[index + 1..]);
         if before.iter().all(|owner| has_plane(owner, own)) && after.iter().all(|follower| has_plane(own, follower)) {
-            // Memory is used as records come.
+            // The memory is reserved here, and first written when a record is made.
             let (followed, owned) = (Vec::with_capacity(index), Vec::with_capacity(count - index - 1));
             let (places, agenda) = (vec![0; count], Agenda::new(count));
             return Ok(Self { index: number, starts, places, followed, owned, agenda });

@@ -214,7 +214,7 @@ impl Shield {
     }
 
     /// Takes the messages to be sent after [`Shield::filter`], by receiver. Vehicles that are far and have sent nothing
-    /// get none. A message that is taken and not sent counts as lost. [`Shield::write_broadcast`] is shorter.
+    /// get none. A message that is taken and not sent counts as lost. [`Shield::write_broadcast`] writes fewer bytes.
     pub fn messages(&mut self) -> impl Iterator<Item = Message> + '_ {
         self.contracts.messages(self.period, self.segment)
     }

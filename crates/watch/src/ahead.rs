@@ -54,7 +54,7 @@ impl Scratch {
         let error_m = fold(|of| of.error_m);
         let error_m_s = fold(|of| of.error_m_s);
         let (delta_m, horizon_s) = (settings.delta_m, settings.horizon_s);
-        // Distance beyond which nothing happens within a time.
+        // Distance of two vehicles beyond which they stay apart by delta for a time.
         let reach_m = |time_s: f64| {
             let errors_m = error_m + time_s * (error_m_s + time_s * settings.accel_m_s2 / 2.0);
             delta_m + 1e-3 + 2.0 * (fastest_m_s * time_s + errors_m)
@@ -105,7 +105,7 @@ impl Scratch {
     }
 }
 
-/// Replaces a time of a pair by an earlier one. Of equal times that of the lower pair stays.
+/// Replaces the best time by an earlier one. Of equal times, the time of the lower pair is kept.
 fn first_of(best: &mut Option<(Pair, f64)>, pair: Pair, time_s: f64) {
     if best.is_none_or(|of| (time_s, pair) < (of.1, of.0)) {
         *best = Some((pair, time_s));

@@ -2,7 +2,7 @@
 //!
 //! The offset between the monitor's clock and a source's clock is unknown, and so is the delay of each message. The
 //! smallest difference of arrival and stamp so far is the offset plus the smallest delay. An age counts from there, so
-//! it holds every delay beyond the smallest one; `latency_s` of the settings adds the smallest one. The estimate may
+//! it includes every delay beyond the smallest one; `latency_s` of the settings adds the smallest one. The estimate may
 //! rise by [`DRIFT`], because two quartz clocks drift apart.
 
 /// Largest relative rate of two clocks.
@@ -35,7 +35,7 @@ impl SourceClock {
         self.epoch
     }
 
-    /// Returns the time of the monitor of a stamp \[s\].
+    /// Converts a stamp to a time of the monitor \[s\].
     pub(crate) fn time_of(&self, t_s: f64) -> f64 {
         t_s + self.anchor_s
     }

@@ -16,7 +16,7 @@ pub enum Reason {
     Stale(u32, f64),
     /// The velocity of a vehicle is not known yet.
     SpeedUnknown(u32),
-    /// The stamps of a vehicle are of another clock than before.
+    /// The clock of a vehicle stepped, and no message has arrived since.
     ClockStepped(u32),
     /// A vehicle sent two positions with one stamp.
     Conflict(u32),
@@ -39,7 +39,7 @@ impl Reason {
 pub enum State {
     /// Every pair of the heard vehicles keeps delta at the present, by the bounds.
     Clear,
-    /// Neither is established.
+    /// Neither CLEAR nor VIOLATION is established.
     NotKnown(Reason),
     /// A pair is closer than delta: the pair, and its distance \[m\].
     Violation(Pair, f64),
@@ -105,11 +105,11 @@ pub enum Fault {
     OutOfBounds,
     /// Messages came faster than they were read, and some were dropped.
     Dropped,
-    /// A vehicle sent too many messages between two of another vehicle, so that their past was not judged.
+    /// A vehicle sent too many messages between two messages of another one. The past of this pair is not judged.
     NotJudged,
-    /// A message is older than the newest one of its vehicle. It is ignored.
+    /// An ignored message that is older than the newest one of its vehicle.
     Reordered,
-    /// A message came twice. It is ignored.
+    /// An ignored message that is a repetition.
     Duplicate,
 }
 
@@ -145,7 +145,7 @@ impl Fault {
         }
     }
 
-    /// Returns whether nothing is clear for the largest age after this fault.
+    /// Returns whether the state is not CLEAR for the largest age after this fault.
     #[must_use]
     pub fn gives_doubt(self) -> bool {
         !matches!(self, Self::Reordered | Self::Duplicate)

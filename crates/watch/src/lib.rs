@@ -5,7 +5,7 @@
 //! | [`Monitor`] | the core, without input, output or a clock: takes poses, judges the present and the past |
 //! | [`source`] | standard input, MAVLink, rosbridge and Foxglove, each in a thread |
 //! | [`watch`] | a watch from its first input to its end, with [`Notice`]s as text and JSON |
-//! | [`Record`] | recording of what was watched |
+//! | [`Record`] | recording of the poses that the monitor used |
 //! | [`page`] | server of the live page |
 //! | [`pair`] | derivation and formulas of the time until which a pair is clear |
 

@@ -43,7 +43,7 @@ pub struct Taken {
 }
 
 struct Vehicle {
-    /// Its clock; `None` if the stamps have a common clock.
+    /// Clock of the vehicle; `None` if the stamps have a common clock.
     clock: Option<SourceClock>,
     /// Number of steps of the clock when the history began.
     epoch: u32,
@@ -223,7 +223,7 @@ impl Monitor {
     }
 
     /// Takes a pose that arrived at `arrival_s` on the caller's clock \[s\], which must not go back. Returns the
-    /// vehicle and the time of the monitor of a pose that is used, `None` for one that is ignored.
+    /// vehicle and the time of the monitor of a used pose, `None` for an ignored pose.
     pub fn take(&mut self, pose: &Pose<'_>, arrival_s: f64) -> Option<Taken> {
         let within = |of: &Vector3<f64>, most: f64| of.iter().all(|x| x.abs() <= most);
         let is_readable = pose.t_s.abs() <= LARGEST_TIME_S
@@ -493,7 +493,7 @@ impl Monitor {
         Some(clock.age_s(of.history.newest()?.t_s, self.now_s) + self.settings.latency_s)
     }
 
-    /// Drops the history of a vehicle, whose stamps are of another clock.
+    /// Drops the history of a vehicle after a step of its clock.
     fn forget(&mut self, vehicle: u32, epoch: u32) {
         let of = &mut self.vehicles[vehicle as usize];
         of.history.clear();
@@ -512,7 +512,7 @@ impl Monitor {
         let bound_m = 2.0 * self.settings.position_error_m
             + error_m_s * h_s
             + accel * h_s * h_s / 2.0
-            // Stamps of one unit in the last place off.
+            // Stamps may be wrong by one unit in the last place.
             + velocity.norm() * 4.0 * f64::EPSILON * pose.t_s.abs();
         let moved_m = (pose.position_m - fix.position_m - velocity * h_s).norm();
         moved_m > bound_m * (1.0 + 1e-9) + 1e-9 * (1.0 + pose.position_m.amax())
@@ -571,10 +571,10 @@ impl Monitor {
 
     /// Judges all pairs over the time between the last judgement and the newest positions.
     ///
-    /// The motion between two positions of a vehicle is straight. A gap longer than the largest age is not judged: the
-    /// vehicle was stale in it.
+    /// The motion between two positions of a vehicle is straight. A gap longer than the largest age is not judged,
+    /// because the vehicle was stale within the gap.
     fn judge_past(&mut self) {
-        // Judged until here for every vehicle with a new position.
+        // Time until which every vehicle with a new position was judged.
         let mut floor_s = f64::INFINITY;
         for of in &self.vehicles {
             let (Some(newest), Some(clock)) = (of.history.newest(), self.clock_of(of)) else { continue };

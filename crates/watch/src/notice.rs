@@ -13,7 +13,7 @@ pub struct Notice {
     pub event: &'static str,
     /// Line of text.
     pub text: String,
-    /// The same as JSON.
+    /// The notice as JSON.
     pub json: Value,
 }
 

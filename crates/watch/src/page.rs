@@ -45,7 +45,7 @@ struct Shared {
     address: SocketAddr,
     token: Option<String>,
     viewers: Mutex<Vec<SyncSender<Arc<str>>>>,
-    /// Names of the vehicles, which every viewer needs first.
+    /// Names of the vehicles, sent first to every viewer.
     roster: Mutex<Arc<str>>,
     connections: AtomicUsize,
 }
@@ -273,7 +273,7 @@ fn is_address(host: &str) -> bool {
         || is_local(without_port)
 }
 
-/// Compares without an early end, whose time would tell the equal part.
+/// Compares in constant time, so that the time does not reveal how many bytes are equal.
 fn is_equal(a: &[u8], b: &[u8]) -> bool {
     a.len() == b.len() && a.iter().zip(b).fold(0, |different, (a, b)| different | (a ^ b)) == 0
 }

@@ -106,15 +106,15 @@ impl RelativeMotion {
         self.nominal_m() - self.u[0]
     }
 
-    /// Returns whether the separation is at least `delta_m` for `time_s`, by a test that needs no search. `false` is
-    /// no statement.
+    /// Returns whether the separation is at least `delta_m` for `time_s`, by a test that needs no search. `false`
+    /// decides nothing.
     #[must_use]
     pub fn is_clear_for(&self, time_s: f64, delta_m: f64) -> bool {
         self.nominal_m() - self.dv.norm() * time_s - self.error_at(time_s) >= delta_m
     }
 
     /// Returns for how long from the present the separation is at least `delta_m` \[s\], at most `horizon_s`; `None`
-    /// if the bounds allow less at the present. The result is never above the exact time.
+    /// if the bounds allow a smaller separation at the present. The result is never above the exact time.
     ///
     /// Each step follows the tangent of `|dp + dv t|`, which lies below this convex function, to the root of a
     /// quadratic.

@@ -1,4 +1,4 @@
-//! Recording of what was watched.
+//! Recording of the poses that the monitor used.
 
 use std::fs::File;
 use std::io::{self, BufWriter, Write as _};
@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 
 use crate::source::OwnedPose;
 
-/// Poses as CSV with the columns `time_s,id,x,y,z,vx,vy,vz`, in a file that has its name when it is complete.
+/// Poses as CSV with the columns `time_s,id,x,y,z,vx,vy,vz`, in a file `PATH.partial` until it is complete.
 pub struct Record {
     file: BufWriter<File>,
     partial: PathBuf,
@@ -16,14 +16,14 @@ pub struct Record {
     rows: u64,
 }
 
-/// Extension of a file that is not complete.
+/// Extension of an incomplete file.
 const PARTIAL: &str = "partial";
 
 impl Record {
     /// Creates the file `PATH.partial`.
     ///
     /// # Errors
-    /// If it cannot be created.
+    /// If the file cannot be created.
     pub fn create(path: &Path) -> io::Result<Self> {
         let mut name = path.as_os_str().to_owned();
         name.push(".");
@@ -37,7 +37,7 @@ impl Record {
     /// Appends a pose at a time of the monitor \[s\]. Numbers round-trip.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If the file cannot be written.
     pub fn push(&mut self, time_s: f64, pose: &OwnedPose) -> io::Result<()> {
         let at = pose.position_m;
         let id = quoted(&pose.id);
@@ -60,10 +60,10 @@ impl Record {
         self.rows
     }
 
-    /// Gives the file its name.
+    /// Renames `PATH.partial` to `PATH`.
     ///
     /// # Errors
-    /// If it cannot be written.
+    /// If the file cannot be written or renamed.
     pub fn finish(mut self) -> io::Result<()> {
         self.file.flush()?;
         self.file.get_ref().sync_all()?;

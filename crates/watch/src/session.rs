@@ -74,8 +74,8 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Returns whether every judgement after the start was CLEAR, without a violation and within the plan. A plan with
-    /// other times than the positions is not kept.
+    /// Returns whether every judgement after the start was CLEAR, without a violation and within the plan. With a
+    /// plan, at least one position must have been compared.
     #[must_use]
     pub fn is_good(&self) -> bool {
         self.has_started && !self.was_not_known && !self.was_violated && !self.was_off_plan && self.compared != Some(0)
@@ -119,7 +119,7 @@ impl Summary {
     }
 }
 
-/// Watch that runs.
+/// Running watch.
 struct Session<'a> {
     monitor: Monitor,
     output: &'a mut dyn Output,
@@ -197,13 +197,13 @@ impl Session<'_> {
             && let Some(ahead_s) = self.monitor.is_ahead_s(pose.t_s)
             && ahead_s > 0.0
         {
-            // All poses of the instant are taken.
+            // All poses with the present stamp have been taken.
             let since_s = self.last.map_or(f64::INFINITY, |last| self.monitor.now_s() - last.now_s);
             if since_s >= ASSESS_PERIOD_S {
                 self.assess(arrival_s)?;
             }
             if ahead_s > self.monitor.settings().max_age_s {
-                // Nothing was heard in between.
+                // No message came between the present and this stamp.
                 self.monitor.advance(pose.t_s);
                 self.assess(arrival_s)?;
             }

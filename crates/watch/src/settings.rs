@@ -48,7 +48,7 @@ pub struct Settings {
     pub accel_m_s2: f64,
     /// Bound eps on the error of each position \[m\], with the speed times the error of its stamp.
     pub position_error_m: f64,
-    /// Bound `eps_v` on the error of each velocity that is sent \[m/s\].
+    /// Bound e on the error of each velocity that is sent \[m/s\].
     pub velocity_error_m_s: f64,
     /// Acceleration B with which each vehicle can brake along the line between two \[m/s^2\].
     pub brake_m_s2: f64,

@@ -123,7 +123,7 @@ pub struct Outcome {
     pub separation: Option<Status>,
     /// Findings for the limits on single vehicles.
     pub envelope: EnvelopeOutcome,
-    /// Findings for well clear, if it was asked.
+    /// Findings for well clear, if the settings have its thresholds.
     pub well_clear: Option<WellClearOutcome>,
     /// Names of all vehicles of the recording, including those that are not selected.
     pub vehicles: Vec<String>,

@@ -28,11 +28,11 @@ use tautline_core::track::Item;
 const MOST_DELAY_S: f64 = 60.0;
 /// Interval between two delays that are tried \[s\].
 const DELAY_STEP_S: f64 = 0.05;
-/// Width to which the best of them is narrowed \[s\].
+/// Width to which the interval around the best delay is narrowed \[s\].
 const DELAY_WIDTH_S: f64 = 1e-7;
 /// Largest number of positions by which the delay is estimated.
 const MOST_POSITIONS: usize = 2000;
-/// Number of instants of a curve among them, before they are thinned.
+/// Number of instants of a curve among these positions, before thinning.
 const INSTANTS_OF_A_CURVE: usize = 16;
 /// Largest number of instants of a vehicle that are kept for a figure.
 const MOST_INSTANTS: usize = 1024;
@@ -76,11 +76,11 @@ pub struct Unknown {
 /// Result of a comparison.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanFindings {
-    /// Clear if every distance is known and within the tube, or within itself without a tube.
+    /// Verdict: clear if every distance is known and, with a tube, within the tube.
     pub status: Status,
     /// Time of the flight at which the plan has time 0 \[s\].
     pub delay_s: f64,
-    /// Range of delays among which it was estimated \[s\]; `None` if it was given.
+    /// Range of delays of the search \[s\]; `None` if the delay was given.
     pub searched_s: Option<(f64, f64)>,
     /// Allowed distance \[m\], if given.
     pub tube_m: Option<f64>,

@@ -6,13 +6,13 @@
 //! - s . v < 0, the horizontal miss distance |s x v| / |v| is below D, and the modified tau (D^2 - |s|^2) / (s . v) is
 //!   below T.
 //!
-//! It is not well clear if it is not so horizontally and |z| < Z. D is both DMOD and the threshold HMD* of the miss
-//! distance. This is `WCV_TAUMOD` of NASA's DAIDALUS without its vertical time threshold.
+//! A pair is not well clear if it is not well clear horizontally and |z| < Z. D is both DMOD and the threshold HMD* of
+//! the miss distance. This is `WCV_TAUMOD` of NASA's DAIDALUS without its vertical time threshold.
 //!
 //! On straight segments v is constant. With the time t from the closest approach, the miss distance m, and w^2 = (D^2 -
 //! m^2) / |v|^2, the first condition is |t| < w. The second is t < 0 and t^2 + T t - w^2 < 0. Both together are the
 //! interval from -T/2 - sqrt(T^2/4 + w^2) to w. It is empty if m >= D. All ends are enclosed by interval arithmetic.
-//! What lies between the enclosures is undecided.
+//! Times within an enclosure of an end are undecided.
 
 mod enclosed;
 

@@ -1,4 +1,4 @@
-//! `export_drones`: writes a flight for drones, and judges what the drones will hold.
+//! `export_drones`: writes a flight for drones, and judges the written motion.
 //!
 //! The flight is audited, encoded and written beside the output. The written files are read back, compared with the
 //! flight and audited. Only files that were proved, or judged clear for sampled formats, get the name of the output.
@@ -299,7 +299,7 @@ impl<'a> Written<'a> {
         ArtefactError { path: self.output.display().to_string(), source }.into()
     }
 
-    /// Opens the files with the reader that any user has.
+    /// Opens the files with the public readers.
     fn open(&self, options: &DroneOptions) -> Result<Box<dyn Tracks<Error = ReadError>>, ReadError> {
         let time_unit = (options.dialect == Dialect::Px4Show).then_some(TimeUnit::Seconds);
         read::open(&self.content, &ReadOptions { time_unit, ..ReadOptions::default() })
@@ -383,7 +383,7 @@ impl Drop for Written<'_> {
 
 /// Returns the failure of a vehicle that is not in the written files.
 fn lost(label: &str) -> Failure {
-    let message = format!("vehicle {label}: the written files do not give it back");
+    let message = format!("vehicle {label}: the written files have no vehicle of this name");
     Failure::input("export/name", message, "rename the vehicle in the recording")
 }
 

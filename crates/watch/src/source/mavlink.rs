@@ -18,7 +18,7 @@ use tautline_recordings::read::EarthFrame;
 
 /// Message id, payload length without extensions, and extra byte of the checksum of `LOCAL_POSITION_NED`.
 const LOCAL: (u32, usize, u8) = (32, 28, 185);
-/// The same of `GLOBAL_POSITION_INT`.
+/// Message id, payload length and extra byte of `GLOBAL_POSITION_INT`.
 const GLOBAL: (u32, usize, u8) = (33, 28, 104);
 /// First bytes of `MAVLink` 1 and 2.
 const STARTS: [u8; 2] = [0xFE, 0xFD];
@@ -97,7 +97,7 @@ pub fn poses_of_datagram(mut bytes: &[u8], frame: &MavlinkFrame, arrival_s: f64,
 
 /// Returns the pose of the first frame, if it has one, and the length of the frame.
 fn first_frame(bytes: &[u8], frame: &MavlinkFrame) -> Result<(Option<OwnedPose>, usize), String> {
-    let cut = || "it ends within a frame of MAVLink".to_owned();
+    let cut = || "ends within a frame of MAVLink".to_owned();
     let payload = usize::from(*bytes.get(1).ok_or_else(cut)?);
     let (message, system, payload, length, is_whole) = match bytes[0] {
         0xFE => {
@@ -120,7 +120,7 @@ fn first_frame(bytes: &[u8], frame: &MavlinkFrame) -> Result<(Option<OwnedPose>,
             let is_whole = extra_of(id).is_none_or(|extra| raw.has_valid_crc_with_extra_crc(extra));
             (id, raw.system_id(), raw.payload().to_vec(), length, is_whole)
         }
-        other => return Err(format!("no frame of MAVLink begins with {other:#04x}, but with {STARTS:#04x?}")),
+        other => return Err(format!("a frame of MAVLink must begin with one of {STARTS:02x?}, got {other:02x}")),
     };
     if !is_whole {
         return Err(format!("the checksum of message {message} of system {system} is wrong"));

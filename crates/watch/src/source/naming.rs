@@ -29,7 +29,7 @@ pub struct Naming {
 const MOST_TOPICS: usize = 10_000;
 
 impl Naming {
-    /// Returns the names of topics that have not been read yet.
+    /// Returns a naming without vehicles.
     #[must_use]
     pub fn new(options: NamingOptions) -> Self {
         let frame = options.frame.clone();

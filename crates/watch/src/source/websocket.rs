@@ -12,9 +12,9 @@ use super::{Feed, Input};
 
 /// Time limit of a connection and of its handshake.
 const PATIENCE: Duration = Duration::from_secs(5);
-/// Silence after which the server is asked for an answer.
+/// Silence after which the client sends a ping.
 const SILENCE: Duration = Duration::from_secs(5);
-/// Time between two looks at the end of the watch.
+/// Time between two checks for the end of the watch.
 const POLL: Duration = Duration::from_millis(100);
 
 /// Message of a server.

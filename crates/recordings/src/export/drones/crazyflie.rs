@@ -15,11 +15,11 @@ use crate::segments::{HEAD_BYTES, LARGEST, OutOfRange, Trajectory, rounding_m};
 
 /// Memory of the firmware for trajectories \[bytes\].
 const MEMORY_BYTES: usize = 4096;
-/// Size of a polynomial in it \[bytes\].
+/// Size of a polynomial in this memory \[bytes\].
 const PIECE_BYTES: usize = 132;
 /// Unit of length of compressed segments \[m\].
 const UNIT_M: f64 = 1e-3;
-/// Name of the memory.
+/// Name of the memory in messages.
 const MEMORY: &str = "the memory of a Crazyflie";
 
 /// Polynomial as the firmware holds it: duration \[s\] and coefficients of the powers of time \[m/s^k\].

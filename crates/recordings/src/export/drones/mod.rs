@@ -50,7 +50,7 @@ impl Dialect {
         }
     }
 
-    /// Returns the name in sentences.
+    /// Returns the name for messages.
     #[must_use]
     pub fn title(self) -> &'static str {
         match self {
@@ -163,7 +163,7 @@ pub struct FlownVehicle {
 }
 
 /// Reads all motions of a recording. Samples are joined by straight lines. With `holds`, a vehicle rests at each sample
-/// until the next one. Gaps are joined, too; the caller refuses them before.
+/// until the next one. Gaps are joined too, so the caller must refuse gaps before.
 ///
 /// # Errors
 /// [`ReadError`] if the recording cannot be read.
@@ -398,11 +398,11 @@ pub enum DroneError {
         vehicle: String,
         /// Number of pieces.
         pieces: usize,
-        /// Their size \[bytes\].
+        /// Size of all pieces \[bytes\].
         bytes: usize,
-        /// The memory.
+        /// Name of the memory.
         what: &'static str,
-        /// Its size \[bytes\].
+        /// Size of the memory \[bytes\].
         most: usize,
         /// Whether a compressed form exists.
         compresses: bool,

@@ -11,7 +11,7 @@ use crate::read::curves::powers;
 
 /// Relative excess over the largest distance found at an instant up to which a bound is not tightened.
 const RELATIVE: f64 = 0.01;
-/// Excess over that distance which is always accepted \[m\].
+/// Excess over the largest distance found up to which a bound is not tightened \[m\].
 const ABSOLUTE_M: f64 = 1e-6;
 /// Largest number of halvings of a part.
 const MOST_HALVINGS: u32 = 24;
@@ -157,7 +157,7 @@ pub struct Deviation {
     pub bound_m: f64,
     /// Largest distance that was found at an instant \[m\]; at most 1 % or 1 um below the bound.
     pub found_m: f64,
-    /// That instant \[s\].
+    /// Instant of the largest distance \[s\].
     pub time_s: f64,
 }
 

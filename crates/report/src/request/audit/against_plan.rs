@@ -1,4 +1,4 @@
-//! Comparison of a recording with its plan, as `--plan` asks for.
+//! Comparison of a recording with its plan, for `--plan`.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ const NAMES_LISTED: usize = 12;
 /// Largest delay that may be given \[s\]: a century.
 const MOST_DELAY_S: f64 = 3.2e9;
 
-/// Question about a plan.
+/// Options of a comparison with a plan.
 #[derive(Clone, Debug, PartialEq)]
 pub struct PlanQuestion {
     /// File or folder of the plan, in any format that is read.
@@ -111,7 +111,7 @@ pub(super) fn compare(
     Ok((report, notes, figure(&found, flight.outcome)))
 }
 
-/// Adds the findings to a report; also returns the figure. The run's audit says nothing about distances from a plan
+/// Adds the findings to a report; also returns the figure. The run's audit does not cover distances from a plan
 /// between two samples (`is_by_run`).
 pub(super) fn attach(
     report: RecordedReport,
