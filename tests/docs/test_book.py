@@ -20,7 +20,7 @@ OF_ANOTHER = ("thrust_n_per_rpm2",)
 ITEM = re.compile(r"^- \[([^\]]+)\]\(([\w-]+\.md)\)(: .+)?$", re.MULTILINE)
 
 AREAS = """scenario recording audit export request compare margin sweep attack campaign render pictures files usage
-machine law simulation"""
+machine law simulation watch"""
 CODE = re.compile(rf'"((?:{"|".join(AREAS.split())})/[a-z0-9-]+)"')
 
 sys.path.insert(0, str(DOCS))

@@ -102,6 +102,15 @@ pub struct Entry {
 }
 
 impl Broadcast {
+    /// Largest number of entries for which memory is reserved. A vehicle is rarely near more planes.
+    const RESERVED: usize = 128;
+
+    /// Returns a broadcast without entries, with memory for those of a swarm of this number of vehicles.
+    #[must_use]
+    pub fn for_swarm(vehicles: usize) -> Self {
+        Self { entries: Vec::with_capacity(vehicles.min(Self::RESERVED)), ..Self::default() }
+    }
+
     /// Returns the message to a vehicle. `None` if the broadcast has none.
     #[inline]
     #[must_use]

@@ -392,8 +392,8 @@ impl Series {
     }
 }
 
-/// Returns the times in which only one of two is present. Such a time shorter than `shortest_s` at either end of both
-/// does not count.
+/// Returns the times in which only one of two is present. At either end of both, a planned time shorter than
+/// `shortest_s` does not count, because samples rarely begin and end with the plan.
 fn unknown_times(vehicle: usize, flown: &[Segment], planned: &[Segment], shortest_s: f64) -> Vec<Unknown> {
     let (flown, planned) = (runs(flown), runs(planned));
     let mut ends_s: Vec<f64> = flown.iter().chain(&planned).flat_map(|run| [run.from_s, run.to_s]).collect();
@@ -418,7 +418,8 @@ fn unknown_times(vehicle: usize, flown: &[Segment], planned: &[Segment], shortes
     }
     found.retain(|of| {
         let is_at_end = Some(of.from_s) == first_s || Some(of.to_s) == last_s;
-        !is_at_end || of.to_s - of.from_s >= shortest_s
+        let allowed_s = if of.is_flown { SHORTEST_UNKNOWN_S } else { shortest_s };
+        !is_at_end || of.to_s - of.from_s >= allowed_s
     });
     found
 }

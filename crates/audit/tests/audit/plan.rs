@@ -132,10 +132,16 @@ fn times_of_one_alone_are_unknown() {
     assert_eq!(found.status, Status::Undecided);
     let [of] = found.unknown[..] else { panic!("{:?}", found.unknown) };
     assert_eq!((of.from_s, of.to_s, of.is_flown), (8.0, 10.0, true));
-    // Within a window that both cover, everything is known; less than an interval at an end does not count.
-    for to_s in [8.0, 8.05] {
+    // Within a window that both cover, everything is known. A flown end without a plan counts, however short.
+    for (to_s, status) in [(8.0, Status::Clear), (8.05, Status::Undecided)] {
         let window = Settings { to_s: Some(to_s), ..plan_alone() };
-        assert_eq!(compare(&window, &flight, &plan, Some(0.0), Some(1.0)).status, Status::Clear, "{to_s}");
+        assert_eq!(compare(&window, &flight, &plan, Some(0.0), Some(1.0)).status, status, "{to_s}");
+    }
+    // A planned end without samples does not count if it is shorter than an interval.
+    for (last, status) in [(80, Status::Clear), (79, Status::Undecided)] {
+        let window = Settings { from_s: Some(0.05), ..plan_alone() };
+        let found = compare(&window, &flight[..=last], &plan, Some(0.05), Some(1.0));
+        assert_eq!(found.status, status, "{last} {:?}", found.unknown);
     }
     // A gap in the flight.
     let gappy: Vec<_> = flight.iter().filter(|item| !(2.05..3.95).contains(&item.time_s())).cloned().collect();

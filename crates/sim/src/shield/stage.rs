@@ -78,7 +78,7 @@ pub(crate) struct ShieldStage {
 }
 
 /// Messages of all vehicles at one instant.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 struct Round {
     /// Messages of each sender.
     broadcasts: Vec<Broadcast>,
@@ -86,6 +86,14 @@ struct Round {
     arrives_s: Vec<f64>,
     /// Time from which none of them arrives any more \[s\].
     over_s: f64,
+}
+
+impl Round {
+    fn of(vehicles: usize) -> Self {
+        let broadcasts: Vec<_> = (0..vehicles).map(|_| Broadcast::for_swarm(vehicles)).collect();
+        let arrives_s = Vec::with_capacity(broadcasts.iter().map(|broadcast| broadcast.entries.capacity()).sum());
+        Self { broadcasts, arrives_s, over_s: 0.0 }
+    }
 }
 
 impl ShieldStage {
@@ -141,8 +149,7 @@ impl ShieldStage {
         }
         self.observe_measurements(time_s, truth);
         let sends = self.has_round(time_s);
-        let mut round = self.spare.pop().unwrap_or_default();
-        round.broadcasts.resize_with(command.nrows(), Broadcast::default);
+        let mut round = self.spare.pop().unwrap_or_else(|| Round::of(command.nrows()));
         let Self { fleet, measured, wanted, commands, .. } = self;
         each(fleet.shields_mut(), commands, &mut round.broadcasts, |i, shield, command, broadcast| {
             *command = shield.filter(measured[i], wanted[i]);

@@ -6,7 +6,7 @@ use super::report::{RecordedReport, VehicleFinding};
 use crate::report::section::Section;
 use tautline_audit::recorded::{Outcome, PlanFindings};
 use tautline_audit::{Status, recorded};
-use tautline_core::text::{at_least, at_most, exact, fixed, seconds};
+use tautline_core::text::{at_least, at_most, beside_limit, exact, fixed, seconds};
 
 /// Findings on a flight against its plan.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -126,7 +126,11 @@ impl PlanReport {
             (Status::Violation, _) => {
                 let left = self.vehicles.iter().max_by(|a, b| a.finding.lower_m.total_cmp(&b.finding.lower_m));
                 left.map_or(String::new(), |VehicleFinding { vehicle, finding }| {
-                    let (least, at) = (at_least(finding.lower_m, 6), seconds(finding.at_s));
+                    let least = match self.tube_m {
+                        Some(tube_m) => beside_limit(finding.lower_m, tube_m, 6),
+                        None => at_least(finding.lower_m, 6),
+                    };
+                    let at = seconds(finding.at_s);
                     format!("{vehicle} is {least} m from the plan at {at} ({tube}{delay})")
                 })
             }
@@ -134,8 +138,8 @@ impl PlanReport {
                 (Some(VehicleFinding { vehicle, finding: PlanUnknown { from_s, to_s, missing } }), _) => {
                     let (from, to) = (fixed(*from_s, 3), fixed(*to_s, 3));
                     format!(
-                        "the distance of {vehicle} from the plan is not known from {from} s to {to} s: no {missing} \
-                         ({delay})"
+                        "the distance of {vehicle} from the plan is not known from {from} s to {to} s: no {missing}; \
+                         --from and --to select the time to judge ({delay})"
                     )
                 }
                 (None, Some((vehicle, PlanDistance { upper_m, lower_m, .. }))) => {

@@ -71,7 +71,8 @@ pub(super) fn compare(
     if plan.clock().by_steps && !is_in_seconds {
         let message =
             format!("{}: the unit of time of the plan is inferred from steps of whole numbers only", path.display());
-        return Err(Failure::input("audit/guessed-time-unit", message, "write the times of the plan in seconds"));
+        let help = "name the column of the times of the plan by their unit, such as t_s or t_ms";
+        return Err(Failure::input("audit/guessed-time-unit", message, help));
     }
     let is_planar = flight.is_planar || plan.is_planar();
     if is_planar {
