@@ -59,6 +59,17 @@ class Arrays(Case):
         self.assertEqual(tl.audit(t, p, limit=limit, accel_window=0.4).status, "clear")
         self.assertEqual(tl.audit(t, p, limit=limit, accel_window=0.2).status, "violation")
 
+    def test_cylinders_well_clear_and_rules_of_shows_are_judged(self) -> None:
+        t = np.array([0.0, 1.0])
+        p = np.array([[[-5, 0, 5], [5, 0.25, 5.5]], [[5, 0, 5], [-5, 0.25, 5.5]]], float)
+        self.assertEqual(tl.audit(t, p, cylinder=(0.5, 0.6)).verdict, "VIOLATION")
+        self.assertEqual(tl.audit(t, p, cylinder="0.5,0.4").verdict, "CLEAR if straight between samples")
+        self.assertEqual(tl.audit(t, p, well_clear="do-365").verdict, "VIOLATION")
+        self.assertEqual(tl.audit(t, p, rules="skybrush").verdict, "VIOLATION")
+        self.assertEqual(tl.audit(t, p, ellipsoid="crazyswarm").verdict, "CLEAR if straight between samples")
+        self.refuses(tl.Error, "above 0, got 0.0", lambda: tl.audit(t, p, cylinder=(0, 1)))
+        self.refuses(tl.Error, "unknown rules `foo`", lambda: tl.audit(t, p, rules="foo"))
+
     def test_a_flight_is_compared_with_its_plan(self) -> None:
         t = np.array([0.0, 1.0])
         p = np.array([[[0.0, 0, 0], [0.0, 2, 0]], [[5.0, 0.1, 0], [5.0, 2, 0]]])

@@ -165,8 +165,8 @@ class Recordings(Case):
 
     def test_flights_for_drones_are_judged_after_their_encoding(self) -> None:
         t = np.arange(201) * 0.04
-        p = np.zeros((201, 2, 3))
-        p[:, 1, 0] = 2.0
+        p = np.zeros((201, 4, 3))
+        p[:, :, 0] = 2.0 * np.arange(4)
         p[:, :, 1] = np.sin(t)[:, None]
         np.savez(self.folder / "pair.npz", t=t, positions=p)
         answer = tl.export(self.folder / "pair.npz", self.folder / "cf", to="crazyflie", delta=1.5, tolerance=0.02)
@@ -175,7 +175,7 @@ class Recordings(Case):
         self.assertIn("PROVED CLEAR", answer.verdict)
         self.assertLessEqual(answer.deviation["bound_m"], 0.02)
         self.assertAlmostEqual(answer.margin["margin"], 0.5, delta=0.04)
-        self.assertEqual([vehicle["label"] for vehicle in answer["vehicles"]], ["1", "2"])
+        self.assertEqual([vehicle["label"] for vehicle in answer["vehicles"]], ["1", "2", "3", "4"])
         self.assertEqual(tl.audit(self.folder / "cf", delta=1.5).verdict, "PROVED CLEAR")
         refused = tl.export(self.folder / "pair.npz", self.folder / "no.skyc", to="skyc", delta=2.5)
         assert refused is not None
