@@ -25,6 +25,7 @@ NOT_RUN_HERE = {
     ("CONTRIBUTING.md", "cargo run --release -- schema"): "writes docs/scenario.md; test_book.py compares the two",
     ("docs/clusters.md", "cp target/release/tautline"): "copies into the shared folder of a cluster",
     ("docs/clusters.md", "/shared/tautline"): "the same",
+    ("docs/plan-to-flight.md", "tautline watch mavlink:"): "listens until Ctrl-C",
     ("docs/watch.md", "tautline watch mavlink:"): "listens until Ctrl-C; crates/watch tests the source",
     ("docs/watch.md", "tautline watch rosbridge:"): "the same; tests/program/watch.rs runs it",
     ("docs/watch.md", "tautline watch foxglove:"): "the same",

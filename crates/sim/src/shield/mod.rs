@@ -55,7 +55,7 @@ const BYTES_PER_MESSAGE: u128 = 64;
 
 /// Shield: changes commands of the law only where this is needed to certify that no two vehicles come closer than
 /// `law.delta_m`. Commands are held over the periods of `time.control_hz`, 20 Hz unless given. Messages of the shield
-/// use the latency, loss and rate of `[network]`, between all pairs of vehicles.
+/// use the latency, loss and rate of `[network]`, between vehicles near their common plane.
 #[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ShieldSpec {
