@@ -140,6 +140,9 @@ fn wrong_input_ends_with_2_and_leaves_nothing() {
     write("jump/b.csv", "duration,x^0,y^0,z^0\n2,9,0,1\n");
     write("flat.csv", "t,id,x,y\n0,a,0,0\n0,b,3,0\n1,a,0,1\n1,b,3,1\n");
     write("two.csv", "t,id,x,y,z\n0,ä,0,0,0\n0,b,3,0,0\n1,ä,0,1,0\n1,b,3,1,0\n");
+    write("steps.csv", "t,id,x,y,z\n0,a,0,0,1\n0,b,9,0,1\n10,a,2,0,1\n10,b,9,2,1\n20,a,4,0,1\n20,b,9,4,1\n");
+    write("point.csv", &rows(&|t, name| name == "a" || t == 0.0));
+    write("distant.csv", "t,id,x,y,z\n0.5,a,1e6,0,0\n0.5,b,1e6,3,0\n1.5,a,1e6,0,1\n1.5,b,1e6,3,1\n");
     fs::create_dir(folder.path().join("full")).expect("a folder");
     write("full/notes.md", "mine");
     let before = names(folder.path());
@@ -159,7 +162,19 @@ fn wrong_input_ends_with_2_and_leaves_nothing() {
         ("flight.csv", "skyc", &["--sample-hz", "10"], "export/unused-option", ["--sample-hz", "px4-show"]),
         ("flight.csv", "vviz", &["--sample-hz", "0"], "export/sample-rate", ["--sample-hz", "0.0"]),
         ("flight.csv", "px4-show", &["--tolerance", "0.001"], "export/too-fast", ["samples are up to", "--sample-hz"]),
-        ("flight.csv", "skyb", &["--from", "20"], "audit/empty-window", ["no vehicle", "window"]),
+        ("flight.csv", "skyb", &["--from", "20"], "export/window", ["--from: no vehicle", "0.0 s to 8.0 s"]),
+        ("flight.csv", "skyb", &["--until", "-2"], "export/window", ["--until: no vehicle", "0.0 s to 8.0 s"]),
+        ("flight.csv", "skyb", &["--until", "nan"], "export/window", ["--until: must be a finite", "got NaN"]),
+        (
+            "flight.csv",
+            "skyb",
+            &["--from", "5", "--until", "3"],
+            "export/window",
+            ["--until: must be", "3.0 s and 5.0 s"],
+        ),
+        ("steps.csv", "crazyflie", &[], "audit/guessed-time-unit", ["export --to", "--time-unit ms"]),
+        ("point.csv", "skyb", &[], "export/absent", ["vehicle b", "absent for a part"]),
+        ("distant.csv", "crazyflie", &[], "export/tolerance", ["rounds positions", "origin"]),
     ] {
         let output = if to == "skyc" || to == "vviz" { "show" } else { "out" };
         let arguments = [&["export", input, "--to", to, "-o", output, "--delta", "0.5"], more].concat();
@@ -170,6 +185,10 @@ fn wrong_input_ends_with_2_and_leaves_nothing() {
         }
         assert_eq!(names(folder.path()), before, "{arguments:?}");
     }
+    // No parent is made.
+    let deep = ran(folder.path(), &["export", "flight.csv", "--to", "skyb", "-o", "new/x/y", "--delta", "1"]);
+    assert_eq!((deep.exit, deep.code()), (Some(2), "files/no-folder"), "{}", said(&deep));
+    assert_eq!(names(folder.path()), before);
     let unknown = ran(folder.path(), &["export", "flight.csv", "--to", "foo", "-o", "out"]);
     assert_eq!(unknown.exit, Some(2));
     assert!(said(&unknown).contains("crazyflie, skyb, skyc, px4-show, vviz"), "{}", said(&unknown));
@@ -214,4 +233,67 @@ fn one_vehicle_is_written_and_not_judged() {
     );
     let two = ran(folder.path(), &["export", "flight.csv", "--to", "crazyflie", "-o", "two"]);
     assert_eq!((two.exit, two.code()), (Some(2), "audit/no-limit"), "{}", said(&two));
+    assert!(said(&two).contains("give --delta or --ellipsoid") && !said(&two).contains("--fence"), "{}", said(&two));
+}
+
+#[test]
+fn obstacles_move_with_the_exported_part() {
+    let folder = folder();
+    let write = |name: &str, text: &str| fs::write(folder.path().join(name), text).expect("written");
+    // The vehicle is at x = t. The ball crosses its path at x = 7 m.
+    write("line.csv", "t,id,x,y,z\n0.5,a,0.5,0,1\n9.5,a,9.5,0,1\n");
+    let ball = |crossing_s: f64| {
+        let (from_s, to_s) = (crossing_s - 2.0, crossing_s + 2.0);
+        format!(
+            "[[obstacle]]\nname = \"ball\"\nball = { radius_m = 0.3 }\nclearance_m = 0.3\n\
+             path = [[{from_s}, 7.0, -20.0, 1.0], [{to_s}, 7.0, 20.0, 1.0]]\n"
+        )
+    };
+    let exported = |crossing_s: f64, output: &str| {
+        write("ball.toml", &ball(crossing_s));
+        let arguments = ["export", "line.csv", "--to", "skyc", "-o", output, "--obstacles", "ball.toml"];
+        ran(folder.path(), &[&arguments[..], &["--delta", "0.5", "--from", "4.5"]].concat())
+    };
+    // It crosses at 2.5 s, which is 7 s of the flight in times of the files.
+    let clear = exported(2.5, "clear.skyc");
+    assert_eq!(clear.exit, Some(0), "{}", said(&clear));
+    assert!(said(&clear).contains("times and names of the files"), "{}", said(&clear));
+    // It meets the vehicle at 7 s.
+    let hit = exported(7.0, "hit.skyc");
+    assert_eq!((hit.exit, hit.code()), (Some(1), "export/violation"), "{}", said(&hit));
+    assert!(said(&hit).contains("the flight itself"), "{}", said(&hit));
+    // Without the shift, the file would be at x = 7 m at 2.5 s, and its distance to this ball would be 0 m.
+    let margin = number(&said(&clear), "margin");
+    assert!(margin > 1.0, "{}", said(&clear));
+}
+
+#[test]
+fn force_keeps_the_input_and_files_of_others() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let data = folder.path().join("data");
+    fs::create_dir(&data).expect("a folder");
+    fs::write(data.join("ok.csv"), circles()).expect("written");
+    let export = |input: &str, output: &str| {
+        ran(folder.path(), &["export", input, "--to", "skyb", "-o", output, "--force", "--delta", "1"])
+    };
+    let refused = export("data/ok.csv", "data");
+    assert_eq!(refused.exit, Some(2), "{}", said(&refused));
+    assert_eq!(names(&data), ["ok.csv"]);
+    // An input between files of an export.
+    fs::write(folder.path().join("flight.csv"), circles()).expect("written");
+    let cf = ["export", "flight.csv", "--to", "crazyflie", "-o", "cf", "--delta", "1"];
+    assert_eq!(ran(folder.path(), &cf).exit, Some(0));
+    let inside = export("cf/a.csv", "cf");
+    assert_eq!((inside.exit, inside.code()), (Some(2), "files/overwrites-input"), "{}", said(&inside));
+    assert_eq!(names(&folder.path().join("cf")), ["a.csv", "b.csv"]);
+    // Files with the extension of an export, but other content.
+    for (name, text) in [("mine.csv", "t,x,y\n"), ("mine.skyb", "other"), ("mine.traj", "1 2 3")] {
+        fs::write(folder.path().join("cf").join(name), text).expect("written");
+        let foreign = export("flight.csv", "cf");
+        assert_eq!((foreign.exit, foreign.code()), (Some(2), "files/exists"), "{}", said(&foreign));
+        assert_eq!(names(&folder.path().join("cf")), ["a.csv", "b.csv", name]);
+        fs::remove_file(folder.path().join("cf").join(name)).expect("removed");
+    }
+    assert_eq!(export("flight.csv", "cf").exit, Some(0));
+    assert_eq!(names(&folder.path().join("cf")), ["a.skyb", "b.skyb"]);
 }

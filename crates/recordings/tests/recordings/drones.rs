@@ -307,3 +307,47 @@ fn a_folder_of_compiled_trajectories_is_one_recording() {
     let refused = Whole::read(folder.path(), &ReadOptions::default()).expect_err("refused");
     assert!(refused.file.ends_with("d11.skyb") && refused.help().contains("remove the file"), "{refused}");
 }
+
+/// The firmware evaluates polynomials by the scheme of Horner in single precision.
+#[test]
+#[expect(clippy::cast_possible_truncation, reason = "the firmware has single precision")]
+fn deviation_covers_single_precision_in_the_drone() {
+    let options = DroneOptions { tolerance_m: Some(0.1), ..DroneOptions::new(Dialect::Crazyflie) };
+    let x_m = |k: u32| 3e4 + f64::from(k % 4);
+    let arc = |k: u32| {
+        Arc::straight(f64::from(k), f64::from(k + 1), vector![x_m(k), 0.0, 0.0], vector![x_m(k + 1), 0.0, 0.0])
+    };
+    let flight = [("a".to_owned(), Motion { arcs: (0..4).map(arc).collect() })];
+    let encoded = drones::encode(&flight, &DroneOptions { tolerance_m: Some(0.5), ..options }, &|| false);
+    let file = &encoded.expect("encoded").files[0];
+    let (_folder, path) = written("a.csv", &file.bytes);
+    let mut held = motions(&path, false).remove(0).1;
+    let exact = deviation_with_rests(&flight[0].1, &held);
+    let added_m = drones::add_evaluation(&mut held, &options);
+    let whole = deviation_with_rests(&flight[0].1, &held);
+    // At least 24 roundings of 30 km.
+    assert!(
+        added_m > 24.0 * 3e4 / 16_777_216.0 && whole.bound_m >= exact.found_m + 0.5 * added_m,
+        "{exact:?} {whole:?}"
+    );
+    let text = String::from_utf8(file.bytes.clone()).expect("text");
+    let (mut start_s, mut worst_m) = (0.0, 0.0_f64);
+    for line in text.lines().skip(1) {
+        let numbers: Vec<f32> = line.split(',').map(|cell| cell.parse().expect("a number")).collect();
+        for step in 0..=1000_u16 {
+            let t = numbers[0] * (f32::from(step) / 1000.0);
+            let x = numbers[1..9].iter().rev().fold(0.0_f32, |sum, power| sum * t + power);
+            let judged_m = held.position_m(start_s + f64::from(t)).x;
+            worst_m = worst_m.max((f64::from(x) - judged_m).abs());
+        }
+        start_s += f64::from(numbers[0]);
+    }
+    assert!(worst_m > 1e-3 && worst_m <= added_m, "{worst_m} {added_m}");
+    // A tolerance below the rounding of the drone is refused.
+    let far = [(
+        "a".to_owned(),
+        Motion { arcs: vec![Arc::straight(0.0, 1.0, vector![1e6, 0.0, 0.0], vector![1e6, 1.0, 0.0])] },
+    )];
+    let refused = drones::encode(&far, &DroneOptions::new(Dialect::Crazyflie), &|| false).expect_err("refused");
+    assert_eq!(refused.code(), "export/tolerance", "{refused}");
+}

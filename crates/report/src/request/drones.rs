@@ -144,8 +144,20 @@ impl DroneExportRequest {
             };
             return Err(Failure::input("files/exists", format!("`{}` exists", output.display()), help));
         }
+        let parent = output.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        if !parent.is_dir() {
+            let message = format!("--output: there is no folder {}", parent.display());
+            return Err(Failure::input("files/no-folder", message, "make this folder, or give another path"));
+        }
         let mut inputs: Vec<_> = self.paths.iter().map(|path| ("the recording", path.as_path())).collect();
         inputs.extend(self.obstacles.as_deref().map(|path| ("the file of obstacles", path)));
+        let replaced = fs::canonicalize(output).ok();
+        let is_within =
+            |path: &Path| fs::canonicalize(path).ok().zip(replaced.as_ref()).is_some_and(|(a, b)| a.starts_with(b));
+        if let Some((called, path)) = inputs.iter().find(|(_, path)| is_within(path)) {
+            let message = format!("--output {} would overwrite {called}, {}", output.display(), path.display());
+            return Err(Failure::input("files/overwrites-input", message, "give another path"));
+        }
         outputs::check(&inputs, &[("--output", output)])
     }
 
@@ -160,7 +172,48 @@ impl DroneExportRequest {
             ..Settings::default()
         };
         let obstacles = self.obstacles.clone();
-        AuditRequest { settings, obstacles, config: ConfigFile::None, ..AuditRequest::new(subject) }
+        AuditRequest { settings, obstacles, for_drones: true, config: ConfigFile::None, ..AuditRequest::new(subject) }
+    }
+
+    /// Checks the window before anything is read.
+    fn check_window(&self) -> Result<(), Failure> {
+        for (option, given) in [("--from", self.from_s), ("--until", self.until_s)] {
+            if let Some(given) = given.filter(|given| !given.is_finite()) {
+                let message = format!("{option}: must be a finite number of seconds, got {given:?}");
+                return Err(Failure::input("export/window", message, format!("give {option} a time such as 2.5")));
+            }
+        }
+        match (self.from_s, self.until_s) {
+            (Some(from_s), Some(until_s)) if until_s <= from_s => {
+                let message = format!("--until: must be after --from, got {until_s:?} s and {from_s:?} s");
+                Err(Failure::input("export/window", message, "give a larger --until or a smaller --from"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Returns an error of the audit in terms of the options of an export.
+    fn in_own_terms(&self, failure: Failure, vehicles: &[FlownVehicle]) -> Failure {
+        let help = match failure.code() {
+            "audit/empty-window" => {
+                let spans = || vehicles.iter().filter_map(|of| of.motion.span_s());
+                let first_s = spans().map(|span| span.0).fold(f64::INFINITY, f64::min);
+                let last_s = spans().map(|span| span.1).fold(f64::NEG_INFINITY, f64::max);
+                let (option, given) = match (self.from_s, self.until_s) {
+                    (Some(from_s), until_s) if until_s.is_none() || from_s > last_s => ("--from", from_s),
+                    (_, until_s) => ("--until", until_s.unwrap_or(last_s)),
+                };
+                let message = format!(
+                    "{option}: no vehicle is present in the exported part, got {given:?} s; the recording has {first_s:?} \
+                     s to {last_s:?} s"
+                );
+                return Failure::input("export/window", message, "give --from and --until within the recording");
+            }
+            "audit/no-limit" => "give --delta or --ellipsoid",
+            "audit/obstacles-and-ellipsoid" => "give --delta, or leave --obstacles out",
+            _ => return failure,
+        };
+        failure.with_help(help)
     }
 }
 
@@ -168,8 +221,7 @@ impl DroneExportRequest {
 fn is_export(folder: &Path) -> bool {
     let is_exported = |entry: fs::DirEntry| {
         let path = entry.path();
-        let is_named = path.extension().is_some_and(|of| ["csv", "skyb", "traj"].iter().any(|known| of == *known));
-        is_named && entry.file_type().is_ok_and(|of| of.is_file())
+        entry.file_type().is_ok_and(|of| of.is_file()) && drones::is_exported(&path).unwrap_or(false)
     };
     fs::read_dir(folder).is_ok_and(|mut entries| entries.all(|entry| entry.is_ok_and(is_exported)))
 }
@@ -191,6 +243,7 @@ struct Flight {
 
 impl Flight {
     fn read(request: &DroneExportRequest, monitor: &dyn Monitor) -> Result<Self, Failure> {
+        request.check_window()?;
         let quiet = Quiet::new(monitor);
         let mut audit = request.audit();
         let mut settings = audit.settings_with_limits(&quiet)?;
@@ -207,15 +260,17 @@ impl Flight {
         if !has_pair {
             audit.settings.envelope.limits = vec![Limit { quantity: Quantity::Speed, allowed: BEYOND_M_S }];
         }
-        let report = audit.configured()?.judge(&quiet)?.report;
+        let judged = audit.configured()?.judge(&quiet).map_err(|error| request.in_own_terms(error, &vehicles))?;
+        let report = judged.report;
         check_presence(&report)?;
-        let span = |of: &FlownVehicle| of.motion.span_s();
-        let Some(spans) = vehicles.iter().map(span).collect::<Option<Vec<_>>>().filter(|spans| !spans.is_empty())
-        else {
-            let message = format!("{}: a vehicle has fewer than two samples", audit.subject.name());
-            let help = "leave it out of the recording: a drone needs a motion";
-            return Err(Failure::input("export/absent", message, help));
+        let span = |of: &FlownVehicle| {
+            of.motion.span_s().ok_or_else(|| {
+                let message = format!("vehicle {}: it has fewer than two samples", of.name);
+                let help = "leave it out of the recording: a drone needs a motion";
+                Failure::input("export/absent", message, help)
+            })
         };
+        let spans = vehicles.iter().map(span).collect::<Result<Vec<_>, _>>()?;
         let from_s = spans.iter().map(|span| span.0).fold(request.from_s.unwrap_or(f64::NEG_INFINITY), f64::max);
         let until_s = spans.iter().map(|span| span.1).fold(request.until_s.unwrap_or(f64::INFINITY), f64::min);
         if until_s <= from_s {
@@ -229,6 +284,10 @@ impl Flight {
         if report.status == Status::Undecided {
             notes.push(format!("the flight itself is {}", report.headline()));
         }
+        // The written motion begins at 0 s.
+        for (time_s, _) in settings.obstacles.iter_mut().flat_map(|obstacle| &mut obstacle.path) {
+            *time_s -= from_s;
+        }
         settings.max_gap_s = Some(f64::INFINITY);
         (settings.from_s, settings.to_s, settings.is_own_limit) = (None, None, false);
         Ok(Self { vehicles, span_s: (from_s, until_s), settings, has_pair, audit: report, notes })
@@ -238,14 +297,18 @@ impl Flight {
 /// Refuses a vehicle that is absent for a part of the window, or whose motion has a gap.
 fn check_presence(report: &RecordedReport) -> Result<(), Failure> {
     if let Some(absent) = report.presence.listed.first() {
-        let seen = |of: Option<f64>| of.map_or("never".to_owned(), |time_s| format!("{time_s:?} s"));
         let spans = report.presence.listed.iter();
+        let is_seen = spans.clone().all(|of| of.finding.from_s.is_some());
         let from_s = spans.clone().filter_map(|of| of.finding.from_s).fold(f64::NEG_INFINITY, f64::max);
         let to_s = spans.filter_map(|of| of.finding.to_s).fold(f64::INFINITY, f64::min);
-        let (first, last) = (seen(absent.finding.from_s), seen(absent.finding.to_s));
-        let message =
-            format!("vehicle {}: it is absent for a part of the flight (seen {first} to {last})", absent.vehicle);
-        let help = if from_s < to_s {
+        let seen = match (absent.finding.from_s, absent.finding.to_s) {
+            (Some(first_s), Some(last_s)) => {
+                format!("is absent for a part of the flight (seen {first_s:?} s to {last_s:?} s)")
+            }
+            _ => "is not seen between --from and --until".to_owned(),
+        };
+        let message = format!("vehicle {}: it {seen}", absent.vehicle);
+        let help = if is_seen && from_s < to_s {
             format!("export the part in which all vehicles are present: --from {from_s:?} --until {to_s:?}")
         } else {
             "export a recording in which all vehicles are present at one time".to_owned()
@@ -314,7 +377,9 @@ impl<'a> Written<'a> {
         monitor: &dyn Monitor,
     ) -> Result<DroneExport, Failure> {
         let start_s = flight.span_s.0;
-        let held = drones::motions(self.open(options)?.as_mut(), options.dialect.holds_samples())?;
+        let mut held = drones::motions(self.open(options)?.as_mut(), options.dialect.holds_samples())?;
+        let errors = held.iter_mut().map(|of| drones::add_evaluation(&mut of.motion, options));
+        let evaluation_m = errors.fold(0.0, f64::max);
         let compared = flight.vehicles.par_iter().zip(&encoded.vehicles).map(|(flown, of)| {
             let read_back = held.iter().find(|held| held.name == of.label).ok_or_else(|| lost(&of.label))?;
             let curve = if read_back.motion.arcs.is_empty() { Motion::default() } else { read_back.motion.clone() };
@@ -341,10 +406,12 @@ impl<'a> Written<'a> {
             return Ok(answer);
         }
         let mut settings = flight.settings.clone();
+        inflate(&mut settings, evaluation_m);
         for (flown, of) in flight.vehicles.iter().zip(&answer.vehicles) {
             // An ellipsoid replaces recorded radii.
             if flown.radius_m.is_some() && settings.ellipsoid_m.is_none() {
-                settings.vehicles.entry(of.label.clone()).or_default().radius_m = flown.radius_m;
+                settings.vehicles.entry(of.label.clone()).or_default().radius_m =
+                    flown.radius_m.map(|radius_m| radius_m + evaluation_m);
             }
         }
         let motions: &[_] = match options.dialect {
@@ -366,11 +433,19 @@ impl<'a> Written<'a> {
 
     /// Moves the files to the output.
     fn keep(&self, force: bool) -> Result<(), Failure> {
-        let old = self.folder.join("old");
-        if self.output.is_dir() && force {
-            fs::rename(self.output, &old).map_err(|error| self.error(error))?;
+        if !(self.output.is_dir() && force) {
+            return fs::rename(&self.content, self.output).map_err(|error| self.error(error));
         }
-        fs::rename(&self.content, self.output).map_err(|error| self.error(error))
+        // Beside the folder, which is removed in any case.
+        let old = self.folder.with_extension("old");
+        fs::rename(self.output, &old).map_err(|error| self.error(error))?;
+        fs::rename(&self.content, self.output).map_err(|error| match fs::rename(&old, self.output) {
+            Ok(()) => self.error(error),
+            Err(_) => self.error(error).with_help(format!("the old folder is now {}", old.display())),
+        })?;
+        // The export is complete, even if the old folder remains.
+        let _ = fs::remove_dir_all(&old);
+        Ok(())
     }
 }
 
@@ -379,6 +454,20 @@ impl Drop for Written<'_> {
         // The first error is reported; an error of the removal is ignored.
         let _ = fs::remove_dir_all(&self.folder);
     }
+}
+
+/// Inflates limits, so that they hold if each vehicle is up to `by_m` \[m\] from the judged motion.
+fn inflate(settings: &mut Settings, by_m: f64) {
+    settings.delta_m = settings.delta_m.map(|delta_m| delta_m + 2.0 * by_m);
+    settings.radius_m = settings.radius_m.map(|radius_m| radius_m + by_m);
+    for radius_m in settings.vehicles.values_mut().filter_map(|of| of.radius_m.as_mut()) {
+        *radius_m += by_m;
+    }
+    for clearance_m in settings.obstacles.iter_mut().filter_map(|of| of.clearance_m.as_mut()) {
+        *clearance_m += by_m;
+    }
+    // An ellipsoid scaled by 1 + e / a, with a the shortest half axis, contains its sum with a ball of radius e.
+    settings.ellipsoid_m = settings.ellipsoid_m.map(|axes| axes * (1.0 + by_m / axes.min()));
 }
 
 /// Returns the failure of a vehicle that is not in the written files.
@@ -404,14 +493,20 @@ impl DroneExport {
     /// kept.
     fn add(&mut self, report: RecordedReport, start_s: f64) {
         let closest = report.closest.iter().chain(&report.obstacles.closest);
-        let margins = closest.map(|of| (of.finding.lower_m - of.finding.limit_m, of.who.clone(), of.finding.time_s));
+        let name = |label: &String| {
+            self.vehicles.iter().find(|of| of.label == *label).map_or_else(|| label.clone(), |of| of.name.clone())
+        };
+        let margins =
+            closest.map(|of| (of.finding.lower_m - of.finding.limit_m, of.who.each_ref().map(name), of.finding.time_s));
         let least = margins.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(margin, who, at_s)| (margin, who, at_s + start_s));
         let is_less = match (&least, &self.margin) {
             (Some((new, ..)), Some((old, ..))) => new < old,
             (least, _) => least.is_some(),
         };
         if report.status != Status::Clear && self.refusal.is_none() {
-            let message = format!("the flight is clear, but not the written motion: {}", report.headline());
+            let shift =
+                if start_s == 0.0 { String::new() } else { format!(", whose 0 s are {start_s:?} s of the flight") };
+            let message = format!("the flight is clear, but not the written motion{shift}: {}", report.headline());
             let help = "give a smaller --tolerance or a larger --sample-hz, or fly it with a larger separation";
             self.refusal = Some(Failure::input("export/violation", message, help));
         }
@@ -449,19 +544,26 @@ impl DroneExport {
         answer.to_string()
     }
 
+    /// Returns whether times or names of the files differ from those of the flight.
+    fn has_own_terms(&self) -> bool {
+        self.span_s.0 != 0.0 || self.vehicles.iter().any(|of| of.name != of.label)
+    }
+
     /// Returns the answer in words.
     fn text(&self, request: &DroneExportRequest, flight: &Flight) -> String {
         let mut text = match &self.audit {
+            Some(report) if self.has_own_terms() => report.headline() + "; times and names of the files\n",
             Some(report) => report.headline() + "\n",
             None => "not judged: there is one vehicle and no obstacle\n".to_owned(),
         };
         let unit = if flight.settings.ellipsoid_m.is_some() { "half axes" } else { "m" };
+        let of_flight = if self.has_own_terms() { " of the flight" } else { "" };
         // Writing to a string cannot fail.
         if let Some((margin, [one, other], at_s)) = &self.margin {
             let left = at_least(*margin, DECIMALS);
             let _ = writeln!(
                 text,
-                "margin       {left} {unit} above the limit, {one} and {other} at {} s",
+                "margin       {left} {unit} above the limit, {one} and {other} at {} s{of_flight}",
                 fixed(*at_s, 3)
             );
         }
@@ -470,7 +572,7 @@ impl DroneExport {
             let at_s = fixed(found.time_s, 3);
             let _ = writeln!(
                 text,
-                "deviation    at most {most} m from the flight at every instant, vehicle {vehicle} at {at_s} s"
+                "deviation    at most {most} m from the flight at every instant, vehicle {vehicle} at {at_s} s{of_flight}"
             );
         }
         let dialect = request.drones.dialect;
@@ -488,5 +590,35 @@ impl DroneExport {
         let _ = writeln!(text, "flight       {} s to {} s{shift}", fixed(from_s, 3), fixed(until_s, 3));
         let _ = write!(text, "wrote {}: {}, {} bytes", request.output.display(), dialect.title(), self.bytes);
         text
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_folder_that_cannot_be_replaced_is_restored() {
+        let place = tempfile::tempdir().expect("a folder");
+        let output = place.path().join("cf");
+        fs::create_dir(&output).expect("made");
+        fs::write(output.join("a.csv"), "old").expect("written");
+        let folder = place.path().join(".cf.partial");
+        // There is no new content, so the second rename fails.
+        let written = Written { output: &output, content: folder.join("cf"), folder, bytes: 0 };
+        assert!(written.keep(true).is_err());
+        drop(written);
+        assert_eq!(fs::read_to_string(output.join("a.csv")).expect("restored"), "old");
+        assert_eq!(fs::read_dir(place.path()).expect("a folder").count(), 1);
+    }
+
+    #[test]
+    fn inflated_ellipsoids_contain_a_ball_around_each_point() {
+        let mut settings = Settings { ellipsoid_m: Some(Vector3::new(1.0, 1.0, 2.0)), ..Settings::default() };
+        inflate(&mut settings, 0.1);
+        assert_eq!(settings.ellipsoid_m, Some(Vector3::new(1.1, 1.1, 2.2)));
+        let mut settings = Settings { radius_m: Some(0.2), ..Settings::delta(1.0) };
+        inflate(&mut settings, 0.125);
+        assert_eq!((settings.delta_m, settings.radius_m), (Some(1.25), Some(0.325)));
     }
 }

@@ -14,9 +14,12 @@ use super::{DroneError, DroneFile, EncodedVehicle, Work};
 use crate::segments::{HEAD_BYTES, LARGEST, OutOfRange, Trajectory, rounding_m};
 
 /// Memory of the firmware for trajectories \[bytes\].
-const MEMORY_BYTES: usize = 4096;
+pub(super) const MEMORY_BYTES: usize = 4096;
 /// Size of a polynomial in this memory \[bytes\].
 const PIECE_BYTES: usize = 132;
+/// Bound on the error of a polynomial that the firmware computes in single precision, relative to the sum of
+/// `|c_k| T^k`. Scheme of Horner: 14 roundings; time: 7, one for each power. The others cover sums of errors.
+const EVALUATION: f64 = 24.0 / 16_777_216.0;
 /// Unit of length of compressed segments \[m\].
 const UNIT_M: f64 = 1e-3;
 /// Name of the memory in messages.
@@ -35,7 +38,10 @@ pub(super) fn polynomials(
     label: &str,
     motion: &Motion,
 ) -> Result<(DroneFile, EncodedVehicle), DroneError> {
-    let found = work.within(name, motion, 0.0, |_| true, |pieces| Ok(Some(rounded(pieces))))?;
+    // The sum of `|c_k| T^k` is at least the distance from the origin.
+    let points = motion.arcs.iter().flat_map(|arc| [arc.points[0], arc.points[arc.points.len() - 1]]);
+    let least_m = EVALUATION * points.map(|point| point.norm()).fold(0.0, f64::max);
+    let found = work.within(name, motion, least_m, |_| true, |pieces| Ok(Some(rounded(pieces))))?;
     let bytes = found.len() * PIECE_BYTES;
     if bytes > MEMORY_BYTES {
         let (vehicle, pieces) = (name.to_owned(), found.len());
@@ -71,7 +77,22 @@ fn rounded(pieces: &[Piece]) -> (Vec<Polynomial>, Motion) {
         polynomials.push(Polynomial { duration_s, powers });
         from_s = to_s;
     }
-    (polynomials, Motion { arcs })
+    let mut curve = Motion { arcs };
+    add_evaluation(&mut curve);
+    (polynomials, curve)
+}
+
+/// Adds the error of the firmware to the rounding of each arc. Returns the largest one \[m\].
+pub(super) fn add_evaluation(motion: &mut Motion) -> f64 {
+    let mut largest_m = 0.0_f64;
+    for arc in &mut motion.arcs {
+        let length_s = arc.to_s - arc.from_s;
+        // Horner's scheme from the last coefficient on.
+        let size_m = arc.powers().iter().rev().fold(0.0, |sum, power| sum * length_s + power.norm());
+        arc.rounding_m += EVALUATION * size_m;
+        largest_m = largest_m.max(EVALUATION * size_m);
+    }
+    largest_m
 }
 
 /// Returns the CSV with one polynomial in each row. Its decimals have the values of single precision.

@@ -12,11 +12,16 @@ pub mod motion;
 mod sampled;
 pub(crate) mod skybrush;
 
+use std::fs::File;
+use std::io::{self, Read as _};
+use std::path::Path;
+
 use rayon::prelude::*;
 
 use self::fit::{FitError, Piece};
 use self::motion::{Arc, Deviation, Motion, deviation};
 use crate::read::ReadError;
+use crate::segments::Trajectory;
 use tautline_core::track::{Item, Sample, Tracks};
 
 /// Format that drones fly.
@@ -242,6 +247,28 @@ pub fn encode(
     }
 }
 
+/// Adds the rounding of a drone that computes in single precision to the arcs of a motion that its files hold. Returns
+/// the largest one \[m\]; 0 for other formats than polynomials of a Crazyflie.
+pub fn add_evaluation(motion: &mut Motion, options: &DroneOptions) -> f64 {
+    let has_polynomials = options.dialect == Dialect::Crazyflie && !options.is_compressed;
+    if has_polynomials { crazyflie::add_evaluation(motion) } else { 0.0 }
+}
+
+/// Returns whether the content of a file is that of an export to a folder.
+///
+/// # Errors
+/// The error of the system.
+pub fn is_exported(path: &Path) -> io::Result<bool> {
+    let mut bytes = Vec::new();
+    File::open(path)?.take(crazyflie::MEMORY_BYTES as u64 + 1).read_to_end(&mut bytes)?;
+    Ok(match path.extension().and_then(|extension| extension.to_str()) {
+        Some("csv") => bytes.starts_with(b"duration,x^0") || bytes.starts_with(b"idx,t,px"),
+        Some("skyb") => bytes.starts_with(skybrush::MAGIC),
+        Some("traj") => Trajectory::decode(&bytes, true).is_ok_and(|(_, length)| length == bytes.len()),
+        _ => false,
+    })
+}
+
 /// Returns all results in order, or the error of the first vehicle that has one, for any number of threads.
 fn first_error<T: Send>(
     results: impl IndexedParallelIterator<Item = Result<T, DroneError>>,
@@ -464,7 +491,7 @@ impl DroneError {
     pub fn help(&self) -> &'static str {
         match self {
             Self::Tolerance(_) => "give a tolerance in metres, such as 0.01",
-            Self::Resolution { .. } => "give a larger --tolerance",
+            Self::Resolution { .. } => "give a larger --tolerance, or move the origin nearer to the flight",
             Self::SkybVersion(_) => "leave --skyb-version out, or give 1 or 2",
             Self::SampleRate(_) => "give a rate such as 20",
             Self::TooFast { .. } => {

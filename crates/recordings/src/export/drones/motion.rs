@@ -155,7 +155,7 @@ impl Motion {
 pub struct Deviation {
     /// Proved bound on the distance at every instant \[m\].
     pub bound_m: f64,
-    /// Largest distance that was found at an instant \[m\]; at most 1 % or 1 um below the bound.
+    /// Largest distance that was found at an instant \[m\]; at most 1 % or 1 um and the rounding below the bound.
     pub found_m: f64,
     /// Instant of the largest distance \[s\].
     pub time_s: f64,
@@ -168,14 +168,15 @@ pub fn deviation(first: &Motion, second: &Motion) -> Option<Deviation> {
     let mut open = Vec::new();
     for part in parts(first, second) {
         part.note(&mut found);
-        if part.bound_m() > accepted(found.found_m) {
+        if part.bound_m() > accepted(found.found_m) + part.pad_m {
             open.push(part);
         } else {
             found.bound_m = found.bound_m.max(part.bound_m());
         }
     }
     while let Some(part) = open.pop() {
-        if part.bound_m() <= accepted(found.found_m) || part.halvings >= MOST_HALVINGS {
+        // Halving does not reduce the rounding.
+        if part.bound_m() <= accepted(found.found_m) + part.pad_m || part.halvings >= MOST_HALVINGS {
             found.bound_m = found.bound_m.max(part.bound_m());
             continue;
         }

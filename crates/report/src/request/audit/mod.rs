@@ -191,6 +191,8 @@ pub struct AuditRequest<'a> {
     pub independent: bool,
     /// Whether an undecided verdict counts as good.
     pub allow_undecided: bool,
+    /// Whether the motion is exported for drones, so that a wrong unit of time changes its speed.
+    pub for_drones: bool,
     /// Choice of the `tautline.toml`. Motion in memory has no nearest file.
     pub config: ConfigFile,
     /// Command or expression that repeats the audit, for the page.
@@ -217,6 +219,7 @@ impl<'a> AuditRequest<'a> {
             expect_vehicles: None,
             independent: false,
             allow_undecided: false,
+            for_drones: false,
             config: ConfigFile::default(),
             command: String::new(),
             html: None,
@@ -378,7 +381,7 @@ impl<'a> AuditRequest<'a> {
     pub fn settings_with_limits(&self, monitor: &dyn Monitor) -> Result<Settings, Failure> {
         let mut settings = self.complete_settings()?;
         let (own, show) = self.subject.own(monitor)?;
-        rules::fill(&mut settings, self, show.as_ref());
+        rules::fill(&mut settings, self, show.as_ref())?;
         RecordedLimits::fill(&mut settings, self, own.as_ref());
         Ok(settings)
     }
@@ -423,6 +426,7 @@ impl<'a> AuditRequest<'a> {
     fn refuse_guessed_seconds(&self, unit: &str, items: &[Item]) -> Result<(), Failure> {
         let settings = &self.settings;
         let asked = [
+            (self.for_drones, "export --to"),
             (settings.motion == Some(Interpolation::Bounded), "--motion bounded"),
             (settings.from_s.is_some(), "--from"),
             (settings.to_s.is_some(), "--to"),
@@ -507,7 +511,7 @@ impl ConfiguredAudit<'_> {
         let (own, show) = request.subject.own(monitor)?;
         let open: &Open<'_> = &|| request.subject.open();
         let own = if request.independent { own.map(OwnRecording::independent) } else { own };
-        let notes_on_rules = rules::fill(&mut settings, request, show.as_ref());
+        let notes_on_rules = rules::fill(&mut settings, request, show.as_ref())?;
         let taken = RecordedLimits::fill(&mut settings, request, own.as_ref());
         proof::check(request, &settings)?;
         let mut auditor = TrackAuditor::new(settings.clone())?;
