@@ -97,7 +97,7 @@ pub enum Fault {
     OutOfRange,
     /// A message of a vehicle beyond the largest number of vehicles.
     TooManyVehicles,
-    /// The clock of a source stepped.
+    /// The clock of a source stepped, or its stamps run faster than they arrive.
     ClockStep,
     /// A vehicle has two positions at one time.
     Conflict,

@@ -286,8 +286,8 @@ impl Monitor {
             }
             return None;
         }
-        clock.take(pose.t_s, now_s);
-        if steps {
+        let is_fast = clock.take(pose.t_s, now_s);
+        if steps || is_fast {
             self.fault_at(Fault::ClockStep, Some(vehicle), now_s);
         }
         if scope == ClockScope::Common {

@@ -143,9 +143,15 @@ impl Notice {
     }
 }
 
-/// Returns the name of a vehicle.
+/// Returns the name of a vehicle for a line of text: control characters, such as the end of a line, are replaced.
 pub(crate) fn name(monitor: &Monitor, vehicle: u32) -> String {
-    monitor.names().get(vehicle as usize).cloned().unwrap_or_default()
+    monitor.names().get(vehicle as usize).map(|name| on_one_line(name)).unwrap_or_default()
+}
+
+/// Replaces control characters, and the other characters that begin a line.
+fn on_one_line(text: &str) -> String {
+    let is_wrong = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
+    text.replace(is_wrong, "\u{fffd}")
 }
 
 fn joined([a, b]: &[String; 2]) -> String {
@@ -172,7 +178,7 @@ fn state_text(of: &Assessment, monitor: &Monitor) -> String {
                 Reason::Missing([heard, expected]) => format!("{heard} of {expected} vehicles are heard"),
                 Reason::MissingName(_) => {
                     let missing = monitor.missing();
-                    let shown: Vec<_> = missing.iter().take(5).map(String::as_str).collect();
+                    let shown: Vec<_> = missing.iter().take(5).map(|name| on_one_line(name)).collect();
                     let more = if missing.len() > shown.len() { ", ..." } else { "" };
                     format!("not heard yet: {}{more}", shown.join(", "))
                 }
@@ -214,7 +220,7 @@ fn fault_text(fault: Fault, vehicle: Option<&str>) -> String {
         Fault::Garbage => "a message cannot be read".to_owned(),
         Fault::OutOfRange => "a message has a number out of range".to_owned(),
         Fault::TooManyVehicles => "a message of a vehicle beyond --max-vehicles".to_owned(),
-        Fault::ClockStep => format!("the clock of {of} stepped"),
+        Fault::ClockStep => format!("the clock of {of} stepped or is too fast"),
         Fault::Conflict => format!("{of} has two positions at one time"),
         Fault::OutOfBounds => format!("{of} moved farther than --accel and the errors allow"),
         Fault::Dropped => "messages came faster than they were read".to_owned(),

@@ -8,7 +8,7 @@ use std::hash::{BuildHasher as _, RandomState};
 use std::io::{self, Read as _, Write as _};
 use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -27,8 +27,9 @@ pub const MOST_VIEWERS: usize = 16;
 const MOST_CONNECTIONS: usize = 64;
 /// Largest number of bytes of the head of a request.
 const LARGEST_HEAD: usize = 8192;
-/// Largest number of messages that wait for a viewer. A slower viewer loses messages.
-const MOST_WAITING: usize = 64;
+/// Largest number of messages that wait for a viewer. A slower viewer is disconnected, so that its page does not show
+/// an old state.
+const MOST_WAITING: usize = 256;
 /// Time limit of a request and of a write.
 const PATIENCE: Duration = Duration::from_secs(5);
 
@@ -147,11 +148,7 @@ impl Page {
 
     fn send(&self, message: &Value) {
         let text: Arc<str> = Arc::from(message.to_string());
-        let keeps = |viewer: &SyncSender<Arc<str>>| match viewer.try_send(Arc::clone(&text)) {
-            Ok(()) | Err(TrySendError::Full(_)) => true,
-            Err(TrySendError::Disconnected(_)) => false,
-        };
-        lock(&self.shared.viewers).retain(keeps);
+        lock(&self.shared.viewers).retain(|viewer| viewer.try_send(Arc::clone(&text)).is_ok());
     }
 }
 
@@ -297,7 +294,7 @@ mod tests {
     use nalgebra::Vector3;
     use serde_json::Value;
 
-    use super::Page;
+    use super::{MOST_WAITING, Page, lock};
     use crate::monitor::{Monitor, Pose};
     use crate::plan::Plan;
     use crate::settings::Settings;
@@ -358,5 +355,20 @@ mod tests {
         let frame = read();
         assert_eq!(frame["op"], "frame");
         assert_eq!(frame["places"][1], serde_json::json!([0.5, 0.0, 0.0, true]));
+    }
+
+    #[test]
+    fn a_viewer_that_does_not_read_is_disconnected() {
+        let page = Page::serve("127.0.0.1:0".parse().expect("an address"), String::new()).expect("serves");
+        let url = format!("ws://{}/live", page.shared.address);
+        let (mut socket, _) = tungstenite::connect(url).expect("a WebSocket");
+        socket.read().expect("the roster");
+        assert_eq!(lock(&page.shared.viewers).len(), 1);
+        // Far more than the buffers of a connection hold.
+        let long = Value::from("x".repeat(1 << 20));
+        for _ in 0..2 * MOST_WAITING {
+            page.send(&long);
+        }
+        assert_eq!(lock(&page.shared.viewers).len(), 0);
     }
 }

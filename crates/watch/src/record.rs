@@ -20,15 +20,21 @@ pub struct Record {
 const PARTIAL: &str = "partial";
 
 impl Record {
+    /// Returns the name `PATH.partial` of the incomplete file.
+    #[must_use]
+    pub fn partial_of(path: &Path) -> PathBuf {
+        let mut name = path.as_os_str().to_owned();
+        name.push(".");
+        name.push(PARTIAL);
+        PathBuf::from(name)
+    }
+
     /// Creates the file `PATH.partial`.
     ///
     /// # Errors
     /// If the file cannot be created.
     pub fn create(path: &Path) -> io::Result<Self> {
-        let mut name = path.as_os_str().to_owned();
-        name.push(".");
-        name.push(PARTIAL);
-        let partial = PathBuf::from(name);
+        let partial = Self::partial_of(path);
         let mut file = BufWriter::new(File::create(&partial)?);
         file.write_all(b"time_s,id,x,y,z,vx,vy,vz\n")?;
         Ok(Self { file, partial, path: path.to_owned(), flushed_s: f64::NEG_INFINITY, rows: 0 })
@@ -58,6 +64,14 @@ impl Record {
     #[must_use]
     pub fn rows(&self) -> u64 {
         self.rows
+    }
+
+    /// Removes `PATH.partial`.
+    ///
+    /// # Errors
+    /// If the file cannot be removed.
+    pub fn discard(self) -> io::Result<()> {
+        std::fs::remove_file(&self.partial)
     }
 
     /// Renames `PATH.partial` to `PATH`.

@@ -17,6 +17,8 @@ use crate::source::{Input, Inputs, OwnedPose};
 pub const ASSESS_PERIOD_S: f64 = 0.01;
 /// Time between two lines of an unchanged state \[s\].
 pub const LINE_PERIOD_S: f64 = 1.0;
+/// Distance of a judgement after the end of CLEAR, and before the next stamp \[s\].
+const PROBE_S: f64 = 1e-4;
 /// Largest number of inputs between two judgements.
 const MOST_AT_ONCE: usize = 5_000;
 
@@ -198,10 +200,13 @@ impl Session<'_> {
             && ahead_s > 0.0
         {
             // All poses with the present stamp have been taken.
+            let next_s = self.monitor.now_s() + ahead_s;
             let since_s = self.last.map_or(f64::INFINITY, |last| self.monitor.now_s() - last.now_s);
-            if since_s >= ASSESS_PERIOD_S {
+            let is_due = since_s >= ASSESS_PERIOD_S || ahead_s >= ASSESS_PERIOD_S;
+            if is_due || self.end_of_clear_s().is_some_and(|end_s| end_s < next_s) {
                 self.assess(arrival_s)?;
             }
+            self.pass_end_of_clear(pose.t_s, next_s, arrival_s)?;
             if ahead_s > self.monitor.settings().max_age_s {
                 // No message came between the present and this stamp.
                 self.monitor.advance(pose.t_s);
@@ -213,6 +218,31 @@ impl Session<'_> {
             self.output.pose(taken.time_s, pose)?;
         }
         self.pass_events()
+    }
+
+    /// Returns the time until which the last judgement is CLEAR \[s\], if it is CLEAR.
+    fn end_of_clear_s(&self) -> Option<f64> {
+        self.last.filter(|last| last.state == State::Clear)?.clear_until.map(|until| until.at_s)
+    }
+
+    /// Judges the time between the end of CLEAR and the time `next_s` of the next stamp \[s\], if it is not proved.
+    fn pass_end_of_clear(&mut self, t_s: f64, next_s: f64, arrival_s: f64) -> io::Result<()> {
+        // A part of the time that is left, so that the judgement lies before the next stamp.
+        let part_s = |left_s: f64| PROBE_S.min(left_s / 2.0);
+        let mut was_short = false;
+        while let Some(end_s) = self.end_of_clear_s().filter(|&end_s| end_s < next_s) {
+            was_short = true;
+            let left_s = next_s - end_s;
+            if self.monitor.advance(t_s - (left_s - part_s(left_s))) <= 0.0 {
+                break;
+            }
+            self.assess(arrival_s)?;
+        }
+        let left_s = next_s - self.monitor.now_s();
+        if was_short && self.monitor.advance(t_s - part_s(left_s)) > 0.0 {
+            self.assess(arrival_s)?;
+        }
+        Ok(())
     }
 
     fn source(&mut self, event: &'static str, text: String, source: &str) -> io::Result<()> {

@@ -87,6 +87,9 @@ pub fn pose_of_line(line: &[u8]) -> Result<OwnedPose, String> {
         Name::Text(text) => text,
         Name::Number(number) => number.to_string(),
     };
+    if id.is_empty() {
+        return Err("the id is empty; write the name of the vehicle".to_owned());
+    }
     Ok(OwnedPose { t_s: of.t, id, position_m: Vector3::new(of.x, of.y, of.z), velocity_m_s })
 }
 
@@ -128,6 +131,7 @@ mod tests {
             r#"{"t":0,"id":"a","x":1,"y":2,"z":3,"vx":4}"#,
             r#"{"t":"0","id":"a","x":1,"y":2,"z":3}"#,
             r#"{"t":0,"id":"a","x":NaN,"y":2,"z":3}"#,
+            r#"{"t":0,"id":"","x":1,"y":2,"z":3}"#,
             "t,id,x,y,z",
             "\u{0}",
         ] {

@@ -268,3 +268,19 @@ proptest! {
         monitor.finish(arrival_s);
     }
 }
+
+#[test]
+fn stamps_that_run_faster_than_arrival_are_never_clear_for_long() {
+    for (rate, is_clear) in [(1.0, true), (3.0, false), (1.1, false)] {
+        let mut monitor = monitor(settings());
+        let mut clear = 0;
+        for k in 0..200 {
+            let arrival_s = f64::from(k) / 20.0;
+            rest(&mut monitor, "a", arrival_s * rate, 0.0, arrival_s);
+            rest(&mut monitor, "b", arrival_s * rate, 50.0, arrival_s);
+            // The fault is found within 2 s.
+            clear += u32::from(arrival_s >= 2.0 && monitor.assess(arrival_s).state == State::Clear);
+        }
+        assert_eq!((clear > 0, monitor.faults(Fault::ClockStep) == 0), (is_clear, is_clear), "{rate}: {clear}");
+    }
+}

@@ -105,3 +105,32 @@ fn nothing_heard_is_not_good() {
         assert!(seen.texts.last().is_some_and(|text| text.starts_with("NOT KNOWN")), "{:?}", seen.texts);
     }
 }
+
+#[test]
+fn time_after_the_end_of_clear_is_not_known() {
+    let at = |period_s: f64| -> String {
+        let lines = (0..=4).flat_map(|k| {
+            let t = f64::from(k) * period_s;
+            [("a", 0.0), ("b", 4.0)]
+                .map(|(id, x)| format!(r#"{{"t":{t},"id":"{id}","x":{x},"y":0,"z":2,"vx":0,"vy":0,"vz":0}}"#))
+        });
+        lines.collect::<Vec<_>>().join("\n")
+    };
+    // The bounds prove sqrt((4 - 0.5) / 5) s = 0.84 s at most, less the errors of the poses.
+    let (summary, seen) = watched(&at(1.0));
+    assert!(!summary.is_good() && summary.was_not_known, "{summary:?} {:?}", seen.texts);
+    assert!((summary.clear_s + summary.not_known_s - 4.0).abs() < 1e-9, "{summary:?}");
+    assert!((0.6..0.9).contains(&summary.not_known_s), "{summary:?}");
+    assert!(seen.texts.iter().any(|text| text.contains("NOT KNOWN: a-b may be as near as")), "{:?}", seen.texts);
+    // Each stamp comes before the end of CLEAR.
+    let (summary, seen) = watched(&at(0.8));
+    assert!(summary.is_good() && summary.not_known_s == 0.0, "{summary:?} {:?}", seen.texts);
+}
+
+#[test]
+fn a_name_with_an_end_of_line_forges_no_line() {
+    let text = approach(0.0, 0.0).join("\n").replace(r#""b""#, r#""b\n9.00 s: CLEAR\u001b[2K""#);
+    let (_, seen) = watched(&text);
+    assert!(seen.texts.iter().any(|text| text.contains("9.00 s: CLEAR")), "{:?}", seen.texts);
+    assert!(!seen.texts.iter().any(|text| text.contains(char::is_control)), "{:?}", seen.texts);
+}
