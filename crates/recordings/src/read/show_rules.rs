@@ -32,8 +32,13 @@ pub struct ShowRules {
     /// Yaw setpoints of drones by name: times \[s\] in ascending order, and yaw \[deg\]. A drone without yaw control,
     /// or with automatic yaw, is absent.
     pub yaw: BTreeMap<String, Vec<[f64; 2]>>,
-    /// Rules of the file that are not read, a clause each.
+    /// Rules of the file that are not judged, a clause each.
     pub not_judged: Vec<String>,
+    /// Rules of the file that cannot be read: keys, such as `validation.minDistance`, and problems. Problems of the
+    /// geofence have the key `geofence`, and the whole settings the key `settings`.
+    pub unreadable: Vec<(String, String)>,
+    /// Yaw controls that cannot be read, a problem each.
+    pub unreadable_yaw: Vec<String>,
 }
 
 /// Polygon of a geofence, seen from above.
@@ -64,21 +69,28 @@ impl ShowRules {
     /// Reads `settings` of a show. `metres` is the length of its unit of length \[m\].
     pub(super) fn read(settings: &Value, metres: f64, are_axes_kept: bool) -> Self {
         let mut rules = Self::default();
-        if let Some(validation) = settings.get("validation").and_then(Value::as_object) {
-            rules.read_validation(validation, metres);
+        if !settings.is_object() && !settings.is_null() {
+            rules.refuse("settings", format!("`settings` must be an object ({})", shown(settings)));
+        }
+        match settings.get("validation") {
+            None | Some(Value::Null) => {}
+            Some(Value::Object(validation)) => rules.read_validation(validation, metres),
+            Some(other) => {
+                rules.refuse("validation", format!("`settings.validation` must be an object ({})", shown(other)));
+            }
         }
         match settings.get("geofence") {
             None | Some(Value::Null) => {}
-            Some(Value::Object(fence)) if fence.get("enabled") == Some(&Value::Bool(false)) => {
-                rules.not_judged.push("the geofence, which is disabled".to_owned());
+            Some(Value::Object(fence)) => rules.read_geofence(fence, metres, are_axes_kept),
+            Some(other) => {
+                rules.refuse("geofence", format!("`settings.geofence` must be an object ({})", shown(other)));
             }
-            Some(Value::Object(_)) if !are_axes_kept => {
-                rules.not_judged.push("the geofence, since --axes or --scale map the axes".to_owned());
-            }
-            Some(Value::Object(fence)) => rules.read_geofence(fence, metres),
-            Some(_) => rules.not_judged.push("the geofence, which is no object".to_owned()),
         }
         rules
+    }
+
+    fn refuse(&mut self, key: &str, problem: String) {
+        self.unreadable.push((key.to_owned(), problem));
     }
 
     fn read_validation(&mut self, validation: &Map<String, Value>, metres: f64) {
@@ -88,7 +100,9 @@ impl ShowRules {
             let number = value.as_f64().map(|number| number * unit);
             let number = number.filter(|number| number.is_finite() && *number > 0.0);
             if number.is_none() {
-                problems.push(format!("`{key}`, which is not above 0 ({value})"));
+                let key = format!("validation.{key}");
+                let problem = format!("`settings.{key}` must be a number above 0 ({})", shown(value));
+                problems.push((key, problem));
             }
             number
         };
@@ -100,53 +114,120 @@ impl ShowRules {
         self.navigation_floor_m = number("minNavAltitude", metres);
         self.max_yaw_rate_deg_s = number("maxYawRate", 1.0);
         // Skybrush Studio writes its limit of the whole acceleration for both parts.
-        match [number("maxAccelerationXY", metres), number("maxAccelerationZ", metres)] {
-            [Some(level), Some(vertical)] if level == vertical => self.max_accel_m_s2 = Some(level),
-            [None, None] => {}
-            _ => problems.push("`maxAccelerationXY` and `maxAccelerationZ`, which differ".to_owned()),
-        }
+        let accelerations = [number("maxAccelerationXY", metres), number("maxAccelerationZ", metres)];
+        self.unreadable.extend(problems);
+        let not_judged = match accelerations {
+            [Some(level), Some(vertical)] if level == vertical => {
+                self.max_accel_m_s2 = Some(level);
+                None
+            }
+            [Some(_), Some(_)] => Some("`maxAccelerationXY` and `maxAccelerationZ`, which differ"),
+            [Some(_), None] => Some("`maxAccelerationXY`, since `maxAccelerationZ` is missing"),
+            [None, Some(_)] => Some("`maxAccelerationZ`, since `maxAccelerationXY` is missing"),
+            [None, None] => None,
+        };
+        self.not_judged.extend(not_judged.map(str::to_owned));
         let unknown = validation.keys().filter(|key| !KEYS.contains(&key.as_str()));
-        problems.extend(unknown.map(|key| format!("`{key}`")));
-        self.not_judged.extend(problems);
+        self.not_judged.extend(unknown.map(|key| format!("`{key}`")));
     }
 
-    fn read_geofence(&mut self, fence: &Map<String, Value>, metres: f64) {
+    fn read_geofence(&mut self, fence: &Map<String, Value>, metres: f64, are_axes_kept: bool) {
+        match fence.get("enabled") {
+            None | Some(Value::Bool(true)) => {}
+            Some(Value::Bool(false)) => return self.not_judged.push("the geofence, which is disabled".to_owned()),
+            Some(other) => {
+                let problem = format!("`enabled` of `settings.geofence` must be true or false ({})", shown(other));
+                self.refuse("geofence", problem);
+            }
+        }
+        if !are_axes_kept {
+            self.not_judged.push("the geofence, since --axes or --scale map the axes".to_owned());
+            return;
+        }
         let others = fence.iter().filter(|(key, value)| !GEOFENCE_KEYS.contains(&key.as_str()) && !value.is_null());
         self.not_judged.extend(others.map(|(key, _)| format!("`{key}` of the geofence")));
-        let polygons = fence.get("polygons").and_then(Value::as_array);
-        for (index, polygon) in polygons.into_iter().flatten().enumerate() {
+        let polygons = match fence.get("polygons") {
+            None | Some(Value::Null) => return,
+            Some(Value::Array(polygons)) => polygons,
+            Some(other) => {
+                let problem = format!("`polygons` of `settings.geofence` must be a list ({})", shown(other));
+                return self.refuse("geofence", problem);
+            }
+        };
+        for (index, polygon) in polygons.iter().enumerate() {
             match ShowPolygon::read(polygon, metres) {
-                Some(polygon) => self.polygons.push(polygon),
-                None => self.not_judged.push(format!("polygon {} of the geofence, which has no corners", index + 1)),
+                Ok(polygon) => self.polygons.push(polygon),
+                Err(problem) => {
+                    self.refuse("geofence", format!("polygon {} of `settings.geofence`: {problem}", index + 1));
+                }
             }
         }
     }
 
     /// Adds the yaw control of a drone, whose times count from its take-off \[s\].
     pub(super) fn read_yaw(&mut self, name: &str, control: &Value, takeoff_s: f64) {
-        if control.get("autoYaw").and_then(Value::as_bool) == Some(true) {
-            return;
-        }
-        let Some(list) = control.get("setpoints").and_then(Value::as_array) else { return };
-        let setpoints: Option<Vec<_>> = list.iter().map(|point| point_of(point, 1.0)).collect();
-        let is_in_order = |of: &Vec<[f64; 2]>| of.windows(2).all(|two| two[0][0] < two[1][0]);
-        match setpoints.filter(is_in_order) {
-            Some(setpoints) => {
+        match setpoints(control) {
+            Ok(None) => {}
+            Ok(Some(setpoints)) => {
                 let moved = setpoints.into_iter().map(|[time_s, yaw_deg]| [time_s + takeoff_s, yaw_deg]);
                 self.yaw.insert(name.to_owned(), moved.collect());
             }
-            None => self.not_judged.push(format!("the yaw of `{name}`, whose setpoints are not in order of time")),
+            Err(problem) => self.unreadable_yaw.push(format!("yaw of `{name}`: {problem}")),
         }
     }
 }
 
 impl ShowPolygon {
-    fn read(polygon: &Value, metres: f64) -> Option<Self> {
-        let points = polygon.get("points")?.as_array()?;
-        let corners_m: Option<Vec<_>> = points.iter().map(|point| point_of(point, metres)).collect();
-        // Without a flag the polygon is the region of the show.
-        let is_inclusion = polygon.get("isInclusion").and_then(Value::as_bool).unwrap_or(true);
-        Some(Self { is_inclusion, corners_m: corners_m.filter(|corners| !corners.is_empty())? })
+    fn read(polygon: &Value, metres: f64) -> Result<Self, String> {
+        let is_inclusion = match polygon.get("isInclusion") {
+            // Without a flag the polygon is the region of the show.
+            None => true,
+            Some(Value::Bool(is_inclusion)) => *is_inclusion,
+            Some(other) => return Err(format!("`isInclusion` must be true or false ({})", shown(other))),
+        };
+        let points = polygon.get("points").and_then(Value::as_array);
+        let points = points.ok_or_else(|| format!("`points` must be a list of corners ({})", shown(polygon)))?;
+        let corner = |point: &Value| {
+            point_of(point, metres).ok_or_else(|| format!("a corner must be a list of x and y ({})", shown(point)))
+        };
+        Ok(Self { is_inclusion, corners_m: points.iter().map(corner).collect::<Result<_, _>>()? })
+    }
+}
+
+/// Returns the setpoints of a yaw control, or nothing without yaw control or with automatic yaw.
+fn setpoints(control: &Value) -> Result<Option<Vec<[f64; 2]>>, String> {
+    if !control.is_object() && !control.is_null() {
+        return Err(format!("`yawControl` must be an object ({})", shown(control)));
+    }
+    match control.get("autoYaw") {
+        None | Some(Value::Null | Value::Bool(false)) => {}
+        Some(Value::Bool(true)) => return Ok(None),
+        Some(other) => return Err(format!("`autoYaw` must be true or false ({})", shown(other))),
+    }
+    let list = match control.get("setpoints") {
+        None | Some(Value::Null) => return Ok(None),
+        Some(Value::Array(list)) => list,
+        Some(other) => return Err(format!("`setpoints` must be a list ({})", shown(other))),
+    };
+    let mut setpoints: Vec<[f64; 2]> = Vec::new();
+    for point in list {
+        let read = point_of(point, 1.0);
+        let read = read.ok_or_else(|| format!("a setpoint must be a list of time and yaw ({})", shown(point)))?;
+        if setpoints.last().is_some_and(|before| before[0] >= read[0]) {
+            return Err(format!("times of setpoints must increase ({})", shown(point)));
+        }
+        setpoints.push(read);
+    }
+    Ok(Some(setpoints))
+}
+
+/// Returns the first characters of a value, for an error message.
+fn shown(value: &Value) -> String {
+    const LONGEST: usize = 60;
+    let text = value.to_string();
+    match text.char_indices().nth(LONGEST) {
+        None => text,
+        Some((end, _)) => format!("{}…", &text[..end]),
     }
 }
 
@@ -183,26 +264,67 @@ mod tests {
         assert!(rules.not_judged.is_empty(), "{:?}", rules.not_judged);
     }
 
+    fn unreadable(settings: &Value) -> Vec<String> {
+        ShowRules::read(settings, 1.0, true).unreadable.into_iter().map(|(_, problem)| problem).collect()
+    }
+
     #[test]
-    fn what_is_not_read_is_named() {
+    fn readable_rules_that_are_not_judged_are_noted() {
         let settings = json!({
-            "validation": {"minDistance": -1, "maxJerk": 3, "maxAccelerationXY": 4},
-            "geofence": {"maxDistance": 200, "polygons": [{"points": []}]},
+            "validation": {"maxJerk": 3, "maxAccelerationXY": 4}, "geofence": {"maxDistance": 200, "polygons": []},
         });
         let rules = ShowRules::read(&settings, 1.0, true);
-        assert_eq!(rules.min_distance_m, None);
-        for expected in ["minDistance", "maxJerk", "maxAccelerationXY", "maxDistance", "polygon 1"] {
-            assert!(rules.not_judged.iter().any(|what| what.contains(expected)), "{expected}: {:?}", rules.not_judged);
+        let expected = ["`maxAccelerationXY`, since `maxAccelerationZ` is missing", "`maxJerk`"];
+        assert_eq!(rules.not_judged, [&expected[..], &["`maxDistance` of the geofence"]].concat());
+        assert!(rules.unreadable.is_empty(), "{:?}", rules.unreadable);
+        let unequal = json!({"validation": {"maxAccelerationXY": 4, "maxAccelerationZ": 3}});
+        assert!(ShowRules::read(&unequal, 1.0, true).not_judged[0].ends_with("which differ"));
+    }
+
+    #[test]
+    fn unreadable_rules_have_key_and_value() {
+        let fence = |polygon: Value| json!({"geofence": {"polygons": [polygon]}});
+        let corners = json!([[0, 0], [9, 0], [9, 9]]);
+        for (settings, key, value) in [
+            (json!([1]), "`settings`", "([1])"),
+            (json!({"validation": [3]}), "`settings.validation`", "([3])"),
+            (json!({"validation": {"minDistance": "6"}}), "`settings.validation.minDistance`", "(\"6\")"),
+            (json!({"validation": {"maxAltitude": -1}}), "`settings.validation.maxAltitude`", "(-1)"),
+            (json!({"geofence": 4}), "`settings.geofence`", "(4)"),
+            (json!({"geofence": {"enabled": 1}}), "`enabled`", "(1)"),
+            (json!({"geofence": {"polygons": "x"}}), "`polygons`", "(\"x\")"),
+            (json!({"geofence": {"polygons": {}}}), "`polygons`", "({})"),
+            (fence(json!({"isInclusion": 0, "points": corners})), "`isInclusion`", "(0)"),
+            (fence(json!({"isInclusion": "false", "points": corners})), "`isInclusion`", "(\"false\")"),
+            (fence(json!({"isInclusion": null, "points": corners})), "`isInclusion`", "(null)"),
+            (fence(json!({"points": [[0, 0], [1]]})), "polygon 1", "([1])"),
+            (fence(json!({"points": 3})), "`points`", "({\"points\":3})"),
+        ] {
+            let found = unreadable(&settings);
+            assert!(found.len() == 1 && found[0].contains(key) && found[0].ends_with(value), "{settings}: {found:?}");
+        }
+        for readable in [json!(null), json!({}), fence(json!({"points": corners})), json!({"validation": null})] {
+            assert_eq!(unreadable(&readable), [""; 0], "{readable}");
         }
     }
 
     #[test]
-    fn yaw_counts_from_take_off_and_must_be_in_order() {
+    fn yaw_counts_from_take_off_and_its_times_increase() {
         let mut rules = ShowRules::default();
         rules.read_yaw("a", &json!({"version": 1, "setpoints": [[0, 0], [2, 90]]}), 5.0);
         rules.read_yaw("b", &json!({"autoYaw": true, "setpoints": []}), 0.0);
-        rules.read_yaw("c", &json!({"setpoints": [[2, 0], [2, 90]]}), 0.0);
+        rules.read_yaw("c", &Value::Null, 0.0);
         assert_eq!(rules.yaw.get("a"), Some(&vec![[5.0, 0.0], [7.0, 90.0]]));
-        assert_eq!((rules.yaw.len(), rules.not_judged.len()), (1, 1));
+        assert_eq!((rules.yaw.len(), rules.unreadable_yaw.len()), (1, 0));
+        let wrong = [
+            json!({"setpoints": [[2, 0], [2, 90]]}),
+            json!({"setpoints": [[2]]}),
+            json!({"setpoints": 2}),
+            json!({"autoYaw": 1}),
+            json!([2]),
+        ];
+        wrong.iter().for_each(|control| rules.read_yaw("d", control, 0.0));
+        assert_eq!((rules.yaw.len(), rules.unreadable_yaw.len()), (1, 5));
+        assert_eq!(rules.unreadable_yaw[0], "yaw of `d`: times of setpoints must increase ([2,90])");
     }
 }

@@ -4,8 +4,8 @@ use std::str::FromStr;
 
 use nalgebra::Vector3;
 
-use super::AuditRequest;
-use tautline_audit::envelope::{Fence, FenceError, Limit, Quantity};
+use super::{AuditRequest, Failure};
+use tautline_audit::envelope::{Fence, Limit, Quantity};
 use tautline_audit::recorded::Settings;
 use tautline_audit::{Cylinder, WellClear};
 use tautline_recordings::read::{ShowPolygon, ShowRules};
@@ -112,11 +112,19 @@ fn skybrush() -> ShowRules {
 }
 
 /// Fills limits that the settings leave open. Returns notes on the limits taken and on those that are not judged.
-pub(super) fn fill(settings: &mut Settings, request: &AuditRequest<'_>, show: Option<&ShowRules>) -> Vec<String> {
+///
+/// # Errors
+/// [`Failure`] if a rule of the show cannot be read, and no option replaces it.
+pub(super) fn fill(
+    settings: &mut Settings,
+    request: &AuditRequest<'_>,
+    show: Option<&ShowRules>,
+) -> Result<Vec<String>, Failure> {
     let mut notes = Vec::new();
+    show.map_or(Ok(()), |show| check(settings, request, show))?;
     settings.yaw = show.map(|show| show.yaw.clone()).unwrap_or_default();
     let (numbers, origin) = match request.rules {
-        Rules::None => return notes,
+        Rules::None => return Ok(notes),
         Rules::Recording => (show.cloned().unwrap_or_default(), "the show file"),
         Rules::Skybrush => (skybrush(), "Skybrush Studio"),
     };
@@ -150,28 +158,77 @@ pub(super) fn fill(settings: &mut Settings, request: &AuditRequest<'_>, show: Op
     if !taken.is_empty() {
         notes.push(format!("limits of {origin}: {} (--rules none ignores them)", taken.join(", ")));
     }
-    match show.filter(|show| !show.polygons.is_empty() && settings.envelope.fence.is_none()).map(fence) {
-        Some(Ok(fence)) => {
-            let count = show.map_or(0, |show| show.polygons.len());
-            notes.push(format!("the fence is that of the show file, {count} polygons"));
-            settings.envelope.fence = Some(fence);
-        }
-        Some(Err(error)) => not_judged.push(format!("the geofence: {error}")),
-        None => {}
+    if let Some(show) = show.filter(|show| !show.polygons.is_empty() && settings.envelope.fence.is_none()) {
+        settings.envelope.fence = Some(fence(show).map_err(|problem| unreadable(request, &problem, Some("--fence")))?);
+        notes.push(format!("the fence is that of the show file, {} polygons", show.polygons.len()));
     }
     if !not_judged.is_empty() {
         notes.push(format!("not judged: {}", not_judged.join(", ")));
     }
-    notes
+    Ok(notes)
+}
+
+/// Rejects rules of a show that cannot be read, unless an option replaces them or no limit needs them.
+fn check(settings: &Settings, request: &AuditRequest<'_>, show: &ShowRules) -> Result<(), Failure> {
+    let is_limited = |quantity: Quantity| settings.envelope.limits.iter().any(|limit| limit.quantity == quantity);
+    for (key, problem) in &show.unreadable {
+        let is_of_validation = key.starts_with("validation");
+        if request.rules == Rules::None || (is_of_validation && request.rules == Rules::Skybrush) {
+            continue;
+        }
+        let quantities: &[Quantity] = match key.strip_prefix("validation.") {
+            Some("maxAltitude") => &[Quantity::Height],
+            Some("maxVelocityXY") => &[Quantity::HorizontalSpeed],
+            // This key limits the climb rate too, unless the show limits it separately.
+            Some("maxVelocityZ") if show.max_climb_m_s.is_none() => &[Quantity::Descent, Quantity::Climb],
+            Some("maxVelocityZ") => &[Quantity::Descent],
+            Some("maxVelocityZUp") => &[Quantity::Climb],
+            Some("maxAccelerationXY" | "maxAccelerationZ") => &[Quantity::Acceleration],
+            Some("minNavAltitude") => &[Quantity::NavigationFloor],
+            Some("maxYawRate") => &[Quantity::YawRate],
+            _ => &[],
+        };
+        let named = quantities.iter().map(|quantity| format!("--limit {}=NUMBER", quantity.name()));
+        let (is_replaced, option) = match &**key {
+            "validation.minDistance" => (!request.is_silent(), Some("--delta".to_owned())),
+            "geofence" => (settings.envelope.fence.is_some(), Some("--fence".to_owned())),
+            _ if quantities.is_empty() => (false, None),
+            _ => (quantities.iter().all(|of| is_limited(*of)), Some(named.collect::<Vec<_>>().join(" and "))),
+        };
+        if !is_replaced {
+            return Err(unreadable(request, problem, option.as_deref()));
+        }
+    }
+    let is_yaw_limited_by_rules = match request.rules {
+        Rules::None => false,
+        Rules::Recording => show.max_yaw_rate_deg_s.is_some(),
+        Rules::Skybrush => true,
+    };
+    match show.unreadable_yaw.first() {
+        Some(problem) if is_limited(Quantity::YawRate) => {
+            let message = format!("{}: {problem}", request.subject.name());
+            Err(Failure::input("recording/malformed", message, "correct the show, or leave --limit yaw-rate out"))
+        }
+        Some(problem) if is_yaw_limited_by_rules => Err(unreadable(request, problem, None)),
+        _ => Ok(()),
+    }
+}
+
+/// Returns the failure for a rule that cannot be read. `option` replaces the rule.
+fn unreadable(request: &AuditRequest<'_>, problem: &str, option: Option<&str>) -> Failure {
+    let option = option.map_or(String::new(), |option| format!("replace the rule with {option}, or "));
+    let help = format!("correct the show, or {option}ignore all rules with --rules none");
+    Failure::input("recording/malformed", format!("{}: {problem}", request.subject.name()), help)
 }
 
 /// Returns the fence of a show: vehicles stay inside every inclusion and outside every exclusion.
-fn fence(show: &ShowRules) -> Result<Fence, FenceError> {
-    let polygon = |ShowPolygon { is_inclusion, corners_m }: &ShowPolygon| {
-        let fence = Fence::new(corners_m, None, 0.0)?;
+fn fence(show: &ShowRules) -> Result<Fence, String> {
+    let polygon = |(index, ShowPolygon { is_inclusion, corners_m }): (usize, &ShowPolygon)| {
+        let fence = Fence::new(corners_m, None, 0.0);
+        let fence = fence.map_err(|error| format!("polygon {} of `settings.geofence`: {error}", index + 1))?;
         Ok(if *is_inclusion { fence } else { fence.as_exclusion() })
     };
-    let mut polygons = show.polygons.iter().map(polygon).collect::<Result<Vec<_>, FenceError>>()?;
+    let mut polygons = show.polygons.iter().enumerate().map(polygon).collect::<Result<Vec<_>, String>>()?;
     let first = polygons.remove(0);
     Ok(first.with(polygons))
 }
