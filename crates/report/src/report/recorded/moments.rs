@@ -2,10 +2,11 @@
 
 use super::report::RecordedReport;
 use super::report::{PairFinding, VehicleFinding};
+use super::well_clear::WellClearFindings;
 use super::words::interval;
 use crate::replay::{JudgementContext, Kind, LONGEST_NAME, Moment, Span, cut};
 use tautline_audit::envelope::Exceedance;
-use tautline_audit::recorded::{Approach, Gap, ObjectPair};
+use tautline_audit::recorded::{Approach, Gap, ObjectPair, WellClearLoss};
 use tautline_audit::{Undecided, Violation};
 
 impl RecordedReport {
@@ -26,8 +27,8 @@ impl RecordedReport {
         let violations = violations.iter().map(|of| Moment::violation(&of.finding, &of.names(), unit));
         let undecided = self.undecided.iter().map(|of| undecided(&of.short()));
         let gaps = self.gaps.iter().map(|of| unseen(&of.short()));
-        let of_limits = self.moments_of_limits();
-        let (beyond, open): (Vec<_>, Vec<_>) = of_limits.into_iter().partition(|of| of.kind == Kind::Violation);
+        let of_limits = self.moments_of_limits().into_iter().chain(self.moments_of_well_clear());
+        let (beyond, open): (Vec<_>, Vec<_>) = of_limits.partition(|of| of.kind == Kind::Violation);
         closest.into_iter().chain(violations).chain(beyond).chain(undecided).chain(open).chain(gaps).collect()
     }
 
@@ -57,6 +58,30 @@ impl RecordedReport {
             violations.chain(limit.undecided.iter().map(named(Kind::Undecided))).collect::<Vec<_>>()
         };
         self.limits.iter().flat_map(of_limit).collect()
+    }
+
+    fn moments_of_well_clear(&self) -> Vec<Moment> {
+        let Some(found) = &self.well_clear else { return Vec::new() };
+        let short = |of: &[PairFinding<WellClearLoss>]| of.iter().map(PairFinding::short).collect::<Vec<_>>();
+        let found = WellClearFindings {
+            violations: short(&found.violations),
+            undecided: short(&found.undecided),
+            ..found.clone()
+        };
+        let moment = |kind: Kind, of: &PairFinding<WellClearLoss>, said: &str| {
+            let WellClearLoss { pair, from_s, to_s, .. } = of.finding;
+            let span = Span { from_s, to_s, at_s: f64::midpoint(from_s, to_s) };
+            let (how, verdict) = match kind {
+                Kind::Violation => ("are not", "Violation"),
+                _ => ("may not be", "Undecided"),
+            };
+            let brief = format!("{} {how} well clear", of.names());
+            Moment::new(kind, ObjectPair::Vehicles(pair), span, brief, format!("{verdict}: {said}"))
+        };
+        let losses = found.violations.iter().zip(found.violations_in_words());
+        let open = found.undecided.iter().zip(found.undecided_in_words());
+        let losses = losses.map(|(of, said)| moment(Kind::Violation, of, &said));
+        losses.chain(open.map(|(of, said)| moment(Kind::Undecided, of, &said))).collect()
     }
 }
 
