@@ -28,7 +28,9 @@ use crate::report::recorded::{AssumedMotion, Basis, Clock, RecordedReport, Sourc
 use crate::report::{Status, write_atomically};
 use replays::Instants;
 use tautline_audit::Obstacle;
-use tautline_audit::recorded::{Interpolation, Outcome, Presence, Settings, TrackAuditor, VehicleSettings};
+use tautline_audit::recorded::{
+    Interpolation, Outcome, Presence, RecordedError, Settings, TrackAuditor, VehicleSettings,
+};
 use tautline_core::text::counted;
 use tautline_core::track::{Item, Tracks};
 use tautline_recordings::read::{self, Format, ReadError, ReadOptions, ShowRules};
@@ -352,6 +354,12 @@ impl<'a> AuditRequest<'a> {
                 "--radius and --ellipsoid are both given",
                 "an ellipsoid has its own size: leave one of them out",
             ));
+        }
+        let jumps = self.settings.motion.filter(|of| matches!(of, Interpolation::Hold | Interpolation::Bounded));
+        if let Some(motion) = jumps.filter(|_| self.settings.well_clear.is_some()) {
+            let error = RecordedError::WellClearMotion { motion: motion.name() };
+            let help = "give --motion linear, or leave --motion out";
+            return Err(Failure::input("audit/well-clear", format!("--{error}"), help));
         }
         if self.settings.only.as_ref().is_some_and(BTreeSet::is_empty) {
             let help = "name at least one vehicle, or leave --ids out to judge all";
