@@ -5,6 +5,8 @@
 (() => {
 // Instants that are drawn, and the time between two [s].
 const INSTANTS = 200, PERIOD_S = 0.1;
+// Delay from which the shown state is not known [s], and largest relative rate of the clocks of server and browser.
+const MOST_BEHIND_S = 1, DRIFT = 1e-4;
 const root = /** @type {any} */ (document.querySelector(".replay"));
 const verdict = /** @type {HTMLElement} */ (document.querySelector("#verdict"));
 const log = /** @type {HTMLElement} */ (document.querySelector("#log"));
@@ -15,6 +17,11 @@ let delta = 1, radius = 0.1;
 /** Middle and half sizes of the drawn box [m]. @type {number[][] | null} */
 let box = null;
 let waits = 500;
+/** Places and closest pair that are drawn. */
+let drawn = [0], near = [65535, 65535];
+/** Time of the last frame on the clocks of the browser and the server, and smallest difference of both [s].
+ * @type {{ arrival_s: number, t_s: number, least_s: number } | null} */
+let last = null;
 
 /** Packs numbers as base64. @param {ArrayBufferView} numbers */
 const packed = numbers => {
@@ -58,6 +65,9 @@ const restart = places => {
   start();
   // The present is the end of the shown time.
   root.querySelector(".replay-poster")?.remove();
+  // A live view has no other time to play or to choose.
+  for (const one of root.querySelectorAll(".replay-play, .replay-track, .replay-clock, [aria-label=Speed]"))
+    one.style.display = "none";
   const scrub = root.querySelector("input[type=range]");
   if (scrub) {
     scrub.value = "0";
@@ -65,22 +75,39 @@ const restart = places => {
   }
 };
 
+/** Shows a state beside and in the view. @param {string} text @param {string} state @param {number[]} who */
+const show = (text, state, who) => {
+  verdict.textContent = text;
+  verdict.dataset.state = state;
+  // Without a box the view has other vehicles than the roster.
+  if (box) root.player?.push(drawn, [-INSTANTS * PERIOD_S, state === "violation", text, who, null], near);
+};
+/** Shows that the state is old. @param {number} behind_s */
+const doubt = behind_s => show(`NOT KNOWN: the page is ${behind_s.toFixed(1)} s behind`, "not-known", []);
+
+/** Returns the delay of a frame beyond the smallest delay [s]. @param {number} t_s */
+const delay = t_s => {
+  const arrival_s = performance.now() / 1000, lag_s = arrival_s - t_s;
+  // A clock that goes back is that of another watch.
+  const before = last && t_s >= last.t_s ? last : null;
+  const least_s = before ? Math.min(before.least_s + DRIFT * (arrival_s - before.arrival_s), lag_s) : lag_s;
+  last = { arrival_s, t_s, least_s };
+  return lag_s - least_s;
+};
+
 /** Draws a frame. @param {any} frame */
 const draw = frame => {
-  verdict.textContent = frame.text;
-  verdict.dataset.state = frame.state;
+  const behind_s = delay(frame.t_s), isOld = behind_s > MOST_BEHIND_S;
   const places = frame.places.slice(0, names.length);
-  if (!places.some((/** @type {any} */ at) => at)) return;
   const outside = places.some((/** @type {any} */ at) =>
-    at && (!box || [0, 1, 2].some(axis => Math.abs(at[axis] - box[0][axis]) > 2 * box[1][axis])));
-  if (!root.player || outside) restart(places);
-  const flat = places.flatMap((/** @type {any} */ at) => {
+    at && (!root.player || !box || [0, 1, 2].some(axis => Math.abs(at[axis] - box[0][axis]) > 2 * box[1][axis])));
+  if (outside) restart(places);
+  drawn = places.flatMap((/** @type {any} */ at) => {
     const from = box?.[0] ?? [0, 0, 0];
     return at ? [at[0] - from[0], at[1] - from[1], at[2] - from[2], at[3] ? 1 : 0] : [0, 0, 0, 0];
   });
-  const violated = frame.state === "violation";
-  const statement = [-INSTANTS * PERIOD_S, violated, frame.text, frame.who ?? [], null];
-  root.player?.push(flat, statement, frame.near ?? [65535, 65535]);
+  near = frame.near ?? [65535, 65535];
+  if (isOld) doubt(behind_s); else show(frame.text, frame.state, frame.who ?? []);
   root.dataset.frames = `${+(root.dataset.frames ?? 0) + 1}`;
 };
 
@@ -107,11 +134,17 @@ const connect = () => {
     else note(message.notice);
   };
   socket.onclose = () => {
-    verdict.textContent = "NOT KNOWN: the page lost its server and connects again";
-    verdict.dataset.state = "not-known";
+    last = null;
+    show("NOT KNOWN: the page lost its server and connects again", "not-known", []);
     setTimeout(connect, waits);
     waits = Math.min(2 * waits, 5000);
   };
 };
 connect();
+// A server that stalls sends no frame.
+setInterval(() => {
+  if (!last) return;
+  const behind_s = performance.now() / 1000 - last.t_s - last.least_s;
+  if (performance.now() / 1000 - last.arrival_s > MOST_BEHIND_S) doubt(behind_s);
+}, 250);
 })();

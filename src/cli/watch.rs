@@ -85,7 +85,7 @@ pub(super) struct WatchArguments {
     /// Approved plan, a recording of any format: report deviations from it, and expect its vehicles.
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
-    /// Stamp at which the plan has its time 0 [s].
+    /// Stamp at which the plan has its time 0 [s]; with `--clocks own`, the time since the start of the watch.
     #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true, requires = "plan")]
     plan_start: f64,
     /// Largest deviation from the plan [m].
@@ -136,12 +136,12 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<Exit, Failure> {
     }
     let (feed, inputs) = source::channel(Arc::clone(terminal.interruption()));
     arguments.start(source, feed, console)?;
-    let summary = watch_inputs(monitor, &inputs, &mut outputs)
-        .map_err(|error| Failure::machine("files/cannot-write", format!("cannot write the watch: {error}")))?;
-    if let Some(recorder) = outputs.recorder {
-        recorder.finish(console)?;
-    }
-    Ok(Exit::good_if(summary.is_good()))
+    let watched = watch_inputs(monitor, &inputs, &mut outputs)
+        .map_err(|error| Failure::machine("files/cannot-write", format!("cannot write the watch: {error}")));
+    // The recording is complete even if another output failed.
+    let recorded = outputs.recorder.map_or(Ok(true), |recorder| recorder.finish(console));
+    let is_good = watched?.is_good();
+    Ok(Exit::good_if(recorded? && is_good))
 }
 
 /// Source of the command line.
@@ -245,11 +245,13 @@ impl WatchArguments {
                 return Err(Failure::input("watch/record", message, "give a name that ends in .csv or .mcap"));
             }
         };
-        if path.exists() && !self.force {
-            let message = format!("--record: the file exists ({})", path.display());
+        let table = if is_mcap { path.with_extension("mcap.csv") } else { path.clone() };
+        // The watch writes all three.
+        let partial = Record::partial_of(&table);
+        if let Some(there) = [path, &table, &partial].into_iter().find(|of| of.exists() && !self.force) {
+            let message = format!("--record: the file exists ({})", there.display());
             return Err(Failure::input("watch/record", message, "give another name, or --force to overwrite it"));
         }
-        let table = if is_mcap { path.with_extension("mcap.csv") } else { path.clone() };
         let record = Record::create(&table).map_err(|error| cannot_write(&table, &error))?;
         Ok(Some(Recorder { record, table, path: path.clone(), is_mcap }))
     }
@@ -296,8 +298,14 @@ struct Recorder {
 }
 
 impl Recorder {
-    fn finish(self, console: Console) -> Result<(), Failure> {
+    /// Completes the recording. Returns whether it has positions; without any, no file stays.
+    fn finish(self, console: Console) -> Result<bool, Failure> {
         let rows = self.record.rows();
+        if rows == 0 {
+            self.record.discard().map_err(|error| cannot_write(&self.table, &error))?;
+            console.warn(&format!("--record: no position was heard, so {} is not written", self.path.display()));
+            return Ok(false);
+        }
         self.record.finish().map_err(|error| cannot_write(&self.table, &error))?;
         if self.is_mcap {
             let request = ExportRequest {
@@ -315,7 +323,7 @@ impl Recorder {
             let _ = std::fs::remove_file(&self.table);
         }
         console.warn(&format!("recorded {rows} positions in {}", self.path.display()));
-        Ok(())
+        Ok(true)
     }
 }
 

@@ -200,6 +200,52 @@ fn the_recording_is_judged_to_the_same_violations() {
 }
 
 #[test]
+fn a_recording_overwrites_no_other_file_and_is_not_empty() {
+    let folder = tempdir().expect("a folder");
+    let record = |input: &str, more: &[&str]| {
+        watched(folder.path(), &[&STAMPS[..], &["--record", "r.mcap"], more].concat(), input)
+    };
+    // Without a position there is no file.
+    let empty = record("", &[]);
+    assert_eq!(empty.exit, Some(1), "{empty:?}");
+    assert!(empty.err.contains("no position was heard, so r.mcap is not written"), "{empty:?}");
+    assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 0);
+    for other in ["r.mcap.csv", "r.mcap.csv.partial"] {
+        fs::write(folder.path().join(other), "mine").expect("a file");
+        let refused = record(&approach(0.0, 0.0), &[]);
+        assert_eq!((refused.exit, refused.code()), (Some(2), "watch/record"), "{refused:?}");
+        assert_eq!(fs::read_to_string(folder.path().join(other)).expect("the file"), "mine");
+        fs::remove_file(folder.path().join(other)).expect("the file");
+    }
+    fs::write(folder.path().join("r.mcap.csv"), "old").expect("a file");
+    assert_eq!(record(&approach(0.0, 0.0), &["--force"]).exit, Some(0));
+    assert!(folder.path().join("r.mcap").exists());
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_recording_is_complete_if_another_output_fails() {
+    let folder = tempdir().expect("a folder");
+    let full = fs::File::options().write(true).open("/dev/full").expect("the device");
+    let mut child = Command::new(TAUTLINE)
+        .args(["watch", "--json", "--record", "r.csv"])
+        .args(STAMPS)
+        .current_dir(folder.path())
+        .stdin(Stdio::piped())
+        .stdout(full)
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program runs");
+    let mut input = child.stdin.take().expect("a pipe");
+    // The watch may end before its input.
+    let _ = input.write_all(approach(0.0, 0.0).as_bytes());
+    drop(input);
+    assert_eq!(child.wait().expect("ends").code(), Some(3));
+    let text = fs::read_to_string(folder.path().join("r.csv")).expect("the recording");
+    assert!(text.lines().count() > 1, "{text}");
+}
+
+#[test]
 fn deviations_from_the_plan_are_reported() {
     let folder = tempdir().expect("a folder");
     let plan = "time_s,id,x,y,z\n0,a,0,0,2\n0,b,4,0,2\n4,a,0,0,2\n4,b,4,0,2\n";

@@ -5,8 +5,8 @@
 //! it includes every delay beyond the smallest one; `latency_s` of the settings adds the smallest one. The estimate may
 //! rise by [`DRIFT`], because two quartz clocks drift apart.
 //!
-//! Stamps that run faster than arrival make the offset fall. Each new stamp then looks young, so its age proves nothing.
-//! A fall by more than [`FALL_S`] beyond [`FALL_RATE`] of the elapsed time is a fault.
+//! Stamps that run faster than arrival make the offset fall. Each new stamp then looks young, and its age proves
+//! nothing. A fall by more than [`FALL_S`] beyond [`FALL_RATE`] of the elapsed time is a fault.
 
 /// Largest relative rate of two clocks.
 pub const DRIFT: f64 = 1e-4;
