@@ -245,7 +245,7 @@ fn obstacles_move_with_the_exported_part() {
     let ball = |crossing_s: f64| {
         let (from_s, to_s) = (crossing_s - 2.0, crossing_s + 2.0);
         format!(
-            "[[obstacle]]\nname = \"ball\"\nball = { radius_m = 0.3 }\nclearance_m = 0.3\n\
+            "[[obstacle]]\nname = \"ball\"\nball = {{ radius_m = 0.3 }}\nclearance_m = 0.3\n\
              path = [[{from_s}, 7.0, -20.0, 1.0], [{to_s}, 7.0, 20.0, 1.0]]\n"
         )
     };

@@ -458,7 +458,12 @@ impl Drop for Written<'_> {
 
 /// Inflates limits, so that they hold if each vehicle is up to `by_m` \[m\] from the judged motion.
 fn inflate(settings: &mut Settings, by_m: f64) {
-    settings.delta_m = settings.delta_m.map(|delta_m| delta_m + 2.0 * by_m);
+    if by_m == 0.0 {
+        return;
+    }
+    // Rounded up to a micrometre, for messages.
+    let up = |x: f64| ((x * 1e6).ceil() / 1e6).max(x);
+    settings.delta_m = settings.delta_m.map(|delta_m| up(delta_m + 2.0 * by_m));
     settings.radius_m = settings.radius_m.map(|radius_m| radius_m + by_m);
     for radius_m in settings.vehicles.values_mut().filter_map(|of| of.radius_m.as_mut()) {
         *radius_m += by_m;
