@@ -50,6 +50,19 @@ fn well_clear_is_in_every_answer() {
 }
 
 #[test]
+fn the_replay_shows_a_loss_of_well_clear() {
+    let page = |thresholds: &str| {
+        let folder = tempfile::tempdir().expect("a folder");
+        fs::write(folder.path().join("traffic.csv"), HEAD_ON).expect("written");
+        let words = ["audit", "traffic.csv", "--well-clear", thresholds, "--to", "170", "--time-unit", "s"];
+        ran_by(TAUTLINE, folder.path(), &[&words[..], &["--html", "page.html"]].concat());
+        fs::read_to_string(folder.path().join("page.html")).expect("a page")
+    };
+    let stated = "violation: a and b are not well clear";
+    assert!(page("do-365").contains(stated) && !page("f3442").contains(stated));
+}
+
+#[test]
 fn ellipsoids_have_names() {
     let named = audit("pass.csv", PASS, &["--ellipsoid", "crazyswarm"]);
     let given = audit("pass.csv", PASS, &["--ellipsoid", "0.125,0.125,0.375"]);
@@ -75,6 +88,8 @@ fn wrong_rules_are_refused() {
     ] {
         let ran = audit("pass.csv", text, words);
         assert_eq!((ran.exit, ran.code()), (Some(2), code), "{words:?}: {ran:?}");
+        let is_well_clear_of_jumps = words.contains(&"hold") && words.contains(&"--well-clear");
+        assert!(!is_well_clear_of_jumps || !ran.err.contains("ellipsoid"), "{ran:?}");
     }
 }
 
@@ -133,4 +148,53 @@ fn the_rules_of_skybrush_are_its_defaults() {
     let without = judged("");
     assert_eq!(status(&without, "yaw_rate_deg_s"), None);
     assert!(without.err.contains("not judged: the yaw rate, since the recording has no yaw"), "{without:?}");
+}
+
+#[test]
+fn unreadable_rules_of_a_show_are_refused_unless_they_are_replaced() {
+    const VALID: &str = r#"{"points": [[-5, -5], [25, -5], [25, 9], [-5, 9]]}"#;
+    let fence =
+        |polygons: &str| format!(r#"{{"validation": {{"minDistance": 3}}, "geofence": {{"polygons": {polygons}}}}}"#);
+    let flagged =
+        |flag: &str| fence(&format!(r#"[{{"isInclusion": {flag}, "points": [[-5, -5], [25, -5], [25, 9]]}}]"#));
+    let bow_tie = fence(&format!(r#"[{VALID}, {{"points": [[0, 0], [9, 9], [9, 0], [0, 9]]}}]"#));
+    let delta = ["--delta", "3"].as_slice();
+    let replaced = ["--delta", "3", "--limit", "descent=3", "--limit", "climb=3"].as_slice();
+    for (settings, named, options) in [
+        (bow_tie, "polygon 2 of `settings.geofence`", None),
+        (fence(&format!(r#"[{VALID}, {{"points": [[0, 0], [9, 9]]}}]"#)), "got 2", None),
+        (flagged("0"), "`isInclusion` must be true or false (0)", None),
+        (flagged(r#""false""#), "`isInclusion` must be true or false (\"false\")", None),
+        (flagged("null"), "`isInclusion` must be true or false (null)", None),
+        (fence(r#""x""#), "`polygons` of `settings.geofence` must be a list (\"x\")", None),
+        (fence("{}"), "`polygons` of `settings.geofence` must be a list ({})", None),
+        (r#"{"validation": [3]}"#.to_owned(), "`settings.validation` must be an object ([3])", None),
+        ("[1]".to_owned(), "`settings` must be an object ([1])", None),
+        (r#"{"validation": {"minDistance": "6"}}"#.to_owned(), "minDistance` must be a number above 0", Some(delta)),
+        (
+            r#"{"validation": {"maxVelocityZ": -1}}"#.to_owned(),
+            "--limit descent=NUMBER and --limit climb=",
+            Some(replaced),
+        ),
+    ] {
+        let text = show(&settings, "");
+        let refused = audit("show.json", &text, options.map_or(delta, |_| &[]));
+        assert_eq!((refused.exit, refused.code()), (Some(2), "recording/malformed"), "{settings}: {refused:?}");
+        let said = refused.err.split_whitespace().filter(|word| *word != "|").collect::<Vec<_>>().join(" ");
+        assert!(said.contains(named) && said.contains("--rules none"), "{named}: {said}");
+        let good = options.unwrap_or(&["--delta", "3", "--rules", "none"]);
+        assert_eq!(audit("show.json", &text, good).exit, Some(0), "{settings}");
+    }
+}
+
+#[test]
+fn a_limit_of_yaw_rate_needs_readable_setpoints() {
+    let jump = r#""yawControl": {"version": 1, "setpoints": [[0, 0], [2, 0], [2, 300]]},"#;
+    let judged = |options: &[&str]| audit("show.json", &show("{}", jump), options);
+    for options in [&["--rules", "skybrush"][..], &["--delta", "3", "--limit", "yaw-rate=30"]] {
+        let refused = judged(options);
+        assert_eq!((refused.exit, refused.code()), (Some(2), "recording/malformed"), "{refused:?}");
+        assert!(refused.err.contains("times of setpoints must increase"), "{refused:?}");
+    }
+    assert_eq!(judged(&["--delta", "3"]).exit, Some(0));
 }
