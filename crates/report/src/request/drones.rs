@@ -204,8 +204,8 @@ impl DroneExportRequest {
                     (_, until_s) => ("--until", until_s.unwrap_or(last_s)),
                 };
                 let message = format!(
-                    "{option}: no vehicle is present in the exported part, got {given:?} s; the recording has {first_s:?} \
-                     s to {last_s:?} s"
+                    "{option}: no vehicle is present in the exported part, got {given:?} s; the recording has \
+                     {first_s:?} s to {last_s:?} s"
                 );
                 return Failure::input("export/window", message, "give --from and --until within the recording");
             }
@@ -577,7 +577,8 @@ impl DroneExport {
             let at_s = fixed(found.time_s, 3);
             let _ = writeln!(
                 text,
-                "deviation    at most {most} m from the flight at every instant, vehicle {vehicle} at {at_s} s{of_flight}"
+                "deviation    at most {most} m from the flight at every instant, vehicle {vehicle} at {at_s} \
+                 s{of_flight}"
             );
         }
         let dialect = request.drones.dialect;
