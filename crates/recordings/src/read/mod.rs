@@ -126,11 +126,13 @@ pub fn recording_name(paths: &[&Path]) -> String {
 }
 
 /// Returns the rules that the recording itself states, as Skybrush shows do; `None` for any other recording.
-#[must_use]
-pub fn show_rules(path: &Path, options: &ReadOptions) -> Option<ShowRules> {
+///
+/// # Errors
+/// [`ReadError`] if the file is a show that cannot be read.
+pub fn show_rules(path: &Path, options: &ReadOptions) -> Result<Option<ShowRules>, ReadError> {
     let mut source = Source::file(path);
-    let is_show = path.is_file() && recognise(&mut source, options.format).ok()? == Format::SKYBRUSH;
-    if is_show { skybrush::rules(&source, options).ok() } else { None }
+    let is_show = path.is_file() && recognise(&mut source, options.format).is_ok_and(|of| of == Format::SKYBRUSH);
+    is_show.then(|| skybrush::rules(&source, options)).transpose()
 }
 
 /// Returns the files of a folder or archive; `None` if the path is itself a recording.

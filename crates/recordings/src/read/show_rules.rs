@@ -323,7 +323,9 @@ mod tests {
             json!({"autoYaw": 1}),
             json!([2]),
         ];
-        wrong.iter().for_each(|control| rules.read_yaw("d", control, 0.0));
+        for control in &wrong {
+            rules.read_yaw("d", control, 0.0);
+        }
         assert_eq!((rules.yaw.len(), rules.unreadable_yaw.len()), (1, 5));
         assert_eq!(rules.unreadable_yaw[0], "yaw of `d`: times of setpoints must increase ([2,90])");
     }

@@ -120,7 +120,13 @@ pub(super) fn rules(source: &Source, options: &ReadOptions) -> Result<ShowRules,
     let (names, drones): (Vec<_>, Vec<_>) = drones.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
     for (name, (trajectory, mut yaw)) in distinct(names).into_iter().zip(drones) {
         if let Some(elsewhere) = yaw.get("$ref").and_then(Value::as_str).map(str::to_owned) {
-            yaw = referenced(archive.as_mut(), &elsewhere)?;
+            match referenced(archive.as_mut(), &elsewhere) {
+                Ok(found) => yaw = found,
+                Err(error) => {
+                    rules.unreadable_yaw.push(format!("yaw of `{name}`: {error}"));
+                    continue;
+                }
+            }
         }
         rules.read_yaw(&name, &yaw, trajectory.takeoff_s);
     }

@@ -283,7 +283,7 @@ fn polynomial(text: &str, time_s: f32) -> Vector3<f64> {
 #[test]
 fn shows_state_their_distance_and_names() {
     let (_folder, path) = exported(&DroneOptions { delta_m: Some(1.5), ..DroneOptions::new(Dialect::Skyc) });
-    let rules = read::show_rules(&path, &ReadOptions::default()).expect("rules");
+    let rules = read::show_rules(&path, &ReadOptions::default()).expect("a show").expect("rules");
     assert_eq!(rules.min_distance_m, Some(1.5));
     let whole = Whole::read(&path, &ReadOptions::default()).expect("read");
     let degrees = whole.items.iter().filter_map(|item| match item {
@@ -310,7 +310,6 @@ fn a_folder_of_compiled_trajectories_is_one_recording() {
 
 /// The firmware evaluates polynomials by the scheme of Horner in single precision.
 #[test]
-#[expect(clippy::cast_possible_truncation, reason = "the firmware has single precision")]
 fn deviation_covers_single_precision_in_the_drone() {
     let options = DroneOptions { tolerance_m: Some(0.1), ..DroneOptions::new(Dialect::Crazyflie) };
     let x_m = |k: u32| 3e4 + f64::from(k % 4);

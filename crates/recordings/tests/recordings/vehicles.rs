@@ -185,7 +185,8 @@ fn skybrush_show_defines_its_minimum_distance() {
         ("wrong.json", &show(r#""settings": {"validation": {"minDistance": -1}},"#)),
         ("table.csv", A),
     ]);
-    let rules = |name: &str, options: &ReadOptions| read::show_rules(&folder.path().join(name), options);
+    let rules =
+        |name: &str, options: &ReadOptions| read::show_rules(&folder.path().join(name), options).expect("a show");
     let limit = |name: &str| rules(name, &ReadOptions::default()).and_then(|rules| rules.min_distance_m);
     assert_eq!(["said.json", "silent.json", "wrong.json", "table.csv"].map(limit), [Some(2.5), None, None, None]);
     let scaled = ReadOptions { scale: Some(0.5.into()), ..ReadOptions::default() };

@@ -112,7 +112,10 @@ impl Subject<'_> {
         match self {
             Self::InMemory { own, .. } => Ok((own.cloned(), None)),
             Self::Files { paths, options } => {
-                let show = paths.first().and_then(|path| read::show_rules(path, options));
+                let show = match paths.first() {
+                    Some(path) => read::show_rules(path, options).map_err(|error| Failure::from(error).of(path))?,
+                    None => None,
+                };
                 Ok((own_recording(paths, options, monitor)?, show))
             }
         }
