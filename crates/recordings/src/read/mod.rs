@@ -132,7 +132,7 @@ pub fn recording_name(paths: &[&Path]) -> String {
 pub fn show_rules(path: &Path, options: &ReadOptions) -> Result<Option<ShowRules>, ReadError> {
     let mut source = Source::file(path);
     let is_show = path.is_file() && recognise(&mut source, options.format).is_ok_and(|of| of == Format::SKYBRUSH);
-    is_show.then(|| skybrush::rules(&source, options)).transpose()
+    if is_show { skybrush::rules(&source, options) } else { Ok(None) }
 }
 
 /// Returns the files of a folder or archive; `None` if the path is itself a recording.

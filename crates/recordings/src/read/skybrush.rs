@@ -109,12 +109,12 @@ fn show(source: &Source) -> Result<(Show, Option<Archive>), ReadError> {
     Ok((show, archive))
 }
 
-/// Returns the rules that the show states itself.
-pub(super) fn rules(source: &Source, options: &ReadOptions) -> Result<ShowRules, ReadError> {
-    let (show, mut archive) = show(source)?;
+/// Returns the rules that the show states itself; `None` for a file without a readable show, which [`open`] refuses.
+pub(super) fn rules(source: &Source, options: &ReadOptions) -> Result<Option<ShowRules>, ReadError> {
+    let Ok((show, mut archive)) = show(source) else { return Ok(None) };
     let are_axes_kept = options.turn() == Axes::default();
     let mut rules = ShowRules::read(&show.settings, options.metres(), are_axes_kept);
-    let Some(swarm) = show.swarm else { return Ok(rules) };
+    let Some(swarm) = show.swarm else { return Ok(Some(rules)) };
     let drones = swarm.drones.into_iter().enumerate();
     let drones = drones.map(|(index, drone)| resolved(index, drone, archive.as_mut()));
     let (names, drones): (Vec<_>, Vec<_>) = drones.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
@@ -130,7 +130,7 @@ pub(super) fn rules(source: &Source, options: &ReadOptions) -> Result<ShowRules,
         }
         rules.read_yaw(&name, &yaw, trajectory.takeoff_s);
     }
-    Ok(rules)
+    Ok(Some(rules))
 }
 
 /// Returns the name of a drone, its trajectory and its yaw control.
