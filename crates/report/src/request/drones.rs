@@ -378,8 +378,11 @@ impl<'a> Written<'a> {
     ) -> Result<DroneExport, Failure> {
         let start_s = flight.span_s.0;
         let mut held = drones::motions(self.open(options)?.as_mut(), options.dialect.holds_samples())?;
-        let errors = held.iter_mut().map(|of| drones::add_evaluation(&mut of.motion, options));
-        let evaluation_m = errors.fold(0.0, f64::max);
+        let mut evaluation_m = 0.0_f64;
+        for of in &encoded.vehicles {
+            let read_back = held.iter_mut().find(|held| held.name == of.label).ok_or_else(|| lost(&of.label))?;
+            evaluation_m = evaluation_m.max(of.add_evaluation(&mut read_back.motion));
+        }
         let compared = flight.vehicles.par_iter().zip(&encoded.vehicles).map(|(flown, of)| {
             let read_back = held.iter().find(|held| held.name == of.label).ok_or_else(|| lost(&of.label))?;
             let curve = if read_back.motion.arcs.is_empty() { Motion::default() } else { read_back.motion.clone() };

@@ -8,6 +8,7 @@ use std::fmt::Write as _;
 
 use nalgebra::Vector3;
 
+use super::evaluation::{Evaluator, ROUNDING};
 use super::fit::{POINTS, Piece, seconds};
 use super::motion::{Arc, Motion};
 use super::{DroneError, DroneFile, EncodedVehicle, Work};
@@ -19,7 +20,7 @@ pub(super) const MEMORY_BYTES: usize = 4096;
 const PIECE_BYTES: usize = 132;
 /// Bound on the error of a polynomial that the firmware computes in single precision, relative to the sum of
 /// `|c_k| T^k`. Scheme of Horner: 14 roundings; time: 7, one for each power. The others cover sums of errors.
-const EVALUATION: f64 = 24.0 / 16_777_216.0;
+const EVALUATION: f64 = 24.0 * ROUNDING;
 /// Unit of length of compressed segments \[m\].
 const UNIT_M: f64 = 1e-3;
 /// Name of the memory in messages.
@@ -41,7 +42,16 @@ pub(super) fn polynomials(
     // The sum of `|c_k| T^k` is at least the distance from the origin.
     let points = motion.arcs.iter().flat_map(|arc| [arc.points[0], arc.points[arc.points.len() - 1]]);
     let least_m = EVALUATION * points.map(|point| point.norm()).fold(0.0, f64::max);
-    let found = work.within(name, motion, least_m, |_| true, |pieces| Ok(Some(rounded(pieces))))?;
+    let (found, evaluation_m) = work.within(
+        name,
+        motion,
+        least_m,
+        |_| true,
+        |pieces| {
+            let (polynomials, evaluation_m, curve) = rounded(pieces);
+            Ok(Some(((polynomials, evaluation_m), curve)))
+        },
+    )?;
     let bytes = found.len() * PIECE_BYTES;
     if bytes > MEMORY_BYTES {
         let (vehicle, pieces) = (name.to_owned(), found.len());
@@ -49,12 +59,13 @@ pub(super) fn polynomials(
     }
     let file = DroneFile { name: format!("{label}.csv"), bytes: csv(&found).into_bytes() };
     let (name, label) = (name.to_owned(), label.to_owned());
-    Ok((file, EncodedVehicle { name, label, parts: found.len(), bytes }))
+    Ok((file, EncodedVehicle { name, label, parts: found.len(), bytes, evaluation_m }))
 }
 
-/// Rounds pieces to single precision; also returns the curve of the rounded numbers.
+/// Rounds pieces to single precision; also returns the error of each in the firmware \[m\], and the curve of the
+/// rounded numbers with these errors.
 #[expect(clippy::cast_possible_truncation, reason = "the firmware has single precision")]
-fn rounded(pieces: &[Piece]) -> (Vec<Polynomial>, Motion) {
+fn rounded(pieces: &[Piece]) -> (Vec<Polynomial>, Vec<f64>, Motion) {
     let (mut polynomials, mut arcs, mut from_s) = (Vec::with_capacity(pieces.len()), Vec::new(), 0.0);
     let mut end_ms = 0;
     for piece in pieces {
@@ -77,22 +88,15 @@ fn rounded(pieces: &[Piece]) -> (Vec<Polynomial>, Motion) {
         polynomials.push(Polynomial { duration_s, powers });
         from_s = to_s;
     }
-    let mut curve = Motion { arcs };
-    add_evaluation(&mut curve);
-    (polynomials, curve)
-}
-
-/// Adds the error of the firmware to the rounding of each arc. Returns the largest one \[m\].
-pub(super) fn add_evaluation(motion: &mut Motion) -> f64 {
-    let mut largest_m = 0.0_f64;
-    for arc in &mut motion.arcs {
+    let mut evaluation_m = Vec::with_capacity(arcs.len());
+    for arc in &mut arcs {
         let length_s = arc.to_s - arc.from_s;
         // Horner's scheme from the last coefficient on.
         let size_m = arc.powers().iter().rev().fold(0.0, |sum, power| sum * length_s + power.norm());
+        evaluation_m.push(EVALUATION * size_m);
         arc.rounding_m += EVALUATION * size_m;
-        largest_m = largest_m.max(EVALUATION * size_m);
     }
-    largest_m
+    (polynomials, evaluation_m, Motion { arcs })
 }
 
 /// Returns the CSV with one polynomial in each row. Its decimals have the values of single precision.
@@ -131,7 +135,7 @@ pub(super) fn compressed(
         |pieces| {
             let trajectory =
                 Trajectory::of_pieces(pieces, UNIT_M, false).map_err(|error| too_far(name, error, UNIT_M))?;
-            let curve = trajectory.motion(UNIT_M);
+            let curve = trajectory.motion(UNIT_M, Evaluator::Crazyflie);
             Ok(Some((trajectory, curve)))
         },
     )?;
@@ -151,7 +155,9 @@ pub(super) fn compressed(
         });
     }
     let file = DroneFile { name: format!("{label}.traj"), bytes };
-    Ok((file, EncodedVehicle { name: name.to_owned(), label: label.to_owned(), parts: pieces, bytes: size }))
+    let evaluation_m = Evaluator::Crazyflie.errors_m(&found, UNIT_M);
+    let (name, label) = (name.to_owned(), label.to_owned());
+    Ok((file, EncodedVehicle { name, label, parts: pieces, bytes: size, evaluation_m }))
 }
 
 /// Returns the error of a coordinate beyond 16 bits.
@@ -165,13 +171,15 @@ pub(super) fn too_far(name: &str, error: OutOfRange, unit_m: f64) -> DroneError 
 }
 
 impl Trajectory {
-    /// Returns the motion of the segments, for a unit of length \[m\].
-    pub(super) fn motion(&self, unit_m: f64) -> Motion {
+    /// Returns the motion of the segments as a program evaluates them, for a unit of length \[m\].
+    pub(super) fn motion(&self, unit_m: f64, evaluator: Evaluator) -> Motion {
         let (mut arcs, mut from_ms) = (Vec::with_capacity(self.segments.len()), 0);
+        let mut errors_m = evaluator.errors_m(self, unit_m).into_iter();
         for (duration_ms, points) in self.curves(unit_m) {
             let to_ms = from_ms + u64::from(duration_ms);
             if to_ms > from_ms {
-                arcs.push(Arc { from_s: seconds(from_ms), to_s: seconds(to_ms), points, rounding_m: 0.0 });
+                let rounding_m = errors_m.next().unwrap_or(f64::INFINITY);
+                arcs.push(Arc { from_s: seconds(from_ms), to_s: seconds(to_ms), points, rounding_m });
             }
             from_ms = to_ms;
         }
@@ -223,7 +231,7 @@ mod tests {
         let bytes = &encoded.files[0].bytes;
         let (trajectory, length) = Trajectory::decode(bytes, true).expect("decoded");
         assert_eq!((length, encoded.vehicles[0].bytes), (bytes.len(), bytes.len()));
-        assert!(deviation_with_rests(&flight[0].1, &trajectory.motion(UNIT_M)).bound_m <= 0.03);
+        assert!(deviation_with_rests(&flight[0].1, &trajectory.motion(UNIT_M, Evaluator::Crazyflie)).bound_m <= 0.03);
     }
 
     #[test]
@@ -235,5 +243,28 @@ mod tests {
         assert!(encode(&flight, &DroneOptions::new(Dialect::Crazyflie), &|| false).is_ok());
         let fine = DroneOptions { tolerance_m: Some(0.001), ..options };
         assert!(matches!(encode(&flight, &fine, &|| false), Err(DroneError::Resolution { .. })));
+    }
+
+    #[test]
+    fn tolerance_covers_single_precision_of_compressed_segments() {
+        // A turn 30 m from the origin, which needs curves.
+        let place = |k: u32| {
+            let t = f64::from(k) / 20.0;
+            vector![31.0 + libm::sin(t), 31.0 + libm::cos(t), 31.0]
+        };
+        let arc = |k: u32| Arc::straight(f64::from(k) / 20.0, f64::from(k + 1) / 20.0, place(k), place(k + 1));
+        let flight = [("cf1".to_owned(), Motion { arcs: (0..100).map(arc).collect() })];
+        let options = DroneOptions { is_compressed: true, ..DroneOptions::new(Dialect::Crazyflie) };
+        let encoded = encode(&flight, &options, &|| false).expect("encoded");
+        let largest_m = encoded.vehicles[0].evaluation_m.iter().copied().fold(0.0, f64::max);
+        assert!(largest_m > 1e-4 && largest_m < 0.01, "{largest_m}");
+        let (trajectory, _) = Trajectory::decode(&encoded.files[0].bytes, true).expect("decoded");
+        let mut exact = trajectory.motion(UNIT_M, Evaluator::Crazyflie);
+        exact.arcs.iter_mut().for_each(|arc| arc.rounding_m = 0.0);
+        let of_file = deviation_with_rests(&flight[0].1, &exact);
+        encoded.vehicles[0].add_evaluation(&mut exact);
+        let of_drone = deviation_with_rests(&flight[0].1, &exact);
+        // Negative twin: the deviation of the file alone is smaller.
+        assert!(of_drone.bound_m <= 0.01 && of_drone.bound_m > of_file.bound_m + 1e-5, "{of_drone:?} {of_file:?}");
     }
 }

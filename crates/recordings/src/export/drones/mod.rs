@@ -7,6 +7,7 @@
 //! [`encode`] returns files in memory. A caller that writes them reads the files back and judges what the files hold.
 
 mod crazyflie;
+mod evaluation;
 pub mod fit;
 pub mod motion;
 mod sampled;
@@ -154,6 +155,21 @@ pub struct EncodedVehicle {
     pub parts: usize,
     /// Size of its motion in the memory of a drone, or in the file \[bytes\].
     pub bytes: usize,
+    /// Bound on the error of each polynomial that a drone computes in single precision \[m\]; empty for samples.
+    pub evaluation_m: Vec<f64>,
+}
+
+impl EncodedVehicle {
+    /// Adds the error of single precision to the arcs of the motion that its file holds. Returns the largest error
+    /// \[m\]; 0 for samples.
+    pub fn add_evaluation(&self, motion: &mut Motion) -> f64 {
+        let largest_m = self.evaluation_m.iter().copied().fold(0.0, f64::max);
+        let is_each = self.evaluation_m.len() == motion.arcs.len();
+        for (index, arc) in motion.arcs.iter_mut().enumerate() {
+            arc.rounding_m += if is_each { self.evaluation_m[index] } else { largest_m };
+        }
+        largest_m
+    }
 }
 
 /// Vehicle of a recording.
@@ -247,13 +263,6 @@ pub fn encode(
     }
 }
 
-/// Adds the rounding of a drone that computes in single precision to the arcs of a motion that its files hold. Returns
-/// the largest one \[m\]; 0 for other formats than polynomials of a Crazyflie.
-pub fn add_evaluation(motion: &mut Motion, options: &DroneOptions) -> f64 {
-    let has_polynomials = options.dialect == Dialect::Crazyflie && !options.is_compressed;
-    if has_polynomials { crazyflie::add_evaluation(motion) } else { 0.0 }
-}
-
 /// Returns whether the content of a file is that of an export to a folder.
 ///
 /// # Errors
@@ -313,7 +322,7 @@ impl Work<'_> {
         if aim_m <= 0.0 {
             return Err(DroneError::Resolution { tolerance_m, rounding_m: reserve_m });
         }
-        let mut nearest: Option<Deviation> = None;
+        let (mut nearest, mut least_m) = (None::<Deviation>, reserve_m);
         for _ in 0..MOST_FITS {
             let pieces =
                 fit::fit(motion, aim_m, is_allowed, &|| (self.is_interrupted)()).map_err(|error| match error {
@@ -326,8 +335,12 @@ impl Work<'_> {
                     return Ok(encoded);
                 }
                 nearest = Some(found);
+                least_m = reserve_m.max(curve.arcs.iter().map(|arc| arc.rounding_m).fold(0.0, f64::max));
             }
             aim_m *= FIT_SHARE;
+        }
+        if least_m >= tolerance_m {
+            return Err(DroneError::Resolution { tolerance_m, rounding_m: least_m });
         }
         let time_s = nearest.map_or(0.0, |found| found.time_s);
         Err(DroneError::TooFast { vehicle: name.to_owned(), time_s, tolerance_m })

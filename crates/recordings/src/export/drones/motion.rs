@@ -77,6 +77,11 @@ impl Arc {
         }
     }
 
+    /// Returns a bound on the distance \[m\] from another arc over the same interval.
+    pub(super) fn distance_m(&self, other: &Self) -> f64 {
+        Part::new(self, other, self.from_s, self.to_s).bound_m()
+    }
+
     /// Returns the Bernstein coefficients of the part in an interval within the arc.
     fn part(&self, from_s: f64, to_s: f64) -> Vec<Vector3<f64>> {
         if self.points.len() == 1 || (from_s <= self.from_s && to_s >= self.to_s) {
@@ -143,8 +148,8 @@ impl Motion {
         if let Some(last) = self.arcs.last()
             && last.to_s < to_s
         {
-            let (from_s, at) = (last.to_s, last.points[last.points.len() - 1]);
-            self.arcs.push(Arc::straight(from_s, to_s, at, at));
+            let (from_s, at, rounding_m) = (last.to_s, last.points[last.points.len() - 1], last.rounding_m);
+            self.arcs.push(Arc { rounding_m, ..Arc::straight(from_s, to_s, at, at) });
         }
         self
     }

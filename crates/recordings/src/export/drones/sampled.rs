@@ -53,7 +53,10 @@ pub(super) fn px4_show(
     }
     let file = DroneFile { name: format!("{label}.csv"), bytes: text.into_bytes() };
     let (parts, bytes) = (places.len(), file.bytes.len());
-    Ok((file, EncodedVehicle { name: name.to_owned(), label: label.to_owned(), parts, bytes }))
+    Ok((
+        file,
+        EncodedVehicle { name: name.to_owned(), label: label.to_owned(), parts, bytes, evaluation_m: Vec::new() },
+    ))
 }
 
 /// Returns the show of all drones.
@@ -77,7 +80,8 @@ pub(super) fn vviz(work: &Work<'_>, vehicles: &[Vehicle<'_>]) -> Result<Encoded,
         let agent = json!({"homeX": home.x, "homeY": home.z, "homeZ": home.y, "agentTraversal": steps});
         let drone = json!({"id": label, "type": "agent", "agentDescription": agent, "payloadDescription": []});
         let bytes = drone.to_string().len();
-        Ok((drone, EncodedVehicle { name: (*name).clone(), label: label.clone(), parts: places.len(), bytes }))
+        let (name, label, parts) = ((*name).clone(), label.clone(), places.len());
+        Ok((drone, EncodedVehicle { name, label, parts, bytes, evaluation_m: Vec::new() }))
     });
     let (drones, vehicles): (Vec<_>, Vec<_>) = first_error(drones)?.into_iter().unzip();
     let show = json!({

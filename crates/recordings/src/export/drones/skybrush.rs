@@ -16,6 +16,7 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
 use super::crazyflie::too_far;
+use super::evaluation::Evaluator;
 use super::fit::{Piece, seconds};
 use super::motion::Motion;
 use super::{DroneError, DroneFile, Encoded, EncodedVehicle, Vehicle, Work, first_error};
@@ -63,7 +64,7 @@ pub(super) fn trajectory(
         let unit_m = unit_m(scale);
         let encode = |pieces: &[Piece]| {
             let found = Trajectory::of_pieces(pieces, unit_m, false).map_err(|error| too_far(name, error, unit_m))?;
-            let curve = found.motion(unit_m);
+            let curve = found.motion(unit_m, Evaluator::Skybrush);
             Ok(Some((found, curve)))
         };
         work.within(name, motion, rounding_m(unit_m), |_| true, encode)
@@ -76,6 +77,7 @@ pub(super) fn trajectory(
         label: label.to_owned(),
         parts: found.segments.len(),
         bytes: bytes.len(),
+        evaluation_m: Evaluator::Skybrush.errors_m(&found, unit_m(scale)),
     };
     Ok((DroneFile { name: format!("{label}.skyb"), bytes }, vehicle))
 }
@@ -142,7 +144,7 @@ pub(super) fn show(work: &Work<'_>, vehicles: &[Vehicle<'_>]) -> Result<Encoded,
             let encode = |pieces: &[Piece]| {
                 let found =
                     Trajectory::of_pieces(pieces, unit_m, true).map_err(|error| too_far(name, error, unit_m))?;
-                let curve = found.motion(unit_m);
+                let curve = found.motion(unit_m, Evaluator::Skybrush);
                 let is_compiled_alike = proposed_scale(reach_m(&found, scale)) == scale;
                 Ok(is_compiled_alike.then_some((found, curve)))
             };
@@ -155,7 +157,8 @@ pub(super) fn show(work: &Work<'_>, vehicles: &[Vehicle<'_>]) -> Result<Encoded,
             file(name, &found, &[&[scale_byte(scale)], &bytes[..]].concat(), 2)?;
         }
         let (parts, bytes) = (found.segments.len(), bytes.len() + 1);
-        let vehicle = EncodedVehicle { name: (*name).clone(), label: label.clone(), parts, bytes };
+        let evaluation_m = Evaluator::Skybrush.errors_m(&found, unit_m(scale));
+        let vehicle = EncodedVehicle { name: (*name).clone(), label: label.clone(), parts, bytes, evaluation_m };
         Ok((drone(label, &found, scale), vehicle))
     });
     let (drones, vehicles): (Vec<_>, Vec<_>) = first_error(drones)?.into_iter().unzip();
