@@ -130,6 +130,54 @@ fn times_without_plan_or_flight_are_undecided() {
 }
 
 #[test]
+fn an_estimated_delay_limits_the_verdict_to_the_common_time() {
+    let folder = folder();
+    // The flight of `samples.csv`, 1.5 s later than its plan and without its first second.
+    let late: String = SAMPLES
+        .lines()
+        .filter_map(|line| {
+            let (time, rest) = line.split_once(',')?;
+            let time: f64 = time.parse().ok().filter(|time| *time >= 1.0)?;
+            Some(format!("{:?},{rest}\n", time + 1.5))
+        })
+        .collect();
+    // Both vehicles then wait for 3 s at the end of their plans.
+    let waiting = format!("t,id,x,y,z\n{late}8.5,cf1,4,0,1\n8.5,cf2,4,1.5,1\n");
+    fs::write(folder.path().join("late.csv"), waiting).expect("a file");
+    let asked = ["late.csv", "--delta", "1", "--plan", "plan", "--max-gap", "5"];
+    let ran = audit(folder.path(), &asked);
+    assert_eq!(ran.exit, Some(0), "{ran:?}");
+    for words in [
+        "of the plan from 2.500 s to 5.500 s, the common time of flight and plan, cf2 at",
+        "keeps delta (cf1 and cf2:",
+        "needed) in this time",
+    ] {
+        assert!(ran.out.contains(words), "{words}: {ran:?}");
+    }
+    let report = json(folder.path(), &asked);
+    let [from_s, to_s] = [0, 1].map(|k| report["plan"]["common_s"][k].as_f64().expect("a time"));
+    assert!((from_s - 2.5).abs() < 1e-9 && (to_s - 5.5).abs() < 1e-3, "{report}");
+    // The claim about the whole flight, or about a given window, stays undecided.
+    for window in [&["--plan-delay", "1.5"][..], &["--to", "8"]] {
+        let whole = audit(folder.path(), &[&asked[..], window].concat());
+        assert_eq!(whole.exit, Some(1), "{whole:?}");
+        assert!(whole.out.starts_with("UNDECIDED: the distance of cf1") && whole.out.contains("no plan"), "{whole:?}");
+    }
+    // A large distance in the common time is found.
+    let tube = audit(folder.path(), &[&asked[..], &["--tube", "0.05"]].concat());
+    assert!(tube.exit == Some(1) && tube.out.starts_with("VIOLATION: cf2 is"), "{tube:?}");
+    // A gap of the flight within the common time is undecided.
+    let gap = audit(folder.path(), &["late.csv", "--delta", "1", "--plan", "plan", "--max-gap", "0.5"]);
+    assert!(gap.exit == Some(1) && gap.out.starts_with("UNDECIDED"), "{gap:?}");
+    // A short overlap is no common time: the plan ends where the flight begins.
+    let after = "t,id,x,y,z\n0.5,cf1,4,0,1\n0.5,cf2,4,1.5,1\n9.25,cf1,4,0,1\n9.25,cf2,4,1.5,1\n";
+    fs::write(folder.path().join("after.csv"), after).expect("a file");
+    let short =
+        audit(folder.path(), &["after.csv", "--time-unit", "s", "--delta", "1", "--plan", "plan", "--max-gap", "20"]);
+    assert!(short.exit == Some(1) && short.out.starts_with("UNDECIDED: the distance of"), "{short:?}");
+}
+
+#[test]
 fn wrong_questions_about_a_plan_are_refused() {
     let folder = folder();
     for (arguments, words) in [

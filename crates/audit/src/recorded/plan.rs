@@ -40,6 +40,8 @@ const MOST_INSTANTS: usize = 1024;
 const PARTS_OF_A_CURVE: u32 = 4;
 /// Shortest unknown time at an end of the window that counts \[s\].
 const SHORTEST_UNKNOWN_S: f64 = 1e-6;
+/// Least common time of flight and plan to which a verdict may be limited, as a share of the shorter of both.
+const LEAST_COMMON: f64 = 0.5;
 /// Relative excess that covers the rounding of summed deviations.
 const ROUNDING: f64 = 1e-12;
 
@@ -88,6 +90,9 @@ pub struct PlanFindings {
     pub has_curves: bool,
     /// Distances of the vehicles, by index. A vehicle without shared time has none.
     pub deviations: Vec<Deviation>,
+    /// Time to which the verdict is limited \[s\]: with an estimated delay, the time in which flight and plan of all
+    /// vehicles are present. `None` if the verdict covers the whole window.
+    pub common_s: Option<(f64, f64)>,
     /// Times in which a distance is not known, by vehicle.
     pub unknown: Vec<Unknown>,
 }
@@ -115,7 +120,7 @@ impl PlanFindings {
             vehicles.insert(name.clone(), VehicleSettings { radius_m, offset_s: shift_s, max_accel_m_s2: None });
         }
         let only = Some(vehicles.keys().cloned().collect());
-        let (from_s, to_s) = (settings.from_s, settings.to_s);
+        let (from_s, to_s) = self.common_s.map_or((settings.from_s, settings.to_s), |of| (Some(of.0), Some(of.1)));
         // A flight above the ground is planned above it, less the largest distance.
         let most_m = self.deviations.iter().map(|of| of.upper_m).fold(self.tube_m.unwrap_or(0.0), f64::max);
         let above_m = settings.above_m.map(|above_m| above_m - most_m * (1.0 + ROUNDING) - ROUNDING * above_m.abs());
@@ -181,6 +186,9 @@ impl PlanComparison {
     /// `None` estimates the delay. Of the delays within a minute, it takes the one of least mean squared distance at
     /// the samples, and of several the smallest. Beyond its ends a plan counts as standing for this estimate alone.
     ///
+    /// An estimated delay moves the ends of the plan away from those of the flight. The verdict is then limited to
+    /// their common time, unless the window is given or the common time is below half of flight and plan.
+    ///
     /// # Errors
     /// [`RecordedError`] if an item of the plan is invalid.
     pub fn finish(
@@ -202,6 +210,11 @@ impl PlanComparison {
             let shortest_s = vehicle.mean_interval_s().max(SHORTEST_UNKNOWN_S);
             unknown.extend(unknown_times(index, &vehicle.segments, planned, shortest_s));
         }
+        let common_s = self.common_time(&plan).filter(|_| is_estimated).filter(|(from_s, to_s)| {
+            let count = unknown.len();
+            unknown.retain(|of| of.from_s < *to_s && of.to_s > *from_s);
+            unknown.len() < count
+        });
         let known = deviations.len() == self.flight.iter().filter(|vehicle| vehicle.is_selected).count();
         let has_left = |of: &Deviation| tube_m.is_some_and(|tube_m| of.lower_m > tube_m);
         let is_within = |of: &Deviation| tube_m.is_none_or(|tube_m| of.upper_m <= tube_m);
@@ -209,7 +222,7 @@ impl PlanComparison {
         let searched_s = is_estimated.then_some((-MOST_DELAY_S, MOST_DELAY_S));
         let status = Status::new(deviations.iter().any(has_left), is_decided);
         let has_curves = self.plan.iter().flat_map(|(_, items)| items).all(|item| matches!(item, Item::Piece(_)));
-        Ok(PlanFindings { status, delay_s, searched_s, tube_m, has_curves, deviations, unknown })
+        Ok(PlanFindings { status, delay_s, searched_s, tube_m, has_curves, deviations, common_s, unknown })
     }
 
     /// Returns the segments of the plan, with times later by `offset_s`, within a window.
@@ -231,6 +244,23 @@ impl PlanComparison {
             Ok((name.clone(), vehicle.segments))
         };
         self.plan.iter().map(of_vehicle).collect()
+    }
+
+    /// Returns the time in which flight and plan of all vehicles are present, up to gaps; an end of the window that is
+    /// given stays. `None` if this time is below [`LEAST_COMMON`] of the flight and of the plan.
+    fn common_time(&self, plan: &BTreeMap<String, Vec<Segment>>) -> Option<(f64, f64)> {
+        let ends = |segments: &[Segment]| Some((segments.first()?.from_s, segments.last()?.to_s));
+        let (mut flown, mut planned) = (Vec::new(), Vec::new());
+        for vehicle in self.flight.iter().filter(|vehicle| vehicle.is_selected) {
+            flown.push(ends(&vehicle.segments)?);
+            planned.push(ends(plan.get(&vehicle.name)?)?);
+        }
+        let longest_s = |spans: &[(f64, f64)]| spans.iter().map(|span| span.1 - span.0).fold(0.0, f64::max);
+        let least_s = LEAST_COMMON * longest_s(&flown).min(longest_s(&planned));
+        let spans = || flown.iter().chain(&planned);
+        let from_s = self.settings.from_s.unwrap_or(spans().map(|span| span.0).fold(f64::NEG_INFINITY, f64::max));
+        let to_s = self.settings.to_s.unwrap_or(spans().map(|span| span.1).fold(f64::INFINITY, f64::min));
+        (to_s > from_s && to_s - from_s >= least_s).then_some((from_s, to_s))
     }
 
     fn estimated_delay(&self, shift_s: f64) -> Result<f64, RecordedError> {

@@ -24,6 +24,8 @@ pub struct PlanReport {
     pub tube_m: Option<f64>,
     /// Largest distance of each vehicle from its plan.
     pub vehicles: Vec<VehicleFinding<PlanDistance>>,
+    /// Time to which the status is limited \[s\], with an estimated delay; null if it covers the whole window.
+    pub common_s: Option<(f64, f64)>,
     /// Times in which a distance is not known.
     pub unknown: Vec<VehicleFinding<PlanUnknown>>,
     /// Separation that follows from the plan; null if nothing follows.
@@ -100,6 +102,7 @@ impl PlanReport {
                 .map(|of| VehicleFinding::new(outcome, of.vehicle, distance(of)))
                 .collect(),
             unknown: found.unknown.iter().map(|of| VehicleFinding::new(outcome, of.vehicle, unknown(of))).collect(),
+            common_s: found.common_s,
             certificate: audited.filter(|_| !is_contradictory).and_then(PlanCertificate::of),
             assumes: (!found.has_curves).then(|| "the plan is straight between its samples".to_owned()),
         }
@@ -108,6 +111,13 @@ impl PlanReport {
     /// Returns the vehicle with the largest distance.
     fn farthest(&self) -> Option<&VehicleFinding<PlanDistance>> {
         self.vehicles.iter().max_by(|a, b| a.finding.upper_m.total_cmp(&b.finding.upper_m))
+    }
+
+    /// Returns the time to which the status is limited.
+    fn common(&self) -> String {
+        self.common_s.map_or(String::new(), |(from_s, to_s)| {
+            format!(" from {} s to {} s, the common time of flight and plan", fixed(from_s, 3), fixed(to_s, 3))
+        })
     }
 
     /// Returns the findings with the status of the verdict in a clause.
@@ -120,8 +130,12 @@ impl PlanReport {
         match (self.status, farthest) {
             (Status::Clear, Some((vehicle, PlanDistance { upper_m, at_s, .. }))) => {
                 let (most, at) = (at_most(*upper_m, 6), seconds(*at_s));
-                let certified = self.certificate.as_ref().map_or(String::new(), |of| format!("; {}", of.words()));
-                format!("within {most} m of the plan, {vehicle} at {at} ({tube}{delay}){certified}")
+                let certified = self.certificate.as_ref().map_or(String::new(), |of| {
+                    let then = if self.common_s.is_some() { " in this time" } else { "" };
+                    format!("; {}{then}", of.words())
+                });
+                let common = self.common();
+                format!("within {most} m of the plan{common}, {vehicle} at {at} ({tube}{delay}){certified}")
             }
             (Status::Violation, _) => {
                 let left = self.vehicles.iter().max_by(|a, b| a.finding.lower_m.total_cmp(&b.finding.lower_m));
@@ -158,7 +172,8 @@ impl PlanReport {
         });
         let certificate =
             self.certificate.as_ref().map_or("no separation follows from the plan".to_owned(), PlanCertificate::words);
-        let caption = format!("{}, delay {} s ({searched}); {certificate}", self.file, fixed(self.delay_s, 6));
+        let caption =
+            format!("{}{}, delay {} s ({searched}); {certificate}", self.file, self.common(), fixed(self.delay_s, 6));
         let row = |VehicleFinding { vehicle, finding }: &VehicleFinding<PlanDistance>| {
             let PlanDistance { upper_m, lower_m, at_s, rms_m } = *finding;
             let verdict = match self.tube_m {
