@@ -155,7 +155,10 @@ fn planned() -> Vec<u8> {
     let spline = (1, 1, 5_i64, (1, 5), knots.to_vec(), vec![[0.0, 1.0, 2.0], [1.0; 3], [2.0; 3]], vec![0.0], 0.1);
     let ends = [[1.0_f32, 2.0, 3.0]; 6];
     let minco = (2_i16, 5, (1, 5), 0.5_f32, 5_u8, ends, [vec![2.0_f32], vec![2.0], vec![2.0]], vec![1.0_f32, 0.5]);
+    let six = |x: f32| (0..6_u8).map(|k| x - f32::from(k)).collect::<Vec<_>>();
+    let polynomials = (3_i16, 5, (1, 5), 5_u8, six(1.0), six(2.0), six(3.0), vec![1.5_f32]);
     let messages = [
+        ("/planning/polynomials", "traj_utils/msg/PolyTraj", "cdr", 1, cdr(&polynomials, true)),
         ("/planning/bspline", "traj_utils/msg/Bspline", "cdr", 1, cdr(&spline, true)),
         ("/planning/trajectory", "traj_utils/msg/MINCOTraj", "cdr", 1, cdr(&minco, false)),
     ];

@@ -1,4 +1,4 @@
-//! Curves of planners: B-splines and MINCO trajectories in bags, and tables of Bezier curves.
+//! Curves of planners: B-splines, MINCO trajectories and polynomials in bags, and tables of Bezier curves.
 
 use std::fs;
 
@@ -11,12 +11,28 @@ use crate::recording::{Whole, assert_refused};
 
 const B_SPLINE: &str = "traj_utils/msg/Bspline";
 const MINCO: &str = "traj_utils/msg/MINCOTraj";
+const POLYNOMIALS: &str = "traj_utils/msg/PolyTraj";
 const TOPIC: &str = "/drone_0_planning/bspline";
 const BROADCAST: &str = "/planning/broadcast_traj_send";
 const REST: [f32; 3] = [0.0; 3];
 
 type Bspline = (i32, i32, i64, Stamp, Vec<f64>, Vec<[f64; 3]>, Vec<f64>, f64);
 type Minco = (i16, i32, Stamp, f32, u8, [[f32; 3]; 6], [Vec<f32>; 3], Vec<f32>);
+
+type PolyTraj = (i16, i32, Stamp, u8, Vec<f32>, Vec<f32>, Vec<f32>, Vec<f32>);
+
+/// Returns two pieces of 1 s and 2 s from (0, 0, 1): x = t, y = t^2 until (1, 1, 1), then a line along y at 2 m/s.
+fn polynomials(drone: i16) -> PolyTraj {
+    let piece = |powers: [f32; 3]| [0.0, 0.0, 0.0, powers[2], powers[1], powers[0]];
+    let both = |first, second| [piece(first), piece(second)].concat();
+    let x = both([0.0, 1.0, 0.0], [1.0, 0.0, 0.0]);
+    let y = both([0.0, 0.0, 1.0], [1.0, 2.0, 0.0]);
+    (drone, 1, (SEC, 500_000_000), 5, x, y, both([1.0, 0.0, 0.0], [1.0, 0.0, 0.0]), vec![1.0, 2.0])
+}
+
+fn of_polynomials(message: &PolyTraj) -> Message {
+    (TOPIC, POLYNOMIALS, "cdr", 7, cdr(message, true))
+}
 
 /// Returns a uniform cubic B-spline with seven points: four intervals of 1 s, along x at 1 m/s.
 fn spline(drone: i32, nanosec: u32, y: f64) -> Bspline {
@@ -124,6 +140,30 @@ fn a_minco_trajectory_passes_its_points_and_ends_unknown() {
 }
 
 #[test]
+fn polynomials_have_their_highest_power_first_and_end_unknown() {
+    let mut next = polynomials(2);
+    next.2 = (SEC + 5, 0);
+    let found = whole("plan.mcap", &mcap_of(&[of_polynomials(&polynomials(2)), of_polynomials(&next)]));
+    for (time_s, expected) in
+        [(0.5, [0.0, 0.0, 1.0]), (1.0, [0.5, 0.25, 1.0]), (1.5, [1.0, 1.0, 1.0]), (3.5, [1.0, 5.0, 1.0])]
+    {
+        assert_near(position(&found, "2", time_s), expected);
+    }
+    let spans: Vec<_> = pieces(&found).into_iter().map(|piece| (piece.from_s, piece.to_s)).collect();
+    assert_eq!(spans, [(0.5, 1.5), (1.5, 3.5), (5.0, 6.0), (6.0, 8.0)], "no piece between 3.5 s and 5 s");
+    assert!(found.notes.iter().any(|note| note.contains("is not known")), "{:?}", found.notes);
+    // Another message of the planner with the same start contradicts the curve.
+    let error = refused(&[of_polynomials(&polynomials(2)), of_minco(&minco(2, 0.0))], &ReadOptions::default());
+    assert_refused(&error, "recording/duplicate-row", &format!("curve 2 on topic `{BROADCAST}`"));
+    let one = read_bytes(
+        "plan.mcap",
+        &mcap_of(&[of_polynomials(&polynomials(2)), of_minco(&minco(2, 0.0))]),
+        &topics(&[TOPIC]),
+    );
+    assert_near(position(&one.expect("read"), "2", 1.0), [0.5, 0.25, 1.0]);
+}
+
+#[test]
 fn repeated_curves_are_read_once_and_contradictory_ones_refused() {
     let one = of(&spline(1, 0, 0.0));
     let copy = ("/broadcast_bspline", B_SPLINE, "cdr", 9, cdr(&spline(1, 0, 0.0), true));
@@ -181,7 +221,7 @@ fn wrong_curves_name_the_field_and_its_value() {
     let of_trajectory: [(Spoil<Minco>, &str, &str); 7] = [
         (|m| m.4 = 7, "recording/degree", "order: must be 5, got 7"),
         (|m| m.6[1].clear(), "recording/field-count", "inner_y: 2 durations need one number less, got 0"),
-        (|m| m.7.clear(), "recording/field-count", "inner_x: 0 durations need one number less, got 1"),
+        (|m| m.7.clear(), "recording/field-count", "duration: a curve needs at least one piece, got none"),
         (|m| m.7[1] = 0.0, "recording/duration", "duration[1]: must be positive, got 0 s"),
         (|m| m.7[0] = -1.0, "recording/duration", "duration[0]: must be positive, got -1 s"),
         (|m| m.7[0] = f32::NAN, "recording/not-finite", "duration[0]: must be a finite number, got NaN"),
@@ -192,6 +232,22 @@ fn wrong_curves_name_the_field_and_its_value() {
         spoil(&mut message);
         let error = refused(&[of_minco(&message)], &ReadOptions::default());
         assert_refused(&error, code, &format!("curve 1 on topic `{BROADCAST}`"));
+        assert!(error.to_string().contains(problem), "{error}");
+    }
+    let of_pieces: [(Spoil<PolyTraj>, &str, &str); 7] = [
+        (|m| m.3 = 7, "recording/degree", "order: must be 5, got 7"),
+        (|m| m.5.truncate(11), "recording/field-count", "coef_y: 2 durations need 12 numbers, got 11"),
+        (|m| m.7.clear(), "recording/field-count", "duration: a curve needs at least one piece, got none"),
+        (|m| m.7[1] = 0.0, "recording/duration", "duration[1]: must be positive, got 0 s"),
+        (|m| m.7[0] = f32::INFINITY, "recording/not-finite", "duration[0]: must be a finite number, got inf"),
+        (|m| m.6[11] = f32::NAN, "recording/not-finite", "coef_z[11]: must be a finite number, got NaN"),
+        (|m| m.4.clear(), "recording/field-count", "coef_x: 2 durations need 12 numbers, got 0"),
+    ];
+    for (spoil, code, problem) in of_pieces {
+        let mut message = polynomials(1);
+        spoil(&mut message);
+        let error = refused(&[of_polynomials(&message)], &ReadOptions::default());
+        assert_refused(&error, code, &format!("curve 1 on topic `{TOPIC}`"));
         assert!(error.to_string().contains(problem), "{error}");
     }
     let cut = (TOPIC, B_SPLINE, "cdr", 7, cdr(&spline(1, 0, 0.0), true)[..60].to_vec());

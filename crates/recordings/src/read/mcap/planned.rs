@@ -1,11 +1,13 @@
-//! Reads curves of planners: `traj_utils/msg/Bspline` of EGO-Planner and `traj_utils/msg/MINCOTraj` of its version 2.
+//! Reads curves of planners: `traj_utils/msg/Bspline` of EGO-Planner, and `traj_utils/msg/MINCOTraj` and
+//! `traj_utils/msg/PolyTraj` of its version 2.
 //!
 //! A curve of a drone is flown from its start until the next one of that drone starts. The trajectory server of the
 //! first version holds the last point of a curve. That of the second version sends nothing after the end: the motion is
 //! unknown there.
 //!
 //! A B-spline has its degree in `order`, and its time 0 at the knot with this index. A MINCO trajectory of order 5 is
-//! the curve of least jerk through its points.
+//! the curve of least jerk through its points. A polynomial trajectory of order 5 has six coefficients of each piece,
+//! the highest power of the time since its start first.
 
 use std::collections::BTreeMap;
 
@@ -27,6 +29,10 @@ use tautline_core::track::{Clock, Item, Metadata};
 
 const B_SPLINE: &str = "traj_utils/msg/Bspline";
 const MINCO: &str = "traj_utils/msg/MINCOTraj";
+const POLYNOMIALS: &str = "traj_utils/msg/PolyTraj";
+
+/// Degree of the curves of EGO-Planner v2.
+const DEGREE: u8 = 5;
 
 /// Highest supported degree of a B-spline.
 const HIGHEST_DEGREE: i32 = 15;
@@ -38,7 +44,7 @@ const REPLAN: &str = "check the planner and its version, and record again; or ch
 
 /// Returns whether the messages of a schema are curves of a planner.
 pub(super) fn is_curve(schema: &str) -> bool {
-    matches!(schema, B_SPLINE | MINCO)
+    matches!(schema, B_SPLINE | MINCO | POLYNOMIALS)
 }
 
 /// Opens the curves of planners; `None` if the recording has none, or the user names other topics.
@@ -72,7 +78,11 @@ pub(super) fn open(
         }
         number += 1;
         let at = || Place::Part(format!("curve {number} on topic `{}`", message.of.topic));
-        let read = if message.of.schema == MINCO { Plan::of_minco } else { Plan::of_b_spline };
+        let read = match &*message.of.schema {
+            MINCO => Plan::of_minco,
+            POLYNOMIALS => Plan::of_polynomials,
+            _ => Plan::of_b_spline,
+        };
         let (drone, plan) = read(&message.of.encoding, message.bytes).map_err(|fault| fault.at(at()))?;
         let start_ns = plan.start_ns;
         match drones.entry(drone).or_default().insert(start_ns, plan.clone()) {
@@ -220,30 +230,17 @@ impl Plan {
     /// Returns the drone and the curve of a message.
     fn of_minco(encoding: &str, bytes: &[u8]) -> Result<(i32, Self), Fault> {
         let minco: MincoTraj = decoded(encoding, bytes)?;
-        if minco.order != 5 {
-            return refuse("recording/degree", format!("order: must be 5, got {}", minco.order), REPLAN);
-        }
-        let wide = |of: &[f32]| of.iter().map(|&number| f64::from(number)).collect::<Vec<_>>();
-        let [x, y, z, durations] = [
-            ("inner_x", &minco.inner_x),
-            ("inner_y", &minco.inner_y),
-            ("inner_z", &minco.inner_z),
-            ("duration", &minco.durations),
-        ]
-        .map(|(name, numbers)| (name, wide(numbers)));
-        for (name, numbers) in [&x, &y, &z, &durations] {
-            refuse_not_finite(name, numbers)?;
-        }
-        let (durations, pieces) = (durations.1, minco.durations.len());
+        refuse_degree(minco.order)?;
+        let durations = durations(&minco.durations)?;
+        let pieces = durations.len();
+        let [x, y, z] = [("inner_x", &minco.inner_x), ("inner_y", &minco.inner_y), ("inner_z", &minco.inner_z)]
+            .map(|(name, numbers)| (name, wide(numbers)));
         for (name, numbers) in [&x, &y, &z] {
+            refuse_not_finite(name, numbers)?;
             if numbers.len() + 1 != pieces {
                 let problem = format!("{name}: {pieces} durations need one number less, got {}", numbers.len());
                 return refuse("recording/field-count", problem, REPLAN);
             }
-        }
-        if let Some(k) = durations.iter().position(|duration_s| *duration_s <= 0.0) {
-            let problem = format!("duration[{k}]: must be positive, got {} s", durations[k]);
-            return refuse("recording/duration", problem, REPLAN);
         }
         for (name, states) in [("start", &minco.start), ("end", &minco.end)] {
             for (letter, numbers) in ["p", "v", "a"].into_iter().zip(states) {
@@ -256,6 +253,60 @@ impl Plan {
         let (sec, nanosec) = minco.start_time;
         let start_ns = nanoseconds(sec.into(), nanosec.into());
         Ok((minco.drone.into(), Self { start_ns, parts, is_held: false }))
+    }
+
+    /// Returns the drone and the curve of a message.
+    fn of_polynomials(encoding: &str, bytes: &[u8]) -> Result<(i32, Self), Fault> {
+        let PolyTraj { drone, start: (sec, nanosec), order, x, y, z, durations: lengths, .. } =
+            decoded(encoding, bytes)?;
+        refuse_degree(order)?;
+        let durations = durations(&lengths)?;
+        let (pieces, terms) = (durations.len(), usize::from(DEGREE) + 1);
+        let axes = [("coef_x", wide(&x)), ("coef_y", wide(&y)), ("coef_z", wide(&z))];
+        for (name, numbers) in &axes {
+            refuse_not_finite(name, numbers)?;
+            if numbers.len() != terms * pieces {
+                let problem =
+                    format!("{name}: {pieces} durations need {} numbers, got {}", terms * pieces, numbers.len());
+                return refuse("recording/field-count", problem, REPLAN);
+            }
+        }
+        let (mut parts, mut from_s) = (Vec::with_capacity(pieces), 0.0);
+        for (piece, duration_s) in durations.iter().enumerate() {
+            let highest = terms * piece + usize::from(DEGREE);
+            let coefficient = |power: usize| Vector3::from_fn(|axis, _| axes[axis].1[highest - power]);
+            parts.push((from_s, from_s + duration_s, (0..terms).map(coefficient).collect()));
+            from_s += duration_s;
+        }
+        let start_ns = nanoseconds(sec.into(), nanosec.into());
+        Ok((drone.into(), Self { start_ns, parts, is_held: false }))
+    }
+}
+
+fn wide(numbers: &[f32]) -> Vec<f64> {
+    numbers.iter().map(|&number| f64::from(number)).collect()
+}
+
+fn refuse_degree(order: u8) -> Result<(), Fault> {
+    if order == DEGREE {
+        return Ok(());
+    }
+    refuse("recording/degree", format!("order: must be {DEGREE}, got {order}"), REPLAN)
+}
+
+/// Returns the durations of the pieces \[s\], at least one.
+fn durations(lengths: &[f32]) -> Result<Vec<f64>, Fault> {
+    let durations = wide(lengths);
+    refuse_not_finite("duration", &durations)?;
+    if durations.is_empty() {
+        return refuse("recording/field-count", "duration: a curve needs at least one piece, got none", REPLAN);
+    }
+    match durations.iter().position(|duration_s| *duration_s <= 0.0) {
+        Some(k) => {
+            let problem = format!("duration[{k}]: must be positive, got {} s", durations[k]);
+            refuse("recording/duration", problem, REPLAN)
+        }
+        None => Ok(durations),
     }
 }
 
@@ -300,5 +351,18 @@ struct MincoTraj {
     inner_x: Vec<f32>,
     inner_y: Vec<f32>,
     inner_z: Vec<f32>,
+    durations: Vec<f32>,
+}
+
+/// Message of EGO-Planner v2: six coefficients of each piece, and durations.
+#[derive(Deserialize)]
+struct PolyTraj {
+    drone: i16,
+    _traj_id: i32,
+    start: (i32, u32),
+    order: u8,
+    x: Vec<f32>,
+    y: Vec<f32>,
+    z: Vec<f32>,
     durations: Vec<f32>,
 }
