@@ -34,6 +34,9 @@ for tests in tests/ci ${long:+tests/cluster tests/docs}; do
     target/cluster/bin/python -m unittest discover --verbose --start-directory "$tests"
 done
 
+# Exported files with the libraries of their formats.
+target/readers/bin/python -m unittest discover --verbose --start-directory tests/readers
+
 # The Python package, in a debug build.
 VIRTUAL_ENV="$PWD/target/python" target/python/bin/maturin develop --manifest-path python/Cargo.toml
 TAUTLINE_NOTEBOOKS=$long target/python/bin/python -m unittest discover --verbose --start-directory tests/python

@@ -73,6 +73,10 @@ environment() {
 # Ray for tests/cluster, pre-commit and YAML for tests/ci.
 environment cluster 'pre_commit, ray, yaml' 'ray>=2.40,<3' pre-commit pyyaml
 
+# The library that uploads Crazyflie trajectories, for tests/readers. Its other dependencies are not needed.
+environment readers cflib.crazyflie.mem.trajectory_memory \
+    --no-deps cflib==0.1.34 importlib_resources libusb-package 'numpy>=2.2,<3' packaging pyusb
+
 # Build tool of the Python package, and packages for tests/python.
 environment python 'gymnasium, ipykernel, matplotlib, maturin, mypy, nbclient, numpy, pandas, pettingzoo, pyarrow' \
     gymnasium ipykernel 'matplotlib>=3.5' 'maturin>=1.9.4,<2' mypy nbclient 'numpy>=1.23' 'pandas>=1.5' pettingzoo \
