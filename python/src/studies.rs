@@ -6,9 +6,9 @@ use pyo3::prelude::*;
 use tautline::attack::Bound;
 use tautline::campaign::CampaignRequest;
 use tautline::export::WRITTEN;
-use tautline::export::drones::{Dialect, DroneOptions};
+use tautline::export::drones::Dialect;
 use tautline::margin::Range;
-use tautline::request::{DroneExportRequest, ExportRequest, Failure, Monitor as _, Silent, export_drones, export_file};
+use tautline::request::{DroneChoices, ExportRequest, Failure, Monitor as _, Silent, export_drones, export_file};
 use tautline::scenario::builtin;
 use tautline::studies::{Criterion, Experiment, Study as _, StudyFiles, StudyRequest};
 use tautline::sweep::SweptKey;
@@ -64,6 +64,21 @@ pub(crate) struct DroneKeywords {
     skyb_version: u8,
 }
 
+impl From<DroneKeywords> for DroneChoices {
+    fn from(keywords: DroneKeywords) -> Self {
+        Self {
+            tolerance_m: keywords.tolerance,
+            delta_m: keywords.delta,
+            ellipsoid_m: keywords.ellipsoid.map(Into::into),
+            obstacles: keywords.obstacles,
+            from_s: keywords.from_s,
+            until_s: keywords.until_s,
+            is_compressed: keywords.compressed,
+            skyb_version: keywords.skyb_version,
+        }
+    }
+}
+
 /// Writes a recording in another format, or for drones. Returns the answer of an export for drones.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
@@ -81,29 +96,11 @@ pub(crate) fn export(
     let lossless = WRITTEN.iter().map(|format| (format.name, (Some(*format), None)));
     let of_drones = Dialect::ALL.map(|dialect| (dialect.name(), (None, Some(dialect))));
     let (format, dialect) = choice("to", to, &lossless.chain(of_drones).collect::<Vec<_>>())?.unwrap_or_default();
+    let request = ExportRequest { paths, options, output, format, sample_hz, force };
     let Some(dialect) = dialect else {
-        let request = ExportRequest { paths, options, output, format, sample_hz, force };
         return answered(py, |monitor| export_file(&request, monitor)).map(|()| None);
     };
-    let usual = DroneOptions::new(dialect);
-    let request = DroneExportRequest {
-        paths,
-        options,
-        output,
-        drones: DroneOptions {
-            tolerance_m: drones.tolerance.or(usual.tolerance_m),
-            is_compressed: drones.compressed,
-            skyb_version: drones.skyb_version,
-            sample_hz,
-            ..usual
-        },
-        delta_m: drones.delta,
-        ellipsoid_m: drones.ellipsoid.map(Into::into),
-        obstacles: drones.obstacles,
-        from_s: drones.from_s,
-        until_s: drones.until_s,
-        force,
-    };
+    let request = request.for_drones(dialect, drones.into());
     let exported = answered(py, |monitor| export_drones(&request, monitor))?;
     Ok(Some((exported.is_good(), exported.to_json())))
 }

@@ -10,9 +10,9 @@ use super::Exit;
 use super::console::{self, Console, Terminal};
 use super::reading::{self, ReadArguments, one_of, three};
 use tautline_recordings::export::WRITTEN;
-use tautline_recordings::export::drones::{Dialect, DroneOptions};
+use tautline_recordings::export::drones::Dialect;
 use tautline_recordings::read::Format;
-use tautline_report::request::{DroneExportRequest, ExportRequest, Failure, export_drones, export_file};
+use tautline_report::request::{DroneChoices, ExportRequest, Failure, export_drones, export_file};
 
 /// Arguments of `tautline export`.
 #[derive(Debug, Args)]
@@ -76,6 +76,21 @@ struct DroneArguments {
     skyb_version: u8,
 }
 
+impl DroneArguments {
+    fn choices(&self) -> DroneChoices {
+        DroneChoices {
+            tolerance_m: self.tolerance,
+            delta_m: self.delta,
+            ellipsoid_m: self.ellipsoid,
+            obstacles: self.obstacles.clone(),
+            from_s: self.from,
+            until_s: self.until,
+            is_compressed: self.compressed,
+            skyb_version: self.skyb_version,
+        }
+    }
+}
+
 pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
     let [paths] = &arguments.reading.recordings()[..] else {
         let help = "give --join if each file holds a vehicle of one recording";
@@ -86,30 +101,12 @@ pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
     let (paths, options) = (paths.clone(), arguments.reading.options(arguments.input_format));
     let ExportArguments { output, format, sample_hz, force, drones, .. } = arguments;
     let (output, sample_hz, force) = (output.clone(), *sample_hz, *force);
+    let request = ExportRequest { paths, options, output, format: *format, sample_hz, force };
     let Some(dialect) = drones.to else {
-        let request = ExportRequest { paths, options, output, format: *format, sample_hz, force };
         export_file(&request, &terminal)?;
         return Ok(Exit::Good);
     };
-    let usual = DroneOptions::new(dialect);
-    let request = DroneExportRequest {
-        paths,
-        options,
-        output,
-        drones: DroneOptions {
-            tolerance_m: drones.tolerance.or(usual.tolerance_m),
-            is_compressed: drones.compressed,
-            skyb_version: drones.skyb_version,
-            sample_hz,
-            ..usual
-        },
-        delta_m: drones.delta,
-        ellipsoid_m: drones.ellipsoid,
-        obstacles: drones.obstacles.clone(),
-        from_s: drones.from,
-        until_s: drones.until,
-        force,
-    };
+    let request = request.for_drones(dialect, drones.choices());
     match export_drones(&request, &terminal)?.refusal {
         None => Ok(Exit::Good),
         Some(refusal) => {

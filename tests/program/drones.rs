@@ -142,6 +142,7 @@ fn wrong_input_ends_with_2_and_leaves_nothing() {
     write("two.csv", "t,id,x,y,z\n0,ä,0,0,0\n0,b,3,0,0\n1,ä,0,1,0\n1,b,3,1,0\n");
     write("steps.csv", "t,id,x,y,z\n0,a,0,0,1\n0,b,9,0,1\n10,a,2,0,1\n10,b,9,2,1\n20,a,4,0,1\n20,b,9,4,1\n");
     write("point.csv", &rows(&|t, name| name == "a" || t == 0.0));
+    write("wide.csv", "t,a_x,a_y,a_z,b_x,b_y,b_z\n0.5,0,0,1,,,\n1.5,1,0,1,,,\n2.5,2,0,1,,,\n");
     write("distant.csv", "t,id,x,y,z\n0.5,a,1e6,0,0\n0.5,b,1e6,3,0\n1.5,a,1e6,0,1\n1.5,b,1e6,3,1\n");
     fs::create_dir(folder.path().join("full")).expect("a folder");
     write("full/notes.md", "mine");
@@ -173,6 +174,14 @@ fn wrong_input_ends_with_2_and_leaves_nothing() {
             ["--until: must be", "3.0 s and 5.0 s"],
         ),
         ("steps.csv", "crazyflie", &[], "audit/guessed-time-unit", ["export --to", "--time-unit ms"]),
+        ("wide.csv", "skyb", &[], "export/absent", ["vehicle b: it is not seen at any time", "leave the vehicle out"]),
+        (
+            "late.csv",
+            "skyb",
+            &["--until", "1"],
+            "export/absent",
+            ["b: it is not seen in the exported", "export a part"],
+        ),
         ("point.csv", "skyb", &[], "export/absent", ["vehicle b", "absent for a part"]),
         ("distant.csv", "crazyflie", &[], "export/tolerance", ["rounds positions", "origin"]),
     ] {

@@ -287,8 +287,12 @@ impl From<RecordedError> for Failure {
                 let help = format!("leave --cylinder or --{other} out");
                 return Self::input("audit/cylinder", format!("--{error}"), help);
             }
-            RecordedError::WellClearMotion { .. } | RecordedError::WellClearAndEllipsoid => {
-                let help = "give --motion linear, or leave --motion out; judge ellipsoids without --well-clear";
+            RecordedError::WellClearMotion { .. } => {
+                let help = "give --motion linear, or leave --motion out";
+                return Self::input("audit/well-clear", format!("--{error}"), help);
+            }
+            RecordedError::WellClearAndEllipsoid => {
+                let help = "leave --ellipsoid or --well-clear out";
                 return Self::input("audit/well-clear", format!("--{error}"), help);
             }
             RecordedError::Obstacle(_) => ("audit/obstacle", "correct the obstacle file"),

@@ -23,7 +23,7 @@ mod run;
 mod scenario;
 
 pub use audit::{AuditRequest, AuditedRecording, ConfigFile, OwnRecording, Subject, audit_files, run_audit};
-pub use drones::{DroneExport, DroneExportRequest, export_drones};
+pub use drones::{DroneChoices, DroneExport, DroneExportRequest, export_drones};
 pub use export::{ExportRequest, export_file};
 pub use failure::{Failure, blanked, in_range};
 pub use identify::{IdentifiedModel, identify};

@@ -322,7 +322,7 @@ impl Work<'_> {
         if aim_m <= 0.0 {
             return Err(DroneError::Resolution { tolerance_m, rounding_m: reserve_m });
         }
-        let (mut nearest, mut least_m) = (None::<Deviation>, reserve_m);
+        let mut nearest: Option<Deviation> = None;
         for _ in 0..MOST_FITS {
             let pieces =
                 fit::fit(motion, aim_m, is_allowed, &|| (self.is_interrupted)()).map_err(|error| match error {
@@ -335,12 +335,8 @@ impl Work<'_> {
                     return Ok(encoded);
                 }
                 nearest = Some(found);
-                least_m = reserve_m.max(curve.arcs.iter().map(|arc| arc.rounding_m).fold(0.0, f64::max));
             }
             aim_m *= FIT_SHARE;
-        }
-        if least_m >= tolerance_m {
-            return Err(DroneError::Resolution { tolerance_m, rounding_m: least_m });
         }
         let time_s = nearest.map_or(0.0, |found| found.time_s);
         Err(DroneError::TooFast { vehicle: name.to_owned(), time_s, tolerance_m })

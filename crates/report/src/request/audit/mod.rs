@@ -5,234 +5,41 @@ mod config;
 mod own;
 mod places;
 mod proof;
+mod question;
 mod replays;
 pub mod rules;
+mod subject;
 mod toml_file;
 mod venue_file;
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 
 pub use against_plan::PlanQuestion;
 pub use own::{OwnRecording, run_audit};
+pub use question::{AuditRequest, ConfigFile};
 pub use rules::Rules;
+pub use subject::{Open, Subject, open, own_recording, recording_in};
 
 use self::against_plan::AuditedFlight;
 use self::own::RunAnswer;
+use self::question::{FASTEST_M_S, fastest_m_s};
 use super::run::{figure_files, write_files};
-use super::{Failure, Monitor, RECORDING, outputs};
+use super::{Failure, Monitor, outputs};
 use crate::figures::{self, Format as FigureFormat};
-use crate::report::recorded::{AssumedMotion, Basis, Clock, RecordedReport, Source};
+use crate::report::recorded::{Basis, Clock, RecordedReport, Source};
 use crate::report::{Status, write_atomically};
 use replays::Instants;
 use tautline_audit::Obstacle;
-use tautline_audit::recorded::{
-    Interpolation, Outcome, Presence, RecordedError, Settings, TrackAuditor, VehicleSettings,
-};
-use tautline_core::text::counted;
-use tautline_core::track::{Item, Tracks};
-use tautline_recordings::read::{self, Format, ReadError, ReadOptions, ShowRules};
+use tautline_audit::recorded::{Outcome, Presence, Settings, TrackAuditor};
+use tautline_core::track::Item;
 
 /// Number of items that are read before the first is judged. They determine the usual sampling intervals.
 const OPENING: usize = 65_536;
 
 /// Largest number of notes on vehicles that are never present together with another vehicle.
 const MOST_ALONE: usize = 3;
-
-/// Speed of sound \[m/s\], which no vehicle of a swarm reaches.
-const FASTEST_M_S: f64 = 340.0;
-
-/// Function that opens the recording at its beginning, at each call.
-pub type Open<'a> = dyn Fn() -> Result<Box<dyn Tracks<Error = ReadError> + 'a>, ReadError> + Sync + 'a;
-
-/// The recording of a request.
-#[derive(Clone)]
-pub enum Subject<'a> {
-    /// Files or folders. Several paths are one recording, each with a vehicle of its own.
-    Files {
-        /// Paths, at least one.
-        paths: Vec<PathBuf>,
-        /// Options of the readers.
-        options: Box<ReadOptions>,
-    },
-    /// Motion in the memory of the caller.
-    InMemory {
-        /// Name of the motion in messages.
-        name: &'a str,
-        /// Limits, obstacles and audit of a flight of `tautline run`.
-        own: Option<&'a OwnRecording>,
-        /// Function that opens the motion.
-        open: &'a Open<'a>,
-    },
-}
-
-impl Subject<'_> {
-    /// Returns the name of the recording in messages.
-    #[must_use]
-    pub fn name(&self) -> String {
-        match self {
-            Self::Files { paths, .. } => read::recording_name(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>()),
-            Self::InMemory { name, .. } => (*name).to_owned(),
-        }
-    }
-
-    /// Opens the recording at its beginning.
-    ///
-    /// # Errors
-    /// [`ReadError`] if the recording cannot be read.
-    pub fn open(&self) -> Result<Box<dyn Tracks<Error = ReadError> + '_>, ReadError> {
-        match self {
-            Self::Files { paths, options } => open(paths, options).map(|recording| recording as _),
-            Self::InMemory { open, .. } => open(),
-        }
-    }
-
-    /// Returns the path and the options if the recording is a single file.
-    fn only_file(&self) -> Option<(&Path, &ReadOptions)> {
-        match self {
-            Self::Files { paths, options } => match &paths[..] {
-                [path] => Some((path, options)),
-                _ => None,
-            },
-            Self::InMemory { .. } => None,
-        }
-    }
-
-    fn paths(&self) -> &[PathBuf] {
-        match self {
-            Self::Files { paths, .. } => paths,
-            Self::InMemory { .. } => &[],
-        }
-    }
-
-    /// Returns limits, obstacles and audit of a `tautline run` recording, and the rules of a show file.
-    fn own(&self, monitor: &dyn Monitor) -> Result<(Option<OwnRecording>, Option<ShowRules>), Failure> {
-        match self {
-            Self::InMemory { own, .. } => Ok((own.cloned(), None)),
-            Self::Files { paths, options } => {
-                let show = match paths.first() {
-                    Some(path) => read::show_rules(path, options).map_err(|error| Failure::from(error).of(path))?,
-                    None => None,
-                };
-                Ok((own_recording(paths, options, monitor)?, show))
-            }
-        }
-    }
-}
-
-/// Returns the folder of the figures of a page.
-fn figures_beside(html: &Path) -> PathBuf {
-    let stem = html.file_stem().unwrap_or_default().to_string_lossy();
-    html.with_file_name(format!("{stem}-figures"))
-}
-
-/// Opens files or folders as one recording.
-///
-/// # Errors
-/// [`ReadError`] if one of them cannot be read.
-pub fn open(paths: &[PathBuf], options: &ReadOptions) -> Result<read::Recording, ReadError> {
-    match paths {
-        [path] => read::open(&recording_in(path), options),
-        paths => read::open_joined(&paths.iter().map(PathBuf::as_path).collect::<Vec<_>>(), options),
-    }
-}
-
-/// Returns the recording in the folder of a run, and any other path unchanged.
-#[must_use]
-pub fn recording_in(path: &Path) -> PathBuf {
-    let recorded = path.join(RECORDING);
-    if recorded.is_file() { recorded } else { path.to_owned() }
-}
-
-/// Returns the contents of a recording of `tautline run` besides positions; `None` for any other recording.
-///
-/// # Errors
-/// [`Failure`] if its scenario cannot be read.
-pub fn own_recording(
-    paths: &[PathBuf],
-    options: &ReadOptions,
-    monitor: &dyn Monitor,
-) -> Result<Option<OwnRecording>, Failure> {
-    match paths {
-        [path] if options.format.is_none_or(|format| format == Format::MCAP) => {
-            OwnRecording::read(path, options, monitor)
-        }
-        _ => Ok(None),
-    }
-}
-
-/// Choice of the `tautline.toml` that fills options which the request leaves open.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub enum ConfigFile {
-    /// The nearest file in the recording's folder and its parents, up to the working folder.
-    #[default]
-    Nearest,
-    /// This file.
-    File(PathBuf),
-    /// No file.
-    None,
-}
-
-/// A recording and the question about it.
-#[derive(Clone)]
-pub struct AuditRequest<'a> {
-    /// The recording.
-    pub subject: Subject<'a>,
-    /// Limits, assumed motion, window, clocks and vehicles. Obstacles and a fence from files are added to them.
-    pub settings: Settings,
-    /// TOML file of obstacles.
-    pub obstacles: Option<PathBuf>,
-    /// TOML file of a fence.
-    pub fence: Option<PathBuf>,
-    /// Plan that the recording is compared with.
-    pub plan: Option<PlanQuestion>,
-    /// Origin of limits that the request leaves open.
-    pub rules: Rules,
-    /// Number of vehicles that must be present.
-    pub expect_vehicles: Option<usize>,
-    /// Whether the samples of a recording of `tautline run` are judged without the run's audit.
-    pub independent: bool,
-    /// Whether an undecided verdict counts as good.
-    pub allow_undecided: bool,
-    /// Whether the motion is exported for drones, so that a wrong unit of time changes its speed.
-    pub for_drones: bool,
-    /// Choice of the `tautline.toml`. Motion in memory has no nearest file.
-    pub config: ConfigFile,
-    /// Command or expression that repeats the audit, for the page.
-    pub command: String,
-    /// Path of the page with figures.
-    pub html: Option<PathBuf>,
-    /// Formats of the files of figures, in the folder `NAME-figures` beside the page `NAME.html`.
-    pub formats: Vec<FigureFormat>,
-    /// Path of the proof, which `check_proof.py` confirms. Available for one CSV table and a safety distance alone.
-    pub proof: Option<PathBuf>,
-}
-
-impl<'a> AuditRequest<'a> {
-    /// Returns a request without limits.
-    #[must_use]
-    pub fn new(subject: Subject<'a>) -> Self {
-        Self {
-            subject,
-            settings: Settings::default(),
-            obstacles: None,
-            fence: None,
-            plan: None,
-            rules: Rules::default(),
-            expect_vehicles: None,
-            independent: false,
-            allow_undecided: false,
-            for_drones: false,
-            config: ConfigFile::default(),
-            command: String::new(),
-            html: None,
-            formats: Vec::new(),
-            proof: None,
-        }
-    }
-}
 
 /// The answer of an audit.
 #[derive(Clone, Debug)]
@@ -291,210 +98,6 @@ pub fn audit_files(request: &AuditRequest<'_>, monitor: &dyn Monitor) -> Result<
     let configured = request.configured()?;
     configured.check_outputs(&[])?;
     configured.judge(monitor)
-}
-
-impl<'a> AuditRequest<'a> {
-    /// Fills options that are left open from the `tautline.toml`.
-    ///
-    /// # Errors
-    /// [`Failure`] if that file is wrong.
-    pub fn configured(&self) -> Result<ConfiguredAudit<'a>, Failure> {
-        let mut request = self.clone();
-        if let Subject::Files { paths, .. } = &mut request.subject {
-            for path in paths {
-                *path = recording_in(path);
-            }
-        }
-        config::configured(request)
-    }
-
-    /// Rejects outputs of the request and `more` outputs of the caller that would overwrite an input or each other.
-    ///
-    /// # Errors
-    /// [`Failure`] that names both files.
-    pub fn check_outputs(&self, more: &[outputs::NamedPath<'_>]) -> Result<(), Failure> {
-        let Self { subject, obstacles, fence, plan, html, proof, .. } = self;
-        let settings = config::file_of(self);
-        let mut inputs: Vec<_> = subject.paths().iter().map(|path| ("the recording", path.as_path())).collect();
-        inputs.extend(obstacles.as_deref().map(|path| ("the file of obstacles", path)));
-        inputs.extend(settings.as_deref().map(|path| ("the file of settings", path)));
-        inputs.extend(fence.as_deref().map(|path| ("the file of the fence", path)));
-        inputs.extend(plan.as_ref().map(|plan| ("the plan", plan.path.as_path())));
-        let own = [("--html", html), ("--proof", proof)];
-        let own = own.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?)));
-        outputs::check(&inputs, &more.iter().copied().chain(own).collect::<Vec<_>>())
-    }
-
-    /// Returns whether a radius is given, for all vehicles or for one.
-    fn has_radius(&self) -> bool {
-        self.settings.radius_m.is_some() || self.settings.vehicles.values().any(|of| of.radius_m.is_some())
-    }
-
-    /// Returns whether a largest acceleration is given, for all vehicles or for one.
-    fn has_max_accel(&self) -> bool {
-        self.settings.max_accel_m_s2.is_some() || self.settings.vehicles.values().any(|of| of.max_accel_m_s2.is_some())
-    }
-
-    /// Returns whether no limit on distances is given.
-    fn is_silent(&self) -> bool {
-        let settings = &self.settings;
-        let has_shape = settings.ellipsoid_m.is_some() || settings.cylinder.is_some();
-        settings.delta_m.is_none() && !self.has_radius() && !has_shape
-    }
-
-    /// Returns the settings with the obstacles and the fence of the files.
-    fn complete_settings(&self) -> Result<Settings, Failure> {
-        if self.has_max_accel() && self.settings.motion != Some(Interpolation::Bounded) {
-            return Err(Failure::input(
-                "audit/unused-acceleration",
-                "--max-accel has no effect without --motion bounded",
-                "add --motion bounded, or leave --max-accel out",
-            ));
-        }
-        if self.settings.ellipsoid_m.is_some() && self.has_radius() {
-            return Err(Failure::input(
-                "audit/radius-and-ellipsoid",
-                "--radius and --ellipsoid are both given",
-                "an ellipsoid has its own size: leave one of them out",
-            ));
-        }
-        let jumps = self.settings.motion.filter(|of| matches!(of, Interpolation::Hold | Interpolation::Bounded));
-        if let Some(motion) = jumps.filter(|_| self.settings.well_clear.is_some()) {
-            let error = RecordedError::WellClearMotion { motion: motion.name() };
-            let help = "give --motion linear, or leave --motion out";
-            return Err(Failure::input("audit/well-clear", format!("--{error}"), help));
-        }
-        if self.settings.only.as_ref().is_some_and(BTreeSet::is_empty) {
-            let help = "name at least one vehicle, or leave --ids out to judge all";
-            return Err(Failure::input("audit/nothing-to-judge", "--ids names no vehicle", help));
-        }
-        let limits = &self.settings.envelope.limits;
-        for (k, limit) in limits.iter().enumerate() {
-            if limits[..k].iter().any(|before| before.quantity == limit.quantity) {
-                let message = format!("--limit {} is given twice", limit.quantity.name());
-                return Err(Failure::input("audit/limit-twice", message, "give each limit once"));
-            }
-        }
-        self.plan.as_ref().map_or(Ok(()), PlanQuestion::check)?;
-        let mut settings = self.settings.clone();
-        settings.has_plan = self.plan.is_some();
-        settings.obstacles.extend(self.obstacles.as_deref().map_or(Ok(Vec::new()), venue_file::read_obstacles)?);
-        if let Some(fence) = self.fence.as_deref() {
-            settings.envelope.fence = Some(venue_file::read_fence(fence)?);
-        }
-        Ok(settings)
-    }
-
-    /// Returns the settings with the limits and obstacles of the files and of the recording.
-    ///
-    /// # Errors
-    /// [`Failure`] if the request or a file is wrong, or the recording cannot be read.
-    pub fn settings_with_limits(&self, monitor: &dyn Monitor) -> Result<Settings, Failure> {
-        let mut settings = self.complete_settings()?;
-        let (own, show) = self.subject.own(monitor)?;
-        rules::fill(&mut settings, self, show.as_ref())?;
-        RecordedLimits::fill(&mut settings, self, own.as_ref());
-        Ok(settings)
-    }
-
-    /// Rejects a single vehicle without other limits, and a number of vehicles other than the expected one.
-    fn check_count(&self, outcome: &Outcome, settings: &Settings) -> Result<(), Failure> {
-        let path = self.subject.name();
-        let judged = outcome.presence.iter().flatten().count();
-        if let Some(expected) = self.expect_vehicles
-            && judged != expected
-        {
-            let message = format!("{path}: {} to judge, not {expected}", counted(judged as u64, "vehicle", "vehicles"));
-            return Err(Failure::input(
-                "audit/vehicle-count",
-                message,
-                "look for missing or additional vehicles, or give another --expect-vehicles",
-            ));
-        }
-        let asked =
-            outcome.vehicles.iter().filter(|&name| settings.only.as_ref().is_none_or(|only| only.contains(name)));
-        let asked = asked.count();
-        if asked < 2 && settings.obstacles.is_empty() && settings.envelope.is_empty() && !settings.has_plan {
-            let message =
-                format!("{path}: {} to judge, but no second object", counted(asked as u64, "vehicle", "vehicles"));
-            let help = "judge two vehicles or more (--ids, --frame, --column id=NAME select them), or --obstacles, \
-                 --limit, --fence";
-            return Err(Failure::input("audit/nothing-to-judge", message, help));
-        }
-        if judged == 0 && (self.settings.from_s.is_some() || self.settings.to_s.is_some()) {
-            let message = format!("{path}: no vehicle is present between --from and --to");
-            return Err(Failure::input(
-                "audit/empty-window",
-                message,
-                "give a window in which the recording has vehicles",
-            ));
-        }
-        Ok(())
-    }
-
-    /// Rejects options in seconds if the unit of time is a guess. Seconds are accepted if the unit milliseconds would
-    /// make the vehicles of these first items faster than sound.
-    fn refuse_guessed_seconds(&self, unit: &str, items: &[Item]) -> Result<(), Failure> {
-        let settings = &self.settings;
-        let asked = [
-            (self.for_drones, "export --to"),
-            (settings.motion == Some(Interpolation::Bounded), "--motion bounded"),
-            (settings.from_s.is_some(), "--from"),
-            (settings.to_s.is_some(), "--to"),
-            (settings.max_gap_s.is_some(), "--max-gap"),
-            (settings.vehicles.values().any(|of| of.offset_s != 0.0), "--offset"),
-            (settings.envelope.limits.iter().any(|limit| limit.quantity.unit() != "m"), "--limit"),
-            (settings.has_plan || self.plan.is_some(), "--plan"),
-        ];
-        let Some((_, option)) = asked.into_iter().find(|(is_asked, _)| *is_asked) else { return Ok(()) };
-        let path = self.subject.name();
-        if unit != "s" {
-            let message = format!(
-                "{path}: the unit of time {unit} is inferred from the steps of whole numbers only, and {option} \
-                 depends on it"
-            );
-            return Err(Failure::input(
-                "audit/guessed-time-unit",
-                message,
-                format!("give --time-unit {unit}, or --time-unit s"),
-            ));
-        }
-        if 1000.0 * fastest_m_s(items) > FASTEST_M_S {
-            return Ok(());
-        }
-        let message =
-            format!("{path}: by their steps the times may be in seconds or milliseconds, and {option} depends on it");
-        Err(Failure::input("audit/guessed-time-unit", message, "give --time-unit s, or --time-unit ms"))
-    }
-
-    /// Returns the motion between samples, for a recording of curves or of `tautline run`. Nothing is proved if the
-    /// samples themselves are assumed.
-    fn assumed_motion(
-        &self,
-        curves: bool,
-        holds_every_step: bool,
-        answer: &RunAnswer,
-        assumed: Option<&str>,
-    ) -> AssumedMotion {
-        let most = || {
-            let all = self.settings.max_accel_m_s2.map(|a| format!("{a:?} m/s^2"));
-            let by_name =
-                |(name, of): (&String, &VehicleSettings)| of.max_accel_m_s2.map(|a| format!("{a:?} m/s^2 for {name}"));
-            all.into_iter().chain(self.settings.vehicles.iter().filter_map(by_name)).collect::<Vec<_>>().join(", ")
-        };
-        let (motion, basis) = match self.settings.motion {
-            Some(Interpolation::Hold) => ("held between samples, jumps swept".to_owned(), Basis::Assumed),
-            Some(Interpolation::Bounded) => (format!("accelerations of at most {}", most()), Basis::Bounded),
-            _ if curves => ("on the recording's curves".to_owned(), Basis::Recorded),
-            _ if *answer == RunAnswer::Repeated => ("by the run's audit of every step".to_owned(), Basis::Run),
-            _ if holds_every_step => ("on every step of the run".to_owned(), Basis::Recorded),
-            _ => ("straight between samples".to_owned(), Basis::Assumed),
-        };
-        match assumed {
-            Some(assumed) => AssumedMotion { motion: format!("{motion}, {assumed}"), basis: Basis::Assumed },
-            None => AssumedMotion { motion, basis },
-        }
-    }
 }
 
 impl ConfiguredAudit<'_> {
@@ -718,16 +321,8 @@ struct JudgedRecording {
     is_planar: bool,
 }
 
-/// Returns the largest speed of a vehicle between two samples \[m/s\]; 0 for curves.
-fn fastest_m_s(items: &[Item]) -> f64 {
-    let mut last: BTreeMap<usize, (f64, Vector3<f64>)> = BTreeMap::new();
-    let samples = items.iter().filter_map(|item| match item {
-        Item::Sample(sample) => Some((sample.vehicle, (sample.time_s, sample.position_m))),
-        Item::Piece(_) => None,
-    });
-    let speeds = samples.filter_map(|(vehicle, (time_s, position_m))| {
-        let (before_s, before_m) = last.insert(vehicle, (time_s, position_m))?;
-        Some((position_m - before_m).norm() / (time_s - before_s))
-    });
-    speeds.fold(0.0, f64::max)
+/// Returns the folder of the figures of a page.
+fn figures_beside(html: &Path) -> PathBuf {
+    let stem = html.file_stem().unwrap_or_default().to_string_lossy();
+    html.with_file_name(format!("{stem}-figures"))
 }

@@ -1,0 +1,305 @@
+//! The question of an audit: its options, and the checks of their combination.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+use nalgebra::Vector3;
+
+use super::super::{Failure, Monitor, outputs};
+use super::own::RunAnswer;
+use super::{ConfiguredAudit, PlanQuestion, RecordedLimits, Rules, Subject, config, recording_in, rules, venue_file};
+use crate::figures::Format as FigureFormat;
+use crate::report::recorded::{AssumedMotion, Basis};
+use tautline_audit::recorded::{Interpolation, Outcome, RecordedError, Settings, VehicleSettings};
+use tautline_core::text::counted;
+use tautline_core::track::Item;
+
+/// Speed of sound \[m/s\], which no vehicle of a swarm reaches.
+pub(super) const FASTEST_M_S: f64 = 340.0;
+
+/// Choice of the `tautline.toml` that fills options which the request leaves open.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub enum ConfigFile {
+    /// The nearest file in the recording's folder and its parents, up to the working folder.
+    #[default]
+    Nearest,
+    /// This file.
+    File(PathBuf),
+    /// No file.
+    None,
+}
+
+/// A recording and the question about it.
+#[derive(Clone)]
+pub struct AuditRequest<'a> {
+    /// The recording.
+    pub subject: Subject<'a>,
+    /// Limits, assumed motion, window, clocks and vehicles. Obstacles and a fence from files are added to them.
+    pub settings: Settings,
+    /// TOML file of obstacles.
+    pub obstacles: Option<PathBuf>,
+    /// TOML file of a fence.
+    pub fence: Option<PathBuf>,
+    /// Plan that the recording is compared with.
+    pub plan: Option<PlanQuestion>,
+    /// Origin of limits that the request leaves open.
+    pub rules: Rules,
+    /// Number of vehicles that must be present.
+    pub expect_vehicles: Option<usize>,
+    /// Whether the samples of a recording of `tautline run` are judged without the run's audit.
+    pub independent: bool,
+    /// Whether an undecided verdict counts as good.
+    pub allow_undecided: bool,
+    /// Whether the motion is exported for drones, so that a wrong unit of time changes its speed.
+    pub for_drones: bool,
+    /// Choice of the `tautline.toml`. Motion in memory has no nearest file.
+    pub config: ConfigFile,
+    /// Command or expression that repeats the audit, for the page.
+    pub command: String,
+    /// Path of the page with figures.
+    pub html: Option<PathBuf>,
+    /// Formats of the files of figures, in the folder `NAME-figures` beside the page `NAME.html`.
+    pub formats: Vec<FigureFormat>,
+    /// Path of the proof, which `check_proof.py` confirms. Available for one CSV table and a safety distance alone.
+    pub proof: Option<PathBuf>,
+}
+
+impl<'a> AuditRequest<'a> {
+    /// Returns a request without limits.
+    #[must_use]
+    pub fn new(subject: Subject<'a>) -> Self {
+        Self {
+            subject,
+            settings: Settings::default(),
+            obstacles: None,
+            fence: None,
+            plan: None,
+            rules: Rules::default(),
+            expect_vehicles: None,
+            independent: false,
+            allow_undecided: false,
+            for_drones: false,
+            config: ConfigFile::default(),
+            command: String::new(),
+            html: None,
+            formats: Vec::new(),
+            proof: None,
+        }
+    }
+}
+
+impl<'a> AuditRequest<'a> {
+    /// Fills options that are left open from the `tautline.toml`.
+    ///
+    /// # Errors
+    /// [`Failure`] if that file is wrong.
+    pub fn configured(&self) -> Result<ConfiguredAudit<'a>, Failure> {
+        let mut request = self.clone();
+        if let Subject::Files { paths, .. } = &mut request.subject {
+            for path in paths {
+                *path = recording_in(path);
+            }
+        }
+        config::configured(request)
+    }
+
+    /// Rejects outputs of the request and `more` outputs of the caller that would overwrite an input or each other.
+    ///
+    /// # Errors
+    /// [`Failure`] that names both files.
+    pub fn check_outputs(&self, more: &[outputs::NamedPath<'_>]) -> Result<(), Failure> {
+        let Self { subject, obstacles, fence, plan, html, proof, .. } = self;
+        let settings = config::file_of(self);
+        let mut inputs: Vec<_> = subject.paths().iter().map(|path| ("the recording", path.as_path())).collect();
+        inputs.extend(obstacles.as_deref().map(|path| ("the file of obstacles", path)));
+        inputs.extend(settings.as_deref().map(|path| ("the file of settings", path)));
+        inputs.extend(fence.as_deref().map(|path| ("the file of the fence", path)));
+        inputs.extend(plan.as_ref().map(|plan| ("the plan", plan.path.as_path())));
+        let own = [("--html", html), ("--proof", proof)];
+        let own = own.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?)));
+        outputs::check(&inputs, &more.iter().copied().chain(own).collect::<Vec<_>>())
+    }
+
+    /// Returns whether a radius is given, for all vehicles or for one.
+    pub(super) fn has_radius(&self) -> bool {
+        self.settings.radius_m.is_some() || self.settings.vehicles.values().any(|of| of.radius_m.is_some())
+    }
+
+    /// Returns whether a largest acceleration is given, for all vehicles or for one.
+    pub(super) fn has_max_accel(&self) -> bool {
+        self.settings.max_accel_m_s2.is_some() || self.settings.vehicles.values().any(|of| of.max_accel_m_s2.is_some())
+    }
+
+    /// Returns whether no limit on distances is given.
+    pub(super) fn is_silent(&self) -> bool {
+        let settings = &self.settings;
+        let has_shape = settings.ellipsoid_m.is_some() || settings.cylinder.is_some();
+        settings.delta_m.is_none() && !self.has_radius() && !has_shape
+    }
+
+    /// Returns the settings with the obstacles and the fence of the files.
+    pub(super) fn complete_settings(&self) -> Result<Settings, Failure> {
+        if self.has_max_accel() && self.settings.motion != Some(Interpolation::Bounded) {
+            return Err(Failure::input(
+                "audit/unused-acceleration",
+                "--max-accel has no effect without --motion bounded",
+                "add --motion bounded, or leave --max-accel out",
+            ));
+        }
+        if self.settings.ellipsoid_m.is_some() && self.has_radius() {
+            return Err(Failure::input(
+                "audit/radius-and-ellipsoid",
+                "--radius and --ellipsoid are both given",
+                "an ellipsoid has its own size: leave one of them out",
+            ));
+        }
+        let jumps = self.settings.motion.filter(|of| matches!(of, Interpolation::Hold | Interpolation::Bounded));
+        if let Some(motion) = jumps.filter(|_| self.settings.well_clear.is_some()) {
+            return Err(RecordedError::WellClearMotion { motion: motion.name() }.into());
+        }
+        if self.settings.only.as_ref().is_some_and(BTreeSet::is_empty) {
+            let help = "name at least one vehicle, or leave --ids out to judge all";
+            return Err(Failure::input("audit/nothing-to-judge", "--ids names no vehicle", help));
+        }
+        let limits = &self.settings.envelope.limits;
+        for (k, limit) in limits.iter().enumerate() {
+            if limits[..k].iter().any(|before| before.quantity == limit.quantity) {
+                let message = format!("--limit {} is given twice", limit.quantity.name());
+                return Err(Failure::input("audit/limit-twice", message, "give each limit once"));
+            }
+        }
+        self.plan.as_ref().map_or(Ok(()), PlanQuestion::check)?;
+        let mut settings = self.settings.clone();
+        settings.has_plan = self.plan.is_some();
+        settings.obstacles.extend(self.obstacles.as_deref().map_or(Ok(Vec::new()), venue_file::read_obstacles)?);
+        if let Some(fence) = self.fence.as_deref() {
+            settings.envelope.fence = Some(venue_file::read_fence(fence)?);
+        }
+        Ok(settings)
+    }
+
+    /// Returns the settings with the limits and obstacles of the files and of the recording.
+    ///
+    /// # Errors
+    /// [`Failure`] if the request or a file is wrong, or the recording cannot be read.
+    pub fn settings_with_limits(&self, monitor: &dyn Monitor) -> Result<Settings, Failure> {
+        let mut settings = self.complete_settings()?;
+        let (own, show) = self.subject.own(monitor)?;
+        rules::fill(&mut settings, self, show.as_ref())?;
+        RecordedLimits::fill(&mut settings, self, own.as_ref());
+        Ok(settings)
+    }
+
+    /// Rejects a single vehicle without other limits, and a number of vehicles other than the expected one.
+    pub(super) fn check_count(&self, outcome: &Outcome, settings: &Settings) -> Result<(), Failure> {
+        let path = self.subject.name();
+        let judged = outcome.presence.iter().flatten().count();
+        if let Some(expected) = self.expect_vehicles
+            && judged != expected
+        {
+            let message = format!("{path}: {} to judge, not {expected}", counted(judged as u64, "vehicle", "vehicles"));
+            return Err(Failure::input(
+                "audit/vehicle-count",
+                message,
+                "look for missing or additional vehicles, or give another --expect-vehicles",
+            ));
+        }
+        let asked =
+            outcome.vehicles.iter().filter(|&name| settings.only.as_ref().is_none_or(|only| only.contains(name)));
+        let asked = asked.count();
+        if asked < 2 && settings.obstacles.is_empty() && settings.envelope.is_empty() && !settings.has_plan {
+            let message =
+                format!("{path}: {} to judge, but no second object", counted(asked as u64, "vehicle", "vehicles"));
+            let help = "judge two vehicles or more (--ids, --frame, --column id=NAME select them), or --obstacles, \
+                 --limit, --fence";
+            return Err(Failure::input("audit/nothing-to-judge", message, help));
+        }
+        if judged == 0 && (self.settings.from_s.is_some() || self.settings.to_s.is_some()) {
+            let message = format!("{path}: no vehicle is present between --from and --to");
+            return Err(Failure::input(
+                "audit/empty-window",
+                message,
+                "give a window in which the recording has vehicles",
+            ));
+        }
+        Ok(())
+    }
+
+    /// Rejects options in seconds if the unit of time is a guess. Seconds are accepted if the unit milliseconds would
+    /// make the vehicles of these first items faster than sound.
+    pub(super) fn refuse_guessed_seconds(&self, unit: &str, items: &[Item]) -> Result<(), Failure> {
+        let settings = &self.settings;
+        let asked = [
+            (self.for_drones, "export --to"),
+            (settings.motion == Some(Interpolation::Bounded), "--motion bounded"),
+            (settings.from_s.is_some(), "--from"),
+            (settings.to_s.is_some(), "--to"),
+            (settings.max_gap_s.is_some(), "--max-gap"),
+            (settings.vehicles.values().any(|of| of.offset_s != 0.0), "--offset"),
+            (settings.envelope.limits.iter().any(|limit| limit.quantity.unit() != "m"), "--limit"),
+            (settings.has_plan || self.plan.is_some(), "--plan"),
+        ];
+        let Some((_, option)) = asked.into_iter().find(|(is_asked, _)| *is_asked) else { return Ok(()) };
+        let path = self.subject.name();
+        if unit != "s" {
+            let message = format!(
+                "{path}: the unit of time {unit} is inferred from the steps of whole numbers only, and {option} \
+                 depends on it"
+            );
+            return Err(Failure::input(
+                "audit/guessed-time-unit",
+                message,
+                format!("give --time-unit {unit}, or --time-unit s"),
+            ));
+        }
+        if 1000.0 * fastest_m_s(items) > FASTEST_M_S {
+            return Ok(());
+        }
+        let message =
+            format!("{path}: by their steps the times may be in seconds or milliseconds, and {option} depends on it");
+        Err(Failure::input("audit/guessed-time-unit", message, "give --time-unit s, or --time-unit ms"))
+    }
+
+    /// Returns the motion between samples, for a recording of curves or of `tautline run`. Nothing is proved if the
+    /// samples themselves are assumed.
+    pub(super) fn assumed_motion(
+        &self,
+        curves: bool,
+        holds_every_step: bool,
+        answer: &RunAnswer,
+        assumed: Option<&str>,
+    ) -> AssumedMotion {
+        let most = || {
+            let all = self.settings.max_accel_m_s2.map(|a| format!("{a:?} m/s^2"));
+            let by_name =
+                |(name, of): (&String, &VehicleSettings)| of.max_accel_m_s2.map(|a| format!("{a:?} m/s^2 for {name}"));
+            all.into_iter().chain(self.settings.vehicles.iter().filter_map(by_name)).collect::<Vec<_>>().join(", ")
+        };
+        let (motion, basis) = match self.settings.motion {
+            Some(Interpolation::Hold) => ("held between samples, jumps swept".to_owned(), Basis::Assumed),
+            Some(Interpolation::Bounded) => (format!("accelerations of at most {}", most()), Basis::Bounded),
+            _ if curves => ("on the recording's curves".to_owned(), Basis::Recorded),
+            _ if *answer == RunAnswer::Repeated => ("by the run's audit of every step".to_owned(), Basis::Run),
+            _ if holds_every_step => ("on every step of the run".to_owned(), Basis::Recorded),
+            _ => ("straight between samples".to_owned(), Basis::Assumed),
+        };
+        match assumed {
+            Some(assumed) => AssumedMotion { motion: format!("{motion}, {assumed}"), basis: Basis::Assumed },
+            None => AssumedMotion { motion, basis },
+        }
+    }
+}
+
+/// Returns the largest speed of a vehicle between two samples \[m/s\]; 0 for curves.
+pub(super) fn fastest_m_s(items: &[Item]) -> f64 {
+    let mut last: BTreeMap<usize, (f64, Vector3<f64>)> = BTreeMap::new();
+    let samples = items.iter().filter_map(|item| match item {
+        Item::Sample(sample) => Some((sample.vehicle, (sample.time_s, sample.position_m))),
+        Item::Piece(_) => None,
+    });
+    let speeds = samples.filter_map(|(vehicle, (time_s, position_m))| {
+        let (before_s, before_m) = last.insert(vehicle, (time_s, position_m))?;
+        Some((position_m - before_m).norm() / (time_s - before_s))
+    });
+    speeds.fold(0.0, f64::max)
+}

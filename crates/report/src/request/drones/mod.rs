@@ -1,0 +1,341 @@
+//! `export_drones`: writes a flight for drones, and judges the written motion.
+//!
+//! The flight is audited, encoded and written beside the output. The written files are read back, compared with the
+//! flight and audited. Only files that were proved, or judged clear for sampled formats, get the name of the output.
+
+mod answer;
+mod written;
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use nalgebra::Vector3;
+
+pub use self::answer::DroneExport;
+use self::written::Written;
+use super::audit::{AuditRequest, ConfigFile, Subject, recording_in};
+use super::{ExportRequest, Failure, Monitor, Quiet, outputs};
+use crate::report::Status;
+use crate::report::recorded::RecordedReport;
+use tautline_audit::envelope::{Limit, Quantity};
+use tautline_audit::recorded::Settings;
+use tautline_recordings::export::drones::{self, Dialect, DroneOptions, FlownVehicle};
+use tautline_recordings::read::ReadOptions;
+
+/// Largest speed of a limit that no vehicle reaches \[m/s\]: a lone vehicle is read under it for its gaps.
+const BEYOND_M_S: f64 = 1e9;
+/// A recording and the files to write for drones.
+#[derive(Clone, Debug)]
+pub struct DroneExportRequest {
+    /// Files or folders. Several paths are one recording, each with a vehicle of its own.
+    pub paths: Vec<PathBuf>,
+    /// Options of the readers.
+    pub options: ReadOptions,
+    /// Path of the output: a folder or a file, as the format demands.
+    pub output: PathBuf,
+    /// Format, tolerance and rate. The safety distance is set from the limits.
+    pub drones: DroneOptions,
+    /// Safety distance \[m\]; by default that of the recording.
+    pub delta_m: Option<f64>,
+    /// Half axes of the ellipsoid around each vehicle \[m\]; by default that of the recording.
+    pub ellipsoid_m: Option<Vector3<f64>>,
+    /// TOML file of obstacles; by default those of the recording.
+    pub obstacles: Option<PathBuf>,
+    /// Start of the exported part of the flight \[s\].
+    pub from_s: Option<f64>,
+    /// End of the exported part of the flight \[s\].
+    pub until_s: Option<f64>,
+    /// Whether an existing output is overwritten.
+    pub force: bool,
+}
+
+/// Options that only an export for drones has, each in its default state if the caller leaves it out.
+#[derive(Clone, Debug)]
+pub struct DroneChoices {
+    /// Largest distance from the flight \[m\]; by default that of the format.
+    pub tolerance_m: Option<f64>,
+    /// Safety distance \[m\]; by default that of the recording.
+    pub delta_m: Option<f64>,
+    /// Half axes of the ellipsoid around each vehicle \[m\]; by default that of the recording.
+    pub ellipsoid_m: Option<Vector3<f64>>,
+    /// TOML file of obstacles; by default those of the recording.
+    pub obstacles: Option<PathBuf>,
+    /// Start of the exported part of the flight \[s\].
+    pub from_s: Option<f64>,
+    /// End of the exported part of the flight \[s\].
+    pub until_s: Option<f64>,
+    /// Whether Crazyflie trajectories are compressed.
+    pub is_compressed: bool,
+    /// Version of `.skyb` files: 1, or 2 with a checksum.
+    pub skyb_version: u8,
+}
+
+impl ExportRequest {
+    /// Returns the request for drones with these files and this sampling rate.
+    #[must_use]
+    pub fn for_drones(self, dialect: Dialect, choices: DroneChoices) -> DroneExportRequest {
+        let Self { paths, options, output, format: _, sample_hz, force } = self;
+        let usual = DroneOptions::new(dialect);
+        let drones = DroneOptions {
+            tolerance_m: choices.tolerance_m.or(usual.tolerance_m),
+            is_compressed: choices.is_compressed,
+            skyb_version: choices.skyb_version,
+            sample_hz,
+            ..usual
+        };
+        let DroneChoices { delta_m, ellipsoid_m, obstacles, from_s, until_s, .. } = choices;
+        DroneExportRequest { paths, options, output, drones, delta_m, ellipsoid_m, obstacles, from_s, until_s, force }
+    }
+}
+
+/// Writes a flight for drones, judges the written files, and removes them if they are not clear.
+///
+/// # Errors
+/// [`Failure`] if the request or the recording is wrong, if the format cannot hold the flight, or if no file can be
+/// written. A violation is no error: see [`DroneExport::refusal`].
+pub fn export_drones(request: &DroneExportRequest, monitor: &dyn Monitor) -> Result<DroneExport, Failure> {
+    let paths = request.paths.iter().map(|path| recording_in(path)).collect();
+    let request = &DroneExportRequest { paths, ..request.clone() };
+    request.check()?;
+    let flight = Flight::read(request, monitor)?;
+    for note in &flight.notes {
+        monitor.warn(&format!("note: {note}"));
+    }
+    if flight.audit.status == Status::Violation {
+        let message = format!("the flight itself is not clear: {}", flight.audit.headline());
+        let help = "fly it with a larger separation, or export a part without the violation by --from and --until";
+        let refusal = Some(Failure::input("export/violation", message, help));
+        return Ok(DroneExport { span_s: flight.span_s, refusal, ..DroneExport::empty() });
+    }
+    let mut options = request.drones;
+    options.delta_m = flight.settings.delta_m.filter(|_| flight.settings.ellipsoid_m.is_none());
+    let motions: Vec<_> = flight.vehicles.iter().map(|of| (of.name.clone(), of.motion.clone())).collect();
+    monitor.begin("fit", None);
+    let encoded = drones::encode(&motions, &options, &|| monitor.is_interrupted());
+    monitor.finish();
+    let encoded = encoded.map_err(|error| error.later(flight.span_s.0))?;
+    let written = Written::new(&request.output, &options, &encoded)?;
+    let mut answer = written.judged(&flight, &options, encoded, monitor)?;
+    if answer.refusal.is_none() {
+        written.keep(request.force)?;
+        monitor.say(&answer.text(request, &flight));
+    }
+    answer.bytes = written.bytes;
+    Ok(answer)
+}
+
+impl DroneExportRequest {
+    /// Checks the options and the output.
+    fn check(&self) -> Result<(), Failure> {
+        let Self { drones, output, .. } = self;
+        let dialect = drones.dialect;
+        let unused = [
+            (drones.is_compressed && dialect != Dialect::Crazyflie, "--compressed", "crazyflie"),
+            (drones.skyb_version != 2 && dialect != Dialect::Skyb, "--skyb-version", "skyb"),
+            (drones.sample_hz.is_some() && !dialect.is_sampled(), "--sample-hz", "px4-show and vviz"),
+        ];
+        if let Some((_, option, of)) = unused.into_iter().find(|(is_unused, ..)| *is_unused) {
+            let message = format!("{option}: has no effect with --to {}", dialect.name());
+            return Err(Failure::input("export/unused-option", message, format!("leave it out, or give --to {of}")));
+        }
+        if self.ellipsoid_m.is_some() && self.obstacles.is_some() {
+            let message = "--ellipsoid and --obstacles: must not both be given";
+            return Err(Failure::input("export/unused-option", message, "leave one of them out"));
+        }
+        let replaceable = match fs::read_dir(output) {
+            Ok(mut entries) => dialect.is_folder() && (entries.next().is_none() || (self.force && is_export(output))),
+            Err(_) => !output.exists() || (!dialect.is_folder() && self.force),
+        };
+        if !replaceable {
+            let help = if output.is_dir() != dialect.is_folder() {
+                format!("give a {} that does not exist", if dialect.is_folder() { "folder" } else { "file" })
+            } else if self.force {
+                "give another folder: it holds other files than an export".to_owned()
+            } else {
+                "overwrite it with --force, or give another path".to_owned()
+            };
+            return Err(Failure::input("files/exists", format!("`{}` exists", output.display()), help));
+        }
+        let parent = output.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        if !parent.is_dir() {
+            let message = format!("--output: there is no folder {}", parent.display());
+            return Err(Failure::input("files/no-folder", message, "make this folder, or give another path"));
+        }
+        let mut inputs: Vec<_> = self.paths.iter().map(|path| ("the recording", path.as_path())).collect();
+        inputs.extend(self.obstacles.as_deref().map(|path| ("the file of obstacles", path)));
+        let replaced = fs::canonicalize(output).ok();
+        let is_within =
+            |path: &Path| fs::canonicalize(path).ok().zip(replaced.as_ref()).is_some_and(|(a, b)| a.starts_with(b));
+        if let Some((called, path)) = inputs.iter().find(|(_, path)| is_within(path)) {
+            let message = format!("--output {} would overwrite {called}, {}", output.display(), path.display());
+            return Err(Failure::input("files/overwrites-input", message, "give another path"));
+        }
+        outputs::check(&inputs, &[("--output", output)])
+    }
+
+    /// Returns the request for the audit of the flight.
+    fn audit(&self) -> AuditRequest<'static> {
+        let subject = Subject::Files { paths: self.paths.clone(), options: Box::new(self.options.clone()) };
+        let settings = Settings {
+            delta_m: self.delta_m,
+            ellipsoid_m: self.ellipsoid_m,
+            from_s: self.from_s,
+            to_s: self.until_s,
+            ..Settings::default()
+        };
+        let obstacles = self.obstacles.clone();
+        AuditRequest { settings, obstacles, for_drones: true, config: ConfigFile::None, ..AuditRequest::new(subject) }
+    }
+
+    /// Checks the window before anything is read.
+    fn check_window(&self) -> Result<(), Failure> {
+        for (option, given) in [("--from", self.from_s), ("--until", self.until_s)] {
+            if let Some(given) = given.filter(|given| !given.is_finite()) {
+                let message = format!("{option}: must be a finite number of seconds, got {given:?}");
+                return Err(Failure::input("export/window", message, format!("give {option} a time such as 2.5")));
+            }
+        }
+        match (self.from_s, self.until_s) {
+            (Some(from_s), Some(until_s)) if until_s <= from_s => {
+                let message = format!("--until: must be after --from, got {until_s:?} s and {from_s:?} s");
+                Err(Failure::input("export/window", message, "give a larger --until or a smaller --from"))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Refuses a vehicle that is absent for a part of the window, or whose motion has a gap.
+    fn check_presence(&self, report: &RecordedReport) -> Result<(), Failure> {
+        let is_window = self.from_s.is_some() || self.until_s.is_some();
+        if let Some(absent) = report.presence.listed.first() {
+            let spans = report.presence.listed.iter();
+            let is_seen = spans.clone().all(|of| of.finding.from_s.is_some());
+            let from_s = spans.clone().filter_map(|of| of.finding.from_s).fold(f64::NEG_INFINITY, f64::max);
+            let to_s = spans.filter_map(|of| of.finding.to_s).fold(f64::INFINITY, f64::min);
+            let seen = match (absent.finding.from_s, absent.finding.to_s) {
+                (Some(first_s), Some(last_s)) => {
+                    format!("is absent for a part of the flight (seen {first_s:?} s to {last_s:?} s)")
+                }
+                _ if self.from_s.is_none() && self.until_s.is_none() => "is not seen at any time".to_owned(),
+                _ => "is not seen in the exported part".to_owned(),
+            };
+            let message = format!("vehicle {}: it {seen}", absent.vehicle);
+            let help = if is_seen && from_s < to_s {
+                format!("export the part in which all vehicles are present: --from {from_s:?} --until {to_s:?}")
+            } else {
+                let part = if is_window { ", or export a part in which all vehicles are present" } else { "" };
+                format!("leave the vehicle out of the recording{part}")
+            };
+            return Err(Failure::input("export/absent", message, help));
+        }
+        if let Some(gap) = report.gaps.first() {
+            let (from_s, to_s) = (gap.finding.from_s, gap.finding.to_s);
+            let message =
+                format!("vehicle {}: its motion from {from_s:?} s to {to_s:?} s is unknown, a gap", gap.vehicle);
+            let help = "export a part without the gap by --from and --until, or record all samples";
+            return Err(Failure::input("export/gap", message, help));
+        }
+        Ok(())
+    }
+
+    /// Returns an error of the audit in terms of the options of an export.
+    fn in_own_terms(&self, failure: Failure, vehicles: &[FlownVehicle]) -> Failure {
+        let help = match failure.code() {
+            "audit/empty-window" => {
+                let spans = || vehicles.iter().filter_map(|of| of.motion.span_s());
+                let first_s = spans().map(|span| span.0).fold(f64::INFINITY, f64::min);
+                let last_s = spans().map(|span| span.1).fold(f64::NEG_INFINITY, f64::max);
+                let (option, given) = match (self.from_s, self.until_s) {
+                    (Some(from_s), until_s) if until_s.is_none() || from_s > last_s => ("--from", from_s),
+                    (_, until_s) => ("--until", until_s.unwrap_or(last_s)),
+                };
+                let message = format!(
+                    "{option}: no vehicle is present in the exported part, got {given:?} s; the recording has \
+                     {first_s:?} s to {last_s:?} s"
+                );
+                return Failure::input("export/window", message, "give --from and --until within the recording");
+            }
+            "audit/no-limit" => "give --delta or --ellipsoid",
+            "audit/obstacles-and-ellipsoid" => "give --delta, or leave --obstacles out",
+            _ => return failure,
+        };
+        failure.with_help(help)
+    }
+}
+
+/// Returns whether a folder holds nothing but files of an export.
+fn is_export(folder: &Path) -> bool {
+    let is_exported = |entry: fs::DirEntry| {
+        let path = entry.path();
+        entry.file_type().is_ok_and(|of| of.is_file()) && drones::is_exported(&path).unwrap_or(false)
+    };
+    fs::read_dir(folder).is_ok_and(|mut entries| entries.all(|entry| entry.is_ok_and(is_exported)))
+}
+
+/// Exported part of a flight.
+struct Flight {
+    /// Vehicles with their motions from the start of the part on.
+    vehicles: Vec<FlownVehicle>,
+    /// Start and end \[s\].
+    span_s: (f64, f64),
+    /// Limits for the written motion.
+    settings: Settings,
+    /// Whether there are two objects to keep apart.
+    has_pair: bool,
+    /// Verdict on the flight.
+    audit: RecordedReport,
+    notes: Vec<String>,
+}
+
+impl Flight {
+    fn read(request: &DroneExportRequest, monitor: &dyn Monitor) -> Result<Self, Failure> {
+        request.check_window()?;
+        let quiet = Quiet::new(monitor);
+        let mut audit = request.audit();
+        let mut settings = audit.settings_with_limits(&quiet)?;
+        let mut vehicles = {
+            let mut recording = audit.subject.open()?;
+            if recording.is_planar() {
+                let message = format!("{}: no heights are known", audit.subject.name());
+                let help = "name the column of the height with --column z=NAME";
+                return Err(Failure::input("export/no-heights", message, help));
+            }
+            drones::motions(recording.as_mut(), false)?
+        };
+        let has_pair = vehicles.len() > 1 || !settings.obstacles.is_empty();
+        if !has_pair {
+            audit.settings.envelope.limits = vec![Limit { quantity: Quantity::Speed, allowed: BEYOND_M_S }];
+        }
+        let judged = audit.configured()?.judge(&quiet).map_err(|error| request.in_own_terms(error, &vehicles))?;
+        let report = judged.report;
+        request.check_presence(&report)?;
+        let span = |of: &FlownVehicle| {
+            of.motion.span_s().ok_or_else(|| {
+                let message = format!("vehicle {}: it has fewer than two samples", of.name);
+                let help = "leave it out of the recording: a drone needs a motion";
+                Failure::input("export/absent", message, help)
+            })
+        };
+        let spans = vehicles.iter().map(span).collect::<Result<Vec<_>, _>>()?;
+        let from_s = spans.iter().map(|span| span.0).fold(request.from_s.unwrap_or(f64::NEG_INFINITY), f64::max);
+        let until_s = spans.iter().map(|span| span.1).fold(request.until_s.unwrap_or(f64::INFINITY), f64::min);
+        if until_s <= from_s {
+            let message = format!("the exported part from {from_s:?} s to {until_s:?} s is empty");
+            return Err(Failure::input("export/absent", message, "give --from and --until within the recording"));
+        }
+        for vehicle in &mut vehicles {
+            vehicle.motion = vehicle.motion.window(from_s, until_s);
+        }
+        let mut notes = report.source.notes.clone();
+        if report.status == Status::Undecided {
+            notes.push(format!("the flight itself is {}", report.headline()));
+        }
+        // The written motion begins at 0 s.
+        for (time_s, _) in settings.obstacles.iter_mut().flat_map(|obstacle| &mut obstacle.path) {
+            *time_s -= from_s;
+        }
+        settings.max_gap_s = Some(f64::INFINITY);
+        (settings.from_s, settings.to_s, settings.is_own_limit) = (None, None, false);
+        Ok(Self { vehicles, span_s: (from_s, until_s), settings, has_pair, audit: report, notes })
+    }
+}
