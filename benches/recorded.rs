@@ -11,6 +11,7 @@ use std::time::Instant;
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
 use nalgebra::Vector3;
 use tautline::audit::recorded::{Approach, ObjectPair, Settings, audit};
+use tautline::audit::{Cylinder, WellClear};
 use tautline::track::{Item, Sample};
 
 /// Limit that the show keeps.
@@ -212,5 +213,29 @@ fn recorded(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, recorded);
+/// Times the other limits of pairs on the same show: cylinders, and well clear with and without a horizon.
+fn limits(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("limits of pairs");
+    group.sample_size(10);
+    let cylinder = Cylinder { horizontal_m: DELTA_M, vertical_m: 1.0 };
+    let near = WellClear { horizontal_m: DELTA_M, vertical_m: 1.0, tau_s: 0.0 };
+    let limits = [
+        ("delta", Settings::delta(DELTA_M)),
+        ("cylinder", Settings { cylinder: Some(cylinder), ..Settings::default() }),
+        ("well clear", Settings { well_clear: Some(near), ..Settings::default() }),
+        ("well clear, tau 1 s", Settings { well_clear: Some(WellClear { tau_s: 1.0, ..near }), ..Settings::default() }),
+    ];
+    for vehicles in [5, 100, 1000] {
+        let names: Vec<String> = (1..=vehicles).map(|k| k.to_string()).collect();
+        let items = show(vehicles);
+        for (name, settings) in &limits {
+            group.bench_function(BenchmarkId::new(*name, vehicles), |bencher| {
+                bencher.iter(|| black_box(audit(&names, black_box(&items), settings.clone()).expect("judged")));
+            });
+        }
+    }
+    group.finish();
+}
+
+criterion_group!(benches, recorded, limits);
 criterion_main!(benches);

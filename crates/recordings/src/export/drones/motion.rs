@@ -373,5 +373,8 @@ mod tests {
         assert!((part.position_m(0.5).x - 1.0).abs() < 1e-14);
         let resting = part.resting_until(3.0);
         assert_eq!(resting.position_m(2.5), resting.position_m(1.0));
+        let mut rough = parabola();
+        rough.arcs[0].rounding_m = 0.5;
+        assert_eq!(rough.resting_until(3.0).arcs[1].rounding_m, 0.5, "the end is rounded as the arc is");
     }
 }
