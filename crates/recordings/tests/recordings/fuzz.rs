@@ -1,6 +1,7 @@
 //! Readers end with motion or an error for arbitrary bytes, without a panic and with little memory.
 //!
-//! The number of cases is small by default; `TAUTLINE_FUZZ_CASES` sets the number of each kind.
+//! The number of cases is small by default; `TAUTLINE_FUZZ_CASES` sets the number of each kind. `TAUTLINE_FUZZ_CORPUS`
+//! is a folder for the seeds, as the first inputs of the targets in `fuzz/`.
 
 use std::collections::BTreeMap;
 use std::fs::{self, File};
@@ -11,10 +12,10 @@ use std::time::{Duration, Instant};
 
 use proptest::prelude::*;
 use proptest::test_runner::{Config, TestRunner};
-use tautline_core::track::Item;
 use tautline_recordings::export::{self, ExportOptions};
 use tautline_recordings::read::{self, Format, ReadOptions};
 
+use crate::contract::read_whole;
 use crate::messages::{cdr, mcap_with};
 use crate::recording::Whole;
 use crate::ulog::Log;
@@ -25,9 +26,6 @@ const CASES: u32 = 60;
 /// Time limit for a file of a few kilobytes, on a slow and busy machine.
 const PATIENCE: Duration = Duration::from_secs(20);
 
-/// Limit of the number of items in a file of a few kilobytes.
-const MANY: usize = 10_000_000;
-
 fn cases() -> u32 {
     std::env::var("TAUTLINE_FUZZ_CASES").ok().and_then(|cases| cases.parse().ok()).unwrap_or(CASES)
 }
@@ -37,6 +35,7 @@ const CSV: &str =
 const WIDE: &str = "t,x1,y1,z1,x2,y2,z2\n0,1,2,3,-1.5,.25,1e-3\n.5,1.5,2,3,,,\n";
 const TEXT: &str = "# t x1 y1 z1 x2 y2 z2\n0 1 2 3 -1.5 .25 1e-3\n.5   1.5\t2 3 -1 .25 2e-3\n";
 const TUPLES: &str = "0 (1,2) (-1.5,.25)\n.5 (1.5, 2) (-1,.25)\n";
+const TRAJNET: &str = "0 1 1.5 2\n0 2 3 4\n10 1 1.5 2.5\n10 2 3 4.5\n";
 const ONE: &str = "t,x,y,z\n0,1,2,3\n.5,1,2,4\n";
 const POLYNOMIAL: &str = "duration,x^0,x^1,y^0,y^1,z^0,z^1,\n1,0,1,0,0,1,0,\n0.5,1,1,0,0,1,0,\n";
 const BEZIER: &str = "#duration,p0x,p0y,p0z,...\n1,0,0,1,1,2,1,\n0.5,1,2,1,1,2,1\n";
@@ -115,6 +114,7 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         ("tuples", TUPLES.into()),
         ("polynomial", POLYNOMIAL.into()),
         ("bezier", BEZIER.into()),
+        ("trajnet", TRAJNET.into()),
         ("planned", planned()),
         ("show", SHOW.into()),
         ("gzip", gzip.finish().expect("finished")),
@@ -146,7 +146,8 @@ fn options_of(seed: &str) -> ReadOptions {
     let is_mcap = ["mcap", "planned", "foreign", "zstd", "frames", "metadata.yaml", "bag_0.mcap", "bag_1.mcap.zstd"]
         .contains(&seed);
     let frame = (seed == "frames").then(|| "map".to_owned());
-    ReadOptions { frame, allow_unfinished: is_mcap, ..ReadOptions::default() }
+    let times_per_second = (seed == "trajnet").then_some(30.0);
+    ReadOptions { frame, times_per_second, allow_unfinished: is_mcap, ..ReadOptions::default() }
 }
 
 /// Returns a curve of each planner.
@@ -245,45 +246,11 @@ fn packed(plain: &[u8], compression: &str) -> Vec<u8> {
 /// Reads a file to its end or to an error, and checks the items.
 fn check_read(path: &Path, options: &ReadOptions) -> Result<(), String> {
     let begin = Instant::now();
-    let outcome = catch_unwind(AssertUnwindSafe(|| {
-        let mut items = Vec::new();
-        let mut tracks = read::open(path, options).map_err(|error| (error.to_string(), error.help()))?;
-        while tracks.read(&mut items).map_err(|error| (error.to_string(), error.help()))? {
-            if items.len() > MANY {
-                return Ok(Some("there is no end of items".to_owned()));
-            }
-        }
-        Ok(fault_of(&items, tracks.vehicles().len()))
-    }));
+    let outcome = catch_unwind(AssertUnwindSafe(|| read_whole(path, options)));
     if begin.elapsed() > PATIENCE {
         return Err(format!("it took {:?}", begin.elapsed()));
     }
-    match outcome {
-        Err(_) => Err("it panicked".to_owned()),
-        Ok(Ok(Some(fault))) => Err(fault),
-        Ok(Err((said, help))) if said.is_empty() || help.is_empty() => Err(format!("{said:?} {help:?}")),
-        Ok(_) => Ok(()),
-    }
-}
-
-/// Returns a violation of the contract of `Tracks`, if there is one.
-fn fault_of(items: &[Item], vehicles: usize) -> Option<String> {
-    let mut last = vec![f64::NEG_INFINITY; vehicles];
-    let mut now = f64::NEG_INFINITY;
-    for item in items {
-        let (time_s, vehicle) = (item.time_s(), item.vehicle());
-        let finite = match item {
-            Item::Sample(sample) => sample.position_m.iter().all(|x| x.is_finite()),
-            Item::Piece(piece) => {
-                piece.to_s > piece.from_s && piece.coefficients.iter().flatten().all(|x| x.is_finite())
-            }
-        };
-        if !finite || !time_s.is_finite() || time_s < now || vehicle >= vehicles || time_s <= last[vehicle] {
-            return Some(format!("{item:?} after {now} s"));
-        }
-        (now, last[vehicle]) = (time_s, time_s);
-    }
-    None
+    outcome.unwrap_or_else(|_| Err("it panicked".to_owned()))
 }
 
 fn each(name: &str, strategy: impl Strategy<Value = Vec<u8>>, options: &ReadOptions) {
@@ -417,4 +384,29 @@ fn seeds_are_valid() {
         // The JSON show refers to a part that only the archive contains.
         assert_eq!(read.is_ok(), name != "show", "{name}: {:?}", read.err().map(|error| error.to_string()));
     }
+}
+
+#[test]
+fn every_format_has_a_seed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let corpus = std::env::var_os("TAUTLINE_FUZZ_CORPUS").map_or_else(|| folder.path().join("corpus"), Into::into);
+    let path = folder.path().join("recording");
+    let mut seedless: Vec<_> = Format::all().map(|format| format.name).collect();
+    for (name, seed) in seeds() {
+        fs::write(&path, &seed).expect("written");
+        let is_read = |format: &Format| {
+            let options = ReadOptions { format: Some(*format), ..options_of(name) };
+            read::open(&path, &options).is_ok_and(|mut tracks| {
+                let mut items = Vec::new();
+                tracks.read(&mut items).is_ok()
+            })
+        };
+        let readers: Vec<_> = Format::all().filter(is_read).map(|format| format.name).collect();
+        seedless.retain(|format| !readers.contains(format));
+        for target in readers.into_iter().chain(["recording"]) {
+            fs::create_dir_all(corpus.join(target)).expect("a folder");
+            fs::write(corpus.join(target).join(name), &seed).expect("written");
+        }
+    }
+    assert_eq!(seedless, [""; 0]);
 }

@@ -9,6 +9,7 @@ mod channels;
 mod clocks;
 mod columns;
 mod containers;
+mod contract;
 mod data_sets;
 mod drones;
 mod earth;

@@ -1,0 +1,38 @@
+//! Reads arbitrary bytes as a recording: one target for each reader, and `recording` for the recognition of formats.
+//!
+//! The name of the target is the name of the reader, with `_` in the place of `-`.
+
+#![no_main]
+
+use std::fs;
+use std::path::PathBuf;
+use std::process;
+use std::sync::LazyLock;
+
+use libfuzzer_sys::fuzz_target;
+use tautline_recordings::read::{Format, ReadOptions};
+
+#[path = "../../crates/recordings/tests/recordings/contract.rs"]
+mod contract;
+
+/// Reader and scratch file of this process.
+static SETTING: LazyLock<(ReadOptions, PathBuf)> = LazyLock::new(|| {
+    let name = env!("CARGO_BIN_NAME").replace('_', "-");
+    let format = Format::all().find(|format| format.name == name);
+    assert!(format.is_some() || name == "recording", "{name}: no such reader");
+    // Only this reader needs the rate of frames.
+    let times_per_second = (name == "trajnet").then_some(30.0);
+    let options = ReadOptions { format, times_per_second, ..ReadOptions::default() };
+    (options, std::env::temp_dir().join(format!("tautline-fuzz-{name}-{}", process::id())))
+});
+
+fuzz_target!(|bytes: &[u8]| {
+    let (options, path) = &*SETTING;
+    fs::write(path, bytes).expect("the scratch file is writable");
+    for allow_unfinished in [false, true] {
+        let options = ReadOptions { allow_unfinished, ..options.clone() };
+        if let Err(fault) = contract::read_whole(path, &options) {
+            panic!("{fault}");
+        }
+    }
+});
