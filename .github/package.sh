@@ -1,12 +1,13 @@
 #!/bin/sh
-# Packs the program for one system: sh .github/package.sh PROGRAM TARGET FOLDER
-# Writes tautline-VERSION-TARGET.tar.gz and its SHA-256 into FOLDER.
+# Packs the program for one system: sh .github/package.sh PROGRAM TARGET FOLDER [SUFFIX]
+# Writes tautline-VERSION-TARGET[-SUFFIX].tar.gz and its SHA-256 into FOLDER. The suffix `viewer` marks the program with
+# pictures and the window; the installer takes the archive without a suffix.
 set -eu
-[ $# = 3 ] || { echo "usage: package.sh PROGRAM TARGET FOLDER" >&2; exit 2; }
+[ $# = 3 ] || [ $# = 4 ] || { echo "usage: package.sh PROGRAM TARGET FOLDER [SUFFIX]" >&2; exit 2; }
 program=$1 target=$2 folder=$3
 root=$(cd "$(dirname "$0")/.." && pwd)
 version=$(sed -n 's/^version = "\(.*\)"/\1/p' "$root/Cargo.toml" | head -n 1)
-name=tautline-$version-$target
+name=tautline-$version-$target${4:+-$4}
 
 mkdir -p "$folder"
 work=$(mktemp -d)

@@ -4,7 +4,7 @@
 # The seeds of the tests are the first inputs. An input that fails is kept in fuzz/artifacts, and the exit code is 1.
 set -eu
 cd "$(dirname "$0")/.."
-seconds=${1:-3}
+seconds=${1:-3} # also if it is empty
 [ $# = 0 ] || shift
 targets=${*:-$(sed -n 's/^name = "\([a-z_]*\)"$/\1/p' fuzz/Cargo.toml)}
 fuzz=target/fuzz-tool/bin/cargo-fuzz

@@ -1,7 +1,8 @@
 #!/bin/sh
 # Sets up and runs the tests. From anywhere: sh tests/run.sh [--long] [arguments of cargo test]
 #
-# --long adds tests that take minutes: ignored tests, release bits, MP4 films, two of tests/mutants, clusters, notebooks
+# --long adds tests that take minutes: ignored tests, release bits, MP4 films, fuzz targets, two of
+# tests/mutants, clusters, notebooks
 # and the commands of the docs. TAUTLINE_LONG=1 adds random cases, and the slowest commands of the docs.
 set -eu
 cd "$(dirname "$0")/.."
@@ -25,6 +26,8 @@ if [ "$long" ]; then
     cargo test --release -p tautline-sim --test bits
     # The H.264 encoder, which is not a default feature.
     cargo test -p tautline-render --features mp4 film
+    # Three seconds for each fuzz target; TAUTLINE_LONG=1 takes an hour for all.
+    sh fuzz/run.sh "${TAUTLINE_LONG:+170}"
     # Two mutants, one of the law and one of the audit.
     sh tests/mutants.sh 03-a22 07-sweep-off
 fi

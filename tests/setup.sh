@@ -35,6 +35,18 @@ if ! target/mdbook/bin/mdbook --version >/dev/null 2>&1; then
     rm -rf target/mdbook/build
 fi
 
+# The checker of licences and versions, and the fuzzer.
+if ! target/deny/bin/cargo-deny --version >/dev/null 2>&1; then
+    cargo install --quiet --locked --debug --no-default-features --root target/deny --target-dir target/deny/build \
+        'cargo-deny@0.20.2'
+    rm -rf target/deny/build
+fi
+if ! target/fuzz-tool/bin/cargo-fuzz --version >/dev/null 2>&1; then
+    cargo install --quiet --locked --debug --root target/fuzz-tool --target-dir target/fuzz-tool/build \
+        'cargo-fuzz@0.13.2'
+    rm -rf target/fuzz-tool/build
+fi
+
 # A software driver if there is no graphics driver, for tests/viewer.
 if ! ls /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1 && ! ls /etc/vulkan/icd.d/*.json >/dev/null 2>&1; then
     sudo=$([ "$(id -u)" = 0 ] || echo sudo)
