@@ -1,9 +1,9 @@
 #!/bin/sh
 # Sets up and runs the tests. From anywhere: sh tests/run.sh [--long] [arguments of cargo test]
 #
-# --long adds tests that take minutes: ignored tests, release bits, MP4 films, fuzz targets, two of
-# tests/mutants, clusters, notebooks
-# and the commands of the docs. TAUTLINE_LONG=1 adds random cases, and the slowest commands of the docs.
+# --long adds tests that take minutes: ignored tests, release bits, MP4 films, fuzz targets, two of tests/mutants,
+# clusters, notebooks and the commands of the docs. TAUTLINE_LONG=1 adds random cases, an hour of fuzzing, and
+# the slowest commands of the docs.
 set -eu
 cd "$(dirname "$0")/.."
 

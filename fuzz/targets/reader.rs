@@ -5,18 +5,26 @@
 #![no_main]
 
 use std::fs;
+use std::panic;
 use std::path::PathBuf;
 use std::process;
 use std::sync::LazyLock;
 
 use libfuzzer_sys::fuzz_target;
-use tautline_recordings::read::{Format, ReadOptions};
+use tautline_recordings::read::{Format, ReadOptions, is_guarded};
 
 #[path = "../../crates/recordings/tests/recordings/contract.rs"]
 mod contract;
 
 /// Reader and scratch file of this process.
 static SETTING: LazyLock<(ReadOptions, PathBuf)> = LazyLock::new(|| {
+    // The fuzzer aborts at any panic, but the reader of Parquet turns panics of its library into errors.
+    let abort = panic::take_hook();
+    panic::set_hook(Box::new(move |panic| {
+        if !is_guarded() {
+            abort(panic);
+        }
+    }));
     let name = env!("CARGO_BIN_NAME").replace('_', "-");
     let format = Format::all().find(|format| format.name == name);
     assert!(format.is_some() || name == "recording", "{name}: no such reader");

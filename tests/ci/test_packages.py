@@ -123,7 +123,7 @@ class SupplyChain(unittest.TestCase):
         with tempfile.NamedTemporaryFile("w", suffix=".toml") as file:
             file.write(config)
             file.flush()
-            words = [DENY, "--offline", "check", "--config", file.name, "--hide-inclusion-graph"]
+            words = [DENY, "--offline", "--config", file.name, "check", "--hide-inclusion-graph"]
             return run(*words, "bans", "licenses", "sources", folder=ROOT)
 
     def test_licences_versions_and_sources_are_allowed(self):
