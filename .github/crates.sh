@@ -11,10 +11,14 @@ case $command in package | publish) ;; *) echo "$command: must be package or pub
 cd "$(dirname "$0")/.."
 
 if [ -n "${REPOSITORY:-}" ]; then
-    case $REPOSITORY in https://*) ;; *) echo "REPOSITORY: must be a URL (https://...), got $REPOSITORY" >&2; exit 2 ;; esac
+    case $REPOSITORY in
+        https://*) ;;
+        *) echo "REPOSITORY: must be a URL (https://...), got $REPOSITORY" >&2; exit 2 ;;
+    esac
     for manifest in Cargo.toml crates/*/Cargo.toml; do
         # The table [package] only: the workspace has a license, too.
-        sed "/^\[package\]/,/^\[/ s|^license.workspace = true|&\nrepository = \"$REPOSITORY\"|" "$manifest" >"$manifest.new"
+        line="repository = \"$REPOSITORY\""
+        sed "/^\[package\]/,/^\[/ s|^license.workspace = true|&\n$line|" "$manifest" >"$manifest.new"
         mv "$manifest.new" "$manifest"
     done
     set -- --allow-dirty "$@"
