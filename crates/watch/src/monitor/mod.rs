@@ -4,12 +4,13 @@ mod faults;
 mod intake;
 mod past;
 mod present;
+mod sign_off;
 
 use nalgebra::Vector3;
 
 use crate::ahead;
 use crate::clock::SourceClock;
-use crate::event::{Event, Fault};
+use crate::event::{Event, Fault, Violation};
 use crate::history::History;
 use crate::plan::Plan;
 use crate::settings::{Expected, Settings, SettingsError};
@@ -59,6 +60,7 @@ struct Vehicle {
     /// Whether the newest stamp has two positions.
     has_conflict: bool,
     is_stale: bool,
+    has_signed_off: bool,
     /// Index into the plan.
     planned: Option<usize>,
     deviation_m: Option<f64>,
@@ -200,6 +202,17 @@ impl Monitor {
             + self.ahead.capacity()
     }
 
+    /// Returns whether a vehicle has signed off and was not heard since.
+    #[must_use]
+    pub fn has_signed_off(&self, vehicle: usize) -> bool {
+        self.vehicles.get(vehicle).is_some_and(|of| of.has_signed_off)
+    }
+
+    /// Returns the measured violations that are present.
+    pub fn open_violations(&self) -> impl Iterator<Item = Violation> + '_ {
+        self.violations.open()
+    }
+
     /// Returns the newest position \[m\], the velocity \[m/s\] and the age \[s\] of a vehicle.
     #[must_use]
     pub fn newest(&self, vehicle: usize) -> Option<(Vector3<f64>, Option<Vector3<f64>>, f64)> {
@@ -210,13 +223,9 @@ impl Monitor {
 
     /// Returns the index of a vehicle, and adds a vehicle that is not known; `None` beyond the largest number.
     fn vehicle(&mut self, id: &str) -> Option<u32> {
-        let mut end = id.len().min(LONGEST_NAME);
-        while !id.is_char_boundary(end) {
-            end -= 1;
-        }
-        let id = &id[..end];
-        let place = match self.by_name.binary_search_by(|&k| self.names[k as usize].as_str().cmp(id)) {
-            Ok(place) => return Some(self.by_name[place]),
+        let id = kept(id);
+        let place = match self.find(id) {
+            Ok(vehicle) => return Some(vehicle),
             Err(place) => place,
         };
         if self.names.len() >= self.settings.max_vehicles {
@@ -237,6 +246,7 @@ impl Monitor {
             velocity: None,
             has_conflict: false,
             is_stale: false,
+            has_signed_off: false,
             planned: self.plan.find(id),
             deviation_m: None,
             is_off_plan: false,
@@ -244,6 +254,12 @@ impl Monitor {
         self.ahead.reserve(self.vehicles.len());
         self.boxes.reserve(self.vehicles.len());
         Some(vehicle)
+    }
+
+    /// Returns the index of a vehicle, or its place in the order of names.
+    fn find(&self, id: &str) -> Result<u32, usize> {
+        let place = self.by_name.binary_search_by(|&k| self.names[k as usize].as_str().cmp(id))?;
+        Ok(self.by_name[place])
     }
 
     /// Returns the clock of a vehicle, unless it stepped since the vehicle was heard.
@@ -255,4 +271,13 @@ impl Monitor {
         let clock = self.clock_of(of)?;
         Some(clock.age_s(of.history.newest()?.t_s, self.now_s) + self.settings.latency_s)
     }
+}
+
+/// Returns the part of a name that is kept.
+fn kept(id: &str) -> &str {
+    let mut end = id.len().min(LONGEST_NAME);
+    while !id.is_char_boundary(end) {
+        end -= 1;
+    }
+    &id[..end]
 }

@@ -4,7 +4,7 @@ use nalgebra::Vector3;
 
 use super::Monitor;
 use crate::ahead;
-use crate::event::{Fault, Pair};
+use crate::event::{Event, Fault, Pair};
 use crate::history::Fix;
 use crate::pair::sweep;
 
@@ -44,6 +44,9 @@ impl Monitor {
         let mut lost = None;
         for (k, of) in self.vehicles.iter().enumerate() {
             let (Some(newest), Some(clock)) = (of.history.newest(), self.clock_of(of)) else { continue };
+            if of.has_signed_off && clock.time_of(newest.t_s) <= floor_s {
+                continue;
+            }
             let (mut low_m, mut high_m) = (newest.position_m, newest.position_m);
             for step in (0..of.history.len()).rev() {
                 let fix = of.history.at(step);
@@ -82,9 +85,28 @@ impl Monitor {
             self.judge_pair(pair);
             self.violations.examined(pair, self.judgement);
         }
+        while let Some(pair) = self.past_pair() {
+            if let Some(of) = self.violations.close(|of| of == pair) {
+                self.emit(Event::Ended(of));
+            }
+        }
         for of in &mut self.vehicles {
             of.judged_t_s = of.history.newest().map(|fix| fix.t_s);
         }
+    }
+
+    /// Returns the pair of a present violation that has no more time to judge.
+    fn past_pair(&self) -> Option<Pair> {
+        self.violations.open().map(|of| of.pair).find(|&pair| self.is_past(pair))
+    }
+
+    /// Returns whether a vehicle of a pair signed off and the other one has positions up to this moment, so that the
+    /// pair has no more time to judge.
+    fn is_past(&self, pair: Pair) -> bool {
+        let of = pair.map(|k| &self.vehicles[k as usize]);
+        let newest_s = of.map(|of| Some(self.clock_of(of)?.time_of(of.history.newest()?.t_s)));
+        let [Some(first_s), Some(second_s)] = newest_s else { return false };
+        (of[0].has_signed_off && first_s <= second_s) || (of[1].has_signed_off && second_s <= first_s)
     }
 
     /// Judges a pair over its time since the last judgement.
