@@ -25,7 +25,7 @@ use tautline_watch::{
 #[command(after_help = "\
 Sources:
   -                     Standard input. Each line is a JSON object with t, id, x, y, z, and vx, vy, vz if known.
-                        A line with t, id and "event":"off" is the sign-off of a vehicle.
+                        A line with t, id and event, which is off, is the sign-off of a vehicle.
   mavlink:ADDRESS:PORT  MAVLink over UDP. The system id is the name of a vehicle.
   rosbridge:HOST:PORT   Topics of ROS, with --topic.
   foxglove:HOST:PORT    Topics with positions of a Foxglove server, all or those of --topic.

@@ -8,8 +8,8 @@ use crate::monitor::Monitor;
 /// Notice for the user: a state, or an event.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Notice {
-    /// Kind: `state`, `heard`, `stale`, `back`, `signed-off`, `violation`, `violation-end`, `plan`, `fault`, `connected`, `lost` or
-    /// `summary`.
+    /// Kind: `state`, `heard`, `stale`, `back`, `signed-off`, `violation`, `violation-end`, `plan`, `fault`,
+    /// `connected`, `lost` or `summary`.
     pub event: &'static str,
     /// Line of text.
     pub text: String,

@@ -2,7 +2,8 @@
 //!
 //! A sign-off could hide a violation: the vehicle is not awaited any more, and nothing is known about it afterwards. So
 //! it is accepted only if the bounds prove that the vehicle keeps delta from every other one at this moment, and no
-//! error of the input gives doubt. A refused sign-off changes nothing, and the vehicle becomes stale. The positions up to a sign-off are judged as all others.
+//! error of the input gives doubt. A refused sign-off changes nothing, and the vehicle becomes stale. The positions up
+//! to a sign-off are judged as all others.
 
 use super::{Monitor, kept};
 use crate::event::{Event, Fault};

@@ -61,14 +61,14 @@ fn drops_in(table: &str, inode: &str) -> Option<u64> {
 mod tests {
     use super::drops_in;
 
-    const TABLE: &str = "  sl  local_address rem_address   st tx_queue rx_queue tr tm->when retrnsmt   uid  timeout inode \
-                         ref pointer drops\n\
-        1104: 0100007F:3862 00000000:0000 07 00000000:00000300 00:00000000 00000000  1000        0 83716 2 0 0\n\
-        1105: 00000000:3862 00000000:0000 07 00000000:00000300 00:00000000 00000000  1000        0 83717 2 0 94\n";
-
     #[test]
     fn the_drops_of_one_socket_are_read() {
-        assert_eq!(["83716", "83717", "837"].map(|inode| drops_in(TABLE, inode)), [Some(0), Some(94), None]);
+        // Number, addresses, state, queues, timer, retransmits, user, timeout, inode, references, pointer, drops.
+        let row = |number: u32, inode: u32, drops: u32| {
+            format!("{number}: 0100007F:3862 00000000:0000 07 0:300 00:0 0 1000 0 {inode} 2 0 {drops}\n")
+        };
+        let table = format!("sl local_address\n{}{}", row(1104, 83_716, 0), row(1105, 83_717, 94));
+        assert_eq!(["83716", "83717", "837"].map(|inode| drops_in(&table, inode)), [Some(0), Some(94), None]);
         assert_eq!(drops_in("", "1"), None);
         assert_eq!(drops_in("head\n1 2\n\n", "2"), None);
     }
