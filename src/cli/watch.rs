@@ -130,9 +130,8 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<Exit, Failure> {
     let source = arguments.source()?;
     if let Some(address) = arguments.foxglove.filter(|address| !address.ip().is_loopback()) {
         let message = format!("--foxglove: other machines are refused, as the protocol has no token ({address})");
-        let port = address.port();
-        let help = format!("write --foxglove, and on the other machine ssh -L {port}:127.0.0.1:8765 THIS_MACHINE");
-        return Err(Failure::input("watch/setting", message, &help));
+        let help = "write --foxglove, and run ssh -L 8765:127.0.0.1:8765 THIS_MACHINE on the other machine";
+        return Err(Failure::input("watch/setting", message, help));
     }
     let plan = arguments.read_plan()?;
     let settings = arguments.settings(&source, &plan)?;

@@ -293,7 +293,7 @@ impl Session<'_> {
                 State::Clear => summary.clear_s += passed_s,
                 State::Violation(..) => summary.violation_s += passed_s,
                 State::NotKnown(reason) if summary.has_started && !reason.is_of_end() => {
-                    summary.not_known_s += passed_s
+                    summary.not_known_s += passed_s;
                 }
                 State::NotKnown(_) => {}
             }

@@ -15,23 +15,27 @@ pub(super) struct KernelDrops {
     /// Number of the socket in the tables; `None` if it is not known.
     inode: Option<String>,
     counted: u64,
-    read: Instant,
+    /// Time of the last reading.
+    read: Option<Instant>,
 }
 
 impl KernelDrops {
     /// Starts at zero drops.
     pub(super) fn of(socket: &UdpSocket) -> Self {
-        Self { inode: inode_of(socket), counted: 0, read: Instant::now() }
+        Self { inode: inode_of(socket), counted: 0, read: None }
     }
 
     /// Returns the number of drops since the last call, which is 0 more often than each [`PERIOD`] and where the
     /// system does not count.
     pub(super) fn new_drops(&mut self) -> u64 {
-        let Some(inode) = self.inode.as_deref().filter(|_| self.read.elapsed() >= PERIOD) else { return 0 };
-        self.read = Instant::now();
-        let tables =
+        let Some(inode) = self.inode.as_deref().filter(|_| self.read.is_none_or(|read| read.elapsed() >= PERIOD))
+        else {
+            return 0;
+        };
+        self.read = Some(Instant::now());
+        let mut tables =
             ["/proc/net/udp", "/proc/net/udp6"].into_iter().filter_map(|path| std::fs::read_to_string(path).ok());
-        let Some(total) = tables.filter_map(|table| drops_in(&table, inode)).next() else { return 0 };
+        let Some(total) = tables.find_map(|table| drops_in(&table, inode)) else { return 0 };
         let new = total.saturating_sub(self.counted);
         self.counted = self.counted.max(total);
         new
@@ -76,9 +80,8 @@ mod tests {
     #[cfg(target_os = "linux")]
     #[test]
     fn a_full_buffer_is_counted() {
-        use super::{KernelDrops, PERIOD};
+        use super::KernelDrops;
         use std::net::UdpSocket;
-        use std::time::Instant;
 
         let socket = UdpSocket::bind("127.0.0.1:0").expect("a port");
         let address = socket.local_addr().expect("an address");
@@ -88,8 +91,9 @@ mod tests {
             for _ in 0..datagrams {
                 sender.send_to(&[0; 1000], address).expect("sends");
             }
-            drops.read = Instant::now() - PERIOD;
-            (drops.new_drops(), drops.new_drops())
+            let first = drops.new_drops();
+            drops.read = None;
+            (first, drops.new_drops())
         };
         assert_eq!(count(3), (0, 0));
         // The default buffer holds a few hundred of these.
