@@ -306,9 +306,10 @@ fn wrong_options_end_with_code_2() {
 fn vehicles_that_sign_off_leave_a_good_watch() {
     let flight = approach(0.0, 0.0);
     let off = |id: &str, t: f64| format!("{{\"t\":{t},\"id\":\"{id}\",\"event\":\"off\"}}\n");
-    let later: String = (41..=60)
-        .map(|k| format!("{{\"t\":{},\"id\":\"a\",\"x\":0,\"y\":0,\"z\":2}}\n", f64::from(k) / 10.0))
-        .collect();
+    let later = (41..=60).fold(String::new(), |mut text, k| {
+        let _ = writeln!(text, r#"{{"t":{},"id":"a","x":0,"y":0,"z":2}}"#, f64::from(k) / 10.0);
+        text
+    });
     let ran = judged(&format!("{flight}{}{later}{}", off("b", 4.0), off("a", 6.0)), &["--json"]);
     assert_eq!(ran.exit, Some(0), "{ran:?}");
     let summary = events(&ran).pop().expect("a summary");
