@@ -13,6 +13,7 @@ use super::reading::{one_of, origin};
 use tautline_recordings::read::{self, EarthFrame, ReadError, ReadOptions};
 use tautline_report::report::page::live_page;
 use tautline_report::request::{ExportRequest, Failure, Monitor as _, Silent, export_file};
+use tautline_watch::foxglove_server::FoxgloveServer;
 use tautline_watch::page::Page;
 use tautline_watch::source::{self, Feed, MavlinkFrame, NamingOptions, OwnedPose};
 use tautline_watch::{
@@ -24,6 +25,7 @@ use tautline_watch::{
 #[command(after_help = "\
 Sources:
   -                     Standard input. Each line is a JSON object with t, id, x, y, z, and vx, vy, vz if known.
+                        A line with t, id and event, which is off, is the sign-off of a vehicle.
   mavlink:ADDRESS:PORT  MAVLink over UDP. The system id is the name of a vehicle.
   rosbridge:HOST:PORT   Topics of ROS, with --topic.
   foxglove:HOST:PORT    Topics with positions of a Foxglove server, all or those of --topic.
@@ -106,6 +108,15 @@ pub(super) struct WatchArguments {
         default_missing_value = "127.0.0.1:8737"
     )]
     page: Option<SocketAddr>,
+    /// Serve Foxglove on an address of this machine [default: 127.0.0.1:8765].
+    #[arg(
+        long,
+        value_name = "ADDRESS:PORT",
+        num_args = 0..=1,
+        require_equals = true,
+        default_missing_value = "127.0.0.1:8765"
+    )]
+    foxglove: Option<SocketAddr>,
     /// Write each notice to standard output as a line of JSON.
     #[arg(long)]
     json: bool,
@@ -117,13 +128,19 @@ pub(super) struct WatchArguments {
 /// Watches until the source ends or Ctrl-C.
 pub(super) fn watch(arguments: &WatchArguments) -> Result<Exit, Failure> {
     let source = arguments.source()?;
+    if let Some(address) = arguments.foxglove.filter(|address| !address.ip().is_loopback()) {
+        let message = format!("--foxglove: other machines are refused, as the protocol has no token ({address})");
+        let help = "write --foxglove, and run ssh -L 8765:127.0.0.1:8765 THIS_MACHINE on the other machine";
+        return Err(Failure::input("watch/setting", message, help));
+    }
     let plan = arguments.read_plan()?;
     let settings = arguments.settings(&source, &plan)?;
     let monitor = Monitor::new(settings, plan).map_err(|error| {
         Failure::input("watch/setting", error.to_string(), "give a number in this range; tautline watch --help")
     })?;
     let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
-    let mut outputs = Outputs { console, json: arguments.json, recorder: arguments.recorder()?, page: None };
+    let mut outputs =
+        Outputs { console, json: arguments.json, recorder: arguments.recorder()?, page: None, foxglove: None };
     let terminal = Terminal::new(console)?;
     if let Some(address) = arguments.page {
         let page = Page::serve(address, live_page()).map_err(|error| {
@@ -133,6 +150,16 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<Exit, Failure> {
         })?;
         Console { quiet: false, ..console }.warn(&format!("live page: {}", page.url()));
         outputs.page = Some(page);
+    }
+    if let Some(address) = arguments.foxglove {
+        let frame = arguments.frame.as_deref().unwrap_or("world");
+        let server = FoxgloveServer::serve(address, frame).map_err(|error| {
+            let message = format!("--foxglove: cannot serve on {address}: {error}");
+            Failure::machine("watch/cannot-listen", message)
+                .with_help("give a free port, such as --foxglove=127.0.0.1:8766")
+        })?;
+        Console { quiet: false, ..console }.warn(&format!("Foxglove server: {}", server.url()));
+        outputs.foxglove = Some(server);
     }
     let (feed, inputs) = source::channel(Arc::clone(terminal.interruption()));
     arguments.start(source, feed, console)?;
@@ -333,6 +360,7 @@ struct Outputs {
     json: bool,
     recorder: Option<Recorder>,
     page: Option<Page>,
+    foxglove: Option<FoxgloveServer>,
 }
 
 impl Output for Outputs {
@@ -345,6 +373,9 @@ impl Output for Outputs {
         if let Some(page) = &mut self.page {
             page.notice(notice);
         }
+        if let Some(server) = &mut self.foxglove {
+            server.notice(notice);
+        }
         Ok(())
     }
 
@@ -355,6 +386,9 @@ impl Output for Outputs {
     fn assessed(&mut self, of: &Assessment, monitor: &Monitor) -> io::Result<()> {
         if let Some(page) = &mut self.page {
             page.assessed(of, monitor);
+        }
+        if let Some(server) = &mut self.foxglove {
+            server.assessed(of, monitor);
         }
         Ok(())
     }

@@ -291,11 +291,76 @@ fn wrong_options_end_with_code_2() {
         (&["--delta", "1", "--record", "there.csv"], "watch/record"),
         (&["--delta", "1", "--plan", "none.csv"], "recording/not-found"),
         (&["--delta", "1", "--origin", "95,0,0"], ""),
+        (&["--delta", "1", "--foxglove=0.0.0.0:8765"], "watch/setting"),
+        (&["--delta", "1", "--foxglove=[::]:8765"], "watch/setting"),
+        (&["--delta", "1", "--foxglove=here"], ""),
+        (&["--delta", "1", "--foxglove=127.0.0.1:65536"], ""),
     ] {
         let ran = watched(folder.path(), arguments, "");
         assert_eq!((ran.exit, ran.code()), (Some(2), code), "{arguments:?}: {ran:?}");
     }
     assert_eq!(watched(folder.path(), &[], "").exit, Some(2), "delta is required");
+}
+
+#[test]
+fn vehicles_that_sign_off_leave_a_good_watch() {
+    let flight = approach(0.0, 0.0);
+    let off = |id: &str, t: f64| format!("{{\"t\":{t},\"id\":\"{id}\",\"event\":\"off\"}}\n");
+    let later = (41..=60).fold(String::new(), |mut text, k| {
+        let _ = writeln!(text, r#"{{"t":{},"id":"a","x":0,"y":0,"z":2}}"#, f64::from(k) / 10.0);
+        text
+    });
+    let ran = judged(&format!("{flight}{}{later}{}", off("b", 4.0), off("a", 6.0)), &["--json"]);
+    assert_eq!(ran.exit, Some(0), "{ran:?}");
+    let summary = events(&ran).pop().expect("a summary");
+    assert_eq!((&summary["vehicles"], &summary["signed_off"]), (&Value::from(2), &Value::from(2)), "{summary}");
+    assert!(events(&ran).iter().any(|of| of["event"] == "signed-off" && of["id"] == "b"), "{}", ran.out);
+    // Negative twins: no sign-off, a refused one, and wrong ones.
+    for (input, fault) in [
+        (format!("{flight}{later}"), None),
+        (format!("{}{}{later}", approach(-0.9, 0.0), off("b", 4.0)), Some("sign-off-refused")),
+        (format!("{flight}{}{later}", off("c", 4.0)), Some("garbage")),
+        (format!("{flight}{}{later}", off("b", 1e300)), Some("out-of-range")),
+        (format!("{flight}{}{later}", off("b", 4.0).replace("off", "gone")), Some("garbage")),
+        (format!("{flight}{}{later}", off("b", 4.0).replace("\"t\":4,", "")), Some("garbage")),
+        (format!("{flight}{}{later}", off("b", 4.0).replace("event", "x\":1,\"event")), Some("garbage")),
+    ] {
+        let ran = judged(&input, &["--json"]);
+        assert_eq!(ran.exit, Some(1), "{fault:?}: {ran:?}");
+        let found = events(&ran)
+            .iter()
+            .any(|of| of["event"] == "fault" && Some(of["fault"].as_str().unwrap_or_default()) == fault);
+        assert_eq!(found, fault.is_some(), "{fault:?}: {}", ran.out);
+    }
+}
+
+#[test]
+fn foxglove_is_served_on_the_printed_address() {
+    let mut child = Command::new(TAUTLINE)
+        .args(["watch", "--json", "--delta", "0.5", "--foxglove=127.0.0.1:0"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("the program runs");
+    let mut line = String::new();
+    let mut err = BufReader::new(child.stderr.take().expect("a pipe"));
+    while !line.contains("ws://") {
+        line.clear();
+        assert!(std::io::BufRead::read_line(&mut err, &mut line).expect("a line") > 0, "no address");
+    }
+    let url = &line[line.find("ws://").expect("an address")..];
+    let address = url.trim().trim_start_matches("ws://").to_owned();
+    let request = tungstenite::ClientRequestBuilder::new(url.trim().parse().expect("an address"))
+        .with_sub_protocol("foxglove.sdk.v1");
+    let (mut socket, _) = tungstenite::connect(request).expect("connects");
+    while !socket.read().expect("a message").to_text().is_ok_and(|text| text.contains("/watch/scene")) {}
+    // The port is taken now.
+    let folder = tempdir().expect("a folder");
+    let second = watched(folder.path(), &["--delta", "0.5", &format!("--foxglove={address}")], "");
+    assert_eq!((second.exit, second.code()), (Some(3), "watch/cannot-listen"), "{second:?}");
+    child.kill().expect("ends");
+    child.wait().expect("ends");
 }
 
 /// Starts a watch of a source.

@@ -53,10 +53,11 @@ impl Scratch {
         let fastest_m_s = fold(|of| of.velocity_m_s.norm());
         let error_m = fold(|of| of.error_m);
         let error_m_s = fold(|of| of.error_m_s);
+        let error_m_s2 = fold(|of| of.error_m_s2);
         let (delta_m, horizon_s) = (settings.delta_m, settings.horizon_s);
         // Distance of two vehicles beyond which they stay apart by delta for a time.
         let reach_m = |time_s: f64| {
-            let errors_m = error_m + time_s * (error_m_s + time_s * settings.accel_m_s2 / 2.0);
+            let errors_m = error_m + time_s * (error_m_s + time_s * error_m_s2);
             delta_m + 1e-3 + 2.0 * (fastest_m_s * time_s + errors_m)
         };
         let mut clear_s = horizon_s;

@@ -15,8 +15,8 @@ pub const DRIFT: f64 = 1e-4;
 pub const STEP_S: f64 = 1.0;
 /// Fall of the offset from which the clock is too fast \[s\].
 const FALL_S: f64 = 0.1;
-/// Relative rate at which the offset may fall in addition.
-const FALL_RATE: f64 = 0.01;
+/// Relative rate at which the offset may fall in addition. The bounds count this rate.
+pub(crate) const FALL_RATE: f64 = 0.01;
 /// Further fall from which a clock that was too fast is so again \[s\].
 const FURTHER_FALL_S: f64 = 0.01;
 

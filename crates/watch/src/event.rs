@@ -12,6 +12,8 @@ pub enum Reason {
     Missing([usize; 2]),
     /// An expected vehicle was not heard: its index into [`Expected::Names`](crate::Expected::Names).
     MissingName(usize),
+    /// Fewer than two vehicles are present, because others signed off: the number of present ones.
+    SignedOff(usize),
     /// A vehicle is stale: its age \[s\].
     Stale(u32, f64),
     /// The velocity of a vehicle is not known yet.
@@ -31,6 +33,12 @@ impl Reason {
     #[must_use]
     pub fn is_of_start(&self) -> bool {
         matches!(self, Self::TooFew(_) | Self::Missing(_) | Self::MissingName(_) | Self::SpeedUnknown(_))
+    }
+
+    /// Returns whether the reason is normal after all vehicles but one have signed off.
+    #[must_use]
+    pub fn is_of_end(&self) -> bool {
+        matches!(self, Self::SignedOff(_))
     }
 }
 
@@ -74,6 +82,8 @@ pub struct Assessment {
     pub state: State,
     /// Number of vehicles that were ever heard.
     pub heard: usize,
+    /// Number of vehicles that signed off and were not heard since. The state holds for the other ones.
+    pub signed_off: usize,
     /// Closest pair of vehicles that are not stale.
     pub closest: Option<Separation>,
     /// Time until which every pair keeps delta, with the pair that limits it; only in the state CLEAR.
@@ -107,6 +117,8 @@ pub enum Fault {
     Dropped,
     /// A vehicle sent too many messages between two messages of another one. The past of this pair is not judged.
     NotJudged,
+    /// The sign-off of a vehicle was refused, because it is not proved that the vehicle keeps delta.
+    SignOff,
     /// An ignored message that is older than the newest one of its vehicle.
     Reordered,
     /// An ignored message that is a repetition.
@@ -115,7 +127,7 @@ pub enum Fault {
 
 impl Fault {
     /// All faults.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Garbage,
         Self::OutOfRange,
         Self::TooManyVehicles,
@@ -124,6 +136,7 @@ impl Fault {
         Self::OutOfBounds,
         Self::Dropped,
         Self::NotJudged,
+        Self::SignOff,
         Self::Reordered,
         Self::Duplicate,
     ];
@@ -140,6 +153,7 @@ impl Fault {
             Self::OutOfBounds => "out-of-bounds",
             Self::Dropped => "dropped",
             Self::NotJudged => "not-judged",
+            Self::SignOff => "sign-off-refused",
             Self::Reordered => "reordered",
             Self::Duplicate => "duplicate",
         }
@@ -148,7 +162,7 @@ impl Fault {
     /// Returns whether the state is not CLEAR for the largest age after this fault.
     #[must_use]
     pub fn gives_doubt(self) -> bool {
-        !matches!(self, Self::Reordered | Self::Duplicate)
+        !matches!(self, Self::SignOff | Self::Reordered | Self::Duplicate)
     }
 }
 
@@ -186,7 +200,14 @@ pub enum Event {
         /// Time \[s\].
         at_s: f64,
     },
-    /// A stale vehicle was heard again.
+    /// A vehicle signed off.
+    SignedOff {
+        /// The vehicle.
+        vehicle: u32,
+        /// Time \[s\].
+        at_s: f64,
+    },
+    /// A vehicle that was stale or had signed off was heard again.
     Back {
         /// The vehicle.
         vehicle: u32,

@@ -7,6 +7,7 @@
 //! | [`watch`] | a watch from its first input to its end, with [`Notice`]s as text and JSON |
 //! | [`Record`] | recording of the poses that the monitor used |
 //! | [`page`] | server of the live page |
+//! | [`foxglove_server`] | server for Foxglove |
 //! | [`pair`] | derivation and formulas of the time until which a pair is clear |
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
@@ -14,6 +15,7 @@
 mod ahead;
 mod clock;
 mod event;
+pub mod foxglove_server;
 mod history;
 mod monitor;
 mod notice;

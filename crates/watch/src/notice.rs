@@ -8,8 +8,8 @@ use crate::monitor::Monitor;
 /// Notice for the user: a state, or an event.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Notice {
-    /// Kind: `state`, `heard`, `stale`, `back`, `violation`, `violation-end`, `plan`, `fault`, `connected`, `lost` or
-    /// `summary`.
+    /// Kind: `state`, `heard`, `stale`, `back`, `signed-off`, `violation`, `violation-end`, `plan`, `fault`,
+    /// `connected`, `lost` or `summary`.
     pub event: &'static str,
     /// Line of text.
     pub text: String,
@@ -58,6 +58,9 @@ impl Notice {
             };
             text.extend([moment]);
         }
+        if of.signed_off > 0 {
+            text.extend([format!("; signed off: {} of {}", of.signed_off, of.heard)]);
+        }
         let (state, reason, pair, distance) = match of.state {
             State::Clear => ("clear", None, None, None),
             State::NotKnown(reason) => ("not-known", Some(reason_name(reason)), None, None),
@@ -70,6 +73,7 @@ impl Notice {
             "pair": pair,
             "distance_m": distance,
             "vehicles": of.heard,
+            "signed_off": of.signed_off,
             "closest": closest,
             "clear_until": timed(of.clear_until),
             "clear_to_horizon": of.is_clear_to_horizon,
@@ -92,6 +96,10 @@ impl Notice {
             Event::Stale { vehicle, age_s, at_s } => {
                 let text = format!("{} is stale: not heard for {} s", name(vehicle), fixed(age_s));
                 Self::new("stale", at_s, text, json!({ "id": name(vehicle), "age_s": age_s }))
+            }
+            Event::SignedOff { vehicle, at_s } => {
+                let text = format!("{} signed off", name(vehicle));
+                Self::new("signed-off", at_s, text, json!({ "id": name(vehicle) }))
             }
             Event::Back { vehicle, at_s } => {
                 let text = format!("{} is heard again", name(vehicle));
@@ -182,6 +190,8 @@ fn state_text(of: &Assessment, monitor: &Monitor) -> String {
                     let more = if missing.len() > shown.len() { ", ..." } else { "" };
                     format!("not heard yet: {}{more}", shown.join(", "))
                 }
+                Reason::SignedOff(0) => "every vehicle has signed off".to_owned(),
+                Reason::SignedOff(_) => "only one vehicle has not signed off".to_owned(),
                 Reason::Stale(vehicle, age_s) => format!("{} not heard for {} s", name(vehicle), fixed(age_s)),
                 Reason::SpeedUnknown(vehicle) => format!("the velocity of {} is not known yet", name(vehicle)),
                 Reason::ClockStepped(vehicle) => format!("{} not heard since the step of the clock", name(vehicle)),
@@ -205,6 +215,7 @@ fn reason_name(reason: Reason) -> &'static str {
     match reason {
         Reason::TooFew(_) => "too-few",
         Reason::Missing(_) | Reason::MissingName(_) => "missing",
+        Reason::SignedOff(_) => "signed-off",
         Reason::Stale(..) => "stale",
         Reason::SpeedUnknown(_) => "speed-unknown",
         Reason::ClockStepped(_) => "clock-step",
@@ -225,6 +236,7 @@ fn fault_text(fault: Fault, vehicle: Option<&str>) -> String {
         Fault::OutOfBounds => format!("{of} moved farther than --accel and the errors allow"),
         Fault::Dropped => "messages came faster than they were read".to_owned(),
         Fault::NotJudged => format!("{of} sent more messages than are kept, so a part of the past is not judged"),
+        Fault::SignOff => format!("the sign-off of {of} is refused, because its separation is not proved"),
         Fault::Reordered => format!("{of} sent a message older than its newest one"),
         Fault::Duplicate => format!("{of} sent a message twice"),
     }

@@ -125,7 +125,7 @@ impl Page {
         }
         let most_s = monitor.settings().max_age_s;
         let places: Vec<Value> = (0..self.names)
-            .map(|k| match monitor.newest(k) {
+            .map(|k| match monitor.newest(k).filter(|_| !monitor.has_signed_off(k)) {
                 Some((at, _, age_s)) => json!([at.x, at.y, at.z, age_s <= most_s]),
                 None => Value::Null,
             })

@@ -71,6 +71,8 @@ pub struct Summary {
     pub violations: u64,
     /// Number of vehicles.
     pub vehicles: usize,
+    /// Number of vehicles that had signed off at the end.
+    pub signed_off: usize,
     /// Smallest separation at a judgement or in a measured violation \[m\], with the names of the pair.
     pub closest: Option<(f64, [String; 2])>,
 }
@@ -91,8 +93,9 @@ impl Summary {
             _ => "CLEAR",
         };
         let mut text = format!(
-            "{verdict}: {} vehicles, {} s CLEAR, {} s NOT KNOWN, {} s VIOLATION, measured violations: {}",
+            "{verdict}: {} vehicles{}, {} s CLEAR, {} s NOT KNOWN, {} s VIOLATION, measured violations: {}",
             self.vehicles,
+            if self.signed_off > 0 { format!(" ({} signed off)", self.signed_off) } else { String::new() },
             fixed(self.clear_s),
             fixed(self.not_known_s),
             fixed(self.violation_s),
@@ -109,6 +112,7 @@ impl Summary {
             "good": self.is_good(),
             "started": self.has_started,
             "vehicles": self.vehicles,
+            "signed_off": self.signed_off,
             "clear_s": self.clear_s,
             "not_known_s": self.not_known_s,
             "violation_s": self.violation_s,
@@ -131,6 +135,9 @@ struct Session<'a> {
     line_s: f64,
     /// Sentence of the last error of the input.
     said: String,
+    /// Line of a judgement just before a stamp. The events of this stamp are older, so they come first.
+    held: Option<Notice>,
+    holds: bool,
 }
 
 /// Watches until the source ends or the flag of the inputs is set.
@@ -146,6 +153,8 @@ pub fn watch(monitor: Monitor, inputs: &Inputs, output: &mut dyn Output) -> io::
         last: None,
         line_s: f64::NEG_INFINITY,
         said: String::new(),
+        held: None,
+        holds: false,
     };
     let now_s = || inputs.start.elapsed().as_secs_f64();
     let (mut next_s, mut is_over, mut dropped) = (0.0, false, 0);
@@ -182,6 +191,7 @@ impl Session<'_> {
     fn take(&mut self, input: Input) -> io::Result<bool> {
         match input {
             Input::Pose(pose, arrival_s) => self.pose(&pose, arrival_s)?,
+            Input::SignOff(id, t_s, arrival_s) => self.sign_off(&id, t_s, arrival_s)?,
             Input::Fault(fault, arrival_s, said) => {
                 self.said = said;
                 self.monitor.fault(fault, None, arrival_s);
@@ -195,8 +205,25 @@ impl Session<'_> {
     }
 
     fn pose(&mut self, pose: &OwnedPose, arrival_s: f64) -> io::Result<()> {
+        self.pass_until(pose.t_s, arrival_s)?;
+        let of = Pose { t_s: pose.t_s, id: &pose.id, position_m: pose.position_m, velocity_m_s: pose.velocity_m_s };
+        if let Some(taken) = self.monitor.take(&of, arrival_s) {
+            self.output.pose(taken.time_s, pose)?;
+        }
+        self.pass_events()
+    }
+
+    fn sign_off(&mut self, id: &str, t_s: f64, arrival_s: f64) -> io::Result<()> {
+        self.pass_until(t_s, arrival_s)?;
+        self.said = format!("{:?} signs off and was not heard", id.chars().take(60).collect::<String>());
+        self.monitor.sign_off(id, t_s, arrival_s);
+        self.pass_events()
+    }
+
+    /// Judges the time from the present to a stamp, with [`TimeBase::Stamps`].
+    fn pass_until(&mut self, t_s: f64, arrival_s: f64) -> io::Result<()> {
         if self.monitor.settings().time_base == TimeBase::Stamps
-            && let Some(ahead_s) = self.monitor.is_ahead_s(pose.t_s)
+            && let Some(ahead_s) = self.monitor.is_ahead_s(t_s)
             && ahead_s > 0.0
         {
             // All poses with the present stamp have been taken.
@@ -206,18 +233,14 @@ impl Session<'_> {
             if is_due || self.end_of_clear_s().is_some_and(|end_s| end_s < next_s) {
                 self.assess(arrival_s)?;
             }
-            self.pass_end_of_clear(pose.t_s, next_s, arrival_s)?;
+            self.pass_end_of_clear(t_s, next_s, arrival_s)?;
             if ahead_s > self.monitor.settings().max_age_s {
                 // No message came between the present and this stamp.
-                self.monitor.advance(pose.t_s);
+                self.monitor.advance(t_s);
                 self.assess(arrival_s)?;
             }
         }
-        let of = Pose { t_s: pose.t_s, id: &pose.id, position_m: pose.position_m, velocity_m_s: pose.velocity_m_s };
-        if let Some(taken) = self.monitor.take(&of, arrival_s) {
-            self.output.pose(taken.time_s, pose)?;
-        }
-        self.pass_events()
+        Ok(())
     }
 
     /// Returns the time until which the last judgement is CLEAR \[s\], if it is CLEAR.
@@ -240,7 +263,9 @@ impl Session<'_> {
         }
         let left_s = next_s - self.monitor.now_s();
         if was_short && self.monitor.advance(t_s - part_s(left_s)) > 0.0 {
+            self.holds = true;
             self.assess(arrival_s)?;
+            self.holds = false;
         }
         Ok(())
     }
@@ -256,6 +281,9 @@ impl Session<'_> {
 
     fn judged(&mut self, of: Assessment) -> io::Result<()> {
         self.pass_events()?;
+        if let Some(notice) = self.held.take() {
+            self.output.notice(&notice)?;
+        }
         let summary = &mut self.summary;
         let before = self.last.filter(|last| last.now_s.is_finite() && of.now_s.is_finite());
         if let Some(last) = before {
@@ -264,14 +292,18 @@ impl Session<'_> {
             match last.state {
                 State::Clear => summary.clear_s += passed_s,
                 State::Violation(..) => summary.violation_s += passed_s,
-                State::NotKnown(_) if summary.has_started => summary.not_known_s += passed_s,
+                State::NotKnown(reason) if summary.has_started && !reason.is_of_end() => {
+                    summary.not_known_s += passed_s;
+                }
                 State::NotKnown(_) => {}
             }
         }
-        summary.has_started |= !matches!(of.state, State::NotKnown(reason) if reason.is_of_start());
+        summary.has_started |=
+            !matches!(of.state, State::NotKnown(reason) if reason.is_of_start() || reason.is_of_end());
         summary.was_violated |= matches!(of.state, State::Violation(..));
-        summary.was_not_known |= summary.has_started && matches!(of.state, State::NotKnown(_));
-        summary.vehicles = of.heard;
+        summary.was_not_known |=
+            summary.has_started && matches!(of.state, State::NotKnown(reason) if !reason.is_of_end());
+        (summary.vehicles, summary.signed_off) = (of.heard, of.signed_off);
         if let Some(near) = of.closest {
             note_closest(summary, near.nominal_m, || near.pair.map(|k| name(&self.monitor, k)));
         }
@@ -280,7 +312,12 @@ impl Session<'_> {
         let is_due = of.now_s >= self.line_s + LINE_PERIOD_S || of.now_s < self.line_s;
         if is_change || is_due {
             self.line_s = of.now_s;
-            self.output.notice(&Notice::of_state(&of, &self.monitor))?;
+            let notice = Notice::of_state(&of, &self.monitor);
+            if self.holds {
+                self.held = Some(notice);
+            } else {
+                self.output.notice(&notice)?;
+            }
         }
         self.last = Some(of);
         self.output.assessed(&of, &self.monitor)

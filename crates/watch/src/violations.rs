@@ -34,7 +34,7 @@ impl OpenViolations {
 
     /// Returns the present violation with the smallest distance.
     pub(crate) fn worst(&self) -> Option<Violation> {
-        self.open.iter().map(|record| record.of).min_by(|a, b| a.min_m.total_cmp(&b.min_m))
+        self.open().min_by(|a, b| a.min_m.total_cmp(&b.min_m))
     }
 
     /// Returns a pair that judgement `number` has not examined.
@@ -96,9 +96,14 @@ impl OpenViolations {
         events
     }
 
-    /// Removes and returns a violation of a vehicle, or of any vehicle.
-    pub(crate) fn close(&mut self, vehicle: Option<u32>) -> Option<Violation> {
-        let k = self.open.iter().position(|record| vehicle.is_none_or(|of| record.of.pair.contains(&of)))?;
+    /// Returns the present violations.
+    pub(crate) fn open(&self) -> impl Iterator<Item = Violation> + '_ {
+        self.open.iter().map(|record| record.of)
+    }
+
+    /// Removes and returns a violation whose pair fulfils a condition.
+    pub(crate) fn close(&mut self, is_over: impl Fn(Pair) -> bool) -> Option<Violation> {
+        let k = self.open.iter().position(|record| is_over(record.of.pair))?;
         Some(self.open.remove(k).of)
     }
 

@@ -1,5 +1,7 @@
 //! JSON lines: `{"t": 1.5, "id": "a", "x": 0, "y": 0, "z": 2}`, with `vx`, `vy` and `vz` if known.
 //!
+//! `{"t": 9.5, "id": "a", "event": "off"}` is the sign-off of a vehicle.
+//!
 //! Empty lines and lines that begin with `#` are skipped.
 
 use std::io::{BufRead, Read as _};
@@ -17,9 +19,10 @@ pub const LONGEST_LINE: usize = 1 << 16;
 struct Line {
     t: f64,
     id: Name,
-    x: f64,
-    y: f64,
-    z: f64,
+    event: Option<String>,
+    x: Option<f64>,
+    y: Option<f64>,
+    z: Option<f64>,
     vx: Option<f64>,
     vy: Option<f64>,
     vz: Option<f64>,
@@ -30,6 +33,15 @@ struct Line {
 enum Name {
     Text(String),
     Number(i64),
+}
+
+/// Message of a line.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LineMessage {
+    /// A pose.
+    Pose(OwnedPose),
+    /// The sign-off of a vehicle: its name, and its stamp \[s\].
+    SignOff(String, f64),
 }
 
 /// Reads lines until the end of `from`.
@@ -52,8 +64,9 @@ pub fn lines(mut from: impl BufRead, feed: &Feed) {
                 garbage(format!("longer than {LONGEST_LINE} bytes; write one pose per line"))
             }
             Ok(_) if matches!(line.trim_ascii().first(), None | Some(b'#')) => continue,
-            Ok(_) => match pose_of_line(&line) {
-                Ok(pose) => Input::Pose(pose, arrival_s),
+            Ok(_) => match message_of_line(&line) {
+                Ok(LineMessage::Pose(pose)) => Input::Pose(pose, arrival_s),
+                Ok(LineMessage::SignOff(id, t_s)) => Input::SignOff(id, t_s, arrival_s),
                 Err(why) => garbage(why),
             },
             Err(error) => {
@@ -68,16 +81,17 @@ pub fn lines(mut from: impl BufRead, feed: &Feed) {
     let _ = feed.send(Input::End);
 }
 
-/// Returns the pose of a line.
+/// Returns the message of a line.
 ///
 /// # Errors
-/// A sentence without a full stop if the line is no pose.
-pub fn pose_of_line(line: &[u8]) -> Result<OwnedPose, String> {
-    let of: Line = serde_json::from_slice(line).map_err(|error| {
+/// A sentence without a full stop if the line is neither a pose nor a sign-off.
+pub fn message_of_line(line: &[u8]) -> Result<LineMessage, String> {
+    let refused = |problem: &str| {
         let shown: String = String::from_utf8_lossy(line.trim_ascii()).chars().take(60).collect();
         let remedy = r#"write {"t":0,"id":"a","x":0,"y":0,"z":0}"#;
-        format!("not a pose: {error} ({shown:?}); {remedy}")
-    })?;
+        format!("not a pose: {problem} ({shown:?}); {remedy}")
+    };
+    let of: Line = serde_json::from_slice(line).map_err(|error| refused(&error.to_string()))?;
     let velocity_m_s = match (of.vx, of.vy, of.vz) {
         (Some(x), Some(y), Some(z)) => Some(Vector3::new(x, y, z)),
         (None, None, None) => None,
@@ -90,7 +104,18 @@ pub fn pose_of_line(line: &[u8]) -> Result<OwnedPose, String> {
     if id.is_empty() {
         return Err("the id is empty; write the name of the vehicle".to_owned());
     }
-    Ok(OwnedPose { t_s: of.t, id, position_m: Vector3::new(of.x, of.y, of.z), velocity_m_s })
+    match (of.event.as_deref(), [of.x, of.y, of.z]) {
+        (Some("off"), [None, None, None]) => Ok(LineMessage::SignOff(id, of.t)),
+        (Some("off"), _) => Err("a sign-off with a position; write the last pose in a line before it".to_owned()),
+        (_, [Some(x), Some(y), Some(z)]) => {
+            Ok(LineMessage::Pose(OwnedPose { t_s: of.t, id, position_m: Vector3::new(x, y, z), velocity_m_s }))
+        }
+        (Some(event), [None, None, None]) => Err(format!("unknown event ({event:?}); write \"off\" for a sign-off")),
+        (_, place) => {
+            let missing = ["x", "y", "z"].into_iter().zip(place).find(|(_, of)| of.is_none());
+            Err(refused(&format!("missing field `{}`", missing.map_or("x", |(name, _)| name))))
+        }
+    }
 }
 
 /// Skips the rest of a line.
@@ -115,17 +140,21 @@ mod tests {
 
     use nalgebra::Vector3;
 
-    use super::{LONGEST_LINE, lines, pose_of_line};
+    use super::{LONGEST_LINE, LineMessage, lines, message_of_line};
     use crate::event::Fault;
     use crate::source::{Input, channel};
 
     #[test]
     fn a_line_is_a_pose_with_or_without_velocity() {
-        let pose = pose_of_line(br#"{"t":1.5,"id":7,"x":1,"y":2,"z":3e0,"more":[]}"#).expect("a pose");
+        let pose_of = |line: &[u8]| match message_of_line(line) {
+            Ok(LineMessage::Pose(pose)) => pose,
+            other => panic!("{other:?}"),
+        };
+        let pose = pose_of(br#"{"t":1.5,"id":7,"x":1,"y":2,"z":3e0,"more":[],"event":"landing"}"#);
         assert_eq!((pose.id.as_str(), pose.position_m), ("7", Vector3::new(1.0, 2.0, 3.0)));
         assert_eq!(pose.velocity_m_s, None);
         let moving = br#"{"t":0,"id":"a","x":1,"y":2,"z":3,"vx":4,"vy":5,"vz":6}"#;
-        assert_eq!(pose_of_line(moving).expect("a pose").velocity_m_s, Some(Vector3::new(4.0, 5.0, 6.0)));
+        assert_eq!(pose_of(moving).velocity_m_s, Some(Vector3::new(4.0, 5.0, 6.0)));
         for wrong in [
             r#"{"t":0,"id":"a","x":1,"y":2}"#,
             r#"{"t":0,"id":"a","x":1,"y":2,"z":3,"vx":4}"#,
@@ -133,10 +162,23 @@ mod tests {
             r#"{"t":0,"id":"a","x":NaN,"y":2,"z":3}"#,
             r#"{"t":0,"id":"","x":1,"y":2,"z":3}"#,
             "t,id,x,y,z",
+            r#"{"t":0,"id":"a"}"#,
+            r#"{"t":0,"id":"a","event":"gone"}"#,
+            r#"{"t":0,"id":"a","event":1}"#,
+            r#"{"t":0,"id":"","event":"off"}"#,
+            r#"{"t":0,"event":"off"}"#,
+            r#"{"t":0,"id":"a","event":"off","x":1,"y":2,"z":3}"#,
+            r#"{"t":0,"id":"a","event":"off","z":3}"#,
             "\u{0}",
         ] {
-            assert!(pose_of_line(wrong.as_bytes()).is_err(), "{wrong}");
+            assert!(message_of_line(wrong.as_bytes()).is_err(), "{wrong}");
         }
+    }
+
+    #[test]
+    fn a_line_with_the_event_off_is_a_sign_off() {
+        let found = message_of_line(br#"{"t":9.5,"id":"a","event":"off"}"#);
+        assert_eq!(found, Ok(LineMessage::SignOff("a".to_owned(), 9.5)));
     }
 
     #[test]

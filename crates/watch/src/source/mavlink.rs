@@ -11,7 +11,9 @@ use std::time::Duration;
 
 use mavlink_core::{MAVLinkV1MessageRaw, MAVLinkV2MessageRaw};
 use nalgebra::Vector3;
+use socket2::SockRef;
 
+use super::drops::KernelDrops;
 use super::{Feed, Input, OwnedPose};
 use crate::event::Fault;
 use tautline_recordings::read::EarthFrame;
@@ -24,6 +26,10 @@ const GLOBAL: (u32, usize, u8) = (33, 28, 104);
 const STARTS: [u8; 2] = [0xFE, 0xFD];
 /// Largest number of bytes of a datagram.
 const LARGEST_DATAGRAM: usize = 65_536;
+/// Receive buffer of the socket, as far as the system gives it \[bytes\].
+const RECEIVE_BUFFER: usize = 8 << 20;
+/// Time between two checks for the end of the watch.
+const POLL: Duration = Duration::from_millis(100);
 /// Bit of the incompatibility flags of `MAVLink` 2 for a signature, whose 13 bytes follow the checksum.
 const SIGNED: u8 = 1;
 
@@ -41,17 +47,15 @@ pub enum MavlinkFrame {
 /// # Errors
 /// If the address cannot be bound.
 pub fn mavlink(address: SocketAddr, frame: MavlinkFrame, feed: Feed) -> io::Result<SocketAddr> {
-    let socket = UdpSocket::bind(address)?;
-    socket.set_read_timeout(Some(Duration::from_millis(100)))?;
+    let socket = bind(address)?;
     let bound = socket.local_addr()?;
     std::thread::spawn(move || {
         let mut first = Some(socket);
         feed.reconnect(&format!("mavlink:{bound}"), |connected| {
-            let socket = match first.take().map_or_else(|| UdpSocket::bind(bound), Ok) {
+            let socket = match first.take().map_or_else(|| bind(bound), Ok) {
                 Ok(socket) => socket,
                 Err(error) => return error.to_string(),
             };
-            let _ = socket.set_read_timeout(Some(Duration::from_millis(100)));
             connected();
             listen(&socket, &frame, &feed)
         });
@@ -59,11 +63,22 @@ pub fn mavlink(address: SocketAddr, frame: MavlinkFrame, feed: Feed) -> io::Resu
     Ok(bound)
 }
 
+/// Binds a socket with a large receive buffer.
+fn bind(address: SocketAddr) -> io::Result<UdpSocket> {
+    let socket = UdpSocket::bind(address)?;
+    socket.set_read_timeout(Some(POLL))?;
+    // The system may give less, and counts what it drops.
+    let _ = SockRef::from(&socket).set_recv_buffer_size(RECEIVE_BUFFER);
+    Ok(socket)
+}
+
 /// Reads datagrams until the socket fails; returns the reason.
 fn listen(socket: &UdpSocket, frame: &MavlinkFrame, feed: &Feed) -> String {
     let mut bytes = vec![0; LARGEST_DATAGRAM];
     let mut inputs = Vec::new();
+    let mut drops = KernelDrops::of(socket);
     while !feed.is_over() {
+        feed.note_dropped(drops.new_drops());
         match socket.recv(&mut bytes) {
             Ok(length) => {
                 inputs.clear();

@@ -1,5 +1,6 @@
 //! Sources of poses: each runs in a thread of its own and sends [`Input`]s through one bounded channel.
 
+mod drops;
 mod foxglove;
 mod lines;
 mod mavlink;
@@ -17,7 +18,7 @@ use nalgebra::Vector3;
 use crate::event::Fault;
 
 pub use foxglove::foxglove;
-pub use lines::{LONGEST_LINE, lines, pose_of_line};
+pub use lines::{LONGEST_LINE, LineMessage, lines, message_of_line};
 pub use mavlink::{MavlinkFrame, mavlink, poses_of_datagram};
 pub use naming::{Naming, NamingOptions};
 pub use rosbridge::{poses_of_message, rosbridge};
@@ -45,6 +46,8 @@ pub struct OwnedPose {
 pub enum Input {
     /// A pose, and its arrival since the start of the watch \[s\].
     Pose(OwnedPose, f64),
+    /// The sign-off of a vehicle: its name, its stamp \[s\] and its arrival \[s\].
+    SignOff(String, f64, f64),
     /// An error of the input, with its arrival \[s\] and a sentence.
     Fault(Fault, f64, String),
     /// A source is connected.
@@ -111,6 +114,13 @@ impl Feed {
                 true
             }
             Err(TrySendError::Disconnected(_)) => false,
+        }
+    }
+
+    /// Counts inputs that were lost before they came to the source.
+    fn note_dropped(&self, count: u64) {
+        if count > 0 {
+            self.dropped.fetch_add(count, Ordering::Relaxed);
         }
     }
 

@@ -123,12 +123,47 @@ fn the_monitor_counts_the_delay_of_each_message() {
         clear_for_s(&of).expect("clear")
     };
     let exact = |age_s: f64| {
-        let at = |x: f64| Prediction::new(Vector3::x() * x, Vector3::zeros(), age_s, 0.01, 0.02, 5.0);
+        let at =
+            |x: f64| Prediction::new(Vector3::x() * x, Vector3::zeros(), age_s, 0.01, 0.02 * 1.01, 5.0 * 1.01 * 1.01);
         RelativeMotion::new(&at(0.0), &at(6.0)).clear_for_s(1.0, 10.0).expect("clear")
     };
     for age_s in [0.0, 0.3] {
         assert!((clear(age_s) - exact(age_s)).abs() < 1e-3, "{} {}", clear(age_s), exact(age_s));
     }
+}
+
+#[test]
+fn clear_holds_with_stamps_that_are_too_fast_by_less_than_their_limit() {
+    // A simulator that runs faster than its arrivals: in time of the stamps each vehicle has 10 m/s.
+    let (rate, speed, gap_m, delta_m, accel) = (1.0099, 10.0, 200.0, 1.0, 1e-3);
+    let apart_m = |arrival_s: f64| gap_m - 2.0 * speed * rate * arrival_s;
+    let exact = Settings { accel_m_s2: accel, position_error_m: 0.0, velocity_error_m_s: 0.0, ..settings() };
+    let mut monitor = monitor(exact);
+    let (mut judged, mut broken) = (0, 0);
+    for k in 0..180 {
+        let arrival_s = f64::from(k) / 20.0;
+        for (id, from_m, towards) in [("a", 0.0, 1.0), ("b", gap_m, -1.0)] {
+            let velocity = Vector3::x() * (towards * speed);
+            let position_m = Vector3::x() * from_m + velocity * (rate * arrival_s);
+            let pose = Pose { t_s: rate * arrival_s, id, position_m, velocity_m_s: Some(velocity) };
+            monitor.take(&pose, arrival_s);
+        }
+        // The age of both is 0.03 s.
+        let of = monitor.assess(arrival_s + 0.03);
+        let Some(clear_s) = clear_for_s(&of) else { continue };
+        judged += 1;
+        assert!(apart_m(arrival_s + 0.03 + clear_s) >= delta_m, "{arrival_s} {clear_s}");
+        // Negative twin: without the rate the bounds prove too much.
+        let seen = [1.0, -1.0].map(|towards| {
+            let velocity = Vector3::x() * (towards * speed);
+            let at = Vector3::x() * (-towards * apart_m(arrival_s) / 2.0);
+            Prediction::new(at, velocity, 0.03, 0.0, 0.0, accel)
+        });
+        let without_s = RelativeMotion::new(&seen[0], &seen[1]).clear_for_s(delta_m, 10.0).expect("clear");
+        broken += u32::from(apart_m(arrival_s + 0.03 + without_s) < delta_m);
+    }
+    assert_eq!(monitor.faults(tautline_watch::Fault::ClockStep), 0);
+    assert!(judged > 150 && broken > 100, "{judged} {broken}");
 }
 
 #[test]
@@ -157,7 +192,9 @@ fn the_search_of_all_pairs_equals_the_pairs_one_by_one() {
             let velocity = Vector3::new(random() - 0.5, random() - 0.5, random() - 0.5) * 4.0;
             let id = format!("v{k}");
             monitor.take(&Pose { t_s: 0.0, id: &id, position_m, velocity_m_s: Some(velocity) }, 0.0);
-            all.push(Prediction::new(position_m, velocity, 0.0, 0.01, 0.02, 5.0));
+            // Stamps may be too fast by 1 %.
+            let error_m_s = 0.02 * 1.01 + velocity.norm() * 0.01;
+            all.push(Prediction::new(position_m, velocity, 0.0, 0.01, error_m_s, 5.0 * 1.01 * 1.01));
         }
         let of = monitor.assess(0.0);
         let (mut nearest_m, mut clear_s, mut nominal_s, mut brake_s) = (f64::INFINITY, 10.0_f64, None, None);

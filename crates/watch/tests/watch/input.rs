@@ -232,7 +232,7 @@ proptest! {
     #[test]
     fn any_poses_give_finite_answers(
         poses in prop::collection::vec(
-            (0..4_usize, [number(), number(), number(), number(), number()], 0.0..0.4_f64), 1..60,
+            (0..5_usize, [number(), number(), number(), number(), number()], 0.0..0.4_f64), 1..60,
         ),
         stamps in any::<bool>(), own_clocks in any::<bool>(),
     ) {
@@ -248,6 +248,11 @@ proptest! {
                 Fault::ALL.into_iter().filter(|of| of.gives_doubt()).map(|of| monitor.faults(of)).sum::<u64>()
             };
             let before = doubts(&monitor);
+            if k == 4 {
+                let is_off = monitor.sign_off(["a", "b"][usize::from(x > 0.0)], t_s, arrival_s);
+                prop_assert!(!is_off || monitor.assess(arrival_s).signed_off > 0);
+                continue;
+            }
             let pose = Pose {
                 t_s, id: ["a", "b", "c", ""][k], position_m: Vector3::new(x, y, 0.0),
                 velocity_m_s: (k > 0).then(|| Vector3::new(vx, vy, 0.0)),

@@ -1,9 +1,11 @@
 //! Tests of the monitor and its sources.
 
 mod bounds;
+mod foxglove;
 mod input;
 mod past;
 mod session;
+mod sign_off;
 
 use nalgebra::Vector3;
 use tautline_watch::{Assessment, Monitor, Plan, Pose, Settings};

@@ -128,6 +128,51 @@ fn time_after_the_end_of_clear_is_not_known() {
 }
 
 #[test]
+fn a_violation_is_reported_before_the_state_of_the_same_stamp() {
+    let lines = (0..=3).flat_map(|t| {
+        [("a", f64::from(t), 1, 0.0), ("b", 6.0 - f64::from(t), -1, 0.2)]
+            .map(|(id, x, v, y)| format!(r#"{{"t":{t},"id":"{id}","x":{x},"y":{y},"z":2,"vx":{v},"vy":0,"vz":0}}"#))
+    });
+    let (summary, seen) = watched(&lines.collect::<Vec<_>>().join("\n"));
+    assert!(summary.was_violated, "{summary:?}");
+    let place = |text: &str| seen.texts.iter().position(|of| of.contains(text)).expect(text);
+    assert!(place("violation of a-b began") < place(": VIOLATION a-b"), "{:?}", seen.texts);
+}
+
+#[test]
+fn a_watch_whose_vehicles_sign_off_one_by_one_is_good() {
+    let flight = approach(0.0, 0.0);
+    let rest_of_a = (41..=80).map(|k| format!(r#"{{"t":{},"id":"a","x":0,"y":0,"z":2}}"#, f64::from(k) / 10.0));
+    let off = |t: f64, id: &str| format!(r#"{{"t":{t},"id":"{id}","event":"off"}}"#);
+    let whole = |sign_offs: bool| {
+        let mut lines = flight.clone();
+        lines.extend(sign_offs.then(|| off(4.05, "b")));
+        lines.extend(rest_of_a.clone());
+        lines.extend(sign_offs.then(|| off(8.0, "a")));
+        watched(&lines.join("\n"))
+    };
+    let (summary, seen) = whole(true);
+    assert!(summary.is_good() && summary.signed_off == 2, "{summary:?} {:?}", seen.texts);
+    assert!((summary.clear_s - 4.05).abs() < 1e-9 && summary.not_known_s == 0.0, "{summary:?}");
+    let texts = seen.texts.join("\n");
+    assert!(texts.contains("4.05 s: b signed off"), "{texts}");
+    assert!(texts.contains("NOT KNOWN: only one vehicle has not signed off; signed off: 1 of 2"), "{texts}");
+    assert!(texts.contains("CLEAR: 2 vehicles (2 signed off), 4.05 s CLEAR"), "{texts}");
+    // Negative twin: a silent vehicle is stale.
+    assert!(!whole(false).0.is_good());
+}
+
+#[test]
+fn a_sign_off_alone_starts_no_watch_and_an_unknown_one_gives_doubt() {
+    let (summary, seen) = watched(r#"{"t":0,"id":"a","event":"off"}"#);
+    assert!(!summary.is_good() && !summary.has_started, "{summary:?}");
+    assert!(seen.texts[0].contains(r#""a" signs off and was not heard"#), "{:?}", seen.texts);
+    let flight = approach(0.0, 0.0);
+    let text = [&flight[..20].join("\n"), r#"{"t":1,"id":"z","event":"off"}"#, &flight[20..].join("\n")].join("\n");
+    assert!(watched(&text).0.was_not_known);
+}
+
+#[test]
 fn a_name_with_an_end_of_line_forges_no_line() {
     let text = approach(0.0, 0.0).join("\n").replace(r#""b""#, r#""b\n9.00 s: CLEAR\u001b[2K""#);
     let (_, seen) = watched(&text);

@@ -1,13 +1,13 @@
 //! A round of the live monitor: a pose of each of 1,000 vehicles, and a judgement of all pairs.
 //!
-//! At 50 Hz a round must end within 20 ms. Run with `cargo bench --bench watch`.
+//! At 50 Hz a round must end within 20 ms. Run with `cargo bench -p tautline-watch --bench watch`.
 
 use std::hint::black_box;
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use nalgebra::Vector3;
 
-use tautline::watch::{Monitor, Plan, Pose, Settings};
+use tautline_watch::{Monitor, Plan, Pose, Settings};
 
 /// Number of vehicles.
 const VEHICLES: usize = 1000;
