@@ -9,6 +9,7 @@ mod arrays;
 mod audit;
 mod errors;
 mod flight;
+mod history;
 mod law;
 mod numbers;
 mod observation;

@@ -239,6 +239,7 @@ impl Experiment for Options {
                 ));
             }
         }
+        base.check_keys(self.keys.iter().map(|of| of.key.as_str()))?;
         let points = self.points();
         let scenario = |values: &Vec<f64>| base.with(&sets(&self.keys, values));
         let read = batch.run(points.len(), |number| {
@@ -443,7 +444,7 @@ impl Study for Sweep {
                  random starts, or noise in [wind], [sensing] or [network]"
             )
         });
-        [refused, self.jitter_m.map(jitter_note)].into_iter().flatten().chain(inert).collect()
+        [refused, self.jitter_m.map(jitter_note), self.about.note()].into_iter().flatten().chain(inert).collect()
     }
 
     fn records(&self) -> Table {
