@@ -20,6 +20,7 @@ mod scenario;
 mod shield;
 mod simulation;
 mod studies;
+mod words;
 mod work;
 
 use pyo3::prelude::*;
@@ -49,6 +50,9 @@ mod _native {
     use super::simulation::Simulation;
     #[pymodule_export]
     use super::studies::{attack, campaign, compare, export, margin, scenarios, sweep, validate};
+
+    #[pymodule_export]
+    use super::words::in_python;
 
     /// Initialises the module. Campaigns record the hash of this library as their program, not that of the interpreter.
     #[pymodule_init]

@@ -158,7 +158,7 @@ class Recordings(Case):
             np.testing.assert_array_equal(p, f.positions, format)
             np.testing.assert_array_equal(t, f.t, format)
         self.refuses(tl.Error, "exists", lambda: tl.export(self.folder / "run.mcap", self.folder / "copy.csv"))
-        tl.export(self.folder / "run.mcap", self.folder / "copy.csv", force=True)
+        tl.export(self.folder / "run.mcap", self.folder / "copy.csv", overwrite=True)
         unknown = self.folder / "a.xyz"
         message = "has no extension of a known format"
         self.refuses(tl.Error, message, lambda: tl.export(self.folder / "run.mcap", unknown))

@@ -85,7 +85,7 @@ class Arguments(Case):
         self.assertEqual(tl.audit(t, p, delta=0.1, expect_vehicles=np.int64(4)).vehicles, ["1", "2", "3", "4"])
         self.refuses(TypeError, "laws: a list of names", lambda: tl.compare("pentagon", laws="laplacian"))
         self.refuses(TypeError, "csv: a path is needed", lambda: tl.compare("pentagon", csv=3))
-        self.refuses(TypeError, "force: True or False is needed", lambda: tl.compare("pentagon", force="yes"))
+        self.refuses(TypeError, "overwrite: True or False is needed", lambda: tl.compare("pentagon", overwrite="yes"))
         self.refuses(TypeError, "a lower and an upper bound", lambda: tl.attack("pentagon", vary={"law.alpha": (0,)}))
         self.refuses(TypeError, "needs a list of numbers", lambda: tl.sweep("pentagon", {"law.alpha": 1.0}))
         self.refuses(tl.Error, "a sweep has one key or two", lambda: tl.sweep("pentagon", {}))
