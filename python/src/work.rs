@@ -161,7 +161,7 @@ impl Signals {
 
     /// Whether no signal has raised an exception.
     pub(crate) fn are_silent(&mut self) -> bool {
-        if self.looked.elapsed() >= SIGNALS_EVERY {
+        if self.raised.is_none() && self.looked.elapsed() >= SIGNALS_EVERY {
             self.raised = Python::attach(|py| py.check_signals().err());
             self.looked = Instant::now();
         }

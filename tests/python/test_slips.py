@@ -92,11 +92,13 @@ class Arguments(Case):
         self.refuses(tl.Error, "is not finite", lambda: tl.sweep("pentagon", {"law.alpha": [1.0, float("nan")]}))
         self.refuses(TypeError, "not the class Springs", lambda: tl.fly("pentagon", law=Springs))
 
-    def test_series_of_pandas_are_refused(self) -> None:
+    def test_series_of_pandas_are_read(self) -> None:
         import pandas
 
         t, p = passing()
-        self.refuses(TypeError, "not Series", lambda: tl.audit(pandas.Series(t), p, delta=1.0))
+        self.assertEqual(tl.audit(pandas.Series(t), p, delta=1.0).separation_m, tl.audit(t, p, delta=1.0).separation_m)
+        missing = pandas.Series([*t[:-1], None], dtype="Float64")
+        self.refuses(tl.Error, "t[99]: it is NaN", lambda: tl.audit(missing.to_numpy(na_value=np.nan), p, delta=1.0))
 
     def test_config_applies_to_arrays(self) -> None:
         t, p = passing()
