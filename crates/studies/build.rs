@@ -44,7 +44,7 @@ fn main() -> io::Result<()> {
     for file in files.iter().filter(|file| file.extension().is_some_and(|end| end == "toml" || end == "lock")) {
         println!("cargo::rerun-if-changed={}", file.display());
     }
-    let digits: String = hash.finalize().iter().map(|byte| format!("{byte:02x}")).collect();
+    let digits = hash.finalize().iter().fold(String::new(), |digits, byte| format!("{digits}{byte:02x}"));
     println!("cargo::rustc-env=TAUTLINE_SOURCES={digits}");
     Ok(())
 }

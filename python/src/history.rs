@@ -8,6 +8,7 @@ use std::sync::Arc;
 use pyo3::prelude::*;
 use serde_json::{Value, json};
 use tautline::campaign::Program;
+use tautline::request::Failure;
 use tautline::swarm::{Rows, Swarm};
 
 use crate::errors::{IntoException as _, internal_error, wrong_input};
@@ -96,14 +97,16 @@ impl History {
                  let a law of the scenario fly"
             )));
         }
-        let program = Program::running().map_err(|failure| failure.into_exception())?.sha256;
+        let program = Program::running().map_err(Failure::into_exception)?.sha256;
         let header = json!({ "program": program, "law": law, "vehicles": state.count(), "scenario": toml });
         let header = serde_json::to_vec(&header).map_err(|error| internal_error(&error.to_string()))?;
         let mut bytes = [MAGIC, &header, b"\n"].concat();
         let rows = |bytes: &mut Vec<u8>, rows: &Rows| by_row(rows).for_each(|x| bytes.extend(x.to_le_bytes()));
         for call in &self.calls {
             bytes.push(if call.is_some() { COMMAND } else { FAILED });
-            call.iter().for_each(|command| rows(&mut bytes, command));
+            if let Some(command) = call {
+                rows(&mut bytes, command);
+            }
         }
         for part in &self.parts {
             match part {
@@ -154,7 +157,7 @@ impl Saved {
         let header: Value = serde_json::from_slice(&rest[..end]).map_err(|_| wrong("its header is damaged"))?;
         let text = |key: &str| header[key].as_str().map(str::to_owned);
         let damaged = || wrong("its header is damaged");
-        let program = Program::running().map_err(|failure| failure.into_exception())?.sha256;
+        let program = Program::running().map_err(Failure::into_exception)?.sha256;
         let (saved_by, toml) = (text("program").ok_or_else(damaged)?, text("scenario").ok_or_else(damaged)?);
         if saved_by != program {
             return Err(wrong_input(format!(

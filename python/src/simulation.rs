@@ -308,7 +308,9 @@ impl Simulation {
     fn copy(&self, py: Python<'_>, noise_seed: Option<u64>) -> PyResult<Self> {
         let copied = self.with_history(py, |state| {
             let mut copy = state.clone();
-            noise_seed.into_iter().for_each(|seed| copy.reseed(seed));
+            if let Some(seed) = noise_seed {
+                copy.reseed(seed);
+            }
             copy
         })?;
         Ok(Self { count: self.count, python_law: self.python_law.clone(), state: Mutex::new(copied) })

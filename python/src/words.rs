@@ -1,7 +1,7 @@
 //! Words of Python in messages: options of the command line become arguments of functions.
 //!
-//! Messages of the library name options, such as `--time-unit ms`. [`in_python`] is the only place that translates them,
-//! into `time_unit="ms"`. `tests/python/test_words.py` compares [`OPTIONS`] with the sources of all messages.
+//! Messages of the library name options, such as `--time-unit ms`. [`in_python`] is the only place that translates
+//! them, into `time_unit="ms"`. `tests/python/test_words.py` compares [`OPTIONS`] with the sources of all messages.
 
 use pyo3::prelude::*;
 
@@ -148,16 +148,14 @@ pub(crate) fn in_python(text: &str, code: Option<&str>) -> String {
     let mut is_quoted = false;
     while let Some(next) = rest.chars().next() {
         let begins = words.chars().next_back().is_none_or(|before| before.is_whitespace() || "(,:".contains(before));
-        match rest.strip_prefix("--").filter(|_| begins && !is_quoted).and_then(|after| option(after, code)) {
-            Some((argument, after)) => {
-                words.push_str(&argument);
-                rest = after;
-            }
-            None => {
-                is_quoted ^= next == '`';
-                words.push(next);
-                rest = &rest[next.len_utf8()..];
-            }
+        let found = rest.strip_prefix("--").filter(|_| begins && !is_quoted).and_then(|after| option(after, code));
+        if let Some((argument, after)) = found {
+            words.push_str(&argument);
+            rest = after;
+        } else {
+            is_quoted ^= next == '`';
+            words.push(next);
+            rest = &rest[next.len_utf8()..];
         }
     }
     words

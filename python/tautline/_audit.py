@@ -352,8 +352,8 @@ def audit(
     * ``require_presence``: the audit is undecided where a vehicle is not seen over the whole window.
     * ``independent``: audits a recording of a flight from its samples, without the run's own audit.
 
-    Raises ``TypeError`` for numbers that are no float64, ``FileNotFoundError`` for a missing file and :class:`Error` for other
-    wrong input. docs/audit.md explains the verdicts.
+    Raises ``TypeError`` for numbers that are no float64, ``FileNotFoundError`` for a missing file and :class:`Error`
+    for other wrong input. docs/audit.md explains the verdicts.
     """
     return perform(locals())
 

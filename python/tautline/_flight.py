@@ -29,8 +29,9 @@ ARRAYS = ("t", "positions", "velocities", "commands", "separations_m")
 class Flight(Table):
     """A flight: T recorded instants of N vehicles, and the report of all steps. :func:`fly` returns it.
 
-    As a table it has a row for each instant and vehicle: the time ``t``, the number ``id`` of the vehicle from 1, its
-    ``index`` from 0, and the axes of positions, velocities and commands, `x, y, z, vx, vy, vz, ax, ay, az`.
+    As a table it has a row for each instant and vehicle. Its columns are the time ``t``, the number ``id`` of the
+    vehicle from 1 and its ``index`` from 0. The axes of positions, velocities and commands follow: `x, y, z, vx, vy,
+    vz, ax, ay, az`.
 
     A flight can be pickled. Where the file of its scenario is missing, :attr:`scenario` is then the flown one.
     """

@@ -32,8 +32,8 @@ MAX_NUMBERS = 2**28
 class Recording(Table):
     """A recording in memory: samples and curves of vehicles. :func:`read` returns it. It can be pickled.
 
-    As a table it has a row for each sample in order of time: the time ``t``, the name ``id`` of the vehicle, its
-    ``index`` from 0, and the axes of positions, `x, y, z` (z unless planar). Those of velocities, `vx, vy, vz`, and
+    As a table it has a row for each sample in order of time. Its columns are the time ``t``, the name ``id`` of the
+    vehicle, its ``index`` from 0, and the axes of positions, `x, y, z` (z unless planar). Velocities, `vx, vy, vz`, and
     ``radius`` follow where they are known. Curves have no rows.
     """
 

@@ -20,7 +20,8 @@ from ._tables import Finding, Findings
 class Scenario:
     """A scenario: a built-in one by its name, a file, or TOML text (:meth:`from_toml`).
 
-    ``set`` overrides keys: ``Scenario("pentagon", set={"time.duration_s": 60})``. Values are numbers, bools, strings, lists and dictionaries.
+    ``set`` overrides keys: ``Scenario("pentagon", set={"time.duration_s": 60})``. Values are numbers, bools, strings,
+    lists and dictionaries. Scenarios are equal if they fly the same.
 
     Raises ``FileNotFoundError`` for a missing file and :class:`Error`, with line, column and remedy, for a wrong one.
     """

@@ -10,7 +10,14 @@ import unittest
 import tautline as tl
 from shared import Case, Springs, printed_json, short
 
-SPEC = 'scenario = "pentagon"\nruns = 4\n[set]\ntime.duration_s = 1.0\n[vary]\n"start.jitter_m" = { uniform = [0.0, 0.3] }\n'
+SPEC = """\
+scenario = "pentagon"
+runs = 4
+[set]
+time.duration_s = 1.0
+[vary]
+"start.jitter_m" = { uniform = [0.0, 0.3] }
+"""
 
 
 class Displacement:

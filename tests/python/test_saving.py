@@ -171,7 +171,7 @@ class Simulations(Case):
 class Flights(Case):
     def test_a_flight_survives_a_pickle(self) -> None:
         scenario = short()
-        for flight in (tl.fly(scenario), tl.fly(scenario, law=Springs()), tl.fly("obstacles", set={"time.duration_s": 2})):
+        for flight in (tl.fly(scenario), tl.fly(scenario, law=Springs()), tl.fly(short("obstacles"))):
             again = pickle.loads(pickle.dumps(flight))
             self.assertEqual(again.report, flight.report)
             self.assertEqual((again.headline, again.text, again.passed), (flight.headline, flight.text, flight.passed))

@@ -10,7 +10,9 @@ from shared import ROOT, Case, passing, short
 from tautline import _arguments, _native, _words
 
 #: Options of other programs, and of commands that the package does not have: pictures, films, replays, proofs.
-FOREIGN = {"alarm", "bad", "film", "grid", "ink", "json", "law", "plot", "proof", "run", "shard", "share", "soft", "thing"}
+FOREIGN = {
+    "alarm", "bad", "film", "grid", "ink", "json", "law", "plot", "proof", "run", "shard", "share", "soft", "thing",
+}  # fmt: skip
 #: Crates whose messages reach Python.
 CRATES = ("audit", "core", "laws", "recordings", "report", "shield", "sim", "studies", "validate")
 
@@ -22,8 +24,9 @@ def options_in_sources() -> set[str]:
         for file in (ROOT / "crates" / crate / "src").rglob("*.rs"):
             if file.name == "tests.rs" or "tests" in file.parts:
                 continue
-            lines = [line for line in file.read_text(encoding="utf-8").splitlines() if not line.strip().startswith("//")]
-            text = re.sub(r"`[^`]*`", "", "\n".join(lines))
+            lines = file.read_text(encoding="utf-8").splitlines()
+            code = "\n".join(line for line in lines if not line.strip().startswith("//"))
+            text = re.sub(r"`[^`]*`", "", code)
             found |= set(re.findall(r"(?<![\w-])--([a-z][a-z-]*[a-z])", text))
     return found
 
@@ -161,10 +164,8 @@ class Choices(Case):
         for name in tl.__all__:
             thing = getattr(tl, name)
             self.assertEqual(thing.__module__, "tautline", name)
-            things = [thing, *(value for key, value in vars(thing).items() if not key.startswith("_"))] if inspect.isclass(
-                thing
-            ) else [thing]  # fmt: skip
-            for one in things:
+            members = vars(thing).items() if inspect.isclass(thing) else ()
+            for one in (thing, *(value for key, value in members if not key.startswith("_"))):
                 text = inspect.getdoc(one) or ""
                 if callable(one):
                     try:

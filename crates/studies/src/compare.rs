@@ -34,8 +34,8 @@ const ASSUMED: [&str; 5] = [
 /// Options of a comparison.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// Kinds of laws, names of tables `[laws.NAME]`, or names of external laws. By default the names of all such tables, or all kinds if the
-    /// scenario has no such table.
+    /// Kinds of laws, names of tables `[laws.NAME]`, or names of external laws. By default the names of all such
+    /// tables, or all kinds if the scenario has no such table.
     /// `NAME+shield` flies a law under the shield, `NAME+bare` without it.
     pub laws: Option<Vec<String>>,
     /// Whether each law is flown twice, without and under the shield.
@@ -241,7 +241,8 @@ impl Options {
         names.iter().map(|name| self.law(template, name)).collect()
     }
 
-    /// Returns a figure for each law: the flight with the smallest separation, flown again, at the time of this separation.
+    /// Returns a figure for each law: the flight with the smallest separation, flown again, at the time of this
+    /// separation.
     fn closest_approaches(&self, base: &BaseScenario, study: &Comparison) -> Result<Vec<Figure>, Failure> {
         /// Memory of the history of a flight \[bytes\].
         const HISTORY_BYTES: usize = 4 << 20;
