@@ -207,6 +207,7 @@ import tautline as tl
 class Slow(tl.Law):
     def control(self, obs, out):
         out[:] = 0.0
+signal.signal(signal.SIGINT, signal.default_int_handler)
 threading.Timer(1.0, lambda: os.kill(os.getpid(), signal.SIGINT)).start()
 try:
     tl.compare("pentagon", [Slow(), "edge-tension"], runs=100000)
