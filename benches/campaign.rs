@@ -14,7 +14,7 @@ const SPEC: &str = "scenario = \"pentagon\"\nruns = 16\n[vary]\n\"start.jitter_m
 fn campaigns(criterion: &mut Criterion) {
     let spec = Spec::read("bench", SPEC).expect("a specification");
     let campaign =
-        Campaign::plan(&spec, "bench", Path::new("."), None, Program::running().expect("read")).expect("a plan");
+        Campaign::plan(&spec, "bench", Path::new("."), None, Program::running().expect("read"), None).expect("a plan");
     let law = campaign.laws()[0].clone();
     let scenarios: Vec<_> = (0..16).map(|run| campaign.scenario(run, &law).expect("a scenario")).collect();
     let mut group = criterion.benchmark_group("sixteen flights of the pentagon");

@@ -103,7 +103,7 @@ fn kinds() -> Vec<Kind> {
 fn compared(kind: &Kind, laws: &[String], sets: &[&str], runs: u64) -> Vec<LawRow> {
     let source = Source::Text { name: "arrivals".to_owned(), text: format!("{}{COMMON}", kind.tables) };
     let overrides = sets.iter().map(|&set| set.to_owned()).collect();
-    let scenario = ScenarioRequest { argument: "arrivals".to_owned(), source, overrides };
+    let scenario = ScenarioRequest { argument: "arrivals".to_owned(), source, overrides, external_law: None };
     let options = Options { laws: Some(laws.to_vec()), runs, ..Options::default() };
     let request = StudyRequest::new(scenario, options);
     let comparison = answer(&request, &(), &Silent::default());

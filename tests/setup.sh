@@ -90,9 +90,10 @@ environment readers cflib.crazyflie.mem.trajectory_memory \
     --no-deps cflib==0.1.34 importlib_resources libusb-package 'numpy>=2.2,<3' packaging pyusb
 
 # Build tool of the Python package, and packages for tests/python.
-environment python 'gymnasium, ipykernel, matplotlib, maturin, mypy, nbclient, numpy, pandas, pettingzoo, pyarrow' \
-    gymnasium ipykernel 'matplotlib>=3.5' 'maturin>=1.9.4,<2' mypy nbclient 'numpy>=1.23' 'pandas>=1.5' pettingzoo \
-    pyarrow
+environment python \
+    'gymnasium, ipykernel, joblib, matplotlib, maturin, mypy, nbclient, numpy, pandas, pettingzoo, pyarrow' \
+    gymnasium ipykernel joblib 'matplotlib>=3.5' 'maturin>=1.9.4,<2' mypy nbclient 'numpy>=1.23' 'pandas>=1.5' \
+    pettingzoo pyarrow
 
 # Slurm for tests/cluster, which starts a node.
 if ! (PATH="$PATH:/usr/sbin" && command -v munged && command -v slurmctld && command -v slurmd && command -v sbatch) \

@@ -7,9 +7,11 @@ use numpy::ndarray::{Ix1, Ix3};
 use numpy::{PyReadonlyArray1, PyReadonlyArray3, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
 use tautline::audit::recorded::{self, Settings};
+use tautline::mcap::RunAudit;
 use tautline::report::recorded::RecordedReport;
 use tautline::request::audit::Open;
 use tautline::request::{self, Failure, Monitor as _, OwnRecording, Silent, Subject};
+use tautline::scenario::Scenario;
 use tautline::track::Tracks as _;
 
 use crate::arrays::{Arrays, notes_of_absence};
@@ -28,7 +30,36 @@ fn judged(report: &RecordedReport) -> PyResult<AuditTexts> {
 
 /// Limits, obstacles and audit of a flight, as in its recording.
 #[pyclass(frozen, module = "tautline._native")]
-pub(crate) struct FlightFindings(pub(crate) OwnRecording);
+pub(crate) struct FlightFindings {
+    own: OwnRecording,
+    /// Audit of the run, name of another law, and reason of an early end, as JSON.
+    #[pyo3(get)]
+    json: String,
+}
+
+impl FlightFindings {
+    pub(crate) fn of(
+        scenario: &Scenario,
+        audit: RunAudit,
+        other_law: Option<String>,
+        reason: Option<String>,
+    ) -> PyResult<Self> {
+        let json = serde_json::to_string(&(&audit, &other_law, &reason));
+        let json = json.map_err(|error| internal_error(&error.to_string()))?;
+        Ok(Self { own: OwnRecording::of_run(scenario, audit, other_law, reason), json })
+    }
+}
+
+#[pymethods]
+impl FlightFindings {
+    /// Restores the findings of a flight of a scenario from their JSON.
+    #[new]
+    fn new(scenario: &crate::scenario::Scenario, json: &str) -> PyResult<Self> {
+        let (audit, other_law, reason) =
+            serde_json::from_str(json).map_err(|error| wrong_input(format!("findings: {error}")))?;
+        Self::of(&scenario.scenario, audit, other_law, reason)
+    }
+}
 
 /// Arrays of an audit.
 struct AuditArrays<'py> {
@@ -123,7 +154,7 @@ pub(crate) fn audit_arrays<'py>(
         .then(|| "positions have two axes and no height: the recording is judged in the plane of x and y".to_owned());
     let notes: Vec<String> = plane.into_iter().chain(notes_of_absence(positions, &names)).collect();
     let arrays = Arrays::new(times, positions, velocities, &names, &notes);
-    let own = findings.map(|findings| &findings.0);
+    let own = findings.map(|findings| &findings.own);
     let monitor = Silent::default();
     let work = || {
         let open: &Open<'_> = &|| Ok(Box::new(arrays.clone()));

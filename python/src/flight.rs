@@ -11,7 +11,7 @@ use tautline::mcap::{Header, McapRecorder};
 use tautline::preflight::Preflight;
 use tautline::record::{Event, RecordError, Sample, Sink};
 use tautline::report::Report;
-use tautline::request::{OwnRecording, flight_page, run_audit};
+use tautline::request::{flight_page, run_audit};
 use tautline::run::run_with;
 use tautline::sim::{Breakdown, Components, Ending, SimError};
 
@@ -83,7 +83,7 @@ pub(crate) struct FlightData {
 }
 
 impl FlightData {
-    fn new(py: Python<'_>, report: &Report, samples: Samples, own: OwnRecording) -> PyResult<Self> {
+    fn new(py: Python<'_>, report: &Report, samples: Samples, findings: FlightFindings) -> PyResult<Self> {
         let shape = [samples.times_s.len(), samples.vehicles, 3];
         Ok(Self {
             passed: report.verdict.pass,
@@ -95,7 +95,7 @@ impl FlightData {
             velocities: cube(py, samples.velocities_m_s, shape)?.unbind(),
             commands: cube(py, samples.commands_m_s2, shape)?.unbind(),
             separations_m: PyArray1::from_vec(py, samples.separations_m).unbind(),
-            findings: Py::new(py, FlightFindings(own))?,
+            findings: Py::new(py, findings)?,
         })
     }
 }
@@ -136,7 +136,7 @@ pub(crate) fn fly(
     keep: bool,
 ) -> PyResult<FlightData> {
     let scenario = &scenario.scenario;
-    let law = law.map(|law| PythonLaw::new(law, scenario)).transpose()?;
+    let law = law.map(|law| PythonLaw::new(law, Some(scenario))).transpose()?;
     let is_of_python = law.is_some();
     let samples = Samples { is_kept: keep, vehicles: scenario.count(), ..Samples::default() };
     let mut signals = Signals::new();
@@ -179,6 +179,7 @@ pub(crate) fn fly(
         tautline::report::write_atomically(&path, page.as_bytes())
             .map_err(|error| PyOSError::new_err(error.to_string()))?;
     }
-    let own = OwnRecording::of_flight(scenario, &report, samples.other_law.clone(), samples.ended_early.clone());
-    FlightData::new(py, &report, samples, own)
+    let (other_law, reason) = (samples.other_law.clone(), samples.ended_early.clone());
+    let findings = FlightFindings::of(scenario, run_audit(scenario, &report), other_law, reason)?;
+    FlightData::new(py, &report, samples, findings)
 }

@@ -13,6 +13,7 @@ use tautline::scenario::Scenario;
 use tautline::swarm::Rows;
 
 use crate::errors::{wrong_input, wrong_type};
+use crate::history::Call;
 use crate::numbers::{borrowed, shape_text};
 use crate::observation::Observation;
 
@@ -25,11 +26,17 @@ pub(crate) struct PythonLaw {
     sensing_range_m: Option<f64>,
     controls: Controls,
     control: Arc<Py<PyAny>>,
+    /// Commands of a saved flight, which are repeated before the object is called.
+    repeated: Arc<Vec<Call>>,
+    /// Number of repeated commands.
+    next: usize,
 }
 
 thread_local! {
     /// Exception of a law within the innermost [`catch_exception`] of this thread.
     static RAISED: RefCell<Option<PyErr>> = const { RefCell::new(None) };
+    /// Calls of a law within the innermost [`record_calls`] of this thread.
+    static CALLS: RefCell<Option<Vec<Call>>> = const { RefCell::new(None) };
 }
 
 /// Runs work that calls laws on this thread. Returns its result and the exception that a law raised.
@@ -42,23 +49,33 @@ pub(crate) fn catch_exception<T>(work: impl FnOnce() -> T) -> (T, Option<PyErr>)
     (done, RAISED.replace(outer))
 }
 
+/// Runs work that calls a law on this thread. Returns its result and the calls of the law.
+pub(crate) fn record_calls<T>(work: impl FnOnce() -> T) -> (T, Vec<Call>) {
+    let outer = CALLS.replace(Some(Vec::new()));
+    let done = work();
+    (done, CALLS.replace(outer).unwrap_or_default())
+}
+
 impl PythonLaw {
+    /// Returns the law, which repeats the calls of a saved flight first.
+    pub(crate) fn repeating(self, calls: Vec<Call>) -> Self {
+        Self { repeated: Arc::new(calls), next: 0, ..self }
+    }
+
     /// Wraps an object with a method `control` and optional attributes `name`, `sensing_range_m` and `reaches`.
-    pub(crate) fn new(object: &Bound<'_, PyAny>, scenario: &Scenario) -> PyResult<Self> {
+    pub(crate) fn new(object: &Bound<'_, PyAny>, scenario: Option<&Scenario>) -> PyResult<Self> {
         let py = object.py();
         let control = object.getattr_opt(intern!(py, "control"))?.filter(PyAnyMethods::is_callable);
         let Some(control) = control else {
             let kind = object.get_type().qualname()?;
-            return Err(wrong_type(format!(
-                "law: {kind} has no method control(obs, out); derive it from tautline.Law"
-            )));
+            return Err(wrong_type(format!("law: {kind} has no method control(obs, out)")));
         };
         let given = |name: &str| PyResult::Ok(object.getattr_opt(name)?.filter(|value| !value.is_none()));
         let name = match given("name")? {
             Some(name) => name.extract::<String>()?,
             None => object.get_type().qualname()?.to_string(),
         };
-        if scenario.law().is_ok_and(|own| own.name() == name) {
+        if scenario.is_some_and(|scenario| scenario.law().is_ok_and(|own| own.name() == name)) {
             return Err(wrong_input(format!(
                 "law: `{name}` is the name of the scenario's own law; give it another `name`"
             )));
@@ -78,7 +95,8 @@ impl PythonLaw {
                 return Err(wrong_input(message));
             }
         };
-        Ok(Self { name, sensing_range_m, controls, control: Arc::new(control.unbind()) })
+        let (control, repeated) = (Arc::new(control.unbind()), Arc::default());
+        Ok(Self { name, sensing_range_m, controls, control, repeated, next: 0 })
     }
 
     fn call(&self, py: Python<'_>, at: &observation::Observation<'_>, command: &mut Rows) -> PyResult<()> {
@@ -109,10 +127,30 @@ impl Law for PythonLaw {
     }
 
     fn command(&mut self, at: &observation::Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
-        Python::attach(|py| self.call(py, at, command)).map_err(|raised| {
-            RAISED.set(Some(raised));
-            LawError::Failed
-        })
+        let commanded = match self.repeated.get(self.next) {
+            Some(Some(repeated)) => {
+                command.copy_from(repeated);
+                Ok(())
+            }
+            Some(None) => Err(LawError::Failed),
+            None => {
+                // A law in Python may step another simulation, whose calls are not those of this one.
+                let outer = CALLS.take();
+                let called = Python::attach(|py| self.call(py, at, command));
+                CALLS.set(outer);
+                called.map_err(|raised| {
+                    RAISED.set(Some(raised));
+                    LawError::Failed
+                })
+            }
+        };
+        self.next = self.next.saturating_add(1);
+        CALLS.with_borrow_mut(|calls| {
+            if let Some(calls) = calls {
+                calls.push(commanded.is_ok().then(|| Arc::new(command.clone())));
+            }
+        });
+        commanded
     }
 
     fn capabilities(&self) -> Capabilities {

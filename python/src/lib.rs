@@ -9,6 +9,7 @@ mod arrays;
 mod audit;
 mod errors;
 mod flight;
+mod history;
 mod law;
 mod numbers;
 mod observation;
@@ -19,6 +20,7 @@ mod scenario;
 mod shield;
 mod simulation;
 mod studies;
+mod words;
 mod work;
 
 use pyo3::prelude::*;
@@ -48,6 +50,9 @@ mod _native {
     use super::simulation::Simulation;
     #[pymodule_export]
     use super::studies::{attack, campaign, compare, export, margin, scenarios, sweep, validate};
+
+    #[pymodule_export]
+    use super::words::in_python;
 
     /// Initialises the module. Campaigns record the hash of this library as their program, not that of the interpreter.
     #[pymodule_init]

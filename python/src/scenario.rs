@@ -31,7 +31,7 @@ impl Scenario {
                 (source.clone(), Source::resolve(&source)?)
             };
             let scenario = scenario::Scenario::read(&source, &parsed)?;
-            Ok(Self { scenario, request: ScenarioRequest { argument, source, overrides } })
+            Ok(Self { scenario, request: ScenarioRequest { argument, source, overrides, external_law: None } })
         };
         run_detached(py, read)?.map_err(scenario::ScenarioError::into_exception)
     }

@@ -1,17 +1,20 @@
 //! Simulations that the caller steps.
 
-use std::sync::{Mutex, TryLockError};
+use std::sync::{Arc, Mutex, TryLockError};
 use std::time::{Duration, Instant};
 
 use numpy::PyArray2;
 use numpy::PyUntypedArrayMethods as _;
 use numpy::ndarray::Ix2;
 use pyo3::prelude::*;
+use pyo3::types::PyBytes;
+use tautline::law::Law as _;
 use tautline::sim::{self, Components, Ending, SimError};
-use tautline::swarm::{Pair, first_row_not_finite};
+use tautline::swarm::{Pair, Rows, first_row_not_finite};
 
 use crate::errors::{IntoException as _, wrong_input};
-use crate::law::{PythonLaw, catch_exception};
+use crate::history::{History, Part, Saved};
+use crate::law::{PythonLaw, catch_exception, record_calls};
 use crate::numbers::{borrowed, shape_text, table, to_rows};
 use crate::scenario::Scenario;
 use crate::work::run_detached;
@@ -23,9 +26,16 @@ const AT_ONCE: Duration = Duration::from_millis(50);
 #[pyclass(frozen, module = "tautline._native")]
 pub(crate) struct Simulation {
     count: usize,
-    /// Whether the law is written in Python.
-    is_of_python: bool,
-    state: Mutex<sim::Simulation>,
+    /// Name of the law, if it is written in Python.
+    python_law: Option<String>,
+    state: Mutex<State>,
+}
+
+/// A simulation with its history.
+#[derive(Clone)]
+struct State {
+    simulation: sim::Simulation,
+    history: History,
 }
 
 /// Numbers of a pair in violation, begin and end \[s\], and smallest separation \[m\].
@@ -37,8 +47,13 @@ type Closest = ((usize, usize), f64, f64);
 impl Simulation {
     /// Calls `work` with the simulation. Raises `Error` while another call uses it.
     fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut sim::Simulation) -> T + Send) -> PyResult<T> {
+        self.with_history(py, |state| work(&mut state.simulation))
+    }
+
+    /// As [`Simulation::with`], with the history.
+    fn with_history<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut State) -> T + Send) -> PyResult<T> {
         let done = run_detached(py, || match self.state.try_lock() {
-            Ok(mut simulation) => Ok(work(&mut simulation)),
+            Ok(mut state) => Ok(work(&mut state)),
             Err(TryLockError::WouldBlock) => {
                 Err("the simulation is being stepped, by another thread or by its own law")
             }
@@ -52,7 +67,7 @@ impl Simulation {
         if let Some(raised) = raised {
             return Err(raised);
         }
-        if !self.is_of_python {
+        if self.python_law.is_none() {
             return Ok(());
         }
         match self.with(py, |simulation| simulation.ending().cloned())? {
@@ -64,14 +79,49 @@ impl Simulation {
     }
 }
 
-#[pymethods]
+impl State {
+    /// Flies some steps and adds them to the history. Returns their number; all that are left after the end.
+    fn advance(&mut self, commands: Option<&Arc<Rows>>, left: u64) -> Result<u64, SimError> {
+        let (began, mut flown) = (Instant::now(), 0);
+        let mut ended = Ok(false);
+        while flown < left && began.elapsed() < AT_ONCE {
+            ended = self.step(commands.map(Arc::as_ref));
+            match ended {
+                Ok(false) => flown += 1,
+                Ok(true) | Err(_) => break,
+            }
+        }
+        self.history.add_steps(commands, flown);
+        ended.map(|is_over| if is_over { left } else { flown })
+    }
+
+    /// Flies a step. Returns true if the flight had ended before.
+    fn step(&mut self, commands: Option<&Rows>) -> Result<bool, SimError> {
+        if self.simulation.ending().is_some() {
+            return Ok(true);
+        }
+        match commands {
+            Some(commands) => self.simulation.step_with(commands)?,
+            None => self.simulation.step(),
+        }
+        // Events and samples are not recorded here.
+        self.simulation.events().for_each(drop);
+        self.simulation.sample();
+        Ok(false)
+    }
+
+    fn reseed(&mut self, seed: u64) {
+        let saved = self.simulation.save();
+        self.simulation.load(&saved, Some(seed));
+        self.history.reseed(seed);
+    }
+}
+
 impl Simulation {
-    #[new]
-    #[pyo3(signature = (scenario, law))]
-    fn new(py: Python<'_>, scenario: &Scenario, law: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+    /// Starts a flight. Returns it with the exception that its law raised.
+    fn begin(py: Python<'_>, scenario: &Scenario, law: Option<PythonLaw>) -> PyResult<(Self, Option<PyErr>)> {
         let scenario = &scenario.scenario;
-        let law = law.map(|law| PythonLaw::new(law, scenario)).transpose()?;
-        let is_of_python = law.is_some();
+        let python_law = law.as_ref().map(|law| law.name().to_owned());
         let begin = || -> Result<_, SimError> {
             let parts = match law {
                 Some(law) => Components::with_law(scenario, Box::new(law)),
@@ -79,11 +129,95 @@ impl Simulation {
             };
             sim::Simulation::with(scenario, parts)
         };
-        let (made, raised) = run_detached(py, || catch_exception(begin))?;
-        let state = Mutex::new(made.map_err(SimError::into_exception)?);
-        let simulation = Self { count: scenario.count(), is_of_python, state };
+        let ((made, calls), raised) = run_detached(py, || catch_exception(|| record_calls(begin)))?;
+        let mut history = History::default();
+        history.add_calls(calls);
+        let state = State { simulation: made.map_err(SimError::into_exception)?, history };
+        Ok((Self { count: scenario.count(), python_law, state: Mutex::new(state) }, raised))
+    }
+
+    /// Flies a number of steps, fewer where the flight ends. Returns the exception that the law raised.
+    fn advance(&self, py: Python<'_>, commands: Option<&Arc<Rows>>, steps: u64) -> PyResult<Option<PyErr>> {
+        let mut left = steps;
+        while left > 0 {
+            let (flown, raised) = self.with_history(py, |state| {
+                catch_exception(|| {
+                    let (flown, calls) = record_calls(|| state.advance(commands, left));
+                    state.history.add_calls(calls);
+                    flown
+                })
+            })?;
+            if raised.is_some() {
+                return Ok(raised);
+            }
+            left -= flown.map_err(SimError::into_exception)?;
+            py.check_signals()?;
+        }
+        Ok(None)
+    }
+}
+
+#[pymethods]
+impl Simulation {
+    #[new]
+    #[pyo3(signature = (scenario, law))]
+    fn new(py: Python<'_>, scenario: &Scenario, law: Option<&Bound<'_, PyAny>>) -> PyResult<Self> {
+        let law = law.map(|law| PythonLaw::new(law, Some(&scenario.scenario))).transpose()?;
+        let (simulation, raised) = Self::begin(py, scenario, law)?;
         simulation.raise(py, raised)?;
         Ok(simulation)
+    }
+
+    /// Returns the resolved scenario and the name of the law in Python of a saved simulation.
+    #[staticmethod]
+    fn saved(data: &[u8]) -> PyResult<(String, Option<String>)> {
+        Saved::read(data).map(|saved| (saved.toml, saved.law))
+    }
+
+    /// Repeats a saved simulation under its scenario, and under its law in Python if it has one.
+    #[staticmethod]
+    fn load(py: Python<'_>, scenario: &Scenario, law: Option<&Bound<'_, PyAny>>, data: &[u8]) -> PyResult<Self> {
+        let saved = Saved::read(data)?;
+        if saved.positions_m.nrows() != scenario.scenario.count() {
+            return Err(wrong_input("data: the number of vehicles is not that of the scenario; the bytes are damaged"));
+        }
+        let law = law.map(|law| PythonLaw::new(law, Some(&scenario.scenario))).transpose()?;
+        let given = law.as_ref().map(|law| law.name().to_owned());
+        if given != saved.law {
+            let named = |law: Option<&str>| law.map_or_else(|| "none".to_owned(), |law| format!("`{law}`"));
+            let (saved, given) = (named(saved.law.as_deref()), named(given.as_deref()));
+            return Err(wrong_input(format!(
+                "law: the law in Python of the saved simulation is needed, {saved}, got {given}"
+            )));
+        }
+        let law = law.map(|law| law.repeating(saved.history.calls.clone()));
+        let (simulation, raised) = Self::begin(py, scenario, law)?;
+        let mut raised = raised;
+        for part in &saved.history.parts {
+            if let Some(raised) = raised {
+                return Err(raised);
+            }
+            raised = match part {
+                Part::Own(steps) => simulation.advance(py, None, *steps)?,
+                Part::Outside(commands, steps) => simulation.advance(py, Some(commands), *steps)?,
+                Part::Reseed(seed) => {
+                    simulation.with_history(py, |state| state.reseed(*seed))?;
+                    None
+                }
+            };
+        }
+        let is_equal = simulation.with(py, |simulation| saved.is_state(simulation.state()))?;
+        if !is_equal {
+            return Err(wrong_input("data: the repeated flight ends in another state; the bytes are damaged"));
+        }
+        Ok(simulation)
+    }
+
+    /// Returns the simulation as bytes.
+    fn save<'py>(&self, py: Python<'py>, scenario: &Scenario) -> PyResult<Bound<'py, PyBytes>> {
+        let (law, toml) = (self.python_law.as_deref(), scenario.scenario.resolved_toml());
+        let bytes = self.with_history(py, |state| state.history.save(&toml, law, state.simulation.state()))??;
+        Ok(PyBytes::new(py, &bytes))
     }
 
     /// Flies a number of steps, fewer where the flight ends, with these accelerations if given.
@@ -99,39 +233,15 @@ impl Simulation {
                 Some(to_rows(given.as_array()))
             }
         };
-        let commands = commands.as_ref();
-        if let Some(vehicle) = commands.and_then(first_row_not_finite) {
+        if let Some(vehicle) = commands.as_ref().and_then(first_row_not_finite) {
             let step = self.with(py, |simulation| simulation.steps())? + 1;
             return Err(wrong_input(format!(
                 "step {step}: the command for vehicle {} is not a finite number",
                 vehicle + 1
             )));
         }
-        let mut left = steps;
-        while left > 0 {
-            let some_steps = |simulation: &mut sim::Simulation| -> Result<u64, SimError> {
-                let (began, mut flown) = (Instant::now(), 0);
-                while flown < left && began.elapsed() < AT_ONCE {
-                    if simulation.ending().is_some() {
-                        return Ok(left);
-                    }
-                    match commands {
-                        Some(commands) => simulation.step_with(commands)?,
-                        None => simulation.step(),
-                    }
-                    // Events and samples are not recorded here.
-                    simulation.events().for_each(drop);
-                    simulation.sample();
-                    flown += 1;
-                }
-                Ok(flown)
-            };
-            let (flown, raised) = self.with(py, |simulation| catch_exception(|| some_steps(simulation)))?;
-            self.raise(py, raised)?;
-            left -= flown.map_err(SimError::into_exception)?;
-            py.check_signals()?;
-        }
-        Ok(())
+        let raised = self.advance(py, commands.map(Arc::new).as_ref(), steps)?;
+        self.raise(py, raised)
     }
 
     #[getter]
@@ -196,14 +306,14 @@ impl Simulation {
 
     /// Returns an independent copy, with other random numbers if a seed is given.
     fn copy(&self, py: Python<'_>, noise_seed: Option<u64>) -> PyResult<Self> {
-        let copied = self.with(py, |simulation| {
-            let mut copy = simulation.clone();
-            if noise_seed.is_some() {
-                copy.load(&simulation.save(), noise_seed);
+        let copied = self.with_history(py, |state| {
+            let mut copy = state.clone();
+            if let Some(seed) = noise_seed {
+                copy.reseed(seed);
             }
             copy
         })?;
-        Ok(Self { count: self.count, is_of_python: self.is_of_python, state: Mutex::new(copied) })
+        Ok(Self { count: self.count, python_law: self.python_law.clone(), state: Mutex::new(copied) })
     }
 }
 

@@ -3,27 +3,42 @@
 use std::path::PathBuf;
 
 use pyo3::prelude::*;
-use tautline::attack::Bound;
+use tautline::attack::Bound as Bounds;
 use tautline::campaign::CampaignRequest;
 use tautline::export::WRITTEN;
 use tautline::export::drones::Dialect;
 use tautline::margin::Range;
-use tautline::request::{DroneChoices, ExportRequest, Failure, Monitor as _, Silent, export_drones, export_file};
-use tautline::scenario::builtin;
+use tautline::request::{
+    DroneChoices, ExportRequest, Failure, Monitor, ScenarioRequest, Silent, export_drones, export_file,
+};
+use tautline::scenario::{ExternalLaw, builtin};
 use tautline::studies::{Criterion, Experiment, Study as _, StudyFiles, StudyRequest};
 use tautline::sweep::SweptKey;
 use tautline::validate::{ValidateRequest, validate_into};
 
 use crate::errors::{IntoException as _, internal_error};
+use crate::law::{PythonLaw, catch_exception};
 use crate::request::{ReadOptions, choice};
 use crate::scenario::Scenario;
-use crate::work::run_in_thread_with_pool;
+use crate::work::{SignalMonitor, run_detached, run_in_thread_with_pool};
 
 /// Whether a result is good, and the result as JSON.
 type Answer = (bool, String);
 
-/// Runs a request without the interpreter's lock.
-fn answered<T: Send>(py: Python<'_>, work: impl FnOnce(&Silent) -> Result<T, Failure> + Send) -> PyResult<T> {
+/// Runs a request without the interpreter's lock: on all threads, or on this one for laws in Python.
+fn answered<T: Send>(
+    py: Python<'_>,
+    has_law: bool,
+    work: impl FnOnce(&dyn Monitor) -> Result<T, Failure> + Send,
+) -> PyResult<T> {
+    if has_law {
+        let monitor = SignalMonitor::new();
+        let (answer, raised) = run_detached(py, || catch_exception(|| work(&monitor)))?;
+        return match monitor.raised().or(raised) {
+            Some(raised) => Err(raised),
+            None => answer.map_err(Failure::into_exception),
+        };
+    }
     let monitor = Silent::default();
     run_in_thread_with_pool(py, monitor.interruption(), || work(&monitor))?.map_err(Failure::into_exception)
 }
@@ -98,10 +113,10 @@ pub(crate) fn export(
     let (format, dialect) = choice("to", to, &lossless.chain(of_drones).collect::<Vec<_>>())?.unwrap_or_default();
     let request = ExportRequest { paths, options, output, format, sample_hz, force };
     let Some(dialect) = dialect else {
-        return answered(py, |monitor| export_file(&request, monitor)).map(|()| None);
+        return answered(py, false, |monitor| export_file(&request, monitor)).map(|()| None);
     };
     let request = request.for_drones(dialect, drones.into());
-    let exported = answered(py, |monitor| export_drones(&request, monitor))?;
+    let exported = answered(py, false, |monitor| export_drones(&request, monitor))?;
     Ok(Some((exported.is_good(), exported.to_json())))
 }
 
@@ -120,15 +135,29 @@ pub(crate) struct Outputs {
     threads: Option<usize>,
 }
 
+/// Returns a law in Python as an external law.
+fn external(law: &Bound<'_, PyAny>, scenario: Option<&Scenario>) -> PyResult<ExternalLaw> {
+    Ok(ExternalLaw::new(PythonLaw::new(law, scenario.map(|scenario| &scenario.scenario))?))
+}
+
 /// Flies a study and writes its files.
-fn study<E>(py: Python<'_>, scenario: &Scenario, options: E, outputs: Outputs) -> PyResult<Answer>
+fn study<E>(
+    py: Python<'_>,
+    scenario: &Scenario,
+    law: Option<&Bound<'_, PyAny>>,
+    options: E,
+    outputs: Outputs,
+) -> PyResult<Answer>
 where
-    E: Experiment<Study: Send> + Sync,
+    E: Experiment<Study: Send> + Send + Sync,
 {
+    let external_law = law.map(|law| external(law, Some(scenario))).transpose()?;
+    let has_law = external_law.is_some() || !options.external_laws().is_empty();
     let Outputs { csv, latex, html, force, threads } = outputs;
     let files = StudyFiles { json: None, csv, latex, html, force };
-    let request = StudyRequest { scenario: scenario.request.clone(), options, files, threads };
-    let study = whole(answered(py, |monitor| tautline::studies::answer(&request, &(), monitor))?)?;
+    let scenario = ScenarioRequest { external_law, ..scenario.request.clone() };
+    let request = StudyRequest { scenario, options, files, threads };
+    let study = whole(answered(py, has_law, |monitor| tautline::studies::answer(&request, &(), monitor))?)?;
     Ok((study.is_good(), json(study.to_json())?))
 }
 
@@ -137,18 +166,30 @@ fn question(verdict: String) -> PyResult<Criterion> {
     Ok(choice("verdict", Some(verdict), &questions)?.unwrap_or_default())
 }
 
-/// Flies laws from the same starts.
+/// Flies laws from the same starts: names, and laws in Python.
 #[pyfunction]
 pub(crate) fn compare(
     py: Python<'_>,
     scenario: &Scenario,
-    laws: Option<Vec<String>>,
+    laws: Option<Vec<Bound<'_, PyAny>>>,
     shield: bool,
     runs: u64,
     seed: u64,
     outputs: Outputs,
 ) -> PyResult<Answer> {
-    study(py, scenario, tautline::compare::Options { laws, shield, runs, seed }, outputs)
+    let mut in_python = Vec::new();
+    let mut name = |law: Bound<'_, PyAny>| {
+        if let Ok(name) = law.extract::<String>() {
+            return Ok(name);
+        }
+        let law = external(&law, Some(scenario))?;
+        let name = law.name().to_owned();
+        in_python.push(law);
+        PyResult::Ok(name)
+    };
+    let laws = laws.map(|laws| laws.into_iter().map(&mut name).collect::<PyResult<Vec<_>>>()).transpose()?;
+    let options = tautline::compare::Options { laws, shield, runs, seed, external: in_python };
+    study(py, scenario, None, options, outputs)
 }
 
 /// Searches for the two values of a key between which a verdict turns.
@@ -157,6 +198,7 @@ pub(crate) fn compare(
 pub(crate) fn margin(
     py: Python<'_>,
     scenario: &Scenario,
+    law: Option<&Bound<'_, PyAny>>,
     key: String,
     start: f64,
     stop: f64,
@@ -171,14 +213,16 @@ pub(crate) fn margin(
     let halvings = u32::try_from(halvings).unwrap_or(u32::MAX);
     let range = Range { from: start, to: stop, scan, halvings, logarithmic };
     let options = tautline::margin::Options { key, range, question: question(verdict)?, runs, seed };
-    study(py, scenario, options, outputs)
+    study(py, scenario, law, options, outputs)
 }
 
 /// Flies a grid over one key or two.
 #[pyfunction]
+#[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
 pub(crate) fn sweep(
     py: Python<'_>,
     scenario: &Scenario,
+    law: Option<&Bound<'_, PyAny>>,
     keys: Vec<(String, Vec<f64>)>,
     runs: u64,
     seed: u64,
@@ -187,7 +231,7 @@ pub(crate) fn sweep(
 ) -> PyResult<Answer> {
     let keys = keys.into_iter().map(|(key, values)| SweptKey::new(&key, values)).collect::<Result<_, _>>();
     let (keys, question) = (keys.map_err(Failure::into_exception)?, question(verdict)?);
-    study(py, scenario, tautline::sweep::Options { keys, question, runs, seed }, outputs)
+    study(py, scenario, law, tautline::sweep::Options { keys, question, runs, seed }, outputs)
 }
 
 /// Searches for the worst flight within bounds.
@@ -196,6 +240,7 @@ pub(crate) fn sweep(
 pub(crate) fn attack(
     py: Python<'_>,
     scenario: &Scenario,
+    law: Option<&Bound<'_, PyAny>>,
     start: Option<f64>,
     velocity: Option<f64>,
     apart: Option<f64>,
@@ -206,18 +251,18 @@ pub(crate) fn attack(
     out: Option<PathBuf>,
     outputs: Outputs,
 ) -> PyResult<Answer> {
-    let vary = vary.iter().map(|(key, low, high)| Bound::new(key, *low, *high)).collect::<Result<_, _>>();
+    let vary = vary.iter().map(|(key, low, high)| Bounds::new(key, *low, *high)).collect::<Result<_, _>>();
     let vary = vary.map_err(Failure::into_exception)?;
     let (start_m, velocity_m_s, apart_m) = (start, velocity, apart);
     let options = tautline::attack::Options { vary, start_m, velocity_m_s, apart_m, flights, seeds, seed, out };
-    study(py, scenario, options, outputs)
+    study(py, scenario, law, options, outputs)
 }
 
 /// Measures the claims of the paper and of tautline.
 #[pyfunction]
 pub(crate) fn validate(py: Python<'_>, out: PathBuf, force: bool, threads: Option<usize>) -> PyResult<Answer> {
     let request = ValidateRequest { out, force, threads };
-    let validation = answered(py, |monitor| validate_into(&request, monitor))?;
+    let validation = answered(py, false, |monitor| validate_into(&request, monitor))?;
     Ok((validation.pass, json(validation.to_json())?))
 }
 
@@ -227,6 +272,7 @@ pub(crate) fn validate(py: Python<'_>, out: PathBuf, force: bool, threads: Optio
 pub(crate) fn campaign(
     py: Python<'_>,
     spec: PathBuf,
+    law: Option<&Bound<'_, PyAny>>,
     out: Option<PathBuf>,
     shards: Option<u64>,
     threads: Option<usize>,
@@ -234,8 +280,18 @@ pub(crate) fn campaign(
     until_decided: Option<f64>,
     worst: usize,
 ) -> PyResult<(bool, String, PathBuf)> {
-    let request =
-        CampaignRequest { out, shards, threads, until_width, until_decided, worst, ..CampaignRequest::new(spec) };
-    let answer = whole(answered(py, |monitor| tautline::campaign::campaign(&request, &(), monitor))?)?;
+    let external_law = law.map(|law| external(law, None)).transpose()?;
+    let has_law = external_law.is_some();
+    let request = CampaignRequest {
+        out,
+        shards,
+        threads,
+        until_width,
+        until_decided,
+        worst,
+        external_law,
+        ..CampaignRequest::new(spec)
+    };
+    let answer = whole(answered(py, has_law, |monitor| tautline::campaign::campaign(&request, &(), monitor))?)?;
     Ok((answer.summary.is_good(), json(serde_json::to_string(&answer.summary))?, answer.folder))
 }

@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+use tautline::request::Monitor;
 
 use crate::errors::internal_error;
 
@@ -115,6 +116,37 @@ fn words(panic: &(dyn Any + Send)) -> String {
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "it panicked".to_owned())
 }
 
+/// Monitor of work on the calling thread: signals interrupt the work.
+pub(crate) struct SignalMonitor {
+    interruption: Arc<AtomicBool>,
+    signals: Mutex<Signals>,
+}
+
+impl SignalMonitor {
+    pub(crate) fn new() -> Self {
+        Self { interruption: Arc::default(), signals: Mutex::new(Signals::new()) }
+    }
+
+    /// Returns the exception that a signal raised.
+    pub(crate) fn raised(self) -> Option<PyErr> {
+        self.signals.into_inner().unwrap_or_else(PoisonError::into_inner).raised
+    }
+}
+
+impl Monitor for SignalMonitor {
+    fn interruption(&self) -> &Arc<AtomicBool> {
+        &self.interruption
+    }
+
+    fn is_interrupted(&self) -> bool {
+        let mut signals = self.signals.lock().unwrap_or_else(PoisonError::into_inner);
+        if !signals.are_silent() {
+            self.interruption.store(true, Ordering::Relaxed);
+        }
+        self.interruption.load(Ordering::Relaxed)
+    }
+}
+
 /// Periodic check for signals, on a thread without the lock.
 pub(crate) struct Signals {
     looked: Instant,
@@ -129,7 +161,7 @@ impl Signals {
 
     /// Whether no signal has raised an exception.
     pub(crate) fn are_silent(&mut self) -> bool {
-        if self.looked.elapsed() >= SIGNALS_EVERY {
+        if self.raised.is_none() && self.looked.elapsed() >= SIGNALS_EVERY {
             self.raised = Python::attach(|py| py.check_signals().err());
             self.looked = Instant::now();
         }

@@ -7,38 +7,43 @@ Example::
     f = tl.fly("pentagon")                 # Flies and audits a scenario.
 
 Units are SI, in one inertial frame with z up. Tables of vectors have the shape (N, 3), with a row for each vehicle.
-Vehicle numbers start at 0 in arrays, and at 1 in names, pairs and messages. Wrong input raises :class:`Error` (a
-``ValueError``) with the message of the command line, a wrong dtype ``TypeError``, a missing file
+Vehicle numbers start at 0 in arrays and indices, and at 1 in names, pairs and messages. Wrong input raises
+:class:`Error` (a ``ValueError``) with place, problem and remedy, a wrong type ``TypeError``, a missing file
 ``FileNotFoundError``. Reading, audits and flights release the interpreter's lock.
 """
 
-from ._audit import Audit, ViolationError, audit
+from ._arguments import ReadOptions
+from ._audit import Audit, AuditOptions, ViolationError, audit
 from ._campaign import Campaign, campaign
 from ._flight import Flight, fly
-from ._law import Law
+from ._law import ControlLaw, Law
 from ._native import Error, Observation
 from ._program import Answer, attack, compare, export, margin, sweep, validate
 from ._recording import Recording, read
 from ._scenario import Check, Scenario, check, scenarios
 from ._shield import Shield
 from ._simulation import Simulation
-from ._tables import Finding, Findings
+from ._tables import Finding, Findings, Table
 
 __all__ = [
     "Answer",
     "Audit",
+    "AuditOptions",
     "Campaign",
     "Check",
+    "ControlLaw",
     "Error",
     "Finding",
     "Findings",
     "Flight",
     "Law",
     "Observation",
+    "ReadOptions",
     "Recording",
     "Scenario",
     "Shield",
     "Simulation",
+    "Table",
     "ViolationError",
     "attack",
     "audit",
@@ -55,3 +60,8 @@ __all__ = [
 ]
 
 __version__ = "0.1.0"
+
+for _name in __all__:
+    # Help and pickles name the public module.
+    globals()[_name].__module__ = "tautline"
+del _name

@@ -5,9 +5,10 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypedDict, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from . import _native
 from ._native import Error
@@ -22,6 +23,71 @@ MISSING_FILE_CODES = (
     "files/cannot-read",
 )
 PathLike = str | os.PathLike[str]
+
+if TYPE_CHECKING:
+    from ._words import Duplicates, ReadFormat, TimeUnit
+
+#: Largest integer up to which every integer is a float64.
+EXACT_INTEGER = 2**53
+
+
+def exact_array(value: object, what: str) -> NDArray[np.float64]:
+    """Returns an array of float64 with exactly the given numbers: of an array, a tensor, or nested lists.
+
+    An array of float64 is returned as it is. Raises ``TypeError`` for other kinds of numbers and :class:`Error` for
+    integers that float64 cannot hold.
+    """
+    array = value if isinstance(value, np.ndarray) else foreign_array(value, what)
+    if isinstance(array, np.ma.MaskedArray):
+        raise TypeError(f"{what}: a masked array has unknown numbers; give it as .filled(numpy.nan)")
+    kind, size = array.dtype.kind, array.dtype.itemsize
+    if kind == "f" and size <= 8:
+        return array.astype(np.float64, copy=False)
+    if kind in "iu":
+        if array.size and (int(array.max()) > EXACT_INTEGER or int(array.min()) < -EXACT_INTEGER):
+            raise Error(f"{what}: an integer is larger than 2^53 and is no float64; subtract an offset first")
+        return array.astype(np.float64)
+    raise TypeError(f"{what}: real numbers of at most 64 bits are needed, not {array.dtype}; give float64 or float32")
+
+
+def foreign_array(value: object, what: str) -> NDArray[Any]:
+    """Returns the array of a list or of an array of another library, such as a tensor."""
+    if isinstance(value, (list, tuple)):
+        try:
+            return np.asarray(value)
+        except ValueError as problem:
+            raise Error(f"{what}: {problem}; give rows of equal length") from None
+    try:
+        if hasattr(value, "__array__"):
+            return np.asarray(value)
+        if hasattr(value, "__dlpack__"):
+            return np.from_dlpack(value)
+    except (TypeError, ValueError, RuntimeError, BufferError) as problem:
+        raise TypeError(f"{what}: {problem}") from None
+    raise TypeError(f"{what}: an array is needed, not {type(value).__name__}; give numpy.asarray(..., dtype=float)")
+
+
+class ReadOptions(TypedDict, total=False):
+    """Options of reading, as keyword arguments of :func:`read`, :func:`audit` and :func:`export`."""
+
+    format: ReadFormat | None
+    time_unit: TimeUnit | None
+    fps: float | None
+    time_scale: float | None
+    sort: bool
+    duplicates: Duplicates | None
+    one_vehicle: bool
+    scale: float | Iterable[float] | None
+    axes: str | None
+    dimensions: int | str | None
+    column: Mapping[str, str] | None
+    start: Mapping[str, Iterable[float]] | None
+    layout: str | None
+    frame: str | None
+    topic: str | Sequence[str] | None
+    origin: Iterable[float] | None
+    join: bool
+    allow_unfinished: bool
 
 
 def number(value: object, what: str) -> float:
@@ -163,7 +229,7 @@ def read_options(
     one_vehicle: bool = False,
     scale: float | Iterable[float] | None = None,
     axes: str | None = None,
-    dimensions: str | None = None,
+    dimensions: int | str | None = None,
     column: Mapping[str, str] | None = None,
     start: Mapping[str, Iterable[float]] | None = None,
     layout: str | None = None,
@@ -173,7 +239,7 @@ def read_options(
     join: bool = False,
     allow_unfinished: bool = False,
 ) -> _native.ReadOptions:
-    """Returns the options of reading: those of ``tautline audit --help`` under *Reading*."""
+    """Returns the options of reading."""
     metres = None
     if scale is not None:
         metres = numbers(scale, "scale") if isinstance(scale, Iterable) else [number(scale, "scale")]

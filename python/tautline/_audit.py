@@ -7,15 +7,17 @@ import inspect
 import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from . import _display, _native
 from ._arguments import (
     PathLike,
+    ReadOptions,
     boolean,
+    exact_array,
     name_list,
     name_or_numbers,
     number_or_by_name,
@@ -32,6 +34,11 @@ from ._arguments import (
 )
 from ._native import Error
 from ._tables import Findings
+
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ._words import Motion, Rules
 
 #: Verdict, headline, summary, and the report as JSON.
 Outcome = tuple[str, str, str, str]
@@ -57,8 +64,10 @@ class ViolationError(Error):
 
 
 class Audit:
-    """Result of an audit."""
+    """Result of an audit. :func:`audit` returns it. It can be pickled."""
 
+    _json: str
+    _repeat: Callable[..., Outcome]
     #: Verdict in words: ``PROVED CLEAR``, ``CLEAR if straight between samples``, ``VIOLATION``, ``UNDECIDED``, ...
     verdict: str
     #: Verdict with its reason, in a line.
@@ -66,14 +75,25 @@ class Audit:
     #: Summary that the command line prints.
     text: str
 
-    def __init__(self, outcome: Outcome, repeat: Callable[..., Outcome]) -> None:
-        self.verdict, self.headline, self.text, self._json = outcome
-        self._repeat = repeat
+    def __init__(self) -> None:
+        raise TypeError("an audit is the result of tautline.audit(...)")
+
+    @classmethod
+    def _of(cls, outcome: Outcome, repeat: Callable[..., Outcome]) -> Audit:
+        """Returns the audit with this outcome; ``repeat`` repeats it."""
+        audit = cls.__new__(cls)
+        audit.verdict, audit.headline, text, audit._json = outcome
+        audit.text = _native.in_python(text)
+        audit._repeat = repeat
+        return audit
 
     @functools.cached_property
     def _report(self) -> dict[str, Any]:
         report: dict[str, Any] = json.loads(self._json)
         return report
+
+    def _findings(self, key: str) -> Findings:
+        return Findings(self._report[key], self.vehicles)
 
     @property
     def status(self) -> str:
@@ -117,23 +137,23 @@ class Audit:
     @property
     def closest(self) -> Findings:
         """Ten closest pairs: ``pair``, ``lower_m``, ``upper_m``, ``time_s``, ``limit_m``."""
-        return Findings(self._report["closest"])
+        return self._findings("closest")
 
     @property
     def violations(self) -> Findings:
         """Violations in order of time: ``pair``, ``from_s``, ``to_s``, ``min_m``, ``min_at_s``, ``limit_m``. If there
         are many, the worst ones and the first one of each pair."""
-        return Findings(self._report["violations"])
+        return self._findings("violations")
 
     @property
     def undecided(self) -> Findings:
         """Undecided intervals: ``pair``, ``from_s``, ``to_s``, ``lower_m``, ``upper_m``, ``limit_m``, ``rate_hz``."""
-        return Findings(self._report["undecided"])
+        return self._findings("undecided")
 
     @property
     def gaps(self) -> Findings:
         """Gaps, in which a vehicle is not seen: ``vehicle``, ``from_s``, ``to_s``."""
-        return Findings(self._report["gaps"])
+        return self._findings("gaps")
 
     @property
     def ended_early(self) -> dict[str, Any] | None:
@@ -145,12 +165,12 @@ class Audit:
     @property
     def obstacles(self) -> Findings:
         """Closest approaches to obstacles, with the keys of :attr:`closest`."""
-        return Findings(self._report["obstacles"]["closest"])
+        return Findings(self._report["obstacles"]["closest"], self.vehicles)
 
     @property
     def limits(self) -> Findings:
         """Limits on single vehicles (``limit``, ``fence``), each with its verdict."""
-        return Findings(self._report["limits"])
+        return self._findings("limits")
 
     @property
     def plan(self) -> dict[str, Any] | None:
@@ -167,10 +187,10 @@ class Audit:
     @property
     def notes(self) -> list[str]:
         """Notes on how the recording was read, a sentence each."""
-        return list(self._report["notes"])
+        return [_native.in_python(note) for note in self._report["notes"]]
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything that ``tautline audit --json`` prints."""
+        """Returns the JSON report as a dictionary."""
         report: dict[str, Any] = json.loads(self._json)
         return report
 
@@ -223,20 +243,52 @@ class Audit:
         return _display.make_card(tone, self.verdict, rows, drawing)
 
 
+class AuditOptions(TypedDict, total=False):
+    """Checks of :func:`audit`, as keyword arguments."""
+
+    delta: float | None
+    velocities: ArrayLike | None
+    names: Sequence[str] | None
+    motion: Motion | None
+    max_accel: float | Mapping[str, float] | None
+    radius: float | Mapping[str, float] | None
+    ellipsoid: Sequence[float] | str | None
+    cylinder: Sequence[float] | None
+    well_clear: Sequence[float] | str | None
+    rules: Rules | None
+    obstacles: PathLike | None
+    limit: Mapping[str, float] | None
+    fence: PathLike | None
+    plan: PathLike | None
+    plan_delay: float | None
+    tube: float | None
+    accel_window: float | None
+    config: PathLike | Literal[False] | None
+    from_s: float | None
+    to_s: float | None
+    above: float | None
+    ids: Iterable[str] | None
+    offset: Mapping[str, float] | None
+    expect_vehicles: int | None
+    max_gap: float | None
+    require_presence: bool
+    independent: bool
+
+
 def audit(
-    t: NDArray[np.float64] | PathLike | Sequence[PathLike],
-    positions: NDArray[np.float64] | None = None,
+    t: ArrayLike | PathLike | Sequence[PathLike],
+    positions: ArrayLike | None = None,
     *,
     delta: float | None = None,
-    velocities: NDArray[np.float64] | None = None,
+    velocities: ArrayLike | None = None,
     names: Sequence[str] | None = None,
-    motion: str | None = None,
+    motion: Motion | None = None,
     max_accel: float | Mapping[str, float] | None = None,
     radius: float | Mapping[str, float] | None = None,
     ellipsoid: Sequence[float] | str | None = None,
     cylinder: Sequence[float] | None = None,
     well_clear: Sequence[float] | str | None = None,
-    rules: str | None = None,
+    rules: Rules | None = None,
     obstacles: PathLike | None = None,
     limit: Mapping[str, float] | None = None,
     fence: PathLike | None = None,
@@ -254,17 +306,17 @@ def audit(
     max_gap: float | None = None,
     require_presence: bool = False,
     independent: bool = False,
-    _findings: _native.FlightFindings | None = None,
-    **read_as: Any,
+    **read_as: Unpack[ReadOptions],
 ) -> Audit:
     """Audits positions over time, in arrays or in a recording of any format.
 
     ``tl.audit(t, positions, delta=1.5)`` audits arrays.
 
-    * ``t``: (T,) times [s], float64 in any memory order.
-    * ``positions``: (T, N, 3) or (T, N, 2) [m], float64. NaN in every axis means that the vehicle was not seen. The
-      arrays are borrowed, not copied: do not write to them during the call. ``notes`` names vehicles that were not
-      seen from the first instant to the last.
+    * ``t``: (T,) times [s].
+    * ``positions``: (T, N, 3) or (T, N, 2) [m]. NaN in every axis means that the vehicle was not seen. ``notes`` names
+      vehicles that were not seen from the first instant to the last.
+    * Arrays of float64 are borrowed in any memory order, not copied: do not write to them during the call. Lists,
+      tensors, integers and float32 are copied without rounding.
     * ``layout``: order of the axes of ``positions`` and ``velocities``, such as ``"time,axis,vehicle"``.
     * ``velocities``: (T, N, 3) [m/s], which make ``motion="bounded"`` tighter.
     * ``names``: N names; numbers from 1 unless given.
@@ -300,61 +352,82 @@ def audit(
     * ``require_presence``: the audit is undecided where a vehicle is not seen over the whole window.
     * ``independent``: audits a recording of a flight from its samples, without the run's own audit.
 
-    Raises ``TypeError`` for a wrong dtype, ``FileNotFoundError`` for a missing file and :class:`Error` for other
-    wrong input. docs/audit.md explains the verdicts.
+    Raises ``TypeError`` for numbers that are no float64, ``FileNotFoundError`` for a missing file and :class:`Error`
+    for other wrong input. docs/audit.md explains the verdicts.
     """
-    ids = None if ids is None else name_list(ids, "ids")
-    options = given_arguments(locals()) | read_as
+    return perform(locals())
+
+
+def audit_with(findings: _native.FlightFindings, t: Any, positions: Any, options: AuditOptions) -> Audit:
+    """Audits the arrays of a flight with the findings of its run."""
+    try:
+        bound = inspect.signature(audit).bind(t, positions, **options)
+    except TypeError as wrong:
+        raise TypeError(f"audit() {wrong}") from None
+    bound.apply_defaults()
+    return perform(bound.arguments, findings)
+
+
+def perform(given: Mapping[str, Any], findings: _native.FlightFindings | None = None) -> Audit:
+    """Audits with the arguments of :func:`audit`."""
+    read_as = dict(given["read_as"])
+    t, positions, velocities, names = given["t"], given["positions"], given["velocities"], given["names"]
+    obstacles, fence, plan, config = given["obstacles"], given["fence"], given["plan"], given["config"]
+    ids = None if given["ids"] is None else name_list(given["ids"], "ids")
+    options = given_arguments({**given, "ids": ids}) | read_as
     if unknown := [word for word in read_as if word not in inspect.signature(read_options).parameters]:
         raise TypeError(f"audit() got an unexpected keyword argument '{unknown[0]}'")
-    if plan is None and (plan_delay is not None or tube is not None):
+    if plan is None and (given["plan_delay"] is not None or given["tube"] is not None):
         raise TypeError("plan_delay, tube: only with a plan")
     if ids is not None and not ids:
         raise Error("ids: no vehicle is named; leave it out to audit all")
     # Arrays have no folder that could hold a tautline.toml.
     looks_for_config = config is None and positions is None
     question = _native.AuditOptions(
-        delta=optional_number(delta, "delta"),
-        motion=optional_text(motion, "motion"),
-        max_accel=number_or_by_name(max_accel, "max_accel"),
-        radius=number_or_by_name(radius, "radius"),
-        ellipsoid=name_or_numbers(ellipsoid, "ellipsoid"),
-        cylinder=name_or_numbers(cylinder, "cylinder"),
-        well_clear=name_or_numbers(well_clear, "well_clear"),
-        rules=optional_text(rules, "rules"),
+        delta=optional_number(given["delta"], "delta"),
+        motion=optional_text(given["motion"], "motion"),
+        max_accel=number_or_by_name(given["max_accel"], "max_accel"),
+        radius=number_or_by_name(given["radius"], "radius"),
+        ellipsoid=name_or_numbers(given["ellipsoid"], "ellipsoid"),
+        cylinder=name_or_numbers(given["cylinder"], "cylinder"),
+        well_clear=name_or_numbers(given["well_clear"], "well_clear"),
+        rules=optional_text(given["rules"], "rules"),
         obstacles=optional_path(obstacles, "obstacles"),
-        limit=numbers_by_name(limit, "limit"),
+        limit=numbers_by_name(given["limit"], "limit"),
         fence=optional_path(fence, "fence"),
         plan=optional_path(plan, "plan"),
-        plan_delay=optional_number(plan_delay, "plan_delay"),
-        tube=optional_number(tube, "tube"),
-        accel_window=optional_number(accel_window, "accel_window"),
+        plan_delay=optional_number(given["plan_delay"], "plan_delay"),
+        tube=optional_number(given["tube"], "tube"),
+        accel_window=optional_number(given["accel_window"], "accel_window"),
         config=None if config is False else optional_path(config, "config"),
         has_config=looks_for_config,
-        from_s=optional_number(from_s, "from_s"),
-        to_s=optional_number(to_s, "to_s"),
-        above=optional_number(above, "above"),
+        from_s=optional_number(given["from_s"], "from_s"),
+        to_s=optional_number(given["to_s"], "to_s"),
+        above=optional_number(given["above"], "above"),
         ids=ids,
-        offset=numbers_by_name(offset, "offset"),
-        expect_vehicles=optional_count(expect_vehicles, "expect_vehicles"),
-        max_gap=optional_number(max_gap, "max_gap"),
-        require_presence=boolean(require_presence, "require_presence"),
-        independent=boolean(independent, "independent"),
+        offset=numbers_by_name(given["offset"], "offset"),
+        expect_vehicles=optional_count(given["expect_vehicles"], "expect_vehicles"),
+        max_gap=optional_number(given["max_gap"], "max_gap"),
+        require_presence=boolean(given["require_presence"], "require_presence"),
+        independent=boolean(given["independent"], "independent"),
     )
     more_files = (obstacles, fence, plan, None if config is False else config)
     files = [os.fspath(file) for file in more_files if file is not None]
     if positions is None:
         has_arrays = velocities is not None or names is not None
         return audit_files(question, call_text(repr(t), options), t, read_as, files, has_arrays)
+    if isinstance(t, (str, os.PathLike)):
+        raise TypeError("t: times are needed beside positions, or a path alone")
+    times, positions = exact_array(t, "t"), exact_array(positions, "positions")
+    velocities = None if velocities is None else exact_array(velocities, "velocities")
     layout = read_as.pop("layout", None)
     if layout is not None:
-        positions, velocities = (
-            array if array is None else transposed(array, layout) for array in (positions, velocities)
-        )
+        positions = transposed(positions, layout)
+        velocities = None if velocities is None else transposed(velocities, layout)
     if read_as:
         raise TypeError(f"{', '.join(read_as)}: only for files, but arrays are given")
     command = call_text("t, positions", options)
-    return with_files(files, lambda: audit_arrays(question, command, t, positions, velocities, names, _findings))
+    return with_files(files, lambda: audit_arrays(question, command, times, positions, velocities, names, findings))
 
 
 def given_arguments(arguments: Mapping[str, Any]) -> dict[str, Any]:
@@ -374,7 +447,7 @@ def transposed(array: NDArray[np.float64], layout: str) -> NDArray[np.float64]:
     axes = layout.split(",")
     if sorted(axes) != sorted(usual):
         raise Error(f"layout: must list time, vehicle and axis, such as 'time,axis,vehicle', got '{layout}'")
-    if not isinstance(array, np.ndarray) or array.ndim != len(usual):
+    if array.ndim != len(usual):
         raise TypeError("layout: needs an array with three axes")
     return array.transpose([axes.index(axis) for axis in usual])
 
@@ -396,21 +469,19 @@ def audit_files(
     def repeat(html: str | None = None) -> Outcome:
         return with_files(files + more_files, lambda: _native.audit_files(question, command, files, options, html))
 
-    return Audit(repeat(), repeat)
+    return Audit._of(repeat(), repeat)
 
 
 def audit_arrays(
     question: _native.AuditOptions,
     command: str,
-    t: Any,
-    positions: Any,
-    velocities: Any,
+    t: NDArray[np.float64],
+    positions: NDArray[np.float64],
+    velocities: NDArray[np.float64] | None,
     names: Sequence[str] | None,
-    findings: _native.FlightFindings | None = None,
+    findings: _native.FlightFindings | None,
 ) -> Audit:
-    if isinstance(t, (str, os.PathLike)):
-        raise TypeError("t: times are needed beside positions, or a path alone")
-    count = positions.shape[1] if isinstance(positions, np.ndarray) and positions.ndim == 3 else 0
+    count = positions.shape[1] if positions.ndim == 3 else 0
     vehicles = [str(number) for number in range(1, count + 1)] if names is None else name_list(names, "names")
     if len(set(vehicles)) < len(vehicles):
         raise Error("names: two vehicles have the same name")
@@ -418,7 +489,7 @@ def audit_arrays(
     def repeat(html: str | None = None) -> Outcome:
         return _native.audit_arrays(question, command, t, positions, velocities, vehicles, findings, html)
 
-    return Audit(repeat(), repeat)
+    return Audit._of(repeat(), repeat)
 
 
 def unpickle(outcome: Outcome) -> Audit:
@@ -427,4 +498,4 @@ def unpickle(outcome: Outcome) -> Audit:
     def repeat(html: str | None = None) -> Outcome:
         raise Error("to_html: the recording is not at hand here; write the page in the process of the audit")
 
-    return Audit(outcome, repeat)
+    return Audit._of(outcome, repeat)

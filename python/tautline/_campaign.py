@@ -7,14 +7,17 @@ from typing import TYPE_CHECKING
 
 from . import _native
 from ._arguments import PathLike, count, optional_count, optional_number, optional_path, path, with_files
+from ._law import ControlLaw, check_law
 from ._program import Answer
+from ._tables import Table, import_pyarrow
 
 if TYPE_CHECKING:
     import pandas
+    import pyarrow
 
 
-class Campaign(Answer):
-    """Result of a campaign: the keys of ``campaign.json``, and its folder."""
+class Campaign(Answer, Table):
+    """Result of a campaign: the keys of ``campaign.json``, its folder, and a table with a row for each flight."""
 
     def __init__(self, is_good: bool, text: str, folder: Path) -> None:
         super().__init__(is_good, text)
@@ -25,19 +28,23 @@ class Campaign(Answer):
         """Folder with the parts, ``results.parquet``, ``campaign.json`` and ``campaign.html``."""
         return self._folder
 
+    def to_arrow(self) -> pyarrow.Table:
+        """Returns a table of Arrow with a row for each flight. Imports pyarrow."""
+        import_pyarrow()
+        import pyarrow.parquet
+
+        return pyarrow.parquet.read_table(self._folder / "results.parquet")
+
     def to_pandas(self) -> pandas.DataFrame:
-        """Returns a table with a row for each flight. Imports pandas, and pyarrow, which reads Parquet."""
-        try:
-            import pandas
-        except ImportError:
-            raise ImportError("tables need pandas: pip install pandas pyarrow") from None
-        return pandas.read_parquet(self._folder / "results.parquet")
+        """Returns a data frame with a row for each flight. Imports pandas and pyarrow."""
+        return self.to_arrow().to_pandas()
 
 
 def campaign(
     spec: PathLike,
     out: PathLike | None = None,
     *,
+    law: ControlLaw | None = None,
     shards: int | None = None,
     threads: int | None = None,
     until_width: float | None = None,
@@ -47,14 +54,19 @@ def campaign(
     """Flies a campaign (docs/campaigns.md) on all cores into a folder, by default ``out/NAME`` after the name of the
     file.
 
-    A further call continues an interrupted campaign. The ``worst`` flights are flown again, with recordings and
-    reports.
+    A further call continues an interrupted campaign, also one of the command line. With more ``runs`` in the file it
+    keeps the flights that were flown, and the intervals widen. The ``worst`` flights are flown again, with recordings
+    and reports.
+
+    ``law`` is a law in Python, which flies every run in place of the scenario's law, on the calling thread alone. Only
+    the same call with a law of the same name continues such a campaign.
 
     Raises ``FileNotFoundError`` for a missing specification and :class:`Error` for a wrong one.
     """
     file = path(spec, "spec")
     folder, many = optional_path(out, "out"), (optional_count(shards, "shards"), optional_count(threads, "threads"))
     until = optional_number(until_width, "until_width"), optional_number(until_decided, "until_decided")
-    answer = with_files([file], lambda: _native.campaign(file, folder, *many, *until, count(worst, "worst")))
+    check_law(law)
+    answer = with_files([file], lambda: _native.campaign(file, law, folder, *many, *until, count(worst, "worst")))
     is_good, text, at = answer
     return Campaign(is_good, text, Path(at).absolute())

@@ -12,19 +12,29 @@ from numpy.typing import NDArray
 
 from . import _display, _native
 from ._arguments import PathLike, boolean, path
-from ._audit import Audit, audit
-from ._law import Law, check_law
+from ._audit import Audit, AuditOptions, audit_with
+from ._law import ControlLaw, check_law
 from ._native import Error
-from ._scenario import Scenario, to_scenario
-from ._tables import to_frame
+from ._scenario import Scenario, restore, to_scenario
+from ._tables import Table
 
 if TYPE_CHECKING:
-    import pandas
     from matplotlib.figure import Figure
+    from typing_extensions import Unpack
+
+#: Arrays of a flight.
+ARRAYS = ("t", "positions", "velocities", "commands", "separations_m")
 
 
-class Flight:
-    """A flight: T recorded instants of N vehicles, and the report of all steps."""
+class Flight(Table):
+    """A flight: T recorded instants of N vehicles, and the report of all steps. :func:`fly` returns it.
+
+    As a table it has a row for each instant and vehicle. Its columns are the time ``t``, the number ``id`` of the
+    vehicle from 1 and its ``index`` from 0. The axes of positions, velocities and commands follow: `x, y, z, vx, vy,
+    vz, ax, ay, az`.
+
+    A flight can be pickled. Where the file of its scenario is missing, :attr:`scenario` is then the flown one.
+    """
 
     #: (T,) recorded instants [s].
     t: NDArray[np.float64]
@@ -37,21 +47,36 @@ class Flight:
     #: (T,) smallest separation over the steps since the previous instant [m].
     separations_m: NDArray[np.float64]
 
-    def __init__(self, scenario: Scenario, flown: _native.FlightData) -> None:
-        self.scenario = scenario
-        #: Verdict in a line, and the summary that the command line prints.
-        self.headline, self.text = flown.headline, flown.text
-        #: Whether the flight passes: it is clear and reaches its formation.
-        self.passed = flown.passed
-        self._json = flown.report
-        #: Contents of ``report.json``.
-        self.report: dict[str, Any] = json.loads(flown.report)
-        self.t, self.positions, self.velocities = flown.t, flown.positions, flown.velocities
-        self.commands, self.separations_m = flown.commands, flown.separations_m
-        self._findings = flown.findings
+    #: The scenario.
+    scenario: Scenario
+    #: Verdict in a line.
+    headline: str
+    #: Summary that the command line prints.
+    text: str
+    #: Whether the flight passes: it is clear and reaches its formation.
+    passed: bool
+    #: Contents of ``report.json``.
+    report: dict[str, Any]
+
+    def __init__(self) -> None:
+        raise TypeError("a flight is the result of tautline.fly(...)")
+
+    def _restore(self, scenario: Scenario, state: dict[str, Any]) -> Flight:
+        """Sets the attributes."""
+        self.scenario, self._json, self._findings = scenario, state["report"], state["findings"]
+        self.headline, self.text, self.passed = state["headline"], state["text"], state["passed"]
+        self.report = json.loads(self._json)
+        for name in ARRAYS:
+            setattr(self, name, state[name])
         # The run's audit holds for this motion only.
         for array in (self.t, self.positions):
             array.flags.writeable = False
+        return self
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        state = {name: getattr(self, name) for name in (*ARRAYS, "headline", "text", "passed")}
+        state |= {"report": self._json, "findings": self._findings.json}
+        return unpickle_flight, (self.scenario._source_state(), self.scenario.to_toml(), state)
 
     @property
     def status(self) -> str:
@@ -80,28 +105,23 @@ class Flight:
         report: dict[str, Any] = json.loads(self._json)
         return report
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """Returns a table with a row for each instant and vehicle. Imports pandas.
-
-        Its columns are ``t``, ``id`` (from 1) and the axes of positions, velocities and commands: `x, y, z, vx, vy,
-        vz, ax, ay, az`.
-        """
+    def _columns(self) -> dict[str, Any]:
         instants, vehicles = self.positions.shape[:2]
-        numbers = np.tile(np.arange(1, vehicles + 1), instants)
-        columns: dict[str, Any] = {"t": np.repeat(self.t, vehicles), "id": numbers}
+        indices = np.tile(np.arange(vehicles), instants)
+        columns: dict[str, Any] = {"t": np.repeat(self.t, vehicles), "id": indices + 1, "index": indices}
         for prefix, vectors in (("", self.positions), ("v", self.velocities), ("a", self.commands)):
             for axis, letter in enumerate("xyz"):
                 columns[prefix + letter] = vectors[:, :, axis].ravel()
-        return to_frame(columns)
+        return columns
 
-    def audit(self, **options: Any) -> Audit:
+    def audit(self, **options: Unpack[AuditOptions]) -> Audit:
         """Audits the flight as :func:`tautline.audit` audits its recording.
 
         By default delta, ellipsoids and obstacles are those of the scenario, and the result is that of the run's own
         audit. Other options are evaluated on the recorded instants. A flight that ended early is ``UNDECIDED`` unless
         a violation was found, or ``to_s`` ends the window earlier.
         """
-        return audit(self.t, self.positions, _findings=self._findings, **options)
+        return audit_with(self._findings, self.t, self.positions, options)
 
     def plot(self) -> Figure:
         """Draws the paths from above, and the smallest separation over time with delta. Imports matplotlib."""
@@ -147,7 +167,7 @@ class Flight:
 def fly(
     scenario: Scenario | PathLike,
     *,
-    law: Law | None = None,
+    law: ControlLaw | None = None,
     record: PathLike | None = None,
     html: PathLike | None = None,
     set: Mapping[str, Any] | None = None,
@@ -176,7 +196,20 @@ def fly(
     record_to = None if record is None else path(record, "record")
     page = None if html is None else path(html, "html")
     call = f"tautline.fly({flown!r})" if law is None else f"tautline.fly({flown!r}, law={type(law).__name__}(...))"
-    return Flight(flown, _native.fly(flown._native, law, record_to, page, call, keep))
+    found = _native.fly(flown._native, law, record_to, page, call, boolean(keep, "keep"))
+    state = {name: getattr(found, name) for name in (*ARRAYS, "headline", "text", "passed", "report", "findings")}
+    return Flight.__new__(Flight)._restore(flown, state)
+
+
+def unpickle_flight(source: tuple[Any, ...], toml: str, state: dict[str, Any]) -> Flight:
+    """Returns the flight of another process."""
+    try:
+        scenario = restore(*source)
+    except (Error, FileNotFoundError):
+        # The file is missing here, or has changed since the flight.
+        scenario = Scenario.from_toml(toml)
+    findings = _native.FlightFindings(scenario._native, state["findings"])
+    return Flight.__new__(Flight)._restore(scenario, state | {"findings": findings})
 
 
 def check_outputs(scenario: Scenario, outputs: Mapping[str, PathLike | None]) -> None:

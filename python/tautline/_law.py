@@ -2,17 +2,28 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from ._native import Observation
+    from ._words import Reaches
+
+
+class ControlLaw(Protocol):
+    """Any object with a method ``control``: a law for :func:`fly`, simulations and studies.
+
+    The attributes ``name``, ``sensing_range_m`` and ``reaches`` of :class:`Law` are optional.
+    """
+
+    def control(self, obs: Observation, out: NDArray[np.float64], /) -> None:
+        """Writes the accelerations [m/s^2] of all vehicles into ``out`` (N, 3)."""
 
 
 class Law:
-    """Base class of control laws: subclasses define :meth:`control`.
+    """Optional base class of control laws with the defaults of all attributes: subclasses define :meth:`control`.
 
     Example::
 
@@ -20,8 +31,9 @@ class Law:
             def control(self, obs, out):
                 out[:] = obs.slots_m - obs.positions - 2 * obs.velocities  # Damped springs.
 
-    Such a law has no certificate; its flights are audited like all others. The thread of the flight calls it. Copies
-    of a simulation share the object, so its state is not copied.
+    Such a law has no certificate; its flights are audited like all others. The calling thread calls it. Copies of a
+    simulation share the object, so its state is not copied. A study flies one object many times: a law with a memory
+    clears it where ``obs.t`` is 0.
     """
 
     #: Name in reports; the name of the class unless given.
@@ -30,7 +42,7 @@ class Law:
     sensing_range_m: float | None = None
     #: How a formation counts as reached. With ``"places"`` the vehicles are at the slots, moved with the reference.
     #: ``"displacements"`` ignores a translation, ``"distances"`` also a rotation and a reflection.
-    reaches: ClassVar[str] = "displacements"
+    reaches: ClassVar[Reaches] = "displacements"
 
     def control(self, obs: Observation, out: NDArray[np.float64]) -> None:
         """Writes the accelerations [m/s^2] of all vehicles into ``out``.

@@ -23,6 +23,7 @@ __all__ = [
     "compare",
     "export",
     "fly",
+    "in_python",
     "main",
     "margin",
     "read",
@@ -168,6 +169,11 @@ class Simulation:
     @property
     def ending(self) -> str | None: ...
     def copy(self, noise_seed: int | None) -> Simulation: ...
+    def save(self, scenario: Scenario) -> bytes: ...
+    @staticmethod
+    def load(scenario: Scenario, law: object | None, data: bytes) -> Simulation: ...
+    @staticmethod
+    def saved(data: bytes) -> tuple[str, str | None]: ...
 
 @final
 class FlightData:
@@ -195,6 +201,10 @@ class FlightData:
 @final
 class FlightFindings:
     """Limits, obstacles and audit of a flight."""
+
+    def __new__(cls, scenario: Scenario, json: str) -> FlightFindings: ...
+    @property
+    def json(self) -> str: ...
 
 @final
 class Columns:
@@ -288,6 +298,7 @@ class AuditOptions:
 
 def attack(
     scenario: Scenario,
+    law: object | None,
     start: float | None,
     velocity: float | None,
     apart: float | None,
@@ -316,6 +327,7 @@ def audit_in_rust(
 ) -> tuple[float, float]: ...
 def campaign(
     spec: str,
+    law: object | None,
     out: str | None,
     shards: int | None,
     threads: int | None,
@@ -325,7 +337,7 @@ def campaign(
 ) -> tuple[bool, str, str]: ...
 def compare(
     scenario: Scenario,
-    laws: Sequence[str] | None,
+    laws: Sequence[object] | None,
     shield: bool,
     runs: int,
     seed: int,
@@ -343,9 +355,11 @@ def export(
 def fly(
     scenario: Scenario, law: object | None, record: str | None, html: str | None, command: str, keep: bool
 ) -> FlightData: ...
+def in_python(text: str, code: str | None = None) -> str: ...
 def main(arguments: Sequence[str]) -> int: ...
 def margin(
     scenario: Scenario,
+    law: object | None,
     key: str,
     start: float,
     stop: float,
@@ -361,6 +375,7 @@ def read(paths: Sequence[str], options: ReadOptions) -> Columns: ...
 def scenarios() -> list[str]: ...
 def sweep(
     scenario: Scenario,
+    law: object | None,
     keys: Sequence[tuple[str, Sequence[float]]],
     runs: int,
     seed: int,

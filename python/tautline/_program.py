@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import json
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from . import _display, _native
 from ._arguments import (
     PathLike,
+    ReadOptions,
     boolean,
     count,
     mapping,
-    name_list,
     number,
     optional_count,
     optional_number,
@@ -28,13 +28,19 @@ from ._arguments import (
     single_recording,
     with_files,
 )
+from ._law import ControlLaw, check_law
 from ._scenario import Scenario, to_scenario
 from ._tables import Finding, Findings, format_cell
 
+if TYPE_CHECKING:
+    from typing_extensions import Unpack
+
+    from ._words import ExportFormat, Verdict
+
 
 class Answer(Finding):
-    """Result of a command: a mapping with the keys of its JSON, which are attributes as well. Lists of rows become
-    tables."""
+    """Result of a study or an export: a mapping with the keys of its JSON, which are attributes as well. As attributes,
+    lists of rows are tables."""
 
     def __init__(self, is_good: bool, text: str) -> None:
         super().__init__(json.loads(text))
@@ -47,11 +53,6 @@ class Answer(Finding):
 
     def __bool__(self) -> bool:
         raise TypeError("an answer is neither true nor false; use is_good")
-
-    def __getattr__(self, key: str) -> Any:
-        value = super().__getattr__(key)
-        is_rows = isinstance(value, list) and value and all(isinstance(row, dict) for row in value)
-        return Findings(value) if is_rows else value
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON that the command prints, as a dictionary."""
@@ -71,9 +72,9 @@ def export(
     recording: PathLike | Sequence[PathLike],
     output: PathLike,
     *,
-    to: str | None = None,
+    to: ExportFormat | None = None,
     sample_hz: float | None = None,
-    force: bool = False,
+    overwrite: bool = False,
     tolerance: float | None = None,
     delta: float | None = None,
     ellipsoid: Sequence[float] | None = None,
@@ -82,12 +83,12 @@ def export(
     until_s: float | None = None,
     compressed: bool = False,
     skyb_version: int = 2,
-    **read_as: Any,
+    **read_as: Unpack[ReadOptions],
 ) -> Answer | None:
     """Writes a recording of any format as CSV, Parquet, NPZ or MCAP without rounding, or a flight for drones.
 
     The name of ``output`` gives the format, unless ``to`` is ``csv``, ``parquet``, ``npz`` or ``mcap``. Curves are
-    sampled at ``sample_hz``. ``force`` overwrites an existing file. The options of reading are those of
+    sampled at ``sample_hz``. ``overwrite`` replaces an existing file. The options of reading are those of
     :func:`tautline.audit`. Raises the exceptions of :func:`tautline.read`, and ``OSError`` where the file cannot be
     written.
 
@@ -99,7 +100,7 @@ def export(
     """
     recordings = single_recording(paths(recording, "recording"), read_as)
     options, target = read_options(**read_as), path(output, "output")
-    more = optional_text(to, "to"), optional_number(sample_hz, "sample_hz"), boolean(force, "force")
+    more = optional_text(to, "to"), optional_number(sample_hz, "sample_hz"), boolean(overwrite, "overwrite")
     drones = {
         "tolerance": optional_number(tolerance, "tolerance"),
         "delta": optional_number(delta, "delta"),
@@ -121,22 +122,39 @@ def study_scenario(scenario: Scenario | PathLike, set: Mapping[str, Any] | None)
     return found._native
 
 
+def checked_law(law: ControlLaw | None) -> ControlLaw | None:
+    """Returns a law in Python. Raises ``TypeError`` for a class."""
+    check_law(law)
+    return law
+
+
+def names_and_laws(laws: object) -> list[str | ControlLaw]:
+    """Returns names and laws in Python. A single string is refused: its letters are no names."""
+    if isinstance(laws, (str, bytes)) or not isinstance(laws, Iterable):
+        raise TypeError(f"laws: a list of names and laws is needed, not {type(laws).__name__}")
+    given = list(laws)
+    for law in given:
+        if not isinstance(law, str):
+            check_law(law)
+    return given
+
+
 def outputs(
-    csv: PathLike | None, latex: PathLike | None, html: PathLike | None, force: bool, threads: int | None
+    csv: PathLike | None, latex: PathLike | None, html: PathLike | None, overwrite: bool, threads: int | None
 ) -> dict[str, str | bool | int | None]:
     """Returns the files and threads of a study."""
     return {
         "csv": optional_path(csv, "csv"),
         "latex": optional_path(latex, "latex"),
         "html": optional_path(html, "html"),
-        "force": boolean(force, "force"),
+        "force": boolean(overwrite, "overwrite"),
         "threads": optional_count(threads, "threads"),
     }
 
 
 def compare(
     scenario: Scenario | PathLike,
-    laws: Sequence[str] | None = None,
+    laws: Sequence[str | ControlLaw] | None = None,
     *,
     shield: bool = False,
     runs: int = 20,
@@ -145,23 +163,24 @@ def compare(
     csv: PathLike | None = None,
     latex: PathLike | None = None,
     html: PathLike | None = None,
-    force: bool = False,
+    overwrite: bool = False,
     threads: int | None = None,
 ) -> Answer:
     """Flies laws from the same starts, on all cores. ``answer.laws.to_pandas()`` has a row for each law.
 
-    ``laws`` are kinds or names of tables ``[laws.NAME]``, by default all that the scenario has. ``shield`` flies each
-    law twice, as ``NAME+bare`` and under the shield as ``NAME+shield``. ``force`` overwrites
-    existing files. More in docs/compare.md.
+    ``laws`` are kinds, names of tables ``[laws.NAME]``, and laws in Python, by default all that the scenario has. Laws
+    in Python fly on the calling thread alone, and nothing is proved about them. ``shield`` flies each
+    law twice, as ``NAME+bare`` and under the shield as ``NAME+shield``. ``overwrite``
+    replaces existing files. More in docs/compare.md.
     """
     return Answer(
         *_native.compare(
             study_scenario(scenario, set),
-            laws=None if laws is None else name_list(laws, "laws"),
+            laws=None if laws is None else names_and_laws(laws),
             shield=boolean(shield, "shield"),
             runs=count(runs, "runs"),
             seed=count(seed, "seed"),
-            outputs=outputs(csv, latex, html, force, threads),
+            outputs=outputs(csv, latex, html, overwrite, threads),
         )
     )
 
@@ -172,9 +191,10 @@ def margin(
     start: float,
     stop: float,
     *,
+    law: ControlLaw | None = None,
     runs: int = 1,
     seed: int = 0,
-    verdict: str = "pass",
+    verdict: Verdict = "pass",
     scan: int = 5,
     halvings: int = 6,
     log: bool = False,
@@ -182,16 +202,18 @@ def margin(
     csv: PathLike | None = None,
     latex: PathLike | None = None,
     html: PathLike | None = None,
-    force: bool = False,
+    overwrite: bool = False,
     threads: int | None = None,
 ) -> Answer:
     """Searches between ``start`` and ``stop`` for the two values of a key between which a verdict turns.
 
-    ``verdict`` is ``pass``, ``clear`` or ``reached``. More in docs/margins.md.
+    ``verdict`` is ``pass``, ``clear`` or ``reached``. A law in Python flies in place of the scenario's law, on the
+    calling thread alone. More in docs/margins.md.
     """
     return Answer(
         *_native.margin(
             study_scenario(scenario, set),
+            law=checked_law(law),
             key=str(key),
             start=number(start, "start"),
             stop=number(stop, "stop"),
@@ -201,7 +223,7 @@ def margin(
             scan=count(scan, "scan"),
             halvings=count(halvings, "halvings"),
             logarithmic=boolean(log, "log"),
-            outputs=outputs(csv, latex, html, force, threads),
+            outputs=outputs(csv, latex, html, overwrite, threads),
         )
     )
 
@@ -210,20 +232,22 @@ def sweep(
     scenario: Scenario | PathLike,
     keys: Mapping[str, Sequence[float]],
     *,
+    law: ControlLaw | None = None,
     runs: int = 1,
     seed: int = 0,
-    verdict: str = "pass",
+    verdict: Verdict = "pass",
     set: Mapping[str, Any] | None = None,
     csv: PathLike | None = None,
     latex: PathLike | None = None,
     html: PathLike | None = None,
-    force: bool = False,
+    overwrite: bool = False,
     threads: int | None = None,
 ) -> Answer:
     """Flies a grid over one key or two, such as ``{"network.loss": np.linspace(0, 0.5, 11)}``.
 
     ``answer.points.to_pandas()`` has a row for each point, with the share of runs that have the ``verdict``.
-    ``verdict`` is ``pass``, ``clear`` or ``reached``. More in docs/sweeps.md.
+    ``verdict`` is ``pass``, ``clear`` or ``reached``. A law in Python flies in place of the scenario's law, on the
+    calling thread alone. More in docs/sweeps.md.
     """
     swept = []
     for key, values in mapping(keys, "keys").items():
@@ -233,11 +257,12 @@ def sweep(
     return Answer(
         *_native.sweep(
             study_scenario(scenario, set),
+            law=checked_law(law),
             keys=swept,
             runs=count(runs, "runs"),
             seed=count(seed, "seed"),
             verdict=str(verdict),
-            outputs=outputs(csv, latex, html, force, threads),
+            outputs=outputs(csv, latex, html, overwrite, threads),
         )
     )
 
@@ -245,6 +270,7 @@ def sweep(
 def attack(
     scenario: Scenario | PathLike,
     *,
+    law: ControlLaw | None = None,
     start: float | None = None,
     velocity: float | None = None,
     vary: Mapping[str, tuple[float, float]] | None = None,
@@ -257,7 +283,7 @@ def attack(
     csv: PathLike | None = None,
     latex: PathLike | None = None,
     html: PathLike | None = None,
-    force: bool = False,
+    overwrite: bool = False,
     threads: int | None = None,
 ) -> Answer:
     """Searches for the flight with the smallest separation.
@@ -266,6 +292,7 @@ def attack(
     * ``velocity``: largest offset of each start velocity [m/s].
     * ``vary``: keys, each with a lower and an upper bound.
     * ``apart``: smallest separation of two start positions [m].
+    * ``law``: law in Python, which flies in place of the scenario's law, on the calling thread alone.
 
     A search without a violation proves nothing. More in docs/attack.md.
     """
@@ -277,6 +304,7 @@ def attack(
     return Answer(
         *_native.attack(
             study_scenario(scenario, set),
+            law=checked_law(law),
             start=optional_number(start, "start"),
             velocity=optional_number(velocity, "velocity"),
             apart=optional_number(apart, "apart"),
@@ -285,13 +313,13 @@ def attack(
             seeds=count(seeds, "seeds"),
             seed=count(seed, "seed"),
             out=optional_path(out, "out"),
-            outputs=outputs(csv, latex, html, force, threads),
+            outputs=outputs(csv, latex, html, overwrite, threads),
         )
     )
 
 
-def validate(out: PathLike | None = None, *, force: bool = False, threads: int | None = None) -> Answer:
+def validate(out: PathLike | None = None, *, overwrite: bool = False, threads: int | None = None) -> Answer:
     """Measures the claims of the paper and of tautline. Writes figures and a page into the folder ``out``, if given."""
     with tempfile.TemporaryDirectory() as folder:
         at = str(Path(folder) / "validate") if out is None else path(out, "out")
-        return Answer(*_native.validate(at, boolean(force, "force"), optional_count(threads, "threads")))
+        return Answer(*_native.validate(at, boolean(overwrite, "overwrite"), optional_count(threads, "threads")))

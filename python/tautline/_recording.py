@@ -3,58 +3,70 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _display, _native
-from ._arguments import PathLike, paths, read_options, single_recording, with_files
-from ._audit import Audit, audit
+from ._arguments import PathLike, ReadOptions, number, paths, read_options, single_recording, with_files
+from ._audit import Audit, AuditOptions, audit
 from ._native import Error
-from ._tables import to_frame
+from ._tables import Table
 
 if TYPE_CHECKING:
-    import pandas
+    from typing_extensions import Unpack
 
 #: An interval longer than this many usual intervals is a gap, as in an audit.
 GAP_FACTOR = 1.5
+#: Names of the columns of a recording in memory, which pickles hold.
+COLUMNS = (
+    "vehicles", "notes", "planar", "unit", "epoch_ns", "vehicle", "t", "position", "velocity", "radius",
+    "piece_vehicle", "piece_span", "piece_coefficients",
+)  # fmt: skip
 #: Largest array of positions: 2 GiB.
 MAX_NUMBERS = 2**28
 
 
-class Recording:
-    """A recording in memory: samples and curves of vehicles."""
+class Recording(Table):
+    """A recording in memory: samples and curves of vehicles. :func:`read` returns it. It can be pickled.
 
-    def __init__(self, files: list[str], read_as: dict[str, Any]) -> None:
+    As a table it has a row for each sample in order of time. Its columns are the time ``t``, the name ``id`` of the
+    vehicle, its ``index`` from 0, and the axes of positions, `x, y, z` (z unless planar). Velocities, `vx, vy, vz`, and
+    ``radius`` follow where they are known. Curves have no rows.
+    """
+
+    def __init__(self, files: list[str], read_as: ReadOptions) -> None:
         self._files, self._read_as = single_recording(files, read_as), read_as
         options = read_options(**read_as)
-        self._columns = with_files(files, lambda: _native.read(files, options))
+        columns = with_files(files, lambda: _native.read(files, options))
+        self._data = SimpleNamespace(**{name: getattr(columns, name) for name in COLUMNS})
 
     @property
     def vehicles(self) -> list[str]:
         """Names of the vehicles."""
-        return self._columns.vehicles
+        return list(self._data.vehicles)
 
     @property
     def notes(self) -> list[str]:
         """Notes on how the recording was read, a sentence each."""
-        return self._columns.notes
+        return [_native.in_python(note) for note in self._data.notes]
 
     @property
     def is_planar(self) -> bool:
         """Whether the height of a vehicle is unknown; z is then 0 everywhere and has no meaning."""
-        return self._columns.planar
+        return bool(self._data.planar)
 
     @property
     def epoch_ns(self) -> int:
         """Epoch that was subtracted from all times, so that clocks in nanoseconds keep their digits [ns]."""
-        return self._columns.epoch_ns
+        return int(self._data.epoch_ns)
 
     @property
     def has_curves(self) -> bool:
         """Whether the motion of a vehicle is given by curves."""
-        return len(self._columns.piece_vehicle) > 0
+        return len(self._data.piece_vehicle) > 0
 
     def to_numpy(
         self, hz: float | None = None, *, max_gap_s: float | None = None
@@ -72,11 +84,10 @@ class Recording:
             raise Error(f"max_gap_s: must be 0 s or more, got {max_gap_s}")
         if hz is None:
             return self._as_recorded()
-        if isinstance(hz, bool) or not isinstance(hz, (int, float, np.integer, np.floating)):
-            raise TypeError(f"hz: a number is needed, not {type(hz).__name__}")
+        hz = number(hz, "hz")
         if not (np.isfinite(hz) and hz > 0):
             raise Error(f"hz: must be positive and finite, got {hz}")
-        columns = self._columns
+        columns = self._data
         starts = [*columns.t[:1], *columns.piece_span[:, 0]]
         ends = [*columns.t[-1:], *columns.piece_span[:, 1]]
         if not starts:
@@ -94,7 +105,7 @@ class Recording:
     def _as_recorded(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         if self.has_curves:
             raise Error("the recording has curves; give a sampling rate, hz=")
-        columns = self._columns
+        columns = self._data
         t, instant = np.unique(columns.t, return_inverse=True)
         if len(t) * 3 * len(self.vehicles) > MAX_NUMBERS:
             size = f"{len(t)} instants of {len(self.vehicles)} vehicles, mostly without a position"
@@ -106,8 +117,8 @@ class Recording:
     def _interpolate(
         self, vehicle: int, t: NDArray[np.float64], out: NDArray[np.float64], max_gap_s: float | None
     ) -> None:
-        own = self._columns.vehicle == vehicle
-        seen_s, position = self._columns.t[own], self._columns.position[own]
+        own = self._data.vehicle == vehicle
+        seen_s, position = self._data.t[own], self._data.position[own]
         if len(seen_s) == 0:
             return
         interval_s = np.diff(seen_s)
@@ -123,7 +134,7 @@ class Recording:
             out[is_seen, axis] = np.interp(t[is_seen], seen_s, position[:, axis])
 
     def _evaluate(self, vehicle: int, t: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-        columns = self._columns
+        columns = self._data
         for piece in np.flatnonzero(columns.piece_vehicle == vehicle):
             from_s, to_s = columns.piece_span[piece]
             within = (t >= from_s) & (t <= to_s)
@@ -133,16 +144,12 @@ class Recording:
                 at = at * since + coefficient
             out[within] = at
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """Returns a table with a row for each sample in order of time. Imports pandas.
-
-        Its columns are ``t``, ``id`` and the axes of positions: ``x``, ``y``, ``z`` (unless planar). Those of
-        velocities and ``radius`` follow where known. Raises :class:`Error` for curves.
-        """
+    def _columns(self) -> dict[str, Any]:
         if self.has_curves:
             raise Error("the recording has curves, which have no rows; use to_numpy(hz=...)")
-        columns = self._columns
-        rows: dict[str, Any] = {"t": columns.t, "id": np.array(self.vehicles, dtype=object)[columns.vehicle]}
+        columns = self._data
+        names = np.array(self.vehicles, dtype=object)[columns.vehicle]
+        rows: dict[str, Any] = {"t": columns.t, "id": names, "index": columns.vehicle}
         letters = "xy" if self.is_planar else "xyz"
         for axis, letter in enumerate(letters):
             rows[letter] = columns.position[:, axis]
@@ -150,11 +157,11 @@ class Recording:
             rows |= {f"v{letter}": columns.velocity[:, axis] for axis, letter in enumerate(letters)}
         if not np.isnan(columns.radius).all():
             rows["radius"] = columns.radius
-        return to_frame(rows)
+        return rows
 
-    def audit(self, **options: Any) -> Audit:
+    def audit(self, **options: Unpack[AuditOptions]) -> Audit:
         """Audits the recording's files with :func:`tautline.audit`, with the same options of reading."""
-        return audit(self._files, **{**self._read_as, **options})
+        return audit(self._files, **self._read_as, **options)
 
     def __len__(self) -> int:
         return len(self.vehicles)
@@ -163,23 +170,23 @@ class Recording:
         return True
 
     def _repr_html_(self) -> str:
-        t = [*self._columns.t[:1], *self._columns.t[-1:], *self._columns.piece_span.ravel()]
+        t = [*self._data.t[:1], *self._data.t[-1:], *self._data.piece_span.ravel()]
         rows = [
             ("vehicles", str(len(self))),
-            ("samples", str(len(self._columns.t))),
-            ("pieces of curves", str(len(self._columns.piece_vehicle))),
+            ("samples", str(len(self._data.t))),
+            ("pieces of curves", str(len(self._data.piece_vehicle))),
             ("time", f"{min(t):.6g} s to {max(t):.6g} s" if t else "-"),
             *(("note", note) for note in self.notes),
         ]
         return _display.make_card("open", ", ".join(self._files), rows)
 
     def __repr__(self) -> str:
-        columns = self._columns
+        columns = self._data
         size = f"{len(columns.piece_vehicle)} pieces of curves" if self.has_curves else f"{len(columns.t)} samples"
         return f"<Recording {', '.join(self._files)}: {len(self)} vehicles, {size}>"
 
 
-def read(recording: PathLike | Sequence[PathLike], **read_as: Any) -> Recording:
+def read(recording: PathLike | Sequence[PathLike], **read_as: Unpack[ReadOptions]) -> Recording:
     """Reads a recording of any format into memory.
 
     It is a file or folder, or with ``join=True`` a list of files with one vehicle each.

@@ -14,14 +14,14 @@ from numpy.typing import NDArray
 from . import _display, _native
 from ._arguments import PathLike, mapping, with_files
 from ._native import Error
-from ._tables import Findings
+from ._tables import Finding, Findings
 
 
 class Scenario:
     """A scenario: a built-in one by its name, a file, or TOML text (:meth:`from_toml`).
 
-    ``set`` overrides keys, as ``--set`` of the command line does: ``Scenario("pentagon", set={"time.duration_s":
-    60})``. Values are numbers, bools, strings, lists and dictionaries.
+    ``set`` overrides keys: ``Scenario("pentagon", set={"time.duration_s": 60})``. Values are numbers, bools, strings,
+    lists and dictionaries. Scenarios are equal if they fly the same.
 
     Raises ``FileNotFoundError`` for a missing file and :class:`Error`, with line, column and remedy, for a wrong one.
     """
@@ -59,8 +59,19 @@ class Scenario:
         if now.sha256 != self.sha256:
             raise Error(f"{self._source}: has changed since it was read; create a new Scenario")
 
+    def _source_state(self) -> tuple[Any, ...]:
+        """Returns the arguments of `restore` for this scenario."""
+        return self._source, self._is_text, self._sets, self.files, self.sha256
+
     def __reduce__(self) -> tuple[Any, ...]:
-        return restore, (self._source, self._is_text, self._sets, self.files, self.sha256)
+        return restore, self._source_state()
+
+    def __eq__(self, other: object) -> bool:
+        """Whether two scenarios fly the same: their complete texts are equal."""
+        return self.sha256 == other.sha256 if isinstance(other, Scenario) else NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(self.sha256)
 
     @property
     def name(self) -> str:
@@ -188,7 +199,8 @@ class Check:
 
     def __init__(self, found: tuple[bool, str, str, str]) -> None:
         #: Whether the check does not refuse the flight.
-        self.is_good, self.headline, self.text, self._json = found
+        self.is_good, self.headline, text, self._json = found
+        self.text = _native.in_python(text)
         self._found: dict[str, Any] = json.loads(self._json)
 
     @property
@@ -211,9 +223,12 @@ class Check:
         raise TypeError("a check is neither true nor false; use is_good")
 
     def __getattr__(self, key: str) -> Any:
-        if key.startswith("_") or key not in self._found:
+        if key.startswith("_"):
             raise AttributeError(key)
-        return self._found[key]
+        return getattr(Finding(self._found), key)
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *self._found})
 
     def __repr__(self) -> str:
         return f"<Check {self.headline}>"

@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from . import _display, _native
-from ._arguments import PathLike
-from ._law import Law, check_law
+from ._arguments import PathLike, exact_array
+from ._law import ControlLaw, check_law
 from ._native import Error
 from ._scenario import Scenario, to_scenario
 from ._tables import Finding, Findings
@@ -32,21 +32,22 @@ class Simulation:
         self,
         scenario: Scenario | PathLike = "pentagon",
         *,
-        law: Law | None = None,
+        law: ControlLaw | None = None,
         set: Mapping[str, Any] | None = None,
     ) -> None:
         self.scenario = to_scenario(scenario, set)
         check_law(law)
+        self._law = law
         self._native = _native.Simulation(self.scenario._native, law)
 
-    def step(self, u: NDArray[np.float64] | None = None, steps: int = 1) -> None:
+    def step(self, u: ArrayLike | None = None, steps: int = 1) -> None:
         """Flies steps of ``scenario.dt_s``, fewer where the flight ends.
 
-        ``u`` (N, 3) or (N, 2) float64 are accelerations [m/s^2] that replace those of the law. Without ``u`` a step
+        ``u`` (N, 3) or (N, 2) are accelerations [m/s^2] that replace those of the law. Without ``u`` a step
         that is too long for the law is flown in parts.
 
         Raises :class:`Error` where the flight has already ended, or where ``u`` has a wrong shape or is not finite;
-        ``TypeError`` for a wrong dtype. An exception of the law ends the flight and is raised again.
+        ``TypeError`` for numbers that are no float64. An exception of the law ends the flight and is raised again.
         """
         if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)):
             raise TypeError(f"steps: a whole number is needed, not {type(steps).__name__}")
@@ -54,7 +55,12 @@ class Simulation:
             raise Error(f"steps: must be at least 1, got {steps}")
         if (ending := self.ending) is not None:
             raise Error(f"the flight has ended ({ending}); create a new simulation, or step an earlier copy")
-        self._native.step(u, min(int(steps), 2**63))
+        commands = None if u is None else exact_array(u, "u")
+        self._native.step(commands, min(int(steps), 2**63))
+
+    @property
+    def _names(self) -> list[str]:
+        return [str(number) for number in range(1, len(self.scenario) + 1)]
 
     @property
     def t(self) -> float:
@@ -94,7 +100,8 @@ class Simulation:
         if found is None:
             return None
         (first, second), separation_m, time_s = found
-        return Finding({"who": [str(first), str(second)], "separation_m": separation_m, "time_s": time_s})
+        values = {"who": [str(first), str(second)], "separation_m": separation_m, "time_s": time_s}
+        return Finding(values, self._names)
 
     @property
     def least_clearance_m(self) -> float | None:
@@ -113,7 +120,8 @@ class Simulation:
         """Violations of pairs so far: ``pair``, ``from_s``, ``to_s``, ``min_m``."""
         found = self._native.judged()[1]
         return Findings(
-            [{"who": [str(i), str(j)], "from_s": a, "to_s": b, "min_m": least} for (i, j), a, b, least in found]
+            [{"who": [str(i), str(j)], "from_s": a, "to_s": b, "min_m": least} for (i, j), a, b, least in found],
+            self._names,
         )
 
     @property
@@ -139,9 +147,41 @@ class Simulation:
         """
         if noise_seed is not None and not (isinstance(noise_seed, (int, np.integer)) and 0 <= noise_seed < 2**64):
             raise Error(f"noise_seed: must be a whole number from 0 to 2^64 - 1, got {noise_seed!r}")
-        other = Simulation.__new__(Simulation)
-        other.scenario, other._native = self.scenario, self._native.copy(noise_seed)
-        return other
+        return Simulation._of(self.scenario, self._law, self._native.copy(noise_seed))
+
+    def save(self) -> bytes:
+        """Returns the simulation as bytes: the scenario, the accelerations from outside, and the commands of a law in
+        Python. Their size grows with the steps that were flown with such accelerations or commands.
+
+        Raises :class:`Error` if these exceed 256 MiB.
+        """
+        return self._native.save(self.scenario._native)
+
+    @classmethod
+    def load(cls, data: bytes, law: ControlLaw | None = None) -> Simulation:
+        """Returns a saved simulation, which continues with the same bits.
+
+        The flight so far is flown again, without calls of ``law``. ``law`` is the law in Python of the saved
+        simulation, with the memory that it had.
+
+        Raises :class:`Error` for damaged bytes, for those of another program, and for another law.
+        """
+        if not isinstance(data, (bytes, bytearray, memoryview)):
+            raise TypeError(f"data: bytes are needed, not {type(data).__name__}")
+        check_law(law)
+        toml, _ = _native.Simulation.saved(bytes(data))
+        scenario = Scenario.from_toml(toml)
+        return cls._of(scenario, law, _native.Simulation.load(scenario._native, law, bytes(data)))
+
+    @classmethod
+    def _of(cls, scenario: Scenario, law: ControlLaw | None, native: _native.Simulation) -> Simulation:
+        simulation = cls.__new__(cls)
+        simulation.scenario, simulation._law, simulation._native = scenario, law, native
+        return simulation
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Pickle stores the law by its own class.
+        return Simulation.load, (self.save(), self._law)
 
     def __copy__(self) -> Simulation:
         return self.copy()

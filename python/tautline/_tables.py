@@ -8,13 +8,39 @@ from typing import TYPE_CHECKING, Any, overload
 
 if TYPE_CHECKING:
     import pandas
+    import pyarrow
+
+
+class Table:
+    """A flat table: a row for each finding, instant or flight, and a column of plain values for each key.
+
+    Libraries of data frames read it without a copy through Arrow, such as ``polars.DataFrame(table)``.
+    """
+
+    def _columns(self) -> dict[str, Any]:
+        raise NotImplementedError
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """Returns a data frame of pandas. Imports pandas."""
+        return to_frame(self._columns())
+
+    def to_arrow(self) -> pyarrow.Table:
+        """Returns a table of Arrow. Imports pyarrow."""
+        pyarrow = import_pyarrow()
+        return pyarrow.table({name: to_arrow_column(values) for name, values in self._columns().items()})
+
+    def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
+        """Exports the table to any library that reads the Arrow PyCapsule interface. Imports pyarrow."""
+        return self.to_arrow().__arrow_c_stream__(requested_schema)
 
 
 class Finding(Mapping[str, Any]):
-    """A finding. The keys of the command line's JSON are attributes as well (``finding.min_m``)."""
+    """A finding. The keys of the command line's JSON are attributes as well (``finding.min_m``). As attributes, nested
+    objects are findings and lists of objects are tables."""
 
-    def __init__(self, values: Mapping[str, Any]) -> None:
+    def __init__(self, values: Mapping[str, Any], vehicles: Sequence[str] = ()) -> None:
         self._values = dict(values)
+        self._vehicles = vehicles
 
     def __getitem__(self, key: str) -> Any:
         return self._values[key]
@@ -25,26 +51,47 @@ class Finding(Mapping[str, Any]):
     def __len__(self) -> int:
         return len(self._values)
 
+    def __eq__(self, other: object) -> bool:
+        return dict(self) == dict(other) if isinstance(other, Mapping) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
+
     def __getattr__(self, key: str) -> Any:
         if key.startswith("_") or key not in self._values:
-            raise AttributeError(key)
-        return self._values[key]
+            raise AttributeError(f"{type(self).__name__} has no attribute or key {key!r}")
+        value = self._values[key]
+        if isinstance(value, Mapping):
+            return Finding(value, self._vehicles)
+        is_rows = isinstance(value, list) and value and all(isinstance(row, Mapping) for row in value)
+        return Findings(value, self._vehicles) if is_rows else value
+
+    def __dir__(self) -> list[str]:
+        return sorted({*super().__dir__(), *(key for key in self._values if key.isidentifier())})
 
     @property
     def pair(self) -> tuple[str, str]:
         """Names of the two vehicles, or of the vehicle and the obstacle."""
+        if "who" not in self._values:
+            raise AttributeError(f"{type(self).__name__} has no pair")
         first, second = self._values["who"]
         return first, second
 
+    @property
+    def indices(self) -> tuple[int | None, ...]:
+        """Indices of the vehicles of the finding, from 0; None for an obstacle. Empty where it names no vehicle."""
+        names = self._values.get("who", [self._values["vehicle"]] if "vehicle" in self._values else [])
+        return tuple(index_of(name, self._vehicles) for name in names)
+
     def __repr__(self) -> str:
-        return f"Finding({', '.join(f'{key}={value!r}' for key, value in self._values.items())})"
+        return f"{type(self).__name__}({', '.join(f'{key}={value!r}' for key, value in self._values.items())})"
 
 
-class Findings(Sequence[Finding]):
-    """A list of findings."""
+class Findings(Sequence[Finding], Table):
+    """A list of findings, and a table with a row for each. ``first`` and ``second`` name a pair, ``first_index`` and
+    ``second_index`` are the indices from 0. Nested keys are joined by dots; nested tables are left out."""
 
-    def __init__(self, rows: Sequence[Mapping[str, Any]]) -> None:
-        self._rows = [Finding(row) for row in rows]
+    def __init__(self, rows: Sequence[Mapping[str, Any]], vehicles: Sequence[str] = ()) -> None:
+        self._rows = [Finding(row, vehicles) for row in rows]
 
     @overload
     def __getitem__(self, index: int) -> Finding: ...
@@ -56,9 +103,15 @@ class Findings(Sequence[Finding]):
     def __len__(self) -> int:
         return len(self._rows)
 
-    def to_pandas(self) -> pandas.DataFrame:
-        """Returns a table with a row for each finding; ``first`` and ``second`` name the pair. Imports pandas."""
-        return to_frame([flatten(row) for row in self._rows])
+    def __eq__(self, other: object) -> bool:
+        return list(self) == list(other) if isinstance(other, Sequence) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def _columns(self) -> dict[str, Any]:
+        rows = [flatten(row) for row in self._rows]
+        names = dict.fromkeys(name for row in rows for name in row)
+        return {name: [row.get(name) for row in rows] for name in names}
 
     def __repr__(self) -> str:
         return f"Findings({self._rows!r})"
@@ -67,24 +120,60 @@ class Findings(Sequence[Finding]):
         return make_table([flatten(row) for row in self._rows])
 
 
-def flatten(row: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns a finding with the names of its pair in two cells."""
+def index_of(name: str, vehicles: Sequence[str]) -> int | None:
+    """Returns the index of a vehicle; None for an obstacle."""
+    return vehicles.index(name) if name in vehicles else None
+
+
+def flatten(row: Finding) -> dict[str, Any]:
+    """Returns plain values by key, with the names and indices of a pair in cells of their own."""
     cells: dict[str, Any] = {}
-    for key, value in row.items():
-        if key == "who":
-            cells["first"], cells["second"] = value
-        else:
-            cells[key] = value
+
+    def add(prefix: str, values: Mapping[str, Any]) -> None:
+        for key, value in values.items():
+            name = prefix + key
+            if isinstance(value, Mapping):
+                add(f"{name}.", value)
+            elif key == "who":
+                cells[f"{prefix}first"], cells[f"{prefix}second"] = value
+            elif key.endswith("pair") and isinstance(value, (list, tuple)) and len(value) == 2:
+                cells[f"{name}.first"], cells[f"{name}.second"] = value
+            elif not (isinstance(value, list) and any(isinstance(one, (Mapping, list)) for one in value)):
+                cells[name] = value
+
+    add("", row)
+    if "who" in row and row._vehicles:
+        cells["first_index"], cells["second_index"] = row.indices
+    elif "vehicle" in row and row._vehicles:
+        (cells["vehicle_index"],) = row.indices
     return cells
 
 
-def to_frame(rows: Any, **more: Any) -> pandas.DataFrame:
-    """Returns a table of pandas. Imports pandas."""
+def import_pyarrow() -> Any:
+    """Imports pyarrow."""
+    try:
+        import pyarrow
+    except ImportError:
+        raise ImportError("tables of Arrow need pyarrow: pip install pyarrow") from None
+    return pyarrow
+
+
+def to_arrow_column(values: Any) -> Any:
+    """Returns a column of Arrow; one of several types becomes text."""
+    pyarrow = import_pyarrow()
+    try:
+        return pyarrow.array(values)
+    except (pyarrow.ArrowInvalid, pyarrow.ArrowTypeError):
+        return pyarrow.array([None if value is None else str(value) for value in values])
+
+
+def to_frame(columns: Any) -> pandas.DataFrame:
+    """Returns a data frame of pandas. Imports pandas."""
     try:
         import pandas
     except ImportError:
         raise ImportError("tables need pandas: pip install pandas") from None
-    return pandas.DataFrame(rows, **more)
+    return pandas.DataFrame(columns)
 
 
 def make_table(rows: Sequence[Mapping[str, Any]], max_rows: int = 10) -> str:

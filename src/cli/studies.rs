@@ -108,7 +108,13 @@ impl CompareArguments {
     pub(super) fn run(&self) -> Result<Exit, Failure> {
         let default = compare::Options::default();
         let runs = self.runs.runs.unwrap_or(default.runs);
-        self.study.answer(compare::Options { laws: self.laws.clone(), shield: self.shield, runs, seed: self.runs.seed })
+        self.study.answer(compare::Options {
+            laws: self.laws.clone(),
+            shield: self.shield,
+            runs,
+            seed: self.runs.seed,
+            ..compare::Options::default()
+        })
     }
 }
 

@@ -17,7 +17,7 @@ SCRIPT = ROOT / "python" / "campaign.sbatch"
 
 # Stubs that record their arguments, or print the files of the test.
 STUBS = {
-    "sbatch": 'echo "$BLOCK $*" > "$NOTES/submitted"',
+    "sbatch": 'echo "$*" > "$NOTES/submitted"',
     "scontrol": 'echo "MaxArraySize            = $MOST"',
     "tautline": """
         case $2 in
@@ -59,14 +59,17 @@ class Arithmetic(unittest.TestCase):
         (self.notes / "missing").write_text(missing + "\n" if missing else "")
         ran_script = self.script("--partition=night", **variables)
         self.assertEqual(ran_script.returncode, 0, ran_script.stderr)
-        block, array, *options = (self.notes / "submitted").read_text().split()
+        array, *options, mark, block, program = (self.notes / "submitted").read_text().split()
+        self.assertEqual((mark, program), ("--task", "tautline"))
         return int(block), numbers(array.removeprefix("--array=")), options
 
     def flown(self, block: int, tasks: list[int]) -> list[int]:
         """Returns the shards that these tasks fly."""
         (self.notes / "flown").write_text("")
         for task in tasks:
-            self.assertEqual(self.script(BLOCK=block, SLURM_ARRAY_TASK_ID=task).returncode, 0)
+            # A task has no variable of its submission.
+            ran_task = self.script("--task", str(block), "tautline", SLURM_ARRAY_TASK_ID=task)
+            self.assertEqual(ran_task.returncode, 0, ran_task.stderr)
         return [shard for span in (self.notes / "flown").read_text().split() for shard in numbers(span)]
 
     def test_every_shard_is_flown_once(self) -> None:
@@ -87,6 +90,20 @@ class Arithmetic(unittest.TestCase):
                 self.assertEqual((of, tasks), (block, expected), (missing, block))
         flown = self.flown(7, self.submitted(600, "13,500-502,598", BLOCK=7)[1])
         self.assertEqual(flown, [*range(7, 14), *range(497, 504), *range(595, 600)])
+
+    def test_without_scontrol_an_array_has_the_default_size(self) -> None:
+        (self.notes / "scontrol").unlink()
+        (self.notes / "scontrol").write_text("#!/bin/sh\nexit 127\n")
+        (self.notes / "scontrol").chmod(0o755)
+        block, tasks, _ = self.submitted(2002, "0-2001")
+        self.assertEqual((block, max(tasks)), (2, 1000))
+        (self.notes / "scontrol").write_text("#!/bin/sh\necho 'MaxArraySize = 11'\n")
+        self.assertEqual(self.submitted(22, "0-21")[0], 2)
+
+    def test_inside_an_array_the_script_still_submits(self) -> None:
+        _, tasks, _ = self.submitted(3, "0-2", MOST=8, SLURM_ARRAY_TASK_ID=1)
+        self.assertEqual(tasks, [0, 1, 2])
+        self.assertFalse((self.notes / "flown").exists())
 
     def test_a_complete_or_a_wrong_campaign_submits_nothing(self) -> None:
         (self.notes / "missing").write_text("")
@@ -120,7 +137,9 @@ class RealNode(unittest.TestCase):
         return Campaign(folder, runs, duration_s, shards)
 
     def submitted(self, *command: str | Path) -> str:
-        submitted = ran(*command, env={**self.slurm.environment, "TAUTLINE": str(TAUTLINE)}, cwd=self.folder)
+        # Some clusters export no variables to jobs.
+        variables = {"TAUTLINE": str(TAUTLINE), "SBATCH_EXPORT": "NONE"}
+        submitted = ran(*command, env={**self.slurm.environment, **variables}, cwd=self.folder)
         self.assertEqual(submitted.returncode, 0, submitted.stderr)
         return submitted.stdout
 

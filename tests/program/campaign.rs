@@ -150,7 +150,7 @@ fn a_torn_part_is_flown_again_and_that_of_another_campaign_refused() {
 }
 
 #[test]
-fn a_manifest_of_another_program_or_an_edited_one_is_refused_with_both_hashes() {
+fn an_edited_manifest_and_another_specification_are_refused_with_both_hashes() {
     let place = Place::of(SPEC);
     assert_eq!(place.campaign(&["plan", "spec.toml", "--shards", "2", "--out", "camp"]).exit, Some(0));
     let path = place.path("camp/manifest.json");
@@ -163,20 +163,46 @@ fn a_manifest_of_another_program_or_an_edited_one_is_refused_with_both_hashes() 
     assert!(changed.err.contains(&campaign[..32]) && changed.err.contains("its contents are"), "{}", changed.err);
     fs::write(&path, &text).expect("written");
     // The same folder with another specification.
-    fs::write(place.path("spec.toml"), SPEC.replace("runs = 60", "runs = 61")).expect("written");
+    fs::write(place.path("spec.toml"), SPEC.replace("seed = 5", "seed = 61")).expect("written");
     let other = place.campaign(&["run", "spec.toml", "--out", "camp"]);
     assert_eq!(other.exit, Some(2));
     assert!(other.err.contains(&campaign[..32]) && other.err.contains("and this is"), "{}", other.err);
-    // A copy of the program with one more byte is another program.
-    let copy = place.path("tautline-copy");
-    let mut bytes = fs::read(TAUTLINE).expect("the program");
-    bytes.push(0);
-    fs::write(&copy, bytes).expect("written");
-    fs::set_permissions(&copy, fs::metadata(TAUTLINE).expect("it is there").permissions()).expect("allowed");
-    let refused =
-        ran_by(copy.to_str().expect("a path"), place.0.path(), &["campaign", "shard", "camp", "--shard", "0"]);
-    assert_eq!(refused.exit, Some(2), "{}", refused.out);
-    assert!(refused.err.contains("planned by") && refused.err.contains("use the same program"), "{}", refused.err);
+}
+
+#[test]
+fn more_runs_keep_the_flown_ones_and_widen_the_intervals() {
+    let place = Place::of(SPEC);
+    place.run("camp", &["--shards", "4"]);
+    // A damaged part is flown again; the other 45 runs are kept.
+    let damaged = &place.parts("camp")[1];
+    fs::write(damaged, &fs::read(damaged).expect("a part")[..1000]).expect("written");
+    fs::write(place.path("spec.toml"), SPEC.replace("runs = 60", "runs = 90")).expect("written");
+    let raised = place.campaign(&["run", "spec.toml", "--out", "camp", "--worst", "0", "--shards", "1"]);
+    assert!(matches!(raised.exit, Some(0 | 1)), "{}", raised.err);
+    assert!(raised.out.contains("90 flights in"), "15 and 30 runs under two laws: {}", raised.out);
+    let again = place.campaign(&["run", "spec.toml", "--out", "camp", "--worst", "0"]);
+    assert!(!again.out.contains("flights in") && again.exit == raised.exit, "{}", again.out);
+    place.run("fresh", &["--shards", "1"]);
+    let rows = |out: &str| {
+        let part = fs::read_to_string(&place.parts(out)[0]).expect("a part");
+        let lines: Vec<_> = part.lines().map(str::to_owned).collect();
+        lines[1..lines.len() - 1].to_vec()
+    };
+    assert_eq!((place.parts("camp").len(), rows("camp").len()), (1, 180));
+    assert_eq!(rows("camp"), rows("fresh"));
+    let answer = |out: &str| serde_json::from_slice::<Value>(&place.left(out)[1]).expect("JSON");
+    let [raised, fresh] = [answer("camp"), answer("fresh")];
+    assert_eq!([&raised["intervals"], &fresh["intervals"]], ["confidence-sequence", "clopper-pearson"]);
+    let width = |of: &Value| {
+        let share = &of["laws"][0]["violated"];
+        share["high"].as_f64().expect("a bound") - share["low"].as_f64().expect("a bound")
+    };
+    assert_eq!(raised["laws"][0]["violated"]["count"], fresh["laws"][0]["violated"]["count"]);
+    assert!(width(&raised) > width(&fresh), "the number of runs was not fixed beforehand");
+    fs::write(place.path("spec.toml"), SPEC).expect("written");
+    let fewer = place.campaign(&["run", "spec.toml", "--out", "camp", "--worst", "0"]);
+    assert_eq!(fewer.exit, Some(2));
+    assert!(fewer.err.contains("with 90 runs, and this is 60"), "{}", fewer.err);
 }
 
 #[test]

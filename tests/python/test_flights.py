@@ -34,7 +34,7 @@ class Flights(Case):
         np.testing.assert_allclose(f.positions[0], f.scenario.positions_m, atol=1e-12)
         self.assertEqual(f.velocities.shape, f.positions.shape)
         self.assertEqual(f.separations_m.min(), f.separation_m)
-        self.assertEqual(f.to_pandas().shape, (len(t) * 5, 11))
+        self.assertEqual(f.to_pandas().shape, (len(t) * 5, 12))
         self.assertEqual(tl.fly(short(), keep=False).positions.shape, (0, 5, 3))
 
     def test_a_violation_is_reported_and_shown(self) -> None:

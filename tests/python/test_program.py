@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import tautline as tl
-from shared import Case, passing, short
+from shared import ROOT, Case, passing, short
 from tautline import _arguments
 
 SPEC = """\
@@ -87,16 +87,34 @@ class Functions(Case):
         self.assertEqual(tl.campaign(spec, out, worst=0).to_dict(), answer.to_dict())
         self.assertEqual((out / "results.parquet").read_bytes(), before)
 
-    def test_a_campaign_records_the_hash_of_its_program(self) -> None:
-        spec, out = self.folder / "spec.toml", self.folder / "out"
-        spec.write_text(SPEC.format(runs=2))
-        tl.campaign(spec, out, worst=0)
-        import hashlib
+    def test_a_campaign_of_the_command_line_continues_in_python_and_back(self) -> None:
+        program = ROOT / "target" / "debug" / "tautline"
+        if not program.exists():
+            self.skipTest(f"{program} is not built")
+        spec, out, again = self.folder / "spec.toml", self.folder / "out", self.folder / "again"
+        spec.write_text(SPEC.format(runs=4))
 
-        from tautline import _native
+        def command(*words: object) -> subprocess.CompletedProcess[str]:
+            line = [str(word) for word in (program, "campaign", *words)]
+            return subprocess.run(line, capture_output=True, text=True, check=False)
 
-        expected = hashlib.sha256(Path(_native.__file__).read_bytes()).hexdigest()
-        self.assertEqual(json.loads((out / "manifest.json").read_text())["tool"]["sha256"], expected)
+        # Half of the flights by the program, the others and the merge in Python.
+        command("plan", spec, "--out", out, "--shards", 2)
+        self.assertEqual(command("shard", out, "--shard", 0).returncode, 0)
+        before = next(out.glob("parts/*0.jsonl")).read_bytes()
+        self.assertEqual(tl.campaign(spec, out, worst=0).runs, 4)
+        self.assertEqual(next(out.glob("parts/*0.jsonl")).read_bytes(), before)
+        # The other way, with more runs.
+        tl.campaign(spec, again, worst=0)
+        self.assertEqual((again / "results.parquet").read_bytes(), (out / "results.parquet").read_bytes())
+        spec.write_text(SPEC.format(runs=6))
+        ran = command("run", spec, "--out", again, "--worst", 0)
+        self.assertIn("2 flights in", ran.stdout, ran.stderr)
+        answer = tl.campaign(spec, again, worst=0)
+        self.assertEqual((answer.runs, answer.intervals), (6, "confidence-sequence"))
+        # Another campaign is refused.
+        spec.write_text(SPEC.format(runs=6) + "\n")
+        self.refuses(tl.Error, "the folder holds campaign", lambda: tl.campaign(spec, out, until_width=0.5, worst=0))
 
     def test_compare(self) -> None:
         answer = tl.compare(short(), ["edge-tension", "laplacian"], runs=3, html=self.folder / "c.html")
@@ -158,7 +176,7 @@ class Recordings(Case):
             np.testing.assert_array_equal(p, f.positions, format)
             np.testing.assert_array_equal(t, f.t, format)
         self.refuses(tl.Error, "exists", lambda: tl.export(self.folder / "run.mcap", self.folder / "copy.csv"))
-        tl.export(self.folder / "run.mcap", self.folder / "copy.csv", force=True)
+        tl.export(self.folder / "run.mcap", self.folder / "copy.csv", overwrite=True)
         unknown = self.folder / "a.xyz"
         message = "has no extension of a known format"
         self.refuses(tl.Error, message, lambda: tl.export(self.folder / "run.mcap", unknown))

@@ -85,18 +85,20 @@ class Arguments(Case):
         self.assertEqual(tl.audit(t, p, delta=0.1, expect_vehicles=np.int64(4)).vehicles, ["1", "2", "3", "4"])
         self.refuses(TypeError, "laws: a list of names", lambda: tl.compare("pentagon", laws="laplacian"))
         self.refuses(TypeError, "csv: a path is needed", lambda: tl.compare("pentagon", csv=3))
-        self.refuses(TypeError, "force: True or False is needed", lambda: tl.compare("pentagon", force="yes"))
+        self.refuses(TypeError, "overwrite: True or False is needed", lambda: tl.compare("pentagon", overwrite="yes"))
         self.refuses(TypeError, "a lower and an upper bound", lambda: tl.attack("pentagon", vary={"law.alpha": (0,)}))
         self.refuses(TypeError, "needs a list of numbers", lambda: tl.sweep("pentagon", {"law.alpha": 1.0}))
         self.refuses(tl.Error, "a sweep has one key or two", lambda: tl.sweep("pentagon", {}))
         self.refuses(tl.Error, "is not finite", lambda: tl.sweep("pentagon", {"law.alpha": [1.0, float("nan")]}))
         self.refuses(TypeError, "not the class Springs", lambda: tl.fly("pentagon", law=Springs))
 
-    def test_series_of_pandas_are_refused(self) -> None:
+    def test_series_of_pandas_are_read(self) -> None:
         import pandas
 
         t, p = passing()
-        self.refuses(TypeError, "not Series", lambda: tl.audit(pandas.Series(t), p, delta=1.0))
+        self.assertEqual(tl.audit(pandas.Series(t), p, delta=1.0).separation_m, tl.audit(t, p, delta=1.0).separation_m)
+        missing = pandas.Series([*t[:-1], None], dtype="Float64")
+        self.refuses(tl.Error, "t[99]: it is NaN", lambda: tl.audit(missing.to_numpy(na_value=np.nan), p, delta=1.0))
 
     def test_config_applies_to_arrays(self) -> None:
         t, p = passing()

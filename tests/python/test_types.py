@@ -1,6 +1,7 @@
 """Tests of types and docstrings: mypy passes, the stub equals the native module, public items have docstrings."""
 
 import inspect
+import re
 import subprocess
 import sys
 import unittest
@@ -32,6 +33,47 @@ class Types(unittest.TestCase):
         for code, text in ((1, wrong), (0, right)):
             ran = self.mypy("mypy", "--strict", "-c", text)
             self.assertEqual(ran.returncode, code, ran.stdout + ran.stderr)
+
+    def test_mypy_finds_wrong_words_keywords_and_laws(self) -> None:
+        law = """
+import numpy as np, tautline as tl
+from numpy.typing import NDArray
+class Mine:
+    def control(self, obs: tl.Observation, out: NDArray[np.float64]) -> None:
+        out[:] = 0.0
+class NoLaw:
+    pass
+"""
+        right = [
+            "tl.audit('a.csv', motion='linear', format='csv', fps=30).closest[0].indices",
+            "tl.read('a.csv', duplicates='first', time_unit='ms').audit(delta=1.0, rules='none')",
+            "tl.fly('pentagon', law=Mine()).audit(limit={'speed': 5.0})",
+            "tl.compare('pentagon', ['orca', Mine()], overwrite=True).laws",
+            "tl.margin('pentagon', 'time.duration_s', 1, 2, law=Mine(), verdict='clear')",
+            "tl.export('a.csv', 'b.skyb', to='skyb', overwrite=True)",
+            "tl.audit([0.0, 1.0], [[[0.0, 0.0]], [[1.0, 1.0]]], delta=1.0)",
+            "tl.Simulation.load(tl.Simulation('pentagon', law=Mine()).save(), law=Mine()).step([[0.0] * 3] * 5)",
+        ]
+        wrong = [
+            "tl.audit('a.csv', motion='liner')",
+            "tl.audit('a.csv', fromat='csv')",
+            "tl.audit('a.csv', format='cvs')",
+            "tl.read('a.csv', time_unit='m')",
+            "tl.read('a.csv', fsp=30)",
+            "tl.fly('pentagon', law=NoLaw())",
+            "tl.fly('pentagon').audit(detla=1.0)",
+            "tl.compare('pentagon', [NoLaw()])",
+            "tl.compare('pentagon', force=True)",
+            "tl.margin('pentagon', 'time.duration_s', 1, 2, verdict='won')",
+            "tl.export('a.csv', 'b.skyb', to='sky')",
+            "tl.read('a.csv').audit(rules='nothing')",
+        ]
+        ran = self.mypy("mypy", "--strict", "-c", law + "\n".join(right))
+        self.assertEqual(ran.returncode, 0, ran.stdout + ran.stderr)
+        ran = self.mypy("mypy", "--strict", "-c", law + "\n".join(wrong))
+        before = len(law.splitlines())
+        found = {int(number) - before for number in re.findall(r"<string>:(\d+): error", ran.stdout)}
+        self.assertEqual(found, set(range(1, len(wrong) + 1)), ran.stdout)
 
     def test_public_items_have_docstrings(self) -> None:
         for name in tl.__all__:

@@ -84,7 +84,8 @@ impl Starts {
 /// Flies a specification on all cores and returns its summary.
 fn answer(spec: &str, folder: &Path) -> Summary {
     let spec = Spec::read("spec", spec).expect("a specification");
-    let campaign = Campaign::plan(&spec, "docs", folder, None, Program::running().expect("a program")).expect("a plan");
+    let campaign =
+        Campaign::plan(&spec, "docs", folder, None, Program::running().expect("a program"), None).expect("a plan");
     let monitor = Silent::default();
     campaign.fly(&Batch::new(None, &monitor).expect("threads")).expect("it flies").expect("nobody interrupts")
 }

@@ -36,7 +36,7 @@ impl Plan {
         Self {
             course: LegHistory::new(&scenario.legs),
             guidance: scenario.reference.clone(),
-            freedom: scenario.law().map_or(Freedom::RigidMotion, |law| law.capabilities().controls.freedom()),
+            freedom: scenario.flown_law().map_or(Freedom::RigidMotion, |law| law.capabilities().controls.freedom()),
             graph: scenario.graph.clone(),
             law: scenario.law.clone(),
             delta_m: scenario.delta_m,

@@ -7,7 +7,7 @@ use crate::flight::{FlightSummary, Outcome};
 use crate::{MOST_RUNS, SEEDS};
 use tautline_core::text::metres;
 use tautline_report::request::{Failure, ScenarioRequest, in_range};
-use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source, Template, takes_integers_only};
+use tautline_sim::scenario::{ExternalLaw, Override, Scenario, ScenarioError, Source, Template, takes_integers_only};
 
 /// Jitter of a start without randomness along each axis, as a part of delta.
 pub const JITTER: f64 = 0.05;
@@ -41,7 +41,30 @@ impl BaseScenario {
     /// # Errors
     /// [`Failure`] if an override or the scenario is wrong.
     pub fn of(request: &ScenarioRequest) -> Result<Self, Failure> {
-        Ok(Self::read(request.source.clone(), request.parsed_overrides()?)?)
+        let base = Self::read(request.source.clone(), request.parsed_overrides()?)?;
+        base.with_external_law(request.external_law.clone())
+    }
+
+    /// Returns the same scenario, whose flights an external law commands.
+    ///
+    /// # Errors
+    /// [`Failure`] `request/law-name` for the name of another law, and for a name that answers cannot show.
+    pub fn with_external_law(self, law: Option<ExternalLaw>) -> Result<Self, Failure> {
+        law.iter().try_for_each(|law| check_law_name(&self.template, law))?;
+        Ok(Self { template: self.template.with_external_law(law), ..self })
+    }
+
+    /// Refuses keys of the scenario's own law that an external law replaces.
+    ///
+    /// # Errors
+    /// [`Failure`] that names the key.
+    pub fn check_keys<'a>(&self, keys: impl IntoIterator<Item = &'a str>) -> Result<(), Failure> {
+        let Some(law) = &self.own().external_law else { return Ok(()) };
+        let is_of_law = |key: &&str| (*key == "law" || key.starts_with("law.")) && *key != "law.delta_m";
+        let Some(key) = keys.into_iter().find(is_of_law) else { return Ok(()) };
+        let name = law.name();
+        let message = format!("{key}: changes no flight, because the law `{name}` replaces that of the scenario");
+        Err(Failure::input("request/replaced-law", message, "vary another key, or fly the law of the scenario"))
     }
 
     /// Returns the unchanged scenario.
@@ -67,7 +90,8 @@ impl BaseScenario {
     /// [`ScenarioError`] if the scenario cannot be flown with these overrides.
     pub fn with(&self, sets: &[String]) -> Result<Scenario, ScenarioError> {
         let more = sets.iter().map(|set| Override::parse(set)).collect::<Result<Vec<_>, _>>()?;
-        Scenario::read(&self.source, &[self.overrides.as_slice(), &more].concat())
+        let scenario = Scenario::read(&self.source, &[self.overrides.as_slice(), &more].concat())?;
+        Ok(Scenario { external_law: self.own().external_law.clone(), ..scenario })
     }
 
     /// Returns whether a key takes integers only.
@@ -130,6 +154,19 @@ impl Runs {
         let jitter = self.jitter_m.map(|jitter_m| format!("{JITTER_KEY}={jitter_m:?}"));
         [format!("start.seed={seed}"), format!("noise.seed={seed}")].into_iter().chain(jitter).collect()
     }
+}
+
+/// Refuses an external law whose name is ambiguous.
+pub(crate) fn check_law_name(template: &Template, law: &ExternalLaw) -> Result<(), Failure> {
+    let name = law.name();
+    let problem = if template.law_names().iter().any(|known| known == name) {
+        format!("law: `{name}` is the name of a built-in law")
+    } else if name.is_empty() || name.contains(['+', ',']) {
+        format!("law: a name must not be empty or contain `+` or `,`, got `{name}`")
+    } else {
+        return Ok(());
+    };
+    Err(Failure::input("request/law-name", problem, "give the law another name"))
 }
 
 /// Returns whether two keys are the same or one contains the other. An axis may have its name or its number.

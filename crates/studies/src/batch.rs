@@ -7,7 +7,7 @@ use std::thread;
 use crate::THREADS;
 use crate::flight::{FlightSummary, fly};
 use tautline_report::request::{Failure, Monitor, in_range};
-use tautline_sim::scenario::Scenario;
+use tautline_sim::scenario::{ExternalLaw, Scenario};
 use tautline_sim::sim::SimError;
 
 /// Steps between two reports of progress.
@@ -19,6 +19,8 @@ pub struct Batch<'a> {
     threads: usize,
     monitor: &'a dyn Monitor,
     finishes_flights: bool,
+    /// Whether everything runs on the calling thread.
+    on_calling_thread: bool,
 }
 
 impl<'a> Batch<'a> {
@@ -29,7 +31,26 @@ impl<'a> Batch<'a> {
     pub fn new(threads: Option<usize>, monitor: &'a dyn Monitor) -> Result<Self, Failure> {
         let threads = threads.unwrap_or_else(|| rayon::current_num_threads().min(*THREADS.end()));
         in_range("--threads", &threads, &THREADS)?;
-        Ok(Self { threads, monitor, finishes_flights: false })
+        Ok(Self { threads, monitor, finishes_flights: false, on_calling_thread: false })
+    }
+
+    /// Returns a batch for flights with these external laws: on the calling thread if a law requires it.
+    ///
+    /// # Errors
+    /// As [`Batch::new`], and [`Failure`] for several threads that a law does not allow.
+    pub fn for_laws<'b>(
+        threads: Option<usize>,
+        monitor: &'a dyn Monitor,
+        laws: impl IntoIterator<Item = &'b ExternalLaw>,
+    ) -> Result<Self, Failure> {
+        let batch = Self::new(threads, monitor)?;
+        let Some(law) = laws.into_iter().find(|law| law.requires_calling_thread()) else { return Ok(batch) };
+        if let Some(threads) = threads.filter(|&threads| threads != 1) {
+            let name = law.name();
+            let message = format!("--threads {threads}: must be 1 for the law `{name}`, which runs on one thread");
+            return Err(Failure::input("request/one-thread", message, "leave --threads out"));
+        }
+        Ok(Self { threads: 1, on_calling_thread: true, ..batch })
     }
 
     /// Returns the same batch, whose flights under way end normally after an interruption.
@@ -81,15 +102,15 @@ impl<'a> Batch<'a> {
             std::iter::from_fn(take).collect::<Vec<_>>()
         };
         let mut made: Vec<_> = thread::scope(|scope| {
-            let started =
-                (0..self.threads.min(count)).map_while(|_| thread::Builder::new().spawn_scoped(scope, work).ok());
+            let spawned = if self.on_calling_thread { 0 } else { self.threads.min(count) };
+            let started = (0..spawned).map_while(|_| thread::Builder::new().spawn_scoped(scope, work).ok());
             let started: Vec<_> = started.collect();
             let join = |thread: thread::ScopedJoinHandle<'_, Vec<_>>| {
                 thread.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
             };
             started.into_iter().flat_map(join).collect()
         });
-        // If the system starts no thread, this thread does the work.
+        // This thread does the work if a law requires it, or if the system starts no thread.
         made.extend(std::iter::from_fn(take));
         made.sort_by_key(|&(number, _)| number);
         made.into_iter().map(|(_, made)| made).collect()
@@ -115,7 +136,7 @@ impl<'a> Batch<'a> {
     /// Flies a scenario to its end. Returns `None` if the batch was interrupted.
     ///
     /// # Errors
-    /// [`SimError`] if the law or the judge cannot be built.
+    /// As [`fly`].
     pub fn fly(&self, scenario: &Scenario, seed: u64) -> Result<Option<FlightSummary>, SimError> {
         if self.is_interrupted() {
             return Ok(None);

@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use serde::Serialize;
 
-use crate::base::{BaseScenario, JITTER, check_runs, jitter_note};
+use crate::base::{BaseScenario, JITTER, check_law_name, check_runs, jitter_note};
 use crate::batch::Batch;
 use crate::flight::{FlightSummary, Outcome};
 use crate::statistics::{CONFIDENCE, Estimate, Proportion};
@@ -16,7 +16,7 @@ use tautline_report::flight_log::FlightLog;
 use tautline_report::report::page::{self, Badge, Tone};
 use tautline_report::request::{Failure, Pictures, ScenarioRequest};
 use tautline_report::run::run;
-use tautline_sim::scenario::{Draw, NamedLaw, Scenario, Template};
+use tautline_sim::scenario::{Draw, ExternalLaw, NamedLaw, Scenario, Template};
 use tautline_sim::sim::audit_obstacle;
 
 /// Assumptions of the numbers.
@@ -34,8 +34,8 @@ const ASSUMED: [&str; 5] = [
 /// Options of a comparison.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Options {
-    /// Kinds of laws, or names of tables `[laws.NAME]`. By default the names of all such tables, or all kinds if the
-    /// scenario has no such table.
+    /// Kinds of laws, names of tables `[laws.NAME]`, or names of external laws. By default the names of all such
+    /// tables, or all kinds if the scenario has no such table.
     /// `NAME+shield` flies a law under the shield, `NAME+bare` without it.
     pub laws: Option<Vec<String>>,
     /// Whether each law is flown twice, without and under the shield.
@@ -45,11 +45,13 @@ pub struct Options {
     /// Seed of the first run. Run k, from 0, has this seed plus k as `start.seed` and, if the flight is random, as
     /// `noise.seed`. A start that does not depend on its seed gets a jitter of 5 % of delta along each axis.
     pub seed: u64,
+    /// External laws that `laws` may name.
+    pub external: Vec<ExternalLaw>,
 }
 
 impl Default for Options {
     fn default() -> Self {
-        Self { laws: None, shield: false, runs: 20, seed: 0 }
+        Self { laws: None, shield: false, runs: 20, seed: 0, external: Vec::new() }
     }
 }
 
@@ -83,7 +85,7 @@ pub struct Comparison {
 pub struct LawRow {
     /// Name of the law: its kind, or that of its table `[laws.NAME]`.
     pub name: String,
-    /// Kind of the law.
+    /// Kind of the law; `external` for an external law.
     pub kind: String,
     /// Overrides that fly the law, one for its kind and one for each key.
     pub overrides: Vec<String>,
@@ -148,6 +150,10 @@ impl Experiment for Options {
         check_runs(self.runs, self.seed)
     }
 
+    fn external_laws(&self) -> &[ExternalLaw] {
+        &self.external
+    }
+
     fn arguments(&self, study: &Comparison) -> Vec<String> {
         let laws: Vec<_> = study.laws.iter().map(|law| law.name.as_str()).collect();
         let (runs, seed) = (self.runs.to_string(), self.seed.to_string());
@@ -184,10 +190,10 @@ impl Experiment for Options {
         if runs == 0 {
             return Ok(None);
         }
-        let time = |(law, flights): (&NamedLaw, &Vec<FlightSummary>)| {
+        let time = |(law, flights): (&ComparedLaw, &Vec<FlightSummary>)| {
             let steps: u64 = flights.iter().map(|flight| flight.steps).sum();
             let law_s: f64 = flights.iter().map(|flight| flight.law_s).sum();
-            LawPerformance { name: law.name.clone(), law_step_s: (steps > 0).then(|| law_s / steps as f64) }
+            LawPerformance { name: law.name().to_owned(), law_step_s: (steps > 0).then(|| law_s / steps as f64) }
         };
         let performance =
             Performance { wall_s: began.elapsed().as_secs_f64(), laws: laws.iter().zip(&flights).map(time).collect() };
@@ -207,7 +213,7 @@ impl Experiment for Options {
     fn illustrate(&self, base: &BaseScenario, study: &Comparison, _pictures: &dyn Pictures) -> Vec<Section> {
         const ABOUT: &str =
             "The flight of each law that came closest, from above, at that instant; all axes are alike.";
-        let block = match closest_approaches(base, study) {
+        let block = match self.closest_approaches(base, study) {
             Ok(figures) => Block::Figures(figures),
             Err(failure) => Block::Page(page::list(&[format!("no figures: {}", failure.in_words())])),
         };
@@ -217,7 +223,8 @@ impl Experiment for Options {
 
 impl Options {
     /// Returns the laws to compare, without repetition.
-    fn laws(&self, template: &Template) -> Result<Vec<NamedLaw>, Failure> {
+    fn laws(&self, template: &Template) -> Result<Vec<ComparedLaw>, Failure> {
+        self.external.iter().try_for_each(|law| check_law_name(template, law))?;
         let names = self.laws.clone().unwrap_or_else(|| template.compared_laws());
         let names = if self.shield { Template::with_and_without_shield(&names) } else { names };
         if names.is_empty() {
@@ -231,59 +238,94 @@ impl Options {
                 "name each law once; variants of a law are tables [laws.NAME] with the same `kind`",
             ));
         }
-        Ok(names.iter().map(|name| template.law(name)).collect::<Result<_, _>>()?)
+        names.iter().map(|name| self.law(template, name)).collect()
+    }
+
+    /// Returns a figure for each law: the flight with the smallest separation, flown again, at the time of this
+    /// separation.
+    fn closest_approaches(&self, base: &BaseScenario, study: &Comparison) -> Result<Vec<Figure>, Failure> {
+        /// Memory of the history of a flight \[bytes\].
+        const HISTORY_BYTES: usize = 4 << 20;
+        let mut flown = Vec::new();
+        for law in &study.laws {
+            let Some(worst) = law.worst() else { continue };
+            let (Some(min_m), Some(at_s), Some(pair)) = (worst.min_m, worst.min_at_s, worst.min_pair) else { continue };
+            let named = self.law(base.template(), &law.name)?;
+            let scenario = drawn(base.template(), &named, worst.seed, study.jitter_m)?;
+            let mut log = FlightLog::of(&scenario).within(HISTORY_BYTES);
+            run(&scenario, &mut log)?;
+            flown.push((law, worst.seed, scenario, (pair, at_s, min_m), log));
+        }
+        let (flights, logs): (Vec<_>, Vec<_>) =
+            flown.into_iter().map(|(law, seed, scenario, closest, log)| ((law, seed, scenario, closest), log)).unzip();
+        let figure = |((law, seed, scenario, ([a, b], at_s, min_m)), log): (&Flown<'_>, &FlightLog)| {
+            let obstacles: Vec<_> = scenario.obstacles.iter().map(audit_obstacle).collect();
+            let figure = at_closest(&law.name, log, &obstacles, Some(([a - 1, b - 1], *at_s)), &logs);
+            let runs = study.runs;
+            Figure {
+                name: format!("closest-{}", law.name.replace('+', "-")),
+                description: format!(
+                    "{}: {} m apart at {at_s:.2} s, vehicles {a} and {b}, the closest of {runs} flights \
+                     (start.seed {seed}).",
+                    law.name,
+                    at_least(*min_m, 3),
+                ),
+                ..figure
+            }
+        };
+        Ok(flights.iter().zip(&logs).map(figure).collect())
+    }
+
+    /// Returns the law with a name. `NAME+shield` and `NAME+bare` choose the shield.
+    fn law(&self, template: &Template, name: &str) -> Result<ComparedLaw, Failure> {
+        let Some(law) = self.external.iter().find(|law| name.split('+').next() == Some(law.name())) else {
+            return Ok(ComparedLaw { named: template.law(name)?, external: None });
+        };
+        let own = format!("{}{}", template.own_law().name, &name[law.name().len()..]);
+        let named = NamedLaw { name: name.to_owned(), ..template.law(&own)? };
+        Ok(ComparedLaw { named, external: Some(law.clone()) })
     }
 }
 
-fn under(law: &NamedLaw, seed: u64) -> String {
-    format!("under the law {}, start.seed = {seed}", law.name)
+/// Law of a comparison: one of the scenario, or an external law over the scenario's own.
+#[derive(Clone, Debug)]
+struct ComparedLaw {
+    named: NamedLaw,
+    external: Option<ExternalLaw>,
+}
+
+impl ComparedLaw {
+    fn name(&self) -> &str {
+        &self.named.name
+    }
+
+    fn kind(&self) -> String {
+        if self.external.is_some() { "external".to_owned() } else { self.named.kind() }
+    }
+
+    /// Returns the overrides that fly the law; for an external law only the choice of the shield.
+    fn overrides(&self) -> Vec<String> {
+        let is_flown = |set: &String| self.external.is_none() || set.starts_with("shield.");
+        self.named.overrides().into_iter().filter(is_flown).collect()
+    }
+}
+
+fn under(law: &ComparedLaw, seed: u64) -> String {
+    format!("under the law {}, start.seed = {seed}", law.name())
 }
 
 /// Returns the flight of a law from the start of a seed.
-fn drawn(template: &Template, law: &NamedLaw, seed: u64, jitter_m: Option<f64>) -> Result<Scenario, Failure> {
-    let drawn = template.scenario(law, Draw { seed, jitter_m });
-    drawn.map_err(|error| Failure::from(error).under(&under(law, seed)))
+fn drawn(template: &Template, law: &ComparedLaw, seed: u64, jitter_m: Option<f64>) -> Result<Scenario, Failure> {
+    let drawn = template.scenario(&law.named, Draw { seed, jitter_m });
+    let drawn = drawn.map_err(|error| Failure::from(error).under(&under(law, seed)))?;
+    Ok(Scenario { external_law: law.external.clone(), ..drawn })
 }
 
 /// The worst flight of a law: its seed, its scenario, and pair, time \[s\] and distance \[m\] of its closest approach.
 type Flown<'a> = (&'a LawRow, u64, Scenario, ([usize; 2], f64, f64));
 
-/// Returns a figure for each law: the flight with the smallest separation, flown again, at the time of this separation.
-fn closest_approaches(base: &BaseScenario, study: &Comparison) -> Result<Vec<Figure>, Failure> {
-    /// Memory of the history of a flight \[bytes\].
-    const HISTORY_BYTES: usize = 4 << 20;
-    let mut flown = Vec::new();
-    for law in &study.laws {
-        let Some(worst) = law.worst() else { continue };
-        let (Some(min_m), Some(at_s), Some(pair)) = (worst.min_m, worst.min_at_s, worst.min_pair) else { continue };
-        let named = base.template().law(&law.name)?;
-        let scenario = drawn(base.template(), &named, worst.seed, study.jitter_m)?;
-        let mut log = FlightLog::of(&scenario).within(HISTORY_BYTES);
-        run(&scenario, &mut log)?;
-        flown.push((law, worst.seed, scenario, (pair, at_s, min_m), log));
-    }
-    let (flights, logs): (Vec<_>, Vec<_>) =
-        flown.into_iter().map(|(law, seed, scenario, closest, log)| ((law, seed, scenario, closest), log)).unzip();
-    let figure = |((law, seed, scenario, ([a, b], at_s, min_m)), log): (&Flown<'_>, &FlightLog)| {
-        let obstacles: Vec<_> = scenario.obstacles.iter().map(audit_obstacle).collect();
-        let figure = at_closest(&law.name, log, &obstacles, Some(([a - 1, b - 1], *at_s)), &logs);
-        let runs = study.runs;
-        Figure {
-            name: format!("closest-{}", law.name.replace('+', "-")),
-            description: format!(
-                "{}: {} m apart at {at_s:.2} s, vehicles {a} and {b}, the closest of {runs} flights \
-                 (start.seed {seed}).",
-                law.name,
-                at_least(*min_m, 3),
-            ),
-            ..figure
-        }
-    };
-    Ok(flights.iter().zip(&logs).map(figure).collect())
-}
-
 impl LawRow {
-    fn new(law: &NamedLaw, flights: Vec<FlightSummary>) -> Self {
+    fn new(law: &ComparedLaw, flights: Vec<FlightSummary>) -> Self {
         let of = flights.len() as u64;
         let count = |is: &dyn Fn(&FlightSummary) -> bool| flights.iter().filter(|flight| is(flight)).count() as u64;
         let ended = |outcome: Outcome| count(&|flight| flight.outcome == outcome);
@@ -292,7 +334,7 @@ impl LawRow {
         let (min_m, peak_m_s2) = (known(|flight| flight.min_m), known(|flight| flight.peak_control_m_s2));
         let worst = worst(&flights);
         Self {
-            name: law.name.clone(),
+            name: law.name().to_owned(),
             kind: law.kind(),
             overrides: law.overrides(),
             clear: Proportion::new(ended(Outcome::Clear), of),

@@ -6,11 +6,12 @@ use serde::{Deserialize, Serialize};
 
 use tautline_core::record::{Event, RecordError, Sample, Sink, Step};
 use tautline_core::swarm::{Rows, row};
+use tautline_laws::law::LawError;
 use tautline_report::report::{INTERRUPTED, Report, Status};
-use tautline_report::run::run_while;
+use tautline_report::run::run_with;
 use tautline_sim::preflight::Preflight;
-use tautline_sim::scenario::Scenario;
-use tautline_sim::sim::SimError;
+use tautline_sim::scenario::{ExternalLaw, Scenario};
+use tautline_sim::sim::{Breakdown, Components, Ending, SimError};
 
 /// Outcome of a flight: the first variant that applies.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -85,16 +86,31 @@ pub struct FlightSummary {
 /// summary.
 ///
 /// # Errors
-/// [`SimError`] if the law or the judge cannot be built.
+/// [`SimError`] if the law or the judge cannot be built, or an external law fails.
 pub fn fly(
     scenario: &Scenario,
     seed: u64,
     carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Option<FlightSummary>, SimError> {
     let mut effort = Effort::default();
-    let report = run_while(scenario, &Preflight::of(scenario)?, &mut effort, carry_on)?;
+    let (preflight, parts) = (Preflight::of(scenario)?, Components::of(scenario)?);
+    let (report, ending) = run_with(scenario, &preflight, parts, &mut effort, carry_on)?;
+    if let Some(law) = &scenario.external_law {
+        refuse_failed_law(law, &ending)?;
+    }
     let is_whole = report.run.ended_early.as_deref() != Some(INTERRUPTED);
     Ok(is_whole.then(|| FlightSummary::new(report, seed, &effort)))
+}
+
+/// Refuses the flight of an external law that failed: a defect of the law is no result of a study.
+fn refuse_failed_law(law: &ExternalLaw, ending: &Ending) -> Result<(), SimError> {
+    let is_failed = match ending {
+        Ending::LawUndefined(error) => *error == LawError::Failed,
+        Ending::BrokeDown(breakdown) => matches!(breakdown, Breakdown::CommandNotFinite { .. }),
+        Ending::Completed | Ending::Interrupted => false,
+    };
+    let reason = ending.reason().filter(|_| is_failed);
+    reason.map_or(Ok(()), |reason| Err(SimError::ExternalLaw { law: law.name().to_owned(), reason }))
 }
 
 impl FlightSummary {

@@ -187,6 +187,7 @@ impl Experiment for Options {
 
     fn fly(&self, base: &BaseScenario, batch: &Batch<'_>) -> Result<Option<Margin>, Failure> {
         let (own, range) = (base.own(), self.range);
+        base.check_keys([self.key.as_str()])?;
         let [from, to] = [range.from, range.to].map(|end| self.scenario(base, end, Vec::new()));
         let ends = [from?, to?];
         let is_random = ends.iter().any(Scenario::is_random_in_flight);
@@ -336,7 +337,7 @@ impl Study for Margin {
             )
         });
         let jitter = self.seeds.jitter_m.map(jitter_note);
-        predicted.chain([interrupted, turns, jitter].into_iter().flatten()).collect()
+        predicted.chain([interrupted, turns, jitter, self.about.note()].into_iter().flatten()).collect()
     }
 
     fn records(&self) -> Table {

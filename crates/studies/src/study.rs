@@ -16,7 +16,7 @@ use tautline_report::report::page::{self, Badge, Markup, Page};
 use tautline_report::report::{ScenarioIdentity, Tool};
 use tautline_report::request::outputs::{self, NamedPath, is_standard_output, write};
 use tautline_report::request::{Failure, Monitor, Pictures, ScenarioRequest};
-use tautline_sim::scenario::Scenario;
+use tautline_sim::scenario::{ExternalLaw, Scenario};
 
 /// Version of the keys of every JSON file of this crate. It rises if a key is renamed, removed or changes its meaning.
 pub const SCHEMA_VERSION: u32 = 3;
@@ -215,6 +215,11 @@ pub trait Experiment {
     /// [`Failure`] if the options or the scenario are wrong.
     fn fly(&self, base: &BaseScenario, batch: &Batch<'_>) -> Result<Option<Self::Study>, Failure>;
 
+    /// Returns the external laws of the options, besides that of the scenario.
+    fn external_laws(&self) -> &[ExternalLaw] {
+        &[]
+    }
+
     /// Prepares further outputs of the study, such as a folder, before the first flight.
     ///
     /// # Errors
@@ -305,7 +310,7 @@ pub fn answer<E: Experiment>(
 ) -> Result<Option<E::Study>, Failure> {
     let StudyRequest { scenario, options, files, threads } = request;
     options.check()?;
-    let batch = Batch::new(*threads, monitor)?;
+    let batch = Batch::for_laws(*threads, monitor, scenario.external_law.iter().chain(options.external_laws()))?;
     outputs::check_new(&scenario.argument, files.outputs(), files.force)?;
     let base = BaseScenario::of(scenario)?;
     options.prepare(files.force)?;
@@ -318,7 +323,9 @@ pub fn answer<E: Experiment>(
     for note in study.notes() {
         monitor.warn(&format!("note: {note}"));
     }
-    let repeats = study.repeats(scenario);
+    // The command line has no external laws.
+    let has_command = scenario.external_law.is_none() && options.external_laws().is_empty();
+    let repeats = if has_command { study.repeats(scenario) } else { Vec::new() };
     let repeated = match &repeats[..] {
         [_, _, _, ..] => vec!["--html writes a page with the command that repeats each of these flights".to_owned()],
         few => few.iter().map(|(what, command)| format!("{what}\n  {command}")).collect(),
@@ -340,7 +347,8 @@ pub fn answer<E: Experiment>(
         let sections = options.illustrate(&base, &study, pictures);
         let arguments = options.arguments(&study);
         let command = scenario.command(E::COMMAND, arguments.iter().map(String::as_str), []);
-        let page = StudyPage { commands: vec![command], repeats, sections };
+        let commands = if has_command { vec![command] } else { Vec::new() };
+        let page = StudyPage { commands, repeats, sections };
         write(file, study.to_html(&page).as_bytes(), monitor)?;
     }
     for (_, file) in files.outputs().filter(|(_, file)| !is_standard_output(file)) {
@@ -366,6 +374,8 @@ pub struct About {
     pub tool: Tool,
     /// Safety distance delta \[m\].
     pub delta_m: f64,
+    /// Name of the external law that flew in place of the scenario's own law.
+    pub external_law: Option<String>,
 }
 
 impl About {
@@ -375,6 +385,13 @@ impl About {
             scenario: ScenarioIdentity { name: scenario.name.clone(), sha256: scenario.sha256_hex() },
             tool: Tool { name: tautline_core::PROGRAM.to_owned(), version: tautline_core::VERSION.to_owned() },
             delta_m: scenario.delta_m,
+            external_law: scenario.external_law.as_ref().map(|law| law.name().to_owned()),
         }
+    }
+
+    /// Returns the note on an external law.
+    pub(crate) fn note(&self) -> Option<String> {
+        let law = self.external_law.as_ref()?;
+        Some(format!("flown under the external law {law}; nothing is proved about this law"))
     }
 }

@@ -15,6 +15,7 @@ use tautline_core::text::{as_toml, beside_limit, counted};
 use tautline_report::figures::{Figure, GridAxis, Separation, Share, heat_map, separations, shares};
 use tautline_report::report::page::{Badge, Tone};
 use tautline_report::request::{Failure, ScenarioRequest};
+use tautline_sim::sim::SimError;
 
 /// Most points of a grid.
 pub const MOST_POINTS: usize = 2500;
@@ -239,6 +240,7 @@ impl Experiment for Options {
                 ));
             }
         }
+        base.check_keys(self.keys.iter().map(|of| of.key.as_str()))?;
         let points = self.points();
         let scenario = |values: &Vec<f64>| base.with(&sets(&self.keys, values));
         let read = batch.run(points.len(), |number| {
@@ -265,9 +267,16 @@ impl Experiment for Options {
         let flown = batch.run_groups(points.len(), count, |point, run| {
             let run = run as u64;
             let scenario = base.with(&[runs.sets(run), sets(&self.keys, &points[point])].concat());
-            let scenario = scenario.map_err(|error| error.message().to_owned());
-            let flight = scenario.and_then(|of| batch.fly(&of, runs.seed(run)).map_err(|error| error.to_string()));
-            Ok::<_, Failure>(flight.transpose())
+            let scenario = match scenario {
+                Ok(scenario) => scenario,
+                Err(error) => return Ok(Some(Err(error.message().to_owned()))),
+            };
+            match batch.fly(&scenario, runs.seed(run)) {
+                Ok(flight) => Ok(flight.map(Ok)),
+                // A defect of an external law is no property of a point.
+                Err(error @ SimError::ExternalLaw { .. }) => Err(Failure::from(error)),
+                Err(error) => Ok(Some(Err(error.to_string()))),
+            }
         })?;
         let of_point =
             |(values, runs): (&Vec<f64>, Option<Vec<_>>)| Some(Point::new(values.clone(), self.question, runs?));
@@ -443,7 +452,7 @@ impl Study for Sweep {
                  random starts, or noise in [wind], [sensing] or [network]"
             )
         });
-        [refused, self.jitter_m.map(jitter_note)].into_iter().flatten().chain(inert).collect()
+        [refused, self.jitter_m.map(jitter_note), self.about.note()].into_iter().flatten().chain(inert).collect()
     }
 
     fn records(&self) -> Table {

@@ -105,11 +105,11 @@ impl Report {
         let certificate = if let (Some(shield), Some(_)) = (&self.shield, self.separation.certified_m) {
             format!("The shield between law and vehicles keeps a certificate: {}.", shield.certificate)
         } else if self.separation.certified_m.is_some() {
-            scenario.law().map_or_else(|error| error.to_string(), |law| law.capabilities().assumptions.to_owned())
+            scenario.flown_law().map_or_else(|error| error.to_string(), |law| law.capabilities().assumptions.to_owned())
         } else {
             format!("No distance is certified. {}", self.separation.certificate_void.join(" "))
         };
-        let moved = match scenario.law().map(|law| law.capabilities().controls.freedom()) {
+        let moved = match scenario.flown_law().map(|law| law.capabilities().controls.freedom()) {
             Ok(Freedom::Fixed) => "where the reference has moved it",
             Ok(Freedom::Translation) => "at any place",
             _ => "at any place, turned or mirrored",

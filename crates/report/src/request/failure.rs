@@ -235,6 +235,11 @@ impl From<SimError> for Failure {
             | SimError::Commands { .. }
             | SimError::ShieldedCommands => Self::new("simulation/inconsistent", false, error.to_string()),
             SimError::Shield(error) => error.into(),
+            SimError::ExternalLaw { .. } => Self::input(
+                "simulation/law-failed",
+                error.to_string(),
+                "correct the law; it gives every vehicle a finite command at every instant",
+            ),
             SimError::Audit(error) => Self::input(
                 "simulation/cannot-judge",
                 error.to_string(),

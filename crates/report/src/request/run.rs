@@ -106,14 +106,14 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
     let folder = OutFolder::at(path, "run", "report.json");
     let _lock = folder.open(request.force)?;
     let mut log = FlightLog::of(scenario);
-    let mut report = threads.install(|| fly(scenario, &preflight, &folder, pictures, monitor, &mut log))?;
+    let mut report = within(&threads, scenario, || fly(scenario, &preflight, &folder, pictures, monitor, &mut log))?;
     if let Some(closest) = report.separation.closest() {
         log.conclude(closest.separation_m, closest.time_s);
     }
     let log = Arc::new(log);
     report.performance = report.performance.filter(|_| request.is_timed);
     if request.verify && report.run.ended_early.as_deref() != Some(INTERRUPTED) {
-        report.verification = Some(threads.install(|| verify(scenario, &report))?);
+        report.verification = Some(within(&threads, scenario, || verify(scenario, &report))?);
     }
     let pictures = pictures.draw(scenario, &report, &log, folder.path(), monitor)?;
     let figures = if request.figures { figures(scenario, &log, &report) } else { Vec::new() };
@@ -173,6 +173,11 @@ fn fly(
     let report = flown?;
     closed?;
     Ok(report)
+}
+
+/// Calls `work` in a pool, or on this thread if the law of the scenario requires it.
+fn within<T: Send>(threads: &ThreadPool, scenario: &Scenario, work: impl FnOnce() -> T + Send) -> T {
+    if scenario.requires_calling_thread() { work() } else { threads.install(work) }
 }
 
 /// Starts a pool of `number` threads, or of one thread per core for 0.

@@ -1,7 +1,7 @@
 //! Scenario of a request.
 
 use super::Failure;
-use tautline_sim::scenario::{Override, Scenario, Source, Template};
+use tautline_sim::scenario::{ExternalLaw, Override, Scenario, Source, Template};
 
 /// A scenario with overrides.
 #[derive(Clone, Debug)]
@@ -12,6 +12,8 @@ pub struct ScenarioRequest {
     pub source: Source,
     /// Overrides, each as `KEY.PATH=VALUE`.
     pub overrides: Vec<String>,
+    /// Law that flies in place of the scenario's own.
+    pub external_law: Option<ExternalLaw>,
 }
 
 impl ScenarioRequest {
@@ -21,7 +23,7 @@ impl ScenarioRequest {
     /// [`Failure`] if neither exists.
     pub fn named(argument: &str, overrides: &[String]) -> Result<Self, Failure> {
         let (argument, overrides) = (argument.to_owned(), overrides.to_vec());
-        Ok(Self { source: Source::resolve(&argument)?, argument, overrides })
+        Ok(Self { source: Source::resolve(&argument)?, argument, overrides, external_law: None })
     }
 
     /// Returns the overrides as keys and values.
@@ -37,7 +39,8 @@ impl ScenarioRequest {
     /// # Errors
     /// [`Failure`] with the place of the error in the text.
     pub fn read(&self) -> Result<Scenario, Failure> {
-        Ok(Scenario::read(&self.source, &self.parsed_overrides()?)?)
+        let scenario = Scenario::read(&self.source, &self.parsed_overrides()?)?;
+        Ok(Scenario { external_law: self.external_law.clone(), ..scenario })
     }
 
     /// Reads the scenario as a template for variations of its keys.
@@ -45,7 +48,8 @@ impl ScenarioRequest {
     /// # Errors
     /// [`Failure`] with the place of the error in the text.
     pub fn template(&self) -> Result<Template, Failure> {
-        Ok(Template::read(&self.source, &self.parsed_overrides()?)?)
+        let template = Template::read(&self.source, &self.parsed_overrides()?)?;
+        Ok(template.with_external_law(self.external_law.clone()))
     }
 
     /// Returns the command line of a command about this scenario, with the options `after` it, and with `sets` beside

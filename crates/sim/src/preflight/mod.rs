@@ -168,10 +168,10 @@ impl Preflight {
     /// # Errors
     /// [`ParameterError`] if the parameters give no law; for a validated scenario only if memory cannot be allocated.
     pub fn of(scenario: &Scenario) -> Result<Self, ParameterError> {
-        let mut law = scenario.law()?;
+        let mut law = scenario.flown_law()?;
         let mut found = Self::with_law(scenario, law.as_ref());
-        // The shield limits the commands of the law.
-        if scenario.shield.is_none() {
+        // The shield limits the commands of the law. Only flights ask an external law for commands.
+        if scenario.shield.is_none() && scenario.external_law.is_none() {
             found.start_peak_m_s2 = peak::start_peak_m_s2(scenario, law.as_mut());
         }
         let message = found.start_peak_m_s2.and_then(peak::extreme_acceleration);

@@ -85,6 +85,7 @@ pub(super) fn scenario(document: Document) -> Result<Scenario, ScenarioError> {
         airframe,
         space,
         law,
+        external_law: None,
         delta_m,
         safety,
     };

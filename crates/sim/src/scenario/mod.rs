@@ -10,6 +10,7 @@ pub mod builtin;
 mod check;
 mod document;
 mod error;
+mod external;
 mod files;
 mod formation;
 mod graph;
@@ -33,6 +34,7 @@ pub use crate::link::{
 };
 pub use crate::shield::ShieldSpec;
 pub use error::{Field, Place, ScenarioError, edit_distance};
+pub use external::ExternalLaw;
 pub use limits::{
     BYTES_PER_EDGE, BYTES_PER_VEHICLE, CONTACT_PREDICTION_M, LARGEST, MAX_HALVINGS, MAX_MEMORY_BYTES, MAX_NAME_CHARS,
     MAX_STEPS, SMALLEST,

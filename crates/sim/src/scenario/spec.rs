@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::external::ExternalLaw;
 use super::time::TimeSpec;
 use crate::link::{ActuationSpec, Failure, NetworkSpec, SensingSpec};
 use crate::shield::ShieldSpec;
@@ -55,6 +56,8 @@ pub struct Scenario {
     pub graph: Graph,
     /// The control law and its parameters.
     pub law: LawSpec,
+    /// Law from outside that flies in place of `law`. The TOML and the hash of the scenario do not contain it.
+    pub external_law: Option<ExternalLaw>,
     /// Safety distance delta \[m\] of the audit: the width of the space around a vehicle that must stay empty.
     pub delta_m: f64,
     /// Shape of that space.
@@ -147,6 +150,7 @@ impl Scenario {
             wind: WindSpec::default(),
             graph: Graph::complete(count),
             law: LawSpec::EdgeTension(EdgeTensionKeys::default()),
+            external_law: None,
             delta_m,
             safety: Safety::Ball,
             plant: PlantSpec::Rapier,
@@ -185,7 +189,7 @@ impl Scenario {
         self.legs.first().map_or(&NOWHERE, |leg| &leg.formation)
     }
 
-    /// Returns the law, ready to fly.
+    /// Returns the scenario's own law, ready to fly; [`Scenario::flown_law`] considers an external law.
     ///
     /// # Errors
     /// [`ParameterError`] if the parameters give no law, which validation rules out, or if memory cannot be allocated.

@@ -10,6 +10,7 @@ use toml::{Table, Value};
 use super::document::{Document, StartShape, StartTable};
 use super::error::ScenarioError;
 use super::error::suggest;
+use super::external::ExternalLaw;
 use super::limits::{MAX_NAME_CHARS, is_name_character};
 use super::source::{Source, decoded, finish};
 use super::spec::Scenario;
@@ -87,6 +88,13 @@ impl Template {
         let own = finish(document, &text)?;
         let folder = source.folder().to_owned();
         Ok(Self { own, start_is_random, laws, overrides: overrides.to_vec(), folder, name, toml })
+    }
+
+    /// Returns the template with an external law, which all its scenarios fly.
+    #[must_use]
+    pub fn with_external_law(mut self, law: Option<ExternalLaw>) -> Self {
+        self.own.external_law = law;
+        self
     }
 
     /// Returns the unchanged scenario of the file.
@@ -178,7 +186,7 @@ impl Template {
             document.noise.seed = draw.seed;
         }
         document.start.jitter_m = draw.jitter_m.unwrap_or(document.start.jitter_m);
-        finish(document, &text)
+        Ok(Scenario { external_law: self.own.external_law.clone(), ..finish(document, &text)? })
     }
 }
 

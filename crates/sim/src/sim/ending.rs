@@ -200,6 +200,14 @@ pub enum SimError {
          use the shield outside of the simulation"
     )]
     ShieldedCommands,
+    /// An external law failed or commanded numbers that are not finite.
+    #[error("the law {law}: {reason}")]
+    ExternalLaw {
+        /// Name of the law.
+        law: String,
+        /// Reason, a sentence.
+        reason: String,
+    },
     /// The scenario has no formation.
     #[error("the scenario has no leg")]
     NoLeg,

@@ -105,7 +105,7 @@ impl Simulation {
         let certificate = certificate.void_where(!link.is_exact() && !is_void, VoidReason::InexactLink);
         let mut state = scenario.start.clone();
         plant.observe(&mut state);
-        let flies_another = scenario.law().is_ok_and(|own| own.name() != law.name());
+        let flies_another = scenario.external_law.is_some() || scenario.law().is_ok_and(|own| own.name() != law.name());
         let other_law = flies_another.then(|| Event::OtherLaw { time_s: 0.0, name: law.name().to_owned() });
         let channels = Channels::of(plant.as_ref(), link.as_ref());
         let mut simulation = Self {
@@ -350,12 +350,12 @@ pub struct Components {
 }
 
 impl Components {
-    /// Returns the components of a scenario.
+    /// Returns the components of a scenario, with its external law if it has one.
     ///
     /// # Errors
     /// [`SimError::Law`] if the parameters give no law; for a valid scenario only if memory cannot be allocated.
     pub fn of(scenario: &Scenario) -> Result<Self, SimError> {
-        Ok(Self::with_law(scenario, scenario.law()?))
+        Ok(Self::with_law(scenario, scenario.flown_law()?))
     }
 
     /// Returns the components of a scenario under another law.

@@ -165,6 +165,7 @@ impl Experiment for Options {
     }
 
     fn fly(&self, base: &BaseScenario, batch: &Batch<'_>) -> Result<Option<Attack>, Failure> {
+        base.check_keys(self.vary.iter().map(|of| of.key.as_str()))?;
         let space = SearchSpace::new(base, self)?;
         batch
             .monitor()
@@ -432,6 +433,7 @@ impl Study for Attack {
             worst.is_some_and(|of| of.outcome == Outcome::Violated && of.clearance_m().is_some_and(|of| of >= 0.0)),
             "the violation is of an obstacle's clearance; the search minimises separations of vehicles only".to_owned(),
         );
+        note(self.about.external_law.is_some(), self.about.note().unwrap_or_default());
         note(self.interrupted, format!("interrupted: {flown}"));
         note(
             self.exhausted,

@@ -15,7 +15,7 @@ use crate::base::BaseScenario;
 use crate::batch::Batch;
 use crate::splitting::{self, SplittingSettings};
 use tautline_report::request::Failure;
-use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source};
+use tautline_sim::scenario::{ExternalLaw, Override, Scenario, ScenarioError, Source};
 
 /// Largest number of runs of a campaign.
 pub const MOST_RUNS: u64 = 1_000_000_000;
@@ -60,7 +60,7 @@ pub struct Law {
 
 impl Campaign {
     /// Plans a campaign with a name and a number of shards, by default one for each `RUNS_OF_A_SHARD` runs. The path
-    /// of a scenario is relative to `folder`.
+    /// of a scenario is relative to `folder`. An external law flies every run in place of the scenario's own law.
     ///
     /// # Errors
     /// [`Failure`] for a wrong specification, and for the first value, law or run that cannot be flown.
@@ -70,6 +70,7 @@ impl Campaign {
         folder: &Path,
         shards: Option<u64>,
         program: Program,
+        external_law: Option<&ExternalLaw>,
     ) -> Result<Self, Failure> {
         let plain = |error| spec.scenario("scenario", "scenario", error);
         let file = folder.join(&spec.scenario);
@@ -87,6 +88,8 @@ impl Campaign {
             scenario: text,
             spec: spec.to_toml()?,
             runs: runs(spec)?,
+            runs_raised: false,
+            external_law: external_law.map(|law| law.name().to_owned()),
             first: Vec::new(),
             shards: 1,
             folder: std::path::absolute(source.folder()).unwrap_or_else(|_| source.folder().to_owned()),
@@ -97,21 +100,22 @@ impl Campaign {
             let problem = format!("--shards {shards}: must be from 1 to {runs}, the number of runs");
             return Err(refused(problem, "give a number in this range, or leave --shards out"));
         }
-        let mut campaign = Self::read(manifest, spec)?;
+        let mut campaign = Self::read(manifest, spec, external_law)?;
         campaign.check(spec)?;
         campaign.manifest.first = campaign.first();
         campaign.manifest = campaign.manifest.sealed();
         Ok(campaign)
     }
 
-    /// Returns the campaign of a manifest.
+    /// Returns the campaign of a manifest. `external_law` is the law that the manifest names, if it names one.
     ///
     /// # Errors
     /// [`Failure`] if the campaign cannot be flown here, for example because a file of its scenario is missing or
-    /// different.
-    pub fn of(manifest: Manifest) -> Result<Self, Failure> {
+    /// different, or because it has another law.
+    pub fn of(manifest: Manifest, external_law: Option<&ExternalLaw>) -> Result<Self, Failure> {
+        check_external_law(&manifest, external_law)?;
         let spec = Spec::read("the specification in the manifest", &manifest.spec)?;
-        let campaign = Self::read(manifest, &spec)?;
+        let campaign = Self::read(manifest, &spec, external_law)?;
         let first = campaign.first();
         if first != campaign.manifest.first {
             let problem = format!(
@@ -125,7 +129,7 @@ impl Campaign {
         Ok(campaign)
     }
 
-    fn read(manifest: Manifest, spec: &Spec) -> Result<Self, Failure> {
+    fn read(manifest: Manifest, spec: &Spec, external_law: Option<&ExternalLaw>) -> Result<Self, Failure> {
         let source = Source::Embedded {
             name: manifest.scenario_name.clone(),
             text: manifest.scenario.clone(),
@@ -143,6 +147,9 @@ impl Campaign {
         let written = sets.iter().map(written).collect::<Result<Vec<_>, _>>();
         let written = written.map_err(|error| spec.scenario("set", "", error))?;
         let base = BaseScenario::read(source, written).map_err(|error| spec.scenario("scenario", "", error))?;
+        let base = base.with_external_law(external_law.cloned())?;
+        base.check_keys(sets.keys().chain(variations.keys()).map(String::as_str))
+            .map_err(|failure| spec.at("vary", failure))?;
         let template = base.template();
         let laws = spec.laws.iter().zip(1..).map(|(name, entry)| {
             let law = template.law(name).map_err(|error| spec.scenario(&format!("laws.{entry}"), "", error))?;
@@ -154,7 +161,8 @@ impl Campaign {
             return Err(spec.refuse("laws", problem, "give each law once"));
         }
         if laws.is_empty() {
-            laws.push(Law { name: template.own_law().name, overrides: Vec::new() });
+            let name = external_law.map_or_else(|| template.own_law().name, |law| law.name().to_owned());
+            laws.push(Law { name, overrides: Vec::new() });
         }
         let is_open = |key: &str| !sets.contains_key(key) && !variations.contains_key(key);
         let open = [
@@ -189,6 +197,14 @@ impl Campaign {
             let remedy = "vary a key that changes the flight, such as \"start.jitter_m\" = { uniform = [0.0, 0.1] } in \
                           [vary], or give the scenario a random start or wind";
             return Err(spec.refuse("runs", problem, remedy));
+        }
+        if self.manifest.external_law.is_some() && !spec.laws.is_empty() {
+            let problem = "laws: must not be given with an external law, which flies every run";
+            return Err(spec.refuse("laws", problem, "leave `laws` or the external law out"));
+        }
+        if self.manifest.external_law.is_some() && self.splitting.is_some() {
+            let problem = "method: splitting copies flights under way, and copies of an external law share its memory";
+            return Err(spec.refuse("method", problem, "fly whole flights, or a law of the scenario"));
         }
         for law in &self.laws {
             self.check_law(spec, law)?;
@@ -245,6 +261,12 @@ impl Campaign {
         first.map(|first| first.map_or_else(|error| error.message().to_owned(), |first| first.sha256_hex())).collect()
     }
 
+    /// Returns the same campaign, whose number of runs was raised after flights had been flown.
+    pub(super) fn raised(mut self) -> Self {
+        self.manifest = Manifest { runs_raised: true, ..self.manifest }.sealed();
+        self
+    }
+
     /// Returns the manifest.
     #[must_use]
     pub fn manifest(&self) -> &Manifest {
@@ -255,6 +277,12 @@ impl Campaign {
     #[must_use]
     pub fn own(&self) -> &Scenario {
         self.base.own()
+    }
+
+    /// Returns the external law that flies every run.
+    #[must_use]
+    pub fn external_law(&self) -> Option<&ExternalLaw> {
+        self.own().external_law.as_ref()
     }
 
     /// Returns the laws that fly every run, in order.
@@ -390,6 +418,21 @@ impl Campaign {
         });
         places.collect()
     }
+}
+
+/// Refuses an external law that is not the one that a manifest names.
+fn check_external_law(manifest: &Manifest, given: Option<&ExternalLaw>) -> Result<(), Failure> {
+    let (planned, given) = (manifest.external_law.as_deref(), given.map(ExternalLaw::name));
+    if planned == given {
+        return Ok(());
+    }
+    let named = |law: Option<&str>| law.map_or_else(|| "the law of its scenario".to_owned(), |law| format!("`{law}`"));
+    let problem = format!("the campaign flies {}, and this is {}", named(planned), named(given));
+    let remedy = match planned {
+        Some(law) => format!("continue the campaign in Python: tautline.campaign(..., law={law}(...))"),
+        None => "continue without an external law, or give another folder".to_owned(),
+    };
+    Err(other_campaign(&manifest.folder, problem, remedy))
 }
 
 fn written<'a>(drawn: &'a BTreeMap<&'a str, toml::Value>) -> impl Iterator<Item = String> + 'a {

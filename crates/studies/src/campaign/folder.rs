@@ -48,7 +48,7 @@ pub struct Folder {
 
 impl Folder {
     /// Writes the manifest of a campaign into a folder. A folder with the same campaign stays unchanged; its number of
-    /// shards must be equal if `shards_asked`.
+    /// shards must be equal if `shards_asked`. A folder with fewer runs of the same campaign keeps its flights.
     ///
     /// # Errors
     /// [`Failure`] if the folder holds another campaign, or this campaign in another number of shards.
@@ -56,8 +56,12 @@ impl Folder {
         let file = path.join("manifest.json");
         if file.exists() {
             let there = Manifest::read(&file, &campaign.manifest().tool)?;
+            let campaign = if there.runs_raised { campaign.raised() } else { campaign };
             let here = campaign.manifest();
             if here.campaign != there.campaign {
+                if here.differs_in_runs_alone(&there)? {
+                    return Self::raise(path, campaign, there);
+                }
                 let problem = format!("the folder holds campaign {}, and this is {}", there.campaign, here.campaign);
                 return Err(other_campaign(path, problem, "give another folder with --out"));
             }
@@ -66,7 +70,7 @@ impl Folder {
                 let remedy = "leave --shards out to continue, or give another folder with --out";
                 return Err(other_campaign(path, problem, remedy));
             }
-            return Ok(Self { path: path.to_owned(), campaign: Campaign::of(there)? });
+            return Ok(Self { path: path.to_owned(), campaign: Campaign::of(there, campaign.external_law())? });
         }
         if let Some(there) = LEFT.iter().map(|name| path.join(name)).find(|there| there.exists()) {
             let problem = "the file exists, and the folder has no manifest of a campaign";
@@ -80,13 +84,18 @@ impl Folder {
         if there == *folder.campaign.manifest() { Ok(folder) } else { Self::plan(path, folder.campaign, shards_asked) }
     }
 
-    /// Opens the campaign in a folder.
+    /// Returns the folder at a path without reading it.
+    pub(super) fn at(path: &Path, campaign: Campaign) -> Self {
+        Self { path: path.to_owned(), campaign }
+    }
+
+    /// Opens the campaign in a folder. Campaigns with an external law can only be opened by [`Folder::plan`].
     ///
     /// # Errors
     /// As [`Manifest::read`] and [`Campaign::of`].
     pub fn open(path: &Path, program: &Program) -> Result<Self, Failure> {
         let file = if path.is_file() { path.to_owned() } else { path.join("manifest.json") };
-        let campaign = Campaign::of(Manifest::read(&file, program)?)?;
+        let campaign = Campaign::of(Manifest::read(&file, program)?, None)?;
         let folder = if path.is_file() { path.parent().unwrap_or(Path::new("")) } else { path };
         Ok(Self { path: folder.to_owned(), campaign })
     }
@@ -291,6 +300,11 @@ impl Folder {
     }
 }
 
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "required by serde")]
+fn is_false(value: &bool) -> bool {
+    !value
+}
+
 /// Returns the failure of two machines that flew a shard with different results.
 pub(super) fn different_results(shard: u64, kept: &Path, other: &Path) -> Failure {
     let [kept, other] = [kept, other].map(Path::display);
@@ -371,6 +385,12 @@ pub struct Manifest {
     pub spec: String,
     /// Number of runs.
     pub runs: u64,
+    /// Whether the number of runs was raised after flights had been flown.
+    #[serde(default, skip_serializing_if = "is_false")]
+    pub runs_raised: bool,
+    /// Name of the external law that flies every run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub external_law: Option<String>,
     /// SHA-256 of the resolved scenario of run 0 under each law. It detects changes in files that the scenario names.
     pub first: Vec<String>,
     /// Number of parts into which the runs are split.
@@ -386,16 +406,19 @@ pub struct Program {
     pub name: String,
     /// Version.
     pub version: String,
-    /// SHA-256 of its executable.
+    /// SHA-256 of its sources and dependencies; of its executable if the sources are unknown.
     pub sha256: String,
 }
 
+/// SHA-256 of the sources of the crates that affect flights, and of the versions of all dependencies. Empty outside of
+/// the workspace.
+const SOURCES: &str = env!("TAUTLINE_SOURCES");
 /// File that contains this crate, if it is not the executable of the process.
 static HOLDER: OnceLock<PathBuf> = OnceLock::new();
 
 impl Program {
-    /// Sets the file that contains this crate if it is a library of another program. The hash of this file then
-    /// identifies the program. Call it before any campaign.
+    /// Sets the file that contains this crate if it is a library of another program. The hash of this file identifies
+    /// the program if its sources are unknown. Call it before any campaign.
     pub fn set_library_file(file: PathBuf) {
         // All calls set the same file, so a second call changes nothing.
         let _ = HOLDER.set(file);
@@ -406,14 +429,14 @@ impl Program {
     /// # Errors
     /// [`Failure`] if its file cannot be read.
     pub fn running() -> Result<Self, Failure> {
+        let (name, version) = (tautline_core::PROGRAM.to_owned(), tautline_core::VERSION.to_owned());
+        if !SOURCES.is_empty() {
+            return Ok(Self { name, version, sha256: SOURCES.to_owned() });
+        }
         let path = HOLDER.get().cloned().map_or_else(std::env::current_exe, Ok);
         let path = path.map_err(file_failure("read", Path::new("the program")))?;
         let program = fs::read(&path).map_err(file_failure("read", &path))?;
-        Ok(Self {
-            name: tautline_core::PROGRAM.to_owned(),
-            version: tautline_core::VERSION.to_owned(),
-            sha256: base16(&Sha256::digest(program)),
-        })
+        Ok(Self { name, version, sha256: base16(&Sha256::digest(program)) })
     }
 }
 
@@ -426,11 +449,24 @@ impl Manifest {
     }
 
     fn hash(&self) -> String {
-        let Self { schema_version, name, tool, scenario_name, scenario, spec, runs, first, .. } = self;
+        let Self {
+            schema_version,
+            name,
+            tool,
+            scenario_name,
+            scenario,
+            spec,
+            runs,
+            first,
+            runs_raised,
+            external_law,
+            ..
+        } = self;
         let (version, runs) = (schema_version.to_string(), runs.to_string());
         let texts = [&version, name, &tool.sha256, scenario_name, scenario, spec, &runs];
         let mut hash = Sha256::new();
-        for text in texts.into_iter().chain(first) {
+        let raised = runs_raised.then(|| "raised".to_owned());
+        for text in texts.into_iter().chain(first).chain(&raised).chain(external_law) {
             // Lengths separate the texts, so that different texts do not give the same bytes.
             hash.update((text.len() as u64).to_le_bytes());
             hash.update(text);
@@ -525,6 +561,21 @@ pub(super) fn base16(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::campaign::Spec;
+
+    #[test]
+    fn another_program_is_refused() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let spec =
+            Spec::read("spec.toml", "scenario = 'pentagon'\n[vary]\nlaw.alpha = { grid = [1.0] }").expect("read");
+        let program = Program::running().expect("a program");
+        let campaign = Campaign::plan(&spec, "one", Path::new("."), None, program.clone(), None).expect("a plan");
+        let folder = Folder::plan(folder.path(), campaign, false).expect("planned");
+        Folder::open(folder.path(), &program).expect("the same program");
+        let other = Program { sha256: "0".repeat(64), ..program };
+        let refused = Folder::open(folder.path(), &other).expect_err("another program").to_string();
+        assert!(refused.contains("planned by") && refused.contains("use the same program"), "{refused}");
+    }
 
     #[test]
     fn a_list_of_shards_reads_back() {

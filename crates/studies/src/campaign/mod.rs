@@ -8,6 +8,7 @@
 mod document;
 mod flights;
 mod folder;
+mod raise;
 mod replay;
 mod request;
 mod shard;

@@ -86,7 +86,9 @@ impl FlightId<'_> {
     /// Returns the name of the flight's folder.
     fn name(self) -> String {
         let bad = self.bad.map_or_else(String::new, |bad| format!("-bad-{bad}"));
-        format!("{}-run-{}{bad}", self.law.name, self.run)
+        // The name of an external law may contain characters that a path cannot hold.
+        let law = self.law.name.replace(|c: char| !(c.is_ascii_alphanumeric() || "-_+.".contains(c)), "-");
+        format!("{law}-run-{}{bad}", self.run)
     }
 
     /// Returns the default folder of the flight's files.
@@ -122,6 +124,10 @@ impl FlightId<'_> {
 
     /// Returns the command that flies a run again without its campaign.
     fn command(self, campaign: &Campaign) -> String {
+        if let Some(law) = campaign.external_law() {
+            let sets = campaign.sets(self.run, self.law).join(", ");
+            return format!("in Python, tautline.fly under the law {} with: {sets}", law.name());
+        }
         let sets = campaign.sets(self.run, self.law);
         let sets = sets.iter().flat_map(|set| ["--set", set.as_str()]);
         let words: Vec<_> = ["run", campaign.scenario_argument()].into_iter().chain(sets).collect();

@@ -12,6 +12,7 @@ use crate::study::{Study as _, StudyPage};
 use tautline_core::text::counted;
 use tautline_report::report::write_atomically;
 use tautline_report::request::{Failure, Monitor, Pictures, command_line, in_range};
+use tautline_sim::scenario::ExternalLaw;
 
 /// File name of the page.
 const PAGE: &str = "campaign.html";
@@ -35,6 +36,8 @@ pub struct CampaignRequest {
     pub threads: Option<usize>,
     /// Number of flights with the least clearance that are flown again for the page: at most [`MOST_WORST`].
     pub worst: usize,
+    /// Law that flies every run in place of the scenario's own.
+    pub external_law: Option<ExternalLaw>,
 }
 
 /// Answer of a campaign.
@@ -50,7 +53,16 @@ impl CampaignRequest {
     /// Returns the request for a specification, with 10 worst flights on the page.
     #[must_use]
     pub fn new(spec: PathBuf) -> Self {
-        Self { spec, until_width: None, until_decided: None, out: None, shards: None, threads: None, worst: MOST_WORST }
+        Self {
+            spec,
+            until_width: None,
+            until_decided: None,
+            out: None,
+            shards: None,
+            threads: None,
+            worst: MOST_WORST,
+            external_law: None,
+        }
     }
 
     /// Returns the name of the campaign.
@@ -86,7 +98,8 @@ impl CampaignRequest {
     /// [`Failure`] if the specification is wrong, or the folder is of another campaign.
     pub fn plan(&self) -> Result<Folder, Failure> {
         let folder = self.spec.parent().unwrap_or(Path::new(""));
-        let campaign = Campaign::plan(&self.read()?, &self.name(), folder, self.shards, Program::running()?)?;
+        let (spec, law) = (self.read()?, self.external_law.as_ref());
+        let campaign = Campaign::plan(&spec, &self.name(), folder, self.shards, Program::running()?, law)?;
         let out = self.out.clone().unwrap_or_else(|| Path::new("out").join(self.name()));
         Folder::plan(&out, campaign, self.shards.is_some())
     }
@@ -103,7 +116,7 @@ pub fn campaign(
     monitor: &dyn Monitor,
 ) -> Result<Option<CampaignAnswer>, Failure> {
     in_range("--worst", &request.worst, &(0..=MOST_WORST))?;
-    let batch = Batch::new(request.threads, monitor)?;
+    let batch = Batch::for_laws(request.threads, monitor, &request.external_law)?;
     let folder = request.plan()?;
     let campaign = folder.campaign();
     let manifest = campaign.manifest();
@@ -239,8 +252,10 @@ fn answer(
         return Ok(None);
     }
     let command = command_line(["campaign", "run", &format!("{}.toml", summary.name)].into_iter());
+    // The command line has no external laws.
+    let command = folder.campaign().external_law().is_none().then_some(command);
     let page = StudyPage {
-        commands: vec![command, folder.campaign().manifest().spec.clone()],
+        commands: command.into_iter().chain([folder.campaign().manifest().spec.clone()]).collect(),
         sections: vec![WorstFlight::section(&flights)],
         ..StudyPage::default()
     };

@@ -75,7 +75,7 @@ impl Folder {
     }
 
     /// Returns the rows in journals of killed processes, without repetition.
-    fn flown_before(&self, shard: u64) -> Result<Vec<Row>, Failure> {
+    pub(super) fn flown_before(&self, shard: u64) -> Result<Vec<Row>, Failure> {
         let (range, laws) = (self.campaign().manifest().range(shard), self.campaign().laws().len());
         let manifest = self.campaign().manifest();
         let mut rows: BTreeMap<(u64, usize), (Row, PathBuf)> = BTreeMap::new();
@@ -267,6 +267,14 @@ impl Journal {
         let row = line(row)?;
         let written = [seal_of(&self.campaign, &row).as_bytes(), b" ", &row].concat();
         self.file.write_all(&written).map_err(file_failure("write", &self.path))
+    }
+
+    /// Waits until the disk holds all rows.
+    ///
+    /// # Errors
+    /// [`Failure`] if the file cannot be written.
+    pub(super) fn sync(self) -> Result<(), Failure> {
+        self.file.sync_all().map_err(file_failure("write", &self.path))
     }
 
     /// Returns the rows of a campaign in a journal.

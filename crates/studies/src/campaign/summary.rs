@@ -164,6 +164,8 @@ impl SummaryAccumulator {
         let is_drawn = campaign.variations().values().any(|variation| variation.grid_len().is_none());
         let intervals = match (campaign.stop(), is_drawn) {
             (Some(_), _) => Intervals::ConfidenceSequence,
+            // More runs after a look at the flights are runs that were not fixed beforehand.
+            (None, true) if campaign.manifest().runs_raised => Intervals::ConfidenceSequence,
             (None, true) => Intervals::ClopperPearson,
             (None, false) => Intervals::Exact,
         };

@@ -13,7 +13,7 @@ fn pentagon() -> BaseScenario {
 }
 
 fn options(laws: &[&str], runs: u64) -> Options {
-    Options { laws: Some(laws.iter().map(|&law| law.to_owned()).collect()), shield: false, runs, seed: 3 }
+    Options { laws: Some(laws.iter().map(|&law| law.to_owned()).collect()), runs, seed: 3, ..Options::default() }
 }
 
 fn interrupted_after(steps: u64, threads: usize) -> Option<Comparison> {

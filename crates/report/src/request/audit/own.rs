@@ -109,9 +109,15 @@ impl OwnRecording {
     /// it is not that of the scenario.
     #[must_use]
     pub fn of_flight(scenario: &Scenario, report: &Report, other_law: Option<String>, reason: Option<String>) -> Self {
-        let (at_s, duration_s) = (report.run.duration_s, scenario.time.duration_s);
-        let early_end = report.run.ended_early.is_some().then_some(EarlyEnd { at_s, duration_s, reason });
-        let audit = StoredAudit::AsWritten(Box::new(run_audit(scenario, report)));
+        Self::of_run(scenario, run_audit(scenario, report), other_law, reason)
+    }
+
+    /// As [`OwnRecording::of_flight`], from the audit of the run ([`run_audit`]).
+    #[must_use]
+    pub fn of_run(scenario: &Scenario, audit: RunAudit, other_law: Option<String>, reason: Option<String>) -> Self {
+        let (at_s, duration_s) = (audit.duration_s, scenario.time.duration_s);
+        let early_end = (!audit.ended_early.is_empty()).then_some(EarlyEnd { at_s, duration_s, reason });
+        let audit = StoredAudit::AsWritten(Box::new(audit));
         Self { early_end, audit, other_law, ..Self::of(scenario, scenario.delta_m, 1.0) }
     }
 

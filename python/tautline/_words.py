@@ -1,0 +1,31 @@
+"""Words that arguments take, so that type checkers find a wrong one. A test compares them with the native module."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+Motion = Literal["linear", "hold", "polynomial", "bounded"]
+Rules = Literal["recording", "skybrush", "none"]
+Verdict = Literal["pass", "clear", "reached"]
+Duplicates = Literal["first", "last", "refuse"]
+TimeUnit = Literal["s", "ms", "us", "ns"]
+ReadFormat = Literal[
+    "ulog",
+    "parquet",
+    "mcap",
+    "npz",
+    "skyb",
+    "jsonl",
+    "vviz",
+    "skybrush",
+    "crazyflie-compressed",
+    "motive",
+    "vicon",
+    "bezier",
+    "crazyflie",
+    "csv",
+    "trajnet",
+    "text",
+]
+ExportFormat = Literal["csv", "parquet", "npz", "mcap", "crazyflie", "skyb", "skyc", "px4-show", "vviz"]
+Reaches = Literal["places", "displacements", "distances"]
