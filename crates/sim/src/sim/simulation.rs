@@ -165,7 +165,7 @@ impl Simulation {
     }
 
     /// Flies one step with given accelerations \[m/s^2\], N x 3, instead of those of the law. The step is not divided
-    /// for the barrier or the rate of the law.
+    /// for the barrier or the rate of the law, and the law's energy is not computed.
     ///
     /// # Errors
     /// [`SimError::Commands`] unless each vehicle has a finite row, and [`SimError::ShieldedCommands`] under a shield;
@@ -180,8 +180,10 @@ impl Simulation {
         }
         if self.ending.is_none() {
             self.overruled = true;
-            self.certificate = self.certificate.clone().void_where(true, VoidReason::ExternalCommands);
-            self.control.clone_from(commands);
+            if !self.certificate.void.contains(&VoidReason::ExternalCommands) {
+                self.certificate = self.certificate.clone().void_where(true, VoidReason::ExternalCommands);
+            }
+            self.control.copy_from(commands);
             self.plant.apply(commands, &mut self.state);
         }
         self.step_or_end();

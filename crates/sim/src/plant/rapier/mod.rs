@@ -48,6 +48,7 @@
 //! it: they are evidence that comes one step late, not the verdict.
 
 mod bodies;
+mod proximity;
 mod quadrotors;
 mod world;
 

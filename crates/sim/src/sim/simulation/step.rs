@@ -274,9 +274,13 @@ impl Simulation {
         if let Some(vehicle) = self.state.first_not_finite() {
             return Err(Breakdown::StateNotFinite { step, vehicle }.into());
         }
-        let began = Instant::now();
-        self.energy = self.controller.energy(self.time_s, &self.state);
-        self.performance.energy += began.elapsed();
+        if self.overruled {
+            self.energy = None;
+        } else {
+            let began = Instant::now();
+            self.energy = self.controller.energy(self.time_s, &self.state);
+            self.performance.energy += began.elapsed();
+        }
         self.energy_monitor.add(self.controller.target.view().revision, self.energy);
         self.peaks.take(largest_row_norm(&self.control), self.energy);
         Ok(())
