@@ -112,6 +112,13 @@ struct World {
     failure: Option<VectorError>,
 }
 
+/// Worlds to change, each with `width` numbers of positions.
+struct Stage<'a> {
+    worlds: &'a mut [World],
+    width: usize,
+    is_parallel: bool,
+}
+
 /// Source of new simulations.
 struct Starts {
     template: Template,
@@ -208,7 +215,7 @@ impl VectorSimulation {
                 world.failure = world.restart(starts, k, later(world.seed, worlds)).err();
             }
         };
-        self.for_each(states, advance);
+        Stage { worlds: &mut self.worlds, width, is_parallel: self.is_parallel }.for_each(states, advance);
         self.worlds.iter_mut().find_map(|world| world.failure.take()).map_or(Ok(()), Err)
     }
 
@@ -227,14 +234,16 @@ impl VectorSimulation {
         self.check_lengths(states)?;
         check("mask", count, chosen.len())?;
         seeds.map_or(Ok(()), |seeds| check("seeds", count, seeds.len()))?;
-        let next = |k: usize| seeds.map_or_else(|| later(self.worlds[k].seed, count as u64), |seeds| seeds[k]);
-        let place = |k: usize| chosen[k].then(|| (k, next(k), self.starts.simulation(k, next(k))));
-        let made: Vec<_> = (0..count).into_par_iter().filter_map(place).collect();
+        let starts = &self.starts;
+        let next = |(k, world): (usize, &World)| (k, seeds.map_or_else(|| later(world.seed, count as u64), |of| of[k]));
+        let drawn: Vec<_> = self.worlds.iter().enumerate().filter(|(k, _)| chosen[*k]).map(next).collect();
+        let made: Vec<_> = drawn.into_par_iter().map(|(k, seed)| (k, seed, starts.simulation(k, seed))).collect();
         let made = made.into_iter().map(|(k, seed, simulation)| Ok((k, seed, simulation?)));
         for (k, seed, simulation) in made.collect::<Result<Vec<_>, VectorError>>()? {
             (self.worlds[k].seed, self.worlds[k].simulation) = (seed, simulation);
         }
-        self.for_each(states, |_| ());
+        let width = 3 * self.vehicles;
+        Stage { worlds: &mut self.worlds, width, is_parallel: self.is_parallel }.for_each(states, |_| ());
         Ok(())
     }
 
@@ -244,35 +253,9 @@ impl VectorSimulation {
     /// [`VectorError::Length`].
     pub fn write(&mut self, states: &mut StatesMut<'_>) -> Result<(), VectorError> {
         self.check_lengths(states)?;
-        self.for_each(states, |_| ());
-        Ok(())
-    }
-
-    /// Changes each world, in any order, and writes its state.
-    fn for_each(&mut self, states: &mut StatesMut<'_>, change: impl Fn((usize, &mut World)) + Sync) {
         let width = 3 * self.vehicles;
-        let update = |k: usize, world: &mut World, state: (&mut [f64], &mut [f64], &mut f64, &mut bool)| {
-            change((k, world));
-            world.write(state);
-        };
-        let StatesMut { positions_m, velocities_m_s, least_clearance_m, is_over } = states;
-        if self.is_parallel && self.worlds.len() > 1 && rayon::current_num_threads() > 1 {
-            self.worlds
-                .par_iter_mut()
-                .zip(positions_m.par_chunks_exact_mut(width))
-                .zip(velocities_m_s.par_chunks_exact_mut(width))
-                .zip(least_clearance_m.par_iter_mut())
-                .zip(is_over.par_iter_mut())
-                .enumerate()
-                .for_each(|(k, ((((world, p), v), clearance), over))| update(k, world, (p, v, clearance, over)));
-        } else {
-            let moving = positions_m.chunks_exact_mut(width).zip(velocities_m_s.chunks_exact_mut(width));
-            let judged = least_clearance_m.iter_mut().zip(is_over.iter_mut());
-            for (k, ((world, (p, v)), (clearance, over))) in self.worlds.iter_mut().zip(moving).zip(judged).enumerate()
-            {
-                update(k, world, (p, v, clearance, over));
-            }
-        }
+        Stage { worlds: &mut self.worlds, width, is_parallel: self.is_parallel }.for_each(states, |_| ());
+        Ok(())
     }
 
     fn check_lengths(&self, states: &StatesMut<'_>) -> Result<(), VectorError> {
@@ -298,6 +281,34 @@ impl VectorSimulation {
             }
         }
         Ok(())
+    }
+}
+
+impl Stage<'_> {
+    /// Changes each world, in any order, and writes its state.
+    fn for_each(self, states: &mut StatesMut<'_>, change: impl Fn((usize, &mut World)) + Sync) {
+        let Self { worlds, width, is_parallel } = self;
+        let update = |k: usize, world: &mut World, state: (&mut [f64], &mut [f64], &mut f64, &mut bool)| {
+            change((k, world));
+            world.write(state);
+        };
+        let StatesMut { positions_m, velocities_m_s, least_clearance_m, is_over } = states;
+        if is_parallel && worlds.len() > 1 && rayon::current_num_threads() > 1 {
+            worlds
+                .par_iter_mut()
+                .zip(positions_m.par_chunks_exact_mut(width))
+                .zip(velocities_m_s.par_chunks_exact_mut(width))
+                .zip(least_clearance_m.par_iter_mut())
+                .zip(is_over.par_iter_mut())
+                .enumerate()
+                .for_each(|(k, ((((world, p), v), clearance), over))| update(k, world, (p, v, clearance, over)));
+        } else {
+            let moving = positions_m.chunks_exact_mut(width).zip(velocities_m_s.chunks_exact_mut(width));
+            let judged = least_clearance_m.iter_mut().zip(is_over.iter_mut());
+            for (k, ((world, (p, v)), (clearance, over))) in worlds.iter_mut().zip(moving).zip(judged).enumerate() {
+                update(k, world, (p, v, clearance, over));
+            }
+        }
     }
 }
 
