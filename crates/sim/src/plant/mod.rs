@@ -85,6 +85,9 @@ pub trait Plant: DynClone + Send {
         Duration::ZERO
     }
 
+    /// Stops the measurement of [`Plant::airframe_time`].
+    fn stop_measuring_time(&mut self) {}
+
     /// Returns the recorded channels of the plant, such as attitude, with names and columns but no values.
     fn channels(&self) -> Vec<Channel> {
         Vec::new()

@@ -12,11 +12,11 @@ mod monitors;
 mod simulation;
 mod vector;
 
-pub(crate) use ending::MAX_BEND_M;
 pub use ending::{Breakdown, Ending, Flight, Performance, SimError};
+pub(crate) use ending::{MAX_BEND_M, Stopwatch};
 pub use judge::{audit_obstacle, audit_shape};
 pub use simulation::{Components, SavedState, Simulation};
-pub use vector::{States, StatesMut, VectorError, VectorSimulation};
+pub use vector::{States, StatesMut, Threads, VectorError, VectorSimulation};
 
 use std::ops::ControlFlow;
 use std::time::Instant;

@@ -3,7 +3,7 @@
 mod step;
 
 use super::controller::Controller;
-use super::ending::{Breakdown, Ending, Flight, MAX_COMMAND_M_S2, Performance, SimError};
+use super::ending::{Breakdown, Ending, Flight, MAX_COMMAND_M_S2, Performance, SimError, Stopwatch};
 use super::judge::{AuditResults, Judge};
 use super::monitors::EnergyMonitor;
 use super::monitors::{IntegrationError, RoundingBound};
@@ -69,6 +69,7 @@ pub struct Simulation {
     sample_is_due: bool,
     ending: Option<Ending>,
     pub(super) performance: Performance,
+    stopwatch: Stopwatch,
 }
 
 /// State of a [`Simulation`] at one instant.
@@ -132,6 +133,7 @@ impl Simulation {
             sample_is_due: false,
             ending: None,
             performance: Performance::default(),
+            stopwatch: Stopwatch { is_on: true },
             resolution: RoundingBound::of(scenario),
             scenario: scenario.clone(),
         };
@@ -216,6 +218,12 @@ impl Simulation {
             self.events.extend(self.judge.closest_to_obstacles());
             self.ending = Some(ending);
         }
+    }
+
+    /// Leaves all times of [`Performance`] at zero.
+    pub(super) fn stop_measuring_time(&mut self) {
+        self.stopwatch.is_on = false;
+        self.plant.stop_measuring_time();
     }
 
     /// Returns the ending of the flight; `None` in flight.

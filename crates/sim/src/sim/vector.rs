@@ -1,13 +1,28 @@
 //! [`VectorSimulation`]: many worlds of one scenario that advance together.
 
-use rayon::prelude::*;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use rayon::{Scope, ThreadPool};
 
 use super::ending::{MAX_COMMAND_M_S2, SimError};
 use super::simulation::Simulation;
-use crate::scenario::{Draw, NamedLaw, ScenarioError, Template};
+use crate::scenario::{
+    BYTES_PER_EDGE, BYTES_PER_VEHICLE, Draw, MAX_MEMORY_BYTES, NamedLaw, Scenario, ScenarioError, Template,
+};
 use tautline_core::swarm::Rows;
 
-/// Worlds of one scenario, each a [`Simulation`] with a seed of its own, on the threads of the current rayon pool.
+/// Number of chunks of worlds for each thread. A thread takes the next chunk when it is done with one.
+const CHUNKS_PER_THREAD: usize = 8;
+/// Number of steps of single vehicles that is worth waking a thread.
+const LOAD_OF_A_THREAD: u64 = 1000;
+/// Load of a new simulation, as a number of steps.
+const LOAD_OF_A_START: u64 = 100;
+/// Expected memory of a world besides its vehicles and edges \[bytes\].
+const BYTES_PER_WORLD: u128 = 49_152;
+/// Number of steps of single vehicles between two calls of `carries_on`.
+const VEHICLE_STEPS_AT_ONCE: u64 = 100_000;
+
+/// Worlds of one scenario, each a [`Simulation`] with a seed of its own, on several threads.
 ///
 /// World k flies the scenario with its seed as `start.seed` and, if the flight is random, as `noise.seed`. It has the
 /// bits of a single simulation under the same commands, for any number of threads. A world that ends does not stop the
@@ -15,10 +30,10 @@ use tautline_core::swarm::Rows;
 ///
 /// ```
 /// use tautline_sim::scenario::{Source, Template};
-/// use tautline_sim::sim::{States, VectorSimulation};
+/// use tautline_sim::sim::{States, Threads, VectorSimulation};
 ///
 /// let template = Template::read(&Source::resolve("pentagon")?, &[])?;
-/// let mut worlds = VectorSimulation::new(template, &[0, 1, 2])?;
+/// let mut worlds = VectorSimulation::new(template, &[0, 1, 2], Threads::Current)?;
 /// let mut states = States::of(&worlds);
 /// let commands = vec![0.1; 3 * worlds.vehicles() * worlds.count()];
 /// worlds.step(Some(&commands), 240, &mut states.borrow())?;
@@ -30,7 +45,19 @@ pub struct VectorSimulation {
     worlds: Vec<World>,
     vehicles: usize,
     resets_ended: bool,
-    is_parallel: bool,
+    threads: Threads,
+}
+
+/// Threads of a [`VectorSimulation`]: the calling thread and helpers.
+#[derive(Clone, Debug, Default)]
+pub enum Threads {
+    /// As many threads as the current rayon pool has.
+    #[default]
+    Current,
+    /// The calling thread alone.
+    One,
+    /// The calling thread, and all threads of a pool.
+    With(Arc<ThreadPool>),
 }
 
 /// Memory of a caller for the states of E worlds of N vehicles, world by world and vehicle by vehicle.
@@ -65,6 +92,14 @@ pub enum VectorError {
     /// There are no worlds.
     #[error("seeds: at least one world is needed, got 0")]
     NoWorlds,
+    /// The worlds would take too much memory.
+    #[error("seeds: at most {most} worlds of this scenario fit into {} GiB, got {found}", MAX_MEMORY_BYTES >> 30)]
+    TooMany {
+        /// Largest number of worlds.
+        most: usize,
+        /// Number given.
+        found: usize,
+    },
     /// A slice has a wrong length.
     #[error("{what}: {expected} values are needed, got {found}")]
     Length {
@@ -108,15 +143,10 @@ struct World {
     simulation: Simulation,
     /// Commands of the present call, N x 3 \[m/s^2\].
     commands: Rows,
+    /// Whether the present call reset this world, which then does not fly.
+    rests: bool,
     /// Error of the present call.
     failure: Option<VectorError>,
-}
-
-/// Worlds to change, each with `width` numbers of positions.
-struct Stage<'a> {
-    worlds: &'a mut [World],
-    width: usize,
-    is_parallel: bool,
 }
 
 /// Source of new simulations.
@@ -131,22 +161,40 @@ impl VectorSimulation {
     /// Creates one world for each seed, at its start.
     ///
     /// # Errors
-    /// [`VectorError::NoWorlds`], [`VectorError::Seed`] if a seed gives no valid start, and [`VectorError::Sim`] if the
+    /// [`VectorError::NoWorlds`], [`VectorError::TooMany`], [`VectorError::Seed`] if a seed gives no valid start, and [`VectorError::Sim`] if the
     /// audit does not support the scenario.
-    pub fn new(template: Template, seeds: &[u64]) -> Result<Self, VectorError> {
+    pub fn new(template: Template, seeds: &[u64], threads: Threads) -> Result<Self, VectorError> {
         if seeds.is_empty() {
             return Err(VectorError::NoWorlds);
+        }
+        let (most, found) = (Self::most_worlds(template.own()), seeds.len());
+        if found > most {
+            return Err(VectorError::TooMany { most, found });
         }
         let vehicles = template.own().count();
         let is_random = template.start_is_random() || template.flight_is_random();
         let starts = Starts { law: template.own_law(), template, is_random };
-        let simulations: Vec<_> =
-            seeds.par_iter().enumerate().map(|(world, &seed)| starts.simulation(world, seed)).collect();
-        let worlds = simulations.into_iter().zip(seeds).map(|(simulation, &seed)| {
-            Ok(World { seed, simulation: simulation?, commands: Rows::zeros(vehicles), failure: None })
-        });
-        let worlds = worlds.collect::<Result<Vec<_>, VectorError>>()?;
-        Ok(Self { starts, worlds, vehicles, resets_ended: false, is_parallel: true })
+        let places: Vec<_> = seeds.iter().copied().enumerate().collect();
+        let world = |((_, seed), simulation): (_, Simulation)| World {
+            seed,
+            simulation,
+            commands: Rows::zeros(vehicles),
+            rests: false,
+            failure: None,
+        };
+        let simulations = starts.simulations(&places, &threads)?;
+        let worlds = places.into_iter().zip(simulations).map(world).collect();
+        Ok(Self { starts, worlds, vehicles, resets_ended: false, threads })
+    }
+
+    /// Returns the largest number of worlds of a scenario whose expected memory is within [`MAX_MEMORY_BYTES`], at least
+    /// one.
+    #[must_use]
+    pub fn most_worlds(scenario: &Scenario) -> usize {
+        let edges = scenario.graph.edges().count() as u128;
+        let of_vehicles = scenario.count() as u128 * BYTES_PER_VEHICLE + edges * BYTES_PER_EDGE;
+        let most = MAX_MEMORY_BYTES / (BYTES_PER_WORLD + of_vehicles);
+        usize::try_from(most).unwrap_or(usize::MAX).max(1)
     }
 
     /// Sets whether [`VectorSimulation::step`] resets worlds that have ended, instead of leaving them.
@@ -154,9 +202,9 @@ impl VectorSimulation {
         self.resets_ended = resets_ended;
     }
 
-    /// Sets whether steps use the threads of the current rayon pool (the default) or only the calling thread.
-    pub fn set_parallel(&mut self, is_parallel: bool) {
-        self.is_parallel = is_parallel;
+    /// Sets the threads that later calls use. The results do not depend on them.
+    pub fn set_threads(&mut self, threads: Threads) {
+        self.threads = threads;
     }
 
     /// Returns the number of worlds E.
@@ -200,23 +248,53 @@ impl VectorSimulation {
         steps: u64,
         states: &mut StatesMut<'_>,
     ) -> Result<(), VectorError> {
+        self.step_while(commands, steps, states, &mut || true)
+    }
+
+    /// Flies like [`VectorSimulation::step`], and calls `carries_on` after some steps of all worlds, every few
+    /// hundredths of a second. Stops if it returns false.
+    ///
+    /// # Errors
+    /// As [`VectorSimulation::step`].
+    pub fn step_while(
+        &mut self,
+        commands: Option<&[f64]>,
+        steps: u64,
+        states: &mut StatesMut<'_>,
+        carries_on: &mut dyn FnMut() -> bool,
+    ) -> Result<(), VectorError> {
         self.check_lengths(states)?;
         if let Some(commands) = commands {
             self.check_commands(commands)?;
         }
-        let (resets_ended, worlds) = (self.resets_ended, self.worlds.len() as u64);
-        let starts = &self.starts;
-        let width = 3 * self.vehicles;
-        let advance = |(k, world): (usize, &mut World)| {
-            if world.simulation.ending().is_none() {
-                let commands = commands.map(|commands| &commands[k * width..(k + 1) * width]);
-                world.fly(commands, steps);
-            } else if resets_ended {
-                world.failure = world.restart(starts, k, later(world.seed, worlds)).err();
+        let (count, vehicles, width) = (self.worlds.len() as u64, self.vehicles as u64, 3 * self.vehicles);
+        let at_once = (VEHICLE_STEPS_AT_ONCE / (count * vehicles)).max(1);
+        let mut flown = 0;
+        while flown < steps {
+            let (is_first, some) = (flown == 0, at_once.min(steps - flown));
+            let (resets_ended, starts) = (self.resets_ended, &self.starts);
+            let advance = |(k, world): (usize, &mut World)| {
+                world.rests &= !is_first;
+                if world.rests {
+                    return;
+                }
+                if world.simulation.ending().is_none() {
+                    world.fly(commands.map(|commands| &commands[k * width..(k + 1) * width]), some);
+                } else if resets_ended && is_first {
+                    world.rests = true;
+                    world.failure = world.restart(starts, k, later(world.seed, count)).err();
+                }
+            };
+            for_each(&mut self.worlds, (&self.threads, some.saturating_mul(count * vehicles)), states, advance);
+            if let Some(failure) = self.worlds.iter_mut().find_map(|world| world.failure.take()) {
+                return Err(failure);
             }
-        };
-        Stage { worlds: &mut self.worlds, width, is_parallel: self.is_parallel }.for_each(states, advance);
-        self.worlds.iter_mut().find_map(|world| world.failure.take()).map_or(Ok(()), Err)
+            flown += some;
+            if !carries_on() {
+                break;
+            }
+        }
+        Ok(())
     }
 
     /// Resets the chosen worlds to their starts, with these seeds or else with the next seed of each: its seed plus E.
@@ -237,13 +315,11 @@ impl VectorSimulation {
         let starts = &self.starts;
         let next = |(k, world): (usize, &World)| (k, seeds.map_or_else(|| later(world.seed, count as u64), |of| of[k]));
         let drawn: Vec<_> = self.worlds.iter().enumerate().filter(|(k, _)| chosen[*k]).map(next).collect();
-        let made: Vec<_> = drawn.into_par_iter().map(|(k, seed)| (k, seed, starts.simulation(k, seed))).collect();
-        let made = made.into_iter().map(|(k, seed, simulation)| Ok((k, seed, simulation?)));
-        for (k, seed, simulation) in made.collect::<Result<Vec<_>, VectorError>>()? {
+        let made = starts.simulations(&drawn, &self.threads)?;
+        for ((k, seed), simulation) in drawn.into_iter().zip(made) {
             (self.worlds[k].seed, self.worlds[k].simulation) = (seed, simulation);
         }
-        let width = 3 * self.vehicles;
-        Stage { worlds: &mut self.worlds, width, is_parallel: self.is_parallel }.for_each(states, |_| ());
+        for_each(&mut self.worlds, (&Threads::One, 0), states, |_| ());
         Ok(())
     }
 
@@ -253,8 +329,7 @@ impl VectorSimulation {
     /// [`VectorError::Length`].
     pub fn write(&mut self, states: &mut StatesMut<'_>) -> Result<(), VectorError> {
         self.check_lengths(states)?;
-        let width = 3 * self.vehicles;
-        Stage { worlds: &mut self.worlds, width, is_parallel: self.is_parallel }.for_each(states, |_| ());
+        for_each(&mut self.worlds, (&Threads::One, 0), states, |_| ());
         Ok(())
     }
 
@@ -281,34 +356,6 @@ impl VectorSimulation {
             }
         }
         Ok(())
-    }
-}
-
-impl Stage<'_> {
-    /// Changes each world, in any order, and writes its state.
-    fn for_each(self, states: &mut StatesMut<'_>, change: impl Fn((usize, &mut World)) + Sync) {
-        let Self { worlds, width, is_parallel } = self;
-        let update = |k: usize, world: &mut World, state: (&mut [f64], &mut [f64], &mut f64, &mut bool)| {
-            change((k, world));
-            world.write(state);
-        };
-        let StatesMut { positions_m, velocities_m_s, least_clearance_m, is_over } = states;
-        if is_parallel && worlds.len() > 1 && rayon::current_num_threads() > 1 {
-            worlds
-                .par_iter_mut()
-                .zip(positions_m.par_chunks_exact_mut(width))
-                .zip(velocities_m_s.par_chunks_exact_mut(width))
-                .zip(least_clearance_m.par_iter_mut())
-                .zip(is_over.par_iter_mut())
-                .enumerate()
-                .for_each(|(k, ((((world, p), v), clearance), over))| update(k, world, (p, v, clearance, over)));
-        } else {
-            let moving = positions_m.chunks_exact_mut(width).zip(velocities_m_s.chunks_exact_mut(width));
-            let judged = least_clearance_m.iter_mut().zip(is_over.iter_mut());
-            for (k, ((world, (p, v)), (clearance, over))) in worlds.iter_mut().zip(moving).zip(judged).enumerate() {
-                update(k, world, (p, v, clearance, over));
-            }
-        }
     }
 }
 
@@ -361,14 +408,26 @@ impl World {
 }
 
 impl Starts {
+    /// Returns simulations at the starts of the seeds of some worlds. An error is that of the first such world.
+    fn simulations(&self, drawn: &[(usize, u64)], threads: &Threads) -> Result<Vec<Simulation>, VectorError> {
+        let mut made: Vec<_> = drawn.iter().map(|_| None).collect();
+        let helpers = threads.helpers(LOAD_OF_A_START * drawn.len() as u64);
+        threads.share(helpers, drawn.iter().zip(&mut made), |(&(world, seed), made)| {
+            *made = Some(self.simulation(world, seed));
+        });
+        made.into_iter().flatten().collect()
+    }
+
     /// Returns a simulation at the start of a seed.
     fn simulation(&self, world: usize, seed: u64) -> Result<Simulation, VectorError> {
-        if !self.is_random {
-            return Ok(Simulation::new(self.template.own())?);
-        }
-        let drawn = self.template.scenario(&self.law, Draw { seed, jitter_m: None });
-        let scenario = drawn.map_err(|why| VectorError::Seed { world, seed, why })?;
-        Ok(Simulation::new(&scenario)?)
+        let mut simulation = if self.is_random {
+            let drawn = self.template.scenario(&self.law, Draw { seed, jitter_m: None });
+            Simulation::new(&drawn.map_err(|why| VectorError::Seed { world, seed, why })?)?
+        } else {
+            Simulation::new(self.template.own())?
+        };
+        simulation.stop_measuring_time();
+        Ok(simulation)
     }
 }
 
@@ -393,6 +452,66 @@ impl States {
     }
 }
 
+/// Changes each world, in any order, and writes its state. `load` is the number of steps of single vehicles.
+fn for_each(
+    worlds: &mut [World],
+    (threads, load): (&Threads, u64),
+    states: &mut StatesMut<'_>,
+    change: impl Fn((usize, &mut World)) + Sync,
+) {
+    let helpers = threads.helpers(load).min(worlds.len() - 1);
+    let width = states.positions_m.len() / worlds.len();
+    let at_once = worlds.len().div_ceil(if helpers == 0 { 1 } else { CHUNKS_PER_THREAD * (helpers + 1) });
+    let StatesMut { positions_m, velocities_m_s, least_clearance_m, is_over } = states;
+    let chunks = worlds
+        .chunks_mut(at_once)
+        .zip(positions_m.chunks_mut(at_once * width))
+        .zip(velocities_m_s.chunks_mut(at_once * width))
+        .zip(least_clearance_m.chunks_mut(at_once))
+        .zip(is_over.chunks_mut(at_once))
+        .enumerate();
+    threads.share(helpers, chunks, |(chunk, ((((worlds, positions), velocities), clearances), over))| {
+        let moving = positions.chunks_mut(width).zip(velocities.chunks_mut(width));
+        let states = moving.zip(clearances).zip(over);
+        for (k, (world, (((p, v), clearance), over))) in worlds.iter_mut().zip(states).enumerate() {
+            change((chunk * at_once + k, world));
+            world.write((p, v, clearance, over));
+        }
+    });
+}
+
+impl Threads {
+    /// Returns the number of threads that help with this number of steps of single vehicles.
+    fn helpers(&self, load: u64) -> usize {
+        let present = match self {
+            Self::Current => rayon::current_num_threads() - 1,
+            Self::One => 0,
+            Self::With(pool) => pool.current_num_threads(),
+        };
+        present.min(usize::try_from(load / LOAD_OF_A_THREAD).unwrap_or(usize::MAX))
+    }
+
+    /// Passes each item to `work`, on the calling thread and the helpers.
+    fn share<T>(&self, helpers: usize, items: impl Iterator<Item = T> + Send, work: impl Fn(T) + Sync) {
+        fn with_helpers<'a>(scope: &Scope<'a>, helpers: usize, run: &'a (impl Fn() + Sync)) {
+            (0..helpers).for_each(|_| scope.spawn(|_| run()));
+            run();
+        }
+        let queue = Mutex::new(items);
+        let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).next();
+        let run = || {
+            while let Some(item) = next() {
+                work(item);
+            }
+        };
+        match self {
+            _ if helpers == 0 => run(),
+            Self::With(pool) => pool.in_place_scope(|scope| with_helpers(scope, helpers, &run)),
+            _ => rayon::in_place_scope(|scope| with_helpers(scope, helpers, &run)),
+        }
+    }
+}
+
 /// Returns the next seed of a world, among those of a scenario file.
 fn later(seed: u64, worlds: u64) -> u64 {
     seed.wrapping_add(worlds) & i64::MAX.cast_unsigned()
@@ -400,4 +519,26 @@ fn later(seed: u64, worlds: u64) -> u64 {
 
 fn check(what: &'static str, expected: usize, found: usize) -> Result<(), VectorError> {
     if expected == found { Ok(()) } else { Err(VectorError::Length { what, expected, found }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Barrier;
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    use super::*;
+
+    #[test]
+    fn helpers_work_beside_the_calling_thread() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
+        let (threads, all, sum) = (Threads::With(Arc::new(pool)), Barrier::new(3), AtomicU32::new(0));
+        // Each item waits until three threads have one.
+        threads.share(threads.helpers(u64::MAX), [1, 2, 4].into_iter(), |item| {
+            all.wait();
+            sum.fetch_add(item, Ordering::Relaxed);
+        });
+        assert_eq!(sum.into_inner(), 7);
+        assert_eq!((threads.helpers(999), threads.helpers(1000)), (0, 1));
+        assert_eq!(Threads::One.helpers(u64::MAX), 0);
+    }
 }

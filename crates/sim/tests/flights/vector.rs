@@ -2,7 +2,10 @@
 
 use tautline_core::swarm::Rows;
 use tautline_sim::scenario::{Draw, Override, Source, Template};
-use tautline_sim::sim::{Ending, SimError, Simulation, States, VectorError, VectorSimulation};
+use tautline_sim::sim::{Ending, SimError, Simulation, States, Threads, VectorError, VectorSimulation};
+
+/// Steps of a call: enough for two helping threads.
+const STEPS_OF_A_CALL: u64 = 80;
 
 fn template(name: &str, sets: &[&str]) -> Template {
     let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect(set)).collect();
@@ -31,7 +34,7 @@ fn assert_bits(template: &Template, steps: usize, given: bool) {
             for step in 0..steps {
                 let all = commands(seeds.len(), vehicles, step);
                 let own = Rows::from_row_slice(&all[3 * k * vehicles..3 * (k + 1) * vehicles]);
-                for _ in 0..2 {
+                for _ in 0..STEPS_OF_A_CALL {
                     if given {
                         single.step_with(&own).expect("finite commands");
                     } else {
@@ -43,12 +46,12 @@ fn assert_bits(template: &Template, steps: usize, given: bool) {
         })
         .collect();
     for threads in [1, 2, 3] {
-        let mut worlds = VectorSimulation::new(template.clone(), &seeds).expect("worlds");
+        let mut worlds = VectorSimulation::new(template.clone(), &seeds, Threads::Current).expect("worlds");
         let mut states = States::of(&worlds);
         pool(threads).install(|| {
             for step in 0..steps {
                 let commands = commands(seeds.len(), vehicles, step);
-                worlds.step(given.then_some(&commands[..]), 2, &mut states.borrow()).expect("flown");
+                worlds.step(given.then_some(&commands[..]), STEPS_OF_A_CALL, &mut states.borrow()).expect("flown");
             }
         });
         for (k, single) in singles.iter().enumerate() {
@@ -65,20 +68,20 @@ fn assert_bits(template: &Template, steps: usize, given: bool) {
 
 #[test]
 fn worlds_of_points_have_the_bits_of_single_simulations() {
-    assert_bits(&template("pentagon", &["start.jitter_m=0.1"]), 150, true);
-    assert_bits(&template("pentagon", &["start.jitter_m=0.1"]), 50, false);
+    assert_bits(&template("pentagon", &["start.jitter_m=0.1"]), 8, true);
+    assert_bits(&template("pentagon", &["start.jitter_m=0.1"]), 4, false);
 }
 
 #[test]
 fn worlds_of_quadrotors_and_of_noise_have_the_bits_of_single_simulations() {
-    assert_bits(&template("crazyflies", &["start.jitter_m=0.02"]), 100, true);
-    assert_bits(&template("pentagon-laplacian", &["sensing={position_noise_m=0.05, rate_hz=100}"]), 50, false);
+    assert_bits(&template("crazyflies", &["start.jitter_m=0.02"]), 4, true);
+    assert_bits(&template("pentagon-laplacian", &["sensing={position_noise_m=0.05, rate_hz=100}"]), 4, false);
 }
 
 #[test]
 fn an_ended_world_stops_no_other_and_resets_to_its_next_seed() {
     let template = template("pentagon", &["start.jitter_m=0.1", "time.duration_s=0.5", "arrival.hold_s=0"]);
-    let mut worlds = VectorSimulation::new(template.clone(), &[7, 8, 9]).expect("worlds");
+    let mut worlds = VectorSimulation::new(template.clone(), &[7, 8, 9], Threads::Current).expect("worlds");
     let mut states = States::of(&worlds);
     worlds.step(None, 100, &mut states.borrow()).expect("flown");
     worlds.reset(&[false, true, false], Some(&[0, 40, 0]), &mut states.borrow()).expect("reset");
@@ -105,7 +108,7 @@ fn a_law_that_fails_ends_its_world_alone() {
     // Under noise, the law of one world measures a collision.
     let template = template("pentagon", &["sensing={position_noise_m=0.35, rate_hz=100}", "time.duration_s=2"]);
     let seeds: Vec<_> = (0..12).collect();
-    let mut worlds = VectorSimulation::new(template, &seeds).expect("worlds");
+    let mut worlds = VectorSimulation::new(template, &seeds, Threads::Current).expect("worlds");
     let mut states = States::of(&worlds);
     worlds.step(None, 480, &mut states.borrow()).expect("flown");
     let failed = |k: &usize| matches!(worlds.world(*k).ending(), Some(Ending::LawUndefined(_)));
@@ -116,7 +119,7 @@ fn a_law_that_fails_ends_its_world_alone() {
 
 #[test]
 fn wrong_input_is_refused_before_anything_is_flown() {
-    let mut worlds = VectorSimulation::new(template("pentagon", &[]), &[0, 1]).expect("worlds");
+    let mut worlds = VectorSimulation::new(template("pentagon", &[]), &[0, 1], Threads::Current).expect("worlds");
     let mut states = States::of(&worlds);
     let mut wrong = vec![0.0; 30];
     for value in [f64::NAN, f64::INFINITY, -1e31] {
@@ -129,10 +132,22 @@ fn wrong_input_is_refused_before_anything_is_flown() {
     states.is_over.pop();
     assert!(worlds.step(None, 1, &mut states.borrow()).is_err());
     assert_eq!(worlds.world(0).steps() + worlds.world(1).steps(), 0);
-    assert!(matches!(VectorSimulation::new(template("pentagon", &[]), &[]), Err(VectorError::NoWorlds)));
+    assert!(matches!(
+        VectorSimulation::new(template("pentagon", &[]), &[], Threads::Current),
+        Err(VectorError::NoWorlds)
+    ));
+
+    let (pentagon, many) = (template("pentagon", &[]), vec![0; 200_000]);
+    let most = VectorSimulation::most_worlds(pentagon.own());
+    assert!((50_000..200_000).contains(&most));
+    let refused = VectorSimulation::new(pentagon, &many, Threads::Current).err().expect("too many");
+    assert_eq!(
+        refused.to_string(),
+        format!("seeds: at most {most} worlds of this scenario fit into 8 GiB, got 200000")
+    );
 
     let shielded = template("shielded-crazyflies", &[]);
-    let mut worlds = VectorSimulation::new(shielded, &[0]).expect("worlds");
+    let mut worlds = VectorSimulation::new(shielded, &[0], Threads::Current).expect("worlds");
     let mut states = States::of(&worlds);
     let zeros = vec![0.0; 3 * worlds.vehicles()];
     let refused = worlds.step(Some(&zeros), 1, &mut states.borrow()).expect_err("a shield");
@@ -146,9 +161,10 @@ fn a_seed_without_a_valid_start_is_named_and_resets_nothing() {
     let law = template.own_law();
     let is_valid = |&seed: &u64| template.scenario(&law, Draw { seed, jitter_m: None }).is_ok();
     let (good, bad): (Vec<u64>, Vec<u64>) = (0..40).partition(is_valid);
-    let refused = VectorSimulation::new(template.clone(), &[good[0], bad[0]]).err().expect("an invalid start");
+    let refused =
+        VectorSimulation::new(template.clone(), &[good[0], bad[0]], Threads::Current).err().expect("an invalid start");
     assert!(refused.to_string().starts_with(&format!("seeds[1]: seed {} gives no valid", bad[0])), "{refused}");
-    let mut worlds = VectorSimulation::new(template, &good[..2]).expect("worlds");
+    let mut worlds = VectorSimulation::new(template, &good[..2], Threads::Current).expect("worlds");
     let mut states = States::of(&worlds);
     worlds.step(None, 3, &mut states.borrow()).expect("flown");
     let seeds = [good[2], bad[0]];

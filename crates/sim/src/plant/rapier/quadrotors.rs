@@ -1,6 +1,6 @@
 //! Quadrotors: rotating rigid bodies lifted by rotors.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rapier3d::prelude::{
@@ -13,6 +13,7 @@ use super::world::{
 };
 use crate::plant::{HullContact, Plant, PlantError, Quadrotors, StepPath};
 use crate::scenario::Scenario;
+use crate::sim::Stopwatch;
 use crate::vehicle::{Drift, Fleet};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Pair, Rows, Swarm, mean_row, row, set_row};
@@ -39,6 +40,7 @@ pub(super) struct Fliers {
     origin_m: Vector3<f64>,
     /// Wall-clock time spent outside the engine.
     airframe: Duration,
+    stopwatch: Stopwatch,
 }
 
 /// State of a body of the engine.
@@ -110,6 +112,7 @@ impl Fliers {
             began_m,
             origin_m,
             airframe: Duration::ZERO,
+            stopwatch: Stopwatch { is_on: true },
         }
     }
 
@@ -210,6 +213,7 @@ impl Clone for Fliers {
             began_m: self.began_m.clone(),
             origin_m: self.origin_m,
             airframe: self.airframe,
+            stopwatch: self.stopwatch,
         }
     }
 }
@@ -226,7 +230,7 @@ impl Plant for Fliers {
     }
 
     fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut StepPath) -> Result<(), PlantError> {
-        let began = Instant::now();
+        let began = self.stopwatch.start();
         self.fleet.save_state();
         self.fleet.run_attitude();
         self.begin(dt_s);
@@ -237,7 +241,7 @@ impl Plant for Fliers {
         } else {
             self.drift_in_engine(dt_s)?;
         }
-        let began = Instant::now();
+        let began = self.stopwatch.start();
         self.end(dt_s);
         self.fleet.advance_clock(dt_s);
         self.fleet.observe(predicted);
@@ -277,6 +281,10 @@ impl Plant for Fliers {
 
     fn airframe_time(&self) -> Duration {
         self.airframe
+    }
+
+    fn stop_measuring_time(&mut self) {
+        self.stopwatch.is_on = false;
     }
 
     fn channels(&self) -> Vec<Channel> {
