@@ -74,9 +74,9 @@ environment() {
 environment cluster 'pre_commit, ray, yaml' 'ray>=2.40,<3' pre-commit pyyaml
 
 # Build tool of the Python package, and packages for tests/python.
-environment python 'gymnasium, ipykernel, matplotlib, maturin, mypy, nbclient, numpy, pandas, pettingzoo, pyarrow' \
-    gymnasium ipykernel 'matplotlib>=3.5' 'maturin>=1.9.4,<2' mypy nbclient 'numpy>=1.23' 'pandas>=1.5' pettingzoo \
-    pyarrow
+environment python 'cma, gymnasium, ipykernel, matplotlib, maturin, mypy, nbclient, numpy, pandas, pettingzoo, pyarrow' \
+    'cma>=4,<5' gymnasium ipykernel 'matplotlib>=3.5' 'maturin>=1.9.4,<2' mypy nbclient 'numpy>=1.23' 'pandas>=1.5' \
+    pettingzoo pyarrow
 
 # Slurm for tests/cluster, which starts a node.
 if ! (PATH="$PATH:/usr/sbin" && command -v munged && command -v slurmctld && command -v slurmd && command -v sbatch) \

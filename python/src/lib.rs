@@ -19,6 +19,7 @@ mod scenario;
 mod shield;
 mod simulation;
 mod studies;
+mod vector;
 mod work;
 
 use pyo3::prelude::*;
@@ -47,7 +48,9 @@ mod _native {
     #[pymodule_export]
     use super::simulation::Simulation;
     #[pymodule_export]
-    use super::studies::{attack, campaign, compare, export, margin, scenarios, sweep, validate};
+    use super::studies::{attack, campaign, compare, export, margin, proportion, scenarios, sweep, validate};
+    #[pymodule_export]
+    use super::vector::VectorSimulation;
 
     /// Initialises the module. Campaigns record the hash of this library as their program, not that of the interpreter.
     #[pymodule_init]

@@ -10,6 +10,7 @@ use tautline::export::drones::{Dialect, DroneOptions};
 use tautline::margin::Range;
 use tautline::request::{DroneExportRequest, ExportRequest, Failure, Monitor as _, Silent, export_drones, export_file};
 use tautline::scenario::builtin;
+use tautline::statistics::Proportion;
 use tautline::studies::{Criterion, Experiment, Study as _, StudyFiles, StudyRequest};
 use tautline::sweep::SweptKey;
 use tautline::validate::{ValidateRequest, validate_into};
@@ -241,4 +242,11 @@ pub(crate) fn campaign(
         CampaignRequest { out, shards, threads, until_width, until_decided, worst, ..CampaignRequest::new(spec) };
     let answer = whole(answered(py, |monitor| tautline::campaign::campaign(&request, &(), monitor))?)?;
     Ok((answer.summary.is_good(), json(serde_json::to_string(&answer.summary))?, answer.folder))
+}
+
+/// Returns share, lower and upper bound of `count` of `of` (Clopper and Pearson, 95 %).
+#[pyfunction]
+pub(crate) fn proportion(count: u64, of: u64) -> (Option<f64>, f64, f64) {
+    let Proportion { share, low, high, .. } = Proportion::new(count, of);
+    (share, low, high)
 }

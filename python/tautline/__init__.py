@@ -13,7 +13,7 @@ Vehicle numbers start at 0 in arrays, and at 1 in names, pairs and messages. Wro
 """
 
 from ._audit import Audit, ViolationError, audit
-from ._campaign import Campaign, campaign
+from ._campaign import Campaign, Proportion, campaign, proportion
 from ._flight import Flight, fly
 from ._law import Law
 from ._native import Error, Observation
@@ -23,6 +23,7 @@ from ._scenario import Check, Scenario, check, scenarios
 from ._shield import Shield
 from ._simulation import Simulation
 from ._tables import Finding, Findings
+from ._vector import VectorSimulation
 
 __all__ = [
     "Answer",
@@ -35,10 +36,12 @@ __all__ = [
     "Flight",
     "Law",
     "Observation",
+    "Proportion",
     "Recording",
     "Scenario",
     "Shield",
     "Simulation",
+    "VectorSimulation",
     "ViolationError",
     "attack",
     "audit",
@@ -48,6 +51,7 @@ __all__ = [
     "export",
     "fly",
     "margin",
+    "proportion",
     "read",
     "scenarios",
     "sweep",
