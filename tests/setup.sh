@@ -74,7 +74,8 @@ environment() {
 environment cluster 'pre_commit, ray, yaml' 'ray>=2.40,<3' pre-commit pyyaml
 
 # Build tool of the Python package, and packages for tests/python.
-environment python 'cma, gymnasium, ipykernel, matplotlib, maturin, mypy, nbclient, numpy, pandas, pettingzoo, pyarrow' \
+environment python \
+    'cma, gymnasium, ipykernel, matplotlib, maturin, mypy, nbclient, numpy, pandas, pettingzoo, pyarrow' \
     'cma>=4,<5' gymnasium ipykernel 'matplotlib>=3.5' 'maturin>=1.9.4,<2' mypy nbclient 'numpy>=1.23' 'pandas>=1.5' \
     pettingzoo pyarrow
 

@@ -56,6 +56,13 @@ def act(parameters: Array, positions: Array, velocities: Array, slots_m: Array) 
     return np.asarray(u / np.maximum(1.0, norm / ACCEL_M_S2))
 
 
+def damped_spring() -> Array:
+    """Returns the parameters of a damped spring to the slot, from which the training starts."""
+    parameters = np.zeros(PARAMETERS)
+    parameters[-4:] = [0.3, 0.8, 0.0, 0.0]
+    return parameters
+
+
 def costs(sim: tl.VectorSimulation, candidates: Array, slots_m: Array) -> Array:
     """Returns the mean cost of each candidate over its starts: distance to the slots [m], and violations."""
     parameters = np.repeat(candidates, STARTS, axis=0)
@@ -72,10 +79,7 @@ def costs(sim: tl.VectorSimulation, candidates: Array, slots_m: Array) -> Array:
 def train(generations: int = GENERATIONS, seed: int = 1, sets: dict[str, Any] = SETS) -> tuple[Array, int]:
     """Returns the trained parameters and the number of flights."""
     scenario = tl.Scenario(SCENARIO, set=sets)
-    # Gains of a damped spring, as a start.
-    start = np.zeros(PARAMETERS)
-    start[-4:] = [0.3, 0.8, 0.0, 0.0]
-    search = cma.CMAEvolutionStrategy(start, 0.3, {"seed": seed, "verbose": -9})
+    search = cma.CMAEvolutionStrategy(damped_spring(), 0.3, {"seed": seed, "verbose": -9})
     sim = tl.VectorSimulation(scenario, search.popsize * STARTS)
     for generation in range(generations):
         # All candidates of a generation fly from the same starts.

@@ -39,32 +39,35 @@ class Recipes(unittest.TestCase):
         self.assertLess(reward, 0.0)
 
     def test_a_policy_is_trained_audited_and_shielded(self) -> None:
-        sets = {**trained_policy.SETS, "time.duration_s": 8.0}
-        bare, shielded = trained_policy.main(seconds=3.0, flights=12, sets=sets)
-        self.assertEqual((shielded.share, shielded.low), (0.0, 0.0))
-        self.assertLess(shielded.high, 0.3)
-        self.assertLessEqual(shielded.share, bare.share)
+        sets = {**trained_policy.SETS, "time.duration_s": 5.0}
+        bare, shielded = trained_policy.main(generations=2, flights=6, sets=sets)
+        self.assertEqual(shielded.share, 0.0)
+        self.assertGreaterEqual(bare.high, shielded.high)
+        # Without training, vehicles collide on the way to their slots.
+        untrained, sets = trained_policy.damped_spring(), trained_policy.SETS
+        self.assertEqual(trained_policy.fly(untrained, False, 6, sets)[0], 6)
+        self.assertEqual(trained_policy.fly(untrained, True, 6, sets)[0], 0)
 
     def test_the_cost_of_a_candidate_that_collides_is_high(self) -> None:
         sets = {**trained_policy.SETS, "time.duration_s": 8.0}
-        sim = tl.VectorSimulation("pentagon", 2 * trained_policy.STARTS, set=sets)
+        sim = tl.VectorSimulation(trained_policy.SCENARIO, 2 * trained_policy.STARTS, set=sets)
         still = np.zeros(trained_policy.PARAMETERS)
         pulled = still.copy()
         # A gain to the slot without damping or distance to others.
         pulled[-4] = 2.0
         costs = trained_policy.costs(sim, np.stack([still, pulled]), sim.scenario.slots_m)
-        self.assertGreater(costs[1], trained_policy.VIOLATION_M / 2)
-        self.assertLess(costs[0], trained_policy.VIOLATION_M / 2)
+        self.assertGreater(costs[1], trained_policy.VIOLATION_M)
+        self.assertLess(costs[0], trained_policy.VIOLATION_M)
 
     def test_the_policy_as_a_law_has_the_bits_of_the_training(self) -> None:
         parameters = np.random.default_rng(0).normal(size=trained_policy.PARAMETERS)
         sets = {**trained_policy.SETS, "time.duration_s": 2.0, "start.seed": 4}
         law = trained_policy.Policy(parameters)
-        flown = tl.fly("pentagon", law=law, set={**sets, "time.control_hz": trained_policy.HZ})
-        sim = tl.VectorSimulation("pentagon", 1, seeds=[4], set=sets)
+        flown = tl.fly(trained_policy.SCENARIO, law=law, set={**sets, "time.control_hz": trained_policy.HZ})
+        sim = tl.VectorSimulation(trained_policy.SCENARIO, 1, seeds=[4], set=sets)
         for _ in range(40):
             u = trained_policy.act(parameters[None], sim.positions, sim.velocities, sim.scenario.slots_m)
-            sim.step(u, steps=12)
+            sim.step(u, steps=2)
         np.testing.assert_array_equal(sim.positions[0], flown.positions[-1])
 
 

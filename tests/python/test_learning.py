@@ -171,7 +171,8 @@ class Imports(unittest.TestCase):
             "    try: __import__('tautline.' + name)\n"
             "    except ModuleNotFoundError as error: print(error)\n"
         )
-        ran = subprocess.run([sys.executable, "-c", code], cwd=ROOT / "tests", capture_output=True, text=True, check=True)
+        line = [sys.executable, "-c", code]
+        ran = subprocess.run(line, cwd=ROOT / "tests", capture_output=True, text=True, check=True)
         lines = ran.stdout.splitlines()
         self.assertIn("tautline.gymnasium: the package gymnasium is missing; pip install", lines[0])
         self.assertIn("tautline.pettingzoo: the package gymnasium is missing; pip install", lines[1])

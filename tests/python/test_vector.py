@@ -265,5 +265,20 @@ class Threads(Case):
         sim.step(commands(20, 1), steps=10)
 
 
+class Proportions(Case):
+    def test_a_proportion_has_the_interval_of_clopper_and_pearson(self) -> None:
+        self.assertEqual(tl.proportion(0, 0).share, None)
+        share, low, high = tl.proportion(0, 200)
+        self.assertEqual((share, low), (0.0, 0.0))
+        # Without a violation, 1 - 0.025^(1/n).
+        self.assertAlmostEqual(high, 1 - 0.025 ** (1 / 200), places=9)
+        found = tl.proportion(13, 200)
+        self.assertAlmostEqual(found.low, 0.0350, places=3)
+        self.assertAlmostEqual(found.high, 0.1086, places=3)
+        self.refuses(tl.Error, "successes: must be at most of = 2, got 3", lambda: tl.proportion(3, 2))
+        self.refuses(tl.Error, "of: must be a whole number from 0 on", lambda: tl.proportion(0, -1))
+        self.refuses(TypeError, "successes: a whole number", lambda: tl.proportion(0.5, 2))
+
+
 if __name__ == "__main__":
     unittest.main()

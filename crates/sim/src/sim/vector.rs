@@ -161,7 +161,8 @@ impl VectorSimulation {
     /// Creates one world for each seed, at its start.
     ///
     /// # Errors
-    /// [`VectorError::NoWorlds`], [`VectorError::TooMany`], [`VectorError::Seed`] if a seed gives no valid start, and [`VectorError::Sim`] if the
+    /// [`VectorError::NoWorlds`], [`VectorError::TooMany`], [`VectorError::Seed`] if a seed gives no valid start, and
+    /// [`VectorError::Sim`] if the
     /// audit does not support the scenario.
     pub fn new(template: Template, seeds: &[u64], threads: Threads) -> Result<Self, VectorError> {
         if seeds.is_empty() {
@@ -187,7 +188,8 @@ impl VectorSimulation {
         Ok(Self { starts, worlds, vehicles, resets_ended: false, threads })
     }
 
-    /// Returns the largest number of worlds of a scenario whose expected memory is within [`MAX_MEMORY_BYTES`], at least
+    /// Returns the largest number of worlds of a scenario whose expected memory is within [`MAX_MEMORY_BYTES`], at
+    /// least
     /// one.
     #[must_use]
     pub fn most_worlds(scenario: &Scenario) -> usize {
@@ -367,14 +369,9 @@ impl World {
             }
         }
         for _ in 0..steps {
-            let flown = match commands {
-                Some(_) => self.simulation.step_with(&self.commands),
-                None => {
-                    self.simulation.step();
-                    Ok(())
-                }
-            };
-            if let Err(error) = flown {
+            if commands.is_none() {
+                self.simulation.step();
+            } else if let Err(error) = self.simulation.step_with(&self.commands) {
                 self.failure = Some(error.into());
                 return;
             }

@@ -1,13 +1,13 @@
 //! Decides which steps the engine's collision detection may be left out of.
 //!
-//! Two bodies of the engine act on each other only through contacts, and it reports contacts only for pairs within a
+//! Bodies of the engine act on each other only through contacts. The engine reports contacts only for pairs within a
 //! reach: two keep-out balls that touch, or two hulls within the contact prediction. While every pair is farther apart
-//! at the beginning of a step, the engine moves each body by its own velocity alone. The plants then compute the same
-//! motion, operation by operation, without the engine's step (a *free* step). It has the same bits: the tests of this
-//! module fly with and without free steps.
+//! at the beginning of a step, the engine moves each body by its own velocity alone. The plants then do the same
+//! operations without the engine's step (a *free* step). The bits are the same: the tests of this module fly with and
+//! without free steps.
 //!
-//! After contacts, a free step follows only a step of the engine that began beyond the reach as well. That step removes all contact
-//! points, so that no old impulse waits for the next contact.
+//! After contacts, a free step follows only a step of the engine that began beyond the reach as well. That step removes
+//! all contact points, so that no old impulse waits for the next contact.
 
 use rapier3d::prelude::Vector;
 
@@ -224,7 +224,7 @@ mod tests {
 
     /// Vehicles that are pulled to the middle, collide and fly on, twice.
     fn colliding(step: usize, state: &Swarm) -> Rows {
-        let sign = if (step / 600) % 2 == 0 { -1.0 } else { 1.0 };
+        let sign = if (step / 600).is_multiple_of(2) { -1.0 } else { 1.0 };
         let middle = state.positions_m.row_mean();
         Rows::from_fn(state.count(), |i, axis| sign * 0.5 * (state.positions_m[(i, axis)] - middle[axis]))
     }
