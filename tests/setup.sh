@@ -91,9 +91,9 @@ environment readers cflib.crazyflie.mem.trajectory_memory \
 
 # Build tool of the Python package, and packages for tests/python.
 environment python \
-    'gymnasium, ipykernel, joblib, matplotlib, maturin, mypy, nbclient, numpy, pandas, pettingzoo, pyarrow' \
-    gymnasium ipykernel joblib 'matplotlib>=3.5' 'maturin>=1.9.4,<2' mypy nbclient 'numpy>=1.23' 'pandas>=1.5' \
-    pettingzoo pyarrow
+    'cma, gymnasium, ipykernel, joblib, matplotlib, maturin, mypy, nbclient, numpy, pandas, pettingzoo, pyarrow' \
+    'cma>=4,<5' gymnasium ipykernel joblib 'matplotlib>=3.5' 'maturin>=1.9.4,<2' mypy nbclient 'numpy>=1.23' \
+    'pandas>=1.5' pettingzoo pyarrow
 
 # Slurm for tests/cluster, which starts a node.
 if ! (PATH="$PATH:/usr/sbin" && command -v munged && command -v slurmctld && command -v slurmd && command -v sbatch) \

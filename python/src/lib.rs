@@ -20,6 +20,7 @@ mod scenario;
 mod shield;
 mod simulation;
 mod studies;
+mod vector;
 mod words;
 mod work;
 
@@ -49,7 +50,9 @@ mod _native {
     #[pymodule_export]
     use super::simulation::Simulation;
     #[pymodule_export]
-    use super::studies::{attack, campaign, compare, export, margin, scenarios, sweep, validate};
+    use super::studies::{attack, campaign, compare, export, margin, proportion, scenarios, sweep, validate};
+    #[pymodule_export]
+    use super::vector::VectorSimulation;
 
     #[pymodule_export]
     use super::words::in_python;

@@ -45,6 +45,11 @@ type Violation = ((usize, usize), f64, f64, f64);
 type Closest = ((usize, usize), f64, f64);
 
 impl Simulation {
+    /// Returns a simulation under a law of this library.
+    pub(crate) fn of(simulation: sim::Simulation) -> Self {
+        Self { count: simulation.state().count(), is_of_python: false, state: Mutex::new(simulation) }
+    }
+
     /// Calls `work` with the simulation. Raises `Error` while another call uses it.
     fn with<T: Send>(&self, py: Python<'_>, work: impl FnOnce(&mut sim::Simulation) -> T + Send) -> PyResult<T> {
         self.with_history(py, |state| work(&mut state.simulation))

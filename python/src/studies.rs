@@ -12,6 +12,7 @@ use tautline::request::{
     DroneChoices, ExportRequest, Failure, Monitor, ScenarioRequest, Silent, export_drones, export_file,
 };
 use tautline::scenario::{ExternalLaw, builtin};
+use tautline::statistics::Proportion;
 use tautline::studies::{Criterion, Experiment, Study as _, StudyFiles, StudyRequest};
 use tautline::sweep::SweptKey;
 use tautline::validate::{ValidateRequest, validate_into};
@@ -294,4 +295,11 @@ pub(crate) fn campaign(
     };
     let answer = whole(answered(py, has_law, |monitor| tautline::campaign::campaign(&request, &(), monitor))?)?;
     Ok((answer.summary.is_good(), json(serde_json::to_string(&answer.summary))?, answer.folder))
+}
+
+/// Returns share, lower and upper bound of `count` of `of` (Clopper and Pearson, 95 %).
+#[pyfunction]
+pub(crate) fn proportion(count: u64, of: u64) -> (Option<f64>, f64, f64) {
+    let Proportion { share, low, high, .. } = Proportion::new(count, of);
+    (share, low, high)
 }

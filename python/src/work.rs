@@ -20,7 +20,45 @@ const SIGNALS_EVERY: Duration = Duration::from_millis(50);
 const STACK: usize = 8 << 20;
 
 static ORIGINAL_PROCESS: OnceLock<u32> = OnceLock::new();
-static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
+/// Threads of a fork.
+static POOL: ProcessPool = ProcessPool::new(0);
+
+/// Thread pool that is created again in a fork, which has no threads of its parent.
+pub(crate) struct ProcessPool {
+    /// Number of threads; 0 for the default of rayon.
+    threads: usize,
+    /// Pool, and the process that created it.
+    pool: Mutex<Option<(u32, Arc<ThreadPool>)>>,
+}
+
+impl ProcessPool {
+    pub(crate) const fn new(threads: usize) -> Self {
+        Self { threads, pool: Mutex::new(None) }
+    }
+
+    /// Returns the pool of this process.
+    pub(crate) fn get(&self) -> Result<Arc<ThreadPool>, ThreadPoolBuildError> {
+        let mut pools = self.pool.lock().unwrap_or_else(PoisonError::into_inner);
+        match &*pools {
+            Some((process, pool)) if *process == process::id() => Ok(Arc::clone(pool)),
+            _ => {
+                let pool = Arc::new(new_pool(self.threads)?);
+                // The pool of the parent process has no threads here: its destructor would wait for ever.
+                std::mem::forget(pools.replace((process::id(), Arc::clone(&pool))));
+                Ok(pool)
+            }
+        }
+    }
+}
+
+impl Drop for ProcessPool {
+    fn drop(&mut self) {
+        let pool = self.pool.get_mut().unwrap_or_else(PoisonError::into_inner).take();
+        if pool.as_ref().is_some_and(|(process, _)| *process != process::id()) {
+            std::mem::forget(pool);
+        }
+    }
+}
 
 /// Runs work in a new thread, without the interpreter's lock.
 ///
@@ -60,7 +98,7 @@ pub(crate) fn run_in_thread<T: Send>(
 ///
 /// A fork has no threads of rayon's global pool: there the work runs in a pool that the process shares.
 pub(crate) fn run_detached<T: Send>(py: Python<'_>, work: impl FnOnce() -> T + Send) -> PyResult<T> {
-    let with_threads = || if is_original_process() { Ok(work()) } else { own_pool().map(|pool| pool.install(work)) };
+    let with_threads = || if is_original_process() { Ok(work()) } else { POOL.get().map(|pool| pool.install(work)) };
     started(finished(py.detach(|| catch_unwind(AssertUnwindSafe(with_threads))))?)
 }
 
@@ -70,7 +108,7 @@ pub(crate) fn run_in_thread_with_pool<T: Send>(
     interrupted: &Arc<AtomicBool>,
     work: impl FnOnce() -> T + Send,
 ) -> PyResult<T> {
-    let with_threads = || if is_original_process() { Ok(work()) } else { new_pool().map(|pool| pool.install(work)) };
+    let with_threads = || if is_original_process() { Ok(work()) } else { new_pool(0).map(|pool| pool.install(work)) };
     started(run_in_thread(py, interrupted, with_threads)?)
 }
 
@@ -79,8 +117,8 @@ fn is_original_process() -> bool {
     *ORIGINAL_PROCESS.get_or_init(process::id) == process::id()
 }
 
-fn new_pool() -> Result<ThreadPool, ThreadPoolBuildError> {
-    ThreadPoolBuilder::new().stack_size(STACK).build()
+fn new_pool(threads: usize) -> Result<ThreadPool, ThreadPoolBuildError> {
+    ThreadPoolBuilder::new().num_threads(threads).stack_size(STACK).build()
 }
 
 fn finished<T>(done: thread::Result<T>) -> PyResult<T> {
@@ -94,20 +132,6 @@ fn started<T>(done: Result<T, ThreadPoolBuildError>) -> PyResult<T> {
 /// Stores the process that imports the package.
 pub(crate) fn remember_process() {
     ORIGINAL_PROCESS.get_or_init(process::id);
-}
-
-/// Returns the thread pool of this fork.
-fn own_pool() -> Result<Arc<ThreadPool>, ThreadPoolBuildError> {
-    let mut pools = POOL.lock().unwrap_or_else(PoisonError::into_inner);
-    match &*pools {
-        Some((process, pool)) if *process == process::id() => Ok(Arc::clone(pool)),
-        _ => {
-            let pool = Arc::new(new_pool()?);
-            // The pool of the parent process has no threads here: its destructor would wait for ever.
-            std::mem::forget(pools.replace((process::id(), Arc::clone(&pool))));
-            Ok(pool)
-        }
-    }
 }
 
 /// Returns the message of a panic.

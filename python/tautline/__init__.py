@@ -14,7 +14,7 @@ Vehicle numbers start at 0 in arrays and indices, and at 1 in names, pairs and m
 
 from ._arguments import ReadOptions
 from ._audit import Audit, AuditOptions, ViolationError, audit
-from ._campaign import Campaign, campaign
+from ._campaign import Campaign, Proportion, campaign, proportion
 from ._flight import Flight, fly
 from ._law import ControlLaw, Law
 from ._native import Error, Observation
@@ -24,6 +24,7 @@ from ._scenario import Check, Scenario, check, scenarios
 from ._shield import Shield
 from ._simulation import Simulation
 from ._tables import Finding, Findings, Table
+from ._vector import VectorSimulation
 
 __all__ = [
     "Answer",
@@ -38,12 +39,14 @@ __all__ = [
     "Flight",
     "Law",
     "Observation",
+    "Proportion",
     "ReadOptions",
     "Recording",
     "Scenario",
     "Shield",
     "Simulation",
     "Table",
+    "VectorSimulation",
     "ViolationError",
     "attack",
     "audit",
@@ -53,6 +56,7 @@ __all__ = [
     "export",
     "fly",
     "margin",
+    "proportion",
     "read",
     "scenarios",
     "sweep",

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from . import _native
 from ._arguments import PathLike, count, optional_count, optional_number, optional_path, path, with_files
 from ._law import ControlLaw, check_law
+from ._native import Error
 from ._program import Answer
 from ._tables import Table, import_pyarrow
 
@@ -70,3 +71,25 @@ def campaign(
     answer = with_files([file], lambda: _native.campaign(file, law, folder, *many, *until, count(worst, "worst")))
     is_good, text, at = answer
     return Campaign(is_good, text, Path(at).absolute())
+
+
+class Proportion(NamedTuple):
+    """Share of flights with its confidence interval."""
+
+    #: Share, from 0 to 1; None for no flights.
+    share: float | None
+    #: Bounds of the true share, with 95 % confidence.
+    low: float
+    high: float
+
+
+def proportion(successes: int, of: int) -> Proportion:
+    """Returns the share of ``successes`` of ``of`` independent flights with the interval of campaigns: Clopper and
+    Pearson, 95 %. The number of flights must be fixed beforehand.
+
+    Raises :class:`Error` for counts below 0, or more successes than flights.
+    """
+    counted, total = count(successes, "successes"), count(of, "of")
+    if counted > total:
+        raise Error(f"successes: must be at most of = {total}, got {counted}")
+    return Proportion(*_native.proportion(counted, total))

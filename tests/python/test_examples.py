@@ -8,7 +8,6 @@ import nbformat
 import numpy as np
 import tautline as tl
 from nbclient import NotebookClient
-from pettingzoo.test import parallel_api_test
 from shared import ROOT, Case
 
 RECIPES = ROOT / "python" / "recipes"
@@ -16,6 +15,7 @@ sys.path.insert(0, str(RECIPES))
 
 import gym_pybullet_drones  # noqa: E402
 import pettingzoo_formation  # noqa: E402
+import trained_policy  # noqa: E402
 
 
 @unittest.skipUnless(os.environ.get("TAUTLINE_NOTEBOOKS"), "a minute: sh tests/run.sh --long runs them")
@@ -32,33 +32,43 @@ class Notebooks(Case):
                 self.assertTrue(any("text/html" in output.get("data", {}) for cell in cells for output in cell.outputs))
 
 
-class PettingZoo(unittest.TestCase):
-    def test_the_environment_passes_the_test_of_pettingzoo(self) -> None:
-        parallel_api_test(pettingzoo_formation.FormationEnv(duration_s=5.0), num_cycles=300)
+class Recipes(unittest.TestCase):
+    def test_an_episode_of_pettingzoo_has_a_verdict(self) -> None:
+        reward, verdict, clearance_m = pettingzoo_formation.episode(seed=1, duration_s=5.0)
+        self.assertEqual(verdict, "violation" if clearance_m < 0 else "clear")
+        self.assertLess(reward, 0.0)
 
-    def test_seed_and_actions_determine_the_episode(self) -> None:
-        def episode(seed: int) -> np.ndarray:
-            env = pettingzoo_formation.FormationEnv(duration_s=5.0)
-            env.reset(seed=seed)
-            action = {agent: np.array([0.1, -0.1], dtype=np.float32) for agent in env.agents}
-            return np.stack([env.step(action)[0]["vehicle_1"] for _ in range(10)])
+    def test_a_policy_is_trained_audited_and_shielded(self) -> None:
+        sets = {**trained_policy.SETS, "time.duration_s": 5.0}
+        bare, shielded = trained_policy.main(generations=2, flights=6, sets=sets)
+        self.assertEqual(shielded.share, 0.0)
+        self.assertGreaterEqual(bare.high, shielded.high)
+        # Without training, vehicles collide on the way to their slots.
+        untrained, sets = trained_policy.damped_spring(), trained_policy.SETS
+        self.assertEqual(trained_policy.fly(untrained, False, 6, sets)[0], 6)
+        self.assertEqual(trained_policy.fly(untrained, True, 6, sets)[0], 0)
 
-        np.testing.assert_array_equal(episode(3), episode(3))
-        self.assertTrue((episode(3) != episode(4)).any())
+    def test_the_cost_of_a_candidate_that_collides_is_high(self) -> None:
+        sets = {**trained_policy.SETS, "time.duration_s": 8.0}
+        sim = tl.VectorSimulation(trained_policy.SCENARIO, 2 * trained_policy.STARTS, set=sets)
+        still = np.zeros(trained_policy.PARAMETERS)
+        pulled = still.copy()
+        # A gain to the slot without damping or distance to others.
+        pulled[-4] = 2.0
+        costs = trained_policy.costs(sim, np.stack([still, pulled]), sim.scenario.slots_m)
+        self.assertGreater(costs[1], trained_policy.VIOLATION_M)
+        self.assertLess(costs[0], trained_policy.VIOLATION_M)
 
-    def test_a_violation_terminates_all_agents(self) -> None:
-        env = pettingzoo_formation.FormationEnv()
-        env.reset(seed=0)
-        for _ in range(100):
-            middle = env.sim.positions.mean(0)
-            pull = np.clip(middle - env.sim.positions, -1, 1)[:, :2]
-            _, rewards, terminated, truncated, _ = env.step(dict(zip(env.possible_agents, pull, strict=True)))
-            if not env.agents:
-                break
-        self.assertTrue(all(terminated.values()))
-        self.assertFalse(any(truncated.values()))
-        self.assertLess(max(rewards.values()), -99.0)
-        self.assertEqual(env.sim.status, "violation")
+    def test_the_policy_as_a_law_has_the_bits_of_the_training(self) -> None:
+        parameters = np.random.default_rng(0).normal(size=trained_policy.PARAMETERS)
+        sets = {**trained_policy.SETS, "time.duration_s": 2.0, "start.seed": 4}
+        law = trained_policy.Policy(parameters)
+        flown = tl.fly(trained_policy.SCENARIO, law=law, set={**sets, "time.control_hz": trained_policy.HZ})
+        sim = tl.VectorSimulation(trained_policy.SCENARIO, 1, seeds=[4], set=sets)
+        for _ in range(40):
+            u = trained_policy.act(parameters[None], sim.positions, sim.velocities, sim.scenario.slots_m)
+            sim.step(u, steps=2)
+        np.testing.assert_array_equal(sim.positions[0], flown.positions[-1])
 
 
 class GymPybulletDrones(Case):

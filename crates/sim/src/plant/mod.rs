@@ -80,10 +80,17 @@ pub trait Plant: DynClone + Send {
     /// Appends the pairs whose solid hulls collided in the last [`Plant::advance`]. Plants of points append nothing.
     fn hull_contacts(&self, _contacts: &mut Vec<HullContact>) {}
 
+    /// Allows steps without collision detection while no contact is possible. The motion has the same bits. Plants
+    /// without an engine have no such steps.
+    fn allow_free_steps(&mut self) {}
+
     /// Returns the wall-clock time spent in forces, rotors and attitude loops.
     fn airframe_time(&self) -> Duration {
         Duration::ZERO
     }
+
+    /// Stops the measurement of [`Plant::airframe_time`].
+    fn stop_measuring_time(&mut self) {}
 
     /// Returns the recorded channels of the plant, such as attitude, with names and columns but no values.
     fn channels(&self) -> Vec<Channel> {

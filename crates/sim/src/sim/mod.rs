@@ -1,20 +1,22 @@
 //! Simulation loop: sense, supervise, command, actuate, move, audit, record.
 //!
 //! A [`Simulation`] advances step by step; [`fly`] takes one to its end and passes all samples and events to a
-//! [`Sink`]. The law is evaluated at the beginning of each step. A [`Plant`](crate::plant::Plant) either holds the
-//! command over the step or evaluates the law in continuous time. The audit sweeps every step, also the parts of
-//! divided steps. A step allocates no memory.
+//! [`Sink`]. A [`VectorSimulation`] advances many worlds together. The law is evaluated at the beginning of each step.
+//! A [`Plant`](crate::plant::Plant) either holds the command over the step or evaluates the law in continuous time. The
+//! audit sweeps every step, also the parts of divided steps. A step allocates no memory.
 
 mod controller;
 mod ending;
 mod judge;
 mod monitors;
 mod simulation;
+mod vector;
 
-pub(crate) use ending::MAX_BEND_M;
 pub use ending::{Breakdown, Ending, Flight, Performance, SimError};
+pub(crate) use ending::{MAX_BEND_M, Stopwatch};
 pub use judge::{audit_obstacle, audit_shape};
 pub use simulation::{Components, SavedState, Simulation};
+pub use vector::{States, StatesMut, Threads, VectorError, VectorSimulation};
 
 use std::ops::ControlFlow;
 use std::time::Instant;

@@ -3,7 +3,7 @@
 mod step;
 
 use super::controller::Controller;
-use super::ending::{Breakdown, Ending, Flight, MAX_COMMAND_M_S2, Performance, SimError};
+use super::ending::{Breakdown, Ending, Flight, MAX_COMMAND_M_S2, Performance, SimError, Stopwatch};
 use super::judge::{AuditResults, Judge};
 use super::monitors::EnergyMonitor;
 use super::monitors::{IntegrationError, RoundingBound};
@@ -69,6 +69,7 @@ pub struct Simulation {
     sample_is_due: bool,
     ending: Option<Ending>,
     pub(super) performance: Performance,
+    stopwatch: Stopwatch,
 }
 
 /// State of a [`Simulation`] at one instant.
@@ -132,6 +133,7 @@ impl Simulation {
             sample_is_due: false,
             ending: None,
             performance: Performance::default(),
+            stopwatch: Stopwatch { is_on: true },
             resolution: RoundingBound::of(scenario),
             scenario: scenario.clone(),
         };
@@ -165,7 +167,7 @@ impl Simulation {
     }
 
     /// Flies one step with given accelerations \[m/s^2\], N x 3, instead of those of the law. The step is not divided
-    /// for the barrier or the rate of the law.
+    /// for the barrier or the rate of the law, and the law's energy is not computed.
     ///
     /// # Errors
     /// [`SimError::Commands`] unless each vehicle has a finite row, and [`SimError::ShieldedCommands`] under a shield;
@@ -180,8 +182,10 @@ impl Simulation {
         }
         if self.ending.is_none() {
             self.overruled = true;
-            self.certificate = self.certificate.clone().void_where(true, VoidReason::ExternalCommands);
-            self.control.clone_from(commands);
+            if !self.certificate.void.contains(&VoidReason::ExternalCommands) {
+                self.certificate = self.certificate.clone().void_where(true, VoidReason::ExternalCommands);
+            }
+            self.control.copy_from(commands);
             self.plant.apply(commands, &mut self.state);
         }
         self.step_or_end();
@@ -214,6 +218,17 @@ impl Simulation {
             self.events.extend(self.judge.closest_to_obstacles());
             self.ending = Some(ending);
         }
+    }
+
+    /// Leaves all times of [`Performance`] at zero.
+    pub(super) fn stop_measuring_time(&mut self) {
+        self.stopwatch.is_on = false;
+        self.plant.stop_measuring_time();
+    }
+
+    /// Allows steps without the engine while no contact is possible. The bits are the same.
+    pub(super) fn allow_free_steps(&mut self) {
+        self.plant.allow_free_steps();
     }
 
     /// Returns the ending of the flight; `None` in flight.

@@ -21,5 +21,6 @@ fn main() {
     audit::a_step_of_a_warm_auditor_allocates_nothing();
     audit::the_memory_of_an_audit_is_linear_in_the_vehicles();
     step_loop::the_loop_allocates_nothing_per_step();
+    step_loop::worlds_allocate_nothing_per_step();
     println!("a step allocates nothing");
 }

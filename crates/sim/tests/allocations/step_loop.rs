@@ -7,8 +7,8 @@ use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::law::{Law, LawError};
 use tautline_laws::observation::Observation;
 use tautline_sim::plant::{self, Plant, PlantError, StepPath};
-use tautline_sim::scenario::{Override, Scenario, Source};
-use tautline_sim::sim::{self, Components};
+use tautline_sim::scenario::{Override, Scenario, Source, Template};
+use tautline_sim::sim::{self, Components, States, Threads, VectorSimulation};
 
 use crate::ALLOCATOR;
 
@@ -142,5 +142,28 @@ pub(crate) fn the_loop_allocates_nothing_per_step() {
 
         let engine = threads.install(|| growth(scenario, law, || plant::of(scenario)));
         println!("{name}: the engine allocates {:.2} times a step", engine as f64 / f64::from(MANY - FEW));
+    }
+}
+
+/// Returns the number of allocations of a call of some steps in three worlds, with given commands or under the law.
+fn allocations_of_worlds(steps: u64, is_given: bool) -> usize {
+    let template = Template::read(&Source::Builtin("pentagon".to_owned()), &[]).expect("a scenario");
+    let mut worlds = VectorSimulation::new(template, &[0, 1, 2], Threads::Current).expect("worlds");
+    let mut states = States::of(&worlds);
+    let commands = vec![0.01; states.positions_m.len()];
+    let mut fly = |steps| worlds.step(is_given.then_some(&commands[..]), steps, &mut states.borrow()).expect("flown");
+    fly(5);
+    let region = Region::new(ALLOCATOR);
+    fly(steps);
+    let change = region.change();
+    change.allocations + change.reallocations
+}
+
+pub(crate) fn worlds_allocate_nothing_per_step() {
+    let threads = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("two threads");
+    for is_given in [true, false] {
+        // Idle threads allocate now and then; allocations of a step occur in every attempt.
+        let allocates_nothing = |_| threads.install(|| allocations_of_worlds(300, is_given)) == 0;
+        assert!((0..ATTEMPTS).any(allocates_nothing), "given commands: {is_given}");
     }
 }

@@ -26,4 +26,5 @@ mod shield;
 mod simulation;
 mod symmetry;
 mod unicycles;
+mod vector;
 mod wind;

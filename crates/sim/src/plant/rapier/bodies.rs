@@ -1,8 +1,9 @@
 //! Points: rigid bodies without rotation that execute commanded accelerations.
 
 use nalgebra::Vector3;
-use rapier3d::prelude::{LockedAxes, PhysicsWorld, RigidBodyBuilder, RigidBodyHandle};
+use rapier3d::prelude::{LockedAxes, PhysicsWorld, RigidBody, RigidBodyBuilder, RigidBodyHandle, Vector};
 
+use super::proximity::Proximity;
 use super::world::{
     copied, empty_world, from_engine, hull, hull_contacts, insert_obstacle, keep_out, keep_out_contacts, to_engine,
 };
@@ -15,6 +16,15 @@ use tautline_core::swarm::{Pair, Rows, Swarm, mean_row, row, set_row};
 pub(super) struct Bodies {
     world: PhysicsWorld,
     handles: Vec<RigidBodyHandle>,
+    /// Positions from the engine's origin \[m\]. The bodies of the engine follow when it steps.
+    positions: Vec<Vector>,
+    /// Velocities, as the engine has them \[m/s\].
+    velocities: Vec<Vector>,
+    /// Inverse mass along each axis, 0 along a locked one \[1/kg\].
+    inverse_masses: Vec<Vector>,
+    proximity: Proximity,
+    /// Whether the last step was free: the engine did not step.
+    was_free: bool,
     /// Accelerations held over the step, with the push of the wind at its beginning \[m/s^2\].
     held: Rows,
     /// Wind, if any.
@@ -39,11 +49,23 @@ impl Bodies {
     pub(super) fn new(scenario: &Scenario) -> Self {
         let mut world = empty_world();
         let origin_m = mean_row(&scenario.start.positions_m);
-        let handles = (0..scenario.count()).map(|i| insert_vehicle(&mut world, scenario, origin_m, i)).collect();
+        let insert = |i| insert_vehicle(&mut world, scenario, origin_m, i);
+        let handles: Vec<_> = (0..scenario.count()).map(insert).collect();
+        let each = |of: &dyn Fn(&RigidBody) -> Vector| -> Vec<_> {
+            handles.iter().map(|&handle| of(&world.bodies[handle])).collect()
+        };
+        let positions = each(&|body| body.translation());
+        let velocities = each(&|body| body.linvel());
+        let inverse_masses = each(&|body| body.mass_properties().effective_inv_mass);
         scenario.obstacles.iter().for_each(|obstacle| insert_obstacle(&mut world, obstacle, origin_m));
         Self {
             world,
             handles,
+            positions,
+            velocities,
+            inverse_masses,
+            proximity: Proximity::of(scenario),
+            was_free: false,
             held: Rows::zeros(scenario.count()),
             air: Air::of(scenario),
             drift_m_s: Rows::zeros(scenario.count()),
@@ -71,23 +93,98 @@ impl Bodies {
         }
     }
 
+    /// Completes a pending drift with the held command, and sets the velocities from which the engine starts.
+    fn begin_drift(&mut self, dt_s: f64) {
+        let (completing, half_decay) = (self.half_decay(self.drifted_s), self.half_decay(dt_s));
+        for (i, velocity) in self.velocities.iter_mut().enumerate() {
+            let held_m_s2 = row(&self.held, i);
+            let velocity_m_s = (from_engine(*velocity) + 0.5 * self.drifted_s * held_m_s2) * completing;
+            let drift_m_s = velocity_m_s * half_decay + 0.5 * dt_s * held_m_s2;
+            set_row(&mut self.drift_m_s, i, drift_m_s);
+            set_row(&mut self.began_m, i, from_engine(self.positions[i]));
+            set(velocity, to_engine(drift_m_s - dt_s * held_m_s2));
+        }
+    }
+
+    /// Moves bodies without contacts, with the operations of the engine.
+    fn drift_freely(&mut self, dt_s: f64) -> Result<(), PlantError> {
+        let mut longest = 0.0_f64;
+        for (i, (position, velocity)) in self.positions.iter_mut().zip(&mut self.velocities).enumerate() {
+            let force = self.mass_kg[i] * to_engine(row(&self.held, i)) + Vector::ZERO;
+            *velocity += force * self.inverse_masses[i] * dt_s;
+            let moved = *velocity * dt_s;
+            *position += moved;
+            if !position.is_finite() {
+                return Err(PlantError::NotFinite { vehicle: i });
+            }
+            longest = longest.max(moved.length_squared());
+        }
+        self.proximity.note_move(longest.sqrt());
+        Ok(())
+    }
+
+    /// Moves bodies with the engine.
+    fn drift_in_engine(&mut self, dt_s: f64) -> Result<(), PlantError> {
+        self.world.integration_parameters.dt = dt_s;
+        for (i, &handle) in self.handles.iter().enumerate() {
+            let body = &mut self.world.bodies[handle];
+            if body.translation() != self.positions[i] {
+                body.set_translation(self.positions[i], true);
+            }
+            body.set_linvel(self.velocities[i], true);
+            body.reset_forces(false);
+            body.add_force(to_engine(row(&self.held, i)) * self.mass_kg[i], true);
+        }
+        self.world.step();
+        if let Some(lost) = self.world.quarantine().bodies().first() {
+            let vehicle = self.handles.iter().position(|h| h == lost).unwrap_or_default();
+            return Err(PlantError::NotFinite { vehicle });
+        }
+        for (i, &handle) in self.handles.iter().enumerate() {
+            let body = &self.world.bodies[handle];
+            (self.positions[i], self.velocities[i]) = (body.translation(), body.linvel());
+        }
+        self.proximity.forget();
+        Ok(())
+    }
+
     /// Returns each velocity \[m/s\], completed by the second half kick of the held acceleration if that is pending.
     fn velocities_m_s(&self) -> impl Iterator<Item = Vector3<f64>> {
         let half_decay = self.half_decay(self.drifted_s);
-        self.handles.iter().enumerate().map(move |(i, &handle)| {
-            let drift_m_s = from_engine(self.world.bodies[handle].linvel());
-            (drift_m_s + 0.5 * self.drifted_s * row(&self.held, i)) * half_decay
-        })
+        self.velocities
+            .iter()
+            .enumerate()
+            .map(move |(i, &drift)| (from_engine(drift) + 0.5 * self.drifted_s * row(&self.held, i)) * half_decay)
+    }
+}
+
+#[cfg(test)]
+impl Bodies {
+    pub(super) fn proximity(&mut self) -> &mut Proximity {
+        &mut self.proximity
+    }
+
+    pub(super) fn was_free(&self) -> bool {
+        self.was_free
     }
 }
 
 impl Clone for Bodies {
     fn clone(&self) -> Self {
-        let world = copied(&self.world);
-        let (handles, mass_kg) = (self.handles.clone(), self.mass_kg.clone());
-        let (held, drift_m_s, began_m) = (self.held.clone(), self.drift_m_s.clone(), self.began_m.clone());
-        let air = self.air.clone();
-        Self { world, handles, held, air, drift_m_s, began_m, mass_kg, ..*self }
+        Self {
+            world: copied(&self.world),
+            handles: self.handles.clone(),
+            positions: self.positions.clone(),
+            velocities: self.velocities.clone(),
+            inverse_masses: self.inverse_masses.clone(),
+            proximity: self.proximity.clone(),
+            held: self.held.clone(),
+            air: self.air.clone(),
+            drift_m_s: self.drift_m_s.clone(),
+            began_m: self.began_m.clone(),
+            mass_kg: self.mass_kg.clone(),
+            ..*self
+        }
     }
 }
 
@@ -97,29 +194,17 @@ impl Plant for Bodies {
     }
 
     fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut StepPath) -> Result<(), PlantError> {
-        self.world.integration_parameters.dt = dt_s;
-        // The held command completes a pending drift.
-        let (completing, half_decay) = (self.half_decay(self.drifted_s), self.half_decay(dt_s));
-        for (i, &handle) in self.handles.iter().enumerate() {
-            let body = &mut self.world.bodies[handle];
-            let held_m_s2 = row(&self.held, i);
-            let velocity_m_s = (from_engine(body.linvel()) + 0.5 * self.drifted_s * held_m_s2) * completing;
-            let drift_m_s = velocity_m_s * half_decay + 0.5 * dt_s * held_m_s2;
-            set_row(&mut self.drift_m_s, i, drift_m_s);
-            set_row(&mut self.began_m, i, from_engine(body.translation()));
-            body.set_linvel(to_engine(drift_m_s - dt_s * held_m_s2), true);
-            body.reset_forces(false);
-            body.add_force(to_engine(held_m_s2) * self.mass_kg[i], true);
+        self.begin_drift(dt_s);
+        self.was_free = self.proximity.begin_step(self.positions.iter().copied());
+        if self.was_free {
+            self.drift_freely(dt_s)?;
+        } else {
+            self.drift_in_engine(dt_s)?;
         }
-        self.world.step();
         self.drifted_s = dt_s;
         if let Some(air) = &mut self.air {
             air.advance(dt_s);
             self.hold();
-        }
-        if let Some(lost) = self.world.quarantine().bodies().first() {
-            let vehicle = self.handles.iter().position(|h| h == lost).unwrap_or_default();
-            return Err(PlantError::NotFinite { vehicle });
         }
         self.observe(predicted);
         Ok(())
@@ -132,19 +217,20 @@ impl Plant for Bodies {
         }
         self.hold();
         if self.drifted_s > 0.0 {
-            for (i, velocity_m_s) in self.velocities_m_s().enumerate() {
-                set_row(&mut state.velocities_m_s, i, from_engine(to_engine(velocity_m_s)));
-            }
-            for (i, &handle) in self.handles.iter().enumerate() {
-                self.world.bodies[handle].set_linvel(to_engine(row(&state.velocities_m_s, i)), true);
+            let half_decay = self.half_decay(self.drifted_s);
+            for (i, velocity) in self.velocities.iter_mut().enumerate() {
+                let drift_m_s = from_engine(*velocity);
+                let completed = to_engine((drift_m_s + 0.5 * self.drifted_s * row(&self.held, i)) * half_decay);
+                set_row(&mut state.velocities_m_s, i, from_engine(completed));
+                set(velocity, completed);
             }
             self.drifted_s = 0.0;
         }
     }
 
     fn observe(&self, swarm: &mut Swarm) {
-        for (i, &handle) in self.handles.iter().enumerate() {
-            set_row(&mut swarm.positions_m, i, self.origin_m + from_engine(self.world.bodies[handle].translation()));
+        for (i, &position) in self.positions.iter().enumerate() {
+            set_row(&mut swarm.positions_m, i, self.origin_m + from_engine(position));
         }
         for (i, velocity_m_s) in self.velocities_m_s().enumerate() {
             set_row(&mut swarm.velocities_m_s, i, velocity_m_s);
@@ -152,11 +238,11 @@ impl Plant for Bodies {
     }
 
     fn restore(&mut self, swarm: &Swarm) {
-        for (i, &handle) in self.handles.iter().enumerate() {
-            let body = &mut self.world.bodies[handle];
-            body.set_translation(to_engine(row(&swarm.positions_m, i) - self.origin_m), true);
-            body.set_linvel(to_engine(row(&swarm.velocities_m_s, i)), true);
+        for i in 0..self.count() {
+            set(&mut self.positions[i], to_engine(row(&swarm.positions_m, i) - self.origin_m));
+            set(&mut self.velocities[i], to_engine(row(&swarm.velocities_m_s, i)));
         }
+        self.proximity.forget();
         self.drifted_s = 0.0;
         if let Some(air) = &mut self.air {
             air.undo();
@@ -178,12 +264,27 @@ impl Plant for Bodies {
         }
     }
 
+    fn allow_free_steps(&mut self) {
+        self.proximity.allow_free_steps();
+    }
+
     fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {
-        keep_out_contacts(&self.world, pairs);
+        if !self.was_free {
+            keep_out_contacts(&self.world, pairs);
+        }
     }
 
     fn hull_contacts(&self, contacts: &mut Vec<HullContact>) {
-        hull_contacts(&self.world, &self.began_m, &self.drift_m_s, contacts);
+        if !self.was_free {
+            hull_contacts(&self.world, &self.began_m, &self.drift_m_s, contacts);
+        }
+    }
+}
+
+/// Sets a vector unless it is equal, like the engine: then a zero keeps its sign.
+fn set(vector: &mut Vector, to: Vector) {
+    if *vector != to {
+        *vector = to;
     }
 }
 

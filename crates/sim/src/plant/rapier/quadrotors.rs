@@ -1,15 +1,19 @@
 //! Quadrotors: rotating rigid bodies lifted by rotors.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use rapier3d::prelude::{MassProperties, PhysicsWorld, Real, RigidBodyBuilder, RigidBodyHandle, Rotation, Vector};
+use rapier3d::prelude::{
+    MassProperties, PhysicsWorld, Real, RigidBody, RigidBodyBuilder, RigidBodyHandle, Rotation, Vector,
+};
 
+use super::proximity::Proximity;
 use super::world::{
     copied, empty_world, from_engine, hull, hull_contacts, insert_obstacle, keep_out, keep_out_contacts, to_engine,
 };
 use crate::plant::{HullContact, Plant, PlantError, Quadrotors, StepPath};
 use crate::scenario::Scenario;
+use crate::sim::Stopwatch;
 use crate::vehicle::{Drift, Fleet};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Pair, Rows, Swarm, mean_row, row, set_row};
@@ -22,6 +26,11 @@ const HULL_FRICTION: Real = 0.5;
 pub(super) struct Fliers {
     world: PhysicsWorld,
     handles: Vec<RigidBodyHandle>,
+    /// Poses and velocities, as the engine has them. The bodies of the engine follow when it steps.
+    bodies: Vec<Body>,
+    proximity: Proximity,
+    /// Whether the last step was free: the engine did not step.
+    was_free: bool,
     fleet: Fleet,
     /// First half of the current step.
     drifts: Vec<Drift>,
@@ -31,6 +40,36 @@ pub(super) struct Fliers {
     origin_m: Vector3<f64>,
     /// Wall-clock time spent outside the engine.
     airframe: Duration,
+    stopwatch: Stopwatch,
+}
+
+/// State of a body of the engine.
+#[derive(Clone, Copy)]
+struct Body {
+    /// Position from the engine's origin \[m\].
+    position: Vector,
+    rotation: Rotation,
+    /// Velocity \[m/s\].
+    linear: Vector,
+    /// Angular velocity \[rad/s\].
+    angular: Vector,
+}
+
+impl Body {
+    fn of(body: &RigidBody) -> Self {
+        let (position, rotation) = (body.translation(), *body.rotation());
+        Self { position, rotation, linear: body.linvel(), angular: body.angvel() }
+    }
+
+    /// Moves the body without contacts, with the operations of the engine. Returns the way.
+    fn drift_freely(&mut self, dt_s: f64) -> Vector {
+        let half_turn = self.angular * (dt_s * 0.5);
+        let turned = Rotation::from_xyzw(half_turn.x, half_turn.y, half_turn.z, 1.0) * self.rotation;
+        self.rotation = turned.normalize();
+        let moved = self.linear * dt_s;
+        self.position += moved;
+        moved
+    }
 }
 
 impl Fliers {
@@ -58,46 +97,87 @@ impl Fliers {
             handle
         });
         let (handles, count): (Vec<_>, _) = (handles.collect(), scenario.count());
+        let bodies = handles.iter().map(|&handle| Body::of(&world.bodies[handle])).collect();
         scenario.obstacles.iter().for_each(|obstacle| insert_obstacle(&mut world, obstacle, origin_m));
         let (drift_m_s, began_m) = (Rows::zeros(count), Rows::zeros(count));
         Self {
             world,
             handles,
+            bodies,
+            proximity: Proximity::of(scenario),
+            was_free: false,
             fleet,
             drifts: Vec::with_capacity(count),
             drift_m_s,
             began_m,
             origin_m,
             airframe: Duration::ZERO,
+            stopwatch: Stopwatch { is_on: true },
         }
     }
 
-    /// Applies half of the kick and sets the engine's velocities for the drift.
+    /// Applies half of the kick and sets the velocities for the drift.
     fn begin(&mut self, dt_s: f64) {
         self.drifts.clear();
-        for (i, &handle) in self.handles.iter().enumerate() {
+        for (i, body) in self.bodies.iter_mut().enumerate() {
             let drift = self.fleet.dynamics.begin_step(&self.fleet.states[i], self.fleet.wrench(i), dt_s);
-            let body = &mut self.world.bodies[handle];
             set_row(&mut self.drift_m_s, i, drift.velocity_m_s);
-            set_row(&mut self.began_m, i, from_engine(body.translation()));
-            body.set_linvel(to_engine(drift.velocity_m_s), true);
-            body.set_angvel(to_engine(drift.turn_rad_s), true);
+            set_row(&mut self.began_m, i, from_engine(body.position));
+            body.linear = to_engine(drift.velocity_m_s);
+            body.angular = to_engine(drift.turn_rad_s);
             self.drifts.push(drift);
         }
     }
 
-    /// Reads the positions from the engine and applies the other half of the kick.
+    /// Moves and turns the bodies without contacts.
+    fn drift_freely(&mut self, dt_s: f64) -> Result<(), PlantError> {
+        let mut longest = 0.0_f64;
+        for (vehicle, body) in self.bodies.iter_mut().enumerate() {
+            let moved = body.drift_freely(dt_s);
+            if !(body.position.is_finite() && body.rotation.is_finite()) {
+                return Err(PlantError::NotFinite { vehicle });
+            }
+            longest = longest.max(moved.length_squared());
+        }
+        self.proximity.note_move(longest.sqrt());
+        Ok(())
+    }
+
+    /// Moves and turns the bodies with the engine.
+    fn drift_in_engine(&mut self, dt_s: f64) -> Result<(), PlantError> {
+        self.world.integration_parameters.dt = dt_s;
+        for (&handle, state) in self.handles.iter().zip(&self.bodies) {
+            let body = &mut self.world.bodies[handle];
+            if (body.translation(), *body.rotation()) != (state.position, state.rotation) {
+                body.set_translation(state.position, true);
+                body.set_rotation(state.rotation, true);
+            }
+            body.set_linvel(state.linear, true);
+            body.set_angvel(state.angular, true);
+        }
+        self.world.step();
+        if let Some(lost) = self.world.quarantine().bodies().first() {
+            let vehicle = self.handles.iter().position(|handle| handle == lost).unwrap_or_default();
+            return Err(PlantError::NotFinite { vehicle });
+        }
+        for (&handle, state) in self.handles.iter().zip(&mut self.bodies) {
+            *state = Body::of(&self.world.bodies[handle]);
+        }
+        self.proximity.forget();
+        Ok(())
+    }
+
+    /// Takes the poses after the drift and applies the other half of the kick.
     fn end(&mut self, dt_s: f64) {
         let lag = self.fleet.dynamics.rotor_lag(dt_s);
-        for (i, &handle) in self.handles.iter().enumerate() {
-            let (body, drift) = (&self.world.bodies[handle], &mut self.drifts[i]);
+        for (i, (body, drift)) in self.bodies.iter().zip(&mut self.drifts).enumerate() {
             let commanded_rpm = self.fleet.commanded_rpm(i);
             let state = &mut self.fleet.states[i];
-            state.position_m = self.origin_m + from_engine(body.translation());
-            state.attitude = attitude(*body.rotation());
+            state.position_m = self.origin_m + from_engine(body.position);
+            state.attitude = attitude(body.rotation);
             state.rotors_rpm = lag.after(state.rotors_rpm, commanded_rpm);
-            let by_m_s = from_engine(body.linvel() - to_engine(drift.velocity_m_s));
-            let by_rad_s = from_engine(body.angvel() - to_engine(drift.turn_rad_s));
+            let by_m_s = from_engine(body.linear - to_engine(drift.velocity_m_s));
+            let by_rad_s = from_engine(body.angular - to_engine(drift.turn_rad_s));
             if by_m_s != Vector3::zeros() || by_rad_s != Vector3::zeros() {
                 self.fleet.dynamics.add_impulse(drift, &state.attitude, by_m_s, by_rad_s);
             }
@@ -110,17 +190,28 @@ impl Fliers {
     }
 }
 
+#[cfg(test)]
+impl Fliers {
+    pub(super) fn was_free(&self) -> bool {
+        self.was_free
+    }
+}
+
 impl Clone for Fliers {
     fn clone(&self) -> Self {
         Self {
             world: copied(&self.world),
             handles: self.handles.clone(),
+            bodies: self.bodies.clone(),
+            proximity: self.proximity.clone(),
+            was_free: self.was_free,
             fleet: self.fleet.clone(),
             drifts: self.drifts.clone(),
             drift_m_s: self.drift_m_s.clone(),
             began_m: self.began_m.clone(),
             origin_m: self.origin_m,
             airframe: self.airframe,
+            stopwatch: self.stopwatch,
         }
     }
 }
@@ -137,18 +228,18 @@ impl Plant for Fliers {
     }
 
     fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut StepPath) -> Result<(), PlantError> {
-        self.world.integration_parameters.dt = dt_s;
-        let began = Instant::now();
+        let began = self.stopwatch.start();
         self.fleet.save_state();
         self.fleet.run_attitude();
         self.begin(dt_s);
         self.airframe += began.elapsed();
-        self.world.step();
-        if let Some(lost) = self.world.quarantine().bodies().first() {
-            let vehicle = self.handles.iter().position(|handle| handle == lost).unwrap_or_default();
-            return Err(PlantError::NotFinite { vehicle });
+        self.was_free = self.proximity.begin_step(self.bodies.iter().map(|body| body.position));
+        if self.was_free {
+            self.drift_freely(dt_s)?;
+        } else {
+            self.drift_in_engine(dt_s)?;
         }
-        let began = Instant::now();
+        let began = self.stopwatch.start();
         self.end(dt_s);
         self.fleet.advance_clock(dt_s);
         self.fleet.observe(predicted);
@@ -167,23 +258,35 @@ impl Plant for Fliers {
 
     fn restore(&mut self, _swarm: &Swarm) {
         self.fleet.restore_state();
-        for (i, &handle) in self.handles.iter().enumerate() {
-            let body = &mut self.world.bodies[handle];
-            body.set_translation(to_engine(row(&self.began_m, i)), true);
-            body.set_rotation(rotation(&self.fleet.states[i].attitude), true);
+        for (i, body) in self.bodies.iter_mut().enumerate() {
+            body.position = to_engine(row(&self.began_m, i));
+            body.rotation = rotation(&self.fleet.states[i].attitude);
         }
+        self.proximity.forget();
+    }
+
+    fn allow_free_steps(&mut self) {
+        self.proximity.allow_free_steps();
     }
 
     fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {
-        keep_out_contacts(&self.world, pairs);
+        if !self.was_free {
+            keep_out_contacts(&self.world, pairs);
+        }
     }
 
     fn hull_contacts(&self, contacts: &mut Vec<HullContact>) {
-        hull_contacts(&self.world, &self.began_m, &self.drift_m_s, contacts);
+        if !self.was_free {
+            hull_contacts(&self.world, &self.began_m, &self.drift_m_s, contacts);
+        }
     }
 
     fn airframe_time(&self) -> Duration {
         self.airframe
+    }
+
+    fn stop_measuring_time(&mut self) {
+        self.stopwatch.is_on = false;
     }
 
     fn channels(&self) -> Vec<Channel> {

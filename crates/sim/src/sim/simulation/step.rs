@@ -1,6 +1,6 @@
 //! One step of a simulation: divided into substeps as required; each is moved, audited and answered by the law.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use super::super::controller::Controller;
 use super::super::ending::{Breakdown, Ending, MAX_BEND_M, MAX_COMMAND_M_S2};
@@ -139,7 +139,7 @@ impl Simulation {
     /// Moves the vehicles from `state` to `next`. Returns the law's error if the law was undefined on the way and the
     /// vehicles moved on.
     fn move_vehicles(&mut self, step: u64, dt_s: f64) -> Result<Option<LawError>, Ending> {
-        let began = Instant::now();
+        let began = self.stopwatch.start();
         self.path.begin();
         let (interval, is_held) = ((self.time_s, dt_s), self.overruled || self.scenario.time.control_hz.is_some());
         let Self { plant, controller, next, path, .. } = self;
@@ -220,11 +220,11 @@ impl Simulation {
         // Held commands complete the velocities before sensors measure them.
         self.controller.accept(self.time_s, &self.state);
         self.controller.link.settle(self.time_s);
-        let Self { judge, controller, state, control, time_s, events, .. } = self;
+        let Self { judge, controller, state, control, time_s, events, stopwatch, .. } = self;
         let may_move = !controller.law.capabilities().requires_calling_thread;
         let (state, time_s): (&Swarm, f64) = (state, *time_s);
         let mut audit = || {
-            let began = Instant::now();
+            let began = stopwatch.start();
             let positions_m = &state.positions_m;
             let judged = match step {
                 None => judge.start(time_s, positions_m, events),
@@ -233,7 +233,7 @@ impl Simulation {
             (judged, began.elapsed())
         };
         let mut act = || {
-            let began = Instant::now();
+            let began = stopwatch.start();
             (controller.act(time_s, state, is_asked.then_some(control)), began.elapsed())
         };
         let side_by_side = may_move && state.count() >= SIDE_BY_SIDE_FROM && rayon::current_num_threads() > 1;
@@ -251,7 +251,7 @@ impl Simulation {
 
     /// Evaluates the law for the present state.
     pub(super) fn evaluate_law(&mut self) -> Result<(), Ending> {
-        let began = Instant::now();
+        let began = self.stopwatch.start();
         let commanded = self.controller.command(self.time_s, &self.state, &mut self.control);
         self.apply_command(self.steps, commanded.map_err(Ending::from), began.elapsed())
     }
@@ -274,9 +274,13 @@ impl Simulation {
         if let Some(vehicle) = self.state.first_not_finite() {
             return Err(Breakdown::StateNotFinite { step, vehicle }.into());
         }
-        let began = Instant::now();
-        self.energy = self.controller.energy(self.time_s, &self.state);
-        self.performance.energy += began.elapsed();
+        if self.overruled {
+            self.energy = None;
+        } else {
+            let began = self.stopwatch.start();
+            self.energy = self.controller.energy(self.time_s, &self.state);
+            self.performance.energy += began.elapsed();
+        }
         self.energy_monitor.add(self.controller.target.view().revision, self.energy);
         self.peaks.take(largest_row_norm(&self.control), self.energy);
         Ok(())

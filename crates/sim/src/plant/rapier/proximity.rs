@@ -1,0 +1,265 @@
+//! Decides which steps the engine may be left out of, where a caller allows that: in a vector simulation.
+//!
+//! Bodies of the engine act on each other only through contacts. The engine reports contacts only for pairs within a
+//! reach: two keep-out balls that touch, or two hulls within the contact prediction. While every pair is farther apart
+//! at the beginning of a step, the engine moves each body by its own velocity alone. The plants then do the same
+//! operations without the engine's step (a *free* step). The bits are the same: the tests of this module fly with and
+//! without free steps.
+//!
+//! After contacts, a free step follows only a step of the engine that began beyond the reach as well. That step removes
+//! all contact points, so that no old impulse waits for the next contact.
+
+use rapier3d::prelude::Vector;
+
+use crate::scenario::{CONTACT_PREDICTION_M, Scenario};
+
+/// Largest number of vehicles with free steps: the search of the nearest pair is quadratic.
+const MAX_COUNT: usize = 128;
+/// Distance beyond the engine's reach from which a step is free \[m\]. It exceeds any rounding.
+const MARGIN_M: f64 = 1e-3;
+
+/// Distance of the nearest pair from the engine's reach, with the memory that bounds it from step to step.
+#[derive(Clone, Debug)]
+pub(super) struct Proximity {
+    /// Distance of two centres below which the engine may report contacts; infinite where that is not known \[m\].
+    reach_m: f64,
+    /// Whether free steps are allowed.
+    is_allowed: bool,
+    /// Lower bound of the distance of any pair beyond the reach \[m\]; not positive if unknown.
+    beyond_m: f64,
+    /// Whether the last step began with every pair beyond the reach.
+    began_beyond: bool,
+}
+
+impl Proximity {
+    pub(super) fn of(scenario: &Scenario) -> Self {
+        let hull_m = scenario.hull_radius_m.iter().copied().fold(0.0, f64::max);
+        let contact_m = scenario.metric().shortest_m(scenario.delta_m).max(2.0 * hull_m) + 2.0 * CONTACT_PREDICTION_M;
+        // Hulls also touch obstacles.
+        let has_free_steps = scenario.obstacles.is_empty() && scenario.count() <= MAX_COUNT;
+        let reach_m = if has_free_steps { contact_m + MARGIN_M } else { f64::INFINITY };
+        // A new engine has no contacts.
+        Self { reach_m, is_allowed: false, beyond_m: 0.0, began_beyond: true }
+    }
+
+    /// Allows free steps.
+    pub(super) fn allow_free_steps(&mut self) {
+        self.is_allowed = true;
+    }
+
+    /// Returns whether the step from these positions, relative to the engine's origin, is free.
+    pub(super) fn begin_step(&mut self, positions: impl Iterator<Item = Vector> + Clone) -> bool {
+        if !self.is_allowed || self.reach_m == f64::INFINITY {
+            return false;
+        }
+        if self.beyond_m <= 0.0 || self.beyond_m.is_nan() {
+            self.beyond_m = beyond_m(positions, self.reach_m);
+        }
+        let is_beyond = self.beyond_m > 0.0;
+        std::mem::replace(&mut self.began_beyond, is_beyond) && is_beyond
+    }
+
+    /// Takes into account that no vehicle moved farther than given \[m\].
+    pub(super) fn note_move(&mut self, longest_m: f64) {
+        self.beyond_m -= 2.0 * longest_m;
+    }
+
+    /// Forgets the distances, because the positions changed.
+    pub(super) fn forget(&mut self) {
+        self.beyond_m = 0.0;
+    }
+
+    /// Makes every step free, whatever the distances.
+    #[cfg(test)]
+    pub(super) fn with_free_steps_only(&mut self) {
+        (self.reach_m, self.beyond_m, self.began_beyond, self.is_allowed) = (0.0, f64::INFINITY, true, true);
+    }
+}
+
+/// Returns the distance of the nearest pair beyond a reach \[m\]; not positive if any pair is within it.
+fn beyond_m(mut positions: impl Iterator<Item = Vector> + Clone, reach_m: f64) -> f64 {
+    let mut least = f64::INFINITY;
+    while let Some(from) = positions.next() {
+        for to in positions.clone() {
+            let squared = (to - from).length_squared();
+            if squared <= reach_m * reach_m || squared.is_nan() {
+                return 0.0;
+            }
+            least = squared.min(least);
+        }
+    }
+    least.sqrt() - reach_m
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::bodies::Bodies;
+    use super::super::quadrotors::Fliers;
+    use super::*;
+    use crate::plant::{HullContact, Plant, StepPath};
+    use crate::scenario::{Override, Source};
+    use tautline_core::swarm::{Pair, Rows, Swarm};
+
+    /// A plant that shows which steps were free.
+    trait Free: Plant {
+        fn was_free(&self) -> bool;
+    }
+
+    impl Free for Bodies {
+        fn was_free(&self) -> bool {
+            Bodies::was_free(self)
+        }
+    }
+
+    impl Free for Fliers {
+        fn was_free(&self) -> bool {
+            Fliers::was_free(self)
+        }
+    }
+
+    fn scenario(name: &str, sets: &[&str]) -> Scenario {
+        let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect(set)).collect();
+        Scenario::read(&Source::Builtin(name.to_owned()), &overrides).expect("a scenario")
+    }
+
+    fn points(scenario: &Scenario) -> Bodies {
+        Bodies::new(scenario)
+    }
+
+    fn fliers(scenario: &Scenario) -> Fliers {
+        Fliers::new(scenario, scenario.fleet().expect("quadrotors"))
+    }
+
+    /// What a flight shows: bits of positions and velocities, contacts, and whether the step was free.
+    #[derive(Default)]
+    struct Seen {
+        bits: Vec<u64>,
+        keep_out: Vec<Pair>,
+        hulls: Vec<HullContact>,
+        free_steps: usize,
+    }
+
+    /// Flies steps under commands. Every 50th step is undone once and flown again in halves.
+    fn fly(plant: &mut dyn Free, dt_s: f64, steps: usize, command: impl Fn(usize, &Swarm) -> Rows) -> Seen {
+        let count = plant.count();
+        let mut state = Swarm::at_rest(Rows::zeros(count));
+        plant.observe(&mut state);
+        let (mut next, mut path, mut seen) = (state.clone(), StepPath::default(), Seen::default());
+        plant.apply(&command(0, &state), &mut state);
+        for step in 1..=steps {
+            let parts = if step % 50 == 0 { &[1.0, 0.5, 0.5][..] } else { &[1.0] };
+            for (k, part) in parts.iter().enumerate() {
+                plant.advance(part * dt_s, &mut next, &mut path).expect("finite");
+                if parts.len() > 1 && k == 0 {
+                    plant.restore(&state);
+                    continue;
+                }
+                std::mem::swap(&mut state, &mut next);
+                plant.apply(&command(step, &state), &mut state);
+                let numbers = state.positions_m.iter().chain(state.velocities_m_s.iter());
+                seen.bits.extend(numbers.map(|x| x.to_bits()));
+                plant.keep_out_contacts(&mut seen.keep_out);
+                plant.hull_contacts(&mut seen.hulls);
+                seen.free_steps += usize::from(plant.was_free());
+            }
+        }
+        seen
+    }
+
+    /// Asserts that a flight with and without free steps is the same. Returns what it shows.
+    fn assert_same(
+        make: impl Fn() -> Box<dyn Free>,
+        dt_s: f64,
+        steps: usize,
+        command: impl Fn(usize, &Swarm) -> Rows,
+    ) -> Seen {
+        let mut free = make();
+        free.allow_free_steps();
+        let with = fly(free.as_mut(), dt_s, steps, &command);
+        let without = fly(make().as_mut(), dt_s, steps, &command);
+        assert_eq!(without.free_steps, 0);
+        let differing = with.bits.iter().zip(&without.bits).position(|(a, b)| a != b);
+        assert_eq!(differing, None, "first different number");
+        assert_eq!((&with.keep_out, &with.hulls), (&without.keep_out, &without.hulls));
+        with
+    }
+
+    /// Accelerations of a few m/s^2 that change at every step, with exact zeros of both signs.
+    fn shaken(step: usize, state: &Swarm) -> Rows {
+        Rows::from_fn(state.count(), |i, axis| match (step / 7 + i + axis) % 5 {
+            0 => 0.0,
+            1 => -0.0,
+            k => 3.0 * libm::sin(0.37 * step as f64 + 1.3 * i as f64 + axis as f64) / k as f64,
+        })
+    }
+
+    #[test]
+    fn free_steps_of_points_have_the_bits_of_the_engine() {
+        for sets in [
+            &[][..],
+            &["swarm.a22_per_s=-0.3", "swarm.mass_kg=[1.0, 0.3, 7.1, 0.1, 2.9]"],
+            &["wind={mean_m_s=[1.0, 0.5, 0.0]}", "vehicle={model=\"point\", drag_per_s=0.4}"],
+            &["start.positions_m=[[30, -5, 1], [90, -5, 2], [60, 5, 3], [0, 5, -4], [120, 5, 7.1]]"],
+        ] {
+            let scenario = scenario("pentagon", sets);
+            let seen = assert_same(|| Box::new(points(&scenario)), scenario.time.dt_s, 400, shaken);
+            assert!(seen.free_steps > 300, "{sets:?}: {} free steps", seen.free_steps);
+        }
+    }
+
+    #[test]
+    fn free_steps_of_quadrotors_have_the_bits_of_the_engine() {
+        for sets in [&[][..], &["vehicle.downwash=true"], &["wind={mean_m_s=[1.0, 0.5, 0.0]}"]] {
+            let scenario = scenario("crazyflies", sets);
+            let seen = assert_same(|| Box::new(fliers(&scenario)), scenario.time.dt_s, 400, shaken);
+            assert!(seen.free_steps > 300, "{sets:?}: {} free steps", seen.free_steps);
+        }
+    }
+
+    /// Vehicles that are pulled to the middle, collide and fly on, twice.
+    fn colliding(step: usize, state: &Swarm) -> Rows {
+        let sign = if (step / 600).is_multiple_of(2) { -1.0 } else { 1.0 };
+        let middle = state.positions_m.row_mean();
+        Rows::from_fn(state.count(), |i, axis| sign * 0.5 * (state.positions_m[(i, axis)] - middle[axis]))
+    }
+
+    #[test]
+    fn collisions_between_free_steps_have_the_bits_of_the_engine() {
+        let scenario = scenario(
+            "pentagon",
+            &[
+                "start.positions_m=[[0, 0], [4, 0]]",
+                "formation={shape=\"line\", spacing_m=3}",
+                "graph.kind=\"complete\"",
+            ],
+        );
+        let seen = assert_same(|| Box::new(points(&scenario)), scenario.time.dt_s, 2400, colliding);
+        assert!(seen.free_steps > 100 && seen.free_steps < 2300, "{} free steps", seen.free_steps);
+        assert!(!seen.hulls.is_empty() && !seen.keep_out.is_empty());
+
+        // Without the search of near pairs, vehicles pass through each other unseen.
+        let mut blind = points(&scenario);
+        Proximity::with_free_steps_only(Bodies::proximity(&mut blind));
+        let blind = fly(&mut blind, scenario.time.dt_s, 2400, colliding);
+        assert!(blind.hulls.is_empty() && blind.bits != seen.bits);
+    }
+
+    #[test]
+    fn a_state_that_is_not_finite_is_an_error_of_the_vehicle() {
+        let scenario = scenario("pentagon", &["swarm={a22_per_s=0, mass_kg=10}"]);
+        let mut plant = points(&scenario);
+        plant.allow_free_steps();
+        let (mut state, mut path) = (scenario.start.clone(), StepPath::default());
+        let mut held = Rows::zeros(scenario.count());
+        for step in 0..4 {
+            held[(3, 1)] = if step == 3 { f64::MAX } else { 0.0 };
+            plant.apply(&held, &mut state);
+            let moved = plant.advance(0.01, &mut state, &mut path);
+            assert_eq!(moved.is_err(), step == 3);
+            if let Err(error) = moved {
+                assert_eq!(error, crate::plant::PlantError::NotFinite { vehicle: 3 });
+            }
+        }
+        assert!(plant.was_free());
+    }
+}

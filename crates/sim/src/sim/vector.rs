@@ -1,0 +1,540 @@
+//! [`VectorSimulation`]: many worlds of one scenario that advance together.
+
+use std::sync::{Arc, Mutex, PoisonError};
+
+use rayon::{Scope, ThreadPool};
+
+use super::ending::{MAX_COMMAND_M_S2, SimError};
+use super::simulation::Simulation;
+use crate::scenario::{
+    BYTES_PER_EDGE, BYTES_PER_VEHICLE, Draw, MAX_MEMORY_BYTES, NamedLaw, Scenario, ScenarioError, Template,
+};
+use tautline_core::swarm::Rows;
+
+/// Number of chunks of worlds for each thread. A thread takes the next chunk when it is done with one.
+const CHUNKS_PER_THREAD: usize = 8;
+/// Number of steps of single vehicles that is worth waking a thread.
+const LOAD_OF_A_THREAD: u64 = 1000;
+/// Load of a new simulation, as a number of steps.
+const LOAD_OF_A_START: u64 = 100;
+/// Expected memory of a world besides its vehicles and edges \[bytes\].
+const BYTES_PER_WORLD: u128 = 49_152;
+/// Number of steps of single vehicles between two calls of `carries_on`.
+const VEHICLE_STEPS_AT_ONCE: u64 = 100_000;
+
+/// Worlds of one scenario, each a [`Simulation`] with a seed of its own, on several threads.
+///
+/// World k flies the scenario with its seed as `start.seed` and, if the flight is random, as `noise.seed`. It has the
+/// bits of a single simulation under the same commands, for any number of threads. A world that ends does not stop the
+/// others; it keeps its last state until it is reset.
+///
+/// ```
+/// use tautline_sim::scenario::{Source, Template};
+/// use tautline_sim::sim::{States, Threads, VectorSimulation};
+///
+/// let template = Template::read(&Source::resolve("pentagon")?, &[])?;
+/// let mut worlds = VectorSimulation::new(template, &[0, 1, 2], Threads::Current)?;
+/// let mut states = States::of(&worlds);
+/// let commands = vec![0.1; 3 * worlds.vehicles() * worlds.count()];
+/// worlds.step(Some(&commands), 240, &mut states.borrow())?;
+/// assert!(states.positions_m.len() == 45 && worlds.world(2).time_s() == 1.0);
+/// # Ok::<(), Box<dyn std::error::Error>>(())
+/// ```
+pub struct VectorSimulation {
+    starts: Starts,
+    worlds: Vec<World>,
+    vehicles: usize,
+    resets_ended: bool,
+    threads: Threads,
+}
+
+/// Threads of a [`VectorSimulation`]: the calling thread and helpers.
+#[derive(Clone, Debug, Default)]
+pub enum Threads {
+    /// As many threads as the current rayon pool has.
+    #[default]
+    Current,
+    /// The calling thread alone.
+    One,
+    /// The calling thread, and all threads of a pool.
+    With(Arc<ThreadPool>),
+}
+
+/// Memory of a caller for the states of E worlds of N vehicles, world by world and vehicle by vehicle.
+pub struct StatesMut<'a> {
+    /// E x N x 3 positions \[m\].
+    pub positions_m: &'a mut [f64],
+    /// E x N x 3 velocities \[m/s\].
+    pub velocities_m_s: &'a mut [f64],
+    /// Smallest clearance of each world so far \[m\], as [`Simulation::least_clearance_m`]; NaN without pairs and
+    /// obstacles.
+    pub least_clearance_m: &'a mut [f64],
+    /// Whether each world has ended.
+    pub is_over: &'a mut [bool],
+}
+
+/// States of all worlds, with memory of their own. The fields are those of [`StatesMut`].
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct States {
+    /// E x N x 3 positions \[m\].
+    pub positions_m: Vec<f64>,
+    /// E x N x 3 velocities \[m/s\].
+    pub velocities_m_s: Vec<f64>,
+    /// Smallest clearance of each world so far \[m\].
+    pub least_clearance_m: Vec<f64>,
+    /// Whether each world has ended.
+    pub is_over: Vec<bool>,
+}
+
+/// Error of a [`VectorSimulation`]. Nothing was flown or reset.
+#[derive(Debug, thiserror::Error)]
+pub enum VectorError {
+    /// There are no worlds.
+    #[error("seeds: at least one world is needed, got 0")]
+    NoWorlds,
+    /// The worlds would take too much memory.
+    #[error("seeds: at most {most} worlds of this scenario fit into {} GiB, got {found}", MAX_MEMORY_BYTES >> 30)]
+    TooMany {
+        /// Largest number of worlds.
+        most: usize,
+        /// Number given.
+        found: usize,
+    },
+    /// A slice has a wrong length.
+    #[error("{what}: {expected} values are needed, got {found}")]
+    Length {
+        /// Name of the slice.
+        what: &'static str,
+        /// Length needed.
+        expected: usize,
+        /// Length given.
+        found: usize,
+    },
+    /// A command is not finite, or too large.
+    #[error("u[{world}, {vehicle}, {axis}]: must be a finite number up to {MAX_COMMAND_M_S2:e} m/s^2, got {value}")]
+    Command {
+        /// The world, from 0.
+        world: usize,
+        /// The vehicle, from 0.
+        vehicle: usize,
+        /// The axis, from 0.
+        axis: usize,
+        /// The acceleration \[m/s^2\].
+        value: f64,
+    },
+    /// A seed gives no valid start. If a world is reset because it ended, the other worlds have advanced.
+    #[error("seeds[{world}]: seed {seed} gives no valid scenario: {why}")]
+    Seed {
+        /// The world, from 0.
+        world: usize,
+        /// Its seed.
+        seed: u64,
+        /// Reason.
+        why: ScenarioError,
+    },
+    /// The scenario cannot be flown in this way.
+    #[error(transparent)]
+    Sim(#[from] SimError),
+}
+
+/// One world.
+struct World {
+    seed: u64,
+    simulation: Simulation,
+    /// Commands of the present call, N x 3 \[m/s^2\].
+    commands: Rows,
+    /// Whether the present call reset this world, which then does not fly.
+    rests: bool,
+    /// Error of the present call.
+    failure: Option<VectorError>,
+}
+
+/// Source of new simulations.
+struct Starts {
+    template: Template,
+    law: NamedLaw,
+    /// Whether start or flight depends on a seed.
+    is_random: bool,
+}
+
+impl VectorSimulation {
+    /// Creates one world for each seed, at its start.
+    ///
+    /// # Errors
+    /// [`VectorError::NoWorlds`], [`VectorError::TooMany`], [`VectorError::Seed`] if a seed gives no valid start, and
+    /// [`VectorError::Sim`] if the audit does not support the scenario.
+    pub fn new(template: Template, seeds: &[u64], threads: Threads) -> Result<Self, VectorError> {
+        if seeds.is_empty() {
+            return Err(VectorError::NoWorlds);
+        }
+        let (most, found) = (Self::most_worlds(template.own()), seeds.len());
+        if found > most {
+            return Err(VectorError::TooMany { most, found });
+        }
+        let vehicles = template.own().count();
+        let is_random = template.start_is_random() || template.flight_is_random();
+        let starts = Starts { law: template.own_law(), template, is_random };
+        let places: Vec<_> = seeds.iter().copied().enumerate().collect();
+        let world = |((_, seed), simulation): (_, Simulation)| World {
+            seed,
+            simulation,
+            commands: Rows::zeros(vehicles),
+            rests: false,
+            failure: None,
+        };
+        let simulations = starts.simulations(&places, &threads)?;
+        let worlds = places.into_iter().zip(simulations).map(world).collect();
+        Ok(Self { starts, worlds, vehicles, resets_ended: false, threads })
+    }
+
+    /// Returns the largest number of worlds of a scenario whose expected memory is within [`MAX_MEMORY_BYTES`], at
+    /// least one.
+    #[must_use]
+    pub fn most_worlds(scenario: &Scenario) -> usize {
+        let edges = scenario.graph.edges().count() as u128;
+        let of_vehicles = scenario.count() as u128 * BYTES_PER_VEHICLE + edges * BYTES_PER_EDGE;
+        let most = MAX_MEMORY_BYTES / (BYTES_PER_WORLD + of_vehicles);
+        usize::try_from(most).unwrap_or(usize::MAX).max(1)
+    }
+
+    /// Sets whether [`VectorSimulation::step`] resets worlds that have ended, instead of leaving them.
+    pub fn set_autoreset(&mut self, resets_ended: bool) {
+        self.resets_ended = resets_ended;
+    }
+
+    /// Sets the threads that later calls use. The results do not depend on them.
+    pub fn set_threads(&mut self, threads: Threads) {
+        self.threads = threads;
+    }
+
+    /// Returns the number of worlds E.
+    #[must_use]
+    pub fn count(&self) -> usize {
+        self.worlds.len()
+    }
+
+    /// Returns the number of vehicles N of a world.
+    #[must_use]
+    pub fn vehicles(&self) -> usize {
+        self.vehicles
+    }
+
+    /// Returns a world, from 0.
+    ///
+    /// # Panics
+    /// If there is no such world.
+    #[must_use]
+    pub fn world(&self, world: usize) -> &Simulation {
+        &self.worlds[world].simulation
+    }
+
+    /// Returns the present seed of each world.
+    pub fn seeds(&self) -> impl Iterator<Item = u64> + '_ {
+        self.worlds.iter().map(|world| world.seed)
+    }
+
+    /// Flies a number of steps in every world, fewer where a world ends, and writes the states.
+    ///
+    /// `commands` are accelerations \[m/s^2\], E x N x 3, held over all of these steps ([`Simulation::step_with`]).
+    /// Those of ended worlds are ignored. Without commands the law flies ([`Simulation::step`]). With
+    /// [`VectorSimulation::set_autoreset`], a world that had ended before this call is reset instead, to its next seed:
+    /// its seed plus E.
+    ///
+    /// # Errors
+    /// [`VectorError`]: a wrong length; a command that is not finite; commands under a shield.
+    pub fn step(
+        &mut self,
+        commands: Option<&[f64]>,
+        steps: u64,
+        states: &mut StatesMut<'_>,
+    ) -> Result<(), VectorError> {
+        self.step_while(commands, steps, states, &mut || true)
+    }
+
+    /// Flies like [`VectorSimulation::step`], and calls `carries_on` after some steps of all worlds, every few
+    /// hundredths of a second. Stops if it returns false.
+    ///
+    /// # Errors
+    /// As [`VectorSimulation::step`].
+    pub fn step_while(
+        &mut self,
+        commands: Option<&[f64]>,
+        steps: u64,
+        states: &mut StatesMut<'_>,
+        carries_on: &mut dyn FnMut() -> bool,
+    ) -> Result<(), VectorError> {
+        self.check_lengths(states)?;
+        if let Some(commands) = commands {
+            self.check_commands(commands)?;
+        }
+        let (count, vehicles, width) = (self.worlds.len() as u64, self.vehicles as u64, 3 * self.vehicles);
+        let at_once = (VEHICLE_STEPS_AT_ONCE / (count * vehicles)).max(1);
+        let mut flown = 0;
+        while flown < steps {
+            let (is_first, some) = (flown == 0, at_once.min(steps - flown));
+            let (resets_ended, starts) = (self.resets_ended, &self.starts);
+            let advance = |(k, world): (usize, &mut World)| {
+                world.rests &= !is_first;
+                if world.rests {
+                    return;
+                }
+                if world.simulation.ending().is_none() {
+                    world.fly(commands.map(|commands| &commands[k * width..(k + 1) * width]), some);
+                } else if resets_ended && is_first {
+                    world.rests = true;
+                    world.failure = world.restart(starts, k, later(world.seed, count)).err();
+                }
+            };
+            for_each(&mut self.worlds, (&self.threads, some.saturating_mul(count * vehicles)), states, advance);
+            if let Some(failure) = self.worlds.iter_mut().find_map(|world| world.failure.take()) {
+                return Err(failure);
+            }
+            flown += some;
+            if !carries_on() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Resets the chosen worlds to their starts, with these seeds or else with the next seed of each: its seed plus E.
+    /// Writes the states of all worlds.
+    ///
+    /// # Errors
+    /// [`VectorError`]: a wrong length, or a seed without a valid start.
+    pub fn reset(
+        &mut self,
+        chosen: &[bool],
+        seeds: Option<&[u64]>,
+        states: &mut StatesMut<'_>,
+    ) -> Result<(), VectorError> {
+        let count = self.count();
+        self.check_lengths(states)?;
+        check("mask", count, chosen.len())?;
+        seeds.map_or(Ok(()), |seeds| check("seeds", count, seeds.len()))?;
+        let starts = &self.starts;
+        let next = |(k, world): (usize, &World)| (k, seeds.map_or_else(|| later(world.seed, count as u64), |of| of[k]));
+        let drawn: Vec<_> = self.worlds.iter().enumerate().filter(|(k, _)| chosen[*k]).map(next).collect();
+        let made = starts.simulations(&drawn, &self.threads)?;
+        for ((k, seed), simulation) in drawn.into_iter().zip(made) {
+            (self.worlds[k].seed, self.worlds[k].simulation) = (seed, simulation);
+        }
+        for_each(&mut self.worlds, (&Threads::One, 0), states, |_| ());
+        Ok(())
+    }
+
+    /// Writes the states of all worlds.
+    ///
+    /// # Errors
+    /// [`VectorError::Length`].
+    pub fn write(&mut self, states: &mut StatesMut<'_>) -> Result<(), VectorError> {
+        self.check_lengths(states)?;
+        for_each(&mut self.worlds, (&Threads::One, 0), states, |_| ());
+        Ok(())
+    }
+
+    fn check_lengths(&self, states: &StatesMut<'_>) -> Result<(), VectorError> {
+        let (worlds, numbers) = (self.count(), 3 * self.vehicles * self.count());
+        check("positions_m", numbers, states.positions_m.len())?;
+        check("velocities_m_s", numbers, states.velocities_m_s.len())?;
+        check("least_clearance_m", worlds, states.least_clearance_m.len())?;
+        check("is_over", worlds, states.is_over.len())
+    }
+
+    fn check_commands(&self, commands: &[f64]) -> Result<(), VectorError> {
+        if self.starts.template.own().shield.as_ref().is_some_and(|shield| shield.enabled) {
+            return Err(SimError::ShieldedCommands.into());
+        }
+        let width = 3 * self.vehicles;
+        check("u", width * self.count(), commands.len())?;
+        // A fold without branches lets the compiler vectorize the comparison.
+        let are_within = |some: &[f64]| some.iter().fold(true, |all, x| all & (x.abs() <= MAX_COMMAND_M_S2));
+        for (world, some) in commands.chunks_exact(width.max(1)).enumerate() {
+            if !are_within(some) && self.world(world).ending().is_none() {
+                let at = some.iter().position(|x| !are_within(&[*x])).unwrap_or_default();
+                return Err(VectorError::Command { world, vehicle: at / 3, axis: at % 3, value: some[at] });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl World {
+    fn fly(&mut self, commands: Option<&[f64]>, steps: u64) {
+        if let Some(commands) = commands {
+            for (i, command) in commands.chunks_exact(3).enumerate() {
+                (0..3).for_each(|axis| self.commands[(i, axis)] = command[axis]);
+            }
+        }
+        for _ in 0..steps {
+            if commands.is_none() {
+                self.simulation.step();
+            } else if let Err(error) = self.simulation.step_with(&self.commands) {
+                self.failure = Some(error.into());
+                return;
+            }
+            // Events are not recorded here.
+            self.simulation.events().for_each(drop);
+            if self.simulation.ending().is_some() {
+                return;
+            }
+        }
+    }
+
+    fn restart(&mut self, starts: &Starts, place: usize, seed: u64) -> Result<(), VectorError> {
+        self.simulation = starts.simulation(place, seed)?;
+        self.seed = seed;
+        Ok(())
+    }
+
+    fn write(
+        &self,
+        (positions_m, velocities_m_s, clearance_m, is_over): (&mut [f64], &mut [f64], &mut f64, &mut bool),
+    ) {
+        let state = self.simulation.state();
+        for (rows, numbers) in [(&state.positions_m, positions_m), (&state.velocities_m_s, velocities_m_s)] {
+            for (i, number) in numbers.chunks_exact_mut(3).enumerate() {
+                (0..3).for_each(|axis| number[axis] = rows[(i, axis)]);
+            }
+        }
+        *clearance_m = self.simulation.least_clearance_m().unwrap_or(f64::NAN);
+        *is_over = self.simulation.ending().is_some();
+    }
+}
+
+impl Starts {
+    /// Returns simulations at the starts of the seeds of some worlds. An error is that of the first such world.
+    fn simulations(&self, drawn: &[(usize, u64)], threads: &Threads) -> Result<Vec<Simulation>, VectorError> {
+        let mut made: Vec<_> = drawn.iter().map(|_| None).collect();
+        let helpers = threads.helpers(LOAD_OF_A_START * drawn.len() as u64);
+        threads.share(helpers, drawn.iter().zip(&mut made), |(&(world, seed), made)| {
+            *made = Some(self.simulation(world, seed));
+        });
+        made.into_iter().flatten().collect()
+    }
+
+    /// Returns a simulation at the start of a seed.
+    fn simulation(&self, world: usize, seed: u64) -> Result<Simulation, VectorError> {
+        let mut simulation = if self.is_random {
+            let drawn = self.template.scenario(&self.law, Draw { seed, jitter_m: None });
+            Simulation::new(&drawn.map_err(|why| VectorError::Seed { world, seed, why })?)?
+        } else {
+            Simulation::new(self.template.own())?
+        };
+        simulation.stop_measuring_time();
+        simulation.allow_free_steps();
+        Ok(simulation)
+    }
+}
+
+impl States {
+    /// Returns states of the size of these worlds, all zero.
+    #[must_use]
+    pub fn of(worlds: &VectorSimulation) -> Self {
+        let (worlds, numbers) = (worlds.count(), 3 * worlds.vehicles() * worlds.count());
+        Self {
+            positions_m: vec![0.0; numbers],
+            velocities_m_s: vec![0.0; numbers],
+            least_clearance_m: vec![0.0; worlds],
+            is_over: vec![false; worlds],
+        }
+    }
+
+    /// Borrows the memory.
+    #[must_use]
+    pub fn borrow(&mut self) -> StatesMut<'_> {
+        let Self { positions_m, velocities_m_s, least_clearance_m, is_over } = self;
+        StatesMut { positions_m, velocities_m_s, least_clearance_m, is_over }
+    }
+}
+
+/// Changes each world, in any order, and writes its state. `load` is the number of steps of single vehicles.
+fn for_each(
+    worlds: &mut [World],
+    (threads, load): (&Threads, u64),
+    states: &mut StatesMut<'_>,
+    change: impl Fn((usize, &mut World)) + Sync,
+) {
+    let helpers = threads.helpers(load).min(worlds.len() - 1);
+    let width = states.positions_m.len() / worlds.len();
+    let at_once = worlds.len().div_ceil(if helpers == 0 { 1 } else { CHUNKS_PER_THREAD * (helpers + 1) });
+    let StatesMut { positions_m, velocities_m_s, least_clearance_m, is_over } = states;
+    let chunks = worlds
+        .chunks_mut(at_once)
+        .zip(positions_m.chunks_mut(at_once * width))
+        .zip(velocities_m_s.chunks_mut(at_once * width))
+        .zip(least_clearance_m.chunks_mut(at_once))
+        .zip(is_over.chunks_mut(at_once))
+        .enumerate();
+    threads.share(helpers, chunks, |(chunk, ((((worlds, positions), velocities), clearances), over))| {
+        let moving = positions.chunks_mut(width).zip(velocities.chunks_mut(width));
+        let states = moving.zip(clearances).zip(over);
+        for (k, (world, (((p, v), clearance), over))) in worlds.iter_mut().zip(states).enumerate() {
+            change((chunk * at_once + k, world));
+            world.write((p, v, clearance, over));
+        }
+    });
+}
+
+impl Threads {
+    /// Returns the number of threads that help with this number of steps of single vehicles.
+    fn helpers(&self, load: u64) -> usize {
+        let present = match self {
+            Self::Current => rayon::current_num_threads() - 1,
+            Self::One => 0,
+            Self::With(pool) => pool.current_num_threads(),
+        };
+        present.min(usize::try_from(load / LOAD_OF_A_THREAD).unwrap_or(usize::MAX))
+    }
+
+    /// Passes each item to `work`, on the calling thread and the helpers.
+    fn share<T>(&self, helpers: usize, items: impl Iterator<Item = T> + Send, work: impl Fn(T) + Sync) {
+        fn with_helpers<'a>(scope: &Scope<'a>, helpers: usize, run: &'a (impl Fn() + Sync)) {
+            (0..helpers).for_each(|_| scope.spawn(|_| run()));
+            run();
+        }
+        let queue = Mutex::new(items);
+        let next = || queue.lock().unwrap_or_else(PoisonError::into_inner).next();
+        let run = || {
+            while let Some(item) = next() {
+                work(item);
+            }
+        };
+        match self {
+            _ if helpers == 0 => run(),
+            Self::With(pool) => pool.in_place_scope(|scope| with_helpers(scope, helpers, &run)),
+            _ => rayon::in_place_scope(|scope| with_helpers(scope, helpers, &run)),
+        }
+    }
+}
+
+/// Returns the next seed of a world, among those of a scenario file.
+fn later(seed: u64, worlds: u64) -> u64 {
+    seed.wrapping_add(worlds) & i64::MAX.cast_unsigned()
+}
+
+fn check(what: &'static str, expected: usize, found: usize) -> Result<(), VectorError> {
+    if expected == found { Ok(()) } else { Err(VectorError::Length { what, expected, found }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Barrier;
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    use super::*;
+
+    #[test]
+    fn helpers_work_beside_the_calling_thread() {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("threads");
+        let (threads, all, sum) = (Threads::With(Arc::new(pool)), Barrier::new(3), AtomicU32::new(0));
+        // Each item waits until three threads have one.
+        threads.share(threads.helpers(u64::MAX), [1, 2, 4].into_iter(), |item| {
+            all.wait();
+            sum.fetch_add(item, Ordering::Relaxed);
+        });
+        assert_eq!(sum.into_inner(), 7);
+        assert_eq!((threads.helpers(999), threads.helpers(1000)), (0, 1));
+        assert_eq!(Threads::One.helpers(u64::MAX), 0);
+    }
+}

@@ -1,0 +1,173 @@
+//! Worlds that advance together have the bits of single simulations.
+
+use tautline_core::swarm::Rows;
+use tautline_sim::scenario::{Draw, Override, Source, Template};
+use tautline_sim::sim::{Ending, SimError, Simulation, States, Threads, VectorError, VectorSimulation};
+
+/// Steps of a call: enough for two helping threads.
+const STEPS_OF_A_CALL: u64 = 80;
+
+fn template(name: &str, sets: &[&str]) -> Template {
+    let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect(set)).collect();
+    Template::read(&Source::Builtin(name.to_owned()), &overrides).expect("a scenario")
+}
+
+fn pool(threads: usize) -> rayon::ThreadPool {
+    rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads")
+}
+
+/// Accelerations of E x N x 3 that differ between worlds and steps.
+fn commands(worlds: usize, vehicles: usize, step: usize) -> Vec<f64> {
+    (0..3 * worlds * vehicles).map(|k| 2.0 * libm::sin(0.7 * k as f64 + 0.9 * step as f64)).collect()
+}
+
+/// Asserts that worlds have the bits of single simulations with the same seeds and commands, for any thread count.
+fn assert_bits(template: &Template, steps: usize, given: bool) {
+    let (seeds, vehicles) = ([3, 14, 15, 92, 65], template.own().count());
+    let law = template.own_law();
+    let singles: Vec<_> = seeds
+        .iter()
+        .enumerate()
+        .map(|(k, &seed)| {
+            let scenario = template.scenario(&law, Draw { seed, jitter_m: None }).expect("a start");
+            let mut single = Simulation::new(&scenario).expect("a simulation");
+            for step in 0..steps {
+                let all = commands(seeds.len(), vehicles, step);
+                let own = Rows::from_row_slice(&all[3 * k * vehicles..3 * (k + 1) * vehicles]);
+                for _ in 0..STEPS_OF_A_CALL {
+                    if given {
+                        single.step_with(&own).expect("finite commands");
+                    } else {
+                        single.step();
+                    }
+                }
+            }
+            single
+        })
+        .collect();
+    for threads in [1, 2, 3] {
+        let mut worlds = VectorSimulation::new(template.clone(), &seeds, Threads::Current).expect("worlds");
+        let mut states = States::of(&worlds);
+        pool(threads).install(|| {
+            for step in 0..steps {
+                let commands = commands(seeds.len(), vehicles, step);
+                worlds.step(given.then_some(&commands[..]), STEPS_OF_A_CALL, &mut states.borrow()).expect("flown");
+            }
+        });
+        for (k, single) in singles.iter().enumerate() {
+            assert_eq!(worlds.world(k).state(), single.state(), "world {k}, {threads} threads");
+            assert_eq!(worlds.world(k).ending(), single.ending());
+            assert_eq!(Some(states.least_clearance_m[k]), single.least_clearance_m());
+            let rows = |numbers: &[f64]| Rows::from_row_slice(&numbers[3 * k * vehicles..3 * (k + 1) * vehicles]);
+            assert_eq!(&rows(&states.positions_m), &single.state().positions_m);
+            assert_eq!(&rows(&states.velocities_m_s), &single.state().velocities_m_s);
+        }
+        assert_ne!(worlds.world(0).state(), worlds.world(1).state(), "seeds give different worlds");
+    }
+}
+
+#[test]
+fn worlds_of_points_have_the_bits_of_single_simulations() {
+    assert_bits(&template("pentagon", &["start.jitter_m=0.1"]), 8, true);
+    assert_bits(&template("pentagon", &["start.jitter_m=0.1"]), 4, false);
+}
+
+#[test]
+fn worlds_of_quadrotors_and_of_noise_have_the_bits_of_single_simulations() {
+    assert_bits(&template("crazyflies", &["start.jitter_m=0.02"]), 4, true);
+    assert_bits(&template("pentagon-laplacian", &["sensing={position_noise_m=0.05, rate_hz=100}"]), 4, false);
+}
+
+#[test]
+fn an_ended_world_stops_no_other_and_resets_to_its_next_seed() {
+    let template = template("pentagon", &["start.jitter_m=0.1", "time.duration_s=0.5", "arrival.hold_s=0"]);
+    let mut worlds = VectorSimulation::new(template.clone(), &[7, 8, 9], Threads::Current).expect("worlds");
+    let mut states = States::of(&worlds);
+    worlds.step(None, 100, &mut states.borrow()).expect("flown");
+    worlds.reset(&[false, true, false], Some(&[0, 40, 0]), &mut states.borrow()).expect("reset");
+    assert_eq!(worlds.seeds().collect::<Vec<_>>(), [7, 40, 9]);
+    worlds.step(None, 100, &mut states.borrow()).expect("flown");
+    assert_eq!(states.is_over, [true, false, true]);
+    assert_eq!(worlds.world(0).ending(), Some(&Ending::Completed));
+    assert_eq!((worlds.world(1).steps(), worlds.world(2).steps()), (100, 120));
+
+    let before = worlds.world(0).state().clone();
+    worlds.step(None, 5, &mut states.borrow()).expect("flown");
+    assert_eq!(worlds.world(0).state(), &before, "an ended world keeps its state");
+    worlds.set_autoreset(true);
+    worlds.step(None, 5, &mut states.borrow()).expect("flown");
+    assert_eq!(worlds.seeds().collect::<Vec<_>>(), [10, 40, 12]);
+    assert_eq!((worlds.world(0).steps(), worlds.world(1).steps()), (0, 110));
+    let drawn = template.scenario(&template.own_law(), Draw { seed: 10, jitter_m: None }).expect("a start");
+    assert_eq!(worlds.world(0).state(), Simulation::new(&drawn).expect("a simulation").state());
+    assert!(!states.is_over[0]);
+}
+
+#[test]
+fn a_law_that_fails_ends_its_world_alone() {
+    // Under noise, the law of one world measures a collision.
+    let template = template("pentagon", &["sensing={position_noise_m=0.35, rate_hz=100}", "time.duration_s=2"]);
+    let seeds: Vec<_> = (0..12).collect();
+    let mut worlds = VectorSimulation::new(template, &seeds, Threads::Current).expect("worlds");
+    let mut states = States::of(&worlds);
+    worlds.step(None, 480, &mut states.borrow()).expect("flown");
+    let failed = |k: &usize| matches!(worlds.world(*k).ending(), Some(Ending::LawUndefined(_)));
+    let failed = (0..12).filter(failed).count();
+    let completed = (0..12).filter(|&k| worlds.world(k).ending() == Some(&Ending::Completed)).count();
+    assert!(failed > 0 && completed > 0, "{failed} failed, {completed} completed");
+}
+
+#[test]
+fn wrong_input_is_refused_before_anything_is_flown() {
+    let mut worlds = VectorSimulation::new(template("pentagon", &[]), &[0, 1], Threads::Current).expect("worlds");
+    let mut states = States::of(&worlds);
+    let mut wrong = vec![0.0; 30];
+    for value in [f64::NAN, f64::INFINITY, -1e31] {
+        wrong[15 + 7] = value;
+        let refused = worlds.step(Some(&wrong), 1, &mut states.borrow()).expect_err("not finite");
+        assert!(refused.to_string().starts_with("u[1, 2, 1]: must be a finite number"), "{refused}");
+    }
+    let refused = worlds.step(Some(&wrong[..29]), 1, &mut states.borrow()).expect_err("too short");
+    assert!(matches!(refused, VectorError::Length { what: "u", expected: 30, found: 29 }));
+    states.is_over.pop();
+    assert!(worlds.step(None, 1, &mut states.borrow()).is_err());
+    assert_eq!(worlds.world(0).steps() + worlds.world(1).steps(), 0);
+    assert!(matches!(
+        VectorSimulation::new(template("pentagon", &[]), &[], Threads::Current),
+        Err(VectorError::NoWorlds)
+    ));
+
+    let (pentagon, many) = (template("pentagon", &[]), vec![0; 200_000]);
+    let most = VectorSimulation::most_worlds(pentagon.own());
+    assert!((50_000..200_000).contains(&most));
+    let refused = VectorSimulation::new(pentagon, &many, Threads::Current).err().expect("too many");
+    assert_eq!(
+        refused.to_string(),
+        format!("seeds: at most {most} worlds of this scenario fit into 8 GiB, got 200000")
+    );
+
+    let shielded = template("shielded-crazyflies", &[]);
+    let mut worlds = VectorSimulation::new(shielded, &[0], Threads::Current).expect("worlds");
+    let mut states = States::of(&worlds);
+    let zeros = vec![0.0; 3 * worlds.vehicles()];
+    let refused = worlds.step(Some(&zeros), 1, &mut states.borrow()).expect_err("a shield");
+    assert!(matches!(refused, VectorError::Sim(SimError::ShieldedCommands)));
+}
+
+#[test]
+fn a_seed_without_a_valid_start_is_named_and_resets_nothing() {
+    // A jitter of 0.9 m puts some starts within delta = 2 m.
+    let template = template("pentagon", &["start.jitter_m=0.9"]);
+    let law = template.own_law();
+    let is_valid = |&seed: &u64| template.scenario(&law, Draw { seed, jitter_m: None }).is_ok();
+    let (good, bad): (Vec<u64>, Vec<u64>) = (0..40).partition(is_valid);
+    let refused =
+        VectorSimulation::new(template.clone(), &[good[0], bad[0]], Threads::Current).err().expect("an invalid start");
+    assert!(refused.to_string().starts_with(&format!("seeds[1]: seed {} gives no valid", bad[0])), "{refused}");
+    let mut worlds = VectorSimulation::new(template, &good[..2], Threads::Current).expect("worlds");
+    let mut states = States::of(&worlds);
+    worlds.step(None, 3, &mut states.borrow()).expect("flown");
+    let seeds = [good[2], bad[0]];
+    worlds.reset(&[true, true], Some(&seeds), &mut states.borrow()).expect_err("an invalid start");
+    assert_eq!((worlds.world(0).steps(), worlds.world(1).steps()), (3, 3));
+}

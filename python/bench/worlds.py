@@ -1,0 +1,85 @@
+"""Measures many worlds at once: ``python python/bench/worlds.py``.
+
+Needs a release build (``pip install ./python``). Every world has five vehicles under given accelerations, and every
+step is audited. The unit is a million steps of single vehicles. Each rate is the best of several runs, measured in turn
+in one process. Another process on the same cores lowers the rates of real time, and hardly those of processor time.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable
+
+import numpy as np
+import tautline as tl
+
+ROUNDS = 5
+WORLDS = 1000
+SETS = {"time.duration_s": 1000.0}
+
+
+def rates(works: dict[str, tuple[Callable[[], object], int]]) -> dict[str, tuple[float, float]]:
+    """Returns the highest rates of each call, in millions a second of processor time and of real time."""
+    best = dict.fromkeys(works, (0.0, 0.0))
+    for _ in range(ROUNDS):
+        for name, (work, count) in works.items():
+            began, used = time.perf_counter(), time.process_time()
+            work()
+            seconds = time.process_time() - used, time.perf_counter() - began
+            best[name] = tuple(max(so_far, count / s / 1e6) for so_far, s in zip(best[name], seconds, strict=True))
+    return best
+
+
+def vector(scenario: tl.Scenario, threads: int, calls: int, steps: int) -> tuple[Callable[[], object], int]:
+    """Returns work in many worlds: some calls of some steps each."""
+    sim = tl.VectorSimulation(scenario, WORLDS, threads=threads)
+    u = np.random.default_rng(0).normal(0.0, 1e-3, (WORLDS, len(scenario), 3))
+
+    def work() -> None:
+        for _ in range(calls):
+            sim.step(u, steps=steps)
+
+    return work, calls * steps * WORLDS * len(scenario)
+
+
+def loop(scenario: tl.Scenario, calls: int, worlds: int = 20) -> tuple[Callable[[], object], int]:
+    """Returns work in a Python loop over single simulations."""
+    sims = [tl.Simulation(scenario) for _ in range(worlds)]
+    u = np.zeros((len(scenario), 3))
+
+    def work() -> None:
+        for _ in range(calls):
+            for sim in sims:
+                sim.step(u)
+
+    return work, calls * worlds * len(scenario)
+
+
+def main() -> None:
+    """Prints a table of rates."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    print(f"million vehicle steps; {WORLDS} worlds of five vehicles, {cores} cores, load {os.getloadavg()[0]:.1f}")
+    for title, scenario in (
+        ("points at 240 Hz", tl.Scenario("pentagon", set=SETS)),
+        ("Crazyflies at 500 Hz", tl.Scenario("crazyflies", set={**SETS, "time.dt_s": 0.002})),
+    ):
+        found = rates(
+            {
+                "1 thread, 1 step a call": vector(scenario, 1, 40, 1),
+                "1 thread, 10 steps a call": vector(scenario, 1, 10, 10),
+                "2 threads, 1 step a call": vector(scenario, 2, 40, 1),
+                "2 threads, 10 steps a call": vector(scenario, 2, 10, 10),
+                "Python loop over single simulations": loop(scenario, 100),
+            }
+        )
+        print(title)
+        for name, (of_processor, of_clock) in found.items():
+            print(f"  {name:36s} {of_processor:6.2f} a second of processor time, {of_clock:6.2f} a second")
+        for steps in ("1 step", "10 steps"):
+            ratio = found[f"2 threads, {steps} a call"][1] / found[f"1 thread, {steps} a call"][1]
+            print(f"  two threads, {steps} a call: {ratio:.2f} times as fast as one")
+
+
+if __name__ == "__main__":
+    main()

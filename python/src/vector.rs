@@ -1,0 +1,304 @@
+//! Many worlds of a scenario that the caller steps together.
+
+use std::sync::{Mutex, TryLockError};
+
+use numpy::ndarray::{ArrayView3, Ix3};
+use numpy::{
+    Element, PyArray, PyArray1, PyArray3, PyArrayDescrMethods as _, PyArrayMethods as _, PyReadonlyArray1,
+    PyUntypedArray, PyUntypedArrayMethods as _, dtype,
+};
+use pyo3::prelude::*;
+use tautline::scenario::{Override, Template};
+use tautline::sim::{self, StatesMut, Threads, VectorError};
+
+use crate::errors::{IntoException as _, internal_error, wrong_input, wrong_input_with_code, wrong_type};
+use crate::numbers::shape_text;
+use crate::scenario::Scenario;
+use crate::simulation::Simulation;
+use crate::work::{ProcessPool, Signals, run_detached};
+
+/// Worlds in progress, and the arrays that hold their states.
+#[pyclass(frozen, module = "tautline._native")]
+pub(crate) struct VectorSimulation {
+    /// Numbers of worlds and of vehicles.
+    shape: [usize; 2],
+    worlds: Mutex<sim::VectorSimulation>,
+    threads: Workers,
+    positions: Py<PyArray3<f64>>,
+    velocities: Py<PyArray3<f64>>,
+    least_clearance_m: Py<PyArray1<f64>>,
+    is_over: Py<PyArray1<bool>>,
+}
+
+/// Threads of the worlds.
+enum Workers {
+    /// One for each core, which the process shares.
+    Shared,
+    /// The calling thread alone.
+    One,
+    /// The calling thread and a pool.
+    Own(ProcessPool),
+}
+
+impl Workers {
+    fn of(threads: usize) -> Self {
+        match threads {
+            0 => Self::Shared,
+            1 => Self::One,
+            _ => Self::Own(ProcessPool::new(threads - 1)),
+        }
+    }
+
+    /// Returns the threads of a call.
+    fn now(&self) -> PyResult<Threads> {
+        Ok(match self {
+            Self::Shared => Threads::Current,
+            Self::One => Threads::One,
+            Self::Own(pool) => Threads::With(pool.get().map_err(|error| internal_error(&error.to_string()))?),
+        })
+    }
+}
+
+impl VectorSimulation {
+    /// Calls `work` with the worlds and the memory of the arrays. Raises `Error` while another call uses them.
+    fn with<T: Send>(
+        &self,
+        py: Python<'_>,
+        work: impl FnOnce(&mut sim::VectorSimulation, &mut StatesMut<'_>) -> T + Send,
+    ) -> PyResult<T> {
+        const BUSY: &str = "the worlds are being stepped by another thread";
+        let busy = |_| wrong_input(BUSY);
+        let mut positions = self.positions.bind(py).try_readwrite().map_err(busy)?;
+        let mut velocities = self.velocities.bind(py).try_readwrite().map_err(busy)?;
+        let mut least_clearance_m = self.least_clearance_m.bind(py).try_readwrite().map_err(busy)?;
+        let mut is_over = self.is_over.bind(py).try_readwrite().map_err(busy)?;
+        let split = |_| internal_error("an array is not contiguous");
+        let mut states = StatesMut {
+            positions_m: positions.as_slice_mut().map_err(split)?,
+            velocities_m_s: velocities.as_slice_mut().map_err(split)?,
+            least_clearance_m: least_clearance_m.as_slice_mut().map_err(split)?,
+            is_over: is_over.as_slice_mut().map_err(split)?,
+        };
+        let threads = self.threads.now()?;
+        let guarded = || match self.worlds.try_lock() {
+            Ok(mut worlds) => {
+                worlds.set_threads(threads);
+                Ok(work(&mut worlds, &mut states))
+            }
+            Err(TryLockError::WouldBlock) => Err(BUSY),
+            Err(TryLockError::Poisoned(_)) => Err("the worlds failed before; make new ones"),
+        };
+        run_detached(py, guarded)?.map_err(wrong_input)
+    }
+
+    /// Copies commands (E, N, 3) or (E, N, 2) of float32 or float64 in any memory order.
+    fn take_commands(&self, given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+        let [worlds, vehicles] = self.shape;
+        let Ok(array) = given.cast::<PyUntypedArray>() else {
+            let kind = given.get_type().qualname()?;
+            return Err(wrong_type(format!("u: a NumPy array is needed, not {kind}; give numpy.asarray(...)")));
+        };
+        if given.hasattr("mask")? {
+            return Err(wrong_type("u: a masked array has unknown numbers; give it as .filled(0.0)"));
+        }
+        let kind = array.dtype();
+        let is_single = kind.is_equiv_to(&dtype::<f32>(given.py()));
+        if !is_single && !kind.is_equiv_to(&dtype::<f64>(given.py())) {
+            let problem = format!("u: an array of float32 or float64 is needed, not of {kind}");
+            return Err(wrong_type(format!("{problem}; give it as .astype(float)")));
+        }
+        let shape = array.shape();
+        if shape.len() != 3 || shape[..2] != self.shape || !matches!(shape[2], 2 | 3) {
+            let found = shape_text(shape);
+            return Err(wrong_input(format!(
+                "u: accelerations of shape ({worlds}, {vehicles}, 3) are needed, not {found}"
+            )));
+        }
+        if !array.is_aligned() {
+            return Err(wrong_type("u: its numbers are not aligned in memory; give a copy, numpy.array(...)"));
+        }
+        if is_single { copied::<f32>(given) } else { copied::<f64>(given) }
+    }
+
+    fn filled<T: Element + Copy>(py: Python<'_>, numbers: impl Iterator<Item = T>) -> Bound<'_, PyArray1<T>> {
+        PyArray1::from_iter(py, numbers)
+    }
+}
+
+#[pymethods]
+impl VectorSimulation {
+    /// Creates one world for each seed, at its start. `threads` is 0 for all.
+    #[new]
+    fn new(
+        py: Python<'_>,
+        scenario: &Scenario,
+        seeds: PyReadonlyArray1<'_, u64>,
+        threads: usize,
+        autoreset: bool,
+    ) -> PyResult<Self> {
+        let (request, seeds) = (&scenario.request, seeds.as_array().to_vec());
+        let workers = Workers::of(threads);
+        let now = workers.now()?;
+        let begin = || -> Result<_, PyErr> {
+            let parsed = request.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>();
+            let template = parsed.and_then(|parsed| Template::read(&request.source, &parsed));
+            let template = template.map_err(tautline::scenario::ScenarioError::into_exception)?;
+            if template.own() != &scenario.scenario {
+                return Err(wrong_input(format!(
+                    "{}: has changed since it was read; create a new Scenario",
+                    request.argument
+                )));
+            }
+            let mut worlds = sim::VectorSimulation::new(template, &seeds, now).map_err(raised)?;
+            worlds.set_autoreset(autoreset);
+            Ok(worlds)
+        };
+        let worlds = run_detached(py, begin)??;
+        let shape = [worlds.count(), worlds.vehicles()];
+        let [count, vehicles] = shape;
+        let made = Self {
+            shape,
+            worlds: Mutex::new(worlds),
+            threads: workers,
+            positions: PyArray3::zeros(py, [count, vehicles, 3], false).unbind(),
+            velocities: PyArray3::zeros(py, [count, vehicles, 3], false).unbind(),
+            least_clearance_m: PyArray1::zeros(py, count, false).unbind(),
+            is_over: PyArray1::from_vec(py, vec![false; count]).unbind(),
+        };
+        made.with(py, |worlds, states| worlds.write(states))?.map_err(raised)?;
+        Ok(made)
+    }
+
+    /// Largest number of worlds of a scenario.
+    #[staticmethod]
+    fn most_worlds(scenario: &Scenario) -> usize {
+        sim::VectorSimulation::most_worlds(&scenario.scenario)
+    }
+
+    /// Flies a number of steps in every world, with these accelerations if given.
+    fn step(&self, py: Python<'_>, commands: Option<&Bound<'_, PyAny>>, steps: u64) -> PyResult<()> {
+        let given = commands.map(|given| self.take_commands(given)).transpose()?;
+        let fly = |worlds: &mut sim::VectorSimulation, states: &mut StatesMut<'_>| {
+            let mut signals = Signals::new();
+            let flown = worlds.step_while(given.as_deref(), steps, states, &mut || signals.are_silent());
+            (flown, signals.raised)
+        };
+        let (flown, raised_by_signal) = self.with(py, fly)?;
+        flown.map_err(raised)?;
+        raised_by_signal.map_or(Ok(()), Err)
+    }
+
+    /// Resets the chosen worlds, to these seeds if given.
+    fn reset(
+        &self,
+        py: Python<'_>,
+        chosen: PyReadonlyArray1<'_, bool>,
+        seeds: Option<PyReadonlyArray1<'_, u64>>,
+    ) -> PyResult<()> {
+        let chosen = chosen.as_array().to_vec();
+        let seeds = seeds.map(|seeds| seeds.as_array().to_vec());
+        self.with(py, |worlds, states| worlds.reset(&chosen, seeds.as_deref(), states))?.map_err(raised)
+    }
+
+    /// (E, N, 3) positions [m].
+    #[getter]
+    fn positions<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f64>> {
+        self.positions.bind(py).clone()
+    }
+
+    /// (E, N, 3) velocities [m/s].
+    #[getter]
+    fn velocities<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f64>> {
+        self.velocities.bind(py).clone()
+    }
+
+    /// (E,) smallest clearances so far [m].
+    #[getter]
+    fn least_clearance_m<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.least_clearance_m.bind(py).clone()
+    }
+
+    /// (E,) whether each world has ended.
+    #[getter]
+    fn is_over<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<bool>> {
+        self.is_over.bind(py).clone()
+    }
+
+    /// (E,) seeds.
+    #[getter]
+    fn seeds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u64>>> {
+        Ok(Self::filled(py, self.with(py, |worlds, _| worlds.seeds().collect::<Vec<_>>())?.into_iter()))
+    }
+
+    /// (E,) times flown [s].
+    #[getter]
+    fn t<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        Ok(Self::filled(py, self.each(py, sim::Simulation::time_s)?.into_iter()))
+    }
+
+    /// (E,) whole steps flown.
+    #[getter]
+    fn steps<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray1<u64>>> {
+        Ok(Self::filled(py, self.each(py, sim::Simulation::steps)?.into_iter()))
+    }
+
+    /// `completed` or the reason of an early end of each world; None before the end.
+    #[getter]
+    fn endings(&self, py: Python<'_>) -> PyResult<Vec<Option<String>>> {
+        let reason = |ending: &sim::Ending| ending.reason().unwrap_or_else(|| "completed".to_owned());
+        self.each(py, |world| world.ending().map(reason))
+    }
+
+    /// Verdicts of the chosen worlds: so far, or of the whole flight after its end.
+    fn statuses(&self, py: Python<'_>, chosen: PyReadonlyArray1<'_, bool>) -> PyResult<Vec<Option<&'static str>>> {
+        let chosen = chosen.as_array().to_vec();
+        let judge = |world: &sim::Simulation| {
+            let (flight, is_over) = (world.clone().finish(), world.ending().is_some());
+            if is_over { flight.status() } else { flight.status_so_far() }.name()
+        };
+        let judge_all = |worlds: &mut sim::VectorSimulation, _: &mut StatesMut<'_>| {
+            let places = chosen.iter().enumerate().take(worlds.count());
+            places.map(|(k, chosen)| chosen.then(|| judge(worlds.world(k)))).collect()
+        };
+        self.with(py, judge_all)
+    }
+
+    /// Returns an independent copy of a world.
+    fn world(&self, py: Python<'_>, world: usize) -> PyResult<Simulation> {
+        let copy = |worlds: &mut sim::VectorSimulation, _: &mut StatesMut<'_>| {
+            (world < worlds.count()).then(|| worlds.world(world).clone())
+        };
+        let of = self.shape[0];
+        let missing = || wrong_input(format!("world: must be below {of}, the number of worlds, got {world}"));
+        Ok(Simulation::of(self.with(py, copy)?.ok_or_else(missing)?))
+    }
+}
+
+impl VectorSimulation {
+    /// Returns a value of each world.
+    fn each<T: Send>(&self, py: Python<'_>, of: impl Fn(&sim::Simulation) -> T + Send + Sync) -> PyResult<Vec<T>> {
+        self.with(py, |worlds, _| (0..worlds.count()).map(|k| of(worlds.world(k))).collect())
+    }
+}
+
+/// Returns the numbers of an array (E, N, 3) or (E, N, 2), vehicle by vehicle; the third axis of the latter is 0.
+fn copied<T: Element + Copy + Into<f64>>(given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
+    let array = given.cast::<PyArray<T, Ix3>>()?;
+    let array = array.try_readonly().map_err(|error| wrong_input(format!("u: {error}; give a copy")))?;
+    let view: ArrayView3<'_, T> = array.as_array();
+    if let (Some(numbers), 3) = (view.as_slice(), view.shape()[2]) {
+        return Ok(numbers.iter().map(|&x| x.into()).collect());
+    }
+    let vehicles = view.rows().into_iter();
+    Ok(vehicles.flat_map(|row| (0..3).map(move |axis| row.get(axis).map_or(0.0, |&x| x.into()))).collect())
+}
+
+/// Returns the exception of an error.
+fn raised(error: VectorError) -> PyErr {
+    let text = error.to_string();
+    match error {
+        VectorError::Seed { why, .. } => wrong_input_with_code(why.code(), text),
+        VectorError::Sim(why) => why.into_exception(),
+        _ => wrong_input(text),
+    }
+}

@@ -1,0 +1,207 @@
+"""Many worlds of a scenario that the caller steps together, for learning and for statistics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _native
+from ._arguments import PathLike, boolean
+from ._arguments import count as whole_number
+from ._native import Error
+from ._scenario import Scenario, to_scenario
+from ._simulation import Simulation
+
+
+class VectorSimulation:
+    """Worlds of one scenario that advance together, on all cores and without the interpreter's lock.
+
+    Example::
+
+        sim = tl.VectorSimulation("pentagon", 1000, set={"start.jitter_m": 0.1})
+        for _ in range(400):
+            sim.step(policy(sim.positions, sim.velocities), steps=12)    # (E, N, 3) accelerations [m/s^2].
+
+    World e flies the scenario with ``seeds[e]`` (by default e) as ``start.seed`` and, where the flight is random, as
+    ``noise.seed``. It has the bits of a single :class:`Simulation` with the same commands, for any number of
+    ``threads`` (by default one for each core). Every step is audited.
+
+    A world ends at the scenario's duration, or where its motion or law cannot go on. It stops no other world: it keeps
+    its last state, ``is_over`` is True and ``endings`` has the reason. A violation ends no world: ``least_clearance_m``
+    is below 0. With ``autoreset=True``, a step first resets the worlds that have ended, to the next seed of each: its
+    seed plus ``num_envs``. They do not fly in that call.
+
+    Raises :class:`Error` for a wrong scenario or a seed without a valid start.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario | PathLike = "pentagon",
+        num_envs: int = 1,
+        *,
+        seeds: Sequence[int] | NDArray[np.integer[Any]] | None = None,
+        threads: int | None = None,
+        autoreset: bool = False,
+        set: Mapping[str, Any] | None = None,
+    ) -> None:
+        self.scenario = to_scenario(scenario, set)
+        #: Number of worlds E.
+        self.num_envs = whole_number(num_envs, "num_envs")
+        if self.num_envs < 1:
+            raise Error(f"num_envs: must be at least 1, got {num_envs}")
+        most = _native.VectorSimulation.most_worlds(self.scenario._native)
+        if self.num_envs > most:
+            raise Error(f"num_envs: must be at most {most} worlds of {len(self.scenario)} vehicles, got {num_envs}")
+        workers = 0 if threads is None else whole_number(threads, "threads")
+        if threads is not None and not 1 <= workers <= 1024:
+            raise Error(f"threads: must be from 1 to 1024, got {threads}; None uses one for each core")
+        numbered = np.arange(self.num_envs, dtype=np.uint64) if seeds is None else self._seeds(seeds)
+        self._native = _native.VectorSimulation(
+            self.scenario._native, numbered, workers, boolean(autoreset, "autoreset")
+        )
+        #: Whether a step resets the worlds that have ended.
+        self.autoreset = bool(autoreset)
+
+    def step(
+        self,
+        u: NDArray[np.floating[Any]] | None = None,
+        steps: int = 1,
+        out: NDArray[np.floating[Any]] | None = None,
+    ) -> None:
+        """Flies steps of ``scenario.dt_s`` in every world, fewer where a world ends.
+
+        ``u`` (E, N, 3) or (E, N, 2) of float32 or float64 are accelerations [m/s^2] that replace those of the law and
+        are held over all of these steps. No step is divided for the law then. Those of ended worlds are ignored.
+        Without ``u`` the scenario's law flies. ``out`` (E, N, 6) of float32 or float64 receives positions and
+        velocities.
+
+        Raises :class:`Error` for a wrong shape, or with the place of a number that is not finite; ``TypeError`` for a
+        wrong dtype. No world moves then.
+        """
+        if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)):
+            raise TypeError(f"steps: a whole number is needed, not {type(steps).__name__}")
+        if steps < 1:
+            raise Error(f"steps: must be at least 1, got {steps}")
+        if out is not None:
+            self._check_out(out)
+        self._native.step(u, min(int(steps), 2**63))
+        if out is not None:
+            out[..., :3], out[..., 3:] = self.positions, self.velocities
+
+    def reset(
+        self,
+        mask: NDArray[np.bool_] | Sequence[bool] | None = None,
+        seeds: Sequence[int] | NDArray[np.integer[Any]] | None = None,
+    ) -> None:
+        """Resets the worlds with ``mask`` (E,), by default all, to their starts.
+
+        ``seeds`` (E,) are the new seeds; those outside of the mask are ignored. Without seeds each world takes its next
+        seed: its seed plus ``num_envs``.
+
+        Raises :class:`Error` for a wrong shape or a seed without a valid start. No world is reset then.
+        """
+        chosen = self._mask(mask)
+        self._native.reset(chosen, None if seeds is None else self._seeds(seeds))
+
+    @property
+    def positions(self) -> NDArray[np.float64]:
+        """(E, N, 3) true positions [m]. This is one array, which every call updates without a copy. Writing to it
+        changes no world."""
+        return self._native.positions
+
+    @property
+    def velocities(self) -> NDArray[np.float64]:
+        """(E, N, 3) true velocities [m/s], one array like ``positions``."""
+        return self._native.velocities
+
+    @property
+    def least_clearance_m(self) -> NDArray[np.float64]:
+        """(E,) smallest clearance of each world so far [m], one array like ``positions``: separation less delta, or
+        distance to an obstacle less its clearance. It is below 0 exactly where there is a violation, and NaN for one
+        vehicle without obstacles."""
+        return self._native.least_clearance_m
+
+    @property
+    def is_over(self) -> NDArray[np.bool_]:
+        """(E,) whether each world has ended, one array like ``positions``."""
+        return self._native.is_over
+
+    @property
+    def endings(self) -> list[str | None]:
+        """``completed`` or the reason of an early end of each world; None before its end."""
+        return self._native.endings
+
+    @property
+    def seeds(self) -> NDArray[np.uint64]:
+        """(E,) present seeds, a copy."""
+        return self._native.seeds
+
+    @property
+    def t(self) -> NDArray[np.float64]:
+        """(E,) times flown [s], a copy."""
+        return self._native.t
+
+    @property
+    def steps(self) -> NDArray[np.uint64]:
+        """(E,) whole steps flown, a copy."""
+        return self._native.steps
+
+    def statuses(self, mask: NDArray[np.bool_] | Sequence[bool] | None = None) -> list[str | None]:
+        """Returns the verdict of each world with ``mask`` (E,), by default of all, and None for the others.
+
+        It is ``clear``, ``violation`` or ``undecided`` so far, and after the end that of the whole flight, which is
+        never ``clear`` where it ended early.
+        """
+        return self._native.statuses(self._mask(mask))
+
+    def world(self, index: int) -> Simulation:
+        """Returns an independent copy of a world, which has its violations and its closest approach.
+
+        ``scenario`` of the copy is that of all worlds: it has the start of its own seed only.
+        """
+        other = Simulation.__new__(Simulation)
+        other.scenario, other._native = self.scenario, self._native.world(whole_number(index, "world"))
+        return other
+
+    def _mask(self, mask: NDArray[np.bool_] | Sequence[bool] | None) -> NDArray[np.bool_]:
+        if mask is None:
+            return np.ones(self.num_envs, dtype=np.bool_)
+        chosen = np.asarray(mask)
+        if chosen.dtype != np.bool_:
+            raise TypeError(f"mask: an array of bool is needed, not of {chosen.dtype}")
+        if chosen.shape != (self.num_envs,):
+            raise Error(f"mask: an array of shape ({self.num_envs},) is needed, not of shape {chosen.shape}")
+        return np.ascontiguousarray(chosen)
+
+    def _seeds(self, seeds: Sequence[int] | NDArray[np.integer[Any]]) -> NDArray[np.uint64]:
+        given = np.asarray(seeds)
+        if given.dtype == np.bool_ or not (np.issubdtype(given.dtype, np.integer) or given.dtype == object):
+            raise TypeError(f"seeds: whole numbers are needed, not {given.dtype}")
+        if given.shape != (self.num_envs,):
+            raise Error(f"seeds: an array of shape ({self.num_envs},) is needed, not of shape {given.shape}")
+        for place, seed in enumerate(given.tolist()):
+            if isinstance(seed, bool) or not isinstance(seed, int):
+                raise TypeError(f"seeds[{place}]: a whole number is needed, not {type(seed).__name__}")
+            if not 0 <= seed < 2**63:
+                raise Error(f"seeds[{place}]: must be a whole number from 0 to 2^63 - 1, got {seed}")
+        return np.ascontiguousarray(given, dtype=np.uint64)
+
+    def _check_out(self, out: object) -> None:
+        shape = (self.num_envs, len(self.scenario), 6)
+        if not isinstance(out, np.ndarray) or out.dtype not in (np.float32, np.float64):
+            kind = out.dtype if isinstance(out, np.ndarray) else type(out).__name__
+            raise TypeError(f"out: an array of float32 or float64 is needed, not {kind}")
+        if out.shape != shape:
+            raise Error(f"out: an array of shape {shape} is needed, not of shape {out.shape}")
+        if not out.flags.writeable:
+            raise Error("out: the array is read-only; give a copy")
+
+    def __len__(self) -> int:
+        return self.num_envs
+
+    def __repr__(self) -> str:
+        over = int(self.is_over.sum())
+        return f"<VectorSimulation {self.scenario.name}: {self.num_envs} worlds, {over} ended>"
