@@ -31,7 +31,7 @@ fuzz_target!(|bytes: &[u8]| {
     judge(&inputs);
 });
 
-/// Judges the inputs as they arrive, 10 ms apart, and checks that no assessment is clear while two vehicles are too near.
+/// Judges the inputs, which arrive 10 ms apart. Checks that no assessment is clear while two vehicles are too near.
 fn judge(inputs: &[Input]) {
     let settings = Settings { clocks: ClockScope::PerVehicle, ..Settings::default() };
     let delta_m = settings.delta_m;

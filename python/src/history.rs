@@ -16,7 +16,7 @@ use crate::numbers::by_row;
 
 /// First bytes of a saved simulation.
 const MAGIC: &[u8] = b"tautline simulation 1\n";
-/// Largest memory of the commands of a history \[bytes\]. A longer history is dropped.
+/// Largest memory of the commands of a history \[bytes\]. A longer history is dropped ([`TOO_LONG`]).
 const MAX_BYTES: usize = 256 << 20;
 /// Tags of the records of a saved simulation.
 const OWN: u8 = 1;
@@ -47,10 +47,23 @@ pub(crate) struct History {
     /// Calls of the law in Python, in order.
     pub(crate) calls: Vec<Call>,
     bytes: usize,
-    is_dropped: bool,
+    /// Reason and remedy, if the history is not known.
+    lost: Option<&'static str>,
 }
 
+/// Reason of a history that was too long, and its remedy.
+const TOO_LONG: &str = "the accelerations of the flight so far exceed 256 MiB and were dropped; save earlier, or let a \
+                        law of the scenario fly";
+/// Reason of a copy of a world, and its remedy.
+const OF_A_WORLD: &str =
+    "a copy of a world of a VectorSimulation has no history; fly a Simulation of the same scenario";
+
 impl History {
+    /// Returns the history of a copy of a world, which is not known.
+    pub(crate) fn of_world() -> Self {
+        Self { lost: Some(OF_A_WORLD), ..Self::default() }
+    }
+
     /// Adds steps, with accelerations if they came from outside.
     pub(crate) fn add_steps(&mut self, commands: Option<&Arc<Rows>>, steps: u64) {
         let same = |one: &Rows, other: &Rows| one.iter().map(|x| x.to_bits()).eq(other.iter().map(|x| x.to_bits()));
@@ -80,22 +93,18 @@ impl History {
 
     fn count(&mut self, numbers: usize) {
         self.bytes += 8 * numbers;
-        if self.bytes > MAX_BYTES || self.is_dropped {
-            *self = Self { is_dropped: true, bytes: 0, ..Self::default() };
+        if self.bytes > MAX_BYTES || self.lost.is_some() {
+            *self = Self { lost: self.lost.or(Some(TOO_LONG)), ..Self::default() };
         }
     }
 
     /// Returns a saved simulation with this history and state.
     ///
     /// # Errors
-    /// `Error` if the history was too long and was dropped.
+    /// `Error` if the history is not known.
     pub(crate) fn save(&self, toml: &str, law: Option<&str>, state: &Swarm) -> PyResult<Vec<u8>> {
-        if self.is_dropped {
-            let most = MAX_BYTES >> 20;
-            return Err(wrong_input(format!(
-                "save: the accelerations of the flight so far exceed {most} MiB and were dropped; save earlier, or \
-                 let a law of the scenario fly"
-            )));
+        if let Some(lost) = self.lost {
+            return Err(wrong_input(format!("save: {lost}")));
         }
         let program = Program::running().map_err(Failure::into_exception)?.sha256;
         let header = json!({ "program": program, "law": law, "vehicles": state.count(), "scenario": toml });

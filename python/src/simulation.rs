@@ -45,9 +45,10 @@ type Violation = ((usize, usize), f64, f64, f64);
 type Closest = ((usize, usize), f64, f64);
 
 impl Simulation {
-    /// Returns a simulation under a law of this library.
-    pub(crate) fn of(simulation: sim::Simulation) -> Self {
-        Self { count: simulation.state().count(), is_of_python: false, state: Mutex::new(simulation) }
+    /// Returns a simulation that was a world of many.
+    pub(crate) fn of_world(simulation: sim::Simulation) -> Self {
+        let (count, history) = (simulation.state().count(), History::of_world());
+        Self { count, python_law: None, state: Mutex::new(State { simulation, history }) }
     }
 
     /// Calls `work` with the simulation. Raises `Error` while another call uses it.

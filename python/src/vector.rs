@@ -165,7 +165,7 @@ impl VectorSimulation {
             least_clearance_m: PyArray1::zeros(py, count, false).unbind(),
             is_over: PyArray1::from_vec(py, vec![false; count]).unbind(),
         };
-        made.with(py, |worlds, states| worlds.write(states))?.map_err(raised)?;
+        made.with(py, sim::VectorSimulation::write)?.map_err(raised)?;
         Ok(made)
     }
 
@@ -270,7 +270,7 @@ impl VectorSimulation {
         };
         let of = self.shape[0];
         let missing = || wrong_input(format!("world: must be below {of}, the number of worlds, got {world}"));
-        Ok(Simulation::of(self.with(py, copy)?.ok_or_else(missing)?))
+        Ok(Simulation::of_world(self.with(py, copy)?.ok_or_else(missing)?))
     }
 }
 

@@ -20,6 +20,13 @@ def commands(worlds: int, step: int, axes: int = 3) -> np.ndarray:
 
 
 class Bits(Case):
+    def test_a_copy_of_a_world_flies_on_but_cannot_be_saved(self) -> None:
+        worlds = tl.VectorSimulation("pentagon", 2)
+        copy = worlds.world(1)
+        copy.step(steps=3)
+        with self.assertRaisesRegex(tl.Error, "save: a copy of a world of a VectorSimulation has no history"):
+            copy.save()
+
     def test_worlds_have_the_bits_of_single_simulations_for_any_threads(self) -> None:
         for name, law in itertools.product(("pentagon", "crazyflies"), (False, True)):
             sets = {**JITTER, "start.jitter_m": 0.01 if name == "crazyflies" else 0.1}
