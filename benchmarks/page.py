@@ -58,7 +58,7 @@ def speed(rows: Sequence[Row]) -> list[str]:
     lines = []
     for row in shown:
         peer = row["peer"]
-        name = peer["name"] if str(row["peer"].get("version", "")) in peer["name"] else f"{peer['name']} {peer['version']}"
+        name = f"{peer['name']} {peer['version']}"
         ratio = f"{row['ratio']:.3g}"
         lines.append((row["work"], time(row["ours"]["time"], row["unit"]), f"{name}: {time(peer['time'], row['unit'])}",
                       ratio if row["ratio"] >= 1 else f"**{ratio}**"))
@@ -120,13 +120,13 @@ def sampling(rows: Sequence[Row]) -> list[str]:
             verdict = "clear"
             if row["violated"]:
                 verdict = "violation" if row["seen_at_samples"] else "**violation, hidden**"
-            lines.append((row["motion"], f"{row['rate_hz']:g} Hz", f"{row['true_m']:.3f} m", f"{row['samples_m']:.3f} m",
-                          f"{row['straight_m']:.3f} m", f"{row['hidden_m']:.3f} m", f"{row['delta_m']:g} m", verdict))
+            lengths = [f"{row[key]:.3f} m" for key in ("true_m", "samples_m", "straight_m", "hidden_m")]
+            lines.append((row["motion"], f"{row['rate_hz']:g} Hz", *lengths, f"{row['delta_m']:g} m", verdict))
     return [
         "## What sampling hides",
         "The separation of the whole motion, at its samples, and on straight lines between the samples. The distance"
         "\nthat samples hide is their separation less that of the whole motion.",
-        table(("motion", "samples", "whole motion", "at samples", "straight lines", "hidden", "limit", "verdict"), lines),
+        table(("motion", "rate", "whole motion", "at samples", "straight lines", "hidden", "limit", "verdict"), lines),
         "Checks of other tools that see positions at samples only, each read in its source:",
         table(("tool", "check", "rate", "source"), TOOLS),
     ]

@@ -8,7 +8,7 @@ from typing import Any
 
 
 def fly(task: dict[str, Any]) -> dict[str, Any]:
-    """Flies `seconds`, half of them on straight lines to the slots, and returns wall-clock time [s] and the last positions [m].
+    """Flies `seconds`, half of them on straight lines to the slots. Returns the time [s] and the last positions [m].
 
     One world on the processor: first-principles physics, its own position controller at `control_hz`. The functions
     are compiled before the measurement.
@@ -62,7 +62,7 @@ def fly(task: dict[str, Any]) -> dict[str, Any]:
         "wall_s": wall_s,
         "positions_m": last.astype(float).tolist(),
         "version": importlib.metadata.version("crazyflow"),
-        "settings": "one world, first-principles dynamics, Euler integrator, its own position controller, float32, jax on the processor",
+        "settings": "one world, first-principles dynamics, Euler, own position controller, float32, jax on the processor",
     }
 
 

@@ -165,7 +165,8 @@ def fly(task: dict[str, Any]) -> dict[str, Any]:
     """Flies `steps` steps and returns the time of a step and of the law in it [us], and the last positions [m]."""
     compiled = task["engine"] != "plain"
     law: Callable[..., None] = numba.njit(cache=True, fastmath=True)(command) if compiled else command
-    engine = {"plain": Plain, "mujoco": MuJoCo, "pybullet": PyBullet}[task["engine"]](task)
+    engines: dict[str, type[Any]] = {"plain": Plain, "mujoco": MuJoCo, "pybullet": PyBullet}
+    engine = engines[task["engine"]](task)
     n, dt, alpha, delta = len(task["positions_m"]), task["dt_s"], task["alpha"], task["delta_m"]
     table: Any = inverse_stiffness(task["slots_m"], delta)
     u: Any = [0.0] * (3 * n)

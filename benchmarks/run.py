@@ -1,5 +1,7 @@
 """Benchmarks of tautline beside other projects: speed, missions, and what sampling hides.
 
+Usage:
+
     python benchmarks/run.py [--quick] [--only GROUP...] [--json FILE] [--markdown FILE]
 
 Peers come from PyPI, each in a virtual environment of its own under target/benchmarks. A peer that cannot be installed

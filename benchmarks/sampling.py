@@ -46,6 +46,24 @@ TOOLS = (
         "as often as the caller asks",
         "learnsyslab/crazyflow 29a3211, crazyflow/sim/sim.py (contacts)",
     ),
+    (
+        "EGO-Planner, swarm",
+        "distance of two B-splines at steps of a plan",
+        "33 Hz (steps of 0.03 s)",
+        "ZJU-FAST-Lab/ego-planner-swarm 92fe9f7, src/planner/plan_manage/src/planner_manager.cpp (checkCollision)",
+    ),
+    (
+        "VMAS, navigation",
+        "distance of each pair at the states after a step",
+        "10 Hz by default",
+        "proroklab/VectorizedMultiAgentSimulator 7fd3a77, vmas/scenarios/navigation.py, vmas/simulator/core.py",
+    ),
+    (
+        "Skybrush Studio for Blender",
+        "nearest neighbours in the current frame",
+        "the frame rate of the scene",
+        "skybrush-io/studio-blender 97992b3, src/modules/sbstudio/plugin/tasks/safety_check.py",
+    ),
 )
 
 

@@ -1,7 +1,7 @@
 """Speed: tautline and a peer do the same work on the same core, in turns.
 
 A round measures tautline and then the peer. The least time of the rounds counts on both sides. A peer of the
-complete graph flies the same law from the same start with the same step; if its last positions differ by more than
+complete graph flies the same law from the same start with the same step. If its last positions differ by more than
 `SAME_M`, its row is "not comparable" and has no ratio.
 """
 
@@ -65,7 +65,7 @@ def complete_graph(
     `peer_alpha` is the scale of the peer's tension [m^2/s^2]. Another value than 1 is a wrong law, for tests.
     """
     start, slots, delta_m = lattice(count, 4.0), lattice(count, 3.0), 2.0
-    tables = {
+    tables: dict[str, dict[str, Any]] = {
         "swarm": {"dimensions": 3},
         "start": {"positions_m": points(start)},
         "formation": {"shape": "points", "points_m": points(slots)},
@@ -125,7 +125,7 @@ def quadrotors(
 ) -> Row:
     """Compares the time of a second of flight of quadrotors. Models and controllers of both sides differ."""
     start, slots = lattice(count, 0.8, 1.0), lattice(count, 0.7, 1.0)
-    tables = {
+    tables: dict[str, dict[str, Any]] = {
         "swarm": {"dimensions": 3},
         "vehicle": {"model": "crazyflie", "attitude_hz": float(hz)},
         "start": {"positions_m": points(start)},
