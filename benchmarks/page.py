@@ -1,5 +1,6 @@
 """The benchmarks as Markdown, and the block of a page that the command replaces."""
 
+import math
 import pathlib
 from collections.abc import Iterable, Sequence
 from typing import Any
@@ -56,12 +57,14 @@ def run(report: dict[str, Any]) -> str:
 def speed(rows: Sequence[Row]) -> list[str]:
     shown = [row for row in rows if row["status"] == "measured"]
     lines = []
-    for row in shown:
-        peer = row["peer"]
-        name = f"{peer['name']} {peer['version']}"
-        ratio = f"{row['ratio']:.3g}"
-        lines.append((row["work"], time(row["ours"]["time"], row["unit"]), f"{name}: {time(peer['time'], row['unit'])}",
-                      ratio if row["ratio"] >= 1 else f"**{ratio}**"))
+    for row in rows:
+        peer, unit = row["peer"], row["unit"]
+        ours = time(row["ours"]["time"], unit) if "time" in row["ours"] else "-"
+        if row["status"] == "measured":
+            ratio = f"{row['ratio']:.3g}" if row["ratio"] >= 1 else f"**{row['ratio']:.3g}**"
+            lines.append((row["work"], ours, f"{peer['name']} {peer['version']}: {time(peer['time'], unit)}", ratio))
+        else:
+            lines.append((row["work"], ours, f"{peer['name']}: {row['status']}", "-"))
     text = [
         "## Speed beside peers",
         "Both sides run on one core, in turns; the least time of the rounds counts. A ratio above 1 means that tautline"
@@ -94,9 +97,9 @@ def missions(rows: Sequence[Row]) -> list[str]:
             collided = f"{row['collided']}" + (f" ({row['hidden']} hidden)" if row["hidden"] else "")
             law = row["law"] + (", shield" if row["shield"] else "")
             flights = row["flights"]
-            lines.append((row["mission"], law, f"{row['succeeded']} of {flights}", collided,
-                          f"{row['reached']}", f"{100 * row['least_m'] / row['delta_m']:.1f} %", median,
-                          f"{row['wall_s']:.2g} s"))
+            least = math.floor(1e4 * row["least_m"] / row["delta_m"]) / 100
+            lines.append((row["mission"], law, f"{row['succeeded']} of {flights}", collided, f"{row['reached']}",
+                          f"{least:.2f} %", median, f"{row['wall_s']:.2g} s"))
     sources = dict.fromkeys(
         f"- {row['mission'].split(',')[0]}: {row['source']}. Success: {row['success']}. Changes: {row['changes']}."
         for row in rows if row["status"] == "measured"
@@ -105,7 +108,7 @@ def missions(rows: Sequence[Row]) -> list[str]:
         "## Missions of other projects",
         "Scenes are rebuilt from the published parameters below; random ones are other draws of the same distribution."
         "\nVehicles are points. *Hidden* collisions lie between the samples at the rate at which the source checks."
-        "\n*Least* is the smallest separation as a share of the limit. Time is the median of the successful flights."
+        "\n*Least* is the smallest separation as a share of the limit, rounded down. Time is the median of the successful flights."
         "\nThe last column is the processing time of a flight. The displacement law has no limit on speed; its gains"
         "\nkeep a lone vehicle below the limit.",
         table(("mission", "law", "succeeded", "collided", "reached", "least", "time", "processing"), lines),
