@@ -6,11 +6,30 @@ from collections.abc import Iterable, Sequence
 from typing import Any
 
 from sampling import TOOLS
+from speed import SAME_M
 
 Row = dict[str, Any]
 
 BEGIN = "<!-- benchmarks: begin; python benchmarks/run.py --markdown replaces this block -->"
 END = "<!-- benchmarks: end -->"
+
+SPEED = (
+    "Both sides run on one core, in turns; the least time of the rounds counts. A ratio above 1 means that tautline is "
+    "faster. A ratio in bold is a loss of tautline."
+)
+MISSIONS = (
+    "Scenes are rebuilt from the published parameters below; random ones are other draws of the same "
+    "distribution. Vehicles are points. Commands have a limit, so no law has a certificate without the shield. "
+    "Only the displacement law and the shield avoid blocks. The displacement law has no limit on speed; its gains "
+    "keep a lone vehicle below the limit. *Succeeded* flights are clear throughout, with each vehicle at its goal "
+    "to the end. *Hidden* collisions lie between the samples at the rate at which the source checks. *Least* is "
+    "the smallest separation as a share of the limit, rounded down. Time is the median of the successful flights. "
+    "The last column is the processing time of a flight."
+)
+SAMPLING = (
+    "The separation of the whole motion, at its samples, and on straight lines between the samples. *Hidden* is the "
+    "separation at samples less that of the whole motion."
+)
 
 
 class NoBlock(Exception):
@@ -50,8 +69,8 @@ def run(report: dict[str, Any]) -> str:
     text += f"\nThe load was {load}."
     if max(machine["load_before"], machine["load_after"] - 1) >= 0.5:
         text += " Other work ran beside it, so absolute times are too long."
-    versions = [f"{peer['versions']}" for peer in report["peers"] if peer["status"] == "installed"]
-    return text + ("\nPeers: " + "; ".join(versions) + "." if versions else "\nNo peer was installed.")
+    versions = [peer["versions"] for peer in report["peers"] if peer["status"] == "installed"]
+    return text + "\n" + wrapped(["Peers: " + "; ".join(versions) + "." if versions else "No peer was installed."])
 
 
 def speed(rows: Sequence[Row]) -> list[str]:
@@ -67,8 +86,7 @@ def speed(rows: Sequence[Row]) -> list[str]:
             lines.append((row["work"], ours, f"{peer['name']}: {row['status']}", "-"))
     text = [
         "## Speed beside peers",
-        "Both sides run on one core, in turns; the least time of the rounds counts. A ratio above 1 means that tautline"
-        "\nis faster. A ratio in bold is a loss of tautline.",
+        wrapped([SPEED]),
         table(("work", "tautline", "peer", "ratio"), lines),
     ]
     if not shown:
@@ -76,10 +94,11 @@ def speed(rows: Sequence[Row]) -> list[str]:
     same = [row for row in shown if "difference_m" in row and row["name"].startswith("complete-graph")]
     if same:
         worst = max(row["difference_m"] for row in same)
-        text.append(
-            "On the complete graph both sides fly the same law with the same step from the same start. Their last"
-            f"\npositions differ by at most {worst:.1g} m; a row with more than 1e-6 m has no ratio."
+        same_text = (
+            "On the complete graph both sides fly the same law with the same step from the same start. Their last "
+            f"positions differ by at most {worst:.1g} m; a row with more than {SAME_M:g} m has no ratio."
         )
+        text.append(wrapped([same_text]))
     sides = sorted({f"- tautline, {kind(row)}: {row['ours']['settings']}." for row in shown})
     sides += sorted({f"- {row['peer']['name']}, {kind(row)}: {row['peer']['settings']}." for row in shown})
     return [*text, "Settings:", wrapped(sides)]
@@ -106,11 +125,7 @@ def missions(rows: Sequence[Row]) -> list[str]:
     )
     return [
         "## Missions of other projects",
-        "Scenes are rebuilt from the published parameters below; random ones are other draws of the same distribution."
-        "\nVehicles are points. *Hidden* collisions lie between the samples at the rate at which the source checks."
-        "\n*Least* is the smallest separation as a share of the limit, rounded down. Time is the median of the successful flights."
-        "\nThe last column is the processing time of a flight. The displacement law has no limit on speed; its gains"
-        "\nkeep a lone vehicle below the limit.",
+        wrapped([MISSIONS]),
         table(("mission", "law", "succeeded", "collided", "reached", "least", "time", "processing"), lines),
         wrapped(sources),
     ]
@@ -127,8 +142,7 @@ def sampling(rows: Sequence[Row]) -> list[str]:
             lines.append((row["motion"], f"{row['rate_hz']:g} Hz", *lengths, f"{row['delta_m']:g} m", verdict))
     return [
         "## What sampling hides",
-        "The separation of the whole motion, at its samples, and on straight lines between the samples. The distance"
-        "\nthat samples hide is their separation less that of the whole motion.",
+        wrapped([SAMPLING]),
         table(("motion", "rate", "whole motion", "at samples", "straight lines", "hidden", "limit", "verdict"), lines),
         "Checks of other tools that see positions at samples only, each read in its source:",
         table(("tool", "check", "rate", "source"), TOOLS),
@@ -161,14 +175,14 @@ def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 
 def wrapped(lines: Iterable[str]) -> str:
-    """Returns list items with lines of at most 118 characters."""
+    """Returns paragraphs or list items with lines of at most 118 characters."""
     text = []
     for line in lines:
         current = ""
         for word in line.split(" "):
             if current and len(current) + 1 + len(word) > 118:
                 text.append(current)
-                current = "  " + word
+                current = "  " + word if line.startswith("- ") else word
             else:
                 current = f"{current} {word}" if current else word
         text.append(current)

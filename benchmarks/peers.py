@@ -53,12 +53,13 @@ class Peers:
         self.folder = folder
         self.install = install
         self.reasons: dict[str, str] = {}
+        self.interpreters: dict[str, str] = {PLAIN: sys.executable}
         self.versions: dict[str, str] = {PLAIN: sys.version.split()[0]}
 
     def python(self, name: str) -> str:
-        """Returns the interpreter of a peer. Raises `Skipped` with the reason if its packages are not there."""
-        if name == PLAIN:
-            return sys.executable
+        """Returns the interpreter of a peer. Raises `Skipped` with the reason if its packages are missing."""
+        if name in self.interpreters:
+            return self.interpreters[name]
         if name in self.reasons:
             raise Skipped(self.reasons[name])
         environment = ENVIRONMENTS[name]
@@ -69,6 +70,7 @@ class Peers:
                 return self._skip(name, f"{name} is not installed under {shown(self.folder)}")
             self._install(folder, environment)
         self.versions[name] = self._versions(interpreter, environment)
+        self.interpreters[name] = str(interpreter)
         return str(interpreter)
 
     def measure(self, name: str, task: dict[str, Any], limit_s: float = 600.0) -> dict[str, Any]:

@@ -56,15 +56,20 @@ class Program:
     def call(self, *words: str, limit_s: float = 1800.0) -> tuple[subprocess.CompletedProcess[str], float]:
         """Runs the program and returns its result with its wall-clock time [s]."""
         began = time.perf_counter()
-        done = subprocess.run(
-            [str(self.path), *words],
-            cwd=self.folder,
-            env=os.environ | {"NO_COLOR": "1"},
-            capture_output=True,
-            text=True,
-            timeout=limit_s,
-            preexec_fn=pin,
-        )
+        try:
+            done = subprocess.run(
+                [str(self.path), *words],
+                cwd=self.folder,
+                env=os.environ | {"NO_COLOR": "1"},
+                capture_output=True,
+                text=True,
+                timeout=limit_s,
+                preexec_fn=pin,
+            )
+        except subprocess.TimeoutExpired:
+            raise Unusable(f"tautline {words[0]} took longer than {limit_s:.0f} s") from None
+        except OSError as problem:
+            raise Unusable(f"{self.path}: cannot be started ({problem.strerror}); build it, or name another") from None
         return done, time.perf_counter() - began
 
     def version(self) -> str:

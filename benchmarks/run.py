@@ -116,10 +116,13 @@ def measure(given: argparse.Namespace) -> dict[str, Any]:
     rows: list[Row] = []
     with tempfile.TemporaryDirectory() as folder:
         program = Program(path, pathlib.Path(folder))
-        version = program.version()
-        for row in all_rows(program, peers, given):
-            rows.append(row)
-            print(line(row), flush=True)
+        try:
+            version = program.version()
+            for row in all_rows(program, peers, given):
+                rows.append(row)
+                print(line(row), flush=True)
+        except Unusable as problem:
+            refuse(f"program: {problem}")
     machine["load_after"] = os.getloadavg()[0]
     return {
         "schema_version": 1,

@@ -104,9 +104,10 @@ def complete_graph(
         entry["peer"] |= {"version": answer["version"], "settings": f"{answer['settings']}; the same law in Numba"}
         if engine == PLAIN:
             entry["peer"]["settings"] = "the same law in lists; a check of the law, no rival"
-        entry["difference_m"] = farthest(answer["positions_m"], program.samples()[-1][1])
-        if not entry["difference_m"] <= SAME_M:
-            why = f"last positions differ by {entry['difference_m']:.2g} m, more than {SAME_M:g} m"
+        difference_m = farthest(answer["positions_m"], program.samples()[-1][1])
+        entry["difference_m"] = difference_m if math.isfinite(difference_m) else None
+        if not difference_m <= SAME_M:
+            why = f"last positions differ by {difference_m:.2g} m, more than {SAME_M:g} m"
             entry |= {"status": "not comparable", "why": why}
             break
     finish(entry, ours, theirs if entry["status"] == "measured" else [])
@@ -161,9 +162,10 @@ def quadrotors(
             break
         theirs.append(answer["wall_s"] / seconds)
         entry["peer"] |= {"version": answer["version"], "settings": f"{answer['settings']}; no audit"}
-        entry["difference_m"] = farthest(answer["positions_m"], slots)
-        if not entry["difference_m"] <= 0.3:
-            why = f"its drones end {entry['difference_m']:.2g} m from their points"
+        difference_m = farthest(answer["positions_m"], slots)
+        entry["difference_m"] = difference_m if math.isfinite(difference_m) else None
+        if not difference_m <= 0.3:
+            why = f"its drones end {difference_m:.2g} m from their points"
             entry |= {"status": "not comparable", "why": why}
             break
     if ours:

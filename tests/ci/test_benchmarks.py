@@ -122,6 +122,12 @@ class Twins(InFolder):
 
 
 class Arguments(InFolder):
+    def script(self, text):
+        file = self.folder / "program"
+        file.write_text(text)
+        file.chmod(0o755)
+        return file
+
     def test_wrong_arguments_end_with_a_sentence_and_code_2(self):
         bare = self.folder / "bare.md"
         bare.write_text("no block\n")
@@ -139,6 +145,7 @@ class Arguments(InFolder):
             (("--trajectories", self.folder / "none"), "--trajectories: no folder at this path"),
             (("--program", self.folder / "none"), "--program: no program at this path"),
             (("--from", words), "cannot be read"),
+            (("--program", self.script("not a program")), "cannot be started"),
         ):
             done = command(*arguments)
             self.assertEqual(done.returncode, 2, (arguments, done.stderr))
