@@ -6,6 +6,7 @@ Engines: `mujoco`, `pybullet`, or `plain`, which integrates in this Python and n
 The command of a step uses the velocity at the middle of the kick, so that all engines are second order in the step.
 """
 
+import importlib.metadata
 import json
 import math
 import sys
@@ -126,7 +127,7 @@ class PyBullet:
     def __init__(self, task: dict[str, Any]) -> None:
         import pybullet
 
-        self.version = str(pybullet.getAPIVersion())
+        self.version = importlib.metadata.version("pybullet")
         self.bullet = pybullet
         pybullet.connect(pybullet.DIRECT)
         pybullet.setPhysicsEngineParameter(fixedTimeStep=task["dt_s"], numSubSteps=1, numSolverIterations=1)

@@ -76,12 +76,14 @@ class Peers:
     def measure(self, name: str, task: dict[str, Any], limit_s: float = 600.0) -> dict[str, Any]:
         """Runs the script `task["script"]` of this folder in the environment of a peer, on one core.
 
-        The script reads the task as JSON from standard input and writes its answer as JSON to standard output.
+        The script reads the task as JSON from standard input and writes its answer as JSON to standard output. Logs of
+        its packages stay in the folder of the environments.
         """
         try:
             done = subprocess.run(
-                [self.python(name), str(HERE / task["script"])],
+                [os.path.abspath(self.python(name)), str(HERE / task["script"])],
                 input=json.dumps(task),
+                cwd=self.folder if self.folder.is_dir() else None,
                 env=os.environ | {"POLARS_MAX_THREADS": "1", "OMP_NUM_THREADS": "1", "NUMBA_NUM_THREADS": "1"},
                 capture_output=True,
                 text=True,
