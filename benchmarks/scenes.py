@@ -266,8 +266,8 @@ def missions(quick: bool, seeds: int) -> list[Mission]:
     ]
     circle_source, blocks_source = "snape/RVO2 1c25b27, examples/Circle.cc", "snape/RVO2 1c25b27, examples/Blocks.cc"
     sphere_source = "snape/RVO2-3D c8e6044, examples/Sphere.cc"
-    goals = rvo_changes + "; goals on a lattice of 5 m about the common goal of a group"
-    crowded = rvo_changes + "; without the agents that start within 3.3 m of another one (source: 812 agents)"
+    goals = rvo_changes + ". Goals on a lattice of 5 m about the common goal of a group"
+    crowded = rvo_changes + ". Without the agents that start within 3.3 m of another one (source: 812 agents)"
     listed += [
         Mission("RVO2 Circle, 250", circle_source, "each within 1.5 m", rvo_changes, circle, 1),
         Mission("RVO2 Blocks, 100", blocks_source, "each within 5 m of its slot (source: 20 m)", goals, blocks, 1),
