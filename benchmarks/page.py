@@ -30,8 +30,8 @@ MISSIONS = (
 )
 SAMPLING = (
     "The separation of the whole motion, at its samples, and on straight lines between the samples. *Hidden* is the "
-    "separation at samples less that of the whole motion. The verdict is that of the whole motion; bold marks a violation "
-    "that no sample shows."
+    "separation at samples less that of the whole motion. The verdict is that of the whole motion; a violation that no "
+    "sample shows is bold."
 )
 
 
