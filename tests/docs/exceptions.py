@@ -12,7 +12,7 @@ NOT_RUN = {
     "export": "a setting of the reader's shell",
     "git": "shows the reader's changes",
     "pip": "tests/setup.sh installs what the tests need",
-    "python": "runs the driver of a cluster; tests/cluster runs it",
+    "python": "runs the driver of a cluster or benchmarks; tests/cluster and tests/ci run them",
     "python3": "runs these tests",
     "ray": "starts a cluster; tests/cluster starts one",
     "sbatch": "submits to Slurm; tests/cluster does",

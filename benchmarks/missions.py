@@ -1,0 +1,105 @@
+"""Missions: published benchmarks under each law, without and under the shield.
+
+A flight is safe if the audit is clear over the whole flight. It succeeds if it is safe and each vehicle is at its goal
+and stays there. A collision that no sample at the source's own rate shows is counted as hidden.
+"""
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+from program import Point, Program, Unusable
+from scenes import Mission, Scene, missions
+
+Row = dict[str, Any]
+
+# Laws with absolute slots. The others reach a formation up to translation, and flocking has no slots.
+LAWS = ("displacement", "orca", "cbf-qp")
+OTHER_LAWS = {
+    "edge-tension": "controls distances: its formation may be rotated and moved",
+    "laplacian": "controls displacements and follows no reference: its formation may be moved",
+    "potential": "controls displacements and follows no reference: its formation may be moved",
+    "flocking": "forms a lattice: slots are not assigned",
+}
+
+
+def rows(program: Program, quick: bool, seeds: int) -> Iterator[Row]:
+    """Yields a row for each mission, law and use of the shield, and a skipped row for each law without goals."""
+    for mission in missions(quick, seeds):
+        for law in LAWS:
+            for shield in (False, True):
+                yield fly(program, mission, law, shield)
+    for law, why in OTHER_LAWS.items():
+        entry = {"group": "missions", "name": f"every mission/{law}", "mission": "every mission", "law": law}
+        yield entry | {"status": "skipped", "why": why}
+
+
+def fly(program: Program, mission: Mission, law: str, shield: bool) -> Row:
+    """Flies all seeds of a mission and returns its counts."""
+    use = "shield" if shield else "bare"
+    entry: Row = {
+        "group": "missions",
+        "name": f"{mission.name}/{law}/{use}",
+        "mission": mission.name,
+        "law": law,
+        "shield": shield,
+        "source": mission.source,
+        "success": mission.success,
+        "changes": mission.changes,
+        "status": "measured",
+        "why": None,
+    }
+    counts = dict.fromkeys(("flights", "safe", "undecided", "reached", "succeeded", "collided", "hidden"), 0)
+    times: list[float] = []
+    wall_s = 0.0
+    least_m = math.inf
+    for seed in range(mission.seeds):
+        scene = mission.scene(seed)
+        try:
+            report = program.fly(scene.text(law, shield))
+        except Unusable as refusal:
+            return entry | {"status": "skipped", "why": str(refusal)}
+        status = report["audit"]["status"]
+        reached = bool(report["formation"]["reached"])
+        counts["flights"] += 1
+        counts["safe"] += status == "clear"
+        counts["undecided"] += status == "undecided"
+        counts["reached"] += reached
+        counts["succeeded"] += status == "clear" and reached
+        if status == "clear" and reached:
+            times.append(report["formation"]["reached_at_s"])
+        if status == "violation":
+            counts["collided"] += 1
+            counts["hidden"] += not any(seen(scene, sample) for _, sample in program.samples())
+        least_m = min(least_m, report["separation"]["min_m"])
+        wall_s += report["performance"]["wall_s"]
+    times.sort()
+    entry |= counts
+    entry["delta_m"] = scene.delta_m
+    entry["duration_s"] = scene.duration_s
+    entry["sampled_hz"] = scene.sampled_hz
+    entry["least_m"] = least_m
+    entry["median_s"] = times[len(times) // 2] if times else None
+    entry["wall_s"] = wall_s / counts["flights"]
+    return entry
+
+
+def seen(scene: Scene, sample: Sequence[Point]) -> bool:
+    """Returns whether two vehicles are closer than delta at a sample, or one is within a clearance of a box.
+
+    Lengths are scaled for an ellipsoid, as in the audit.
+    """
+    squash = scene.half_axes_m[0] / scene.half_axes_m[2] if scene.half_axes_m else 1.0
+    scaled = sorted((x, y, z * squash) for x, y, z in sample)
+    for i, first in enumerate(scaled):
+        for second in scaled[i + 1 :]:
+            if second[0] - first[0] >= scene.delta_m:
+                break
+            if math.dist(first, second) < scene.delta_m:
+                return True
+    for _, at, size in scene.boxes:
+        for point in sample:
+            outside = (max(0.0, abs(x - c) - s / 2) for x, c, s in zip(point, at, size, strict=True))
+            if math.hypot(*outside) < scene.delta_m / 2:
+                return True
+    return False

@@ -1,0 +1,207 @@
+"""The benchmarks as Markdown, and the block of a page that the command replaces."""
+
+import math
+import pathlib
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from sampling import TOOLS
+from speed import SAME_M
+
+Row = dict[str, Any]
+
+BEGIN = "<!-- benchmarks: begin; python benchmarks/run.py --markdown replaces this block -->"
+END = "<!-- benchmarks: end -->"
+
+SPEED = (
+    "Both sides run on one core, in turns; the least time of the rounds counts. A ratio above 1 means that tautline is "
+    "faster. A ratio in bold is a loss of tautline."
+)
+MISSIONS = (
+    "Scenes are rebuilt from the published parameters below; random ones are other draws of the same "
+    "distribution. Vehicles are points. Commands have a limit, so no law has a certificate without the shield. "
+    "Only the displacement law and the shield avoid blocks. The displacement law has no limit on speed; its gains "
+    "keep a lone vehicle below the limit. The shield holds commands for 0.05 s, which is too long for the "
+    "displacement law on the complete graph of 40 vehicles or more in LSC. *Succeeded* flights are clear "
+    "throughout, with each vehicle at its goal to the end. *Hidden* collisions lie between the samples at the "
+    "rate at which the source checks. *Least* is the smallest separation as a share of the limit, rounded down. A "
+    "flight under the displacement law ends when it reaches the limit, so its least stays just below 100 %. Time "
+    "is the median of the successful flights. The last column is the processing time of a flight."
+)
+SAMPLING = (
+    "The separation of the whole motion, at its samples, and on straight lines between the samples. *Hidden* is the "
+    "separation at samples less that of the whole motion. The verdict is that of the whole motion; a violation that no "
+    "sample shows is bold."
+)
+
+
+class NoBlock(Exception):
+    """A page without exactly one block. The message names the two lines that mark it."""
+
+
+def replace(page: str, report: dict[str, Any]) -> str:
+    """Returns the page with a new block. Raises `NoBlock` unless both marks stand once, in order."""
+    if page.count(BEGIN) != 1 or page.count(END) != 1 or page.index(BEGIN) > page.index(END):
+        raise NoBlock(f"no block to replace; add the lines `{BEGIN}` and `{END}`")
+    head, rest = page.split(BEGIN)
+    return head + BEGIN + "\n\n" + block(report) + "\n" + END + rest.split(END)[1]
+
+
+def block(report: dict[str, Any]) -> str:
+    """Returns all tables of a report."""
+    groups: dict[str, list[Row]] = {}
+    for row in report["rows"]:
+        groups.setdefault(row["group"], []).append(row)
+    parts = [run(report)]
+    if "speed" in groups:
+        parts += speed(groups["speed"])
+    if "missions" in groups:
+        parts += missions(groups["missions"])
+    if "sampling" in groups:
+        parts += sampling(groups["sampling"])
+    parts += left_out(report["rows"])
+    return "\n\n".join(parts) + "\n"
+
+
+def run(report: dict[str, Any]) -> str:
+    machine = report["machine"]
+    load = f"{machine['load_before']:.1f} before and {machine['load_after']:.1f} after the run"
+    text = f"`{report['program']}` ({report['build']} build) on {machine['processor']}, {machine['cores']} cores."
+    if report["quick"]:
+        text += "\nThis was a quick run with small sizes."
+    text += f"\nThe load was {load}."
+    if max(machine["load_before"], machine["load_after"] - 1) >= 0.5:
+        text += " Other work ran beside it, so absolute times are too long."
+    versions = [peer["versions"] for peer in report["peers"] if peer["status"] == "installed"]
+    return text + "\n" + wrapped(["Peers: " + "; ".join(versions) + "." if versions else "No peer was installed."])
+
+
+def speed(rows: Sequence[Row]) -> list[str]:
+    shown = [row for row in rows if row["status"] == "measured"]
+    lines = []
+    for row in rows:
+        peer, unit = row["peer"], row["unit"]
+        ours = time(row["ours"]["time"], unit) if "time" in row["ours"] else "-"
+        if row["status"] == "measured":
+            ratio = f"{row['ratio']:.3g}" if row["ratio"] >= 1 else f"**{row['ratio']:.3g}**"
+            lines.append((row["work"], ours, f"{peer['name']} {peer['version']}: {time(peer['time'], unit)}", ratio))
+        else:
+            lines.append((row["work"], ours, f"{peer['name']}: {row['status']}", "-"))
+    text = [
+        "## Speed beside peers",
+        wrapped([SPEED]),
+        table(("work", "tautline", "peer", "ratio"), lines),
+    ]
+    if not shown:
+        return [text[0], "No row was measured."]
+    same = [row for row in shown if "difference_m" in row and row["name"].startswith("complete-graph")]
+    if same:
+        worst = max(row["difference_m"] for row in same)
+        same_text = (
+            "On the complete graph both sides fly the same law with the same step from the same start. Their last "
+            f"positions differ by at most {worst:.1g} m; a row with more than {SAME_M:g} m has no ratio."
+        )
+        text.append(wrapped([same_text]))
+    sides = sorted({f"- tautline, {kind(row)}: {row['ours']['settings']}." for row in shown})
+    sides += sorted({f"- {row['peer']['name']}, {kind(row)}: {row['peer']['settings']}." for row in shown})
+    return [*text, "Settings:", wrapped(sides)]
+
+
+def kind(row: Row) -> str:
+    return str(row["name"]).split("/")[0].replace("-", " ")
+
+
+def missions(rows: Sequence[Row]) -> list[str]:
+    lines = []
+    for row in rows:
+        if row["status"] == "measured":
+            median = "-" if row["median_s"] is None else f"{row['median_s']:.1f} s"
+            collided = f"{row['collided']}" + (f" ({row['hidden']} hidden)" if row["hidden"] else "")
+            law = row["law"] + (", shield" if row["shield"] else "")
+            flights = row["flights"]
+            least = math.floor(1e4 * row["least_m"] / row["delta_m"]) / 100
+            lines.append((row["mission"], law, f"{row['succeeded']} of {flights}", collided, f"{row['reached']}",
+                          f"{least:.2f} %", median, time(row["wall_s"], "s")))
+    sources = dict.fromkeys(
+        f"- {row['mission'].split(',')[0]}: {row['source']}. Success: {row['success']}. Changes: {row['changes']}."
+        for row in rows if row["status"] == "measured"
+    )
+    return [
+        "## Missions of other projects",
+        wrapped([MISSIONS + totals(rows)]),
+        table(("mission", "law", "succeeded", "collided", "reached", "least", "time", "processing"), lines),
+        wrapped(sources),
+    ]
+
+
+def totals(rows: Sequence[Row]) -> str:
+    """Returns a sentence with the collisions of all flights, and those that samples hide."""
+    shown = [row for row in rows if row["status"] == "measured"]
+    bare, shielded = (sum(row["collided"] for row in shown if row["shield"] == use) for use in (False, True))
+    hidden = sum(row["hidden"] for row in shown)
+    return f" Flights that collided: {bare} without the shield, {shielded} under it. Hidden collisions: {hidden}."
+
+
+def sampling(rows: Sequence[Row]) -> list[str]:
+    lines = []
+    for row in rows:
+        if row["status"] == "measured":
+            verdict = "clear"
+            if row["violated"]:
+                verdict = "violation" if row["seen_at_samples"] else "**violation, hidden**"
+            lengths = [f"{row[key]:.3f} m" for key in ("true_m", "samples_m", "straight_m", "hidden_m")]
+            lines.append((row["motion"], f"{row['rate_hz']:g} Hz", *lengths, f"{row['delta_m']:g} m", verdict))
+    return [
+        "## What sampling hides",
+        wrapped([SAMPLING]),
+        table(("motion", "rate", "whole motion", "at samples", "straight lines", "hidden", "limit", "verdict"), lines),
+        "Checks of other tools that see positions at samples only, each read in its source:",
+        table(("tool", "check", "rate", "source"), TOOLS),
+    ]
+
+
+def left_out(rows: Iterable[Row]) -> list[str]:
+    reasons: dict[tuple[str, str], list[str]] = {}
+    for row in rows:
+        if row["status"] != "measured":
+            reasons.setdefault((row["status"], row["why"]), []).append(row["name"])
+    if not reasons:
+        return []
+    lines = [f"- {'; '.join(names)}: {status}, {why}." for (status, why), names in reasons.items()]
+    return ["## Rows without a figure", wrapped(lines)]
+
+
+def time(value: float, unit: str) -> str:
+    """Returns a time in a unit that needs no exponent."""
+    seconds = value * {"us": 1e-6, "s": 1.0}[unit]
+    for scale, name in ((1.0, "s"), (1e-3, "ms"), (1e-6, "us")):
+        if seconds >= scale:
+            return f"{seconds / scale:.3g} {name}"
+    return f"{seconds / 1e-6:.3g} us"
+
+
+def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    lines = [header, ["---"] * len(header), *rows]
+    return "\n".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |" for line in lines)
+
+
+def wrapped(lines: Iterable[str]) -> str:
+    """Returns paragraphs or list items with lines of at most 118 characters."""
+    text = []
+    for line in lines:
+        current = ""
+        for word in line.split(" "):
+            if current and len(current) + 1 + len(word) > 118:
+                text.append(current)
+                current = "  " + word if line.startswith("- ") else word
+            else:
+                current = f"{current} {word}" if current else word
+        text.append(current)
+    return "\n".join(text)
+
+
+def write(path: pathlib.Path, text: str) -> None:
+    """Writes a file under a temporary name and renames it."""
+    temporary = path.with_name(path.name + ".part")
+    temporary.write_text(text, encoding="utf-8")
+    temporary.replace(path)

@@ -1,0 +1,285 @@
+"""Scenes of published benchmarks, rebuilt from their parameters as text of scenarios.
+
+Starts and goals that a project draws at random are drawn here from its parameters with a seed of Python. They are
+other instances of the same distribution.
+"""
+
+import dataclasses
+import math
+import random
+from collections.abc import Callable
+
+from program import Point, points, scenario
+
+
+@dataclasses.dataclass(frozen=True)
+class Scene:
+    """A mission: starts, slots and limits. All numbers are of the source unless `changes` names a difference."""
+
+    name: str
+    start_m: list[Point]
+    slots_m: list[Point]
+    delta_m: float
+    max_speed_m_s: float
+    preferred_speed_m_s: float
+    max_accel_m_s2: float
+    reached_m: float
+    duration_s: float
+    sampled_hz: float
+    dimensions: int = 3
+    dt_s: float = 1 / 240
+    half_axes_m: tuple[float, float, float] | None = None
+    boxes: tuple[tuple[str, Point, Point], ...] = ()
+
+    def text(self, law: str, shield: bool) -> str:
+        """Returns the scenario under a law, with or without the shield. Slots are absolute positions.
+
+        The displacement law has no limit on speed. Its gains are such that a vehicle alone, at rest at the largest
+        distance from its slot, is critically damped and stays below the largest speed.
+        """
+        farthest_m = max(math.dist(a, b) for a, b in zip(self.start_m, self.slots_m, strict=True))
+        rate_per_s = 2 * self.max_speed_m_s / farthest_m
+        laws: dict[str, dict[str, object]] = {
+            "displacement": {"k_per_s2": rate_per_s**2, "zeta_per_s": 2 * rate_per_s},
+            "orca": {
+                "max_speed_m_s": self.max_speed_m_s,
+                "speed_m_s": self.preferred_speed_m_s,
+                "max_accel_m_s2": self.max_accel_m_s2,
+            },
+            "cbf-qp": {"max_speed_m_s": self.max_speed_m_s, "max_accel_m_s2": self.max_accel_m_s2},
+        }
+        hull_m = 0.2 * self.delta_m
+        tables: dict[str, dict[str, object]] = {
+            "swarm": {"dimensions": self.dimensions, "hull_radius_m": hull_m},
+            "start": {"positions_m": points(self.start_m)},
+            "formation": {"shape": "points", "points_m": points(self.slots_m)},
+            "law": {"kind": law, "delta_m": self.delta_m} | laws[law],
+            "reference": {"kind": "rest"},
+            "arrival": {"edge_error_m": self.reached_m, "disagreement_m_s": 10.0, "hold_s": 0.0},
+            "actuation": {"max_accel_m_s2": self.max_accel_m_s2},
+            "time": {"duration_s": self.duration_s, "dt_s": self.dt_s, "record_hz": self.sampled_hz},
+        }
+        if self.half_axes_m:
+            tables["safety"] = {"shape": "ellipsoid", "half_axes_m": str(list(self.half_axes_m))}
+        if shield:
+            tables["shield"] = {"max_speed_m_s": self.max_speed_m_s}
+        rest = ""
+        for name, at, size in self.boxes:
+            rest += f'\n[[obstacle]]\nname = "{name}"\nat_m = {list(at)}\nclearance_m = {self.delta_m / 2}\n'
+            rest += f"box = {{ size_m = {list(size)} }}\n"
+        return scenario(self.name, tables, rest)
+
+
+@dataclasses.dataclass(frozen=True)
+class Mission:
+    """A published benchmark: its source, its success, what differs here, and the scene of each seed."""
+
+    name: str
+    source: str
+    success: str
+    changes: str
+    scene: Callable[[int], Scene]
+    seeds: int
+    quick: bool = False
+
+
+def apart(rng: random.Random, count: int, low: Point, high: Point, least: float, downwash: float = 1.0) -> list[Point]:
+    """Draws points uniformly in a box with a smallest distance. Vertical distances count divided by `downwash`.
+
+    A draw with no room left starts again.
+    """
+    scale = (1.0, 1.0, downwash)
+    while True:
+        drawn: list[Point] = []
+        for _ in range(2000 * count):
+            point = tuple(rng.uniform(a, b) for a, b in zip(low, high, strict=True))
+            scaled = [x / s for x, s in zip(point, scale, strict=True)]
+            if all(math.dist(scaled, [x / s for x, s in zip(other, scale, strict=True)]) > least for other in drawn):
+                drawn.append((point[0], point[1], point[2]))
+                if len(drawn) == count:
+                    return drawn
+
+
+def lsc(count: int) -> Callable[[int], Scene]:
+    """Random missions of LSC: a box of 3 m x 3 m x 2 m, starts and goals at least 0.5 m apart in scaled lengths."""
+
+    def scene(seed: int) -> Scene:
+        rng = random.Random(1000 * count + seed)
+        low, high = (-1.5, -1.5, 0.2), (1.5, 1.5, 2.2)
+        return Scene(
+            name=f"lsc-{count}",
+            start_m=apart(rng, count, low, high, 0.5, 2.0),
+            slots_m=apart(rng, count, low, high, 0.5, 2.0),
+            delta_m=0.3,
+            half_axes_m=(0.15, 0.15, 0.3),
+            max_speed_m_s=1.0,
+            preferred_speed_m_s=1.0,
+            max_accel_m_s2=2.0,
+            reached_m=0.1,
+            duration_s=60.0,
+            sampled_hz=10.0,
+        )
+
+    return scene
+
+
+def gcbf(count: int) -> Callable[[int], Scene]:
+    """The double integrator of GCBF+: a square of 4 m, radius 0.05 m, at most 0.5 m/s and 10 m/s^2."""
+
+    def scene(seed: int) -> Scene:
+        rng = random.Random(7000 * count + seed)
+        low, high = (0.0, 0.0, 0.0), (4.0, 4.0, 0.0)
+        return Scene(
+            name=f"gcbf-{count}",
+            start_m=apart(rng, count, low, high, 0.2),
+            slots_m=apart(rng, count, low, high, 0.2),
+            delta_m=0.1,
+            max_speed_m_s=0.5,
+            preferred_speed_m_s=0.5,
+            max_accel_m_s2=10.0,
+            reached_m=0.1,
+            duration_s=60.0,
+            sampled_hz=1 / 0.03,
+            dimensions=2,
+        )
+
+    return scene
+
+
+def circle(seed: int) -> Scene:
+    """RVO2's Circle: 250 agents change places across a circle of 200 m. `seed` moves each start by up to 1 cm."""
+    rng = random.Random(seed)
+    angles = [2 * math.pi * i / 250 for i in range(250)]
+    return Scene(
+        name="rvo2-circle",
+        start_m=[(200 * math.cos(a) + rng.uniform(-0.01, 0.01), 200 * math.sin(a), 0.0) for a in angles],
+        slots_m=[(-200 * math.cos(a), -200 * math.sin(a), 0.0) for a in angles],
+        delta_m=3.0,
+        max_speed_m_s=2.0,
+        preferred_speed_m_s=1.0,
+        max_accel_m_s2=5.0,
+        reached_m=1.5,
+        duration_s=1000.0,
+        sampled_hz=4.0,
+        dimensions=2,
+        dt_s=0.05,
+    )
+
+
+def blocks(seed: int) -> Scene:
+    """RVO2's Blocks: four groups of 25 agents change corners between four blocks of 30 m."""
+    rng = random.Random(seed)
+    start: list[Point] = []
+    slots: list[Point] = []
+    for sx, sy in ((1, 1), (-1, 1), (1, -1), (-1, -1)):
+        for i in range(5):
+            for j in range(5):
+                wiggle = rng.uniform(-0.01, 0.01)
+                start.append((sx * (55.0 + 10 * i) + wiggle, sy * (55.0 + 10 * j), 0.0))
+                slots.append((-sx * (75.0 + 5 * (2 - i)), -sy * (75.0 + 5 * (2 - j)), 0.0))
+    boxes = tuple(
+        (f"block {k + 1}", (25.0 * sx, 25.0 * sy, 0.0), (30.0, 30.0, 30.0))
+        for k, (sx, sy) in enumerate(((-1, 1), (1, 1), (1, -1), (-1, -1)))
+    )
+    return Scene(
+        name="rvo2-blocks",
+        start_m=start,
+        slots_m=slots,
+        delta_m=4.0,
+        max_speed_m_s=2.0,
+        preferred_speed_m_s=1.0,
+        max_accel_m_s2=5.0,
+        reached_m=5.0,
+        duration_s=600.0,
+        sampled_hz=4.0,
+        dimensions=2,
+        dt_s=0.05,
+        boxes=boxes,
+    )
+
+
+def sphere(seed: int) -> Scene:
+    """RVO2-3D's Sphere: agents on circles of latitude, 0.1 rad apart, change places through a sphere of 100 m.
+
+    The source has 812 agents. Some start closer than two radii, 3 m, to the first agent of their circle; agents within
+    3.3 m of an earlier one are left out.
+    """
+    rng = random.Random(seed)
+    start: list[Point] = []
+    for i in range(32):
+        z, r = 100 * math.cos(i / 10), 100 * math.sin(i / 10)
+        for j in range(math.ceil(r / 2.5)):
+            a = j * 2 * math.pi / (r / 2.5)
+            point = (r * math.cos(a), r * math.sin(a), z)
+            if all(math.dist(point, other) > 3.3 for other in start):
+                start.append(point)
+    shown = [(x + rng.uniform(-0.01, 0.01), y, z) for x, y, z in start]
+    return Scene(
+        name="rvo2-sphere",
+        start_m=shown,
+        slots_m=[(-x, -y, -z) for x, y, z in start],
+        delta_m=3.0,
+        max_speed_m_s=2.0,
+        preferred_speed_m_s=1.0,
+        max_accel_m_s2=5.0,
+        reached_m=3.0,
+        duration_s=400.0,
+        sampled_hz=8.0,
+        dt_s=0.05,
+    )
+
+
+def swap(seed: int) -> Scene:
+    """The swap of six Crazyflies of crazyswarm: opposite corners of an upright hexagon, ellipsoids of 0.125 m."""
+    del seed
+    corners = [(0.0, 1.0, 1.5), (0.25, 0.5, 2.37), (0.25, -0.5, 2.37)]
+    start: list[Point] = [*corners, (-0.25, 0.5, 0.63), (-0.25, -0.5, 0.63), (0.0, -1.0, 1.5)]
+    return Scene(
+        name="crazyswarm-swap6v",
+        start_m=start,
+        slots_m=[(-x, -y, 3.0 - z) for x, y, z in start],
+        delta_m=0.25,
+        half_axes_m=(0.125, 0.125, 0.375),
+        max_speed_m_s=2.0,
+        preferred_speed_m_s=1.0,
+        max_accel_m_s2=5.0,
+        reached_m=0.1,
+        duration_s=40.0,
+        sampled_hz=20.0,
+    )
+
+
+def missions(quick: bool, seeds: int) -> list[Mission]:
+    """Returns the missions with the number of seeds of each. `quick` is one of the two smallest."""
+    lsc_source = "qwerty35/lsc_planner f4d4caf, missions/empty, launch/testall_empty.launch"
+    gcbf_source = "MIT-REALM/gcbfplus 5e7d5cd, gcbfplus/env/double_integrator.py, README.md (test command)"
+    lsc_changes = "acceleration: norm at most 2 m/s^2 (files: 2, 2, 1 by axis); speed: norm; 60 s"
+    gcbf_changes = "norms in place of limits by axis; no obstacles; 60 s in place of 7.68 s"
+    rvo_changes = "commands up to 5 m/s^2 in place of velocities taken at once; starts moved by up to 1 cm"
+    listed = [
+        Mission(f"LSC, {n} agents", lsc_source, "never unsafe, each within 0.1 m", lsc_changes, lsc(n), seeds, n == 10)
+        for n in (10, 20, 30, 40, 50, 60)
+    ]
+    listed += [
+        Mission(f"GCBF+, {n} agents", gcbf_source, "never unsafe, each within 0.1 m", gcbf_changes, gcbf(n), seeds)
+        for n in (8, 16, 32, 64)
+    ]
+    circle_source, blocks_source = "snape/RVO2 1c25b27, examples/Circle.cc", "snape/RVO2 1c25b27, examples/Blocks.cc"
+    sphere_source = "snape/RVO2-3D c8e6044, examples/Sphere.cc"
+    goals = rvo_changes + ". Goals on a lattice of 5 m about the common goal of a group"
+    crowded = rvo_changes + ". Without the agents that start within 3.3 m of another one (source: 812 agents)"
+    listed += [
+        Mission("RVO2 Circle, 250", circle_source, "each within 1.5 m", rvo_changes, circle, 1),
+        Mission("RVO2 Blocks, 100", blocks_source, "each within 5 m of its slot (source: 20 m)", goals, blocks, 1),
+        Mission(f"RVO2-3D Sphere, {len(sphere(0).start_m)}", sphere_source, "each within 3 m", crowded, sphere, 1),
+        Mission(
+            "crazyswarm swap, 6",
+            "USC-ACTLab/crazyswarm beb0549, scripts/swap6v.py, scripts/test_collisionAvoidance.py (radii)",
+            "each within 0.1 m",
+            "points with at most 5 m/s^2; the source flies planned polynomials of 4.25 s",
+            swap,
+            1,
+            True,
+        ),
+    ]
+    return [dataclasses.replace(mission, seeds=1) for mission in listed if mission.quick] if quick else listed
