@@ -35,7 +35,8 @@ impl Reason {
         matches!(self, Self::TooFew(_) | Self::Missing(_) | Self::MissingName(_) | Self::SpeedUnknown(_))
     }
 
-    /// Returns whether the reason is normal after all vehicles but one have signed off.
+    /// Returns whether the reason is normal after all vehicles but one have signed off. It is normal only in the last
+    /// interval of a watch, without another state or a return of a vehicle up to the end.
     #[must_use]
     pub fn is_of_end(&self) -> bool {
         matches!(self, Self::SignedOff(_))
@@ -119,6 +120,8 @@ pub enum Fault {
     NotJudged,
     /// The sign-off of a vehicle was refused, because it is not proved that the vehicle keeps delta.
     SignOff,
+    /// A vehicle sent a pose after its sign-off, so its separation since the sign-off is not known.
+    Returned,
     /// An ignored message that is older than the newest one of its vehicle.
     Reordered,
     /// An ignored message that is a repetition.
@@ -127,7 +130,7 @@ pub enum Fault {
 
 impl Fault {
     /// All faults.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Garbage,
         Self::OutOfRange,
         Self::TooManyVehicles,
@@ -137,6 +140,7 @@ impl Fault {
         Self::Dropped,
         Self::NotJudged,
         Self::SignOff,
+        Self::Returned,
         Self::Reordered,
         Self::Duplicate,
     ];
@@ -154,6 +158,7 @@ impl Fault {
             Self::Dropped => "dropped",
             Self::NotJudged => "not-judged",
             Self::SignOff => "sign-off-refused",
+            Self::Returned => "pose-after-sign-off",
             Self::Reordered => "reordered",
             Self::Duplicate => "duplicate",
         }
@@ -211,6 +216,8 @@ pub enum Event {
     Back {
         /// The vehicle.
         vehicle: u32,
+        /// Time of its sign-off \[s\]; `None` if it was stale.
+        signed_off_s: Option<f64>,
         /// Time \[s\].
         at_s: f64,
     },

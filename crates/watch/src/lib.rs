@@ -12,6 +12,7 @@
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
+mod absences;
 mod ahead;
 mod clock;
 mod event;

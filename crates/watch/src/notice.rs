@@ -101,9 +101,12 @@ impl Notice {
                 let text = format!("{} signed off", name(vehicle));
                 Self::new("signed-off", at_s, text, json!({ "id": name(vehicle) }))
             }
-            Event::Back { vehicle, at_s } => {
-                let text = format!("{} is heard again", name(vehicle));
-                Self::new("back", at_s, text, json!({ "id": name(vehicle) }))
+            Event::Back { vehicle, signed_off_s, at_s } => {
+                let since = signed_off_s.map_or_else(String::new, |since_s| {
+                    format!(" after its sign-off: its separation since {} s is NOT KNOWN", fixed(since_s))
+                });
+                let text = format!("{} is heard again{since}", name(vehicle));
+                Self::new("back", at_s, text, json!({ "id": name(vehicle), "signed_off_s": signed_off_s }))
             }
             Event::Began(of) => {
                 let pair = of.pair.map(name);
@@ -237,6 +240,7 @@ fn fault_text(fault: Fault, vehicle: Option<&str>) -> String {
         Fault::Dropped => "messages came faster than they were read".to_owned(),
         Fault::NotJudged => format!("{of} sent more messages than are kept, so a part of the past is not judged"),
         Fault::SignOff => format!("the sign-off of {of} is refused, because its separation is not proved"),
+        Fault::Returned => format!("{of} sent a position after its sign-off"),
         Fault::Reordered => format!("{of} sent a message older than its newest one"),
         Fault::Duplicate => format!("{of} sent a message twice"),
     }

@@ -61,7 +61,8 @@ struct Vehicle {
     /// Whether the newest stamp has two positions.
     has_conflict: bool,
     is_stale: bool,
-    has_signed_off: bool,
+    /// Time of the sign-off \[s\], if no pose came after it.
+    signed_off_s: Option<f64>,
     /// Index into the plan.
     planned: Option<usize>,
     deviation_m: Option<f64>,
@@ -206,7 +207,7 @@ impl Monitor {
     /// Returns whether a vehicle has signed off and was not heard since.
     #[must_use]
     pub fn has_signed_off(&self, vehicle: usize) -> bool {
-        self.vehicles.get(vehicle).is_some_and(|of| of.has_signed_off)
+        self.vehicles.get(vehicle).is_some_and(|of| of.signed_off_s.is_some())
     }
 
     /// Returns the measured violations that are present.
@@ -247,7 +248,7 @@ impl Monitor {
             velocity: None,
             has_conflict: false,
             is_stale: false,
-            has_signed_off: false,
+            signed_off_s: None,
             planned: self.plan.find(id),
             deviation_m: None,
             is_off_plan: false,

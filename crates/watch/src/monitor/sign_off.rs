@@ -4,6 +4,9 @@
 //! it is accepted only if the bounds prove that the vehicle keeps delta from every other one at this moment, and no
 //! error of the input gives doubt. A refused sign-off changes nothing, and the vehicle becomes stale. The positions up
 //! to a sign-off are judged as all others.
+//!
+//! A pose after a sign-off shows that the vehicle had not left. Its motion since the sign-off was not judged, so this
+//! pose is [`Fault::Returned`], and the time since the sign-off is NOT KNOWN.
 
 use super::{Monitor, kept};
 use crate::event::{Event, Fault};
@@ -12,7 +15,7 @@ use crate::settings::{LARGEST_TIME_S, TimeBase};
 
 impl Monitor {
     /// Takes the sign-off of a vehicle with a stamp of its clock \[s\], which arrived at `arrival_s` on the caller's
-    /// clock \[s\]. Returns whether the sign-off is accepted. A later pose ends it.
+    /// clock \[s\]. Returns whether the sign-off is accepted. A later pose ends it and is [`Fault::Returned`].
     ///
     /// A sign-off of a vehicle that was not heard is [`Fault::Garbage`], one that is older than the newest position
     /// is [`Fault::Reordered`], and one without a proof of delta is [`Fault::SignOff`].
@@ -32,7 +35,7 @@ impl Monitor {
         }
         let now_s = self.now_s;
         let of = &self.vehicles[vehicle as usize];
-        let ignored = match (of.has_signed_off, of.history.newest(), self.clock_of(of)) {
+        let ignored = match (of.signed_off_s.is_some(), of.history.newest(), self.clock_of(of)) {
             (true, ..) => Some(Fault::Duplicate),
             (_, Some(fix), Some(_)) if t_s < fix.t_s => Some(Fault::Reordered),
             (_, Some(_), Some(_)) => None,
@@ -49,7 +52,7 @@ impl Monitor {
             return false;
         }
         let of = &mut self.vehicles[vehicle as usize];
-        (of.has_signed_off, of.is_stale, of.deviation_m) = (true, false, None);
+        (of.signed_off_s, of.is_stale, of.deviation_m) = (Some(now_s), false, None);
         self.emit(Event::SignedOff { vehicle, at_s: now_s });
         true
     }
@@ -58,7 +61,8 @@ impl Monitor {
     /// has no measured violation.
     fn is_apart(&self, vehicle: u32) -> bool {
         let Some(own) = self.fresh_prediction(vehicle as usize) else { return false };
-        let others = (0..self.vehicles.len()).filter(|&k| k != vehicle as usize && !self.vehicles[k].has_signed_off);
+        let others =
+            (0..self.vehicles.len()).filter(|&k| k != vehicle as usize && self.vehicles[k].signed_off_s.is_none());
         self.open_violations().all(|of| !of.pair.contains(&vehicle))
             && others.into_iter().all(|k| {
                 self.fresh_prediction(k)

@@ -50,10 +50,26 @@ fn a_vehicle_that_is_heard_after_its_sign_off_is_present_again() {
     rest(&mut monitor, "c", 3.0, 6.5, 3.0);
     // It is too close to b now.
     assert!(matches!(monitor.assess(3.0).state, State::Violation([1, 2], _)));
-    assert!(monitor.drain_events().any(|event| matches!(event, Event::Back { vehicle: 2, .. })));
+    let back = Event::Back { vehicle: 2, signed_off_s: Some(1.0), at_s: 3.0 };
+    assert!(monitor.drain_events().any(|event| event == back));
+    assert_eq!(monitor.faults(Fault::Returned), 1);
     assert!(!monitor.has_signed_off(2));
     // Silent again, it is awaited.
     assert!(matches!(stay(&mut monitor, 2, 31..=50), State::NotKnown(Reason::Stale(2, _))));
+}
+
+#[test]
+fn a_return_after_a_sign_off_is_not_clear_with_the_time_of_arrival() {
+    for (returns, state) in [(true, State::NotKnown(Reason::Doubt(Fault::Returned))), (false, State::Clear)] {
+        let mut monitor = monitor(settings());
+        stay(&mut monitor, 3, 0..=10);
+        assert!(monitor.sign_off("c", 1.0, 1.0));
+        stay(&mut monitor, 2, 11..=30);
+        if returns {
+            rest(&mut monitor, "c", 3.0, -6.0, 3.0);
+        }
+        assert_eq!(monitor.assess(3.0).state, state);
+    }
 }
 
 #[test]
