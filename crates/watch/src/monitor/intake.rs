@@ -53,7 +53,7 @@ impl Monitor {
         let back_s = newest.filter(|_| is_same_clock).map_or(0.0, |fix| fix.t_s - pose.t_s);
         let jumps = self.settings.time_base == TimeBase::Arrival
             && own.is_some()
-            && clock.is_ahead(pose.t_s, now_s, STEP_S.min(self.settings.max_age_s / 2.0));
+            && clock.is_ahead(pose.t_s, now_s, self.settings.largest_step_s());
         let steps = back_s > STEP_S || jumps;
         if steps {
             clock.step(pose.t_s, now_s);

@@ -8,7 +8,8 @@
 //! A pose after a sign-off shows that the vehicle had not left. Its motion since the sign-off was not judged, so this
 //! pose is [`Fault::Returned`], and the time since the sign-off is NOT KNOWN.
 
-use super::{Monitor, kept};
+use super::{Monitor, Vehicle, kept};
+use crate::clock::STEP_S;
 use crate::event::{Event, Fault};
 use crate::pair::{Prediction, RelativeMotion};
 use crate::settings::{LARGEST_TIME_S, TimeBase};
@@ -18,7 +19,8 @@ impl Monitor {
     /// clock \[s\]. Returns whether the sign-off is accepted. A later pose ends it and is [`Fault::Returned`].
     ///
     /// A sign-off of a vehicle that was not heard is [`Fault::Garbage`], one that is older than the newest position
-    /// is [`Fault::Reordered`], and one without a proof of delta is [`Fault::SignOff`].
+    /// is [`Fault::Reordered`], and one without a proof of delta is [`Fault::SignOff`]. A stamp with which a pose would
+    /// be a step of the clock, or too fast, is [`Fault::ClockStep`]; the clock stays as it is.
     pub fn sign_off(&mut self, id: &str, t_s: f64, arrival_s: f64) -> bool {
         if t_s.is_nan() || t_s.abs() > LARGEST_TIME_S {
             self.fault(Fault::OutOfRange, None, arrival_s);
@@ -35,6 +37,10 @@ impl Monitor {
         }
         let now_s = self.now_s;
         let of = &self.vehicles[vehicle as usize];
+        if self.steps_clock(of, t_s) {
+            self.fault_at(Fault::ClockStep, Some(vehicle), now_s);
+            return false;
+        }
         let ignored = match (of.signed_off_s.is_some(), of.history.newest(), self.clock_of(of)) {
             (true, ..) => Some(Fault::Duplicate),
             (_, Some(fix), Some(_)) if t_s < fix.t_s => Some(Fault::Reordered),
@@ -55,6 +61,14 @@ impl Monitor {
         (of.signed_off_s, of.is_stale, of.deviation_m) = (Some(now_s), false, None);
         self.emit(Event::SignedOff { vehicle, at_s: now_s });
         true
+    }
+
+    /// Returns whether a pose of a vehicle with this stamp \[s\] would be a step of its clock, or too fast, at present.
+    fn steps_clock(&self, of: &Vehicle, t_s: f64) -> bool {
+        let (Some(mut clock), Some(newest)) = (self.clock_of(of), of.history.newest()) else { return false };
+        let is_ahead = self.settings.time_base == TimeBase::Arrival
+            && (clock.is_ahead(t_s, self.now_s, self.settings.largest_step_s()) || clock.take(t_s, self.now_s));
+        is_ahead || newest.t_s - t_s > STEP_S
     }
 
     /// Returns whether the bounds prove that a vehicle keeps delta from all present vehicles at the present, and it

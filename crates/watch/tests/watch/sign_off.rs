@@ -133,6 +133,28 @@ fn wrong_sign_offs_are_faults() {
 }
 
 #[test]
+fn the_stamp_of_a_sign_off_is_checked_like_that_of_a_pose() {
+    // At the arrival of 3 s; the newest position has this stamp.
+    for (t_s, is_step, is_accepted) in [
+        (500.0, true, false),
+        (3.6, true, false),
+        (3.2, true, false),
+        (1.9, true, false),
+        (3.05, false, true),
+        (3.0, false, true),
+    ] {
+        let mut monitor = monitor(settings());
+        stay(&mut monitor, 3, 0..=30);
+        assert_eq!(monitor.sign_off("c", t_s, 3.0), is_accepted, "{t_s}");
+        assert_eq!(monitor.faults(Fault::ClockStep), u64::from(is_step), "{t_s}");
+        let doubt = State::NotKnown(Reason::Doubt(Fault::ClockStep));
+        assert_eq!(monitor.assess(3.0).state, if is_step { doubt } else { State::Clear }, "{t_s}");
+        // The clock of the other vehicles did not move.
+        assert_eq!(stay(&mut monitor, if is_step { 3 } else { 2 }, 31..=45), State::Clear, "{t_s}");
+    }
+}
+
+#[test]
 fn the_past_of_a_vehicle_is_judged_after_its_sign_off() {
     // `a` passes `b` and is 0.9 m behind it at its last position, at 1 s; `b` is heard at 0 s and 1.3 s only.
     let pass = |offset_m: f64| {
