@@ -30,7 +30,7 @@ pub mod source;
 mod violations;
 
 pub use clock::{DRIFT, STEP_S};
-pub use event::{Assessment, Event, Fault, Pair, PairTime, Reason, Separation, State, Violation};
+pub use event::{Assessment, Event, Fault, Pair, PairTime, Reason, Refusal, Separation, State, Violation};
 pub use history::HISTORY;
 pub use monitor::{LONGEST_NAME, MOST_EVENTS, Monitor, Pose, Taken};
 pub use notice::Notice;

@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 
 use crate::ahead;
 use crate::clock::SourceClock;
-use crate::event::{Event, Fault, Violation};
+use crate::event::{Event, Fault, Refusal, Violation};
 use crate::history::History;
 use crate::plan::Plan;
 use crate::settings::{Expected, Settings, SettingsError};
@@ -90,6 +90,8 @@ pub struct Monitor {
     faults: [FaultCount; Fault::ALL.len()],
     /// Last fault that gives doubt, with its time \[s\].
     doubt: Option<(Fault, f64)>,
+    /// Cause of the last refused sign-off.
+    refusal: Option<Refusal>,
     events: Vec<Event>,
     suppressed: u64,
     violations: OpenViolations,
@@ -125,6 +127,7 @@ impl Monitor {
             now_s: f64::NEG_INFINITY,
             faults: Default::default(),
             doubt: None,
+            refusal: None,
             events: Vec::with_capacity(MOST_EVENTS),
             suppressed: 0,
             violations: OpenViolations::new(),
