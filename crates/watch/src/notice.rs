@@ -261,7 +261,8 @@ fn refusal_text(refusal: Refusal, monitor: &Monitor) -> String {
     let max_age_s = monitor.settings().max_age_s;
     match refusal {
         Refusal::Late { t_s, newest_s } => format!(
-            ": its stamp {} s is older than the newest position ({} s), so it is ignored; send it after the last position",
+            ": its stamp {} s is older than the newest position ({} s), so it is ignored; \
+             send it after the last position",
             fixed(t_s),
             fixed(newest_s)
         ),
