@@ -105,7 +105,8 @@ pub(super) struct WatchArguments {
         value_name = "ADDRESS:PORT",
         num_args = 0..=1,
         require_equals = true,
-        default_missing_value = "127.0.0.1:8737"
+        default_missing_value = "127.0.0.1:8737",
+        value_parser = own_address::<8737>
     )]
     page: Option<SocketAddr>,
     /// Serve Foxglove on an address of this machine [default: 127.0.0.1:8765].
@@ -114,7 +115,8 @@ pub(super) struct WatchArguments {
         value_name = "ADDRESS:PORT",
         num_args = 0..=1,
         require_equals = true,
-        default_missing_value = "127.0.0.1:8765"
+        default_missing_value = "127.0.0.1:8765",
+        value_parser = own_address::<8765>
     )]
     foxglove: Option<SocketAddr>,
     /// Write each notice to standard output as a line of JSON.
@@ -132,6 +134,13 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<Exit, Failure> {
         let message = format!("--foxglove: other machines are refused, as the protocol has no token ({address})");
         let help = "write --foxglove, and run ssh -L 8765:127.0.0.1:8765 THIS_MACHINE on the other machine";
         return Err(Failure::input("watch/setting", message, help));
+    }
+    if let (Some(page), Some(foxglove)) = (arguments.page, arguments.foxglove)
+        && share_a_port(page, foxglove)
+    {
+        let message = format!("--page, --foxglove: both have one port ({page}, {foxglove})");
+        let other = if page.port() == u16::MAX { page.port() - 1 } else { page.port() + 1 };
+        return Err(Failure::input("watch/setting", message, format!("write --foxglove=127.0.0.1:{other}")));
     }
     let plan = arguments.read_plan()?;
     let settings = arguments.settings(&source, &plan)?;
@@ -392,6 +401,20 @@ impl Output for Outputs {
         }
         Ok(())
     }
+}
+
+/// Returns the address and port of an option, whose default port is `PORT`.
+fn own_address<const PORT: u16>(text: &str) -> Result<SocketAddr, String> {
+    text.parse().map_err(|_| {
+        let port = text.rsplit(':').next().and_then(|port| port.parse().ok()).unwrap_or(PORT);
+        format!("not an IP address and a port; write 127.0.0.1:{port}")
+    })
+}
+
+/// Returns whether two servers cannot listen on these addresses, because they have one port. Port 0 is any free port.
+fn share_a_port(a: SocketAddr, b: SocketAddr) -> bool {
+    let is_same_ip = a.ip() == b.ip() || a.ip().is_unspecified() || b.ip().is_unspecified();
+    a.port() != 0 && a.port() == b.port() && is_same_ip
 }
 
 fn time_base() -> impl clap::builder::TypedValueParser<Value = TimeBase> {

@@ -335,6 +335,65 @@ fn vehicles_that_sign_off_leave_a_good_watch() {
 }
 
 #[test]
+fn a_watch_with_a_return_after_a_sign_off_is_not_better_than_its_audit() {
+    // `a` signs off at 1 s and is heard again on the other side of `b`, or stays away.
+    for (vehicles, returns_at, exit) in
+        [("b", 31, 1), ("b", 13, 1), ("bc", 31, 1), ("bc", 13, 1), ("b", 99, 0), ("bc", 99, 0)]
+    {
+        let mut input = String::new();
+        for k in 0..=40 {
+            let t = f64::from(k) / 10.0;
+            let x_m = if k <= 10 { 0.0 } else { 10.0 };
+            if k <= 10 || k >= returns_at {
+                let _ = writeln!(input, r#"{{"t":{t},"id":"a","x":{x_m},"y":0,"z":2,"vx":0,"vy":0,"vz":0}}"#);
+            }
+            for (id, x_m) in vehicles.chars().zip([5, 20]) {
+                let _ = writeln!(input, r#"{{"t":{t},"id":"{id}","x":{x_m},"y":0,"z":2,"vx":0,"vy":0,"vz":0}}"#);
+            }
+            if k == 10 {
+                input += "{\"t\":1.02,\"id\":\"a\",\"event\":\"off\"}\n";
+            }
+        }
+        let folder = tempdir().expect("a folder");
+        let ran = watched(folder.path(), &[&STAMPS[..], &["--record", "r.csv"]].concat(), &input);
+        assert_eq!(ran.exit, Some(exit), "{vehicles} {returns_at}: {ran:?}");
+        let audit = ran_by(TAUTLINE, folder.path(), &["audit", "r.csv", "--delta", "0.5"]);
+        assert!(exit == 1 || audit.exit == Some(0), "{vehicles} {returns_at}: {ran:?} {audit:?}");
+        if returns_at == 31 {
+            assert!(audit.exit == Some(1) && audit.out.contains("UNDECIDED"), "{audit:?}");
+        }
+    }
+}
+
+#[test]
+fn a_wrong_address_of_a_server_is_refused_with_a_right_one() {
+    let folder = tempdir().expect("a folder");
+    for (argument, remedy) in [
+        ("--foxglove=localhost:9", "write 127.0.0.1:9"),
+        ("--foxglove=8766", "write 127.0.0.1:8766"),
+        ("--foxglove=:8766", "write 127.0.0.1:8766"),
+        ("--foxglove=127.0.0.1", "write 127.0.0.1:8765"),
+        ("--page=localhost:9", "write 127.0.0.1:9"),
+        ("--page=99999", "write 127.0.0.1:8737"),
+    ] {
+        let ran = watched(folder.path(), &["--delta", "1", argument], "");
+        assert!(ran.exit == Some(2) && ran.err.contains(remedy), "{argument}: {ran:?}");
+    }
+    // One port for both servers: nothing is served and no file is written.
+    for (page, foxglove) in [("127.0.0.1", "127.0.0.1"), ("0.0.0.0", "127.0.0.1"), ("[::1]", "[::1]")] {
+        let [page, foxglove] = [format!("--page={page}:8797"), format!("--foxglove={foxglove}:8797")];
+        let ran = watched(folder.path(), &["--delta", "1", "--record", "r.csv", &page, &foxglove], "");
+        assert_eq!((ran.exit, ran.code()), (Some(2), "watch/setting"), "{ran:?}");
+        assert!(ran.err.contains("--page, --foxglove: both have one port"), "{ran:?}");
+        assert!(!ran.err.contains("live page:") && !ran.err.contains("Foxglove server:"), "{ran:?}");
+        assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 0);
+    }
+    // Negative twin: any free port for each is good, and the watch ends with its input.
+    let free = ["--delta", "1", "--page=127.0.0.1:0", "--foxglove=127.0.0.1:0"];
+    assert_eq!(watched(folder.path(), &free, "").exit, Some(1));
+}
+
+#[test]
 fn foxglove_is_served_on_the_printed_address() {
     let mut child = Command::new(TAUTLINE)
         .args(["watch", "--json", "--delta", "0.5", "--foxglove=127.0.0.1:0"])

@@ -35,7 +35,8 @@ impl Reason {
         matches!(self, Self::TooFew(_) | Self::Missing(_) | Self::MissingName(_) | Self::SpeedUnknown(_))
     }
 
-    /// Returns whether the reason is normal after all vehicles but one have signed off.
+    /// Returns whether the reason is normal after all vehicles but one have signed off. It is normal only in the last
+    /// interval of a watch, without another state or a return of a vehicle up to the end.
     #[must_use]
     pub fn is_of_end(&self) -> bool {
         matches!(self, Self::SignedOff(_))
@@ -117,8 +118,10 @@ pub enum Fault {
     Dropped,
     /// A vehicle sent too many messages between two messages of another one. The past of this pair is not judged.
     NotJudged,
-    /// The sign-off of a vehicle was refused, because it is not proved that the vehicle keeps delta.
+    /// The sign-off of a vehicle was refused or ignored, for the cause in a [`Refusal`].
     SignOff,
+    /// A vehicle sent a pose after its sign-off, so its separation since the sign-off is not known.
+    Returned,
     /// An ignored message that is older than the newest one of its vehicle.
     Reordered,
     /// An ignored message that is a repetition.
@@ -127,7 +130,7 @@ pub enum Fault {
 
 impl Fault {
     /// All faults.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Garbage,
         Self::OutOfRange,
         Self::TooManyVehicles,
@@ -137,6 +140,7 @@ impl Fault {
         Self::Dropped,
         Self::NotJudged,
         Self::SignOff,
+        Self::Returned,
         Self::Reordered,
         Self::Duplicate,
     ];
@@ -154,6 +158,7 @@ impl Fault {
             Self::Dropped => "dropped",
             Self::NotJudged => "not-judged",
             Self::SignOff => "sign-off-refused",
+            Self::Returned => "pose-after-sign-off",
             Self::Reordered => "reordered",
             Self::Duplicate => "duplicate",
         }
@@ -164,6 +169,35 @@ impl Fault {
     pub fn gives_doubt(self) -> bool {
         !matches!(self, Self::SignOff | Self::Reordered | Self::Duplicate)
     }
+}
+
+/// Cause for which a sign-off was refused or ignored.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Refusal {
+    /// Its stamp \[s\] is older than the newest one of the vehicle \[s\].
+    Late {
+        /// Stamp of the sign-off \[s\].
+        t_s: f64,
+        /// Stamp of the newest position \[s\].
+        newest_s: f64,
+    },
+    /// The vehicle has signed off, and its newest position has this stamp \[s\].
+    Repeated {
+        /// Stamp of the sign-off \[s\].
+        t_s: f64,
+        /// Stamp of the newest position \[s\].
+        newest_s: f64,
+    },
+    /// An error of the input gives doubt.
+    Doubt(Fault),
+    /// The vehicle is in a measured violation with another one.
+    Violation(Pair),
+    /// A vehicle is stale, or was not heard since the step of its clock.
+    Stale(u32),
+    /// The velocity of a vehicle is not known, or it has two positions at one time.
+    NoPrediction(u32),
+    /// The bounds allow a pair to be closer than delta: the smallest possible separation \[m\].
+    Uncertain(Pair, f64),
 }
 
 /// Violation by measured positions, with straight motion between them.
@@ -211,6 +245,8 @@ pub enum Event {
     Back {
         /// The vehicle.
         vehicle: u32,
+        /// Time of its sign-off \[s\]; `None` if it was stale.
+        signed_off_s: Option<f64>,
         /// Time \[s\].
         at_s: f64,
     },
@@ -237,6 +273,8 @@ pub enum Event {
         count: u64,
         /// Vehicle of the last error.
         vehicle: Option<u32>,
+        /// Cause of the last refused sign-off, with [`Fault::SignOff`].
+        refusal: Option<Refusal>,
         /// Time \[s\].
         at_s: f64,
     },

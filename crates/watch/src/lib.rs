@@ -12,6 +12,7 @@
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
+mod absences;
 mod ahead;
 mod clock;
 mod event;
@@ -29,7 +30,7 @@ pub mod source;
 mod violations;
 
 pub use clock::{DRIFT, STEP_S};
-pub use event::{Assessment, Event, Fault, Pair, PairTime, Reason, Separation, State, Violation};
+pub use event::{Assessment, Event, Fault, Pair, PairTime, Reason, Refusal, Separation, State, Violation};
 pub use history::HISTORY;
 pub use monitor::{LONGEST_NAME, MOST_EVENTS, Monitor, Pose, Taken};
 pub use notice::Notice;

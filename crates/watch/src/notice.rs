@@ -2,7 +2,7 @@
 
 use serde_json::{Map, Value, json};
 
-use crate::event::{Assessment, Event, Fault, Pair, PairTime, Reason, State};
+use crate::event::{Assessment, Event, Fault, Pair, PairTime, Reason, Refusal, State};
 use crate::monitor::Monitor;
 
 /// Notice for the user: a state, or an event.
@@ -101,9 +101,12 @@ impl Notice {
                 let text = format!("{} signed off", name(vehicle));
                 Self::new("signed-off", at_s, text, json!({ "id": name(vehicle) }))
             }
-            Event::Back { vehicle, at_s } => {
-                let text = format!("{} is heard again", name(vehicle));
-                Self::new("back", at_s, text, json!({ "id": name(vehicle) }))
+            Event::Back { vehicle, signed_off_s, at_s } => {
+                let since = signed_off_s.map_or_else(String::new, |since_s| {
+                    format!(" after its sign-off: its separation since {} s is NOT KNOWN", fixed(since_s))
+                });
+                let text = format!("{} is heard again{since}", name(vehicle));
+                Self::new("back", at_s, text, json!({ "id": name(vehicle), "signed_off_s": signed_off_s }))
             }
             Event::Began(of) => {
                 let pair = of.pair.map(name);
@@ -136,16 +139,25 @@ impl Notice {
                 let more = json!({ "id": name(vehicle), "deviation_m": deviation_m, "outside": is_outside });
                 Self::new("plan", at_s, text, more)
             }
-            Event::Fault { fault, count, vehicle, at_s } => {
+            Event::Fault { fault, count, vehicle, refusal, at_s } => {
                 let of = vehicle.map(&name);
                 let mut text = fault_text(fault, of.as_deref());
+                if let Some(refusal) = refusal {
+                    text.extend([refusal_text(refusal, monitor)]);
+                }
                 if count > 1 {
                     text.extend([format!(" ({count} times)")]);
                 }
                 if matches!(fault, Fault::Garbage | Fault::Dropped) && !said.is_empty() {
                     text.extend([format!(": {said}")]);
                 }
-                Self::new("fault", at_s, text, json!({ "fault": fault.name(), "count": count, "id": of }))
+                let cause = refusal.map(refusal_name);
+                Self::new(
+                    "fault",
+                    at_s,
+                    text,
+                    json!({ "fault": fault.name(), "count": count, "id": of, "cause": cause }),
+                )
             }
         }
     }
@@ -236,9 +248,64 @@ fn fault_text(fault: Fault, vehicle: Option<&str>) -> String {
         Fault::OutOfBounds => format!("{of} moved farther than --accel and the errors allow"),
         Fault::Dropped => "messages came faster than they were read".to_owned(),
         Fault::NotJudged => format!("{of} sent more messages than are kept, so a part of the past is not judged"),
-        Fault::SignOff => format!("the sign-off of {of} is refused, because its separation is not proved"),
+        Fault::SignOff => format!("the sign-off of {of} is refused"),
+        Fault::Returned => format!("{of} sent a position after its sign-off"),
         Fault::Reordered => format!("{of} sent a message older than its newest one"),
         Fault::Duplicate => format!("{of} sent a message twice"),
+    }
+}
+
+/// Returns the cause of a refused sign-off and its remedy, to follow the sentence of the fault.
+fn refusal_text(refusal: Refusal, monitor: &Monitor) -> String {
+    let name = |vehicle: u32| name(monitor, vehicle);
+    let max_age_s = monitor.settings().max_age_s;
+    match refusal {
+        Refusal::Late { t_s, newest_s } => format!(
+            ": its stamp {} s is older than the newest position ({} s), so it is ignored; \
+             send it after the last position",
+            fixed(t_s),
+            fixed(newest_s)
+        ),
+        Refusal::Repeated { t_s, newest_s } => format!(
+            ": the vehicle has signed off, so the sign-off with the stamp {} s is ignored (newest position {} s); \
+             send one sign-off",
+            fixed(t_s),
+            fixed(newest_s)
+        ),
+        Refusal::Doubt(fault) => {
+            let fault = fault_text(fault, None);
+            format!(": {fault} in the last {max_age_s} s; sign off again after {max_age_s} s without an error")
+        }
+        Refusal::Violation(pair) => {
+            let pair = joined(&pair.map(name));
+            format!(": {pair} is in a measured violation; sign off again after its end")
+        }
+        Refusal::Stale(vehicle) => {
+            let of = name(vehicle);
+            format!(": {of} was not heard for {max_age_s} s; sign off again after a new position of {of}")
+        }
+        Refusal::NoPrediction(vehicle) => {
+            let of = name(vehicle);
+            format!(": the velocity or position of {of} is not known; sign off again after a new position of {of}")
+        }
+        Refusal::Uncertain(pair, least_m) => format!(
+            ": {} may be as near as {} m (delta {} m); sign off again when this is at least delta",
+            joined(&pair.map(name)),
+            down(least_m.max(0.0)),
+            monitor.settings().delta_m
+        ),
+    }
+}
+
+fn refusal_name(refusal: Refusal) -> &'static str {
+    match refusal {
+        Refusal::Late { .. } => "late",
+        Refusal::Repeated { .. } => "repeated",
+        Refusal::Doubt(fault) => fault.name(),
+        Refusal::Violation(_) => "violation",
+        Refusal::Stale(_) => "stale",
+        Refusal::NoPrediction(_) => "speed-unknown",
+        Refusal::Uncertain(..) => "uncertain",
     }
 }
 

@@ -7,6 +7,7 @@ use std::time::Duration;
 
 use serde_json::json;
 
+use crate::absences::Absences;
 use crate::event::{Assessment, Event, Fault, Reason, State};
 use crate::monitor::{Monitor, Pose};
 use crate::notice::{Notice, down, fixed, name};
@@ -55,7 +56,7 @@ pub struct Summary {
     pub has_started: bool,
     /// Time in the state CLEAR \[s\].
     pub clear_s: f64,
-    /// Time in the state NOT KNOWN after the start \[s\].
+    /// Time in the state NOT KNOWN after the start \[s\], and time since sign-offs after which the vehicle was heard.
     pub not_known_s: f64,
     /// Time in the state VIOLATION \[s\].
     pub violation_s: f64,
@@ -73,6 +74,8 @@ pub struct Summary {
     pub vehicles: usize,
     /// Number of vehicles that had signed off at the end.
     pub signed_off: usize,
+    /// Number of sign-offs after which the vehicle sent a position.
+    pub returned: u64,
     /// Smallest separation at a judgement or in a measured violation \[m\], with the names of the pair.
     pub closest: Option<(f64, [String; 2])>,
 }
@@ -101,6 +104,9 @@ impl Summary {
             fixed(self.violation_s),
             self.violations
         );
+        if self.returned > 0 {
+            text.extend([format!("; heard again after a sign-off: {}", self.returned)]);
+        }
         if let Some((distance_m, [a, b])) = &self.closest {
             text.extend([format!("; closest {a}-{b} {} m", down(*distance_m))]);
         }
@@ -113,6 +119,7 @@ impl Summary {
             "started": self.has_started,
             "vehicles": self.vehicles,
             "signed_off": self.signed_off,
+            "returned": self.returned,
             "clear_s": self.clear_s,
             "not_known_s": self.not_known_s,
             "violation_s": self.violation_s,
@@ -131,6 +138,7 @@ struct Session<'a> {
     output: &'a mut dyn Output,
     summary: Summary,
     last: Option<Assessment>,
+    absences: Absences,
     /// Time of the last line \[s\].
     line_s: f64,
     /// Sentence of the last error of the input.
@@ -151,6 +159,7 @@ pub fn watch(monitor: Monitor, inputs: &Inputs, output: &mut dyn Output) -> io::
         output,
         summary: Summary::default(),
         last: None,
+        absences: Absences::default(),
         line_s: f64::NEG_INFINITY,
         said: String::new(),
         held: None,
@@ -290,14 +299,30 @@ impl Session<'_> {
             // The first pose may set the time of the monitor back.
             let passed_s = (of.now_s - last.now_s).max(0.0);
             match last.state {
-                State::Clear => summary.clear_s += passed_s,
+                State::Clear => {
+                    summary.clear_s += passed_s;
+                    self.absences.clear_s += passed_s;
+                }
                 State::Violation(..) => summary.violation_s += passed_s,
-                State::NotKnown(reason) if summary.has_started && !reason.is_of_end() => {
-                    summary.not_known_s += passed_s;
+                State::NotKnown(reason) if summary.has_started => {
+                    if reason.is_of_end() {
+                        self.absences.end_s += passed_s;
+                    } else {
+                        summary.not_known_s += passed_s;
+                    }
                 }
                 State::NotKnown(_) => {}
             }
         }
+        // A return of a vehicle, or another state, shows that the watch was not at its end.
+        self.absences.settle();
+        let unseen_s = std::mem::take(&mut self.absences.unseen_s);
+        let has_return = std::mem::take(&mut self.absences.has_return);
+        let is_end = matches!(of.state, State::NotKnown(reason) if reason.is_of_end());
+        let end_s = if is_end && !has_return { 0.0 } else { std::mem::take(&mut self.absences.end_s) };
+        summary.clear_s = (summary.clear_s - unseen_s).max(0.0);
+        summary.not_known_s += unseen_s + end_s;
+        summary.was_not_known |= unseen_s + end_s > 0.0;
         summary.has_started |=
             !matches!(of.state, State::NotKnown(reason) if reason.is_of_start() || reason.is_of_end());
         summary.was_violated |= matches!(of.state, State::Violation(..));
@@ -328,6 +353,12 @@ impl Session<'_> {
         for event in events {
             match event {
                 Event::Began(_) => self.summary.was_violated = true,
+                Event::SignedOff { vehicle, at_s } => self.absences.begin(vehicle, at_s, self.last.as_ref()),
+                Event::Back { vehicle, signed_off_s: Some(_), .. } => {
+                    self.absences.end(vehicle);
+                    self.summary.returned += 1;
+                    self.summary.was_not_known |= self.summary.has_started;
+                }
                 Event::Ended(of) => {
                     note_closest(&mut self.summary, of.min_m, || of.pair.map(|k| name(&self.monitor, k)));
                 }

@@ -1,5 +1,7 @@
 //! Bounds and limits of a watch, with their defaults and checks.
 
+use crate::clock::STEP_S;
+
 /// Largest time stamp that is read \[s\]: about 3,000 years. A stamp in milliseconds since 1970 is larger.
 pub(crate) const LARGEST_TIME_S: f64 = 1e11;
 /// Largest coordinate that is read \[m\].
@@ -103,6 +105,11 @@ pub struct SettingsError {
 }
 
 impl Settings {
+    /// Returns the time by which a stamp may lie after the present of its clock \[s\]; from there it is a step.
+    pub(crate) fn largest_step_s(&self) -> f64 {
+        STEP_S.min(self.max_age_s / 2.0)
+    }
+
     /// Checks the ranges of all numbers.
     ///
     /// # Errors

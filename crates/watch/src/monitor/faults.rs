@@ -53,7 +53,8 @@ impl Monitor {
             let count = &mut self.faults[fault as usize];
             let is_due = count.reported_s.is_none_or(|last_s| at_s - last_s >= FAULT_PERIOD_S);
             if count.waiting > 0 && is_due {
-                let event = Event::Fault { fault, count: count.waiting, vehicle: count.vehicle, at_s };
+                let refusal = self.refusal.filter(|_| fault == Fault::SignOff);
+                let event = Event::Fault { fault, count: count.waiting, vehicle: count.vehicle, refusal, at_s };
                 (count.waiting, count.reported_s) = (0, Some(at_s));
                 self.emit(event);
             }

@@ -53,7 +53,7 @@ impl Monitor {
         let back_s = newest.filter(|_| is_same_clock).map_or(0.0, |fix| fix.t_s - pose.t_s);
         let jumps = self.settings.time_base == TimeBase::Arrival
             && own.is_some()
-            && clock.is_ahead(pose.t_s, now_s, STEP_S.min(self.settings.max_age_s / 2.0));
+            && clock.is_ahead(pose.t_s, now_s, self.settings.largest_step_s());
         let steps = back_s > STEP_S || jumps;
         if steps {
             clock.step(pose.t_s, now_s);
@@ -96,7 +96,7 @@ impl Monitor {
         let of = &mut self.vehicles[k];
         of.history.push(Fix { t_s: pose.t_s, position_m: pose.position_m });
         of.has_conflict = false;
-        let is_back = std::mem::take(&mut of.has_signed_off);
+        let signed_off_s = of.signed_off_s.take();
         of.velocity = match pose.velocity_m_s {
             Some(velocity) => Some((velocity, self.settings.velocity_error_m_s)),
             None => of.history.velocity(eps, accel),
@@ -106,8 +106,9 @@ impl Monitor {
         let time_s = of.taken_s.map_or(at_s, |last_s| at_s.max(last_s.next_up()));
         of.taken_s = Some(time_s);
         self.compare_with_plan(vehicle, at_s, pose.position_m);
-        if is_back {
-            self.emit(Event::Back { vehicle, at_s: now_s });
+        if signed_off_s.is_some() {
+            self.fault_at(Fault::Returned, Some(vehicle), now_s);
+            self.emit(Event::Back { vehicle, signed_off_s, at_s: now_s });
         }
         Some(Taken { vehicle, time_s })
     }

@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 
 use crate::ahead;
 use crate::clock::SourceClock;
-use crate::event::{Event, Fault, Violation};
+use crate::event::{Event, Fault, Refusal, Violation};
 use crate::history::History;
 use crate::plan::Plan;
 use crate::settings::{Expected, Settings, SettingsError};
@@ -45,7 +45,6 @@ pub struct Taken {
     pub time_s: f64,
 }
 
-#[expect(clippy::struct_excessive_bools, reason = "each is a state of its own")]
 struct Vehicle {
     /// Clock of the vehicle; `None` if the stamps have a common clock.
     clock: Option<SourceClock>,
@@ -61,7 +60,8 @@ struct Vehicle {
     /// Whether the newest stamp has two positions.
     has_conflict: bool,
     is_stale: bool,
-    has_signed_off: bool,
+    /// Time of the sign-off \[s\], if no pose came after it.
+    signed_off_s: Option<f64>,
     /// Index into the plan.
     planned: Option<usize>,
     deviation_m: Option<f64>,
@@ -89,6 +89,8 @@ pub struct Monitor {
     faults: [FaultCount; Fault::ALL.len()],
     /// Last fault that gives doubt, with its time \[s\].
     doubt: Option<(Fault, f64)>,
+    /// Cause of the last refused sign-off.
+    refusal: Option<Refusal>,
     events: Vec<Event>,
     suppressed: u64,
     violations: OpenViolations,
@@ -124,6 +126,7 @@ impl Monitor {
             now_s: f64::NEG_INFINITY,
             faults: Default::default(),
             doubt: None,
+            refusal: None,
             events: Vec::with_capacity(MOST_EVENTS),
             suppressed: 0,
             violations: OpenViolations::new(),
@@ -206,7 +209,7 @@ impl Monitor {
     /// Returns whether a vehicle has signed off and was not heard since.
     #[must_use]
     pub fn has_signed_off(&self, vehicle: usize) -> bool {
-        self.vehicles.get(vehicle).is_some_and(|of| of.has_signed_off)
+        self.vehicles.get(vehicle).is_some_and(|of| of.signed_off_s.is_some())
     }
 
     /// Returns the measured violations that are present.
@@ -247,7 +250,7 @@ impl Monitor {
             velocity: None,
             has_conflict: false,
             is_stale: false,
-            has_signed_off: false,
+            signed_off_s: None,
             planned: self.plan.find(id),
             deviation_m: None,
             is_off_plan: false,

@@ -20,7 +20,7 @@ impl Monitor {
     /// Judges all pairs over the time between the last judgement and the newest positions.
     ///
     /// The motion between two positions of a vehicle is straight. A gap longer than the largest age is not judged,
-    /// because the vehicle was stale within the gap.
+    /// because the vehicle was stale or had signed off within the gap. Both make the time of the gap NOT KNOWN.
     pub(super) fn judge_past(&mut self) {
         // Time until which every vehicle with a new position was judged.
         let mut floor_s = f64::INFINITY;
@@ -44,7 +44,7 @@ impl Monitor {
         let mut lost = None;
         for (k, of) in self.vehicles.iter().enumerate() {
             let (Some(newest), Some(clock)) = (of.history.newest(), self.clock_of(of)) else { continue };
-            if of.has_signed_off && clock.time_of(newest.t_s) <= floor_s {
+            if of.signed_off_s.is_some() && clock.time_of(newest.t_s) <= floor_s {
                 continue;
             }
             let (mut low_m, mut high_m) = (newest.position_m, newest.position_m);
@@ -106,7 +106,7 @@ impl Monitor {
         let of = pair.map(|k| &self.vehicles[k as usize]);
         let newest_s = of.map(|of| Some(self.clock_of(of)?.time_of(of.history.newest()?.t_s)));
         let [Some(first_s), Some(second_s)] = newest_s else { return false };
-        (of[0].has_signed_off && first_s <= second_s) || (of[1].has_signed_off && second_s <= first_s)
+        (of[0].signed_off_s.is_some() && first_s <= second_s) || (of[1].signed_off_s.is_some() && second_s <= first_s)
     }
 
     /// Judges a pair over its time since the last judgement.

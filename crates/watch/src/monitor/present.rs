@@ -15,7 +15,7 @@ impl Monitor {
         }
         let now_s = self.now_s;
         self.judge_past();
-        let present = self.vehicles.iter().filter(|of| !of.has_signed_off).count();
+        let present = self.vehicles.iter().filter(|of| of.signed_off_s.is_none()).count();
         let mut reason = None;
         let mut note = |of: Reason| reason = reason.or(Some(of));
         if let Expected::Names(_) = self.settings.expected
@@ -40,7 +40,7 @@ impl Monitor {
         for k in 0..self.vehicles.len() {
             let vehicle = u32::try_from(k).unwrap_or(u32::MAX);
             let of = &self.vehicles[k];
-            if of.has_signed_off {
+            if of.signed_off_s.is_some() {
                 continue;
             }
             let Some(age_s) = self.age_s(of) else {
@@ -65,7 +65,7 @@ impl Monitor {
             self.vehicles[k].is_stale = is_stale;
             match (was_stale, is_stale) {
                 (false, true) => self.emit(Event::Stale { vehicle, age_s, at_s: now_s }),
-                (true, false) => self.emit(Event::Back { vehicle, at_s: now_s }),
+                (true, false) => self.emit(Event::Back { vehicle, signed_off_s: None, at_s: now_s }),
                 _ => {}
             }
         }
@@ -82,7 +82,7 @@ impl Monitor {
         };
         let time = |(pair, in_s): (Pair, f64)| PairTime { pair, at_s: now_s + in_s };
         let clear = found.clear.filter(|_| state == State::Clear);
-        let deviations = self.vehicles.iter().enumerate().filter(|(_, of)| !of.is_stale && !of.has_signed_off);
+        let deviations = self.vehicles.iter().enumerate().filter(|(_, of)| !of.is_stale && of.signed_off_s.is_none());
         Assessment {
             now_s,
             state,

@@ -4,18 +4,23 @@
 //! it is accepted only if the bounds prove that the vehicle keeps delta from every other one at this moment, and no
 //! error of the input gives doubt. A refused sign-off changes nothing, and the vehicle becomes stale. The positions up
 //! to a sign-off are judged as all others.
+//!
+//! A pose after a sign-off shows that the vehicle had not left. Its motion since the sign-off was not judged, so this
+//! pose is [`Fault::Returned`], and the time since the sign-off is NOT KNOWN.
 
-use super::{Monitor, kept};
-use crate::event::{Event, Fault};
+use super::{Monitor, Vehicle, kept};
+use crate::clock::STEP_S;
+use crate::event::{Event, Fault, Refusal};
 use crate::pair::{Prediction, RelativeMotion};
 use crate::settings::{LARGEST_TIME_S, TimeBase};
 
 impl Monitor {
     /// Takes the sign-off of a vehicle with a stamp of its clock \[s\], which arrived at `arrival_s` on the caller's
-    /// clock \[s\]. Returns whether the sign-off is accepted. A later pose ends it.
+    /// clock \[s\]. Returns whether the sign-off is accepted. A later pose ends it and is [`Fault::Returned`].
     ///
-    /// A sign-off of a vehicle that was not heard is [`Fault::Garbage`], one that is older than the newest position
-    /// is [`Fault::Reordered`], and one without a proof of delta is [`Fault::SignOff`].
+    /// A sign-off of a vehicle that was not heard is [`Fault::Garbage`]. One that is older than the newest position,
+    /// repeated or without a proof of delta is [`Fault::SignOff`] with its [`Refusal`]. A stamp with which a pose would
+    /// be a step of the clock, or too fast, is [`Fault::ClockStep`]; the clock stays as it is.
     pub fn sign_off(&mut self, id: &str, t_s: f64, arrival_s: f64) -> bool {
         if t_s.is_nan() || t_s.abs() > LARGEST_TIME_S {
             self.fault(Fault::OutOfRange, None, arrival_s);
@@ -32,44 +37,68 @@ impl Monitor {
         }
         let now_s = self.now_s;
         let of = &self.vehicles[vehicle as usize];
-        let ignored = match (of.has_signed_off, of.history.newest(), self.clock_of(of)) {
-            (true, ..) => Some(Fault::Duplicate),
-            (_, Some(fix), Some(_)) if t_s < fix.t_s => Some(Fault::Reordered),
-            (_, Some(_), Some(_)) => None,
-            _ => Some(Fault::SignOff),
-        };
-        if let Some(fault) = ignored {
-            self.fault_at(fault, Some(vehicle), now_s);
+        if self.steps_clock(of, t_s) {
+            self.fault_at(Fault::ClockStep, Some(vehicle), now_s);
             return false;
         }
-        self.judge_past();
-        let is_doubted = self.doubt.is_some_and(|(_, at_s)| now_s - at_s < self.settings.max_age_s);
-        if is_doubted || !self.is_apart(vehicle) {
+        let newest_s = of.history.newest().map(|fix| fix.t_s);
+        let refusal = match (of.signed_off_s, newest_s, self.clock_of(of)) {
+            (Some(_), Some(newest_s), _) => Some(Refusal::Repeated { t_s, newest_s }),
+            (_, Some(newest_s), Some(_)) if t_s < newest_s => Some(Refusal::Late { t_s, newest_s }),
+            (_, Some(_), Some(_)) => {
+                self.judge_past();
+                self.unproved(vehicle)
+            }
+            _ => Some(Refusal::Stale(vehicle)),
+        };
+        if refusal.is_some() {
+            self.refusal = refusal;
             self.fault_at(Fault::SignOff, Some(vehicle), now_s);
             return false;
         }
         let of = &mut self.vehicles[vehicle as usize];
-        (of.has_signed_off, of.is_stale, of.deviation_m) = (true, false, None);
+        (of.signed_off_s, of.is_stale, of.deviation_m) = (Some(now_s), false, None);
         self.emit(Event::SignedOff { vehicle, at_s: now_s });
         true
     }
 
-    /// Returns whether the bounds prove that a vehicle keeps delta from all present vehicles at the present, and it
-    /// has no measured violation.
-    fn is_apart(&self, vehicle: u32) -> bool {
-        let Some(own) = self.fresh_prediction(vehicle as usize) else { return false };
-        let others = (0..self.vehicles.len()).filter(|&k| k != vehicle as usize && !self.vehicles[k].has_signed_off);
-        self.open_violations().all(|of| !of.pair.contains(&vehicle))
-            && others.into_iter().all(|k| {
-                self.fresh_prediction(k)
-                    .is_some_and(|other| RelativeMotion::new(&own, &other).least_m() >= self.settings.delta_m)
-            })
+    /// Returns whether a pose of a vehicle with this stamp \[s\] would be a step of its clock, or too fast, at present.
+    fn steps_clock(&self, of: &Vehicle, t_s: f64) -> bool {
+        let (Some(mut clock), Some(newest)) = (self.clock_of(of), of.history.newest()) else { return false };
+        let is_ahead = self.settings.time_base == TimeBase::Arrival
+            && (clock.is_ahead(t_s, self.now_s, self.settings.largest_step_s()) || clock.take(t_s, self.now_s));
+        is_ahead || newest.t_s - t_s > STEP_S
     }
 
-    /// Returns the prediction of a vehicle; `None` if it is stale, has a conflict, or its clock or velocity is unknown.
-    fn fresh_prediction(&self, k: usize) -> Option<Prediction> {
-        let of = &self.vehicles[k];
-        let age_s = self.age_s(of).filter(|&age_s| age_s <= self.settings.max_age_s)?;
-        self.prediction(of, age_s).filter(|_| !of.has_conflict)
+    /// Returns why the bounds do not prove that a vehicle keeps delta from all present vehicles at the present; `None`
+    /// if they do.
+    fn unproved(&self, vehicle: u32) -> Option<Refusal> {
+        let doubt = self.doubt.filter(|(_, at_s)| self.now_s - at_s < self.settings.max_age_s);
+        if let Some((fault, _)) = doubt {
+            return Some(Refusal::Doubt(fault));
+        }
+        if let Some(of) = self.open_violations().find(|of| of.pair.contains(&vehicle)) {
+            return Some(Refusal::Violation(of.pair));
+        }
+        let own = match self.fresh_prediction(vehicle) {
+            Ok(own) => own,
+            Err(refusal) => return Some(refusal),
+        };
+        let others = self.vehicles.iter().zip(0_u32..).filter(|(of, k)| *k != vehicle && of.signed_off_s.is_none());
+        others.into_iter().find_map(|(_, k)| match self.fresh_prediction(k) {
+            Err(refusal) => Some(refusal),
+            Ok(other) => {
+                let least_m = RelativeMotion::new(&own, &other).least_m();
+                let keeps_delta = least_m >= self.settings.delta_m;
+                (!keeps_delta).then(|| Refusal::Uncertain([vehicle.min(k), vehicle.max(k)], least_m))
+            }
+        })
+    }
+
+    /// Returns the prediction of a vehicle, unless it is stale, has a conflict, or its clock or velocity is unknown.
+    fn fresh_prediction(&self, vehicle: u32) -> Result<Prediction, Refusal> {
+        let of = &self.vehicles[vehicle as usize];
+        let age_s = self.age_s(of).filter(|&age_s| age_s <= self.settings.max_age_s).ok_or(Refusal::Stale(vehicle))?;
+        self.prediction(of, age_s).filter(|_| !of.has_conflict).ok_or(Refusal::NoPrediction(vehicle))
     }
 }

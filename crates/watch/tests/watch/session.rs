@@ -162,6 +162,72 @@ fn a_watch_whose_vehicles_sign_off_one_by_one_is_good() {
     assert!(!whole(false).0.is_good());
 }
 
+/// Returns lines of vehicles at rest on the x axis, each at 10 Hz for its tenths of a second.
+fn resting(vehicles: &[(&str, f64, std::ops::Range<u32>)]) -> Vec<(f64, String)> {
+    let lines = vehicles.iter().flat_map(|(id, x, tenths)| {
+        tenths.clone().map(move |k| {
+            let t = f64::from(k) / 10.0;
+            (t, format!(r#"{{"t":{t},"id":"{id}","x":{x},"y":0,"z":2,"vx":0,"vy":0,"vz":0}}"#))
+        })
+    });
+    lines.collect()
+}
+
+/// Returns lines in the order of their stamps.
+fn in_order(mut lines: Vec<(f64, String)>) -> String {
+    lines.sort_by(|a, b| a.0.total_cmp(&b.0));
+    lines.into_iter().map(|(_, line)| line).collect::<Vec<_>>().join("\n")
+}
+
+fn off(t: f64, id: &str) -> (f64, String) {
+    (t, format!(r#"{{"t":{t},"id":"{id}","event":"off"}}"#))
+}
+
+#[test]
+fn a_return_after_a_sign_off_makes_the_time_since_the_sign_off_not_known() {
+    // `a` signs off at 1.02 s and is heard again at 3.1 s, on the other side of `b`.
+    for (others, clear_s) in [(&[("b", 5.0, 0..41)][..], 1.02), (&[("b", 5.0, 0..41), ("c", 20.0, 0..41)], 1.02)] {
+        let flight = |returns: bool| {
+            let mut lines = resting(others);
+            lines.extend(resting(&[("a", 0.0, 0..11)]));
+            lines.push(off(1.02, "a"));
+            lines.extend(returns.then(|| resting(&[("a", 10.0, 31..41)])).into_iter().flatten());
+            watched(&in_order(lines))
+        };
+        let (summary, seen) = flight(true);
+        assert!(!summary.is_good() && summary.was_not_known && summary.returned == 1, "{summary:?} {:?}", seen.texts);
+        // NOT KNOWN from the sign-off to the return, and for the largest age from there.
+        assert!((summary.clear_s - clear_s).abs() < 1e-9, "{summary:?}");
+        assert!((summary.not_known_s - 2.98).abs() < 1e-9, "{summary:?}");
+        let texts = seen.texts.join("\n");
+        let back = "3.10 s: a is heard again after its sign-off: its separation since 1.02 s is NOT KNOWN";
+        assert!(texts.contains(back), "{texts}");
+        assert!(texts.contains("3.10 s: NOT KNOWN: a vehicle sent a position after its sign-off"), "{texts}");
+        assert!(texts.contains("; heard again after a sign-off: 1"), "{texts}");
+        // Negative twin: without the return, the watch is good.
+        let (summary, seen) = flight(false);
+        assert!(summary.is_good() && summary.returned == 0, "{summary:?} {:?}", seen.texts);
+    }
+}
+
+#[test]
+fn only_the_last_time_with_one_vehicle_is_the_end_of_a_watch() {
+    // `a` signs off, `b` is silent from 1 s to 3 s, and `c` comes then or never.
+    let flight = |comes: bool| {
+        let mut lines = resting(&[("a", 0.0, 0..11), ("b", 5.0, 0..11), ("b", 5.0, 30..41)]);
+        lines.push(off(1.02, "a"));
+        lines.extend(comes.then(|| resting(&[("c", 10.0, 31..41)])).into_iter().flatten());
+        watched(&in_order(lines))
+    };
+    let (summary, seen) = flight(true);
+    assert!(!summary.is_good() && summary.was_not_known, "{summary:?} {:?}", seen.texts);
+    assert!(summary.not_known_s > 1.9, "{summary:?}");
+    assert!(seen.texts.last().is_some_and(|text| text.starts_with("NOT KNOWN: 3 vehicles")), "{:?}", seen.texts);
+    // Negative twin: the time since the sign-off of `a` is the end.
+    let (summary, seen) = flight(false);
+    assert!(summary.is_good() && summary.not_known_s == 0.0, "{summary:?} {:?}", seen.texts);
+}
+
 #[test]
 fn a_sign_off_alone_starts_no_watch_and_an_unknown_one_gives_doubt() {
     let (summary, seen) = watched(r#"{"t":0,"id":"a","event":"off"}"#);

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::{monitor, rest, settings};
-use tautline_watch::{Event, Fault, Monitor, Pose, Reason, Settings, State, TimeBase};
+use tautline_watch::{Event, Fault, Monitor, Notice, Pose, Reason, Settings, State, TimeBase};
 
 const IDS: [&str; 3] = ["a", "b", "c"];
 
@@ -50,10 +50,26 @@ fn a_vehicle_that_is_heard_after_its_sign_off_is_present_again() {
     rest(&mut monitor, "c", 3.0, 6.5, 3.0);
     // It is too close to b now.
     assert!(matches!(monitor.assess(3.0).state, State::Violation([1, 2], _)));
-    assert!(monitor.drain_events().any(|event| matches!(event, Event::Back { vehicle: 2, .. })));
+    let back = Event::Back { vehicle: 2, signed_off_s: Some(1.0), at_s: 3.0 };
+    assert!(monitor.drain_events().any(|event| event == back));
+    assert_eq!(monitor.faults(Fault::Returned), 1);
     assert!(!monitor.has_signed_off(2));
     // Silent again, it is awaited.
     assert!(matches!(stay(&mut monitor, 2, 31..=50), State::NotKnown(Reason::Stale(2, _))));
+}
+
+#[test]
+fn a_return_after_a_sign_off_is_not_clear_with_the_time_of_arrival() {
+    for (returns, state) in [(true, State::NotKnown(Reason::Doubt(Fault::Returned))), (false, State::Clear)] {
+        let mut monitor = monitor(settings());
+        stay(&mut monitor, 3, 0..=10);
+        assert!(monitor.sign_off("c", 1.0, 1.0));
+        stay(&mut monitor, 2, 11..=30);
+        if returns {
+            rest(&mut monitor, "c", 3.0, -6.0, 3.0);
+        }
+        assert_eq!(monitor.assess(3.0).state, state);
+    }
 }
 
 #[test]
@@ -102,7 +118,7 @@ fn wrong_sign_offs_are_faults() {
     for (id, t_s, fault) in [
         ("d", 1.0, Fault::Garbage),
         ("", 1.0, Fault::Garbage),
-        ("c", 0.9, Fault::Reordered),
+        ("c", 0.9, Fault::SignOff),
         ("c", f64::NAN, Fault::OutOfRange),
         ("c", f64::INFINITY, Fault::OutOfRange),
         ("c", -1e12, Fault::OutOfRange),
@@ -113,7 +129,77 @@ fn wrong_sign_offs_are_faults() {
     }
     assert_eq!(stay(&mut monitor, 3, 11..=30), State::Clear);
     assert!(monitor.sign_off("c", 3.0, 3.0) && !monitor.sign_off("c", 3.0, 3.0));
-    assert_eq!((monitor.faults(Fault::Duplicate), monitor.names().len()), (1, 3));
+    assert_eq!((monitor.faults(Fault::SignOff), monitor.names().len()), (2, 3));
+    // A sign-off is not reported like a position.
+    assert_eq!(monitor.faults(Fault::Reordered) + monitor.faults(Fault::Duplicate), 0);
+}
+
+#[test]
+fn the_stamp_of_a_sign_off_is_checked_like_that_of_a_pose() {
+    // At the arrival of 3 s; the newest position has this stamp.
+    for (t_s, is_step, is_accepted) in [
+        (500.0, true, false),
+        (3.6, true, false),
+        (3.2, true, false),
+        (1.9, true, false),
+        (3.05, false, true),
+        (3.0, false, true),
+    ] {
+        let mut monitor = monitor(settings());
+        stay(&mut monitor, 3, 0..=30);
+        assert_eq!(monitor.sign_off("c", t_s, 3.0), is_accepted, "{t_s}");
+        assert_eq!(monitor.faults(Fault::ClockStep), u64::from(is_step), "{t_s}");
+        let doubt = State::NotKnown(Reason::Doubt(Fault::ClockStep));
+        assert_eq!(monitor.assess(3.0).state, if is_step { doubt } else { State::Clear }, "{t_s}");
+        // The clock of the other vehicles did not move.
+        assert_eq!(stay(&mut monitor, if is_step { 3 } else { 2 }, 31..=45), State::Clear, "{t_s}");
+    }
+}
+
+#[test]
+fn a_refused_sign_off_is_reported_with_its_cause_and_a_remedy() {
+    let refused = |prepare: fn(&mut Monitor), t_s: f64| {
+        let mut monitor = monitor(settings());
+        stay(&mut monitor, 3, 0..=10);
+        prepare(&mut monitor);
+        monitor.drain_events();
+        assert!(!monitor.sign_off("c", t_s, t_s.max(1.0)));
+        let events: Vec<_> = monitor.drain_events().collect();
+        let event =
+            events.iter().find(|of| matches!(of, Event::Fault { fault: Fault::SignOff, .. })).expect("an event");
+        let notice = Notice::of_event(event, &monitor, "");
+        (notice.json["cause"].as_str().unwrap_or_default().to_owned(), notice.text)
+    };
+    let nothing = |_: &mut Monitor| {};
+    let signed_off = |monitor: &mut Monitor| assert!(monitor.sign_off("c", 1.0, 1.0));
+    let doubted = |monitor: &mut Monitor| monitor.fault(Fault::OutOfBounds, Some(2), 1.0);
+    let stale = |monitor: &mut Monitor| {
+        for k in 11..=25 {
+            let now_s = 0.1 * f64::from(k);
+            rest(monitor, "b", now_s, 6.0, now_s);
+            rest(monitor, "c", now_s, 12.0, now_s);
+        }
+    };
+    let near = |monitor: &mut Monitor| rest(monitor, "d", 1.0, 13.015, 1.0);
+    for (found, cause, parts) in [
+        (
+            refused(nothing, 0.9),
+            "late",
+            ["its stamp 0.90 s is older than the newest position (1.00 s)", "ignored; send it"],
+        ),
+        (
+            refused(signed_off, 1.1),
+            "repeated",
+            ["with the stamp 1.10 s is ignored (newest position 1.00 s)", "; send one"],
+        ),
+        (refused(doubted, 1.0), "out-of-bounds", ["moved farther than --accel", "; sign off again after 1 s without"]),
+        (refused(stale, 2.5), "stale", ["a was not heard for 1 s", "; sign off again after a new position of a"]),
+        (refused(near, 1.0), "uncertain", ["c-d may be as near as 0.99 m (delta 1 m)", "; sign off again when"]),
+    ] {
+        assert_eq!(found.0, cause, "{found:?}");
+        assert!(parts.iter().all(|part| found.1.contains(part)), "{found:?}");
+        assert_eq!(found.1.contains("may be as near"), cause == "uncertain", "{found:?}");
+    }
 }
 
 #[test]
