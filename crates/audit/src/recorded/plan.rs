@@ -90,8 +90,8 @@ pub struct PlanFindings {
     pub has_curves: bool,
     /// Distances of the vehicles, by index. A vehicle without shared time has none.
     pub deviations: Vec<Deviation>,
-    /// Time to which the verdict is limited \[s\]: with an estimated delay, the common time of the flight as a whole and
-    /// the plan as a whole. `None` if the verdict covers the whole window.
+    /// Time to which the verdict is limited \[s\]: with an estimated delay, the common time of the flight as a whole
+    /// and the plan as a whole. `None` if the verdict covers the whole window.
     pub common_s: Option<(f64, f64)>,
     /// Times in which a distance is not known, by vehicle.
     pub unknown: Vec<Unknown>,
@@ -187,9 +187,9 @@ impl PlanComparison {
     /// the samples, and of several the smallest. Beyond its ends a plan counts as standing for this estimate alone.
     ///
     /// An estimated delay moves the ends of the plan away from those of the flight, by at most the delay and a mean
-    /// sampling interval. The verdict is then limited to the common time of the flight as a whole, from its first to its
-    /// last sample, and the plan as a whole. It is not limited if an end differs by more, or if the common time is below
-    /// half of flight and plan. A vehicle that vanishes in the common time is unknown.
+    /// sampling interval. The verdict is then limited to the common time of the flight as a whole, from its first to
+    /// its last sample, and the plan as a whole. It is not limited if an end differs by more, or if the common time is
+    /// below half of flight and plan. A vehicle that vanishes in the common time is unknown.
     ///
     /// # Errors
     /// [`RecordedError`] if an item of the plan is invalid.
