@@ -155,7 +155,7 @@ fn wrong_input_ends_with_2_and_leaves_nothing() {
         ("jump", "skyc", &[], "export/too-fast", ["vehicle a at ", "--tolerance"]),
         ("flat.csv", "skyc", &[], "export/no-heights", ["no heights", "--column z=NAME"]),
         ("two.csv", "crazyflie", &[], "export/name", ["no file name", "rename"]),
-        ("flight.csv", "crazyflie", &["--tolerance", "0.00002"], "export/too-long", ["4096 bytes", "--compressed"]),
+        ("flight.csv", "crazyflie", &["--tolerance", "0.00005"], "export/too-long", ["4096 bytes", "--compressed"]),
         ("flight.csv", "skyb", &["--tolerance", "0.001"], "export/tolerance", ["rounds positions", "--tolerance"]),
         ("flight.csv", "skyb", &["--tolerance", "-1"], "export/tolerance", ["--tolerance", "-1"]),
         ("flight.csv", "skyb", &["--skyb-version", "3"], "export/skyb-version", ["must be 1 or 2", "3"]),

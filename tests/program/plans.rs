@@ -141,8 +141,8 @@ fn an_estimated_delay_limits_the_verdict_to_the_common_time() {
             Some(format!("{:?},{rest}\n", time + 1.5))
         })
         .collect();
-    // Both vehicles then wait for 3 s at the end of their plans.
-    let waiting = format!("t,id,x,y,z\n{late}8.5,cf1,4,0,1\n8.5,cf2,4,1.5,1\n");
+    // Both vehicles then wait for 2 s at the end of their plans.
+    let waiting = format!("t,id,x,y,z\n{late}7.5,cf1,4,0,1\n7.5,cf2,4,1.5,1\n");
     fs::write(folder.path().join("late.csv"), waiting).expect("a file");
     let asked = ["late.csv", "--delta", "1", "--plan", "plan", "--max-gap", "5"];
     let ran = audit(folder.path(), &asked);
@@ -158,7 +158,7 @@ fn an_estimated_delay_limits_the_verdict_to_the_common_time() {
     let [from_s, to_s] = [0, 1].map(|k| report["plan"]["common_s"][k].as_f64().expect("a time"));
     assert!((from_s - 2.5).abs() < 1e-9 && (to_s - 5.5).abs() < 1e-3, "{report}");
     // The claim about the whole flight, or about a given window, stays undecided.
-    for window in [&["--plan-delay", "1.5"][..], &["--to", "8"]] {
+    for window in [&["--plan-delay", "1.5"][..], &["--to", "7"]] {
         let whole = audit(folder.path(), &[&asked[..], window].concat());
         assert_eq!(whole.exit, Some(1), "{whole:?}");
         assert!(whole.out.starts_with("UNDECIDED: the distance of cf1") && whole.out.contains("no plan"), "{whole:?}");

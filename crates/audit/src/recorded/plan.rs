@@ -90,8 +90,8 @@ pub struct PlanFindings {
     pub has_curves: bool,
     /// Distances of the vehicles, by index. A vehicle without shared time has none.
     pub deviations: Vec<Deviation>,
-    /// Time to which the verdict is limited \[s\]: with an estimated delay, the time in which flight and plan of all
-    /// vehicles are present. `None` if the verdict covers the whole window.
+    /// Time to which the verdict is limited \[s\]: with an estimated delay, the common time of the flight as a whole
+    /// and the plan as a whole. `None` if the verdict covers the whole window.
     pub common_s: Option<(f64, f64)>,
     /// Times in which a distance is not known, by vehicle.
     pub unknown: Vec<Unknown>,
@@ -186,8 +186,10 @@ impl PlanComparison {
     /// `None` estimates the delay. Of the delays within a minute, it takes the one of least mean squared distance at
     /// the samples, and of several the smallest. Beyond its ends a plan counts as standing for this estimate alone.
     ///
-    /// An estimated delay moves the ends of the plan away from those of the flight. The verdict is then limited to
-    /// their common time, unless the window is given or the common time is below half of flight and plan.
+    /// An estimated delay moves the ends of the plan away from those of the flight, by at most the delay and a mean
+    /// sampling interval. The verdict is then limited to the common time of the flight as a whole, from its first to
+    /// its last sample, and the plan as a whole. It is not limited if an end differs by more, or if the common time is
+    /// below half of flight and plan. A vehicle that vanishes in the common time is unknown.
     ///
     /// # Errors
     /// [`RecordedError`] if an item of the plan is invalid.
@@ -210,10 +212,11 @@ impl PlanComparison {
             let shortest_s = vehicle.mean_interval_s().max(SHORTEST_UNKNOWN_S);
             unknown.extend(unknown_times(index, &vehicle.segments, planned, shortest_s));
         }
-        let common_s = self.common_time(&plan).filter(|_| is_estimated).filter(|(from_s, to_s)| {
-            let count = unknown.len();
-            unknown.retain(|of| of.from_s < *to_s && of.to_s > *from_s);
-            unknown.len() < count
+        let common_s = if is_estimated { self.common_time(&plan, delay_s) } else { None }.filter(|common_s| {
+            let within: Vec<_> = unknown.iter().filter_map(|of| self.unknown_within(of, *common_s)).collect();
+            let is_limited = within != unknown;
+            unknown = within;
+            is_limited
         });
         let known = deviations.len() == self.flight.iter().filter(|vehicle| vehicle.is_selected).count();
         let has_left = |of: &Deviation| tube_m.is_some_and(|tube_m| of.lower_m > tube_m);
@@ -246,21 +249,40 @@ impl PlanComparison {
         self.plan.iter().map(of_vehicle).collect()
     }
 
-    /// Returns the time in which flight and plan of all vehicles are present, up to gaps; an end of the window that is
-    /// given stays. `None` if this time is below [`LEAST_COMMON`] of the flight and of the plan.
-    fn common_time(&self, plan: &BTreeMap<String, Vec<Segment>>) -> Option<(f64, f64)> {
+    /// Returns the common time of the flight as a whole and the plan as a whole; an end of the window that is given
+    /// stays. `None` if another end differs by more than the delay and a sampling interval, or if the common time is
+    /// below [`LEAST_COMMON`] of the flight and of the plan.
+    fn common_time(&self, plan: &BTreeMap<String, Vec<Segment>>, delay_s: f64) -> Option<(f64, f64)> {
         let ends = |segments: &[Segment]| Some((segments.first()?.from_s, segments.last()?.to_s));
-        let (mut flown, mut planned) = (Vec::new(), Vec::new());
+        let (mut flown, mut planned, mut interval_s) = (Vec::new(), Vec::new(), 0.0_f64);
         for vehicle in self.flight.iter().filter(|vehicle| vehicle.is_selected) {
             flown.push(ends(&vehicle.segments)?);
             planned.push(ends(plan.get(&vehicle.name)?)?);
+            interval_s = interval_s.max(vehicle.mean_interval_s());
         }
-        let longest_s = |spans: &[(f64, f64)]| spans.iter().map(|span| span.1 - span.0).fold(0.0, f64::max);
-        let least_s = LEAST_COMMON * longest_s(&flown).min(longest_s(&planned));
-        let spans = || flown.iter().chain(&planned);
-        let from_s = self.settings.from_s.unwrap_or(spans().map(|span| span.0).fold(f64::NEG_INFINITY, f64::max));
-        let to_s = self.settings.to_s.unwrap_or(spans().map(|span| span.1).fold(f64::INFINITY, f64::min));
-        (to_s > from_s && to_s - from_s >= least_s).then_some((from_s, to_s))
+        let whole = |spans: &[(f64, f64)]| {
+            let from_s = spans.iter().map(|span| span.0).fold(f64::INFINITY, f64::min);
+            (from_s, spans.iter().map(|span| span.1).fold(f64::NEG_INFINITY, f64::max))
+        };
+        let (flown, planned) = (whole(&flown), whole(&planned));
+        let most_s = delay_s.abs() + interval_s.max(SHORTEST_UNKNOWN_S);
+        let is_explained = |given: Option<f64>, apart_s: f64| given.is_some() || apart_s.abs() <= most_s;
+        let is_explained = is_explained(self.settings.from_s, flown.0 - planned.0)
+            && is_explained(self.settings.to_s, flown.1 - planned.1);
+        let from_s = self.settings.from_s.unwrap_or(flown.0.max(planned.0));
+        let to_s = self.settings.to_s.unwrap_or(flown.1.min(planned.1));
+        let least_s = LEAST_COMMON * (flown.1 - flown.0).min(planned.1 - planned.0);
+        (is_explained && to_s > from_s && to_s - from_s >= least_s).then_some((from_s, to_s))
+    }
+
+    /// Returns the part of an unknown time within the common time. At its ends, a planned time shorter than a sampling
+    /// interval does not count, because the vehicles of a flight are rarely sampled at the same instants.
+    fn unknown_within(&self, of: &Unknown, (from_s, to_s): (f64, f64)) -> Option<Unknown> {
+        let part = Unknown { from_s: of.from_s.max(from_s), to_s: of.to_s.min(to_s), ..*of };
+        let is_at_end = part.from_s == from_s || part.to_s == to_s;
+        let interval_s = if of.is_flown || !is_at_end { 0.0 } else { self.flight[of.vehicle].mean_interval_s() };
+        let shortest_s = if is_at_end { interval_s.max(SHORTEST_UNKNOWN_S) } else { 0.0 };
+        (part.to_s > part.from_s && part.to_s - part.from_s >= shortest_s).then_some(part)
     }
 
     fn estimated_delay(&self, shift_s: f64) -> Result<f64, RecordedError> {

@@ -157,6 +157,59 @@ fn times_of_one_alone_are_unknown() {
     assert_eq!((found.status, found.deviations.len()), (Status::Undecided, 0));
 }
 
+/// Samples of two vehicles 5 m apart on the closed path, later by a delay, within a time of each \[s\].
+fn two_flights(delay_s: f64, spans_s: [(f64, f64); 2]) -> Vec<Item> {
+    let all = (-40..=240).map(|k| f64::from(k) * 0.05);
+    let of = |vehicle: usize, t: f64| sample(vehicle, t, path(t - delay_s) + vector![0.0, 5.0, 0.0] * vehicle as f64);
+    let is_in = |(from_s, to_s): (f64, f64), t: f64| t > from_s - 1e-9 && t < to_s + 1e-9;
+    all.flat_map(|t| (0..2).filter(move |k| is_in(spans_s[*k], t)).map(move |k| of(k, t))).collect()
+}
+
+#[test]
+fn an_estimated_delay_hides_no_vehicle_that_vanishes() {
+    let plan = [path_plan(0, Vector3::zeros()), path_plan(1, vector![0.0, 5.0, 0.0])];
+    let judged = |delay_s, spans_s| compare(&plan_alone(), &two_flights(delay_s, spans_s), &plan, None, Some(0.1));
+    let all = (0.0, 8.0);
+    for (delay_s, spans_s, expected) in [
+        // The delay alone moves the ends of the plan.
+        (0.0, [all; 2], Status::Clear),
+        (1.0, [all; 2], Status::Clear),
+        (-1.0, [all; 2], Status::Clear),
+        // Vehicles are sampled at different instants.
+        (1.0, [(0.05, 7.95), all], Status::Clear),
+        // One vehicle ends earlier, or starts later, while its plan goes on.
+        (0.0, [(0.0, 5.0), all], Status::Undecided),
+        (1.0, [(0.0, 7.5), all], Status::Undecided),
+        (1.0, [(1.5, 8.0), all], Status::Undecided),
+        (-1.0, [all, (0.5, 8.0)], Status::Undecided),
+        // The whole flight ends earlier, or starts later, than the delay explains.
+        (0.0, [(0.0, 5.0); 2], Status::Undecided),
+        (1.0, [(0.0, 6.0); 2], Status::Undecided),
+        (0.5, [(2.0, 8.5); 2], Status::Undecided),
+    ] {
+        let found = judged(delay_s, spans_s);
+        assert!((found.delay_s - delay_s).abs() < 0.01, "{delay_s} {}", found.delay_s);
+        assert_eq!(found.status, expected, "{delay_s} {spans_s:?} {:?} {:?}", found.common_s, found.unknown);
+        assert_eq!(found.unknown.is_empty(), expected == Status::Clear);
+    }
+    // The unknown time is that of the vehicle within the common time.
+    let found = judged(1.0, [(0.0, 7.5), all]);
+    let [of] = found.unknown[..] else { panic!("{:?}", found.unknown) };
+    assert!((of.vehicle, of.is_flown) == (0, false) && (of.from_s - 7.5).abs() < 1e-9 && of.to_s == 8.0, "{of:?}");
+    // Without its plan, a vehicle may leave early; beyond its plan, it is unknown.
+    let short = [piece(0, 0.0, 4.0, vec![vector![0.0, 0.0, 1.0], vector![1.0, 0.0, 0.0]]), plan[1].clone()];
+    let straight = (0..=80).map(|k| f64::from(k) * 0.05).map(|t| sample(0, t + 1.0, vector![t, 0.0, 1.0]));
+    let others = two_flights(1.0, [(9.0, 9.0), (0.0, 8.0)]).into_iter().filter(|item| item.vehicle() == 1);
+    let early: Vec<_> = straight.chain(others).collect();
+    for (until_s, status) in [(0.0, Status::Clear), (2.0, Status::Undecided)] {
+        let stays = sample(0, 5.0 + until_s, vector![4.0, 0.0, 1.0]);
+        let flight = in_order(early.iter().cloned().chain((until_s > 0.0).then_some(stays)).collect());
+        let settings = Settings { max_gap_s: Some(5.0), ..plan_alone() };
+        let found = compare(&settings, &flight, &short, None, Some(0.1));
+        assert_eq!(found.status, status, "{until_s} {:?} {:?}", found.common_s, found.unknown);
+    }
+}
+
 /// Two vehicles on parallel paths this far apart, each flown 0.2 m to the side of its plan.
 fn parallel(apart: f64) -> (Vec<Item>, Vec<Item>) {
     let aside = [Vector3::zeros(), vector![0.0, apart, 0.0]];

@@ -199,7 +199,17 @@ type Spoil<T> = fn(&mut T);
 
 #[test]
 fn wrong_curves_name_the_field_and_its_value() {
-    let of_spline: [(Spoil<Bspline>, &str, &str); 9] = [
+    let of_spline: [(Spoil<Bspline>, &str, &str); 11] = [
+        (
+            |m| m.3.1 = 1_000_000_000,
+            "recording/time-format",
+            "start_time.nanosec: must be below 1000000000, got 1000000000",
+        ),
+        (
+            |m| (m.1, m.5) = (1, vec![[0.0; 3]]),
+            "recording/knots",
+            "pos_pts: a curve of order 1 needs more than 1 point, got 1",
+        ),
         (|m| m.1 = 0, "recording/degree", "order: must be 1 to 15, got 0"),
         (|m| m.1 = 16, "recording/degree", "order: must be 1 to 15, got 16"),
         (|m| m.4.truncate(10), "recording/knots", "knots: 7 points of order 3 need 11 knots, got 10"),
@@ -218,7 +228,9 @@ fn wrong_curves_name_the_field_and_its_value() {
         assert_refused(&error, code, &place);
         assert!(error.to_string().contains(problem), "{error}");
     }
-    let of_trajectory: [(Spoil<Minco>, &str, &str); 7] = [
+    let of_trajectory: [(Spoil<Minco>, &str, &str); 9] = [
+        (|m| m.2.1 = u32::MAX, "recording/time-format", "start_time.nanosec: must be below 1000000000, got 4294967295"),
+        (|m| m.7.truncate(1), "recording/field-count", "inner_x: 1 duration needs one number less, got 1"),
         (|m| m.4 = 7, "recording/degree", "order: must be 5, got 7"),
         (|m| m.6[1].clear(), "recording/field-count", "inner_y: 2 durations need one number less, got 0"),
         (|m| m.7.clear(), "recording/field-count", "duration: a curve needs at least one piece, got none"),
@@ -234,7 +246,13 @@ fn wrong_curves_name_the_field_and_its_value() {
         assert_refused(&error, code, &format!("curve 1 on topic `{BROADCAST}`"));
         assert!(error.to_string().contains(problem), "{error}");
     }
-    let of_pieces: [(Spoil<PolyTraj>, &str, &str); 7] = [
+    let of_pieces: [(Spoil<PolyTraj>, &str, &str); 9] = [
+        (
+            |m| m.2.1 = 4_000_000_000,
+            "recording/time-format",
+            "start_time.nanosec: must be below 1000000000, got 4000000000",
+        ),
+        (|m| m.7.truncate(1), "recording/field-count", "coef_x: 1 duration needs 6 numbers, got 12"),
         (|m| m.3 = 7, "recording/degree", "order: must be 5, got 7"),
         (|m| m.5.truncate(11), "recording/field-count", "coef_y: 2 durations need 12 numbers, got 11"),
         (|m| m.7.clear(), "recording/field-count", "duration: a curve needs at least one piece, got none"),
@@ -250,6 +268,15 @@ fn wrong_curves_name_the_field_and_its_value() {
         assert_refused(&error, code, &format!("curve 1 on topic `{TOPIC}`"));
         assert!(error.to_string().contains(problem), "{error}");
     }
+    // The last nanosecond of a second is a start.
+    let mut last = polynomials(1);
+    last.2.1 = 999_999_999;
+    let found = whole("plan.mcap", &mcap_of(&[of_polynomials(&last)]));
+    assert_eq!(piece(&found.items[0]).from_s, 0.999_999_999);
+    // Bytes after the last field are ignored, as those of all messages in CDR.
+    let (topic, schema, encoding, time, mut bytes) = of_polynomials(&last);
+    bytes.extend([1; 8]);
+    assert_eq!(whole("plan.mcap", &mcap_of(&[(topic, schema, encoding, time, bytes)])).items, found.items);
     let cut = (TOPIC, B_SPLINE, "cdr", 7, cdr(&spline(1, 0, 0.0), true)[..60].to_vec());
     assert_refused(
         &refused(&[cut], &ReadOptions::default()),

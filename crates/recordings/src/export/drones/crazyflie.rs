@@ -21,6 +21,8 @@ const PIECE_BYTES: usize = 132;
 /// Bound on the error of a polynomial that the firmware computes in single precision, relative to the sum of
 /// `|c_k| T^k`. Scheme of Horner: 14 roundings; time: 7, one for each power. The others cover sums of errors.
 const EVALUATION: f64 = 24.0 * ROUNDING;
+/// Factor of bounds that covers sums of errors, and rounding in double precision.
+const SUMS: f64 = 1.01;
 /// Unit of length of compressed segments \[m\].
 const UNIT_M: f64 = 1e-3;
 /// Name of the memory in messages.
@@ -88,15 +90,37 @@ fn rounded(pieces: &[Piece]) -> (Vec<Polynomial>, Vec<f64>, Motion) {
         polynomials.push(Polynomial { duration_s, powers });
         from_s = to_s;
     }
-    let mut evaluation_m = Vec::with_capacity(arcs.len());
-    for arc in &mut arcs {
+    let mut evaluation_m = clock_errors_m(&arcs);
+    for (arc, error_m) in arcs.iter_mut().zip(&mut evaluation_m) {
         let length_s = arc.to_s - arc.from_s;
         // Horner's scheme from the last coefficient on.
         let size_m = arc.powers().iter().rev().fold(0.0, |sum, power| sum * length_s + power.norm());
-        evaluation_m.push(EVALUATION * size_m);
-        arc.rounding_m += EVALUATION * size_m;
+        *error_m += EVALUATION * size_m;
+        arc.rounding_m += *error_m;
     }
     (polynomials, evaluation_m, Motion { arcs })
+}
+
+/// Returns a bound on the distance that an error of the time adds to each arc \[m\].
+///
+/// The firmware subtracts the durations of all pieces before one after the other. Each subtraction rounds the remaining
+/// time, which is at most that from the start of the next piece to the end of this one. Near its ends, an arc may be
+/// taken for a neighbour.
+fn clock_errors_m(arcs: &[Arc]) -> Vec<f64> {
+    let speeds_m_s: Vec<_> = arcs.iter().map(Arc::speed_m_s).collect();
+    let last = |arc: &Arc| arc.points[arc.points.len() - 1];
+    let jumps_m: Vec<_> = arcs.windows(2).map(|pair| (pair[1].points[0] - last(&pair[0])).norm()).collect();
+    let (mut errors_m, mut starts_s) = (Vec::with_capacity(arcs.len()), 0.0);
+    for (index, arc) in arcs.iter().enumerate() {
+        starts_s += arc.from_s;
+        let error_s = SUMS * ROUNDING * (index as f64 * arc.to_s - starts_s).max(0.0);
+        let first = arcs.partition_point(|other| other.to_s < arc.from_s - error_s);
+        let end = arcs.partition_point(|other| other.from_s <= arc.to_s + error_s);
+        let speed_m_s = speeds_m_s[first..end].iter().copied().fold(0.0, f64::max);
+        let jump_m: f64 = jumps_m[first..end - 1].iter().sum();
+        errors_m.push(SUMS * (speed_m_s * error_s + jump_m));
+    }
+    errors_m
 }
 
 /// Returns the CSV with one polynomial in each row. Its decimals have the values of single precision.
@@ -211,6 +235,47 @@ mod tests {
         assert_eq!((numbers.len(), numbers[0]), (33, 2.5));
         assert!((numbers[2] - 0.4).abs() < 1e-6 && (numbers[10] - 0.04).abs() < 1e-6, "{numbers:?}");
         assert!(numbers.iter().all(|number| f64::from(*number as f32) == *number));
+    }
+
+    /// Returns the position at a time since the start \[s\] as the firmware computes it.
+    fn flown(polynomials: &[Polynomial], mut time_s: f32) -> Vector3<f64> {
+        for polynomial in polynomials {
+            if time_s <= polynomial.duration_s {
+                let horner = |sum: Vector3<f32>, power: &Vector3<f32>| sum * time_s + power;
+                return polynomial.powers.iter().rev().fold(Vector3::zeros(), horner).map(f64::from);
+            }
+            time_s -= polynomial.duration_s;
+        }
+        panic!("the flight has ended")
+    }
+
+    #[test]
+    #[expect(clippy::cast_possible_truncation, reason = "the firmware has single precision")]
+    fn the_error_of_subtracted_durations_is_bounded() {
+        // Long waits, each followed by a fast way: 10 m in 0.7 s.
+        let points = |from: f64, to: f64| {
+            std::array::from_fn(|k| vector![from + (to - from) * k as f64 / (POINTS - 1) as f64, 0.0, 1.0])
+        };
+        let piece = |k: u32| match k % 4 {
+            0 => Piece { duration_ms: 31_001, points: points(-5.0, -5.0) },
+            1 => Piece { duration_ms: 703, points: points(-5.0, 5.0) },
+            2 => Piece { duration_ms: 17_013, points: points(5.0, 5.0) },
+            _ => Piece { duration_ms: 703, points: points(5.0, -5.0) },
+        };
+        let pieces: Vec<_> = (0..30).map(piece).collect();
+        let (polynomials, evaluation_m, curve) = rounded(&pieces);
+        let (mut worst, mut worst_without_clock) = (0.0_f64, 0.0_f64);
+        for (arc, error_m) in curve.arcs.iter().zip(&evaluation_m) {
+            for k in 1..1000 {
+                let time_s = (arc.from_s + (arc.to_s - arc.from_s) * f64::from(k) / 1000.0) as f32;
+                let off_m = (flown(&polynomials, time_s) - curve.position_m(f64::from(time_s))).norm();
+                worst = worst.max(off_m / error_m);
+                worst_without_clock = worst_without_clock.max(off_m / (EVALUATION * 30.0));
+            }
+        }
+        assert!(worst <= 1.0 && worst > 0.05, "{worst}");
+        // Negative twin: Horner's scheme alone does not explain the error; |c_0| + |c_1| T is at most 16 m.
+        assert!(worst_without_clock > 2.0, "{worst_without_clock}");
     }
 
     #[test]

@@ -96,12 +96,17 @@ impl Arc {
         if start_s < self.to_s { split(&rest, fraction(to_s, start_s)).0 } else { rest }
     }
 
+    /// Returns a bound on the speed \[m/s\], up to rounding.
+    pub(super) fn speed_m_s(&self) -> f64 {
+        let step_m = self.points.windows(2).map(|pair| (pair[1] - pair[0]).norm()).fold(0.0, f64::max);
+        (self.points.len() as f64 - 1.0) * step_m / (self.to_s - self.from_s)
+    }
+
     /// Returns a bound on the rounding of [`Self::part`] and of later additions, for a motion up to a time \[s\].
     fn pad_m(&self) -> f64 {
         let count = self.points.len() as f64;
         let size = self.points.iter().map(|point| point.abs().max()).fold(0.0, f64::max);
-        let step = self.points.windows(2).map(|pair| (pair[1] - pair[0]).norm()).fold(0.0, f64::max);
-        let speed_m_s = (count - 1.0) * step / (self.to_s - self.from_s);
+        let speed_m_s = self.speed_m_s();
         let time_s = self.from_s.abs().max(self.to_s.abs());
         self.rounding_m + f64::EPSILON * (32.0 * (count + 2.0) * size + 4.0 * time_s * speed_m_s)
     }

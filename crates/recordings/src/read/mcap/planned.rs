@@ -193,7 +193,7 @@ impl Plan {
 
     /// Returns the drone and the curve of a message.
     fn of_b_spline(encoding: &str, bytes: &[u8]) -> Result<(i32, Self), Fault> {
-        let Bspline { drone, degree, start: (sec, nanosec), knots, points, .. } = decoded(encoding, bytes)?;
+        let Bspline { drone, degree, start, knots, points, .. } = decoded(encoding, bytes)?;
         if !(1..=HIGHEST_DEGREE).contains(&degree) {
             let problem = format!("order: must be 1 to {HIGHEST_DEGREE}, got {degree}");
             return refuse("recording/degree", problem, REPLAN);
@@ -202,8 +202,8 @@ impl Plan {
         refuse_not_finite("knots", &knots)?;
         refuse_not_finite("pos_pts", points.as_flattened())?;
         if points.len() <= degree {
-            let problem =
-                format!("pos_pts: a curve of order {degree} needs more than {degree} points, got {}", points.len());
+            let least = counted(degree as u64, "point", "points");
+            let problem = format!("pos_pts: a curve of order {degree} needs more than {least}, got {}", points.len());
             return refuse("recording/knots", problem, REPLAN);
         }
         let expected = points.len() + degree + 1;
@@ -224,7 +224,7 @@ impl Plan {
         }
         let points: Vec<_> = points.into_iter().map(Vector3::from).collect();
         let parts = b_spline(degree, &knots, &points);
-        Ok((drone, Self { start_ns: nanoseconds(sec.into(), nanosec.into()), parts, is_held: true }))
+        Ok((drone, Self { start_ns: start_ns(start)?, parts, is_held: true }))
     }
 
     /// Returns the drone and the curve of a message.
@@ -238,7 +238,7 @@ impl Plan {
         for (name, numbers) in [&x, &y, &z] {
             refuse_not_finite(name, numbers)?;
             if numbers.len() + 1 != pieces {
-                let problem = format!("{name}: {pieces} durations need one number less, got {}", numbers.len());
+                let problem = format!("{name}: {} one number less, got {}", need(pieces), numbers.len());
                 return refuse("recording/field-count", problem, REPLAN);
             }
         }
@@ -250,15 +250,13 @@ impl Plan {
         let state = |of: [[f32; 3]; 3]| of.map(|numbers| Vector3::from(numbers.map(f64::from)));
         let inner: Vec<_> = x.1.iter().zip(&y.1).zip(&z.1).map(|((x, y), z)| Vector3::new(*x, *y, *z)).collect();
         let parts = minimum_jerk(state(minco.start), &inner, state(minco.end), &durations);
-        let (sec, nanosec) = minco.start_time;
-        let start_ns = nanoseconds(sec.into(), nanosec.into());
+        let start_ns = start_ns(minco.start_time)?;
         Ok((minco.drone.into(), Self { start_ns, parts, is_held: false }))
     }
 
     /// Returns the drone and the curve of a message.
     fn of_polynomials(encoding: &str, bytes: &[u8]) -> Result<(i32, Self), Fault> {
-        let PolyTraj { drone, start: (sec, nanosec), order, x, y, z, durations: lengths, .. } =
-            decoded(encoding, bytes)?;
+        let PolyTraj { drone, start, order, x, y, z, durations: lengths, .. } = decoded(encoding, bytes)?;
         refuse_degree(order)?;
         let durations = durations(&lengths)?;
         let (pieces, terms) = (durations.len(), usize::from(DEGREE) + 1);
@@ -266,8 +264,8 @@ impl Plan {
         for (name, numbers) in &axes {
             refuse_not_finite(name, numbers)?;
             if numbers.len() != terms * pieces {
-                let problem =
-                    format!("{name}: {pieces} durations need {} numbers, got {}", terms * pieces, numbers.len());
+                let needed = need(pieces);
+                let problem = format!("{name}: {needed} {} numbers, got {}", terms * pieces, numbers.len());
                 return refuse("recording/field-count", problem, REPLAN);
             }
         }
@@ -278,13 +276,27 @@ impl Plan {
             parts.push((from_s, from_s + duration_s, (0..terms).map(coefficient).collect()));
             from_s += duration_s;
         }
-        let start_ns = nanoseconds(sec.into(), nanosec.into());
+        let start_ns = start_ns(start)?;
         Ok((drone.into(), Self { start_ns, parts, is_held: false }))
     }
 }
 
+/// Returns the start of a curve \[ns\].
+fn start_ns((sec, nanosec): (i32, u32)) -> Result<i64, Fault> {
+    if i64::from(nanosec) < NS_PER_S {
+        return Ok(nanoseconds(sec.into(), nanosec.into()));
+    }
+    let problem = format!("start_time.nanosec: must be below {NS_PER_S}, got {nanosec}");
+    refuse("recording/time-format", problem, REPLAN)
+}
+
 fn wide(numbers: &[f32]) -> Vec<f64> {
     numbers.iter().map(|&number| f64::from(number)).collect()
+}
+
+/// Returns the start of a message on the numbers that durations need.
+fn need(durations: usize) -> String {
+    counted(durations as u64, "duration needs", "durations need")
 }
 
 fn refuse_degree(order: u8) -> Result<(), Fault> {
