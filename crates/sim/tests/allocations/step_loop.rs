@@ -161,6 +161,8 @@ fn allocations_of_worlds(steps: u64, is_given: bool) -> usize {
 
 pub(crate) fn worlds_allocate_nothing_per_step() {
     for is_given in [true, false] {
-        assert_eq!(allocations_of_worlds(300, is_given), 0, "given commands: {is_given}");
+        // Idle threads of other tests allocate now and then.
+        let allocates_nothing = |_| allocations_of_worlds(300, is_given) == 0;
+        assert!((0..ATTEMPTS).any(allocates_nothing), "given commands: {is_given}");
     }
 }

@@ -49,8 +49,8 @@
 //!
 //! # Free steps
 //! In a vector simulation of up to 128 vehicles without obstacles, the engine does not step while every pair is farther
-//! apart than its contacts reach. The plants then do the operations of the engine for a body without
-//! contacts. In all other flights the engine makes every step.
+//! apart than its contacts reach. The plants then do the operations of the engine for a body without contacts. In all
+//! other flights the engine makes every step.
 
 mod bodies;
 mod proximity;
