@@ -6,7 +6,6 @@ set -eu
 cd "$(dirname "$0")/.."
 seconds=${1:-3} # also if it is empty
 [ $# = 0 ] || shift
-targets=${*:-$(sed -n 's/^name = "\([a-z_]*\)"$/\1/p' fuzz/Cargo.toml)}
 fuzz=target/fuzz-tool/bin/cargo-fuzz
 
 corpus=$PWD/target/fuzz/corpus
@@ -14,13 +13,20 @@ TAUTLINE_FUZZ_CORPUS=$corpus/readers cargo test --quiet --package tautline-recor
 mkdir -p "$corpus/readers/scenario"
 cp assets/*.toml "$corpus/readers/scenario/"
 
+# A target is a reader, `recording` for the recognition of formats, `scenario`, or a live source.
+targets=${*:-$(ls "$corpus/readers") watch-lines watch-mavlink watch-rosbridge}
 failed=
 for target in $targets; do
+    case $target in
+        scenario) program=scenario ;;
+        watch-*) program=watch ;;
+        *) program=reader ;;
+    esac
     mkdir -p "$corpus/$target"
-    seeds=$corpus/readers/$(echo "$target" | tr _ -)
+    seeds=$corpus/readers/$target
     # A development build: assertions and overflow checks are on. Without a sanitizer, which needs a nightly compiler;
     # the workspace has no unsafe code.
-    "$fuzz" run --dev --sanitizer none --target-dir target/fuzz "$target" "$corpus/$target" \
+    TAUTLINE_FUZZ=$target "$fuzz" run --dev --sanitizer none --target-dir target/fuzz "$program" "$corpus/$target" \
         $([ ! -d "$seeds" ] || echo "$seeds") -- -max_total_time="$seconds" -timeout=20 -rss_limit_mb=4096 \
         -max_len=65536 -print_final_stats=1 || failed="$failed $target"
 done

@@ -1,6 +1,5 @@
-//! Reads arbitrary bytes as a recording: one target for each reader, and `recording` for the recognition of formats.
-//!
-//! The name of the target is the name of the reader, with `_` in the place of `-`.
+//! Reads arbitrary bytes as a recording. The variable `TAUTLINE_FUZZ` names the reader, such as `csv`; `recording` stands
+//! for the recognition of formats.
 
 #![no_main]
 
@@ -25,7 +24,7 @@ static SETTING: LazyLock<(ReadOptions, PathBuf)> = LazyLock::new(|| {
             abort(panic);
         }
     }));
-    let name = env!("CARGO_BIN_NAME").replace('_', "-");
+    let name = std::env::var("TAUTLINE_FUZZ").expect("TAUTLINE_FUZZ: the name of a reader, such as csv");
     let format = Format::all().find(|format| format.name == name);
     assert!(format.is_some() || name == "recording", "{name}: no such reader");
     // Only this reader needs the rate of frames.

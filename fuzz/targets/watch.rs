@@ -1,6 +1,9 @@
-//! Judges arbitrary bytes as live input: lines, a MAVLink datagram or a message of rosbridge, named by the target.
+//! Judges arbitrary bytes as live input. The variable `TAUTLINE_FUZZ` names the source: `watch-lines`, `watch-mavlink` (a
+//! datagram) or `watch-rosbridge` (a message).
 
 #![no_main]
+
+use std::sync::LazyLock;
 
 use libfuzzer_sys::fuzz_target;
 use tautline_watch::source::{
@@ -9,18 +12,21 @@ use tautline_watch::source::{
 };
 use tautline_watch::{ClockScope, Monitor, Plan, Pose, Settings, State};
 
+static SOURCE: LazyLock<String> =
+    LazyLock::new(|| std::env::var("TAUTLINE_FUZZ").expect("TAUTLINE_FUZZ: the name of a source, such as watch-lines"));
+
 fuzz_target!(|bytes: &[u8]| {
     let mut inputs = Vec::new();
-    match env!("CARGO_BIN_NAME") {
-        "watch_lines" => {
+    match SOURCE.as_str() {
+        "watch-lines" => {
             let messages = bytes.split(|&byte| byte == b'\n').filter_map(|line| message_of_line(line).ok());
             inputs.extend(messages.map(|message| match message {
                 LineMessage::Pose(pose) => Input::Pose(pose, 0.0),
                 LineMessage::SignOff(id, t_s) => Input::SignOff(id, t_s, 0.0),
             }));
         }
-        "watch_mavlink" => poses_of_datagram(bytes, &MavlinkFrame::Local, 0.0, &mut inputs),
-        "watch_rosbridge" => {
+        "watch-mavlink" => poses_of_datagram(bytes, &MavlinkFrame::Local, 0.0, &mut inputs),
+        "watch-rosbridge" => {
             let text = String::from_utf8_lossy(bytes);
             let mut naming = Naming::new(NamingOptions::default());
             let poses = poses_of_message(&text, &mut naming).into_iter().flatten().flatten();
