@@ -1,5 +1,6 @@
-//! Reads arbitrary bytes as a recording. The variable `TAUTLINE_FUZZ` names the reader, such as `csv`; `recording` stands
-//! for the recognition of formats.
+//! Reads arbitrary bytes as a recording.
+//!
+//! The variable `TAUTLINE_FUZZ` names the reader, such as `csv`; `recording` stands for the recognition of formats.
 
 #![no_main]
 

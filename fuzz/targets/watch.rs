@@ -1,5 +1,7 @@
-//! Judges arbitrary bytes as live input. The variable `TAUTLINE_FUZZ` names the source: `watch-lines`, `watch-mavlink` (a
-//! datagram) or `watch-rosbridge` (a message).
+//! Judges arbitrary bytes as live input.
+//!
+//! The variable `TAUTLINE_FUZZ` names the source: `watch-lines`, `watch-mavlink` (a datagram) or `watch-rosbridge` (a
+//! message).
 
 #![no_main]
 

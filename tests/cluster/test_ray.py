@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import re
 import shutil
@@ -80,14 +81,18 @@ class RayCluster(unittest.TestCase):
         folder.mkdir()
         camp = Campaign(folder, runs=2, duration_s=1.0)
         program = folder / "tautline"
-        program.write_bytes(TAUTLINE.read_bytes() + b"\n")
+        # The hash of the sources identifies a program.
+        sources = json.loads((camp.path / "manifest.json").read_text())["tool"]["sha256"].encode()
+        bytes_of_program = TAUTLINE.read_bytes()
+        self.assertIn(sources, bytes_of_program)
+        program.write_bytes(bytes_of_program.replace(sources, sources[::-1]))
         program.chmod(0o755)
         flown = ran(*self.driver(camp.path, "--tautline", str(program)), env=ENVIRONMENT)
         self.assertEqual(flown.returncode, 2, flown.stderr)
         self.assertIn("SHA-256", flown.stderr)
 
     def test_killed_stopped_and_added_nodes_give_the_same_bytes(self) -> None:
-        camp = Campaign(self.folder, runs=120, duration_s=2.0)
+        camp = Campaign(self.folder, runs=120, duration_s=240.0)
         hasty = ["--tautline", str(TAUTLINE), "--hedge-after", "4"]
         log = self.folder / "driver.log"
 
