@@ -35,7 +35,8 @@ if ! target/mdbook/bin/mdbook --version >/dev/null 2>&1; then
     rm -rf target/mdbook/build
 fi
 
-# The checker of licences and versions, and the fuzzer.
+# The checker of licences and versions, which reads the sources of all systems, and the fuzzer.
+cargo fetch --quiet --locked
 if ! target/deny/bin/cargo-deny --version >/dev/null 2>&1; then
     cargo install --quiet --locked --debug --no-default-features --root target/deny --target-dir target/deny/build \
         'cargo-deny@0.20.2'
