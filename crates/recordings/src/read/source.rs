@@ -150,6 +150,11 @@ const FREE_GROWTH_BYTES: u64 = 64 * 1024 * 1024;
 /// Largest growth factor beyond [`FREE_GROWTH_BYTES`]. Deflate reaches 1032, recordings of real motion 20.
 const GROWTH_LIMIT: u64 = 200;
 
+/// Returns whether unpacked data are so much larger than the packed ones that they are refused.
+pub(super) fn grows_without_end(unpacked_bytes: u64, packed_bytes: u64) -> bool {
+    unpacked_bytes > FREE_GROWTH_BYTES.max(packed_bytes.saturating_mul(GROWTH_LIMIT))
+}
+
 /// Opened zip archive.
 pub(super) struct Archive {
     path: PathBuf,
@@ -296,7 +301,7 @@ impl<R: Read> Read for Growing<R> {
         let bytes = self.inner.read(buffer)?;
         self.inflated_bytes += bytes as u64;
         let Self { inflated_bytes, packed_bytes, .. } = *self;
-        if inflated_bytes > FREE_GROWTH_BYTES.max(packed_bytes.saturating_mul(GROWTH_LIMIT)) {
+        if grows_without_end(inflated_bytes, packed_bytes) {
             let grown = format!("it unpacks to more than {inflated_bytes} bytes from {packed_bytes}");
             return Err(io::Error::new(io::ErrorKind::FileTooLarge, grown));
         }

@@ -4,9 +4,10 @@ use std::fs::{self, File};
 use std::path::Path;
 use std::sync::Arc;
 
-use parquet::basic::Compression;
-use parquet::data_type::{DoubleType, Int32Type, Int64Type};
+use parquet::basic::{Compression, Encoding};
+use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int32Type, Int64Type};
 use parquet::file::properties::WriterProperties;
+use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::file::writer::SerializedFileWriter;
 use parquet::schema::parser::parse_message_type;
 use tautline_recordings::read::{ReadError, ReadOptions};
@@ -18,14 +19,18 @@ enum Cells {
     Real([f64; 2]),
     Int([i32; 2]),
     Long([i64; 2]),
+    Text([&'static str; 2]),
 }
 
-use Cells::{Int, Long, Real};
+use Cells::{Int, Long, Real, Text};
 
 fn write(path: &Path, columns: &[(&str, Cells)], packed: Compression) {
+    write_with(path, columns, WriterProperties::builder().set_compression(packed).build());
+}
+
+fn write_with(path: &Path, columns: &[(&str, Cells)], properties: WriterProperties) {
     let fields: Vec<_> = columns.iter().map(|(column, _)| format!("required {column};")).collect();
     let schema = parse_message_type(&format!("message samples {{ {} }}", fields.join(" "))).expect("a schema");
-    let properties = WriterProperties::builder().set_compression(packed).build();
     let file = File::create(path).expect("a file");
     let mut writer = SerializedFileWriter::new(file, Arc::new(schema), Arc::new(properties)).expect("a writer");
     let mut group = writer.next_row_group().expect("a group");
@@ -35,6 +40,7 @@ fn write(path: &Path, columns: &[(&str, Cells)], packed: Compression) {
             Real(cells) => column.typed::<DoubleType>().write_batch(cells, None, None),
             Int(cells) => column.typed::<Int32Type>().write_batch(cells, None, None),
             Long(cells) => column.typed::<Int64Type>().write_batch(cells, None, None),
+            Text(cells) => column.typed::<ByteArrayType>().write_batch(&cells.map(ByteArray::from), None, None),
         }
         .expect("written");
         column.close().expect("closed");
@@ -112,4 +118,98 @@ fn unsupported_codec_is_named() {
 /// Returns the offsets of a byte string.
 fn memmem<'a>(text: &'a [u8], part: &'a [u8]) -> impl Iterator<Item = usize> + 'a {
     text.windows(part.len()).enumerate().filter(move |(_, window)| *window == part).map(|(at, _)| at)
+}
+
+#[test]
+fn text_in_delta_encodings_is_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("flight.parquet");
+    let zero = || Real([0.0, 0.0]);
+    let columns = [
+        seconds(),
+        ("binary id (UTF8)", Text(["a", "a"])),
+        ("double x", zero()),
+        ("double y", zero()),
+        ("double z", zero()),
+    ];
+    for (encoding, readable) in
+        [(Encoding::PLAIN, true), (Encoding::DELTA_BYTE_ARRAY, false), (Encoding::DELTA_LENGTH_BYTE_ARRAY, false)]
+    {
+        let properties = WriterProperties::builder().set_dictionary_enabled(false);
+        write_with(&path, &columns, properties.set_column_encoding("id".into(), encoding).build());
+        match Whole::read(&path, &ReadOptions::default()) {
+            Ok(_) => assert!(readable, "{encoding}"),
+            Err(refused) => {
+                assert!(!readable, "{encoding}: {refused}");
+                assert_refused(&refused, "recording/unsupported-compression", "");
+            }
+        }
+    }
+}
+
+/// Returns the bytes of a file with two rows, and its pages of `z`, the last column.
+fn packed_flight(packed: Compression) -> (Vec<u8>, std::ops::Range<usize>) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("flight.parquet");
+    let zero = || Real([0.0, 0.0]);
+    let columns =
+        [seconds(), ("int64 id", Long([1, 1])), ("double x", zero()), ("double y", zero()), ("double z", zero())];
+    write(&path, &columns, packed);
+    assert!(Whole::read(&path, &ReadOptions::default()).is_ok());
+    let reader = SerializedFileReader::new(File::open(&path).expect("opened")).expect("read");
+    let (start, length) = reader.metadata().row_group(0).column(4).byte_range();
+    (fs::read(&path).expect("read"), start as usize..(start + length) as usize)
+}
+
+/// Reads these bytes as a file and returns the text of the error.
+fn refusal(bytes: &[u8]) -> String {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("flight.parquet");
+    fs::write(&path, bytes).expect("written");
+    let refused = Whole::read(&path, &ReadOptions::default()).expect_err("refused");
+    assert_eq!(refused.code(), "recording/damaged", "{refused}");
+    refused.to_string()
+}
+
+/// A number of 2^31 - 1 as a signed varint.
+const HUGE: [u8; 5] = [0xfe, 0xff, 0xff, 0xff, 0x0f];
+
+#[test]
+fn claimed_page_sizes_are_checked_before_memory_is_allocated() {
+    let (bytes, pages) = packed_flight(Compression::SNAPPY);
+    let page = &bytes[pages.clone()];
+    // A dictionary page begins with its type 2, its unpacked size 8, its packed size, and the number of values, 1.
+    let [0x15, 0x04, 0x15, 0x10, 0x15, _, 0x4c, 0x15, 0x02, ..] = page else { panic!("{page:x?}") };
+    for (at, text) in [(8, "a dictionary claims 2147483647 values in 8 bytes"), (3, "its pages unpack to more than")] {
+        let (head, tail) = (&bytes[..pages.start + at], &bytes[pages.start + at + 1..]);
+        let found = refusal(&[head, &HUGE, tail].concat());
+        assert!(found.contains(text), "{found}");
+    }
+    // A header with a repeated size, of which another reader could take the other one.
+    let repeated = [&bytes[..pages.start + 4], &[0x05, 0x04, 0x10], &bytes[pages.start + 4..]].concat();
+    let found = refusal(&repeated);
+    assert!(found.contains("a field is out of order"), "{found}");
+}
+
+#[test]
+fn claims_of_a_footer_are_checked_before_memory_is_allocated() {
+    let file = |footer: &[u8]| {
+        let length = u32::try_from(footer.len()).expect("short").to_le_bytes();
+        [b"PAR1", footer, &length, b"PAR1"].concat()
+    };
+    // Version 1, then a list of schema elements, which are groups with a name and a number of columns.
+    let schema = |count: &[u8], group: &[u8]| [&[0x15, 0x02, 0x19, 0xfc], count, group].concat();
+    let group = |columns: &[u8]| [&[0x48, 0x01, b's', 0x15], columns, &[0x00]].concat();
+    for footer in [
+        schema(&[0x01], &group(&HUGE)),
+        // 100,000 groups in each other.
+        schema(&[0xa0, 0x8d, 0x06], &group(&[0x02]).repeat(100_000)),
+    ] {
+        let found = refusal(&file(&[&footer[..], &[0x00]].concat()));
+        assert!(found.contains("its schema nests too deep, or claims more columns"), "{found}");
+    }
+    // A list of 2^31 - 1 truth values, each of which takes no byte.
+    let lists = [&[0x15, 0x02, 0xe9, 0xf1][..], &[0xff, 0xff, 0xff, 0xff, 0x07], &[0x00]].concat();
+    let found = refusal(&file(&lists));
+    assert!(found.contains("a list is longer than the rest of the file"), "{found}");
 }

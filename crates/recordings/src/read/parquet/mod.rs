@@ -3,29 +3,33 @@
 //! Columns are flat. Vehicles are text or integers, other values are numbers. Times are numbers or time stamps, which
 //! have a unit. The key `epoch_ns` of the file metadata optionally holds the epoch.
 
+mod pages;
+
 use std::borrow::Cow;
 use std::fs::File;
 use std::io::{Read as _, Seek as _, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 
 use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit as ParquetUnit, Type as Physical};
-use parquet::column::reader::{ColumnReader, ColumnReaderImpl};
+use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
 use parquet::data_type::{ByteArray, DataType};
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
-use super::clock::{Stamp, TimeUnit};
-use super::error::{Fault, Place, ReadError, refuse};
-use super::layout::Layout;
-use super::options::ReadOptions;
-use super::order::{BATCH, Recording};
-use super::readers::{FormatOption, Packing, Reader};
-use super::source::Source;
-use super::table;
-use super::table::Cells;
+use self::pages::{PageFile, Pages, delta_text};
+use crate::read::clock::{Stamp, TimeUnit};
+use crate::read::error::{Fault, Place, ReadError, refuse};
+use crate::read::layout::Layout;
+use crate::read::options::ReadOptions;
+use crate::read::order::{BATCH, Recording};
+use crate::read::readers::{FormatOption, Packing, Reader};
+use crate::read::source::Source;
+use crate::read::table;
+use crate::read::table::Cells;
 
-pub(super) const READER: Reader = Reader {
+pub(in crate::read) const READER: Reader = Reader {
     name: "parquet",
     title: "a Parquet file",
     extensions: &["parquet"],
@@ -44,18 +48,27 @@ pub(crate) const EPOCH_KEY: &str = "epoch_ns";
 const BATCH_CELLS: usize = 640_000;
 
 /// Opens a table.
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+pub(in crate::read) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut file = File::open(&source.path)?;
     if file.metadata()?.len() < 12 {
         return Err(Fault::Truncated("the end of the file is missing".to_owned()).into());
     }
-    let mut end = [0; 4];
-    file.seek(SeekFrom::End(-4))?;
+    let mut end = [0; 8];
+    file.seek(SeekFrom::End(-8))?;
     file.read_exact(&mut end)?;
-    if end != *b"PAR1" && end != *b"PARE" {
+    let [length @ .., _, _, _, _] = end;
+    if end[4..] == *b"PARE" {
+        return Err(Fault::damaged("its footer is encrypted").into());
+    }
+    let footer_bytes = i64::from(u32::from_le_bytes(length));
+    if end[4..] != *b"PAR1" || file.seek(SeekFrom::End(-8 - footer_bytes)).is_err() {
         let what = "the end of the file, with the description of its columns, is missing".to_owned();
         return Err(Fault::Truncated(what).into());
     }
+    let mut footer = Vec::new();
+    file.try_clone()?.take(footer_bytes.cast_unsigned()).read_to_end(&mut footer)?;
+    pages::check_footer(&footer).map_err(|error| Fault::damaged(format!("the description of its columns: {error}")))?;
+    let pages = PageFile::new(file.try_clone()?);
     let reader = guarded(|| SerializedFileReader::new(file))?;
     let metadata = reader.metadata().file_metadata();
     let schema = metadata.schema_descr();
@@ -76,7 +89,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     }
     let epoch_ns = metadata.key_value_metadata().into_iter().flatten().find(|pair| pair.key == EPOCH_KEY);
     let epoch_ns = epoch_ns.and_then(|pair| pair.value.as_deref()).and_then(|value| value.parse().ok());
-    let groups = Groups { reader, header, wanted: Vec::new(), columns: Vec::new(), cursor: Cursor::default() };
+    let groups = Groups { reader, pages, header, wanted: Vec::new(), columns: Vec::new(), cursor: Cursor::default() };
     table::open(source, groups, layout, unit, epoch_ns.unwrap_or(0), options)
 }
 
@@ -139,15 +152,19 @@ fn unreadable(
     if let Some(what) = other {
         return Some((ELEMENT_TYPE, what, "save numbers as double, and time as double, int64 or time stamps"));
     }
-    let mut chunks = metadata.row_groups().iter().filter_map(|group| group.columns().get(column));
-    let packed = chunks.find_map(|chunk| match chunk.compression() {
+    const PACKED: &str = "recording/unsupported-compression";
+    let chunks = || metadata.row_groups().iter().filter_map(|group| group.columns().get(column));
+    let packed = chunks().find_map(|chunk| match chunk.compression() {
         Compression::BROTLI(_) => Some("is packed by brotli, which is not supported"),
         Compression::LZO => Some("is packed by lzo, which is not supported"),
         _ => None,
     });
-    packed.map(|what| {
-        ("recording/unsupported-compression", what, "save it uncompressed, or packed by one of snappy, gzip, lz4, zstd")
-    })
+    if let Some(what) = packed {
+        return Some((PACKED, what, "save it uncompressed, or packed by one of snappy, gzip, lz4, zstd"));
+    }
+    let is_delta = descriptor.physical_type() == Physical::BYTE_ARRAY
+        && chunks().any(|chunk| chunk.encodings().any(|encoding| delta_text(encoding).is_some()));
+    is_delta.then_some((PACKED, "holds text in a delta encoding", "save text with a dictionary or in plain encoding"))
 }
 
 /// Returns whether the integers of a column are unsigned.
@@ -221,6 +238,7 @@ struct Column {
 /// Table, read one row group after another.
 struct Groups {
     reader: SerializedFileReader<File>,
+    pages: Arc<PageFile>,
     header: Vec<String>,
     /// Columns to read.
     wanted: Vec<usize>,
@@ -251,8 +269,9 @@ impl Groups {
         let (group, reader) = (self.cursor.group, &self.reader);
         let mut columns = Vec::new();
         for &number in &self.wanted {
-            let column = guarded(|| reader.get_row_group(group)?.get_column_reader(number))?;
             let descriptor = schema.column(number);
+            let pages = guarded(|| Pages::new(&self.pages, reader.metadata().row_group(group), number))?;
+            let column = get_column_reader(Arc::clone(&descriptor), Box::new(pages));
             let (present, unsigned) = (descriptor.max_def_level(), is_unsigned(&descriptor));
             columns.push(Column { number, present, unsigned, reader: column, cells: Vec::new() });
         }
@@ -297,6 +316,7 @@ impl Cells for Groups {
 
     fn restart(&mut self, columns: &[usize], _all: bool) -> Result<(), ReadError> {
         self.wanted = columns.to_vec();
+        self.pages.restart();
         self.cursor = Cursor::default();
         Ok(())
     }
