@@ -30,7 +30,7 @@ MISSIONS = (
 )
 SAMPLING = (
     "The separation of the whole motion, at its samples, and on straight lines between the samples. *Hidden* is the "
-    "separation at samples less that of the whole motion. The verdict is that of the whole motion; a violation that no "
+    "separation at samples less that of the whole motion. Separations are rounded down. The verdict is that of the whole motion; a violation that no "
     "sample shows is bold."
 )
 
@@ -149,7 +149,8 @@ def sampling(rows: Sequence[Row]) -> list[str]:
             verdict = "clear"
             if row["violated"]:
                 verdict = "violation" if row["seen_at_samples"] else "**violation, hidden**"
-            lengths = [f"{row[key]:.3f} m" for key in ("true_m", "samples_m", "straight_m", "hidden_m")]
+            lengths = [f"{math.floor(1000 * row[key]) / 1000:.3f} m" for key in ("true_m", "samples_m", "straight_m")]
+            lengths.append(f"{row['hidden_m']:.3f} m")
             lines.append((row["motion"], f"{row['rate_hz']:g} Hz", *lengths, f"{row['delta_m']:g} m", verdict))
     return [
         "## What sampling hides",

@@ -2,13 +2,19 @@
 # Fuzzes each target for some seconds: sh fuzz/run.sh [SECONDS [TARGET...]]
 #
 # The seeds of the tests are the first inputs. An input that fails is kept in fuzz/artifacts, and the exit code is 1.
+# Without SECONDS, runs are short and repeat: the inputs follow from a fixed seed, and those of earlier runs are left out.
 set -eu
 cd "$(dirname "$0")/.."
-seconds=${1:-3} # also if it is empty
+seconds=${1:-} # may be given as the empty string
 [ $# = 0 ] || shift
 fuzz=target/fuzz-tool/bin/cargo-fuzz
 
 corpus=$PWD/target/fuzz/corpus
+seed=0 # another one for each run
+if [ -z "$seconds" ]; then
+    seconds=3 seed=1
+    rm -rf "$corpus"
+fi
 TAUTLINE_FUZZ_CORPUS=$corpus/readers cargo test --quiet --package tautline-recordings --test recordings every_format_has
 mkdir -p "$corpus/readers/scenario"
 cp assets/*.toml "$corpus/readers/scenario/"
@@ -27,7 +33,7 @@ for target in $targets; do
     # A development build: assertions and overflow checks are on. Without a sanitizer, which needs a nightly compiler;
     # the workspace has no unsafe code.
     TAUTLINE_FUZZ=$target "$fuzz" run --dev --sanitizer none --target-dir target/fuzz "$program" "$corpus/$target" \
-        $([ ! -d "$seeds" ] || echo "$seeds") -- -max_total_time="$seconds" -timeout=20 -rss_limit_mb=4096 \
+        $([ ! -d "$seeds" ] || echo "$seeds") -- -max_total_time="$seconds" -seed=$seed -timeout=20 -rss_limit_mb=4096 \
         -max_len=65536 -print_final_stats=1 || failed="$failed $target"
 done
 [ -z "$failed" ] || { echo "failing targets:$failed" >&2; exit 1; }

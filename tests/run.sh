@@ -26,7 +26,7 @@ if [ "$long" ]; then
     cargo test --release -p tautline-sim --test bits
     # The H.264 encoder, which is not a default feature.
     cargo test -p tautline-render --features mp4 film
-    # Three seconds for each fuzz target; TAUTLINE_LONG=1 takes an hour for all.
+    # A minute for all fuzz targets, with the same inputs in each run; TAUTLINE_LONG=1 takes an hour, with others.
     sh fuzz/run.sh "${TAUTLINE_LONG:+170}"
     # Two mutants, one of the law and one of the audit.
     sh tests/mutants.sh 03-a22 07-sweep-off
