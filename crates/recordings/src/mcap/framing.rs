@@ -16,6 +16,10 @@ use tautline_core::record::{ReadFault, RecordError};
 /// Largest accepted record \[bytes\]: a sample of three million vehicles.
 const RECORD_LIMIT_BYTES: u64 = 256 * 1024 * 1024;
 
+/// Unpacked size of all chunks up to which their growth is not limited \[bytes\], and the largest growth factor beyond.
+const FREE_GROWTH_BYTES: u64 = 1024 * 1024 * 1024;
+const GROWTH_LIMIT: u64 = 200;
+
 /// Size of a record header: opcode and length.
 const HEAD_BYTES: usize = 9;
 
@@ -42,6 +46,8 @@ pub(super) struct RecordReader {
     body: Vec<u8>,
     /// Range of `body` with the unread records of a chunk.
     chunk: std::ops::Range<usize>,
+    /// Unpacked size of the chunks up to now \[bytes\].
+    unpacked_bytes: u64,
     ended: bool,
 }
 
@@ -65,6 +71,7 @@ impl RecordReader {
             body_offset: offset,
             body: Vec::new(),
             chunk: 0..0,
+            unpacked_bytes: 0,
             ended: false,
         })
     }
@@ -89,6 +96,10 @@ impl RecordReader {
                 op::CHUNK => {
                     self.body = chunk_records(&self.body).map_err(|reason| damaged(self.body_offset, reason))?;
                     self.chunk = 0..self.body.len();
+                    self.unpacked_bytes += self.body.len() as u64;
+                    if self.unpacked_bytes > FREE_GROWTH_BYTES.max(self.offset.saturating_mul(GROWTH_LIMIT)) {
+                        return Err(damaged(self.body_offset, "its chunks unpack to more than 200 times their size"));
+                    }
                 }
                 _ => return Ok(Some(Record { offset: self.body_offset, opcode, body: &self.body })),
             }

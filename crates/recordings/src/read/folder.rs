@@ -55,7 +55,10 @@ impl Folder {
     /// Lists an archive. A single folder around all files is skipped.
     pub(super) fn of_archive(path: &Path) -> Result<Self, ReadError> {
         let mut folder = Self::default();
-        let names = Archive::open(path)?.names();
+        let mut archive = Archive::open(path)?;
+        archive.check_entries()?;
+        let names = archive.names();
+        let mut folders: BTreeMap<String, Vec<Source>> = BTreeMap::new();
         let is_file =
             |name: &String| !(name.ends_with('/') || name.starts_with("__MACOSX") || is_hidden(Path::new(name)));
         for name in names.into_iter().filter(is_file) {
@@ -65,11 +68,9 @@ impl Folder {
                 continue;
             }
             let parent = name.rsplit_once('/').map_or("", |(parent, _)| parent).to_owned();
-            match folder.folders.iter_mut().find(|(known, _)| *known == parent) {
-                Some((_, files)) => files.push(source),
-                None => folder.folders.push((parent, vec![source])),
-            }
+            folders.entry(parent).or_default().push(source);
         }
+        folder.folders = folders.into_iter().collect();
         let around = |(name, _): &(String, _)| name.is_empty();
         if let Some(top) = folder.folders.iter().position(around).or((folder.folders.len() == 1).then_some(0)) {
             folder.files = folder.folders.swap_remove(top).1;

@@ -11,6 +11,7 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::{DeserializeOwned, IgnoredAny};
 use serde_json::Value;
+use serde_json::value::RawValue;
 
 use super::axes::Axes;
 use super::curves::{Curves, distinct, from_json, piece, powers};
@@ -44,8 +45,7 @@ pub(super) const SHOW: &str = "show.json";
 #[derive(Deserialize)]
 struct Show {
     swarm: Option<Swarm>,
-    #[serde(default)]
-    settings: Value,
+    settings: Option<Box<RawValue>>,
 }
 
 #[derive(Deserialize)]
@@ -56,7 +56,7 @@ struct Swarm {
 
 #[derive(Deserialize)]
 struct Drone {
-    settings: Option<Settings>,
+    settings: Option<Box<Settings>>,
 }
 
 #[derive(Default, Deserialize)]
@@ -65,8 +65,8 @@ struct Settings {
     elsewhere: Option<String>,
     name: Option<String>,
     trajectory: Option<Trajectory>,
-    #[serde(default, rename = "yawControl")]
-    yaw: Value,
+    #[serde(rename = "yawControl")]
+    yaw: Option<Box<RawValue>>,
 }
 
 #[derive(Default, Deserialize)]
@@ -80,6 +80,10 @@ struct Trajectory {
     takeoff_s: f64,
 }
 
+/// Longest text of the rules of a show, and of the yaw control of a drone \[bytes\]. In memory, a value may take ninety
+/// times its text.
+const RULES_LIMIT_BYTES: usize = 4 * 1024 * 1024;
+
 /// Time \[s\], position, optional control points, and an ignored field.
 #[derive(Deserialize)]
 #[serde(expecting = "a keyed point [t, [x, y, z], [control points]]")]
@@ -90,8 +94,9 @@ fn show(source: &Source) -> Result<(Show, Option<Archive>), ReadError> {
     let mut head = [0; 2];
     let is_archive = source.bytes()?.read(&mut head).is_ok_and(|bytes| bytes == 2 && head == *b"PK");
     let mut archive = is_archive.then(|| Archive::open(&source.path)).transpose()?;
+    archive.as_mut().map_or(Ok(()), Archive::check_entries)?;
     let show = match &mut archive {
-        Some(archive) if archive.holds(SHOW) => parse(&archive.whole(SHOW)?, Some(SHOW))?,
+        Some(archive) if archive.holds(SHOW) => parse(&archive.document(SHOW)?, Some(SHOW))?,
         Some(_) => {
             let problem = format!("it is an archive with neither `{SHOW}` nor NumPy arrays nor tables");
             return refuse(
@@ -113,14 +118,17 @@ fn show(source: &Source) -> Result<(Show, Option<Archive>), ReadError> {
 pub(super) fn rules(source: &Source, options: &ReadOptions) -> Result<Option<ShowRules>, ReadError> {
     let Ok((show, mut archive)) = show(source) else { return Ok(None) };
     let are_axes_kept = options.turn() == Axes::default();
-    let mut rules = ShowRules::read(&show.settings, options.metres(), are_axes_kept);
+    let settings = value(show.settings.as_deref(), "its `settings`")?;
+    let mut rules = ShowRules::read(&settings, options.metres(), are_axes_kept);
     let Some(swarm) = show.swarm else { return Ok(Some(rules)) };
     let drones = swarm.drones.into_iter().enumerate();
     let drones = drones.map(|(index, drone)| resolved(index, drone, archive.as_mut()));
     let (names, drones): (Vec<_>, Vec<_>) = drones.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
-    for (name, (trajectory, mut yaw)) in distinct(names).into_iter().zip(drones) {
+    for (name, (trajectory, yaw)) in distinct(names).into_iter().zip(drones) {
+        let mut yaw = value(yaw.as_deref(), &format!("`yawControl` of drone `{name}`"))?;
         if let Some(elsewhere) = yaw.get("$ref").and_then(Value::as_str).map(str::to_owned) {
-            match referenced(archive.as_mut(), &elsewhere) {
+            let found = referenced::<Box<RawValue>>(archive.as_mut(), &elsewhere);
+            match found.and_then(|found| Ok(value(Some(&found), "the yaw control")?)) {
                 Ok(found) => yaw = found,
                 Err(error) => {
                     rules.unreadable_yaw.push(format!("yaw of `{name}`: {error}"));
@@ -133,12 +141,21 @@ pub(super) fn rules(source: &Source, options: &ReadOptions) -> Result<Option<Sho
     Ok(Some(rules))
 }
 
+/// Returns the value of a text, which `what` names. A missing text is null.
+fn value(text: Option<&RawValue>, what: &str) -> Result<Value, Fault> {
+    let text = text.map_or("null", RawValue::get);
+    if text.len() > RULES_LIMIT_BYTES {
+        let problem = format!("{what} has {} bytes, at most {RULES_LIMIT_BYTES} are read", text.len());
+        return refuse("recording/malformed", problem, "export the show from Skybrush again");
+    }
+    serde_json::from_str(text).map_err(Fault::damaged)
+}
+
+/// Trajectory of a drone, and the text of its yaw control.
+type Motion = (Trajectory, Option<Box<RawValue>>);
+
 /// Returns the name of a drone, its trajectory and its yaw control.
-fn resolved(
-    index: usize,
-    drone: Drone,
-    mut archive: Option<&mut Archive>,
-) -> Result<(String, (Trajectory, Value)), ReadError> {
+fn resolved(index: usize, drone: Drone, mut archive: Option<&mut Archive>) -> Result<(String, Motion), ReadError> {
     let mut settings = drone.settings.unwrap_or_default();
     if let Some(elsewhere) = &settings.elsewhere {
         settings = referenced(archive.as_deref_mut(), elsewhere)?;
@@ -202,7 +219,7 @@ fn referenced<T: DeserializeOwned>(archive: Option<&mut Archive>, reference: &st
         let problem = format!("it refers to `{reference}`, which is missing");
         return refuse("recording/archive-entry", problem, "give the .skyc file that holds all parts of the show");
     };
-    parse(&archive.whole(name)?, Some(name))
+    parse(&archive.document(name)?, Some(name))
 }
 
 fn parse<T: DeserializeOwned>(bytes: &[u8], entry: Option<&str>) -> Result<T, ReadError> {

@@ -155,10 +155,23 @@ pub(super) fn grows_without_end(unpacked_bytes: u64, packed_bytes: u64) -> bool 
     unpacked_bytes > FREE_GROWTH_BYTES.max(packed_bytes.saturating_mul(GROWTH_LIMIT))
 }
 
+/// Returns the error of data that grow too large.
+pub(super) fn grown(unpacked_bytes: u64, packed_bytes: u64) -> io::Error {
+    let problem = format!("it unpacks to more than {unpacked_bytes} bytes from {packed_bytes}");
+    io::Error::new(io::ErrorKind::FileTooLarge, problem)
+}
+
+/// Size up to which documents of an archive may be unpacked to memory, and their largest growth factor beyond it. A
+/// document takes up to twelve times its size in memory. Shows of real motion grow by a factor of ten.
+const FREE_DOCUMENT_BYTES: u64 = 2 * FREE_GROWTH_BYTES;
+const DOCUMENT_GROWTH_LIMIT: u64 = 30;
+
 /// Opened zip archive.
 pub(super) struct Archive {
     path: PathBuf,
     zip: ZipArchive<BufReader<File>>,
+    /// Size of the documents unpacked to memory up to now \[bytes\].
+    document_bytes: u64,
 }
 
 impl Archive {
@@ -175,7 +188,7 @@ impl Archive {
             let remedy = "unpack it, and make an archive with only one of the two";
             return refuse("recording/archive-entry", format!("two entries have the name {}", quoted(&name)), remedy);
         }
-        Ok(Self { path: path.to_owned(), zip })
+        Ok(Self { path: path.to_owned(), zip, document_bytes: 0 })
     }
 
     /// Returns whether there is an entry with this name.
@@ -224,10 +237,33 @@ impl Archive {
         })
     }
 
-    /// Returns all bytes of an entry, unpacked.
-    pub(super) fn whole(&mut self, name: &str) -> Result<Vec<u8>, ReadError> {
+    /// Checks that no two entries share bytes, so that unpacked sizes are limited by the size of the file.
+    pub(super) fn check_entries(&mut self) -> Result<(), Fault> {
+        let mut ranges = Vec::with_capacity(self.zip.len());
+        for index in 0..self.zip.len() {
+            let entry = self.zip.by_index_raw(index).map_err(zip_fault)?;
+            let start = entry.data_start().ok_or_else(|| Fault::damaged("an entry has no offset in the archive"))?;
+            ranges.push((start, start.saturating_add(entry.compressed_size())));
+        }
+        ranges.sort_unstable();
+        if ranges.windows(2).any(|pair| pair[0].1 > pair[1].0) {
+            return refuse("recording/archive-entry", "two entries share bytes", "make the archive again");
+        }
+        Ok(())
+    }
+
+    /// Returns all bytes of an entry, unpacked. The size of all documents read so is limited.
+    pub(super) fn document(&mut self, name: &str) -> Result<Vec<u8>, ReadError> {
+        let packed_bytes = std::fs::metadata(&self.path)?.len();
+        let limit = FREE_DOCUMENT_BYTES.max(packed_bytes.saturating_mul(DOCUMENT_GROWTH_LIMIT));
+        let left = limit.saturating_sub(self.document_bytes);
         let mut bytes = Vec::new();
-        self.entry(name)?.read_to_end(&mut bytes).map_err(|error| Fault::from(error).at(place(name)))?;
+        let read = self.entry(name)?.take(left + 1).read_to_end(&mut bytes);
+        let read = read.map_err(|error| Fault::from(error).at(place(name)))? as u64;
+        self.document_bytes += read;
+        if read > left {
+            return Err(Fault::from(grown(self.document_bytes, packed_bytes)).at(place(name)));
+        }
         Ok(bytes)
     }
 }
@@ -302,8 +338,7 @@ impl<R: Read> Read for Growing<R> {
         self.inflated_bytes += bytes as u64;
         let Self { inflated_bytes, packed_bytes, .. } = *self;
         if grows_without_end(inflated_bytes, packed_bytes) {
-            let grown = format!("it unpacks to more than {inflated_bytes} bytes from {packed_bytes}");
-            return Err(io::Error::new(io::ErrorKind::FileTooLarge, grown));
+            return Err(grown(inflated_bytes, packed_bytes));
         }
         Ok(bytes)
     }

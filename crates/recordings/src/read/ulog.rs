@@ -219,11 +219,11 @@ impl Log {
             self.topics.remove(&id);
             return Ok(());
         }
-        let mut fields = BTreeMap::new();
+        let (mut fields, mut sizes) = (BTreeMap::new(), BTreeMap::new());
         let mut offset = 0_usize;
         let format = self.formats.get(name).ok_or_else(|| Fault::damaged(format!("`{name}` has no format")))?;
         for field in format {
-            let bytes = self.size(&field.kind, DEEPEST)?.saturating_mul(field.count);
+            let bytes = self.size(&field.kind, DEEPEST, &mut sizes)?.saturating_mul(field.count);
             if let Some((_, Some(kind))) = Kind::of(&field.kind).filter(|_| field.count == 1) {
                 fields.insert(field.name.clone(), (offset, kind));
             }
@@ -236,16 +236,19 @@ impl Log {
         Ok(())
     }
 
-    /// Returns the size of a type \[bytes\], which may be a format.
-    fn size(&self, kind: &str, depth: usize) -> Result<usize, Fault> {
-        if let Some((bytes, _)) = Kind::of(kind) {
+    /// Returns the size of a type \[bytes\], which may be a format. `known` keeps the sizes of formats.
+    fn size<'a>(&'a self, kind: &'a str, depth: usize, known: &mut BTreeMap<&'a str, usize>) -> Result<usize, Fault> {
+        if let Some(bytes) = Kind::of(kind).map(|(bytes, _)| bytes).or_else(|| known.get(kind).copied()) {
             return Ok(bytes);
         }
         let unknown = || Fault::damaged(format!("there is no format {}", quoted(kind)));
         let fields = self.formats.get(kind).filter(|_| depth > 0).ok_or_else(unknown)?;
-        fields.iter().try_fold(0_usize, |sum, field| {
-            Ok(sum.saturating_add(self.size(&field.kind, depth - 1)?.saturating_mul(field.count)))
-        })
+        let mut bytes = 0_usize;
+        for field in fields {
+            bytes = bytes.saturating_add(self.size(&field.kind, depth - 1, known)?.saturating_mul(field.count));
+        }
+        known.insert(kind, bytes);
+        Ok(bytes)
     }
 
     fn data(&mut self, body: &[u8], at: u64) -> Result<(), Fault> {

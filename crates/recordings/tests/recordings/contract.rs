@@ -19,6 +19,9 @@ pub(crate) fn read_whole(path: &Path, options: &ReadOptions) -> Result<(), Strin
         while items.len() <= MOST_ITEMS && tracks.read(&mut items)? {}
         Ok(tracks.vehicles().len())
     };
+    if let Err(error) = read::show_rules(path, options) {
+        check_message(&error)?;
+    }
     match read() {
         Ok(_) if items.len() > MOST_ITEMS => Err("the items have no end".to_owned()),
         Ok(vehicles) => item_fault(&items, vehicles).map_or(Ok(()), Err),

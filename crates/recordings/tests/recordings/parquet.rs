@@ -4,7 +4,7 @@ use std::fs::{self, File};
 use std::path::Path;
 use std::sync::Arc;
 
-use parquet::basic::{Compression, Encoding};
+use parquet::basic::{Compression, Encoding, GzipLevel};
 use parquet::data_type::{ByteArray, ByteArrayType, DoubleType, Int32Type, Int64Type};
 use parquet::file::properties::WriterProperties;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
@@ -158,16 +158,17 @@ fn packed_flight(packed: Compression) -> (Vec<u8>, std::ops::Range<usize>) {
     assert!(Whole::read(&path, &ReadOptions::default()).is_ok());
     let reader = SerializedFileReader::new(File::open(&path).expect("opened")).expect("read");
     let (start, length) = reader.metadata().row_group(0).column(4).byte_range();
-    (fs::read(&path).expect("read"), start as usize..(start + length) as usize)
+    let at = |byte: u64| usize::try_from(byte).expect("short");
+    (fs::read(&path).expect("read"), at(start)..at(start + length))
 }
 
-/// Reads these bytes as a file and returns the text of the error.
-fn refusal(bytes: &[u8]) -> String {
+/// Reads these bytes as a file and returns the text of the error, which has this code.
+fn refusal(bytes: &[u8], code: &str) -> String {
     let folder = tempfile::tempdir().expect("a folder");
     let path = folder.path().join("flight.parquet");
     fs::write(&path, bytes).expect("written");
     let refused = Whole::read(&path, &ReadOptions::default()).expect_err("refused");
-    assert_eq!(refused.code(), "recording/damaged", "{refused}");
+    assert_eq!(refused.code(), code, "{refused}");
     refused.to_string()
 }
 
@@ -180,14 +181,17 @@ fn claimed_page_sizes_are_checked_before_memory_is_allocated() {
     let page = &bytes[pages.clone()];
     // A dictionary page begins with its type 2, its unpacked size 8, its packed size, and the number of values, 1.
     let [0x15, 0x04, 0x15, 0x10, 0x15, _, 0x4c, 0x15, 0x02, ..] = page else { panic!("{page:x?}") };
-    for (at, text) in [(8, "a dictionary claims 2147483647 values in 8 bytes"), (3, "its pages unpack to more than")] {
+    for (at, code, text) in [
+        (8, "recording/damaged", "a dictionary claims 2147483647 values in 8 bytes"),
+        (3, "recording/grows-too-large", "it unpacks to more than 214748"),
+    ] {
         let (head, tail) = (&bytes[..pages.start + at], &bytes[pages.start + at + 1..]);
-        let found = refusal(&[head, &HUGE, tail].concat());
+        let found = refusal(&[head, &HUGE, tail].concat(), code);
         assert!(found.contains(text), "{found}");
     }
     // A header with a repeated size, of which another reader could take the other one.
     let repeated = [&bytes[..pages.start + 4], &[0x05, 0x04, 0x10], &bytes[pages.start + 4..]].concat();
-    let found = refusal(&repeated);
+    let found = refusal(&repeated, "recording/damaged");
     assert!(found.contains("a field is out of order"), "{found}");
 }
 
@@ -205,11 +209,48 @@ fn claims_of_a_footer_are_checked_before_memory_is_allocated() {
         // 100,000 groups in each other.
         schema(&[0xa0, 0x8d, 0x06], &group(&[0x02]).repeat(100_000)),
     ] {
-        let found = refusal(&file(&[&footer[..], &[0x00]].concat()));
+        let found = refusal(&file(&[&footer[..], &[0x00]].concat()), "recording/damaged");
         assert!(found.contains("its schema nests too deep, or claims more columns"), "{found}");
     }
     // A list of 2^31 - 1 truth values, each of which takes no byte.
     let lists = [&[0x15, 0x02, 0xe9, 0xf1][..], &[0xff, 0xff, 0xff, 0xff, 0x07], &[0x00]].concat();
-    let found = refusal(&file(&lists));
+    let found = refusal(&file(&lists), "recording/damaged");
     assert!(found.contains("a list is longer than the rest of the file"), "{found}");
+}
+
+#[test]
+fn pages_that_unpack_to_more_than_they_claim_are_refused() {
+    // The library would unpack the whole page before it compares the sizes.
+    let (mut bytes, pages) = packed_flight(Compression::GZIP(GzipLevel::default()));
+    let [0x15, 0x04, 0x15, claimed @ 0x10, ..] = &mut bytes[pages] else { panic!("no dictionary page of 8 bytes") };
+    *claimed = 0x0e;
+    let found = refusal(&bytes, "recording/damaged");
+    assert!(found.contains("a page unpacks to more bytes than its header states"), "{found}");
+}
+
+/// Returns the bytes of a flight whose footer has another number of rows, for the file or for its group.
+fn with_rows(of_file: u8, of_group: u8) -> Vec<u8> {
+    let (mut bytes, _) = packed_flight(Compression::UNCOMPRESSED);
+    let end = bytes.len() - 8;
+    let footer = bytes.len() - 8 - u32::from_le_bytes(bytes[end..end + 4].try_into().expect("four")) as usize;
+    // After the schema, the footer has the rows of the file and a list of one group. The group ends with its rows.
+    let of_rows: Vec<_> = (footer..end).filter(|&at| bytes[at..].starts_with(&[0x16, 0x04, 0x19, 0x1c])).collect();
+    let [at] = of_rows[..] else { panic!("{of_rows:?}") };
+    bytes[at + 1] = 2 * of_file;
+    let group: Vec<_> = (at + 4..end - 1).filter(|&at| bytes[at..].starts_with(&[0x16, 0x04, 0x26])).collect();
+    let Some(&at) = group.last() else { panic!("no rows of a group") };
+    bytes[at + 1] = 2 * of_group;
+    bytes
+}
+
+#[test]
+fn rows_that_a_footer_hides_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("flight.parquet");
+    fs::write(&path, with_rows(2, 2)).expect("written");
+    assert_eq!(Whole::read(&path, &ReadOptions::default()).expect("read").items.len(), 2);
+    let hidden = refusal(&with_rows(1, 1), "recording/damaged");
+    assert!(hidden.contains("has more cells than its group has rows"), "{hidden}");
+    let other = refusal(&with_rows(2, 1), "recording/damaged");
+    assert!(other.contains("its number of rows is not the sum over its row groups"), "{other}");
 }

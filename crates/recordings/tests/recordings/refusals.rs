@@ -224,6 +224,61 @@ fn decompression_bombs_are_refused() {
 }
 
 #[test]
+fn entries_that_share_bytes_are_refused() {
+    let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    for name in ["a.csv", "b.csv"] {
+        zip.start_file(name, SimpleFileOptions::default()).expect("an entry");
+        zip.write_all(b"t,x,y,z\n0,1,2,3\n1,1,2,3\n").expect("written");
+    }
+    let mut bytes = zip.finish().expect("finished").into_inner();
+    let (_folder, path) = written("flight.zip", &bytes);
+    assert!(Whole::read(&path, &ReadOptions::default()).is_ok());
+    // The second entry of the directory points to the first one: its offset follows 42 bytes after the signature.
+    let directory: Vec<_> = (0..bytes.len() - 4).filter(|&at| bytes[at..].starts_with(b"PK\x01\x02")).collect();
+    bytes[directory[1] + 42..directory[1] + 46].fill(0);
+    let error = refused("flight.zip", &bytes);
+    assert_eq!(error.code(), "recording/archive-entry", "{error}");
+    assert!(error.to_string().contains("two entries share bytes"), "{error}");
+}
+
+#[test]
+fn rules_of_a_show_are_limited() {
+    let show = |zeros: usize| {
+        let values = vec!["{}"; zeros].join(",");
+        let drone = r#"{"settings": {"trajectory": {"points": [[0, [1, 2, 3]], [1, [1, 2, 4]]]}}}"#;
+        format!(r#"{{"swarm": {{"drones": [{drone}]}}, "settings": {{"x": [{values}]}}}}"#)
+    };
+    for (zeros, is_read) in [(10, true), (2_000_000, false)] {
+        let (_folder, path) = written("show.json", show(zeros).as_bytes());
+        assert!(Whole::read(&path, &ReadOptions::default()).is_ok(), "positions do not depend on the rules");
+        match read::show_rules(&path, &ReadOptions::default()) {
+            Ok(rules) => assert!(is_read && rules.is_some(), "{zeros}"),
+            Err(error) => {
+                assert!(!is_read, "{error}");
+                assert_refused(&error, "recording/malformed", "");
+            }
+        }
+    }
+}
+
+#[test]
+fn documents_that_a_show_repeats_are_limited() {
+    // Each drone refers to the same trajectory of 40 MB.
+    let drone = r##"{"settings": {"trajectory": {"$ref": "./a.json#"}}}"##;
+    let show = format!(r#"{{"swarm": {{"drones": [{}]}}}}"#, [drone; 5].join(","));
+    let mut trajectory = br#"{"points": [[0, [1, 2, 3]], [1, [1, 2, 4]]]"#.to_vec();
+    trajectory.resize(40 * 1024 * 1024, b' ');
+    trajectory.push(b'}');
+    let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    for (name, bytes) in [("show.json", show.as_bytes()), ("a.json", &trajectory)] {
+        zip.start_file(name, SimpleFileOptions::default()).expect("an entry");
+        zip.write_all(bytes).expect("written");
+    }
+    let error = refused("show.skyc", &zip.finish().expect("finished").into_inner());
+    assert!(matches!(error.fault, Fault::Bomb { .. }), "{error}");
+}
+
+#[test]
 fn false_lengths_allocate_no_memory() {
     // The header declares 10^15 numbers, but no data follow.
     let array = |shape: &str| {

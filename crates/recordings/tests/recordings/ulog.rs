@@ -130,3 +130,18 @@ fn invalid_logs_are_refused() {
     assert_refused(&read_bytes("cf1.ulg", &log, &topic).expect_err("no position"), "recording/unknown-topic", "");
     assert!(read(&log).is_err(), "no position at all");
 }
+
+#[test]
+fn formats_of_formats_are_measured_once() {
+    // Seven levels of formats with 200 fields each: 200^7 fields in all.
+    let mut log = Log::new();
+    for level in 0..7 {
+        let kind = if level == 6 { "uint8_t".to_owned() } else { format!("f{}", level + 1) };
+        let fields: String = (0..200).map(|field| format!("{kind} a{field};")).collect();
+        log.message(b'F', format!("f{level}:{fields}").as_bytes());
+    }
+    log.message(b'F', b"vehicle_global_position:uint64_t timestamp;f0 deep;double lat;double lon;float alt;");
+    log.message(b'A', &[&[0][..], &0_u16.to_le_bytes(), b"vehicle_global_position"].concat());
+    let found = read(&log.global(1_000_000, 47.0, 8.0, 400.0).bytes());
+    assert!(found.is_err(), "{found:?}");
+}

@@ -13,9 +13,9 @@ use super::text::Override;
 use super::text::Text;
 use super::{build, builtin, template};
 
-/// Size limit of a scenario file \[bytes\]: a million vehicles with a position, a velocity, a slot and an edge each.
-/// Reading takes about 45 times the size of the file in memory.
-pub const MAX_FILE_BYTES: u64 = 128 << 20;
+/// Size limit of a scenario file \[bytes\]: 250,000 vehicles with a position, a velocity, a slot and an edge each.
+/// Reading takes 45 to 100 times the size of the file in memory.
+pub const MAX_FILE_BYTES: u64 = 32 << 20;
 
 /// Name of standard input in messages.
 const STANDARD_INPUT: &str = "standard input";

@@ -7,9 +7,10 @@ mod pages;
 
 use std::borrow::Cow;
 use std::fs::File;
-use std::io::{Read as _, Seek as _, SeekFrom};
+use std::io::{self, Read as _, Seek as _, SeekFrom};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use parquet::basic::{Compression, ConvertedType, LogicalType, TimeUnit as ParquetUnit, Type as Physical};
 use parquet::column::reader::{ColumnReader, ColumnReaderImpl, get_column_reader};
@@ -18,7 +19,7 @@ use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
-use self::pages::{PageFile, Pages, delta_text};
+use self::pages::{Pages, delta_text};
 use crate::read::clock::{Stamp, TimeUnit};
 use crate::read::error::{Fault, Place, ReadError, refuse};
 use crate::read::layout::Layout;
@@ -47,10 +48,17 @@ pub(crate) const EPOCH_KEY: &str = "epoch_ns";
 /// Largest number of cells read at once: some 20 MB.
 const BATCH_CELLS: usize = 640_000;
 
+/// Number of cells below which repeated cells are not limited: some 1 GB if each has eight bytes.
+const FREE_CELLS: u64 = 1 << 27;
+
+/// Largest number of cells for each byte of the file beyond [`FREE_CELLS`].
+const CELLS_PER_BYTE: u64 = 25;
+
 /// Opens a table.
 pub(in crate::read) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut file = File::open(&source.path)?;
-    if file.metadata()?.len() < 12 {
+    let file_bytes = file.metadata()?.len();
+    if file_bytes < 12 {
         return Err(Fault::Truncated("the end of the file is missing".to_owned()).into());
     }
     let mut end = [0; 8];
@@ -68,8 +76,7 @@ pub(in crate::read) fn open(source: &Source, options: &ReadOptions) -> Result<Re
     let mut footer = Vec::new();
     file.try_clone()?.take(footer_bytes.cast_unsigned()).read_to_end(&mut footer)?;
     pages::check_footer(&footer).map_err(|error| Fault::damaged(format!("the description of its columns: {error}")))?;
-    let pages = PageFile::new(file.try_clone()?);
-    let reader = guarded(|| SerializedFileReader::new(file))?;
+    let reader = guarded(|| SerializedFileReader::new(file.try_clone()?))?;
     let metadata = reader.metadata().file_metadata();
     let schema = metadata.schema_descr();
     let header: Vec<String> = schema.columns().iter().map(|column| column.path().string()).collect();
@@ -87,10 +94,34 @@ pub(in crate::read) fn open(source: &Source, options: &ReadOptions) -> Result<Re
             return refuse(code, format!("column `{}` {what}", header[column]), remedy);
         }
     }
+    check_rows(&reader, layout.columns().len(), file_bytes)?;
     let epoch_ns = metadata.key_value_metadata().into_iter().flatten().find(|pair| pair.key == EPOCH_KEY);
     let epoch_ns = epoch_ns.and_then(|pair| pair.value.as_deref()).and_then(|value| value.parse().ok());
-    let groups = Groups { reader, pages, header, wanted: Vec::new(), columns: Vec::new(), cursor: Cursor::default() };
+    let groups = Groups {
+        reader,
+        file,
+        unpacked_bytes: Arc::default(),
+        header,
+        wanted: Vec::new(),
+        columns: Vec::new(),
+        cursor: Cursor::default(),
+    };
     table::open(source, groups, layout, unit, epoch_ns.unwrap_or(0), options)
+}
+
+/// Checks the numbers of rows that the file claims. A row of `columns` cells takes no byte if all cells repeat.
+fn check_rows(reader: &SerializedFileReader<File>, columns: usize, file_bytes: u64) -> Result<(), Fault> {
+    let metadata = reader.metadata();
+    let rows = metadata
+        .row_groups()
+        .iter()
+        .try_fold(0_u64, |sum, group| u64::try_from(group.num_rows()).ok().and_then(|rows| sum.checked_add(rows)));
+    let rows = rows.filter(|&rows| u64::try_from(metadata.file_metadata().num_rows()) == Ok(rows));
+    let rows = rows.ok_or_else(|| Fault::damaged("its number of rows is not the sum over its row groups"))?;
+    if rows.saturating_mul(columns as u64) > FREE_CELLS.max(file_bytes.saturating_mul(CELLS_PER_BYTE)) {
+        return Err(Fault::Bomb(format!("it claims {rows} rows of {columns} columns in {file_bytes} bytes")));
+    }
+    Ok(())
 }
 
 thread_local! {
@@ -111,6 +142,10 @@ fn guarded<T>(call: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, Fault
     match outcome {
         Ok(Ok(value)) => Ok(value),
         Ok(Err(ParquetError::EOF(what))) => Err(Fault::Truncated(what)),
+        Ok(Err(ParquetError::External(error))) => Err(match error.downcast::<io::Error>() {
+            Ok(error) => Fault::from(*error),
+            Err(error) => Fault::damaged(error),
+        }),
         Ok(Err(error)) => Err(Fault::damaged(error)),
         Err(_) => Err(Fault::damaged("its pages contradict each other")),
     }
@@ -136,6 +171,7 @@ fn unreadable(
     column: usize,
 ) -> Option<(&'static str, &'static str, &'static str)> {
     const ELEMENT_TYPE: &str = "recording/element-type";
+    const PACKED: &str = "recording/unsupported-compression";
     let metadata = reader.metadata();
     let descriptor = metadata.file_metadata().schema_descr().column(column);
     if descriptor.max_rep_level() > 0 {
@@ -152,7 +188,6 @@ fn unreadable(
     if let Some(what) = other {
         return Some((ELEMENT_TYPE, what, "save numbers as double, and time as double, int64 or time stamps"));
     }
-    const PACKED: &str = "recording/unsupported-compression";
     let chunks = || metadata.row_groups().iter().filter_map(|group| group.columns().get(column));
     let packed = chunks().find_map(|chunk| match chunk.compression() {
         Compression::BROTLI(_) => Some("is packed by brotli, which is not supported"),
@@ -209,6 +244,22 @@ fn read_cells(column: &mut Column, name: &str, count: usize) -> Result<Vec<Cell>
     }
 }
 
+/// Tries to read a cell after the last row of a group, and returns the number of cells found.
+fn one_more(column: &mut Column) -> Result<usize, Fault> {
+    fn of<D: DataType>(reader: &mut ColumnReaderImpl<D>) -> Result<usize, Fault> {
+        let (mut values, mut levels) = (Vec::new(), Vec::new());
+        guarded(|| reader.read_records(1, Some(&mut levels), None, &mut values)).map(|(records, ..)| records)
+    }
+    match &mut column.reader {
+        ColumnReader::DoubleColumnReader(reader) => of(reader),
+        ColumnReader::FloatColumnReader(reader) => of(reader),
+        ColumnReader::Int64ColumnReader(reader) => of(reader),
+        ColumnReader::Int32ColumnReader(reader) => of(reader),
+        ColumnReader::ByteArrayColumnReader(reader) => of(reader),
+        _ => Ok(0),
+    }
+}
+
 fn cells<D: DataType>(
     reader: &mut ColumnReaderImpl<D>,
     present: i16,
@@ -238,7 +289,9 @@ struct Column {
 /// Table, read one row group after another.
 struct Groups {
     reader: SerializedFileReader<File>,
-    pages: Arc<PageFile>,
+    /// The same file, for its pages, and their unpacked size up to now \[bytes\].
+    file: File,
+    unpacked_bytes: Arc<AtomicU64>,
     header: Vec<String>,
     /// Columns to read.
     wanted: Vec<usize>,
@@ -270,7 +323,8 @@ impl Groups {
         let mut columns = Vec::new();
         for &number in &self.wanted {
             let descriptor = schema.column(number);
-            let pages = guarded(|| Pages::new(&self.pages, reader.metadata().row_group(group), number))?;
+            let pages =
+                guarded(|| Pages::new(&self.file, &self.unpacked_bytes, reader.metadata().row_group(group), number))?;
             let column = get_column_reader(Arc::clone(&descriptor), Box::new(pages));
             let (present, unsigned) = (descriptor.max_def_level(), is_unsigned(&descriptor));
             columns.push(Column { number, present, unsigned, reader: column, cells: Vec::new() });
@@ -299,6 +353,15 @@ impl Groups {
             }
         }
         self.cursor.rows_left -= count;
+        if self.cursor.rows_left == 0 {
+            for column in &mut self.columns {
+                let beyond = one_more(column)?;
+                if beyond > 0 {
+                    let name = &self.header[column.number];
+                    return Err(Fault::damaged(format!("column `{name}` has more cells than its group has rows")));
+                }
+            }
+        }
         Ok(count)
     }
 
@@ -316,7 +379,7 @@ impl Cells for Groups {
 
     fn restart(&mut self, columns: &[usize], _all: bool) -> Result<(), ReadError> {
         self.wanted = columns.to_vec();
-        self.pages.restart();
+        self.unpacked_bytes.store(0, Ordering::Relaxed);
         self.cursor = Cursor::default();
         Ok(())
     }

@@ -4,34 +4,54 @@
 //! with ascending fields of the known types. So the library finds the same numbers.
 
 use std::fs::File;
-use std::io::{self, BufRead, BufReader, Cursor, Read as _, Seek as _, SeekFrom};
-use std::sync::Arc;
+use std::io::{self, BufRead, BufReader, Cursor, Read, Seek as _, SeekFrom};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use bytes::Bytes;
-use parquet::basic::{Encoding, Type as Physical};
+use parquet::basic::{Compression, Encoding, Type as Physical};
 use parquet::column::page::{Page, PageMetadata, PageReader};
 use parquet::errors::{ParquetError, Result};
 use parquet::file::metadata::RowGroupMetaData;
 use parquet::file::reader::{ChunkReader, Length, SerializedPageReader};
 
-use crate::read::source::grows_without_end;
+use crate::read::source::{grown, grows_without_end};
 
-/// Pages of a file, whose unpacked size is limited.
+/// File whose pages have a limited unpacked size.
 pub(super) struct PageFile {
     file: File,
-    /// Unpacked size of the pages read up to now \[bytes\].
-    unpacked_bytes: AtomicU64,
+    /// Unpacked size of the pages of all columns read up to now \[bytes\].
+    unpacked_bytes: Arc<AtomicU64>,
+    compression: Compression,
+    /// Header of the current page.
+    header: Mutex<PageHeader>,
+}
+
+/// Sizes in the header of a page \[bytes\].
+#[derive(Clone, Copy, Default)]
+struct PageHeader {
+    unpacked_bytes: u64,
+    /// Size of the levels before the packed values.
+    levels_bytes: u64,
+    is_plain: bool,
 }
 
 impl PageFile {
-    pub(super) fn new(file: File) -> Arc<Self> {
-        Arc::new(Self { file, unpacked_bytes: AtomicU64::new(0) })
-    }
-
-    /// Forgets the pages of an earlier pass.
-    pub(super) fn restart(&self) {
-        self.unpacked_bytes.store(0, Ordering::Relaxed);
+    fn unpacks_too_much(&self, page: &[u8]) -> bool {
+        let header = *self.header.lock().unwrap_or_else(PoisonError::into_inner);
+        let Some(packed) = usize::try_from(header.levels_bytes).ok().and_then(|start| page.get(start..)) else {
+            return false;
+        };
+        let claimed_bytes = header.unpacked_bytes.saturating_sub(header.levels_bytes);
+        let most = |unpacked: &mut dyn Read| io::copy(&mut unpacked.take(claimed_bytes + 1), &mut io::sink());
+        // The library unpacks the other codecs into a buffer of the claimed size. It also reports damaged data.
+        let unpacked = match self.compression {
+            _ if header.is_plain => return false,
+            Compression::GZIP(_) => most(&mut flate2::read::MultiGzDecoder::new(packed)),
+            Compression::LZ4 => most(&mut lz4_flex::frame::FrameDecoder::new(packed)),
+            _ => return false,
+        };
+        unpacked.is_ok_and(|bytes| bytes > claimed_bytes)
     }
 }
 
@@ -47,21 +67,26 @@ impl ChunkReader for PageFile {
     /// Checks the page header at this offset, and returns a reader of it.
     fn get_read(&self, start: u64) -> Result<Self::T> {
         let mut reader = self.file.get_read(start)?;
-        let page_bytes = Thrift { left: Length::len(&self.file).saturating_sub(start), reader: &mut reader }
-            .unpacked_page_bytes()
-            .map_err(|error| ParquetError::General(format!("the header of a page: {error}")))?;
         let packed_bytes = Length::len(&self.file);
+        let header = Thrift { left: packed_bytes.saturating_sub(start), reader: &mut reader }
+            .page_header()
+            .map_err(|error| ParquetError::General(format!("the header of a page: {error}")))?;
+        let page_bytes = header.unpacked_bytes;
         let unpacked_bytes = self.unpacked_bytes.fetch_add(page_bytes, Ordering::Relaxed) + page_bytes;
         if grows_without_end(unpacked_bytes, packed_bytes) {
-            let problem = format!("its pages unpack to more than {unpacked_bytes} bytes from {packed_bytes}");
-            return Err(ParquetError::General(problem));
+            return Err(ParquetError::External(grown(unpacked_bytes, packed_bytes).into()));
         }
+        *self.header.lock().unwrap_or_else(PoisonError::into_inner) = header;
         reader.seek(SeekFrom::Start(start))?;
         Ok(reader)
     }
 
     fn get_bytes(&self, start: u64, length: usize) -> Result<Bytes> {
-        self.file.get_bytes(start, length)
+        let page = self.file.get_bytes(start, length)?;
+        if self.unpacks_too_much(&page) {
+            return Err(ParquetError::General("a page unpacks to more bytes than its header states".to_owned()));
+        }
+        Ok(page)
     }
 }
 
@@ -72,10 +97,22 @@ pub(super) struct Pages {
 }
 
 impl Pages {
-    pub(super) fn new(file: &Arc<PageFile>, group: &RowGroupMetaData, column: usize) -> Result<Self> {
+    /// Opens a column of a row group. `unpacked_bytes` counts the unpacked size of all columns.
+    pub(super) fn new(
+        file: &File,
+        unpacked_bytes: &Arc<AtomicU64>,
+        group: &RowGroupMetaData,
+        column: usize,
+    ) -> Result<Self> {
         let chunk = group.column(column);
         let rows = usize::try_from(group.num_rows())?;
-        let pages = SerializedPageReader::new(Arc::clone(file), chunk, rows, None)?;
+        let file = PageFile {
+            file: file.try_clone()?,
+            unpacked_bytes: Arc::clone(unpacked_bytes),
+            compression: chunk.compression(),
+            header: Mutex::default(),
+        };
+        let pages = SerializedPageReader::new(Arc::new(file), chunk, rows, None)?;
         Ok(Self { pages, physical: chunk.column_type() })
     }
 
@@ -151,7 +188,7 @@ pub(super) fn check_footer(footer: &[u8]) -> io::Result<()> {
     Ok(())
 }
 
-/// Types of the compact protocol. A field that is false has the type 2, and is given as `BOOL` here.
+/// Types of the compact protocol. The type of a truth value is its value.
 const BOOL: u8 = 1;
 const FALSE: u8 = 2;
 const I8: u8 = 3;
@@ -208,6 +245,11 @@ impl<R: BufRead> Thrift<R> {
         i32::try_from(value).map_err(|_| damaged("a number is too large"))
     }
 
+    /// Reads a size or count, which is a signed number.
+    fn size(&mut self) -> io::Result<u64> {
+        u64::try_from(self.number()?).map_err(|_| damaged("a size is negative"))
+    }
+
     fn jump(&mut self, bytes: u64) -> io::Result<()> {
         if bytes > self.left {
             return Err(io::ErrorKind::UnexpectedEof.into());
@@ -224,8 +266,8 @@ impl<R: BufRead> Thrift<R> {
             return Ok(None);
         }
         *id += delta;
-        let kind = if kind == FALSE { BOOL } else { kind };
-        if delta == 0 || kinds.get(*id - 1).is_some_and(|&known| known != kind) {
+        let is_other = |&known: &u8| known != kind && !(known == BOOL && kind == FALSE);
+        if delta == 0 || kinds.get(*id - 1).is_some_and(is_other) {
             return Err(damaged("a field is out of order or has a wrong type"));
         }
         Ok(Some(kind))
@@ -247,7 +289,7 @@ impl<R: BufRead> Thrift<R> {
             return Err(damaged("its fields nest too deep"));
         }
         match kind {
-            BOOL => Ok(()),
+            BOOL | FALSE => Ok(()),
             I8 => self.byte().map(drop),
             I16 | I32 | I64 => self.varint().map(drop),
             DOUBLE => self.jump(8),
@@ -288,7 +330,7 @@ impl<R: BufRead> Thrift<R> {
             let (mut id, mut children) = (0, 0);
             while let Some(kind) = self.field(&mut id, SCHEMA_ELEMENT)? {
                 match id {
-                    5 => children = u64::try_from(self.number()?).map_err(|_| damaged("a group has no columns"))?,
+                    5 => children = self.size()?,
                     _ => self.skip(kind, 0)?,
                 }
             }
@@ -305,19 +347,28 @@ impl<R: BufRead> Thrift<R> {
         Ok(())
     }
 
-    /// Reads the header of a page and returns its unpacked size \[bytes\].
-    fn unpacked_page_bytes(&mut self) -> io::Result<u64> {
-        let (mut id, mut bytes) = (0, 0);
+    /// Reads the header of a page.
+    fn page_header(&mut self) -> io::Result<PageHeader> {
+        let (mut id, mut header) = (0, PageHeader::default());
         while let Some(kind) = self.field(&mut id, PAGE)? {
             match id {
-                2 => bytes = u64::try_from(self.number()?).map_err(|_| damaged("its size is negative"))?,
+                2 => header.unpacked_bytes = self.size()?,
                 5 => self.skip_struct(DATA_PAGE, 0)?,
                 7 => self.skip_struct(DICTIONARY_PAGE, 0)?,
-                8 => self.skip_struct(DATA_PAGE_V2, 0)?,
+                8 => {
+                    let mut id = 0;
+                    while let Some(kind) = self.field(&mut id, DATA_PAGE_V2)? {
+                        match id {
+                            5 | 6 => header.levels_bytes += self.size()?,
+                            7 => header.is_plain = kind == FALSE,
+                            _ => self.skip(kind, 1)?,
+                        }
+                    }
+                }
                 _ => self.skip(kind, 0)?,
             }
         }
-        Ok(bytes)
+        Ok(header)
     }
 }
 
