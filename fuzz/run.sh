@@ -2,7 +2,7 @@
 # Fuzzes each target for some seconds: sh fuzz/run.sh [SECONDS [TARGET...]]
 #
 # The seeds of the tests are the first inputs. An input that fails is kept in fuzz/artifacts, and the exit code is 1.
-# Without SECONDS, runs are short and repeat: the inputs follow from a fixed seed, and those of earlier runs are left out.
+# Without SECONDS, runs are short and repeatable: the inputs follow from a fixed seed, without those of earlier runs.
 set -eu
 cd "$(dirname "$0")/.."
 seconds=${1:-} # may be given as the empty string

@@ -14,6 +14,8 @@ import tarfile
 import tempfile
 import unittest
 
+import yaml
+
 from test_ci import PROGRAM, ROOT, TARGET, VERSION, run
 
 DENY = ROOT / "target/deny/bin/cargo-deny"
@@ -94,14 +96,20 @@ class Crates(Copied):
         done = subprocess.run(check, cwd=unpacked, capture_output=True, text=True, timeout=MINUTES, check=False)
         self.assertEqual(done.returncode, 0, done.stderr[-4000:])
 
-    def test_the_repository_is_written_into_each_published_manifest(self):
-        url = "https://example.invalid/owner/tautline"
-        done = self.crates("package", "--offline", "--list", REPOSITORY=url)
+    def test_the_repository_is_written_into_each_package_and_manifests_are_restored(self):
+        manifests = [self.folder / "Cargo.toml", *self.folder.glob("crates/*/Cargo.toml")]
+        before = [manifest.read_bytes() for manifest in manifests]
+        url, packed = "https://example.invalid/owner/tautline", self.folder / "packed"
+        done = self.crates("package", "--offline", "--no-verify", "--target-dir", str(packed), REPOSITORY=url)
         self.assertEqual(done.returncode, 0, done.stderr)
-        words = ["cargo", "metadata", "--no-deps", "--offline", "--format-version", "1"]
-        listed = json.loads(subprocess.run(words, cwd=self.folder, capture_output=True, check=True).stdout)
-        having = {package["name"] for package in listed["packages"] if package["repository"] == url}
+        having = set()
+        for archive in (packed / "package").glob("*.crate"):
+            with tarfile.open(archive) as files:
+                manifest = files.extractfile(f"{archive.stem}/Cargo.toml").read().decode()
+            if f'\nrepository = "{url}"\n' in manifest:
+                having.add(archive.stem.removesuffix(f"-{VERSION}"))
         self.assertEqual(having, PUBLISHED)
+        self.assertEqual([manifest.read_bytes() for manifest in manifests], before)
 
     def test_wrong_arguments_are_named(self):
         done = self.crates("publsh")
@@ -116,6 +124,111 @@ class Crates(Copied):
         listed = json.loads(subprocess.run(words, cwd=ROOT, capture_output=True, check=True).stdout)
         # An empty list of registries forbids publishing.
         self.assertEqual({of["name"] for of in listed["packages"] if of["publish"] != []}, PUBLISHED)
+
+
+class Publishing(Copied):
+    """Publishes to a registry that a program `cargo` on PATH imitates. The files of REGISTRY are published crates."""
+
+    CARGO = """#!/bin/sh
+echo "$*" >>"$REGISTRY/calls"
+[ "$1 $2" = "publish --package" ] || exit 0
+grep -q '^repository = "https://example.invalid/"' Cargo.toml || { echo "no repository" >&2; exit 101; }
+if [ -e "$REGISTRY/$3" ]; then
+    echo "error: crate $3@0.1.0 already exists on crates.io index" >&2
+    exit 101
+fi
+case " $BROKEN " in *" $3 "*) echo "error: failed to verify package tarball" >&2; exit 101 ;; esac
+if [ "$(ls "$REGISTRY" | grep -c ^tautline)" -ge 5 ] && [ ! -e "$REGISTRY/refused-$3" ]; then
+    touch "$REGISTRY/refused-$3"
+    echo "  the remote server responded with an error (status 429 Too Many Requests): You have published too many" >&2
+    exit 101
+fi
+touch "$REGISTRY/$3"
+"""
+
+    def setUp(self):
+        super().setUp()
+        self.registry = self.folder / "registry"
+        self.registry.mkdir()
+        program = self.folder / "path/cargo"
+        program.parent.mkdir()
+        program.write_text(self.CARGO)
+        program.chmod(0o755)
+
+    def publish(self, *words, broken=""):
+        """Returns the finished process and the arguments of each call of cargo."""
+        path = os.pathsep.join([str(self.folder / "path"), os.environ["PATH"]])
+        environment = {"PATH": path, "REGISTRY": str(self.registry), "BROKEN": broken, "WAIT_S": "0"}
+        done = run("sh", self.folder / ".github/crates.sh", "publish", "--locked", *words, folder=self.folder,
+                   REPOSITORY="https://example.invalid/", **environment)
+        return done, (self.registry / "calls").read_text().splitlines()
+
+    def published(self):
+        return {file.name for file in self.registry.glob("tautline*")}
+
+    def test_crates_are_published_after_their_dependencies(self):
+        done, calls = self.publish()
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(self.published(), PUBLISHED)
+        words = ["cargo", "metadata", "--no-deps", "--offline", "--format-version", "1"]
+        listed = json.loads(subprocess.run(words, cwd=ROOT, capture_output=True, check=True).stdout)
+        needed = {of["name"]: PUBLISHED & {to["name"] for to in of["dependencies"]} for of in listed["packages"]}
+        order = list(dict.fromkeys(call.split()[2] for call in calls))
+        for position, crate in enumerate(order):
+            self.assertLessEqual(needed[crate], set(order[:position]), crate)
+            self.assertIn(f"publish --package {crate} --allow-dirty --locked", calls)
+
+    def test_a_refused_crate_is_tried_again(self):
+        done, calls = self.publish()
+        self.assertEqual(len(calls), len(PUBLISHED) + len(PUBLISHED) - 5)
+        self.assertEqual(done.stderr.count("attempt 2 follows in 0 s"), len(PUBLISHED) - 5)
+
+    def test_a_failed_run_is_resumed(self):
+        before = (self.folder / "Cargo.toml").read_bytes()
+        done, calls = self.publish(broken="tautline-sim")
+        self.assertEqual(done.returncode, 1)
+        self.assertIn("tautline-sim: not published; repeat the command", done.stderr)
+        self.assertIn("failed to verify package tarball", done.stderr)
+        self.assertIn("--package tautline-sim", calls[-1])
+        self.assertNotIn("tautline", self.published())
+        self.assertEqual((self.folder / "Cargo.toml").read_bytes(), before)
+        some = self.published()
+        done, _ = self.publish()
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(self.published(), PUBLISHED)
+        skipped = set(re.findall("^(.*): skipped, already published$", done.stdout, re.MULTILINE))
+        self.assertEqual(skipped, some)
+
+    def test_a_dry_run_is_one_call(self):
+        done, [call] = self.publish("--dry-run")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertTrue(call.startswith("publish --workspace --exclude "), call)
+        self.assertEqual(self.published(), set())
+
+
+class Workflows(unittest.TestCase):
+    FILES = sorted((ROOT / ".github/workflows").glob("*.yml"))
+
+    def test_shell_scripts_parse(self):
+        blocks = [(file, file.read_text()) for file in (ROOT / ".github").glob("*.sh")]
+        for file in self.FILES:
+            for name, job in yaml.safe_load(file.read_text())["jobs"].items():
+                blocks += [(f"{file}: {name}", step["run"]) for step in job["steps"] if "run" in step]
+        self.assertGreater(len(blocks), 20)
+        for place, script in blocks:
+            script = re.sub(r"\$\{\{.*?\}\}", "expression", script)
+            done = subprocess.run(["bash", "-n"], input=script, capture_output=True, text=True, check=False)
+            self.assertEqual((done.returncode, done.stderr), (0, ""), place)
+
+    def test_actions_are_pinned_by_commit(self):
+        for file in self.FILES:
+            for line in re.findall(r"uses: .*", file.read_text()):
+                self.assertRegex(line, r"^uses: \S+@[0-9a-f]{40} # v\d+\.\d+\.\d+$", file)
+
+    def test_jobs_that_need_an_account_run_in_the_environment_release(self):
+        for name, job in yaml.safe_load((ROOT / ".github/workflows/release.yml").read_text())["jobs"].items():
+            has_account = {"id-token", "packages"} & job.get("permissions", {}).keys()
+            self.assertEqual(job.get("environment"), "release" if has_account else None, name)
 
 
 class SupplyChain(unittest.TestCase):
@@ -163,12 +276,44 @@ class Installed(unittest.TestCase):
         done = run("sh", ROOT / ".github/package.sh", PROGRAM, TARGET, self.folder, "viewer", folder=self.folder)
         self.assertEqual(pathlib.Path(done.stdout.strip()).name, f"tautline-{VERSION}-{TARGET}-viewer.tar.gz")
 
+    def test_the_smoke_test_starts_an_archive(self):
+        done = run("sh", ROOT / ".github/package.sh", PROGRAM, TARGET, "dist", folder=self.folder)
+        archive = self.folder / done.stdout.strip()
+        done = run("sh", ROOT / ".github/smoke.sh", archive, folder=self.folder)
+        self.assertEqual((done.returncode, done.stdout), (0, f"{archive}: started\n"), done.stderr)
+        done = run("sh", ROOT / ".github/smoke.sh", "tautline.zip", folder=self.folder)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("must be an archive, a wheel or the source distribution", done.stderr)
+
+    def test_the_smoke_test_refuses_another_version(self):
+        program = self.folder / "tautline"
+        program.write_text("#!/bin/sh\necho tautline 9.9.9\n")
+        program.chmod(0o755)
+        done = run("sh", ROOT / ".github/package.sh", program, TARGET, "dist", folder=self.folder)
+        done = run("sh", ROOT / ".github/smoke.sh", done.stdout.strip(), folder=self.folder)
+        self.assertEqual(done.returncode, 1)
+        self.assertIn(f'has the version "tautline 9.9.9", must be "tautline {VERSION}"', done.stderr)
+
+    def test_the_source_distribution_has_all_crates(self):
+        words = [MATURIN, "sdist", "--manifest-path", ROOT / "python/Cargo.toml", "--out", "dist"]
+        done = subprocess.run(words, cwd=self.folder, capture_output=True, text=True, timeout=MINUTES, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr[-4000:])
+        [file] = (self.folder / "dist").iterdir()
+        # CONTRIBUTING.md downloads this name.
+        self.assertEqual(file.name, f"tautline-{VERSION}.tar.gz")
+        with tarfile.open(file) as files:
+            names = {name.removeprefix(f"tautline-{VERSION}/") for name in files.getnames()}
+        manifests = {f"crates/{crate.removeprefix('tautline-')}/Cargo.toml" for crate in PUBLISHED - {"tautline"}}
+        self.assertLessEqual(manifests | {"Cargo.lock", "pyproject.toml", "PKG-INFO"}, names)
+
     def test_a_wheel_works_in_a_clean_environment(self):
         words = [MATURIN, "build", "--manifest-path", ROOT / "python/Cargo.toml", "--out", "dist"]
         done = subprocess.run(words, cwd=self.folder, capture_output=True, text=True, timeout=MINUTES, check=False)
         self.assertEqual(done.returncode, 0, done.stderr[-4000:])
         [wheel] = (self.folder / "dist").glob("*.whl")
         self.assertRegex(wheel.name, rf"^tautline-{re.escape(VERSION)}-cp310-abi3-")
+        done = run("sh", ROOT / ".github/smoke.sh", wheel, folder=self.folder, PYTHON=sys.executable)
+        self.assertEqual(done.returncode, 0, done.stderr)
         subprocess.run([sys.executable, "-m", "venv", self.folder / "venv"], check=True)
         install = [self.folder / "venv/bin/pip", "install", "--quiet", "--disable-pip-version-check", wheel]
         subprocess.run(install, check=True, timeout=MINUTES)
