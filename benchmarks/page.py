@@ -25,12 +25,12 @@ GRAPH = (
     "and evaluates each pair once."
 )
 QUADROTORS = (
-    "The two sides fly Crazyflies with different models and controllers. A lattice contracts from a spacing of 0.8 m to "
-    f"0.7 m within 5 s. Each vehicle must end within {SLOT_M:g} m of its slot. "
+    "The two sides fly Crazyflies with different models and controllers. A lattice contracts from a spacing of 0.8 m "
+    f"to 0.7 m within 5 s. Each vehicle must end within {SLOT_M:g} m of its slot. "
 )
 WORLDS = (
     "crazyflow is built for many worlds on an accelerator. Its row has one world on one core. "
-    "`python python/bench/worlds.py` measures many worlds in tautline (`tl.VectorSimulation`)."
+    "`python/bench/worlds.py` measures many worlds in tautline (`tl.VectorSimulation`)."
 )
 MISSIONS = (
     "Scenes are rebuilt from the published parameters below; random ones are other draws of the same "
@@ -39,10 +39,9 @@ MISSIONS = (
     "keep a lone vehicle below the limit. The shield holds commands for 0.05 s. This hold is too long for the "
     "displacement law on the complete graph of 40 vehicles or more in LSC. *Succeeded* flights are clear "
     "throughout, with each vehicle at its goal to the end. A flight has *hidden* collisions if no sample at the "
-    "source's rate shows a collision. *Least* is the smallest separation as a share of the limit, "
-    "rounded down. A flight under the displacement law ends when it reaches the limit, so its smallest separation is "
-    "just below the limit. Time is the median of the successful flights. The last column is the processing time of a "
-    "flight."
+    "source's rate shows a collision. *Least* is the smallest separation as a share of the limit, rounded down. A "
+    "flight under the displacement law ends when it reaches the limit, so its smallest separation is just below the "
+    "limit. Time is the median of the successful flights. The last column is the processing time of a flight."
 )
 SAMPLING = (
     "Columns show the separation of the whole motion, at its samples, and on straight lines between the samples. "

@@ -2,7 +2,7 @@
 
 Usage:
 
-    python benchmarks/run.py [--quick] [--only GROUP...] [--json FILE] [--markdown FILE]
+    python benchmarks/run.py [--quick] [--only GROUP...] [--trajectories FOLDER...] [--json FILE] [--markdown FILE]
 
 Peers come from PyPI, each in a virtual environment of its own under target/benchmarks. A peer that cannot be installed
 is skipped, with the reason in the output and on the page. `--quick` has small sizes and installs nothing.
