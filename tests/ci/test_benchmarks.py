@@ -256,7 +256,8 @@ class Page(unittest.TestCase):
         motion |= {"true_m": 0.9, "samples_m": 1.1, "straight_m": 1.0, "hidden_m": 0.2, "delta_m": 1.0, "why": None}
         motion |= {"violated": True, "seen_at_samples": False, "source": "owner/name abcdef0, a/show"}
         flight = {"group": "missions", "name": "Ring, 3/orca/bare", "mission": "Ring, 3", "law": "orca"}
-        flight |= {"shield": False, "source": "owner/name abcdef0", "success": "each within 1 m", "changes": "none", "why": None}
+        flight |= {"shield": False}
+        flight |= {"source": "owner/name abcdef0", "success": "each within 1 m", "changes": "none", "why": None}
         flight |= {"status": "measured", "flights": 4, "succeeded": 1, "reached": 2, "collided": 3, "hidden": 1}
         flight |= {"ended_between": 1, "least_m": 0.9, "delta_m": 1.0, "median_s": 2.0, "wall_s": 0.1}
         skipped = {"group": "missions", "name": "Ring, 3/laplacian", "status": "skipped", "why": "no slots"}
