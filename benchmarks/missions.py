@@ -1,7 +1,9 @@
 """Missions: published benchmarks under each law, without and under the shield.
 
 A flight is safe if the audit is clear over the whole flight. It succeeds if it is safe and each vehicle is at its goal
-and stays there. A collision that no sample at the source's own rate shows is counted as hidden.
+and stays there. A flight whose collisions show at no sample of the source's grid counts as hidden. A law that is
+undefined at the limit ends its flight there. If no sample before shows a collision, the flight counts as "ended
+between", because later samples are unknown.
 """
 
 import math
@@ -12,6 +14,9 @@ from program import Point, Program, Unusable
 from scenes import Mission, Scene, missions
 
 Row = dict[str, Any]
+
+# Counts of flights whose collisions show at no sample.
+UNSEEN = ("hidden", "ended_between")
 
 # Laws with absolute slots. The others reach a formation up to translation, and flocking has no slots.
 LAWS = ("displacement", "orca", "cbf-qp")
@@ -49,7 +54,7 @@ def fly(program: Program, mission: Mission, law: str, shield: bool) -> Row:
         "status": "measured",
         "why": None,
     }
-    counts = dict.fromkeys(("flights", "safe", "undecided", "reached", "succeeded", "collided", "hidden"), 0)
+    counts = dict.fromkeys(("flights", "safe", "undecided", "reached", "succeeded", "collided", *UNSEEN), 0)
     times: list[float] = []
     wall_s = 0.0
     least_m = math.inf
@@ -70,7 +75,9 @@ def fly(program: Program, mission: Mission, law: str, shield: bool) -> Row:
             times.append(report["formation"]["reached_at_s"])
         if status == "violation":
             counts["collided"] += 1
-            counts["hidden"] += not any(seen(scene, sample) for _, sample in program.samples())
+            unseen = how_unseen(scene, program.samples(), report["run"]["ended_early"] is not None)
+            if unseen:
+                counts[unseen] += 1
         least_m = min(least_m, report["separation"]["min_m"])
         wall_s += report["performance"]["wall_s"]
     times.sort()
@@ -82,6 +89,21 @@ def fly(program: Program, mission: Mission, law: str, shield: bool) -> Row:
     entry["median_s"] = times[len(times) // 2] if times else None
     entry["wall_s"] = wall_s / counts["flights"]
     return entry
+
+
+def how_unseen(scene: Scene, samples: Sequence[tuple[float, Sequence[Point]]], ended_early: bool) -> str | None:
+    """Returns the count of a flight that collided and shows it at no sample of the source's grid, else `None`.
+
+    A recording also has the instant at which a flight ends. This instant counts only if it is on the grid.
+    """
+    if any(seen(scene, sample) for t, sample in samples if on_grid(t, scene.sampled_hz)):
+        return None
+    return "ended_between" if ended_early else "hidden"
+
+
+def on_grid(t: float, rate_hz: float) -> bool:
+    """Returns whether a time [s] is an integral number of periods, up to rounding."""
+    return abs(t * rate_hz - round(t * rate_hz)) < 1e-6
 
 
 def seen(scene: Scene, sample: Sequence[Point]) -> bool:

@@ -5,8 +5,9 @@ import pathlib
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from missions import UNSEEN
 from sampling import TOOLS
-from speed import SAME_M
+from speed import SAME_M, SLOT_M
 
 Row = dict[str, Any]
 
@@ -14,24 +15,38 @@ BEGIN = "<!-- benchmarks: begin; python benchmarks/run.py --markdown replaces th
 END = "<!-- benchmarks: end -->"
 
 SPEED = (
-    "Both sides run on one core, in turns; the least time of the rounds counts. A ratio above 1 means that tautline is "
-    "faster. A ratio in bold is a loss of tautline."
+    "Both sides run on one core, in turns. The least time of the rounds counts. A ratio above 1 means that tautline is "
+    "faster. A ratio in bold is a loss of tautline. Parentheses contain the smallest and the largest ratio of a round. "
+    "A tilde replaces a ratio if 1 is within this spread."
+)
+GRAPH = (
+    "Times of the complete graph have two parts: the law and the rest of a step. The rest is energy check, engine and "
+    "audit in tautline, and engine alone in a peer. The law in Numba is code of this project, compiled with fastmath, "
+    "and evaluates each pair once."
+)
+QUADROTORS = (
+    "The two sides fly Crazyflies with different models and controllers. A lattice contracts from a spacing of 0.8 m "
+    f"to 0.7 m within 5 s. Each vehicle must end within {SLOT_M:g} m of its slot. "
+)
+WORLDS = (
+    "crazyflow is built for many worlds on an accelerator. Its row has one world on one core. "
+    "`python/bench/worlds.py` measures many worlds in tautline (`tl.VectorSimulation`)."
 )
 MISSIONS = (
     "Scenes are rebuilt from the published parameters below; random ones are other draws of the same "
     "distribution. Vehicles are points. Commands have a limit, so no law has a certificate without the shield. "
     "Only the displacement law and the shield avoid blocks. The displacement law has no limit on speed; its gains "
-    "keep a lone vehicle below the limit. The shield holds commands for 0.05 s, which is too long for the "
+    "keep a lone vehicle below the limit. The shield holds commands for 0.05 s. This hold is too long for the "
     "displacement law on the complete graph of 40 vehicles or more in LSC. *Succeeded* flights are clear "
-    "throughout, with each vehicle at its goal to the end. *Hidden* collisions lie between the samples at the "
-    "rate at which the source checks. *Least* is the smallest separation as a share of the limit, rounded down. A "
-    "flight under the displacement law ends when it reaches the limit, so its least stays just below 100 %. Time "
-    "is the median of the successful flights. The last column is the processing time of a flight."
+    "throughout, with each vehicle at its goal to the end. A flight has *hidden* collisions if no sample at the "
+    "source's rate shows a collision. *Least* is the smallest separation as a share of the limit, rounded down. A "
+    "flight under the displacement law ends when it reaches the limit, so its smallest separation is just below the "
+    "limit. Time is the median of the successful flights. The last column is the processing time of a flight."
 )
 SAMPLING = (
-    "The separation of the whole motion, at its samples, and on straight lines between the samples. *Hidden* is the "
-    "separation at samples less that of the whole motion. Separations are rounded down. The verdict is that of the whole motion; a violation that no "
-    "sample shows is bold."
+    "Columns show the separation of the whole motion, at its samples, and on straight lines between the samples. "
+    "*Hidden* is the separation at samples less that of the whole motion. Separations are rounded down. The verdict is "
+    "that of the whole motion. A violation that no sample shows is bold."
 )
 
 
@@ -81,15 +96,14 @@ def speed(rows: Sequence[Row]) -> list[str]:
     lines = []
     for row in rows:
         peer, unit = row["peer"], row["unit"]
-        ours = time(row["ours"]["time"], unit) if "time" in row["ours"] else "-"
+        ours = times(row["ours"], unit) if "time" in row["ours"] else "-"
         if row["status"] == "measured":
-            ratio = f"{row['ratio']:.3g}" if row["ratio"] >= 1 else f"**{row['ratio']:.3g}**"
-            lines.append((row["work"], ours, f"{peer['name']} {peer['version']}: {time(peer['time'], unit)}", ratio))
+            lines.append((row["work"], ours, f"{peer['name']} {peer['version']}: {times(peer, unit)}", ratio(row)))
         else:
             lines.append((row["work"], ours, f"{peer['name']}: {row['status']}", "-"))
     text = [
         "## Speed beside peers",
-        wrapped([SPEED]),
+        wrapped([SPEED + rounds(shown)]),
         table(("work", "tautline", "peer", "ratio"), lines),
     ]
     if not shown:
@@ -101,10 +115,40 @@ def speed(rows: Sequence[Row]) -> list[str]:
             "On the complete graph both sides fly the same law with the same step from the same start. Their last "
             f"positions differ by at most {worst:.1g} m; a row with more than {SAME_M:g} m has no ratio."
         )
-        text.append(wrapped([same_text]))
+        text += [wrapped([GRAPH]), wrapped([same_text])]
+    flown = [row for row in shown if "end_m" in row["peer"]]
+    if flown:
+        ours_m, theirs_m = (max(row[side]["end_m"] for row in flown) for side in ("ours", "peer"))
+        ends = f"The largest distances are {ours_m:.2g} m in tautline and {theirs_m:.2g} m in a peer. "
+        worlds = WORLDS if any(row["peer"]["name"] == "crazyflow" for row in flown) else ""
+        text.append(wrapped([(QUADROTORS + ends + worlds).strip()]))
     sides = sorted({f"- tautline, {kind(row)}: {row['ours']['settings']}." for row in shown})
     sides += sorted({f"- {row['peer']['name']}, {kind(row)}: {row['peer']['settings']}." for row in shown})
     return [*text, "Settings:", wrapped(sides)]
+
+
+def rounds(rows: Sequence[Row]) -> str:
+    """Returns a sentence with the numbers of rounds of the rows."""
+    counts = sorted({row["rounds"] for row in rows})
+    return f" Rounds of a row: {' or '.join(map(str, counts))}." if counts else ""
+
+
+def times(side: Row, unit: str) -> str:
+    """Returns the time of a side, with its parts if they are known."""
+    text = time(side["time"], unit)
+    if "parts" in side:
+        text += f" (law {time(side['parts']['law'], unit)}, rest {time(side['parts']['rest'], unit)})"
+    return text
+
+
+def ratio(row: Row) -> str:
+    """Returns the ratio with its spread over the rounds. A spread that contains 1 leaves no ratio."""
+    smallest, largest = row["smallest_ratio"], row["largest_ratio"]
+    spread = "one round" if row["rounds"] == 1 else f"{smallest:.3g} to {largest:.3g}"
+    if smallest <= 1 <= largest:
+        return f"~ within the spread ({spread})"
+    text = f"{row['ratio']:.3g}"
+    return f"{text if smallest > 1 else f'**{text}**'} ({spread})"
 
 
 def kind(row: Row) -> str:
@@ -135,11 +179,17 @@ def missions(rows: Sequence[Row]) -> list[str]:
 
 
 def totals(rows: Sequence[Row]) -> str:
-    """Returns a sentence with the collisions of all flights, and those that samples hide."""
+    """Returns sentences with the collisions of all flights, and those that samples hide."""
     shown = [row for row in rows if row["status"] == "measured"]
     bare, shielded = (sum(row["collided"] for row in shown if row["shield"] == use) for use in (False, True))
-    hidden = sum(row["hidden"] for row in shown)
-    return f" Flights that collided: {bare} without the shield, {shielded} under it. Hidden collisions: {hidden}."
+    hidden, between = (sum(row[count] for row in shown) for count in UNSEEN)
+    text = f" Flights that collided: {bare} without the shield, {shielded} under it."
+    text += f" Flights with hidden collisions: {hidden}."
+    if between:
+        flights = "1 flight" if between == 1 else f"{between} flights"
+        text += f" {flights} ended at the limit between two samples. Later samples are unknown, so such a flight does "
+        text += "not count as hidden."
+    return text
 
 
 def sampling(rows: Sequence[Row]) -> list[str]:
@@ -156,9 +206,16 @@ def sampling(rows: Sequence[Row]) -> list[str]:
         "## What sampling hides",
         wrapped([SAMPLING]),
         table(("motion", "rate", "whole motion", "at samples", "straight lines", "hidden", "limit", "verdict"), lines),
+        *origins(rows),
         "Checks of other tools that see positions at samples only, each read in its source:",
         table(("tool", "check", "rate", "source"), TOOLS),
     ]
+
+
+def origins(rows: Sequence[Row]) -> list[str]:
+    """Returns the sources of published trajectories as a list."""
+    lines = dict.fromkeys(f"- {row['motion']}: {row['source']}." for row in rows if row.get("source"))
+    return ["Sources of trajectories:", wrapped(lines)] if lines else []
 
 
 def left_out(rows: Iterable[Row]) -> list[str]:

@@ -62,7 +62,8 @@ def fly(task: dict[str, Any]) -> dict[str, Any]:
         "wall_s": wall_s,
         "positions_m": last.astype(float).tolist(),
         "version": importlib.metadata.version("crazyflow"),
-        "settings": "one world, first-principles dynamics, Euler, own position controller, float32, jax on the CPU",
+        "settings": "one world on one core, first-principles dynamics, Euler, own position controller, float32, jax on "
+        "the CPU",
     }
 
 

@@ -1,4 +1,4 @@
-"""Measures work on tables of positions: a pairwise sweep in NumPy, and CSV in pandas and polars. Started by `peers.py`.
+"""Measures work on tables of positions: sweeps in NumPy and SciPy, and CSV in pandas and polars. Started by `peers.py`.
 
 The least of `rounds` repetitions counts. Imports are not measured.
 """
@@ -30,6 +30,20 @@ def sweep(task: dict[str, Any]) -> dict[str, Any]:
     return {"wall_s": seconds, "min_m": least_m, "version": np.__version__, "settings": "all pairs of each sample"}
 
 
+def tree_sweep(task: dict[str, Any]) -> dict[str, Any]:
+    """Returns the same as `sweep`, from the nearest neighbour of each vehicle in a k-d tree of each sample."""
+    import numpy as np
+    import scipy
+    from scipy.spatial import cKDTree
+
+    def judge() -> float:
+        positions = np.load(task["path"])["positions"]
+        return min(float(cKDTree(sample).query(sample, k=2)[0][:, 1].min()) for sample in positions)
+
+    seconds, least_m = best(judge, task["rounds"])
+    return {"wall_s": seconds, "min_m": least_m, "version": scipy.__version__, "settings": "a tree of each sample"}
+
+
 def pandas_csv(task: dict[str, Any]) -> dict[str, Any]:
     """Returns the time of `pandas.read_csv` and the number of rows."""
     import pandas
@@ -57,5 +71,5 @@ def best(work: Callable[[], Any], rounds: int) -> tuple[float, Any]:
 
 if __name__ == "__main__":
     given = json.load(sys.stdin)
-    work = {"sweep": sweep, "pandas": pandas_csv, "polars": polars_csv}[given["work"]]
+    work = {"all pairs": sweep, "tree": tree_sweep, "pandas": pandas_csv, "polars": polars_csv}[given["work"]]
     print(json.dumps(work(given)))

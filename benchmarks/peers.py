@@ -38,7 +38,7 @@ ENVIRONMENTS = {
         Environment("pybullet", ("pybullet", "numba", "numpy"), "pybullet, numba", "zlib"),
         Environment("crazyflow", ("crazyflow",), "crazyflow", "MIT"),
         Environment("gym-pybullet-drones", ("gym-pybullet-drones",), "gym_pybullet_drones", "MIT"),
-        Environment("tables", ("numpy", "pandas", "polars"), "numpy, pandas, polars", "BSD-3-Clause, MIT"),
+        Environment("tables", ("numpy", "scipy", "pandas", "polars"), "scipy, pandas, polars", "BSD-3-Clause, MIT"),
     )
 }
 

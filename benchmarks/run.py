@@ -2,7 +2,7 @@
 
 Usage:
 
-    python benchmarks/run.py [--quick] [--only GROUP...] [--json FILE] [--markdown FILE]
+    python benchmarks/run.py [--quick] [--only GROUP...] [--trajectories FOLDER...] [--json FILE] [--markdown FILE]
 
 Peers come from PyPI, each in a virtual environment of its own under target/benchmarks. A peer that cannot be installed
 is skipped, with the reason in the output and on the page. `--quick` has small sizes and installs nothing.
@@ -29,6 +29,8 @@ from program import ROOT, Program, Unusable, find
 
 Row = dict[str, Any]
 
+# Version of the keys of `--json`.
+SCHEMA = 2
 GROUPS = ("speed", "missions", "sampling")
 
 
@@ -61,7 +63,7 @@ def arguments() -> argparse.Namespace:
                         help="virtual environments of the peers [default: target/benchmarks]")
     parser.add_argument("--seeds", type=int, default=30, metavar="N", help="random scenes of a mission [default: 30]")
     parser.add_argument("--trajectories", type=pathlib.Path, nargs="+", default=[], metavar="FOLDER",
-                        help="folders of Crazyflie polynomials, such as swap6v_pps of crazyswarm")
+                        help="folders of Crazyflie polynomials; docs/benchmarks.md names three of crazyswarm")
     given = parser.parse_args()
     unknown = [name for name in given.only or [] if name not in GROUPS]
     if unknown:
@@ -100,8 +102,10 @@ def read(path: pathlib.Path) -> dict[str, Any]:
         report = json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as problem:
         refuse(f"--from: {path}: cannot be read ({problem}); name a file of --json")
-    if not isinstance(report, dict) or not isinstance(report.get("rows"), list) or report.get("schema_version") != 1:
+    if not isinstance(report, dict) or not isinstance(report.get("rows"), list):
         refuse(f"--from: {path}: not a report of this command; name a file of --json")
+    if report.get("schema_version") != SCHEMA:
+        refuse(f"--from: {path}: schema_version must be {SCHEMA} ({report.get('schema_version')}); measure again")
     return report
 
 
@@ -125,7 +129,7 @@ def measure(given: argparse.Namespace) -> dict[str, Any]:
             refuse(f"program: {problem}")
     machine["load_after"] = os.getloadavg()[0]
     return {
-        "schema_version": 1,
+        "schema_version": SCHEMA,
         "program": version,
         "build": path.parent.name if path.parent.name in ("release", "debug") else "unknown",
         "quick": given.quick,
@@ -159,7 +163,7 @@ def line(row: Row) -> str:
         return f"{row['name']}: {row['status']}: {row['why']}"
     if row["group"] == "speed":
         ours, theirs = page.time(row["ours"]["time"], row["unit"]), page.time(row["peer"]["time"], row["unit"])
-        return f"{row['name']}: tautline {ours}, peer {theirs}, ratio {row['ratio']:.3g}"
+        return f"{row['name']}: tautline {ours}, peer {theirs}, ratio {page.ratio(row)}"
     if row["group"] == "missions":
         return f"{row['name']}: {row['succeeded']} of {row['flights']} succeeded, {row['collided']} collided"
     return f"{row['name']}: whole motion {row['true_m']:.3f} m, at samples {row['samples_m']:.3f} m"

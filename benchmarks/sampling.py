@@ -1,5 +1,6 @@
 """What sampling hides: the separation at samples beside the separation of the whole motion."""
 
+import hashlib
 import math
 import pathlib
 from collections.abc import Iterator, Sequence
@@ -67,6 +68,14 @@ TOOLS = (
 )
 
 
+# Folders of published trajectories: source with its commit, by the digest of their files.
+FOLDERS = {
+    "5bbcd263e65f7eb3": "USC-ACTLab/crazyswarm beb0549, ros_ws/src/crazyswarm/scripts/swap6v_pps",
+    "afb84ae60b2f0ffc": "USC-ACTLab/crazyswarm beb0549, ros_ws/src/crazyswarm/scripts/crossing2_pps",
+    "fe2679a5db384332": "USC-ACTLab/crazyswarm beb0549, ros_ws/src/crazyswarm/scripts/crossing4_pps",
+}
+
+
 def rows(program: Program, quick: bool, folders: Sequence[pathlib.Path]) -> Iterator[Row]:
     """Yields a row for each flight and rate, and for each folder of Crazyflie polynomials."""
     for name, scenario, sets in FLIGHTS[: 2 if quick else None]:
@@ -94,11 +103,19 @@ def flight(program: Program, name: str, scenario: str, sets: Sequence[str]) -> I
         yield judged(entry | {"straight_m": straight["separation"]["min_m"]})
 
 
+def source(folder: pathlib.Path) -> str:
+    """Returns repository, commit and path of a folder of trajectories, found by the contents of its CSV files."""
+    digest = hashlib.sha256()
+    for file in sorted(folder.glob("*.csv")):
+        digest.update(file.read_bytes())
+    return FOLDERS.get(digest.hexdigest()[:16], "unknown source")
+
+
 def curves(program: Program, folder: pathlib.Path) -> Iterator[Row]:
     """Judges a folder of Crazyflie polynomials on its curves and at samples of them."""
     delta_m = 0.25  # two radii of 0.125 m
     for rate in RATES_HZ:
-        entry = row(folder.name, rate)
+        entry = row(folder.name, rate) | {"source": source(folder)}
         try:
             report, _ = program.audit(str(folder.resolve()), "--delta", repr(delta_m))
             words = ["export", str(folder.resolve()), "--output", "curves.csv", "--force", "--quiet"]

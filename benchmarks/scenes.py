@@ -14,7 +14,10 @@ from program import Point, points, scenario
 
 @dataclasses.dataclass(frozen=True)
 class Scene:
-    """A mission: starts, slots and limits. All numbers are of the source unless `changes` names a difference."""
+    """A mission: starts, slots and limits. All numbers are of the source unless `changes` names a difference.
+
+    `sampled_hz` is the rate at which the source checks. A period of it is an integral number of steps.
+    """
 
     name: str
     start_m: list[Point]
@@ -141,6 +144,7 @@ def gcbf(count: int) -> Callable[[int], Scene]:
             duration_s=60.0,
             sampled_hz=1 / 0.03,
             dimensions=2,
+            dt_s=0.005,
         )
 
     return scene
@@ -225,7 +229,7 @@ def sphere(seed: int) -> Scene:
         reached_m=3.0,
         duration_s=400.0,
         sampled_hz=8.0,
-        dt_s=0.05,
+        dt_s=0.025,
     )
 
 
@@ -255,7 +259,8 @@ def missions(quick: bool, seeds: int) -> list[Mission]:
     gcbf_source = "MIT-REALM/gcbfplus 5e7d5cd, gcbfplus/env/double_integrator.py, README.md (test command)"
     lsc_changes = "acceleration: norm at most 2 m/s^2 (files: 2, 2, 1 by axis); speed: norm; 60 s"
     gcbf_changes = "norms in place of limits by axis; no obstacles; 60 s in place of 7.68 s"
-    rvo_changes = "commands up to 5 m/s^2 in place of velocities taken at once; starts moved by up to 1 cm"
+    rvo_changes = "commands up to 5 m/s^2 in place of velocities taken at once; starts moved by up to 1 cm. "
+    rvo_changes += "RVO2 has no limit on acceleration. Its own method may succeed where `orca` collides"
     listed = [
         Mission(f"LSC, {n} agents", lsc_source, "never unsafe, each within 0.1 m", lsc_changes, lsc(n), seeds, n == 10)
         for n in (10, 20, 30, 40, 50, 60)

@@ -1,13 +1,16 @@
 """Speed: tautline and a peer do the same work on the same core, in turns.
 
-A round measures tautline and then the peer. The least time of the rounds counts on both sides. A peer of the
-complete graph flies the same law from the same start with the same step. If its last positions differ by more than
-`SAME_M`, its row is "not comparable" and has no ratio.
+A round measures tautline and then the peer. The least time of the rounds counts on both sides. The ratios of single
+rounds give the spread.
+
+A peer of the complete graph flies the same law from the same start with the same step. If its last positions differ by
+more than `SAME_M`, its row is "not comparable" and has no ratio. The same holds for quadrotors of either side that end
+farther than `SLOT_M` from their slots.
 """
 
 import math
 import random
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from peers import PLAIN, Peers, Skipped
@@ -17,20 +20,27 @@ Row = dict[str, Any]
 
 # Largest distance between the last positions of both sides of the complete graph [m].
 SAME_M = 1e-6
+# Largest distance between a quadrotor and its slot at the end of a flight [m].
+SLOT_M = 0.3
+# Gains of the displacement law of quadrotors: critically damped with a rate of 1.5/s.
+QUADROTOR_GAINS = {"k_per_s2": 2.25, "zeta_per_s": 3.0}
 DT_S = 1 / 240
 
 
 def rows(program: Program, peers: Peers, quick: bool) -> Iterator[Row]:
     """Yields all rows of this group, each when it is measured."""
-    rounds = 1 if quick else 3
-    yield complete_graph(program, peers, PLAIN, 5, 2400, 1)
+    rounds = 1 if quick else 5
+    yield complete_graph(program, peers, PLAIN, 5, 240 if quick else 24_000, rounds)
     for count, steps in ((5, 240), (100, 24)) if quick else ((5, 24_000), (100, 1200), (1000, 120)):
         for engine in ("mujoco", "pybullet"):
             yield complete_graph(program, peers, engine, count, steps, rounds)
     for count, hz, control_hz, peer in ((100, 500, 100, "crazyflow"), *gym_table()):
-        yield quadrotors(program, peers, peer, count, hz, control_hz, 0.2 if quick else 5.0, rounds)
+        yield quadrotors(program, peers, peer, count, hz, control_hz, 5.0, rounds)
     for count, instants in ((20, 50),) if quick else ((100, 5000), (1000, 1000)):
-        yield sweep(program, peers, count, instants, rounds)
+        for method in SWEEPS:
+            # All pairs of 1000 vehicles take 20 s.
+            slow = method == "NumPy" and count == 1000
+            yield sweep(program, peers, method, count, instants, 3 if slow else rounds)
     for library in ("pandas", "polars"):
         yield csv(program, peers, library, 200 if quick else 50_000, rounds)
 
@@ -45,11 +55,21 @@ def row(name: str, work: str, unit: str) -> Row:
 
 
 def finish(entry: Row, ours: list[float], theirs: list[float]) -> None:
-    """Adds the least time of each side and their ratio, above 1 where tautline is faster."""
+    """Adds the least time of each side and their ratio, above 1 where tautline is faster.
+
+    Also adds the smallest and largest ratio of a round. The ratio of the least times lies between the two.
+    """
     entry["ours"]["time"] = min(ours)
     if theirs:
+        ratios = [their / our for our, their in zip(ours, theirs, strict=True)]
         entry["peer"]["time"] = min(theirs)
         entry["ratio"] = min(theirs) / min(ours)
+        entry |= {"rounds": len(ratios), "smallest_ratio": min(ratios), "largest_ratio": max(ratios)}
+
+
+def parts(step_us: float, law_us: float) -> dict[str, float]:
+    """Returns the time of the law and of the rest of a step [us]."""
+    return {"law": law_us, "rest": step_us - law_us}
 
 
 def lattice(count: int, spacing_m: float, z_m: float = 0.0) -> list[Point]:
@@ -85,7 +105,7 @@ def complete_graph(
     }
     entry = row(f"complete-graph/{count}/{engine.replace(' ', '-')}", f"a step of {count} points, complete graph", "us")
     entry["ours"] = {"settings": "Rapier, law, energy check, audit of each step; one thread"}
-    entry["peer"] = {"name": engine, "settings": "the same law in Numba; no audit"}
+    entry["peer"] = {"name": engine}
     ours: list[float] = []
     theirs: list[float] = []
     for _ in range(rounds):
@@ -93,17 +113,18 @@ def complete_graph(
         spent = report["performance"]
         ours.append(1e6 * spent["wall_s"] / report["run"]["steps"])
         if ours[-1] == min(ours):
-            parts = {key: 1e6 * spent[f"{key}_s"] / report["run"]["steps"] for key in ("law", "physics", "audit")}
-            entry["ours"]["parts"] = parts
+            entry["ours"]["parts"] = parts(ours[-1], 1e6 * spent["law_s"] / report["run"]["steps"])
         try:
             answer = peers.measure(engine, task)
         except Skipped as reason:
             entry |= {"status": "skipped", "why": str(reason)}
             break
         theirs.append(answer["step_us"])
+        if theirs[-1] == min(theirs):
+            entry["peer"]["parts"] = parts(theirs[-1], answer["law_us"])
         entry["peer"] |= {"version": answer["version"], "settings": f"{answer['settings']}; the same law in Numba"}
         if engine == PLAIN:
-            entry["peer"]["settings"] = "the same law in lists; a check of the law, no rival"
+            entry["peer"]["settings"] = "the same law in lists; verifies the law; not a speed comparison"
         difference_m = farthest(answer["positions_m"], program.samples()[-1][1])
         entry["difference_m"] = difference_m if math.isfinite(difference_m) else None
         if not difference_m <= SAME_M:
@@ -114,7 +135,7 @@ def complete_graph(
     return entry
 
 
-def farthest(first: list[list[float]], second: list[Point]) -> float:
+def farthest(first: Sequence[Sequence[float]], second: Sequence[Point]) -> float:
     """Returns the largest distance between positions of the same vehicle [m]; infinite if numbers differ or are NaN."""
     if len(first) != len(second) or not all(math.isfinite(x) for point in first for x in point):
         return math.inf
@@ -124,20 +145,26 @@ def farthest(first: list[list[float]], second: list[Point]) -> float:
 def quadrotors(
     program: Program, peers: Peers, peer: str, count: int, hz: int, control_hz: int, seconds: float, rounds: int
 ) -> Row:
-    """Compares the time of a second of flight of quadrotors. Models and controllers of both sides differ."""
-    start, slots = lattice(count, 0.8, 1.0), lattice(count, 0.7, 1.0)
+    """Compares the time of a second of flight of quadrotors. Models and controllers of both sides differ.
+
+    A lattice contracts about its centre, so that the law needs no reference.
+    """
+    start = lattice(count, 0.8, 1.0)
+    slots = contracted(start, 0.875)
     tables: dict[str, dict[str, Any]] = {
         "swarm": {"dimensions": 3},
         "vehicle": {"model": "crazyflie", "attitude_hz": float(hz)},
         "start": {"positions_m": points(start)},
         "formation": {"shape": "points", "points_m": points(slots)},
-        "law": {"kind": "edge-tension", "alpha": 1e-4, "delta_m": 0.4},
+        "law": {"kind": "displacement", "delta_m": 0.4} | QUADROTOR_GAINS,
         "arrival": {"hold_s": 0.0},
         "time": {"duration_s": seconds, "dt_s": 1 / hz, "control_hz": float(control_hz), "record_hz": 1.0},
     }
     work = f"a second of {count} Crazyflies, physics at {hz} Hz, commands at {control_hz} Hz"
     entry = row(f"quadrotors/{count}/{peer}", work, "s")
-    entry["ours"] = {"settings": "Rapier, rotors, attitude loop, edge-tension law, audit of each step; one thread"}
+    gains = f"k {QUADROTOR_GAINS['k_per_s2']:g}/s^2, zeta {QUADROTOR_GAINS['zeta_per_s']:g}/s"
+    settings = f"Rapier, rotors, attitude loop, displacement law ({gains}), audit of each step; one thread"
+    entry["ours"] = {"settings": settings}
     entry["peer"] = {"name": peer, "settings": "no audit"}
     task = {
         "script": "peer_crazyflow.py",
@@ -154,6 +181,8 @@ def quadrotors(
         if report["run"]["ended_early"]:
             entry |= {"status": "not comparable", "why": f"tautline: {report['run']['ended_early']}"}
             break
+        if not arrived(entry, "ours", "tautline", farthest(program.samples()[-1][1], slots)):
+            break
         ours.append(report["performance"]["wall_s"] / seconds)
         try:
             answer = peers.measure(peer, task)
@@ -162,15 +191,30 @@ def quadrotors(
             break
         theirs.append(answer["wall_s"] / seconds)
         entry["peer"] |= {"version": answer["version"], "settings": f"{answer['settings']}; no audit"}
-        difference_m = farthest(answer["positions_m"], slots)
-        entry["difference_m"] = difference_m if math.isfinite(difference_m) else None
-        if not difference_m <= 0.3:
-            why = f"its drones end {difference_m:.2g} m from their points"
-            entry |= {"status": "not comparable", "why": why}
+        if not arrived(entry, "peer", peer, farthest(answer["positions_m"], slots)):
             break
     if ours:
         finish(entry, ours, theirs if entry["status"] == "measured" else [])
     return entry
+
+
+def contracted(start: list[Point], factor: float) -> list[Point]:
+    """Returns positions with their distances from the mean position multiplied by a factor."""
+    mean_x, mean_y, mean_z = (sum(axis) / len(start) for axis in zip(*start, strict=True))
+    return [
+        (mean_x + factor * (x - mean_x), mean_y + factor * (y - mean_y), mean_z + factor * (z - mean_z))
+        for x, y, z in start
+    ]
+
+
+def arrived(entry: Row, side: str, name: str, end_m: float) -> bool:
+    """Adds the largest distance of a side from its slots. More than `SLOT_M` makes the row "not comparable"."""
+    entry[side]["end_m"] = end_m if math.isfinite(end_m) else None
+    if end_m <= SLOT_M:
+        return True
+    why = f"{name}: its vehicles end {end_m:.2g} m from their slots, more than {SLOT_M:g} m"
+    entry |= {"status": "not comparable", "why": why}
+    return False
 
 
 def table(program: Program, count: int, instants: int, name: str) -> int:
@@ -188,15 +232,24 @@ def table(program: Program, count: int, instants: int, name: str) -> int:
         return file.tell()
 
 
-def sweep(program: Program, peers: Peers, count: int, instants: int, rounds: int) -> Row:
-    """Compares the audit of a recording with the smallest distance at its samples in NumPy."""
-    entry = row(f"sweep/{count}", f"judge {count} vehicles at {instants} samples from NPZ", "s")
+# Peers of the sweep: name, work of `peer_tables.py`, settings.
+SWEEPS = {
+    "NumPy": ("all pairs", "samples only, all pairs, imports excluded; one core"),
+    "SciPy cKDTree": ("tree", "samples only, nearest neighbour of each vehicle, imports excluded; one core"),
+}
+
+
+def sweep(program: Program, peers: Peers, method: str, count: int, instants: int, rounds: int) -> Row:
+    """Compares the audit of a recording with the smallest distance at its samples in a peer of `SWEEPS`."""
+    work, peer_settings = SWEEPS[method]
+    name = f"sweep/{count}/{method.replace(' ', '-')}"
+    entry = row(name, f"judge {count} vehicles at {instants} samples from NPZ", "s")
     settings = "tautline audit: straight lines between samples, process included; one core"
     entry["ours"] = {"settings": settings}
-    entry["peer"] = {"name": "NumPy", "settings": "samples only, all pairs, imports excluded; one core"}
+    entry["peer"] = {"name": method, "settings": peer_settings}
     table(program, count, instants, "table.csv")
     program.call("export", "table.csv", "--output", "table.npz", "--force", "--quiet")
-    task = {"script": "peer_tables.py", "work": "sweep", "path": str(program.folder / "table.npz"), "rounds": 1}
+    task = {"script": "peer_tables.py", "work": work, "path": str(program.folder / "table.npz"), "rounds": 1}
     ours: list[float] = []
     theirs: list[float] = []
     for _ in range(rounds):

@@ -3,6 +3,7 @@
 Usage: `python -m unittest discover --start-directory tests/ci`. TAUTLINE is the program [target/debug/tautline].
 """
 
+import dataclasses
 import json
 import os
 import pathlib
@@ -18,6 +19,7 @@ sys.path.insert(0, str(ROOT / "benchmarks"))
 
 import missions  # noqa: E402
 import page  # noqa: E402
+import run  # noqa: E402
 import sampling  # noqa: E402
 import scenes  # noqa: E402
 import speed  # noqa: E402
@@ -47,7 +49,7 @@ class Quick(InFolder):
         done = command("--quick", "--environments", self.folder / "none", "--json", rows, "--markdown", target)
         self.assertEqual(done.returncode, 0, done.stderr)
         report = json.loads(rows.read_text())
-        self.assertEqual(report["schema_version"], 1)
+        self.assertEqual(report["schema_version"], run.SCHEMA)
         self.assertTrue(report["quick"])
         self.assertFalse((self.folder / "none").exists())
         for peer in report["peers"]:
@@ -62,10 +64,17 @@ class Quick(InFolder):
         check = next(row for row in measured if row["name"] == "complete-graph/5/plain-Python")
         self.assertLessEqual(check["difference_m"], speed.SAME_M)
         self.assertGreater(check["ratio"], 0)
+        for side in ("ours", "peer"):
+            self.assertAlmostEqual(sum(check[side]["parts"].values()), check[side]["time"])
+            self.assertGreater(min(check[side]["parts"].values()), 0)
+        quadrotors = [row for row in report["rows"] if row["name"].startswith("quadrotors/")]
+        self.assertEqual(len(quadrotors), 4)
+        for row in quadrotors:
+            self.assertLessEqual(row["ours"]["end_m"], speed.SLOT_M, row)
         for row in measured:
             if row["group"] == "missions":
                 self.assertEqual(row["collided"] + row["safe"] + row["undecided"], row["flights"], row)
-                self.assertLessEqual(row["hidden"], row["collided"], row)
+                self.assertLessEqual(row["hidden"] + row["ended_between"], row["collided"], row)
                 if row["shield"]:
                     self.assertEqual(row["collided"], 0, row)
         laplacian = [row for row in measured if row["name"].startswith("swap, laplacian")]
@@ -89,9 +98,29 @@ class Twins(InFolder):
         self.assertEqual(row["status"], "not comparable", row)
         self.assertIn("last positions differ", row["why"])
         self.assertNotIn("ratio", row)
-        report = {"schema_version": 1, "rows": [row]}
+        report = {"schema_version": run.SCHEMA, "rows": [row]}
         (self.folder / "rows.json").write_text(json.dumps(report))
         self.assertEqual(command("--from", self.folder / "rows.json").returncode, 1)
+
+    def test_quadrotors_of_either_side_must_end_at_their_slots(self):
+        for side in ("ours", "peer"):
+            entry = {"ours": {}, "peer": {}, "status": "measured", "why": None}
+            self.assertTrue(speed.arrived(entry, side, "engine", 0.3))
+            self.assertEqual((entry["status"], entry[side]["end_m"]), ("measured", 0.3))
+            for far_m, stored in ((0.31, 0.31), (float("inf"), None)):
+                self.assertFalse(speed.arrived(entry, side, "engine", far_m))
+                self.assertEqual((entry["status"], entry[side]["end_m"]), ("not comparable", stored))
+                self.assertIn("more than 0.3 m", entry["why"])
+
+    def test_a_contraction_keeps_the_mean_position(self):
+        found = speed.contracted([(0.0, 0.0, 1.0), (4.0, 2.0, 1.0)], 0.5)
+        self.assertEqual(found, [(1.0, 0.5, 1.0), (3.0, 1.5, 1.0)])
+
+    def test_the_spread_of_ratios_is_that_of_paired_rounds(self):
+        entry = {"ours": {}, "peer": {}}
+        speed.finish(entry, [2.0, 1.0], [3.0, 4.0])
+        self.assertEqual((entry["ours"]["time"], entry["peer"]["time"], entry["ratio"]), (1.0, 3.0, 3.0))
+        self.assertEqual((entry["rounds"], entry["smallest_ratio"], entry["largest_ratio"]), (2, 1.5, 4.0))
 
     def test_positions_that_are_not_numbers_are_infinitely_far(self):
         self.assertEqual(speed.farthest([[0.0, 0.0, float("nan")]], [(0.0, 0.0, 0.0)]), float("inf"))
@@ -112,6 +141,37 @@ class Twins(InFolder):
         blocks = scenes.blocks(0)
         self.assertTrue(missions.seen(blocks, [(8.5, 25.0, 0.0)]))
         self.assertFalse(missions.seen(blocks, [(7.5, 25.0, 0.0)]))
+
+    def test_only_samples_on_the_grid_show_a_collision(self):
+        scene = scenes.circle(0)  # checks at 4 Hz, limit 3 m
+        near, far = [(0.0, 0.0, 0.0), (2.9, 0.0, 0.0)], [(0.0, 0.0, 0.0), (3.1, 0.0, 0.0)]
+        for samples, ended_early, expected in (
+            ([(0.0, far), (0.25, near), (0.5, far)], False, None),
+            ([(0.0, far), (0.25, far), (0.3, near)], False, "hidden"),
+            ([(0.0, far), (0.25, far), (0.3, near)], True, "ended_between"),
+            ([(0.0, far), (0.25, near), (0.3, near)], True, None),
+            ([(0.0, far), (0.25 + 1e-9, near)], True, None),
+        ):
+            self.assertEqual(missions.how_unseen(scene, samples, ended_early), expected, samples)
+
+    def test_a_flight_that_ends_at_the_limit_between_samples_is_not_hidden(self):
+        mission = next(mission for mission in scenes.missions(quick=True, seeds=1) if mission.name == "LSC, 10 agents")
+        ending = dataclasses.replace(mission, scene=lambda _: mission.scene(26))
+        row = missions.fly(self.program, ending, "displacement", shield=False)
+        self.assertEqual((row["collided"], row["ended_between"], row["hidden"]), (1, 1, 0), row)
+
+    def test_the_samples_of_all_missions_are_on_the_grid_of_the_source(self):
+        for mission in scenes.missions(quick=False, seeds=1):
+            scene = mission.scene(0)
+            steps = 1 / (scene.sampled_hz * scene.dt_s)
+            self.assertAlmostEqual(steps, round(steps), 9, mission.name)
+            # The shield holds commands for 0.05 s.
+            self.assertAlmostEqual(0.05 / scene.dt_s, round(0.05 / scene.dt_s), 9, mission.name)
+
+    def test_a_folder_of_trajectories_is_known_by_its_contents(self):
+        (self.folder / "swap6v_pps").mkdir()
+        (self.folder / "swap6v_pps/pp1.csv").write_text("0,1\n")
+        self.assertEqual(sampling.source(self.folder / "swap6v_pps"), "unknown source")
 
     def test_random_scenes_keep_the_published_distances(self):
         for mission in scenes.missions(quick=False, seeds=1):
@@ -153,7 +213,59 @@ class Arguments(InFolder):
             self.assertNotIn("Traceback", done.stderr)
 
 
+def speed_row(name, ours, peer, **more):
+    row = {"group": "speed", "name": name, "work": f"work of {name}", "unit": "us", "status": "measured", "why": None}
+    return row | {"ours": {"settings": "one thread"} | ours, "peer": {"settings": "no audit"} | peer} | more
+
+
 class Page(unittest.TestCase):
+    def test_a_spread_that_contains_1_has_no_ratio(self):
+        for rounds, smallest, ratio, largest, text in (
+            (5, 1.2, 1.3, 1.456, "1.3 (1.2 to 1.46)"),
+            (5, 0.5, 0.6, 0.9, "**0.6** (0.5 to 0.9)"),
+            (5, 0.95, 1.2, 1.3, "~ within the spread (0.95 to 1.3)"),
+            (5, 1.0, 1.2, 1.3, "~ within the spread (1 to 1.3)"),
+            (1, 2.0, 2.0, 2.0, "2 (one round)"),
+        ):
+            row = {"rounds": rounds, "smallest_ratio": smallest, "ratio": ratio, "largest_ratio": largest}
+            self.assertEqual(page.ratio(row), text)
+
+    def test_collisions_of_flights_that_end_between_samples_are_counted_apart(self):
+        row = {"status": "measured", "shield": False, "collided": 3, "hidden": 1, "ended_between": 0}
+        counts = " Flights that collided: 3 without the shield, 0 under it. Flights with hidden collisions: 1."
+        self.assertEqual(page.totals([row]), counts)
+        between = page.totals([row | {"ended_between": 2}])
+        self.assertTrue(between.startswith(counts + " 2 flights ended at the limit between two samples."), between)
+
+    def test_a_report_gives_the_text_of_a_page(self):
+        spread = {"rounds": 5, "smallest_ratio": 1.5, "ratio": 2.0, "largest_ratio": 2.5}
+        graph = speed_row(
+            "complete-graph/5/mujoco",
+            {"time": 2.0, "parts": {"law": 0.5, "rest": 1.5}},
+            {"name": "mujoco", "version": "1.0", "time": 4.0, "parts": {"law": 1.0, "rest": 3.0}},
+            difference_m=2e-13,
+            **spread,
+        )
+        flown = speed_row(
+            "quadrotors/2/crazyflow",
+            {"time": 1500.0, "end_m": 0.02},
+            {"name": "crazyflow", "version": "1.0", "time": 3000.0, "end_m": 0.1},
+            **spread,
+        )
+        motion = {"group": "sampling", "name": "show/1 Hz", "motion": "show", "rate_hz": 1.0, "status": "measured"}
+        motion |= {"true_m": 0.9, "samples_m": 1.1, "straight_m": 1.0, "hidden_m": 0.2, "delta_m": 1.0, "why": None}
+        motion |= {"violated": True, "seen_at_samples": False, "source": "owner/name abcdef0, a/show"}
+        flight = {"group": "missions", "name": "Ring, 3/orca/bare", "mission": "Ring, 3", "law": "orca"}
+        flight |= {"shield": False}
+        flight |= {"source": "owner/name abcdef0", "success": "each within 1 m", "changes": "none", "why": None}
+        flight |= {"status": "measured", "flights": 4, "succeeded": 1, "reached": 2, "collided": 3, "hidden": 1}
+        flight |= {"ended_between": 1, "least_m": 0.9, "delta_m": 1.0, "median_s": 2.0, "wall_s": 0.1}
+        skipped = {"group": "missions", "name": "Ring, 3/laplacian", "status": "skipped", "why": "no slots"}
+        report = run.EMPTY | {"program": "tautline 1.0", "rows": [graph, flown, motion, flight, skipped]}
+        found = page.replace(f"before\n{page.BEGIN}\nSTALE\n{page.END}\nafter\n", report)
+        expected = (ROOT / "tests/ci/benchmarks_page.md").read_text()
+        self.assertEqual(found, expected)
+
     def test_the_page_of_the_docs_has_a_block_of_a_full_run(self):
         text = (ROOT / "docs/benchmarks.md").read_text()
         block = text.split(page.BEGIN)[1].split(page.END)[0]
