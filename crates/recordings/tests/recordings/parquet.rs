@@ -189,7 +189,7 @@ fn claimed_page_sizes_are_checked_before_memory_is_allocated() {
         let found = refusal(&[head, &HUGE, tail].concat(), code);
         assert!(found.contains(text), "{found}");
     }
-    // A header with a repeated size, of which another reader could take the other one.
+    // A header with two sizes: another reader could take the other one.
     let repeated = [&bytes[..pages.start + 4], &[0x05, 0x04, 0x10], &bytes[pages.start + 4..]].concat();
     let found = refusal(&repeated, "recording/damaged");
     assert!(found.contains("a field is out of order"), "{found}");
@@ -212,7 +212,7 @@ fn claims_of_a_footer_are_checked_before_memory_is_allocated() {
         let found = refusal(&file(&[&footer[..], &[0x00]].concat()), "recording/damaged");
         assert!(found.contains("its schema nests too deep, or claims more columns"), "{found}");
     }
-    // A list of 2^31 - 1 truth values, each of which takes no byte.
+    // A list of 2^31 - 1 truth values, which take no bytes.
     let lists = [&[0x15, 0x02, 0xe9, 0xf1][..], &[0xff, 0xff, 0xff, 0xff, 0x07], &[0x00]].concat();
     let found = refusal(&file(&lists), "recording/damaged");
     assert!(found.contains("a list is longer than the rest of the file"), "{found}");

@@ -5,7 +5,7 @@ use rapier3d::prelude::{LockedAxes, PhysicsWorld, RigidBody, RigidBodyBuilder, R
 
 use super::proximity::Proximity;
 use super::world::{
-    copied, empty_world, from_engine, hull, hull_contacts, insert_obstacle, keep_out, keep_out_contacts, to_engine,
+    Engine, empty_world, from_engine, hull, hull_contacts, insert_obstacle, keep_out, keep_out_contacts, to_engine,
 };
 use crate::plant::{Air, HullContact, Plant, PlantError, StepPath};
 use crate::scenario::{Scenario, Space};
@@ -14,7 +14,7 @@ use tautline_core::swarm::{Pair, Rows, Swarm, mean_row, row, set_row};
 
 /// Swarm of rigid bodies, one per vehicle, in vehicle order.
 pub(super) struct Bodies {
-    world: PhysicsWorld,
+    engine: Engine,
     handles: Vec<RigidBodyHandle>,
     /// Positions from the engine's origin \[m\]. The bodies of the engine follow when it steps.
     positions: Vec<Vector>,
@@ -59,7 +59,7 @@ impl Bodies {
         let inverse_masses = each(&|body| body.mass_properties().effective_inv_mass);
         scenario.obstacles.iter().for_each(|obstacle| insert_obstacle(&mut world, obstacle, origin_m));
         Self {
-            world,
+            engine: Engine::new(world, Proximity::may_have_free_steps(scenario)),
             handles,
             positions,
             velocities,
@@ -125,23 +125,24 @@ impl Bodies {
 
     /// Moves bodies with the engine.
     fn drift_in_engine(&mut self, dt_s: f64) -> Result<(), PlantError> {
-        self.world.integration_parameters.dt = dt_s;
-        for (i, &handle) in self.handles.iter().enumerate() {
-            let body = &mut self.world.bodies[handle];
-            if body.translation() != self.positions[i] {
-                body.set_translation(self.positions[i], true);
+        let Self { handles, positions, velocities, held, mass_kg, .. } = self;
+        self.engine.step(dt_s, |world| {
+            for (i, &handle) in handles.iter().enumerate() {
+                let body = &mut world.bodies[handle];
+                if body.translation() != positions[i] {
+                    body.set_translation(positions[i], true);
+                }
+                body.set_linvel(velocities[i], true);
+                body.reset_forces(false);
+                body.add_force(to_engine(row(held, i)) * mass_kg[i], true);
             }
-            body.set_linvel(self.velocities[i], true);
-            body.reset_forces(false);
-            body.add_force(to_engine(row(&self.held, i)) * self.mass_kg[i], true);
-        }
-        self.world.step();
-        if let Some(lost) = self.world.quarantine().bodies().first() {
+        });
+        if let Some(lost) = self.engine.world.quarantine().bodies().first() {
             let vehicle = self.handles.iter().position(|h| h == lost).unwrap_or_default();
             return Err(PlantError::NotFinite { vehicle });
         }
         for (i, &handle) in self.handles.iter().enumerate() {
-            let body = &self.world.bodies[handle];
+            let body = &self.engine.world.bodies[handle];
             (self.positions[i], self.velocities[i]) = (body.translation(), body.linvel());
         }
         self.proximity.forget();
@@ -172,7 +173,7 @@ impl Bodies {
 impl Clone for Bodies {
     fn clone(&self) -> Self {
         Self {
-            world: copied(&self.world),
+            engine: self.engine.clone(),
             handles: self.handles.clone(),
             positions: self.positions.clone(),
             velocities: self.velocities.clone(),
@@ -270,13 +271,13 @@ impl Plant for Bodies {
 
     fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {
         if !self.was_free {
-            keep_out_contacts(&self.world, pairs);
+            keep_out_contacts(&self.engine.world, pairs);
         }
     }
 
     fn hull_contacts(&self, contacts: &mut Vec<HullContact>) {
         if !self.was_free {
-            hull_contacts(&self.world, &self.began_m, &self.drift_m_s, contacts);
+            hull_contacts(&self.engine.world, &self.began_m, &self.drift_m_s, contacts);
         }
     }
 }

@@ -7,7 +7,8 @@
 //! without free steps.
 //!
 //! After contacts, a free step follows only a step of the engine that began beyond the reach as well. That step removes
-//! all contact points, so that no old impulse waits for the next contact.
+//! all contact points, so that no old impulse waits for the next contact. A new engine solves the next contacts
+//! (`super::world::Engine`).
 
 use rapier3d::prelude::Vector;
 
@@ -35,11 +36,14 @@ impl Proximity {
     pub(super) fn of(scenario: &Scenario) -> Self {
         let hull_m = scenario.hull_radius_m.iter().copied().fold(0.0, f64::max);
         let contact_m = scenario.metric().shortest_m(scenario.delta_m).max(2.0 * hull_m) + 2.0 * CONTACT_PREDICTION_M;
-        // Hulls also touch obstacles.
-        let has_free_steps = scenario.obstacles.is_empty() && scenario.count() <= MAX_COUNT;
-        let reach_m = if has_free_steps { contact_m + MARGIN_M } else { f64::INFINITY };
+        let reach_m = if Self::may_have_free_steps(scenario) { contact_m + MARGIN_M } else { f64::INFINITY };
         // A new engine has no contacts.
         Self { reach_m, is_allowed: false, beyond_m: 0.0, began_beyond: true }
+    }
+
+    /// Returns whether flights of a scenario may have free steps. Hulls also touch obstacles.
+    pub(super) fn may_have_free_steps(scenario: &Scenario) -> bool {
+        scenario.obstacles.is_empty() && scenario.count() <= MAX_COUNT
     }
 
     /// Allows free steps.
@@ -99,6 +103,9 @@ mod tests {
     use crate::plant::{HullContact, Plant, StepPath};
     use crate::scenario::{Override, Source};
     use tautline_core::swarm::{Pair, Rows, Swarm};
+
+    /// Number of random flights with collisions.
+    const FLIGHTS: usize = 200;
 
     /// A plant that shows which steps were free.
     trait Free: Plant {
@@ -242,6 +249,28 @@ mod tests {
         Proximity::with_free_steps_only(Bodies::proximity(&mut blind));
         let blind = fly(&mut blind, scenario.time.dt_s, 2400, colliding);
         assert!(blind.hulls.is_empty() && blind.bits != seen.bits);
+    }
+
+    #[test]
+    fn collisions_of_several_hulls_have_the_bits_of_the_engine() {
+        // Strong commands that are held: many hulls collide, some of them in the same step.
+        let scenario = scenario("gusts", &[]);
+        let mut seed = 1_u64;
+        let mut collisions = 0;
+        for _ in 0..FLIGHTS {
+            let mut draw = || {
+                // Knuth's generator; the sum of four draws is close to normal.
+                let mut uniform = || {
+                    seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                    (seed >> 33) as f64 / f64::from(1_u32 << 30) - 1.0
+                };
+                100.0 * (uniform() + uniform() + uniform() + uniform())
+            };
+            let held = Rows::from_fn(scenario.count(), |_, axis| if axis < 2 { draw() } else { 0.0 });
+            let seen = assert_same(|| Box::new(points(&scenario)), scenario.time.dt_s, 80, |_, _| held.clone());
+            collisions += usize::from(!seen.hulls.is_empty());
+        }
+        assert!(collisions > FLIGHTS / 2, "{collisions} flights with collisions");
     }
 
     #[test]

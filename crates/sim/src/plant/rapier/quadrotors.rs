@@ -3,13 +3,11 @@
 use std::time::Duration;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use rapier3d::prelude::{
-    MassProperties, PhysicsWorld, Real, RigidBody, RigidBodyBuilder, RigidBodyHandle, Rotation, Vector,
-};
+use rapier3d::prelude::{MassProperties, Real, RigidBody, RigidBodyBuilder, RigidBodyHandle, Rotation, Vector};
 
 use super::proximity::Proximity;
 use super::world::{
-    copied, empty_world, from_engine, hull, hull_contacts, insert_obstacle, keep_out, keep_out_contacts, to_engine,
+    Engine, empty_world, from_engine, hull, hull_contacts, insert_obstacle, keep_out, keep_out_contacts, to_engine,
 };
 use crate::plant::{HullContact, Plant, PlantError, Quadrotors, StepPath};
 use crate::scenario::Scenario;
@@ -24,7 +22,7 @@ const HULL_FRICTION: Real = 0.5;
 /// Swarm of quadrotors, one body per vehicle, in vehicle order. The engine moves and turns the bodies and detects
 /// collisions; the fleet computes forces, torques and the velocities around the engine's step.
 pub(super) struct Fliers {
-    world: PhysicsWorld,
+    engine: Engine,
     handles: Vec<RigidBodyHandle>,
     /// Poses and velocities, as the engine has them. The bodies of the engine follow when it steps.
     bodies: Vec<Body>,
@@ -101,7 +99,7 @@ impl Fliers {
         scenario.obstacles.iter().for_each(|obstacle| insert_obstacle(&mut world, obstacle, origin_m));
         let (drift_m_s, began_m) = (Rows::zeros(count), Rows::zeros(count));
         Self {
-            world,
+            engine: Engine::new(world, Proximity::may_have_free_steps(scenario)),
             handles,
             bodies,
             proximity: Proximity::of(scenario),
@@ -145,23 +143,24 @@ impl Fliers {
 
     /// Moves and turns the bodies with the engine.
     fn drift_in_engine(&mut self, dt_s: f64) -> Result<(), PlantError> {
-        self.world.integration_parameters.dt = dt_s;
-        for (&handle, state) in self.handles.iter().zip(&self.bodies) {
-            let body = &mut self.world.bodies[handle];
-            if (body.translation(), *body.rotation()) != (state.position, state.rotation) {
-                body.set_translation(state.position, true);
-                body.set_rotation(state.rotation, true);
+        let Self { handles, bodies, .. } = self;
+        self.engine.step(dt_s, |world| {
+            for (&handle, state) in handles.iter().zip(&*bodies) {
+                let body = &mut world.bodies[handle];
+                if (body.translation(), *body.rotation()) != (state.position, state.rotation) {
+                    body.set_translation(state.position, true);
+                    body.set_rotation(state.rotation, true);
+                }
+                body.set_linvel(state.linear, true);
+                body.set_angvel(state.angular, true);
             }
-            body.set_linvel(state.linear, true);
-            body.set_angvel(state.angular, true);
-        }
-        self.world.step();
-        if let Some(lost) = self.world.quarantine().bodies().first() {
+        });
+        if let Some(lost) = self.engine.world.quarantine().bodies().first() {
             let vehicle = self.handles.iter().position(|handle| handle == lost).unwrap_or_default();
             return Err(PlantError::NotFinite { vehicle });
         }
         for (&handle, state) in self.handles.iter().zip(&mut self.bodies) {
-            *state = Body::of(&self.world.bodies[handle]);
+            *state = Body::of(&self.engine.world.bodies[handle]);
         }
         self.proximity.forget();
         Ok(())
@@ -200,7 +199,7 @@ impl Fliers {
 impl Clone for Fliers {
     fn clone(&self) -> Self {
         Self {
-            world: copied(&self.world),
+            engine: self.engine.clone(),
             handles: self.handles.clone(),
             bodies: self.bodies.clone(),
             proximity: self.proximity.clone(),
@@ -271,13 +270,13 @@ impl Plant for Fliers {
 
     fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {
         if !self.was_free {
-            keep_out_contacts(&self.world, pairs);
+            keep_out_contacts(&self.engine.world, pairs);
         }
     }
 
     fn hull_contacts(&self, contacts: &mut Vec<HullContact>) {
         if !self.was_free {
-            hull_contacts(&self.world, &self.began_m, &self.drift_m_s, contacts);
+            hull_contacts(&self.engine.world, &self.began_m, &self.drift_m_s, contacts);
         }
     }
 

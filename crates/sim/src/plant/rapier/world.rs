@@ -1,5 +1,7 @@
 //! Bodies, colliders and contacts of the engine, common to both plants of rigid bodies.
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 use rapier3d::prelude::{
     ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, PhysicsWorld, Real, SharedShape,
@@ -18,9 +20,63 @@ const KEEP_OUT: Group = Group::GROUP_2;
 /// Share of the closing speed that two hulls keep after a bounce.
 const HULL_RESTITUTION: Real = 0.5;
 
+/// The engine, whose contacts do not depend on steps before them.
+///
+/// The engine solves contacts of several hulls one after the other, in an order that depends on its earlier steps. A
+/// step that brings hulls into contact, after a step without contacts, is therefore repeated by a new engine. So a
+/// flight with free steps, which the engine does not make, has the same contacts (`super::proximity`).
+pub(super) struct Engine {
+    pub(super) world: PhysicsWorld,
+    /// Engine before its first step; `None` if no flight of this scenario has free steps.
+    new: Option<Arc<PhysicsWorld>>,
+    /// Whether the last step had contacts of hulls.
+    had_contacts: bool,
+}
+
+impl Engine {
+    /// Takes an engine that has made no step.
+    pub(super) fn new(world: PhysicsWorld, may_have_free_steps: bool) -> Self {
+        let new = may_have_free_steps.then(|| Arc::new(copied(&world)));
+        Self { world, new, had_contacts: false }
+    }
+
+    /// Makes a step of this length \[s\]. `set` sets poses, velocities and forces of all bodies at its beginning.
+    pub(super) fn step(&mut self, dt_s: f64, set: impl Fn(&mut PhysicsWorld)) {
+        let step = |world: &mut PhysicsWorld| {
+            world.integration_parameters.dt = dt_s;
+            set(world);
+            world.step();
+        };
+        step(&mut self.world);
+        let has_contacts = has_hull_contacts(&self.world);
+        if has_contacts
+            && !self.had_contacts
+            && let Some(new) = &self.new
+        {
+            self.world = copied(new);
+            step(&mut self.world);
+        }
+        self.had_contacts = has_contacts;
+    }
+}
+
+impl Clone for Engine {
+    fn clone(&self) -> Self {
+        Self { world: copied(&self.world), new: self.new.clone(), had_contacts: self.had_contacts }
+    }
+}
+
+/// Returns whether the engine solves a contact of hulls, be it only a predicted one.
+fn has_hull_contacts(world: &PhysicsWorld) -> bool {
+    let is_hull =
+        |handle| world.colliders.get(handle).is_some_and(|collider| collider.collision_groups().memberships == HULL);
+    let mut pairs = world.narrow_phase.contact_pairs();
+    pairs.any(|pair| is_hull(pair.collider1) && pair.manifolds().iter().any(|manifold| !manifold.points.is_empty()))
+}
+
 /// Copies the state that the engine carries from step to step: bodies, contacts, islands, bounding volumes. Working
 /// memory is not copied.
-pub(super) fn copied(world: &PhysicsWorld) -> PhysicsWorld {
+fn copied(world: &PhysicsWorld) -> PhysicsWorld {
     PhysicsWorld {
         gravity: world.gravity,
         integration_parameters: world.integration_parameters,
