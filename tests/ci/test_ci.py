@@ -281,7 +281,7 @@ class Audits(InFolder):
         self.write("flights/tautline.toml", "[audit]\ndelta_m = 1.0\n")
         done = self.audit("flights/deep/a.csv", "--json")
         self.assertEqual(done.returncode, 0)
-        note = "options that the command line does not set come from flights/tautline.toml"
+        note = "options that the command line does not set come from flights/tautline.toml: delta_m"
         self.assertIn(note, json.loads(done.stdout)["notes"])
         self.assertEqual(self.audit("flights/deep/a.csv", "--delta", "9").returncode, 1)
         self.assertEqual(self.audit("flights/deep/a.csv", "--no-config").returncode, 2)

@@ -48,6 +48,9 @@ struct AuditTable {
     require_presence: Option<bool>,
     accel_window_s: Option<f64>,
     limits: BTreeMap<String, f64>,
+    /// Names of the given keys.
+    #[serde(skip)]
+    keys: Vec<String>,
 }
 
 /// Name, or three numbers.
@@ -126,7 +129,10 @@ fn nearest(recording: &Path) -> Option<PathBuf> {
 }
 
 fn parse(text: &str, path: &Path) -> Result<AuditTable, Failure> {
-    FILE.parse(text, path).map(|document: Document| document.audit)
+    let Document { audit } = FILE.parse(text, path)?;
+    let given = text.parse::<toml::Table>().ok().and_then(|mut table| table.remove("audit"));
+    let keys = given.iter().filter_map(toml::Value::as_table).flat_map(toml::Table::keys).cloned().collect();
+    Ok(AuditTable { keys, ..audit })
 }
 
 impl AuditTable {
@@ -207,7 +213,9 @@ impl AuditTable {
                 limits.push(Limit { quantity, allowed });
             }
         }
-        let asked_by = Some(format!("options that the command line does not set come from {}", path.display()));
+        // Each key may change the verdict.
+        let (path, keys) = (path.display(), self.keys.join(", "));
+        let asked_by = Some(format!("options that the command line does not set come from {path}: {keys}"));
         Ok(ConfiguredAudit { request, asked_by })
     }
 }
