@@ -264,7 +264,7 @@ fn rules_of_a_show_are_limited() {
 #[test]
 fn documents_that_a_show_repeats_are_limited() {
     // Each drone refers to the same trajectory of 40 MB.
-    let drone = r##"{"settings": {"trajectory": {"$ref": "./a.json#"}}}"##;
+    let drone = r#"{"settings": {"trajectory": {"$ref": "./a.json"}}}"#;
     let show = format!(r#"{{"swarm": {{"drones": [{}]}}}}"#, [drone; 5].join(","));
     let mut trajectory = br#"{"points": [[0, [1, 2, 3]], [1, [1, 2, 4]]]"#.to_vec();
     trajectory.resize(40 * 1024 * 1024, b' ');

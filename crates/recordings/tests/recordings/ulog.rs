@@ -137,7 +137,7 @@ fn formats_of_formats_are_measured_once() {
     let mut log = Log::new();
     for level in 0..7 {
         let kind = if level == 6 { "uint8_t".to_owned() } else { format!("f{}", level + 1) };
-        let fields: String = (0..200).map(|field| format!("{kind} a{field};")).collect();
+        let fields = (0..200).map(|field| format!("{kind} a{field};")).collect::<Vec<_>>().concat();
         log.message(b'F', format!("f{level}:{fields}").as_bytes());
     }
     log.message(b'F', b"vehicle_global_position:uint64_t timestamp;f0 deep;double lat;double lon;float alt;");
