@@ -173,9 +173,8 @@ def to_frame(columns: Any) -> pandas.DataFrame:
         import pandas
     except ImportError:
         raise ImportError("tables need pandas: pip install pandas") from None
-    return pandas.DataFrame(
-        {name: pandas.Series(values, dtype=object) if is_rounded(values) else values for name, values in columns.items()}
-    )
+    exact = {name: pandas.Series(values, dtype=object) for name, values in columns.items() if is_rounded(values)}
+    return pandas.DataFrame({**columns, **exact})
 
 
 def is_rounded(values: Any) -> bool:
