@@ -92,8 +92,12 @@ class VectorSimulation:
             raise Error(f"steps: must be at least 1, got {steps}")
         if out is not None:
             self._check_out(out)
-        is_borrowed = u is None or (isinstance(u, np.ndarray) and u.dtype in (np.float32, np.float64))
-        self._native.step(u if is_borrowed else exact_array(u, "u"), min(int(steps), 2**63))
+        commands: NDArray[np.floating[Any]] | None = None
+        if isinstance(u, np.ndarray) and u.dtype in (np.float32, np.float64):
+            commands = u
+        elif u is not None:
+            commands = exact_array(u, "u")
+        self._native.step(commands, min(int(steps), 2**63))
         if out is not None:
             out[..., :3], out[..., 3:] = self.positions, self.velocities
 
