@@ -214,6 +214,7 @@ class Flights(Case):
         file, (t, p) = self.folder / "run.mcap", passing()
         flight = tl.fly(short(), record=file)
         recording, audit = tl.read(file), tl.audit(t, p, delta=1.5)
+        answer = tl.compare(short(), ["laplacian"], runs=1)
         for result, part in (
             (flight, flight.positions.tobytes()[-800:]),
             (flight, flight.velocities.tobytes()[-800:]),
@@ -222,6 +223,7 @@ class Flights(Case):
             (recording, recording._data.position.tobytes()[-800:]),
             (recording, recording._data.t.tobytes()[-80:]),
             (audit, audit.headline.encode()),
+            (answer, b"state_hash"),
         ):
             data = bytearray(pickle.dumps(result))
             pickle.loads(data)
