@@ -7,6 +7,7 @@ use std::sync::Arc;
 
 use pyo3::prelude::*;
 use serde_json::{Value, json};
+use sha2::{Digest as _, Sha256};
 use tautline::campaign::Program;
 use tautline::request::Failure;
 use tautline::swarm::{Rows, Swarm};
@@ -14,6 +15,8 @@ use tautline::swarm::{Rows, Swarm};
 use crate::errors::{IntoException as _, internal_error, wrong_input};
 use crate::numbers::by_row;
 
+/// Length of the SHA-256 of all bytes, which ends a saved simulation \[bytes\].
+const HASH: usize = 32;
 /// First bytes of a saved simulation.
 const MAGIC: &[u8] = b"tautline simulation 1\n";
 /// Largest memory of the commands of a history \[bytes\]. A longer history is dropped ([`TOO_LONG`]).
@@ -64,19 +67,23 @@ impl History {
         Self { lost: Some(OF_A_WORLD), ..Self::default() }
     }
 
-    /// Adds steps, with accelerations if they came from outside.
-    pub(crate) fn add_steps(&mut self, commands: Option<&Arc<Rows>>, steps: u64) {
+    /// Adds steps, with accelerations if they came from outside. Returns `None` for more than 2^64 steps.
+    #[must_use]
+    pub(crate) fn add_steps(&mut self, commands: Option<&Arc<Rows>>, steps: u64) -> Option<()> {
         let same = |one: &Rows, other: &Rows| one.iter().map(|x| x.to_bits()).eq(other.iter().map(|x| x.to_bits()));
         match (self.parts.last_mut(), commands) {
             _ if steps == 0 => {}
-            (Some(Part::Own(count)), None) => *count += steps,
-            (Some(Part::Outside(before, count)), Some(commands)) if same(before, commands) => *count += steps,
+            (Some(Part::Own(count)), None) => *count = count.checked_add(steps)?,
+            (Some(Part::Outside(before, count)), Some(commands)) if same(before, commands) => {
+                *count = count.checked_add(steps)?;
+            }
             (_, None) => self.parts.push(Part::Own(steps)),
             (_, Some(commands)) => {
                 self.parts.push(Part::Outside(Arc::clone(commands), steps));
                 self.count(commands.len());
             }
         }
+        Some(())
     }
 
     /// Adds calls of the law in Python.
@@ -137,6 +144,7 @@ impl History {
         bytes.push(STATE);
         rows(&mut bytes, &state.positions_m);
         rows(&mut bytes, &state.velocities_m_s);
+        bytes.extend(Sha256::digest(&bytes));
         Ok(bytes)
     }
 }
@@ -175,16 +183,23 @@ impl Saved {
             )));
         }
         let vehicles = header["vehicles"].as_u64().and_then(|count| usize::try_from(count).ok()).ok_or_else(damaged)?;
-        let mut reader = Reader { bytes: &rest[end + 1..], vehicles };
         let truncated = || wrong("it is truncated or damaged");
+        let (records, hash) = rest[end + 1..].split_last_chunk::<HASH>().ok_or_else(truncated)?;
+        if Sha256::digest(&bytes[..bytes.len() - HASH])[..] != hash[..] {
+            return Err(truncated());
+        }
+        let mut reader = Reader { bytes: records, vehicles };
         let mut history = History::default();
         loop {
             match reader.tag().ok_or_else(truncated)? {
-                OWN => history.add_steps(None, reader.integer().ok_or_else(truncated)?),
+                OWN => {
+                    let steps = reader.integer().ok_or_else(truncated)?;
+                    history.add_steps(None, steps).ok_or_else(truncated)?;
+                }
                 OUTSIDE => {
                     let steps = reader.integer().ok_or_else(truncated)?;
                     let commands = reader.rows().ok_or_else(truncated)?;
-                    history.add_steps(Some(&Arc::new(commands)), steps);
+                    history.add_steps(Some(&Arc::new(commands)), steps).ok_or_else(truncated)?;
                 }
                 RESEED => history.reseed(reader.integer().ok_or_else(truncated)?),
                 COMMAND => history.add_calls(vec![Some(Arc::new(reader.rows().ok_or_else(truncated)?))]),

@@ -93,6 +93,12 @@ impl Scenario {
         self.scenario.graph.edges().collect()
     }
 
+    /// Whether a shield changes commands.
+    #[getter]
+    fn is_shielded(&self) -> bool {
+        self.scenario.shield.as_ref().is_some_and(|shield| shield.enabled)
+    }
+
     #[getter]
     fn toml(&self) -> String {
         self.scenario.resolved_toml()

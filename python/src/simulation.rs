@@ -97,7 +97,8 @@ impl State {
                 Ok(true) | Err(_) => break,
             }
         }
-        self.history.add_steps(commands, flown);
+        // A flight has less than 2^64 steps.
+        let _ = self.history.add_steps(commands, flown);
         ended.map(|is_over| if is_over { left } else { flown })
     }
 

@@ -4,17 +4,18 @@ use std::sync::{Mutex, TryLockError};
 
 use numpy::ndarray::{ArrayView3, Ix3};
 use numpy::{
-    Element, PyArray, PyArray1, PyArray3, PyArrayDescrMethods as _, PyArrayMethods as _, PyReadonlyArray1,
+    BorrowError, Element, PyArray, PyArray1, PyArray3, PyArrayDescrMethods as _, PyArrayMethods as _, PyReadonlyArray1,
     PyUntypedArray, PyUntypedArrayMethods as _, dtype,
 };
 use pyo3::prelude::*;
 use tautline::scenario::{Override, Template};
-use tautline::sim::{self, StatesMut, Threads, VectorError};
+use tautline::sim::{self, SeedChoice, StatesMut, Threads, VectorError};
 
 use crate::errors::{IntoException as _, internal_error, wrong_input, wrong_input_with_code, wrong_type};
 use crate::numbers::shape_text;
 use crate::scenario::Scenario;
 use crate::simulation::Simulation;
+use crate::words::in_python;
 use crate::work::{ProcessPool, Signals, run_detached};
 
 /// Worlds in progress, and the arrays that hold their states.
@@ -60,18 +61,27 @@ impl Workers {
 }
 
 impl VectorSimulation {
-    /// Calls `work` with the worlds and the memory of the arrays. Raises `Error` while another call uses them.
+    /// Calls `work` with the worlds and the memory of the arrays. Raises `Error` while another call uses them, and for
+    /// an array that the caller made read-only.
     fn with<T: Send>(
         &self,
         py: Python<'_>,
         work: impl FnOnce(&mut sim::VectorSimulation, &mut StatesMut<'_>) -> T + Send,
     ) -> PyResult<T> {
         const BUSY: &str = "the worlds are being stepped by another thread";
-        let busy = |_| wrong_input(BUSY);
-        let mut positions = self.positions.bind(py).try_readwrite().map_err(busy)?;
-        let mut velocities = self.velocities.bind(py).try_readwrite().map_err(busy)?;
-        let mut least_clearance_m = self.least_clearance_m.bind(py).try_readwrite().map_err(busy)?;
-        let mut is_over = self.is_over.bind(py).try_readwrite().map_err(busy)?;
+        let refused = |name: &'static str| {
+            move |error| match error {
+                BorrowError::NotWriteable => {
+                    wrong_input(format!("{name}: the array is read-only; call {name}.setflags(write=True)"))
+                }
+                _ => wrong_input(BUSY),
+            }
+        };
+        let mut positions = self.positions.bind(py).try_readwrite().map_err(refused("positions"))?;
+        let mut velocities = self.velocities.bind(py).try_readwrite().map_err(refused("velocities"))?;
+        let clearances = self.least_clearance_m.bind(py).try_readwrite();
+        let mut least_clearance_m = clearances.map_err(refused("least_clearance_m"))?;
+        let mut is_over = self.is_over.bind(py).try_readwrite().map_err(refused("is_over"))?;
         let split = |_| internal_error("an array is not contiguous");
         let mut states = StatesMut {
             positions_m: positions.as_slice_mut().map_err(split)?,
@@ -127,16 +137,20 @@ impl VectorSimulation {
 
 #[pymethods]
 impl VectorSimulation {
-    /// Creates one world for each seed, at its start. `threads` is 0 for all.
+    /// Creates one world for each seed, at its start. `threads` is 0 for all. `searches` goes on to later seeds where a
+    /// seed has no valid start.
     #[new]
     fn new(
         py: Python<'_>,
         scenario: &Scenario,
-        seeds: PyReadonlyArray1<'_, u64>,
+        seeds: Vec<u64>,
         threads: usize,
         autoreset: bool,
+        searches: bool,
     ) -> PyResult<Self> {
-        let (request, seeds) = (&scenario.request, seeds.as_array().to_vec());
+        let request = &scenario.request;
+        let choice = if searches { SeedChoice::From } else { SeedChoice::Exactly };
+        let seeds: Vec<_> = seeds.into_iter().map(choice).collect();
         let workers = Workers::of(threads);
         let now = workers.now()?;
         let begin = || -> Result<_, PyErr> {
@@ -149,7 +163,7 @@ impl VectorSimulation {
                     request.argument
                 )));
             }
-            let mut worlds = sim::VectorSimulation::new(template, &seeds, now).map_err(raised)?;
+            let mut worlds = sim::VectorSimulation::with_seeds(template, &seeds, now).map_err(raised)?;
             worlds.set_autoreset(autoreset);
             Ok(worlds)
         };
@@ -188,16 +202,21 @@ impl VectorSimulation {
         raised_by_signal.map_or(Ok(()), Err)
     }
 
-    /// Resets the chosen worlds, to these seeds if given.
+    /// Resets the chosen worlds, to these seeds if given, else to the next seed of each. With `first`, world e takes
+    /// `first` + e as its next seed.
     fn reset(
         &self,
         py: Python<'_>,
         chosen: PyReadonlyArray1<'_, bool>,
-        seeds: Option<PyReadonlyArray1<'_, u64>>,
+        seeds: Option<Vec<Option<u64>>>,
+        first: Option<u64>,
     ) -> PyResult<()> {
-        let chosen = chosen.as_array().to_vec();
-        let seeds = seeds.map(|seeds| seeds.as_array().to_vec());
-        self.with(py, |worlds, states| worlds.reset(&chosen, seeds.as_deref(), states))?.map_err(raised)
+        let chosen = copied_mask(chosen);
+        let next = |k: usize| first.map_or(SeedChoice::Next, |first| SeedChoice::From(first.saturating_add(k as u64)));
+        let given = |k: usize| seeds.as_ref().and_then(|seeds| seeds.get(k).copied().flatten());
+        let choices: Vec<_> =
+            (0..chosen.len()).map(|k| given(k).map_or_else(|| next(k), SeedChoice::Exactly)).collect();
+        self.with(py, |worlds, states| worlds.reset(&chosen, Some(&choices), states))?.map_err(raised)
     }
 
     /// (E, N, 3) positions [m].
@@ -251,7 +270,7 @@ impl VectorSimulation {
 
     /// Verdicts of the chosen worlds: so far, or of the whole flight after its end.
     fn statuses(&self, py: Python<'_>, chosen: PyReadonlyArray1<'_, bool>) -> PyResult<Vec<Option<&'static str>>> {
-        let chosen = chosen.as_array().to_vec();
+        let chosen = copied_mask(chosen);
         let judge = |world: &sim::Simulation| {
             let (flight, is_over) = (world.clone().finish(), world.ending().is_some());
             if is_over { flight.status() } else { flight.status_so_far() }.name()
@@ -281,6 +300,12 @@ impl VectorSimulation {
     }
 }
 
+/// Returns a copy of a mask, and ends the loan of its array: the mask may be `is_over` itself.
+#[expect(clippy::needless_pass_by_value, reason = "ends the loan")]
+fn copied_mask(mask: PyReadonlyArray1<'_, bool>) -> Vec<bool> {
+    mask.as_array().to_vec()
+}
+
 /// Returns the numbers of an array (E, N, 3) or (E, N, 2), vehicle by vehicle; the third axis of the latter is 0.
 fn copied<T: Element + Copy + Into<f64>>(given: &Bound<'_, PyAny>) -> PyResult<Vec<f64>> {
     let array = given.cast::<PyArray<T, Ix3>>()?;
@@ -297,7 +322,9 @@ fn copied<T: Element + Copy + Into<f64>>(given: &Bound<'_, PyAny>) -> PyResult<V
 fn raised(error: VectorError) -> PyErr {
     let text = error.to_string();
     match error {
-        VectorError::Seed { why, .. } => wrong_input_with_code(why.code(), text),
+        VectorError::Seed { why, .. } | VectorError::NoSeed { why, .. } => {
+            wrong_input_with_code(why.code(), in_python(&text, Some(why.code())))
+        }
         VectorError::Sim(why) => why.into_exception(),
         _ => wrong_input(text),
     }

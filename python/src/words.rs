@@ -167,6 +167,7 @@ fn option<'a>(text: &'a str, code: Option<&str>) -> Option<(String, &'a str)> {
     let (name, after) = text.split_at(end);
     let &(_, kind) = OPTIONS.iter().find(|(option, _)| *option == name)?;
     let argument = argument(name, code);
+    let kind = if argument == "stop" { Kind::Number } else { kind };
     if kind == Kind::Flag {
         let value = if name == "no-config" { "False" } else { "True" };
         return Some((format!("{argument}={value}"), after));
@@ -191,7 +192,7 @@ fn argument(name: &str, code: Option<&str>) -> String {
         ("from", "margin") => "start",
         ("to", "margin") => "stop",
         ("key", "sweep") => "keys",
-        ("to", "export") => "to",
+        ("format" | "to", "export") => "to",
         ("from", _) => "from_s",
         ("to", _) => "to_s",
         ("until", _) => "until_s",

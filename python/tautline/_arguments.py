@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 
 #: Largest integer up to which every integer is a float64.
 EXACT_INTEGER = 2**53
+#: Problem and remedy of a larger integer.
+LARGE_INTEGER = "an integer is larger than 2^53 and is no float64; subtract an offset first"
 
 
 def exact_array(value: object, what: str) -> NDArray[np.float64]:
@@ -42,10 +44,12 @@ def exact_array(value: object, what: str) -> NDArray[np.float64]:
         raise TypeError(f"{what}: a masked array has unknown numbers; give it as .filled(numpy.nan)")
     kind, size = array.dtype.kind, array.dtype.itemsize
     if kind == "f" and size <= 8:
+        if array is not value and has_large_number(array) and may_have_large_integer(value):
+            raise Error(f"{what}: {LARGE_INTEGER}")
         return array.astype(np.float64, copy=False)
     if kind in "iu":
-        if array.size and (int(array.max()) > EXACT_INTEGER or int(array.min()) < -EXACT_INTEGER):
-            raise Error(f"{what}: an integer is larger than 2^53 and is no float64; subtract an offset first")
+        if may_have_large_integer(array):
+            raise Error(f"{what}: {LARGE_INTEGER}")
         return array.astype(np.float64)
     raise TypeError(f"{what}: real numbers of at most 64 bits are needed, not {array.dtype}; give float64 or float32")
 
@@ -53,6 +57,9 @@ def exact_array(value: object, what: str) -> NDArray[np.float64]:
 def foreign_array(value: object, what: str) -> NDArray[Any]:
     """Returns the array of a list or of an array of another library, such as a tensor."""
     if isinstance(value, (list, tuple)):
+        rows = (row for part in value for row in (part, *(part if isinstance(part, (list, tuple)) else ())))
+        if any(isinstance(row, np.ma.MaskedArray) for row in rows):
+            raise TypeError(f"{what}: a masked array has unknown numbers; give it as .filled(numpy.nan)")
         try:
             return np.asarray(value)
         except ValueError as problem:
@@ -65,6 +72,30 @@ def foreign_array(value: object, what: str) -> NDArray[Any]:
     except (TypeError, ValueError, RuntimeError, BufferError) as problem:
         raise TypeError(f"{what}: {problem}") from None
     raise TypeError(f"{what}: an array is needed, not {type(value).__name__}; give numpy.asarray(..., dtype=float)")
+
+
+def has_large_number(array: NDArray[Any]) -> bool:
+    """Whether an array of floats has a finite number from which a larger integer could have been rounded."""
+    sizes = np.abs(array)
+    return bool(((sizes >= EXACT_INTEGER) & np.isfinite(sizes)).any())
+
+
+def may_have_large_integer(value: object) -> bool:
+    """Whether the source of an array has an integer above 2^53, which NumPy rounds beside a float.
+
+    True for a table or an array of another library whose type is not a float: its integers are rounded beside
+    unknown numbers and other columns.
+    """
+    if isinstance(value, (list, tuple)):
+        return any(map(may_have_large_integer, value))
+    if isinstance(value, np.ndarray):
+        is_integer = value.dtype.kind in "iu" and value.size > 0
+        return is_integer and (int(value.max()) > EXACT_INTEGER or int(value.min()) < -EXACT_INTEGER)
+    if isinstance(value, (int, np.integer)):
+        return abs(int(value)) > EXACT_INTEGER
+    if isinstance(value, (float, np.floating)):
+        return False
+    return "float" not in str(getattr(value, "dtype", "")).lower()
 
 
 class ReadOptions(TypedDict, total=False):
@@ -91,13 +122,16 @@ class ReadOptions(TypedDict, total=False):
 
 
 def number(value: object, what: str) -> float:
-    """Returns a number."""
+    """Returns a number. Raises :class:`Error` for an integer that float64 cannot hold."""
     if isinstance(value, (bool, np.bool_)) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise TypeError(f"{what}: a number is needed, not {type(value).__name__}")
     try:
-        return float(value)
+        found = float(value)
     except OverflowError:
         raise Error(f"{what}: the number is too large") from None
+    if isinstance(value, (int, np.integer)) and found != int(value):
+        raise Error(f"{what}: the integer {value} is no float64; give {found!r}")
+    return found
 
 
 def optional_number(value: object, what: str) -> float | None:

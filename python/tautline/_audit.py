@@ -33,6 +33,7 @@ from ._arguments import (
     with_files,
 )
 from ._native import Error
+from ._pickles import sealed, unsealed
 from ._tables import Findings
 
 if TYPE_CHECKING:
@@ -217,8 +218,8 @@ class Audit:
     def __bool__(self) -> bool:
         raise TypeError("an audit is neither true nor false; use is_clear or raise_for_violation()")
 
-    def __reduce__(self) -> tuple[Callable[..., Audit], tuple[Outcome]]:
-        return unpickle, ((self.verdict, self.headline, self.text, self._json),)
+    def __reduce__(self) -> tuple[Callable[..., Audit], tuple[Any, ...]]:
+        return unpickle, sealed(self.verdict, self.headline, self.text, self._json)
 
     def __repr__(self) -> str:
         return f"<Audit {self.headline}>"
@@ -492,10 +493,11 @@ def audit_arrays(
     return Audit._of(repeat(), repeat)
 
 
-def unpickle(outcome: Outcome) -> Audit:
-    """Returns an audit of another process, which cannot be repeated."""
+def unpickle(*pickled: Any) -> Audit:
+    """Returns an audit of another process, which cannot be repeated. Raises :class:`Error` for damaged bytes."""
+    verdict, headline, text, report = unsealed("Audit", *pickled)
 
     def repeat(html: str | None = None) -> Outcome:
         raise Error("to_html: the recording is not at hand here; write the page in the process of the audit")
 
-    return Audit._of(outcome, repeat)
+    return Audit._of((verdict, headline, text, report), repeat)

@@ -15,6 +15,7 @@ from ._arguments import PathLike, boolean, path
 from ._audit import Audit, AuditOptions, audit_with
 from ._law import ControlLaw, check_law
 from ._native import Error
+from ._pickles import sealed, unsealed
 from ._scenario import Scenario, restore, to_scenario
 from ._tables import Table
 
@@ -76,7 +77,7 @@ class Flight(Table):
     def __reduce__(self) -> tuple[Any, ...]:
         state = {name: getattr(self, name) for name in (*ARRAYS, "headline", "text", "passed")}
         state |= {"report": self._json, "findings": self._findings.json}
-        return unpickle_flight, (self.scenario._source_state(), self.scenario.to_toml(), state)
+        return unpickle_flight, sealed(self.scenario._source_state(), self.scenario.to_toml(), state)
 
     @property
     def status(self) -> str:
@@ -201,8 +202,9 @@ def fly(
     return Flight.__new__(Flight)._restore(flown, state)
 
 
-def unpickle_flight(source: tuple[Any, ...], toml: str, state: dict[str, Any]) -> Flight:
-    """Returns the flight of another process."""
+def unpickle_flight(*pickled: Any) -> Flight:
+    """Returns the flight of another process. Raises :class:`Error` for damaged bytes."""
+    source, toml, state = unsealed("Flight", *pickled)
     try:
         scenario = restore(*source)
     except (Error, FileNotFoundError):

@@ -2,15 +2,64 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
-from ._arguments import number
+from ._arguments import PathLike, number
 from ._native import Error
 from ._scenario import Scenario
+from ._vector import VectorSimulation
 
 #: Penalty of a violation.
 VIOLATION = 100.0
+
+
+class Worlds(VectorSimulation):
+    """Worlds of an environment. A new world passes over seeds without a valid start."""
+
+    _searches = True
+
+    def __init__(
+        self,
+        scenario: Scenario | PathLike,
+        num_envs: int,
+        *,
+        threads: int | None = None,
+        set: Mapping[str, Any] | None = None,
+    ) -> None:
+        super().__init__(scenario, num_envs, threads=threads, set=set)
+        if self.scenario._native.is_shielded:
+            raise Error(
+                f"scenario: the shield of {self.scenario.name} replaces actions; give set={{'shield.enabled': False}}"
+            )
+
+    def start(self, seed: int, is_given: bool) -> None:
+        """Resets the only world to a seed, or to the next one with a valid start if no seed was given."""
+        if is_given:
+            self.reset(seeds=[seed])
+        else:
+            self._reset(first=seed)
+
+
+def steps_of_action(hz: float, scenario: Scenario) -> int:
+    """Returns the number of steps for which an action is held.
+
+    Raises :class:`Error` where ``1 / hz`` is not a whole number of steps, or longer than the scenario.
+    """
+    actions_per_step = hz * scenario.dt_s
+    if actions_per_step * scenario.steps < 1 - 1e-9:
+        least_hz = 1 / (scenario.dt_s * scenario.steps)
+        raise Error(f"hz: an action must not be longer than the scenario, got {hz}; give {least_hz:.12g} or more")
+    steps = round(1 / actions_per_step)
+    if abs(steps * actions_per_step - 1) <= 1e-9:
+        return steps
+    fewer = int(1 / actions_per_step)
+    rates_hz = " or ".join(f"{1 / (count * scenario.dt_s):.12g}" for count in (fewer + 1, fewer) if count > 0)
+    problem = f"an action must be held for a whole number of steps of {scenario.dt_s} s"
+    raise Error(f"hz: {problem}, got {hz}; give {rates_hz}")
 
 
 class FormationTask:
@@ -27,7 +76,7 @@ class FormationTask:
             if not 0 < value < np.inf:
                 raise Error(f"{name}: must be a finite number above 0, got {value}")
         #: Steps of the scenario for one action.
-        self.steps = max(1, round(1 / (self.hz * scenario.dt_s)))
+        self.steps = steps_of_action(self.hz, scenario)
         self.count = len(scenario)
         in_plane = not (scenario.positions_m[:, 2].any() or scenario.slots_m[:, 2].any())
         #: Axes of actions and observations.

@@ -29,6 +29,7 @@ from ._arguments import (
     with_files,
 )
 from ._law import ControlLaw, check_law
+from ._pickles import sealed, unsealed
 from ._scenario import Scenario, to_scenario
 from ._tables import Finding, Findings, format_cell
 
@@ -53,6 +54,13 @@ class Answer(Finding):
 
     def __bool__(self) -> bool:
         raise TypeError("an answer is neither true nor false; use is_good")
+
+    def __getstate__(self) -> tuple[Any, ...]:
+        return sealed(vars(self))
+
+    def __setstate__(self, state: tuple[Any, ...]) -> None:
+        (attributes,) = unsealed(type(self).__name__, *state)
+        self.__dict__.update(attributes)
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON that the command prints, as a dictionary."""

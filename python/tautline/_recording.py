@@ -13,6 +13,7 @@ from . import _display, _native
 from ._arguments import PathLike, ReadOptions, number, paths, read_options, single_recording, with_files
 from ._audit import Audit, AuditOptions, audit
 from ._native import Error
+from ._pickles import sealed, unsealed
 from ._tables import Table
 
 if TYPE_CHECKING:
@@ -163,6 +164,9 @@ class Recording(Table):
         """Audits the recording's files with :func:`tautline.audit`, with the same options of reading."""
         return audit(self._files, **self._read_as, **options)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return unpickle_recording, sealed(self._files, self._read_as, vars(self._data))
+
     def __len__(self) -> int:
         return len(self.vehicles)
 
@@ -194,3 +198,11 @@ def read(recording: PathLike | Sequence[PathLike], **read_as: Unpack[ReadOptions
     :class:`Error`, with file, place, value and remedy, for a file that cannot be read.
     """
     return Recording(paths(recording, "recording"), read_as)
+
+
+def unpickle_recording(*pickled: Any) -> Recording:
+    """Returns the recording of another process. Raises :class:`Error` for damaged bytes."""
+    files, read_as, columns = unsealed("Recording", *pickled)
+    recording = Recording.__new__(Recording)
+    recording._files, recording._read_as, recording._data = files, read_as, SimpleNamespace(**columns)
+    return recording

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _native
 from ._arguments import count as whole_number
-from ._arguments import number
+from ._arguments import exact_array, number
 from ._native import Error
 
 
@@ -156,10 +156,7 @@ class Shield:
 
 def _rows(value: ArrayLike, name: str, count: int | None) -> NDArray[np.float64]:
     """Returns rows of three numbers, z = 0 where two are given."""
-    try:
-        rows = np.asarray(value, dtype=np.float64)
-    except (TypeError, ValueError) as problem:
-        raise Error(f"{name}: {problem}; give rows of numbers") from None
+    rows = exact_array(value, name)
     if rows.ndim != 2 or rows.shape[1] not in (2, 3) or (count is not None and len(rows) != count):
         wanted = "N" if count is None else count
         shape = np.shape(value)

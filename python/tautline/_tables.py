@@ -159,11 +159,11 @@ def import_pyarrow() -> Any:
 
 
 def to_arrow_column(values: Any) -> Any:
-    """Returns a column of Arrow; one of several types becomes text."""
+    """Returns a column of Arrow; one of several types, or of integers above 64 bits, becomes text."""
     pyarrow = import_pyarrow()
     try:
         return pyarrow.array(values)
-    except (pyarrow.ArrowInvalid, pyarrow.ArrowTypeError):
+    except (OverflowError, pyarrow.ArrowInvalid, pyarrow.ArrowTypeError):
         return pyarrow.array([None if value is None else str(value) for value in values])
 
 
@@ -173,7 +173,15 @@ def to_frame(columns: Any) -> pandas.DataFrame:
         import pandas
     except ImportError:
         raise ImportError("tables need pandas: pip install pandas") from None
-    return pandas.DataFrame(columns)
+    exact = {name: pandas.Series(values, dtype=object) for name, values in columns.items() if is_rounded(values)}
+    return pandas.DataFrame({**columns, **exact})
+
+
+def is_rounded(values: Any) -> bool:
+    """Whether pandas would round an integer of a list, because another value is None or a float."""
+    if not isinstance(values, list) or all(isinstance(value, int) for value in values):
+        return False
+    return any(isinstance(value, int) and abs(value) > 2**53 for value in values)
 
 
 def make_table(rows: Sequence[Mapping[str, Any]], max_rows: int = 10) -> str:

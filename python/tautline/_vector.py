@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from . import _native
-from ._arguments import PathLike, boolean
+from ._arguments import PathLike, boolean, exact_array
 from ._arguments import count as whole_number
 from ._native import Error
 from ._scenario import Scenario, to_scenario
@@ -31,11 +31,15 @@ class VectorSimulation:
 
     A world ends at the scenario's duration, or where its motion or law cannot go on. It stops no other world: it keeps
     its last state, ``is_over`` is True and ``endings`` has the reason. A violation ends no world: ``least_clearance_m``
-    is below 0. With ``autoreset=True``, a step first resets the worlds that have ended, to the next seed of each: its
-    seed plus ``num_envs``. They do not fly in that call.
+    is below 0. With ``autoreset=True``, a step first resets the worlds that have ended, to the next seed of each. They
+    do not fly in that call. The next seed of a world is its seed plus ``num_envs``; seeds without a valid start are
+    passed over, at most 1000 of them.
 
     Raises :class:`Error` for a wrong scenario or a seed without a valid start.
     """
+
+    #: Whether a new world passes over seeds without a valid start.
+    _searches: ClassVar[bool] = False
 
     def __init__(
         self,
@@ -58,28 +62,29 @@ class VectorSimulation:
         workers = 0 if threads is None else whole_number(threads, "threads")
         if threads is not None and not 1 <= workers <= 1024:
             raise Error(f"threads: must be from 1 to 1024, got {threads}; None uses one for each core")
-        numbered = np.arange(self.num_envs, dtype=np.uint64) if seeds is None else self._seeds(seeds)
+        numbered = list(range(self.num_envs)) if seeds is None else self._seeds(seeds)
         self._native = _native.VectorSimulation(
-            self.scenario._native, numbered, workers, boolean(autoreset, "autoreset")
+            self.scenario._native, numbered, workers, boolean(autoreset, "autoreset"), self._searches
         )
         #: Whether a step resets the worlds that have ended.
         self.autoreset = bool(autoreset)
 
     def step(
         self,
-        u: NDArray[np.floating[Any]] | None = None,
+        u: ArrayLike | None = None,
         steps: int = 1,
         out: NDArray[np.floating[Any]] | None = None,
     ) -> None:
         """Flies steps of ``scenario.dt_s`` in every world, fewer where a world ends.
 
-        ``u`` (E, N, 3) or (E, N, 2) of float32 or float64 are accelerations [m/s^2] that replace those of the law and
-        are held over all of these steps. No step is divided for the law then. Those of ended worlds are ignored.
-        Without ``u`` the scenario's law flies. ``out`` (E, N, 6) of float32 or float64 receives positions and
-        velocities.
+        ``u`` (E, N, 3) or (E, N, 2) are accelerations [m/s^2] that replace those of the law and are held over all of
+        these steps. Arrays of float32 and float64 are fastest. No step is divided for the law then. Those of ended
+        worlds are ignored. Without ``u`` the scenario's law flies. ``out`` (E, N, 6) of float32 or float64 receives
+        positions and velocities.
 
-        Raises :class:`Error` for a wrong shape, or with the place of a number that is not finite; ``TypeError`` for a
-        wrong dtype. No world moves then.
+        Raises :class:`Error` for a wrong shape, or with the place of a number that is not finite; ``TypeError`` for
+        numbers that are no float64. No world moves then. Where ``autoreset`` finds no valid start for a world, the
+        others fly, and :class:`Error` names the world.
         """
         if isinstance(steps, bool) or not isinstance(steps, (int, np.integer)):
             raise TypeError(f"steps: a whole number is needed, not {type(steps).__name__}")
@@ -87,24 +92,39 @@ class VectorSimulation:
             raise Error(f"steps: must be at least 1, got {steps}")
         if out is not None:
             self._check_out(out)
-        self._native.step(u, min(int(steps), 2**63))
+        commands: NDArray[np.floating[Any]] | None = None
+        if isinstance(u, np.ndarray) and u.dtype in (np.float32, np.float64):
+            commands = u
+        elif u is not None:
+            commands = exact_array(u, "u")
+        self._native.step(commands, min(int(steps), 2**63))
         if out is not None:
             out[..., :3], out[..., 3:] = self.positions, self.velocities
 
     def reset(
         self,
         mask: NDArray[np.bool_] | Sequence[bool] | None = None,
-        seeds: Sequence[int] | NDArray[np.integer[Any]] | None = None,
+        seeds: Sequence[int | None] | NDArray[np.integer[Any]] | None = None,
     ) -> None:
         """Resets the worlds with ``mask`` (E,), by default all, to their starts.
 
-        ``seeds`` (E,) are the new seeds; those outside of the mask are ignored. Without seeds each world takes its next
-        seed: its seed plus ``num_envs``.
+        ``seeds`` (E,) are the new seeds; those outside of the mask are ignored. Without seeds, or with None in their
+        list, a world takes its next seed.
 
         Raises :class:`Error` for a wrong shape or a seed without a valid start. No world is reset then.
         """
+        self._reset(mask, seeds)
+
+    def _reset(
+        self,
+        mask: NDArray[np.bool_] | Sequence[bool] | None = None,
+        seeds: Sequence[int | None] | NDArray[np.integer[Any]] | None = None,
+        first: int | None = None,
+    ) -> None:
+        """Resets worlds. With ``first``, world e has ``first + e`` as its next seed."""
         chosen = self._mask(mask)
-        self._native.reset(chosen, None if seeds is None else self._seeds(seeds))
+        given = None if seeds is None else self._seeds_or_none(seeds, chosen)
+        self._native.reset(chosen, given, first)
 
     @property
     def positions(self) -> NDArray[np.float64]:
@@ -162,9 +182,7 @@ class VectorSimulation:
 
         ``scenario`` of the copy is that of all worlds: it has the start of its own seed only.
         """
-        other = Simulation.__new__(Simulation)
-        other.scenario, other._native = self.scenario, self._native.world(whole_number(index, "world"))
-        return other
+        return Simulation._of(self.scenario, None, self._native.world(whole_number(index, "world")))
 
     def _mask(self, mask: NDArray[np.bool_] | Sequence[bool] | None) -> NDArray[np.bool_]:
         if mask is None:
@@ -176,18 +194,39 @@ class VectorSimulation:
             raise Error(f"mask: an array of shape ({self.num_envs},) is needed, not of shape {chosen.shape}")
         return np.ascontiguousarray(chosen)
 
-    def _seeds(self, seeds: Sequence[int] | NDArray[np.integer[Any]]) -> NDArray[np.uint64]:
-        given = np.asarray(seeds)
-        if given.dtype == np.bool_ or not (np.issubdtype(given.dtype, np.integer) or given.dtype == object):
-            raise TypeError(f"seeds: whole numbers are needed, not {given.dtype}")
-        if given.shape != (self.num_envs,):
-            raise Error(f"seeds: an array of shape ({self.num_envs},) is needed, not of shape {given.shape}")
-        for place, seed in enumerate(given.tolist()):
-            if isinstance(seed, bool) or not isinstance(seed, int):
+    def _seeds(self, seeds: Sequence[int] | NDArray[np.integer[Any]]) -> list[int]:
+        """Returns a seed for each world."""
+        found = self._seeds_or_none(seeds, np.ones(self.num_envs, dtype=np.bool_))
+        if None in found:
+            raise TypeError(f"seeds[{found.index(None)}]: a whole number is needed, not NoneType")
+        return [seed for seed in found if seed is not None]
+
+    def _seeds_or_none(
+        self, seeds: Sequence[int | None] | NDArray[np.integer[Any]], chosen: NDArray[np.bool_]
+    ) -> list[int | None]:
+        """Returns the given seed of each chosen world, and None for the others."""
+        given = np.asarray(seeds) if hasattr(seeds, "__array__") else seeds
+        if isinstance(given, np.ndarray):
+            if given.dtype.kind not in "iuO":
+                raise TypeError(f"seeds: whole numbers are needed, not {given.dtype}")
+            shape, given = given.shape, given.tolist()
+        elif isinstance(given, (str, bytes)) or not isinstance(given, Sequence):
+            raise TypeError(f"seeds: a list of whole numbers is needed, not {type(given).__name__}")
+        else:
+            shape = (len(given),)
+        if shape != (self.num_envs,):
+            raise Error(f"seeds: an array of shape ({self.num_envs},) is needed, not of shape {shape}")
+        found: list[int | None] = [None] * self.num_envs
+        for place in np.flatnonzero(chosen).tolist():
+            seed = given[place]
+            if seed is None:
+                continue
+            if isinstance(seed, (bool, np.bool_)) or not isinstance(seed, (int, np.integer)):
                 raise TypeError(f"seeds[{place}]: a whole number is needed, not {type(seed).__name__}")
             if not 0 <= seed < 2**63:
                 raise Error(f"seeds[{place}]: must be a whole number from 0 to 2^63 - 1, got {seed}")
-        return np.ascontiguousarray(given, dtype=np.uint64)
+            found[place] = int(seed)
+        return found
 
     def _check_out(self, out: object) -> None:
         shape = (self.num_envs, len(self.scenario), 6)
@@ -198,6 +237,12 @@ class VectorSimulation:
             raise Error(f"out: an array of shape {shape} is needed, not of shape {out.shape}")
         if not out.flags.writeable:
             raise Error("out: the array is read-only; give a copy")
+
+    def __copy__(self) -> VectorSimulation:
+        raise TypeError("a VectorSimulation cannot be copied; world(k) returns a copy of a world")
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> VectorSimulation:
+        return self.__copy__()
 
     def __len__(self) -> int:
         return self.num_envs

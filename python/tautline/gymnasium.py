@@ -12,10 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._arguments import PathLike
-from ._formation import VIOLATION, FormationTask
+from ._formation import VIOLATION, FormationTask, Worlds
 from ._native import Error
 from ._scenario import Scenario
-from ._vector import VectorSimulation
 
 try:
     import gymnasium
@@ -47,7 +46,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
     of each episode that is over. All modes of autoreset are supported.
     """
 
-    sim: VectorSimulation
+    sim: Worlds
 
     def __init__(
         self,
@@ -60,7 +59,7 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         threads: int | None = None,
         set: Mapping[str, Any] | None = None,
     ) -> None:
-        self.sim = VectorSimulation(scenario, num_envs, threads=threads, set=set)
+        self.sim = Worlds(scenario, num_envs, threads=threads, set=set)
         self.task = FormationTask(self.sim.scenario, hz, max_accel_m_s2)
         self.num_envs = self.sim.num_envs
         self.autoreset_mode = AutoresetMode(autoreset_mode)
@@ -72,23 +71,24 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         self._is_seeded = False
 
     def reset(
-        self, *, seed: int | list[int] | None = None, options: dict[str, Any] | None = None
+        self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, Info]:
         """Resets all episodes, or those with ``options["reset_mask"]`` (E,).
 
-        World e takes ``seed + e`` or ``seed[e]`` as the seed of its start and flight. Without a seed each world takes
-        its next seed; the first ones are random.
+        World e takes ``seed + e`` or ``seed[e]`` as the seed of its start and flight. Without a seed, or with None in
+        the list, a world takes its next seed; the first ones are random. Seeds without a valid start are passed over
+        then, and are an error where they are given.
         """
         mask = np.ones(self.num_envs, dtype=np.bool_)
         if options is not None and options.get("reset_mask") is not None:
             mask = options["reset_mask"]
+        first = None
         if isinstance(seed, (int, np.integer)):
             super().reset(seed=int(seed))
             seed = [int(seed) + e for e in range(self.num_envs)]
-        elif seed is None and not self._is_seeded:
+        elif not self._is_seeded:
             first = int(self.np_random.integers(2**31))
-            seed = [first + e for e in range(self.num_envs)]
-        self.sim.reset(mask, seed)
+        self.sim._reset(mask, seed, first)
         self._is_seeded = True
         self._done[mask] = False
         return self._observe(), self._info(np.zeros_like(self._done))
@@ -156,16 +156,17 @@ class FormationEnv(gymnasium.Env[Observations, NDArray[np.float32]]):
         max_accel_m_s2: float = 5.0,
         set: Mapping[str, Any] | None = None,
     ) -> None:
-        self.sim = VectorSimulation(scenario, 1, threads=1, set=set)
+        self.sim = Worlds(scenario, 1, threads=1, set=set)
         self.task = FormationTask(self.sim.scenario, hz, max_accel_m_s2)
         self.observation_space, self.action_space = _spaces(self.task)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, Info]:
-        """Starts an episode. ``seed`` determines it and, without further seeds, those after it."""
+        """Starts an episode. ``seed`` determines it and, without further seeds, those after it. A seed without a valid
+        start is an error where it is given, and is passed over without ``seed``."""
         super().reset(seed=seed)
-        self.sim.reset(seeds=[int(self.np_random.integers(2**31))])
+        self.sim.start(int(self.np_random.integers(2**31)), is_given=seed is not None)
         return self._observe(), self._info(False)
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observations, float, bool, bool, Info]:
@@ -190,7 +191,7 @@ def _spaces(task: FormationTask) -> tuple[Any, Any]:
     return observations, Box(-1.0, 1.0, shape=(task.count, task.axes), dtype=np.float32)
 
 
-def _ends(sim: VectorSimulation) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _ends(sim: Worlds) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Returns whether each episode is terminated, and whether it is truncated."""
     terminated, over = sim.least_clearance_m < 0, sim.is_over
     if over.any():

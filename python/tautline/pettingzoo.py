@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._arguments import PathLike
-from ._formation import VIOLATION, FormationTask
+from ._formation import VIOLATION, FormationTask, Worlds
 from ._native import Error
 from ._scenario import Scenario
-from ._vector import VectorSimulation
 
 try:
     from gymnasium.spaces import Box
@@ -52,7 +51,7 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
         max_accel_m_s2: float = 5.0,
         set: Mapping[str, Any] | None = None,
     ) -> None:
-        self.sim = VectorSimulation(scenario, 1, threads=1, set=set)
+        self.sim = Worlds(scenario, 1, threads=1, set=set)
         self.task = FormationTask(self.sim.scenario, hz, max_accel_m_s2)
         self.possible_agents = [f"vehicle_{number}" for number in range(1, self.task.count + 1)]
         self.agents: list[str] = []
@@ -73,10 +72,11 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Arrays, dict[str, dict[str, Any]]]:
-        """Starts an episode. ``seed`` determines it and, without further seeds, those after it."""
+        """Starts an episode. ``seed`` determines it and, without further seeds, those after it. A seed without a valid
+        start is an error where it is given, and is passed over without ``seed``."""
         if seed is not None:
             self.np_random, _ = seeding.np_random(seed)
-        self.sim.reset(seeds=[int(self.np_random.integers(2**31))])
+        self.sim.start(int(self.np_random.integers(2**31)), is_given=seed is not None)
         self.agents = list(self.possible_agents)
         return self._observe(), self._infos(False)
 

@@ -262,6 +262,34 @@ fn a_replay_has_the_same_hash_and_the_worst_flights_have_recordings() {
         recordings.filter(|entry| entry.as_ref().is_ok_and(|entry| entry.path().join("run.mcap").exists())).count(),
         2
     );
+    // More runs have other worst flights. Folders of replays and of other programs stay.
+    let replayed = (0..6).find(|run| !place.path(&format!("camp/worst/edge-tension-run-{run}")).exists());
+    let replayed = replayed.expect("a run").to_string();
+    place.campaign(&["replay", "camp", "--run", &replayed, "--law", "edge-tension", "--no-snapshots"]);
+    fs::create_dir(place.path("camp/worst/notes")).expect("a folder");
+    let chosen = fs::read_dir(place.path("camp/worst")).expect("flights").filter_map(Result::ok);
+    let chosen = chosen.map(|entry| entry.path()).find(|path| path.join(".chosen-by-campaign").exists());
+    let former = place.path("camp/worst/edge-tension-run-99");
+    fs::rename(chosen.expect("a chosen flight"), &former).expect("renamed");
+    fs::write(place.path("spec.toml"), SPEC.replace("runs = 60", "runs = 40")).expect("written");
+    let raised = place.campaign(&["run", "spec.toml", "--out", "camp", "--worst", "2", "--no-snapshots"]);
+    assert!(matches!(raised.exit, Some(0 | 1)), "{}", raised.err);
+    let answer = json(&fs::read(place.path("camp/campaign.json")).expect("an answer"));
+    let mut kept = vec!["notes".to_owned(), format!("edge-tension-run-{replayed}")];
+    for law in answer["laws"].as_array().expect("laws") {
+        let name = law["name"].as_str().expect("a name");
+        kept.extend(
+            law["worst"].as_array().expect("flights").iter().map(|flight| format!("{name}-run-{}", flight["run"])),
+        );
+    }
+    assert!(!former.exists(), "run 99 is not among the worst flights");
+    for entry in fs::read_dir(place.path("camp/worst")).expect("flown again") {
+        let name = entry.expect("an entry").file_name().into_string().expect("a name");
+        assert!(kept.contains(&name), "{name} is not among the worst flights: {kept:?}");
+    }
+    for name in &kept[..2] {
+        assert!(place.path(&format!("camp/worst/{name}")).exists(), "{name}");
+    }
     // The command on the page flies the same bits.
     let report = fs::read(place.path("again/report.json")).expect("a report");
     assert_eq!(json(&report)["run"]["state_hash"], worst["state_hash"]);

@@ -257,7 +257,7 @@ class Campaigns(Case):
         line = [sys.executable, "-m", "tautline", "campaign", "merge", str(self.out)]
         ran = subprocess.run(line, capture_output=True, text=True, check=False)
         self.assertEqual(ran.returncode, 2)
-        self.assertIn("flies `Springs`", ran.stderr)
+        self.assertIn(f"{self.out}: the campaign flies `Springs`", ran.stderr)
 
     def test_splitting_laws_and_keys_of_the_law_are_refused(self) -> None:
         for message, more in (

@@ -125,6 +125,53 @@ class Gymnasium(Case):
         self.refuses(tl.Error, "hz: must be", lambda: FormationEnv(hz=0))
         self.refuses(TypeError, "max_accel_m_s2: a number", lambda: FormationEnv(max_accel_m_s2="5"))
 
+    def test_an_action_is_held_for_a_whole_number_of_steps(self) -> None:
+        for make in (FormationEnv, FormationVectorEnv, ParallelFormationEnv):
+            self.refuses(tl.Error, "got 100.0; give 80 or 120", lambda make=make: make("pentagon", hz=100))
+        self.refuses(tl.Error, "got 1000.0; give 240", lambda: FormationEnv("pentagon", hz=1000))
+        for hz in (1e-300, 5e-324, 0.001):
+            message = f"hz: an action must not be longer than the scenario, got {hz}; give 0.00833333333333 or more"
+            self.refuses(tl.Error, message, lambda hz=hz: FormationEnv("pentagon", hz=hz))
+        for hz in (240, 120, 80, 20, 240 / 7, 1 / 120):
+            env = FormationEnv("pentagon", hz=hz)
+            env.reset(seed=0)
+            env.step(np.zeros((5, 2)))
+            self.assertAlmostEqual(env.sim.t[0] * hz, 1.0, places=9)
+
+    def test_seeds_without_a_valid_start_are_passed_over(self) -> None:
+        sets = {"start.jitter_m": 0.6, "time.duration_s": 1.0}
+        with self.assertRaisesRegex(tl.Error, r"seeds\[0\]: seed 75 gives no valid scenario: set:1:16"):
+            tl.VectorSimulation("pentagon", 1, seeds=[75], set=sets)
+        still = np.zeros((2, 5, 2))
+        for mode in AutoresetMode.NEXT_STEP, AutoresetMode.SAME_STEP:
+            env = FormationVectorEnv("pentagon", 2, autoreset_mode=mode, set=sets)
+            env.reset(seed=73)
+            while not (ends := env.step(still))[3].any():
+                pass
+            self.assertEqual(ends[3].tolist(), [True, True])
+            env.step(still)
+            self.assertEqual(env.sim.seeds.tolist(), [77, 76])
+            env.reset(seed=[None, 80])
+            self.assertEqual(env.sim.seeds.tolist(), [79, 80])
+            self.refuses(tl.Error, "seed 75", lambda env=env: env.reset(seed=75))
+        # Of many random first seeds some have no valid start.
+        FormationVectorEnv("pentagon", 300, set=sets).reset()
+        for make in (FormationEnv, ParallelFormationEnv):
+            env, refused = make("pentagon", set=sets), 0
+            for seed in range(60):
+                try:
+                    env.reset(seed=seed)
+                except tl.Error:
+                    refused += 1
+                env.reset()
+            self.assertGreater(refused, 0)
+
+    def test_shielded_scenarios_are_refused(self) -> None:
+        for make in (FormationEnv, FormationVectorEnv, ParallelFormationEnv):
+            message = "scenario: the shield of shielded-crazyflies replaces actions"
+            self.refuses(tl.Error, message, lambda make=make: make("shielded-crazyflies"))
+        FormationVectorEnv("shielded-crazyflies", 2, set={"shield.enabled": False})
+
 
 class PettingZoo(Case):
     def test_the_environment_passes_the_tests_of_pettingzoo(self) -> None:

@@ -1,6 +1,7 @@
 """Tests of pickles and saved simulations: another process continues with the same bits."""
 
 import copy
+import hashlib
 import multiprocessing
 import pickle
 import unittest
@@ -151,14 +152,34 @@ class Simulations(Case):
         header = saved.index(b'"program":"') + len(b'"program":"')
         other = saved[:header] + b"0" * 64 + saved[header + 64 :]
         self.refuses(tl.Error, "saved by another program", lambda: load(other, law=Springs()))
-        # A changed command ends in another state.
-        for place in (len(saved) - 1, len(saved) - 241 - 9 - 120 + 7):
+        # Every flipped bit is found, also in the scenario.
+        places = [saved.index(b"delta_m") + 12, *range(0, len(saved), 31), len(saved) - 1]
+        for place in places:
             changed = bytearray(saved)
-            changed[place] ^= 0x3F
-            self.refuses(tl.Error, "the bytes are damaged", lambda data=changed: load(data, law=Springs()))
+            changed[place] ^= 0x01
+            with self.assertRaises(tl.Error, msg=place):
+                load(changed, law=Springs())
+        changed = saved.replace(b"delta_m = 2.0", b"delta_m = 1.8")
+        self.assertNotEqual(changed, saved)
+        self.refuses(tl.Error, "it is truncated or damaged", lambda: load(changed, law=Springs()))
         # A claimed number of vehicles allocates nothing.
         huge = plain.replace(b'"vehicles":5', b'"vehicles":9999999999999999')
         self.refuses(tl.Error, "truncated or damaged", lambda: load(huge))
+
+    def test_bytes_with_a_new_hash_are_refused_without_a_crash(self) -> None:
+        plain = tl.Simulation(short()).save()[:-32]
+        state = plain[-241:]
+
+        def hashed(records: bytes) -> bytes:
+            data = plain[:-241] + records + state
+            return data + hashlib.sha256(data).digest()
+
+        step = b"\x01" + (3).to_bytes(8, "little")
+        again = tl.Simulation.load(hashed(b""))
+        self.assertEqual(again.steps, 0)
+        self.refuses(tl.Error, "ends in another state", lambda: tl.Simulation.load(hashed(step)))
+        most = b"\x01" + (2**64 - 1).to_bytes(8, "little")
+        self.refuses(tl.Error, "truncated or damaged", lambda: tl.Simulation.load(hashed(most + step)))
 
     def test_other_processes_continue(self) -> None:
         sims = [self.flown(short(), law) for law in (None, Integral())]
@@ -188,6 +209,26 @@ class Flights(Case):
         again = pickle.loads(pickle.dumps(flight))
         self.assertEqual((again.status, again.audit().verdict), ("violation", "VIOLATION"))
         self.assertGreater(tl.audit(again.t, again.positions, delta=2.0).separation_m, again.separation_m)
+
+    def test_a_flipped_bit_of_a_pickle_is_found(self) -> None:
+        file, (t, p) = self.folder / "run.mcap", passing()
+        flight = tl.fly(short(), record=file)
+        recording, audit = tl.read(file), tl.audit(t, p, delta=1.5)
+        answer = tl.compare(short(), ["laplacian"], runs=1)
+        for result, part in (
+            (flight, flight.positions.tobytes()[-800:]),
+            (flight, flight.velocities.tobytes()[-800:]),
+            (flight, b'"status":"clear"'),
+            (flight, flight.headline.encode()),
+            (recording, recording._data.position.tobytes()[-800:]),
+            (recording, recording._data.t.tobytes()[-80:]),
+            (audit, audit.headline.encode()),
+            (answer, b"state_hash"),
+        ):
+            data = bytearray(pickle.dumps(result))
+            pickle.loads(data)
+            data[data.rindex(part) + 5] ^= 0x01
+            self.refuses(tl.Error, "the bytes of the pickle are damaged", lambda data=data: pickle.loads(data))
 
     def test_without_its_file_a_flight_keeps_its_scenario(self) -> None:
         file = self.folder / "s.toml"

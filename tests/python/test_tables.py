@@ -28,6 +28,13 @@ def through_arrow(table: tl.Table) -> pyarrow.Table:
 
 
 class Tables(Case):
+    def test_integers_are_not_rounded_beside_unknown_values(self) -> None:
+        big = 2**53 + 1
+        for values in ([big, None], [big, 0.5], [2**63 + 1, None]):
+            findings = tl.Findings([{"seed": value} for value in values])
+            self.assertEqual(findings.to_pandas().seed.tolist()[0], values[0])
+            self.assertEqual(int(findings.to_arrow()["seed"].to_pylist()[0]), values[0])
+
     def test_every_table_is_flat_in_pandas_and_arrow(self) -> None:
         t, p = passing()
         p[20:40, 3] = np.nan

@@ -6,6 +6,8 @@ import signal
 import threading
 import time
 import unittest
+from copy import copy as shallow_copy
+from copy import deepcopy
 
 import numpy as np
 import tautline as tl
@@ -26,6 +28,9 @@ class Bits(Case):
         copy.step(steps=3)
         with self.assertRaisesRegex(tl.Error, "save: a copy of a world of a VectorSimulation has no history"):
             copy.save()
+        self.assertEqual(deepcopy(copy).copy().steps, 3)
+        for do in (shallow_copy, deepcopy):
+            self.refuses(TypeError, "a VectorSimulation cannot be copied", lambda do=do: do(worlds))
 
     def test_worlds_have_the_bits_of_single_simulations_for_any_threads(self) -> None:
         for name, law in itertools.product(("pentagon", "crazyflies"), (False, True)):
@@ -52,6 +57,16 @@ class Bits(Case):
         planar[:, :, 2] = 0.0
         ended = []
         for u in (planar, planar.astype(np.float32), np.asfortranarray(planar), planar[:, :, :2], planar[::-1][::-1]):
+            sim = tl.VectorSimulation("pentagon", 4, set=JITTER)
+            sim.step(u, steps=20)
+            ended.append(sim.positions.copy())
+        for other in ended[1:]:
+            np.testing.assert_array_equal(ended[0], other)
+
+    def test_lists_integers_and_half_precision_are_exact(self) -> None:
+        exact = np.round(3 * commands(4, 0))
+        ended = []
+        for u in (exact, exact.tolist(), exact.astype(np.int8), exact.astype(np.float16), exact.astype(">f8")):
             sim = tl.VectorSimulation("pentagon", 4, set=JITTER)
             sim.step(u, steps=20)
             ended.append(sim.positions.copy())
@@ -114,6 +129,35 @@ class Resets(Case):
         self.assertEqual(sim.steps.tolist(), [720, 401, 720])
         self.assertEqual(sim.statuses([True, False, False])[1:], [None, None])
 
+    def test_a_step_returns_when_all_worlds_have_ended(self) -> None:
+        sim = tl.VectorSimulation("pentagon", 3, set=JITTER)
+        sim.step(steps=10**12)
+        self.assertEqual(sim.steps.tolist(), [720] * 3)
+        sim.step(np.zeros((3, 5, 3)), steps=10**18)
+
+    def test_own_arrays_are_masks(self) -> None:
+        sim = tl.VectorSimulation("pentagon", 2, set=JITTER)
+        sim.reset([False, True])
+        sim.step(steps=10)
+        sim.reset(np.array([True, False]))
+        sim.step(steps=710)
+        self.assertEqual(sim.is_over.tolist(), [False, True])
+        self.assertEqual(sim.statuses(sim.is_over)[0], None)
+        sim.reset(sim.is_over)
+        self.assertEqual((sim.steps.tolist(), sim.is_over.any()), ([710, 0], False))
+
+    def test_seeds_outside_of_the_mask_are_ignored_and_none_is_the_next(self) -> None:
+        sim = tl.VectorSimulation("pentagon", 3, set=JITTER)
+        for outside in (-1, 2**70, "x", None, 1.5):
+            sim.reset([False, True, False], seeds=[outside, 40, outside])
+            self.assertEqual(sim.seeds.tolist(), [0, 40, 2])
+        sim.reset(seeds=[7, None, np.uint64(9)])
+        self.assertEqual(sim.seeds.tolist(), [7, 43, 9])
+        sim.reset(seeds=np.array([1, 2, 3], dtype=np.int8))
+        self.assertEqual(sim.seeds.tolist(), [1, 2, 3])
+        sim.reset(seeds=range(3))
+        self.assertEqual(sim.seeds.tolist(), [0, 1, 2])
+
     def test_autoreset_takes_the_next_seed_and_does_not_fly(self) -> None:
         sim = tl.VectorSimulation("pentagon", 2, seeds=[3, 8], autoreset=True, set=JITTER)
         sim.step(steps=10**6)
@@ -151,11 +195,11 @@ class WrongInput(Case):
     def test_wrong_commands_are_refused_and_nothing_moves(self) -> None:
         sim = tl.VectorSimulation("pentagon", 2)
         for message, u in (
-            ("not of int64", np.zeros((2, 5, 3), dtype=np.int64)),
-            ("not of float16", np.zeros((2, 5, 3), dtype=np.float16)),
-            ("not of >f8", np.zeros((2, 5, 3), dtype=">f8")),
-            ("not list", [[0.0]]),
+            ("not complex128", np.zeros((2, 5, 3), dtype=complex)),
+            ("not bool", np.zeros((2, 5, 3), dtype=bool)),
+            ("not float", 0.0),
             ("masked", np.ma.masked_array(np.zeros((2, 5, 3)))),
+            ("masked", np.ma.masked_array(np.zeros((2, 5, 3), dtype=np.int8))),
         ):
             self.refuses(TypeError, message, lambda u=u: sim.step(u))
         for shape in ((5, 3), (2, 5), (2, 5, 1), (3, 5, 3), (2, 4, 3), (2, 5, 3, 1)):
@@ -164,6 +208,11 @@ class WrongInput(Case):
             u = np.zeros((2, 5, 3), dtype=kind)
             u[1, 3, 2] = value
             self.refuses(tl.Error, "u[1, 3, 2]: must be a finite number", lambda u=u: sim.step(u))
+        self.refuses(tl.Error, "m/s^2, got 1e300", lambda: sim.step(np.full((2, 5, 3), 1e300)))
+        self.refuses(tl.Error, "is larger than 2^53", lambda: sim.step([[[2**53 + 1, 0.5, 0.0]] * 5] * 2))
+        sim.positions.setflags(write=False)
+        self.refuses(tl.Error, "positions: the array is read-only; call positions.setflags", lambda: sim.step())
+        sim.positions.setflags(write=True)
         for steps, kind in ((0, tl.Error), (-1, tl.Error), (1.0, TypeError), (True, TypeError), ("1", TypeError)):
             self.refuses(kind, "steps: ", lambda steps=steps: sim.step(steps=steps))
         for out, kind in (
@@ -187,7 +236,13 @@ class WrongInput(Case):
             (tl.Error, "shape (2,) is needed, not of shape (3,)", lambda: make("pentagon", 2, seeds=[1, 2, 3])),
             (tl.Error, "seeds[1]: must be a whole number from 0", lambda: make("pentagon", 2, seeds=[1, -2])),
             (tl.Error, "seeds[0]: must be a whole number from 0", lambda: make("pentagon", 1, seeds=[2**63])),
-            (TypeError, "seeds: whole numbers are needed", lambda: make("pentagon", 2, seeds=[1.0, 2.0])),
+            (TypeError, "seeds[0]: a whole number is needed", lambda: make("pentagon", 2, seeds=[1.0, 2.0])),
+            (TypeError, "seeds: whole numbers are needed", lambda: make("pentagon", 2, seeds=np.ones(2))),
+            (TypeError, "seeds: a list of whole numbers", lambda: make("pentagon", 2, seeds=3)),
+            (TypeError, "seeds[1]: a whole number is needed", lambda: make("pentagon", 2, seeds=[3, None])),
+            (TypeError, "seeds[0]: a whole number is needed", lambda: make("pentagon", 2).reset(seeds=[True, 1])),
+            (tl.Error, "shape (2,) is needed, not of shape (0,)", lambda: make("pentagon", 2, seeds=[])),
+            (tl.Error, "seeds[0]: must be a whole number from 0", lambda: make("pentagon", 2, seeds=[2**63, 0])),
             (TypeError, "autoreset: True or False", lambda: make("pentagon", 2, autoreset=1)),
             (TypeError, "mask: an array of bool", lambda: make("pentagon", 2).reset([1, 0])),
             (tl.Error, "mask: an array of shape (2,)", lambda: make("pentagon", 2).reset([True])),

@@ -63,6 +63,8 @@ class Words(Case):
             ("--no-config ignores the file", None, "config=False ignores the file"),
             ("give a --to that is at least --from", None, "give a to_s that is at least from_s"),
             ("--from and --to", "margin/range", "start and stop"),
+            ("--from 1 --to 1: equal", "margin/range", "start=1 stop=1: equal"),
+            ("with --format csv, parquet", "export/unknown-format", 'with to="csv", parquet'),
             ("no effect with --to skyb", "export/unused-option", 'no effect with to="skyb"'),
             ("--key a --key b", "sweep/grid", 'keys="a" keys="b"'),
             ("run `tautline check --set x`", None, "run `tautline check --set x`"),
@@ -98,6 +100,8 @@ class Words(Case):
             lambda: tl.margin(short(), "time.duration_s", -1, 1, log=True),
             lambda: tl.sweep(short(), {}),
             lambda: tl.sweep(short(), {"law.alpha": [1, 1]}),
+            lambda: tl.sweep(short(), {"law.alpha": []}),
+            lambda: tl.VectorSimulation("pentagon", 1, seeds=[75], set={"start.jitter_m": 0.6}),
             lambda: tl.sweep(short(), {"start.seed": [0.5]}),
             lambda: tl.attack(short()),
             lambda: tl.attack(short(), start=0.1, flights=0),
@@ -110,6 +114,7 @@ class Words(Case):
                 with self.assertRaises((tl.Error, OSError)) as caught:
                     do()
                 self.assertNotRegex(str(caught.exception), r"(?<![\w-])--[a-z]")
+                self.assertNotRegex(str(caught.exception), "KEY=")
 
     def test_notes_name_no_option(self) -> None:
         file = self.folder / "a.csv"

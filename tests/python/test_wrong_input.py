@@ -26,6 +26,38 @@ class Arrays(Case):
         ):
             self.refuses(TypeError, message, lambda t=times, p=positions: tl.audit(t, p, delta=1.0))
 
+    def test_integers_that_are_no_doubles_are_refused_beside_floats(self) -> None:
+        import pandas
+        import pyarrow
+
+        big, message = 2**53, "is larger than 2^53 and is no float64"
+        t, near = [0.0, 1.0], [[big + 1, 0.0, 0.0], [big + 3, 0.0, 0.0]]
+        rows = [[np.array([big + 1, 0, 0]), np.array([0.5, 0.0, 0.0])]] * 2
+        for times, positions in (
+            (t, [near] * 2),
+            (t, [tuple(map(tuple, near))] * 2),
+            (t, rows),
+            (t, [[[2**63 + 1, 0, 0], [-1, 0, 0]]] * 2),
+            ([0.5, big + 1], [[[0.0] * 3, [2.0, 0.0, 0.0]]] * 2),
+            (pyarrow.array([0, big + 1, None]), [[[0.0] * 3, [2.0, 0.0, 0.0]]] * 3),
+            (pandas.DataFrame({"a": [0.5], "b": [big + 1]}), [[[0.0] * 3, [2.0, 0.0, 0.0]]] * 2),
+        ):
+            self.refuses(tl.Error, message, lambda t=times, p=positions: tl.audit(t, p, delta=3.0))
+        # Floats of this size are exact, and so are integers up to 2^53.
+        for far in (float(big), big):
+            positions = [[[far, 0.0, 0.0], [far - 2, 0.0, 0.0]]] * 2
+            self.assertEqual(tl.audit(t, positions, delta=1.0).separation_m, 2.0)
+        sim = tl.Simulation("pentagon")
+        self.refuses(tl.Error, message, lambda: sim.step([[big + 1, 0.5, 0.0]] * 5))
+        rounded = "delta: the integer 9007199254740993 is no float64"
+        self.refuses(tl.Error, rounded, lambda: tl.audit(*passing(), delta=big + 1))
+        self.refuses(tl.Error, message, lambda: tl.Shield([[big + 1, 0.5], [0, 0]], delta_m=1, period_s=0.1))
+
+    def test_masked_arrays_in_lists_are_refused(self) -> None:
+        hidden = np.ma.masked_array(np.zeros((2, 3)), mask=True)
+        for positions in ([hidden, hidden], [list(hidden), list(hidden)]):
+            self.refuses(TypeError, "masked", lambda p=positions: tl.audit([0.0, 1.0], p, delta=1.0))
+
     def test_wrong_shapes_are_refused(self) -> None:
         t, p = passing()
         for message, times, positions in (

@@ -101,6 +101,12 @@ pub struct Sweep {
     pub points: Vec<Point>,
 }
 
+/// Returns the failure of values, which the command line and Python give in different forms.
+fn wrong_values(why: &str) -> Failure {
+    Failure::input("sweep/key", why, "give finite numbers, each of them once")
+}
+
+/// Returns the failure of a text.
 fn wrong(why: &str) -> Failure {
     let help = format!(
         "write KEY=FROM:TO:COUNT with two different finite numbers and a count from 2 to {MOST_POINTS}, or \
@@ -156,9 +162,11 @@ impl SweptKey {
         let key = key.trim().to_owned();
         let twice = values.iter().enumerate().find(|(k, value)| values[..*k].contains(value));
         match (values.iter().find(|value| !value.is_finite()), twice) {
-            (Some(value), _) => Err(wrong(&format!("--key {key}: {value} is not finite"))),
-            (None, Some((_, value))) => Err(wrong(&format!("--key {key}: {value} is given twice"))),
-            (None, None) if values.is_empty() || key.is_empty() => Err(wrong("--key: the grid is empty")),
+            (Some(value), _) => Err(wrong_values(&format!("--key {key}: {value} is not finite"))),
+            (None, Some((_, value))) => Err(wrong_values(&format!("--key {key}: {value} is given twice"))),
+            (None, None) if values.is_empty() || key.is_empty() => {
+                Err(wrong_values(&format!("--key {key}: the grid is empty")))
+            }
             (None, None) => Ok(Self { key, values }),
         }
     }
@@ -256,7 +264,7 @@ impl Experiment for Options {
             return Err(scenario(&points[0])
                 .map_err(refused)
                 .err()
-                .unwrap_or_else(|| wrong("--key: the grid is empty")));
+                .unwrap_or_else(|| wrong_values("--key: the grid is empty")));
         };
         let keys: Vec<_> = self.keys.iter().map(|of| &*of.key).collect();
         let runs = Runs::new(self.runs, self.seed, base, is_random || keys.contains(&JITTER_KEY));

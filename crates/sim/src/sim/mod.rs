@@ -16,7 +16,7 @@ pub use ending::{Breakdown, Ending, Flight, Performance, SimError};
 pub(crate) use ending::{MAX_BEND_M, Stopwatch};
 pub use judge::{audit_obstacle, audit_shape};
 pub use simulation::{Components, SavedState, Simulation};
-pub use vector::{States, StatesMut, Threads, VectorError, VectorSimulation};
+pub use vector::{SeedChoice, States, StatesMut, Threads, VectorError, VectorSimulation};
 
 use std::ops::ControlFlow;
 use std::time::Instant;

@@ -19,6 +19,8 @@ const LOAD_OF_A_THREAD: u64 = 1000;
 const LOAD_OF_A_START: u64 = 100;
 /// Expected memory of a world besides its vehicles and edges \[bytes\].
 const BYTES_PER_WORLD: u128 = 49_152;
+/// Number of seeds that are tried for a valid start.
+const MOST_SEEDS: u64 = 1000;
 /// Number of steps of single vehicles between two calls of `carries_on`.
 const VEHICLE_STEPS_AT_ONCE: u64 = 100_000;
 
@@ -58,6 +60,18 @@ pub enum Threads {
     One,
     /// The calling thread, and all threads of a pool.
     With(Arc<ThreadPool>),
+}
+
+/// Choice of the seed of a world.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SeedChoice {
+    /// The next seed of the world with a valid start: its seed plus E, or else E later, at most 1000 seeds.
+    #[default]
+    Next,
+    /// The first seed with a valid start: this one, or else E later, at most 1000 seeds.
+    From(u64),
+    /// This seed. It is an error if it has no valid start.
+    Exactly(u64),
 }
 
 /// Memory of a caller for the states of E worlds of N vehicles, world by world and vehicle by vehicle.
@@ -111,7 +125,7 @@ pub enum VectorError {
         found: usize,
     },
     /// A command is not finite, or too large.
-    #[error("u[{world}, {vehicle}, {axis}]: must be a finite number up to {MAX_COMMAND_M_S2:e} m/s^2, got {value}")]
+    #[error("u[{world}, {vehicle}, {axis}]: must be a finite number up to {MAX_COMMAND_M_S2:e} m/s^2, got {value:e}")]
     Command {
         /// The world, from 0.
         world: usize,
@@ -122,7 +136,7 @@ pub enum VectorError {
         /// The acceleration \[m/s^2\].
         value: f64,
     },
-    /// A seed gives no valid start. If a world is reset because it ended, the other worlds have advanced.
+    /// A given seed gives no valid start.
     #[error("seeds[{world}]: seed {seed} gives no valid scenario: {why}")]
     Seed {
         /// The world, from 0.
@@ -130,6 +144,16 @@ pub enum VectorError {
         /// Its seed.
         seed: u64,
         /// Reason.
+        why: ScenarioError,
+    },
+    /// No seed of a search gives a valid start. If a world is reset because it ended, the other worlds have advanced.
+    #[error("seeds[{world}]: {MOST_SEEDS} seeds from {first} on give no valid scenario, the last one because of {why}")]
+    NoSeed {
+        /// The world, from 0.
+        world: usize,
+        /// First seed of the search.
+        first: u64,
+        /// Reason of the last seed.
         why: ScenarioError,
     },
     /// The scenario cannot be flown in this way.
@@ -155,6 +179,30 @@ struct Starts {
     law: NamedLaw,
     /// Whether start or flight depends on a seed.
     is_random: bool,
+    /// Number of worlds E.
+    worlds: u64,
+}
+
+/// Search for a seed with a valid start.
+#[derive(Clone, Copy)]
+struct Search {
+    /// The world, from 0.
+    world: usize,
+    /// First seed.
+    first: u64,
+    /// Whether seeds after the first one are tried.
+    goes_on: bool,
+}
+
+impl Search {
+    /// Returns the search of a choice. `next` is the seed after the present one of the world.
+    const fn of(choice: SeedChoice, world: usize, next: u64) -> Self {
+        match choice {
+            SeedChoice::Next => Self { world, first: next, goes_on: true },
+            SeedChoice::From(first) => Self { world, first, goes_on: true },
+            SeedChoice::Exactly(first) => Self { world, first, goes_on: false },
+        }
+    }
 }
 
 impl VectorSimulation {
@@ -164,6 +212,15 @@ impl VectorSimulation {
     /// [`VectorError::NoWorlds`], [`VectorError::TooMany`], [`VectorError::Seed`] if a seed gives no valid start, and
     /// [`VectorError::Sim`] if the audit does not support the scenario.
     pub fn new(template: Template, seeds: &[u64], threads: Threads) -> Result<Self, VectorError> {
+        let seeds: Vec<_> = seeds.iter().copied().map(SeedChoice::Exactly).collect();
+        Self::with_seeds(template, &seeds, threads)
+    }
+
+    /// Creates one world for each choice of a seed. The next seed of world k is k.
+    ///
+    /// # Errors
+    /// As [`VectorSimulation::new`], and [`VectorError::NoSeed`].
+    pub fn with_seeds(template: Template, seeds: &[SeedChoice], threads: Threads) -> Result<Self, VectorError> {
         if seeds.is_empty() {
             return Err(VectorError::NoWorlds);
         }
@@ -173,17 +230,16 @@ impl VectorSimulation {
         }
         let vehicles = template.own().count();
         let is_random = template.start_is_random() || template.flight_is_random();
-        let starts = Starts { law: template.own_law(), template, is_random };
-        let places: Vec<_> = seeds.iter().copied().enumerate().collect();
-        let world = |((_, seed), simulation): (_, Simulation)| World {
+        let starts = Starts { law: template.own_law(), template, is_random, worlds: seeds.len() as u64 };
+        let searches: Vec<_> = seeds.iter().zip(0..).map(|(&choice, k)| Search::of(choice, k, k as u64)).collect();
+        let world = |(seed, simulation)| World {
             seed,
             simulation,
             commands: Rows::zeros(vehicles),
             rests: false,
             failure: None,
         };
-        let simulations = starts.simulations(&places, &threads)?;
-        let worlds = places.into_iter().zip(simulations).map(world).collect();
+        let worlds = starts.simulations(&searches, &threads)?.into_iter().map(world).collect();
         Ok(Self { starts, worlds, vehicles, resets_ended: false, threads })
     }
 
@@ -237,11 +293,12 @@ impl VectorSimulation {
     ///
     /// `commands` are accelerations \[m/s^2\], E x N x 3, held over all of these steps ([`Simulation::step_with`]).
     /// Those of ended worlds are ignored. Without commands the law flies ([`Simulation::step`]). With
-    /// [`VectorSimulation::set_autoreset`], a world that had ended before this call is reset instead, to its next seed:
-    /// its seed plus E.
+    /// [`VectorSimulation::set_autoreset`], a world that had ended before this call is reset instead, to its next seed
+    /// ([`SeedChoice::Next`]). The call returns early when all worlds have ended.
     ///
     /// # Errors
-    /// [`VectorError`]: a wrong length; a command that is not finite; commands under a shield.
+    /// [`VectorError`]: a wrong length; a command that is not finite; commands under a shield. For
+    /// [`VectorError::NoSeed`] the world stays ended, and the others fly all steps.
     pub fn step(
         &mut self,
         commands: Option<&[f64]>,
@@ -269,7 +326,7 @@ impl VectorSimulation {
         }
         let (count, vehicles, width) = (self.worlds.len() as u64, self.vehicles as u64, 3 * self.vehicles);
         let at_once = (VEHICLE_STEPS_AT_ONCE / (count * vehicles)).max(1);
-        let mut flown = 0;
+        let (mut flown, mut failure) = (0, None);
         while flown < steps {
             let (is_first, some) = (flown == 0, at_once.min(steps - flown));
             let (resets_ended, starts) = (self.resets_ended, &self.starts);
@@ -282,42 +339,43 @@ impl VectorSimulation {
                     world.fly(commands.map(|commands| &commands[k * width..(k + 1) * width]), some);
                 } else if resets_ended && is_first {
                     world.rests = true;
-                    world.failure = world.restart(starts, k, later(world.seed, count)).err();
+                    world.failure = world.restart(starts, k).err();
                 }
             };
             for_each(&mut self.worlds, (&self.threads, some.saturating_mul(count * vehicles)), states, advance);
-            if let Some(failure) = self.worlds.iter_mut().find_map(|world| world.failure.take()) {
-                return Err(failure);
-            }
+            let mut failures = self.worlds.iter_mut().filter_map(|world| world.failure.take());
+            failure = failure.or(failures.next());
+            failures.for_each(drop);
             flown += some;
-            if !carries_on() {
+            let all_rest = self.worlds.iter().all(|world| world.rests || world.simulation.ending().is_some());
+            if all_rest || !carries_on() {
                 break;
             }
         }
-        Ok(())
+        failure.map_or(Ok(()), Err)
     }
 
-    /// Resets the chosen worlds to their starts, with these seeds or else with the next seed of each: its seed plus E.
-    /// Writes the states of all worlds.
+    /// Resets the chosen worlds to their starts, with these seeds or else with the next seed of each. Writes the states
+    /// of all worlds. The seeds of other worlds are ignored.
     ///
     /// # Errors
-    /// [`VectorError`]: a wrong length, or a seed without a valid start.
+    /// [`VectorError`]: a wrong length, or seeds without a valid start. No world is reset then.
     pub fn reset(
         &mut self,
         chosen: &[bool],
-        seeds: Option<&[u64]>,
+        seeds: Option<&[SeedChoice]>,
         states: &mut StatesMut<'_>,
     ) -> Result<(), VectorError> {
         let count = self.count();
         self.check_lengths(states)?;
         check("mask", count, chosen.len())?;
         seeds.map_or(Ok(()), |seeds| check("seeds", count, seeds.len()))?;
-        let starts = &self.starts;
-        let next = |(k, world): (usize, &World)| (k, seeds.map_or_else(|| later(world.seed, count as u64), |of| of[k]));
-        let drawn: Vec<_> = self.worlds.iter().enumerate().filter(|(k, _)| chosen[*k]).map(next).collect();
-        let made = starts.simulations(&drawn, &self.threads)?;
-        for ((k, seed), simulation) in drawn.into_iter().zip(made) {
-            (self.worlds[k].seed, self.worlds[k].simulation) = (seed, simulation);
+        let choice = |k| seeds.map_or(SeedChoice::Next, |seeds: &[SeedChoice]| seeds[k]);
+        let next = |(k, world): (usize, &World)| Search::of(choice(k), k, self.starts.later(world.seed));
+        let searches: Vec<_> = self.worlds.iter().enumerate().filter(|(k, _)| chosen[*k]).map(next).collect();
+        let made = self.starts.simulations(&searches, &self.threads)?;
+        for (search, (seed, simulation)) in searches.into_iter().zip(made) {
+            (self.worlds[search.world].seed, self.worlds[search.world].simulation) = (seed, simulation);
         }
         for_each(&mut self.worlds, (&Threads::One, 0), states, |_| ());
         Ok(())
@@ -370,7 +428,7 @@ impl World {
             if commands.is_none() {
                 self.simulation.step();
             } else if let Err(error) = self.simulation.step_with(&self.commands) {
-                self.failure = Some(error.into());
+                (self.failure, self.rests) = (Some(error.into()), true);
                 return;
             }
             // Events are not recorded here.
@@ -381,9 +439,8 @@ impl World {
         }
     }
 
-    fn restart(&mut self, starts: &Starts, place: usize, seed: u64) -> Result<(), VectorError> {
-        self.simulation = starts.simulation(place, seed)?;
-        self.seed = seed;
+    fn restart(&mut self, starts: &Starts, place: usize) -> Result<(), VectorError> {
+        (self.seed, self.simulation) = starts.first(Search::of(SeedChoice::Next, place, starts.later(self.seed)))?;
         Ok(())
     }
 
@@ -403,14 +460,33 @@ impl World {
 }
 
 impl Starts {
-    /// Returns simulations at the starts of the seeds of some worlds. An error is that of the first such world.
-    fn simulations(&self, drawn: &[(usize, u64)], threads: &Threads) -> Result<Vec<Simulation>, VectorError> {
-        let mut made: Vec<_> = drawn.iter().map(|_| None).collect();
-        let helpers = threads.helpers(LOAD_OF_A_START * drawn.len() as u64);
-        threads.share(helpers, drawn.iter().zip(&mut made), |(&(world, seed), made)| {
-            *made = Some(self.simulation(world, seed));
+    /// Returns the found seeds, with simulations at their starts. An error is that of the first such world.
+    fn simulations(&self, searches: &[Search], threads: &Threads) -> Result<Vec<(u64, Simulation)>, VectorError> {
+        let mut made: Vec<_> = searches.iter().map(|_| None).collect();
+        let helpers = threads.helpers(LOAD_OF_A_START * searches.len() as u64);
+        threads.share(helpers, searches.iter().zip(&mut made), |(&search, made)| {
+            *made = Some(self.first(search));
         });
         made.into_iter().flatten().collect()
+    }
+
+    /// Returns the first seed with a valid start, and the simulation at this start.
+    fn first(&self, Search { world, first, goes_on }: Search) -> Result<(u64, Simulation), VectorError> {
+        let (mut seed, mut tried) = (first, 1);
+        loop {
+            match self.simulation(world, seed) {
+                Err(VectorError::Seed { .. }) if goes_on && tried < MOST_SEEDS => {
+                    (seed, tried) = (self.later(seed), tried + 1);
+                }
+                Err(VectorError::Seed { why, .. }) if goes_on => return Err(VectorError::NoSeed { world, first, why }),
+                made => return Ok((seed, made?)),
+            }
+        }
+    }
+
+    /// Returns the next seed of a world, among those of a scenario file.
+    fn later(&self, seed: u64) -> u64 {
+        seed.wrapping_add(self.worlds) & i64::MAX.cast_unsigned()
     }
 
     /// Returns a simulation at the start of a seed.
@@ -506,11 +582,6 @@ impl Threads {
             _ => rayon::in_place_scope(|scope| with_helpers(scope, helpers, &run)),
         }
     }
-}
-
-/// Returns the next seed of a world, among those of a scenario file.
-fn later(seed: u64, worlds: u64) -> u64 {
-    seed.wrapping_add(worlds) & i64::MAX.cast_unsigned()
 }
 
 fn check(what: &'static str, expected: usize, found: usize) -> Result<(), VectorError> {

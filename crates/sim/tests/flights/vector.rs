@@ -2,7 +2,7 @@
 
 use tautline_core::swarm::Rows;
 use tautline_sim::scenario::{Draw, Override, Source, Template};
-use tautline_sim::sim::{Ending, SimError, Simulation, States, Threads, VectorError, VectorSimulation};
+use tautline_sim::sim::{Ending, SeedChoice, SimError, Simulation, States, Threads, VectorError, VectorSimulation};
 
 /// Steps of a call: enough for two helping threads.
 const STEPS_OF_A_CALL: u64 = 80;
@@ -84,7 +84,13 @@ fn an_ended_world_stops_no_other_and_resets_to_its_next_seed() {
     let mut worlds = VectorSimulation::new(template.clone(), &[7, 8, 9], Threads::Current).expect("worlds");
     let mut states = States::of(&worlds);
     worlds.step(None, 100, &mut states.borrow()).expect("flown");
-    worlds.reset(&[false, true, false], Some(&[0, 40, 0]), &mut states.borrow()).expect("reset");
+    worlds
+        .reset(
+            &[false, true, false],
+            Some(&[SeedChoice::Exactly(0), SeedChoice::Exactly(40), SeedChoice::Next]),
+            &mut states.borrow(),
+        )
+        .expect("reset");
     assert_eq!(worlds.seeds().collect::<Vec<_>>(), [7, 40, 9]);
     worlds.step(None, 100, &mut states.borrow()).expect("flown");
     assert_eq!(states.is_over, [true, false, true]);
@@ -167,7 +173,50 @@ fn a_seed_without_a_valid_start_is_named_and_resets_nothing() {
     let mut worlds = VectorSimulation::new(template, &good[..2], Threads::Current).expect("worlds");
     let mut states = States::of(&worlds);
     worlds.step(None, 3, &mut states.borrow()).expect("flown");
-    let seeds = [good[2], bad[0]];
+    let seeds = [good[2], bad[0]].map(SeedChoice::Exactly);
     worlds.reset(&[true, true], Some(&seeds), &mut states.borrow()).expect_err("an invalid start");
     assert_eq!((worlds.world(0).steps(), worlds.world(1).steps()), (3, 3));
+}
+
+#[test]
+fn a_search_takes_the_first_seed_with_a_valid_start() {
+    let template = template("pentagon", &["start.jitter_m=0.9", "time.duration_s=1"]);
+    let law = template.own_law();
+    let is_valid = |seed: u64| template.scenario(&law, Draw { seed, jitter_m: None }).is_ok();
+    let first = |mut seed: u64| {
+        while !is_valid(seed) {
+            seed += 2;
+        }
+        seed
+    };
+    // The two seeds after `good` are invalid.
+    let good = (0..1000_u64).find(|&seed| is_valid(seed) && !is_valid(seed + 2) && is_valid(seed + 1)).expect("a seed");
+    let mut worlds = VectorSimulation::new(template.clone(), &[good, good + 1], Threads::Current).expect("worlds");
+    let mut states = States::of(&worlds);
+    worlds.set_autoreset(true);
+    // The call returns when all worlds have ended.
+    worlds.step(None, u64::MAX, &mut states.borrow()).expect("flown");
+    assert_eq!(states.is_over, [true, true]);
+    worlds.step(None, u64::MAX, &mut states.borrow()).expect("reset");
+    assert_eq!(worlds.seeds().collect::<Vec<_>>(), [first(good + 2), first(good + 3)]);
+    assert_eq!((worlds.world(0).steps(), worlds.world(1).steps()), (0, 0));
+    let seeds = [SeedChoice::From(good + 2), SeedChoice::From(good)];
+    worlds.reset(&[true, true], Some(&seeds), &mut states.borrow()).expect("reset");
+    assert_eq!(worlds.seeds().collect::<Vec<_>>(), [first(good + 2), good]);
+}
+
+#[test]
+fn a_world_without_a_valid_start_costs_the_others_no_step() {
+    // Hardly any seed gives a valid start.
+    let sets = ["start.jitter_m=0.5", "law.delta_m=1.55", "start.seed=347", "time.duration_s=1"];
+    let (template, seeds) = (template("swap", &sets), [347, 347]);
+    let mut worlds = VectorSimulation::new(template, &seeds, Threads::Current).expect("worlds");
+    let mut states = States::of(&worlds);
+    worlds.step(None, 200, &mut states.borrow()).expect("flown");
+    worlds.reset(&[false, true], Some(&[SeedChoice::Exactly(seeds[1]); 2]), &mut states.borrow()).expect("reset");
+    worlds.set_autoreset(true);
+    worlds.step(None, 100, &mut states.borrow()).expect("flown");
+    let refused = worlds.step(None, 30, &mut states.borrow()).expect_err("no valid start");
+    assert!(matches!(refused, VectorError::NoSeed { world: 0, .. }), "{refused}");
+    assert_eq!((states.is_over[0], worlds.world(1).steps()), (true, 130));
 }

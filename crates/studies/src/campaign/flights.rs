@@ -107,13 +107,14 @@ impl Campaign {
         Ok(campaign)
     }
 
-    /// Returns the campaign of a manifest. `external_law` is the law that the manifest names, if it names one.
+    /// Returns the campaign of a manifest in the folder `at`. `external_law` is the law that the manifest names, if it
+    /// names one.
     ///
     /// # Errors
     /// [`Failure`] if the campaign cannot be flown here, for example because a file of its scenario is missing or
     /// different, or because it has another law.
-    pub fn of(manifest: Manifest, external_law: Option<&ExternalLaw>) -> Result<Self, Failure> {
-        check_external_law(&manifest, external_law)?;
+    pub fn of(manifest: Manifest, at: &Path, external_law: Option<&ExternalLaw>) -> Result<Self, Failure> {
+        check_external_law(&manifest, at, external_law)?;
         let spec = Spec::read("the specification in the manifest", &manifest.spec)?;
         let campaign = Self::read(manifest, &spec, external_law)?;
         let first = campaign.first();
@@ -124,7 +125,7 @@ impl Campaign {
                 campaign.manifest.first.join(", ")
             );
             let remedy = "use the same files of the scenario on all machines";
-            return Err(other_campaign(&campaign.manifest.folder, problem, remedy));
+            return Err(other_campaign(at, problem, remedy));
         }
         Ok(campaign)
     }
@@ -421,7 +422,7 @@ impl Campaign {
 }
 
 /// Refuses an external law that is not the one that a manifest names.
-fn check_external_law(manifest: &Manifest, given: Option<&ExternalLaw>) -> Result<(), Failure> {
+fn check_external_law(manifest: &Manifest, at: &Path, given: Option<&ExternalLaw>) -> Result<(), Failure> {
     let (planned, given) = (manifest.external_law.as_deref(), given.map(ExternalLaw::name));
     if planned == given {
         return Ok(());
@@ -432,7 +433,7 @@ fn check_external_law(manifest: &Manifest, given: Option<&ExternalLaw>) -> Resul
         Some(law) => format!("continue the campaign in Python: tautline.campaign(..., law={law}(...))"),
         None => "continue without an external law, or give another folder".to_owned(),
     };
-    Err(other_campaign(&manifest.folder, problem, remedy))
+    Err(other_campaign(at, problem, remedy))
 }
 
 fn written<'a>(drawn: &'a BTreeMap<&'a str, toml::Value>) -> impl Iterator<Item = String> + 'a {

@@ -70,7 +70,7 @@ impl Folder {
                 let remedy = "leave --shards out to continue, or give another folder with --out";
                 return Err(other_campaign(path, problem, remedy));
             }
-            return Ok(Self { path: path.to_owned(), campaign: Campaign::of(there, campaign.external_law())? });
+            return Ok(Self { path: path.to_owned(), campaign: Campaign::of(there, path, campaign.external_law())? });
         }
         if let Some(there) = LEFT.iter().map(|name| path.join(name)).find(|there| there.exists()) {
             let problem = "the file exists, and the folder has no manifest of a campaign";
@@ -95,7 +95,7 @@ impl Folder {
     /// As [`Manifest::read`] and [`Campaign::of`].
     pub fn open(path: &Path, program: &Program) -> Result<Self, Failure> {
         let file = if path.is_file() { path.to_owned() } else { path.join("manifest.json") };
-        let campaign = Campaign::of(Manifest::read(&file, program)?, None)?;
+        let campaign = Campaign::of(Manifest::read(&file, program)?, path, None)?;
         let folder = if path.is_file() { path.parent().unwrap_or(Path::new("")) } else { path };
         Ok(Self { path: folder.to_owned(), campaign })
     }

@@ -50,7 +50,7 @@ impl Folder {
             let remedy = "their interval needs a number of runs that was fixed beforehand: give another folder";
             return Err(other_campaign(path, problem, remedy));
         }
-        let old = Self::at(path, Campaign::of(there, campaign.external_law())?);
+        let old = Self::at(path, Campaign::of(there, path, campaign.external_law())?);
         let new = Self::at(path, campaign.raised());
         new.create_parts()?;
         let manifest = new.campaign().manifest();

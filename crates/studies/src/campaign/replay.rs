@@ -1,5 +1,6 @@
 //! Replays of flights of a campaign: the worst flights for its page, and any flight by its number.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use super::folder::FAULTY;
@@ -16,6 +17,11 @@ use tautline_report::request::{
     Failure, Monitor, Pictures, Quiet, RECORDING, RunFiles, RunRequest, command_line, replay_of_run, run_into,
 };
 use tautline_sim::scenario::Scenario;
+
+/// Folder of the worst flights, in the folder of the campaign.
+const WORST_FLIGHTS: &str = "worst";
+/// Empty file in the folder of a flight that the campaign chose, which distinguishes it from requested replays.
+const CHOSEN: &str = ".chosen-by-campaign";
 
 /// Request for a replay of a flight, with the folder of its files.
 #[derive(Clone, Debug)]
@@ -93,7 +99,16 @@ impl FlightId<'_> {
 
     /// Returns the default folder of the flight's files.
     fn folder(self, folder: &Folder) -> PathBuf {
-        folder.file("worst").join(self.name())
+        folder.file(WORST_FLIGHTS).join(self.name())
+    }
+
+    /// Creates the folder of a flight that the campaign chose.
+    fn create_chosen(self, folder: &Folder) -> Result<PathBuf, Failure> {
+        let path = self.folder(folder);
+        std::fs::create_dir_all(&path).map_err(file_failure("write", &path))?;
+        let mark = path.join(CHOSEN);
+        std::fs::write(&mark, "").map_err(file_failure("write", &mark))?;
+        Ok(path)
     }
 
     /// Returns a description of the flight.
@@ -216,7 +231,8 @@ pub(super) fn fly_worst_again(
         }
         let flight = FlightId { law, run: worst.run, bad: None };
         let scenario = flight.scenario(campaign)?;
-        let run = RunRequest::reproducible(&scenario, flight.command(campaign), flight.folder(folder));
+        let out = flight.create_chosen(folder)?;
+        let run = RunRequest::reproducible(&scenario, flight.command(campaign), out);
         let left = run_into(&run, pictures, &Quiet::new(monitor))?;
         check(flight, &left, &worst.state_hash)?;
         let replay = replay_of_run(&scenario, &left.log, &left.report, PAGE_BYTES / most.max(1));
@@ -225,10 +241,34 @@ pub(super) fn fly_worst_again(
     Ok(flights)
 }
 
+/// Removes the folders of flights that the campaign chose before it had more runs, and that are not among the worst
+/// now.
+pub(super) fn remove_former_worst(folder: &Folder, summary: &Summary) -> Result<(), Failure> {
+    let root = folder.file(WORST_FLIGHTS);
+    let names: Vec<_> = std::iter::zip(folder.campaign().laws(), &summary.laws)
+        .flat_map(|(law, of)| {
+            let worst = of.worst.iter().map(move |worst| FlightId { law, run: worst.run, bad: None });
+            worst.chain(of.bad.iter().map(move |bad| FlightId { law, run: bad.run, bad: Some(bad.bad) }))
+        })
+        .map(|flight| root.join(flight.name()))
+        .collect();
+    let entries = match std::fs::read_dir(&root) {
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+        entries => entries.map_err(file_failure("read", &root))?,
+    };
+    for entry in entries {
+        let path = entry.map_err(file_failure("read", &root))?.path();
+        if !names.contains(&path) && path.join(CHOSEN).is_file() && !path.is_symlink() {
+            std::fs::remove_dir_all(&path).map_err(file_failure("remove", &path))?;
+        }
+    }
+    Ok(())
+}
+
 /// Repeats a violated flight that a splitting estimate kept, and describes it for the page of the campaign.
 fn repeat_violated_flight(folder: &Folder, law: &Law, bad: &ViolatedRun) -> Result<WorstFlight, Failure> {
     let flight = FlightId { law, run: bad.run, bad: Some(bad.bad) };
-    fly_violated_flight(folder, flight, bad.bad, &flight.folder(folder))?;
+    fly_violated_flight(folder, flight, bad.bad, &flight.create_chosen(folder)?)?;
     let (run, number) = (bad.run.to_string(), bad.bad.to_string());
     // Relative to the folder of the page, so that the page has the same bytes for any path of the campaign.
     let command = ["campaign", "replay", ".", "--run", &run, "--law", &law.name, "--bad", &number];

@@ -4,7 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-use super::replay::{WorstFlight, fly_worst_again};
+use super::replay::{WorstFlight, fly_worst_again, remove_former_worst};
 use super::{ANSWER, Campaign, Folder, Program, RESULTS, Shard, Spec, Stop, Summary, Tally};
 use crate::Criterion;
 use crate::batch::Batch;
@@ -251,6 +251,7 @@ fn answer(
         monitor.warn(&format!("interrupted: all flights are kept, and no page was written; write it with: {report}"));
         return Ok(None);
     }
+    remove_former_worst(folder, &summary)?;
     let command = command_line(["campaign", "run", &format!("{}.toml", summary.name)].into_iter());
     // The command line has no external laws.
     let command = folder.campaign().external_law().is_none().then_some(command);
