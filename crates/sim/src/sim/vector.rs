@@ -18,7 +18,9 @@ const LOAD_OF_A_THREAD: u64 = 1000;
 /// Load of a new simulation, as a number of steps.
 const LOAD_OF_A_START: u64 = 100;
 /// Expected memory of a world besides its vehicles and edges \[bytes\].
-const BYTES_PER_WORLD: u128 = 49_152;
+const BYTES_PER_WORLD: u128 = 65_536;
+/// Expected memory of a vehicle in the engine that a world keeps for the next contact \[bytes\].
+const BYTES_PER_KEPT_VEHICLE: u128 = 1024;
 /// Number of seeds that are tried for a valid start.
 const MOST_SEEDS: u64 = 1000;
 /// Number of steps of single vehicles between two calls of `carries_on`.
@@ -248,7 +250,8 @@ impl VectorSimulation {
     #[must_use]
     pub fn most_worlds(scenario: &Scenario) -> usize {
         let edges = scenario.graph.edges().count() as u128;
-        let of_vehicles = scenario.count() as u128 * BYTES_PER_VEHICLE + edges * BYTES_PER_EDGE;
+        let of_vehicle = BYTES_PER_VEHICLE + BYTES_PER_KEPT_VEHICLE;
+        let of_vehicles = scenario.count() as u128 * of_vehicle + edges * BYTES_PER_EDGE;
         let most = MAX_MEMORY_BYTES / (BYTES_PER_WORLD + of_vehicles);
         usize::try_from(most).unwrap_or(usize::MAX).max(1)
     }
