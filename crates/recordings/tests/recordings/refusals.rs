@@ -224,6 +224,30 @@ fn decompression_bombs_are_refused() {
 }
 
 #[test]
+fn chunks_that_grow_without_end_are_refused() {
+    // Five chunks of 250 MiB, each with one record of zeros of an unknown kind.
+    const UNPACKED_BYTES: usize = 250 << 20;
+    let mut records = vec![0; UNPACKED_BYTES];
+    records[0] = 0x80;
+    records[1..9].copy_from_slice(&(UNPACKED_BYTES as u64 - 9).to_le_bytes());
+    let packed = zstd::encode_all(&records[..], 1).expect("packed");
+    drop(records);
+    let mut chunk = [[0; 16].as_slice(), &(UNPACKED_BYTES as u64).to_le_bytes(), &[0; 4]].concat();
+    for field in [&4_u32.to_le_bytes()[..], b"zstd", &(packed.len() as u64).to_le_bytes(), &packed] {
+        chunk.extend_from_slice(field);
+    }
+    let chunk = [&[6][..], &(chunk.len() as u64).to_le_bytes(), &chunk].concat();
+    let header = [&[1][..], &8_u64.to_le_bytes(), &[0; 8]].concat();
+    let file = |chunks: usize| [b"\x89MCAP0\r\n".as_slice(), &header, &chunk.repeat(chunks)].concat();
+    let refused = |chunks| {
+        let options = ReadOptions { allow_unfinished: true, ..ReadOptions::default() };
+        refused_with("flight.mcap", &file(chunks), &options).to_string()
+    };
+    assert!(!refused(1).contains("200 times"), "{}", refused(1));
+    assert!(refused(5).contains("its chunks unpack to more than 200 times their size"), "{}", refused(5));
+}
+
+#[test]
 fn entries_that_share_bytes_are_refused() {
     let mut zip = zip::ZipWriter::new(Cursor::new(Vec::new()));
     for name in ["a.csv", "b.csv"] {
