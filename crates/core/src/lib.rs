@@ -5,6 +5,7 @@
 //! | [`swarm`] | positions and velocities, a row per vehicle and a column per axis |
 //! | [`track`] | recorded motion of any origin: instants, pieces of curves, clocks |
 //! | [`record`] | a flight's samples as they are made, and the traits that receive them |
+//! | [`fact`] | facts that a statement rests on, with their sources |
 //! | [`text`] | formatting of numbers |
 //! | [`half_spaces`] | the point nearest to a wish in half-spaces and a ball, for laws and the shield |
 //!
@@ -13,6 +14,7 @@
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
+pub mod fact;
 pub mod half_spaces;
 pub mod record;
 pub mod swarm;

@@ -5,6 +5,8 @@
 
 use nalgebra::Vector3;
 
+use crate::fact::Fact;
+
 /// State of a vehicle at one instant.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
@@ -87,12 +89,15 @@ pub struct Clock {
 }
 
 /// Properties of a recording as a whole.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Metadata {
     /// Time scale.
     pub clock: Clock,
     /// Notes for the user on how the recording was read, one sentence each, such as: rows were sorted.
     pub notes: Vec<String>,
+    /// Facts behind times, positions and names of vehicles, each with its source. Facts may be added as the recording
+    /// is read.
+    pub facts: Vec<Fact>,
     /// Assumption behind the positions, as a phrase after "if"; `None` if the recording holds all positions of its
     /// items. A recording with an assumption proves nothing.
     pub assumed: Option<String>,
@@ -142,6 +147,11 @@ pub trait Tracks {
     /// [`Metadata::notes`].
     fn notes(&self) -> &[String] {
         &self.metadata().notes
+    }
+
+    /// [`Metadata::facts`].
+    fn facts(&self) -> &[Fact] {
+        &self.metadata().facts
     }
 
     /// [`Metadata::assumed`].

@@ -11,10 +11,11 @@ use tautline_audit::recorded::{
     TOUCHING_ELLIPSOIDS, Tallies,
 };
 use tautline_audit::{Status, Undecided, Violation};
+use tautline_core::fact::Fact;
 use tautline_core::swarm::Pair;
 
 /// The recording and how it was read.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Source {
     /// Path of the recording.
     pub recording: String,
@@ -24,6 +25,8 @@ pub struct Source {
     pub planar: bool,
     /// Notes on the reading, a sentence each.
     pub notes: Vec<String>,
+    /// Facts that the verdict rests on, with their sources.
+    pub facts: Vec<Fact>,
 }
 
 /// Clock of a recording.

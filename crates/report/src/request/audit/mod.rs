@@ -33,6 +33,7 @@ use crate::report::{Status, write_atomically};
 use replays::Instants;
 use tautline_audit::Obstacle;
 use tautline_audit::recorded::{Outcome, Presence, Settings, TrackAuditor};
+use tautline_core::fact::Fact;
 use tautline_core::track::Item;
 
 /// Number of items that are read before the first is judged. They determine the usual sampling intervals.
@@ -134,7 +135,7 @@ impl ConfiguredAudit<'_> {
         }
         auditor = auditor.with_interruption(monitor.interruption().clone());
         let mut instants = request.html.as_ref().map(|_| Instants::default());
-        let JudgedRecording { mut outcome, clock, mut notes, assumed, curves, is_planar } =
+        let JudgedRecording { mut outcome, clock, mut notes, mut facts, assumed, curves, is_planar } =
             self.judged(auditor, &settings, open, monitor, &mut |items, names| {
                 if let Some(instants) = &mut instants {
                     instants.note(items, names, &settings);
@@ -152,7 +153,8 @@ impl ConfiguredAudit<'_> {
         for note in &notes {
             monitor.warn(&format!("note: {note}"));
         }
-        let source = Source { recording: request.subject.name(), clock, planar: is_planar, notes };
+        facts.extend(request.facts(&between, self.asked_by.as_deref()));
+        let source = Source { recording: request.subject.name(), clock, planar: is_planar, notes, facts };
         let flight = AuditedFlight {
             open,
             name: request.subject.name(),
@@ -241,7 +243,8 @@ impl ConfiguredAudit<'_> {
         let clock = Clock { unit: clock.unit.to_owned(), inferred: clock.inferred, epoch_ns: clock.epoch_ns };
         let outcome = auditor.finish().map_err(|error| Failure::from(error).of(Path::new(&called)))?;
         let (notes, assumed) = (recording.notes().to_vec(), recording.assumed().map(str::to_owned));
-        Ok(JudgedRecording { outcome, clock, notes, assumed, curves, is_planar })
+        let facts = recording.facts().to_vec();
+        Ok(JudgedRecording { outcome, clock, notes, facts, assumed, curves, is_planar })
     }
 }
 
@@ -313,6 +316,7 @@ struct JudgedRecording {
     outcome: Outcome,
     clock: Clock,
     notes: Vec<String>,
+    facts: Vec<Fact>,
     /// Assumption about the samples themselves.
     assumed: Option<String>,
     /// Whether the recording has curves instead of samples.

@@ -11,6 +11,7 @@ use super::{ConfiguredAudit, PlanQuestion, RecordedLimits, Rules, Subject, confi
 use crate::figures::Format as FigureFormat;
 use crate::report::recorded::{AssumedMotion, Basis};
 use tautline_audit::recorded::{Interpolation, Outcome, RecordedError, Settings, VehicleSettings};
+use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::text::counted;
 use tautline_core::track::Item;
 
@@ -287,6 +288,23 @@ impl<'a> AuditRequest<'a> {
             Some(assumed) => AssumedMotion { motion: format!("{motion}, {assumed}"), basis: Basis::Assumed },
             None => AssumedMotion { motion, basis },
         }
+    }
+
+    /// Returns the facts that come from the request: motion, exemptions, file of settings.
+    pub(super) fn facts(&self, between: &AssumedMotion, settings_file: Option<&str>) -> Vec<Fact> {
+        let declared = |is_declared: bool| if is_declared { Source::Declared } else { Source::Default };
+        let motion = match between.basis {
+            Basis::Recorded => Source::Recorded,
+            Basis::Run => Source::Proved,
+            Basis::Bounded => Source::Declared,
+            Basis::Assumed => declared(self.settings.motion.is_some()),
+        };
+        let mut facts = vec![Fact::name(FactKind::Motion, motion, &between.motion)];
+        if let Some(above_m) = self.settings.above_m {
+            facts.push(Fact::number(FactKind::GroundExemption, Source::Declared, above_m, "m"));
+        }
+        facts.extend(settings_file.map(|file| Fact::name(FactKind::SettingsFile, Source::Declared, file)));
+        facts
     }
 }
 
