@@ -3,6 +3,8 @@
 //! A statement such as "clear" or "certified" carries the list of its [`Fact`]s. Printing, JSON and proofs read this
 //! list. A fact that data at hand contradict is refused or takes the statement away.
 
+use std::fmt;
+
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
@@ -125,6 +127,16 @@ pub enum FactValue {
     Number(f64, &'static str),
     /// Name: of a unit, a file, a topic, a kind of motion.
     Name(String),
+}
+
+/// The number with its unit, or the name.
+impl fmt::Display for FactValue {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Number(value, unit) => write!(out, "{value:?} {unit}"),
+            Self::Name(name) => out.write_str(name),
+        }
+    }
 }
 
 /// Fact that a statement rests on.

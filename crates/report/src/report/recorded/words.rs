@@ -11,6 +11,7 @@ use crate::report::page::{self, Badge, Page, Start, Tone};
 use crate::report::section::Section;
 use tautline_audit::recorded::{Approach, Gap, ObjectPair, WIDTH_M};
 use tautline_audit::{LISTED, Status, Tally, Undecided, Violation};
+use tautline_core::fact::Coded;
 use tautline_core::text::{at_least, at_most, beside_limit, counted, exact, fixed, in_order, seconds};
 
 /// Largest numbers of violations in the text, and on the page.
@@ -296,6 +297,12 @@ impl RecordedReport {
             format!("Time 0 s is {} ns on the recording's clock.", self.source.clock.epoch_ns),
         ];
         page.add("Assumptions", "The verdict holds under these assumptions.", [page::list(&assumed)]);
+        let facts = self.source.facts.iter().map(|fact| {
+            let value = fact.value.as_ref().map_or_else(String::new, ToString::to_string);
+            [fact.code().to_owned(), fact.source.code().to_owned(), one_line(&value)]
+        });
+        let columns = ["Fact", "Source", "Value"];
+        page.add("Facts", "The verdict rests on these facts.", [page::words("Facts and sources", &columns, facts)]);
         page.add("Reproduce", "This command judges the recording again.", [page::command(command)]);
         page.render()
     }
