@@ -50,7 +50,7 @@ impl Contracts {
     pub(crate) fn new(index: usize, starts: Arc<[Start]>) -> Result<Self, ShieldError> {
         let count = starts.len();
         let (Some(own), Ok(number)) = (starts.get(index), u16::try_from(index)) else {
-            let problem = format!("the number of the vehicle is not among {count} starts, of which 65536 may be given");
+            let problem = format!("the number of the vehicle is not among {count} starts of at most 65536");
             return Err(ShieldError::new("index", problem, index as f64, "count vehicles from 0"));
         };
         let has_plane = |owner: &Start, follower: &Start| divider_of_starts(owner, follower).is_some();

@@ -65,32 +65,32 @@
 //!  of the period and the whole brake after it are inside.
 //!
 //! **Lemma 2** (a choice always exists). At each instant, after steps 1 and 2, p and s are inside all planes held, so
-//!  the brake is a choice. Both are inside at the start: each vehicle tests p and s of both vehicles of a pair against
-//!  the first plane, and a pair that fails the test does not start. The last command was accepted, or was that of the
-//!  brake, so the next p and s are inside all planes held over the period (Lemma 1). A plane is taken on only after p
-//!  and s were tested against it. Dropping a plane changes nothing.
+//!  the brake is a choice. Both are inside at the start, because each vehicle tests p and s of both vehicles against
+//!  the first plane of the pair. A pair that fails the test does not start. The last command was accepted, or was that
+//!  of the brake, so the next p and s are inside all planes held over the period (Lemma 1). A plane is taken on only
+//!  after p and s were tested against it. Dropping a plane changes nothing.
 //!
 //! **Lemma 3** ([`contract`]). At every time the two vehicles of a pair hold a common plane. Its base case is the plane
 //!  of the announced starts, which both compute with the same numbers (A5).
 //!
 //! **Lemma 4** ([`obstacle`]). The vehicle may renew a plane before a convex obstacle alone, at any instant.
 //!
-//! **Theorem.** Let A1 to A5 hold, and let the segments of each pair pass the test of Lemma 2, for which they must be at
-//!  least delta + e1 + e2 apart. Let the segment of each vehicle be at least its clearance and e from each obstacle. Then
-//!  any two vehicles are at least delta apart at all times, and each vehicle keeps its clearance, under every law,
+//! **Theorem.** Let A1 to A5 hold, and let the segments of each pair pass the test of Lemma 2, for which they must be
+//!  at least delta + e1 + e2 apart. Let the segment of each vehicle be at least its clearance and e from each obstacle.
+//!  Then any two vehicles are at least delta apart at all times, and each vehicle keeps its clearance, under every law,
 //!  latency and loss.
 //!
 //! *Proof.* Take the common plane of Lemma 3 at a time t. By Lemmas 1 and 2 both references are inside it, one on its
 //!  side by m1 and the other one by m2. They are at least m1 + m2 = delta + e1 + e2 apart. Each vehicle is within its e
 //!  of its reference. Lemma 4 gives the clearance of obstacles.
 //!
-//! Doubles round: the margins of a pair contain 1e-6 m for it. [`settings`] lists what this covers, and refuses settings
-//! and starts beyond it.
+//! Doubles round: the margins of a pair contain 1e-6 m for it. [`settings`] lists what this covers, and refuses
+//! settings and starts beyond it.
 //!
 //! # What voids the certificate
 //! A vehicle that is dead, frozen or weaker than A voids it. So do a push or an error beyond its bound, other starts on
-//! the two sides of a pair, forged messages and a vehicle without a contract. A silent vehicle does not void it: the others stay behind the last common
-//! plane.
+//! the two sides of a pair, forged messages and a vehicle without a contract. A silent vehicle does not void it: the
+//! others stay behind the last common plane.
 //! [`Counters::exceeded`](report::Counters::exceeded) names an assumption that did not hold in a flight.
 //!
 //! Arrival is not proved. Planes that are not renewed stay safe, and vehicles wait behind them.

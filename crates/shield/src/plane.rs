@@ -11,9 +11,9 @@
 //! # Verified planes
 //! A pair of points of two segments gives an upper bound of their distance. A unit normal gives a lower bound: the gap
 //! between the ends of the two segments along it. [`Divider::between`] takes the normal of the closest points if both
-//! bounds agree. Otherwise, for example for long segments that are nearly parallel, it takes the normal with the widest
-//! gap among that of the closest points, those of the four ends, and the common perpendicular. The gap is computed from
-//! the ends, so a normal that is not the best one costs room but never safety.
+//! bounds agree. They do not agree for long segments that are nearly parallel. It then takes the normal with the widest
+//! gap: of the closest points, of the four ends, or of the common perpendicular. The gap is computed from the ends, so
+//! a normal that is not the best one costs room but never safety.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

@@ -1,9 +1,9 @@
 //! Settings of a shielded vehicle, and the limits of its reference that follow from them.
 //!
 //! # Rounding budget
-//! Each vehicle has half of [`ROUNDING_M`], 5e-7 m, in its margin for the rounding of doubles. u is 2^-53, C the largest
-//! coordinate, L the longest reserved segment, m the number of periods of the longest brake, J the [`Tube::jumps`], and
-//! w the way of a unicycle in a period.
+//! Each vehicle has half of [`ROUNDING_M`], 5e-7 m, in its margin for the rounding of doubles. The unit of rounding u
+//! is 2^-53, and C is the largest coordinate. The longest brake takes m periods, J is [`Tube::jumps`], and w is the
+//! way of a unicycle in a period.
 //!
 //! | tolerance | where | length that it costs | limit | at the limit |
 //! | --- | --- | --- | --- | --- |
@@ -21,15 +21,15 @@
 //! | 1e-12 | speeds of a unicycle, relative | 1e-12 w | w <= 100 m | 1e-10 m |
 //! | u | normal before an obstacle at d, with the reach R | 8 u C R / d | C by this row | 1e-7 m |
 //!
-//! *Brake.* In each of its periods the position errs by at most 8 u C. The speed errs by at most 4 u V, which moves the
-//! stop point by at most 8 u C: the time left times V is at most twice the length of the segment. The stop point itself
-//! errs by 16 u C. Only the brake adds errors up: other commands are tested at the computed numbers.
+//! *Brake.* In each of its periods the position errs by at most 8 u C, and the speed by at most 4 u V. The time left
+//! times V is at most twice the length of the segment, so the stop point moves by at most 8 u C. It errs by 16 u C
+//! itself. Only the brake adds errors up: other commands are tested at the computed numbers.
 //!
 //! *Reference.* The reference jumps by its rounding, at most 8 u C, in each period. The tracker follows: its distance
 //! grows by [`Tube::jumps`] times that.
 //!
-//! Settings and starts beyond a limit are refused. A reference that flies farther than [`Limits::farthest_m`] exceeds an
-//! assumption, which the report names.
+//! Settings and starts beyond a limit are refused. A reference that flies farther than [`Limits::farthest_m`] exceeds
+//! an assumption, which the report names.
 
 use std::fmt;
 

@@ -80,8 +80,8 @@ impl Shield {
     /// Returns the shield of the vehicle with this number, counted from 0, among the announced starts of all vehicles.
     ///
     /// # Errors
-    /// If the number is not in the list, a start is invalid or for another delta or ellipsoid, the own start is not the
-    /// one of these limits, or the vehicle starts too near to another one.
+    /// If the number is not in the list, or a start is invalid or for another delta or ellipsoid. Also if the own start
+    /// is not that of these limits, or the vehicle starts too near to another one.
     pub fn new(limits: &Limits, index: usize, starts: &[Start]) -> Result<Self, ShieldError> {
         starts.iter().try_for_each(Start::check)?;
         limits.check_bodies(starts)?;

@@ -33,19 +33,19 @@
 //! - **Cell.** E = exp(X) with |X| <= 0.5. X errs by 3.1 u |X| (length of a cell, rate of the lag, product). The k-th
 //!   term of the series errs by 6.2 k u |X|^k / k!, and the sum of 21 terms by 20.2 u exp(0.5). In all E errs by less
 //!   than 45 u.
-//! - **Grid.** G of the next point is E times G of this one. The computed step errs by F with |F| <= 60 u |G^|. The error
-//!   after i steps is the sum of G(i-1-j) F(j), so with g^ the largest computed norm of n points it is at most
+//! - **Grid.** G of the next point is E times G of this one. The computed step errs by F with |F| <= 60 u |G^|. The
+//!   error after i steps is the sum of G(i-1-j) F(j), so with g^ the largest computed norm of n points it is at most
 //!   `eps_g` = 60 u n g^^2 / (1 - 60 u n g^).
 //! - **Step.** The map S from instant to instant is G times the lift, of norm l. It errs by
-//!   `eps_s` = (`eps_g` + 5.1 u g^) l. The map to the grid points errs by as much.
+//!   `eps_s` = (`eps_g` + 5.1 u g^) l. The map to the grid points has the same bound.
 //! - **Powers.** A computed power is S times the last one plus F with |F| <= phi |last one|, where
 //!   phi = `eps_s` + 1.01 o u |S^| and o is the order. As for the grid, the norms N of all true powers sum to at most
-//!   N^ / (1 - phi N^), and a power errs by at most phi N N^. The same holds for a column x of inputs: the norms of all
-//!   its powers sum to at most M = N (|x^| + 2 `eps_g`) / (1 - phi N), and their errors to N (`eps_g` + phi M).
-//! - **Sum.** Let Q be the norm of the map from the state to what is bounded, and `eps_q` its error. The sum over all
-//!   periods errs by Q N (`eps_g` + phi M) + `eps_q` M, times the bound of each input. The start errs by
-//!   (Q phi N N^ + `eps_q` N) times its bound. All terms of the sums are positive, so adding K periods errs by less than
-//!   (K + 400) u of the sum.
+//!   N^ / (1 - phi N^), and a power errs by at most phi N N^. The powers of a column x of inputs have norms that sum
+//!   to at most M = N (|x^| + 2 `eps_g`) / (1 - phi N). Their errors sum to at most N (`eps_g` + phi M).
+//! - **Sum.** Let Q be the norm of the map from the state to what is bounded, and `eps_q` its error. The sum over
+//!   all periods errs by Q N (`eps_g` + phi M) + `eps_q` M, times the bound of each input. The start errs by
+//!   (Q phi N N^ + `eps_q` N) times its bound. All terms of the sums are positive, so adding K periods errs by less
+//!   than (K + 400) u of the sum.
 //!
 //! The numbers of this bound are rounded too: the terms above are doubled.
 
@@ -114,8 +114,8 @@ pub struct Tube {
     pub error_m: f64,
     /// Bound `A_t` on the feedback \[m/s^2\].
     pub feedback_m_s2: f64,
-    /// Largest distance to a reference that jumps by 1 m and 1 m/s at each instant, in units of 1 m, for the rounding of
-    /// the reference.
+    /// Largest distance to a reference that jumps by 1 m and 1 m/s at each instant \[m\], for the rounding of the
+    /// reference.
     pub jumps: f64,
 }
 

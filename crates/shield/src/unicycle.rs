@@ -152,8 +152,8 @@ impl Loiter {
     /// Returns the start of a vehicle, which all vehicles must know.
     ///
     /// # Errors
-    /// If a setting is out of range, a number is not finite, the reserved segment reaches beyond 1e6 m along an axis, or
-    /// the speed is not within its limits.
+    /// If a setting is out of range, a number is not finite, or the speed is not within its limits. Also if the
+    /// reserved segment reaches beyond 1e6 m along an axis.
     pub fn start(&self, pose: &Pose) -> Result<Start, ShieldError> {
         let fails = |place, problem: &str, value, remedy| Err(ShieldError::new(place, problem.into(), value, remedy));
         let positive = [
