@@ -211,7 +211,8 @@ impl Settings {
         let fails = |place, problem, value, remedy| Err(ShieldError::new(place, problem, value, remedy));
         if margin_m > FARTHEST_M {
             let problem = format!("margins must be at most {FARTHEST_M} m, which the margin for rounding covers");
-            return fails("delta_m", problem, margin_m, "use a shorter distance or smaller errors");
+            let place = if self.half_height_m.is_some() { "half_height_m" } else { "delta_m" };
+            return fails(place, problem, margin_m, "use a shorter distance, smaller errors or a rounder ellipsoid");
         }
         if self.accel_m_s2 / self.tracker_per_s2 > STIFF_M {
             let problem = format!("must be at most {STIFF_M} m times `tracker_per_s2`, for the rounding of commands");

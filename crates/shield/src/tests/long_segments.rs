@@ -260,6 +260,6 @@ fn the_gap_of_a_normal_is_at_most_the_distance_and_near_it() {
         assert!((verified - gap.width_m).abs() < 1e-8, "{pair:?}: {verified} {gap:?}");
         assert!((gap.normal.norm() - 1.0).abs() < 1e-12);
         let lost = DELTA_M + pair.room_m - gap.width_m;
-        assert!((-1e-8..LOST_M).contains(&lost), "{pair:?}: {lost}");
+        assert!((-1e-6..LOST_M).contains(&lost), "{pair:?}: {lost}");
     }
 }

@@ -259,6 +259,55 @@ fn a_law_that_is_undefined_makes_the_shield_brake() {
 }
 
 #[test]
+fn starts_on_paths_that_converge_are_refused_or_clear_without_a_command() {
+    let scenario = |apart_m: f64, speed_m_s: f64, angle_rad: f64| {
+        let text = format!(
+            r#"
+            [start]
+            positions_m = [[0, 0], [0, {apart_m}]]
+            velocities_m_s = [[{speed_m_s}, 0], [{speed_m_s}, {}]]
+            [formation]
+            shape = "points"
+            points_m = [[0, 0], [0, 50]]
+            [law]
+            kind = "laplacian"
+            delta_m = 1.0
+            [plant]
+            kind = "ideal"
+            [shield]
+            max_speed_m_s = {}
+            [time]
+            duration_s = {}
+            "#,
+            -angle_rad * speed_m_s,
+            1.001 * speed_m_s,
+            speed_m_s / 2.9,
+        );
+        let source = tautline_sim::scenario::Source::Text { name: "converging".into(), text };
+        Scenario::read(&source, &[])
+    };
+    // Twice the path error of the ideal plant, and rounding.
+    let required_m = 1.0 + 2.1e-5;
+    for (speed_m_s, length_m) in [(50.0, 416.0), (300.0, 15_000.0)] {
+        for angle_rad in [1e-12, 1e-9, 0.99e-7, 1e-6] {
+            let lost_m = angle_rad * length_m;
+            if lost_m > 2e-7 {
+                let error = scenario(required_m + 0.8 * lost_m, speed_m_s, angle_rad).expect_err("too near");
+                assert!(error.to_string().contains("reserve segments nearer"), "{angle_rad}: {error}");
+            }
+            let near = scenario(required_m + 1.1 * lost_m + 1e-7, speed_m_s, angle_rad).expect("far enough");
+            if speed_m_s < 100.0 || angle_rad == 0.99e-7 {
+                let (flight, _) = fly_with(&near, Box::new(Adversary::Undefined), plant::of(&near));
+                let flight = flight.expect("a flight");
+                assert_eq!((flight.audit.status, report(&flight).breach), (Status::Clear, None), "{angle_rad}");
+                let closest_m = flight.audit.closest.expect("a pair").separation_m;
+                assert!(closest_m < required_m + 0.2 * lost_m + 1e-5, "{angle_rad}: {closest_m}");
+            }
+        }
+    }
+}
+
+#[test]
 fn a_saved_flight_continues_with_the_same_bits() {
     let (scenario, _) =
         (0..).find_map(|seed| draw(seed, 12).filter(|(scenario, _)| scenario.network.loss > 0.1)).expect("one");
