@@ -360,7 +360,7 @@ class InFlights(Case):
 
         for speed_m_s in (50.0, 300.0):
             with self.assertRaises(tl.Error) as refused:
-                tl.Scenario(text(0.9, speed_m_s, 0.0))
+                tl.Scenario(text(1.00001, speed_m_s, 0.0))
             required_m = float(str(refused.exception).split("nearer than the ")[1].split(" m")[0])
             # Parallel paths keep this room, converging ones do not.
             near_m = required_m + 1e-5
