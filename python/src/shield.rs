@@ -49,6 +49,7 @@ fn limits((delta_m, period_s, measurement_delay_periods, others): Given) -> PyRe
     settings.limits().map_err(refused)
 }
 
+#[allow(clippy::needless_pass_by_value, reason = "for `map_err`")]
 fn refused(error: impl Display) -> PyErr {
     wrong_input_with_code("shield/refused", error.to_string())
 }

@@ -174,8 +174,8 @@ class Shield:
     def observe(self, positions: ArrayLike, velocities: ArrayLike, since_s: float) -> None:
         """Records true states, ``since_s`` after the instant of the last command, for the report of a simulation."""
         rows = 1 if self.index is not None else self._native.count
-        given = self._each(rows, {"positions": positions, "velocities": velocities})
-        self._native.observe(*given, number(since_s, "since_s"))
+        p, v = self._each(rows, {"positions": positions, "velocities": velocities})
+        self._native.observe(p, v, number(since_s, "since_s"))
 
     def observe_measurement(
         self,
@@ -186,7 +186,7 @@ class Shield:
     ) -> None:
         """Records measured states and the true states that they measured, for the report of a simulation."""
         rows = 1 if self.index is not None else self._native.count
-        named = {
+        named: dict[str, object] = {
             "positions": positions,
             "velocities": velocities,
             "true_positions": true_positions,
@@ -228,7 +228,7 @@ class Shield:
         whose = f"{self._native.count} vehicles" if self.index is None else f"vehicle {self.index + 1}"
         return f"<tautline.Shield of {whose}: {self.certificate}>"
 
-    def _each(self, rows: int, named: dict[str, ArrayLike]) -> list[NDArray[np.float64]]:
+    def _each(self, rows: int, named: dict[str, object]) -> list[NDArray[np.float64]]:
         """Returns a row of three numbers for each shield."""
         own = self.index is not None
         return [_rows([value] if own else value, name, rows) for name, value in named.items()]
@@ -268,11 +268,10 @@ def _bytes(message: object) -> bytes:
         return b""
 
 
-def _rows(value: ArrayLike, name: str, count: int | None) -> NDArray[np.float64]:
+def _rows(value: object, name: str, count: int | None) -> NDArray[np.float64]:
     """Returns rows of three numbers, z = 0 where two are given."""
     rows = exact_array(value, name)
     if rows.ndim != 2 or rows.shape[1] not in (2, 3) or (count is not None and len(rows) != count):
         wanted = "N" if count is None else count
-        shape = np.shape(value)
-        raise Error(f"{name}: must have the shape ({wanted}, 3) or ({wanted}, 2), got {shape}; give a row per vehicle")
+        raise Error(f"{name}: must have the shape ({wanted}, 3) or ({wanted}, 2), got {rows.shape}; give a row per vehicle")
     return np.ascontiguousarray(np.pad(rows, ((0, 0), (0, 3 - rows.shape[1]))))

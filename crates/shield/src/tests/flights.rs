@@ -318,11 +318,11 @@ fn closest_without_radio(mut shields: [Shield; 2]) -> f64 {
     let (mut commands, mut begun) = ([Vector3::zeros(); 2], [0.0; 2]);
     let mut closest = f64::INFINITY;
     while now < 6.0 {
-        for i in 0..2 {
+        for (i, shield) in shields.iter_mut().enumerate() {
             if now >= next[i] - 1e-9 {
-                (states[i], begun[i]) = (shields[i].next_reference(), now);
+                (states[i], begun[i]) = (shield.next_reference(), now);
                 let towards = if i == 0 { 50.0 } else { -50.0 };
-                commands[i] = shields[i].filter(states[i], Vector3::x() * towards);
+                commands[i] = shield.filter(states[i], Vector3::x() * towards);
                 next[i] += periods[i];
             }
         }
@@ -349,7 +349,7 @@ fn vehicles_with_different_settings_stay_apart_by_the_starts_that_they_announce(
     ] {
         let apart = [2.2, 2.4, 2.8, 3.2].into_iter().find_map(|apart_m| announced(settings, apart_m).ok());
         let closest = closest_without_radio(apart.expect("far enough"));
-        assert!(closest >= 1.0 && closest < 1.6, "{settings:?}: {closest}");
+        assert!((1.0..1.6).contains(&closest), "{settings:?}: {closest}");
     }
     // delta and ellipsoid are shared.
     let other = Settings { delta_m: 2.0, ..base };
