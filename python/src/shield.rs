@@ -1,18 +1,57 @@
 //! Shields for vehicles and simulators outside of the product.
 
+use std::fmt::Display;
+
 use numpy::ndarray::ArrayView2;
 use numpy::{PyArray2, PyReadonlyArray2, ToPyArray as _};
 use pyo3::prelude::*;
 use pyo3::types::PyBytes;
-use tautline::shield::{Counters, Fleet, Message, Settings, Shield as VehicleShield, State};
+use tautline::fact::Coded as _;
+use tautline::shield::{Fleet, Limits, Message, SavedShield, Settings, Shield as VehicleShield, Start, State};
 
-use crate::errors::{internal_error, wrong_input, wrong_input_with_code};
+use crate::errors::{internal_error, wrong_input_with_code};
 
 /// Shields of all vehicles, or of one of them.
 #[pyclass(module = "tautline._native")]
 pub(crate) struct Shield {
-    shields: Vec<VehicleShield>,
+    shields: Shields,
     count: usize,
+}
+
+#[expect(clippy::large_enum_variant, reason = "one per object in Python")]
+enum Shields {
+    All(Fleet),
+    One(VehicleShield),
+}
+
+impl Shields {
+    fn get(&self) -> &[VehicleShield] {
+        match self {
+            Self::All(fleet) => fleet.shields(),
+            Self::One(shield) => std::slice::from_ref(shield),
+        }
+    }
+
+    fn get_mut(&mut self) -> &mut [VehicleShield] {
+        match self {
+            Self::All(fleet) => fleet.shields_mut(),
+            Self::One(shield) => std::slice::from_mut(shield),
+        }
+    }
+}
+
+/// Settings with a safety distance, a period, a delay of measurements, and others by name.
+type Given = (f64, f64, usize, Vec<(String, f64)>);
+
+fn limits((delta_m, period_s, measurement_delay_periods, others): Given) -> PyResult<Limits> {
+    let mut settings = Settings { measurement_delay_periods, ..Settings::new(delta_m, period_s) };
+    others.iter().try_for_each(|(name, value)| set(&mut settings, name, *value))?;
+    settings.limits().map_err(refused)
+}
+
+#[allow(clippy::needless_pass_by_value, reason = "for `map_err`")]
+fn refused(error: impl Display) -> PyErr {
+    wrong_input_with_code("shield/refused", error.to_string())
 }
 
 fn state(positions_m: &ArrayView2<'_, f64>, velocities_m_s: &ArrayView2<'_, f64>, i: usize) -> State {
@@ -38,6 +77,7 @@ fn set(settings: &mut Settings, name: &str, value: f64) -> PyResult<()> {
         "actuator_lag_s" => settings.actuator_lag_s = value,
         "tracking_error_m" => settings.tracking_error_m = Some(value),
         "path_error_m" => settings.path_error_m = value,
+        "half_height_m" => settings.half_height_m = Some(value),
         "ease_m" => settings.ease_m = Some(value),
         "turn" => settings.turn = value,
         _ => return Err(internal_error(&format!("unknown setting {name}"))),
@@ -47,33 +87,45 @@ fn set(settings: &mut Settings, name: &str, value: f64) -> PyResult<()> {
 
 #[pymethods]
 impl Shield {
-    /// Creates the shields of vehicles at their starts: of all, or of the vehicle `index`.
+    /// Creates the shields of all vehicles at their starts.
     #[new]
     fn new(
         positions_m: PyReadonlyArray2<'_, f64>,
         velocities_m_s: PyReadonlyArray2<'_, f64>,
-        delta_m: f64,
-        period_s: f64,
-        delay_periods: usize,
-        others: Vec<(String, f64)>,
-        index: Option<usize>,
+        settings: Given,
     ) -> PyResult<Self> {
-        let mut settings = Settings { measurement_delay_periods: delay_periods, ..Settings::new(delta_m, period_s) };
-        others.iter().try_for_each(|(name, value)| set(&mut settings, name, *value))?;
-        let refused = |error: &dyn std::fmt::Display| wrong_input_with_code("shield/refused", error.to_string());
-        let limits = settings.limits().map_err(|error| refused(&error))?;
+        let limits = limits(settings)?;
         let (positions_m, velocities_m_s) = (positions_m.as_array(), velocities_m_s.as_array());
         let count = positions_m.shape()[0];
         let states: Vec<_> = (0..count).map(|i| state(&positions_m, &velocities_m_s, i)).collect();
-        let shields = match index {
-            None => Fleet::new(&vec![limits; count], &states).map_err(|error| refused(&error))?.shields().to_vec(),
-            Some(index) => {
-                let starts = states.into_iter().map(|state| limits.start(state)).collect::<Result<Vec<_>, _>>();
-                let starts = starts.map_err(|error| refused(&error))?;
-                vec![VehicleShield::new(&limits, index, &starts).map_err(|error| refused(&error))?]
-            }
-        };
-        Ok(Self { shields, count })
+        let fleet = Fleet::new(&vec![limits; count], &states).map_err(refused)?;
+        Ok(Self { shields: Shields::All(fleet), count })
+    }
+
+    /// Returns the bytes of the start of a vehicle.
+    #[staticmethod]
+    fn start<'py>(
+        py: Python<'py>,
+        position_m: PyReadonlyArray2<'_, f64>,
+        velocity_m_s: PyReadonlyArray2<'_, f64>,
+        flight: u64,
+        settings: Given,
+    ) -> PyResult<Bound<'py, PyBytes>> {
+        let start = limits(settings)?.start(state(&position_m.as_array(), &velocity_m_s.as_array(), 0));
+        Ok(PyBytes::new(py, &start.map_err(refused)?.with_flight(flight).to_bytes()))
+    }
+
+    /// Creates the shield of the vehicle `index` among announced starts.
+    #[staticmethod]
+    fn of_starts(starts: Vec<Vec<u8>>, index: usize, settings: Given) -> PyResult<Self> {
+        let limits = limits(settings)?;
+        let read = starts
+            .iter()
+            .enumerate()
+            .map(|(i, bytes)| Start::from_bytes(bytes).map_err(|error| refused(format!("starts[{i}]: {error}"))));
+        let read = read.collect::<PyResult<Vec<_>>>()?;
+        let shield = VehicleShield::new(&limits, index, &read).map_err(refused)?;
+        Ok(Self { shields: Shields::One(shield), count: read.len() })
     }
 
     /// Returns the commands for the next period, a row for each shield.
@@ -86,8 +138,24 @@ impl Shield {
     ) -> Bound<'py, PyArray2<f64>> {
         let (positions, velocities) = (positions_m.as_array(), velocities_m_s.as_array());
         let mut commands = wanted_m_s2.as_array().to_owned();
-        for (i, shield) in self.shields.iter_mut().enumerate() {
+        for (i, shield) in self.shields.get_mut().iter_mut().enumerate() {
             let command = shield.filter(state(&positions, &velocities, i), vector(&wanted_m_s2.as_array(), i).into());
+            (0..3).for_each(|axis| commands[(i, axis)] = command[axis]);
+        }
+        commands.to_pyarray(py)
+    }
+
+    /// Returns the commands of the brake for the next period, a row for each shield.
+    fn brake<'py>(
+        &mut self,
+        py: Python<'py>,
+        positions_m: PyReadonlyArray2<'_, f64>,
+        velocities_m_s: PyReadonlyArray2<'_, f64>,
+    ) -> Bound<'py, PyArray2<f64>> {
+        let (positions, velocities) = (positions_m.as_array(), velocities_m_s.as_array());
+        let mut commands = positions.to_owned();
+        for (i, shield) in self.shields.get_mut().iter_mut().enumerate() {
+            let command = shield.brake(state(&positions, &velocities, i));
             (0..3).for_each(|axis| commands[(i, axis)] = command[axis]);
         }
         commands.to_pyarray(py)
@@ -96,33 +164,56 @@ impl Shield {
     /// Gives each message of a shield to its receiver, except the lost ones, N x N by sender and receiver.
     fn exchange(&mut self, lost: Option<PyReadonlyArray2<'_, bool>>) {
         let lost = lost.as_ref().map(PyReadonlyArray2::as_array);
-        for sender in 0..self.shields.len() {
-            let messages: Vec<_> = self.shields[sender].messages().collect();
+        let shields = self.shields.get_mut();
+        for sender in 0..shields.len() {
+            let messages: Vec<_> = shields[sender].messages().collect();
             for message in messages {
-                let receiver = message.to as usize;
+                let receiver = usize::from(message.to);
                 if lost.is_none_or(|lost| !lost[(sender, receiver)]) {
-                    self.shields[receiver].hear(&message);
+                    // As over a radio, so that shields of one vehicle each get the same numbers.
+                    shields[receiver].hear_bytes(&message.to_bytes());
                 }
             }
         }
     }
 
     /// Takes the messages to send after `filter`, each with its receiver.
-    fn messages<'py>(&mut self, py: Python<'py>) -> PyResult<Vec<(u32, Bound<'py, PyBytes>)>> {
-        let messages = self.shields.iter_mut().flat_map(VehicleShield::messages);
-        let packed = messages.map(|message| {
-            let bytes = serde_json::to_vec(&message).map_err(|error| internal_error(&error.to_string()))?;
-            Ok((message.to, PyBytes::new(py, &bytes)))
-        });
-        packed.collect()
+    fn messages<'py>(&mut self, py: Python<'py>) -> Vec<(u16, Bound<'py, PyBytes>)> {
+        let messages = self.shields.get_mut().iter_mut().flat_map(VehicleShield::messages);
+        messages.map(|message: Message| (message.to, PyBytes::new(py, &message.to_bytes()))).collect()
     }
 
-    /// Takes a message that arrived.
-    fn hear(&mut self, message: &[u8]) -> PyResult<()> {
-        let message: Message = serde_json::from_slice(message)
-            .map_err(|error| wrong_input(format!("message: {error}; give the bytes that `messages` returned")))?;
-        self.shields.iter_mut().for_each(|shield| shield.hear(&message));
-        Ok(())
+    /// Takes a message that arrived. Other bytes are dropped and counted.
+    fn hear(&mut self, message: &[u8]) {
+        self.shields.get_mut().iter_mut().for_each(|shield| shield.hear_bytes(message));
+    }
+
+    /// Records true states, `since_s` after the last commands.
+    fn observe(
+        &mut self,
+        positions_m: PyReadonlyArray2<'_, f64>,
+        velocities_m_s: PyReadonlyArray2<'_, f64>,
+        since_s: f64,
+    ) {
+        let (positions, velocities) = (positions_m.as_array(), velocities_m_s.as_array());
+        for (i, shield) in self.shields.get_mut().iter_mut().enumerate() {
+            shield.observe(since_s, &state(&positions, &velocities, i));
+        }
+    }
+
+    /// Records measurements and the true states that they measured.
+    fn observe_measurement(
+        &mut self,
+        positions_m: PyReadonlyArray2<'_, f64>,
+        velocities_m_s: PyReadonlyArray2<'_, f64>,
+        true_positions_m: PyReadonlyArray2<'_, f64>,
+        true_velocities_m_s: PyReadonlyArray2<'_, f64>,
+    ) {
+        let measured = (positions_m.as_array(), velocities_m_s.as_array());
+        let truth = (true_positions_m.as_array(), true_velocities_m_s.as_array());
+        for (i, shield) in self.shields.get_mut().iter_mut().enumerate() {
+            shield.observe_measurement(&state(&measured.0, &measured.1, i), &state(&truth.0, &truth.1, i));
+        }
     }
 
     /// Number of vehicles.
@@ -134,20 +225,44 @@ impl Shield {
     /// Certificate in words.
     #[getter]
     fn certificate(&self) -> String {
-        self.shields.first().map(|shield| shield.limits().certificate()).unwrap_or_default()
+        self.shields.get().first().map(|shield| shield.limits().certificate()).unwrap_or_default()
     }
 
     /// Bound on the distance to the reference [m].
     #[getter]
     fn tube_m(&self) -> f64 {
-        self.shields.first().map_or(0.0, |shield| shield.limits().tube().error_m)
+        self.shields.get().first().map_or(0.0, |shield| shield.limits().tube().error_m)
     }
 
-    /// Numbers so far as JSON, and the assumption that did not hold.
-    fn report(&self) -> PyResult<(String, Option<String>)> {
-        let mut counters = Counters::default();
-        self.shields.iter().for_each(|shield| counters.merge(shield.counters()));
-        let json = serde_json::to_string(&counters).map_err(|error| internal_error(&error.to_string()))?;
-        Ok((json, counters.exceeded().map(|exceeded| exceeded.to_string())))
+    /// Numbers so far and assumptions as JSON; text and code of the assumption that did not hold.
+    fn report(&self) -> PyResult<(String, String, Option<(String, &'static str)>)> {
+        let (counters, assumptions) = match &self.shields {
+            Shields::All(fleet) => (fleet.report(), fleet.assumptions()),
+            Shields::One(shield) => (*shield.counters(), shield.assumptions()),
+        };
+        let internal = |error: serde_json::Error| internal_error(&error.to_string());
+        let exceeded = counters.exceeded().map(|exceeded| (exceeded.to_string(), exceeded.code()));
+        let counters = serde_json::to_string(&counters).map_err(internal)?;
+        Ok((counters, serde_json::to_string(&assumptions).map_err(internal)?, exceeded))
+    }
+
+    /// Returns a shield that continues from saved data.
+    #[staticmethod]
+    fn load(saved: &[u8]) -> PyResult<Self> {
+        let wrong = |error: serde_json::Error| refused(format!("saved: {error}; give unaltered data"));
+        let (is_fleet, saved): (bool, Vec<SavedShield>) = serde_json::from_slice(saved).map_err(wrong)?;
+        let fleet = Fleet::load(&saved).map_err(refused)?;
+        let count = saved.first().map_or(0, SavedShield::vehicles);
+        let first = fleet.shields().first().filter(|_| !is_fleet).cloned();
+        Ok(Self { shields: first.map_or(Shields::All(fleet), Shields::One), count })
+    }
+
+    /// Returns the state of the shield, for `load`.
+    fn save<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        let saved: Option<Vec<_>> = self.shields.get().iter().map(VehicleShield::save).collect();
+        let saved = saved.ok_or_else(|| internal_error("a shield with obstacles"))?;
+        let is_fleet = matches!(self.shields, Shields::All(_));
+        let json = serde_json::to_vec(&(is_fleet, saved)).map_err(|error| internal_error(&error.to_string()))?;
+        Ok(PyBytes::new(py, &json))
     }
 }

@@ -120,34 +120,58 @@ class Scenario:
     def sha256(self) -> str: ...
     def check(self) -> tuple[bool, str, str, str]: ...
 
+#: Safety distance [m], period [s], delay of measurements [periods], other settings by name.
+_ShieldSettings = tuple[float, float, int, list[tuple[str, float]]]
+
 @final
 class Shield:
     def __new__(
         cls,
         positions_m: NDArray[np.float64],
         velocities_m_s: NDArray[np.float64],
-        delta_m: float,
-        period_s: float,
-        delay_periods: int,
-        others: list[tuple[str, float]],
-        index: int | None,
+        settings: _ShieldSettings,
     ) -> Shield: ...
+    @staticmethod
+    def start(
+        position_m: NDArray[np.float64],
+        velocity_m_s: NDArray[np.float64],
+        flight: int,
+        settings: _ShieldSettings,
+    ) -> bytes: ...
+    @staticmethod
+    def of_starts(starts: list[bytes], index: int, settings: _ShieldSettings) -> Shield: ...
     def filter(
         self,
         positions_m: NDArray[np.float64],
         velocities_m_s: NDArray[np.float64],
         wanted_m_s2: NDArray[np.float64],
     ) -> NDArray[np.float64]: ...
+    def brake(
+        self, positions_m: NDArray[np.float64], velocities_m_s: NDArray[np.float64]
+    ) -> NDArray[np.float64]: ...
     def exchange(self, lost: NDArray[np.bool_] | None) -> None: ...
     def messages(self) -> list[tuple[int, bytes]]: ...
     def hear(self, message: bytes) -> None: ...
+    def observe(
+        self, positions_m: NDArray[np.float64], velocities_m_s: NDArray[np.float64], since_s: float
+    ) -> None: ...
+    def observe_measurement(
+        self,
+        positions_m: NDArray[np.float64],
+        velocities_m_s: NDArray[np.float64],
+        true_positions_m: NDArray[np.float64],
+        true_velocities_m_s: NDArray[np.float64],
+    ) -> None: ...
     @property
     def count(self) -> int: ...
     @property
     def certificate(self) -> str: ...
     @property
     def tube_m(self) -> float: ...
-    def report(self) -> tuple[str, str | None]: ...
+    def report(self) -> tuple[str, str, tuple[str, str] | None]: ...
+    @staticmethod
+    def load(saved: bytes) -> Shield: ...
+    def save(self) -> bytes: ...
 
 @final
 class Simulation:

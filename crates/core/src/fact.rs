@@ -81,6 +81,8 @@ coded! {
         PositionError = "position-error",
         /// Bound on the error of a measured or received velocity.
         VelocityError = "velocity-error",
+        /// Largest coordinate, for the rounding of doubles.
+        Coordinates = "coordinates",
         /// Largest speed.
         Speed = "speed",
         /// Distance of a vehicle from its reference.

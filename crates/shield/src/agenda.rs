@@ -15,6 +15,8 @@
 //! Lemmas 2 and 3 hold unchanged: a vehicle may propose, decide and send at any of its instants, or not. A contract
 //! that is not looked at keeps its planes.
 
+use serde::{Deserialize, Serialize};
+
 /// Numbers of periods after which a contract is looked at again, while its plane has the room for it.
 const SLEEPS: [u64; 7] = [2, 4, 8, 16, 32, 64, 128];
 /// Number of periods for which contracts are noted, above the longest of [`SLEEPS`].
@@ -43,7 +45,7 @@ impl Horizon {
 }
 
 /// Sets of contracts, one bit for each vehicle: to be looked at in a period, with news, and to be written to.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Agenda {
     /// Words of a set.
     words: usize,
@@ -62,6 +64,13 @@ impl Agenda {
         let mut due = vec![0; BUCKETS * words];
         due[words..2 * words].fill(u64::MAX);
         Self { words, taken: 0, due, heard: vec![0; words], outgoing: vec![0; words] }
+    }
+
+    /// Whether the sets have the sizes of a swarm of this many vehicles.
+    pub(crate) fn is_of(&self, count: usize) -> bool {
+        let words = count.div_ceil(64);
+        let sizes = [self.due.len(), self.heard.len(), self.outgoing.len()];
+        self.words == words && sizes == [BUCKETS * words, words, words]
     }
 
     /// Number of words of a set.

@@ -1,13 +1,18 @@
 //! Brake of a vehicle: where it comes to rest, and the command that brings it there.
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+use crate::saved::vector;
 
 /// Position and velocity of a vehicle.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// Position \[m\].
+    #[serde(with = "vector")]
     pub position_m: Vector3<f64>,
     /// Velocity \[m/s\].
+    #[serde(with = "vector")]
     pub velocity_m_s: Vector3<f64>,
 }
 

@@ -13,8 +13,20 @@
 //! never decides on that number again. A new number is given only after that. The argument uses no clock, order,
 //! latency or share of loss.
 //!
-//! Every message repeats the present segment, the pending proposal and the last decision. A message with a larger stamp
-//! therefore contains all that an older one can still say, and the newest message of a sender is the only one stored.
+//! The base case is the plane of the starts. Both vehicles compute it from the same two announced starts, and each of
+//! them tests both segments against both of its sides (`divider_of_starts`). A pair that fails the test has no
+//! contract.
+//!
+//! # Shared starts
+//! Each message carries a hash of the two starts of the pair. A vehicle that reads another hash holds other starts than
+//! its partner, and the base case fails. The contract is void from then on: the vehicle keeps the planes that it holds
+//! for ever, brakes before them, and takes no proposal and no decision. It still sends, so that the partner reads the
+//! other hash too. [`Counters::exceeded`](crate::Counters::exceeded) reports it.
+//!
+//! # Messages
+//! Every message of an owner repeats the pending proposal, every one of a follower its segment and the last decision. A
+//! message with a larger stamp therefore contains all that an older one can still say, and the newest message of a
+//! sender is the only one stored.
 //!
 //! # When messages are sent
 //! Lemma 3 allows the loss of any message, so it allows that none is sent. A contract is due in the periods of
@@ -32,13 +44,13 @@ use serde::{Deserialize, Serialize};
 use crate::agenda::Horizon;
 use crate::choice::Reach;
 use crate::plane::{Divider, Metric, Plane, Segment};
-use crate::settings::Start;
+use crate::start::{Start, hash_of_pair};
 
 /// Proposal of a plane by the owner of a pair.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Proposal {
     /// Number of the proposal, from 1 in each pair.
-    pub number: u64,
+    pub number: u32,
     /// Proposed plane.
     pub divider: Divider,
 }
@@ -47,43 +59,65 @@ pub struct Proposal {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Decision {
     /// Number of the proposal.
-    pub number: u64,
+    pub number: u32,
     /// Whether the follower holds the proposed plane.
     pub accepted: bool,
 }
 
 /// Message from one vehicle to another. It may arrive late, never, twice or after a later one.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// [`Message::to_bytes`] gives its 64 bytes.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Message {
     /// Sender, counted from 0.
-    pub from: u32,
+    pub from: u16,
     /// Receiver, counted from 0.
-    pub to: u32,
+    pub to: u16,
     /// Number of the sender's period, from 1.
-    pub stamp: u64,
-    /// Segment that the sender holds from its next instant on.
-    pub segment: Segment,
-    /// Pending proposal, if the sender owns the pair.
-    pub proposal: Option<Proposal>,
-    /// Last decision, if the sender is the follower of the pair.
-    pub decision: Option<Decision>,
+    pub stamp: u32,
+    /// Hash of the starts of the pair.
+    pub starts: u64,
+    /// Content, by the side of the sender.
+    pub body: Body,
+}
+
+/// Content of a message. The sender is the owner of the pair if its number is the smaller one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Body {
+    /// From the owner.
+    Owner {
+        /// Pending proposal.
+        proposal: Option<Proposal>,
+    },
+    /// From the follower.
+    Follower {
+        /// Segment that the sender holds from its next instant on.
+        segment: Segment,
+        /// Last decision.
+        decision: Option<Decision>,
+    },
 }
 
 impl Message {
-    /// Whether all numbers are finite and a proposed normal has length 1.
+    /// Whether all numbers are ones that a vehicle sends.
     pub(crate) fn is_valid(&self) -> bool {
-        self.segment.is_finite() && self.proposal.is_none_or(|proposal| proposal.divider.is_valid())
+        let is_valid = match &self.body {
+            Body::Owner { proposal } => {
+                self.from < self.to && proposal.is_none_or(|proposal| proposal.divider.is_valid())
+            }
+            Body::Follower { segment, .. } => self.from > self.to && segment.is_finite(),
+        };
+        is_valid && self.stamp > 0
     }
 }
 
 /// Messages from one vehicle to others, with the segment once. It may arrive at each of them late, never, twice or
 /// after a later one.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Broadcast {
     /// Sender, counted from 0.
-    pub from: u32,
+    pub from: u16,
     /// Number of the sender's period, from 1.
-    pub stamp: u64,
+    pub stamp: u32,
     /// Segment that the sender holds from its next instant on.
     pub segment: Segment,
     /// Parts for single vehicles, by their number. A broadcast has no message to the others.
@@ -91,10 +125,12 @@ pub struct Broadcast {
 }
 
 /// Part of a broadcast for one vehicle.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Entry {
     /// Receiver, counted from 0.
-    pub to: u32,
+    pub to: u16,
+    /// Hash of the starts of the pair.
+    pub starts: u64,
     /// Pending proposal, if the sender owns the pair.
     pub proposal: Option<Proposal>,
     /// Last decision, if the sender is the follower of the pair.
@@ -114,7 +150,7 @@ impl Broadcast {
     /// Returns the message to a vehicle. `None` if the broadcast has none.
     #[inline]
     #[must_use]
-    pub fn message(&self, to: u32) -> Option<Message> {
+    pub fn message(&self, to: u16) -> Option<Message> {
         let place = self.entries.binary_search_by_key(&to, |entry| entry.to).ok()?;
         Some(self.message_of(&self.entries[place]))
     }
@@ -123,13 +159,22 @@ impl Broadcast {
     #[inline]
     #[must_use]
     pub fn message_of(&self, entry: &Entry) -> Message {
-        let Entry { to, proposal, decision } = *entry;
-        Message { from: self.from, to, stamp: self.stamp, segment: self.segment, proposal, decision }
+        entry.message(self.from, self.stamp, self.segment)
     }
 
     /// Messages to all vehicles with one, in their order.
     pub fn messages(&self) -> impl Iterator<Item = Message> + '_ {
         self.entries.iter().map(|entry| self.message_of(entry))
+    }
+}
+
+impl Entry {
+    /// Returns the message of a sender with this part.
+    #[inline]
+    pub(crate) fn message(&self, from: u16, stamp: u32, segment: Segment) -> Message {
+        let Self { to, starts, proposal, decision } = *self;
+        let body = if from < to { Body::Owner { proposal } } else { Body::Follower { segment, decision } };
+        Message { from, to, stamp, starts, body }
     }
 }
 
@@ -186,17 +231,81 @@ pub(crate) struct Instant<'a> {
     pub(crate) horizons: [Horizon; 2],
 }
 
-/// Returns the plane between an owner and a follower at their starts, which both compute with the same numbers.
+/// Returns the plane between an owner and a follower at their starts, which both compute with the same numbers. `None`
+/// unless both ends of both segments are inside, each on its side.
 pub(crate) fn divider_of_starts(owner: &Start, follower: &Start) -> Option<Divider> {
-    Divider::between(owner.metric, &owner.segment, &follower.segment, owner.margin_m, follower.margin_m)
+    let divider = Divider::between(owner.metric, &owner.segment, &follower.segment, owner.margin_m, follower.margin_m)?;
+    let is_inside = divider.owner_plane(owner.metric, owner.margin_m).contains(&owner.segment)
+        && divider.follower_plane(follower.metric, follower.margin_m).contains(&follower.segment);
+    is_inside.then_some(divider)
+}
+
+/// What both vehicles of a pair must agree on before the first plane, and what was heard of it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub(crate) struct Shared {
+    /// Hash of the two starts; 0 until the contract has a record.
+    pub(crate) hash: u64,
+    pub(crate) state: Agreement,
+}
+
+/// What a vehicle has heard of the starts that its partner holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) enum Agreement {
+    /// No message.
+    Unheard,
+    /// The same hash.
+    Same,
+    /// Another hash. The contract is void.
+    Void,
+}
+
+/// What became of a message.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Heard {
+    /// It is stored.
+    Stored,
+    /// It is to another vehicle, older than another one, or of a void contract.
+    Ignored,
+    /// It has a number that no vehicle sends.
+    Invalid,
+    /// The sender holds other starts.
+    OtherStarts,
+    /// No start of the sender was announced.
+    Unknown,
+}
+
+impl Shared {
+    const UNHEARD: Self = Self { hash: 0, state: Agreement::Unheard };
+
+    /// Compares the hash of a message. Returns whether the message may be read.
+    #[inline]
+    fn compare(&mut self, hash: u64) -> Result<(), Heard> {
+        if hash != self.hash {
+            self.state = Agreement::Void;
+            return Err(Heard::OtherStarts);
+        }
+        match self.state {
+            Agreement::Void => Err(Heard::Ignored),
+            Agreement::Same => Ok(()),
+            Agreement::Unheard => {
+                self.state = Agreement::Same;
+                Ok(())
+            }
+        }
+    }
+
+    fn is_void(&self) -> bool {
+        self.state == Agreement::Void
+    }
 }
 
 /// Contract of a vehicle as the owner, with the newest message heard from the follower. Number 0 stands for no
 /// proposal.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Owned {
+    pub(crate) shared: Shared,
     /// Stamp, segment and decision of the newest message; at first the segment of the start.
-    stamp: u64,
+    stamp: u32,
     segment: Segment,
     decision: Decision,
     /// Plane that both vehicles hold.
@@ -215,12 +324,13 @@ pub(crate) struct Owned {
 }
 
 impl Owned {
-    /// Returns the contract at the start. `None` if the segments are closer than the margins.
+    /// Returns the contract at the start, without its hash. `None` if the segments are closer than the margins.
     pub(crate) fn new(own: &Start, follower: &Start) -> Option<Self> {
         let held = divider_of_starts(own, follower)?.owner_plane(own.metric, own.margin_m);
         let renewed = RENEWED * own.reach_m.max(follower.reach_m);
         let between = (own.margin_m + follower.margin_m) * own.metric.widest();
         Some(Self {
+            shared: Shared::UNHEARD,
             stamp: 0,
             segment: follower.segment,
             decision: NO_DECISION,
@@ -234,17 +344,26 @@ impl Owned {
         })
     }
 
-    /// Stores a message of the follower unless a later one was heard or its numbers are invalid. Returns whether it was
-    /// stored.
+    /// Returns the contract with the hash of its starts.
+    pub(crate) fn with_hash(mut self, own: &Start, follower: &Start) -> Self {
+        self.shared.hash = hash_of_pair(own, follower);
+        self
+    }
+
+    /// Stores a valid message of the follower unless a later one was heard or the contract is void.
     #[inline]
-    pub(crate) fn hear(&mut self, message: &Message) -> bool {
-        let is_new = message.stamp > self.stamp && message.is_valid();
-        if is_new {
-            self.stamp = message.stamp;
-            self.segment = message.segment;
-            self.decision = message.decision.unwrap_or(NO_DECISION);
+    pub(crate) fn hear(&mut self, message: &Message) -> Heard {
+        if let Err(heard) = self.shared.compare(message.starts) {
+            return heard;
         }
-        is_new
+        let Body::Follower { segment, decision } = message.body else { return Heard::Invalid };
+        if message.stamp <= self.stamp {
+            return Heard::Ignored;
+        }
+        self.stamp = message.stamp;
+        self.segment = segment;
+        self.decision = decision.unwrap_or(NO_DECISION);
+        Heard::Stored
     }
 
     /// Reads the newest message at an instant of this vehicle, with its segment from this instant on. If due, proposes
@@ -252,6 +371,9 @@ impl Owned {
     /// Returns whether the follower is to get a message.
     #[inline]
     pub(crate) fn renew(&mut self, own: &Segment, side: &Side, period: u64, is_due: bool) -> bool {
+        if self.shared.is_void() {
+            return is_due && !self.is_far(own);
+        }
         if self.is_pending {
             if self.decision.number != self.proposed.number {
                 return is_due;
@@ -264,10 +386,12 @@ impl Owned {
         if !is_due || self.is_far(own) {
             return false;
         }
+        // After the largest number the plane stays.
         if let Some(divider) = Divider::between(side.metric, own, &self.segment, side.margin_m, self.follower_margin_m)
             && side.owner_plane(&divider).contains(own)
+            && let Some(number) = self.proposed.number.checked_add(1)
         {
-            self.proposed = Proposal { number: self.proposed.number + 1, divider };
+            self.proposed = Proposal { number, divider };
             self.is_pending = true;
         }
         // Without a proposal, the message asks for the follower's segment.
@@ -315,10 +439,10 @@ impl Owned {
         self.is_pending.then(|| side.owner_plane(&self.proposed.divider))
     }
 
-    /// Returns the pending proposal.
+    /// Returns the pending proposal to be sent.
     #[inline]
     pub(crate) fn proposal(&self) -> Option<Proposal> {
-        self.is_pending.then_some(self.proposed)
+        (self.is_pending && !self.shared.is_void()).then_some(self.proposed)
     }
 
     /// Returns the number of periods since the held plane was taken on.
@@ -329,10 +453,11 @@ impl Owned {
 }
 
 /// Contract of a vehicle as the follower, with the newest message heard from the owner.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Followed {
+    pub(crate) shared: Shared,
     /// Stamp and proposal of the newest message.
-    stamp: u64,
+    stamp: u32,
     proposal: Proposal,
     /// Plane that both vehicles hold.
     pub(crate) held: Plane,
@@ -347,29 +472,39 @@ pub(crate) struct Followed {
 }
 
 impl Followed {
-    /// Returns the contract at the start. `None` if the segments are closer than the margins.
+    /// Returns the contract at the start, without its hash. `None` if the segments are closer than the margins.
     pub(crate) fn new(own: &Start, owner: &Start) -> Option<Self> {
         let held = divider_of_starts(owner, own)?.follower_plane(own.metric, own.margin_m);
         let far_m = RENEWED * own.reach_m.max(owner.reach_m);
-        Some(Self { stamp: 0, proposal: NO_PROPOSAL, held, held_since: 0, decided: NO_DECISION, far_m, due: 0 })
+        let (shared, proposal, decided) = (Shared::UNHEARD, NO_PROPOSAL, NO_DECISION);
+        Some(Self { shared, stamp: 0, proposal, held, held_since: 0, decided, far_m, due: 0 })
     }
 
-    /// Stores a message of the owner unless a later one was heard or its numbers are invalid. Returns whether it was
-    /// stored.
+    /// Returns the contract with the hash of its starts.
+    pub(crate) fn with_hash(mut self, own: &Start, owner: &Start) -> Self {
+        self.shared.hash = hash_of_pair(owner, own);
+        self
+    }
+
+    /// Stores a valid message of the owner unless a later one was heard or the contract is void.
     #[inline]
-    pub(crate) fn hear(&mut self, message: &Message) -> bool {
-        let is_new = message.stamp > self.stamp && message.is_valid();
-        if is_new {
-            self.stamp = message.stamp;
-            self.proposal = message.proposal.unwrap_or(NO_PROPOSAL);
+    pub(crate) fn hear(&mut self, message: &Message) -> Heard {
+        if let Err(heard) = self.shared.compare(message.starts) {
+            return heard;
         }
-        is_new
+        let Body::Owner { proposal } = message.body else { return Heard::Invalid };
+        if message.stamp <= self.stamp {
+            return Heard::Ignored;
+        }
+        self.stamp = message.stamp;
+        self.proposal = proposal.unwrap_or(NO_PROPOSAL);
+        Heard::Stored
     }
 
     /// Decides on a new proposal at an instant of this vehicle, with its segment from this instant on.
     #[inline]
     pub(crate) fn decide(&mut self, own: &Segment, side: &Side, period: u64, counted: &mut Renewed) {
-        if self.proposal.number <= self.decided.number {
+        if self.shared.is_void() || self.proposal.number <= self.decided.number {
             return;
         }
         let plane = side.follower_plane(&self.proposal.divider);
@@ -436,6 +571,7 @@ mod tests {
     use super::*;
     use crate::Limits;
     use crate::settings::{ROUNDING_M, Settings};
+    use crate::start::Start;
 
     /// Margin 0.5 m.
     fn limits() -> Limits {
@@ -454,17 +590,21 @@ mod tests {
 
     /// Returns the owner at 0 and the follower at `x`.
     fn pair(x: f64) -> (Owned, Followed) {
-        (Owned::new(&slot(0.0), &slot(x)).expect("apart"), Followed::new(&slot(x), &slot(0.0)).expect("apart"))
+        let (one, other) = (slot(0.0), slot(x));
+        let owner = Owned::new(&one, &other).expect("apart").with_hash(&one, &other);
+        (owner, Followed::new(&other, &one).expect("apart").with_hash(&other, &one))
     }
 
     /// Returns the message of vehicle 0, the owner.
-    fn proposes(owner: &Owned, stamp: u64, x: f64) -> Message {
-        Message { from: 0, to: 1, stamp, segment: at(x), proposal: owner.proposal(), decision: None }
+    fn proposes(owner: &Owned, stamp: u32) -> Message {
+        let body = Body::Owner { proposal: owner.proposal() };
+        Message { from: 0, to: 1, stamp, starts: owner.shared.hash, body }
     }
 
     /// Returns the message of vehicle 1, the follower.
-    fn decides(follower: &Followed, stamp: u64, x: f64) -> Message {
-        Message { from: 1, to: 0, stamp, segment: at(x), proposal: None, decision: follower.decision() }
+    fn decides(follower: &Followed, stamp: u32, x: f64) -> Message {
+        let body = Body::Follower { segment: at(x), decision: follower.decision() };
+        Message { from: 1, to: 0, stamp, starts: follower.shared.hash, body }
     }
 
     #[test]
@@ -482,13 +622,13 @@ mod tests {
         // The follower has moved to 3; the owner hears it and proposes a plane at 1.5.
         owner.hear(&decides(&follower, 1, 3.0));
         owner.renew(&at(0.0), &SIDE, 1, true);
-        let sent = proposes(&owner, 1, 0.0);
+        let sent = proposes(&owner, 1);
         assert_eq!((owner.held(), owner.pending(&SIDE).map(|plane| plane.offset_m)), (old, Some(1.0)));
         // No second proposal while one is pending, and a decision on another number has no effect.
         owner.renew(&at(0.2), &SIDE, 1, true);
-        assert_eq!(proposes(&owner, 1, 0.0), sent);
-        let mut stale = decides(&follower, 2, 3.0);
-        stale.decision = Some(Decision { number: 7, accepted: true });
+        assert_eq!(proposes(&owner, 1), sent);
+        let decision = Some(Decision { number: 7, accepted: true });
+        let stale = Message { body: Body::Follower { segment: at(3.0), decision }, ..decides(&follower, 2, 3.0) };
         owner.hear(&stale);
         owner.renew(&at(0.0), &SIDE, 2, true);
         assert_eq!((owner.held(), owner.pending(&SIDE).is_some()), (old, true));
@@ -513,7 +653,7 @@ mod tests {
         let mut counted = Renewed::default();
         let (old, kept) = (owner.held(), follower.held());
         owner.renew(&at(0.5), &SIDE, 1, true);
-        follower.hear(&proposes(&owner, 1, 0.5));
+        follower.hear(&proposes(&owner, 1));
         // The follower is at 2.6: inside the old plane, outside the proposed one at 2.25 plus 0.5.
         follower.decide(&at(2.6), &SIDE, 1, &mut counted);
         assert_eq!((counted, follower.held()), (Renewed { refused: 1, ..Renewed::default() }, kept));
@@ -543,14 +683,67 @@ mod tests {
     #[test]
     fn older_and_invalid_messages_are_ignored() {
         let (mut owner, mut follower) = pair(4.0);
-        owner.hear(&decides(&follower, 5, 3.0));
+        assert_eq!(owner.hear(&decides(&follower, 5, 3.0)), Heard::Stored);
         let heard = owner;
-        owner.hear(&decides(&follower, 4, 2.0));
-        owner.hear(&decides(&follower, 6, f64::NAN));
+        assert_eq!(owner.hear(&decides(&follower, 4, 2.0)), Heard::Ignored);
         assert_eq!(owner, heard);
-        let unheard = follower;
+        assert!(!decides(&follower, 6, f64::NAN).is_valid() && !decides(&follower, 0, 3.0).is_valid());
         let divider = Divider { normal: [2.0, 0.0, 0.0], offset_m: 0.0 };
-        follower.hear(&Message { proposal: Some(Proposal { number: 1, divider }), ..proposes(&owner, 7, 3.0) });
-        assert_eq!(follower, unheard);
+        let body = Body::Owner { proposal: Some(Proposal { number: 1, divider }) };
+        assert!(!Message { body, ..proposes(&owner, 7) }.is_valid());
+        // A body of the other side.
+        assert!(!Message { from: 1, to: 0, ..proposes(&owner, 7) }.is_valid());
+        let unheard = follower;
+        assert_eq!(
+            follower.hear(&Message { body: decides(&follower, 7, 3.0).body, ..proposes(&owner, 7) }),
+            Heard::Invalid
+        );
+        assert_eq!(Followed { shared: unheard.shared, ..follower }, unheard);
+    }
+
+    #[test]
+    fn another_hash_voids_the_contract_for_ever() {
+        let (mut owner, mut follower) = pair(4.0);
+        owner.renew(&at(0.0), &SIDE, 1, true);
+        let (sent, held) = (proposes(&owner, 1), owner.held());
+        assert!(owner.proposal().is_some());
+        let mut counted = Renewed::default();
+        let other = Message { starts: sent.starts ^ 1, ..sent };
+        assert_eq!((follower.hear(&other), follower.hear(&sent)), (Heard::OtherStarts, Heard::Ignored));
+        let kept = follower.held();
+        follower.decide(&at(4.0), &SIDE, 2, &mut counted);
+        assert_eq!((follower.held(), follower.decision(), counted), (kept, None, Renewed::default()));
+
+        let other = Message { starts: 0, ..decides(&follower, 9, 4.0) };
+        let decision = Some(Decision { number: 1, accepted: true });
+        let yes = Message { body: Body::Follower { segment: at(4.0), decision }, ..decides(&follower, 10, 4.0) };
+        assert_eq!((owner.hear(&other), owner.hear(&yes)), (Heard::OtherStarts, Heard::Ignored));
+        // Both planes are held for ever. The owner still sends, without a proposal.
+        for period in 2..9 {
+            assert!(owner.renew(&at(0.0), &SIDE, period, true));
+            assert_eq!((owner.held(), owner.pending(&SIDE).is_some(), owner.proposal()), (held, true, None));
+        }
+    }
+
+    #[test]
+    fn a_normal_of_single_precision_leaves_both_vehicles_their_margins() {
+        let mut random = crate::tests::Random::new(71);
+        let metrics = [Metric::BALL, Metric::ellipsoid(1.0, 0.3), Metric::ellipsoid(1.0, 2.0)];
+        for round in 0..3_000 {
+            let metric = metrics[round % 3];
+            // Rounded before it is proposed.
+            #[allow(clippy::cast_possible_truncation)]
+            let normal = <[f64; 3]>::from(random.direction()).map(|value| f64::from(value as f32));
+            let divider = Divider { normal, offset_m: random.between(-100.0, 100.0) };
+            assert!(divider.is_valid());
+            let (mine, yours) = (random.between(0.1, 50.0), random.between(0.1, 50.0));
+            let planes = [divider.owner_plane(metric, mine), divider.follower_plane(metric, yours)];
+            assert!(planes.iter().all(|plane| (plane.normal.norm() - 1.0).abs() < 1e-12));
+            let [one, other] = planes.map(|plane| {
+                let point = random.vector(200.0);
+                point + plane.normal * plane.room_m(&point).min(0.0)
+            });
+            assert!(metric.scaled(&(one - other)).norm() >= mine + yours - 1e-10, "{divider:?}");
+        }
     }
 }

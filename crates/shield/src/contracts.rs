@@ -3,20 +3,35 @@
 use std::cmp::Ordering;
 use std::sync::Arc;
 
+use serde::{Deserialize, Serialize};
+
 use crate::agenda::Agenda;
 use crate::choice::Reach;
-use crate::contract::{Broadcast, Entry, Followed, Instant, Message, Owned, Renewed, divider_of_starts};
+use crate::contract::{
+    Agreement, Broadcast, Entry, Followed, Heard, Instant, Message, Owned, Renewed, divider_of_starts,
+};
 use crate::fleet::{PairRoom, closest_starts};
 use crate::plane::Segment;
-use crate::settings::{ShieldError, Start};
+use crate::settings::ShieldError;
+use crate::start::{Start, hash_of_pair};
 #[cfg(test)]
 use crate::{contract::Side, plane::Divider};
+
+/// Contracts of a vehicle as they are saved.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(crate) struct SavedContracts {
+    index: u16,
+    places: Vec<u32>,
+    followed: Vec<Followed>,
+    owned: Vec<Owned>,
+    agenda: Agenda,
+}
 
 /// Contracts of a vehicle with all others. A contract has a record from the first instant or message at which it is
 /// more than the plane of the starts, which both vehicles can compute again.
 #[derive(Clone, Debug)]
 pub(crate) struct Contracts {
-    index: u32,
+    index: u16,
     starts: Arc<[Start]>,
     /// Place of the record of each other vehicle, from 1; 0 without a record.
     places: Vec<u32>,
@@ -34,8 +49,8 @@ impl Contracts {
     /// If the number is not in the list, or the vehicle starts too near to another one.
     pub(crate) fn new(index: usize, starts: Arc<[Start]>) -> Result<Self, ShieldError> {
         let count = starts.len();
-        let (Some(own), Ok(number)) = (starts.get(index), u32::try_from(index)) else {
-            let problem = format!("the number of the vehicle is not among {count} starts");
+        let (Some(own), Ok(number)) = (starts.get(index), u16::try_from(index)) else {
+            let problem = format!("the number of the vehicle is not among {count} starts of at most 65536");
             return Err(ShieldError::new("index", problem, index as f64, "count vehicles from 0"));
         };
         let has_plane = |owner: &Start, follower: &Start| divider_of_starts(owner, follower).is_some();
@@ -55,9 +70,63 @@ impl Contracts {
         ))
     }
 
+    /// Returns the contracts to be saved.
+    pub(crate) fn save(&self) -> SavedContracts {
+        let Self { index, starts: _, places, followed, owned, agenda } = self.clone();
+        SavedContracts { index, places, followed, owned, agenda }
+    }
+
+    /// Returns saved contracts among these starts.
+    ///
+    /// # Errors
+    /// If the data do not fit the starts.
+    pub(crate) fn load(saved: &SavedContracts, starts: Arc<[Start]>) -> Result<Self, ShieldError> {
+        let mut contracts = Self::new(saved.index as usize, starts)?;
+        let SavedContracts { index, places, followed, owned, agenda } = saved;
+        // Each record belongs to one place, on its side.
+        let mut records = [vec![false; followed.len()], vec![false; owned.len()]];
+        let mut fits = places.len() == contracts.places.len() && agenda.is_of(places.len());
+        for (other, place) in places.iter().enumerate().filter(|(_, place)| **place > 0) {
+            let record = records[usize::from(other > *index as usize)].get_mut(*place as usize - 1);
+            fits &= other != *index as usize && record.is_some_and(|record| !std::mem::replace(record, true));
+        }
+        fits &= records.iter().flatten().all(|is_used| *is_used);
+        for (other, place) in places.iter().enumerate().filter(|(_, place)| **place > 0) {
+            if !fits {
+                break;
+            }
+            let (own, partner) = (contracts.starts[*index as usize], contracts.starts[other]);
+            let place = *place as usize - 1;
+            fits = if other < *index as usize {
+                followed[place].shared.hash == hash_of_pair(&partner, &own)
+            } else {
+                owned[place].shared.hash == hash_of_pair(&own, &partner)
+            };
+        }
+        if !fits {
+            let problem = "the saved contracts do not fit the starts".into();
+            return Err(ShieldError::new("saved", problem, places.len() as f64, "give unaltered data"));
+        }
+        contracts.places.copy_from_slice(places);
+        contracts.followed.extend_from_slice(followed);
+        contracts.owned.extend_from_slice(owned);
+        contracts.agenda = agenda.clone();
+        Ok(contracts)
+    }
+
     /// Number of the vehicle.
-    pub(crate) fn index(&self) -> u32 {
+    pub(crate) fn index(&self) -> u16 {
         self.index
+    }
+
+    /// Announced starts of all vehicles.
+    pub(crate) fn starts(&self) -> &[Start] {
+        &self.starts
+    }
+
+    /// Announced start of the vehicle.
+    pub(crate) fn own(&self) -> &Start {
+        &self.starts[self.index as usize]
     }
 
     /// Returns the contract with a vehicle of a larger number, at the start.
@@ -79,13 +148,14 @@ impl Contracts {
 
     fn add(&mut self, other: usize) -> Option<usize> {
         // `new` has found a plane for each pair.
+        let (own, partner) = (&self.starts[self.index as usize], self.starts.get(other)?);
         let count = match other.cmp(&(self.index as usize)) {
             Ordering::Less => {
-                self.followed.push(self.followed_at_start(other)?);
+                self.followed.push(self.followed_at_start(other)?.with_hash(own, partner));
                 self.followed.len()
             }
             Ordering::Greater => {
-                self.owned.push(self.owned_at_start(other)?);
+                self.owned.push(self.owned_at_start(other)?.with_hash(own, partner));
                 self.owned.len()
             }
             Ordering::Equal => return None,
@@ -96,20 +166,33 @@ impl Contracts {
 
     /// Stores a message to this vehicle. Messages to other vehicles have no effect.
     #[inline]
-    pub(crate) fn hear(&mut self, message: &Message) {
+    pub(crate) fn hear(&mut self, message: &Message) -> Heard {
         let from = message.from as usize;
-        if message.to != self.index || !message.is_valid() {
-            return;
+        if message.to != self.index {
+            return Heard::Ignored;
         }
-        let Some(place) = self.place(from) else { return };
-        let is_new = if message.from < self.index {
+        if !message.is_valid() {
+            return Heard::Invalid;
+        }
+        let Some(place) = self.place(from) else { return Heard::Unknown };
+        let heard = if message.from < self.index {
             self.followed[place].hear(message)
         } else {
             self.owned[place].hear(message)
         };
-        if is_new {
+        // A void contract is looked at too, so that the partner hears this vehicle's hash.
+        if matches!(heard, Heard::Stored | Heard::OtherStarts) {
             self.agenda.hear(from);
         }
+        heard
+    }
+
+    /// Returns the number of other vehicles, and of those that sent the hash of the same starts.
+    pub(crate) fn agreed(&self) -> [usize; 2] {
+        let followed = self.followed.iter().map(|contract| contract.shared);
+        let shared = followed.chain(self.owned.iter().map(|contract| contract.shared));
+        let same = shared.filter(|shared| shared.state == Agreement::Same).count();
+        [self.starts.len() - 1, same]
     }
 
     /// Reads the newest messages, decides and proposes at an instant, in the order of the other vehicles. Adds the
@@ -194,31 +277,40 @@ impl Contracts {
     #[inline]
     fn next_entry(&mut self) -> Option<Entry> {
         let to = self.agenda.next_outgoing()?;
-        let (number, place) = (u32::try_from(to).ok()?, self.place(to)?);
-        Some(if number < self.index {
-            Entry { to: number, proposal: None, decision: self.followed[place].decision() }
+        let (to, place) = (u16::try_from(to).ok()?, self.place(to)?);
+        Some(if to < self.index {
+            let contract = &self.followed[place];
+            Entry { to, starts: contract.shared.hash, proposal: None, decision: contract.decision() }
         } else {
-            Entry { to: number, proposal: self.owned[place].proposal(), decision: None }
+            let contract = &self.owned[place];
+            Entry { to, starts: contract.shared.hash, proposal: contract.proposal(), decision: None }
         })
     }
 
     /// Takes the messages that are to be sent.
-    pub(crate) fn messages(&mut self, stamp: u64, segment: Segment) -> impl Iterator<Item = Message> + '_ {
+    pub(crate) fn messages(&mut self, period: u64, segment: Segment) -> impl Iterator<Item = Message> + '_ {
         let from = self.index;
         std::iter::from_fn(move || {
-            let Entry { to, proposal, decision } = self.next_entry()?;
-            Some(Message { from, to, stamp, segment, proposal, decision })
+            let stamp = stamp(period)?;
+            Some(self.next_entry()?.message(from, stamp, segment))
         })
     }
 
     /// Takes the messages that are to be sent, as one.
-    pub(crate) fn write_broadcast(&mut self, stamp: u64, segment: Segment, broadcast: &mut Broadcast) {
-        (broadcast.from, broadcast.stamp, broadcast.segment) = (self.index, stamp, segment);
+    pub(crate) fn write_broadcast(&mut self, period: u64, segment: Segment, broadcast: &mut Broadcast) {
         broadcast.entries.clear();
+        let Some(stamp) = stamp(period) else { return };
+        (broadcast.from, broadcast.stamp, broadcast.segment) = (self.index, stamp, segment);
         while let Some(entry) = self.next_entry() {
             broadcast.entries.push(entry);
         }
     }
+}
+
+/// Returns the stamp of a period. After 2^32 periods, 1.3 years at 100 Hz, a vehicle is silent: the others stay behind
+/// their last planes.
+fn stamp(period: u64) -> Option<u32> {
+    u32::try_from(period).ok()
 }
 
 /// Defects for tests: planes without the contract.
@@ -246,7 +338,7 @@ impl Contracts {
     }
 
     /// Returns the number of the pending proposal to a vehicle.
-    pub(crate) fn pending_number(&self, to: u32) -> Option<u64> {
+    pub(crate) fn pending_number(&self, to: u16) -> Option<u32> {
         let place = *self.places.get(to as usize).filter(|place| to > self.index && **place > 0)?;
         Some(self.owned[place as usize - 1].proposal()?.number)
     }

@@ -7,16 +7,20 @@ use nalgebra::Vector3;
 use crate::brake::State;
 use crate::contract::{Broadcast, Message};
 use crate::obstacle::Obstacle;
-use crate::report::Counters;
-use crate::settings::{Limits, ShieldError, Start};
+use crate::report::{Assumption, Counters, SharedStarts, assumptions};
+use crate::saved::SavedShield;
+use crate::settings::{Limits, ShieldError};
 use crate::shield::Shield;
+use crate::start::Start;
 
 /// Two vehicles and the distance of their reserved segments.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PairRoom {
     /// The two vehicles, counted from 0.
     pub pair: (usize, usize),
-    /// Distance of their segments \[m\], in the scaled lengths of ellipsoids.
+    /// Distance of their segments \[m\], in the scaled lengths of ellipsoids, see [`Metric::distance_m`].
+    ///
+    /// [`Metric::distance_m`]: crate::plane::Metric::distance_m
     pub distance_m: f64,
     /// Smallest distance with a certificate \[m\]: the sum of the two margins.
     pub required_m: f64,
@@ -138,6 +142,18 @@ impl Fleet {
         Ok(Self { shields: shields.collect::<Result<_, _>>()? })
     }
 
+    /// Returns shields that were saved together, which continue with the same bits.
+    ///
+    /// # Errors
+    /// If the data are not those of shields of this version, or the shields have different starts.
+    pub fn load(saved: &[SavedShield]) -> Result<Self, ShieldError> {
+        if saved.iter().any(|one| one.starts != saved[0].starts) {
+            let problem = "the saved shields have different starts".into();
+            return Err(ShieldError::new("saved", problem, saved.len() as f64, "save them at one instant"));
+        }
+        Ok(Self { shields: saved.iter().map(SavedShield::load).collect::<Result<_, _>>()? })
+    }
+
     /// Stores a message for its receiver.
     pub fn hear(&mut self, message: &Message) {
         if let Some(shield) = self.shields.get_mut(message.to as usize) {
@@ -181,6 +197,16 @@ impl Fleet {
         let mut report = Counters::default();
         self.shields.iter().for_each(|shield| report.merge(shield.counters()));
         report
+    }
+
+    /// Returns the assumptions of the certificate with the limits of the first vehicle and the numbers of all, see
+    /// [`Shield::assumptions`]. One program computes all shields from one list of starts.
+    #[must_use]
+    pub fn assumptions(&self) -> Vec<Assumption> {
+        let Some(first) = self.shields.first() else { return vec![] };
+        let agreed = self.shields.iter().map(|shield| shield.shared_starts().agreed).min().unwrap_or_default();
+        let starts = SharedStarts { partners: self.shields.len() - 1, agreed, is_one_list: true };
+        assumptions(first.limits(), &self.report(), starts)
     }
 }
 

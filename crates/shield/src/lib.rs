@@ -8,14 +8,17 @@
 //! | module | holds |
 //! | --- | --- |
 //! | [`brake`] | stop point and command of the brake; the reservation (Lemma 1) |
-//! | [`tube`] | rigorous bounds on the distance to the reference and on the feedback |
+//! | [`tube`] | bounds on the distance to the reference and on the feedback |
 //! | [`plane`] | reserved segments and the plane between two of them |
 //! | [`contract`] | messages, proposals and decisions (Lemma 3) |
 //! | `contracts` | contracts of a vehicle with all others |
 //! | `agenda` | periods at which contracts are looked at |
 //! | [`obstacle`] | convex obstacles and the planes before them (Lemma 4) |
 //! | [`choice`] | which commands are accepted, and which one is taken |
-//! | [`settings`] | settings, defaults, errors, limits of the reference |
+//! | [`settings`] | settings, defaults, errors, limits of the reference, rounding budget |
+//! | [`start`] | announced starts, their bytes, and their hash |
+//! | [`wire`] | messages as bytes |
+//! | [`saved`] | state of a shield, to be continued in another process |
 //! | [`shield`] | [`Shield`] of one vehicle, for real vehicles and simulators |
 //! | [`unicycle`] | shield of a vehicle that cannot stop (Lemma 5) |
 //! | [`fleet`] | [`Fleet`] of all vehicles of a simulation; the condition on starts |
@@ -31,7 +34,12 @@
 //! - **A3** The shield runs at every instant. Where it is missed, the brake goes on ([`Shield::brake`]).
 //! - **A4** A message that arrives is what was sent, and arrives after it was sent. It may be late, lost, doubled or
 //!   overtaken.
-//! - **A5** All vehicles use one frame and know all announced starts. The first instant is at the start.
+//! - **A5** All vehicles use one frame. The starts of a pair are announced values that both vehicles hold with the same
+//!   bits ([`Start`]); no vehicle computes the start of another one from its own settings. The first instant is at the
+//!   start.
+//!
+//! Each message carries a hash of the two starts of its pair. A vehicle that holds other starts is found by its first
+//! message that arrives.
 //!
 //! # Algorithm
 //! At each instant the vehicle, with its reference at (p, v) and the stop point s of its brake:
@@ -57,28 +65,32 @@
 //!  of the period and the whole brake after it are inside.
 //!
 //! **Lemma 2** (a choice always exists). At each instant, after steps 1 and 2, p and s are inside all planes held, so
-//!  the brake is a choice. Both are inside at the start. The last command was accepted, or was that of the brake, so
-//!  the next p and s are inside all planes held over the period (Lemma 1). A plane is taken on only after p and s were
-//!  tested against it. Dropping a plane changes nothing.
+//!  the brake is a choice. Both are inside at the start, because each vehicle tests p and s of both vehicles against
+//!  the first plane of the pair. A pair that fails the test does not start. The last command was accepted, or was that
+//!  of the brake, so the next p and s are inside all planes held over the period (Lemma 1). A plane is taken on only
+//!  after p and s were tested against it. Dropping a plane changes nothing.
 //!
-//! **Lemma 3** ([`contract`]). At every time the two vehicles of a pair hold a common plane.
+//! **Lemma 3** ([`contract`]). At every time the two vehicles of a pair hold a common plane. Its base case is the plane
+//!  of the announced starts, which both compute with the same numbers (A5).
 //!
 //! **Lemma 4** ([`obstacle`]). The vehicle may renew a plane before a convex obstacle alone, at any instant.
 //!
-//! **Theorem.** Let A1 to A5 hold, and let the segments of each pair be at least delta + e1 + e2 apart at the start.
-//!  Let the segment of each vehicle be at least its clearance and e from each obstacle. Then any two vehicles are at
-//!  least delta apart at all times, and each vehicle keeps its clearance, under every law, latency and loss.
+//! **Theorem.** Let A1 to A5 hold, and let the segments of each pair pass the test of Lemma 2, for which they must be
+//!  at least delta + e1 + e2 apart. Let the segment of each vehicle be at least its clearance and e from each obstacle.
+//!  Then any two vehicles are at least delta apart at all times, and each vehicle keeps its clearance, under every law,
+//!  latency and loss.
 //!
 //! *Proof.* Take the common plane of Lemma 3 at a time t. By Lemmas 1 and 2 both references are inside it, one on its
 //!  side by m1 and the other one by m2. They are at least m1 + m2 = delta + e1 + e2 apart. Each vehicle is within its e
 //!  of its reference. Lemma 4 gives the clearance of obstacles.
 //!
-//! Doubles round: margins contain 1e-6 m for it ([`settings::ROUNDING_M`]), which covers positions up to 1e6 m.
+//! Doubles round: the margins of a pair contain 1e-6 m for it. [`settings`] lists what this covers, and refuses
+//! settings and starts beyond it.
 //!
 //! # What voids the certificate
-//! A vehicle that is dead, frozen or weaker than A voids it. So do a push or an error beyond its bound, altered
-//! messages and a vehicle without a contract. A silent vehicle does not void it: the others stay behind the last common
-//! plane.
+//! A vehicle that is dead, frozen or weaker than A voids it. So do a push or an error beyond its bound, other starts on
+//! the two sides of a pair, forged messages and a vehicle without a contract. A silent vehicle does not void it: the
+//! others stay behind the last common plane.
 //! [`Counters::exceeded`](report::Counters::exceeded) names an assumption that did not hold in a flight.
 //!
 //! Arrival is not proved. Planes that are not renewed stay safe, and vehicles wait behind them.
@@ -94,18 +106,23 @@ pub mod fleet;
 pub mod obstacle;
 pub mod plane;
 pub mod report;
+pub mod saved;
 pub mod settings;
 pub mod shield;
+pub mod start;
 pub mod tube;
 pub mod unicycle;
+pub mod wire;
 
 pub use brake::State;
-pub use contract::{Broadcast, Entry, Message};
+pub use contract::{Body, Broadcast, Entry, Message};
 pub use fleet::Fleet;
 pub use obstacle::{ConvexBody, Obstacle};
 pub use report::Counters;
-pub use settings::{Limits, Settings, ShieldError, Start};
+pub use saved::SavedShield;
+pub use settings::{Limits, Settings, ShieldError};
 pub use shield::Shield;
+pub use start::Start;
 pub use unicycle::UnicycleShield;
 
 #[cfg(test)]

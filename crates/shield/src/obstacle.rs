@@ -151,7 +151,7 @@ impl KeepOut {
     /// \[m\].
     pub(crate) fn all(
         obstacles: &[Obstacle],
-        vehicle: u32,
+        vehicle: u16,
         around_m: f64,
         segment: &Segment,
     ) -> Result<Vec<Self>, ShieldError> {
@@ -180,6 +180,11 @@ impl KeepOut {
             }
         });
         keep_outs.collect()
+    }
+
+    /// Least distance of the segment from the body \[m\].
+    pub(crate) fn least_m(&self) -> f64 {
+        self.margin_m.max(LEAST_M)
     }
 
     /// Returns the plane to be held from an instant on, with the position of the reference, its reserved segment and

@@ -7,11 +7,28 @@
 //! proof holds for the scaled references S p^. An error of e is at most e max(1, delta / (2 k)) there. The true plane
 //! of a scaled one n . S x <= c is (S n) . x <= c, divided by |S n|. Brake, choice and reach use true planes.
 
+//!
+//! # Verified planes
+//! A pair of points of two segments gives an upper bound of their distance. A unit normal gives a lower bound: the gap
+//! between the ends of the two segments along it. [`Divider::between`] takes the normal of the closest points if both
+//! bounds agree. They do not agree for long segments that are nearly parallel. It then takes the normal with the widest
+//! gap: of the closest points, of the four ends, or of the common perpendicular. The gap is computed from the ends, so
+//! a normal that is not the best one costs room but never safety.
+
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
+use crate::saved::vector;
+
+/// Largest difference of the two bounds of a distance that counts as rounding \[m\].
+const BOUNDS_AGREE_M: f64 = 1e-9;
+/// Largest deviation of the squared length of a normal that is rounding of doubles.
+const UNIT: f64 = 1e-14;
+/// Largest deviation of the squared length of a normal that is valid: rounding of single precision.
+const SINGLE: f64 = 1e-6;
+
 /// Scaled lengths, in which two vehicles are delta apart: level lengths as they are, vertical ones times a factor.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Metric {
     vertical: f64,
 }
@@ -25,6 +42,16 @@ impl Metric {
     #[must_use]
     pub fn ellipsoid(delta_m: f64, half_height_m: f64) -> Self {
         Self { vertical: delta_m / (2.0 * half_height_m) }
+    }
+
+    /// Returns the lengths with this factor of vertical ones.
+    pub(crate) fn of_vertical(vertical: f64) -> Self {
+        Self { vertical }
+    }
+
+    /// Factor of vertical lengths.
+    pub(crate) fn vertical(self) -> f64 {
+        self.vertical
     }
 
     /// Returns a vector in scaled lengths.
@@ -45,7 +72,8 @@ impl Metric {
         1.0 / self.vertical.min(1.0)
     }
 
-    /// Returns the distance of two segments in scaled lengths \[m\].
+    /// Returns the distance of two segments in scaled lengths \[m\]. It is the verified gap of a plane where rounding
+    /// makes the closest points uncertain, and then at most the distance.
     #[must_use]
     pub fn distance_m(self, one: &Segment, other: &Segment) -> f64 {
         self.segment(one).distance_m(&self.segment(other))
@@ -99,11 +127,70 @@ impl Segment {
         self.stop_m.into()
     }
 
-    /// Returns the distance of two segments \[m\].
+    /// Returns the distance of two segments \[m\]. See [`Metric::distance_m`].
     #[must_use]
     pub fn distance_m(&self, other: &Self) -> f64 {
-        let (own, others) = self.closest_points(other);
-        (others - own).norm()
+        self.gap(other).map_or(0.0, |gap| gap.width_m)
+    }
+
+    /// Returns the gap of the best normal between this segment and another one. `None` if they meet or a number is not
+    /// finite.
+    #[inline]
+    pub(crate) fn gap(&self, other: &Self) -> Option<Gap> {
+        let (from, to) = self.closest_points(other);
+        let distance = (to - from).norm();
+        // A distance that is not finite fails the comparison too.
+        if !(distance > 0.0 && distance < f64::INFINITY) {
+            return None;
+        }
+        let normal = (to - from) / distance;
+        let verified = self.gap_along(other, normal, from);
+        if verified.width_m >= distance - BOUNDS_AGREE_M {
+            return Some(Gap { normal, edge_m: normal.dot(&from), width_m: distance });
+        }
+        let best = self.normals(other).into_iter().map(|normal| self.gap_along(other, normal, from));
+        let best = best.fold(verified, |best, gap| if gap.width_m > best.width_m { gap } else { best });
+        (best.width_m > 0.0).then_some(best)
+    }
+
+    /// Returns the gap along a unit normal. Extents are taken from a point near both segments, for less rounding.
+    fn gap_along(&self, other: &Self, normal: Vector3<f64>, near: Vector3<f64>) -> Gap {
+        let [own, others] =
+            [self, other].map(|segment| [segment.position(), segment.stop()].map(|point| normal.dot(&(point - near))));
+        let (most, least) = (own[0].max(own[1]), others[0].min(others[1]));
+        Gap { normal, edge_m: normal.dot(&near) + most, width_m: least - most }
+    }
+
+    /// Returns unit normals towards another segment: those of the four ends and the common perpendicular, both ways.
+    fn normals(&self, other: &Self) -> [Vector3<f64>; 6] {
+        let across = (self.stop() - self.position()).cross(&(other.stop() - other.position()));
+        [
+            other.nearest(&self.position()) - self.position(),
+            other.nearest(&self.stop()) - self.stop(),
+            other.position() - self.nearest(&other.position()),
+            other.stop() - self.nearest(&other.stop()),
+            across,
+            -across,
+        ]
+        // A vector of length 0 has a gap that is not a number, which is never the widest.
+        .map(|towards| towards / towards.norm())
+    }
+
+    /// Returns the point of this segment closest to a point.
+    fn nearest(&self, point: &Vector3<f64>) -> Vector3<f64> {
+        let along = self.stop() - self.position();
+        let length = along.norm_squared();
+        if length > 0.0 {
+            self.position() + along * ((point - self.position()).dot(&along) / length).clamp(0.0, 1.0)
+        } else {
+            self.position()
+        }
+    }
+
+    /// Largest coordinate of both ends \[m\].
+    #[inline]
+    pub(crate) fn farthest_m(&self) -> f64 {
+        self.position_m.iter().chain(&self.stop_m).fold(0.0, |farthest, value| farthest.max(value.abs()))
     }
 
     /// Whether all numbers are finite.
@@ -113,7 +200,8 @@ impl Segment {
         self.position_m.iter().chain(&self.stop_m).map(|value| value * 0.0).sum::<f64>() == 0.0
     }
 
-    /// Returns the closest points of this segment and of another one.
+    /// Returns the closest points of this segment and of another one. [`Segment::gap`] verifies them: for segments that
+    /// are nearly parallel they may be far from the closest ones.
     ///
     /// The squared distance of the points at the fractions s and t is a convex quadratic. Its minimum over all s and t
     /// is clamped to the ends of one segment. Then the best point of the other segment is taken (Ericson, Real-Time
@@ -152,10 +240,22 @@ impl Segment {
     }
 }
 
-/// Half-space of all x with `normal . x <= offset`, in which a vehicle keeps its path.
+/// Space between two segments along a unit normal.
 #[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Gap {
+    /// Unit normal, from the first segment to the second one.
+    pub(crate) normal: Vector3<f64>,
+    /// Largest extent of the first segment along the normal \[m\].
+    pub(crate) edge_m: f64,
+    /// Width \[m\].
+    pub(crate) width_m: f64,
+}
+
+/// Half-space of all x with `normal . x <= offset`, in which a vehicle keeps its path.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Plane {
     /// Unit normal, towards the other vehicle.
+    #[serde(with = "vector")]
     pub normal: Vector3<f64>,
     /// Largest extent along the normal \[m\].
     pub offset_m: f64,
@@ -192,7 +292,7 @@ impl Plane {
 /// in the scaled lengths of a [`Metric`].
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Divider {
-    /// Unit normal, from the owner to the follower.
+    /// Normal from the owner to the follower, of length 1 up to rounding of single precision.
     pub normal: [f64; 3],
     /// Extent along the normal \[m\].
     pub offset_m: f64,
@@ -210,38 +310,45 @@ impl Divider {
         owner_margin_m: f64,
         follower_margin_m: f64,
     ) -> Option<Self> {
-        let (from, to) = metric.segment(owner).closest_points(&metric.segment(follower));
-        let apart = to - from;
-        let distance = apart.norm();
-        let room = distance - owner_margin_m - follower_margin_m;
-        // A distance that is not finite fails the comparison too.
-        if !(room >= 0.0 && distance > 0.0 && distance < f64::INFINITY) {
-            return None;
-        }
-        let normal = apart / distance;
-        Some(Self { normal: normal.into(), offset_m: normal.dot(&from) + owner_margin_m + room / 2.0 })
+        let gap = metric.segment(owner).gap(&metric.segment(follower))?;
+        let room = gap.width_m - owner_margin_m - follower_margin_m;
+        (room >= 0.0).then(|| Self { normal: gap.normal.into(), offset_m: gap.edge_m + owner_margin_m + room / 2.0 })
     }
 
     /// Returns the true half-space of the owner with its margin \[m\] in scaled lengths.
     #[inline]
     #[must_use]
     pub fn owner_plane(&self, metric: Metric, margin_m: f64) -> Plane {
-        metric.true_plane(self.normal.into(), self.offset_m - margin_m)
+        let (normal, offset_m) = self.unit();
+        metric.true_plane(normal, offset_m - margin_m)
     }
 
     /// Returns the true half-space of the follower with its margin \[m\] in scaled lengths.
     #[inline]
     #[must_use]
     pub fn follower_plane(&self, metric: Metric, margin_m: f64) -> Plane {
-        metric.true_plane(-Vector3::from(self.normal), -self.offset_m - margin_m)
+        let (normal, offset_m) = self.unit();
+        metric.true_plane(-normal, -offset_m - margin_m)
     }
 
-    /// Whether the normal has length 1 up to rounding and the offset is finite.
+    /// Returns the divider with a normal of length 1. Both vehicles of a pair get the same numbers from the same
+    /// divider, so a normal that was rounded before it was proposed costs nothing.
+    #[inline]
+    fn unit(&self) -> (Vector3<f64>, f64) {
+        let normal = Vector3::from(self.normal);
+        let squared = normal.norm_squared();
+        // A normal of length 1 would be rounded.
+        if (squared - 1.0).abs() <= UNIT {
+            return (normal, self.offset_m);
+        }
+        let length = squared.sqrt();
+        (normal / length, self.offset_m / length)
+    }
+
+    /// Whether the normal has length 1 up to rounding of single precision and the offset is finite.
     #[inline]
     pub(crate) fn is_valid(&self) -> bool {
-        /// Error of a squared length by rounding, and by a radio that sends few digits.
-        const UNIT: f64 = 1e-12;
-        (Vector3::from(self.normal).norm_squared() - 1.0).abs() <= UNIT && self.offset_m.is_finite()
+        (Vector3::from(self.normal).norm_squared() - 1.0).abs() <= SINGLE && self.offset_m.is_finite()
     }
 }
 

@@ -1,20 +1,61 @@
 //! Settings of a shielded vehicle, and the limits of its reference that follow from them.
+//!
+//! # Rounding budget
+//! Each vehicle has half of [`ROUNDING_M`], 5e-7 m, in its margin for the rounding of doubles. The unit of rounding u
+//! is 2^-53, and C is the largest coordinate. The longest brake takes m periods, J is [`Tube::jumps`], and w is the
+//! way of a unicycle in a period.
+//!
+//! | tolerance | where | length that it costs | limit | at the limit |
+//! | --- | --- | --- | --- | --- |
+//! | 2.5e-7 m | excess of a bound that is not reported | itself | | 2.5e-7 m |
+//! | u | plane at a point: product, offset, margin | 16 u C | C <= 1e6 m | 1.8e-9 m |
+//! | u | brake, reference, tracker | u C (16 (m + 2) + 8 J) | [`Limits::farthest_m`] | 1.5e-7 m |
+//! | 1e-12 | largest command and speed, relative | 1e-12 A / kp | A / kp <= 1e4 m | 1e-8 m |
+//! | 1e-14 | squared length of a normal | 5e-15 times the margin | margin <= 1e6 m | 5e-9 m |
+//! | 1e-6 | squared length of a proposed normal | 0: both divide by the same length | | 0 |
+//! | 1e-14 | squared sine of parallel segments | 0: both ends are tested | | 0 |
+//! | 1e-9 m | short segments, bounds of a distance that agree | 0: both ends are tested | | 0 |
+//! | 1e-6 m | reach beyond which planes are left out | 0: it is added to the reach | | 0 |
+//! | 1e-9 | sine of the turn of a straight unicycle | 1e-9 w / 2 | w <= 100 m | 5e-8 m |
+//! | 1e-9 | periods of slowing down of a unicycle | 0: the rest point is kept | | 0 |
+//! | 1e-12 | speeds of a unicycle, relative | 1e-12 w | w <= 100 m | 1e-10 m |
+//! | u | normal before an obstacle at d, with the reach R | 8 u C R / d | C by this row | 1e-7 m |
+//!
+//! *Brake.* In each of its periods the position errs by at most 8 u C, and the speed by at most 4 u V. The time left
+//! times V is at most twice the length of the segment, so the stop point moves by at most 8 u C. It errs by 16 u C
+//! itself. Only the brake adds errors up: other commands are tested at the computed numbers.
+//!
+//! *Reference.* The reference jumps by its rounding, at most 8 u C, in each period. The tracker follows: its distance
+//! grows by [`Tube::jumps`] times that.
+//!
+//! Settings and starts beyond a limit are refused. A reference that flies farther than [`Limits::farthest_m`] exceeds
+//! an assumption, which the report names.
 
 use std::fmt;
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use crate::agenda::Horizon;
 use crate::brake::{Brake, State};
 use crate::choice::{Choice, Envelope};
 use crate::contract::Side;
 use crate::plane::{Metric, Segment};
+use crate::start::Start;
 use crate::tube::{TrackerLoop, Tube, TubeError};
 
 /// Largest coordinate of a start \[m\].
-const FARTHEST_M: f64 = 1e6;
-/// Part of the safety distance that is added because of rounding \[m\]. It covers positions up to 1e6 m.
+pub(crate) const FARTHEST_M: f64 = 1e6;
+/// Part of the safety distance that is added because of rounding \[m\]. The module lists what it covers.
 pub const ROUNDING_M: f64 = 1e-6;
+/// Part of the margin of a vehicle for its brake and its reference \[m\].
+const MOTION_M: f64 = 1.5e-7;
+/// Part of the margin before an obstacle for the rounding of its normal \[m\].
+pub(crate) const NORMAL_M: f64 = 1e-7;
+/// Largest error of one rounded operation, relative to its result.
+pub(crate) const UNIT_ROUNDOFF: f64 = f64::EPSILON / 2.0;
+/// Largest quotient of the largest command and the gain on position \[m\].
+const STIFF_M: f64 = 1e4;
 /// Default deceleration of the brake, as a share of the largest command.
 const BRAKE_SHARE: f64 = 0.6;
 /// Default ease, as a share of the safety distance.
@@ -26,7 +67,8 @@ pub(crate) const LEAD_PERIODS: f64 = 2.0;
 const MAX_DELAY: usize = 20;
 
 /// Settings of one vehicle. [`Settings::new`] fills in the defaults.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Settings {
     /// Smallest separation of any pair that is certified \[m\]; the same for all vehicles.
     pub delta_m: f64,
@@ -160,7 +202,36 @@ impl Settings {
         let stretch = metric.stretch();
         let margin_m = f64::midpoint(self.delta_m, ROUNDING_M * stretch) + tube.error_m * stretch;
         let lead_m = LEAD_PERIODS * self.max_speed_m_s * self.period_s;
-        Ok(Limits { settings: *self, tube, envelope, choice, side: Side { margin_m, metric }, lead_m })
+        let farthest_m = self.farthest_m(&envelope, &tube, margin_m)?;
+        Ok(Limits { settings: *self, tube, envelope, choice, side: Side { margin_m, metric }, lead_m, farthest_m })
+    }
+
+    /// Returns the largest coordinate that the margin for rounding covers \[m\].
+    fn farthest_m(&self, envelope: &Envelope, tube: &Tube, margin_m: f64) -> Result<f64, ShieldError> {
+        let fails = |place, problem, value, remedy| Err(ShieldError::new(place, problem, value, remedy));
+        if margin_m > FARTHEST_M {
+            let problem = format!("margins must be at most {FARTHEST_M} m, which the margin for rounding covers");
+            let place = if self.half_height_m.is_some() { "half_height_m" } else { "delta_m" };
+            return fails(place, problem, margin_m, "use a shorter distance, smaller errors or a rounder ellipsoid");
+        }
+        if self.accel_m_s2 / self.tracker_per_s2 > STIFF_M {
+            let problem = format!("must be at most {STIFF_M} m times `tracker_per_s2`, for the rounding of commands");
+            return fails("accel_m_s2", problem, self.accel_m_s2, "lower it or raise `tracker_per_s2`");
+        }
+        let periods = (self.max_speed_m_s / (envelope.brake.deceleration_m_s2() * self.period_s)).floor();
+        let jumps = if self.tracking_error_m.is_some() { 0.0 } else { tube.jumps };
+        let roundings = 16.0 * (periods + 2.0) + 8.0 * jumps;
+        let farthest_m = (MOTION_M / (UNIT_ROUNDOFF * roundings)).floor().min(FARTHEST_M);
+        let longest_m = envelope.brake.distance_m(self.max_speed_m_s);
+        // Negative or not a number if the sum overflows.
+        if longest_m >= 0.0 && longest_m <= farthest_m {
+            return Ok(farthest_m);
+        }
+        let problem = format!(
+            "a brake over {longest_m} m in {periods} periods, with this tracker, leaves coordinates up to \
+             {farthest_m} m to the margin for rounding"
+        );
+        fails("max_speed_m_s", problem, self.max_speed_m_s, "lower it, brake harder, or lengthen the period")
     }
 
     fn check_ranges(&self) -> Result<(), ShieldError> {
@@ -246,6 +317,7 @@ pub struct Limits {
     side: Side,
     /// Distance beyond reach within which planes are renewed in each period \[m\].
     pub(crate) lead_m: f64,
+    farthest_m: f64,
 }
 
 impl Limits {
@@ -290,6 +362,13 @@ impl Limits {
     #[must_use]
     pub fn metric(&self) -> Metric {
         self.side.metric
+    }
+
+    /// Largest coordinate of the reference and of its stop points that the margin for rounding covers \[m\]: 1e6, less
+    /// with long brakes or a slow tracker.
+    #[must_use]
+    pub fn farthest_m(&self) -> f64 {
+        self.farthest_m
     }
 
     pub(crate) fn side(&self) -> Side {
@@ -361,23 +440,19 @@ impl Limits {
     /// measurement.
     ///
     /// # Errors
-    /// If a number is not finite, a coordinate is beyond 1e6 m, or the speed is above the largest one.
+    /// If a number is not finite, the segment reaches beyond [`Limits::farthest_m`], or the speed is above the largest
+    /// one.
     pub fn start(&self, state: State) -> Result<Start, ShieldError> {
-        if !state.is_finite() {
-            return Err(ShieldError::new("start", "must be finite".into(), f64::NAN, "give a position and a velocity"));
-        }
-        let farthest_m = state.position_m.amax();
-        if farthest_m > FARTHEST_M {
-            let problem = format!("is farther than {FARTHEST_M} m from the origin along an axis");
-            return Err(ShieldError::new("start", problem, farthest_m, "move the origin near the vehicles"));
-        }
+        let segment = Segment::new(state.position_m, self.envelope.brake.stop_m(&state));
+        let start = self.announced(state, segment);
+        start.check()?;
+        start.check_segment(self.farthest_m)?;
         let speed = state.velocity_m_s.norm();
         if speed > self.settings.max_speed_m_s {
             let problem = format!("starts faster than `max_speed_m_s` = {}", self.settings.max_speed_m_s);
             return Err(ShieldError::new("start", problem, speed, "raise `max_speed_m_s` or start slower"));
         }
-        let segment = Segment::new(state.position_m, self.envelope.brake.stop_m(&state));
-        Ok(self.announced(state, segment))
+        Ok(start)
     }
 
     /// Returns a slot: a start at rest, for [`closest_starts`](crate::fleet::closest_starts).
@@ -390,23 +465,8 @@ impl Limits {
     fn announced(&self, state: State, segment: Segment) -> Start {
         let Side { margin_m, metric } = self.side;
         let reach_m = self.envelope.largest_reach_m(self.choice) + self.lead_m;
-        Start { state, segment, margin_m, delta_m: self.settings.delta_m, metric, reach_m }
+        Start { state, segment, margin_m, flight: 0, delta_m: self.settings.delta_m, metric, reach_m }
     }
-}
-
-/// Start of a vehicle as announced to all.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Start {
-    /// State of the reference.
-    pub state: State,
-    /// Reserved segment.
-    pub segment: Segment,
-    /// Distance that the vehicle keeps from the plane between a pair \[m\], in scaled lengths.
-    pub margin_m: f64,
-    pub(crate) delta_m: f64,
-    pub(crate) metric: Metric,
-    /// Reach of a period at the largest speed, and the lead \[m\].
-    pub(crate) reach_m: f64,
 }
 
 /// Settings or starts that cannot be certified: `PLACE: PROBLEM (VALUE); REMEDY`.
@@ -473,7 +533,37 @@ mod tests {
         assert!(late.contains("0.3 m/s^2; measurements are 2 periods old; actuators lag by 0.05 s (tube"), "{late}");
         // The assumed tube takes the place of the computed one; the feedback is still that of the loop.
         let assumed = Settings { tracking_error_m: Some(0.25), path_error_m: 0.125, ..settings }.limits().expect("ok");
-        assert_eq!(assumed.tube(), Tube { error_m: 0.375, feedback_m_s2: limits.tube().feedback_m_s2 });
+        assert_eq!(assumed.tube(), Tube { error_m: 0.375, ..limits.tube() });
+    }
+
+    #[test]
+    fn settings_beyond_the_rounding_budget_are_refused() {
+        let limits = |change: fn(&mut Settings)| {
+            let mut settings = Settings::new(1.0, 0.05);
+            change(&mut settings);
+            settings.limits()
+        };
+        assert_eq!(limits(|_| ()).expect("defaults").farthest_m(), 1e6);
+        // A brake of 2,000 periods over 15 km.
+        let fast = |settings: &mut Settings| settings.max_speed_m_s = 300.0;
+        let fast = limits(fast).expect("fast").farthest_m();
+        assert!((40_000.0..45_000.0).contains(&fast), "{fast}");
+        let refused = |change| limits(change).expect_err("refused").to_string();
+        let slow = refused(|settings| (settings.max_speed_m_s, settings.period_s) = (300.0, 0.001));
+        assert!(slow.starts_with("max_speed_m_s: a brake over 15000") && slow.contains("in 100000 periods"), "{slow}");
+        assert!(slow.ends_with("(300); lower it, brake harder, or lengthen the period"), "{slow}");
+        let weak = refused(|settings| settings.brake_m_s2 = Some(1e-300));
+        assert!(weak.starts_with("max_speed_m_s: a brake over"), "{weak}");
+        assert!(refused(|settings| settings.delta_m = 1e7).starts_with("delta_m: margins must be at most 1000000 m"));
+        assert!(refused(|settings| settings.accel_m_s2 = 1e5).starts_with("accel_m_s2: must be at most 10000 m times"));
+        // Starts and their stop points are within it.
+        let limits = Settings { max_speed_m_s: 300.0, ..Settings::new(1.0, 0.05) }.limits().expect("fast");
+        let at = |x: f64, speed: f64| State { position_m: Vector3::x() * x, velocity_m_s: Vector3::x() * speed };
+        assert!(limits.start(at(25_000.0, 300.0)).is_ok() && limits.start(at(fast, 0.0)).is_ok());
+        for start in [at(fast + 1.0, 0.0), at(fast - 10_000.0, 300.0)] {
+            let error = limits.start(start).expect_err("far").to_string();
+            assert!(error.contains("farther than 4") && error.ends_with("near the vehicles"), "{error}");
+        }
     }
 
     #[test]
@@ -508,6 +598,9 @@ mod tests {
         );
         assert!(limits.start(State::at_rest(Vector3::x() * f64::NAN)).is_err());
         let far = limits.start(State::at_rest(Vector3::x() * -2e6)).expect_err("far").to_string();
-        assert!(far.starts_with("start: is farther than 1000000 m from the origin along an axis (2000000)"), "{far}");
+        assert!(
+            far.starts_with("start: reserves space farther than 1000000 m from the origin along an axis (2000000)")
+        );
+        assert!(far.ends_with("use a local frame with its origin near the vehicles"), "{far}");
     }
 }

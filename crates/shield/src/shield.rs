@@ -8,24 +8,27 @@ use nalgebra::Vector3;
 use crate::agenda::Horizon;
 use crate::brake::State;
 use crate::choice::{Chosen, Reach};
-use crate::contract::{Broadcast, Instant, Message};
+use crate::contract::{Broadcast, Heard, Instant, Message};
 use crate::contracts::Contracts;
 use crate::obstacle::{KeepOut, Obstacle};
 use crate::plane::Segment;
-use crate::report::Counters;
-use crate::settings::{Limits, ShieldError, Start};
-
-/// Smallest change of a command that is counted \[m/s^2\].
-const CHANGED_M_S2: f64 = 1e-9;
+use crate::report::{Assumption, Counters, SharedStarts, assumptions};
+use crate::saved::SavedShield;
+use crate::settings::{Limits, NORMAL_M, ShieldError, UNIT_ROUNDOFF};
+use crate::start::Start;
 
 /// Number of planes within reach for which memory is reserved.
 const REACHED: usize = 128;
 
 /// Shield of one vehicle.
 ///
+/// Each vehicle makes its own [`Start`] with [`Limits::start`] and announces it to all others
+/// ([`Start::to_bytes`]). Each of them creates its shield from all announced starts. Vehicles may have different
+/// periods, brakes, limits and errors.
+///
 /// At each instant of the vehicle call [`Shield::filter`], send the [`Shield::messages`], and hold the command over the
-/// period. Give each message to [`Shield::hear`] when it arrives, at any time. Messages may be late, lost, doubled or
-/// out of order; their numbers must arrive bit for bit.
+/// period. Give each message to [`Shield::hear`] when it arrives, at any time, or its bytes to [`Shield::hear_bytes`].
+/// Messages may be late, lost, doubled or out of order.
 ///
 /// ```
 /// use nalgebra::Vector3;
@@ -68,17 +71,58 @@ pub struct Shield {
     fastest: Horizon,
     keep_outs: Vec<KeepOut>,
     reach: Reach,
+    /// Largest coordinate that the margins for rounding cover \[m\].
+    farthest_m: f64,
     counters: Counters,
 }
 
 impl Shield {
-    /// Returns the shield of the vehicle with this number among the starts of all vehicles.
+    /// Returns the shield of the vehicle with this number, counted from 0, among the announced starts of all vehicles.
     ///
     /// # Errors
-    /// If the number is not in the list, or the vehicle starts too near to another one.
+    /// If the number is not in the list, or a start is invalid or for another delta or ellipsoid. Also if the own start
+    /// is not that of these limits, or the vehicle starts too near to another one.
     pub fn new(limits: &Limits, index: usize, starts: &[Start]) -> Result<Self, ShieldError> {
+        starts.iter().try_for_each(Start::check)?;
         limits.check_bodies(starts)?;
+        if let Some(own) = starts.get(index)
+            && limits.start(own.state)?.with_flight(own.flight) != *own
+        {
+            let problem = format!("the announced start of vehicle {} is not that of its own settings", index + 1);
+            return Err(ShieldError::new("start", problem, index as f64, "announce `Limits::start` of these settings"));
+        }
         Self::of_checked(limits, index, &starts.into())
+    }
+
+    /// Returns a saved shield.
+    pub(crate) fn loaded(saved: &SavedShield, limits: &Limits, starts: &Arc<[Start]>) -> Result<Self, ShieldError> {
+        let contracts = Contracts::load(&saved.contracts, Arc::clone(starts))?;
+        let mut shield = Self::new(limits, contracts.index().into(), starts)?;
+        shield.contracts = contracts;
+        shield.period = saved.period;
+        (shield.reference, shield.acceleration) = (saved.reference, saved.acceleration);
+        (shield.next, shield.segment) = (saved.next, saved.segment);
+        shield.past.extend(&saved.past);
+        shield.counters = saved.counters;
+        Ok(shield)
+    }
+
+    /// Returns the state of this shield, to be continued in another process. Of a shield and its copies only one may
+    /// fly on. `None` for a shield with obstacles.
+    #[must_use]
+    pub fn save(&self) -> Option<SavedShield> {
+        self.keep_outs.is_empty().then(|| SavedShield {
+            settings: *self.limits.settings(),
+            starts: self.contracts.starts().to_vec(),
+            period: self.period,
+            reference: self.reference,
+            acceleration: self.acceleration,
+            next: self.next,
+            segment: self.segment,
+            past: self.past.iter().copied().collect(),
+            contracts: self.contracts.save(),
+            counters: self.counters,
+        })
     }
 
     /// Returns the shield among starts that have the same bodies.
@@ -99,6 +143,7 @@ impl Shield {
             keep_outs: vec![],
             // Two planes per other vehicle, but few are within reach.
             reach: Reach::with_capacity((2 * starts.len()).min(REACHED)),
+            farthest_m: limits.farthest_m(),
             counters: Counters::default(),
         })
     }
@@ -106,16 +151,30 @@ impl Shield {
     /// Returns this shield with planes before these obstacles, in the place of earlier ones. Obstacles must not move.
     ///
     /// # Errors
-    /// If a clearance is invalid, or the vehicle is too near to an obstacle to stop before it.
+    /// If a clearance is invalid, or the vehicle is too near to an obstacle to stop before it. Also if the vehicle
+    /// starts so far from the origin that the margin for rounding does not cover the normals of planes before it.
     pub fn with_obstacles(mut self, obstacles: &[Obstacle]) -> Result<Self, ShieldError> {
         self.keep_outs = KeepOut::all(obstacles, self.contracts.index(), self.limits.tube().error_m, &self.segment)?;
+        let own = self.contracts.own();
+        let nearest_m = self.keep_outs.iter().map(KeepOut::least_m).fold(f64::INFINITY, f64::min);
+        self.farthest_m = self.limits.farthest_m().min(NORMAL_M * nearest_m / (8.0 * UNIT_ROUNDOFF * own.reach_m));
+        own.check_segment(self.farthest_m)?;
         Ok(self)
     }
 
     /// Stores a message to this vehicle until the next instant. Messages to other vehicles have no effect.
     #[inline]
     pub fn hear(&mut self, message: &Message) {
-        self.contracts.hear(message);
+        let heard = self.contracts.hear(message);
+        self.counters.heard(heard, message.from);
+    }
+
+    /// Stores the message of bytes that arrived. Bytes that are not a message are dropped and counted.
+    pub fn hear_bytes(&mut self, bytes: &[u8]) {
+        match Message::from_bytes(bytes) {
+            Ok(message) => self.hear(&message),
+            Err(_) => self.counters.heard(Heard::Invalid, 0),
+        }
     }
 
     /// Stores the message to this vehicle in a broadcast until the next instant.
@@ -154,15 +213,16 @@ impl Shield {
         self.counters.renewed(renewed);
         let drag = reference.velocity_m_s * limits.settings().a22_per_s;
         let wanted = if is_level { Vector3::new(wanted.x, wanted.y, 0.0) } else { wanted };
-        let wish = limits.envelope.cut(&reference.velocity_m_s, wanted + drag);
+        let own = wanted + drag;
+        let wish = limits.envelope.cut(&reference.velocity_m_s, own);
         let chosen = if wish.iter().all(|value| value.is_finite()) {
             let chosen = self.reach.choose(&limits.envelope, &reference, wish, limits.choice);
-            let change = (chosen.acceleration - wish).norm();
-            self.counters.chosen(chosen.is_brake, if change > CHANGED_M_S2 { change } else { 0.0 });
+            let changes = [own, wish].map(|command| (chosen.acceleration - command).norm());
+            self.counters.chosen(chosen.is_brake, changes[0].min(f64::MAX), changes[1]);
             chosen
         } else {
             let acceleration = limits.envelope.brake.command(&reference.velocity_m_s);
-            self.counters.chosen(true, acceleration.norm());
+            self.counters.chosen(true, acceleration.norm(), f64::INFINITY);
             Chosen { acceleration, is_brake: true }
         };
         self.command(measured, chosen.acceleration)
@@ -172,7 +232,7 @@ impl Shield {
     pub fn brake(&mut self, measured: State) -> Vector3<f64> {
         self.advance();
         let acceleration = self.limits.envelope.brake.command(&self.reference.velocity_m_s);
-        self.counters.chosen(true, 0.0);
+        self.counters.chosen(true, 0.0, 0.0);
         self.command(measured, acceleration)
     }
 
@@ -193,6 +253,7 @@ impl Shield {
         self.acceleration = acceleration;
         self.next = self.reference.after(acceleration, settings.period_s);
         self.segment = Segment::new(self.next.position_m, self.limits.envelope.brake.stop_m(&self.next));
+        self.counters.reserved(self.segment.farthest_m(), self.farthest_m);
         let then = self.past.front().filter(|_| self.past.len() > settings.measurement_delay_periods);
         let feedback = match then {
             // No measurement of that age exists yet.
@@ -234,8 +295,9 @@ impl Shield {
     /// Records a measurement and the true state that it measured, for the report of a simulation.
     pub fn observe_measurement(&mut self, measured: &State, truth: &State) {
         let settings = self.limits.settings();
-        self.counters.sensed((measured.position_m - truth.position_m).norm(), settings.position_error_m);
-        self.counters.sensed((measured.velocity_m_s - truth.velocity_m_s).norm(), settings.velocity_error_m_s);
+        let errors = [measured.position_m - truth.position_m, measured.velocity_m_s - truth.velocity_m_s];
+        self.counters
+            .sensed(errors.map(|error| error.norm()), [settings.position_error_m, settings.velocity_error_m_s]);
     }
 
     /// Limits of the reference.
@@ -274,9 +336,22 @@ impl Shield {
         &self.counters
     }
 
+    /// Returns how many partners hold the same starts, by their messages.
+    #[must_use]
+    pub fn shared_starts(&self) -> SharedStarts {
+        let [partners, agreed] = self.contracts.agreed();
+        SharedStarts { partners, agreed, is_one_list: false }
+    }
+
+    /// Returns the assumptions of the certificate: where each comes from, what was observed of it, and whether it held.
+    #[must_use]
+    pub fn assumptions(&self) -> Vec<Assumption> {
+        assumptions(&self.limits, &self.counters, self.shared_starts())
+    }
+
     /// For tests: see [`Contracts::pending_number`].
     #[cfg(test)]
-    pub(crate) fn pending_number(&self, to: u32) -> Option<u64> {
+    pub(crate) fn pending_number(&self, to: u16) -> Option<u32> {
         self.contracts.pending_number(to)
     }
 

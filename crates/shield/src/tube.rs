@@ -1,4 +1,4 @@
-//! Error tube of the tracker: rigorous bounds on the distance from a vehicle to its reference and on the feedback.
+//! Error tube of the tracker: bounds on the distance from a vehicle to its reference and on the feedback.
 //!
 //! # The sampled loop
 //! The reference has p^'' = u^ with u^ held over each period h. The vehicle has p'' = a22 p' + r + w. Its command is
@@ -25,9 +25,31 @@
 //!   part of a push in its own period is convex in time.
 //! - Let the power L of the loop have a norm n below 1. The norms of this and all later powers sum to at most
 //!   n / (1 - n) times the sum of the norms before. This bounds the tail, and proves that the loop is stable.
-//! - Rounding is bounded by a relative term that grows with the sum of the norms.
+//!
+//! # Rounding
+//! The sums are computed in doubles, with u = 2^-53. Their rounding is bounded and added. Norms are the largest row
+//! sums, hats mark computed values, and products of m terms err by at most 1.01 m u times the product of the norms.
+//!
+//! - **Cell.** E = exp(X) with |X| <= 0.5. X errs by 3.1 u |X| (length of a cell, rate of the lag, product). The k-th
+//!   term of the series errs by 6.2 k u |X|^k / k!, and the sum of 21 terms by 20.2 u exp(0.5). In all E errs by less
+//!   than 45 u.
+//! - **Grid.** G of the next point is E times G of this one. The computed step errs by F with |F| <= 60 u |G^|. The
+//!   error after i steps is the sum of G(i-1-j) F(j), so with g^ the largest computed norm of n points it is at most
+//!   `eps_g` = 60 u n g^^2 / (1 - 60 u n g^).
+//! - **Step.** The map S from instant to instant is G times the lift, of norm l. It errs by
+//!   `eps_s` = (`eps_g` + 5.1 u g^) l. The map to the grid points has the same bound.
+//! - **Powers.** A computed power is S times the last one plus F with |F| <= phi |last one|, where
+//!   phi = `eps_s` + 1.01 o u |S^| and o is the order. As for the grid, the norms N of all true powers sum to at most
+//!   N^ / (1 - phi N^), and a power errs by at most phi N N^. The powers of a column x of inputs have norms that sum
+//!   to at most M = N (|x^| + 2 `eps_g`) / (1 - phi N). Their errors sum to at most N (`eps_g` + phi M).
+//! - **Sum.** Let Q be the norm of the map from the state to what is bounded, and `eps_q` its error. The sum over
+//!   all periods errs by Q N (`eps_g` + phi M) + `eps_q` M, times the bound of each input. The start errs by
+//!   (Q phi N N^ + `eps_q` N) times its bound. All terms of the sums are positive, so adding K periods errs by less
+//!   than (K + 400) u of the sum.
+//!
+//! The numbers of this bound are rounded too: the terms above are doubled.
 
-use nalgebra::{DMatrix, DVector, RowDVector, SMatrix};
+use nalgebra::{DMatrix, DVector, Dim, Matrix, RawStorage, RowDVector, SMatrix};
 
 /// Smallest number of cells of a period.
 const CELLS: usize = 16;
@@ -43,6 +65,10 @@ const CONTRACTED: f64 = 1e-13;
 const GROWN: f64 = 1e9;
 /// Largest number of periods that are summed.
 const MAX_PERIODS: usize = 50_000;
+/// Bound on the error of a step of the grid, in units of rounding.
+const GRID_STEP: f64 = 60.0;
+/// Roundings of a sum beside those of its periods.
+const OTHER_ROUNDINGS: f64 = 400.0;
 
 /// Continuous state: error of position, error of velocity, actuator, feedback, held command of the reference.
 const STATES: usize = 5;
@@ -88,6 +114,9 @@ pub struct Tube {
     pub error_m: f64,
     /// Bound `A_t` on the feedback \[m/s^2\].
     pub feedback_m_s2: f64,
+    /// Largest distance to a reference that jumps by 1 m and 1 m/s at each instant \[m\], for the rounding of the
+    /// reference.
+    pub jumps: f64,
 }
 
 /// Reason why a loop has no tube.
@@ -111,7 +140,8 @@ impl TrackerLoop {
         if !sampled.step.iter().all(|value| value.is_finite()) {
             return Err(TubeError::Unstable);
         }
-        let (mut tube, mut sums) = (Tube { error_m: 0.0, feedback_m_s2: 0.0 }, Sums::own_period(&sampled));
+        let mut tube = Tube { error_m: 0.0, feedback_m_s2: 0.0, jumps: 0.0 };
+        let mut sums = Sums::own_period(&sampled);
         let mut inputs = sampled.inputs.clone();
         let mut starts = sampled.starts.clone();
         let mut power = DMatrix::identity(sampled.order(), sampled.order());
@@ -122,8 +152,9 @@ impl TrackerLoop {
             tube.feedback_m_s2 = tube.feedback_m_s2.max(sums.feedback + start.feedback);
             let norm = row_sum_norm(&power);
             if period > 0 && norm <= CONTRACTED {
-                return Ok(sampled.with_tail(tube, norm, norms));
+                return sampled.with_tail(tube, norm, norms, period).ok_or(TubeError::Slow);
             }
+            tube.jumps += (&sampled.positions * &starts).column_iter().map(|column| column.amax()).sum::<f64>();
             if norm > GROWN {
                 return Err(TubeError::Unstable);
             }
@@ -296,22 +327,49 @@ impl Sampled {
         self.cell_s * self.cell_s / 8.0 * row.iter().zip(lifted).map(|(bound, value)| bound * value.abs()).sum::<f64>()
     }
 
-    /// Adds the bounds of all later periods and of rounding.
-    fn with_tail(&self, tube: Tube, norm: f64, norms: f64) -> Tube {
-        let column = |k: usize| self.inputs.column(k).amax();
-        let start = self.tracker.position_error_m.max(self.tracker.velocity_error_m_s);
-        let tail = norms * norm * (self.bound(column) / (1.0 - norm) + start);
+    /// Adds the bounds of all later periods and of rounding. `None` if rounding hides whether the loop contracts.
+    ///
+    /// The names are those of the documentation of the module.
+    fn with_tail(&self, tube: Tube, norm: f64, norms: f64, periods: usize) -> Option<Tube> {
+        let u = f64::EPSILON / 2.0;
+        let order = self.order() as f64;
+        let start = self.tracker.position_error_m + self.tracker.velocity_error_m_s;
+        let largest = self.grid.iter().map(|at| row_sum_norm(at)).fold(0.0, f64::max);
+        let grid = GRID_STEP * u * self.cells as f64 * largest;
+        let eps_grid = 2.0 * grid * largest / (1.0 - grid);
+        let lift = row_sum_norm(&self.lift);
+        let eps_step = 2.0 * (eps_grid + 5.1 * u * largest) * lift;
+        let phi = eps_step + 2.0 * order * u * row_sum_norm(&self.step);
+        let computed = norms * (1.0 + 2.0 * (periods as f64 + order) * u);
+        if !(grid < 0.5 && phi * computed < 0.5) {
+            return None;
+        }
+        let powers = computed / (1.0 - phi * computed) * (1.0 + 8.0 * u);
+        // Norm of the last power, which all later ones contain as a factor.
+        let last = norm + phi * powers * computed;
+        if last >= 0.5 {
+            return None;
+        }
+        let inputs = self.bound(|k| self.inputs.column(k).amax());
+        let weight = self.bound(|_| 1.0);
+        let columns = powers * (inputs + 2.0 * eps_grid * weight) / (1.0 - phi * powers);
+        let error = powers * (eps_grid * weight + phi * columns) + phi * powers * computed * start;
+        let tail = powers * last * ((inputs + eps_grid * weight) / (1.0 - last) + start);
+        let bounded = |sum: f64, map: f64, eps_map: f64| {
+            let rounding = (map + eps_map) * error + eps_map * (columns + powers * start) + 2.0 * eps_grid * weight;
+            sum * (1.0 + (periods as f64 + OTHER_ROUNDINGS) * u) + 2.0 * rounding + 2.0 * (map + eps_map) * tail
+        };
         let position = row_sum_norm(&self.positions);
         let lifted = self.lift.map(f64::abs);
         let bend = self.bend((0..STATES).map(|row| lifted.row(row).sum()));
+        // The curvature contains the computed grid: (c rate)^2 / 8 exp(0.5) < 0.06.
+        let eps_position = eps_step + 2.0 * order * u * position + 0.06 * eps_grid * lift + 100.0 * u * bend;
         let feedback = self.feedback.iter().map(|value| value.abs()).sum::<f64>();
-        // Each product and sum errs by at most an epsilon per term, and later powers pass the error on.
-        let terms = (STATES * self.cells + self.order()) as f64;
-        let rounding = 1.0 + 8.0 * f64::EPSILON * terms * (1.0 + norms * row_sum_norm(&self.step));
-        Tube {
-            error_m: rounding * (tube.error_m + tail * (position + bend)),
-            feedback_m_s2: rounding * (tube.feedback_m_s2 + tail * feedback),
-        }
+        Some(Tube {
+            error_m: bounded(tube.error_m, position + bend, eps_position),
+            feedback_m_s2: bounded(tube.feedback_m_s2, feedback, 2.0 * order * u * feedback),
+            jumps: tube.jumps,
+        })
     }
 }
 
@@ -382,7 +440,7 @@ fn exponential(of: &Continuous) -> Continuous {
 }
 
 /// Returns the norm of a matrix for the largest component: its largest sum of absolute values in a row.
-fn row_sum_norm(of: &DMatrix<f64>) -> f64 {
+fn row_sum_norm<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(of: &Matrix<f64, R, C, S>) -> f64 {
     of.row_iter().map(|row| row.iter().map(|value| value.abs()).sum()).fold(0.0, f64::max)
 }
 

@@ -30,18 +30,22 @@
 //! This lemma takes the place of Lemma 1. Lemma 2 holds: the fallback keeps its own segment, and a plane is taken on
 //! only after q and c were tested. Lemmas 3 and 4 and the theorem are unchanged, with r in the margins. The tube e is
 //! an assumption here, since the tracker of a unicycle is the user's.
+//!
+//! Over the fallback the reference is placed from c in each period, so that rounding does not move c.
 
 use nalgebra::Vector3;
+use tautline_core::fact::FactKind;
 
 use crate::State;
 use crate::agenda::Horizon;
 use crate::choice::Reach;
-use crate::contract::{Broadcast, Instant, Message, Side};
+use crate::contract::{Broadcast, Heard, Instant, Message, Side};
 use crate::contracts::Contracts;
 use crate::obstacle::{KeepOut, Obstacle};
 use crate::plane::{Metric, Segment};
-use crate::report::Counters;
-use crate::settings::{LEAD_PERIODS, ROUNDING_M, ShieldError, Start};
+use crate::report::{Assumption, Counters, SharedStarts};
+use crate::settings::{FARTHEST_M, LEAD_PERIODS, NORMAL_M, ROUNDING_M, ShieldError, UNIT_ROUNDOFF};
+use crate::start::Start;
 
 /// Largest turn in a period \[rad\].
 const MAX_TURN_RAD: f64 = 1.5;
@@ -53,6 +57,10 @@ const RATES: i32 = 4;
 const MAX_PERIODS: u32 = 1_000_000;
 /// Part of a period of slowing down that is rounding.
 const ROUNDING: f64 = 1e-9;
+/// Relative excess of a speed that is rounding.
+const SPEED_ROUNDING: f64 = 1e-12;
+/// Largest way of q in a period \[m\], for the margin for rounding.
+const MAX_WAY_M: f64 = 100.0;
 
 /// Pose and speed of a unicycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -144,7 +152,8 @@ impl Loiter {
     /// Returns the start of a vehicle, which all vehicles must know.
     ///
     /// # Errors
-    /// If a setting is out of range, a number is not finite, or the speed is not within its limits.
+    /// If a setting is out of range, a number is not finite, or the speed is not within its limits. Also if the
+    /// reserved segment reaches beyond 1e6 m along an axis.
     pub fn start(&self, pose: &Pose) -> Result<Start, ShieldError> {
         let fails = |place, problem: &str, value, remedy| Err(ShieldError::new(place, problem.into(), value, remedy));
         let positive = [
@@ -170,6 +179,14 @@ impl Loiter {
                 "shorten the period",
             );
         }
+        if self.way_m() > MAX_WAY_M {
+            let problem = format!("must move by at most {MAX_WAY_M} m in a period, for the rounding of its corner");
+            return fails("max_speed_m_s", &problem, self.max_speed_m_s, "shorten the period");
+        }
+        if self.margin_m() > FARTHEST_M {
+            let problem = format!("margins must be at most {FARTHEST_M} m, which the margin for rounding covers");
+            return fails("delta_m", &problem, self.margin_m(), "use a shorter distance or a smaller circle");
+        }
         if self.slowing(self.max_speed_m_s).0 > MAX_PERIODS {
             let problem = "slowing down must take at most a million periods";
             return fails("accel_m_s2", problem, self.accel_m_s2, "raise it or lower `max_speed_m_s`");
@@ -181,14 +198,17 @@ impl Loiter {
             let problem = "the speed must be from `min_speed_m_s` to `max_speed_m_s`";
             return fails("start", problem, pose.speed_m_s, "change the speed or its limits");
         }
-        Ok(Start {
+        let start = Start {
             state: pose.state(),
             segment: self.fallback(pose).segment,
             margin_m: self.margin_m(),
+            flight: 0,
             delta_m: self.delta_m,
             metric: Metric::BALL,
             reach_m: self.reach_m(self.max_speed_m_s) + self.lead_m(),
-        })
+        };
+        start.check()?;
+        Ok(start)
     }
 
     /// Returns the largest way of q in a period \[m\].
@@ -231,9 +251,14 @@ impl Loiter {
 
     /// Returns q.
     pub(crate) fn pivot_m(&self, pose: &Pose) -> Vector3<f64> {
+        pose.position_m + self.beside_m(pose)
+    }
+
+    /// Returns q less the position.
+    fn beside_m(&self, pose: &Pose) -> Vector3<f64> {
         let ahead = pose.ahead();
         let side = if self.is_left { 1.0 } else { -1.0 };
-        pose.position_m + Vector3::new(-ahead.y, ahead.x, 0.0) * (side * self.radius_m())
+        Vector3::new(-ahead.y, ahead.x, 0.0) * (side * self.radius_m())
     }
 
     /// Returns the point where the tangents of the path of q at two poses meet, or the later q on a straight path.
@@ -281,9 +306,13 @@ pub struct UnicycleShield {
     keep_outs: Vec<KeepOut>,
     period: u64,
     reference: Pose,
+    /// Command since the instant of the reference.
+    command: Steering,
     next: Pose,
     fallback: Fallback,
     near: Reach,
+    /// Largest coordinate that the margins for rounding cover \[m\].
+    farthest_m: f64,
     counters: Counters,
 }
 
@@ -294,8 +323,9 @@ impl UnicycleShield {
     /// If a setting or the start is invalid, or the vehicle starts too near to another one.
     pub fn new(loiter: &Loiter, index: usize, pose: &Pose, starts: &[Start]) -> Result<Self, ShieldError> {
         let own = loiter.start(pose)?;
+        starts.iter().try_for_each(Start::check)?;
         let contracts = Contracts::new(index, starts.into())?;
-        if starts.get(index) != Some(&own) {
+        if own.with_flight(contracts.own().flight) != *contracts.own() {
             let problem = "the announced start differs from this pose of the vehicle counted from 0".into();
             return Err(ShieldError::new("start", problem, index as f64, "announce `Loiter::start` of this pose"));
         }
@@ -312,9 +342,11 @@ impl UnicycleShield {
             keep_outs: vec![],
             period: 0,
             reference: *pose,
+            command: Steering::default(),
             next: *pose,
             fallback: loiter.fallback(pose),
             near: Reach::with_capacity(2 * starts.len()),
+            farthest_m: FARTHEST_M,
             counters: Counters::default(),
         })
     }
@@ -328,12 +360,25 @@ impl UnicycleShield {
     pub fn with_obstacles(mut self, obstacles: &[Obstacle]) -> Result<Self, ShieldError> {
         let around = self.loiter.tracking_error_m + self.loiter.radius_m();
         self.keep_outs = KeepOut::all(obstacles, self.contracts.index(), around, &self.fallback.segment)?;
+        let own = self.contracts.own();
+        let nearest_m = self.keep_outs.iter().map(KeepOut::least_m).fold(f64::INFINITY, f64::min);
+        self.farthest_m = FARTHEST_M.min(NORMAL_M * nearest_m / (8.0 * UNIT_ROUNDOFF * own.reach_m));
+        own.check_segment(self.farthest_m)?;
         Ok(self)
     }
 
     /// Stores a message to this vehicle until the next instant.
     pub fn hear(&mut self, message: &Message) {
-        self.contracts.hear(message);
+        let heard = self.contracts.hear(message);
+        self.counters.heard(heard, message.from);
+    }
+
+    /// Stores the message of bytes that arrived. Bytes that are not a message are dropped and counted.
+    pub fn hear_bytes(&mut self, bytes: &[u8]) {
+        match Message::from_bytes(bytes) {
+            Ok(message) => self.hear(&message),
+            Err(_) => self.counters.heard(Heard::Invalid, 0),
+        }
     }
 
     /// Returns the command of the reference for the next period. A wish that is not finite falls back.
@@ -353,14 +398,17 @@ impl UnicycleShield {
         self.counters.renewed(self.contracts.renew(&at, &mut self.near));
         self.near.extend(self.keep_outs.iter_mut().filter_map(|keep_out| keep_out.within(&segment, reach)));
         if !(wanted.accel_m_s2.is_finite() && wanted.turn_rad_s.is_finite()) {
-            self.counters.chosen(true, 1.0);
+            self.counters.chosen(true, 1.0, 1.0);
             return self.fall_back();
         }
         let wish = self.loiter.cut(self.reference.speed_m_s, wanted);
-        let change = |command: Steering| {
-            let turn = (command.turn_rad_s - wish.turn_rad_s) / self.loiter.turn_rad_s;
-            turn.hypot((command.accel_m_s2 - wish.accel_m_s2) / self.loiter.accel_m_s2)
+        let loiter = self.loiter;
+        // In the limits of both rates.
+        let distance = |command: Steering, from: Steering| {
+            let turn = (command.turn_rad_s - from.turn_rad_s) / loiter.turn_rad_s;
+            turn.hypot((command.accel_m_s2 - from.accel_m_s2) / loiter.accel_m_s2).min(f64::MAX)
         };
+        let change = |command: Steering| distance(command, wish);
         let rates = (-RATES..=RATES).map(|k| self.loiter.turn_rad_s * f64::from(k) / f64::from(RATES));
         let speeds = [wish.accel_m_s2, 0.0, -self.loiter.accel_m_s2];
         let others = rates.flat_map(|turn_rad_s| speeds.map(|accel_m_s2| Steering { accel_m_s2, turn_rad_s }));
@@ -371,26 +419,29 @@ impl UnicycleShield {
         };
         let chosen = self.accepted(wish).map(|after| (wish, after)).or_else(best);
         if let Some((command, (next, fallback))) = chosen {
-            self.counters.chosen(false, (command.accel_m_s2 - wish.accel_m_s2).abs().max(change(command)));
-            (self.next, self.fallback) = (next, fallback);
+            self.counters.chosen(false, distance(command, wanted), change(command));
+            (self.command, self.next, self.fallback) = (command, next, fallback);
+            self.counters.reserved(self.fallback.segment.farthest_m(), self.farthest_m);
             return command;
         }
-        self.counters.chosen(true, change(Steering::default()));
-        self.fall_back()
+        let command = self.fall_back();
+        self.counters.chosen(true, distance(command, wanted), distance(command, wish));
+        command
     }
 
     /// Returns the command of the fallback, where an instant passes without a wish.
     pub fn loiter(&mut self) -> Steering {
         self.reference = self.next;
         self.period += 1;
-        self.counters.chosen(true, 0.0);
+        self.counters.chosen(true, 0.0, 0.0);
         self.fall_back()
     }
 
     /// Returns the pose and the fallback after an accepted command.
     fn accepted(&self, command: Steering) -> Option<(Pose, Fallback)> {
         let next = self.reference.after(command, self.loiter.period_s);
-        let speeds = self.loiter.min_speed_m_s * (1.0 - ROUNDING)..=self.loiter.max_speed_m_s * (1.0 + ROUNDING);
+        let speeds =
+            self.loiter.min_speed_m_s * (1.0 - SPEED_ROUNDING)..=self.loiter.max_speed_m_s * (1.0 + SPEED_ROUNDING);
         if !next.is_finite() || !speeds.contains(&next.speed_m_s) {
             return None;
         }
@@ -403,18 +454,58 @@ impl UnicycleShield {
     fn fall_back(&mut self) -> Steering {
         let (Loiter { period_s, min_speed_m_s, turn_rad_s, is_left, .. }, mut command) =
             (self.loiter, Steering::default());
+        let centre_m = self.fallback.segment.stop();
         if self.fallback.periods > 0 {
             let left = f64::from(self.fallback.periods) * period_s;
             command.accel_m_s2 = (min_speed_m_s - self.reference.speed_m_s) / left;
         } else {
             command.turn_rad_s = if is_left { turn_rad_s } else { -turn_rad_s };
         }
-        self.next = self.reference.after(command, period_s);
+        (self.command, self.next) = (command, self.reference.after(command, period_s));
         self.fallback.periods = self.fallback.periods.saturating_sub(1);
-        // The centre stays.
-        let pivot = self.loiter.pivot_m(&self.next);
-        self.fallback.segment = Segment::new(pivot, self.fallback.segment.stop());
+        // q is placed from the centre, which stays: rounding does not add up.
+        let pivot_m = if self.fallback.periods == 0 {
+            self.next.speed_m_s = min_speed_m_s;
+            centre_m
+        } else {
+            let left_s = f64::from(self.fallback.periods) * period_s;
+            centre_m - self.next.ahead() * (left_s * (self.next.speed_m_s + min_speed_m_s) / 2.0)
+        };
+        self.next.position_m = pivot_m - self.loiter.beside_m(&self.next);
+        self.fallback.segment = Segment::new(pivot_m, centre_m);
+        self.counters.reserved(self.fallback.segment.farthest_m(), self.farthest_m);
         command
+    }
+
+    /// Records a true position \[m\], `since_s` after the instant of the last command, for the report of a simulation.
+    pub fn observe(&mut self, since_s: f64, truth_m: &Vector3<f64>) {
+        let error_m = (truth_m - self.reference.after(self.command, since_s).position_m).norm();
+        self.counters.tracked(error_m, self.loiter.tracking_error_m);
+    }
+
+    /// Returns how many partners hold the same starts, by their messages.
+    #[must_use]
+    pub fn shared_starts(&self) -> SharedStarts {
+        let [partners, agreed] = self.contracts.agreed();
+        SharedStarts { partners, agreed, is_one_list: false }
+    }
+
+    /// Returns the assumptions of the certificate: where each comes from, what was observed of it, and whether it held.
+    #[must_use]
+    pub fn assumptions(&self) -> Vec<Assumption> {
+        let (loiter, counters) = (&self.loiter, &self.counters);
+        vec![
+            Assumption::shared_starts(counters, self.shared_starts()),
+            Assumption::declared(FactKind::Acceleration, loiter.accel_m_s2, "m/s^2"),
+            Assumption::observed(
+                FactKind::TrackingError,
+                (loiter.tracking_error_m, "m"),
+                counters.tracking_share,
+                false,
+            ),
+            Assumption::declared(FactKind::Period, loiter.period_s, "s"),
+            Assumption::observed(FactKind::Coordinates, (self.farthest_m, "m"), counters.coordinate_share, false),
+        ]
     }
 
     /// Segment from q to c that the reference reserves from the next instant on.

@@ -17,7 +17,7 @@ pub struct ShieldNumbers {
     pub exceeded: Option<String>,
     /// Number of commands.
     pub commands: u64,
-    /// Share of commands that the shield changed.
+    /// Share of commands that differ from the law's own.
     pub changed_share: f64,
     /// Largest change of a command \[m/s^2\].
     pub largest_change_m_s2: f64,
@@ -25,12 +25,12 @@ pub struct ShieldNumbers {
     pub brake_share: f64,
     /// Longest time that a vehicle braked \[s\].
     pub longest_brake_s: f64,
-    /// Largest distance of a vehicle to its reference, as a share of the tube.
-    pub tube_share: f64,
+    /// Largest distance of a vehicle to its reference, as a share of the tube; null if it was not observed.
+    pub tube_share: Option<f64>,
     /// Largest command of a vehicle, as a share of the largest one that it carries out.
-    pub command_share: f64,
-    /// Largest error of a measured own state, as a share of its bound.
-    pub measurement_share: f64,
+    pub command_share: Option<f64>,
+    /// Largest error of a measured own state, as a share of its bound; null if it was not observed.
+    pub measurement_share: Option<f64>,
     /// Number of proposed planes that were accepted.
     pub proposals_accepted: u64,
     /// Number of proposed planes that were refused.
@@ -49,8 +49,6 @@ impl From<&ShieldReport> for ShieldNumbers {
     fn from(of: &ShieldReport) -> Self {
         let counters = &of.counters;
         let periods_s = |periods: u64| periods as f64 * of.period_s;
-        // A share of a bound of 0 is rounding, or infinite.
-        let share = |share: f64| if share.is_finite() { share } else { f64::MAX };
         Self {
             certificate: of.certificate.clone(),
             tube_m: of.tube_m,
@@ -60,9 +58,9 @@ impl From<&ShieldReport> for ShieldNumbers {
             largest_change_m_s2: counters.largest_change_m_s2,
             brake_share: counters.brake_share(),
             longest_brake_s: periods_s(counters.longest_brake),
-            tube_share: share(counters.tracking_share),
-            command_share: share(counters.command_share),
-            measurement_share: share(counters.measurement_share),
+            tube_share: counters.tracking_share,
+            command_share: counters.command_share,
+            measurement_share: counters.measurement_share(),
             proposals_accepted: counters.accepted,
             proposals_refused: counters.refused,
             oldest_plane_s: periods_s(counters.oldest_plane),
@@ -98,7 +96,7 @@ impl ShieldNumbers {
             metres(self.largest_change_m_s2),
             percent(self.brake_share),
             seconds(self.longest_brake_s),
-            percent(self.tube_share),
+            self.tube_share.map_or_else(|| "an unknown part".into(), percent),
             metres(self.tube_m),
             counted(self.proposals_accepted, "plane", "planes"),
             self.proposals_refused,

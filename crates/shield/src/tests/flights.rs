@@ -4,7 +4,9 @@ use nalgebra::Vector3;
 
 use super::Random;
 use super::world::{Flight, Law, Radio, STEPS, World, flat};
-use crate::{Fleet, Limits, Settings, State};
+use crate::plane::Segment;
+use crate::report::Exceeded;
+use crate::{Body, Counters, Fleet, Limits, Message, SavedShield, Settings, Shield, ShieldError, Start, State};
 
 /// Safety distance of the random flights \[m\].
 const DELTA_M: f64 = 1.0;
@@ -126,7 +128,7 @@ fn random_flights_keep_the_safety_distance_and_every_bound() {
         let report = world.report();
         assert_eq!(report.exceeded(), None, "flight {seed}: {report:?}");
         closest = closest.min(world.closest_m);
-        largest_share = largest_share.max(report.tracking_share);
+        largest_share = largest_share.max(report.tracking_share.expect("observed"));
         changed += report.changed;
     }
     // The flights use what they are given: some vehicles come close, and some tubes are used up.
@@ -236,7 +238,7 @@ fn a_broadcast_contains_the_messages_and_is_heard_like_them() {
     }
     let (mut by_message, mut by_broadcast) = (world.fleet.clone(), world.fleet.clone());
     let mut broadcast = crate::Broadcast::default();
-    let count = u32::try_from(world.states.len()).expect("few");
+    let count = u16::try_from(world.states.len()).expect("few");
     let mut count_sent = 0;
     for shield in world.fleet.shields_mut() {
         // Messages are taken once.
@@ -250,8 +252,13 @@ fn a_broadcast_contains_the_messages_and_is_heard_like_them() {
             by_message.hear(message);
         }
         by_broadcast.hear_broadcast(&broadcast);
-        let json = serde_json::to_string(&broadcast).expect("plain data");
-        assert_eq!(serde_json::from_str::<crate::Broadcast>(&json).expect("plain data"), broadcast);
+        for message in &sent {
+            let read = Message::from_bytes(&message.to_bytes()).expect("own bytes");
+            assert_eq!(
+                (read.from, read.to, read.stamp, read.starts),
+                (message.from, message.to, message.stamp, message.starts)
+            );
+        }
     }
     assert!(count_sent > 3, "{count_sent}");
     assert_ne!(format!("{by_message:?}"), format!("{:?}", world.fleet));
@@ -272,15 +279,227 @@ fn invalid_numbers_and_messages_leave_the_reference_finite_and_are_counted() {
     assert!(report.exceeded().is_some());
 
     let message = fleet.messages().next().expect("two vehicles");
-    let json = serde_json::to_string(&message).expect("plain data");
-    assert_eq!(serde_json::from_str::<crate::Message>(&json).expect("plain data"), message);
     let before = fleet.clone();
-    let mut bad = message;
-    bad.stamp = 99;
-    bad.segment.stop_m[1] = f64::NAN;
-    fleet.hear(&bad);
-    for (from, to) in [(7, 1), (1, 1), (0, 9)] {
-        fleet.hear(&crate::Message { from, to, stamp: 99, ..message });
+    let segment = Segment::new(Vector3::x() * f64::NAN, Vector3::zeros());
+    let invalid = Message { from: 1, to: 0, body: Body::Follower { segment, decision: None }, ..message };
+    fleet.hear(&invalid);
+    fleet.hear(&Message { stamp: 0, ..message });
+    fleet.hear(&Message { from: 1, to: 1, ..message });
+    // To a vehicle that does not exist.
+    fleet.hear(&Message { to: 9, ..message });
+    fleet.shields_mut()[1].hear_bytes(b"{}");
+    fleet.shields_mut()[1].hear_bytes(&message.to_bytes()[1..]);
+    assert_eq!(fleet.report().invalid_messages, 5);
+    // Nothing else has changed.
+    for (shield, before) in fleet.shields().iter().zip(before.shields()) {
+        let without = Counters { invalid_messages: 0, ..*shield.counters() };
+        assert_eq!((without, shield.segment()), (*before.counters(), before.segment()));
+        assert_eq!(format!("{:?}", shield.assumptions()), format!("{:?}", before.assumptions()));
     }
-    assert_eq!(format!("{fleet:?}"), format!("{before:?}"));
+    assert_eq!(fleet.report().exceeded(), before.report().exceeded());
+}
+
+/// Returns shields of vehicles with these settings, each from the announced bytes of all, at 0 and `apart_m` along x.
+/// The second one flies at the first one at 1.5 m/s.
+fn announced(settings: [Settings; 2], apart_m: f64) -> Result<[Shield; 2], ShieldError> {
+    let limits = settings.map(|settings| settings.limits().expect("valid"));
+    let states = [[0.0, 0.0], [apart_m, -1.5]]
+        .map(|[x, v]| State { position_m: Vector3::x() * x, velocity_m_s: Vector3::x() * v });
+    let sent = [0, 1].map(|i| limits[i].start(states[i]).expect("valid").to_bytes());
+    let starts = sent.map(|bytes| Start::from_bytes(&bytes).expect("own bytes"));
+    Ok([Shield::new(&limits[0], 0, &starts)?, Shield::new(&limits[1], 1, &starts)?])
+}
+
+/// Flies two exact vehicles at each other without a radio, each at its own period. Returns the least separation.
+fn closest_without_radio(mut shields: [Shield; 2]) -> f64 {
+    let periods = [0, 1].map(|i| shields[i].limits().settings().period_s);
+    let (mut next, mut now) = ([0.0_f64; 2], 0.0_f64);
+    let mut states = [0, 1].map(|i| shields[i].next_reference());
+    let (mut commands, mut begun) = ([Vector3::zeros(); 2], [0.0; 2]);
+    let mut closest = f64::INFINITY;
+    while now < 6.0 {
+        for (i, shield) in shields.iter_mut().enumerate() {
+            if now >= next[i] - 1e-9 {
+                (states[i], begun[i]) = (shield.next_reference(), now);
+                let towards = if i == 0 { 50.0 } else { -50.0 };
+                commands[i] = shield.filter(states[i], Vector3::x() * towards);
+                next[i] += periods[i];
+            }
+        }
+        let places = [0, 1].map(|i| states[i].after(commands[i], now - begun[i]).position_m);
+        closest = closest.min((places[1] - places[0]).norm());
+        now += 0.001;
+    }
+    closest
+}
+
+#[test]
+fn vehicles_with_different_settings_stay_apart_by_the_starts_that_they_announce() {
+    let base = Settings { ease_m: Some(0.0), turn: 0.0, ..Settings::new(1.0, 0.05) };
+    let brake = |brake| Settings { brake_m_s2: Some(brake), ..base };
+    let accel = |accel_m_s2| Settings { accel_m_s2, ..base };
+    let period = |period_s| Settings { period_s, ..base };
+    let error = |position_error_m| Settings { position_error_m, ..base };
+    for settings in [
+        [brake(3.0), brake(1.0)],
+        [brake(1.0), brake(3.0)],
+        [accel(5.0), accel(2.0)],
+        [period(0.02), period(0.2)],
+        [error(0.0), error(0.1)],
+    ] {
+        let apart = [2.2, 2.4, 2.8, 3.2].into_iter().find_map(|apart_m| announced(settings, apart_m).ok());
+        let closest = closest_without_radio(apart.expect("far enough"));
+        assert!((1.0..1.6).contains(&closest), "{settings:?}: {closest}");
+    }
+    // delta and ellipsoid are shared.
+    let other = Settings { delta_m: 2.0, ..base };
+    let error = announced([base, other], 9.0).expect_err("delta").to_string();
+    assert!(error.starts_with("delta_m: vehicle 2 has another value (1)"), "{error}");
+    let other = Settings { half_height_m: Some(0.3), ..base };
+    let error = announced([base, other], 9.0).expect_err("ellipsoid").to_string();
+    assert!(error.starts_with("half_height_m: vehicle 2 has another value"), "{error}");
+}
+
+#[test]
+fn vehicles_that_compute_the_start_of_the_other_one_from_their_own_settings_violate() {
+    let base = Settings { ease_m: Some(0.0), turn: 0.0, ..Settings::new(1.0, 0.05) };
+    let brake = |brake| Settings { brake_m_s2: Some(brake), ..base };
+    let accel = |accel_m_s2| Settings { accel_m_s2, ..base };
+    let period = |period_s| Settings { period_s, ..base };
+    let delta = |delta_m| Settings { delta_m, ..base };
+    for (settings, apart_m, certified_m) in [
+        ([brake(3.0), brake(1.0)], 2.2, 1.0),
+        ([accel(5.0), accel(2.0)], 2.2, 1.0),
+        ([period(0.02), period(0.2)], 2.2, 1.0),
+        ([delta(1.0), delta(2.0)], 3.2, 2.0),
+    ] {
+        let states = [[0.0, 0.0], [apart_m, -1.5]]
+            .map(|[x, v]| State { position_m: Vector3::x() * x, velocity_m_s: Vector3::x() * v });
+        let shields = [0, 1].map(|i| {
+            let limits = settings[i].limits().expect("valid");
+            let starts = states.map(|state| limits.start(state).expect("valid"));
+            Shield::of_checked(&limits, i, &starts.as_slice().into()).expect("apart")
+        });
+        let closest = closest_without_radio(shields);
+        assert!(closest < certified_m - 0.005, "{settings:?}: {closest}");
+    }
+}
+
+#[test]
+fn an_own_start_of_other_settings_is_refused() {
+    let base = Settings::new(1.0, 0.05);
+    let limits = base.limits().expect("valid");
+    let weak = Settings { brake_m_s2: Some(1.0), ..base }.limits().expect("valid");
+    let moving = State { position_m: Vector3::x() * 5.0, velocity_m_s: Vector3::x() };
+    let other = limits.start(State::at_rest(Vector3::zeros())).expect("valid");
+    let own = weak.start(moving).expect("valid").with_flight(7);
+    assert!(Shield::new(&weak, 1, &[other, own]).is_ok());
+    let error = Shield::new(&limits, 1, &[other, own]).expect_err("another brake").to_string();
+    assert!(error.starts_with("start: the announced start of vehicle 2 is not that of its own settings"), "{error}");
+    assert!(Shield::new(&limits, 2, &[other, own]).expect_err("no such vehicle").to_string().starts_with("index: "));
+}
+
+#[test]
+fn another_version_of_a_start_voids_the_certificate_on_both_sides_by_the_first_message() {
+    let limits = Settings::new(1.0, 0.05).limits().expect("valid");
+    let start = |x: f64| limits.start(State::at_rest(Vector3::x() * x)).expect("valid");
+    let held = [[start(0.0), start(2.2)], [start(0.0).with_flight(1), start(2.2)]];
+    let mut shields = [0, 1].map(|i| Shield::new(&limits, i, &held[i]).expect("apart"));
+    for _ in 0..40 {
+        for (i, shield) in shields.iter_mut().enumerate() {
+            let towards = if i == 0 { 5.0 } else { -5.0 };
+            shield.filter(shield.next_reference(), Vector3::x() * towards);
+        }
+        for i in 0..2 {
+            for message in shields[i].messages().collect::<Vec<_>>() {
+                shields[1 - i].hear_bytes(&message.to_bytes());
+            }
+        }
+    }
+    for (i, shield) in shields.iter().enumerate() {
+        let counters = shield.counters();
+        let other = u16::try_from(1 - i).expect("small");
+        assert_eq!(counters.exceeded(), Some(Exceeded::OtherStarts(other)));
+        assert!(counters.other_starts >= 30 && counters.accepted + counters.refused == 0, "{counters:?}");
+        assert_eq!((shield.shared_starts().agreed, shield.assumptions()[0].held), (0, Some(false)));
+    }
+    // Both wait behind the first plane.
+    let places = [0, 1].map(|i| shields[i].next_reference().position_m.x);
+    assert!(places[0] <= 0.6 && places[1] >= 1.6, "{places:?}");
+
+    // A message from a vehicle without a start.
+    let mut alone = Shield::new(&limits, 0, &held[0][..1]).expect("alone");
+    let body = Body::Follower { segment: alone.segment(), decision: None };
+    alone.hear(&Message { from: 4, to: 0, stamp: 1, starts: 1, body });
+    assert_eq!(alone.counters().exceeded(), Some(Exceeded::UnknownSender));
+}
+
+#[test]
+fn messages_of_an_earlier_flight_void_the_certificate_and_are_not_read() {
+    let limits = Settings::new(1.0, 0.05).limits().expect("valid");
+    let flight = |flight: u64| {
+        let start = |x: f64| limits.start(State::at_rest(Vector3::x() * x)).expect("valid").with_flight(flight);
+        let starts = [start(0.0), start(2.5)];
+        [0, 1].map(|i| Shield::new(&limits, i, &starts).expect("apart"))
+    };
+    let period = |shields: &mut [Shield; 2], wanted: f64| {
+        shields.iter_mut().for_each(|shield| _ = shield.filter(shield.next_reference(), Vector3::x() * wanted));
+        let sent: Vec<_> = shields.iter_mut().flat_map(Shield::messages).collect();
+        sent.iter().for_each(|message| shields[message.to as usize].hear(message));
+        sent
+    };
+    let mut earlier = flight(1);
+    let old: Vec<_> = (0..100).flat_map(|_| period(&mut earlier, 2.0)).collect();
+    let proposals = old.iter().filter(|message| matches!(message.body, Body::Owner { proposal: Some(_) }));
+    assert!(proposals.count() > 20);
+    for (now, is_void) in [(2, true), (1, false)] {
+        let mut shields = flight(now);
+        period(&mut shields, 0.0);
+        old.iter().for_each(|message| shields[message.to as usize].hear(message));
+        // Without a number of the flight nothing tells the messages apart.
+        let is_read = shields.iter().any(|shield| shield.counters().exceeded().is_none());
+        assert_eq!(is_read, !is_void);
+    }
+}
+
+#[test]
+fn a_shield_that_was_saved_and_loaded_continues_with_the_same_bits() {
+    let ranges = Ranges { most_vehicles: 6, laws: &[Law::Slot], imperfect: true };
+    let flight = random_flight(3, ranges);
+    let mut world = World::new(&flight);
+    (0..200).for_each(|_| world.step(&flight));
+    let mut loaded = world.clone();
+    for shield in loaded.fleet.shields_mut() {
+        let json = serde_json::to_string(&shield.save().expect("no obstacles")).expect("plain data");
+        let saved: SavedShield = serde_json::from_str(&json).expect("plain data");
+        let read = saved.load().expect("own data");
+        assert_eq!(serde_json::to_string(&read.save()).expect("plain data"), json);
+        *shield = read;
+        // Altered data are refused.
+        let starts = json.replace("\"flight\":0", "\"flight\":1");
+        let altered: SavedShield = serde_json::from_str(&starts).expect("plain data");
+        assert!(altered.load().expect_err("other starts").to_string().starts_with("saved: "));
+    }
+    (0..200).for_each(|_| world.step(&flight));
+    (0..200).for_each(|_| loaded.step(&flight));
+    assert_eq!((&world.states, world.report()), (&loaded.states, loaded.report()));
+    let wall = crate::obstacle::SolidHalfSpace { normal: Vector3::z_axis(), offset_m: -50.0 };
+    let walled = world.fleet.shields()[0].clone().with_obstacles(&[crate::Obstacle::new(wall, 0.1)]);
+    assert!(walled.expect("far").save().is_none());
+}
+
+#[test]
+fn commands_beyond_the_limits_of_the_vehicle_count_as_changed() {
+    let limits = Settings::new(1.0, 0.05).limits().expect("valid");
+    let start = limits.start(State::at_rest(Vector3::zeros())).expect("valid");
+    let mut shield = Shield::new(&limits, 0, &[start]).expect("alone");
+    // Each command is cut to a twentieth.
+    for _ in 0..4 {
+        shield.filter(shield.next_reference(), Vector3::x() * 100.0);
+    }
+    let counters = shield.counters();
+    assert_eq!((counters.changed_share(), counters.limited), (1.0, 4));
+    assert!((counters.largest_change_m_s2 - 95.0).abs() < 1e-9, "{counters:?}");
+    shield.filter(shield.next_reference(), Vector3::x());
+    assert_eq!(shield.counters().changed, 4);
 }

@@ -2,6 +2,7 @@
 
 mod ellipsoids;
 mod flights;
+mod long_segments;
 mod obstacles;
 mod reference;
 mod twins;

@@ -3,6 +3,7 @@
 use nalgebra::Vector3;
 
 use super::Random;
+use crate::contract::{Body, Decision};
 use crate::plane::Segment;
 use crate::{Counters, Fleet, Limits, Message, Obstacle, State};
 
@@ -119,10 +120,10 @@ pub(super) struct World {
     /// Seconds from the last instant of each vehicle.
     since_s: Vec<f64>,
     held: Vec<(f64, Vector3<f64>)>,
-    /// Messages on their way, with the time of arrival.
-    flying: Vec<(f64, Message)>,
+    /// Messages on their way, with the time of arrival and the segment of the sender.
+    flying: Vec<(f64, Message, Segment)>,
     /// Stamp and segment of the newest message, by receiver and sender.
-    heard: Vec<Vec<(u64, Segment)>>,
+    heard: Vec<Vec<(u32, Segment)>>,
     /// Whether the last message of each pair was lost.
     lost: Vec<bool>,
     random: Random,
@@ -205,16 +206,17 @@ impl World {
                 place += 1;
                 continue;
             }
-            let (_, mut message) = self.flying.swap_remove(place);
+            let (_, mut message, segment) = self.flying.swap_remove(place);
             if of.defect == Defect::OwnerDropsOldPlane {
                 let owner = &self.fleet.shields()[message.to as usize];
                 if let Some(number) = owner.pending_number(message.from) {
-                    message.decision = Some(crate::contract::Decision { number, accepted: true });
+                    let decision = Some(Decision { number, accepted: true });
+                    message.body = Body::Follower { segment, decision };
                 }
             }
             let heard = &mut self.heard[message.to as usize][message.from as usize];
             if message.stamp > heard.0 {
-                *heard = (message.stamp, message.segment);
+                *heard = (message.stamp, segment);
             }
             self.fleet.hear(&message);
         }
@@ -246,6 +248,7 @@ impl World {
         let (now, count) = (self.time_s(), self.states.len());
         let broadcast_is_lost = of.radio.every_third && (self.step / of.instants[i] + i).is_multiple_of(3);
         let messages: Vec<_> = self.fleet.shields_mut()[i].messages().collect();
+        let segment = self.fleet.shields()[i].segment();
         for message in messages {
             let burst = of.radio.burst.max(1.0);
             let lost = &mut self.lost[i * count + message.to as usize];
@@ -259,7 +262,7 @@ impl World {
             }
             let copies = 1 + usize::from(self.random.chance(of.radio.duplicates));
             for _ in 0..copies {
-                self.flying.push((now + 1e-6 + of.radio.latency_s * self.random.unit(), message));
+                self.flying.push((now + 1e-6 + of.radio.latency_s * self.random.unit(), message, segment));
             }
         }
     }
@@ -357,7 +360,7 @@ pub(super) fn flat(vector: Vector3<f64>, planar: bool) -> Vector3<f64> {
 ///
 /// The derivative of the square is a cubic. Between its extrema it is monotone, so each change of sign from minus to
 /// plus has one minimum, found by bisection.
-fn least_separation(r: &Vector3<f64>, v: &Vector3<f64>, a: &Vector3<f64>, step_s: f64) -> (f64, f64) {
+pub(super) fn least_separation(r: &Vector3<f64>, v: &Vector3<f64>, a: &Vector3<f64>, step_s: f64) -> (f64, f64) {
     let at = |t: f64| (r + v * t + a * (t * t / 2.0)).norm();
     let slope = |t: f64| {
         let (point, speed) = (r + v * t + a * (t * t / 2.0), v + a * t);

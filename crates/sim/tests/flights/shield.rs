@@ -193,7 +193,8 @@ fn random_flights_never_violate_while_the_bounds_hold() {
         let room_m = flight.audit.closest.expect("two vehicles").separation_m - scenario.delta_m;
         assert!(flight.audit.status == Status::Clear && room_m > 0.0, "{seed}: {room_m} {:?}", flight.audit.status);
         assert_eq!(flight.certificate.certified_m, Some(1.0), "{seed}: {:?}", flight.certificate.void);
-        assert!(shield.counters.command_share <= 1.0 && shield.counters.tracking_share <= 1.0, "{seed}: {shield:?}");
+        let shares = [shield.counters.command_share, shield.counters.tracking_share];
+        assert!(shares.iter().all(|share| share.is_some_and(|share| share <= 1.0)), "{seed}: {shield:?}");
         least_m = least_m.min(room_m);
         changed += shield.counters.changed_share();
     }
@@ -255,6 +256,55 @@ fn a_law_that_is_undefined_makes_the_shield_brake() {
     assert_eq!((flight.ending.reason(), flight.audit.status), (None, Status::Clear));
     assert_eq!(report(&flight).undefined, 401);
     assert!(log.samples.last().expect("samples").swarm.velocities_m_s.amax() < 1e-9, "both have stopped");
+}
+
+#[test]
+fn starts_on_paths_that_converge_are_refused_or_clear_without_a_command() {
+    let scenario = |apart_m: f64, speed_m_s: f64, angle_rad: f64| {
+        let text = format!(
+            r#"
+            [start]
+            positions_m = [[0, 0], [0, {apart_m}]]
+            velocities_m_s = [[{speed_m_s}, 0], [{speed_m_s}, {}]]
+            [formation]
+            shape = "points"
+            points_m = [[0, 0], [0, 50]]
+            [law]
+            kind = "laplacian"
+            delta_m = 1.0
+            [plant]
+            kind = "ideal"
+            [shield]
+            max_speed_m_s = {}
+            [time]
+            duration_s = {}
+            "#,
+            -angle_rad * speed_m_s,
+            1.001 * speed_m_s,
+            speed_m_s / 2.9,
+        );
+        let source = tautline_sim::scenario::Source::Text { name: "converging".into(), text };
+        Scenario::read(&source, &[])
+    };
+    // Twice the path error of the ideal plant, and rounding.
+    let required_m = 1.0 + 2.1e-5;
+    for (speed_m_s, length_m) in [(50.0, 416.0), (300.0, 15_000.0)] {
+        for angle_rad in [1e-12, 1e-9, 0.99e-7, 1e-6] {
+            let lost_m = angle_rad * length_m;
+            if lost_m > 2e-7 {
+                let error = scenario(required_m + 0.8 * lost_m, speed_m_s, angle_rad).expect_err("too near");
+                assert!(error.to_string().contains("reserve segments nearer"), "{angle_rad}: {error}");
+            }
+            let near = scenario(required_m + 1.1 * lost_m + 1e-7, speed_m_s, angle_rad).expect("far enough");
+            if speed_m_s < 100.0 || angle_rad == 0.99e-7 {
+                let (flight, _) = fly_with(&near, Box::new(Adversary::Undefined), plant::of(&near));
+                let flight = flight.expect("a flight");
+                assert_eq!((flight.audit.status, report(&flight).breach), (Status::Clear, None), "{angle_rad}");
+                let closest_m = flight.audit.closest.expect("a pair").separation_m;
+                assert!(closest_m < required_m + 0.2 * lost_m + 1e-5, "{angle_rad}: {closest_m}");
+            }
+        }
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::error::Error;
 
 use nalgebra::Vector3;
-use tautline_shield::{Settings, Shield, State};
+use tautline_shield::{Settings, Shield, Start, State};
 
 /// Period of the controllers \[s\].
 const PERIOD_S: f64 = 0.05;
@@ -23,7 +23,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{}", limits.certificate());
 
     let mut states = [0.0, 3.0, 6.0, 9.0].map(|x| State::at_rest(Vector3::new(x, 0.1 * x * x, 0.0)));
-    let starts = states.iter().map(|state| limits.start(*state)).collect::<Result<Vec<_>, _>>()?;
+    // Each vehicle announces its own start as bytes.
+    let announced = states.iter().map(|state| limits.start(*state).map(|start| start.to_bytes()));
+    let announced = announced.collect::<Result<Vec<_>, _>>()?;
+    let starts = announced.iter().map(|bytes| Start::from_bytes(bytes)).collect::<Result<Vec<_>, _>>()?;
     let shields = (0..states.len()).map(|own| Shield::new(&limits, own, &starts));
     let mut shields = shields.collect::<Result<Vec<_>, _>>()?;
 

@@ -20,7 +20,7 @@ fn refused(sets: &[&str]) -> ScenarioError {
 }
 
 fn tube_share(flight: &Flight) -> f64 {
-    flight.shield.as_ref().expect("a shield").counters.tracking_share
+    flight.shield.as_ref().expect("a shield").counters.tracking_share.expect("observed")
 }
 
 #[test]
