@@ -97,8 +97,8 @@ impl PositionLookup {
     }
 }
 
-/// Number of parts of a curve segment between which it is sampled.
-const PARTS_OF_A_CURVE: u32 = 8;
+/// Number of parts between which the common time of two segments is sampled.
+const PARTS: u32 = 8;
 /// Largest number of kept samples; beyond, neighbours are merged.
 const MAX_SAMPLES: usize = 4096;
 
@@ -119,8 +119,8 @@ pub struct PairSample {
 
 /// Distance of one pair over time, computed while a recording is read again.
 ///
-/// Samples lie at the ends of segments and at the closest approach between them. In a long recording only the closest
-/// of several neighbours is kept, so no approach is lost.
+/// Samples lie at the ends of segments, at the closest approach and between them: a line through few samples would lie
+/// above the distance. In a long recording only the closest of several neighbours is kept, so no approach is lost.
 #[derive(Clone, Debug)]
 pub struct PairSeries {
     vehicles: Vec<(usize, Vehicle)>,
@@ -245,8 +245,8 @@ impl PairSample {
     }
 }
 
-/// Samples the time that two segments share: its ends, the closest approach of straight segments, and points in between
-/// on curves. Adds at least one sample.
+/// Samples the time that two segments share: its ends, points in between, and the closest approach of straight segments.
+/// Adds at least one sample.
 fn samples(overlap: &Overlap<'_>, target: Target<'_>, found: &mut Vec<PairSample>) {
     let Overlap { first, second, interval: Interval { from_s, to_s } } = *overlap;
     let at = |time_s: f64| {
@@ -255,7 +255,8 @@ fn samples(overlap: &Overlap<'_>, target: Target<'_>, found: &mut Vec<PairSample
         let distance_m = target.distance(positions_m[1] - positions_m[0]);
         PairSample { time_s, distance_m, deviation_m, positions_m, unseen_before: false }
     };
-    let mut times_s = vec![from_s, to_s];
+    let place = |k: u32| from_s + (to_s - from_s) * f64::from(k) / f64::from(PARTS);
+    let mut times_s: Vec<f64> = [from_s, to_s].into_iter().chain((1..PARTS).map(place)).collect();
     if first.curve().is_none() && second.curve().is_none() {
         let motion = overlap.straight();
         let closest = match target {
@@ -264,9 +265,6 @@ fn samples(overlap: &Overlap<'_>, target: Target<'_>, found: &mut Vec<PairSample
             Target::Shape(shape) => shape.closest(motion.from, motion.to).1,
         };
         times_s.push(from_s + (to_s - from_s) * closest);
-    } else {
-        let place = |k: u32| from_s + (to_s - from_s) * f64::from(k) / f64::from(PARTS_OF_A_CURVE);
-        times_s.extend((1..PARTS_OF_A_CURVE).map(place));
     }
     times_s.sort_unstable_by(f64::total_cmp);
     times_s.dedup();
