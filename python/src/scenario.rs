@@ -99,7 +99,8 @@ impl Scenario {
     /// Parts that a learning environment ignores: key, reason, and the key and the value that turn the part off.
     fn parts_ignored_by_environments(&self, py: Python<'_>) -> PyResult<Vec<IgnoredPart>> {
         let read = || {
-            let parsed = self.request.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
+            let parsed =
+                self.request.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
             Template::read(&self.request.source, &parsed)
         };
         let template = run_detached(py, read)?.map_err(scenario::ScenarioError::into_exception)?;

@@ -190,7 +190,8 @@ def keys(value: Any, place: str, *names: str) -> list[Any]:
 
 def number(value: Any, place: str, least: int | None = None) -> Exact:
     if type(value) is not Exact or (least is not None and value < least):
-        raise Unreadable(f"proof: {place} must be a number{'' if least is None else ' of 0 or more'}, got {short(value)}")
+        needed = "a number" if least is None else f"a number of {least} or more"
+        raise Unreadable(f"proof: {place} must be {needed}, got {short(value)}")
     return value
 
 
@@ -339,7 +340,8 @@ class Table:
         tracks = []
         for name, rows in self.rows.items():
             shift, gap = scaled(shifts.get(name, (0, 0)), decimals), gaps[name]
-            tracks.append(self.segments(name, (decimals, places), shift, None if gap is None else scaled(gap, decimals)))
+            max_gap = None if gap is None else scaled(gap, decimals)
+            tracks.append(self.segments(name, (decimals, places), shift, max_gap))
         return Motion(tracks, decimals, places)
 
     @staticmethod
@@ -384,7 +386,9 @@ def within(track: list[Segment], from_t: int, to_t: int) -> list[Segment]:
     return track[begin : bisect_right(track, to_t, key=lambda segment: segment.from_t)]
 
 
-def closest(first: list[Segment], second: list[Segment], span: tuple[int, int], pair: tuple[int, int]) -> Approach | None:
+def closest(
+    first: list[Segment], second: list[Segment], span: tuple[int, int], pair: tuple[int, int]
+) -> Approach | None:
     """Smallest distance of two vehicles over all segments that share a time with an interval and with each other."""
     least: Approach | None = None
     for a in within(first, *span):

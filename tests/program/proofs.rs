@@ -142,8 +142,7 @@ fn the_checker_has_exit_codes() {
     assert_eq!(said.lines().next(), Some(verdict), "{said}");
     assert!(said.lines().skip(1).all(|line| line.starts_with("assumes  ")), "{said}");
     let text = fs::read_to_string(at("proof.json")).expect("a proof");
-    fs::write(at("wrong.json"), text.replace("\"separation_m\":1.0", "\"separation_m\":1.0000001"))
-        .expect("a file");
+    fs::write(at("wrong.json"), text.replace("\"separation_m\":1.0", "\"separation_m\":1.0000001")).expect("a file");
     assert_eq!(check("wrong.json", "pass.csv").0, Some(1));
     fs::write(at("other.csv"), PASS.replace("5,1,0", "5,1.5,0")).expect("a file");
     assert_eq!(check("proof.json", "other.csv").0, Some(1));
@@ -190,7 +189,10 @@ fn an_export_of_a_flight_has_a_proof() {
     let ran = python(folder.path(), &checker(), &["proof.json", "flight.csv"]);
     assert_eq!(ran.status.code(), Some(0), "{ran:?}");
     let header = fs::read_to_string(folder.path().join("flight.csv")).expect("a table");
-    assert!(header.lines().next().is_some_and(|names| names.contains(",vx,") && names.contains(",qw,")), "{header:.80}");
+    assert!(
+        header.lines().next().is_some_and(|names| names.contains(",vx,") && names.contains(",qw,")),
+        "{header:.80}"
+    );
 }
 
 #[test]
@@ -199,7 +201,8 @@ fn recordings_without_a_proof_are_refused_with_a_remedy() {
     fs::write(folder.path().join("pass.csv"), PASS).expect("a file");
     fs::write(folder.path().join("wide.csv"), "t,x1,y1,z1,x2,y2,z2\n0,0,0,0,5,0,0\n1,0,0,0,5,0,0\n").expect("a file");
     fs::write(folder.path().join("seconds.csv"), PASS.replace("t,", "t_s,")).expect("a file");
-    let more: String = PASS.lines().enumerate().map(|(k, line)| format!("{line},{}\n", ["battery", "1"][k.min(1)])).collect();
+    let more: String =
+        PASS.lines().enumerate().map(|(k, line)| format!("{line},{}\n", ["battery", "1"][k.min(1)])).collect();
     fs::write(folder.path().join("more.csv"), more).expect("a file");
     for (arguments, code) in [
         (&["pass.csv", "--radius", "1"][..], "audit/no-proof"),

@@ -245,8 +245,8 @@ impl PairSample {
     }
 }
 
-/// Samples the time that two segments share: its ends, points in between, and the closest approach of straight segments.
-/// Adds at least one sample.
+/// Samples the time that two segments share: its ends, points in between, and the closest approach of straight
+/// segments. Adds at least one sample.
 fn samples(overlap: &Overlap<'_>, target: Target<'_>, found: &mut Vec<PairSample>) {
     let Overlap { first, second, interval: Interval { from_s, to_s } } = *overlap;
     let at = |time_s: f64| {

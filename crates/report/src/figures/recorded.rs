@@ -221,8 +221,7 @@ mod tests {
         let found = steps(&bounds);
         let (known, breaks): (Vec<_>, Vec<_>) = found.iter().partition(|(time_s, _)| time_s.is_finite());
         assert_eq!(breaks.len(), 2);
-        let expected =
-            [(0.0, 5.0), (1.0, 5.0), (1.0, 3.0), (2.0, 3.0), (4.0, 6.0), (5.0, 6.0), (7.0, 2.0), (7.0, 2.0)];
+        let expected = [(0.0, 5.0), (1.0, 5.0), (1.0, 3.0), (2.0, 3.0), (4.0, 6.0), (5.0, 6.0), (7.0, 2.0), (7.0, 2.0)];
         assert_eq!(known, expected);
         let drawn = smallest(&bounds, &encounter(0.0), "Smallest separation").svg;
         assert!(drawn.contains("smallest in each interval") && drawn.contains("closest 1.000000 m at 1.000 s"));

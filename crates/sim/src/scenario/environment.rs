@@ -101,8 +101,7 @@ impl Scenario {
             ReferenceMotion::Rest { position_m } => position_m != nalgebra::Vector3::zeros(),
             _ => true,
         };
-        let has_recovery =
-            deadlock.is_on() && self.law().is_ok_and(|law| law.capabilities().settling.is_some());
+        let has_recovery = deadlock.is_on() && self.law().is_ok_and(|law| law.capabilities().settling.is_some());
         let is_led = reference.as_ref().is_some_and(|guidance| guidance.known_by.leader().is_some());
         [
             (reference.as_ref().is_some_and(is_moving), REFERENCE),

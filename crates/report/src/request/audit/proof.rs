@@ -26,8 +26,24 @@ const TIMES: [(&str, Option<TimeUnit>); 4] =
 const COLUMNS: [&str; 4] = ["id", "x", "y", "z"];
 /// Names of columns that do not change the reading; those of the exports of a run, besides velocities.
 const UNUSED: [&str; 18] = [
-    "vx", "vy", "vz", "qw", "qx", "qy", "qz", "thrust_1_n", "thrust_2_n", "thrust_3_n", "thrust_4_n", "heading_rad",
-    "speed_m_s", "wind_x_m_s", "wind_y_m_s", "wind_z_m_s", "oldest_s", "mean_s",
+    "vx",
+    "vy",
+    "vz",
+    "qw",
+    "qx",
+    "qy",
+    "qz",
+    "thrust_1_n",
+    "thrust_2_n",
+    "thrust_3_n",
+    "thrust_4_n",
+    "heading_rad",
+    "speed_m_s",
+    "wind_x_m_s",
+    "wind_y_m_s",
+    "wind_z_m_s",
+    "oldest_s",
+    "mean_s",
 ];
 
 /// Version of the file. A new motion, limit or format of data is a new name within this version.
@@ -112,8 +128,9 @@ pub(super) fn check(request: &AuditRequest<'_>, settings: &Settings) -> Result<(
         return no_proof("a recording that is not one file", EXPORT);
     };
     let Some(time) = time_of_table(path).filter(|_| is_read_plainly(options)) else {
-        let needed = "t_s (or t, time, time_s), id, x, y, z in metres, and besides at most vx, vy, vz and those of an export";
-        return no_proof(&format!("{}: its columns must be {needed}", path.display()), EXPORT);
+        let what = "a file that is not a table with the columns t_s (t, time, time_s), id, x, y and z in metres, and \
+                    at most those of an export besides";
+        return no_proof(what, EXPORT);
     };
     let contradicts = |unit: &TimeUnit| options.time_unit.is_some_and(|given| given != *unit);
     if time.filter(contradicts).is_some() {
@@ -143,8 +160,8 @@ fn time_of_table(path: &Path) -> Option<Option<TimeUnit>> {
     // A row of units below the header has no digit in the time column.
     let place = names.iter().position(|name| name == time)?;
     let first = lines.records().next().and_then(Result::ok);
-    let has_units = first
-        .is_some_and(|row| row.get(place).is_some_and(|cell| !cell.bytes().any(|byte| byte.is_ascii_digit())));
+    let has_units =
+        first.is_some_and(|row| row.get(place).is_some_and(|cell| !cell.bytes().any(|byte| byte.is_ascii_digit())));
     (is_plain && !has_units).then_some(*unit)
 }
 
