@@ -130,7 +130,7 @@ def decimal(text: str) -> tuple[int, int]:
 
 
 def scaled(number: tuple[int, int], decimals: int) -> int:
-    return number[0] * 10 ** (decimals - number[1])
+    return int(number[0] * 10 ** (decimals - number[1]))
 
 
 def shown(name: str) -> str:
