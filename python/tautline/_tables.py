@@ -193,7 +193,7 @@ def make_table(rows: Sequence[Mapping[str, Any]], max_rows: int = 10) -> str:
     columns = list(dict.fromkeys(key for row in rows for key in row))
     head = "".join(f"<th>{html.escape(str(column))}</th>" for column in columns)
     body = "".join(
-        "<tr>" + "".join(f"<td>{html.escape(format_cell(row.get(column), str(column)))}</td>" for column in columns) + "</tr>"
+        "<tr>" + "".join(f"<td>{html.escape(format_cell(row.get(key), str(key)))}</td>" for key in columns) + "</tr>"
         for row in rows[:max_rows]
     )
     more = f"<p>and {len(rows) - max_rows} more</p>" if len(rows) > max_rows else ""
