@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ._arguments import PathLike, number
 from ._native import Error
-from ._scenario import Scenario
+from ._scenario import Scenario, to_scenario
 from ._vector import VectorSimulation
 
 #: Penalty of a violation.
@@ -33,9 +33,10 @@ class Worlds(VectorSimulation):
         threads: int | None = None,
         set: Mapping[str, Any] | None = None,
     ) -> None:
-        super().__init__(scenario, num_envs, threads=threads, set=set)
-        if parts := self.scenario._native.parts_ignored_by_environments():
-            raise Error(refusal(self.scenario.name, parts))
+        wanted = to_scenario(scenario, set)
+        if parts := wanted._native.parts_ignored_by_environments():
+            raise Error(refusal(wanted.name, parts))
+        super().__init__(wanted, num_envs, threads=threads)
 
     def start(self, seed: int, is_given: bool) -> None:
         """Resets the only world to a seed, or to the next one with a valid start if no seed was given."""

@@ -170,7 +170,7 @@ mod tests {
             ("pentagon", vec!["actuation.lag_s=0.2"], "actuation"),
             ("pentagon", vec!["actuation.max_accel_m_s2=1"], "actuation"),
             ("pentagon", vec!["failure=[{kind=\"dead\", vehicle=1, at_s=1}]"], "failure"),
-            ("pentagon", vec!["shield.enabled=true"], "shield"),
+            ("hexagon", vec!["shield.enabled=true"], "shield"),
             ("pentagon", vec!["leg=[{shape=\"circle\", radius_m=5, start_s=3}]"], "leg"),
             ("pentagon", vec!["formation.assignment=optimal", "start.jitter_m=0.1"], "formation.assignment"),
             ("swap", vec![], "deadlock"),
@@ -192,11 +192,11 @@ mod tests {
             ("kind=\"rest\", position_m=[1, 0]", vec!["reference"]),
             ("kind=\"velocity\", velocity_m_s=[1, 0]", vec!["reference"]),
             ("kind=\"circle\", radius_m=1, period_s=9", vec!["reference"]),
-            ("kind=\"rest\", leader=1", vec!["reference.leader"]),
         ] {
             let reference = format!("reference={{{motion}}}");
             assert_eq!(ignored("swap", &["deadlock.mode=off", &reference]), expected, "{motion}");
         }
+        assert_eq!(ignored("pentagon-leader", &["deadlock.mode=off"]), ["reference.leader"]);
         // Recovery moves no slots under a law that does not spread them, and an assignment to a fixed start is fixed.
         assert_eq!(ignored("pentagon", &["deadlock.mode=start"]), [""; 0]);
         assert_eq!(ignored("pentagon", &["formation.assignment=optimal"]), [""; 0]);
