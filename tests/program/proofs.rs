@@ -42,7 +42,9 @@ fn recording(number: u64) -> String {
     let (is_together, is_short) = (random.below(2) == 0, random.below(2) == 0);
     let start_s = if random.below(4) == 0 { 1_700_000_000 } else { 0 };
     let (has_more, is_quoted, end) = (random.below(3) == 0, random.below(5) == 0, ["\n", "\r\n"][number as usize % 2]);
-    let time_name = ["t_s", "t", "time", "time_s"][random.below(4) as usize];
+    // Seconds, milliseconds, dates, or seconds with an exponent.
+    let kind = random.below(4);
+    let time_name = ["t", "time", "t_s", "time_s"][random.below(if kind == 1 { 2 } else { 4 }) as usize];
     let digits = |x: f64| if is_short { format!("{x:.3}") } else { format!("{x:?}") };
     let mut rows = Vec::new();
     for vehicle in 0..vehicles {
@@ -51,7 +53,13 @@ fn recording(number: u64) -> String {
         for instant in 0..instants {
             let time_s = 0.5 * instant as f64 + shift_s;
             position = position.map(|x| x + random.between(-3.0, 3.0));
-            let time = if start_s > 0 { format!("{}", f64::from(start_s) + time_s) } else { digits(time_s) };
+            let time = match kind {
+                0 if start_s > 0 => format!("{}", f64::from(start_s) + time_s),
+                0 => digits(time_s),
+                1 => format!("{:.0}", 1e3 * (f64::from(start_s) + time_s)),
+                2 => format!("2023-11-14T22:13:{:09.6}Z", 20.0 + time_s),
+                _ => format!("{:e}", time_s),
+            };
             let [x, y, z] = position.map(digits);
             let id = if is_quoted { format!("\"v{vehicle}\"") } else { format!("v{vehicle}") };
             let more = if has_more { ",1,2.5,-3e0,nan" } else { "" };
