@@ -219,7 +219,7 @@ mod tests {
         let bound = |from_s: f64, to_s: f64, distance: f64| LowerBound { interval_s: [from_s, to_s], distance };
         let bounds = [bound(0.0, 1.0, 5.0), bound(1.0, 2.0, 3.0), bound(4.0, 5.0, 6.0), bound(7.0, 7.0, 2.0)];
         let found = steps(&bounds);
-        let (known, breaks): (Vec<_>, Vec<_>) = found.iter().partition(|(time_s, _)| time_s.is_finite());
+        let (known, breaks): (Vec<_>, Vec<_>) = found.iter().copied().partition(|(time_s, _)| time_s.is_finite());
         assert_eq!(breaks.len(), 2);
         let expected = [(0.0, 5.0), (1.0, 5.0), (1.0, 3.0), (2.0, 3.0), (4.0, 6.0), (5.0, 6.0), (7.0, 2.0), (7.0, 2.0)];
         assert_eq!(known, expected);
