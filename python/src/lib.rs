@@ -55,7 +55,7 @@ mod _native {
     use super::vector::VectorSimulation;
 
     #[pymodule_export]
-    use super::words::in_python;
+    use super::words::{in_python, separation_text};
 
     /// Initialises the module. Campaigns record the hash of this library as their program, not that of the interpreter.
     #[pymodule_init]

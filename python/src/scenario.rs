@@ -4,11 +4,14 @@ use numpy::PyArray2;
 use pyo3::prelude::*;
 use tautline::preflight::Preflight;
 use tautline::request::ScenarioRequest;
-use tautline::scenario::{self, Override, Source};
+use tautline::scenario::{self, Override, Source, Template};
 
 use crate::errors::{IntoException as _, json, wrong_input};
 use crate::numbers::table;
 use crate::work::run_detached;
+
+/// Key of a part, reason, and the key and the value that turn it off.
+type IgnoredPart = (&'static str, &'static str, Option<(&'static str, &'static str)>);
 
 /// A complete and valid scenario.
 #[pyclass(frozen, module = "tautline._native")]
@@ -93,10 +96,15 @@ impl Scenario {
         self.scenario.graph.edges().collect()
     }
 
-    /// Whether a shield changes commands.
-    #[getter]
-    fn is_shielded(&self) -> bool {
-        self.scenario.shield.as_ref().is_some_and(|shield| shield.enabled)
+    /// Parts that a learning environment ignores: key, reason, and the key and the value that turn the part off.
+    fn parts_ignored_by_environments(&self, py: Python<'_>) -> PyResult<Vec<IgnoredPart>> {
+        let read = || {
+            let parsed =
+                self.request.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
+            Template::read(&self.request.source, &parsed)
+        };
+        let template = run_detached(py, read)?.map_err(scenario::ScenarioError::into_exception)?;
+        Ok(template.parts_ignored_by_environments().iter().map(|part| (part.key, part.what, part.off)).collect())
     }
 
     #[getter]

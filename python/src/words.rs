@@ -137,6 +137,12 @@ const NO_VALUES: [&str; 36] = [
     "writes",
 ];
 
+/// Returns a separation [m] with at most six decimals, rounded down.
+#[pyfunction]
+pub(crate) fn separation_text(distance_m: f64) -> String {
+    tautline::text::at_least(distance_m, 6)
+}
+
 /// Returns a text of the library with arguments of Python instead of options. `code` is the code of the failure, if the
 /// text is a message of one.
 #[pyfunction]

@@ -152,11 +152,11 @@ class Flight(Table):
 
     def _repr_html_(self) -> str:
         reached = self.report["formation"]["reached_at_s"]
-        nearest = self.separation_m
+        nearest, delta = self.separation_m, f"delta {self.scenario.delta_m:g} m"
         rows = [
             ("scenario", self.scenario.name),
             ("vehicles", str(len(self.scenario))),
-            ("smallest separation", "-" if nearest is None else f"{nearest:.6g} m (delta {self.scenario.delta_m:g} m)"),
+            ("smallest separation", "-" if nearest is None else f"{_native.separation_text(nearest)} m ({delta})"),
             ("violations", str(len(self.report["audit"]["violations"]))),
             ("formation reached", "no" if reached is None else f"at {reached:.4g} s"),
         ]

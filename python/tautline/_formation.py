@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ._arguments import PathLike, number
 from ._native import Error
-from ._scenario import Scenario
+from ._scenario import Scenario, to_scenario
 from ._vector import VectorSimulation
 
 #: Penalty of a violation.
@@ -18,7 +18,10 @@ VIOLATION = 100.0
 
 
 class Worlds(VectorSimulation):
-    """Worlds of an environment. A new world passes over seeds without a valid start."""
+    """Worlds of an environment. A new world passes over seeds without a valid start.
+
+    Raises :class:`Error` for a scenario with parts that an environment ignores.
+    """
 
     _searches = True
 
@@ -30,11 +33,10 @@ class Worlds(VectorSimulation):
         threads: int | None = None,
         set: Mapping[str, Any] | None = None,
     ) -> None:
-        super().__init__(scenario, num_envs, threads=threads, set=set)
-        if self.scenario._native.is_shielded:
-            raise Error(
-                f"scenario: the shield of {self.scenario.name} replaces actions; give set={{'shield.enabled': False}}"
-            )
+        wanted = to_scenario(scenario, set)
+        if parts := wanted._native.parts_ignored_by_environments():
+            raise Error(refusal(wanted.name, parts))
+        super().__init__(wanted, num_envs, threads=threads)
 
     def start(self, seed: int, is_given: bool) -> None:
         """Resets the only world to a seed, or to the next one with a valid start if no seed was given."""
@@ -42,6 +44,17 @@ class Worlds(VectorSimulation):
             self.reset(seeds=[seed])
         else:
             self._reset(first=seed)
+
+
+def refusal(name: str, parts: list[tuple[str, str, tuple[str, str] | None]]) -> str:
+    """Returns the message on parts of a scenario that an environment ignores."""
+    problem = ", ".join(f"{key} ({what})" for key, what, _ in parts)
+    remedies = [f"without [{key.partition('.')[0]}]" for key, _, off in parts if off is None]
+    values = {"false": "False"}
+    sets = {f"'{off[0]}': {values.get(off[1], off[1])}".replace('"', "'") for _, _, off in parts if off is not None}
+    remedies = [f"give a scenario {' and '.join(sorted(set(remedies)))}"] if remedies else []
+    remedies += [f"give set={{{', '.join(sorted(sets))}}}"] if sets else []
+    return f"scenario: an environment ignores parts of {name}: {problem}; {', and '.join(remedies)}"
 
 
 def steps_of_action(hz: float, scenario: Scenario) -> int:

@@ -70,7 +70,7 @@ class Answer(Finding):
         return f"<{type(self).__name__} {'good' if self.is_good else 'bad'}: {', '.join(self)}>"
 
     def _repr_html_(self) -> str:
-        plain = [(key, format_cell(value)) for key, value in self.items() if not isinstance(value, (list, dict))]
+        plain = [(key, format_cell(value, key)) for key, value in self.items() if not isinstance(value, (list, dict))]
         tables = [(key, value) for key in self if isinstance(value := getattr(self, key), Findings)]
         shown = "".join(f"<h4>{escape(key)}</h4>{value._repr_html_()}" for key, value in tables)
         return _display.make_card("good" if self.is_good else "bad", type(self).__name__, plain) + shown

@@ -199,7 +199,9 @@ class Simulation:
             ("ending", self.ending or "in progress"),
             (
                 "smallest separation so far",
-                "-" if closest is None else f"{closest.separation_m:.6g} m at {closest.time_s:.4g} s",
+                "-"
+                if closest is None
+                else f"{_native.separation_text(closest.separation_m)} m at {closest.time_s:.4g} s",
             ),
         ]
         tone = {"clear": "open", "violation": "bad"}.get(status, "open")

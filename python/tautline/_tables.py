@@ -6,6 +6,8 @@ import html
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, overload
 
+from . import _native
+
 if TYPE_CHECKING:
     import pandas
     import pyarrow
@@ -191,15 +193,21 @@ def make_table(rows: Sequence[Mapping[str, Any]], max_rows: int = 10) -> str:
     columns = list(dict.fromkeys(key for row in rows for key in row))
     head = "".join(f"<th>{html.escape(str(column))}</th>" for column in columns)
     body = "".join(
-        "<tr>" + "".join(f"<td>{html.escape(format_cell(row.get(column)))}</td>" for column in columns) + "</tr>"
+        "<tr>" + "".join(f"<td>{html.escape(format_cell(row.get(key), str(key)))}</td>" for key in columns) + "</tr>"
         for row in rows[:max_rows]
     )
     more = f"<p>and {len(rows) - max_rows} more</p>" if len(rows) > max_rows else ""
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}"
 
 
-def format_cell(value: object) -> str:
-    """Returns a value as text, rounded to six digits."""
+#: Last words of keys with a separation or another distance that must not be shown larger than it is.
+DISTANCES = ("separation_m", "min_m", "min", "least", "lower", "lower_m", "clearance_m", "certified_m")
+
+
+def format_cell(value: object, key: str) -> str:
+    """Returns the value of a key as text, rounded to six digits, or down for a separation."""
     if value is None:
         return "-"
+    if isinstance(value, float) and key.rpartition(".")[2] in DISTANCES:
+        return _native.separation_text(value)
     return f"{value:.6g}" if isinstance(value, float) else str(value)

@@ -33,6 +33,7 @@ mod reading;
 mod reads;
 mod references;
 mod refuses;
+mod rounding;
 mod rules;
 mod runs;
 mod scenarios;

@@ -29,13 +29,13 @@ def crash(env: FormationVectorEnv, world: int) -> np.ndarray:
 
 class Gymnasium(Case):
     def test_one_world_passes_the_check_of_gymnasium(self) -> None:
-        for scenario in ("pentagon", "crazyflies", "swap"):
+        for scenario, more in ("pentagon", {}), ("crazyflies", {}), ("swap", {"deadlock.mode": "off"}):
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
                 # The spaces of velocities and distances have no limit.
                 warnings.filterwarnings("ignore", message=".*observation space (minimum|maximum) value is.*infinity")
                 warnings.filterwarnings("ignore", message=".*not within the.*|.*render.*|.*the reward.*")
-                env = gymnasium.make("tautline/Formation-v0", scenario=scenario, set={"time.duration_s": 2.0})
+                env = gymnasium.make("tautline/Formation-v0", scenario=scenario, set={"time.duration_s": 2.0, **more})
                 check_env(env.unwrapped, skip_render_check=True)
 
     def test_the_vector_environment_has_the_spaces_and_types_that_it_declares(self) -> None:
@@ -166,11 +166,35 @@ class Gymnasium(Case):
                 env.reset()
             self.assertGreater(refused, 0)
 
-    def test_shielded_scenarios_are_refused(self) -> None:
-        for make in (FormationEnv, FormationVectorEnv, ParallelFormationEnv):
-            message = "scenario: the shield of shielded-crazyflies replaces actions"
-            self.refuses(tl.Error, message, lambda make=make: make("shielded-crazyflies"))
-        FormationVectorEnv("shielded-crazyflies", 2, set={"shield.enabled": False})
+    def test_scenarios_with_parts_that_an_environment_ignores_are_refused(self) -> None:
+        accepted = []
+        for name in tl.scenarios():
+            try:
+                env = FormationVectorEnv(name, 1, hz=tl.Scenario(name).dt_s ** -1)
+            except tl.Error as error:
+                self.assertIn(f"scenario: an environment ignores parts of {name}: ", str(error))
+                for make in (FormationEnv, ParallelFormationEnv):
+                    self.refuses(tl.Error, str(error), lambda make=make, name=name: make(name))
+                continue
+            # The slots that the environment pays for are those to which the scenario flies.
+            accepted.append(name)
+            np.testing.assert_array_equal(env.task._slots_m, tl.Scenario(name).slots_m[:, : env.task.axes])
+        static = ["circle", "crazyflies", "hexagon", "pentagon", "pentagon-collinear", "pentagon-laplacian"]
+        self.assertEqual(sorted(accepted), static)
+
+    def test_a_refusal_names_each_part_and_a_remedy(self) -> None:
+        message = (
+            "scenario: an environment ignores parts of shielded-crazyflies: network (observations are the true states),"
+            " shield (it replaces actions); give set={'network': {}, 'shield.enabled': False}"
+        )
+        self.refuses(tl.Error, message, lambda: FormationEnv("shielded-crazyflies"))
+        FormationVectorEnv("shielded-crazyflies", 2, set={"network": {}, "shield.enabled": False})
+        message = (
+            "scenario: an environment ignores parts of leader-lossy: reference (it moves the slots), reference.leader"
+            " (the other vehicles follow the leader), deadlock (it spreads the slots), network (observations are the"
+            " true states); give a scenario without [reference], and give set={'deadlock.mode': 'off', 'network': {}}"
+        )
+        self.refuses(tl.Error, message, lambda: FormationEnv("leader-lossy"))
 
 
 class PettingZoo(Case):

@@ -164,17 +164,21 @@ fn the_page_of_an_audit_shows_the_smallest_distance_and_an_inset() {
         near.split("<svg xmlns").find(|figure| figure.contains("Smallest separation of all pairs")).expect("a figure");
     assert!(figure.contains("closest 1.500000 m at 50.000 s, limit 1.0 m"), "{figure}");
     // The smallest separation of all pairs: 8 m except around the pass.
-    let lines = figure.split("<polyline ").filter_map(|line| line.split('>').next());
-    let line = lines.filter(|line| line.contains("#0072B2")).max_by_key(|line| line.len());
-    let corners: Vec<(f64, f64)> = line
-        .and_then(|line| line.split('"').find(|text| text.contains(',')))
-        .expect("a line")
-        .split(' ')
-        .filter_map(|corner| corner.split_once(',').and_then(|(x, y)| Some((x.parse().ok()?, y.parse().ok()?))))
-        .collect();
+    let corners_of = |colour: &str| -> Vec<(f64, f64)> {
+        let lines = figure.split("<polyline ").filter_map(|line| line.split('>').next());
+        let line = lines.filter(|line| line.contains(colour)).max_by_key(|line| line.len());
+        let corners = line.and_then(|line| line.split('"').find(|text| text.contains(','))).expect("a line").split(' ');
+        let numbers = |(x, y): (&str, &str)| Some((x.parse().ok()?, y.parse().ok()?));
+        corners.filter_map(|corner| corner.split_once(',').and_then(numbers)).collect()
+    };
+    let corners = corners_of("#0072B2");
     let lowest = corners.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).expect("corners");
     let [first, last] = [corners[0], corners[corners.len() - 1]];
-    // Of an interval with a constant separation the line has only the beginning.
+    // Steps from the first instant to the last: each line is level or upright.
+    let limit = corners_of("#1B1F24");
+    assert!((first.0 - limit[0].0).abs() < 1.0 && (last.0 - limit[1].0).abs() < 1.0, "{corners:?} {limit:?}");
+    let is_step = |two: &[(f64, f64)]| two[0].0 == two[1].0 || two[0].1 == two[1].1;
+    assert!(corners.windows(2).all(is_step), "{corners:?}");
     assert!((lowest.0 - f64::midpoint(first.0, last.0)).abs() < 10.0 && first.1 == last.1, "{corners:?}");
     let insets = |page: &str| page.matches("<svg x=").count();
     assert_eq!((insets(&near), insets(&page(30.0))), (1, 0), "a visible approach has no inset");

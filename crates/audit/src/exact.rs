@@ -91,11 +91,6 @@ impl ExactMotion {
         self.integer(0.0).separation()
     }
 
-    /// Returns the first time of the smallest separation, rounded down to a double \[s\].
-    pub(super) fn closest_s(&self) -> f64 {
-        self.integer(0.0).closest_s(self.interval)
-    }
-
     /// Returns the motion in integers.
     #[cold]
     fn integer(&self, distance: f64) -> IntegerMotion {
@@ -354,34 +349,6 @@ impl IntegerMotion {
         let (squared, by_squared) = self.closest();
         rounded_root(&squared, &(by_squared * &self.weight * &self.weight), self.units.0)
     }
-
-    /// Returns the first time of the smallest separation by bisection of the doubles in the interval.
-    pub(super) fn closest_s(&self, interval: Interval) -> f64 {
-        let start_rate = product(&self.ends[0], &self.by);
-        if start_rate >= BigInt::ZERO {
-            return interval.from_s;
-        }
-        if product(&self.ends[1], &self.by) <= BigInt::ZERO {
-            return interval.to_s;
-        }
-        let by_squared = product(&self.by, &self.by);
-        // (t - from_s) |d|^2 <= -(r0 . d) (to_s - from_s)
-        let is_reached = |time_s: f64| {
-            let times = Units::of([interval.from_s, interval.to_s, time_s]);
-            let [from, to, at] = [interval.from_s, interval.to_s, time_s].map(|time_s| times.integer(time_s));
-            (at - &from) * &by_squared <= -&start_rate * (to - from)
-        };
-        let (mut low, mut high) = (interval.from_s, interval.to_s);
-        while low.next_up() < high {
-            let middle = midpoint(low, high);
-            if is_reached(middle) {
-                low = middle;
-            } else {
-                high = middle;
-            }
-        }
-        low
-    }
 }
 
 /// Compares the height at a time within a line with another height, exactly.
@@ -466,8 +433,6 @@ mod tests {
                 prop_assert_eq!(motion.is_below(distance), integer.is_below());
                 prop_assert_eq!(motion.starts_below(distance), integer.starts_below());
             }
-            let at_s = motion.closest_s();
-            prop_assert!(motion.interval.from_s <= at_s && at_s <= motion.interval.to_s);
         }
     }
 
@@ -482,7 +447,7 @@ mod tests {
             };
             let interval = Interval { from_s: 0.0, to_s: 1.0 };
             let motion = ExactMotion { first: line(0.0, 1.0), second: line(size, -1.0), interval };
-            assert_eq!((motion.separation(), motion.closest_s()), (size, 0.5));
+            assert_eq!(motion.separation(), size);
             assert!(!motion.is_below(size) && motion.is_below(size.next_up()));
         }
     }

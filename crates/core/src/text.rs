@@ -77,9 +77,41 @@ pub fn below_bound(number: f64, bound: f64) -> [String; 2] {
 }
 
 /// Formats a length \[m\], speed or acceleration with three decimals, or in powers of ten below 5e-3 and from 1e7 on.
+///
+/// A separation or a clearance is formatted by [`separation`], and a number that a limit bounds from above by
+/// [`up_to`].
 #[must_use]
 pub fn metres(number: f64) -> String {
-    if number == 0.0 || (5e-3..1e7).contains(&number.abs()) { fixed(number, 3) } else { format!("{number:.1e}") }
+    if is_fixed(number) { fixed(number, 3) } else { format!("{number:.1e}") }
+}
+
+/// Formats a separation, a distance or a clearance \[m\] as [`metres`] does, rounded down: the true one is not smaller.
+#[must_use]
+pub fn separation(distance_m: f64) -> String {
+    if is_fixed(distance_m) { at_least(distance_m, 3) } else { rounded_in_powers(distance_m, -1.0) }
+}
+
+/// Formats a speed, an acceleration, an error or a needed length as [`metres`] does, rounded up: the true one is not
+/// larger.
+#[must_use]
+pub fn up_to(number: f64) -> String {
+    if is_fixed(number) { at_most(number, 3) } else { rounded_in_powers(number, 1.0) }
+}
+
+/// Returns whether a number is written with three decimals.
+fn is_fixed(number: f64) -> bool {
+    number == 0.0 || (5e-3..1e7).contains(&number.abs())
+}
+
+/// Formats a number with two digits in powers of ten, rounded up (`sign` 1) or down (`sign` -1).
+fn rounded_in_powers(number: f64, sign: f64) -> String {
+    let shown = format!("{number:.1e}");
+    let rounded = shown.parse().unwrap_or(number);
+    if sign * (rounded - number) >= 0.0 || !number.is_finite() {
+        return shown;
+    }
+    let exponent = shown.split_once('e').and_then(|(_, exponent)| exponent.parse::<i32>().ok()).unwrap_or_default();
+    format!("{:.1e}", rounded + sign * 10_f64.powi(exponent - 1))
 }
 
 /// Replaces the control characters that reverse the direction of text by U+FFFD. Names in foreign files may contain
@@ -215,6 +247,34 @@ mod tests {
         }
         assert_eq!([beside_limit(1.5, 2.0, 6), beside_limit(2.5, 2.0, 6)], ["1.500000", "2.500000"]);
         assert_eq!(below_bound(2.055_2, 2.055_306_9), ["2.0552", "2.0553"]);
+    }
+
+    #[test]
+    fn separations_are_rounded_down_and_upper_bounds_up() {
+        for (number, down, up) in [
+            (2.504_72, "2.504", "2.505"),
+            (2.504, "2.504", "2.504"),
+            (-0.4995, "-0.500", "-0.499"),
+            (0.0, "0.000", "0.000"),
+            (1.26e-4, "1.2e-4", "1.3e-4"),
+            (1.24e-4, "1.2e-4", "1.3e-4"),
+            (1.2e-4, "1.2e-4", "1.2e-4"),
+            (9.96e-4, "9.9e-4", "1.0e-3"),
+            (1.239e8, "1.2e8", "1.3e8"),
+            (-1.26e-4, "-1.3e-4", "-1.2e-4"),
+            (f64::INFINITY, "inf", "inf"),
+        ] {
+            assert_eq!([separation(number), up_to(number)], [down, up], "{number}");
+        }
+        for k in 1_u32..2000 {
+            for scale in [1e-12, 1e-5, 1e-3, 0.1, 1e5, 1e12] {
+                let number = f64::from(k) * 1.000_37 * scale;
+                let [low, high]: [f64; 2] =
+                    [separation(number), up_to(number)].map(|shown| shown.parse().expect("a number"));
+                assert!(low <= number && number <= high, "{low} {number} {high}");
+                assert!(high - low <= 0.11 * number.max(1e-2), "{low} {number} {high}");
+            }
+        }
     }
 
     #[test]

@@ -43,6 +43,7 @@ use crate::contract::Side;
 use crate::plane::{Metric, Segment};
 use crate::start::Start;
 use crate::tube::{TrackerLoop, Tube, TubeError};
+use tautline_core::text::{at_least, at_most, exact};
 
 /// Largest coordinate of a start \[m\].
 pub(crate) const FARTHEST_M: f64 = 1e6;
@@ -421,18 +422,19 @@ impl Limits {
             if of.actuator_lag_s > 0.0 { format!("; actuators lag by {} s", of.actuator_lag_s) } else { String::new() };
         let tube = if of.tracking_error_m.is_some() { "assumed tube" } else { "tube" };
         let height = of.half_height_m.map_or_else(String::new, |half| {
-            format!(" on a level and {:.3} m in the vertical, outside the ellipsoid of these half axes", 2.0 * half)
+            let vertical = at_least(2.0 * half, 3);
+            format!(" on a level and {vertical} m in the vertical, outside the ellipsoid of these half axes")
         });
         format!(
-            "certified never closer than {:.3} m{height} under any law and any loss of messages. Assumed: commands up \
+            "certified never closer than {} m{height} under any law and any loss of messages. Assumed: commands up \
              to {} m/s^2 are carried out; position errors stay below {} m and velocity errors below {} m/s; pushes \
-             stay below {} m/s^2{delay}{lag} ({tube} {:.3} m)",
-            of.delta_m,
+             stay below {} m/s^2{delay}{lag} ({tube} {} m)",
+            exact(of.delta_m),
             of.accel_m_s2,
             of.position_error_m,
             of.velocity_error_m_s,
             of.disturbance_m_s2,
-            self.tube.error_m
+            at_most(self.tube.error_m, 3)
         )
     }
 

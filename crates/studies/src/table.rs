@@ -12,7 +12,7 @@ use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::Type;
 
 use crate::statistics::{Estimate, Proportion};
-use tautline_core::text::{aligned, as_toml, at_least, at_most, fixed, metres, significant};
+use tautline_core::text::{aligned, as_toml, at_least, at_most, fixed, separation, significant};
 use tautline_report::report::page::{self, Markup, Render as _, Tone, noted, tinted};
 
 /// Text for an unknown or inapplicable value.
@@ -56,9 +56,7 @@ pub enum Kind {
     Measured,
     /// An estimate: four significant digits, and its interval.
     Estimate,
-    /// A length with three decimals.
-    Metres,
-    /// A smallest length, rounded down.
+    /// A separation or another smallest number, rounded down.
     AtLeast,
     /// A probability in powers of ten.
     Rare,
@@ -147,8 +145,7 @@ impl Column {
 
     fn number(&self, number: f64) -> String {
         match self.kind {
-            Kind::Metres => metres(number),
-            Kind::AtLeast => at_least(number, 3),
+            Kind::AtLeast => separation(number),
             Kind::Measured | Kind::Estimate if number == 0.0 => "0".to_owned(),
             Kind::Measured | Kind::Estimate => significant(number, DIGITS),
             Kind::Rare => format!("{number:.2e}"),

@@ -1,13 +1,10 @@
-//! Second pass over a judged recording: positions at given times, distances of one pair over time, and the proof of the
-//! smallest separation.
+//! Second pass over a judged recording: positions at given times, and distances of one pair over time.
 
 use nalgebra::Vector3;
-use serde::Serialize;
 
 use super::outcome::{Gap, Outcome};
 use super::settings::{RecordedError, Settings};
 use super::vehicle::Vehicle;
-use super::window::within;
 use crate::enclosure::Target;
 use crate::obstacle::Shape;
 use crate::outcome::ObjectPair;
@@ -100,8 +97,8 @@ impl PositionLookup {
     }
 }
 
-/// Number of parts of a curve segment between which it is sampled.
-const PARTS_OF_A_CURVE: u32 = 8;
+/// Number of parts between which the common time of two segments is sampled.
+const PARTS: u32 = 8;
 /// Largest number of kept samples; beyond, neighbours are merged.
 const MAX_SAMPLES: usize = 4096;
 
@@ -122,8 +119,8 @@ pub struct PairSample {
 
 /// Distance of one pair over time, computed while a recording is read again.
 ///
-/// Samples lie at the ends of segments and at the closest approach between them. In a long recording only the closest
-/// of several neighbours is kept, so no approach is lost.
+/// Samples lie at the ends of segments, at the closest approach and between them: a line through few samples would lie
+/// above the distance. In a long recording only the closest of several neighbours is kept, so no approach is lost.
 #[derive(Clone, Debug)]
 pub struct PairSeries {
     vehicles: Vec<(usize, Vehicle)>,
@@ -248,8 +245,8 @@ impl PairSample {
     }
 }
 
-/// Samples the time that two segments share: its ends, the closest approach of straight segments, and points in between
-/// on curves. Adds at least one sample.
+/// Samples the time that two segments share: its ends, points in between, and the closest approach of straight
+/// segments. Adds at least one sample.
 fn samples(overlap: &Overlap<'_>, target: Target<'_>, found: &mut Vec<PairSample>) {
     let Overlap { first, second, interval: Interval { from_s, to_s } } = *overlap;
     let at = |time_s: f64| {
@@ -258,7 +255,8 @@ fn samples(overlap: &Overlap<'_>, target: Target<'_>, found: &mut Vec<PairSample
         let distance_m = target.distance(positions_m[1] - positions_m[0]);
         PairSample { time_s, distance_m, deviation_m, positions_m, unseen_before: false }
     };
-    let mut times_s = vec![from_s, to_s];
+    let place = |k: u32| from_s + (to_s - from_s) * f64::from(k) / f64::from(PARTS);
+    let mut times_s: Vec<f64> = [from_s, to_s].into_iter().chain((1..PARTS).map(place)).collect();
     if first.curve().is_none() && second.curve().is_none() {
         let motion = overlap.straight();
         let closest = match target {
@@ -267,120 +265,10 @@ fn samples(overlap: &Overlap<'_>, target: Target<'_>, found: &mut Vec<PairSample
             Target::Shape(shape) => shape.closest(motion.from, motion.to).1,
         };
         times_s.push(from_s + (to_s - from_s) * closest);
-    } else {
-        let place = |k: u32| from_s + (to_s - from_s) * f64::from(k) / f64::from(PARTS_OF_A_CURVE);
-        times_s.extend((1..PARTS_OF_A_CURVE).map(place));
     }
     times_s.sort_unstable_by(f64::total_cmp);
     times_s.dedup();
     found.extend(times_s.into_iter().map(at));
-}
-
-/// Number of segments per window of the vehicle with the most segments.
-const SEGMENTS: usize = 8;
-
-/// Proof of the smallest separation of straight lines between samples, with boxes that show that no other pair comes
-/// closer.
-///
-/// `python/tautline/check_proof.py` shares no code with this crate and checks a proof by exact arithmetic.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Proof {
-    /// Largest double that is at most the smallest separation \[m\].
-    pub separation_m: f64,
-    /// Names of the two vehicles with the smallest separation.
-    pub pair: [String; 2],
-    /// Largest double that is at most the first time of the smallest separation \[s\].
-    pub time_s: f64,
-    /// Windows that cover the recording, in order of time.
-    #[serde(skip)]
-    pub windows: Vec<ProofWindow>,
-}
-
-/// Bounding boxes of vehicles in a window of time.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ProofWindow {
-    /// Start \[s\].
-    pub from_s: f64,
-    /// End \[s\].
-    pub to_s: f64,
-    /// For each present vehicle: index, least x, y, z, greatest x, y, z \[m\] over all segments that meet the window.
-    pub boxes: Vec<(usize, f64, f64, f64, f64, f64, f64)>,
-}
-
-/// Builds a proof while a recording is read again.
-#[derive(Clone, Debug)]
-pub struct ProofBuilder {
-    vehicles: Vec<Vehicle>,
-}
-
-impl ProofBuilder {
-    /// Creates a builder for a recording that was audited with these settings and this outcome.
-    #[must_use]
-    pub fn new(settings: &Settings, outcome: &Outcome) -> Self {
-        Self { vehicles: vehicles(settings, outcome) }
-    }
-
-    /// Adds the next items of the recording.
-    ///
-    /// # Errors
-    /// [`RecordedError`] if an item is invalid.
-    pub fn push(&mut self, items: &[Item]) -> Result<(), RecordedError> {
-        for item in items {
-            if let Some(vehicle) = self.vehicles.get_mut(item.vehicle()) {
-                vehicle.take(item)?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Returns the proof. `None` if no pair was judged, a limit comes from radii, or the motion between samples is not
-    /// straight.
-    #[must_use]
-    pub fn finish(self, outcome: &Outcome) -> Option<Proof> {
-        let closest = outcome.closest.first()?;
-        let (pair, separation_m) = (closest.pair.vehicles()?, closest.lower_m);
-        let [first, second] = [pair.first(), pair.second()].map(|of| self.vehicles.get(of));
-        let (first, second) = first.zip(second)?;
-        let is_sampled = |segment: &Segment| segment.parent.is_none();
-        let is_plain = |vehicle: &Vehicle| vehicle.radius_m.is_none() && vehicle.segments.iter().all(is_sampled);
-        if !self.vehicles.iter().all(is_plain) {
-            return None;
-        }
-        let mut time_s = None;
-        overlaps(&first.segments, &second.segments, |overlap| {
-            let motion = overlap.straight();
-            if time_s.is_none() && motion.closest().separation_m() - motion.resolution_m() <= separation_m {
-                let exact = overlap.exact();
-                time_s = exact.is_below(separation_m.next_up()).then(|| exact.closest_s());
-            }
-        });
-        let windows = self.windows();
-        Some(Proof { separation_m, pair: [first.name.clone(), second.name.clone()], time_s: time_s?, windows })
-    }
-
-    fn windows(&self) -> Vec<ProofWindow> {
-        let Some(densest) = self.vehicles.iter().max_by_key(|vehicle| vehicle.segments.len()) else {
-            return Vec::new();
-        };
-        let ends = |end: fn(&Vehicle) -> Option<f64>| self.vehicles.iter().filter_map(end);
-        let begin_s = ends(|vehicle| Some(vehicle.segments.first()?.from_s)).fold(f64::INFINITY, f64::min);
-        let end_s = ends(|vehicle| Some(vehicle.segments.last()?.to_s)).fold(f64::NEG_INFINITY, f64::max);
-        let inner = densest.segments.iter().skip(SEGMENTS).step_by(SEGMENTS).map(|segment| segment.to_s);
-        let mut times_s = vec![begin_s];
-        times_s.extend(inner.filter(|time_s| begin_s < *time_s && *time_s < end_s));
-        times_s.push(end_s);
-        times_s.windows(2).map(|two| self.window(Interval { from_s: two[0], to_s: two[1] })).collect()
-    }
-
-    fn window(&self, window: Interval) -> ProofWindow {
-        let boxes = self.vehicles.iter().enumerate().filter_map(|(index, vehicle)| {
-            let parts = &vehicle.segments[within(&vehicle.segments, window)];
-            let low = parts.iter().map(|part| part.from.inf(&part.to)).reduce(|a, b| a.inf(&b))?;
-            let high = parts.iter().map(|part| part.from.sup(&part.to)).reduce(|a, b| a.sup(&b))?;
-            Some((index, low.x, low.y, low.z, high.x, high.y, high.z))
-        });
-        ProofWindow { from_s: window.from_s, to_s: window.to_s, boxes: boxes.collect() }
-    }
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize, Serializer};
 use super::topic::Topic;
 use tautline_core::record::{Channel, Event, OwnedSample, Peaks, ReadFault, Sample};
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm};
-use tautline_core::text::{at_least, metres};
+use tautline_core::text::{at_least, up_to};
 
 /// Topic that every run recording has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -298,7 +298,7 @@ impl From<&Event> for EventMessage<&'static str> {
                 "hulls-hit",
                 pair.numbers(),
                 *closing_m_s,
-                format!("the hulls of vehicles {pair} hit at {} m/s", metres(*closing_m_s)),
+                format!("the hulls of vehicles {pair} hit at {} m/s", up_to(*closing_m_s)),
             ),
             Event::StepRefined { dt_s, .. } => {
                 ("step-refined", NO_PAIR, *dt_s, format!("a step was flown in steps down to {dt_s} s"))

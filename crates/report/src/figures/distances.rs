@@ -160,7 +160,8 @@ fn of_many_pairs(spans: &Spans<'_>, chart: &mut Chart) -> String {
         let (pair, separation_m) = nearest_present(span.positions_m, spans.log.metric())?;
         Some(ClosestApproach { pair, separation_m, time_s: span.time_s })
     };
-    let closest: Vec<_> = if swept.is_empty() && ranked_pairs.len() == all {
+    let is_swept = !swept.is_empty();
+    let closest: Vec<_> = if !is_swept && ranked_pairs.len() == all {
         instants.iter().filter_map(|span| Some((span.time_s, nearest(span)?))).collect()
     } else {
         swept
@@ -170,7 +171,8 @@ fn of_many_pairs(spans: &Spans<'_>, chart: &mut Chart) -> String {
         let apart = spans.iter().map(|span| (span.time_s, apart_m(span))).collect();
         chart.line(apart, Stroke::solid(PALETTE[k + 1], 1.0), pair_label(pair));
     }
-    let smallest = closest.iter().map(|&(time_s, closest)| (time_s, closest.separation_m)).collect();
+    let at_ends = || closest.iter().map(|&(time_s, closest)| (time_s, closest.separation_m)).collect();
+    let smallest = if is_swept { steps(&closest) } else { at_ends() };
     chart.line(smallest, Stroke::dashed(SOFT_INK, 1.4), "smallest");
     match (ranked_pairs.len(), ranks.len()) {
         (ranked, instants) if ranked < all => {
@@ -178,6 +180,16 @@ fn of_many_pairs(spans: &Spans<'_>, chart: &mut Chart) -> String {
         }
         _ => String::new(),
     }
+}
+
+/// Returns the corners of steps: a line through the closest approaches of spans that end at these times would lie above
+/// the distance in between.
+fn steps(closest: &[(f64, ClosestApproach)]) -> Vec<(f64, f64)> {
+    let starts = closest.iter().take(1).chain(closest).map(|&(start_s, _)| start_s);
+    let corners = starts
+        .zip(closest)
+        .flat_map(|(start_s, &(end_s, closest))| [(start_s, closest.separation_m), (end_s, closest.separation_m)]);
+    corners.collect()
 }
 
 /// Returns the pairs whose distances are ranked, and the number of all pairs.

@@ -56,7 +56,7 @@ pub use laws::{OfLaw, by_law};
 pub use over_time::{channels, control, disagreement, energy, shape_error};
 pub use paper::Format;
 pub use paths::{at_closest, paths};
-pub use recorded::{Encounter, PlanLine, closest_approach, encounters, plan_distances, smallest};
+pub use recorded::{Encounter, LowerBound, PlanLine, closest_approach, encounters, plan_distances, smallest};
 pub use space::paths_in_space;
 pub use studies::{Histogram, Separation, Share, attack, histograms, margin, separations, shares, verdicts};
 pub use validation::{Step, convergence, tension_curve};

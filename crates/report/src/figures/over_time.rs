@@ -7,6 +7,7 @@ use super::distances::quantile;
 use super::spans::{Span, Spans};
 use super::svg::{INK, PALETTE, Stroke};
 use crate::flight_log::{FEW_VEHICLES, FlightLog, ROTORS, SERIES};
+use tautline_core::text::up_to;
 use tautline_laws::formation::{evaluated_edges, largest_edge_error_m};
 use tautline_laws::graph::Graph;
 use tautline_laws::target::{Leg, LegHistory};
@@ -50,10 +51,10 @@ pub fn control(log: &FlightLog, title: &str) -> Figure {
     let mut chart = Chart::new(spans.time_axis(), y);
     of_each(&mut chart, &spans, |span| &span.extremes.control_m_s2);
     if let Some([peak, time_s]) = peak.filter(|[peak, _]| *peak > sampled().fold(0.0, f64::max)) {
-        chart.marks.push(Mark::ring((time_s, peak), INK, Some(format!("peak of all steps {peak:.3} m/s²"))));
+        chart.marks.push(Mark::ring((time_s, peak), INK, Some(format!("peak of all steps {} m/s²", up_to(peak)))));
     }
     let peak = peak.map_or(0.0, |[peak, _]| peak);
-    let description = format!("Control effort of {count} vehicles over time; at most {peak:.3} m/s².");
+    let description = format!("Control effort of {count} vehicles over time; at most {} m/s².", up_to(peak));
     chart.figure("control", title, &description)
 }
 
@@ -81,7 +82,7 @@ fn channel(spans: &Spans<'_>, k: usize, most_thrust_n: Option<f64>) -> Figure {
     let mut chart = Chart::new(spans.time_axis(), y);
     of_each(&mut chart, spans, |span| &span.extremes.series[k]);
     let gap = if unit == "°" { "" } else { " " };
-    let mut description = format!("The {what} of {count} vehicles over time; at most {peak:.3}{gap}{unit}.");
+    let mut description = format!("The {what} of {count} vehicles over time; at most {}{gap}{unit}.", up_to(peak));
     if let Some(most) = most {
         chart.level(most, Stroke::dashed(INK, 1.3), format!("maximum of a rotor {most} N"));
         description = format!("{description} A rotor gives at most {most} N.");

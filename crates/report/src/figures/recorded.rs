@@ -4,6 +4,7 @@ use super::Figure;
 use super::axis::{Axis, Scale, extent};
 use super::chart::{Band, Chart, Inset, Mark};
 use super::svg::{INK, PALETTE, Stroke};
+use tautline_core::text::up_to;
 
 /// Width of the inset of a closest approach, relative to the distance in the plane.
 const NEAR: f64 = 4.0;
@@ -79,23 +80,50 @@ pub fn encounters(encounters: &[Encounter], name: &str, title: &str) -> Figure {
     chart.figure(name, title, &description)
 }
 
-/// Draws the smallest separation of all pairs over time \[s\], with the limit and the closest approach of the closest
-/// pair. The line breaks where no distance is known.
+/// Lower bound of a distance in an interval of time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LowerBound {
+    /// Start and end of the interval \[s\]; equal for an instant.
+    pub interval_s: [f64; 2],
+    /// No pair is closer in the interval.
+    pub distance: f64,
+}
+
+/// Draws the smallest separation of all pairs in each interval of time \[s\] as steps, with the limit and the closest
+/// approach of the closest pair. Steps never lie above the separation, as a line through the closest approaches does.
+/// They break where no distance is known.
 #[must_use]
-pub fn smallest(distances: &[Option<(f64, f64)>], closest: &Encounter, title: &str) -> Figure {
+pub fn smallest(bounds: &[LowerBound], closest: &Encounter, title: &str) -> Figure {
     let Encounter { limit_m: limit, unit, .. } = *closest;
-    let points: Vec<_> = distances.iter().map(|known| known.unwrap_or((f64::NAN, f64::NAN))).collect();
+    let points = steps(bounds);
     let times_s = points.iter().map(|point| point.0).chain(closest.distances.iter().map(|point| point.0));
     let (from_s, to_s) = extent(times_s).unwrap_or((0.0, 0.0));
     let numbers: Vec<_> = points.iter().map(|point| point.1).chain([limit]).collect();
     let mut chart = Chart::new(Axis::time(from_s, to_s), Axis::distances(unit, &numbers, limit));
-    let least = points.iter().copied().filter(|point| point.1.is_finite()).min_by(|a, b| a.1.total_cmp(&b.1));
-    chart.line(points, Stroke::solid(PALETTE[0], 1.5), "smallest separation of all pairs");
+    let least = bounds.iter().map(|bound| bound.distance).min_by(f64::total_cmp);
+    chart.line(points, Stroke::solid(PALETTE[0], 1.5), "smallest in each interval");
     chart.level(limit, Stroke::solid(INK, 2.0), format!("limit {limit:?} {unit}"));
     let words = closest.closest();
-    chart.marks.extend(least.map(|at| Mark::ring(at, INK, Some(format!("closest {words}")))));
-    let description = format!("Smallest separation of all pairs over time; closest {words}, limit {limit:?} {unit}.");
+    let ring = |least| Mark::ring((closest.closest_s, least), INK, Some(format!("closest {words}")));
+    chart.marks.extend(least.map(ring));
+    let description = format!(
+        "Smallest separation of all pairs in each interval of time, in steps; closest {words}, limit {limit:?} {unit}."
+    );
     chart.figure("smallest", title, &description)
+}
+
+/// Returns the corners of steps, with a break before each interval that does not touch the previous one.
+fn steps(bounds: &[LowerBound]) -> Vec<(f64, f64)> {
+    let mut points = Vec::with_capacity(2 * bounds.len());
+    let mut end_s = f64::NEG_INFINITY;
+    for &LowerBound { interval_s: [from_s, to_s], distance } in bounds {
+        if from_s > end_s && !points.is_empty() {
+            points.push((f64::NAN, f64::NAN));
+        }
+        points.extend([(from_s, distance), (to_s, distance)]);
+        end_s = to_s;
+    }
+    points
 }
 
 /// Draws the paths of two vehicles from above \[m\] and their positions at the closest approach. An inset enlarges that
@@ -155,7 +183,7 @@ pub fn plan_distances(lines: &[PlanLine<'_>], tube_m: Option<f64>, title: &str) 
     let most = all().map(|point| point.1 + point.2).filter(|m| m.is_finite()).fold(0.0, f64::max);
     let (count, drawn) = (lines.len(), lines.len().min(DRAWN));
     let description =
-        format!("{title} over time, of {drawn} of {count} vehicles with the largest; at most {most:.3} m.");
+        format!("{title} over time, of {drawn} of {count} vehicles with the largest; at most {} m.", up_to(most));
     chart.figure("plan", title, &description)
 }
 
@@ -184,6 +212,19 @@ mod tests {
         assert!(doubtful.svg.matches("<polygon").count() > sure.svg.matches("<polygon").count());
         let seen = closest_approach(&encounter(0.0), "Closest approach");
         assert!(seen.svg.contains("alpha") && seen.svg.contains("closest 1.000000 m at 1.000 s"));
+    }
+
+    #[test]
+    fn steps_cover_each_interval_and_break_between_intervals_that_do_not_touch() {
+        let bound = |from_s: f64, to_s: f64, distance: f64| LowerBound { interval_s: [from_s, to_s], distance };
+        let bounds = [bound(0.0, 1.0, 5.0), bound(1.0, 2.0, 3.0), bound(4.0, 5.0, 6.0), bound(7.0, 7.0, 2.0)];
+        let found = steps(&bounds);
+        let (known, breaks): (Vec<_>, Vec<_>) = found.iter().copied().partition(|(time_s, _)| time_s.is_finite());
+        assert_eq!(breaks.len(), 2);
+        let expected = [(0.0, 5.0), (1.0, 5.0), (1.0, 3.0), (2.0, 3.0), (4.0, 6.0), (5.0, 6.0), (7.0, 2.0), (7.0, 2.0)];
+        assert_eq!(known, expected);
+        let drawn = smallest(&bounds, &encounter(0.0), "Smallest separation").svg;
+        assert!(drawn.contains("smallest in each interval") && drawn.contains("closest 1.000000 m at 1.000 s"));
     }
 
     #[test]

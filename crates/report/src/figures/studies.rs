@@ -4,7 +4,7 @@ use super::Figure;
 use super::axis::Axis;
 use super::chart::{Chart, Line, Mark};
 use super::svg::{ALARM, INK, PALETTE, SOFT_INK, Stroke};
-use tautline_core::text::{exact, metres, significant};
+use tautline_core::text::{exact, separation, significant};
 
 /// Draws the smallest separation found so far \[m\] over the `flights` of a search, with delta and the separation of
 /// the flight of the unchanged scenario. `found` holds each flight, numbered from 1, that was worse than all before.
@@ -27,7 +27,7 @@ pub fn attack(found: &[(u64, f64)], flights: u64, delta_m: f64, own_m: Option<f6
     }
     let worst = found.last();
     chart.marks.extend(worst.map(|&(flight, min_m)| Mark::ring((flight as f64, min_m), PALETTE[0], None)));
-    let found = worst.map(|(flight, min_m)| format!("{} m in flight {flight}", metres(*min_m)));
+    let found = worst.map(|(flight, min_m)| format!("{} m in flight {flight}", separation(*min_m)));
     let found = found.unwrap_or_else(|| "no flight".to_owned());
     let description = format!("The smallest separation found over the flights of the search: {found}.");
     chart.figure("attack", "Smallest separation found", &description)

@@ -9,7 +9,7 @@ use super::section::Section;
 use crate::figures::Figure;
 use crate::replay::{NoReplay, Replay};
 use tautline_core::swarm::Bounce;
-use tautline_core::text::{beside_limit, metres, seconds, significant};
+use tautline_core::text::{beside_limit, seconds, significant, up_to};
 use tautline_laws::formation::Freedom;
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::{PlantSpec, Scenario};
@@ -92,7 +92,7 @@ impl Report {
         let caption = "intervals in which a pair was below delta";
         let violations = Section::table("Violations", caption, columns, self.audit.violations.iter().map(violation));
         let hit = |bounce: &Bounce| {
-            [bounce.pair.to_string(), seconds(bounce.time_s), format!("{} m/s", metres(bounce.closing_m_s))]
+            [bounce.pair.to_string(), seconds(bounce.time_s), format!("{} m/s", up_to(bounce.closing_m_s))]
         };
         let caption = "after the first collision the motion is not governed by the law";
         let hits = self.hulls.bounces.iter().flatten().map(hit);

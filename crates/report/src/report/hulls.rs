@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::flight::FlightResult;
 use tautline_audit::AuditOutcome;
 use tautline_core::swarm::{Bounce, Pair};
-use tautline_core::text::{beside_limit, exact, metres, seconds};
+use tautline_core::text::{beside_limit, exact, seconds, up_to};
 
 /// Collisions of solid hulls, or the pair of points whose hulls would have collided.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -67,7 +67,7 @@ impl Hulls {
     fn hits(&self) -> Option<String> {
         let bounces = self.bounces.as_deref().unwrap_or_default();
         let &Bounce { pair, time_s, closing_m_s } = bounces.first()?;
-        let first = format!("{} at {} with {} m/s", vehicles(pair), seconds(time_s), metres(closing_m_s));
+        let first = format!("{} at {} with {} m/s", vehicles(pair), seconds(time_s), up_to(closing_m_s));
         Some(match bounces.len() {
             1 => format!("hulls hit once: {first}"),
             times => format!("hulls hit {times} times: first {first}"),

@@ -6,7 +6,7 @@ use super::flight::{FlightResult, finite};
 use super::section::Section;
 use super::verdict::INTEGRATION;
 use tautline_audit::{Approach, ClearanceOutcome, ObjectPair, Status, Violation};
-use tautline_core::text::{at_least, beside_limit, counted, exact, metres, seconds};
+use tautline_core::text::{at_least, beside_limit, counted, exact, seconds, separation, up_to};
 use tautline_sim::sim::Ending;
 
 /// Findings of the audit on obstacles.
@@ -119,7 +119,7 @@ impl Obstacles {
     /// The approach that breaks the certificate, in a few words.
     pub(super) fn broken_certificate(&self) -> Option<String> {
         let (certified_m, tightest) = self.certified_and_tightest()?;
-        Some(format!("{}, certified {} m beyond it", tightest.brief(), metres(certified_m)))
+        Some(format!("{}, certified {} m beyond it", tightest.brief(), separation(certified_m)))
     }
 
     /// Returns the reasons against a pass as sentences.
@@ -136,7 +136,7 @@ impl Obstacles {
             format!(
                 "The law certifies {} m beyond every clearance in continuous time, and {}: the flown motion is not \
                  the one that the proof covers. Shorten time.dt_s.",
-                metres(certified_m),
+                separation(certified_m),
                 tightest.brief()
             )
         });
@@ -210,7 +210,7 @@ impl ObstacleApproach {
         let Self { vehicle, obstacle, clearance_m, min_m, min_at_s } = self;
         let (clearance, at) = (exact(*clearance_m), seconds(*min_at_s));
         if *min_m < 0.0 {
-            let deep = metres(-min_m);
+            let deep = up_to(-min_m);
             let clearance = format!("clearance {clearance} m");
             return format!("vehicle {vehicle} was {deep} m inside obstacle {obstacle} at {at} ({clearance})");
         }
@@ -219,7 +219,7 @@ impl ObstacleApproach {
     }
 }
 
-/// Formats a distance beside its clearance; rounded down if it is positive.
+/// Formats a distance beside its clearance, rounded down.
 fn shown(distance_m: f64, clearance_m: f64) -> String {
-    if distance_m < 0.0 { metres(distance_m) } else { beside_limit(distance_m, clearance_m, 6) }
+    if distance_m < 0.0 { separation(distance_m) } else { beside_limit(distance_m, clearance_m, 6) }
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use tautline_core::text::{counted, metres, seconds};
+use tautline_core::text::{counted, seconds, up_to};
 use tautline_sim::shield::ShieldReport;
 
 /// Numbers of the shield, of all vehicles together.
@@ -93,11 +93,11 @@ impl ShieldNumbers {
             "changed {} of commands by up to {} m/s^2, braked in {} (longest {}); used {} of the tube of {} m; {} \
              accepted, {} refused",
             percent(self.changed_share),
-            metres(self.largest_change_m_s2),
+            up_to(self.largest_change_m_s2),
             percent(self.brake_share),
             seconds(self.longest_brake_s),
             self.tube_share.map_or_else(|| "an unknown part".into(), percent),
-            metres(self.tube_m),
+            up_to(self.tube_m),
             counted(self.proposals_accepted, "plane", "planes"),
             self.proposals_refused,
         )

@@ -4,6 +4,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use super::{Failure, ScenarioRequest, Silent, outputs};
+use tautline_core::text::at_most;
 use tautline_sim::shield::Identification;
 use tautline_sim::vehicle::{self, MODELS, Model, Tracking};
 
@@ -74,9 +75,12 @@ fn without_table(text: &str) -> String {
 fn tracking_table(tracking: &Tracking, measured: &Identification) -> String {
     let keys = toml::to_string(tracking).unwrap_or_default();
     format!(
-        "\n# Measured by `tautline check --identify`, not proved: at most {:.4} m in {} flights, times {}.\n# Worst: \
+        "\n# Measured by `tautline check --identify`, not proved: at most {} m in {} flights, times {}.\n# Worst: \
          {}.\n[tracking]\n{keys}",
-        measured.largest_error_m, measured.flights, measured.factor, measured.sequence
+        at_most(measured.largest_error_m, 4),
+        measured.flights,
+        measured.factor,
+        measured.sequence
     )
 }
 

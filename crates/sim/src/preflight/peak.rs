@@ -2,7 +2,7 @@
 
 use crate::scenario::Scenario;
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
-use tautline_core::text::metres;
+use tautline_core::text::up_to;
 use tautline_laws::law::Law;
 use tautline_laws::observation::Observation;
 use tautline_laws::space::CellList;
@@ -63,7 +63,7 @@ pub(super) fn extreme_acceleration(peak_m_s2: f64) -> Option<String> {
             "At the start of a leg the law commands {} m/s^2, {peak_g:.1} times gravity. Few vehicles reach more than \
              {CREDIBLE_G} times gravity. Reduce the law's gains or the distance between start and slots, or set \
              actuation.max_accel_m_s2.",
-            metres(peak_m_s2)
+            up_to(peak_m_s2)
         )
     })
 }

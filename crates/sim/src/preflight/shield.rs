@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use crate::scenario::Scenario;
-use tautline_core::text::{metres, significant};
+use tautline_core::text::{separation, significant, up_to};
 use tautline_shield::fleet::PairRoom;
 
 /// Shield of a scenario, in SI units.
@@ -64,7 +64,7 @@ impl ShieldCheck {
             "{}; reference acceleration up to {} m/s^2; starts of vehicles {i} and {j} have {} m of room",
             self.certificate,
             significant(self.reference_m_s2, 4),
-            metres(self.start_room_m)
+            separation(self.start_room_m)
         )
     }
 
@@ -75,8 +75,8 @@ impl ShieldCheck {
             format!(
                 "The shield keeps vehicles {} m apart, and the slots of vehicles {i} and {j} are {} m closer: they \
                  are never reached. Enlarge the formation, or lower the errors that the shield assumes.",
-                metres(self.required_m),
-                metres(-self.slot_room_m)
+                up_to(self.required_m),
+                up_to(-self.slot_room_m)
             )
         })
     }
@@ -88,8 +88,8 @@ impl ShieldCheck {
             format!(
                 "The slots of vehicles {i} and {j} leave {} m beyond what the shield requires, less than its ease of \
                  {} m: vehicles may wait near them. Enlarge the formation, or reduce shield.ease_m.",
-                metres(self.slot_room_m),
-                metres(self.ease_m)
+                separation(self.slot_room_m),
+                up_to(self.ease_m)
             )
         })
     }

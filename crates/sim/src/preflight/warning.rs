@@ -5,7 +5,7 @@ use serde::Serialize;
 use super::{Connectivity, LegCertificate, Preflight, margins};
 use crate::vehicle::Quadrotor;
 use tautline_core::text;
-use tautline_core::text::{at_least, beside_limit, counted, exact, metres, seconds, table};
+use tautline_core::text::{at_least, beside_limit, counted, exact, seconds, table, up_to};
 
 /// Warning about a scenario.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -219,7 +219,7 @@ impl Preflight {
             }
             None => "not certified".to_owned(),
         };
-        format!("{certified}, {start_clearance_margin_m:.6} m at the start")
+        format!("{certified}, {} m at the start", at_least(start_clearance_margin_m, 6))
     }
 
     fn no_margins(&self) -> &'static str {
@@ -278,7 +278,7 @@ impl Preflight {
 
     fn peak_line(&self) -> Option<String> {
         let of_leg = if self.legs.is_empty() { "" } else { " of a leg" };
-        self.start_peak_m_s2.map(|peak_m_s2| format!("{} m/s^2 at the start{of_leg}", metres(peak_m_s2)))
+        self.start_peak_m_s2.map(|peak_m_s2| format!("{} m/s^2 at the start{of_leg}", up_to(peak_m_s2)))
     }
 
     fn rigidity_line(&self) -> String {
@@ -353,5 +353,5 @@ fn flat(dimension: usize) -> &'static str {
 }
 
 fn margin(margin_m: Option<f64>) -> String {
-    margin_m.map_or("-".to_owned(), |margin_m| format!("{margin_m:.6}"))
+    margin_m.map_or("-".to_owned(), |margin_m| at_least(margin_m, 6))
 }

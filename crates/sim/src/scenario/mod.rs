@@ -9,6 +9,7 @@ mod build;
 pub mod builtin;
 mod check;
 mod document;
+mod environment;
 mod error;
 mod external;
 mod files;
@@ -33,6 +34,7 @@ pub use crate::link::{
     ActuationSpec, Failure, FailureKind, LinkFailure, NearStates, NetworkSpec, SensingSpec, StalePolicy,
 };
 pub use crate::shield::ShieldSpec;
+pub use environment::IgnoredPart;
 pub use error::{Field, Place, ScenarioError, edit_distance};
 pub use external::ExternalLaw;
 pub use limits::{

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
-use super::document::{Document, StartShape, StartTable};
+use super::document::{Assignment, Document, StartShape, StartTable};
 use super::error::ScenarioError;
 use super::error::suggest;
 use super::external::ExternalLaw;
@@ -29,6 +29,8 @@ pub struct Template {
     overrides: Vec<Override>,
     own: Scenario,
     start_is_random: bool,
+    /// Assignment of vehicles to the slots of the first leg.
+    assignment: Assignment,
     laws: Vec<(String, LawSpec)>,
 }
 
@@ -85,9 +87,10 @@ impl Template {
         let named = document.laws.iter().map(|(name, other)| (name.clone(), other.kind.clone().complete(a22_per_s)));
         let laws = named.collect();
         let start_is_random = is_random(&document);
+        let assignment = document.formation.placement.assignment;
         let own = finish(document, &text)?;
         let folder = source.folder().to_owned();
-        Ok(Self { own, start_is_random, laws, overrides: overrides.to_vec(), folder, name, toml })
+        Ok(Self { own, start_is_random, assignment, laws, overrides: overrides.to_vec(), folder, name, toml })
     }
 
     /// Returns the template with an external law, which all its scenarios fly.
@@ -107,6 +110,11 @@ impl Template {
     #[must_use]
     pub fn start_is_random(&self) -> bool {
         self.start_is_random
+    }
+
+    /// Returns the assignment of vehicles to the slots of the first leg.
+    pub(super) fn assignment(&self) -> Assignment {
+        self.assignment
     }
 
     /// Returns whether the flight depends on the seed of noise.

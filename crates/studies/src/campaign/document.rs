@@ -141,11 +141,11 @@ impl Summary {
         let rows: Vec<(String, Quantiles)> = self.laws.iter().flat_map(numbers).collect();
         Table::of("Quantiles over the flights, with 95 % intervals of order statistics", &rows)
             .column("", "Number", Kind::Text, |(name, _)| name.clone())
-            .column("", "Least", Kind::Metres, |(_, of)| of.min)
-            .column("", "5 %", Kind::Metres, |(_, of)| of.p05)
-            .column("", "Median", Kind::Metres, |(_, of)| of.median)
-            .column("", "95 %", Kind::Metres, |(_, of)| of.p95)
-            .column("", "Most", Kind::Metres, |(_, of)| of.max)
+            .column("", "Least", Kind::AtLeast, |(_, of)| of.min)
+            .column("", "5 %", Kind::AtLeast, |(_, of)| of.p05)
+            .column("", "Median", Kind::AtLeast, |(_, of)| of.median)
+            .column("", "95 %", Kind::AtLeast, |(_, of)| of.p95)
+            .column("", "Most", Kind::AtLeast, |(_, of)| of.max)
             .build()
     }
 

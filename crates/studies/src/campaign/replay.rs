@@ -9,7 +9,7 @@ use super::{Campaign, Folder, Law, Row, Summary, ViolatedRun, Worst};
 use crate::flight::Outcome;
 use crate::splitting::{self, StateHashAtStep};
 use crate::study::{Block, Section};
-use tautline_core::text::{beside_limit, metres};
+use tautline_core::text::{beside_limit, separation, up_to};
 use tautline_recordings::mcap::{Header, McapRecorder};
 use tautline_report::replay::{NoReplay, PAGE_BYTES, Replay};
 use tautline_report::report::page::{self, Picture, Start};
@@ -276,7 +276,7 @@ fn repeat_violated_flight(folder: &Folder, law: &Law, bad: &ViolatedRun) -> Resu
         "Violated flight {number} of run {run} under {}: {} m below delta in step {}. To repeat it, in the folder of \
          this page:",
         law.name,
-        metres(-bad.clearance_m),
+        up_to(-bad.clearance_m),
         bad.violated_at_step
     );
     Ok(WorstFlight {
@@ -335,7 +335,7 @@ fn shown(flight: FlightId<'_>, campaign: &Campaign, worst: &Worst, left: &RunFil
         flight.law.name,
         if by_obstacle { "a vehicle came nearer to an obstacle than its clearance; " } else { "" },
         beside_limit(worst.min_m, worst.min_m - worst.clearance_m, 3),
-        metres(worst.clearance_m.abs()),
+        if worst.clearance_m < 0.0 { up_to(-worst.clearance_m) } else { separation(worst.clearance_m) },
         if worst.clearance_m < 0.0 { "below" } else { "above" }
     );
     let closest = left.pictures.iter().find(|(name, _)| name == "closest");

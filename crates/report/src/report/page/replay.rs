@@ -8,7 +8,7 @@ use maud::{Markup, PreEscaped, html};
 use sha2::{Digest as _, Sha256};
 
 use crate::replay::{Chart, NoReplay, Replay};
-use tautline_core::text::{counted, metres};
+use tautline_core::text::{counted, metres, up_to};
 
 /// Style sheet of replays.
 pub(super) const STYLE: &str = include_str!("replay.css");
@@ -133,7 +133,7 @@ fn note(replay: &Replay) -> String {
         format!(
             "Positions are rounded by at most {} m and {motion}. Distances, times and verdicts are those of the \
              audit. ",
-            metres(replay.rounding_m)
+            up_to(replay.rounding_m)
         ),
         some(replay.vehicles, "vehicles"),
         some(replay.moments, "findings"),
@@ -152,7 +152,7 @@ fn note(replay: &Replay) -> String {
             )
         }),
         if replay.obstacles_off_m > 0.0 {
-            format!("Moving obstacles are drawn at most {} m off their paths. ", metres(replay.obstacles_off_m))
+            format!("Moving obstacles are drawn at most {} m off their paths. ", up_to(replay.obstacles_off_m))
         } else {
             String::new()
         },

@@ -140,7 +140,7 @@ impl RecordedReport {
         if let Some(VehicleFinding { vehicle, finding }) = &self.contradiction {
             return format!(
                 "{vehicle} needs {} m/s^2 at {}, more than the assumed {:?} m/s^2",
-                fixed(finding.needs_m_s2, 3),
+                at_most(finding.needs_m_s2, 3),
                 seconds(finding.time_s),
                 finding.assumed_m_s2
             );

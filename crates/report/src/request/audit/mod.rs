@@ -196,7 +196,7 @@ impl ConfiguredAudit<'_> {
         }
         if let Some((file, (path, _))) = request.proof.as_ref().zip(request.subject.only_file()) {
             let recording = &report.source.recording;
-            let refused = proof::write(file, path, recording, (&settings, &outcome), &report.source.clock, open)?;
+            let refused = proof::write(file, path, recording, (&settings, &outcome), &report.source.clock)?;
             if let Some(why) = refused {
                 monitor.warn(&format!("note: {why}"));
             }

@@ -1,4 +1,6 @@
 //! `tautline audit --proof`: a verdict that `check_proof.py` confirms without this program.
+//!
+//! The file holds the verdict and the facts that the table does not contain. The checker derives everything else.
 
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
@@ -10,20 +12,45 @@ use serde::Serialize;
 use sha2::{Digest as _, Sha256};
 
 use super::super::Failure;
-use super::{AuditRequest, Open};
+use super::AuditRequest;
 use crate::report::recorded::Clock;
 use crate::report::write_atomically;
 use tautline_audit::Status;
-use tautline_audit::recorded::{Interpolation, Outcome, Proof, ProofBuilder, ProofWindow, Settings};
-use tautline_recordings::read;
-use tautline_recordings::read::{ColumnNames, ReadOptions};
+use tautline_audit::recorded::{Interpolation, Outcome, Settings};
+use tautline_recordings::read::{ColumnNames, ReadOptions, TimeUnit};
 
-/// Names of the time column that the checker accepts.
-const TIMES: [&str; 4] = ["t_s", "t", "time", "time_s"];
-/// Names of the other columns that it reads.
+/// Names of the time column that the checker accepts, and the unit that a name gives.
+const TIMES: [(&str, Option<TimeUnit>); 4] =
+    [("t_s", Some(TimeUnit::Seconds)), ("time_s", Some(TimeUnit::Seconds)), ("t", None), ("time", None)];
+/// Names of the other columns that it needs.
 const COLUMNS: [&str; 4] = ["id", "x", "y", "z"];
-/// Names of columns that straight motion between samples does not need.
-const VELOCITIES: [&str; 3] = ["vx", "vy", "vz"];
+/// Names of columns that do not change the reading; those of the exports of a run, besides velocities.
+const UNUSED: [&str; 18] = [
+    "vx",
+    "vy",
+    "vz",
+    "qw",
+    "qx",
+    "qy",
+    "qz",
+    "thrust_1_n",
+    "thrust_2_n",
+    "thrust_3_n",
+    "thrust_4_n",
+    "heading_rad",
+    "speed_m_s",
+    "wind_x_m_s",
+    "wind_y_m_s",
+    "wind_z_m_s",
+    "oldest_s",
+    "mean_s",
+];
+
+/// Version of the file. A new motion, limit or format of data is a new name within this version.
+const VERSION: u32 = 2;
+
+/// Way to a recording with a proof.
+const EXPORT: &str = "write it as a table with `tautline export RECORDING -o FILE.csv`, and audit that";
 
 /// Content of the file.
 #[derive(Serialize)]
@@ -32,29 +59,45 @@ struct ProofFile<'a> {
     version: u32,
     data: Data<'a>,
     claim: Claim<'a>,
-    windows: &'a [ProofWindow],
+    assumed: Assumed<'a>,
 }
 
 /// The recording of the claim.
 #[derive(Serialize)]
 struct Data<'a> {
+    format: &'static str,
     recording: &'a str,
     sha256: String,
 }
 
-/// The claim.
+/// The verdict, which the checker computes and compares.
 #[derive(Serialize)]
 struct Claim<'a> {
     status: Status,
     motion: &'static str,
-    limit_m: f64,
-    #[serde(flatten)]
-    proof: &'a Proof,
-    vehicles: &'a [String],
-    /// Largest gap that is joined \[s\]; null if every gap is joined.
-    max_gaps_s: &'a [f64],
+    limit: Limit,
+    /// Largest double that is at most the smallest separation \[m\].
+    separation_m: f64,
+    /// Names of the two vehicles with the smallest separation.
+    pair: [&'a str; 2],
+}
+
+/// Limit of the separation.
+#[derive(Serialize)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+enum Limit {
+    /// Smallest allowed distance of two vehicles \[m\].
+    Distance { distance_m: f64 },
+}
+
+/// Facts that the table does not contain.
+#[derive(Serialize)]
+struct Assumed<'a> {
+    time_unit: &'a str,
+    /// Largest gap that is joined, by vehicle \[s\]; null if every gap is joined.
+    max_gaps_s: BTreeMap<&'a str, f64>,
+    /// Shifts of clocks, by vehicle \[s\].
     offsets_s: BTreeMap<&'a str, f64>,
-    clock: &'a Clock,
 }
 
 /// Rejects requests without a proof, before the work begins.
@@ -81,15 +124,17 @@ pub(super) fn check(request: &AuditRequest<'_>, settings: &Settings) -> Result<(
     if let Some((_, what)) = is_other.iter().find(|(is_asked, _)| *is_asked) {
         return no_proof(what, "ask for --delta alone, with --offset and --max-gap as needed");
     }
-    let is_plain =
-        request.subject.only_file().is_some_and(|(path, options)| is_table(path) && is_read_plainly(options));
-    if !is_plain {
-        let called = request.subject.name();
-        let help = "write it as a table with `tautline export RECORDING -o FILE.csv`, and audit that";
-        return no_proof(
-            &format!("{called}: it is not one CSV file with the columns t_s, id, x, y and z in metres"),
-            help,
-        );
+    let Some((path, options)) = request.subject.only_file() else {
+        return no_proof("a recording that is not one file", EXPORT);
+    };
+    let Some(time) = time_of_table(path).filter(|_| is_read_plainly(options)) else {
+        let what = "a file that is not a table with the columns t_s (t, time, time_s), id, x, y and z in metres, and \
+                    at most those of an export besides";
+        return no_proof(what, EXPORT);
+    };
+    let contradicts = |unit: &TimeUnit| options.time_unit.is_some_and(|given| given != *unit);
+    if time.filter(contradicts).is_some() {
+        return no_proof("times in another unit than the name of their column", "rename the column to t");
     }
     Ok(())
 }
@@ -101,48 +146,40 @@ fn is_read_plainly(options: &ReadOptions) -> bool {
     options.columns == ColumnNames::default() && !is_moved && !is_chosen
 }
 
-/// Returns whether the file is a table that the checker reads.
-fn is_table(path: &Path) -> bool {
-    let Ok(file) = File::open(path) else { return false };
-    let mut lines = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(file);
-    let Ok(header) = lines.headers() else { return false };
+/// Returns the unit that the time column of a table gives; `None` if the checker does not read the table.
+#[expect(clippy::option_option, reason = "a table may have no unit")]
+fn time_of_table(path: &Path) -> Option<Option<TimeUnit>> {
+    let mut lines = csv::ReaderBuilder::new().comment(Some(b'#')).from_reader(File::open(path).ok()?);
+    let header = lines.headers().ok()?;
     let names: Vec<&str> = header.iter().map(|name| name.trim().trim_start_matches('\u{feff}')).collect();
-    let count = |wanted: &[&str]| names.iter().filter(|name| wanted.contains(name)).count();
-    let is_known = |name: &str| TIMES.contains(&name) || COLUMNS.contains(&name) || VELOCITIES.contains(&name);
-    let are_others_unread = names.iter().all(|name| is_known(name) || !read::is_read(name));
-    let is_plain = count(&TIMES) == 1 && COLUMNS.iter().all(|column| count(&[column]) == 1) && are_others_unread;
+    let mut times = TIMES.iter().filter(|(time, _)| names.contains(time));
+    let (time, unit) = times.next().filter(|_| times.next().is_none())?;
+    let is_known = |name: &&str| name == time || COLUMNS.contains(name) || UNUSED.contains(name);
+    let is_once = |wanted: &&str| names.iter().filter(|name| *name == wanted).count() == 1;
+    let is_plain = names.iter().all(is_known) && names.iter().all(is_once) && COLUMNS.iter().all(is_once);
     // A row of units below the header has no digit in the time column.
-    let time = names.iter().position(|name| TIMES.contains(name));
+    let place = names.iter().position(|name| name == time)?;
     let first = lines.records().next().and_then(Result::ok);
-    let has_units = time
-        .zip(first)
-        .is_some_and(|(time, row)| row.get(time).is_some_and(|cell| !cell.bytes().any(|byte| byte.is_ascii_digit())));
-    is_plain && !has_units
+    let has_units =
+        first.is_some_and(|row| row.get(place).is_some_and(|cell| !cell.bytes().any(|byte| byte.is_ascii_digit())));
+    (is_plain && !has_units).then_some(*unit)
 }
 
-/// Reads the recording again and writes the proof. Returns a note if there is no proof.
+/// Writes the proof. Returns a note if there is no proof.
 pub(super) fn write(
     file: &Path,
     path: &Path,
     recording: &str,
     (settings, outcome): (&Settings, &Outcome),
     clock: &Clock,
-    open: &Open<'_>,
 ) -> Result<Option<String>, Failure> {
     let none = |why: &str| Ok(Some(format!("no proof is written: {why}")));
     if outcome.status == Status::Undecided {
         return none("the verdict is undecided");
     }
-    let mut builder = ProofBuilder::new(settings, outcome);
-    let mut tracks = open()?;
-    let (mut items, mut more) = (Vec::new(), true);
-    while more {
-        items.clear();
-        more = tracks.read(&mut items)?;
-        builder.push(&items)?;
-    }
-    let Some(proof) = builder.finish(outcome) else {
-        return none("the recording gives radii, or it does not hold samples");
+    let closest = outcome.closest.first().and_then(|closest| Some((closest, closest.pair.vehicles()?)));
+    let (Some((closest, pair)), Some(distance_m)) = (closest, settings.delta_m) else {
+        return none("no two vehicles are present at one time");
     };
     let bytes = fs::read(path).map_err(|error| {
         Failure::machine("recording/cannot-read", format!("cannot read {}: {error}", path.display()))
@@ -151,22 +188,24 @@ pub(super) fn write(
         let _ = write!(text, "{byte:02x}");
         text
     });
-    let offsets_s = settings.vehicles.iter().map(|(name, of)| (name.as_str(), of.offset_s)).collect();
+    let names = outcome.vehicles.iter().map(String::as_str);
+    let offsets_s = settings.vehicles.iter().filter(|(_, own)| own.offset_s != 0.0);
     let content = ProofFile {
         format: "tautline proof",
-        version: 1,
-        data: Data { recording, sha256 },
+        version: VERSION,
+        data: Data { format: "csv", recording, sha256 },
         claim: Claim {
             status: outcome.status,
             motion: "linear",
-            limit_m: settings.delta_m.unwrap_or(f64::NAN),
-            proof: &proof,
-            vehicles: &outcome.vehicles,
-            max_gaps_s: &outcome.max_gaps_s,
-            offsets_s,
-            clock,
+            limit: Limit::Distance { distance_m },
+            separation_m: closest.lower_m,
+            pair: [pair.first(), pair.second()].map(|vehicle| outcome.vehicles[vehicle].as_str()),
         },
-        windows: &proof.windows,
+        assumed: Assumed {
+            time_unit: &clock.unit,
+            max_gaps_s: names.zip(outcome.max_gaps_s.iter().copied()).collect(),
+            offsets_s: offsets_s.map(|(name, own)| (name.as_str(), own.offset_s)).collect(),
+        },
     };
     let text = serde_json::to_string(&content)
         .map_err(|error| Failure::machine("files/cannot-write", format!("cannot write a proof: {error}")))?;

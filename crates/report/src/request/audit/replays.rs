@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::super::{Failure, Monitor};
 use super::Open;
 use crate::figures;
-use crate::figures::{Encounter, Figure};
+use crate::figures::{Encounter, Figure, LowerBound};
 use crate::flight_log::FlightLog;
 use crate::replay::{Kind, MOST_INSTANTS, NoReplay, PAGE_BYTES, Replay, Span, Stage, chosen};
 use crate::report::recorded::{RecordedReport, interval, unit};
@@ -141,7 +141,7 @@ fn encounter_figures(
     if let Some(nearest) = pairs.first() {
         drawn.push(figures::encounters(&pairs, "encounters", "Distances of the closest pairs"));
         drawn.push(figures::closest_approach(nearest, "Closest approach from above"));
-        drawn.push(figures::smallest(&over_time(&outcome.smallest), nearest, "Smallest separation of all pairs"));
+        drawn.push(figures::smallest(&lower_bounds(&outcome.smallest), nearest, "Smallest separation of all pairs"));
     }
     if !obstacles.is_empty() {
         drawn.push(figures::encounters(&obstacles, "obstacles", "Distances from the closest obstacles"));
@@ -149,14 +149,9 @@ fn encounter_figures(
     Ok(drawn)
 }
 
-/// Returns times and smallest distances, with `None` for intervals in which they are unknown.
-fn over_time(slices: &[Slice]) -> Vec<Option<(f64, f64)>> {
-    let ends = std::iter::once(None).chain(slices.iter().map(|slice| Some(slice.known_s()[1])));
-    let points = slices.iter().zip(ends).flat_map(|(slice, end_s)| {
-        let gap = end_s.is_some_and(|end_s| end_s < slice.known_s()[0]).then_some(None);
-        gap.into_iter().chain([Some((slice.closest.time_s, slice.closest.certain_m()))])
-    });
-    points.collect()
+/// Returns the lower bounds of the separation in the intervals in which it is known.
+fn lower_bounds(slices: &[Slice]) -> Vec<LowerBound> {
+    slices.iter().map(|slice| LowerBound { interval_s: slice.known_s(), distance: slice.closest.lower_m }).collect()
 }
 
 /// Returns the data of a figure of a close pair.
