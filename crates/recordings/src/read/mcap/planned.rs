@@ -63,6 +63,7 @@ pub(super) fn open(
     let unused = [
         (options.frame.is_some(), "--frame", "curves of planners name no frame"),
         (options.origin.is_some(), "--origin", "curves of planners have no place on the Earth"),
+        (options.clock.is_some(), "--clock", "curves of planners have their own times of start"),
         (options.sort, "--sort", "curves of planners are sorted by their starts"),
         (options.duplicates.is_some(), "--duplicates", "curves of planners are no rows"),
     ];
