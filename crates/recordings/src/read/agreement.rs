@@ -1,7 +1,7 @@
 //! Comparison of two positions of each vehicle in one table: in metres, and as latitude and longitude.
 //!
-//! Both describe one motion if a rotation and a shift, common to all vehicles and times, bring one onto the other.
-//! Positions from each vehicle's own start have no common shift.
+//! Both describe one motion if a turn about the vertical and a shift, common to all vehicles and times, bring one onto
+//! the other. Positions from each vehicle's own start have no common shift.
 
 use nalgebra::{Matrix3, Vector3};
 
@@ -60,11 +60,22 @@ impl Sums {
         (self.metric_squared + self.earth_squared - means).max(0.0)
     }
 
-    /// Returns the root mean square deviation after the best rotation and shift of this vehicle alone \[m\].
+    /// Returns the root mean square deviation after the best turn and shift of this vehicle alone \[m\].
     fn noise_m(&self) -> f64 {
-        let aligned = 2.0 * self.covariance().singular_values().sum();
+        let aligned = alignment(&self.covariance()).map_or(0.0, |(_, aligned)| 2.0 * aligned);
         ((self.squares() - aligned).max(0.0) / self.count).sqrt()
     }
+}
+
+/// Returns the turn about the vertical, perhaps mirrored, that aligns the metric position best with the place on the
+/// Earth, and the products that it aligns.
+fn alignment(covariance: &Matrix3<f64>) -> Option<(Matrix3<f64>, f64)> {
+    let across = covariance.fixed_view::<2, 2>(0, 0).into_owned().svd(true, true);
+    let up = covariance[(2, 2)];
+    let mut turn = Matrix3::identity();
+    turn.fixed_view_mut::<2, 2>(0, 0).copy_from(&(across.u? * across.v_t?));
+    turn[(2, 2)] = 1.0_f64.copysign(up);
+    Some((turn, across.singular_values.sum() + up.abs()))
 }
 
 /// Comparison over all rows.
@@ -109,7 +120,7 @@ impl FrameAgreement {
         ((far[0] - far[1]).abs() > largest_m).then_some(far)
     }
 
-    /// Returns the vehicle with the largest deviation after the best common rotation and shift, and the deviation \[m\],
+    /// Returns the vehicle with the largest deviation after the best common turn and shift, and the deviation \[m\],
     /// if it contradicts a common frame.
     fn contradiction(&self) -> Option<(usize, f64)> {
         let seen = || self.vehicles.iter().enumerate().filter(|(_, sums)| sums.count > 0.0);
@@ -118,15 +129,14 @@ impl FrameAgreement {
         if seen().count() < 2 {
             return None;
         }
-        let svd = all.covariance().svd(true, true);
-        let rotation = svd.u? * svd.v_t?;
+        let (turn, _) = alignment(&all.covariance())?;
         let noise = seen().map(|(_, sums)| sums.count * sums.noise_m().powi(2)).sum::<f64>() / all.count;
         let extent_m = (all.squares() / all.count).sqrt();
         let evidence_m = (2.0 * noise.sqrt()).clamp(SMALLEST_EVIDENCE_M, LARGEST_ERROR_M) + PROJECTION * extent_m;
         let deviation_m = |sums: &Sums| {
             let shift = (sums.earth / sums.count - all.earth / all.count)
-                - rotation * (sums.metric / sums.count - all.metric / all.count);
-            let turned = 2.0 * (rotation.transpose() * sums.covariance()).trace();
+                - turn * (sums.metric / sums.count - all.metric / all.count);
+            let turned = 2.0 * (turn.transpose() * sums.covariance()).trace();
             (shift.norm_squared() + (sums.squares() - turned).max(0.0) / sums.count).sqrt()
         };
         let worst = seen().map(|(vehicle, sums)| (vehicle, deviation_m(sums))).max_by(|a, b| a.1.total_cmp(&b.1));
@@ -139,7 +149,7 @@ impl FrameAgreement {
         let name = quoted(names.get(vehicle).map_or("", String::as_str));
         let (metric, earth) = columns.names(header);
         let problem = format!(
-            "{metric} and {earth} give different distances between vehicles: no common origin and rotation brings \
+            "{metric} and {earth} give different distances between vehicles: no common origin and direction brings \
              them closer than {deviation_m:.3} m at vehicle {name}"
         );
         Some(columns.fault(problem, header))

@@ -11,7 +11,7 @@ use super::heading::Words;
 /// Names of columns that occur in data of aircraft only, without separators.
 const COLUMNS: Words = Words(
     "icao24 icao hex hexident callsign squawk groundspeed gs tas ias mach track verticalrate vertrate barorate \
-     geomrate altbaro altgeom baroaltitude geoaltitude",
+     geomrate altbaro altgeom",
 );
 
 /// Names of columns with the rate of the height, without separators.

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use tautline_core::fact::{Fact, FactKind, Source};
-use tautline_core::track::{Item, Metadata, Tracks};
+use tautline_core::track::{Item, Metadata, Sample, Tracks};
 
 use super::error::{Fault, ReadError, quoted};
 use super::options::ReadOptions;
@@ -103,12 +103,12 @@ fn fault(names: &[String], first: usize, second: usize) -> Fault {
     let problem = format!(
         "the vehicles {first} and {second} have equal positions at all common times, as one vehicle under two names has"
     );
-    let remedy = "leave one of them out (for messages, choose topics with --topic); give relative curves their starts \
-                  with --start; or confirm two vehicles with --distinct";
+    let remedy = "leave one of them out (for messages, choose topics with --topic), or confirm two vehicles with \
+                  --distinct";
     Fault::coded("recording/vehicle-twice", problem, remedy)
 }
 
-/// Position of a vehicle at a time, or its curve from this time on, as bits.
+/// Position of a vehicle at a time, as bits.
 type Bits = [u64; 3];
 
 /// Search for two vehicles with equal positions at all common times.
@@ -122,7 +122,7 @@ struct Twins {
     candidates: u32,
     /// Items of the current time.
     now_s: f64,
-    instant: Vec<(usize, Bits, bool)>,
+    instant: Vec<(usize, Bits)>,
     has_new: bool,
 }
 
@@ -145,7 +145,8 @@ struct Seen {
 impl Twins {
     #[inline]
     fn observe(&mut self, item: &Item) {
-        let (vehicle, time_s) = (item.vehicle(), item.time_s());
+        // Curves are plans: two equal ones are a violation.
+        let Item::Sample(Sample { vehicle, time_s, position_m, .. }) = *item else { return };
         if time_s.to_bits() != self.now_s.to_bits() {
             self.close();
             self.now_s = time_s;
@@ -155,15 +156,7 @@ impl Twins {
         }
         self.has_new |= !self.vehicles[vehicle].is_seen;
         // Adding 0 converts -0 to +0.
-        let (bits, is_moving_curve) = match item {
-            Item::Sample(sample) => ([0, 1, 2].map(|axis| (sample.position_m[axis] + 0.0).to_bits()), false),
-            Item::Piece(piece) => {
-                let numbers = piece.coefficients.iter().flat_map(|of| of.iter().map(|x| (x + 0.0).to_bits()));
-                let is_moving_curve = piece.coefficients.iter().skip(1).any(|of| of.iter().any(|x| *x != 0.0));
-                (hashed(numbers.chain([piece.to_s.to_bits()])), is_moving_curve)
-            }
-        };
-        self.instant.push((vehicle, bits, is_moving_curve));
+        self.instant.push((vehicle, [0, 1, 2].map(|axis| (position_m[axis] + 0.0).to_bits())));
     }
 
     /// Compares the positions of the current time.
@@ -177,12 +170,12 @@ impl Twins {
 
     fn compare(&mut self) {
         let instant = std::mem::take(&mut self.instant);
-        for &(vehicle, bits, _) in &instant {
+        for &(vehicle, bits) in &instant {
             self.vehicles[vehicle].now = Some(bits);
         }
         // Vehicles that differ from their partner form new groups.
         let mut regrouped: HashMap<(usize, Bits), usize> = HashMap::new();
-        for &(vehicle, bits, is_moving_curve) in &instant {
+        for &(vehicle, bits) in &instant {
             let Some(partner) = self.vehicles[vehicle].partner else { continue };
             match self.vehicles[partner].now {
                 None => self.vehicles[vehicle].was_alone = true,
@@ -190,9 +183,6 @@ impl Twins {
                     let seen = &mut self.vehicles[vehicle];
                     let is_move = seen.times > 0 && seen.last != bits;
                     (seen.times, seen.moves) = (seen.times + 1, seen.moves + u32::from(is_move));
-                    if is_moving_curve {
-                        (seen.times, seen.moves) = (seen.times + ENOUGH_TIMES, seen.moves + ENOUGH_MOVES);
-                    }
                     seen.last = bits;
                 }
                 Some(_) => {
@@ -211,7 +201,7 @@ impl Twins {
         if self.has_new {
             self.pair_new(&instant);
         }
-        for &(vehicle, ..) in &instant {
+        for &(vehicle, _) in &instant {
             let seen = &mut self.vehicles[vehicle];
             (seen.now, seen.is_seen) = (None, true);
         }
@@ -219,14 +209,14 @@ impl Twins {
     }
 
     /// Pairs vehicles that are seen for the first time with a vehicle at the same place.
-    fn pair_new(&mut self, instant: &[(usize, Bits, bool)]) {
+    fn pair_new(&mut self, instant: &[(usize, Bits)]) {
         let mut groups: HashMap<Bits, usize> = HashMap::new();
         // Earlier vehicles come first: a vehicle with samples before cannot be paired with another one of these.
-        let known = instant.iter().filter(|(vehicle, ..)| self.vehicles[*vehicle].is_seen);
-        for &(vehicle, bits, _) in known {
+        let known = instant.iter().filter(|(vehicle, _)| self.vehicles[*vehicle].is_seen);
+        for &(vehicle, bits) in known {
             groups.entry(bits).or_insert(vehicle);
         }
-        for &(vehicle, bits, is_moving_curve) in instant {
+        for &(vehicle, bits) in instant {
             if self.vehicles[vehicle].is_seen {
                 continue;
             }
@@ -235,8 +225,7 @@ impl Twins {
             if first == vehicle {
                 continue;
             }
-            let (times, moves) = if is_moving_curve { (ENOUGH_TIMES, ENOUGH_MOVES) } else { (1, 0) };
-            (seen.partner, seen.times, seen.moves, seen.last) = (Some(first), times, moves, bits);
+            (seen.partner, seen.times, seen.moves, seen.last) = (Some(first), 1, 0, bits);
             self.candidates += 1;
         }
     }
@@ -248,16 +237,4 @@ impl Twins {
         let mut pairs = self.vehicles.iter().enumerate().filter(|(_, seen)| is_evident(seen));
         pairs.find_map(|(vehicle, seen)| Some([seen.partner?, vehicle]))
     }
-}
-
-/// Returns three numbers that differ for different lists.
-fn hashed(numbers: impl Iterator<Item = u64>) -> Bits {
-    const FACTORS: [u64; 3] = [0x9e37_79b9_7f4a_7c15, 0xc2b2_ae3d_27d4_eb4f, 0x1656_67b1_9e37_79f9];
-    let mut bits = FACTORS;
-    for number in numbers {
-        for (hash, factor) in bits.iter_mut().zip(FACTORS) {
-            *hash = (*hash ^ number).wrapping_mul(factor).rotate_left(29);
-        }
-    }
-    bits
 }

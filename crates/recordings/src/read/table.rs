@@ -8,6 +8,7 @@ use tautline_core::fact::{Fact, FactKind, Source};
 
 use super::agreement::FrameAgreement;
 use super::aviation::ClimbMonitor;
+use super::axes::Axes;
 use super::clock::{Date, Probe, Stamp, TimeUnit};
 use super::earth::{LocalFrame, convert_to_local, is_no_fix, no_fixes, origin};
 use super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
@@ -45,8 +46,8 @@ struct Table<C> {
     climb: Option<ClimbMonitor>,
     /// Whether the user gives the unit of heights.
     is_height_unit_given: bool,
-    /// Comparison with a second position on the Earth, and the metres per unit of the first one.
-    agreement: Option<(FrameAgreement, f64)>,
+    /// Comparison with a second position on the Earth, and the axes of the first one in metres.
+    agreement: Option<(FrameAgreement, Axes)>,
     /// Whether a row that lacks a coordinate has no position, and the number of such rows.
     skips_incomplete: bool,
     incomplete: u64,
@@ -101,7 +102,8 @@ pub(super) fn open<C: Cells + 'static>(
     let alternative_ids = layout.alternative_ids.iter().copied().map(AlternativeId::new).collect();
     let watches = layout.slots.watched.iter().cloned().map(SwapMonitor::new).collect();
     let climb = layout.rate.map(ClimbMonitor::new);
-    let agreement = (!layout.second.is_empty()).then(|| (FrameAgreement::default(), options.metres()));
+    let agreement =
+        (!layout.second.is_empty()).then(|| (FrameAgreement::default(), options.turn().scaled([options.metres(); 3])));
     let table = Table {
         climb,
         is_height_unit_given: options.scale.is_some(),
@@ -266,7 +268,7 @@ impl<C: Cells> Table<C> {
         {
             climb.observe(row.vehicle, row.stamp, row.position.z, rate);
         }
-        let Some((agreement, scale)) = &mut self.agreement else { return Ok(()) };
+        let Some((agreement, axes)) = &mut self.agreement else { return Ok(()) };
         let Some(second) = self.layout.second.get(place) else { return Ok(()) };
         let mut there = Vector3::zeros();
         for axis in 0..3 {
@@ -276,7 +278,7 @@ impl<C: Cells> Table<C> {
                 None => return Ok(()),
             }
         }
-        let mut metric = row.position * *scale;
+        let mut metric = axes.turn(row.position);
         if second.columns[2].is_none() {
             metric.z = 0.0;
         }

@@ -269,7 +269,7 @@ fn state_vectors_are_in_metres() {
     let mut text =
         "time,icao24,lat,lon,velocity,heading,vertrate,callsign,onground,squawk,baroaltitude,hour\n".to_owned();
     for k in 0..40 {
-        let _ = writeln!(text, "{},3c6444,47,8.{k},200,90,5,DLH1,false,1000,{},1", 1_600_000_000 + k, 3000 + 5 * k);
+        let _ = writeln!(text, "{},3c6444,47,8.{k:04},200,90,5,DLH1,false,1000,{},1", 1_600_000_000 + k, 3000 + 5 * k);
     }
     let facts = facts("states.csv", text.as_bytes(), &usual());
     has(&facts, ["height-unit", "convention", "m"]);
@@ -431,25 +431,6 @@ fn vehicles_with_equal_positions_throughout_are_one() {
     }));
     let error = refused(&three, &usual(), "recording/vehicle-twice");
     assert!(error.to_string().contains("`b` and `c`"), "{error}");
-}
-
-#[test]
-fn equal_curves_are_one_vehicle() {
-    let folder = tempfile::tempdir().expect("a folder");
-    let curve = |x: f64| {
-        let header = "duration,x^0,x^1,x^2,x^3,x^4,x^5,x^6,x^7,y^0,y^1,y^2,y^3,y^4,y^5,y^6,y^7,";
-        let header =
-            header.to_owned() + "z^0,z^1,z^2,z^3,z^4,z^5,z^6,z^7,yaw^0,yaw^1,yaw^2,yaw^3,yaw^4,yaw^5,yaw^6,yaw^7";
-        format!("{header}\n2,{x},1{}\n", ",0".repeat(30))
-    };
-    for (name, x) in [("a.csv", 0.0), ("b.csv", 5.0), ("c.csv", 0.0)] {
-        fs::write(folder.path().join(name), curve(x)).expect("written");
-    }
-    let error = Whole::read(folder.path(), &usual()).expect_err("equal curves");
-    assert_eq!(error.code(), "recording/vehicle-twice", "{error}");
-    assert!(Whole::read(folder.path(), &ReadOptions { distinct: true, ..usual() }).is_ok());
-    fs::write(folder.path().join("c.csv"), curve(1.0)).expect("written");
-    assert_eq!(Whole::read(folder.path(), &usual()).expect("three").vehicles.len(), 3);
 }
 
 #[test]
