@@ -182,7 +182,7 @@ impl Compared {
         self.fault(problem, header)
     }
 
-    /// Returns the fault of two positions of which one must be chosen.
+    /// Returns the fault of two positions that need a choice.
     pub(super) fn fault(&self, problem: String, header: &[String]) -> Fault {
         let chosen = |columns: &[Option<usize>; 3], roles: [&str; 3]| {
             let given = columns.iter().zip(roles).filter_map(|(column, role)| Some((role, (*column)?)));

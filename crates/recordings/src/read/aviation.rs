@@ -1,7 +1,7 @@
 //! Heights of aircraft: their unit, and their agreement with a recorded vertical rate.
 //!
-//! Data of aircraft mix units: the library `traffic` and ADS-B receivers write heights in feet, vertical rates in feet
-//! per minute and speeds in knots; the state vectors of `OpenSky` are in metres. Their columns have no unit.
+//! Data of aircraft mix units. The library `traffic` and ADS-B receivers write heights in feet, vertical rates in feet
+//! per minute and speeds in knots. The state vectors of `OpenSky` are in metres. Their columns have no unit.
 
 use super::clock::Stamp;
 use super::error::{Fault, quoted};

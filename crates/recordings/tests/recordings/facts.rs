@@ -424,7 +424,7 @@ fn vehicles_with_equal_positions_throughout_are_one() {
         std::iter::once(row(k, "a", moving(k))).chain(second)
     }));
     refused(&later, &usual(), "recording/vehicle-twice");
-    // Three names of which two separate later.
+    // Two of three names separate later.
     let three = table(&mut (0..20).flat_map(|k| {
         let side = if k > 10 { 3.0 } else { 0.0 };
         [row(k, "a", moving(k)), row(k, "b", moving(k) + side), row(k, "c", moving(k) + side)]
@@ -435,8 +435,11 @@ fn vehicles_with_equal_positions_throughout_are_one() {
 
 #[test]
 fn arrays_of_objects_are_rows() {
-    let array = "\u{feff} [ {\"t\": 0, \"id\": \"a}\\\"\", \"x\": 1, \"y\": 2, \"z\": 3},\n{\"t\":0,\"id\":\"b\",\"x\":5,\"y\":2,\"z\":3}\n,\
-                 {\"t\": 1, \"id\": \"a}\\\"\", \"x\": 2, \"y\": 2, \"z\": 3} ]\n";
+    let array = concat!(
+        "\u{feff} [ {\"t\": 0, \"id\": \"a}\\\"\", \"x\": 1, \"y\": 2, \"z\": 3},\n",
+        "{\"t\":0,\"id\":\"b\",\"x\":5,\"y\":2,\"z\":3}\n,",
+        "{\"t\": 1, \"id\": \"a}\\\"\", \"x\": 2, \"y\": 2, \"z\": 3} ]\n",
+    );
     let found = whole("flight.json", array.as_bytes());
     assert_eq!(found.samples()[2], (1.0, "a}\"", [2.0, 2.0, 3.0]));
     for (text, code, place) in [

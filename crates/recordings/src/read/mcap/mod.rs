@@ -11,7 +11,8 @@
 //! | `foxglove.PoseInFrame`, `geometry_msgs/msg/PoseStamped`, `PoseWithCovarianceStamped`, `PointStamped`, `nav_msgs/msg/Odometry`, `sensor_msgs/msg/NavSatFix` | the same | the topic |
 //!
 //! Times are those in the messages, or the log times if no message has one. All sources must have one clock. All
-//! positions must be in one frame, or be transformed to it. A file that was not closed is refused, unless the user accepts its complete part.
+//! positions must be in one frame, or be transformed to it. A file that was not closed is refused, unless the user
+//! accepts its complete part.
 
 pub(super) mod bag;
 mod clocks;
