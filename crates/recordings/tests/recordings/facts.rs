@@ -433,6 +433,70 @@ fn vehicles_with_equal_positions_throughout_are_one() {
     assert!(error.to_string().contains("`b` and `c`"), "{error}");
 }
 
+/// Positions of a vehicle by instant; `None` where it is not seen.
+type Positions = Vec<Option<u32>>;
+
+/// Returns whether two vehicles have equal positions at all common times, the first of which is the first time of one.
+fn are_twins(a: &Positions, b: &Positions) -> bool {
+    let both: Vec<_> = (0..a.len()).filter_map(|k| Some((k, a[k]?, b[k]?))).collect();
+    let moves = both.windows(2).filter(|two| two[0].1 != two[1].1).count();
+    let first = |of: &Positions| of.iter().position(Option::is_some);
+    let begins = both.first().is_some_and(|(k, ..)| first(a) == Some(*k) || first(b) == Some(*k));
+    begins && both.len() > 2 && moves > 1 && both.iter().all(|(_, a, b)| a == b)
+}
+
+#[test]
+fn twins_of_random_tables_are_those_of_a_comparison_of_all_pairs() {
+    let mut state = 1_u64;
+    let mut random = move |below: u32| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        u32::try_from(state >> 33).expect("31 bits") % below
+    };
+    let (mut refused, mut read_whole) = (0, 0);
+    for case in 0..600 {
+        let is_whole = case % 2 == 0;
+        let (count, instants) = (2 + random(4), 3 + random(8));
+        let mut vehicles: Vec<Positions> = Vec::new();
+        for vehicle in 0..count {
+            // Half of the vehicles copy an earlier one, and change it at some times.
+            let copied = (vehicle > 0 && random(2) == 0).then(|| vehicles[random(vehicle) as usize].clone());
+            let mut of: Positions = (0..instants).map(|_| Some(random(3))).collect();
+            if let Some(copied) = copied {
+                let changed = random(3) == 0;
+                let at = random(instants) as usize;
+                let kept = |k: usize| if changed && k == at { None } else { copied[k] };
+                of = of.iter().enumerate().map(|(k, own)| kept(k).or(*own)).collect();
+            }
+            if !is_whole {
+                of.iter_mut().for_each(|place| *place = place.filter(|_| random(4) > 0));
+            }
+            vehicles.push(of);
+        }
+        let mut text = "t,id,x,y,z\n".to_owned();
+        for k in 0..instants {
+            for (vehicle, of) in vehicles.iter().enumerate() {
+                if let Some(x) = of[k as usize] {
+                    let _ = writeln!(text, "{}.5,v{vehicle},{x},0,0", k);
+                }
+            }
+        }
+        let pairs = (0..vehicles.len()).flat_map(|a| (0..a).map(move |b| (a, b)));
+        let twins: Vec<_> = pairs.filter(|&(a, b)| are_twins(&vehicles[a], &vehicles[b])).collect();
+        match read(&text, &ReadOptions { columns: id_is_id(), ..usual() }) {
+            Ok(_) if is_whole => assert_eq!(twins, [], "{text}"),
+            Ok(_) => {}
+            Err(error) if error.code() == "recording/vehicle-twice" => {
+                refused += 1;
+                let is_named = |&(a, b): &(usize, usize)| error.to_string().contains(&format!("`v{b}` and `v{a}`"));
+                assert!(twins.iter().any(is_named), "{error}\n{text}");
+            }
+            Err(error) => assert_eq!(error.code(), "recording/empty", "{error}\n{text}"),
+        }
+        read_whole += u32::from(twins.is_empty());
+    }
+    assert!(refused > 50 && read_whole > 50, "{refused} {read_whole}");
+}
+
 #[test]
 fn arrays_of_objects_are_rows() {
     let array = concat!(
