@@ -263,7 +263,7 @@ pub(super) fn is_main_time(name: &str) -> bool {
 /// Name of times since the start of the vehicle's computer, without unit.
 const BOOT_TIME: &str = "time_boot";
 
-/// Returns whether a column gives times since the start of the vehicle's computer, as `time_boot_ms` of MAVLink does.
+/// Returns whether a column gives times since the start of the vehicle's computer, as `time_boot_ms` of `MAVLink` does.
 pub(super) fn is_boot_time(name: &str) -> bool {
     time_and_unit(name).0 == BOOT_TIME
 }

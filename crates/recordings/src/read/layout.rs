@@ -24,6 +24,7 @@ const PLACES: [&str; 7] = ["home", "origin", "base", "datum", "ref", "reference"
 
 /// Roles of the columns of a table.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "independent properties of the columns")]
 pub(super) struct Layout {
     /// Column of the time; `None` if the row number is the time.
     pub(super) time: Option<usize>,
@@ -119,13 +120,7 @@ impl Layout {
             None => columns.claim_wide(&headings).map(|names| (names.clone(), names))?,
         };
         if !one && id.is_none() {
-            let is_part = |name: &str, of: &str| {
-                name.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '/', '_']))
-            };
-            let is_known = |vehicle: &str| names.iter().any(|name| is_part(name, vehicle) || is_part(vehicle, name));
-            let is_place = |vehicle: &str| PLACES.contains(&vehicle.to_lowercase().as_str());
-            let lost = in_other_frame.into_iter().find(|vehicle| !is_known(vehicle) && !is_place(vehicle));
-            lost.map_or(Ok(()), |vehicle| Err(two_frames(vehicle, &names[0], on_earth)))?;
+            refuse_two_frames(in_other_frame, &names, on_earth)?;
         }
         let bodies = vehicles.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<Vec<_>, _>>()?;
         let flat = vehicles.iter().zip(&bodies).filter(|(_, body)| body.position[2].is_none());
@@ -369,6 +364,17 @@ fn vehicles_of<'a>(first: Role, headings: &[(usize, Heading<'a>)]) -> BTreeSet<&
     };
     let second: BTreeSet<_> = of(first + 1).collect();
     of(first).filter(|vehicle| second.contains(vehicle)).collect()
+}
+
+/// Refuses vehicles whose positions are given in another frame only. `names` are the vehicles that are read.
+fn refuse_two_frames(in_other_frame: BTreeSet<&str>, names: &[String], on_earth: bool) -> Result<(), Fault> {
+    let is_part = |name: &str, of: &str| {
+        name.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '/', '_']))
+    };
+    let is_known = |vehicle: &str| names.iter().any(|name| is_part(name, vehicle) || is_part(vehicle, name));
+    let is_place = |vehicle: &str| PLACES.contains(&vehicle.to_lowercase().as_str());
+    let lost = in_other_frame.into_iter().find(|vehicle| !is_known(vehicle) && !is_place(vehicle));
+    lost.map_or(Ok(()), |vehicle| Err(two_frames(vehicle, &names[0], on_earth)))
 }
 
 /// Returns the fault of a table that gives `vehicle` in another frame than the vehicle `read`.

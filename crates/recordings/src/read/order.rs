@@ -29,9 +29,9 @@ pub(super) struct RecordingInfo {
     pub(super) unit: Option<TimeUnit>,
     /// Number of time units per second, if given by the user.
     pub(super) times_per_second: Option<f64>,
-    /// Whether the user gives the unit of the times; whether the file does, by a column or a type; else the format
-    /// defines it.
+    /// Whether the user gives the unit of the times.
     pub(super) is_unit_given: bool,
+    /// Whether a column of the file gives the unit of the times; else the format defines it.
     pub(super) is_unit_in_file: bool,
     /// Epoch of the times according to the file \[ns\].
     pub(super) epoch_ns: i64,
@@ -145,11 +145,14 @@ impl<R: Rows> Ordered<R> {
             metadata.notes.push("rows were not in order of time and were sorted".to_owned());
         }
         metadata.clock = timing.clock.clone();
-        let source = match () {
-            () if info.is_unit_given => Source::Declared,
-            () if timing.clock.inferred => Source::Inferred,
-            () if info.is_unit_in_file => Source::Deduced,
-            () => Source::Convention,
+        let source = if info.is_unit_given {
+            Source::Declared
+        } else if timing.clock.inferred {
+            Source::Inferred
+        } else if info.is_unit_in_file {
+            Source::Deduced
+        } else {
+            Source::Convention
         };
         metadata.facts.push(match info.times_per_second {
             Some(rate) => Fact::number(FactKind::TimeUnit, source, rate.recip(), "s"),

@@ -120,6 +120,8 @@ struct Twins {
     /// Partner of each vehicle, and its candidacy; by vehicle.
     vehicles: Vec<Seen>,
     candidates: u32,
+    /// Number of earlier times.
+    instants: u64,
     /// Items of the current time.
     now_s: f64,
     instant: Vec<(usize, Bits)>,
@@ -134,6 +136,8 @@ struct Seen {
     /// Number of common times with the partner, and of changes of position between them.
     times: u32,
     moves: u32,
+    /// Number of the instant at which the vehicle got its first partner.
+    paired_at: u64,
     /// Position at the last common time.
     last: Bits,
     /// Whether the vehicle was seen at a time without its partner.
@@ -165,6 +169,7 @@ impl Twins {
             self.compare();
         }
         self.has_new = false;
+        self.instants += 1;
         self.instant.clear();
     }
 
@@ -188,12 +193,11 @@ impl Twins {
                 Some(_) => {
                     let was_alone = self.vehicles[vehicle].was_alone;
                     let next = if was_alone { vehicle } else { *regrouped.entry((partner, bits)).or_insert(vehicle) };
-                    let seen = &mut self.vehicles[vehicle];
                     if next == vehicle {
-                        seen.partner = None;
+                        self.vehicles[vehicle].partner = None;
                         self.candidates -= 1;
                     } else {
-                        (seen.partner, seen.last) = (Some(next), bits);
+                        self.vehicles[vehicle] = self.regrouped(vehicle, next, bits);
                     }
                 }
             }
@@ -206,6 +210,17 @@ impl Twins {
             (seen.now, seen.is_seen) = (None, true);
         }
         self.instant = instant;
+    }
+
+    /// Returns the state of a vehicle that has left its partner together with the vehicle `next`.
+    fn regrouped(&self, vehicle: usize, next: usize, bits: Bits) -> Seen {
+        let (own, other) = (self.vehicles[vehicle], self.vehicles[next]);
+        // Two vehicles that were seen at all times since they had a partner have all these times in common.
+        let is_dense = |seen: &Seen| u64::from(seen.times) == self.instants - seen.paired_at;
+        let common = if other.times < own.times { other } else { own };
+        let (times, moves) = if is_dense(&own) && is_dense(&other) { (common.times, common.moves) } else { (0, 0) };
+        let is_move = times > 0 && own.last != bits;
+        Seen { partner: Some(next), times: times + 1, moves: moves + u32::from(is_move), last: bits, ..own }
     }
 
     /// Pairs vehicles that are seen for the first time with a vehicle at the same place.
@@ -226,6 +241,7 @@ impl Twins {
                 continue;
             }
             (seen.partner, seen.times, seen.moves, seen.last) = (Some(first), 1, 0, bits);
+            seen.paired_at = self.instants;
             self.candidates += 1;
         }
     }

@@ -271,10 +271,10 @@ impl<C: Cells> Table<C> {
         let Some((agreement, axes)) = &mut self.agreement else { return Ok(()) };
         let Some(second) = self.layout.second.get(place) else { return Ok(()) };
         let mut there = Vector3::zeros();
-        for axis in 0..3 {
-            let Some(column) = second.columns[axis] else { continue };
+        for (axis, (column, unit)) in second.columns.iter().zip(second.units).enumerate() {
+            let Some(column) = *column else { continue };
             match self.cells.number(column).filter(|number| number.is_finite()) {
-                Some(number) => there[axis] = number * second.units[axis],
+                Some(number) => there[axis] = number * unit,
                 None => return Ok(()),
             }
         }
@@ -440,7 +440,8 @@ impl<C: Cells> Rows for Table<C> {
         let names = self.no_fixes.keys().filter_map(|&vehicle| self.names.all().get(vehicle));
         let mut of: Vec<_> = names.take(LISTED).map(|name| quoted(name)).collect();
         of.extend((self.no_fixes.len() > LISTED).then(|| "...".to_owned()));
-        let mut notes = Vec::from_iter(no_fixes(self.no_fixes.values().sum(), &format!(" of {}", of.join(", "))));
+        let of = format!(" of {}", of.join(", "));
+        let mut notes: Vec<_> = no_fixes(self.no_fixes.values().sum(), &of).into_iter().collect();
         if self.incomplete > 0 {
             notes.push(format!("positions omitted because one of their coordinates is empty: {}", self.incomplete));
         }
