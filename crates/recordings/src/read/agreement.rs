@@ -165,11 +165,11 @@ pub(super) struct Compared {
 impl Compared {
     /// Returns the names of the columns in metres, and of those on the Earth.
     fn names(&self, header: &[String]) -> (String, String) {
-        let of = |columns: &[Option<usize>; 3]| {
+        let listed = |columns: &[Option<usize>; 3]| {
             let names: Vec<_> = columns.iter().flatten().map(|&column| quoted(&header[column])).collect();
             names.join(", ")
         };
-        (of(&self.metric), of(&self.earth))
+        (listed(&self.metric), listed(&self.earth))
     }
 
     /// Returns the fault of a row with contradicting distances from the vehicle's first position.
@@ -211,10 +211,10 @@ mod tests {
             let wave = noise_m * libm::sin(7.0 * s);
             for (vehicle, home) in homes.iter().enumerate() {
                 let side = if vehicle == 0 { 1.0 } else { -1.0 };
-                let at = vector![side * (s - 10.0), 3.0 * side + wave, 5.0 + libm::sin(s)];
-                let metric = rotation * (at - home);
+                let true_m = vector![side * (s - 10.0), 3.0 * side + wave, 5.0 + libm::sin(s)];
+                let metric = rotation * (true_m - home);
                 let degree_m = 111_194.93;
-                let place = vector![(at.y + wave) / degree_m, at.x / degree_m, at.z];
+                let place = vector![(true_m.y + wave) / degree_m, true_m.x / degree_m, true_m.z];
                 if agreement.observe(vehicle, metric, place).is_some() {
                     return true;
                 }

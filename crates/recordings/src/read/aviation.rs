@@ -201,11 +201,11 @@ mod tests {
     #[test]
     fn columns_of_aircraft_are_recognised() {
         let header = |text: &str| text.split(',').map(str::to_owned).collect::<Vec<_>>();
-        let of = |text: &str, id| column_of_aircraft(&header(text), id, usize::MAX).cloned();
-        assert_eq!(of("t,id,lat,lon,alt,vertical_rate", Some(1)).as_deref(), Some("vertical_rate"));
-        assert_eq!(of("time,icao24,lat,lon,velocity,heading,vertrate,callsign,baroaltitude", Some(1)), None);
-        assert_eq!(of("t,track,lat,lon,alt", Some(1)), None);
-        assert_eq!(of("t,id,lat,lon,alt,yaw", Some(1)), None);
+        let found = |text: &str, id| column_of_aircraft(&header(text), id, usize::MAX).cloned();
+        assert_eq!(found("t,id,lat,lon,alt,vertical_rate", Some(1)).as_deref(), Some("vertical_rate"));
+        assert_eq!(found("time,icao24,lat,lon,velocity,heading,vertrate,callsign,baroaltitude", Some(1)), None);
+        assert_eq!(found("t,track,lat,lon,alt", Some(1)), None);
+        assert_eq!(found("t,id,lat,lon,alt,yaw", Some(1)), None);
         assert_eq!(rate_column(&header("t,alt,vertical_rate [ft/min]")), Some((2, Some(0.3048 / 60.0))));
         assert_eq!(rate_column(&header("t,climb_m_s")), Some((1, Some(1.0))));
     }

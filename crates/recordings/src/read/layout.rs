@@ -287,8 +287,8 @@ impl Layout {
         }
         let place_of = |vehicle: &String, body: &VehicleColumns| {
             let only = |is_role: &dyn Fn(Role) -> bool| {
-                let of = |(_, found): &&(usize, Heading<'_>)| found.vehicle == vehicle && is_role(found.role);
-                let mut found = places.iter().filter(of);
+                let is_meant = |(_, found): &&(usize, Heading<'_>)| found.vehicle == vehicle && is_role(found.role);
+                let mut found = places.iter().filter(is_meant);
                 found.next().filter(|_| found.next().is_none()).copied()
             };
             let [lat, lon] = [0, 1].map(|axis| only(&|role| role == EARTH + axis));

@@ -440,8 +440,8 @@ impl<C: Cells> Rows for Table<C> {
         let names = self.no_fixes.keys().filter_map(|&vehicle| self.names.all().get(vehicle));
         let mut of: Vec<_> = names.take(LISTED).map(|name| quoted(name)).collect();
         of.extend((self.no_fixes.len() > LISTED).then(|| "...".to_owned()));
-        let of = format!(" of {}", of.join(", "));
-        let mut notes: Vec<_> = no_fixes(self.no_fixes.values().sum(), &of).into_iter().collect();
+        let vehicles = format!(" of {}", of.join(", "));
+        let mut notes: Vec<_> = no_fixes(self.no_fixes.values().sum(), &vehicles).into_iter().collect();
         if self.incomplete > 0 {
             notes.push(format!("positions omitted because one of their coordinates is empty: {}", self.incomplete));
         }

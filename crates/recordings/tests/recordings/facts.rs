@@ -64,8 +64,8 @@ fn poses(topic: &'static str, y: f64, epoch_ns: i64, delay_ns: i64, has_stamp: f
         let stamp_ns = if has_stamp(k) { stamp_ns } else { 0 };
         let parts = (stamp_ns.div_euclid(1_000_000_000), stamp_ns.rem_euclid(1_000_000_000));
         let stamp = (i32::try_from(parts.0).expect("seconds"), u32::try_from(parts.1).expect("nanoseconds"));
-        let at = [f64::from(k) / 10.0, y, 1.0];
-        (topic, POSE, "cdr", log_ns, cdr(&((stamp, "world"), (at, NO_TURN)), true))
+        let place = [f64::from(k) / 10.0, y, 1.0];
+        (topic, POSE, "cdr", log_ns, cdr(&((stamp, "world"), (place, NO_TURN)), true))
     };
     (0..30).map(message).collect()
 }
@@ -153,9 +153,9 @@ fn stamps_of_several_clocks_are_refused() {
 fn vehicles_of_transforms_have_one_clock_too() {
     let transform = |k: u32, child: &'static str, y: f64, offset_s: i32| {
         let stamp = (SEC + offset_s, k * 100_000_000);
-        let of = ((stamp, "world"), child, ([f64::from(k), y, 0.0], NO_TURN));
+        let sent = ((stamp, "world"), child, ([f64::from(k), y, 0.0], NO_TURN));
         let log_ns = UNIX.cast_unsigned() + u64::from(k) * 100_000_000;
-        ("/tf", TF, "cdr", log_ns, cdr(&(vec![of],), true))
+        ("/tf", TF, "cdr", log_ns, cdr(&(vec![sent],), true))
     };
     let all = |offset_s: i32| -> Vec<Message> {
         (0..10).flat_map(|k| [transform(k, "cf1", 0.0, 0), transform(k, "cf2", 2.0, offset_s)]).collect()
@@ -292,13 +292,13 @@ fn two_positions(home: [f64; 3], is_sorted_by_vehicle: bool) -> String {
     for k in 0..100_u32 {
         for drone in [1, 2] {
             let side = if drone == 1 { 1.0 } else { -1.0 };
-            let at = [side * (f64::from(k) / 10.0 - 5.0), 0.0, 5.0];
+            let true_m = [side * (f64::from(k) / 10.0 - 5.0), 0.0, 5.0];
             let from = if drone == 1 { [0.0; 3] } else { home };
-            let [x, y, z] = [0, 1, 2].map(|axis| at[axis] - from[axis]);
-            let (lat, lon) = (at[1] / 110_574.0, at[0] / 111_319.5);
+            let [x, y, z] = [0, 1, 2].map(|axis| true_m[axis] - from[axis]);
+            let (lat, lon) = (true_m[1] / 110_574.0, true_m[0] / 111_319.5);
             rows.push((
                 if is_sorted_by_vehicle { drone } else { 0 },
-                format!("{},{drone},{x},{y},{z},{lat},{lon},{}\n", f64::from(k) / 10.0, at[2]),
+                format!("{},{drone},{x},{y},{z},{lat},{lon},{}\n", f64::from(k) / 10.0, true_m[2]),
             ));
         }
     }
@@ -458,22 +458,22 @@ fn twins_of_random_tables_are_those_of_a_comparison_of_all_pairs() {
         for vehicle in 0..count {
             // Half of the vehicles copy an earlier one, and change it at some times.
             let copied = (vehicle > 0 && random(2) == 0).then(|| vehicles[random(vehicle) as usize].clone());
-            let mut of: Positions = (0..instants).map(|_| Some(random(3))).collect();
+            let mut positions: Positions = (0..instants).map(|_| Some(random(3))).collect();
             if let Some(copied) = copied {
                 let changed = random(3) == 0;
-                let at = random(instants) as usize;
-                let kept = |k: usize| if changed && k == at { None } else { copied[k] };
-                of = of.iter().enumerate().map(|(k, own)| kept(k).or(*own)).collect();
+                let change = random(instants) as usize;
+                let kept = |k: usize| if changed && k == change { None } else { copied[k] };
+                positions = positions.iter().enumerate().map(|(k, own)| kept(k).or(*own)).collect();
             }
             if !is_whole {
-                of.iter_mut().for_each(|place| *place = place.filter(|_| random(4) > 0));
+                positions.iter_mut().for_each(|place| *place = place.filter(|_| random(4) > 0));
             }
-            vehicles.push(of);
+            vehicles.push(positions);
         }
         let mut text = "t,id,x,y,z\n".to_owned();
         for k in 0..instants {
-            for (vehicle, of) in vehicles.iter().enumerate() {
-                if let Some(x) = of[k as usize] {
+            for (vehicle, positions) in vehicles.iter().enumerate() {
+                if let Some(x) = positions[k as usize] {
                     let _ = writeln!(text, "{k}.5,v{vehicle},{x},0,0");
                 }
             }
@@ -550,9 +550,9 @@ fn times_have_several_names() {
     assert_eq!(both.samples()[1].0, 1.5);
     refused("tstamp,epoch,id,x,y\n0,7,a,1,2\n", &usual(), "recording/ambiguous-column");
     // Computers of several vehicles start at several times.
-    let of = |rows: &str| read(&format!("time_boot_ms,sysid,x,y\n{rows}"), &usual()).expect("read").assumed;
-    assert_eq!(of("0,1,1,2\n100,1,1,3\n"), None);
-    let assumed = of("0,1,1,2\n0,2,5,2\n100,1,1,3\n100,2,5,3\n");
+    let assumed_of = |rows: &str| read(&format!("time_boot_ms,sysid,x,y\n{rows}"), &usual()).expect("read").assumed;
+    assert_eq!(assumed_of("0,1,1,2\n100,1,1,3\n"), None);
+    let assumed = assumed_of("0,1,1,2\n0,2,5,2\n100,1,1,3\n100,2,5,3\n");
     assert_eq!(assumed.as_deref(), Some("the clocks of all vehicles started together"));
 }
 
