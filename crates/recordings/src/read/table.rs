@@ -282,7 +282,10 @@ impl<C: Cells> Table<C> {
         if second.columns[2].is_none() {
             metric.z = 0.0;
         }
-        let far_m = agreement.observe(row.vehicle, metric, there).filter(|_| !is_no_fix(&there));
+        if is_no_fix(&there) {
+            return Ok(());
+        }
+        let far_m = agreement.observe(row.vehicle, metric, there);
         match far_m.zip(self.layout.compared(place)) {
             None => Ok(()),
             Some((far_m, compared)) => {
