@@ -160,6 +160,8 @@ impl FrameAgreement {
 pub(super) struct Compared {
     pub(super) metric: [Option<usize>; 3],
     pub(super) earth: [Option<usize>; 3],
+    /// Whether the names of the columns in metres give directions, which columns chosen by the user do not have.
+    pub(super) has_directions: bool,
 }
 
 impl Compared {
@@ -189,10 +191,13 @@ impl Compared {
             let given: Vec<_> = given.map(|(role, column)| format!("--column {role}={}", header[column])).collect();
             given.join(" ")
         };
-        let metric = chosen(&self.metric, ["x", "y", "z"]);
+        let metric = if self.has_directions {
+            format!("by removing the columns {}", self.names(header).1)
+        } else {
+            format!("with {}", chosen(&self.metric, ["x", "y", "z"]))
+        };
         let earth = chosen(&self.earth, ["lat", "lon", "alt"]);
-        let remedy =
-            format!("choose the positions that have one origin for all vehicles, with {metric}, or with {earth}");
+        let remedy = format!("choose the positions that have one origin for all vehicles, {metric}, or with {earth}");
         Fault::coded("recording/several-frames", problem, remedy)
     }
 }

@@ -156,8 +156,8 @@ impl Layout {
         }
         layout.notes.extend(columns.heights_used(&layout, options)?);
         layout.facts = columns.facts(&layout, options);
+        layout.convention = convention.clone();
         layout.compare(header, options, &vehicles, &places)?;
-        layout.convention = convention;
         layout.check(header, options, one)?;
         if let [first, ..] = layout.slots.ids[..] {
             layout
@@ -315,7 +315,8 @@ impl Layout {
     /// Returns the columns of both positions of a vehicle, if it has two.
     pub(super) fn compared(&self, vehicle: usize) -> Option<Compared> {
         let (second, body) = self.second.get(vehicle).zip(self.bodies.get(vehicle))?;
-        Some(Compared { metric: body.position, earth: second.columns })
+        let has_directions = self.convention.has_directions();
+        Some(Compared { metric: body.position, earth: second.columns, has_directions })
     }
 
     /// Returns the columns that are read or examined, each once, in ascending order.

@@ -334,6 +334,10 @@ fn positions_from_own_homes_are_refused_beside_degrees() {
     assert!(read(&one(1.0), &usual()).is_ok());
     let error = refused(&one(3.28), &usual(), "recording/several-frames");
     assert!(error.place.is_some(), "{error}");
+    // Columns that name directions cannot be chosen by roles.
+    let directed = two_positions([0.0, 10.0, 0.0], false).replace(",x,y,z,", ",east,north,up,");
+    let error = refused(&directed, &usual(), "recording/several-frames");
+    assert!(error.help().contains("by removing the columns `lat`, `lon`, `alt`"), "{}", error.help());
     // Rows without degrees, or without a fix, are not compared.
     for unknown in [",,,", ",0,0,0"] {
         let without = |(k, line): (usize, &str)| {
