@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use pyo3::prelude::*;
 use tautline::audit::envelope::{Envelope, Limit, Quantity};
 use tautline::audit::recorded::{self, Interpolation, VehicleSettings};
-use tautline::read::{self, ArrayAxis, ColumnNames, Dimensions, Duplicates, Format, TimeUnit};
+use tautline::read::{self, ArrayAxis, ColumnNames, Dimensions, Duplicates, Format, MessageClock, TimeUnit};
 use tautline::request::audit::PlanQuestion;
 use tautline::request::audit::rules::{self, Rules};
 use tautline::request::{AuditRequest, ConfigFile, Subject};
@@ -38,8 +38,9 @@ pub(crate) struct ReadOptions(pub(crate) read::ReadOptions);
 impl ReadOptions {
     #[new]
     #[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
-    #[pyo3(signature = (*, format, time_unit, fps, time_scale, sort, duplicates, one_vehicle, scale, axes, dimensions,
-                        column, start, layout, frame, topic, origin, allow_unfinished))]
+    #[pyo3(signature = (*, format, time_unit, fps, time_scale, sort, duplicates, one_vehicle, skip_incomplete,
+                        distinct, clock, scale, axes, dimensions, column, start, layout, frame, topic, origin,
+                        allow_unfinished))]
     fn new(
         format: Option<String>,
         time_unit: Option<String>,
@@ -48,6 +49,9 @@ impl ReadOptions {
         sort: bool,
         duplicates: Option<String>,
         one_vehicle: bool,
+        skip_incomplete: bool,
+        distinct: bool,
+        clock: Option<String>,
         scale: Option<Vec<f64>>,
         axes: Option<String>,
         dimensions: Option<String>,
@@ -89,6 +93,9 @@ impl ReadOptions {
             axes: parsed("axes", axes)?,
             dimensions: choice("dimensions", dimensions, &Dimensions::ALL.map(|of| (of.name(), of)))?,
             one_vehicle,
+            skip_incomplete,
+            distinct,
+            clock: choice("clock", clock, &MessageClock::ALL.map(|clock| (clock.name(), clock)))?,
             starts: start.into_iter().collect(),
             columns,
             layout: layout.map_err(|error| wrong_input(format!("layout: {error}, got `{given}`")))?,

@@ -25,7 +25,7 @@ MISSING_FILE_CODES = (
 PathLike = str | os.PathLike[str]
 
 if TYPE_CHECKING:
-    from ._words import Duplicates, ReadFormat, TimeUnit
+    from ._words import Duplicates, MessageClock, ReadFormat, TimeUnit
 
 #: Largest integer up to which every integer is a float64.
 EXACT_INTEGER = 2**53
@@ -108,6 +108,9 @@ class ReadOptions(TypedDict, total=False):
     sort: bool
     duplicates: Duplicates | None
     one_vehicle: bool
+    skip_incomplete: bool
+    distinct: bool
+    clock: MessageClock | None
     scale: float | Iterable[float] | None
     axes: str | None
     dimensions: int | str | None
@@ -261,6 +264,9 @@ def read_options(
     sort: bool = False,
     duplicates: str | None = None,
     one_vehicle: bool = False,
+    skip_incomplete: bool = False,
+    distinct: bool = False,
+    clock: str | None = None,
     scale: float | Iterable[float] | None = None,
     axes: str | None = None,
     dimensions: int | str | None = None,
@@ -286,6 +292,9 @@ def read_options(
         sort=boolean(sort, "sort"),
         duplicates=optional_text(duplicates, "duplicates"),
         one_vehicle=boolean(one_vehicle, "one_vehicle"),
+        skip_incomplete=boolean(skip_incomplete, "skip_incomplete"),
+        distinct=boolean(distinct, "distinct"),
+        clock=optional_text(clock, "clock"),
         scale=metres,
         axes=optional_text(axes, "axes"),
         dimensions=None if dimensions is None else str(dimensions),

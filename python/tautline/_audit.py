@@ -323,8 +323,8 @@ def audit(
     * ``names``: N names; numbers from 1 unless given.
 
     ``tl.audit("flight.mcap")`` audits a file or folder, or with ``join=True`` a list of files with one vehicle each.
-    These options control reading: `format, time_unit, fps, time_scale, sort, duplicates, one_vehicle, scale, axes,
-    dimensions, column, start, layout, frame, topic, origin, allow_unfinished`.
+    These options control reading: `format, time_unit, fps, time_scale, sort, duplicates, one_vehicle, skip_incomplete,
+    distinct, clock, scale, axes, dimensions, column, start, layout, frame, topic, origin, allow_unfinished`.
 
     * ``delta``: safety distance of two centres [m].
     * ``radius``: radius of all vehicles, or by name [m]; the limit of a pair is max(delta, r1 + r2).

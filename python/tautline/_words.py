@@ -8,6 +8,7 @@ Motion = Literal["linear", "hold", "polynomial", "bounded"]
 Rules = Literal["recording", "skybrush", "none"]
 Verdict = Literal["pass", "clear", "reached"]
 Duplicates = Literal["first", "last", "refuse"]
+MessageClock = Literal["stamp", "log"]
 TimeUnit = Literal["s", "ms", "us", "ns"]
 ReadFormat = Literal[
     "ulog",

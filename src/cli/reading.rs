@@ -8,7 +8,8 @@ use clap::Args;
 use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
 
 use tautline_recordings::read::{
-    ArrayAxis, ArrayLayout, Axes, ColumnNames, Dimensions, Duplicates, Format, ReadOptions, Scale, TimeUnit,
+    ArrayAxis, ArrayLayout, Axes, ColumnNames, Dimensions, Duplicates, Format, MessageClock, ReadOptions, Scale,
+    TimeUnit,
 };
 #[cfg(feature = "viewer")]
 use tautline_report::request::Failure;
@@ -51,6 +52,15 @@ pub(super) struct ReadArguments {
     /// Read all rows of a table as one vehicle, whatever its other columns.
     #[arg(long)]
     one_vehicle: bool,
+    /// Read a row that lacks a coordinate as a row without a position.
+    #[arg(long)]
+    skip_incomplete: bool,
+    /// Confirm that vehicles with equal positions are different vehicles.
+    #[arg(long)]
+    distinct: bool,
+    /// Times of messages: their stamps, or the times at which they were logged [default: stamps, if all have one].
+    #[arg(long, value_name = "CLOCK", value_parser = clock())]
+    clock: Option<MessageClock>,
     /// Numbers of a vehicle in a table without a header: x and y, x to z, or these with their velocities.
     #[arg(long, value_name = "NUMBERS", value_parser = dimensions())]
     dimensions: Option<Dimensions>,
@@ -118,6 +128,9 @@ impl ReadArguments {
             axes: self.axes,
             dimensions: self.dimensions,
             one_vehicle: self.one_vehicle,
+            skip_incomplete: self.skip_incomplete,
+            distinct: self.distinct,
+            clock: self.clock,
             starts: self.starts.iter().cloned().collect(),
             columns,
             layout: self.layout,
@@ -128,6 +141,10 @@ impl ReadArguments {
             ..ReadOptions::default()
         }
     }
+}
+
+fn clock() -> impl TypedValueParser<Value = MessageClock> {
+    one_of(MessageClock::ALL.map(|clock| (clock.name().into(), clock)).into())
 }
 
 fn duplicates() -> impl TypedValueParser<Value = Duplicates> {

@@ -106,6 +106,22 @@ fn unordered_and_duplicate_rows_are_read_by_options() {
 }
 
 #[test]
+fn incomplete_rows_and_equal_vehicles_are_read_by_options() {
+    let gap = "t_s,id,x,y,alt\n0,a,0,0,5\n1,a,1,0,\n2,a,2,0,5\n0,b,0,9,5\n1,b,1,9,5\n2,b,2,9,5\n";
+    let twins = "t_s,id,x,y\n0,a,0,0\n0,b,0,0\n1,a,1,0\n1,b,1,0\n2,a,2,0\n2,b,2,0\n";
+    for (text, words, exit, expected) in [
+        (gap, &[][..], 2, "recording/empty-cell"),
+        (gap, &["--skip-incomplete"], 0, "coordinates is empty: 1"),
+        (gap, &["--skip-incomplete", "--clock", "log"], 2, "recording/unused-option"),
+        (twins, &[], 2, "recording/vehicle-twice"),
+        (twins, &["--distinct"], 1, "VIOLATION"),
+    ] {
+        let (code, text) = said(&audit(&[("f.csv", text)], &[&["f.csv", "--delta", "1"], words].concat()));
+        assert!(code == Some(exit) && text.contains(expected), "{words:?}: {text}");
+    }
+}
+
+#[test]
 fn a_single_vehicle_is_judged_by_its_limits() {
     let text = "t_s,x,y,z,mode\n0,0,0,0,4\n1,1,0,0,4\n2,2,0,1,4\n";
     for (words, exit, expected) in [

@@ -134,6 +134,7 @@ class Choices(Case):
             ("ReadFormat", lambda: tl.read(file, format="x")),
             ("TimeUnit", lambda: tl.read(file, time_unit="x")),
             ("Duplicates", lambda: tl.read(file, duplicates="x")),
+            ("MessageClock", lambda: tl.read(file, clock="x")),
             ("ExportFormat", lambda: tl.export(file, output, to="x")),
             ("Verdict", lambda: tl.margin(short(), "time.duration_s", 1, 2, verdict="x")),
         ):

@@ -265,6 +265,11 @@ impl Timing {
         (Self { clock, per_second: per_second as f64, epoch }, note)
     }
 
+    /// Returns the number of units per second.
+    pub(super) fn per_second(&self) -> f64 {
+        self.per_second
+    }
+
     /// Returns a clock with `per_second` units per second.
     pub(super) fn given(per_second: f64) -> Self {
         Self { clock: Clock { unit: "given", ..Clock::default() }, per_second, epoch: 0 }
@@ -358,6 +363,11 @@ pub(super) fn time_columns(
 ) -> Result<Option<(usize, Option<SubunitColumn>)>, Fault> {
     let mut candidates: Vec<_> =
         header.iter().enumerate().filter_map(|(column, name)| candidate(column, name)).collect();
+    // Names such as `epoch` and `time_boot_ms` give the time only in a table without another time.
+    if candidates.iter().any(|candidate| heading::is_main_time(&header[candidate.column])) {
+        let is_second = |name: &str| heading::is_time(name) && !heading::is_main_time(name);
+        candidates.retain(|candidate| !is_second(&header[candidate.column]));
+    }
     let is_whole_time = |candidate: &Candidate| heading::is_time(&header[candidate.column]);
     // A part alone, such as `sec` or `ms`, is not a time: the whole is unknown.
     if candidates.len() == 1 && !is_whole_time(&candidates[0]) {

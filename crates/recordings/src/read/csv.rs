@@ -49,6 +49,7 @@ pub(super) const TEXT: Reader = Reader {
         FormatOption::Origin,
         FormatOption::Axes,
         FormatOption::OneVehicle,
+        FormatOption::Incomplete,
     ],
     packing: Packing::Any,
 };

@@ -196,6 +196,13 @@ impl Fault {
         Self::coded("recording/empty-cell", format!("column `{column}` is empty"), remedy)
     }
 
+    /// Returns the fault of an empty cell beside other coordinates.
+    pub(super) fn empty_coordinate(column: &str) -> Self {
+        let remedy = "fill it, leave all cells of the position empty if the vehicle was not seen, or read such rows as \
+                      rows without a position with --skip-incomplete";
+        Self::coded("recording/empty-cell", format!("column `{column}` is empty"), remedy)
+    }
+
     /// Returns the fault of decreasing time.
     pub(super) fn time_backwards(time_s: f64, before_s: f64) -> Self {
         let problem = format!("time runs backwards: {time_s} s comes after {before_s} s");

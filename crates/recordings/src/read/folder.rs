@@ -10,6 +10,7 @@ use super::identity::spelling;
 use super::order::Recording;
 use super::readers::is_prose;
 use super::source::{Archive, Source};
+use tautline_core::fact::{self, Fact, FactKind};
 use tautline_core::track::{Clock, Item, Metadata, Tracks};
 
 /// Longest number in a file name that is sorted by value \[digits\].
@@ -280,6 +281,15 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
         let without = without.join(", ");
         notes.push(format!("no height is known of {without}: the heights of the other files are not used"));
     }
+    let mut facts = vec![
+        Fact::name(FactKind::Identity, fact::Source::Convention, "each file is one vehicle"),
+        Fact::name(FactKind::Clock, fact::Source::Default, "one clock for all files"),
+    ];
+    for fact in recordings.iter().flat_map(|tracks| tracks.facts()) {
+        if fact.kind != FactKind::Identity && !facts.contains(fact) {
+            facts.push(fact.clone());
+        }
+    }
     let mut joined = Vec::new();
     for ((path, tracks), own) in paths.into_iter().zip(recordings).zip(&clocks) {
         note_new(&mut notes, tracks.notes());
@@ -289,7 +299,7 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
     }
     let assumed = joined.iter().find_map(|part| part.tracks.assumed()).map(str::to_owned);
     let earth_origin = joined.iter().find_map(|part| part.tracks.earth_origin()).cloned();
-    let metadata = Metadata { clock, notes, assumed, is_planar, earth_origin, ..Metadata::default() };
+    let metadata = Metadata { clock, notes, facts, assumed, is_planar, earth_origin, ..Metadata::default() };
     Ok(Box::new(Joined { vehicles, parts: joined, metadata }))
 }
 

@@ -2,6 +2,8 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use tautline_core::fact::Source;
+
 use super::clock::TimeUnit;
 use super::error::{Fault, quoted, refuse};
 
@@ -39,9 +41,9 @@ pub(super) fn is_angle(role: Role) -> bool {
     (EARTH..EARTH + 2).contains(&role)
 }
 
-const HEIGHT: Role = EARTH + 2;
+pub(super) const HEIGHT: Role = EARTH + 2;
 /// Depth: a height with the opposite sign. Column names may have this role; the user cannot select it.
-const DEPTH: Role = EARTH + 3;
+pub(super) const DEPTH: Role = EARTH + 3;
 
 /// Names of latitude and longitude.
 const EARTH_NAMES: [&[&str]; 2] = [&["lat", "latitude"], &["lon", "lng", "long", "longitude"]];
@@ -58,8 +60,10 @@ const HEIGHT_STARTS: Words = Words(
     "gps gnss global geo geometric geodetic ellipsoidal wgs84 baro barometric barometer pressure rel relative \
      abs absolute local pos position est estimated true raw filtered",
 );
-const HEIGHT_ENDS: Words =
-    Words("agl msl amsl asl hae rel relative above_ground above_ground_level above_sea_level above_takeoff");
+const HEIGHT_ENDS: Words = Words(concat!(
+    "agl msl amsl asl hae rel relative above_ground above_ground_level above_sea_level above_takeoff ",
+    "baro barometric pressure geom geometric gps gnss wgs84 ellipsoid",
+));
 
 /// Names of other quantities with axes, which are not vehicles.
 const QUANTITIES: Words = Words(concat!(
@@ -173,6 +177,23 @@ fn height(name: &str) -> Option<Role> {
     behind(name).or_else(|| ends.find_map(behind))
 }
 
+/// Returns the surface from which a column counts heights, by its name.
+pub(super) fn height_reference(name: &str) -> (Source, &'static str) {
+    let name = bracketed(name).0.to_lowercase();
+    let has = |words: &[&str]| words.iter().any(|word| name.contains(word));
+    if has(&["hae", "ellipsoid", "wgs84", "geom", "geo_alt", "geoalt"]) {
+        (Source::Deduced, "ellipsoid")
+    } else if has(&["baro", "pressure"]) {
+        (Source::Deduced, "pressure")
+    } else if has(&["msl", "asl", "above_sea"]) {
+        (Source::Deduced, "sea level")
+    } else if has(&["rel", "agl", "above_ground", "takeoff"]) {
+        (Source::Deduced, "ground")
+    } else {
+        (Source::Default, "one level for all vehicles")
+    }
+}
+
 /// Returns whether the last word of a name is a quantity with axes, as in `cf1_gyro` and `../orientation`.
 pub(super) fn is_quantity_name(name: &str) -> bool {
     let name = name.to_lowercase();
@@ -227,10 +248,24 @@ pub(super) fn is_clock(name: &str) -> bool {
     is_time(name) || is_frame(name) || name.eq_ignore_ascii_case("duration")
 }
 
+/// Returns whether a column gives the time.
 pub(super) fn is_time(name: &str) -> bool {
+    is_main_time(name) || matches!(time_and_unit(name).0.as_str(), "tstamp" | "epoch" | BOOT_TIME)
+}
+
+/// Returns whether a column gives the time, whatever other columns the table has.
+pub(super) fn is_main_time(name: &str) -> bool {
     const NAMES: [&str; 10] =
         ["t", "time", "timestamp", "stamp", "datetime", "date_time", "utc", "time_utc", "utc_time", "timestamp_utc"];
     NAMES.contains(&time_and_unit(name).0.as_str())
+}
+
+/// Name of times since the start of the vehicle's computer, without unit.
+const BOOT_TIME: &str = "time_boot";
+
+/// Returns whether a column gives times since the start of the vehicle's computer, as `time_boot_ms` of `MAVLink` does.
+pub(super) fn is_boot_time(name: &str) -> bool {
+    time_and_unit(name).0 == BOOT_TIME
 }
 
 /// Returns whether a column counts frames or steps.
@@ -280,8 +315,23 @@ pub(super) fn rank_of_name(name: &str) -> Option<u8> {
     }
 }
 
+/// Returns whether a column holds the address of an aircraft, which names it better than other columns do.
+pub(super) fn is_aircraft_address(name: &str) -> bool {
+    matches!(joined(name).as_str(), "icao24" | "icao" | "hex" | "hexident")
+}
+
+/// Returns whether a column holds the direction of flight beside a column that names aircraft.
+pub(super) fn is_track(name: &str) -> bool {
+    joined(name) == "track"
+}
+
+/// Returns whether a column names aircraft, and no other vehicles.
+pub(super) fn names_aircraft(name: &str) -> bool {
+    is_aircraft_address(name) || matches!(joined(name).as_str(), "callsign" | "flight" | "tail" | "registration")
+}
+
 /// Returns a name in lower case without unit and separators.
-fn joined(name: &str) -> String {
+pub(super) fn joined(name: &str) -> String {
     bracketed(name).0.to_lowercase().replace(['_', ' ', '-', '.'], "")
 }
 

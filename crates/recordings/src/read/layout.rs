@@ -5,20 +5,26 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use tautline_core::fact::{Fact, FactKind, Source};
+
+use super::agreement::{Compared, SecondPosition};
 use super::axes::Convention;
 use super::clock::{SubunitColumn, TimeUnit};
 use super::error::{Fault, list, quoted, refuse};
-use super::heading::{EARTH, Heading, Heights, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity};
+use super::heading::{
+    DEPTH, EARTH, HEIGHT, Heading, Heights, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity,
+};
 use super::identity::Slots;
 use super::options::{ColumnNames, ReadOptions};
 use super::order::PLANAR;
-use super::{axes, clock, heading, identity};
+use super::{aviation, axes, clock, heading, identity};
 
 /// Names of places that are not vehicles.
 const PLACES: [&str; 7] = ["home", "origin", "base", "datum", "ref", "reference", "launch"];
 
 /// Roles of the columns of a table.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "independent properties of the columns")]
 pub(super) struct Layout {
     /// Column of the time; `None` if the row number is the time.
     pub(super) time: Option<usize>,
@@ -46,8 +52,16 @@ pub(super) struct Layout {
     pub(super) on_earth: bool,
     /// Frames and programs recognised by the column names.
     pub(super) convention: Convention,
+    /// Whether times count from the start of each vehicle's computer.
+    pub(super) counts_from_boot: bool,
+    /// Column of the vertical rate of a long table, and the size of its unit \[m/s\] if its name has one.
+    pub(super) rate: Option<(usize, Option<f64>)>,
+    /// Second position of each vehicle, on the Earth, beside the one that is read.
+    pub(super) second: Vec<SecondPosition>,
     /// Whether a vehicle has no height column: then no height is used.
     pub(super) is_planar: bool,
+    /// Facts that follow from the header and the options.
+    pub(super) facts: Vec<Fact>,
     /// Notes for the user about the columns.
     pub(super) notes: Vec<String>,
 }
@@ -82,6 +96,7 @@ impl Layout {
         let gives = |role: Role| headings.iter().any(|(_, of)| of.role == role) || columns.get("", role).is_some();
         let on_earth = gives(EARTH) && gives(EARTH + 1) && !(gives(POSITION) && gives(POSITION + 1));
         columns.place = if on_earth { EARTH } else { POSITION };
+        let places = if on_earth || convention.reference.is_some() { Vec::new() } else { headings.clone() };
         let in_other_frame = vehicles_of(if on_earth { POSITION } else { EARTH }, &headings);
         headings.retain(|(_, heading)| if on_earth { heading.role >= RADIUS } else { !is_angle(heading.role) });
         columns.heights = Heights::place(columns.place, header, &mut columns.found, &mut headings);
@@ -105,13 +120,7 @@ impl Layout {
             None => columns.claim_wide(&headings).map(|names| (names.clone(), names))?,
         };
         if !one && id.is_none() {
-            let is_part = |name: &str, of: &str| {
-                name.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '/', '_']))
-            };
-            let is_known = |vehicle: &str| names.iter().any(|name| is_part(name, vehicle) || is_part(vehicle, name));
-            let is_place = |vehicle: &str| PLACES.contains(&vehicle.to_lowercase().as_str());
-            let lost = in_other_frame.into_iter().find(|vehicle| !is_known(vehicle) && !is_place(vehicle));
-            lost.map_or(Ok(()), |vehicle| Err(two_frames(vehicle, &names[0], on_earth)))?;
+            refuse_two_frames(in_other_frame, &names, on_earth)?;
         }
         let bodies = vehicles.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<Vec<_>, _>>()?;
         let flat = vehicles.iter().zip(&bodies).filter(|(_, body)| body.position[2].is_none());
@@ -129,6 +138,7 @@ impl Layout {
             bodies,
             on_earth,
             is_planar,
+            counts_from_boot: convention.counts_from_boot || heading::is_boot_time(&header[time]),
             ..Self::default()
         };
         layout.refuse_other_frames(header, &columns.heights, &convention)?;
@@ -144,8 +154,10 @@ impl Layout {
             let of = if flat.len() < vehicles.len() { format!(" of {}", list(&flat, 12)) } else { String::new() };
             layout.notes.push(format!("no column gives the height{of}: {PLANAR}"));
         }
-        layout.notes.extend(columns.heights_used(&layout.bodies, options)?);
-        layout.convention = convention;
+        layout.notes.extend(columns.heights_used(&layout, options)?);
+        layout.facts = columns.facts(&layout, options);
+        layout.convention = convention.clone();
+        layout.compare(header, options, &vehicles, &places)?;
         layout.check(header, options, one)?;
         if let [first, ..] = layout.slots.ids[..] {
             layout
@@ -154,6 +166,19 @@ impl Layout {
             layout.names.clear();
         }
         Ok(layout)
+    }
+
+    /// Returns the fact which column names the vehicles.
+    fn identity(&self, header: &[String], options: &ReadOptions) -> Fact {
+        let (source, name) = match (self.id, self.slots.ids.first()) {
+            (Some(id), _) if self.is_id_given => (Source::Declared, format!("column {}", quoted(&header[id]))),
+            (Some(id), _) => (Source::Deduced, format!("column {}", quoted(&header[id]))),
+            (None, Some(&first)) => (Source::Deduced, format!("columns such as {}", quoted(&header[first]))),
+            (None, None) if self.names.len() > 1 => (Source::Deduced, "names of columns".to_owned()),
+            (None, None) if options.one_vehicle => (Source::Declared, "one vehicle".to_owned()),
+            (None, None) => (Source::Convention, "one vehicle, named after the file".to_owned()),
+        };
+        Fact::name(FactKind::Identity, source, name)
     }
 
     /// Refuses a header in which only some position columns give the direction of their axis.
@@ -246,6 +271,54 @@ impl Layout {
         Ok(())
     }
 
+    /// Finds columns with which the positions are compared: a vertical rate, and a second position on the Earth.
+    fn compare(
+        &mut self,
+        header: &[String],
+        options: &ReadOptions,
+        vehicles: &[String],
+        places: &[(usize, Heading<'_>)],
+    ) -> Result<(), Fault> {
+        let has_height = |body: &VehicleColumns| body.position[2].is_some();
+        self.rate = aviation::rate_column(header).filter(|_| matches!(&self.bodies[..], [body] if has_height(body)));
+        let is_chosen = options.columns.given().any(|(role, _)| !matches!(role, TIME | ID | RADIUS));
+        if self.on_earth || is_chosen {
+            return Ok(());
+        }
+        let place_of = |vehicle: &String, body: &VehicleColumns| {
+            let only = |is_role: &dyn Fn(Role) -> bool| {
+                let is_meant = |(_, found): &&(usize, Heading<'_>)| found.vehicle == vehicle && is_role(found.role);
+                let mut found = places.iter().filter(is_meant);
+                found.next().filter(|_| found.next().is_none()).copied()
+            };
+            let [lat, lon] = [0, 1].map(|axis| only(&|role| role == EARTH + axis));
+            let height = only(&|role| matches!(role, HEIGHT | DEPTH)).filter(|_| body.position[2].is_some());
+            let degrees = |found: Heading<'_>| found.unit.map_or(Some(1.0), heading::degrees);
+            let ((lat, of_lat), (lon, of_lon)) = (lat?, lon?);
+            let up = height.map_or(1.0, |(_, found)| {
+                let metres = found.unit.and_then(|unit| heading::size_of(unit, false)).unwrap_or(1.0);
+                if found.role == DEPTH { -metres } else { metres }
+            });
+            let columns = [Some(lat), Some(lon), height.map(|(column, _)| column)];
+            Some(SecondPosition { columns, units: [degrees(of_lat)?, degrees(of_lon)?, up] })
+        };
+        let second: Option<Vec<_>> =
+            vehicles.iter().zip(&self.bodies).map(|(vehicle, body)| place_of(vehicle, body)).collect();
+        self.second = second.unwrap_or_default();
+        if let Some(compared) = self.compared(0).filter(|_| options.is_joined) {
+            let problem = "it has positions in metres and on the Earth, which are not compared between files";
+            return Err(compared.fault(problem.to_owned(), header));
+        }
+        Ok(())
+    }
+
+    /// Returns the columns of both positions of a vehicle, if it has two.
+    pub(super) fn compared(&self, vehicle: usize) -> Option<Compared> {
+        let (second, body) = self.second.get(vehicle).zip(self.bodies.get(vehicle))?;
+        let has_directions = self.convention.has_directions();
+        Some(Compared { metric: body.position, earth: second.columns, has_directions })
+    }
+
     /// Returns the columns that are read or examined, each once, in ascending order.
     pub(super) fn columns_to_observe(&self) -> Vec<usize> {
         let columns: BTreeSet<_> = self
@@ -254,6 +327,8 @@ impl Layout {
             .chain(self.alternative_ids.iter().copied())
             .chain(self.suspects.iter().copied())
             .chain(self.slots.watched.iter().flatten().copied())
+            .chain(self.rate.map(|(column, _)| column))
+            .chain(self.second.iter().flat_map(|second| second.columns).flatten())
             .collect();
         columns.into_iter().collect()
     }
@@ -292,6 +367,17 @@ fn vehicles_of<'a>(first: Role, headings: &[(usize, Heading<'a>)]) -> BTreeSet<&
     of(first).filter(|vehicle| second.contains(vehicle)).collect()
 }
 
+/// Refuses vehicles whose positions are given in another frame only. `names` are the vehicles that are read.
+fn refuse_two_frames(in_other_frame: BTreeSet<&str>, names: &[String], on_earth: bool) -> Result<(), Fault> {
+    let is_part = |name: &str, of: &str| {
+        name.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '/', '_']))
+    };
+    let is_known = |vehicle: &str| names.iter().any(|name| is_part(name, vehicle) || is_part(vehicle, name));
+    let is_place = |vehicle: &str| PLACES.contains(&vehicle.to_lowercase().as_str());
+    let lost = in_other_frame.into_iter().find(|vehicle| !is_known(vehicle) && !is_place(vehicle));
+    lost.map_or(Ok(()), |vehicle| Err(two_frames(vehicle, &names[0], on_earth)))
+}
+
 /// Returns the fault of a table that gives `vehicle` in another frame than the vehicle `read`.
 fn two_frames(vehicle: &str, read: &str, on_earth: bool) -> Fault {
     let kinds = ["metres", "latitude and longitude"];
@@ -311,7 +397,13 @@ fn two_frames(vehicle: &str, read: &str, on_earth: bool) -> Fault {
 /// Returns the vehicle column and other possible ones; a column given by the user has no alternatives.
 fn naming_columns(header: &[String], time: usize, given: Option<usize>) -> (Option<usize>, Vec<usize>) {
     let is_one = |&column: &usize| column != time && heading::is_id(&header[column]);
-    let mut named = (0..header.len()).filter(is_one);
+    let mut named: Vec<_> = (0..header.len()).filter(is_one).collect();
+    // Beside the name of an aircraft, `track` is its direction.
+    if named.iter().any(|&column| heading::names_aircraft(&header[column])) {
+        named.retain(|&column| !heading::is_track(&header[column]));
+    }
+    named.sort_by_key(|&column| !heading::is_aircraft_address(&header[column]));
+    let mut named = named.into_iter();
     if given.is_some() { (given, Vec::new()) } else { (named.next(), named.collect()) }
 }
 
@@ -400,13 +492,21 @@ impl<'a> Columns<'a> {
 
     /// Returns the note on height columns recognised by name. Such heights point up, whatever the mapping of the other
     /// axes.
-    pub(super) fn heights_used(
-        &self,
-        bodies: &[VehicleColumns],
-        options: &ReadOptions,
-    ) -> Result<Option<String>, Fault> {
-        let used = self.heights.among(bodies.iter().filter_map(|body| body.position[2]));
+    ///
+    /// # Errors
+    /// If a height without a unit is beside columns of aircraft, whose heights are usually in feet.
+    pub(super) fn heights_used(&self, layout: &Layout, options: &ReadOptions) -> Result<Option<String>, Fault> {
+        let used = self.heights_of(layout);
         let Some(&(first, is_turned)) = used.first() else { return Ok(None) };
+        let aircraft = aviation::column_of_aircraft(self.header, layout.id, first);
+        if let Some(other) = aircraft.filter(|_| !self.units.contains_key(&first) && options.scale.is_none()) {
+            let [height, other] = [&self.header[first], other].map(|name| quoted(name));
+            let problem =
+                format!("column {height} has no unit, and column {other} beside it occurs in data of aircraft");
+            let remedy = "data of aircraft have heights in feet or metres: give --scale 0.3048 for feet or --scale 1 \
+                          for metres, or put the unit into the name, as in `altitude_ft`";
+            return refuse("recording/unknown-unit", problem, remedy);
+        }
         if self.place != EARTH {
             axes::refuse_turned_height(options, &self.header[first])?;
         }
@@ -414,12 +514,47 @@ impl<'a> Columns<'a> {
         let turned = if is_turned { ", with opposite sign" } else { "" };
         let scale = options.metres();
         let unit = match self.units.get(&first) {
+            None if aviation::is_state_vectors(self.header) && options.scale.is_none() => {
+                ", in metres as in the state vectors of OpenSky".to_owned()
+            }
             None if self.place == EARTH && scale != 1.0 => format!(", in units of {scale} m (--scale)"),
             None if self.place == EARTH => ", in metres: the name has no unit (--scale sets another)".to_owned(),
             _ => String::new(),
         };
         let columns = if used.len() > 1 { "columns" } else { "column" };
         Ok(Some(format!("heights are read from {columns} {}{turned}{unit}", list(&names, 12))))
+    }
+
+    /// Returns the columns that are read as heights by their names, and whether the sign is inverted.
+    fn heights_of(&self, layout: &Layout) -> Vec<(usize, bool)> {
+        self.heights.among(layout.bodies.iter().filter_map(|body| body.position[2]))
+    }
+
+    /// Returns the facts on units, heights and names of vehicles that follow from the header and the options.
+    fn facts(&self, layout: &Layout, options: &ReadOptions) -> Vec<Fact> {
+        let mut facts = vec![layout.identity(self.header, options)];
+        let lengths = layout.bodies.iter().flat_map(|body| body.position).flatten();
+        let unit_of = |column: usize| self.units.get(&column).map(|unit| (*unit).to_owned());
+        let unit = |kind: FactKind, unit: Option<String>| match (options.scale, unit) {
+            (Some(_), _) => Fact::number(kind, Source::Declared, options.metres(), "m"),
+            (None, Some(unit)) => Fact::name(kind, Source::Deduced, unit),
+            (None, None) => Fact::name(kind, Source::Default, "m"),
+        };
+        if !layout.on_earth {
+            facts.push(unit(FactKind::LengthUnit, lengths.clone().find_map(unit_of)));
+        }
+        let height = self.heights_of(layout).first().map(|(column, _)| *column);
+        let third = layout.bodies.first().and_then(|body| body.position[2]);
+        if let Some(column) = height.or(third.filter(|_| layout.on_earth)) {
+            let is_convention = aviation::is_state_vectors(self.header) && options.scale.is_none();
+            facts.push(match unit_of(column) {
+                None if is_convention => Fact::name(FactKind::HeightUnit, Source::Convention, "m"),
+                named => unit(FactKind::HeightUnit, named),
+            });
+            let (source, reference) = heading::height_reference(&self.header[column]);
+            facts.push(Fact::name(FactKind::HeightReference, source, reference));
+        }
+        facts
     }
 
     pub(super) fn claim(&mut self, vehicle: &str, heading: &Heading<'a>, column: usize) -> Result<(), Fault> {

@@ -12,6 +12,8 @@
 //! with two positions at one time or with decreasing time, and two unrelated time columns. Each [`ReadError`] names the
 //! file, the place, the value and the remedy. Inferences such as the unit of time appear in the notes.
 
+mod agreement;
+mod aviation;
 mod axes;
 mod bezier;
 mod capture;
@@ -38,6 +40,7 @@ mod show_rules;
 mod skybrush;
 mod source;
 mod spline;
+mod stated;
 mod table;
 mod ulog;
 mod vviz;
@@ -49,7 +52,7 @@ pub use earth::EarthFrame;
 pub use error::{Fault, Place, ReadError};
 pub use heading::is_read;
 pub use mcap::{Channels, LivePose, has_live_poses, live_poses};
-pub use options::{ArrayAxis, ArrayLayout, ColumnNames, Dimensions, Duplicates, ReadOptions, Scale};
+pub use options::{ArrayAxis, ArrayLayout, ColumnNames, Dimensions, Duplicates, MessageClock, ReadOptions, Scale};
 pub use order::Recording;
 pub use readers::{Format, READERS, Reader};
 pub use show_rules::{ShowPolygon, ShowRules};
@@ -75,7 +78,10 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
         Ok(None) => open_one(Source::file(path), options),
         Err(error) => Err(error),
     };
-    opened.and_then(|recording| axes::turned(recording, options)).map_err(|error| error.of(path))
+    opened
+        .and_then(|recording| axes::turned(recording, options))
+        .map(|recording| stated::stated(recording, options, path))
+        .map_err(|error| error.of(path))
 }
 
 /// Opens several files as one recording, with one vehicle per file, named after the file. Folders and archives
@@ -95,10 +101,11 @@ pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, 
             None => all.files.push(Source::file(path)),
         }
     }
-    let opened = open_folder(all, options);
+    let (opened, name) = (open_folder(all, options), recording_name(paths));
     opened
         .and_then(|recording| axes::turned(recording, options))
-        .map_err(|error| error.of(Path::new(&recording_name(paths))))
+        .map(|recording| stated::stated(recording, options, Path::new(&name)))
+        .map_err(|error| error.of(Path::new(&name)))
 }
 
 /// Opens the channels of a run recording or of an MCAP export; `None` without channels, and for any other recording.

@@ -1,9 +1,11 @@
-//! Reads tables with one JSON object per line. Keys are columns. Keys of nested objects are joined with dots; lists of
-//! two or three numbers have the keys x, y and z.
+//! Reads tables of JSON objects: one per line, or the elements of an array. Keys are columns. Keys of nested objects
+//! are joined with dots; lists of two or three numbers have the keys x, y and z. Lines of `TrajNet++` hold a frame, a
+//! pedestrian and a position in the object `track`; its lines with the object `scene` hold no position.
 
 use std::borrow::Cow;
 use std::collections::{BTreeMap, HashMap};
 use std::fmt;
+use std::io::{BufReader, Bytes, Read};
 
 use serde::de::{DeserializeSeed, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
@@ -13,17 +15,17 @@ use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{FormatOption, Packing, Reader};
-use super::source::{Lines, Source};
+use super::source::{BLOCK_BYTES, LINE_LIMIT_BYTES, Lines, Source};
 use super::table;
 use super::table::Cells;
 
 pub(super) const READER: Reader = Reader {
     name: "jsonl",
     title: "a table of JSON objects",
-    extensions: &["jsonl", "ndjson"],
-    docs: "Table with an object of JSON in each line",
+    extensions: &["jsonl", "ndjson", "json"],
+    docs: "Table with an object of JSON in each line, or a JSON array of objects",
     magic: &[],
-    sniff: |head| head.is_text(are_in),
+    sniff: |head| head.is_text(|text| are_in(text) || is_array(text)),
     open,
     supports: FormatOption::TABLE,
     packing: Packing::Any,
@@ -32,9 +34,22 @@ pub(super) const READER: Reader = Reader {
 /// Largest number of columns; more indicate lists of changing length.
 const MOST_COLUMNS: usize = 100_000;
 
+/// Keys of a position in `TrajNet++`, and the names of their columns.
+const TRAJNET: [(&str, &str); 4] = [("track.f", "frame"), ("track.p", "id"), ("track.x", "x"), ("track.y", "y")];
+
 /// Opens a table.
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let objects = Objects::open(source)?;
+    let mut first = [0];
+    let mut bytes = source.bytes()?;
+    while bytes.read(&mut first)? == 1 && (first[0].is_ascii_whitespace() || BOM.contains(&first[0])) {}
+    if first == *b"[" { open_objects::<Elements>(source, options) } else { open_objects::<Lines>(source, options) }
+}
+
+/// Bytes of a mark at the beginning of a text in UTF-8.
+const BOM: [u8; 3] = [0xef, 0xbb, 0xbf];
+
+fn open_objects<T: ObjectText + 'static>(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+    let objects = Objects::<T>::open(source)?;
     let layout = Layout::of(&objects.header, options, &source.stem())?;
     let is_of =
         |list: &str, column: &usize| objects.header[*column].strip_prefix(list).is_some_and(|end| end.starts_with('.'));
@@ -42,11 +57,11 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let mut uneven = objects.uneven.iter().filter(|_| !is_named);
     if let Some((list, line)) = uneven.find(|(list, _)| used.iter().any(|column| is_of(list, column))) {
         let problem = format!(
-            "the length of the list {} differs from the first line; its elements cannot be assigned to vehicles",
+            "the length of the list {} differs from the first object; its elements cannot be assigned to vehicles",
             quoted(list)
         );
         let remedy = "name each vehicle in its object, as in {\"id\": \"a\", \"x\": 1, ...}";
-        return Err(Fault::coded("recording/list-length", problem, remedy).at(Place::Line(*line)));
+        return Err(Fault::coded("recording/list-length", problem, remedy).at(T::place(*line)));
     }
     table::open(source, objects, layout, None, 0, options)
 }
@@ -56,6 +71,163 @@ pub(super) fn are_in(text: &[u8]) -> bool {
     let mut lines = text.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii).filter(|line| !line.is_empty());
     let is_object = |line: &[u8]| line.starts_with(b"{") && serde_json::from_slice::<IgnoredAny>(line).is_ok();
     lines.next().is_some_and(is_object) && lines.next().is_some_and(|line| line.starts_with(b"{"))
+}
+
+/// Returns whether a text begins with an array of objects.
+pub(super) fn is_array(text: &[u8]) -> bool {
+    text.strip_prefix(b"[").is_some_and(|elements| elements.trim_ascii_start().starts_with(b"{"))
+}
+
+/// Text of objects, with one object in memory.
+trait ObjectText: Sized {
+    fn open(source: &Source) -> Result<Self, ReadError>;
+
+    /// Moves to the next object; returns `false` after the last one.
+    fn advance(&mut self) -> Result<bool, ReadError>;
+
+    /// Returns the current object.
+    fn object(&self) -> &[u8];
+
+    /// Returns its number, from 1.
+    fn number(&self) -> u64;
+
+    /// Returns the place of the object with this number.
+    fn place(number: u64) -> Place;
+}
+
+impl ObjectText for Lines {
+    fn open(source: &Source) -> Result<Self, ReadError> {
+        Self::new(source)
+    }
+
+    fn advance(&mut self) -> Result<bool, ReadError> {
+        while Self::advance(self)? {
+            if !self.line().trim_ascii().is_empty() {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    fn object(&self) -> &[u8] {
+        self.line().trim_ascii()
+    }
+
+    fn number(&self) -> u64 {
+        Self::number(self)
+    }
+
+    fn place(number: u64) -> Place {
+        Place::Line(number)
+    }
+}
+
+/// Elements of an array of objects.
+struct Elements {
+    input: Bytes<BufReader<Box<dyn Read>>>,
+    element: Vec<u8>,
+    number: u64,
+    has_ended: bool,
+}
+
+impl Elements {
+    fn byte(&mut self) -> Result<u8, ReadError> {
+        let byte = self.input.next().transpose().map_err(|error| self.fault(error))?;
+        byte.ok_or_else(|| self.fault(Fault::Truncated("the end of its array is missing".to_owned())))
+    }
+
+    /// Returns the next byte that is not blank.
+    fn next_sign(&mut self) -> Result<u8, ReadError> {
+        loop {
+            let byte = self.byte()?;
+            if !byte.is_ascii_whitespace() {
+                return Ok(byte);
+            }
+        }
+    }
+
+    fn fault(&self, fault: impl Into<Fault>) -> ReadError {
+        fault.into().at(Self::place(self.number.max(1)))
+    }
+
+    /// Refuses a byte that cannot be at its place.
+    fn refuse(&self, byte: u8, expected: &str) -> ReadError {
+        let problem =
+            format!("it is not an array of JSON objects: {expected} is expected, got {}", byte.escape_ascii());
+        self.fault(Fault::coded(
+            "recording/malformed",
+            problem,
+            "write an array like [{\"t\": 0, \"id\": \"a\", ...}, ...]",
+        ))
+    }
+
+    /// Reads an object up to its closing brace.
+    fn read_object(&mut self) -> Result<(), ReadError> {
+        let (mut depth, mut in_text, mut is_escaped) = (1_u64, false, false);
+        self.element.clear();
+        self.element.push(b'{');
+        while depth > 0 {
+            let byte = self.byte()?;
+            if self.element.len() == LINE_LIMIT_BYTES {
+                return Err(self.fault(Fault::LineTooLong(LINE_LIMIT_BYTES)));
+            }
+            self.element.push(byte);
+            match byte {
+                _ if is_escaped => is_escaped = false,
+                b'\\' if in_text => is_escaped = true,
+                b'"' => in_text = !in_text,
+                b'{' if !in_text => depth += 1,
+                b'}' if !in_text => depth -= 1,
+                _ => {}
+            }
+        }
+        Ok(())
+    }
+}
+
+impl ObjectText for Elements {
+    fn open(source: &Source) -> Result<Self, ReadError> {
+        let input = BufReader::with_capacity(BLOCK_BYTES, source.bytes()?).bytes();
+        let mut elements = Self { input, element: Vec::new(), number: 0, has_ended: false };
+        while elements.next_sign()? != b'[' {}
+        Ok(elements)
+    }
+
+    fn advance(&mut self) -> Result<bool, ReadError> {
+        if self.has_ended {
+            return Ok(false);
+        }
+        self.number += 1;
+        let mut sign = self.next_sign()?;
+        if self.number > 1 && sign == b',' {
+            sign = self.next_sign()?;
+        } else if self.number > 1 && sign != b']' {
+            return Err(self.refuse(sign, "a comma or a closing bracket"));
+        }
+        match sign {
+            b'{' => self.read_object().map(|()| true),
+            b']' => {
+                self.has_ended = true;
+                self.element.clear();
+                let rest = self.input.find(|byte| !byte.as_ref().is_ok_and(u8::is_ascii_whitespace)).transpose();
+                let rest = rest.map_err(|error| self.fault(error))?;
+                rest.map_or(Ok(false), |byte| Err(self.refuse(byte, "the end of the file")))
+            }
+            other => Err(self.refuse(other, "an object")),
+        }
+    }
+
+    fn object(&self) -> &[u8] {
+        &self.element
+    }
+
+    fn number(&self) -> u64 {
+        self.number
+    }
+
+    fn place(number: u64) -> Place {
+        Place::Part(format!("element {number}"))
+    }
 }
 
 /// Value of a key.
@@ -68,26 +240,29 @@ enum Cell {
     Text(String),
 }
 
-/// Objects of a file, line by line.
-struct Objects {
+/// Objects of a file, one by one.
+struct Objects<T> {
     source: Source,
-    lines: Lines,
+    text: T,
+    /// Whether objects without a key of `track` hold no position.
+    is_trajnet: bool,
     header: Vec<String>,
     columns: HashMap<String, usize>,
     cells: Vec<Cell>,
     flat: Vec<(String, Cell)>,
-    /// Lists of objects in the line, and their lengths above 0.
+    /// Lists of objects in the object, and their lengths above 0.
     lists: Vec<(String, usize)>,
-    /// Lists of objects with changing length, and the line of the first change.
+    /// Lists of objects with changing length, and the number of the object with the first change.
     uneven: BTreeMap<String, u64>,
 }
 
-impl Objects {
-    /// Opens a file and collects the keys of all lines.
+impl<T: ObjectText> Objects<T> {
+    /// Opens a file and collects the keys of all objects.
     fn open(source: &Source) -> Result<Self, ReadError> {
         let mut objects = Self {
             source: source.clone(),
-            lines: Lines::new(source)?,
+            text: T::open(source)?,
+            is_trajnet: false,
             header: Vec::new(),
             columns: HashMap::new(),
             cells: Vec::new(),
@@ -96,10 +271,10 @@ impl Objects {
             uneven: BTreeMap::new(),
         };
         let mut lengths: HashMap<String, usize> = HashMap::new();
-        while objects.next_line()? {
+        while objects.next_object()? {
             for (list, length) in objects.lists.drain(..) {
                 if *lengths.entry(list.clone()).or_insert(length) != length {
-                    objects.uneven.entry(list).or_insert(objects.lines.number());
+                    objects.uneven.entry(list).or_insert(objects.text.number());
                 }
             }
             for (key, _) in &objects.flat {
@@ -109,32 +284,48 @@ impl Objects {
                 if objects.header.len() == MOST_COLUMNS {
                     let problem = format!("its objects have more than {MOST_COLUMNS} different keys");
                     let remedy = "write one object per vehicle and time, with the same keys in all";
-                    return Err(
-                        Fault::coded("recording/field-count", problem, remedy).at(Place::Line(objects.lines.number()))
-                    );
+                    let fault = Fault::coded("recording/field-count", problem, remedy);
+                    return Err(fault.at(T::place(objects.text.number())));
                 }
                 objects.columns.insert(key.clone(), objects.header.len());
                 objects.header.push(key.clone());
             }
         }
-        if objects.header.is_empty() { Err(Fault::Empty.into()) } else { Ok(objects) }
+        if objects.header.is_empty() {
+            return Err(Fault::Empty.into());
+        }
+        objects.rename_trajnet();
+        Ok(objects)
     }
 
-    /// Moves to the next line that is not blank, and flattens its object.
-    fn next_line(&mut self) -> Result<bool, ReadError> {
-        self.flat.clear();
-        self.lists.clear();
-        while self.lines.advance()? {
-            let line = self.lines.line().trim_ascii();
-            if line.is_empty() {
-                continue;
-            }
-            let (flat, lists) = (&mut self.flat, &mut self.lists);
-            return take_apart(line, flat, lists)
-                .map(|()| true)
-                .map_err(|fault| fault.at(Place::Line(self.lines.number())));
+    /// Names the columns of `TrajNet++` like those of other tables.
+    fn rename_trajnet(&mut self) {
+        self.is_trajnet = TRAJNET.iter().all(|(key, _)| self.columns.contains_key(*key));
+        if !self.is_trajnet {
+            return;
         }
-        Ok(false)
+        self.header.retain(|key| !key.starts_with("scene."));
+        self.columns = self.header.iter().enumerate().map(|(column, key)| (key.clone(), column)).collect();
+        for name in &mut self.header {
+            let known = TRAJNET.iter().find(|(key, _)| key == name).map(|(_, column)| *column);
+            *name = known.unwrap_or(name.strip_prefix("track.").unwrap_or(name)).to_owned();
+        }
+    }
+
+    /// Moves to the next object and flattens it.
+    fn next_object(&mut self) -> Result<bool, ReadError> {
+        loop {
+            self.flat.clear();
+            self.lists.clear();
+            if !self.text.advance()? {
+                return Ok(false);
+            }
+            take_apart(self.text.object(), &mut self.flat, &mut self.lists)
+                .map_err(|fault| fault.at(T::place(self.text.number())))?;
+            if !self.is_trajnet || self.flat.iter().any(|(key, _)| key.starts_with("track.")) {
+                return Ok(true);
+            }
+        }
     }
 }
 
@@ -252,20 +443,20 @@ impl<'de> Visitor<'de> for Flat<'_> {
     }
 }
 
-impl Cells for Objects {
+impl<T: ObjectText> Cells for Objects<T> {
     fn header(&self) -> &[String] {
         &self.header
     }
 
     fn restart(&mut self, _columns: &[usize], _all: bool) -> Result<(), ReadError> {
-        self.lines = Lines::new(&self.source)?;
+        self.text = T::open(&self.source)?;
         Ok(())
     }
 
     fn advance(&mut self) -> Result<bool, ReadError> {
         self.cells.clear();
         self.cells.resize(self.header.len(), Cell::Empty);
-        let more = self.next_line()?;
+        let more = self.next_object()?;
         for (key, cell) in self.flat.drain(..) {
             if let Some(&column) = self.columns.get(&key) {
                 self.cells[column] = cell;
@@ -275,11 +466,11 @@ impl Cells for Objects {
     }
 
     fn row(&self) -> u64 {
-        self.lines.number()
+        self.text.number()
     }
 
     fn place(row: u64) -> Place {
-        Place::Line(row)
+        T::place(row)
     }
 
     fn text(&self, column: usize) -> Result<Cow<'_, str>, Fault> {

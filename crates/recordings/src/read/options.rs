@@ -178,6 +178,29 @@ impl Duplicates {
     }
 }
 
+/// Clock of the messages of a recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MessageClock {
+    /// Stamps in the messages.
+    Stamp,
+    /// Times at which the recorder logged the messages.
+    Log,
+}
+
+impl MessageClock {
+    /// All variants.
+    pub const ALL: [Self; 2] = [Self::Stamp, Self::Log];
+
+    /// Returns the name for `--clock`.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Stamp => "stamp",
+            Self::Log => "log",
+        }
+    }
+}
+
 /// Names of columns given by the user, one per role of [`ColumnNames::ROLES`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct ColumnNames([Option<String>; 12]);
@@ -226,6 +249,12 @@ pub struct ReadOptions {
     pub dimensions: Option<Dimensions>,
     /// Whether all rows of a table belong to one vehicle, whatever other columns it has.
     pub one_vehicle: bool,
+    /// Whether a row that lacks a coordinate is a row without a position; refused otherwise.
+    pub skip_incomplete: bool,
+    /// Whether vehicles with equal positions are different vehicles; refused otherwise.
+    pub distinct: bool,
+    /// Clock of messages; by default their stamps, or the log times if no message has a stamp.
+    pub clock: Option<MessageClock>,
     /// Whether the file is one of several of a recording, with a common origin and clock; set by
     /// [`open_joined`](super::open_joined).
     pub is_joined: bool,
@@ -321,6 +350,8 @@ impl ReadOptions {
                 "--fps and --time-scale",
                 "has a fixed unit of time",
             ),
+            (self.clock.is_some(), FormatOption::Clock, "--clock", "has no messages with log times"),
+            (self.skip_incomplete, FormatOption::Incomplete, "--skip-incomplete", "has no rows with empty cells"),
             (self.sort, FormatOption::Rows, "--sort", "holds curves in order of time"),
             (self.duplicates.is_some(), FormatOption::Rows, "--duplicates", "holds curves, not rows"),
             (self.dimensions.is_some(), FormatOption::Dimensions, "--dimensions", "defines the numbers of a vehicle"),

@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use nalgebra::Vector3;
+use tautline_core::fact::{Fact, FactKind, Source};
 
 use super::clock::{Probe, Stamp, TimeUnit, Timing};
 use super::error::{Fault, Place, ReadError, quoted};
 use super::options::{Duplicates, ReadOptions};
-use super::source::Source;
+use super::source::Source as File;
 use tautline_core::track::{Item, Metadata, Sample, Tracks};
 
 /// Longest step between two positions on the Earth that is accepted at any speed \[m\].
@@ -28,6 +29,10 @@ pub(super) struct RecordingInfo {
     pub(super) unit: Option<TimeUnit>,
     /// Number of time units per second, if given by the user.
     pub(super) times_per_second: Option<f64>,
+    /// Whether the user gives the unit of the times.
+    pub(super) is_unit_given: bool,
+    /// Whether a column of the file gives the unit of the times; else the format defines it.
+    pub(super) is_unit_in_file: bool,
     /// Epoch of the times according to the file \[ns\].
     pub(super) epoch_ns: i64,
     /// Metres per unit of length.
@@ -46,7 +51,7 @@ impl RecordingInfo {
     /// Returns the properties for these options. The unit of the user takes precedence over `file_unit`, the unit of
     /// the file.
     pub(super) fn new(
-        source: &Source,
+        source: &File,
         options: &ReadOptions,
         file_unit: Option<TimeUnit>,
         notes: Vec<String>,
@@ -57,6 +62,8 @@ impl RecordingInfo {
             path: source.display_path(),
             unit,
             times_per_second: options.times_per_second,
+            is_unit_given: options.time_unit.is_some() || options.times_per_second.is_some(),
+            is_unit_in_file: false,
             epoch_ns: 0,
             scale: options.metres(),
             sort: options.sort,
@@ -117,10 +124,12 @@ impl<R: Rows> Ordered<R> {
         let settled = || Timing::settle(&probe, info.unit);
         let (mut timing, note) = info.times_per_second.map_or_else(settled, |rate| (Timing::given(rate), None));
         timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(info.epoch_ns);
+        rows.settle_clock(timing.per_second());
         metadata.notes.extend(note);
         // After a survey, notes and the assumption cover all rows.
         metadata.assumed = rows.assumed();
         metadata.notes.extend(rows.notes());
+        metadata.facts.extend(rows.facts());
         if !rows.is_wide() {
             rows.settle_names();
             rows.rewind()?;
@@ -136,6 +145,19 @@ impl<R: Rows> Ordered<R> {
             metadata.notes.push("rows were not in order of time and were sorted".to_owned());
         }
         metadata.clock = timing.clock.clone();
+        let source = if info.is_unit_given {
+            Source::Declared
+        } else if timing.clock.inferred {
+            Source::Inferred
+        } else if info.is_unit_in_file {
+            Source::Deduced
+        } else {
+            Source::Convention
+        };
+        metadata.facts.push(match info.times_per_second {
+            Some(rate) => Fact::number(FactKind::TimeUnit, source, rate.recip(), "s"),
+            None => Fact::name(FactKind::TimeUnit, source, timing.clock.unit),
+        });
         let batch = first.into_iter();
         Ok(Self {
             info,
@@ -301,7 +323,11 @@ impl<R: Rows> Ordered<R> {
         }
         if items.len() == before && !self.finished {
             self.finished = true;
+            if let Some(fault) = self.rows.late_fault() {
+                return Err(fault.into());
+            }
             self.info.metadata.notes.extend(self.rows.late_notes());
+            self.info.metadata.facts.extend(self.rows.late_facts());
         }
         Ok(items.len() > before)
     }
@@ -364,6 +390,24 @@ pub(super) trait Rows {
     fn late_notes(&self) -> Vec<String> {
         Vec::new()
     }
+
+    /// Facts that are known before the first row is returned.
+    fn facts(&self) -> Vec<Fact> {
+        Vec::new()
+    }
+
+    /// Facts that are known after all rows have been read.
+    fn late_facts(&self) -> Vec<Fact> {
+        Vec::new()
+    }
+
+    /// Fault that is known after all rows have been read.
+    fn late_fault(&self) -> Option<Fault> {
+        None
+    }
+
+    /// Receives the number of time units per second.
+    fn settle_clock(&mut self, _per_second: f64) {}
 
     /// Assumption that the positions and their times rest on, if there is one.
     fn assumed(&self) -> Option<String> {

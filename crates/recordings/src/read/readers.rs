@@ -66,13 +66,15 @@ pub(super) enum FormatOption {
     Topics,
     Axes,
     OneVehicle,
+    Incomplete,
+    Clock,
     Unfinished,
 }
 
 impl FormatOption {
     /// Options of tables with named columns.
     pub(super) const TABLE: &'static [Self] =
-        &[Self::TimeUnit, Self::Rows, Self::Columns, Self::Origin, Self::Axes, Self::OneVehicle];
+        &[Self::TimeUnit, Self::Rows, Self::Columns, Self::Origin, Self::Axes, Self::OneVehicle, Self::Incomplete];
 }
 
 /// Packing in which a file of a format is read.
@@ -322,7 +324,7 @@ fn unsupported_text(text: &[u8]) -> Option<Fault> {
         b'<' if holds("<kml") => ("a KML file", EARTH),
         b'<' if holds("<html") || holds("<HTML") => ("a page of HTML", TABLE),
         b'<' => ("an XML file", TABLE),
-        b'[' => ("JSON, but not a Skybrush show", TABLE),
+        b'[' if !objects::is_array(text) => ("JSON, but neither a Skybrush show nor an array of objects", TABLE),
         _ => return None,
     };
     Some(Fault::coded("recording/unsupported-format", format!("it is {what}, which is not supported"), remedy))

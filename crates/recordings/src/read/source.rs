@@ -19,7 +19,7 @@ use super::error::{Fault, Place, ReadError, quoted, refuse};
 pub(super) const LINE_LIMIT_BYTES: usize = 8 * 1024 * 1024;
 
 /// Block size of reads \[bytes\].
-const BLOCK_BYTES: usize = 256 * 1024;
+pub(super) const BLOCK_BYTES: usize = 256 * 1024;
 
 /// First bytes of a gzip file.
 pub(super) const GZIP_MAGIC: [u8; 2] = [0x1f, 0x8b];

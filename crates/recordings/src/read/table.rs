@@ -4,7 +4,11 @@ use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
+use tautline_core::fact::{Fact, FactKind, Source};
 
+use super::agreement::FrameAgreement;
+use super::aviation::ClimbMonitor;
+use super::axes::Axes;
 use super::clock::{Date, Probe, Stamp, TimeUnit};
 use super::earth::{LocalFrame, convert_to_local, is_no_fix, no_fixes, origin};
 use super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
@@ -12,7 +16,7 @@ use super::identity::{AlternativeId, Names, SuspectColumn, SwapMonitor};
 use super::layout::{Layout, VehicleColumns};
 use super::options::ReadOptions;
 use super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
-use super::source::Source;
+use super::source::Source as File;
 
 /// Number of vehicles, from the first on, whose rows are examined for several vehicles under one name.
 const MOST_SUSPECTED: usize = 256;
@@ -38,6 +42,17 @@ struct Table<C> {
     watches: Vec<SwapMonitor>,
     /// Number of positions whose vehicle is named by a column of a wide table.
     named: usize,
+    /// Comparison of heights with a vertical rate.
+    climb: Option<ClimbMonitor>,
+    /// Whether the user gives the unit of heights.
+    is_height_unit_given: bool,
+    /// Comparison with a second position on the Earth, and the axes of the first one in metres.
+    agreement: Option<(FrameAgreement, Axes)>,
+    /// Whether a row that lacks a coordinate has no position, and the number of such rows.
+    skips_incomplete: bool,
+    incomplete: u64,
+    /// Number of time units per second, once known.
+    per_second: f64,
     /// Number of rows without a fix, by vehicle.
     no_fixes: BTreeMap<usize, u64>,
     /// Vehicle of the last row.
@@ -48,7 +63,7 @@ struct Table<C> {
 
 /// Opens a table with these cells; `unit` is the unit of times if the format defines it.
 pub(super) fn open<C: Cells + 'static>(
-    source: &Source,
+    source: &File,
     mut cells: C,
     layout: Layout,
     unit: Option<TimeUnit>,
@@ -75,10 +90,27 @@ pub(super) fn open<C: Cells + 'static>(
     cells.restart(&layout.columns_to_observe(), true)?;
     // For places on the Earth the scale applies to heights only, and is part of the column factors.
     info.scale = if layout.on_earth { 1.0 } else { info.scale };
-    let has_own_clock = options.is_joined && layout.convention.counts_from_boot;
+    let counts_from_boot = layout.counts_from_boot;
+    let has_own_clock = options.is_joined && counts_from_boot;
+    info.is_unit_in_file = true;
+    info.metadata.facts.extend(layout.facts.iter().cloned());
+    info.metadata.facts.push(if counts_from_boot {
+        Fact::name(FactKind::Clock, Source::Default, "times since the start of each vehicle's computer")
+    } else {
+        Fact::name(FactKind::Clock, Source::Deduced, "one column")
+    });
     let alternative_ids = layout.alternative_ids.iter().copied().map(AlternativeId::new).collect();
     let watches = layout.slots.watched.iter().cloned().map(SwapMonitor::new).collect();
+    let climb = layout.rate.map(ClimbMonitor::new);
+    let agreement =
+        (!layout.second.is_empty()).then(|| (FrameAgreement::default(), options.turn().scaled([options.metres(); 3])));
     let table = Table {
+        climb,
+        is_height_unit_given: options.scale.is_some(),
+        agreement,
+        skips_incomplete: options.skip_incomplete,
+        incomplete: 0,
+        per_second: 1.0,
         cells,
         layout,
         names,
@@ -184,7 +216,15 @@ impl<C: Cells> Table<C> {
         let first = self.layout.id.map_or(Ok(0), |id| self.vehicle(id))?;
         for place in 0..self.layout.bodies.len() {
             let body = &self.layout.bodies[place];
-            let Some(mut row) = row(&self.cells, stamp, first + place, body, &self.layout.metres)? else { continue };
+            let found = row(&self.cells, stamp, first + place, body, &self.layout.metres, self.skips_incomplete)?;
+            let mut row = match found {
+                Found::Row(row) => row,
+                Found::Incomplete => {
+                    self.incomplete += 1;
+                    continue;
+                }
+                Found::Unseen => continue,
+            };
             if let Some(&id) = self.layout.slots.ids.get(place) {
                 row.vehicle = self.vehicle(id)?;
                 self.named += 1;
@@ -193,6 +233,7 @@ impl<C: Cells> Table<C> {
                 *self.no_fixes.entry(row.vehicle).or_default() += 1;
                 continue;
             }
+            self.compare(place, &row)?;
             if let Some(columns) = self.layout.convention.reference {
                 let valid = &self.layout.convention.valid;
                 if !convert_to_local(&self.cells, &mut row, (columns, valid), self.local, &mut self.row_frame)? {
@@ -217,6 +258,47 @@ impl<C: Cells> Table<C> {
             self.suspect(rows.last().filter(|row| row.place == self.cells.row()).copied())?;
         }
         Ok(())
+    }
+
+    /// Compares a position with the vertical rate and the second position of its row.
+    #[inline]
+    fn compare(&mut self, place: usize, row: &Row) -> Result<(), Fault> {
+        if let Some(climb) = &mut self.climb
+            && let Some(rate) = self.cells.number(climb.column).filter(|rate| rate.is_finite())
+        {
+            climb.observe(row.vehicle, row.stamp, row.position.z, rate);
+        }
+        let Some((agreement, axes)) = &mut self.agreement else { return Ok(()) };
+        let Some(second) = self.layout.second.get(place) else { return Ok(()) };
+        let mut there = Vector3::zeros();
+        for (axis, (column, unit)) in second.columns.iter().zip(second.units).enumerate() {
+            let Some(column) = *column else { continue };
+            match self.cells.number(column).filter(|number| number.is_finite()) {
+                Some(number) => there[axis] = number * unit,
+                None => return Ok(()),
+            }
+        }
+        let mut metric = axes.turn(row.position);
+        if second.columns[2].is_none() {
+            metric.z = 0.0;
+        }
+        if is_no_fix(&there) {
+            return Ok(());
+        }
+        let far_m = agreement.observe(row.vehicle, metric, there);
+        match far_m.zip(self.layout.compared(place)) {
+            None => Ok(()),
+            Some((far_m, compared)) => {
+                let name = self.names.all().get(row.vehicle).map_or("", String::as_str);
+                Err(compared.fault_of_row(self.cells.header(), name, far_m))
+            }
+        }
+    }
+
+    /// Returns the fault of heights that contradict the vertical rate.
+    fn contradicting_rate(&self) -> Option<Fault> {
+        let height = self.layout.bodies.first().and_then(|body| body.position[2])?;
+        self.climb.as_ref()?.fault(self.per_second, self.cells.header(), height)
     }
 
     /// Examines the unused columns in a row of a vehicle.
@@ -285,7 +367,17 @@ impl<C: Cells> Table<C> {
     }
 }
 
-/// Returns the row of a vehicle; `None` if it was not seen.
+/// Position of a vehicle in a row.
+enum Found {
+    Row(Row),
+    /// The vehicle was not seen: all cells are empty.
+    Unseen,
+    /// Some cells are empty.
+    Incomplete,
+}
+
+/// Returns the position of a vehicle in a row. A position or velocity with some empty cells is an error, unless
+/// `skips_incomplete` is set.
 #[inline]
 fn row(
     cells: &impl Cells,
@@ -293,8 +385,17 @@ fn row(
     vehicle: usize,
     body: &VehicleColumns,
     metres: &[f64],
-) -> Result<Option<Row>, Fault> {
-    let Some(position) = vector(cells, &body.position, metres)? else { return Ok(None) };
+    skips_incomplete: bool,
+) -> Result<Found, Fault> {
+    let is_incomplete = |columns: &[Option<usize>; 3]| {
+        let is_empty = |column: &usize| cells.text(*column).is_ok_and(|text| text.trim().is_empty());
+        let empty = columns.iter().flatten().filter(|column| is_empty(column)).count();
+        empty > 0 && empty < columns.iter().flatten().count()
+    };
+    if skips_incomplete && (is_incomplete(&body.position) || body.velocity.as_ref().is_some_and(is_incomplete)) {
+        return Ok(Found::Incomplete);
+    }
+    let Some(position) = vector(cells, &body.position, metres)? else { return Ok(Found::Unseen) };
     let velocity = body.velocity.as_ref().map(|columns| vector(cells, columns, metres)).transpose()?.flatten();
     let radius = match body.radius {
         Some(column) => number(cells, column)?.map(|radius| radius * metres[column]),
@@ -304,7 +405,7 @@ fn row(
         let problem = format!("column `{}` holds {radius}, a negative radius", cells.header()[column]);
         return refuse("recording/radius", problem, "write 0 or a positive number");
     }
-    Ok(Some(Row { stamp, place: cells.row(), vehicle, position, velocity, radius }))
+    Ok(Found::Row(Row { stamp, place: cells.row(), vehicle, position, velocity, radius }))
 }
 
 impl<C: Cells> Rows for Table<C> {
@@ -323,7 +424,9 @@ impl<C: Cells> Rows for Table<C> {
         self.count = 0;
         self.no_fixes.clear();
         self.suspects.clear();
-        self.named = 0;
+        (self.named, self.incomplete) = (0, 0);
+        self.climb.iter_mut().for_each(ClimbMonitor::rewind);
+        self.agreement.iter_mut().for_each(|(agreement, _)| agreement.rewind());
         self.cells.restart(&self.layout.columns_to_observe(), true)
     }
 
@@ -340,7 +443,33 @@ impl<C: Cells> Rows for Table<C> {
         let names = self.no_fixes.keys().filter_map(|&vehicle| self.names.all().get(vehicle));
         let mut of: Vec<_> = names.take(LISTED).map(|name| quoted(name)).collect();
         of.extend((self.no_fixes.len() > LISTED).then(|| "...".to_owned()));
-        no_fixes(self.no_fixes.values().sum(), &format!(" of {}", of.join(", "))).into_iter().collect()
+        let vehicles = format!(" of {}", of.join(", "));
+        let mut notes: Vec<_> = no_fixes(self.no_fixes.values().sum(), &vehicles).into_iter().collect();
+        if self.incomplete > 0 {
+            notes.push(format!("positions omitted because one of their coordinates is empty: {}", self.incomplete));
+        }
+        if let Some(fault) = self.contradicting_rate().filter(|_| self.is_height_unit_given) {
+            notes.push(format!("the given unit of heights is used, but {fault}"));
+        }
+        notes
+    }
+
+    fn late_facts(&self) -> Vec<Fact> {
+        let incomplete = Fact::number(FactKind::Rows, Source::Declared, self.incomplete as f64, "incomplete");
+        (self.incomplete > 0).then_some(incomplete).into_iter().collect()
+    }
+
+    /// Returns the fault of heights or positions that contradict other columns of the table.
+    fn late_fault(&self) -> Option<Fault> {
+        let of_heights = self.contradicting_rate().filter(|_| !self.is_height_unit_given);
+        of_heights.or_else(|| {
+            let (agreement, _) = self.agreement.as_ref()?;
+            agreement.fault(self.names.all(), self.cells.header(), &self.layout.compared(0)?)
+        })
+    }
+
+    fn settle_clock(&mut self, per_second: f64) {
+        self.per_second = per_second;
     }
 
     fn place(&self, number: u64) -> Place {
@@ -352,7 +481,9 @@ impl<C: Cells> Rows for Table<C> {
     }
 
     fn assumed(&self) -> Option<String> {
-        self.has_own_clock.then(|| "the clocks of all vehicles started together".to_owned())
+        // After a survey all names of a long table are known.
+        let is_of_several = self.layout.counts_from_boot && self.names.all().len() > 1;
+        (self.has_own_clock || is_of_several).then(|| "the clocks of all vehicles started together".to_owned())
     }
 
     /// Reads only times and names, which is several times faster.
@@ -467,6 +598,6 @@ pub(super) fn vector(
     match missing {
         None => Ok(Some(vector)),
         Some(_) if !filled => Ok(None),
-        Some(column) => Err(empty(cells, column)),
+        Some(column) => Err(Fault::empty_coordinate(&cells.header()[column])),
     }
 }

@@ -15,6 +15,7 @@ use std::io::{BufReader, Read};
 use std::str;
 
 use nalgebra::Vector3;
+use tautline_core::fact::{self, Fact, FactKind};
 
 use super::axes;
 use super::clock::{Stamp, TimeUnit};
@@ -90,6 +91,13 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let none = Fault::coded("recording/empty", "it holds no position", "record again");
     let mut info = RecordingInfo::new(source, options, Some(TimeUnit::Microseconds), notes, none);
     info.metadata.earth_origin = Some(local.measured_from(options.origin));
+    let of_clock = if log.boot_us.is_some() { fact::Source::Recorded } else { fact::Source::Default };
+    info.metadata.facts = vec![
+        Fact::name(FactKind::Clock, of_clock, clock),
+        Fact::name(FactKind::Identity, fact::Source::Convention, "one vehicle, named after the file"),
+        Fact::name(FactKind::HeightUnit, fact::Source::Convention, "m"),
+        Fact::name(FactKind::HeightReference, fact::Source::Convention, "sea level"),
+    ];
     let assumed = options.is_joined.then(|| assumed.to_owned());
     let rows = Positions { names: vec![source.stem()], rows: rows.into_iter(), assumed };
     Ok(Box::new(Ordered::open(rows, info)?))

@@ -135,7 +135,7 @@ fn end_of_every_curve_is_sampled() {
     let curves = folder.path().join("curves");
     fs::create_dir(&curves).expect("a folder");
     fs::write(curves.join("cf1.csv"), PARABOLA).expect("written");
-    fs::write(curves.join("cf2.csv"), PARABOLA.replace("\n2,", "\n1.75,")).expect("written");
+    fs::write(curves.join("cf2.csv"), PARABOLA.replace("\n2,1,", "\n1.75,9,")).expect("written");
     let target = folder.path().join("target.csv");
     export(&curves, &target, Format::CSV, &ExportOptions { sample_hz: Some(0.8) }).expect("exported");
     let whole = whole(&target);

@@ -76,6 +76,17 @@ const EARTH: &str =
     "t,id,lat,lon,alt,radius\n0,a,47.3,8.5,400,0.1\n0,b,47.300001,-179.9,401,\n1,a,47.301,8.5,400,0.1\n";
 const JSONL: &str =
     "{\"t\": 0, \"id\": \"a\", \"pos\": [1, 2, 3]}\n{\"t\": 1.5, \"id\": 7, \"pos\": [1, 2, 3.5], \"q\": null}\n";
+const ARRAY: &str =
+    "[{\"t\": 0, \"id\": \"a}\", \"x\": 1, \"y\": 2},\n {\"t\": 1, \"id\": \"b\", \"x\": 1, \"y\": 2}]\n";
+const SCENES: &str = concat!(
+    "{\"scene\": {\"id\": 0, \"p\": 1, \"s\": 1, \"e\": 3, \"fps\": 2.5}}\n",
+    "{\"track\": {\"f\": 1, \"p\": 1, \"x\": 1, \"y\": 2}}\n",
+    "{\"track\": {\"f\": 3, \"p\": 1, \"x\": 1, \"y\": 3}}\n",
+);
+const COMPARED: &str = concat!(
+    "t,id,x,y,z,lat,lon,alt,climb\n",
+    "0,a,1,2,3,47,8,403,1\n0,b,1,3,3,47.000009,8,403,\n1,a,1,2,4,47,8,404,1\n1,b,1,3,3,,8,403,0\n",
+);
 const PX4: &str = "timestamp,x,y,z,ref_lat,ref_lon,ref_alt,xy_valid\n0,1,2,-3,47,8,400,1\n20000,1,2,-3,nan,8,400,1\n";
 const SPLIT: &str = "sec,nanosec,id,north,east,down\ns,ns,-,m,m,m\n1,5,a,1,2,3\n1,999999999,a,1,2,4\n";
 const DATES: &str = "time,id,x,y\n2023-11-14T22:13:20.5Z,a,1,2\n2023-11-14 23:13:21+01:00,a,1,2\n";
@@ -125,6 +136,9 @@ fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         ("npz", exported(export::Format::NPZ)),
         ("mcap", exported(export::Format::MCAP)),
         ("jsonl", JSONL.into()),
+        ("array", ARRAY.into()),
+        ("scenes", SCENES.into()),
+        ("compared", COMPARED.into()),
         ("px4", PX4.into()),
         ("split", SPLIT.into()),
         ("dates", DATES.into()),
@@ -146,7 +160,7 @@ fn options_of(seed: &str) -> ReadOptions {
     let is_mcap = ["mcap", "planned", "foreign", "zstd", "frames", "metadata.yaml", "bag_0.mcap", "bag_1.mcap.zstd"]
         .contains(&seed);
     let frame = (seed == "frames").then(|| "map".to_owned());
-    let times_per_second = (seed == "trajnet").then_some(30.0);
+    let times_per_second = ["trajnet", "scenes"].contains(&seed).then_some(30.0);
     ReadOptions { frame, times_per_second, allow_unfinished: is_mcap, ..ReadOptions::default() }
 }
 

@@ -14,6 +14,7 @@ mod data_sets;
 mod drones;
 mod earth;
 mod exports;
+mod facts;
 mod formats;
 mod fuzz;
 mod heights;

@@ -91,7 +91,8 @@ fn seekable_formats_may_be_packed() {
         let bytes = fs::read(&exported).expect("read");
         let archive = folder.path().join("flight.zip");
         fs::write(&archive, zipped(&[("a.csv", A.as_bytes()), (name, &bytes)])).expect("written");
-        let found = whole(&archive).expect(name);
+        let distinct = ReadOptions { distinct: true, ..ReadOptions::default() };
+        let found = Whole::read(&archive, &distinct).expect(name);
         let samples = found.samples();
         let of =
             |vehicle: &'static str| samples.iter().filter(move |sample| sample.1 == vehicle).map(|&(t, _, x)| (t, x));
@@ -207,7 +208,7 @@ fn unsupported_formats_have_a_remedy() {
         (b"<?xml version=\"1.0\"?>\n<kml xmlns=\"x\">", "KML", "lat,lon,alt"),
         (b"  <?xml version=\"1.0\"?><flight/>", "XML", "t,id,x,y,z"),
         (b"{\"type\": \"FeatureCollection\", \"features\": []}", "not a Skybrush show", "t,id,x,y,z"),
-        (b"[{\"t\": 0, \"x\": 1}]", "not a Skybrush show", "t,id,x,y,z"),
+        (b"[[0, 1, 2]]", "neither a Skybrush show nor an array of objects", "t,id,x,y,z"),
         (b"\x89HDF\r\n\x1a\n\0", "HDF5", "numpy.savez"),
         (b"7z\xbc\xaf\x27\x1c\0\x04", "7z archive", "give the folder"),
         (&[&[b'a'; 257][..], b"ustar\x0000"].concat(), "tar archive", "give the folder"),

@@ -1,12 +1,13 @@
 //! Reads MCAP recordings of other programs: consecutive files, and poses transformed to one frame.
 
 use nalgebra::{Point3, Vector3};
+use tautline_core::fact::{self, Fact, FactKind};
 
 use super::super::clock::{Stamp, TimeUnit};
 use super::super::earth::{is_no_fix, no_fixes};
 use super::super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
 use super::super::identity::Names;
-use super::super::options::{Duplicates, ReadOptions};
+use super::super::options::{Duplicates, MessageClock, ReadOptions};
 use super::super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
 use super::super::source::Source;
 use super::messages::{EARTH, Observation, PoseKind, VehicleKey, is_list, reader_of_topic};
@@ -101,6 +102,10 @@ impl Rows for ForeignRows {
 
     fn assumed(&self) -> Option<String> {
         self.poses.assumed()
+    }
+
+    fn facts(&self) -> Vec<Fact> {
+        self.poses.facts()
     }
 
     fn place(&self, number: u64) -> Place {
@@ -249,7 +254,7 @@ impl Poses {
 
     fn append(&mut self, observation: Observation, message: &Message<'_>, rows: &mut Vec<Row>) -> Result<(), Fault> {
         let topic = &message.of.topic;
-        let time_ns = self.plan.time_of(topic, observation.stamp_ns, message.log_ns);
+        let time_ns = self.plan.time_of(observation.stamp_ns, message.log_ns);
         if let PoseKind::Transform(turn) = observation.kind {
             return if is_static(topic) {
                 Ok(())
@@ -356,9 +361,23 @@ impl Poses {
         Ok(())
     }
 
-    /// Returns the assumption behind interpolated transforms, if there are any.
+    /// Returns the assumption behind log times and interpolated transforms, if there are any.
     pub(super) fn assumed(&self) -> Option<String> {
-        (self.conversions.interpolated > 0).then(|| "transforms uniform between their samples".to_owned())
+        let log_times = (self.plan.clock == MessageClock::Log).then_some("positions at their times of logging");
+        let transforms = (self.conversions.interpolated > 0).then_some("transforms uniform between their samples");
+        let all: Vec<_> = log_times.into_iter().chain(transforms).collect();
+        (!all.is_empty()).then(|| all.join(", "))
+    }
+
+    /// Returns the facts on clock, vehicles and frame.
+    pub(super) fn facts(&self) -> Vec<Fact> {
+        let mut facts = self.plan.facts();
+        if let Some((frame, _)) = &self.frame
+            && frame != EARTH
+        {
+            facts.push(Fact::name(FactKind::Frame, fact::Source::Recorded, frame));
+        }
+        facts
     }
 
     /// Returns the notes for the user.

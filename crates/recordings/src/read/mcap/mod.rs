@@ -10,10 +10,12 @@
 //! | `traj_utils/msg/Bspline`, `traj_utils/msg/MINCOTraj`, `traj_utils/msg/PolyTraj` | cdr | the number of the drone |
 //! | `foxglove.PoseInFrame`, `geometry_msgs/msg/PoseStamped`, `PoseWithCovarianceStamped`, `PointStamped`, `nav_msgs/msg/Odometry`, `sensor_msgs/msg/NavSatFix` | the same | the topic |
 //!
-//! Times are those in the messages, or the log times if no message of a topic has one. All positions must be in one
-//! frame, or be transformed to it. A file that was not closed is refused, unless the user accepts its complete part.
+//! Times are those in the messages, or the log times if no message has one. All sources must have one clock. All
+//! positions must be in one frame, or be transformed to it. A file that was not closed is refused, unless the user
+//! accepts its complete part.
 
 pub(super) mod bag;
+mod clocks;
 mod foreign;
 mod messages;
 mod outline;
@@ -50,6 +52,7 @@ pub(in crate::read) const READER: Reader = Reader {
         FormatOption::Origin,
         FormatOption::Frame,
         FormatOption::Topics,
+        FormatOption::Clock,
         FormatOption::Axes,
         FormatOption::Unfinished,
     ],
@@ -91,7 +94,11 @@ pub(super) fn open_run(path: &Path) -> Option<McapRecording> {
 /// Opens a recording by its first known schema.
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut topics = TopicReader::open(&source.path)?;
-    match origin(&mut topics)? {
+    let origin = origin(&mut topics)?;
+    if options.clock.is_some() && matches!(origin, Some(Origin::Run | Origin::Export)) {
+        return refuse("recording/unused-option", "it is a recording of tautline, which has one clock", "omit --clock");
+    }
+    match origin {
         Some(Origin::Run) => return own::open_samples(source, options),
         Some(Origin::Export) => return own::open_export(source, options),
         Some(Origin::Foreign) => {

@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use super::super::earth::is_no_fix;
 use super::super::error::{Fault, Place, ReadError, quoted, refuse};
 use super::super::heading::Words;
+use super::clocks::Clocks;
 use super::foreign::SplitFiles;
 use super::messages::{EARTH, FIXES, Observation, PoseKind, VehicleKey, is_of_transforms, reader_of_topic};
 use super::planned;
@@ -48,8 +49,8 @@ pub(super) struct Outline {
     unread: BTreeSet<String>,
     /// Topics of moving transforms.
     transforms: BTreeSet<String>,
-    /// Topics with a message that has a time.
-    pub(super) stamped: BTreeSet<String>,
+    /// Stamps and log times of all sources of positions.
+    pub(super) clocks: Clocks,
     /// Topics with curves of planners that are read.
     pub(super) curves: BTreeSet<String>,
     /// First position on the Earth \[degrees, m\].
@@ -78,13 +79,31 @@ impl Outline {
                 outline.unread.insert(message.of.topic.clone());
             }
             let all = outline.observations_in(&message, &mut number)?;
+            outline.observe_stamps(&message, &all);
             let listed = all.iter().filter(|observation| matches!(observation.vehicle, VehicleKey::Listed(_))).count();
             let learnt = outline
                 .count(&message, listed)
                 .and_then(|()| all.into_iter().try_for_each(|observation| outline.learn(&message, observation)));
             learnt.map_err(|fault| fault.at(place(number, &message)))
         })?;
+        outline.clocks.close_window();
         Ok(outline)
+    }
+
+    /// Records the stamps of a message. All poses of one message have one stamp, unless they are transforms.
+    fn observe_stamps(&mut self, message: &Message<'_>, all: &[Observation]) {
+        let topic = &message.of.topic;
+        if is_static(topic) {
+            return;
+        }
+        for observation in all {
+            match (&observation.kind, &observation.vehicle) {
+                (PoseKind::Transform(_), VehicleKey::Named(child)) => {
+                    self.clocks.observe(topic, child, message.log_ns, observation.stamp_ns);
+                }
+                _ => return self.clocks.observe(topic, "", message.log_ns, observation.stamp_ns),
+            }
+        }
     }
 
     /// Returns whether the messages of a topic are read: transforms are always read, because frames may require them.
@@ -131,9 +150,6 @@ impl Outline {
 
     fn learn(&mut self, message: &Message<'_>, observation: Observation) -> Result<(), Fault> {
         let topic = &message.of.topic;
-        if observation.stamp_ns != 0 && !self.stamped.contains(topic) {
-            self.stamped.insert(topic.clone());
-        }
         if let (PoseKind::Transform(turn), VehicleKey::Named(child)) = (&observation.kind, &observation.vehicle) {
             let fixed_pose = is_static(topic).then_some(FramePose { position: observation.position, turn: *turn });
             if fixed_pose.is_none() && !self.transforms.contains(topic) {
@@ -208,6 +224,7 @@ impl Outline {
             let remedy = if is_chosen { "name only one of the two with --topic" } else { CHOOSE };
             Fault::coded("recording/ambiguous-topics", problem, remedy)
         };
+        let called = |space: &str| if space.is_empty() { "the same robot".to_owned() } else { quoted(space) };
         let (mut named, mut robots) = (BTreeMap::new(), BTreeMap::new());
         for (topic, described) in &self.topics {
             for name in &described.names {
@@ -216,6 +233,15 @@ impl Outline {
                 }
             }
         }
+        let mut lists = BTreeMap::new();
+        for (topic, described) in self.topics.iter().filter(|_| !is_chosen) {
+            if described.listed > 0
+                && let Some(first) = lists.insert(robot_of(topic), topic)
+            {
+                return Err(twice(first, topic, "the same vehicles"));
+            }
+        }
+        let mut whole_names: Vec<(Vec<String>, &String)> = Vec::new();
         for (topic, described) in self.topics.iter().filter(|(_, described)| described.is_vehicle) {
             if let Some((name, first)) = topic.rsplit('/').take(2).find_map(|part| named.get_key_value(part)) {
                 return Err(twice(first, topic, &quoted(name)));
@@ -223,13 +249,21 @@ impl Outline {
             if is_chosen {
                 continue;
             }
-            let robot = namespace(topic);
-            let (first, schema) = *robots.entry(robot).or_insert((topic, &described.schema));
+            let (robot, own_namespace) = (robot_of(topic), namespace(topic));
+            let is_same = |(other, first): &&(Vec<String>, &String)| {
+                let is_part = other.starts_with(&robot) || robot.starts_with(other);
+                // In a namespace with a name, `/a/pose` is the robot `a`, and `/a/camera` belongs to it.
+                *other == robot || (is_part && namespace(first) == own_namespace)
+            };
+            if let Some((_, first)) = whole_names.iter().find(is_same) {
+                return Err(twice(first, topic, &called(own_namespace)));
+            }
+            whole_names.push((robot, topic));
+            let (first, schema) = *robots.entry(own_namespace).or_insert((topic, &described.schema));
             if *schema != described.schema
                 || (first != topic && [first, topic].iter().any(|topic| is_setpoint(last(topic))))
             {
-                let vehicle = if robot.is_empty() { "the same robot".to_owned() } else { quoted(robot) };
-                return Err(twice(first, topic, &vehicle));
+                return Err(twice(first, topic, &called(own_namespace)));
             }
         }
         Ok(())
@@ -321,6 +355,24 @@ const SETPOINT_WORDS: Words = Words(
      reference setpoint sp target waypoint wp",
 );
 
+/// Words in names of topics that describe a measurement and no vehicle: quantities, their processing, sensors and
+/// programs.
+const MEASUREMENT_WORDS: Words = Words(concat!(
+    "pose poses odom odometry pos position positions loc location locations coord coordinates point ",
+    "points state states transform transforms fix fixes gps gnss navsat rtk global local ",
+    "raw unfiltered filter filtered fused fusion estimate estimated estimates estimator est estimation measured ",
+    "measurement measurements smooth smoothed corrected interpolated cov covariance with stamped current latest truth ",
+    "ground gt true data msg msgs message info topic out output mavros fmu ",
+    "px4 vicon mocap optitrack qualisys motive natnet vrpn ekf ekf2 ukf kf amcl ",
+    "slam vio vins mapping localization localizer localisation self sensor enu ned",
+));
+
+/// Returns the words of a topic that may name a robot: `cf1` of `/cf1/pose_raw` and of `/mocap/cf1`.
+fn robot_of(topic: &str) -> Vec<String> {
+    let words = words(topic);
+    words.split(' ').filter(|word| !word.is_empty() && !MEASUREMENT_WORDS.contains(word)).map(str::to_owned).collect()
+}
+
 /// Returns whether a topic holds constant transforms.
 pub(super) fn is_static(topic: &str) -> bool {
     last(topic) == "tf_static"
@@ -378,7 +430,23 @@ mod tests {
 
 #[cfg(test)]
 mod topic_name_tests {
-    use super::is_setpoint;
+    use super::{is_setpoint, robot_of};
+
+    #[test]
+    fn robots_are_recognised_in_the_names_of_topics() {
+        for (topic, robot) in [
+            ("/a/pose", "a"),
+            ("/a/pose_raw", "a"),
+            ("/uav1/mavros/local_position/pose", "uav1"),
+            ("/uav1/ground_truth/pose", "uav1"),
+            ("/mocap/cf1", "cf1"),
+            ("/swarm/alphaPose", "swarm alpha"),
+            ("/swarm/pose1", "swarm pose1"),
+            ("/amcl_pose", ""),
+        ] {
+            assert_eq!(robot_of(topic).join(" "), robot, "{topic}");
+        }
+    }
 
     #[test]
     fn setpoint_topics_are_recognised_by_name() {

@@ -22,6 +22,7 @@ use super::super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
 use super::super::source::Source;
 use crate::mcap::topic::{Message, Part, Topic, TopicReader, decode};
 use crate::mcap::{CHANNEL_SCHEMA, ChannelMessage, Entry, McapRecording, SWARM_SCHEMA};
+use tautline_core::fact::{self, Fact, FactKind};
 use tautline_core::record::{Channel, ReadFault};
 
 /// Topic of the vehicle names.
@@ -226,7 +227,9 @@ pub(super) fn open_samples(source: &Source, options: &ReadOptions) -> Result<Rec
     let vehicles = recording.header().vehicles;
     let run = Run { recording, vehicles, names: Names::default(), samples: 0 };
     let none = Fault::coded("recording/empty", "it holds no sample", "record again");
-    let info = RecordingInfo::new(source, options, Some(TimeUnit::Seconds), notes, none);
+    let mut info = RecordingInfo::new(source, options, Some(TimeUnit::Seconds), notes, none);
+    info.metadata.facts.push(Fact::name(FactKind::Identity, fact::Source::Recorded, "numbers of the simulation"));
+    info.metadata.facts.push(Fact::name(FactKind::Clock, fact::Source::Recorded, "time of the simulation"));
     Ok(Box::new(Ordered::open(run, info)?))
 }
 

@@ -3,11 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Vector3};
+use tautline_core::fact::{Fact, FactKind, Source};
 
 use super::super::axes;
 use super::super::earth::LocalFrame;
 use super::super::error::{Fault, ReadError, quoted, refuse};
-use super::super::options::ReadOptions;
+use super::super::options::{MessageClock, ReadOptions};
 use super::foreign::SplitFiles;
 use super::messages::{EARTH, PoseKind, VehicleKey};
 use super::outline::{Outline, is_static, place, refuse_local_frames, space};
@@ -26,6 +27,9 @@ pub(super) struct ReadPlan {
     chains: BTreeMap<String, BTreeMap<String, Option<Chain>>>,
     /// Vehicles of the transforms, by namespace and driver.
     bodies: BTreeMap<String, BTreeMap<String, Vec<VehicleFrame>>>,
+    /// Clock of all positions.
+    pub(super) clock: MessageClock,
+    is_clock_given: bool,
     notes: Vec<String>,
 }
 
@@ -54,6 +58,8 @@ impl ReadPlan {
             earth: origin.map(LocalFrame::at).transpose()?,
             chains: BTreeMap::new(),
             bodies: BTreeMap::new(),
+            clock: MessageClock::Stamp,
+            is_clock_given: options.clock.is_some(),
             notes: Vec::new(),
             outline,
         };
@@ -73,6 +79,7 @@ impl ReadPlan {
             refuse_local_frames(plan.outline.given_in().chain(bodies))?;
         }
         let needed = plan.find_chains()?;
+        plan.clock = plan.decide_clock(&needed, options.clock)?;
         plan.gather(&needed, splits)?;
         Ok(plan)
     }
@@ -155,6 +162,25 @@ impl ReadPlan {
         Ok(needed)
     }
 
+    /// Decides which clock gives the times of all positions.
+    fn decide_clock(
+        &self,
+        needed: &BTreeMap<String, BTreeSet<String>>,
+        given: Option<MessageClock>,
+    ) -> Result<MessageClock, Fault> {
+        self.outline.clocks.decide(given, |topic, frame| {
+            if frame.is_empty() {
+                return self.outline.topics.contains_key(topic).then_some(true);
+            }
+            let space = space(topic);
+            if self.bodies_of(space, frame).is_some() {
+                return Some(true);
+            }
+            // Publishers of other frames may date their transforms forward.
+            needed.get(space).filter(|frames| frames.contains(frame)).map(|_| false)
+        })
+    }
+
     /// Stores the moving transforms that must be known at all times.
     fn gather(
         &mut self,
@@ -177,7 +203,7 @@ impl ReadPlan {
                 if is_static(topic) || !needed.get(space).is_some_and(|frames| frames.contains(&child)) {
                     continue;
                 }
-                let time_ns = self.time_of(topic, observation.stamp_ns, message.log_ns);
+                let time_ns = self.time_of(observation.stamp_ns, message.log_ns);
                 let placed = FramePose { position: observation.position, turn };
                 let tree = self.outline.trees.entry(space.to_owned()).or_default();
                 tree.store(&child, time_ns, &placed).map_err(|fault| fault.at(place(number, &message)))?;
@@ -190,9 +216,12 @@ impl ReadPlan {
         Ok(())
     }
 
-    /// Returns the time of a message \[ns\]. A stamp of 0 is valid on a topic with other stamps.
-    pub(super) fn time_of(&self, topic: &str, stamp_ns: i64, log_ns: u64) -> i64 {
-        if self.outline.stamped.contains(topic) { stamp_ns } else { i64::try_from(log_ns).unwrap_or(i64::MAX) }
+    /// Returns the time of a message \[ns\].
+    pub(super) fn time_of(&self, stamp_ns: i64, log_ns: u64) -> i64 {
+        match self.clock {
+            MessageClock::Stamp => stamp_ns,
+            MessageClock::Log => i64::try_from(log_ns).unwrap_or(i64::MAX),
+        }
     }
 
     /// Returns the vehicles whose poses follow from the transforms of a frame.
@@ -255,6 +284,27 @@ impl ReadPlan {
     /// Returns the local frame of places on the Earth, if these are read.
     pub(super) fn local(&self) -> Option<LocalFrame> {
         self.earth.filter(|_| self.target_frame.is_none())
+    }
+
+    /// Returns the facts on clock, vehicles, heights and the requested frame.
+    pub(super) fn facts(&self) -> Vec<Fact> {
+        let (clock, source) = match (self.clock, self.is_clock_given) {
+            (MessageClock::Stamp, false) => ("stamps of messages", Source::Recorded),
+            (MessageClock::Log, false) => ("log times, because no message has a stamp", Source::Deduced),
+            (MessageClock::Stamp, true) => ("stamps of messages", Source::Declared),
+            (MessageClock::Log, true) => ("log times", Source::Declared),
+        };
+        let source_of_names = if self.outline.named.is_empty() { Source::Deduced } else { Source::Declared };
+        let mut facts = vec![
+            Fact::name(FactKind::Clock, source, clock),
+            Fact::name(FactKind::Identity, source_of_names, "topics, and names in messages"),
+        ];
+        facts.extend(self.target_frame.as_ref().map(|frame| Fact::name(FactKind::Frame, Source::Declared, frame)));
+        if self.local().is_some() {
+            facts.push(Fact::name(FactKind::HeightUnit, Source::Convention, "m"));
+            facts.push(Fact::name(FactKind::HeightReference, Source::Convention, "ellipsoid"));
+        }
+        facts
     }
 
     /// Returns the notes for the user.

@@ -24,6 +24,7 @@ use super::foreign::SplitFiles;
 use super::messages::nanoseconds;
 use super::outline::Outline;
 use crate::mcap::topic::{CDR, Part as FilePart, decode};
+use tautline_core::fact::{self, Fact, FactKind};
 use tautline_core::text::counted;
 use tautline_core::track::{Clock, Item, Metadata};
 
@@ -63,6 +64,7 @@ pub(super) fn open(
     let unused = [
         (options.frame.is_some(), "--frame", "curves of planners name no frame"),
         (options.origin.is_some(), "--origin", "curves of planners have no place on the Earth"),
+        (options.clock.is_some(), "--clock", "curves of planners have their own times of start"),
         (options.sort, "--sort", "curves of planners are sorted by their starts"),
         (options.duplicates.is_some(), "--duplicates", "curves of planners are no rows"),
     ];
@@ -114,7 +116,11 @@ pub(super) fn open(
     }
     let vehicles = vehicles(&drones, epoch_ns, options.metres(), &mut notes)?;
     let clock = Clock { unit: "ns", epoch_ns, ..Clock::default() };
-    Ok(Some(Curves::with_metadata(vehicles, Metadata { clock, ..Metadata::in_seconds(notes) })))
+    let facts = vec![
+        Fact::name(FactKind::Clock, fact::Source::Recorded, "times of start in messages"),
+        Fact::name(FactKind::Identity, fact::Source::Deduced, "numbers of drones in messages"),
+    ];
+    Ok(Some(Curves::with_metadata(vehicles, Metadata { clock, facts, ..Metadata::in_seconds(notes) })))
 }
 
 /// Returns the names and the pieces of all drones, and adds notes on the ends of curves.

@@ -142,7 +142,7 @@ pub(super) fn check(request: &AuditRequest<'_>, settings: &Settings) -> Result<(
 /// Returns whether a file is read unchanged, in metres.
 fn is_read_plainly(options: &ReadOptions) -> bool {
     let is_moved = options.scale.is_some() || options.axes.is_some() || options.times_per_second.is_some();
-    let is_chosen = options.sort || options.one_vehicle || options.duplicates.is_some();
+    let is_chosen = options.sort || options.one_vehicle || options.skip_incomplete || options.duplicates.is_some();
     options.columns == ColumnNames::default() && !is_moved && !is_chosen
 }
 
