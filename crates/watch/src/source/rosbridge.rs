@@ -94,11 +94,22 @@ fn live_poses(message: &Value) -> Option<Vec<LivePose>> {
             return Some(Vec::new());
         }
         let place = json!({ "x": message["latitude"], "y": message["longitude"], "z": message["altitude"] });
-        return Some(vec![LivePose { is_on_earth: true, ..pose(&message["header"], &place, None, None)? }]);
+        let accuracy_m = fix_accuracy_m(message);
+        return Some(vec![LivePose { is_on_earth: true, accuracy_m, ..pose(&message["header"], &place, None, None)? }]);
     }
     let place = [&message["pose"]["pose"]["position"], &message["pose"]["position"], &message["point"]];
     let place = place.into_iter().find(|of| of.is_object())?;
     Some(vec![pose(&message["header"], place, None, None)?])
+}
+
+/// Returns the standard deviation of a fix \[m\], unless its covariance is unknown.
+fn fix_accuracy_m(message: &Value) -> Option<f64> {
+    let is_known = message["position_covariance_type"].as_u64().is_some_and(|kind| kind > 0);
+    let variances = [0, 4, 8].map(|k| message["position_covariance"][k].as_f64());
+    let [Some(east), Some(north), Some(up)] = variances.map(|of| of.filter(|of| is_known && *of > 0.0)) else {
+        return None;
+    };
+    Some((east + north + up).sqrt())
 }
 
 fn transform(of: &Value) -> Option<LivePose> {
@@ -118,6 +129,7 @@ fn pose(header: &Value, place: &Value, name: Option<String>, number: Option<usiz
         frame: header["frame_id"].as_str()?.to_owned(),
         stamp_ns: seconds.saturating_mul(1_000_000_000).saturating_add(nanoseconds),
         position: Vector3::new(axis("x")?, axis("y")?, axis("z")?),
+        accuracy_m: None,
         is_on_earth: false,
         is_transform: false,
     })

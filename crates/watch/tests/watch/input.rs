@@ -255,7 +255,7 @@ proptest! {
             }
             let pose = Pose {
                 t_s, id: ["a", "b", "c", ""][k], position_m: Vector3::new(x, y, 0.0),
-                velocity_m_s: (k > 0).then(|| Vector3::new(vx, vy, 0.0)),
+                velocity_m_s: (k > 0).then(|| Vector3::new(vx, vy, 0.0)), accuracy_m: None
             };
             monitor.take(&pose, arrival_s);
             let of = monitor.assess(arrival_s);

@@ -64,6 +64,8 @@ pub struct LivePose {
     pub stamp_ns: i64,
     /// Position \[m\]; latitude, longitude \[degrees\] and height \[m\] if `is_on_earth`.
     pub position: Vector3<f64>,
+    /// Standard deviation of the position \[m\], if the message has it.
+    pub accuracy_m: Option<f64>,
     /// Whether the position is a place on the Earth.
     pub is_on_earth: bool,
     /// Whether the position is a transform between two frames. Some frames are no vehicles.
@@ -82,6 +84,7 @@ pub fn has_live_poses(schema: &str, encoding: &str) -> bool {
 /// A sentence if the message is damaged or its schema is not read.
 pub fn live_poses(schema: &str, encoding: &str, bytes: &[u8]) -> Result<Vec<LivePose>, String> {
     let reader = reader_of(schema).ok_or_else(|| format!("messages of {schema} are not read"))?;
+    let accuracy_m = if schema == FIXES { fix_accuracy_m(encoding, bytes) } else { None };
     let live = |of: Observation| {
         let (name, number) = match of.vehicle {
             VehicleKey::Topic => (None, None),
@@ -96,6 +99,7 @@ pub fn live_poses(schema: &str, encoding: &str, bytes: &[u8]) -> Result<Vec<Live
             frame: of.frame,
             stamp_ns: of.stamp_ns,
             position: of.position,
+            accuracy_m,
             is_on_earth,
             is_transform,
         }
@@ -221,6 +225,13 @@ impl Fix {
         }
         vec![Observation { frame: EARTH.to_owned(), ..header.observation(VehicleKey::Topic, CdrPose(place, [0.0; 4])) }]
     }
+}
+
+/// Returns the standard deviation of a fix \[m\]; `None` if the covariance after its position is unknown.
+fn fix_accuracy_m(encoding: &str, bytes: &[u8]) -> Option<f64> {
+    let (_, covariance, kind): (Fix, [f64; 9], u8) = decode_ros(encoding, bytes).ok()?;
+    let variances = [covariance[0], covariance[4], covariance[8]];
+    (kind > 0 && variances.iter().all(|of| *of > 0.0)).then(|| variances.iter().sum::<f64>().sqrt())
 }
 
 fn decode_foxglove<T: prost::Message + Default + DeserializeOwned>(encoding: &str, bytes: &[u8]) -> Result<T, String> {
