@@ -330,13 +330,14 @@ impl Track {
         Some(measured)
     }
 
-    /// Returns the readings from which windows to a reading with sent velocities throughout begin.
+    /// Returns the readings from which windows to a reading with sent velocities throughout begin: the newest one, and
+    /// those within reach.
     fn windows<'a>(&'a self, mark: &'a Mark, bounds: Bounds) -> impl Iterator<Item = &'a Mark> {
         let balanced_s = 2.0 * mark.reading.position_error_m / bounds.velocity_error_m_s;
         // `max` also replaces the quotient of two zeros.
         let reach_s = balanced_s.max(SHORTEST_REACH_S).min(LONGEST_REACH_S);
-        let all = std::iter::once(&self.newest).chain(self.rings.iter().flat_map(Ring::iter));
-        all.filter(move |from| from.breaks == mark.breaks && mark.window_s(from) <= reach_s)
+        let marks = self.rings.iter().flat_map(Ring::iter).filter(move |from| mark.window_s(from) <= reach_s);
+        std::iter::once(&self.newest).chain(marks).filter(|from| from.breaks == mark.breaks)
     }
 
     fn agrees(&self, mark: &Mark, bounds: Bounds) -> bool {

@@ -145,15 +145,12 @@ impl Monitor {
     /// Takes a pose that is older than the newest one of its vehicle.
     fn take_late(&mut self, vehicle: u32, pose: &Pose<'_>) {
         let now_s = self.now_s;
+        self.fault_at(Fault::Reordered, Some(vehicle), now_s);
         let of = &mut self.vehicles[vehicle as usize];
         let late = of.history.late(pose.t_s);
-        if late.position_m == Some(pose.position_m) {
-            self.fault_at(Fault::Duplicate, Some(vehicle), now_s);
-            return;
-        }
-        let are_two = of.streams.take_late(late.gap_s, late.least_gap_s, now_s);
-        self.fault_at(Fault::Reordered, Some(vehicle), now_s);
-        if are_two {
+        // A copy by another link is no evidence of a second vehicle.
+        let is_copy = late.position_m == Some(pose.position_m);
+        if !is_copy && of.streams.take_late(late.gap_s, late.least_gap_s, now_s) {
             self.find_two_streams(vehicle);
         }
     }
