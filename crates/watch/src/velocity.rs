@@ -63,6 +63,8 @@ const LEVELS: usize = 5;
 const MARKS: usize = 8;
 /// Smallest time between two readings of each ring \[s\].
 const SPACINGS_S: [f64; LEVELS] = [0.01, 0.04, 0.16, 0.64, 2.56];
+/// Smallest length of a window that bounds a velocity \[s\].
+const LEAST_WINDOW_S: f64 = 1e-6;
 /// Smallest length to which windows reach \[s\].
 const SHORTEST_REACH_S: f64 = 1.0;
 /// Largest length to which windows reach \[s\].
@@ -165,13 +167,17 @@ impl Mark {
         1e-9 * (1.0 + self.reading.position_m.amax()) + speed_m_s * 4.0 * f64::EPSILON * self.reading.t_s.abs()
     }
 
-    /// Returns the velocities that the positions at both ends of a window allow at each of its ends.
-    fn quotient(&self, from: &Self, bounds: Bounds) -> Ball {
+    /// Returns the velocities that the positions at both ends of a window allow at each of its ends; `None` for a
+    /// window that is too short.
+    fn quotient(&self, from: &Self, bounds: Bounds) -> Option<Ball> {
         let window_s = self.window_s(from);
+        if window_s < LEAST_WINDOW_S {
+            return None;
+        }
         let centre = (self.reading.position_m - from.reading.position_m) / window_s;
         let errors_m = self.reading.position_error_m + from.reading.position_error_m;
         let rounding_m = self.rounding_m(centre.norm());
-        Ball { centre, radius: (errors_m + rounding_m) / window_s + bounds.accel_m_s2 * window_s / 2.0 }
+        Some(Ball { centre, radius: (errors_m + rounding_m) / window_s + bounds.accel_m_s2 * window_s / 2.0 })
     }
 
     /// Returns whether the sum of the sent velocities over a window agrees with the positions at its ends.
@@ -258,6 +264,18 @@ impl VelocityEnclosure {
     }
 }
 
+/// Two sets of velocities without a common one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Disjoint;
+
+/// Returns the common velocities of two sets. A set may be unknown.
+fn common(a: Option<Ball>, b: Option<Ball>) -> Result<Option<Ball>, Disjoint> {
+    match (a, b) {
+        (Some(a), Some(b)) => a.intersection(b).map(Some).ok_or(Disjoint),
+        (a, b) => Ok(a.or(b)),
+    }
+}
+
 fn sent(reading: &Reading, bounds: Bounds) -> Option<Ball> {
     reading.velocity_m_s.map(|centre| Ball { centre, radius: bounds.velocity_error_m_s })
 }
@@ -282,52 +300,45 @@ impl Track {
 
     fn take(&mut self, reading: Reading, bounds: Bounds) -> Option<Fault> {
         let mark = self.newest.next(reading);
-        let growth = bounds.accel_m_s2 * mark.window_s(&self.newest);
-        let Some(measured) = self.measure(&mark, bounds) else {
+        let Ok(measured) = self.measure(&mark, bounds) else {
             // Positions before a jump bound no velocity after it.
             self.restart(reading, bounds);
             return Some(Fault::OutOfBounds);
         };
         let agrees = self.agrees(&mark, bounds);
         let moves = self.moves_while_held(&mark, bounds);
-        let earlier = self.velocity.map(|of| of.grown(growth));
-        let combined = match (sent(&reading, bounds), earlier) {
-            (Some(sent), Some(earlier)) => match measured.intersection(sent) {
-                None => Err(Fault::VelocityDisagrees),
-                Some(both) => both.intersection(earlier).ok_or(Fault::OutOfBounds),
-            },
-            (Some(other), None) | (None, Some(other)) => measured.intersection(other).ok_or(Fault::VelocityDisagrees),
-            (None, None) => Ok(measured),
-        };
         let is_within = self.changes_within(&mark, bounds);
+        let earlier = self.velocity.map(|of| of.grown(bounds.accel_m_s2 * mark.window_s(&self.newest)));
+        let sent = sent(&reading, bounds);
         for (ring, spacing_s) in self.rings.iter_mut().zip(SPACINGS_S) {
             ring.push(mark, spacing_s);
         }
-        (self.newest, self.measured) = (mark, Some(measured));
-        let fault = match combined {
-            _ if !agrees || moves => Some(Fault::VelocityDisagrees),
-            Ok(_) if !is_within => Some(Fault::OutOfBounds),
-            Ok(_) => None,
-            Err(fault) => Some(fault),
+        (self.newest, self.measured) = (mark, measured);
+        let velocity = match common(measured, sent) {
+            Err(Disjoint) => Err(Fault::VelocityDisagrees),
+            Ok(_) if !agrees || moves => Err(Fault::VelocityDisagrees),
+            Ok(_) if !is_within => Err(Fault::OutOfBounds),
+            Ok(both) => common(both, earlier).map_err(|Disjoint| match sent {
+                Some(_) => Fault::OutOfBounds,
+                None => Fault::VelocityDisagrees,
+            }),
         };
         // After a contradiction the positions alone decide.
-        self.velocity = Some(combined.ok().filter(|_| fault.is_none()).unwrap_or(measured));
-        fault
+        self.velocity = velocity.unwrap_or(measured.or(sent));
+        velocity.err()
     }
 
-    /// Returns the velocities that the positions allow; `None` if they contradict each other.
-    fn measure(&self, mark: &Mark, bounds: Bounds) -> Option<Ball> {
+    /// Returns the velocities that the positions allow, if they allow a bound.
+    fn measure(&self, mark: &Mark, bounds: Bounds) -> Result<Option<Ball>, Disjoint> {
         let step = mark.quotient(&self.newest, bounds);
         let growth = bounds.accel_m_s2 * mark.window_s(&self.newest);
         // The quotient of the step bounds the velocity at both of its ends.
-        let mut measured = match self.measured {
-            Some(before) => before.intersection(step)?.grown(growth).intersection(step)?,
-            None => step,
-        };
+        let before = common(self.measured, step)?.map(|of| of.grown(growth));
+        let mut measured = common(before, step)?;
         for from in self.rings.iter().flat_map(Ring::iter) {
-            measured = measured.intersection(mark.quotient(from, bounds))?;
+            measured = common(measured, mark.quotient(from, bounds))?;
         }
-        Some(measured)
+        Ok(measured)
     }
 
     /// Returns the readings from which windows to a reading with sent velocities throughout begin: the newest one, and
