@@ -44,6 +44,8 @@
 //! when `b T` is above `eps_n + eps_k + A sum of g^2 / 4`. Windows reach to `2 eps / e`, where both errors weigh the
 //! same, but at least to [`SHORTEST_REACH_S`] and at most to [`LONGEST_REACH_S`].
 //!
+//! A first reading has no window, so its velocity is compared with nothing.
+//!
 //! A position that is repeated without the change of a bit is no new measurement. Then the errors of both ends are
 //! equal, and the summed velocities alone must be at most `e T + A sum of g^2 / 4`, with [`RESOLUTION_M`] for the
 //! resolution of positions. This is tested from [`HELD_S`] on.
@@ -244,6 +246,11 @@ impl VelocityEnclosure {
     /// Returns the velocities at the newest reading; `None` with one reading without a velocity.
     pub(crate) fn velocity(&self) -> Option<Ball> {
         self.track.as_ref()?.velocity
+    }
+
+    /// Returns whether positions bound the velocity, so that a sent velocity was compared with them.
+    pub(crate) fn is_measured(&self) -> bool {
+        self.track.as_ref().is_some_and(|track| track.measured.is_some())
     }
 
     /// Forgets all readings.

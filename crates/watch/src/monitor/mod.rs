@@ -192,8 +192,12 @@ impl Monitor {
         let present = || self.vehicles.iter().filter(|of| of.signed_off_s.is_none());
         let largest_m = present().filter_map(|of| of.position_error_m).reduce(f64::max);
         let mut facts = self.settings.facts(largest_m);
-        if present().any(|of| of.sends_velocity) {
-            facts.push(Fact::new(FactKind::VelocityAgreement, Source::Observed));
+        let mut senders = present().filter(|of| of.sends_velocity).peekable();
+        if senders.peek().is_some() {
+            // A first velocity is compared with nothing.
+            let is_observed = senders.all(|of| of.velocity.is_measured());
+            let source = if is_observed { Source::Observed } else { Source::NotObservable };
+            facts.push(Fact::new(FactKind::VelocityAgreement, source));
         }
         facts.push(Fact::new(FactKind::OneStream, Source::Observed));
         facts

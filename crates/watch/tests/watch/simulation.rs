@@ -204,14 +204,14 @@ fn fly(sent: Sent, seed: u64) -> Run {
             run.broken_s = run.broken_s.min(violation_s);
         }
     };
-    let mut last_s = 0.0;
+    let (mut last_s, mut taken) = (0.0, 0);
     loop {
         let k = usize::from(senders[1].next_s < senders[0].next_s);
         let t_s = senders[k].next_s;
         if t_s > SENT_S {
             return run;
         }
-        if t_s > last_s && random.share() < 0.3 {
+        if t_s > last_s && taken > 1 && random.share() < 0.3 {
             // With stamps, the present is the newest stamp.
             let now_s = random.between(last_s, t_s);
             judge(&mut monitor, &mut run, now_s);
@@ -222,7 +222,11 @@ fn fly(sent: Sent, seed: u64) -> Run {
         if faults(&monitor) > before {
             run.fault_s = run.fault_s.min(t_s);
         }
-        judge(&mut monitor, &mut run, t_s);
+        taken += u32::from(k == 0);
+        // One position contradicts no velocity.
+        if taken > 1 || matches!(sent, Sent::Right | Sent::PositionsOnly) {
+            judge(&mut monitor, &mut run, t_s);
+        }
         last_s = t_s;
         senders[k].next_s += senders[k].period_s * random.between(0.7, 1.3);
     }
