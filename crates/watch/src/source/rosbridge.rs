@@ -141,6 +141,7 @@ mod tests {
 
     use super::poses_of_message;
     use crate::source::{Naming, NamingOptions};
+    use tautline_recordings::read::EarthFrame;
 
     const HEADER: &str = r#""header":{"stamp":{"sec":3,"nanosec":500000000},"frame_id":"world"}"#;
 
@@ -167,6 +168,21 @@ mod tests {
         ] {
             assert_eq!(read(topic, &body), one(id), "{body}");
         }
+    }
+
+    #[test]
+    fn a_fix_has_the_accuracy_of_its_covariance_unless_it_is_unknown() {
+        let earth = EarthFrame::new([47.0, 8.0, 400.0]).expect("an origin");
+        let accuracy_m = |kind: u8| {
+            let mut naming = Naming::new(NamingOptions { earth: Some(earth), ..NamingOptions::default() });
+            let place = r#""latitude":47.0,"longitude":8.0,"altitude":401.0"#;
+            let covariance = format!(r#""position_covariance":[1,0,0,0,4,0,0,0,4],"position_covariance_type":{kind}"#);
+            let text = format!(r#"{{"op":"publish","topic":"/a/fix","msg":{{{HEADER},{place},{covariance}}}}}"#);
+            let poses = poses_of_message(&text, &mut naming).expect("a message");
+            let [Ok(pose)] = &poses[..] else { panic!("{poses:?}") };
+            pose.accuracy_m
+        };
+        assert_eq!((accuracy_m(2), accuracy_m(0)), (Some(3.0), None));
     }
 
     #[test]

@@ -367,3 +367,25 @@ struct FrameTransforms {
     #[prost(message, repeated, tag = "1")]
     transforms: Vec<FrameTransform>,
 }
+
+#[cfg(test)]
+mod tests {
+    use super::{FIXES, live_poses};
+    use crate::mcap::topic::{CDR, encode};
+
+    #[test]
+    fn a_fix_has_the_accuracy_of_its_covariance_unless_it_is_unknown() {
+        let accuracy_m = |[east, north, up]: [f64; 3], kind: u8| {
+            let covariance = [east, 0.0, 0.0, 0.0, north, 0.0, 0.0, 0.0, up];
+            let header = ((7_i32, 0_u32), "gps".to_owned());
+            let mut bytes = Vec::new();
+            encode(&(header, (0_i8, 1_u16), [47.0, 8.0, 400.0], covariance, kind), &mut bytes).expect("a message");
+            let poses = live_poses(FIXES, CDR, &bytes).expect("a message");
+            (poses.len(), poses[0].accuracy_m)
+        };
+        assert_eq!(accuracy_m([1.0, 4.0, 4.0], 2), (1, Some(3.0)));
+        for (variances, kind) in [([1.0, 4.0, 4.0], 0), ([0.0, 4.0, 4.0], 2), ([1.0, f64::NAN, 4.0], 2)] {
+            assert_eq!(accuracy_m(variances, kind), (1, None), "{variances:?} {kind}");
+        }
+    }
+}
