@@ -267,7 +267,8 @@ mod tests {
         let both: Vec<_> = (0..40).map(|k| 0.1 * f64::from(k / 2) - if k % 2 == 1 { 0.33 } else { 0.0 }).collect();
         assert!(found(&both));
         // Every fifth message is overtaken.
-        let overtaken: Vec<_> = (0..60).map(|k| 0.1 * f64::from(k + [0, 0, 0, 1, -1][k as usize % 5])).collect();
+        let places = (0..60).zip([0, 0, 0, 1, -1].into_iter().cycle());
+        let overtaken: Vec<_> = places.map(|(k, change)| 0.1 * f64::from(k + change)).collect();
         assert!(!found(&overtaken));
     }
 }

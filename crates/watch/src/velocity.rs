@@ -355,7 +355,7 @@ impl Track {
         // `max` also replaces the quotient of two zeros.
         let reach_s = balanced_s.max(SHORTEST_REACH_S).min(LONGEST_REACH_S);
         let marks = self.rings.iter().flat_map(Ring::iter).filter(move |from| mark.window_s(from) <= reach_s);
-        std::iter::once(&self.newest).chain(marks).filter(|from| from.breaks == mark.breaks)
+        std::iter::once(&self.newest).chain(marks).filter(move |from| from.breaks == mark.breaks)
     }
 
     fn agrees(&self, mark: &Mark, bounds: Bounds) -> bool {
@@ -405,14 +405,15 @@ mod tests {
         Reading { t_s, position_m: Vector3::new(x_m, 0.0, 0.0), position_error_m: 0.05, velocity_m_s }
     }
 
+    /// Returns times at a rate \[Hz\] up to an end \[s\].
+    fn times(rate_hz: f64, end_s: f64) -> impl Iterator<Item = f64> {
+        (0_u32..).map(move |k| f64::from(k) / rate_hz).take_while(move |t_s| *t_s < end_s)
+    }
+
     /// Returns the time of the first fault of readings at a rate \[Hz\] for 3 s, with its kind.
     fn first_fault(rate_hz: f64, of: impl Fn(f64) -> Reading, bounds: Bounds) -> Option<(f64, Fault)> {
         let mut enclosure = VelocityEnclosure::default();
-        let count = (3.0 * rate_hz) as u32;
-        (0..count).find_map(|k| {
-            let t_s = f64::from(k) / rate_hz;
-            enclosure.take(of(t_s), bounds).map(|fault| (t_s, fault))
-        })
+        times(rate_hz, 3.0).find_map(|t_s| enclosure.take(of(t_s), bounds).map(|fault| (t_s, fault)))
     }
 
     #[test]
@@ -497,8 +498,7 @@ mod tests {
         for rate_hz in [30.0, 100.0, 1000.0] {
             let mut enclosure = VelocityEnclosure::default();
             let mut widest: f64 = 0.0;
-            for k in 0..(2.0 * rate_hz) as u32 {
-                let t_s = f64::from(k) / rate_hz;
+            for (k, t_s) in times(rate_hz, 2.0).enumerate() {
                 // Errors of alternating sign.
                 let error_m = if k % 2 == 0 { 0.01 } else { -0.01 };
                 let at = Reading { position_error_m: 0.01, ..reading(t_s, 2.5 * t_s * t_s + error_m, None) };

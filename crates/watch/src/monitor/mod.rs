@@ -50,6 +50,7 @@ pub struct Taken {
     pub time_s: f64,
 }
 
+#[expect(clippy::struct_excessive_bools, reason = "each is a finding of its own")]
 struct Vehicle {
     /// Clock of the vehicle; `None` if the stamps have a common clock.
     clock: Option<SourceClock>,

@@ -18,6 +18,11 @@ const PIECE_S: f64 = 0.25;
 /// Time between two compared separations \[s\].
 const STEP_S: f64 = 0.005;
 
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to COMPARED_S / STEP_S")]
+fn index(x: f64) -> usize {
+    x as usize
+}
+
 /// Random numbers of a linear congruential generator.
 struct Random(u64);
 
@@ -59,7 +64,7 @@ impl Motion {
         let (mut position, mut velocity) = (position_m, velocity_m_s);
         let is_steady = random.share() < 0.3;
         let steady = random.within(ACCEL_M_S2);
-        for _ in 0..=(COMPARED_S / PIECE_S) as usize {
+        for _ in 0..=index(COMPARED_S / PIECE_S) {
             let accel = if is_steady { steady } else { random.within(ACCEL_M_S2) };
             pieces.push([position, velocity, accel]);
             position += velocity * PIECE_S + accel * (PIECE_S * PIECE_S / 2.0);
@@ -69,7 +74,7 @@ impl Motion {
     }
 
     fn state(&self, t_s: f64) -> (Vector3<f64>, Vector3<f64>) {
-        let k = ((t_s / PIECE_S) as usize).min(self.pieces.len() - 1);
+        let k = index(t_s / PIECE_S).min(self.pieces.len() - 1);
         let ([position, velocity, accel], h_s) = (self.pieces[k], t_s - PIECE_S * k as f64);
         (position + velocity * h_s + accel * (h_s * h_s / 2.0), velocity + accel * h_s)
     }
@@ -184,7 +189,7 @@ fn fly(sent: Sent, seed: u64) -> Run {
         senders[1].sent = sent;
     }
     // Time of the first violation at or after each step.
-    let steps = (COMPARED_S / STEP_S) as usize;
+    let steps = index(COMPARED_S / STEP_S);
     let mut next_violation_s = vec![f64::INFINITY; steps + 1];
     for k in (0..steps).rev() {
         let t_s = STEP_S * k as f64;
@@ -198,7 +203,7 @@ fn fly(sent: Sent, seed: u64) -> Run {
         let Some(until) = of.clear_until else { return };
         assert_eq!(of.state, State::Clear);
         run.clear += 1;
-        let first = (of.now_s / STEP_S).ceil() as usize;
+        let first = index((of.now_s / STEP_S).ceil());
         let violation_s = next_violation_s.get(first).copied().unwrap_or(f64::INFINITY);
         if violation_s < until.at_s {
             run.broken_s = run.broken_s.min(violation_s);
