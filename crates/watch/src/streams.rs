@@ -60,26 +60,27 @@ impl Changes {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct StampOrder {
     changes: Changes,
-    /// Stamp and time of the newest message \[s\].
-    newest_s: Option<(f64, f64)>,
-    /// Stamp and time of the last message before the newest step \[s\].
-    former_s: Option<(f64, f64)>,
+    /// Newest stamp \[s\].
+    newest_s: Option<f64>,
+    /// Stamps before and after the newest step back \[s\].
+    step_s: Option<[f64; 2]>,
     returns: u32,
 }
 
 impl StampOrder {
-    /// Takes a message in order with its stamp at a time \[s\]. Returns whether there are two clocks.
-    pub(crate) fn take(&mut self, t_s: f64, at_s: f64) -> bool {
+    /// Takes a message in order with its stamp \[s\]. Returns whether there are two clocks.
+    ///
+    /// The stamps since the step give the time that passed, so that the times of arrival do not matter.
+    pub(crate) fn take(&mut self, t_s: f64) -> bool {
         self.changes.in_order();
-        let newest_s = self.newest_s.replace((t_s, at_s));
-        let Some((before_s, taken_s)) = newest_s else { return false };
+        let Some(before_s) = self.newest_s.replace(t_s) else { return false };
         if t_s < before_s - STEP_S {
-            self.former_s = newest_s;
-        } else if let Some((former_s, left_s)) = self.former_s
-            && t_s - before_s > STEP_S + (at_s - taken_s)
-            && (t_s - former_s - (at_s - left_s)).abs() <= STEP_S
+            self.step_s = Some([before_s, t_s]);
+        } else if let Some([former_s, after_s]) = self.step_s
+            && t_s > before_s + STEP_S
+            && (t_s - former_s - (before_s - after_s)).abs() <= STEP_S
         {
-            self.former_s = None;
+            self.step_s = None;
             self.returns += 1;
         }
         self.returns >= RETURNS
@@ -234,7 +235,7 @@ mod tests {
     fn a_clock_that_steps_back_and_returns_twice_is_two_clocks() {
         let found = |stamps: &[f64]| {
             let mut order = StampOrder::default();
-            stamps.iter().enumerate().any(|(k, &t_s)| order.take(t_s, 0.1 * k as f64))
+            stamps.iter().any(|&t_s| order.take(t_s))
         };
         let line = |k: usize, offset_s: f64| offset_s + 0.1 * k as f64;
         let stamps = |offset: fn(usize) -> f64| (0..60).map(|k| line(k, offset(k))).collect::<Vec<_>>();
@@ -254,7 +255,7 @@ mod tests {
                 let at_s = 0.05 * k as f64;
                 let Some(&newest_s) = kept.last().filter(|&&newest_s| newest_s > t_s) else {
                     kept.push(t_s);
-                    return order.take(t_s, at_s);
+                    return order.take(t_s);
                 };
                 assert!(newest_s - t_s < 1.0);
                 let after = kept.iter().position(|&of| of > t_s).expect("a later stamp");

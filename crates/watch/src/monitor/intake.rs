@@ -44,12 +44,8 @@ impl Monitor {
             (TimeBase::Stamps, Some(clock)) => clock.time_of(pose.t_s),
             (TimeBase::Stamps, None) => pose.t_s,
         };
-        let before_s = self.now_s;
         self.now_s = self.now_s.max(arrival_s);
         let now_s = self.now_s;
-        // The stamps of a replay pass no time of their own.
-        let is_replay = self.settings.time_base == TimeBase::Stamps && before_s.is_finite();
-        let passed_s = if is_replay { before_s } else { now_s };
         if is_first {
             self.faults.iter_mut().for_each(|count| count.reported_s = None);
             self.doubt = self.doubt.map(|(fault, _)| (fault, now_s));
@@ -95,7 +91,7 @@ impl Monitor {
         if self.vehicles[k].epoch != clock.epoch() {
             self.forget(vehicle, clock.epoch());
         }
-        if self.vehicles[k].streams.take(pose.t_s, passed_s) {
+        if self.vehicles[k].streams.take(pose.t_s) {
             self.find_two_streams(vehicle);
         }
         self.enclose_velocity(vehicle, pose);
