@@ -61,13 +61,13 @@ fn two_vehicles_far_apart_are_clear() {
 fn every_line_with_clear_has_its_facts() {
     let ran = judged(&approach(0.0, 0.0), &["--json", "--position-error", "0.02", "--accel", "5"]);
     assert_eq!(ran.exit, Some(0), "{ran:?}");
-    let is_clear = |of: &&Value| of["state"] == "clear" || of["event"] == "summary";
-    let lines: Vec<_> = events(&ran).into_iter().filter(|of| is_clear(&of)).collect();
+    let is_clear = |line: &&Value| line["state"] == "clear" || line["event"] == "summary";
+    let lines: Vec<_> = events(&ran).into_iter().filter(|line| is_clear(&line)).collect();
     assert_eq!(lines.len(), 6, "{}", ran.out);
     for line in lines {
         let fact = |kind: &str| {
-            let found = line["facts"].as_array().and_then(|facts| facts.iter().find(|of| of["fact"] == kind));
-            found.map(|of| (of["source"].as_str().unwrap_or_default().to_owned(), of["value"].as_f64()))
+            let found = line["facts"].as_array().and_then(|facts| facts.iter().find(|fact| fact["fact"] == kind));
+            found.map(|fact| (fact["source"].as_str().unwrap_or_default().to_owned(), fact["value"].as_f64()))
         };
         assert_eq!(fact("position-error"), Some(("declared".to_owned(), Some(0.02))), "{line}");
         assert_eq!(fact("acceleration"), Some(("declared".to_owned(), Some(5.0))), "{line}");
@@ -80,7 +80,7 @@ fn every_line_with_clear_has_its_facts() {
     }
     // Other states rest on no facts.
     let ran = judged(&approach(-2.0, 0.3), &["--json"]);
-    assert!(events(&ran).iter().all(|of| of["state"] == "clear" || of["facts"].is_null()), "{}", ran.out);
+    assert!(events(&ran).iter().all(|line| line["state"] == "clear" || line["facts"].is_null()), "{}", ran.out);
 }
 
 #[test]
@@ -88,9 +88,9 @@ fn a_sent_velocity_of_zero_is_a_contradiction() {
     let input = approach(-2.0, 0.6).replace(r#""vx":-2"#, r#""vx":0"#);
     let ran = judged(&input, &["--json"]);
     assert_eq!(ran.exit, Some(1), "{ran:?}");
-    assert!(events(&ran).iter().any(|of| of["fault"] == "velocity-disagrees" && of["id"] == "b"), "{}", ran.out);
-    let late = events(&ran).into_iter().filter(|of| of["t_s"].as_f64().is_some_and(|t_s| t_s > 0.15));
-    assert_eq!(late.filter(|of| of["state"] == "clear").count(), 0, "{}", ran.out);
+    assert!(events(&ran).iter().any(|line| line["fault"] == "velocity-disagrees" && line["id"] == "b"), "{}", ran.out);
+    let late = events(&ran).into_iter().filter(|line| line["t_s"].as_f64().is_some_and(|t_s| t_s > 0.15));
+    assert_eq!(late.filter(|line| line["state"] == "clear").count(), 0, "{}", ran.out);
 }
 
 #[test]

@@ -83,7 +83,7 @@ impl Connections {
     /// places ends.
     fn add(&mut self, address: IpAddr, stream: TcpStream) -> u64 {
         if self.pending.len() >= MOST_PENDING {
-            let places = |of: &Pending| self.pending.iter().filter(|other| other.address == of.address).count();
+            let places = |one: &Pending| self.pending.iter().filter(|other| other.address == one.address).count();
             // Of equal counts, `max_by_key` takes the last one.
             let ended = (0..self.pending.len()).rev().max_by_key(|&k| places(&self.pending[k]));
             if let Some(pending) = ended.and_then(|k| self.pending.remove(k)) {

@@ -258,7 +258,7 @@ mod tests {
                     return order.take(t_s);
                 };
                 assert!(newest_s - t_s < 1.0);
-                let after = kept.iter().position(|&of| of > t_s).expect("a later stamp");
+                let after = kept.iter().position(|&other_s| other_s > t_s).expect("a later stamp");
                 let gap_s = after.checked_sub(1).map(|before| kept[after] - kept[before]);
                 let least_s = kept.windows(2).map(|two| two[1] - two[0]).fold(f64::INFINITY, f64::min);
                 order.take_late(gap_s, least_s, at_s)

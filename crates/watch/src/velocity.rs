@@ -315,7 +315,7 @@ impl Track {
         let agrees = self.agrees(&mark, bounds);
         let moves = self.moves_while_held(&mark, bounds);
         let is_within = self.changes_within(&mark, bounds);
-        let earlier = self.velocity.map(|of| of.grown(bounds.accel_m_s2 * mark.window_s(&self.newest)));
+        let earlier = self.velocity.map(|ball| ball.grown(bounds.accel_m_s2 * mark.window_s(&self.newest)));
         let sent = sent(&reading, bounds);
         for (ring, spacing_s) in self.rings.iter_mut().zip(SPACINGS_S) {
             ring.push(mark, spacing_s);
@@ -340,7 +340,7 @@ impl Track {
         let step = mark.quotient(&self.newest, bounds);
         let growth = bounds.accel_m_s2 * mark.window_s(&self.newest);
         // The quotient of the step bounds the velocity at both of its ends.
-        let before = common(self.measured, step)?.map(|of| of.grown(growth));
+        let before = common(self.measured, step)?.map(|ball| ball.grown(growth));
         let mut measured = common(before, step)?;
         for from in self.rings.iter().flat_map(Ring::iter) {
             measured = common(measured, mark.quotient(from, bounds))?;
@@ -411,9 +411,9 @@ mod tests {
     }
 
     /// Returns the time of the first fault of readings at a rate \[Hz\] for 3 s, with its kind.
-    fn first_fault(rate_hz: f64, of: impl Fn(f64) -> Reading, bounds: Bounds) -> Option<(f64, Fault)> {
+    fn first_fault(rate_hz: f64, reading_at: impl Fn(f64) -> Reading, bounds: Bounds) -> Option<(f64, Fault)> {
         let mut enclosure = VelocityEnclosure::default();
-        times(rate_hz, 3.0).find_map(|t_s| enclosure.take(of(t_s), bounds).map(|fault| (t_s, fault)))
+        times(rate_hz, 3.0).find_map(|t_s| enclosure.take(reading_at(t_s), bounds).map(|fault| (t_s, fault)))
     }
 
     #[test]
@@ -472,7 +472,7 @@ mod tests {
     #[test]
     fn a_position_that_is_repeated_while_a_velocity_is_sent_is_found() {
         // The error of GNSS hides the difference for longer than the repeated position.
-        let coarse = |of: Reading| Reading { position_error_m: 5.0, ..of };
+        let coarse = |fine: Reading| Reading { position_error_m: 5.0, ..fine };
         let frozen = first_fault(10.0, |t_s| coarse(reading(t_s, 3.0, Some(2.0))), BOUNDS);
         assert_eq!(frozen, Some((0.3, Fault::VelocityDisagrees)));
         // Negative twins: at rest, with a position that changes, and with a velocity within its error.
@@ -501,8 +501,8 @@ mod tests {
             for (k, t_s) in times(rate_hz, 2.0).enumerate() {
                 // Errors of alternating sign.
                 let error_m = if k % 2 == 0 { 0.01 } else { -0.01 };
-                let at = Reading { position_error_m: 0.01, ..reading(t_s, 2.5 * t_s * t_s + error_m, None) };
-                assert_eq!(enclosure.take(at, bounds), None, "{rate_hz} {t_s}");
+                let noisy = Reading { position_error_m: 0.01, ..reading(t_s, 2.5 * t_s * t_s + error_m, None) };
+                assert_eq!(enclosure.take(noisy, bounds), None, "{rate_hz} {t_s}");
                 let Some(ball) = enclosure.velocity() else { continue };
                 assert!((ball.centre.x - 5.0 * t_s).abs() <= ball.radius, "{rate_hz} {t_s}: {ball:?}");
                 widest = if t_s > 0.5 { widest.max(ball.radius) } else { widest };
@@ -521,6 +521,6 @@ mod tests {
         assert_eq!(enclosure.take(reading(2.0, 40.0, None), BOUNDS), Some(Fault::OutOfBounds));
         assert_eq!(enclosure.velocity(), None);
         assert_eq!(enclosure.take(reading(2.1, 40.0, None), BOUNDS), None);
-        assert!(enclosure.velocity().is_some_and(|of| of.centre.norm() < 1e-9));
+        assert!(enclosure.velocity().is_some_and(|ball| ball.centre.norm() < 1e-9));
     }
 }

@@ -142,11 +142,11 @@ impl Monitor {
     fn take_late(&mut self, vehicle: u32, pose: &Pose<'_>) {
         let now_s = self.now_s;
         self.fault_at(Fault::Reordered, Some(vehicle), now_s);
-        let of = &mut self.vehicles[vehicle as usize];
-        let late = of.history.late(pose.t_s);
+        let own = &mut self.vehicles[vehicle as usize];
+        let late = own.history.late(pose.t_s);
         // A copy by another link is no evidence of a second vehicle.
         let is_copy = late.position_m == Some(pose.position_m);
-        if !is_copy && of.streams.take_late(late.gap_s, late.least_gap_s, now_s) {
+        if !is_copy && own.streams.take_late(late.gap_s, late.least_gap_s, now_s) {
             self.find_two_streams(vehicle);
         }
     }
@@ -163,8 +163,8 @@ impl Monitor {
     }
 
     fn find_two_streams(&mut self, vehicle: u32) {
-        let of = &mut self.vehicles[vehicle as usize];
-        if !std::mem::replace(&mut of.has_two_streams, true) {
+        let own = &mut self.vehicles[vehicle as usize];
+        if !std::mem::replace(&mut own.has_two_streams, true) {
             self.fault_at(Fault::TwoStreams, Some(vehicle), self.now_s);
         }
     }
@@ -176,14 +176,14 @@ impl Monitor {
             accel_m_s2: self.settings.accel_m_s2.value,
             velocity_error_m_s: self.settings.velocity_error_m_s.value,
         };
-        let of = &mut self.vehicles[vehicle as usize];
-        of.position_error_m = error_m;
-        of.sends_velocity = pose.velocity_m_s.is_some();
+        let own = &mut self.vehicles[vehicle as usize];
+        own.position_error_m = error_m;
+        own.sends_velocity = pose.velocity_m_s.is_some();
         let fault = if let Some(position_error_m) = error_m {
             let Pose { t_s, position_m, velocity_m_s, .. } = *pose;
-            of.velocity.take(Reading { t_s, position_m, position_error_m, velocity_m_s }, bounds)
+            own.velocity.take(Reading { t_s, position_m, position_error_m, velocity_m_s }, bounds)
         } else {
-            of.velocity.clear();
+            own.velocity.clear();
             None
         };
         if let Some(fault) = fault {

@@ -190,13 +190,13 @@ impl Monitor {
     /// Returns the facts on which CLEAR rests at present, each with its source.
     #[must_use]
     pub fn facts(&self) -> Vec<Fact> {
-        let present = || self.vehicles.iter().filter(|of| of.signed_off_s.is_none());
-        let largest_m = present().filter_map(|of| of.position_error_m).reduce(f64::max);
+        let present = || self.vehicles.iter().filter(|vehicle| vehicle.signed_off_s.is_none());
+        let largest_m = present().filter_map(|vehicle| vehicle.position_error_m).reduce(f64::max);
         let mut facts = self.settings.facts(largest_m);
-        let mut senders = present().filter(|of| of.sends_velocity).peekable();
+        let mut senders = present().filter(|vehicle| vehicle.sends_velocity).peekable();
         if senders.peek().is_some() {
             // A first velocity is compared with nothing.
-            let is_observed = senders.all(|of| of.velocity.is_measured());
+            let is_observed = senders.all(|vehicle| vehicle.velocity.is_measured());
             let source = if is_observed { Source::Observed } else { Source::NotObservable };
             facts.push(Fact::new(FactKind::VelocityAgreement, source));
         }
@@ -253,7 +253,7 @@ impl Monitor {
     pub fn newest(&self, vehicle: usize) -> Option<(Vector3<f64>, Option<Vector3<f64>>, f64)> {
         let of = self.vehicles.get(vehicle)?;
         let fix = of.history.newest()?;
-        Some((fix.position_m, of.velocity.velocity().map(|of| of.centre), self.age_s(of).unwrap_or(f64::INFINITY)))
+        Some((fix.position_m, of.velocity.velocity().map(|ball| ball.centre), self.age_s(of).unwrap_or(f64::INFINITY)))
     }
 
     /// Returns the index of a vehicle, and adds a vehicle that is not known; `None` beyond the largest number.

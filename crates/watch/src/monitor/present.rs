@@ -29,7 +29,9 @@ impl Monitor {
             _ if self.names.len() < 2 => note(Reason::TooFew(self.names.len())),
             _ => {}
         }
-        if let Some(k) = self.vehicles.iter().position(|of| of.has_two_streams && of.signed_off_s.is_none()) {
+        if let Some(k) =
+            self.vehicles.iter().position(|vehicle| vehicle.has_two_streams && vehicle.signed_off_s.is_none())
+        {
             note(Reason::TwoStreams(u32::try_from(k).unwrap_or(u32::MAX)));
         }
         if let Some((fault, at_s)) = self.doubt

@@ -106,7 +106,9 @@ fn live_poses(message: &Value) -> Option<Vec<LivePose>> {
 fn fix_accuracy_m(message: &Value) -> Option<f64> {
     let is_known = message["position_covariance_type"].as_u64().is_some_and(|kind| kind > 0);
     let variances = [0, 4, 8].map(|k| message["position_covariance"][k].as_f64());
-    let [Some(east), Some(north), Some(up)] = variances.map(|of| of.filter(|of| is_known && *of > 0.0)) else {
+    let [Some(east), Some(north), Some(up)] =
+        variances.map(|found| found.filter(|variance| is_known && *variance > 0.0))
+    else {
         return None;
     };
     Some((east + north + up).sqrt())

@@ -38,9 +38,9 @@ impl Random {
 
     fn direction(&mut self) -> Vector3<f64> {
         loop {
-            let of = Vector3::new(self.share() - 0.5, self.share() - 0.5, self.share() - 0.5);
-            if of.norm() > 0.1 {
-                return of.normalize();
+            let vector = Vector3::new(self.share() - 0.5, self.share() - 0.5, self.share() - 0.5);
+            if vector.norm() > 0.1 {
+                return vector.normalize();
             }
         }
     }
@@ -198,12 +198,12 @@ fn fly(sent: Sent, seed: u64) -> Run {
     }
     let mut run = Run { clear: 0, fault_s: f64::INFINITY, broken_s: f64::INFINITY };
     let judge = |monitor: &mut Monitor, run: &mut Run, now_s: f64| {
-        let of = monitor.assess(now_s);
+        let judged = monitor.assess(now_s);
         monitor.drain_events();
-        let Some(until) = of.clear_until else { return };
-        assert_eq!(of.state, State::Clear);
+        let Some(until) = judged.clear_until else { return };
+        assert_eq!(judged.state, State::Clear);
         run.clear += 1;
-        let first = index((of.now_s / STEP_S).ceil());
+        let first = index((judged.now_s / STEP_S).ceil());
         let violation_s = next_violation_s.get(first).copied().unwrap_or(f64::INFINITY);
         if violation_s < until.at_s {
             run.broken_s = run.broken_s.min(violation_s);

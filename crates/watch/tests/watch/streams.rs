@@ -35,12 +35,14 @@ fn a_sent_velocity_of_zero_at_5_m_s_is_not_clear() {
     assert!(monitor.faults(Fault::VelocityDisagrees) > 90);
     // The positions show that the pair is on course to violate.
     let mut seen = monitor;
-    assert!(seen.assess(0.0).nominal_violation.is_some_and(|of| (of.at_s - 2.2).abs() < 0.1));
+    assert!(seen.assess(0.0).nominal_violation.is_some_and(|first| (first.at_s - 2.2).abs() < 0.1));
     // Negative twin: the right velocity.
     let (monitor, judged) = approach(5.0, |t_s| 5.0 * t_s);
     assert_eq!(monitor.faults(Fault::VelocityDisagrees) + monitor.faults(Fault::OutOfBounds), 0);
     assert!(judged[..60].iter().all(|(_, until_s)| until_s.is_some_and(|until_s| until_s < 2.2)), "{judged:?}");
-    assert!(monitor.facts().iter().any(|of| of.kind == FactKind::VelocityAgreement && of.source == Source::Observed));
+    assert!(
+        monitor.facts().iter().any(|fact| fact.kind == FactKind::VelocityAgreement && fact.source == Source::Observed)
+    );
 }
 
 #[test]
@@ -206,8 +208,8 @@ fn with_receivers(position_error_m: Option<Bound>, accuracy_mm: Option<[u32; 2]>
             radio.take(&local([system, 1, byte.wrapping_mul(2).wrapping_add(1)], 100 * k, north_m), arrival_s);
         }
     }
-    let of = radio.monitor.assess(4.9);
-    (of.state, Notice::of_state(&of, &radio.monitor), radio.monitor)
+    let judged = radio.monitor.assess(4.9);
+    (judged.state, Notice::of_state(&judged, &radio.monitor), radio.monitor)
 }
 
 #[test]

@@ -231,7 +231,7 @@ impl Fix {
 fn fix_accuracy_m(encoding: &str, bytes: &[u8]) -> Option<f64> {
     let (_, covariance, kind): (Fix, [f64; 9], u8) = decode_ros(encoding, bytes).ok()?;
     let variances = [covariance[0], covariance[4], covariance[8]];
-    (kind > 0 && variances.iter().all(|of| *of > 0.0)).then(|| variances.iter().sum::<f64>().sqrt())
+    (kind > 0 && variances.iter().all(|variance| *variance > 0.0)).then(|| variances.iter().sum::<f64>().sqrt())
 }
 
 fn decode_foxglove<T: prost::Message + Default + DeserializeOwned>(encoding: &str, bytes: &[u8]) -> Result<T, String> {
