@@ -9,10 +9,9 @@ use std::sync::LazyLock;
 
 use libfuzzer_sys::fuzz_target;
 use tautline_watch::source::{
-    Input, LineMessage, MavlinkFrame, Naming, NamingOptions, OwnedPose, message_of_line, poses_of_datagram,
-    poses_of_message,
+    Input, LineMessage, MavlinkFrame, MavlinkReader, Naming, NamingOptions, message_of_line, poses_of_message,
 };
-use tautline_watch::{ClockScope, Monitor, Plan, Pose, Settings, State};
+use tautline_watch::{ClockScope, Monitor, Plan, Settings, State};
 
 static SOURCE: LazyLock<String> =
     LazyLock::new(|| std::env::var("TAUTLINE_FUZZ").expect("TAUTLINE_FUZZ: the name of a source, such as watch-lines"));
@@ -27,7 +26,7 @@ fuzz_target!(|bytes: &[u8]| {
                 LineMessage::SignOff(id, t_s) => Input::SignOff(id, t_s, 0.0),
             }));
         }
-        "watch-mavlink" => poses_of_datagram(bytes, &MavlinkFrame::Local, 0.0, &mut inputs),
+        "watch-mavlink" => MavlinkReader::new(MavlinkFrame::Local).take(bytes, 0.0, &mut inputs),
         "watch-rosbridge" => {
             let text = String::from_utf8_lossy(bytes);
             let mut naming = Naming::new(NamingOptions::default());
@@ -49,10 +48,10 @@ fn judge(inputs: &[Input]) {
     for (number, input) in inputs.iter().enumerate() {
         let arrival_s = 0.01 * number as f64;
         match input {
-            Input::Pose(OwnedPose { t_s, id, position_m, velocity_m_s }, _) => {
-                let (position_m, velocity_m_s) = (*position_m, *velocity_m_s);
-                monitor.take(&Pose { t_s: *t_s, id, position_m, velocity_m_s }, arrival_s);
+            Input::Pose(pose, _) => {
+                monitor.take(&pose.borrowed(), arrival_s);
             }
+            Input::TwoStreams(id, _) => monitor.two_streams(id, arrival_s),
             Input::SignOff(id, t_s, _) => has_sign_off |= monitor.sign_off(id, *t_s, arrival_s),
             _ => {}
         }

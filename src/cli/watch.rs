@@ -17,7 +17,8 @@ use tautline_watch::foxglove_server::FoxgloveServer;
 use tautline_watch::page::Page;
 use tautline_watch::source::{self, Feed, MavlinkFrame, NamingOptions, OwnedPose};
 use tautline_watch::{
-    Assessment, ClockScope, Expected, Monitor, Notice, Output, Plan, Record, Settings, TimeBase, watch as watch_inputs,
+    Assessment, Bound, ClockScope, Expected, Monitor, Notice, Output, Plan, Record, Settings, TimeBase,
+    watch as watch_inputs,
 };
 
 /// Arguments of `tautline watch`.
@@ -39,24 +40,26 @@ pub(super) struct WatchArguments {
     /// Safety distance of two centres [m].
     #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
     delta: f64,
-    /// Bound on the acceleration of each vehicle [m/s^2].
-    #[arg(long, value_name = "M/S2", default_value_t = 5.0, allow_negative_numbers = true)]
-    accel: f64,
-    /// Bound on the error of each position [m], with the speed times the error of its stamp.
-    #[arg(long, value_name = "METRES", default_value_t = 0.05, allow_negative_numbers = true)]
-    position_error: f64,
-    /// Bound on the error of each velocity that is sent [m/s].
-    #[arg(long, value_name = "M/S", default_value_t = 0.1, allow_negative_numbers = true)]
-    velocity_error: f64,
+    /// Bound on the acceleration of each vehicle [m/s^2]: g tan(tilt) for level flight [default: 9.81, a tilt of 45
+    /// degrees, or a fall with stopped motors].
+    #[arg(long, value_name = "M/S2", allow_negative_numbers = true)]
+    accel: Option<f64>,
+    /// Bound on the error of each position [m], with the speed times the error of its stamp [default: 0.05, and with
+    /// `--origin` five times the standard deviation that the source reports].
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
+    position_error: Option<f64>,
+    /// Bound on the error of each velocity that is sent [m/s] [default: 0.1].
+    #[arg(long, value_name = "M/S", allow_negative_numbers = true)]
+    velocity_error: Option<f64>,
     /// Acceleration with which each vehicle can brake [m/s^2].
     #[arg(long, value_name = "M/S2", default_value_t = 3.0, allow_negative_numbers = true)]
     brake: f64,
-    /// Age beyond which a vehicle is stale [s].
-    #[arg(long, value_name = "SECONDS", default_value_t = 1.0, allow_negative_numbers = true)]
-    max_age: f64,
-    /// Smallest delay between a stamp and its arrival [s], which the watch cannot measure.
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true)]
-    latency: f64,
+    /// Age beyond which a vehicle is stale [s] [default: 1].
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    max_age: Option<f64>,
+    /// Smallest delay between a stamp and its arrival [s], which the watch cannot measure [default: 0].
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    latency: Option<f64>,
     /// Time ahead that is examined [s].
     #[arg(long, value_name = "SECONDS", default_value_t = 10.0, allow_negative_numbers = true)]
     horizon: f64,
@@ -87,9 +90,10 @@ pub(super) struct WatchArguments {
     /// Approved plan, a recording of any format: report deviations from it, and expect its vehicles.
     #[arg(long, value_name = "FILE")]
     plan: Option<PathBuf>,
-    /// Stamp at which the plan has its time 0 [s]; with `--clocks own`, the time since the start of the watch.
-    #[arg(long, value_name = "SECONDS", default_value_t = 0.0, allow_negative_numbers = true, requires = "plan")]
-    plan_start: f64,
+    /// Stamp at which the plan has its time 0 [s]; with `--clocks own`, the time since the start of the watch. By
+    /// default, the times of the plan are stamps. With times since 1970, time 0 is the first second.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, requires = "plan")]
+    plan_start: Option<f64>,
     /// Largest deviation from the plan [m].
     #[arg(long, value_name = "METRES", default_value_t = 0.5, allow_negative_numbers = true, requires = "plan")]
     tube: f64,
@@ -142,7 +146,7 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<Exit, Failure> {
         let other = if page.port() == u16::MAX { page.port() - 1 } else { page.port() + 1 };
         return Err(Failure::input("watch/setting", message, format!("write --foxglove=127.0.0.1:{other}")));
     }
-    let plan = arguments.read_plan()?;
+    let plan = arguments.read_plan(&source)?;
     let settings = arguments.settings(&source, &plan)?;
     let monitor = Monitor::new(settings, plan).map_err(|error| {
         Failure::input("watch/setting", error.to_string(), "give a number in this range; tautline watch --help")
@@ -220,6 +224,11 @@ impl WatchArguments {
         Ok(address)
     }
 
+    fn clock_scope(&self, source: &Address) -> ClockScope {
+        let is_mavlink = matches!(source, Address::Mavlink(_));
+        self.clocks.unwrap_or(if is_mavlink { ClockScope::PerVehicle } else { ClockScope::Common })
+    }
+
     fn settings(&self, source: &Address, plan: &Plan) -> Result<Settings, Failure> {
         let expected = match self.expect {
             Some(count) => Expected::Count(count),
@@ -231,41 +240,59 @@ impl WatchArguments {
             let message = format!("--ids: name {} is empty", empty + 1);
             return Err(Failure::input("watch/setting", message, "separate names by one comma each"));
         }
-        let own_clocks = matches!(source, Address::Mavlink(_));
-        let clocks = if own_clocks { ClockScope::PerVehicle } else { ClockScope::Common };
+        let by_default = Settings::default();
+        let bound = |given: Option<f64>, default: Bound| given.map_or(default, Bound::declared);
+        // Positions on the Earth have the error of their receiver.
+        let is_on_earth = self.origin.is_some() && !matches!(source, Address::Lines);
+        let position_error_m = match self.position_error {
+            Some(error_m) => Some(Bound::declared(error_m)),
+            None => by_default.position_error_m.filter(|_| !is_on_earth),
+        };
         Ok(Settings {
             delta_m: self.delta,
-            accel_m_s2: self.accel,
-            position_error_m: self.position_error,
-            velocity_error_m_s: self.velocity_error,
+            accel_m_s2: bound(self.accel, by_default.accel_m_s2),
+            position_error_m,
+            velocity_error_m_s: bound(self.velocity_error, by_default.velocity_error_m_s),
             brake_m_s2: self.brake,
-            max_age_s: self.max_age,
-            latency_s: self.latency,
+            max_age_s: bound(self.max_age, by_default.max_age_s),
+            latency_s: bound(self.latency, by_default.latency_s),
             horizon_s: self.horizon,
             tube_m: self.tube,
             expected,
             max_vehicles: self.max_vehicles,
             time_base: self.time,
-            clocks: self.clocks.unwrap_or(clocks),
+            clocks: self.clock_scope(source),
         })
     }
 
-    fn read_plan(&self) -> Result<Plan, Failure> {
+    fn read_plan(&self, source: &Address) -> Result<Plan, Failure> {
         let Some(path) = &self.plan else { return Ok(Plan::default()) };
-        if !self.plan_start.is_finite() {
-            let message = format!("--plan-start: must be finite ({})", self.plan_start);
+        if let Some(start_s) = self.plan_start.filter(|start_s| !start_s.is_finite()) {
+            let message = format!("--plan-start: must be finite ({start_s})");
             return Err(Failure::input("watch/setting", message, "give a number of seconds"));
         }
         let unread = |error: ReadError| Failure::from(error).under("--plan");
         let mut recording = read::open(path, &ReadOptions::default()).map_err(unread)?;
-        let plan = Plan::read(&mut *recording, self.plan_start).map_err(unread)?.ok_or_else(|| {
-            let message = format!("--plan: {}: too long to keep in memory", path.display());
-            Failure::input("watch/plan", message, "give a plan with at most 20 million positions")
-        })?;
-        if recording.clock().by_steps {
-            let unit = recording.clock().unit;
-            let message = format!("--plan: {}: the unit of its times is a guess ({unit})", path.display());
-            return Err(Failure::input("watch/plan", message, "name the column of times time_s or time_ms"));
+        let refused = |problem: &str, help: &str| {
+            let message = format!("--plan: {}: {problem}", path.display());
+            Err(Failure::input("watch/plan", message, help))
+        };
+        let epoch_s = match self.clock_scope(source) {
+            // The reader counts times since 1970 from a whole second.
+            ClockScope::Common => recording.clock().epoch_ns as f64 * 1e-9,
+            ClockScope::PerVehicle => 0.0,
+        };
+        let start_s = self.plan_start.unwrap_or(epoch_s);
+        let Some(plan) = Plan::read(&mut *recording, start_s).map_err(unread)? else {
+            return refused("too long to keep in memory", "give a plan with at most 20 million positions");
+        };
+        let metadata = recording.metadata();
+        if metadata.clock.by_steps {
+            let problem = format!("the unit of its times is a guess ({})", metadata.clock.unit);
+            return refused(&problem, "name the column of times time_s or time_ms");
+        }
+        if metadata.is_planar {
+            return refused("it has no heights, so a deviation in height is not known", "add the heights to the plan");
         }
         Ok(plan)
     }

@@ -48,14 +48,49 @@ fn events(ran: &Ran) -> Vec<Value> {
 fn two_vehicles_far_apart_are_clear() {
     let ran = judged(&approach(0.0, 0.0), &[]);
     assert_eq!(ran.exit, Some(0), "{ran:?}");
-    assert!(ran.out.contains("0.00 s: CLEAR until 0.80 s (0.80 s from now); closest a-b 4.00 m"), "{}", ran.out);
-    assert!(
-        ran.out.lines().last().is_some_and(|line| line.starts_with("CLEAR: 2 vehicles, 4.00 s CLEAR")),
-        "{}",
-        ran.out
-    );
+    let bounds = "if positions are within 0.05 m (default) and accelerations within 9.81 m/s^2 (default)";
+    let first = format!("0.00 s: CLEAR until 0.57 s (0.57 s from now) {bounds}; closest a-b 4.00 m");
+    assert!(ran.out.contains(&first), "{}", ran.out);
+    let last = format!("CLEAR {bounds}: 2 vehicles, 4.00 s CLEAR");
+    assert!(ran.out.lines().last().is_some_and(|line| line.starts_with(&last)), "{}", ran.out);
     // A line each second of the stamps.
     assert_eq!(ran.out.matches("CLEAR until").count(), 5, "{}", ran.out);
+}
+
+#[test]
+fn every_line_with_clear_has_its_facts() {
+    let ran = judged(&approach(0.0, 0.0), &["--json", "--position-error", "0.02", "--accel", "5"]);
+    assert_eq!(ran.exit, Some(0), "{ran:?}");
+    let is_clear = |line: &&Value| line["state"] == "clear" || line["event"] == "summary";
+    let lines: Vec<_> = events(&ran).into_iter().filter(|line| is_clear(&line)).collect();
+    assert_eq!(lines.len(), 6, "{}", ran.out);
+    for line in lines {
+        let fact = |kind: &str| {
+            let found = line["facts"].as_array().and_then(|facts| facts.iter().find(|fact| fact["fact"] == kind));
+            found.map(|fact| (fact["source"].as_str().unwrap_or_default().to_owned(), fact["value"].as_f64()))
+        };
+        assert_eq!(fact("position-error"), Some(("declared".to_owned(), Some(0.02))), "{line}");
+        assert_eq!(fact("acceleration"), Some(("declared".to_owned(), Some(5.0))), "{line}");
+        assert_eq!(fact("age"), Some(("default".to_owned(), Some(1.0))), "{line}");
+        // One position of a vehicle contradicts no velocity.
+        let agreement = if line["t_s"] == 0.0 { "not-observable" } else { "observed" };
+        assert_eq!(fact("velocity-agreement"), Some((agreement.to_owned(), None)), "{line}");
+        let text = line["text"].as_str().unwrap_or_default();
+        assert!(text.contains("within 0.02 m (declared) and accelerations within 5 m/s^2 (declared)"), "{text}");
+    }
+    // Other states rest on no facts.
+    let ran = judged(&approach(-2.0, 0.3), &["--json"]);
+    assert!(events(&ran).iter().all(|line| line["state"] == "clear" || line["facts"].is_null()), "{}", ran.out);
+}
+
+#[test]
+fn a_sent_velocity_of_zero_is_a_contradiction() {
+    let input = approach(-2.0, 0.6).replace(r#""vx":-2"#, r#""vx":0"#);
+    let ran = judged(&input, &["--json"]);
+    assert_eq!(ran.exit, Some(1), "{ran:?}");
+    assert!(events(&ran).iter().any(|line| line["fault"] == "velocity-disagrees" && line["id"] == "b"), "{}", ran.out);
+    let late = events(&ran).into_iter().filter(|line| line["t_s"].as_f64().is_some_and(|t_s| t_s > 0.15));
+    assert_eq!(late.filter(|line| line["state"] == "clear").count(), 0, "{}", ran.out);
 }
 
 #[test]
@@ -267,6 +302,22 @@ fn deviations_from_the_plan_are_reported() {
     fs::write(folder.path().join("guess.csv"), plan.replace("time_s", "t")).expect("a file");
     let guess = watched(folder.path(), &[&STAMPS[..], &["--plan", "guess.csv"]].concat(), "");
     assert_eq!((guess.exit, guess.code()), (Some(2), "watch/plan"), "{guess:?}");
+    // Times since 1970 in both are one clock.
+    let since_1970 = |text: &str| text.replace("\n0,", "\n1700000000,").replace("\n4,", "\n1700000004,");
+    fs::write(folder.path().join("absolute.csv"), since_1970(plan)).expect("a file");
+    let flight = approach(0.0, 0.0).lines().fold(String::new(), |mut text, line| {
+        let (t_s, rest) = line[5..].split_once(',').expect("a stamp");
+        let t_s = t_s.parse::<f64>().expect("a number") + 1.7e9;
+        let _ = writeln!(text, "{{\"t\":{t_s},{rest}");
+        text
+    });
+    let absolute = watched(folder.path(), &[&STAMPS[..], &["--plan", "absolute.csv"]].concat(), &flight);
+    assert_eq!(absolute.exit, Some(0), "{absolute:?}");
+    assert!(absolute.out.contains("positions compared with the plan: 82"), "{}", absolute.out);
+    // A plan without heights.
+    fs::write(folder.path().join("flat.csv"), "time_s,id,x,y\n0,a,0,0\n0,b,4,0\n4,a,0,0\n4,b,4,0\n").expect("a file");
+    let flat = watched(folder.path(), &[&STAMPS[..], &["--plan", "flat.csv"]].concat(), "");
+    assert_eq!((flat.exit, flat.code()), (Some(2), "watch/plan"), "{flat:?}");
     // A vehicle of the plan that is not heard.
     let alone: String = approach(0.0, 0.0).replace("\"b\"", "\"c\"");
     assert!(run(&alone).out.contains("NOT KNOWN: not heard yet: b"));

@@ -91,6 +91,10 @@ coded! {
         Period = "period",
         /// Age of a measurement or message.
         Age = "age",
+        /// Smallest delay of a message between its stamp and its arrival.
+        Latency = "latency",
+        /// Each name of a vehicle belongs to one clock and one sequence of messages.
+        OneStream = "one-stream",
         /// Sent velocities agree with positions over windows of the history.
         VelocityAgreement = "velocity-agreement",
     }

@@ -31,7 +31,7 @@ fn rounds(criterion: &mut Criterion) {
                     let grid = Vector3::new((k % 10) as f64, (k / 10 % 10) as f64, (k / 100) as f64) * spacing_m;
                     let position_m = grid + Vector3::new(sway, sway, 0.0);
                     let velocity_m_s = Some(Vector3::new(speed, speed, 0.0));
-                    monitor.take(&Pose { t_s, id, position_m, velocity_m_s }, t_s);
+                    monitor.take(&Pose { t_s, id, position_m, velocity_m_s, accuracy_m: None }, t_s);
                 }
                 let of = monitor.assess(t_s);
                 monitor.drain_events();

@@ -45,7 +45,7 @@ fn give_others(feed: &Feed, round: u32) {
         let arrival_s = feed.now_s();
         let position_m = Vector3::new(f64::from(k % 25) * 3.0, f64::from(k / 25) * 3.0 + 10.0, 2.0);
         let (t_s, id) = (f64::from(round) * 0.02, format!("other {k}"));
-        let pose = OwnedPose { t_s, id, position_m, velocity_m_s: Some(Vector3::zeros()) };
+        let pose = OwnedPose { t_s, id, position_m, velocity_m_s: Some(Vector3::zeros()), accuracy_m: None };
         // A full channel is a finding of the watch.
         let _ = feed.offer(Input::Pose(pose, arrival_s));
     }

@@ -18,6 +18,10 @@ pub enum Reason {
     Stale(u32, f64),
     /// The velocity of a vehicle is not known yet.
     SpeedUnknown(u32),
+    /// The error of the positions of a vehicle is not known: no bound is given, and the source reports none.
+    ErrorUnknown(u32),
+    /// The messages of a vehicle are those of two vehicles with one name.
+    TwoStreams(u32),
     /// The clock of a vehicle stepped, and no message has arrived since.
     ClockStepped(u32),
     /// A vehicle sent two positions with one stamp.
@@ -32,7 +36,10 @@ impl Reason {
     /// Returns whether the reason is normal before all vehicles are heard.
     #[must_use]
     pub fn is_of_start(&self) -> bool {
-        matches!(self, Self::TooFew(_) | Self::Missing(_) | Self::MissingName(_) | Self::SpeedUnknown(_))
+        matches!(
+            self,
+            Self::TooFew(_) | Self::Missing(_) | Self::MissingName(_) | Self::SpeedUnknown(_) | Self::ErrorUnknown(_)
+        )
     }
 
     /// Returns whether the reason is normal after all vehicles but one have signed off. It is normal only in the last
@@ -114,6 +121,12 @@ pub enum Fault {
     Conflict,
     /// A vehicle moved farther than its bounds allow.
     OutOfBounds,
+    /// The velocities that a vehicle sends contradict its positions.
+    VelocityDisagrees,
+    /// The bound on the error of positions is smaller than the accuracy that the source reports.
+    Inaccurate,
+    /// The messages of a vehicle are those of two vehicles with one name.
+    TwoStreams,
     /// Messages came faster than they were read, and some were dropped.
     Dropped,
     /// A vehicle sent too many messages between two messages of another one. The past of this pair is not judged.
@@ -130,13 +143,16 @@ pub enum Fault {
 
 impl Fault {
     /// All faults.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 15] = [
         Self::Garbage,
         Self::OutOfRange,
         Self::TooManyVehicles,
         Self::ClockStep,
         Self::Conflict,
         Self::OutOfBounds,
+        Self::VelocityDisagrees,
+        Self::Inaccurate,
+        Self::TwoStreams,
         Self::Dropped,
         Self::NotJudged,
         Self::SignOff,
@@ -155,6 +171,9 @@ impl Fault {
             Self::ClockStep => "clock-step",
             Self::Conflict => "conflict",
             Self::OutOfBounds => "out-of-bounds",
+            Self::VelocityDisagrees => "velocity-disagrees",
+            Self::Inaccurate => "inaccurate",
+            Self::TwoStreams => "two-streams",
             Self::Dropped => "dropped",
             Self::NotJudged => "not-judged",
             Self::SignOff => "sign-off-refused",
@@ -194,6 +213,8 @@ pub enum Refusal {
     Violation(Pair),
     /// A vehicle is stale, or was not heard since the step of its clock.
     Stale(u32),
+    /// The messages of a vehicle are those of two vehicles with one name.
+    TwoStreams(u32),
     /// The velocity of a vehicle is not known, or it has two positions at one time.
     NoPrediction(u32),
     /// The bounds allow a pair to be closer than delta: the smallest possible separation \[m\].

@@ -174,6 +174,7 @@ fn status(of: &Assessment, monitor: &Monitor, state: &str) -> Value {
         "state": state,
         "reason": notice.json["reason"],
         "text": notice.text,
+        "facts": notice.json["facts"],
         "separation_m": of.closest.map(|near| near.nominal_m),
         "least_separation_m": of.closest.map(|near| near.least_m),
         "closest_pair": of.closest.map(|near| pair(near.pair)),
@@ -186,7 +187,7 @@ fn status(of: &Assessment, monitor: &Monitor, state: &str) -> Value {
 }
 
 fn is_stale(monitor: &Monitor, vehicle: usize) -> bool {
-    let most_s = monitor.settings().max_age_s;
+    let most_s = monitor.settings().max_age_s.value;
     !monitor.has_signed_off(vehicle) && monitor.newest(vehicle).is_some_and(|(.., age_s)| age_s > most_s)
 }
 

@@ -5,9 +5,6 @@ use nalgebra::Vector3;
 /// Largest number of positions that a vehicle keeps.
 pub const HISTORY: usize = 128;
 
-/// Smallest time between two positions of a difference quotient \[s\].
-const LEAST_INTERVAL_S: f64 = 1e-6;
-
 /// Position with its stamp.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Fix {
@@ -66,36 +63,42 @@ impl History {
         (1..self.len).rev().find(|&k| self.at(k).t_s <= t_s).unwrap_or(0)
     }
 
-    /// Returns the velocity at the newest position by a difference quotient, with the bound on its error.
-    ///
-    /// The error is `2 eps / h + A h / 2` for two positions `h` apart. The positions with the smallest error are used.
-    pub(crate) fn velocity(&self, position_error_m: f64, accel_m_s2: f64) -> Option<(Vector3<f64>, f64)> {
-        let newest = self.newest()?;
-        let error = |h_s: f64| 2.0 * position_error_m / h_s + accel_m_s2 * h_s / 2.0;
-        let mut best: Option<(Fix, f64)> = None;
-        // The error falls with h up to its only minimum and rises from there.
-        for k in (0..self.len - 1).rev() {
+    /// Returns how a stamp before the newest one lies among the stamps.
+    pub(crate) fn late(&self, t_s: f64) -> Late {
+        let mut late = Late { position_m: None, gap_s: None, least_gap_s: f64::INFINITY };
+        for k in 0..self.len {
             let fix = self.at(k);
-            let h_s = newest.t_s - fix.t_s;
-            if h_s < LEAST_INTERVAL_S {
-                continue;
+            if fix.t_s == t_s {
+                late.position_m = Some(fix.position_m);
             }
-            let error_m_s = error(h_s);
-            match best {
-                Some((_, least)) if error_m_s > least => break,
-                _ => best = Some((fix, error_m_s)),
+            if k > 0 {
+                let before_s = self.at(k - 1).t_s;
+                late.least_gap_s = late.least_gap_s.min(fix.t_s - before_s);
+                if before_s < t_s && t_s < fix.t_s {
+                    late.gap_s = Some(fix.t_s - before_s);
+                }
             }
         }
-        let (fix, error_m_s) = best?;
-        Some(((newest.position_m - fix.position_m) / (newest.t_s - fix.t_s), error_m_s))
+        late
     }
+}
+
+/// Place of a late stamp among the stamps of a history.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Late {
+    /// Position with the same stamp \[m\].
+    pub(crate) position_m: Option<Vector3<f64>>,
+    /// Distance of the stamps before and after it \[s\].
+    pub(crate) gap_s: Option<f64>,
+    /// Smallest distance of two successive stamps \[s\].
+    pub(crate) least_gap_s: f64,
 }
 
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
 
-    use super::{Fix, HISTORY, History};
+    use super::{Fix, HISTORY, History, Late};
 
     #[test]
     fn keeps_the_newest_positions_only() {
@@ -110,18 +113,14 @@ mod tests {
     }
 
     #[test]
-    fn a_difference_quotient_holds_its_error_bound() {
-        let (accel, position_error_m) = (5.0, 0.01);
+    fn a_late_stamp_has_its_place_among_the_others() {
         let mut history = History::new();
-        for k in 0..100 {
-            let t_s = 0.01 * f64::from(k);
-            // Errors of alternating sign are the worst case.
-            let error_m = if k % 2 == 0 { position_error_m } else { -position_error_m };
-            history.push(Fix { t_s, position_m: Vector3::x() * (accel * t_s * t_s / 2.0 + error_m) });
+        for (t_s, x) in [(1.0, 0.0), (1.5, 1.0), (3.0, 2.0)] {
+            history.push(Fix { t_s, position_m: Vector3::x() * x });
         }
-        let (velocity, error_m_s) = history.velocity(position_error_m, accel).expect("two positions");
-        assert!((velocity.x - accel * 0.99).abs() <= error_m_s, "{velocity} {error_m_s}");
-        // sqrt(4 eps A) is the smallest possible bound.
-        assert!(error_m_s < 1.01 * (4.0 * position_error_m * accel).sqrt(), "{error_m_s}");
+        let late = |t_s| history.late(t_s);
+        assert_eq!(late(1.5), Late { position_m: Some(Vector3::x()), gap_s: None, least_gap_s: 0.5 });
+        assert_eq!(late(2.0), Late { position_m: None, gap_s: Some(1.5), least_gap_s: 0.5 });
+        assert_eq!(late(0.5).gap_s, None);
     }
 }

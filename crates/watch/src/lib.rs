@@ -8,6 +8,8 @@
 //! | [`Record`] | recording of the poses that the monitor used |
 //! | [`page`] | server of the live page |
 //! | [`foxglove_server`] | server for Foxglove |
+//! | `velocity` | derivation of the enclosure of velocities, and the test whether sent velocities agree |
+//! | `streams` | evidence that one name carries the messages of two vehicles |
 //! | [`pair`] | derivation and formulas of the time until which a pair is clear |
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
@@ -27,6 +29,8 @@ mod record;
 mod session;
 mod settings;
 pub mod source;
+mod streams;
+mod velocity;
 mod violations;
 
 pub use clock::{DRIFT, STEP_S};
@@ -37,5 +41,7 @@ pub use notice::Notice;
 pub use plan::Plan;
 pub use record::Record;
 pub use session::{ASSESS_PERIOD_S, LINE_PERIOD_S, Output, Summary, watch};
-pub use settings::{ClockScope, Expected, Settings, SettingsError, TimeBase};
+pub use settings::{
+    Bound, ClockScope, DEFAULT_ACCEL_M_S2, Expected, REPORTED_DEVIATIONS, Settings, SettingsError, TimeBase,
+};
 pub use violations::MOST_OPEN;

@@ -4,6 +4,8 @@ use serde_json::{Map, Value, json};
 
 use crate::event::{Assessment, Event, Fault, Pair, PairTime, Reason, Refusal, State};
 use crate::monitor::Monitor;
+use crate::settings::REPORTED_DEVIATIONS;
+use tautline_core::fact::{Coded as _, Fact, FactKind, FactValue, Source};
 
 /// Notice for the user: a state, or an event.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,6 +68,7 @@ impl Notice {
             State::NotKnown(reason) => ("not-known", Some(reason_name(reason)), None, None),
             State::Violation(pair, distance_m) => ("violation", None, Some(two(pair)), Some(distance_m)),
         };
+        let facts = matches!(of.state, State::Clear).then(|| monitor.facts());
         let deviation = of.deviation.map(|(vehicle, metres)| json!({ "id": name(vehicle), "deviation_m": metres }));
         let more = json!({
             "state": state,
@@ -77,6 +80,7 @@ impl Notice {
             "closest": closest,
             "clear_until": timed(of.clear_until),
             "clear_to_horizon": of.is_clear_to_horizon,
+            "facts": facts,
             "nominal_violation": timed(of.nominal_violation),
             "last_brake": timed(of.last_brake),
             "plan": deviation,
@@ -185,7 +189,8 @@ fn state_text(of: &Assessment, monitor: &Monitor) -> String {
         State::Clear => {
             let at_s = of.clear_until.map_or(of.now_s, |until| until.at_s);
             let left_s = at_s - of.now_s;
-            format!("CLEAR until {} s ({} s from now)", down(at_s), down(left_s))
+            let bounds = bounds_text(&monitor.facts());
+            format!("CLEAR until {} s ({} s from now){bounds}", down(at_s), down(left_s))
         }
         State::Violation(pair, distance_m) => {
             let delta_m = monitor.settings().delta_m;
@@ -206,10 +211,14 @@ fn state_text(of: &Assessment, monitor: &Monitor) -> String {
                 Reason::SignedOff(_) => "only one vehicle has not signed off".to_owned(),
                 Reason::Stale(vehicle, age_s) => format!("{} not heard for {} s", name(vehicle), fixed(age_s)),
                 Reason::SpeedUnknown(vehicle) => format!("the velocity of {} is not known yet", name(vehicle)),
+                Reason::ErrorUnknown(vehicle) => {
+                    format!("{} reports no accuracy of its positions; give --position-error", name(vehicle))
+                }
+                Reason::TwoStreams(vehicle) => fault_text(Fault::TwoStreams, Some(&name(vehicle))),
                 Reason::ClockStepped(vehicle) => format!("{} not heard since the step of the clock", name(vehicle)),
                 Reason::Conflict(vehicle) => format!("{} has two positions at one time", name(vehicle)),
                 Reason::Doubt(fault) => {
-                    format!("{} in the last {} s", fault_text(fault, None), monitor.settings().max_age_s)
+                    format!("{} in the last {} s", fault_text(fault, None), monitor.settings().max_age_s.value)
                 }
                 Reason::Uncertain(pair, least_m) => format!(
                     "{} may be as near as {} m (delta {} m)",
@@ -223,6 +232,23 @@ fn state_text(of: &Assessment, monitor: &Monitor) -> String {
     }
 }
 
+/// Returns the bounds on positions and accelerations as a condition of CLEAR.
+pub(crate) fn bounds_text(facts: &[Fact]) -> String {
+    let bound = |kind: FactKind| {
+        let fact = facts.iter().find(|fact| fact.kind == kind)?;
+        let Some(FactValue::Number(value, unit)) = fact.value else { return None };
+        let (value, source) = match fact.source {
+            Source::Recorded => (up(value), format!("{REPORTED_DEVIATIONS} reported deviations")),
+            source => (value.to_string(), source.code().to_owned()),
+        };
+        Some(format!("within {value} {unit} ({source})"))
+    };
+    match (bound(FactKind::PositionError), bound(FactKind::Acceleration)) {
+        (Some(error), Some(accel)) => format!(" if positions are {error} and accelerations {accel}"),
+        _ => String::new(),
+    }
+}
+
 fn reason_name(reason: Reason) -> &'static str {
     match reason {
         Reason::TooFew(_) => "too-few",
@@ -230,6 +256,8 @@ fn reason_name(reason: Reason) -> &'static str {
         Reason::SignedOff(_) => "signed-off",
         Reason::Stale(..) => "stale",
         Reason::SpeedUnknown(_) => "speed-unknown",
+        Reason::ErrorUnknown(_) => "error-unknown",
+        Reason::TwoStreams(_) => Fault::TwoStreams.name(),
         Reason::ClockStepped(_) => "clock-step",
         Reason::Conflict(_) => "conflict",
         Reason::Doubt(fault) => fault.name(),
@@ -246,6 +274,16 @@ fn fault_text(fault: Fault, vehicle: Option<&str>) -> String {
         Fault::ClockStep => format!("the clock of {of} stepped or is too fast"),
         Fault::Conflict => format!("{of} has two positions at one time"),
         Fault::OutOfBounds => format!("{of} moved farther than --accel and the errors allow"),
+        Fault::VelocityDisagrees => {
+            format!("{of} sends velocities that contradict its positions; check their frame, unit and time")
+        }
+        Fault::Inaccurate => {
+            format!("{of} reports an accuracy that is worse than --position-error; give a larger --position-error")
+        }
+        Fault::TwoStreams => format!(
+            "the messages of {of} are those of two vehicles; give each vehicle a name or system id of its own and one \
+             link, and start again"
+        ),
         Fault::Dropped => "messages came faster than they were read".to_owned(),
         Fault::NotJudged => format!("{of} sent more messages than are kept, so a part of the past is not judged"),
         Fault::SignOff => format!("the sign-off of {of} is refused"),
@@ -258,7 +296,7 @@ fn fault_text(fault: Fault, vehicle: Option<&str>) -> String {
 /// Returns the cause of a refused sign-off and its remedy, to follow the sentence of the fault.
 fn refusal_text(refusal: Refusal, monitor: &Monitor) -> String {
     let name = |vehicle: u32| name(monitor, vehicle);
-    let max_age_s = monitor.settings().max_age_s;
+    let max_age_s = monitor.settings().max_age_s.value;
     match refusal {
         Refusal::Late { t_s, newest_s } => format!(
             ": its stamp {} s is older than the newest position ({} s), so it is ignored; \
@@ -284,6 +322,7 @@ fn refusal_text(refusal: Refusal, monitor: &Monitor) -> String {
             let of = name(vehicle);
             format!(": {of} was not heard for {max_age_s} s; sign off again after a new position of {of}")
         }
+        Refusal::TwoStreams(vehicle) => format!(": {}", fault_text(Fault::TwoStreams, Some(&name(vehicle)))),
         Refusal::NoPrediction(vehicle) => {
             let of = name(vehicle);
             format!(": the velocity or position of {of} is not known; sign off again after a new position of {of}")
@@ -304,6 +343,7 @@ fn refusal_name(refusal: Refusal) -> &'static str {
         Refusal::Doubt(fault) => fault.name(),
         Refusal::Violation(_) => "violation",
         Refusal::Stale(_) => "stale",
+        Refusal::TwoStreams(_) => Fault::TwoStreams.name(),
         Refusal::NoPrediction(_) => "speed-unknown",
         Refusal::Uncertain(..) => "uncertain",
     }
@@ -323,4 +363,9 @@ pub(crate) fn fixed(time_s: f64) -> String {
 pub(crate) fn down(x: f64) -> String {
     // A sum such as 0.3 - 1e-17 stays 0.3.
     format!("{:.2}", ((x + 1e-9) * 100.0).floor() / 100.0)
+}
+
+/// Returns a number with hundredths, rounded up.
+fn up(x: f64) -> String {
+    format!("{:.2}", ((x - 1e-9) * 100.0).ceil() / 100.0)
 }

@@ -3,14 +3,18 @@
 //! The page is a string of the caller. The WebSocket `/live` sends [frames](Page::assessed) and notices as JSON. On an
 //! address other than loopback both need the token of [`Page::url`]. A request whose `Host` is a name, or whose
 //! `Origin` is another page, is refused, so that no other site can read the positions through a browser.
+//!
+//! Connections without a valid request have places of their own, and a second each to send one. If all places are
+//! taken, a new connection takes the oldest place of the address that has most of them. So a host with idle
+//! connections does not keep out other hosts, or requests that come at once.
 
+use std::collections::VecDeque;
 use std::hash::{BuildHasher as _, RandomState};
 use std::io::{self, Read as _, Write as _};
-use std::net::{IpAddr, SocketAddr, TcpListener, TcpStream};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::net::{IpAddr, Shutdown, SocketAddr, TcpListener, TcpStream};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
 use tungstenite::Message;
@@ -23,14 +27,18 @@ use crate::notice::Notice;
 pub const FRAME_PERIOD_S: f64 = 0.1;
 /// Largest number of viewers.
 pub const MOST_VIEWERS: usize = 16;
-/// Largest number of connections that are being answered, viewers included.
-const MOST_CONNECTIONS: usize = 64;
+/// Largest number of connections with a valid request, viewers included.
+const MOST_ADMITTED: usize = 64;
+/// Largest number of connections without a valid request.
+const MOST_PENDING: usize = 64;
+/// Time limit of a request. A browser sends it at once.
+const REQUEST_PATIENCE: Duration = Duration::from_secs(1);
 /// Largest number of bytes of the head of a request.
 const LARGEST_HEAD: usize = 8192;
 /// Largest number of messages that wait for a viewer. A slower viewer is disconnected, so that its page does not show
 /// an old state.
 const MOST_WAITING: usize = 256;
-/// Time limit of a request and of a write.
+/// Time limit of a write.
 const PATIENCE: Duration = Duration::from_secs(5);
 
 /// Server of the live page. It ends with the process.
@@ -48,7 +56,58 @@ struct Shared {
     viewers: Mutex<Vec<SyncSender<Arc<str>>>>,
     /// Names of the vehicles, sent first to every viewer.
     roster: Mutex<Arc<str>>,
-    connections: AtomicUsize,
+    connections: Mutex<Connections>,
+}
+
+/// Connections that are being answered.
+#[derive(Default)]
+struct Connections {
+    /// Connections without a valid request, the oldest first.
+    pending: VecDeque<Pending>,
+    /// Number of connections with one.
+    admitted: usize,
+    /// Number of the next connection.
+    next: u64,
+}
+
+/// Connection without a valid request.
+struct Pending {
+    number: u64,
+    address: IpAddr,
+    /// Handle that ends the connection.
+    stream: TcpStream,
+}
+
+impl Connections {
+    /// Adds a connection and returns its number. Without a place, the oldest connection of the address with most
+    /// places ends.
+    fn add(&mut self, address: IpAddr, stream: TcpStream) -> u64 {
+        if self.pending.len() >= MOST_PENDING {
+            let places = |one: &Pending| self.pending.iter().filter(|other| other.address == one.address).count();
+            // Of equal counts, `max_by_key` takes the last one.
+            let ended = (0..self.pending.len()).rev().max_by_key(|&k| places(&self.pending[k]));
+            if let Some(pending) = ended.and_then(|k| self.pending.remove(k)) {
+                // A connection that has ended is no error.
+                let _ = pending.stream.shutdown(Shutdown::Both);
+            }
+        }
+        self.next += 1;
+        self.pending.push_back(Pending { number: self.next, address, stream });
+        self.next
+    }
+
+    /// Removes a connection from those without a valid request. Returns whether it was among them.
+    fn remove(&mut self, number: u64) -> bool {
+        let place = self.pending.iter().position(|pending| pending.number == number);
+        place.is_some_and(|k| self.pending.remove(k).is_some())
+    }
+
+    /// Moves a connection to those with a valid request, if there is a place.
+    fn admit(&mut self, number: u64) -> bool {
+        let is_admitted = self.remove(number) && self.admitted < MOST_ADMITTED;
+        self.admitted += usize::from(is_admitted);
+        is_admitted
+    }
 }
 
 impl Page {
@@ -69,7 +128,7 @@ impl Page {
             token,
             viewers: Mutex::default(),
             roster: Mutex::new(Arc::from("{\"op\":\"roster\",\"names\":[]}")),
-            connections: AtomicUsize::new(0),
+            connections: Mutex::default(),
         });
         let server = Arc::clone(&shared);
         std::thread::spawn(move || {
@@ -78,15 +137,13 @@ impl Page {
                     std::thread::sleep(Duration::from_millis(50));
                     continue;
                 };
-                if server.connections.fetch_add(1, Ordering::Relaxed) >= MOST_CONNECTIONS {
-                    server.connections.fetch_sub(1, Ordering::Relaxed);
-                    continue;
-                }
+                let (Ok(address), Ok(handle)) = (stream.peer_addr(), stream.try_clone()) else { continue };
+                let number = lock(&server.connections).add(address.ip(), handle);
                 let server = Arc::clone(&server);
                 std::thread::spawn(move || {
                     // A viewer that leaves is no error.
-                    let _ = answer(stream, &server);
-                    server.connections.fetch_sub(1, Ordering::Relaxed);
+                    let _ = answer(stream, number, &server);
+                    lock(&server.connections).remove(number);
                 });
             }
         });
@@ -123,7 +180,7 @@ impl Page {
         if lock(&self.shared.viewers).is_empty() {
             return;
         }
-        let most_s = monitor.settings().max_age_s;
+        let most_s = monitor.settings().max_age_s.value;
         let places: Vec<Value> = (0..self.names)
             .map(|k| match monitor.newest(k).filter(|_| !monitor.has_signed_off(k)) {
                 Some((at, _, age_s)) => json!([at.x, at.y, at.z, age_s <= most_s]),
@@ -163,19 +220,37 @@ enum Request {
 }
 
 /// Answers one connection: the page, or the WebSocket until the viewer leaves.
-fn answer(mut stream: TcpStream, shared: &Shared) -> io::Result<()> {
-    stream.set_read_timeout(Some(PATIENCE))?;
+fn answer(mut stream: TcpStream, number: u64, shared: &Shared) -> io::Result<()> {
     stream.set_write_timeout(Some(PATIENCE))?;
     stream.set_nodelay(true)?;
     // The handshake of the WebSocket reads the same bytes again.
     let head = peek_head(&stream)?;
+    stream.set_read_timeout(Some(PATIENCE))?;
     match request(&head, shared) {
-        Ok(Request::Page) => {
+        Ok(request) => {
+            if !lock(&shared.connections).admit(number) {
+                return Ok(());
+            }
+            let answered = answer_valid(stream, request, head.len(), shared);
+            lock(&shared.connections).admitted -= 1;
+            answered
+        }
+        Err(status) => {
             read_head(&mut stream, head.len())?;
+            respond(&mut stream, status, "text/plain", status.as_bytes())
+        }
+    }
+}
+
+/// Answers a valid request.
+fn answer_valid(mut stream: TcpStream, request: Request, head: usize, shared: &Shared) -> io::Result<()> {
+    match request {
+        Request::Page => {
+            read_head(&mut stream, head)?;
             let kind = "text/html; charset=utf-8";
             respond(&mut stream, "200 OK", kind, shared.html.as_bytes())
         }
-        Ok(Request::Live) => {
+        Request::Live => {
             let Ok(mut socket) = tungstenite::accept(stream) else { return Ok(()) };
             let receiver = {
                 let mut viewers = lock(&shared.viewers);
@@ -189,10 +264,6 @@ fn answer(mut stream: TcpStream, shared: &Shared) -> io::Result<()> {
             };
             view(&mut socket, &receiver);
             Ok(())
-        }
-        Err(status) => {
-            read_head(&mut stream, head.len())?;
-            respond(&mut stream, status, "text/plain", status.as_bytes())
         }
     }
 }
@@ -209,14 +280,19 @@ fn view(socket: &mut tungstenite::WebSocket<TcpStream>, receiver: &Receiver<Arc<
 /// Returns the head of a request without taking it from the stream.
 fn peek_head(stream: &TcpStream) -> io::Result<Vec<u8>> {
     let mut bytes = vec![0; LARGEST_HEAD];
-    let until = std::time::Instant::now() + PATIENCE;
+    let until = Instant::now() + REQUEST_PATIENCE;
     loop {
+        let left = until.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Err(io::ErrorKind::TimedOut.into());
+        }
+        stream.set_read_timeout(Some(left))?;
         let length = stream.peek(&mut bytes)?;
         if let Some(end) = bytes[..length].windows(4).position(|four| four == b"\r\n\r\n") {
             bytes.truncate(end + 4);
             return Ok(bytes);
         }
-        if length == 0 || length == LARGEST_HEAD || std::time::Instant::now() > until {
+        if length == 0 || length == LARGEST_HEAD {
             return Err(io::ErrorKind::InvalidData.into());
         }
         std::thread::sleep(Duration::from_millis(5));
@@ -289,12 +365,13 @@ fn respond(stream: &mut TcpStream, status: &str, kind: &str, body: &[u8]) -> io:
 #[cfg(test)]
 mod tests {
     use std::io::{Read as _, Write as _};
-    use std::net::TcpStream;
+    use std::net::{TcpListener, TcpStream};
+    use std::time::Instant;
 
     use nalgebra::Vector3;
     use serde_json::Value;
 
-    use super::{MOST_WAITING, Page, lock};
+    use super::{Connections, MOST_PENDING, MOST_WAITING, Page, REQUEST_PATIENCE, lock};
     use crate::monitor::{Monitor, Pose};
     use crate::plan::Plan;
     use crate::settings::Settings;
@@ -336,6 +413,60 @@ mod tests {
     }
 
     #[test]
+    fn idle_connections_keep_out_no_request() {
+        let page = Page::serve("0.0.0.0:0".parse().expect("an address"), "<p>live".to_owned()).expect("serves");
+        let port = page.shared.address.port();
+        let (_, query) = page.url().split_once('?').map(|(a, b)| (a.to_owned(), b.to_owned())).expect("a token");
+        let is_served = || get(&page, &format!("/?{query}"), "Host: 127.0.0.1:PORT").starts_with("HTTP/1.1 200");
+        let begun = Instant::now();
+        let mut idle = Vec::new();
+        // Idle connections, and connections that sent a part of a request.
+        for k in 0..3 * MOST_PENDING {
+            let mut stream = TcpStream::connect(("127.0.0.1", port)).expect("connects");
+            if k % 2 == 0 {
+                stream.write_all(b"GET / HTTP/1.1\r\nHost: ").expect("sends");
+            }
+            idle.push(stream);
+        }
+        assert!(is_served());
+        // Connections with a valid request have places of their own.
+        let url = format!("ws://127.0.0.1:{port}/live?{query}");
+        let (mut viewer, _) = tungstenite::connect(url).expect("a WebSocket");
+        viewer.read().expect("the roster");
+        for _ in 0..2 * MOST_PENDING {
+            idle.push(TcpStream::connect(("127.0.0.1", port)).expect("connects"));
+        }
+        assert!(is_served() && begun.elapsed() < REQUEST_PATIENCE, "{:?}", begun.elapsed());
+        page.send(&Value::from("still here"));
+        assert!(viewer.read().is_ok_and(|message| message.to_text().is_ok_and(|text| text.contains("still here"))));
+        // An idle connection ends after its time.
+        let mut last = idle.pop().expect("a connection");
+        last.set_read_timeout(Some(3 * REQUEST_PATIENCE)).expect("a limit");
+        assert!(last.read(&mut [0]).is_ok_and(|length| length == 0));
+        let is_empty = || lock(&page.shared.connections).pending.is_empty();
+        while !is_empty() && begun.elapsed() < 4 * REQUEST_PATIENCE {
+            std::thread::yield_now();
+        }
+        assert!(is_empty());
+    }
+
+    #[test]
+    fn an_address_with_most_places_loses_its_oldest_one() {
+        let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
+        let stream = || TcpStream::connect(listener.local_addr().expect("an address")).expect("connects");
+        let mut connections = Connections::default();
+        let few: std::net::IpAddr = "10.0.0.1".parse().expect("an address");
+        let many: std::net::IpAddr = "10.0.0.2".parse().expect("an address");
+        let first = connections.add(few, stream());
+        let second = connections.add(many, stream());
+        for _ in 0..MOST_PENDING {
+            connections.add(many, stream());
+        }
+        assert_eq!(connections.pending.len(), MOST_PENDING);
+        assert!(!connections.admit(second) && connections.admit(first) && connections.admitted == 1);
+    }
+
+    #[test]
     fn a_viewer_gets_the_roster_and_frames() {
         let mut page = Page::serve("127.0.0.1:0".parse().expect("an address"), String::new()).expect("serves");
         let url = format!("ws://{}/live", page.shared.address);
@@ -348,7 +479,7 @@ mod tests {
         let mut monitor = Monitor::new(Settings::default(), Plan::default()).expect("settings");
         for (id, x) in [("a", 0.0), ("b", 0.5)] {
             let position_m = Vector3::x() * x;
-            monitor.take(&Pose { t_s: 0.0, id, position_m, velocity_m_s: None }, 0.0);
+            monitor.take(&Pose { t_s: 0.0, id, position_m, velocity_m_s: None, accuracy_m: None }, 0.0);
         }
         page.assessed(&monitor.assess(0.0), &monitor);
         assert_eq!(read()["names"], serde_json::json!(["a", "b"]));

@@ -112,7 +112,9 @@ mod tests {
         for (t_s, id) in [(0.1, "a, b"), (0.1, "c"), (0.2, "a, b"), (0.2, "c")] {
             let position_m = Vector3::new(third, -t_s, 7.0);
             let velocity_m_s = Some(Vector3::new(0.0, -1.0, third));
-            record.push(t_s, &OwnedPose { t_s, id: id.to_owned(), position_m, velocity_m_s }).expect("a row");
+            record
+                .push(t_s, &OwnedPose { t_s, id: id.to_owned(), position_m, velocity_m_s, accuracy_m: None })
+                .expect("a row");
         }
         assert!(!path.exists());
         record.finish().expect("a file");

@@ -9,10 +9,11 @@ use serde_json::json;
 
 use crate::absences::Absences;
 use crate::event::{Assessment, Event, Fault, Reason, State};
-use crate::monitor::{Monitor, Pose};
-use crate::notice::{Notice, down, fixed, name};
+use crate::monitor::Monitor;
+use crate::notice::{Notice, bounds_text, down, fixed, name};
 use crate::settings::TimeBase;
 use crate::source::{Input, Inputs, OwnedPose};
+use tautline_core::fact::Fact;
 
 /// Time between two judgements \[s\]; an alarm is at most this late.
 pub const ASSESS_PERIOD_S: f64 = 0.01;
@@ -88,15 +89,18 @@ impl Summary {
         self.has_started && !self.was_not_known && !self.was_violated && !self.was_off_plan && self.compared != Some(0)
     }
 
-    fn notice(&self, at_s: f64) -> Notice {
+    /// Returns the last line, with the facts on which CLEAR rests.
+    fn notice(&self, at_s: f64, facts: &[Fact]) -> Notice {
         let verdict = match self {
             _ if self.was_violated => "VIOLATION",
             _ if !self.has_started || self.was_not_known || self.compared == Some(0) => "NOT KNOWN",
             _ if self.was_off_plan => "OFF PLAN",
             _ => "CLEAR",
         };
+        let is_clear = verdict == "CLEAR";
+        let bounds = if is_clear { bounds_text(facts) } else { String::new() };
         let mut text = format!(
-            "{verdict}: {} vehicles{}, {} s CLEAR, {} s NOT KNOWN, {} s VIOLATION, measured violations: {}",
+            "{verdict}{bounds}: {} vehicles{}, {} s CLEAR, {} s NOT KNOWN, {} s VIOLATION, measured violations: {}",
             self.vehicles,
             if self.signed_off > 0 { format!(" ({} signed off)", self.signed_off) } else { String::new() },
             fixed(self.clear_s),
@@ -116,6 +120,7 @@ impl Summary {
         let closest = self.closest.as_ref().map(|(distance_m, pair)| json!({ "pair": pair, "distance_m": distance_m }));
         let more = json!({
             "good": self.is_good(),
+            "facts": is_clear.then_some(facts),
             "started": self.has_started,
             "vehicles": self.vehicles,
             "signed_off": self.signed_off,
@@ -206,6 +211,10 @@ impl Session<'_> {
                 self.monitor.fault(fault, None, arrival_s);
                 self.pass_events()?;
             }
+            Input::TwoStreams(id, arrival_s) => {
+                self.monitor.two_streams(&id, arrival_s);
+                self.pass_events()?;
+            }
             Input::Connected(source) => self.source("connected", format!("connected to {source}"), &source)?,
             Input::Lost(source, why) => self.source("lost", format!("lost {source}: {why}; trying again"), &source)?,
             Input::End => return Ok(true),
@@ -215,7 +224,7 @@ impl Session<'_> {
 
     fn pose(&mut self, pose: &OwnedPose, arrival_s: f64) -> io::Result<()> {
         self.pass_until(pose.t_s, arrival_s)?;
-        let of = Pose { t_s: pose.t_s, id: &pose.id, position_m: pose.position_m, velocity_m_s: pose.velocity_m_s };
+        let of = pose.borrowed();
         if let Some(taken) = self.monitor.take(&of, arrival_s) {
             self.output.pose(taken.time_s, pose)?;
         }
@@ -243,7 +252,7 @@ impl Session<'_> {
                 self.assess(arrival_s)?;
             }
             self.pass_end_of_clear(t_s, next_s, arrival_s)?;
-            if ahead_s > self.monitor.settings().max_age_s {
+            if ahead_s > self.monitor.settings().max_age_s.value {
                 // No message came between the present and this stamp.
                 self.monitor.advance(t_s);
                 self.assess(arrival_s)?;
@@ -375,7 +384,7 @@ impl Session<'_> {
         self.judged(of)?;
         self.summary.violations = self.monitor.violations();
         self.summary.compared = self.monitor.compared();
-        self.output.notice(&self.summary.notice(self.monitor.now_s()))?;
+        self.output.notice(&self.summary.notice(self.monitor.now_s(), &self.monitor.facts()))?;
         Ok(self.summary)
     }
 }

@@ -1,6 +1,17 @@
 //! Bounds and limits of a watch, with their defaults and checks.
 
 use crate::clock::STEP_S;
+use tautline_core::fact::{Fact, FactKind, Source};
+
+/// Default bound on the acceleration \[m/s^2\].
+///
+/// A multirotor that keeps its height accelerates by g tan(tilt). Autopilots limit the tilt to 45 degrees or less by
+/// default, which is g = 9.80665 m/s^2. A vehicle whose motors stop falls with g, too.
+pub const DEFAULT_ACCEL_M_S2: f64 = 9.81;
+/// Multiple of the standard deviation that a source reports which is taken as the bound on the error of a position.
+///
+/// With a normal error in each axis, fewer than one position of 200,000 lies farther away.
+pub const REPORTED_DEVIATIONS: f64 = 5.0;
 
 /// Largest time stamp that is read \[s\]: about 3,000 years. A stamp in milliseconds since 1970 is larger.
 pub(crate) const LARGEST_TIME_S: f64 = 1e11;
@@ -41,23 +52,51 @@ pub enum ClockScope {
     PerVehicle,
 }
 
+/// Bound on the motion or on an error, with its source.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bound {
+    /// Value.
+    pub value: f64,
+    /// Source: declared, or a default.
+    pub source: Source,
+}
+
+impl Bound {
+    /// Bound that the user gives.
+    #[must_use]
+    pub fn declared(value: f64) -> Self {
+        Self { value, source: Source::Declared }
+    }
+
+    /// Default bound.
+    #[must_use]
+    pub fn default_of(value: f64) -> Self {
+        Self { value, source: Source::Default }
+    }
+
+    fn fact(self, kind: FactKind, unit: &'static str) -> Fact {
+        Fact::number(kind, self.source, self.value, unit)
+    }
+}
+
 /// Bounds and limits of a watch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settings {
     /// Safety distance delta of two centres \[m\].
     pub delta_m: f64,
     /// Bound A on the acceleration of each vehicle \[m/s^2\].
-    pub accel_m_s2: f64,
-    /// Bound eps on the error of each position \[m\], with the speed times the error of its stamp.
-    pub position_error_m: f64,
+    pub accel_m_s2: Bound,
+    /// Bound eps on the error of each position \[m\], with the speed times the error of its stamp. Without it, the
+    /// bound is [`REPORTED_DEVIATIONS`] times the accuracy that the source reports with each position.
+    pub position_error_m: Option<Bound>,
     /// Bound e on the error of each velocity that is sent \[m/s\].
-    pub velocity_error_m_s: f64,
+    pub velocity_error_m_s: Bound,
     /// Acceleration B with which each vehicle can brake along the line between two \[m/s^2\].
     pub brake_m_s2: f64,
     /// Age beyond which a vehicle is stale \[s\].
-    pub max_age_s: f64,
+    pub max_age_s: Bound,
     /// Smallest delay between a stamp and its arrival \[s\], which the monitor cannot measure.
-    pub latency_s: f64,
+    pub latency_s: Bound,
     /// Time ahead that is examined \[s\].
     pub horizon_s: f64,
     /// Largest deviation from the plan \[m\].
@@ -76,12 +115,12 @@ impl Default for Settings {
     fn default() -> Self {
         Self {
             delta_m: 1.0,
-            accel_m_s2: 5.0,
-            position_error_m: 0.05,
-            velocity_error_m_s: 0.1,
+            accel_m_s2: Bound::default_of(DEFAULT_ACCEL_M_S2),
+            position_error_m: Some(Bound::default_of(0.05)),
+            velocity_error_m_s: Bound::default_of(0.1),
             brake_m_s2: 3.0,
-            max_age_s: 1.0,
-            latency_s: 0.0,
+            max_age_s: Bound::default_of(1.0),
+            latency_s: Bound::default_of(0.0),
             horizon_s: 10.0,
             tube_m: 0.5,
             expected: Expected::Heard,
@@ -107,7 +146,36 @@ pub struct SettingsError {
 impl Settings {
     /// Returns the time by which a stamp may lie after the present of its clock \[s\]; from there it is a step.
     pub(crate) fn largest_step_s(&self) -> f64 {
-        STEP_S.min(self.max_age_s / 2.0)
+        STEP_S.min(self.max_age_s.value / 2.0)
+    }
+
+    /// Returns the bound on the error of a position \[m\] with the accuracy that its source reports \[m\]; `None` if no
+    /// bound is known.
+    #[must_use]
+    pub fn error_of_position_m(&self, accuracy_m: Option<f64>) -> Option<f64> {
+        match self.position_error_m {
+            Some(bound) => Some(bound.value),
+            None => accuracy_m.map(|accuracy_m| REPORTED_DEVIATIONS * accuracy_m),
+        }
+    }
+
+    /// Returns the bounds on which CLEAR rests. `reported_m` is the largest error of a position by the accuracy that
+    /// sources report \[m\].
+    #[must_use]
+    pub fn facts(&self, reported_m: Option<f64>) -> Vec<Fact> {
+        let position_error = match (self.position_error_m, reported_m) {
+            (Some(bound), _) => Some(bound.fact(FactKind::PositionError, "m")),
+            (None, reported_m) => {
+                reported_m.map(|error_m| Fact::number(FactKind::PositionError, Source::Recorded, error_m, "m"))
+            }
+        };
+        let others = [
+            self.accel_m_s2.fact(FactKind::Acceleration, "m/s^2"),
+            self.velocity_error_m_s.fact(FactKind::VelocityError, "m/s"),
+            self.max_age_s.fact(FactKind::Age, "s"),
+            self.latency_s.fact(FactKind::Latency, "s"),
+        ];
+        position_error.into_iter().chain(others).collect()
     }
 
     /// Checks the ranges of all numbers.
@@ -119,12 +187,12 @@ impl Settings {
         let not_negative = "must be from 0 to 1e6";
         for (option, value, least, problem) in [
             ("--delta", self.delta_m, f64::MIN_POSITIVE, positive),
-            ("--accel", self.accel_m_s2, 0.0, not_negative),
-            ("--position-error", self.position_error_m, 0.0, not_negative),
-            ("--velocity-error", self.velocity_error_m_s, 0.0, not_negative),
+            ("--accel", self.accel_m_s2.value, 0.0, not_negative),
+            ("--position-error", self.position_error_m.map_or(0.0, |bound| bound.value), 0.0, not_negative),
+            ("--velocity-error", self.velocity_error_m_s.value, 0.0, not_negative),
             ("--brake", self.brake_m_s2, f64::MIN_POSITIVE, positive),
-            ("--max-age", self.max_age_s, f64::MIN_POSITIVE, positive),
-            ("--latency", self.latency_s, 0.0, not_negative),
+            ("--max-age", self.max_age_s.value, f64::MIN_POSITIVE, positive),
+            ("--latency", self.latency_s.value, 0.0, not_negative),
             ("--horizon", self.horizon_s, f64::MIN_POSITIVE, positive),
             ("--tube", self.tube_m, f64::MIN_POSITIVE, positive),
         ] {
@@ -148,19 +216,19 @@ impl Settings {
 
 #[cfg(test)]
 mod tests {
-    use super::{Expected, Settings};
+    use super::{Bound, Expected, Settings};
 
     #[test]
     fn every_number_has_a_range() {
         assert_eq!(Settings::default().check(), Ok(()));
         let broken: [fn(&mut Settings); 10] = [
             |of| of.delta_m = 0.0,
-            |of| of.accel_m_s2 = -1.0,
-            |of| of.position_error_m = f64::NAN,
-            |of| of.velocity_error_m_s = f64::INFINITY,
+            |of| of.accel_m_s2.value = -1.0,
+            |of| of.position_error_m = Some(Bound::declared(f64::NAN)),
+            |of| of.velocity_error_m_s.value = f64::INFINITY,
             |of| of.brake_m_s2 = 0.0,
-            |of| of.max_age_s = 1e7,
-            |of| of.latency_s = -0.1,
+            |of| of.max_age_s.value = 1e7,
+            |of| of.latency_s.value = -0.1,
             |of| of.horizon_s = 0.0,
             |of| of.tube_m = 0.0,
             |of| of.expected = Expected::Count(1),

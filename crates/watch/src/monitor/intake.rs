@@ -1,12 +1,13 @@
-//! Poses and stamps of the monitor: clocks, bounds and the plan.
+//! Poses and stamps of the monitor: clocks, bounds, streams and the plan.
 
 use nalgebra::Vector3;
 
-use super::{Monitor, Pose, Taken};
+use super::{Monitor, Pose, Taken, kept};
 use crate::clock::{STEP_S, SourceClock};
 use crate::event::{Event, Fault};
 use crate::history::Fix;
 use crate::settings::{ClockScope, LARGEST_POSITION_M, LARGEST_SPEED_M_S, LARGEST_TIME_S, TimeBase};
+use crate::velocity::{Bounds, Reading};
 
 impl Monitor {
     /// Takes a pose that arrived at `arrival_s` on the caller's clock \[s\], which must not go back. Returns the
@@ -15,6 +16,7 @@ impl Monitor {
         let within = |of: &Vector3<f64>, most: f64| of.iter().all(|x| x.abs() <= most);
         let is_readable = pose.t_s.abs() <= LARGEST_TIME_S
             && within(&pose.position_m, LARGEST_POSITION_M)
+            && pose.accuracy_m.is_none_or(|accuracy_m| (0.0..=LARGEST_POSITION_M).contains(&accuracy_m))
             && pose.velocity_m_s.is_none_or(|velocity| within(&velocity, LARGEST_SPEED_M_S));
         if !is_readable {
             self.fault(Fault::OutOfRange, None, arrival_s);
@@ -64,7 +66,7 @@ impl Monitor {
             && let Some(fix) = newest
         {
             if back_s > 0.0 {
-                self.fault_at(Fault::Reordered, Some(vehicle), now_s);
+                self.take_late(vehicle, pose);
             } else if fix.position_m == pose.position_m {
                 self.fault_at(Fault::Duplicate, Some(vehicle), now_s);
             } else {
@@ -89,18 +91,14 @@ impl Monitor {
         if self.vehicles[k].epoch != clock.epoch() {
             self.forget(vehicle, clock.epoch());
         }
-        if self.breaks_bounds(k, pose) {
-            self.fault_at(Fault::OutOfBounds, Some(vehicle), now_s);
+        if self.vehicles[k].streams.take(pose.t_s) {
+            self.find_two_streams(vehicle);
         }
-        let (eps, accel) = (self.settings.position_error_m, self.settings.accel_m_s2);
+        self.enclose_velocity(vehicle, pose);
         let of = &mut self.vehicles[k];
         of.history.push(Fix { t_s: pose.t_s, position_m: pose.position_m });
         of.has_conflict = false;
         let signed_off_s = of.signed_off_s.take();
-        of.velocity = match pose.velocity_m_s {
-            Some(velocity) => Some((velocity, self.settings.velocity_error_m_s)),
-            None => of.history.velocity(eps, accel),
-        };
         let at_s = clock.time_of(pose.t_s);
         // The offset of a clock may shrink by more than the time between two stamps.
         let time_s = of.taken_s.map_or(at_s, |last_s| at_s.max(last_s.next_up()));
@@ -133,25 +131,67 @@ impl Monitor {
     fn forget(&mut self, vehicle: u32, epoch: u32) {
         let of = &mut self.vehicles[vehicle as usize];
         of.history.clear();
-        (of.epoch, of.judged_t_s, of.velocity) = (epoch, None, None);
+        of.velocity.clear();
+        (of.epoch, of.judged_t_s) = (epoch, None);
         while let Some(of) = self.violations.close(|pair| pair.contains(&vehicle)) {
             self.emit(Event::Ended(of));
         }
     }
 
-    /// Returns whether a vehicle cannot have moved from its newest position to this pose within the bounds.
-    fn breaks_bounds(&self, k: usize, pose: &Pose<'_>) -> bool {
-        let of = &self.vehicles[k];
-        let (Some(fix), Some((velocity, error_m_s))) = (of.history.newest(), of.velocity) else { return false };
-        let h_s = pose.t_s - fix.t_s;
-        let accel = self.settings.accel_m_s2;
-        let bound_m = 2.0 * self.settings.position_error_m
-            + error_m_s * h_s
-            + accel * h_s * h_s / 2.0
-            // Stamps may be wrong by one unit in the last place.
-            + velocity.norm() * 4.0 * f64::EPSILON * pose.t_s.abs();
-        let moved_m = (pose.position_m - fix.position_m - velocity * h_s).norm();
-        moved_m > bound_m * (1.0 + 1e-9) + 1e-9 * (1.0 + pose.position_m.amax())
+    /// Takes a pose that is older than the newest one of its vehicle.
+    fn take_late(&mut self, vehicle: u32, pose: &Pose<'_>) {
+        let now_s = self.now_s;
+        self.fault_at(Fault::Reordered, Some(vehicle), now_s);
+        let own = &mut self.vehicles[vehicle as usize];
+        let late = own.history.late(pose.t_s);
+        // A copy by another link is no evidence of a second vehicle.
+        let is_copy = late.position_m == Some(pose.position_m);
+        if !is_copy && own.streams.take_late(late.gap_s, late.least_gap_s, now_s) {
+            self.find_two_streams(vehicle);
+        }
+    }
+
+    /// Notes that a name carries two streams, which arrived at a time on the caller's clock \[s\]. A name that was not
+    /// heard is ignored.
+    pub fn two_streams(&mut self, id: &str, arrival_s: f64) {
+        if let Ok(vehicle) = self.find(kept(id)) {
+            if self.settings.time_base == TimeBase::Arrival {
+                self.now_s = self.now_s.max(self.time_of_arrival(arrival_s));
+            }
+            self.find_two_streams(vehicle);
+        }
+    }
+
+    fn find_two_streams(&mut self, vehicle: u32) {
+        let own = &mut self.vehicles[vehicle as usize];
+        if !std::mem::replace(&mut own.has_two_streams, true) {
+            self.fault_at(Fault::TwoStreams, Some(vehicle), self.now_s);
+        }
+    }
+
+    /// Encloses the velocity of a vehicle at a pose, and reports a contradiction to the bounds.
+    fn enclose_velocity(&mut self, vehicle: u32, pose: &Pose<'_>) {
+        let error_m = self.settings.error_of_position_m(pose.accuracy_m);
+        let bounds = Bounds {
+            accel_m_s2: self.settings.accel_m_s2.value,
+            velocity_error_m_s: self.settings.velocity_error_m_s.value,
+        };
+        let own = &mut self.vehicles[vehicle as usize];
+        own.position_error_m = error_m;
+        own.sends_velocity = pose.velocity_m_s.is_some();
+        let fault = if let Some(position_error_m) = error_m {
+            let Pose { t_s, position_m, velocity_m_s, .. } = *pose;
+            own.velocity.take(Reading { t_s, position_m, position_error_m, velocity_m_s }, bounds)
+        } else {
+            own.velocity.clear();
+            None
+        };
+        if let Some(fault) = fault {
+            self.fault_at(fault, Some(vehicle), self.now_s);
+        }
+        if pose.accuracy_m.zip(error_m).is_some_and(|(accuracy_m, error_m)| error_m < accuracy_m) {
+            self.fault_at(Fault::Inaccurate, Some(vehicle), self.now_s);
+        }
     }
 
     fn compare_with_plan(&mut self, vehicle: u32, time_s: f64, position_m: Vector3<f64>) {

@@ -14,9 +14,12 @@ use crate::event::{Event, Fault, Refusal, Violation};
 use crate::history::History;
 use crate::plan::Plan;
 use crate::settings::{Expected, Settings, SettingsError};
+use crate::streams::StampOrder;
+use crate::velocity::VelocityEnclosure;
 use crate::violations::OpenViolations;
 use faults::FaultCount;
 use past::SweptBox;
+use tautline_core::fact::{Fact, FactKind, Source};
 
 /// Largest number of events that wait for [`Monitor::drain_events`]; further ones are counted.
 pub const MOST_EVENTS: usize = 4096;
@@ -34,6 +37,8 @@ pub struct Pose<'a> {
     pub position_m: Vector3<f64>,
     /// Velocity in this frame \[m/s\], if known.
     pub velocity_m_s: Option<Vector3<f64>>,
+    /// Standard deviation of the position as the source reports it \[m\], if it does.
+    pub accuracy_m: Option<f64>,
 }
 
 /// Pose that the monitor took, for a recording.
@@ -45,6 +50,7 @@ pub struct Taken {
     pub time_s: f64,
 }
 
+#[expect(clippy::struct_excessive_bools, reason = "each is a finding of its own")]
 struct Vehicle {
     /// Clock of the vehicle; `None` if the stamps have a common clock.
     clock: Option<SourceClock>,
@@ -55,8 +61,16 @@ struct Vehicle {
     judged_t_s: Option<f64>,
     /// Time of the last pose that was taken \[s\].
     taken_s: Option<f64>,
-    /// Velocity at the newest position and the bound on its error.
-    velocity: Option<(Vector3<f64>, f64)>,
+    /// Velocities at the newest position that the bounds allow.
+    velocity: VelocityEnclosure,
+    /// Whether the newest pose has a velocity.
+    sends_velocity: bool,
+    /// Bound on the error of the newest position \[m\], if known.
+    position_error_m: Option<f64>,
+    /// Order of the stamps.
+    streams: StampOrder,
+    /// Whether the messages of the name are those of two vehicles.
+    has_two_streams: bool,
     /// Whether the newest stamp has two positions.
     has_conflict: bool,
     is_stale: bool,
@@ -173,6 +187,23 @@ impl Monitor {
         self.violations.total()
     }
 
+    /// Returns the facts on which CLEAR rests at present, each with its source.
+    #[must_use]
+    pub fn facts(&self) -> Vec<Fact> {
+        let present = || self.vehicles.iter().filter(|vehicle| vehicle.signed_off_s.is_none());
+        let largest_m = present().filter_map(|vehicle| vehicle.position_error_m).reduce(f64::max);
+        let mut facts = self.settings.facts(largest_m);
+        let mut senders = present().filter(|vehicle| vehicle.sends_velocity).peekable();
+        if senders.peek().is_some() {
+            // A first velocity is compared with nothing.
+            let is_observed = senders.all(|vehicle| vehicle.velocity.is_measured());
+            let source = if is_observed { Source::Observed } else { Source::NotObservable };
+            facts.push(Fact::new(FactKind::VelocityAgreement, source));
+        }
+        facts.push(Fact::new(FactKind::OneStream, Source::Observed));
+        facts
+    }
+
     /// Returns the number of poses that were compared with the plan; `None` without a plan.
     #[must_use]
     pub fn compared(&self) -> Option<u64> {
@@ -222,7 +253,7 @@ impl Monitor {
     pub fn newest(&self, vehicle: usize) -> Option<(Vector3<f64>, Option<Vector3<f64>>, f64)> {
         let of = self.vehicles.get(vehicle)?;
         let fix = of.history.newest()?;
-        Some((fix.position_m, of.velocity.map(|(velocity, _)| velocity), self.age_s(of).unwrap_or(f64::INFINITY)))
+        Some((fix.position_m, of.velocity.velocity().map(|ball| ball.centre), self.age_s(of).unwrap_or(f64::INFINITY)))
     }
 
     /// Returns the index of a vehicle, and adds a vehicle that is not known; `None` beyond the largest number.
@@ -247,7 +278,11 @@ impl Monitor {
             history: History::new(),
             judged_t_s: None,
             taken_s: None,
-            velocity: None,
+            velocity: VelocityEnclosure::default(),
+            sends_velocity: false,
+            position_error_m: None,
+            streams: StampOrder::default(),
+            has_two_streams: false,
             has_conflict: false,
             is_stale: false,
             signed_off_s: None,
@@ -273,7 +308,7 @@ impl Monitor {
 
     fn age_s(&self, of: &Vehicle) -> Option<f64> {
         let clock = self.clock_of(of)?;
-        Some(clock.age_s(of.history.newest()?.t_s, self.now_s) + self.settings.latency_s)
+        Some(clock.age_s(of.history.newest()?.t_s, self.now_s) + self.settings.latency_s.value)
     }
 }
 

@@ -29,7 +29,7 @@ impl Monitor {
             let mut judged_t_s = of.judged_t_s.unwrap_or(of.history.at(0).t_s);
             // A gap is not judged.
             let next = (of.history.up_to(judged_t_s) + 1).min(of.history.len() - 1);
-            if of.history.at(next).t_s - judged_t_s > self.settings.max_age_s {
+            if of.history.at(next).t_s - judged_t_s > self.settings.max_age_s.value {
                 judged_t_s = of.history.at(next).t_s;
             }
             if newest.t_s > judged_t_s {
@@ -136,7 +136,7 @@ impl Monitor {
             if end_s <= time_s {
                 break;
             }
-            let is_gap = ends.iter().any(|(from, to)| to.t_s - from.t_s > self.settings.max_age_s);
+            let is_gap = ends.iter().any(|(from, to)| to.t_s - from.t_s > self.settings.max_age_s.value);
             if !is_gap {
                 let apart = |at_s: f64| {
                     let place = |k: usize| {

@@ -5,6 +5,7 @@ use crate::clock::FALL_RATE;
 use crate::event::{Assessment, Event, Pair, PairTime, Reason, State};
 use crate::pair::Prediction;
 use crate::settings::{Expected, TimeBase};
+use crate::velocity::Ball;
 
 impl Monitor {
     /// Judges the present and the past since the last call. `arrival_s` is the present on the caller's clock \[s\];
@@ -28,8 +29,13 @@ impl Monitor {
             _ if self.names.len() < 2 => note(Reason::TooFew(self.names.len())),
             _ => {}
         }
+        if let Some(k) =
+            self.vehicles.iter().position(|vehicle| vehicle.has_two_streams && vehicle.signed_off_s.is_none())
+        {
+            note(Reason::TwoStreams(u32::try_from(k).unwrap_or(u32::MAX)));
+        }
         if let Some((fault, at_s)) = self.doubt
-            && now_s - at_s < self.settings.max_age_s
+            && now_s - at_s < self.settings.max_age_s.value
         {
             note(Reason::Doubt(fault));
         }
@@ -47,7 +53,7 @@ impl Monitor {
                 note(Reason::ClockStepped(vehicle));
                 continue;
             };
-            let (was_stale, is_stale) = (of.is_stale, age_s > self.settings.max_age_s);
+            let (was_stale, is_stale) = (of.is_stale, age_s > self.settings.max_age_s.value);
             let ready = match self.prediction(of, age_s) {
                 _ if is_stale => Err(Reason::Stale(vehicle, age_s)),
                 Some(prediction) => {
@@ -56,6 +62,7 @@ impl Monitor {
                     }
                     Ok(prediction)
                 }
+                None if of.position_error_m.is_none() => Err(Reason::ErrorUnknown(vehicle)),
                 None => Err(Reason::SpeedUnknown(vehicle)),
             };
             match ready {
@@ -118,8 +125,9 @@ impl Monitor {
     /// the vehicle then moves for up to (1 + r) a, so its distance from `p + v a` is at most
     /// `eps + (e (1 + r) + |v| r) a + A (1 + r)^2 a^2 / 2`. The same holds for the time ahead.
     pub(super) fn prediction(&self, of: &Vehicle, age_s: f64) -> Option<Prediction> {
-        let ((velocity, error_m_s), fix) = of.velocity.zip(of.history.newest())?;
-        let (eps, accel) = (self.settings.position_error_m, self.settings.accel_m_s2);
+        let Ball { centre: velocity, radius: error_m_s } = of.velocity.velocity()?;
+        let (fix, eps) = of.history.newest().zip(of.position_error_m)?;
+        let accel = self.settings.accel_m_s2.value;
         let rate = match self.settings.time_base {
             TimeBase::Arrival => FALL_RATE,
             TimeBase::Stamps => 0.0,

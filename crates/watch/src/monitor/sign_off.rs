@@ -73,7 +73,7 @@ impl Monitor {
     /// Returns why the bounds do not prove that a vehicle keeps delta from all present vehicles at the present; `None`
     /// if they do.
     fn unproved(&self, vehicle: u32) -> Option<Refusal> {
-        let doubt = self.doubt.filter(|(_, at_s)| self.now_s - at_s < self.settings.max_age_s);
+        let doubt = self.doubt.filter(|(_, at_s)| self.now_s - at_s < self.settings.max_age_s.value);
         if let Some((fault, _)) = doubt {
             return Some(Refusal::Doubt(fault));
         }
@@ -98,7 +98,11 @@ impl Monitor {
     /// Returns the prediction of a vehicle, unless it is stale, has a conflict, or its clock or velocity is unknown.
     fn fresh_prediction(&self, vehicle: u32) -> Result<Prediction, Refusal> {
         let of = &self.vehicles[vehicle as usize];
-        let age_s = self.age_s(of).filter(|&age_s| age_s <= self.settings.max_age_s).ok_or(Refusal::Stale(vehicle))?;
+        if of.has_two_streams {
+            return Err(Refusal::TwoStreams(vehicle));
+        }
+        let age_s =
+            self.age_s(of).filter(|&age_s| age_s <= self.settings.max_age_s.value).ok_or(Refusal::Stale(vehicle))?;
         self.prediction(of, age_s).filter(|_| !of.has_conflict).ok_or(Refusal::NoPrediction(vehicle))
     }
 }

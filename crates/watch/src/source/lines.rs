@@ -108,7 +108,8 @@ pub fn message_of_line(line: &[u8]) -> Result<LineMessage, String> {
         (Some("off"), [None, None, None]) => Ok(LineMessage::SignOff(id, of.t)),
         (Some("off"), _) => Err("a sign-off with a position; write the last pose in a line before it".to_owned()),
         (_, [Some(x), Some(y), Some(z)]) => {
-            Ok(LineMessage::Pose(OwnedPose { t_s: of.t, id, position_m: Vector3::new(x, y, z), velocity_m_s }))
+            let position_m = Vector3::new(x, y, z);
+            Ok(LineMessage::Pose(OwnedPose { t_s: of.t, id, position_m, velocity_m_s, accuracy_m: None }))
         }
         (Some(event), [None, None, None]) => Err(format!("unknown event ({event:?}); write \"off\" for a sign-off")),
         (_, place) => {

@@ -1,10 +1,16 @@
 //! `MAVLink` 1 and 2 over UDP: `LOCAL_POSITION_NED` and `GLOBAL_POSITION_INT`.
 //!
-//! The system id is the name of a vehicle.
+//! The system id is the name of a vehicle. Its positions come from one component. A second component with positions, or
+//! two counts of messages of one component, are two vehicles with one system id.
 //!
-//! Both messages are defined in `common.xml` and `standard.xml`. `mavlink-core` reads frames and checksums. Messages
+//! `GPS_RAW_INT` beside the positions reports the accuracy of the receiver: `h_acc` and `v_acc` are standard
+//! deviations. They belong to the positions of the system for [`ACCURACY_S`]. `eph` and `epv` of `GPS_RAW_INT` and
+//! `HIL_GPS` are dilutions of precision without a unit, so they bound nothing and are not read.
+//!
+//! The messages are defined in `common.xml` and `standard.xml`. `mavlink-core` reads frames and checksums. Messages
 //! with another id are skipped.
 
+use std::collections::BTreeMap;
 use std::io;
 use std::net::{SocketAddr, UdpSocket};
 use std::time::Duration;
@@ -16,12 +22,19 @@ use socket2::SockRef;
 use super::drops::KernelDrops;
 use super::{Feed, Input, OwnedPose};
 use crate::event::Fault;
+use crate::streams::SequenceOrder;
 use tautline_recordings::read::EarthFrame;
 
 /// Message id, payload length without extensions, and extra byte of the checksum of `LOCAL_POSITION_NED`.
 const LOCAL: (u32, usize, u8) = (32, 28, 185);
 /// Message id, payload length and extra byte of `GLOBAL_POSITION_INT`.
 const GLOBAL: (u32, usize, u8) = (33, 28, 104);
+/// Message id, payload length without extensions, and extra byte of `GPS_RAW_INT`.
+const RECEIVER: (u32, usize, u8) = (24, 30, 24);
+/// Type of the fix of a receiver from which it has a position in space.
+const FIX_IN_SPACE: u8 = 3;
+/// Time for which an accuracy is used \[s\].
+const ACCURACY_S: f64 = 5.0;
 /// First bytes of `MAVLink` 1 and 2.
 const STARTS: [u8; 2] = [0xFE, 0xFD];
 /// Largest number of bytes of a datagram.
@@ -51,13 +64,15 @@ pub fn mavlink(address: SocketAddr, frame: MavlinkFrame, feed: Feed) -> io::Resu
     let bound = socket.local_addr()?;
     std::thread::spawn(move || {
         let mut first = Some(socket);
+        let mut reader = MavlinkReader::new(frame);
         feed.reconnect(&format!("mavlink:{bound}"), |connected| {
             let socket = match first.take().map_or_else(|| bind(bound), Ok) {
                 Ok(socket) => socket,
                 Err(error) => return error.to_string(),
             };
             connected();
-            listen(&socket, &frame, &feed)
+            // A system keeps its count while the socket is lost.
+            listen(&socket, &mut reader, &feed)
         });
     });
     Ok(bound)
@@ -73,7 +88,7 @@ fn bind(address: SocketAddr) -> io::Result<UdpSocket> {
 }
 
 /// Reads datagrams until the socket fails; returns the reason.
-fn listen(socket: &UdpSocket, frame: &MavlinkFrame, feed: &Feed) -> String {
+fn listen(socket: &UdpSocket, reader: &mut MavlinkReader, feed: &Feed) -> String {
     let mut bytes = vec![0; LARGEST_DATAGRAM];
     let mut inputs = Vec::new();
     let mut drops = KernelDrops::of(socket);
@@ -82,7 +97,7 @@ fn listen(socket: &UdpSocket, frame: &MavlinkFrame, feed: &Feed) -> String {
         match socket.recv(&mut bytes) {
             Ok(length) => {
                 inputs.clear();
-                poses_of_datagram(&bytes[..length], frame, feed.now_s(), &mut inputs);
+                reader.take(&bytes[..length], feed.now_s(), &mut inputs);
                 if !inputs.drain(..).all(|input| feed.offer(input)) {
                     break;
                 }
@@ -95,33 +110,117 @@ fn listen(socket: &UdpSocket, frame: &MavlinkFrame, feed: &Feed) -> String {
     "the watch has ended".to_owned()
 }
 
-/// Appends the poses of the frames of a datagram, and an error for bytes that are no frame.
-pub fn poses_of_datagram(mut bytes: &[u8], frame: &MavlinkFrame, arrival_s: f64, inputs: &mut Vec<Input>) {
-    while !bytes.is_empty() {
-        let (pose, length) = match first_frame(bytes, frame) {
-            Ok(found) => found,
-            Err(why) => {
-                inputs.push(Input::Fault(Fault::Garbage, arrival_s, format!("datagram: {why}")));
-                return;
+/// Sender of the positions of a system.
+#[derive(Clone, Debug)]
+struct Sender {
+    component: u8,
+    order: SequenceOrder,
+}
+
+/// Reader of datagrams, with the order of the messages and the accuracy of each system.
+#[derive(Clone, Debug)]
+pub struct MavlinkReader {
+    frame: MavlinkFrame,
+    senders: BTreeMap<u32, Sender>,
+    /// Standard deviation of the receiver of each system \[m\], with its arrival \[s\].
+    accuracies: BTreeMap<u32, (f64, f64)>,
+}
+
+/// Frame with a valid checksum, as far as its message is known.
+struct Frame {
+    message: u32,
+    system: u32,
+    component: u8,
+    number: u8,
+    checksum: u16,
+    payload: Vec<u8>,
+    length: usize,
+}
+
+impl MavlinkReader {
+    /// Returns a reader that has read nothing.
+    #[must_use]
+    pub fn new(frame: MavlinkFrame) -> Self {
+        Self { frame, senders: BTreeMap::new(), accuracies: BTreeMap::new() }
+    }
+
+    /// Appends the poses of the frames of a datagram that arrived at a time \[s\], and an error for bytes that are no
+    /// frame.
+    pub fn take(&mut self, mut bytes: &[u8], arrival_s: f64, inputs: &mut Vec<Input>) {
+        while !bytes.is_empty() {
+            let length = first_frame(bytes).and_then(|frame| {
+                self.take_frame(&frame, arrival_s, inputs)?;
+                Ok(frame.length)
+            });
+            match length {
+                Ok(length) => bytes = &bytes[length..],
+                Err(why) => {
+                    inputs.push(Input::Fault(Fault::Garbage, arrival_s, format!("datagram: {why}")));
+                    return;
+                }
+            }
+        }
+    }
+
+    fn take_frame(&mut self, frame: &Frame, arrival_s: f64, inputs: &mut Vec<Input>) -> Result<(), String> {
+        let Frame { system, component, number, checksum, ref payload, .. } = *frame;
+        let reading = match (frame.message, &self.frame) {
+            (id, MavlinkFrame::Local) if id == LOCAL.0 => Some(local(payload)),
+            (id, MavlinkFrame::Global(earth)) if id == GLOBAL.0 => global(payload, earth)?,
+            (id, _) if id == RECEIVER.0 => {
+                match accuracy_m(payload) {
+                    Some(accuracy_m) => self.accuracies.insert(system, (accuracy_m, arrival_s)),
+                    None => self.accuracies.remove(&system),
+                };
+                None
+            }
+            _ => None,
+        };
+        let are_two = match self.senders.get_mut(&system) {
+            Some(sender) if sender.component == component => sender.order.take(number, checksum, arrival_s),
+            Some(_) => reading.is_some(),
+            None => {
+                if reading.is_some() {
+                    let order = SequenceOrder::new(number, checksum, arrival_s);
+                    self.senders.insert(system, Sender { component, order });
+                }
+                false
             }
         };
+        let accuracy = self.accuracies.get(&system).filter(|(_, read_s)| arrival_s - read_s <= ACCURACY_S);
+        let pose = reading.map(|(t_s, position_m, velocity)| OwnedPose {
+            t_s,
+            id: system.to_string(),
+            position_m,
+            velocity_m_s: Some(velocity),
+            accuracy_m: accuracy.map(|(accuracy_m, _)| *accuracy_m),
+        });
         inputs.extend(pose.map(|pose| Input::Pose(pose, arrival_s)));
-        bytes = &bytes[length..];
+        inputs.extend(are_two.then(|| Input::TwoStreams(system.to_string(), arrival_s)));
+        Ok(())
     }
 }
 
-/// Returns the pose of the first frame, if it has one, and the length of the frame.
-fn first_frame(bytes: &[u8], frame: &MavlinkFrame) -> Result<(Option<OwnedPose>, usize), String> {
+/// Returns the first frame of bytes.
+fn first_frame(bytes: &[u8]) -> Result<Frame, String> {
     let cut = || "ends within a frame of MAVLink".to_owned();
     let payload = usize::from(*bytes.get(1).ok_or_else(cut)?);
-    let (message, system, payload, length, is_whole) = match bytes[0] {
+    let (frame, is_whole) = match bytes[0] {
         0xFE => {
             let mut raw = MAVLinkV1MessageRaw::new();
             let length = 8 + payload;
             raw.as_mut_slice()[..length].copy_from_slice(bytes.get(..length).ok_or_else(cut)?);
-            let id = u32::from(raw.message_id());
-            let is_whole = extra_of(id).is_none_or(|extra| raw.has_valid_crc_with_extra_crc(extra));
-            (id, u32::from(raw.system_id()), raw.payload().to_vec(), length, is_whole)
+            let message = u32::from(raw.message_id());
+            let frame = Frame {
+                message,
+                system: u32::from(raw.system_id()),
+                component: raw.component_id(),
+                number: raw.sequence(),
+                checksum: raw.checksum(),
+                payload: raw.payload().to_vec(),
+                length,
+            };
+            (frame, extra_of(message).is_none_or(|extra| raw.has_valid_crc_with_extra_crc(extra)))
         }
         0xFD => {
             let flags = *bytes.get(2).ok_or_else(cut)?;
@@ -131,31 +230,37 @@ fn first_frame(bytes: &[u8], frame: &MavlinkFrame) -> Result<(Option<OwnedPose>,
             let length = 12 + payload + if flags & SIGNED != 0 { 13 } else { 0 };
             let mut raw = MAVLinkV2MessageRaw::new();
             raw.as_mut_slice()[..length].copy_from_slice(bytes.get(..length).ok_or_else(cut)?);
-            let id = raw.message_id();
-            let is_whole = extra_of(id).is_none_or(|extra| raw.has_valid_crc_with_extra_crc(extra));
-            (id, raw.system_id(), raw.payload().to_vec(), length, is_whole)
+            let message = raw.message_id();
+            let frame = Frame {
+                message,
+                system: raw.system_id(),
+                component: raw.component_id(),
+                number: raw.sequence(),
+                checksum: raw.checksum(),
+                payload: raw.payload().to_vec(),
+                length,
+            };
+            (frame, extra_of(message).is_none_or(|extra| raw.has_valid_crc_with_extra_crc(extra)))
         }
         other => return Err(format!("a frame of MAVLink must begin with one of {STARTS:02x?}, got {other:02x}")),
     };
     if !is_whole {
+        let Frame { message, system, .. } = frame;
         return Err(format!("the checksum of message {message} of system {system} is wrong"));
     }
-    let pose = match (message, frame) {
-        (id, MavlinkFrame::Local) if id == LOCAL.0 => Some(local(&payload)),
-        (id, MavlinkFrame::Global(earth)) if id == GLOBAL.0 => global(&payload, earth)?,
-        _ => None,
-    };
-    let named = |(t_s, position_m, velocity): (f64, _, _)| OwnedPose {
-        t_s,
-        id: system.to_string(),
-        position_m,
-        velocity_m_s: Some(velocity),
-    };
-    Ok((pose.map(named), length))
+    Ok(frame)
 }
 
 fn extra_of(message: u32) -> Option<u8> {
-    [LOCAL, GLOBAL].into_iter().find(|of| of.0 == message).map(|of| of.2)
+    [LOCAL, GLOBAL, RECEIVER].into_iter().find(|of| of.0 == message).map(|of| of.2)
+}
+
+/// Returns the standard deviation of `GPS_RAW_INT` \[m\], `None` without a fix in space or an accuracy.
+fn accuracy_m(payload: &[u8]) -> Option<f64> {
+    let metres = |from: usize| f64::from(u32::from_le_bytes(word(payload, from))) * 1e-3;
+    let [horizontal_m, vertical_m] = [metres(34), metres(38)];
+    let has_fix = payload.get(28).is_some_and(|&kind| kind >= FIX_IN_SPACE);
+    (has_fix && horizontal_m > 0.0 && vertical_m > 0.0).then(|| horizontal_m.hypot(vertical_m))
 }
 
 /// Stamp \[s\], position \[m\] and velocity \[m/s\].
@@ -199,7 +304,7 @@ mod tests {
     use mavlink_core::calculate_crc;
     use nalgebra::Vector3;
 
-    use super::{GLOBAL, LOCAL, MavlinkFrame, poses_of_datagram};
+    use super::{GLOBAL, LOCAL, MavlinkFrame, MavlinkReader, RECEIVER};
     use crate::source::{Input, OwnedPose};
     use tautline_recordings::read::EarthFrame;
 
@@ -224,7 +329,7 @@ mod tests {
 
     fn read(bytes: &[u8], frame: &MavlinkFrame) -> Vec<Input> {
         let mut inputs = Vec::new();
-        poses_of_datagram(bytes, frame, 7.0, &mut inputs);
+        MavlinkReader::new(*frame).take(bytes, 7.0, &mut inputs);
         inputs
     }
 
@@ -235,6 +340,7 @@ mod tests {
             id: "42".to_owned(),
             position_m: Vector3::new(2.0, 1.0, 3.0),
             velocity_m_s: Some(Vector3::new(0.25, 0.5, 0.125)),
+            accuracy_m: None,
         };
         for is_new in [true, false] {
             let one = framed(LOCAL, 42, &local_payload(), is_new);
@@ -254,6 +360,36 @@ mod tests {
         // 1e-4 degrees of longitude at 47 degrees of latitude.
         assert!((pose.position_m - Vector3::new(7.607, 0.0, 10.0)).norm() < 2e-3, "{}", pose.position_m);
         assert!((pose.velocity_m_s.expect("sent") - Vector3::new(2.0, 1.0, -3.0)).norm() < 1e-4);
+    }
+
+    /// Returns the payload of `GPS_RAW_INT` with a type of the fix and accuracies \[mm\].
+    fn receiver_payload(fix: u8, horizontal_mm: u32, vertical_mm: u32) -> Vec<u8> {
+        let mut payload = vec![0; 52];
+        payload[28] = fix;
+        payload[34..38].copy_from_slice(&horizontal_mm.to_le_bytes());
+        payload[38..42].copy_from_slice(&vertical_mm.to_le_bytes());
+        payload
+    }
+
+    #[test]
+    fn the_accuracy_of_a_receiver_belongs_to_the_positions_of_its_system_for_a_time() {
+        let mut reader = MavlinkReader::new(MavlinkFrame::Local);
+        let mut accuracy = |system: u8, receiver: Option<Vec<u8>>, arrival_s: f64| {
+            let mut inputs = Vec::new();
+            if let Some(payload) = receiver {
+                reader.take(&framed(RECEIVER, 7, &payload, true), arrival_s, &mut inputs);
+            }
+            reader.take(&framed(LOCAL, system, &local_payload(), true), arrival_s, &mut inputs);
+            let [Input::Pose(pose, _)] = &inputs[..] else { panic!("{inputs:?}") };
+            pose.accuracy_m
+        };
+        assert_eq!(accuracy(7, None, 0.0), None);
+        assert_eq!(accuracy(7, Some(receiver_payload(3, 3000, 4000)), 1.0), Some(5.0));
+        assert_eq!((accuracy(8, None, 1.0), accuracy(7, None, 6.0), accuracy(7, None, 6.1)), (None, Some(5.0), None));
+        for unknown in [receiver_payload(2, 3000, 4000), receiver_payload(3, 0, 4000), vec![0, 1]] {
+            assert_eq!(accuracy(7, Some(receiver_payload(3, 3000, 4000)), 7.0), Some(5.0));
+            assert_eq!(accuracy(7, Some(unknown), 7.0), None);
+        }
     }
 
     #[test]

@@ -16,10 +16,11 @@ use std::time::{Duration, Instant};
 use nalgebra::Vector3;
 
 use crate::event::Fault;
+use crate::monitor::Pose;
 
 pub use foxglove::foxglove;
 pub use lines::{LONGEST_LINE, LineMessage, lines, message_of_line};
-pub use mavlink::{MavlinkFrame, mavlink, poses_of_datagram};
+pub use mavlink::{MavlinkFrame, MavlinkReader, mavlink};
 pub use naming::{Naming, NamingOptions};
 pub use rosbridge::{poses_of_message, rosbridge};
 
@@ -39,6 +40,17 @@ pub struct OwnedPose {
     pub position_m: Vector3<f64>,
     /// Velocity \[m/s\], if known.
     pub velocity_m_s: Option<Vector3<f64>>,
+    /// Standard deviation of the position as the source reports it \[m\], if it does.
+    pub accuracy_m: Option<f64>,
+}
+
+impl OwnedPose {
+    /// Returns the pose for the monitor.
+    #[must_use]
+    pub fn borrowed(&self) -> Pose<'_> {
+        let Self { t_s, ref id, position_m, velocity_m_s, accuracy_m } = *self;
+        Pose { t_s, id, position_m, velocity_m_s, accuracy_m }
+    }
 }
 
 /// Input of a watch.
@@ -50,6 +62,8 @@ pub enum Input {
     SignOff(String, f64, f64),
     /// An error of the input, with its arrival \[s\] and a sentence.
     Fault(Fault, f64, String),
+    /// The messages of a name are those of two vehicles: the name, and the arrival \[s\].
+    TwoStreams(String, f64),
     /// A source is connected.
     Connected(String),
     /// A source is lost, with the reason; it connects again.

@@ -82,7 +82,8 @@ impl Naming {
                 number.map_or_else(|| base.to_owned(), |number| format!("{base}/{number}"))
             }
         };
-        Ok(Some(OwnedPose { t_s: of.stamp_ns as f64 * 1e-9, id, position_m, velocity_m_s: None }))
+        let t_s = of.stamp_ns as f64 * 1e-9;
+        Ok(Some(OwnedPose { t_s, id, position_m, velocity_m_s: None, accuracy_m: of.accuracy_m }))
     }
 
     fn check_topic(&mut self, base: &str, topic: &str) -> Result<(), String> {
@@ -114,6 +115,7 @@ mod tests {
             frame: frame.to_owned(),
             stamp_ns: 1_500_000_000,
             position: Vector3::x(),
+            accuracy_m: None,
             is_on_earth: false,
             is_transform,
         }

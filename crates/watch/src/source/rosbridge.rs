@@ -94,11 +94,24 @@ fn live_poses(message: &Value) -> Option<Vec<LivePose>> {
             return Some(Vec::new());
         }
         let place = json!({ "x": message["latitude"], "y": message["longitude"], "z": message["altitude"] });
-        return Some(vec![LivePose { is_on_earth: true, ..pose(&message["header"], &place, None, None)? }]);
+        let accuracy_m = fix_accuracy_m(message);
+        return Some(vec![LivePose { is_on_earth: true, accuracy_m, ..pose(&message["header"], &place, None, None)? }]);
     }
     let place = [&message["pose"]["pose"]["position"], &message["pose"]["position"], &message["point"]];
     let place = place.into_iter().find(|of| of.is_object())?;
     Some(vec![pose(&message["header"], place, None, None)?])
+}
+
+/// Returns the standard deviation of a fix \[m\], unless its covariance is unknown.
+fn fix_accuracy_m(message: &Value) -> Option<f64> {
+    let is_known = message["position_covariance_type"].as_u64().is_some_and(|kind| kind > 0);
+    let variances = [0, 4, 8].map(|k| message["position_covariance"][k].as_f64());
+    let [Some(east), Some(north), Some(up)] =
+        variances.map(|found| found.filter(|variance| is_known && *variance > 0.0))
+    else {
+        return None;
+    };
+    Some((east + north + up).sqrt())
 }
 
 fn transform(of: &Value) -> Option<LivePose> {
@@ -118,6 +131,7 @@ fn pose(header: &Value, place: &Value, name: Option<String>, number: Option<usiz
         frame: header["frame_id"].as_str()?.to_owned(),
         stamp_ns: seconds.saturating_mul(1_000_000_000).saturating_add(nanoseconds),
         position: Vector3::new(axis("x")?, axis("y")?, axis("z")?),
+        accuracy_m: None,
         is_on_earth: false,
         is_transform: false,
     })
@@ -129,6 +143,7 @@ mod tests {
 
     use super::poses_of_message;
     use crate::source::{Naming, NamingOptions};
+    use tautline_recordings::read::EarthFrame;
 
     const HEADER: &str = r#""header":{"stamp":{"sec":3,"nanosec":500000000},"frame_id":"world"}"#;
 
@@ -155,6 +170,21 @@ mod tests {
         ] {
             assert_eq!(read(topic, &body), one(id), "{body}");
         }
+    }
+
+    #[test]
+    fn a_fix_has_the_accuracy_of_its_covariance_unless_it_is_unknown() {
+        let earth = EarthFrame::new([47.0, 8.0, 400.0]).expect("an origin");
+        let accuracy_m = |kind: u8| {
+            let mut naming = Naming::new(NamingOptions { earth: Some(earth), ..NamingOptions::default() });
+            let place = r#""latitude":47.0,"longitude":8.0,"altitude":401.0"#;
+            let covariance = format!(r#""position_covariance":[1,0,0,0,4,0,0,0,4],"position_covariance_type":{kind}"#);
+            let text = format!(r#"{{"op":"publish","topic":"/a/fix","msg":{{{HEADER},{place},{covariance}}}}}"#);
+            let poses = poses_of_message(&text, &mut naming).expect("a message");
+            let [Ok(pose)] = &poses[..] else { panic!("{poses:?}") };
+            pose.accuracy_m
+        };
+        assert_eq!((accuracy_m(2), accuracy_m(0)), (Some(3.0), None));
     }
 
     #[test]

@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use nalgebra::Vector3;
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
 use tautline_watch::source::{Input, OwnedPose, channel};
-use tautline_watch::{Monitor, Notice, Output, Plan, Pose, Settings, TimeBase, watch};
+use tautline_watch::{Bound, Monitor, Notice, Output, Plan, Pose, Settings, TimeBase, watch};
 
 #[global_allocator]
 static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
@@ -23,9 +23,12 @@ fn round(monitor: &mut Monitor, ids: &[String], round: u32) {
     for (k, id) in ids.iter().enumerate() {
         let offset = if k == 0 { 1.5 * (1.0 + t_s.sin()) } else { 0.0 };
         let position_m = Vector3::new(3.0 * k as f64 + offset, 0.0, 0.0);
-        monitor.take(&Pose { t_s, id, position_m, velocity_m_s: None }, t_s);
+        monitor.take(&Pose { t_s, id, position_m, velocity_m_s: None, accuracy_m: None }, t_s);
     }
-    monitor.take(&Pose { t_s: f64::NAN, id: &ids[0], position_m: Vector3::zeros(), velocity_m_s: None }, t_s);
+    monitor.take(
+        &Pose { t_s: f64::NAN, id: &ids[0], position_m: Vector3::zeros(), velocity_m_s: None, accuracy_m: None },
+        t_s,
+    );
     monitor.assess(t_s);
     monitor.drain_events();
 }
@@ -73,7 +76,7 @@ impl Output for Counted {
 /// violates and parts again, a message is wrong, and a vehicle signs off and comes back.
 fn memory_of_a_watch_does_not_grow() {
     let seconds: u32 = if std::env::var_os("TAUTLINE_LONG").is_some() { 24 * 3600 } else { 1800 };
-    let settings = Settings { time_base: TimeBase::Stamps, accel_m_s2: 1e3, ..Settings::default() };
+    let settings = Settings { time_base: TimeBase::Stamps, accel_m_s2: Bound::declared(1e3), ..Settings::default() };
     let monitor = Monitor::new(settings, Plan::default()).expect("valid settings");
     let (feed, inputs) = channel(Arc::new(AtomicBool::new(false)));
     let poses = Arc::new(AtomicU64::new(0));
@@ -87,7 +90,13 @@ fn memory_of_a_watch_does_not_grow() {
                 for (k, id) in ids.iter().enumerate() {
                     let offset_m = if k == 0 && tick > 25 { 2.5 } else { 0.0 };
                     let position_m = Vector3::new(3.0 * k as f64 + offset_m, 0.0, 0.0);
-                    let pose = OwnedPose { t_s, id: id.clone(), position_m, velocity_m_s: Some(Vector3::zeros()) };
+                    let pose = OwnedPose {
+                        t_s,
+                        id: id.clone(),
+                        position_m,
+                        velocity_m_s: Some(Vector3::zeros()),
+                        accuracy_m: None,
+                    };
                     assert!(feed.send(Input::Pose(pose, t_s)));
                     sent += 1;
                 }

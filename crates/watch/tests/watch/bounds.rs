@@ -5,7 +5,7 @@ use proptest::prelude::*;
 
 use crate::{clear_for_s, monitor, rest, settings};
 use tautline_watch::pair::{Prediction, RelativeMotion};
-use tautline_watch::{Pose, Settings, State};
+use tautline_watch::{Bound, Pose, Settings, State};
 
 /// Motion with an acceleration that is constant on pieces of equal length.
 #[derive(Clone, Debug)]
@@ -137,7 +137,12 @@ fn clear_holds_with_stamps_that_are_too_fast_by_less_than_their_limit() {
     // A simulator that runs faster than its arrivals: in time of the stamps each vehicle has 10 m/s.
     let (rate, speed, gap_m, delta_m, accel) = (1.0099, 10.0, 200.0, 1.0, 1e-3);
     let apart_m = |arrival_s: f64| gap_m - 2.0 * speed * rate * arrival_s;
-    let exact = Settings { accel_m_s2: accel, position_error_m: 0.0, velocity_error_m_s: 0.0, ..settings() };
+    let exact = Settings {
+        accel_m_s2: Bound::declared(accel),
+        position_error_m: Some(Bound::declared(0.0)),
+        velocity_error_m_s: Bound::declared(0.0),
+        ..settings()
+    };
     let mut monitor = monitor(exact);
     let (mut judged, mut broken) = (0, 0);
     for k in 0..180 {
@@ -145,7 +150,7 @@ fn clear_holds_with_stamps_that_are_too_fast_by_less_than_their_limit() {
         for (id, from_m, towards) in [("a", 0.0, 1.0), ("b", gap_m, -1.0)] {
             let velocity = Vector3::x() * (towards * speed);
             let position_m = Vector3::x() * from_m + velocity * (rate * arrival_s);
-            let pose = Pose { t_s: rate * arrival_s, id, position_m, velocity_m_s: Some(velocity) };
+            let pose = Pose { t_s: rate * arrival_s, id, position_m, velocity_m_s: Some(velocity), accuracy_m: None };
             monitor.take(&pose, arrival_s);
         }
         // The age of both is 0.03 s.
@@ -169,7 +174,7 @@ fn clear_holds_with_stamps_that_are_too_fast_by_less_than_their_limit() {
 #[test]
 fn the_latency_of_the_settings_is_part_of_every_age() {
     let clear = |latency_s: f64| {
-        let mut monitor = monitor(Settings { latency_s, ..settings() });
+        let mut monitor = monitor(Settings { latency_s: Bound::declared(latency_s), ..settings() });
         rest(&mut monitor, "a", 0.0, 0.0, 0.0);
         rest(&mut monitor, "b", 0.0, 6.0, 0.0);
         clear_for_s(&monitor.assess(0.0)).expect("clear")
@@ -191,7 +196,7 @@ fn the_search_of_all_pairs_equals_the_pairs_one_by_one() {
             let position_m = Vector3::new(random() * 60.0, random() * 30.0, random() * 20.0);
             let velocity = Vector3::new(random() - 0.5, random() - 0.5, random() - 0.5) * 4.0;
             let id = format!("v{k}");
-            monitor.take(&Pose { t_s: 0.0, id: &id, position_m, velocity_m_s: Some(velocity) }, 0.0);
+            monitor.take(&Pose { t_s: 0.0, id: &id, position_m, velocity_m_s: Some(velocity), accuracy_m: None }, 0.0);
             // Stamps may be too fast by 1 %.
             let error_m_s = 0.02 * 1.01 + velocity.norm() * 0.01;
             all.push(Prediction::new(position_m, velocity, 0.0, 0.01, error_m_s, 5.0 * 1.01 * 1.01));

@@ -17,7 +17,7 @@ use tungstenite::{ClientRequestBuilder, Message, WebSocket};
 use crate::{monitor, settings};
 use tautline_watch::foxglove_server::FoxgloveServer;
 use tautline_watch::source::{Input, OwnedPose, channel};
-use tautline_watch::{Assessment, Monitor, Notice, Output, Settings, watch};
+use tautline_watch::{Assessment, Bound, Monitor, Notice, Output, Settings, watch};
 
 struct Published(FoxgloveServer);
 
@@ -101,7 +101,8 @@ fn watched(gap_m: f64) -> (SceneUpdate, Vec<Log>, Value) {
     let stop = Arc::new(AtomicBool::new(false));
     let (feed, inputs) = channel(Arc::clone(&stop));
     let watching = std::thread::spawn(move || {
-        watch(monitor(Settings { max_age_s: 10.0, ..settings() }), &inputs, &mut Published(server)).expect("watches")
+        watch(monitor(Settings { max_age_s: Bound::declared(10.0), ..settings() }), &inputs, &mut Published(server))
+            .expect("watches")
     });
     // The first status shows that the subscription is served.
     while !matches!(client.next(), Received::Status(_)) {}
@@ -115,6 +116,7 @@ fn watched(gap_m: f64) -> (SceneUpdate, Vec<Log>, Value) {
                     id: id.to_owned(),
                     position_m: Vector3::new(x, 0.0, 2.0),
                     velocity_m_s: Some(Vector3::zeros()),
+                    accuracy_m: None,
                 };
                 if !feed.send(Input::Pose(pose, t_s)) {
                     return;

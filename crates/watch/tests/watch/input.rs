@@ -125,11 +125,20 @@ fn a_vehicle_that_breaks_its_bounds_is_not_clear() {
     let mut monitor = monitor(settings());
     both(&mut monitor, 0.0, 0.0);
     rest(&mut monitor, "a", 0.1, 0.0, 0.1);
-    // 2 * 0.01 + 0.02 * 0.1 + 5 * 0.01 / 2 = 0.047 m.
-    rest(&mut monitor, "b", 0.1, 6.046, 0.1);
+    // 2 * 0.01 + 0.02 * 0.1 + 5 * 0.01 / 4 = 0.0345 m.
+    rest(&mut monitor, "b", 0.1, 6.034, 0.1);
     assert_eq!(monitor.assess(0.1).state, State::Clear);
-    rest(&mut monitor, "b", 0.2, 6.146, 0.2);
-    assert_eq!(monitor.assess(0.2).state, State::NotKnown(Reason::Doubt(Fault::OutOfBounds)));
+    rest(&mut monitor, "b", 0.2, 6.134, 0.2);
+    assert_eq!(monitor.assess(0.2).state, State::NotKnown(Reason::Doubt(Fault::VelocityDisagrees)));
+    // A change of the velocity by 2 * 0.02 + 5 * 0.1 = 0.54 m/s, and by more.
+    for (speed, fault) in [(0.53, 0), (0.55, 1)] {
+        let mut monitor = crate::monitor(settings());
+        for (t_s, x_m, vx) in [(0.0, 0.0, 0.0), (0.1, 0.03, speed)] {
+            let (position_m, velocity_m_s) = (Vector3::x() * x_m, Some(Vector3::x() * vx));
+            monitor.take(&Pose { t_s, id: "a", position_m, velocity_m_s, accuracy_m: None }, t_s);
+        }
+        assert_eq!(monitor.faults(Fault::OutOfBounds), fault, "{speed}");
+    }
 }
 
 #[test]
@@ -255,7 +264,7 @@ proptest! {
             }
             let pose = Pose {
                 t_s, id: ["a", "b", "c", ""][k], position_m: Vector3::new(x, y, 0.0),
-                velocity_m_s: (k > 0).then(|| Vector3::new(vx, vy, 0.0)),
+                velocity_m_s: (k > 0).then(|| Vector3::new(vx, vy, 0.0)), accuracy_m: None
             };
             monitor.take(&pose, arrival_s);
             let of = monitor.assess(arrival_s);

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::{monitor, settings};
-use tautline_watch::{Event, Monitor, Pose, Settings, State, TimeBase, Violation};
+use tautline_watch::{Bound, Event, Monitor, Pose, Settings, State, TimeBase, Violation};
 
 fn replay(monitor: &mut Monitor, poses: &[(f64, &str, f64, f64)]) -> Vec<Violation> {
     let mut ended = Vec::new();
@@ -14,7 +14,7 @@ fn replay(monitor: &mut Monitor, poses: &[(f64, &str, f64, f64)]) -> Vec<Violati
         }));
     };
     for &(t_s, id, x, y) in poses {
-        monitor.take(&Pose { t_s, id, position_m: Vector3::new(x, y, 0.0), velocity_m_s: None }, t_s);
+        monitor.take(&Pose { t_s, id, position_m: Vector3::new(x, y, 0.0), velocity_m_s: None, accuracy_m: None }, t_s);
         monitor.assess(t_s);
         note(monitor);
     }
@@ -24,7 +24,12 @@ fn replay(monitor: &mut Monitor, poses: &[(f64, &str, f64, f64)]) -> Vec<Violati
 }
 
 fn stamps() -> Settings {
-    Settings { time_base: TimeBase::Stamps, accel_m_s2: 100.0, max_age_s: 2.0, ..settings() }
+    Settings {
+        time_base: TimeBase::Stamps,
+        accel_m_s2: Bound::declared(100.0),
+        max_age_s: Bound::declared(2.0),
+        ..settings()
+    }
 }
 
 #[test]
@@ -58,11 +63,11 @@ fn stamps_of_different_rates_are_judged_at_common_times() {
 
 #[test]
 fn a_gap_beyond_the_largest_age_is_not_judged_and_not_clear() {
-    let mut monitor = monitor(Settings { max_age_s: 0.5, ..stamps() });
+    let mut monitor = monitor(Settings { max_age_s: Bound::declared(0.5), ..stamps() });
     let poses = [(0.0, "a", -3.0, 0.0), (0.0, "b", 3.0, 0.6), (1.0, "a", 3.0, 0.0), (1.0, "b", -3.0, 0.6)];
     let mut states = Vec::new();
     for (t_s, id, x, y) in poses {
-        monitor.take(&Pose { t_s, id, position_m: Vector3::new(x, y, 0.0), velocity_m_s: None }, t_s);
+        monitor.take(&Pose { t_s, id, position_m: Vector3::new(x, y, 0.0), velocity_m_s: None, accuracy_m: None }, t_s);
         states.push(monitor.assess(t_s).state);
     }
     assert!(states[..3].iter().all(|state| matches!(state, State::NotKnown(_))), "{states:?}");

@@ -157,7 +157,7 @@ fn a_watch_whose_vehicles_sign_off_one_by_one_is_good() {
     let texts = seen.texts.join("\n");
     assert!(texts.contains("4.05 s: b signed off"), "{texts}");
     assert!(texts.contains("NOT KNOWN: only one vehicle has not signed off; signed off: 1 of 2"), "{texts}");
-    assert!(texts.contains("CLEAR: 2 vehicles (2 signed off), 4.05 s CLEAR"), "{texts}");
+    assert!(texts.contains("(declared): 2 vehicles (2 signed off), 4.05 s CLEAR"), "{texts}");
     // Negative twin: a silent vehicle is stale.
     assert!(!whole(false).0.is_good());
 }

@@ -3,7 +3,7 @@
 use nalgebra::Vector3;
 
 use crate::{monitor, rest, settings};
-use tautline_watch::{Event, Fault, Monitor, Notice, Pose, Reason, Settings, State, TimeBase};
+use tautline_watch::{Bound, Event, Fault, Monitor, Notice, Pose, Reason, Settings, State, TimeBase};
 
 const IDS: [&str; 3] = ["a", "b", "c"];
 
@@ -206,11 +206,16 @@ fn a_refused_sign_off_is_reported_with_its_cause_and_a_remedy() {
 fn the_past_of_a_vehicle_is_judged_after_its_sign_off() {
     // `a` passes `b` and is 0.9 m behind it at its last position, at 1 s; `b` is heard at 0 s and 1.3 s only.
     let pass = |offset_m: f64| {
-        let wide = Settings { time_base: TimeBase::Stamps, accel_m_s2: 0.5, max_age_s: 2.0, ..settings() };
+        let wide = Settings {
+            time_base: TimeBase::Stamps,
+            accel_m_s2: Bound::declared(0.5),
+            max_age_s: Bound::declared(2.0),
+            ..settings()
+        };
         let mut monitor = monitor(wide);
         let take = |monitor: &mut Monitor, t_s: f64, id: &str, at: [f64; 3], speed: f64| {
             let velocity_m_s = Some(Vector3::x() * speed);
-            monitor.take(&Pose { t_s, id, position_m: Vector3::from(at), velocity_m_s }, t_s);
+            monitor.take(&Pose { t_s, id, position_m: Vector3::from(at), velocity_m_s, accuracy_m: None }, t_s);
         };
         take(&mut monitor, 0.0, "a", [-5.1, 0.0, 0.0], 6.0);
         take(&mut monitor, 0.0, "b", [0.0, offset_m, 0.0], 0.0);

@@ -64,6 +64,8 @@ pub struct LivePose {
     pub stamp_ns: i64,
     /// Position \[m\]; latitude, longitude \[degrees\] and height \[m\] if `is_on_earth`.
     pub position: Vector3<f64>,
+    /// Standard deviation of the position \[m\], if the message has it.
+    pub accuracy_m: Option<f64>,
     /// Whether the position is a place on the Earth.
     pub is_on_earth: bool,
     /// Whether the position is a transform between two frames. Some frames are no vehicles.
@@ -82,6 +84,7 @@ pub fn has_live_poses(schema: &str, encoding: &str) -> bool {
 /// A sentence if the message is damaged or its schema is not read.
 pub fn live_poses(schema: &str, encoding: &str, bytes: &[u8]) -> Result<Vec<LivePose>, String> {
     let reader = reader_of(schema).ok_or_else(|| format!("messages of {schema} are not read"))?;
+    let accuracy_m = if schema == FIXES { fix_accuracy_m(encoding, bytes) } else { None };
     let live = |of: Observation| {
         let (name, number) = match of.vehicle {
             VehicleKey::Topic => (None, None),
@@ -96,6 +99,7 @@ pub fn live_poses(schema: &str, encoding: &str, bytes: &[u8]) -> Result<Vec<Live
             frame: of.frame,
             stamp_ns: of.stamp_ns,
             position: of.position,
+            accuracy_m,
             is_on_earth,
             is_transform,
         }
@@ -221,6 +225,13 @@ impl Fix {
         }
         vec![Observation { frame: EARTH.to_owned(), ..header.observation(VehicleKey::Topic, CdrPose(place, [0.0; 4])) }]
     }
+}
+
+/// Returns the standard deviation of a fix \[m\]; `None` if the covariance after its position is unknown.
+fn fix_accuracy_m(encoding: &str, bytes: &[u8]) -> Option<f64> {
+    let (_, covariance, kind): (Fix, [f64; 9], u8) = decode_ros(encoding, bytes).ok()?;
+    let variances = [covariance[0], covariance[4], covariance[8]];
+    (kind > 0 && variances.iter().all(|variance| *variance > 0.0)).then(|| variances.iter().sum::<f64>().sqrt())
 }
 
 fn decode_foxglove<T: prost::Message + Default + DeserializeOwned>(encoding: &str, bytes: &[u8]) -> Result<T, String> {
@@ -355,4 +366,26 @@ impl FrameTransform {
 struct FrameTransforms {
     #[prost(message, repeated, tag = "1")]
     transforms: Vec<FrameTransform>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{FIXES, live_poses};
+    use crate::mcap::topic::{CDR, encode};
+
+    #[test]
+    fn a_fix_has_the_accuracy_of_its_covariance_unless_it_is_unknown() {
+        let accuracy_m = |[east, north, up]: [f64; 3], kind: u8| {
+            let covariance = [east, 0.0, 0.0, 0.0, north, 0.0, 0.0, 0.0, up];
+            let header = ((7_i32, 0_u32), "gps".to_owned());
+            let mut bytes = Vec::new();
+            encode(&(header, (0_i8, 1_u16), [47.0, 8.0, 400.0], covariance, kind), &mut bytes).expect("a message");
+            let poses = live_poses(FIXES, CDR, &bytes).expect("a message");
+            (poses.len(), poses[0].accuracy_m)
+        };
+        assert_eq!(accuracy_m([1.0, 4.0, 4.0], 2), (1, Some(3.0)));
+        for (variances, kind) in [([1.0, 4.0, 4.0], 0), ([0.0, 4.0, 4.0], 2), ([1.0, f64::NAN, 4.0], 2)] {
+            assert_eq!(accuracy_m(variances, kind), (1, None), "{variances:?} {kind}");
+        }
+    }
 }
