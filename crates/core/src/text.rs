@@ -249,7 +249,8 @@ mod tests {
 
     #[test]
     fn a_repeated_number_is_short_and_has_the_same_bits() {
-        let numbers = [0.0, 1.0, -3.5, 0.1 + 0.2, 1e-4, 1e-7, 1e-300, 1e9, 1e15, 1e16, 1e300, -f64::MAX, f64::MIN_POSITIVE];
+        let numbers =
+            [0.0, 1.0, -3.5, 0.1 + 0.2, 1e-4, 1e-7, 1e-300, 1e9, 1e15, 1e16, 1e300, -f64::MAX, f64::MIN_POSITIVE];
         for number in numbers {
             let shown = shortest(number);
             assert!(shown.len() <= 25 && shown.parse() == Ok(number), "{shown}");

@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::base::{BaseScenario, JITTER, check_law_name, check_runs, jitter_note};
 use crate::batch::Batch;
-use crate::flight::{FlightSummary, Outcome, Sample};
+use crate::flight::{FlightSample, FlightSummary, Outcome};
 use crate::statistics::{CONFIDENCE, Estimate, Proportion};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
@@ -328,7 +328,7 @@ type Flown<'a> = (&'a LawRow, u64, Scenario, ([usize; 2], f64, f64));
 
 impl LawRow {
     fn new(law: &ComparedLaw, flights: Vec<FlightSummary>) -> Self {
-        let sample = Sample::new(&flights);
+        let sample = FlightSample::new(&flights);
         let ended = |outcome: Outcome| sample.share(|flight| flight.outcome == outcome);
         let reached_s = |flight: &FlightSummary| flight.reached_at_s.filter(|_| flight.reached);
         let worst = worst(&flights);
@@ -387,7 +387,7 @@ impl LawRow {
         let censored = (reached > 0 && reached < self.reached.of).then(|| {
             format!("{name}: times to reach are over the {reached} of {of} flights that reached the formation")
         });
-        let identical = Sample::new(&self.flights).note(&format!("under {name}"));
+        let identical = FlightSample::new(&self.flights).note(&format!("under {name}"));
         [refused, ended, censored, identical].into_iter().flatten().collect()
     }
 }

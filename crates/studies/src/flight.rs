@@ -104,10 +104,8 @@ pub fn fly(
         refuse_failed_law(law, &ending, &report)?;
     }
     let is_whole = report.run.ended_early.as_deref() != Some(INTERRUPTED);
-    let summary = || FlightSummary {
-        flight_sha256: scenario.flight_sha256_hex(),
-        ..FlightSummary::new(report, seed, &effort)
-    };
+    let summary =
+        || FlightSummary { flight_sha256: scenario.flight_sha256_hex(), ..FlightSummary::new(report, seed, &effort) };
     Ok(is_whole.then(summary))
 }
 
@@ -201,12 +199,12 @@ impl Outcome {
 /// Flights of equal scenarios without randomness are one flight. They are no sample of anything, so numbers over them
 /// have no interval.
 #[derive(Clone, Copy, Debug)]
-pub struct Sample<'a> {
+pub struct FlightSample<'a> {
     flights: &'a [FlightSummary],
     is_repeated: bool,
 }
 
-impl<'a> Sample<'a> {
+impl<'a> FlightSample<'a> {
     /// Compares the flights.
     #[must_use]
     pub fn new(flights: &'a [FlightSummary]) -> Self {
@@ -330,6 +328,9 @@ fn sum_of_norms(rows: &Rows, from: Option<&Rows>) -> f64 {
 mod tests {
     use super::*;
     use tautline_core::swarm::Swarm;
+    use tautline_laws::law::Law;
+    use tautline_laws::observation::Observation;
+    use tautline_sim::scenario::{Override, Source};
 
     /// Returns the effort of two vehicles on circles of 1 m and 2 m with commands of t and 2 t m/s^2.
     fn seen(steps: u32) -> Effort {
@@ -342,6 +343,46 @@ mod tests {
             effort.step(&Step { time_s, swarm: &swarm, control: &control });
         }
         effort
+    }
+
+    /// Law that writes NaN for the first vehicle, or no acceleration for any.
+    #[derive(Clone)]
+    struct Coasting {
+        first_m_s2: f64,
+    }
+
+    impl Law for Coasting {
+        fn name(&self) -> &'static str {
+            "coasting"
+        }
+
+        fn command(&mut self, _at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+            command.fill(0.0);
+            command[(0, 0)] = self.first_m_s2;
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_law_that_fails_under_the_shield_does_not_pass_and_is_no_result_of_a_study() {
+        let sets = ["shield.enabled=true", "time.duration_s=2"];
+        let sets = sets.map(|set| Override::parse(set).expect("an override"));
+        let source = Source::Builtin("swap".to_owned());
+        let mut scenario = Scenario::read(&source, &sets).expect("a scenario");
+        scenario.external_law = Some(ExternalLaw::new(Coasting { first_m_s2: f64::NAN }));
+        let report = tautline_report::run::run(&scenario, &mut ()).expect("a report");
+        let shield = report.shield.as_ref().expect("a shield");
+        assert_eq!((shield.law_undefined, shield.law_failed), (shield.law_failed, 41));
+        let says = |reason: &String| reason.contains("not finite at 41 instants");
+        assert!(!report.verdict.pass && report.verdict.reasons.iter().any(says), "{:?}", report.verdict.reasons);
+        assert!(report.text().contains("no command at 41 instants"), "{}", report.text());
+        let flown = fly(&scenario, 0, &mut |_| ControlFlow::Continue(()));
+        assert!(matches!(flown, Err(SimError::ExternalLaw { .. })), "{flown:?}");
+        scenario.external_law = Some(ExternalLaw::new(Coasting { first_m_s2: 0.0 }));
+        let report = tautline_report::run::run(&scenario, &mut ()).expect("a report");
+        assert_eq!(report.shield.as_ref().map(|shield| shield.law_undefined), Some(0));
+        assert!(!report.verdict.reasons.iter().any(|reason| reason.contains("not finite")));
+        assert!(fly(&scenario, 0, &mut |_| ControlFlow::Continue(())).is_ok());
     }
 
     #[test]

@@ -6,8 +6,8 @@ use serde::Serialize;
 
 use crate::base::{BaseScenario, Criterion, JITTER_KEY, Runs, check_runs, jitter_note};
 use crate::batch::Batch;
-use crate::flight::{FlightSummary, Sample};
-use crate::statistics::{CONFIDENCE, Estimate, Proportion};
+use crate::flight::{FlightSample, FlightSummary};
+use crate::statistics::{CONFIDENCE, Proportion};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
 use tautline_core::text::{counted, shortest, significant};
@@ -250,7 +250,7 @@ impl Experiment for Options {
 
 impl Probe {
     fn new(value: f64, question: Criterion, flights: Vec<FlightSummary>) -> Self {
-        let sample = Sample::new(&flights);
+        let sample = FlightSample::new(&flights);
         let (held, repeated) = (sample.share(|flight| question.holds(flight)), sample.is_repeated());
         let min_m = flights.iter().filter_map(|flight| flight.min_m).reduce(f64::min);
         Self { value, held, min_m, repeated, flights }
@@ -344,7 +344,7 @@ impl Study for Margin {
         });
         let jitter = self.seeds.jitter_m.map(jitter_note);
         let identical = self.probes.iter().filter_map(|probe| {
-            Sample::new(&probe.flights).note(&format!("with {} = {}", self.key, probe.value))
+            FlightSample::new(&probe.flights).note(&format!("with {} = {}", self.key, probe.value))
         });
         let notes = [interrupted, turns, jitter, self.about.note()].into_iter().flatten();
         predicted.chain(notes).chain(identical.take(MOST_NOTES)).collect()
@@ -364,7 +364,7 @@ impl Study for Margin {
 
     fn sections(&self) -> Vec<Section> {
         let lengths = self.probes.iter().filter_map(|probe| {
-            let median_m = Sample::new(&probe.flights).quantile(|flight| flight.min_m, 0.5);
+            let median_m = FlightSample::new(&probe.flights).quantile(|flight| flight.min_m, 0.5);
             let interval_m = median_m.low.zip(median_m.high).map(|(low, high)| [low, high]);
             let (value, flights) = (probe.value, probe.held.of);
             Some(Separation { value, flights, smallest_m: probe.min_m?, median_m: median_m.value?, interval_m })

@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::attack::{Bound, FLIGHTS};
 use crate::base::{BaseScenario, Criterion, JITTER_KEY, Runs, check_runs, jitter_note, overlap};
 use crate::batch::Batch;
-use crate::flight::{FlightSummary, Outcome, Sample};
+use crate::flight::{FlightSample, FlightSummary, Outcome};
 use crate::statistics::{CONFIDENCE, Estimate, Proportion};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
@@ -316,7 +316,7 @@ impl Point {
     fn new(values: Vec<f64>, question: Criterion, runs: Vec<Result<FlightSummary, String>>) -> Self {
         let (flights, refusals): (Vec<_>, Vec<_>) = runs.into_iter().partition(Result::is_ok);
         let flights: Vec<_> = flights.into_iter().flatten().collect();
-        let sample = Sample::new(&flights);
+        let sample = FlightSample::new(&flights);
         Self {
             values,
             held: sample.share(|flight| question.holds(flight)),
@@ -463,7 +463,7 @@ impl Study for Sweep {
             )
         });
         let identical = self.points.iter().filter_map(|point| {
-            Sample::new(&point.flights).note(&format!("with {}", sets(&self.keys, &point.values).join(", ")))
+            FlightSample::new(&point.flights).note(&format!("with {}", sets(&self.keys, &point.values).join(", ")))
         });
         let notes = [refused, self.jitter_m.map(jitter_note), self.about.note()].into_iter().flatten();
         notes.chain(inert).chain(identical.take(MOST_NOTES)).collect()

@@ -141,6 +141,20 @@ fn a_default_that_follows_from_other_keys_survives_write_and_read() {
 }
 
 #[test]
+fn a_number_of_any_size_is_repeated_in_a_few_digits() {
+    for (set, says) in [
+        ("law.delta_m=1e300", "got 1e300"),
+        ("law.delta_m=1e-300", "got 1e-300"),
+        ("law.delta_m=-1e300", "got -1e300"),
+        ("sensing.latency_s=1e-300", "got 1e-300 s"),
+        ("law.delta_m=100000000000000000000000000000000000000000000000000000000000000", "got 1"),
+    ] {
+        let error = read_builtin("pentagon", &[set]).expect_err(set);
+        assert!(error.message().contains(says) && error.message().len() < 120, "{error}");
+    }
+}
+
+#[test]
 fn what_a_flight_refuses_is_refused_at_its_key() {
     let obstacle = |shape: &str| format!("obstacle=[{{name=\"o\", at_m=[0,0,50], {shape}}}]");
     for (set, code, says) in [

@@ -42,6 +42,7 @@ fn values_are_spaced_or_listed() {
         ("law.alpha=0,inf", "is not finite"),
         ("law.alpha=nan,1", "NaN is not finite"),
         ("law.alpha=1,2,1", "1 is given twice"),
+        ("law.alpha=1e300,2,1e300", "law.alpha: 1e300 is given twice"),
         ("=1,2", "the grid is empty"),
     ] {
         let failure = SweptKey::parse(text).expect_err(text);
@@ -110,7 +111,10 @@ fn swept_seeds_and_jitters_override_the_defaults() {
     assert!(notes.contains("the 2 flights with start.jitter_m=0 are one flight repeated"), "{notes}");
     assert!(!notes.contains("start.jitter_m=0.2"), "{notes}");
     let text = sweep.records().text();
-    assert!(text.contains("2 of 2 [") && text.lines().any(|line| line.starts_with("0 ") && !line.contains('[')), "{text}");
+    assert!(
+        text.contains("2 of 2 [") && text.lines().any(|line| line.starts_with("0 ") && !line.contains('[')),
+        "{text}"
+    );
     let seeds = swept(&options(&["start.seed=1,2", "start.jitter_m=0.2"], 1));
     assert_ne!(seeds.points[0].flights[0].state_hash, seeds.points[1].flights[0].state_hash);
     // Two runs of one seed are the same flight, which must not count twice.
