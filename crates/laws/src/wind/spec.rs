@@ -172,8 +172,8 @@ impl WindSpec {
     }
 
     /// Returns an upper bound of the speed of the air at any of `count` vehicles until a time \[s\], in m/s. For mean
-    /// wind and gusts the bound is at most a ten-thousandth above the largest speed. With turbulence, which is unbounded,
-    /// the bound is an estimate that is rarely exceeded.
+    /// wind and gusts the bound is at most a ten-thousandth above the largest speed. With turbulence, which is
+    /// unbounded, the bound is an estimate that is rarely exceeded.
     #[must_use]
     pub fn fastest_m_s(&self, count: usize, until_s: f64) -> f64 {
         let turbulence = self.turbulence.map_or(0.0, |dryden| SIGMAS * dryden.intensity_m_s().norm());

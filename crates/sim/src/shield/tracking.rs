@@ -110,8 +110,8 @@ impl Scenario {
         Err(other_loop.into_iter().fold(found, |found, (key, ..)| found.at(key)))
     }
 
-    /// Returns the first key of the attitude loop that differs from the loop with which the tracking error of the
-    /// built-in model was measured, with the measured and the given value.
+    /// Returns the first key of the attitude loop that differs from that of the measurement, with both values. The
+    /// measurement is that of the built-in model.
     fn other_attitude_loop(&self) -> Option<(&'static str, f64, f64)> {
         let Quadrotor { model, attitude_hz, .. } = self.airframe.quadrotor()?;
         let (_, text) = MODELS.iter().find(|(name, _)| *name == model.name)?;

@@ -120,7 +120,7 @@ fn wrong_input_is_refused_at_its_place_with_a_remedy() {
     }
 }
 
-/// Without this check a flight wrote a recording whose scenario nobody could read.
+/// A recording holds the values that the program fills in, and its reader checks them.
 #[test]
 fn a_default_that_follows_from_other_keys_survives_write_and_read() {
     for (sets, f2_per_s) in [

@@ -193,7 +193,7 @@ fn read(toml: &str) -> Result<Scenario, ScenarioError> {
     Scenario::read(&Source::Text { name: "random.toml".to_owned(), text: toml.to_owned() }, &[])
 }
 
-/// Returns the fault of a refusal: a missing place, key or remedy, or a message that nobody reads.
+/// Returns the fault of a refusal: a missing place, key or remedy, or a long message.
 fn fault_of_refusal(error: &ScenarioError, paths: &[String]) -> Option<String> {
     let shown = error.to_string();
     let is_key = |key: &str| {

@@ -267,8 +267,8 @@ fn a_law_that_is_undefined_makes_the_shield_brake() {
     assert!(log.samples.last().expect("samples").swarm.velocities_m_s.amax() < 1e-9, "both have stopped");
 }
 
-/// Without a shield a command that is not finite ends the flight. Under a shield the vehicle brakes, which must not stay
-/// unnoticed.
+/// Without a shield a command that is not finite ends the flight. Under a shield the vehicle brakes, and the report
+/// counts the instants.
 #[test]
 fn commands_that_are_not_finite_are_counted() {
     let scenario = read(&format!("{SWAP}\n[shield]"));

@@ -31,8 +31,8 @@ impl Proportion {
         Self::between(count, of, clopper_pearson(count, of, TAIL))
     }
 
-    /// Returns `count` of `of` of flights that are no sample, such as all points of a grid: the share itself is both
-    /// ends of the interval, with a confidence of 1. A count above `of` is reduced to `of`.
+    /// Returns `count` of `of` of flights that are no sample, such as all points of a grid. Both ends of the interval
+    /// are the share, with a confidence of 1. A count above `of` is reduced to `of`.
     #[must_use]
     pub fn exact(count: u64, of: u64) -> Self {
         let share = (of > 0).then(|| count.min(of) as f64 / of as f64);
