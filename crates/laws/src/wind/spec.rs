@@ -201,8 +201,10 @@ impl WindSpec {
 const EXCESS: f64 = 1e-4;
 /// Relative excess of a bound that is rounding.
 const ROUNDING: f64 = 1e-12;
+/// Speed below which the excess is relative to the sum of all speeds, as a share of this sum.
+const CANCELLED: f64 = 0.01;
 /// Largest number of halvings of an interval.
-const MOST_HALVINGS: u32 = 40;
+const MOST_HALVINGS: u32 = 20;
 
 /// Mean wind and the gusts that affect one vehicle.
 struct Superposition<'a> {
@@ -224,6 +226,9 @@ impl Superposition<'_> {
         ends_s.retain(|&end_s| end_s >= 0.0);
         ends_s.sort_by(f64::total_cmp);
         let reached_m_s = ends_s.iter().map(|&end_s| self.speed_m_s(end_s)).fold(0.0, f64::max);
+        let gusts_m_s: f64 = self.gusts.iter().map(|gust| gust.velocity_m_s.norm()).sum();
+        // Velocities may cancel, and no bound of several gusts is 0.
+        let least_m_s = CANCELLED * (self.mean_m_s.norm() + gusts_m_s);
         let mut fastest_m_s = reached_m_s;
         let mut open: Vec<_> = ends_s.windows(2).map(|ends| (ends[0], ends[1], 0)).collect();
         while let Some((from_s, to_s, halvings)) = open.pop() {
@@ -231,7 +236,7 @@ impl Superposition<'_> {
             if bound_m_s <= fastest_m_s * (1.0 + ROUNDING) {
                 continue;
             }
-            if bound_m_s <= fastest_m_s * (1.0 + EXCESS) || halvings == MOST_HALVINGS {
+            if bound_m_s <= fastest_m_s + EXCESS * fastest_m_s.max(least_m_s) || halvings == MOST_HALVINGS {
                 fastest_m_s = fastest_m_s.max(bound_m_s);
                 continue;
             }
@@ -351,11 +356,8 @@ mod tests {
                 velocity_m_s: Vector3::new(4.0 * unit() - 2.0, 4.0 * unit() - 2.0, unit()),
                 vehicles: (unit() < 0.5).then(|| vec![0]),
             });
-            let wind = WindSpec {
-                mean_m_s: Vector3::new(unit(), -unit(), 0.0),
-                gusts: gusts.collect(),
-                ..WindSpec::default()
-            };
+            let gusts = gusts.collect();
+            let wind = WindSpec { mean_m_s: Vector3::new(unit(), -unit(), 0.0), gusts, ..WindSpec::default() };
             let bound_m_s = wind.fastest_m_s(2, 10.0);
             let instants = (0..=20_000).map(|step| f64::from(step) * 5e-4);
             let speeds = instants.flat_map(|time_s| [0, 1].map(|vehicle| wind.steady_m_s(vehicle, time_s).norm()));
