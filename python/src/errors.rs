@@ -19,7 +19,8 @@ create_exception!(
 
 /// Returns an exception for wrong input.
 pub(crate) fn wrong_input(message: impl Into<String>) -> PyErr {
-    Error::new_err(message.into())
+    // A failure shortens long numbers.
+    Error::new_err(Failure::new("", false, message.into()).message().to_owned())
 }
 
 /// Returns an exception for an argument of a wrong type.

@@ -215,9 +215,9 @@ fn content(path: &Path) -> Option<Vec<u8>> {
 /// Arguments of `tautline check`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exit codes: 0 flyable, also with other warnings; 1 the flight cannot succeed (relative-velocity-unstable, \
-start-on-line, start-in-plane, step-too-long, drift-unresolved); 2 wrong input, such as a desired distance of at most \
-delta.")]
+Exit codes: 0 flyable, also with other warnings; 1 the flight cannot succeed; 2 wrong input, such as a desired \
+distance of at most delta. The code is 1 with one of these warnings: relative-velocity-unstable, start-on-line, \
+start-in-plane, step-too-long, drift-unresolved, ends-at-start, slots-too-near.")]
 pub(super) struct CheckArguments {
     #[command(flatten)]
     what: ScenarioArguments,

@@ -318,6 +318,8 @@ fn wrong_input_is_refused_with_key_and_remedy() {
         (&format!("{}[stop]\nwidth = 1.5", vary(jitter)), "campaign/plan"),
         (&format!("{SPEC}law.kind = {{ list = [\"orca\", \"potential\"] }}"), "campaign/plan"),
         (&vary("start.seed = \"run\""), "campaign/plan"),
+        (&vary("noise.seed = \"run\""), "campaign/plan"),
+        (&vary("law.alpha = { list = [2.0, 2.0] }"), "campaign/plan"),
     ] {
         refused(spec, code);
     }

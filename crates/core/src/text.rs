@@ -1,5 +1,6 @@
 //! Formats numbers for output that people read.
 
+use std::borrow::Cow;
 use std::fmt::Write as _;
 
 /// Formats a number with `decimals` decimals, or in powers of ten if it is 1e15 or more. Zero has no sign.
@@ -190,11 +191,40 @@ pub fn table<N: std::fmt::Display>(rows: impl IntoIterator<Item = (N, String)>) 
     text
 }
 
-/// Formats a number as TOML, integral values without a decimal point: both integer and float keys accept them.
+/// Formats a given number so that a message repeats it: the shortest decimal with the same bits, in powers of ten
+/// below 1e-5 and from 1e16 on. Integral values have no decimal point, so integer and float keys of TOML accept them.
 #[must_use]
-pub fn as_toml(value: f64) -> String {
-    const WHOLE: f64 = 1e15;
-    if value.abs() < WHOLE { value.to_string() } else { format!("{value:?}") }
+pub fn shortest(value: f64) -> String {
+    let shown = format!("{value:?}");
+    shown.strip_suffix(".0").map_or(shown.clone(), str::to_owned)
+}
+
+/// Formats the long decimals of a message as [`shortest`] does. `{}` writes 1e300 with 301 digits.
+#[must_use]
+pub fn with_short_numbers(message: &str) -> Cow<'_, str> {
+    /// Most characters of a decimal that is kept.
+    const LONG: usize = 25;
+    let is_part = |c: char| c.is_ascii_digit() || c == '.';
+    if !message.as_bytes().chunk_by(|a, b| is_part((*a).into()) && is_part((*b).into())).any(|run| run.len() > LONG) {
+        return Cow::Borrowed(message);
+    }
+    let (mut out, mut rest) = (String::with_capacity(message.len()), message);
+    while let Some(start) = rest.find(is_part) {
+        let end = rest[start..].find(|c| !is_part(c)).map_or(rest.len(), |length| start + length);
+        // A full stop ends a sentence.
+        let digits = rest[start..end].trim_end_matches('.');
+        let is_within_word = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || matches!(c, '_' | '/'));
+        let is_name = is_within_word(rest[..start].chars().next_back()) || is_within_word(rest[end..].chars().next());
+        let number = digits.parse().ok().filter(|_| digits.len() > LONG && !is_name);
+        out += &rest[..start];
+        out += &number.map_or_else(|| digits.to_owned(), shortest);
+        rest = &rest[start + digits.len()..];
+        // The full stops of the run are not part of a number.
+        let stops = rest.len() - rest.trim_start_matches('.').len();
+        out += &rest[..stops];
+        rest = &rest[stops..];
+    }
+    Cow::Owned(out + rest)
 }
 
 /// Formats a count with its noun: `1 vehicle`, `2 vehicles`.
@@ -274,6 +304,27 @@ mod tests {
                 assert!(low <= number && number <= high, "{low} {number} {high}");
                 assert!(high - low <= 0.11 * number.max(1e-2), "{low} {number} {high}");
             }
+        }
+    }
+
+    #[test]
+    fn a_repeated_number_is_short_and_has_the_same_bits() {
+        let numbers =
+            [0.0, 1.0, -3.5, 0.1 + 0.2, 1e-4, 1e-7, 1e-300, 1e9, 1e15, 1e16, 1e300, -f64::MAX, f64::MIN_POSITIVE];
+        for number in numbers {
+            let shown = shortest(number);
+            assert!(shown.len() <= 25 && shown.parse() == Ok(number), "{shown}");
+        }
+        let shown = [2.0, 1e300, 1e-7, f64::INFINITY, 240.0].map(shortest);
+        assert_eq!(shown, ["2", "1e300", "1e-7", "inf", "240"]);
+    }
+
+    #[test]
+    fn long_decimals_of_a_message_are_short() {
+        let message = format!("must be at most {}, got {} and -{}. Or 0.1", 1e9, 1e300, 1e-300);
+        assert_eq!(with_short_numbers(&message), "must be at most 1000000000, got 1e300 and -1e-300. Or 0.1");
+        for kept in ["0.30000000000000004 m", "v1.2.3...", "file 0123456789012345678901234567890.csv", "", "a.b"] {
+            assert_eq!(with_short_numbers(kept), kept);
         }
     }
 

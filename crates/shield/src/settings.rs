@@ -42,8 +42,8 @@ use crate::choice::{Choice, Envelope};
 use crate::contract::Side;
 use crate::plane::{Metric, Segment};
 use crate::start::Start;
-use crate::tube::{TrackerLoop, Tube, TubeError};
-use tautline_core::text::{at_least, at_most, exact};
+use crate::tube::{TrackerLoop, Tube, TubeError, shortest_lag_s};
+use tautline_core::text::{at_least, at_most, exact, shortest};
 
 /// Largest coordinate of a start \[m\].
 pub(crate) const FARTHEST_M: f64 = 1e6;
@@ -300,9 +300,13 @@ impl Settings {
             ),
             TubeError::ShortLag => ShieldError::new(
                 "actuator_lag_s",
-                format!("must be 0 or at least a fortieth of the period of {} s", self.period_s),
+                format!(
+                    "must be 0 or at least {} s for a period of {} s",
+                    at_most(shortest_lag_s(self.period_s), 6),
+                    shortest(self.period_s)
+                ),
                 self.actuator_lag_s,
-                "round it up",
+                "round it up to this lag, or down to 0",
             ),
         }
     }
@@ -494,7 +498,7 @@ impl fmt::Display for ShieldError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         // Rounding of the last digits is left out.
         let value = if self.value.abs() < 1e6 { (self.value * 1e9).round() / 1e9 } else { self.value };
-        write!(out, "{}: {} ({value}); {}", self.place, self.problem, self.remedy)
+        write!(out, "{}: {} ({}); {}", self.place, self.problem, shortest(value), self.remedy)
     }
 }
 

@@ -130,6 +130,12 @@ pub enum TubeError {
     ShortLag,
 }
 
+/// Returns the shortest lag of a period that the enclosure covers \[s\].
+pub(crate) fn shortest_lag_s(period_s: f64) -> f64 {
+    // The row of the actuator has three entries of 1/lag.
+    3.0 * period_s / (CELL_RATE * MAX_CELLS as f64)
+}
+
 impl TrackerLoop {
     /// Returns the tube.
     ///

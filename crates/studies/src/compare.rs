@@ -6,7 +6,7 @@ use serde::Serialize;
 
 use crate::base::{BaseScenario, JITTER, check_law_name, check_runs, jitter_note};
 use crate::batch::Batch;
-use crate::flight::{FlightSummary, Outcome};
+use crate::flight::{FlightSample, FlightSummary, Outcome};
 use crate::statistics::{CONFIDENCE, Estimate, Proportion};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
@@ -119,6 +119,8 @@ pub struct LawRow {
     pub peak_control_median_m_s2: Estimate,
     /// Mean integral of |u|, summed over the vehicles \[m/s\].
     pub total_control_mean_m_s: Estimate,
+    /// Whether the flights are one flight repeated, because nothing in them is random. No number has an interval then.
+    pub repeated: bool,
     /// The flights, in the order of their seeds.
     pub flights: Vec<FlightSummary>,
 }
@@ -326,32 +328,30 @@ type Flown<'a> = (&'a LawRow, u64, Scenario, ([usize; 2], f64, f64));
 
 impl LawRow {
     fn new(law: &ComparedLaw, flights: Vec<FlightSummary>) -> Self {
-        let of = flights.len() as u64;
-        let count = |is: &dyn Fn(&FlightSummary) -> bool| flights.iter().filter(|flight| is(flight)).count() as u64;
-        let ended = |outcome: Outcome| count(&|flight| flight.outcome == outcome);
-        let known = |of: fn(&FlightSummary) -> Option<f64>| flights.iter().filter_map(of).collect::<Vec<_>>();
-        let reached_s = known(|flight| flight.reached_at_s.filter(|_| flight.reached));
-        let (min_m, peak_m_s2) = (known(|flight| flight.min_m), known(|flight| flight.peak_control_m_s2));
+        let sample = FlightSample::new(&flights);
+        let ended = |outcome: Outcome| sample.share(|flight| flight.outcome == outcome);
+        let reached_s = |flight: &FlightSummary| flight.reached_at_s.filter(|_| flight.reached);
         let worst = worst(&flights);
         Self {
             name: law.name().to_owned(),
             kind: law.kind(),
             overrides: law.overrides(),
-            clear: Proportion::new(ended(Outcome::Clear), of),
-            violated: Proportion::new(ended(Outcome::Violated), of),
-            ended_early: ended(Outcome::EndedEarly),
-            undecided: ended(Outcome::Undecided),
-            refused: count(&|flight| !flight.refused.is_empty()),
-            reached: Proportion::new(count(&|flight| flight.reached), of),
-            reached_median_s: Estimate::quantile(&reached_s, 0.5),
-            reached_p95_s: Estimate::quantile(&reached_s, 0.95),
+            clear: ended(Outcome::Clear),
+            violated: ended(Outcome::Violated),
+            ended_early: ended(Outcome::EndedEarly).count,
+            undecided: ended(Outcome::Undecided).count,
+            refused: sample.count(|flight| !flight.refused.is_empty()),
+            reached: sample.share(|flight| flight.reached),
+            reached_median_s: sample.quantile(reached_s, 0.5),
+            reached_p95_s: sample.quantile(reached_s, 0.95),
             min_smallest_m: worst.and_then(|flight| flight.min_m),
             min_smallest_seed: worst.map(|flight| flight.seed),
-            min_median_m: Estimate::quantile(&min_m, 0.5),
-            path_length_mean_m: Estimate::mean(&known(|flight| Some(flight.path_length_m))),
-            peak_control_largest_m_s2: peak_m_s2.iter().copied().reduce(f64::max),
-            peak_control_median_m_s2: Estimate::quantile(&peak_m_s2, 0.5),
-            total_control_mean_m_s: Estimate::mean(&known(|flight| Some(flight.total_control_m_s))),
+            min_median_m: sample.quantile(|flight| flight.min_m, 0.5),
+            path_length_mean_m: sample.mean(|flight| flight.path_length_m),
+            peak_control_largest_m_s2: flights.iter().filter_map(|flight| flight.peak_control_m_s2).reduce(f64::max),
+            peak_control_median_m_s2: sample.quantile(|flight| flight.peak_control_m_s2, 0.5),
+            total_control_mean_m_s: sample.mean(|flight| flight.total_control_m_s),
+            repeated: sample.is_repeated(),
             flights,
         }
     }
@@ -387,7 +387,8 @@ impl LawRow {
         let censored = (reached > 0 && reached < self.reached.of).then(|| {
             format!("{name}: times to reach are over the {reached} of {of} flights that reached the formation")
         });
-        [refused, ended, censored].into_iter().flatten().collect()
+        let identical = FlightSample::new(&self.flights).note(&format!("under {name}"));
+        [refused, ended, censored, identical].into_iter().flatten().collect()
     }
 }
 

@@ -4,8 +4,10 @@ use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
 
+use crate::statistics::{Estimate, Proportion};
 use tautline_core::record::{Event, RecordError, Sample, Sink, Step};
 use tautline_core::swarm::{Rows, row};
+use tautline_core::text::counted;
 use tautline_laws::law::LawError;
 use tautline_report::report::{INTERRUPTED, Report, Status};
 use tautline_report::run::run_with;
@@ -73,6 +75,9 @@ pub struct FlightSummary {
     pub overlong_steps: u64,
     /// SHA-256 of the resolved scenario.
     pub scenario_sha256: String,
+    /// Hash of what determines the flight ([`Scenario::flight_sha256_hex`]).
+    #[serde(skip)]
+    pub flight_sha256: String,
     /// Hash over the bits of every recorded state.
     pub state_hash: String,
     /// Wall-clock time in the law \[s\].
@@ -96,20 +101,28 @@ pub fn fly(
     let (preflight, parts) = (Preflight::of(scenario)?, Components::of(scenario)?);
     let (report, ending) = run_with(scenario, &preflight, parts, &mut effort, carry_on)?;
     if let Some(law) = &scenario.external_law {
-        refuse_failed_law(law, &ending)?;
+        refuse_failed_law(law, &ending, &report)?;
     }
     let is_whole = report.run.ended_early.as_deref() != Some(INTERRUPTED);
-    Ok(is_whole.then(|| FlightSummary::new(report, seed, &effort)))
+    let summary =
+        || FlightSummary { flight_sha256: scenario.flight_sha256_hex(), ..FlightSummary::new(report, seed, &effort) };
+    Ok(is_whole.then(summary))
 }
 
 /// Refuses the flight of an external law that failed: a defect of the law is no result of a study.
-fn refuse_failed_law(law: &ExternalLaw, ending: &Ending) -> Result<(), SimError> {
+fn refuse_failed_law(law: &ExternalLaw, ending: &Ending, report: &Report) -> Result<(), SimError> {
     let is_failed = match ending {
         Ending::LawUndefined(error) => *error == LawError::Failed,
         Ending::BrokeDown(breakdown) => matches!(breakdown, Breakdown::CommandNotFinite { .. }),
         Ending::Completed | Ending::Interrupted => false,
     };
-    let reason = ending.reason().filter(|_| is_failed);
+    // A shield brakes where the law fails, and the flight goes on.
+    let under_shield = report.shield.as_ref().filter(|shield| shield.law_failed > 0);
+    let under_shield = under_shield.map(|shield| {
+        let instants = counted(shield.law_failed, "instant", "instants");
+        format!("it failed or commanded numbers that are not finite at {instants}, where the shield braked")
+    });
+    let reason = ending.reason().filter(|_| is_failed).or(under_shield);
     reason.map_or(Ok(()), |reason| Err(SimError::ExternalLaw { law: law.name().to_owned(), reason }))
 }
 
@@ -152,6 +165,7 @@ impl FlightSummary {
             refined_steps: report.run.refined_steps,
             overlong_steps: report.run.overlong_steps,
             scenario_sha256: report.scenario.sha256,
+            flight_sha256: String::new(),
             state_hash: report.run.state_hash,
             law_s: report.performance.map_or(0.0, |times| times.law_s),
         }
@@ -177,6 +191,73 @@ impl Outcome {
             Status::Clear if report.audit.parry.disagreements == 0 => Self::Clear,
             Status::Clear | Status::Undecided => Self::Undecided,
         }
+    }
+}
+
+/// Flights of one law or of one point: a sample, or one flight repeated.
+///
+/// Flights of equal scenarios without randomness are one flight. They are no sample of anything, so numbers over them
+/// have no interval.
+#[derive(Clone, Copy, Debug)]
+pub struct FlightSample<'a> {
+    flights: &'a [FlightSummary],
+    is_repeated: bool,
+}
+
+impl<'a> FlightSample<'a> {
+    /// Compares the flights.
+    #[must_use]
+    pub fn new(flights: &'a [FlightSummary]) -> Self {
+        // The flights of an external law may differ although their scenarios are equal.
+        let identity = |flight: &'a FlightSummary| (&*flight.flight_sha256, &*flight.state_hash);
+        let is_repeated = flights.len() > 1 && flights.iter().all(|flight| identity(flight) == identity(&flights[0]));
+        Self { flights, is_repeated }
+    }
+
+    /// Returns whether several flights are one flight repeated.
+    #[must_use]
+    pub fn is_repeated(self) -> bool {
+        self.is_repeated
+    }
+
+    /// Returns the number of flights that show something.
+    pub fn count(self, shows: impl Fn(&FlightSummary) -> bool) -> u64 {
+        self.flights.iter().filter(|flight| shows(flight)).count() as u64
+    }
+
+    /// Returns the share of flights that show something.
+    pub fn share(self, shows: impl Fn(&FlightSummary) -> bool) -> Proportion {
+        let share = if self.is_repeated { Proportion::exact } else { Proportion::new };
+        share(self.count(shows), self.flights.len() as u64)
+    }
+
+    /// Returns a quantile of the known values ([`Estimate::quantile`]).
+    pub fn quantile(self, value: impl Fn(&FlightSummary) -> Option<f64>, part: f64) -> Estimate {
+        self.of_sample(Estimate::quantile(&self.flights.iter().filter_map(value).collect::<Vec<_>>(), part))
+    }
+
+    /// Returns the mean ([`Estimate::mean`]).
+    pub fn mean(self, value: impl Fn(&FlightSummary) -> f64) -> Estimate {
+        self.of_sample(Estimate::mean(&self.flights.iter().map(value).collect::<Vec<_>>()))
+    }
+
+    /// Returns a note if several flights are identical. `which` names them.
+    #[must_use]
+    pub fn note(self, which: &str) -> Option<String> {
+        let [first, others @ ..] = self.flights else { return None };
+        let count = self.flights.len();
+        if self.is_repeated {
+            return Some(format!(
+                "the {count} flights {which} are one flight repeated, because nothing in them is random: they are no \
+                 sample and have no interval"
+            ));
+        }
+        let is_identical = !others.is_empty() && others.iter().all(|flight| flight.state_hash == first.state_hash);
+        is_identical.then(|| format!("the {count} flights {which} are identical: the drawn numbers change nothing"))
+    }
+
+    fn of_sample(self, estimate: Estimate) -> Estimate {
+        if self.is_repeated { estimate.without_interval() } else { estimate }
     }
 }
 
@@ -247,6 +328,9 @@ fn sum_of_norms(rows: &Rows, from: Option<&Rows>) -> f64 {
 mod tests {
     use super::*;
     use tautline_core::swarm::Swarm;
+    use tautline_laws::law::Law;
+    use tautline_laws::observation::Observation;
+    use tautline_sim::scenario::{Override, Source};
 
     /// Returns the effort of two vehicles on circles of 1 m and 2 m with commands of t and 2 t m/s^2.
     fn seen(steps: u32) -> Effort {
@@ -259,6 +343,46 @@ mod tests {
             effort.step(&Step { time_s, swarm: &swarm, control: &control });
         }
         effort
+    }
+
+    /// Law that writes NaN for the first vehicle, or no acceleration for any.
+    #[derive(Clone)]
+    struct Coasting {
+        first_m_s2: f64,
+    }
+
+    impl Law for Coasting {
+        fn name(&self) -> &'static str {
+            "coasting"
+        }
+
+        fn command(&mut self, _at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+            command.fill(0.0);
+            command[(0, 0)] = self.first_m_s2;
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_law_that_fails_under_the_shield_does_not_pass_and_is_no_result_of_a_study() {
+        let sets = ["shield.enabled=true", "time.duration_s=2"];
+        let sets = sets.map(|set| Override::parse(set).expect("an override"));
+        let source = Source::Builtin("swap".to_owned());
+        let mut scenario = Scenario::read(&source, &sets).expect("a scenario");
+        scenario.external_law = Some(ExternalLaw::new(Coasting { first_m_s2: f64::NAN }));
+        let report = tautline_report::run::run(&scenario, &mut ()).expect("a report");
+        let shield = report.shield.as_ref().expect("a shield");
+        assert_eq!((shield.law_undefined, shield.law_failed), (shield.law_failed, 41));
+        let says = |reason: &String| reason.contains("not finite at 41 instants");
+        assert!(!report.verdict.pass && report.verdict.reasons.iter().any(says), "{:?}", report.verdict.reasons);
+        assert!(report.text().contains("no command at 41 instants"), "{}", report.text());
+        let flown = fly(&scenario, 0, &mut |_| ControlFlow::Continue(()));
+        assert!(matches!(flown, Err(SimError::ExternalLaw { .. })), "{flown:?}");
+        scenario.external_law = Some(ExternalLaw::new(Coasting { first_m_s2: 0.0 }));
+        let report = tautline_report::run::run(&scenario, &mut ()).expect("a report");
+        assert_eq!(report.shield.as_ref().map(|shield| shield.law_undefined), Some(0));
+        assert!(!report.verdict.reasons.iter().any(|reason| reason.contains("not finite")));
+        assert!(fly(&scenario, 0, &mut |_| ControlFlow::Continue(())).is_ok());
     }
 
     #[test]

@@ -6,11 +6,11 @@ use serde::Serialize;
 
 use crate::base::{BaseScenario, Criterion, JITTER_KEY, Runs, check_runs, jitter_note};
 use crate::batch::Batch;
-use crate::flight::FlightSummary;
-use crate::statistics::{CONFIDENCE, Estimate, Proportion};
+use crate::flight::{FlightSample, FlightSummary};
+use crate::statistics::{CONFIDENCE, Proportion};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
-use tautline_core::text::{as_toml, counted, significant};
+use tautline_core::text::{counted, shortest, significant};
 use tautline_report::figures::{Separation, Share, margin as figure, separations, verdicts};
 use tautline_report::report::page::{Badge, Tone};
 use tautline_report::request::{Failure, ScenarioRequest, in_range};
@@ -23,6 +23,9 @@ const ABOUT: &str = "The result of the flights over the values of the key, and h
 const SCANS: RangeInclusive<usize> = 2..=1000;
 /// Admitted numbers of halvings.
 const HALVINGS: RangeInclusive<u32> = 0..=50;
+
+/// Most values of identical flights that have a note.
+const MOST_NOTES: usize = 3;
 
 /// Assumptions of the numbers.
 const ASSUMED: [&str; 3] = [
@@ -73,6 +76,8 @@ pub struct Probe {
     pub held: Proportion,
     /// Smallest separation of all runs \[m\].
     pub min_m: Option<f64>,
+    /// Whether the runs are one flight repeated, because nothing in them is random. The share has no interval then.
+    pub repeated: bool,
     /// The runs, in the order of their seeds.
     pub flights: Vec<FlightSummary>,
 }
@@ -133,7 +138,7 @@ impl Options {
 
     /// Returns the scenario with a value of the key and the overrides of a run.
     fn scenario(&self, base: &BaseScenario, value: f64, sets: Vec<String>) -> Result<Scenario, Failure> {
-        let key = format!("{}={}", self.key, as_toml(value));
+        let key = format!("{}={}", self.key, shortest(value));
         let sets: Vec<_> = sets.into_iter().chain([key]).collect();
         base.with(&sets).map_err(|error| Failure::from(error).under(&self.under(value)))
     }
@@ -245,9 +250,10 @@ impl Experiment for Options {
 
 impl Probe {
     fn new(value: f64, question: Criterion, flights: Vec<FlightSummary>) -> Self {
-        let held = flights.iter().filter(|flight| question.holds(flight)).count();
+        let sample = FlightSample::new(&flights);
+        let (held, repeated) = (sample.share(|flight| question.holds(flight)), sample.is_repeated());
         let min_m = flights.iter().filter_map(|flight| flight.min_m).reduce(f64::min);
-        Self { value, held: Proportion::new(held as u64, flights.len() as u64), min_m, flights }
+        Self { value, held, min_m, repeated, flights }
     }
 
     /// Returns whether every run showed the verdict.
@@ -337,7 +343,11 @@ impl Study for Margin {
             )
         });
         let jitter = self.seeds.jitter_m.map(jitter_note);
-        predicted.chain([interrupted, turns, jitter, self.about.note()].into_iter().flatten()).collect()
+        let identical = self.probes.iter().filter_map(|probe| {
+            FlightSample::new(&probe.flights).note(&format!("with {} = {}", self.key, probe.value))
+        });
+        let notes = [interrupted, turns, jitter, self.about.note()].into_iter().flatten();
+        predicted.chain(notes).chain(identical.take(MOST_NOTES)).collect()
     }
 
     fn records(&self) -> Table {
@@ -348,12 +358,13 @@ impl Study for Margin {
             .column("runs", "", Kind::Count, |probe| probe.held.of)
             .column("held", &does, if self.runs == 1 { Kind::OneFlight } else { Kind::Share }, |probe| probe.held)
             .column("min", "Smallest separation [m]", Kind::AtLeast, |probe| probe.min_m)
+            .column("repeated", "", Kind::Flag, |probe| probe.repeated)
             .build()
     }
 
     fn sections(&self) -> Vec<Section> {
         let lengths = self.probes.iter().filter_map(|probe| {
-            let median_m = Estimate::quantile(&probe.flights.iter().filter_map(|of| of.min_m).collect::<Vec<_>>(), 0.5);
+            let median_m = FlightSample::new(&probe.flights).quantile(|flight| flight.min_m, 0.5);
             let interval_m = median_m.low.zip(median_m.high).map(|(low, high)| [low, high]);
             let (value, flights) = (probe.value, probe.held.of);
             Some(Separation { value, flights, smallest_m: probe.min_m?, median_m: median_m.value?, interval_m })
@@ -398,7 +409,7 @@ impl Study for Margin {
 
     fn repeats(&self, scenario: &ScenarioRequest) -> Vec<(String, String)> {
         let side = |(probe, what): (&Probe, &str)| {
-            let key = format!("{}={}", self.key, as_toml(probe.value));
+            let key = format!("{}={}", self.key, shortest(probe.value));
             let sets: Vec<_> = self.seeds.sets(probe.worst_run(self.question)).into_iter().chain([key]).collect();
             (format!("A flight that {what}:"), scenario.command("run", [], &sets))
         };

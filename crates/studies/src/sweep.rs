@@ -7,11 +7,11 @@ use serde::Serialize;
 use crate::attack::{Bound, FLIGHTS};
 use crate::base::{BaseScenario, Criterion, JITTER_KEY, Runs, check_runs, jitter_note, overlap};
 use crate::batch::Batch;
-use crate::flight::{FlightSummary, Outcome};
+use crate::flight::{FlightSample, FlightSummary, Outcome};
 use crate::statistics::{CONFIDENCE, Estimate, Proportion};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
-use tautline_core::text::{as_toml, beside_limit, counted};
+use tautline_core::text::{beside_limit, counted, shortest};
 use tautline_report::figures::{Figure, GridAxis, Separation, Share, heat_map, separations, shares};
 use tautline_report::report::page::{Badge, Tone};
 use tautline_report::request::{Failure, ScenarioRequest};
@@ -19,6 +19,9 @@ use tautline_sim::sim::SimError;
 
 /// Most points of a grid.
 pub const MOST_POINTS: usize = 2500;
+
+/// Most points of identical flights that have a note.
+const MOST_NOTES: usize = 3;
 
 /// Assumptions of the numbers.
 const ASSUMED: [&str; 3] = [
@@ -66,6 +69,9 @@ pub struct Point {
     pub min_median_m: Estimate,
     /// Median of the time to reach the formation, over the runs that reached it \[s\].
     pub reached_median_s: Estimate,
+    /// Whether the flown runs are one flight repeated, because nothing in them is random. Shares and medians have no
+    /// interval then.
+    pub repeated: bool,
     /// Number of refused runs, whose scenario cannot be flown.
     pub refused: u64,
     /// Reason of the first refusal.
@@ -213,7 +219,7 @@ impl Options {
 
 /// Returns the overrides of a point.
 fn sets(keys: &[SweptKey], values: &[f64]) -> Vec<String> {
-    keys.iter().zip(values).map(|(of, &value)| format!("{}={}", of.key, as_toml(value))).collect()
+    keys.iter().zip(values).map(|(of, &value)| format!("{}={}", of.key, shortest(value))).collect()
 }
 
 impl Experiment for Options {
@@ -228,7 +234,7 @@ impl Experiment for Options {
 
     fn arguments(&self, _study: &Sweep) -> Vec<String> {
         let keys = self.keys.iter().flat_map(|SweptKey { key, values }| {
-            let values: Vec<_> = values.iter().copied().map(as_toml).collect();
+            let values: Vec<_> = values.iter().copied().map(shortest).collect();
             ["--key".to_owned(), format!("{key}={}", values.join(","))]
         });
         let (verdict, runs, seed) = (self.question.name(), self.runs.to_string(), self.seed.to_string());
@@ -310,20 +316,15 @@ impl Point {
     fn new(values: Vec<f64>, question: Criterion, runs: Vec<Result<FlightSummary, String>>) -> Self {
         let (flights, refusals): (Vec<_>, Vec<_>) = runs.into_iter().partition(Result::is_ok);
         let flights: Vec<_> = flights.into_iter().flatten().collect();
-        let of = flights.len() as u64;
-        let share = |is: &dyn Fn(&FlightSummary) -> bool| {
-            Proportion::new(flights.iter().filter(|flight| is(flight)).count() as u64, of)
-        };
-        let known = |of: fn(&FlightSummary) -> Option<f64>| flights.iter().filter_map(of).collect::<Vec<_>>();
-        let min_m = known(|flight| flight.min_m);
-        let reached_s = known(|flight| flight.reached_at_s.filter(|_| flight.reached));
+        let sample = FlightSample::new(&flights);
         Self {
             values,
-            held: share(&|flight| question.holds(flight)),
-            violated: share(&|flight| flight.outcome == Outcome::Violated),
-            min_smallest_m: min_m.iter().copied().reduce(f64::min),
-            min_median_m: Estimate::quantile(&min_m, 0.5),
-            reached_median_s: Estimate::quantile(&reached_s, 0.5),
+            held: sample.share(|flight| question.holds(flight)),
+            violated: sample.share(|flight| flight.outcome == Outcome::Violated),
+            min_smallest_m: flights.iter().filter_map(|flight| flight.min_m).reduce(f64::min),
+            min_median_m: sample.quantile(|flight| flight.min_m, 0.5),
+            reached_median_s: sample.quantile(|flight| flight.reached_at_s.filter(|_| flight.reached), 0.5),
+            repeated: sample.is_repeated(),
             refused: refusals.len() as u64,
             first_refusal: refusals.into_iter().find_map(Result::err),
             flights,
@@ -374,7 +375,8 @@ impl Sweep {
         match &self.keys[..] {
             [key] => {
                 let share = |point: &Point| {
-                    let interval = (point.held.of > 1).then_some([point.held.low, point.held.high]);
+                    let has_interval = point.held.of > 1 && !point.repeated;
+                    let interval = has_interval.then_some([point.held.low, point.held.high]);
                     Some(Share { value: point.values[0], share: point.held.share?, interval })
                 };
                 let separation = |point: &Point| {
@@ -460,7 +462,11 @@ impl Study for Sweep {
                  random starts, or noise in [wind], [sensing] or [network]"
             )
         });
-        [refused, self.jitter_m.map(jitter_note), self.about.note()].into_iter().flatten().chain(inert).collect()
+        let identical = self.points.iter().filter_map(|point| {
+            FlightSample::new(&point.flights).note(&format!("with {}", sets(&self.keys, &point.values).join(", ")))
+        });
+        let notes = [refused, self.jitter_m.map(jitter_note), self.about.note()].into_iter().flatten();
+        notes.chain(inert).chain(identical.take(MOST_NOTES)).collect()
     }
 
     fn records(&self) -> Table {
@@ -481,6 +487,7 @@ impl Study for Sweep {
             .column("min_median", median, Kind::Estimate, |point| point.min_median_m)
             .column("reached_median", "Time to reach, median [s]", Kind::Estimate, |point| point.reached_median_s);
         table
+            .column("repeated", "", Kind::Flag, |point| point.repeated)
             .column("refused_count", "Refused", Kind::Count, |point| point.refused)
             .column("first_refusal", "", Kind::Text, |point| point.first_refusal.clone())
             .build()

@@ -12,7 +12,7 @@ use parquet::file::writer::{SerializedFileWriter, SerializedRowGroupWriter};
 use parquet::schema::types::Type;
 
 use crate::statistics::{Estimate, Proportion};
-use tautline_core::text::{aligned, as_toml, at_least, at_most, fixed, separation, significant};
+use tautline_core::text::{aligned, at_least, at_most, fixed, separation, shortest, significant};
 use tautline_report::report::page::{self, Markup, Render as _, Tone, noted, tinted};
 
 /// Text for an unknown or inapplicable value.
@@ -149,7 +149,7 @@ impl Column {
             Kind::Measured | Kind::Estimate if number == 0.0 => "0".to_owned(),
             Kind::Measured | Kind::Estimate => significant(number, DIGITS),
             Kind::Rare => format!("{number:.2e}"),
-            _ => as_toml(number),
+            _ => shortest(number),
         }
     }
 

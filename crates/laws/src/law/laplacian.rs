@@ -25,7 +25,7 @@ pub struct LaplacianKeys {
     #[serde(default = "one")]
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub f1_per_s2: f64,
-    /// Gain on velocities in 1/s; by default 1 + `swarm.a22_per_s`.
+    /// Gain on velocities in 1/s; by default 1 + `swarm.a22_per_s` - `vehicle.drag_per_s`, at least 0.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0))]
     pub f2_per_s: Option<f64>,
@@ -44,7 +44,12 @@ impl Default for LaplacianKeys {
 impl LaplacianKeys {
     /// Sets keys that are not given to their defaults.
     pub(super) fn complete(self, a22_per_s: f64) -> Self {
-        Self { f2_per_s: self.f2_per_s.or(Some(1.0 + a22_per_s)), ..self }
+        Self { f2_per_s: Some(self.f2_per_s(a22_per_s)), ..self }
+    }
+
+    /// Returns the gain on velocities \[1/s\]. The default is not negative: for a22 < -1 the drag alone damps.
+    fn f2_per_s(&self, a22_per_s: f64) -> f64 {
+        self.f2_per_s.unwrap_or((1.0 + a22_per_s).max(0.0))
     }
 }
 
@@ -55,7 +60,7 @@ impl LaplacianKeys {
 /// ```
 ///
 /// Reaches the slots `h_i` up to a common translation from any start on a connected graph. Does not keep vehicles
-/// apart. The source's gains are f1 = 1 and f2 = 1 + a22.
+/// apart. The source's gains are f1 = 1 and f2 = 1 + a22; below a22 = -1 the default of f2 is 0.
 ///
 /// # Energy
 /// On the complete graph, with `e_i = p_i - h_i`,
@@ -83,7 +88,7 @@ impl LaplacianLaw {
     #[expect(clippy::needless_pass_by_value, reason = "every law takes its keys by value")]
     pub fn new(context: &LawContext<'_>, keys: LaplacianKeys) -> Result<Self, ParameterError> {
         let &LawContext { links, formation, a22_per_s, .. } = context;
-        let (f1_per_s2, f2_per_s) = (keys.f1_per_s2, keys.f2_per_s.unwrap_or(1.0 + a22_per_s));
+        let (f1_per_s2, f2_per_s) = (keys.f1_per_s2, keys.f2_per_s(a22_per_s));
         ParameterError::check(links, formation, &[("f1", f1_per_s2), ("f2", f2_per_s)])?;
         Ok(Self { graph: links.clone(), f1_per_s2, f2_per_s })
     }

@@ -192,7 +192,7 @@ fn plant(scenario: &Scenario) -> (String, &'static str) {
         (Airframe::Unicycle(_), _) => (
             "The vehicles are unicycles: they move in the direction of their heading, turn at a limited rate, and \
              never stop. Their path within a step is an arc in closed form. The audit takes its chord, which it \
-             leaves by less than 1e-5 m. Mass and hull have no effect."
+             leaves by less than 1e-5 delta. Mass and hull have no effect."
                 .to_owned(),
             "held over the step",
         ),

@@ -37,8 +37,12 @@ pub struct ShieldNumbers {
     pub proposals_refused: u64,
     /// Largest age of a plane \[s\].
     pub oldest_plane_s: f64,
-    /// Number of instants at which the law was undefined and all vehicles braked.
+    /// Number of instants at which the law had no finite command for some vehicle, which braked.
     pub law_undefined: u64,
+    /// Number of those instants at which the law failed or commanded numbers that are not finite. The flight does not
+    /// pass then.
+    #[serde(default)]
+    pub law_failed: u64,
     /// Number of messages of the shield, one for each receiver.
     pub messages_sent: u64,
     /// Number of them that were lost.
@@ -65,6 +69,7 @@ impl From<&ShieldReport> for ShieldNumbers {
             proposals_refused: counters.refused,
             oldest_plane_s: periods_s(counters.oldest_plane),
             law_undefined: of.undefined,
+            law_failed: of.failed,
             messages_sent: of.sent,
             messages_lost: of.lost,
         }
@@ -81,6 +86,17 @@ impl ShieldNumbers {
         ))
     }
 
+    /// Returns the reason of a law that failed. Without a shield such a flight ends early.
+    pub(super) fn failed_law(&self) -> Option<String> {
+        (self.law_failed > 0).then(|| {
+            let instants = counted(self.law_failed, "instant", "instants");
+            format!(
+                "The law failed or commanded numbers that are not finite at {instants}, where the shield braked. \
+                 Correct the law: it gives every vehicle a finite command at every instant."
+            )
+        })
+    }
+
     /// Returns a short form of the reason.
     pub(super) fn brief(&self) -> Option<String> {
         self.exceeded.as_ref().map(|exceeded| format!("bound of the shield exceeded: {exceeded}"))
@@ -89,9 +105,13 @@ impl ShieldNumbers {
     /// Returns the numbers in one line.
     pub(super) fn line(&self) -> String {
         let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+        let undefined = match self.law_undefined {
+            0 => String::new(),
+            count => format!("; the law had no command at {}", counted(count, "instant", "instants")),
+        };
         format!(
             "changed {} of commands by up to {} m/s^2, braked in {} (longest {}); used {} of the tube of {} m; {} \
-             accepted, {} refused",
+             accepted, {} refused{undefined}",
             percent(self.changed_share),
             up_to(self.largest_change_m_s2),
             percent(self.brake_share),

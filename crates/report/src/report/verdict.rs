@@ -40,6 +40,7 @@ impl Verdict {
             undecided(result),
             broken_certificate(report),
             report.shield.as_ref().and_then(ShieldNumbers::reason),
+            report.shield.as_ref().and_then(ShieldNumbers::failed_law),
             steps_too_long(result),
             risen_energy(result),
             ended_early(report),

@@ -6,6 +6,7 @@ use std::path::Path;
 
 use tautline_audit::recorded::RecordedError;
 use tautline_core::record::RecordError;
+use tautline_core::text::with_short_numbers;
 use tautline_laws::law::ParameterError;
 use tautline_recordings::export::ExportError;
 use tautline_recordings::export::drones::DroneError;
@@ -56,13 +57,14 @@ impl Failure {
     /// Returns a failure of either kind, without a remedy.
     #[must_use]
     pub fn new(code: &'static str, is_machine: bool, message: impl AsRef<str>) -> Self {
-        Self { code, is_machine, message: blanked(message.as_ref()), help: None, place: None }
+        let message = blanked(&with_short_numbers(message.as_ref()));
+        Self { code, is_machine, message, help: None, place: None }
     }
 
     /// Adds the remedy.
     #[must_use]
     pub fn with_help(mut self, help: impl AsRef<str>) -> Self {
-        self.help = Some(blanked(help.as_ref()));
+        self.help = Some(blanked(&with_short_numbers(help.as_ref())));
         self
     }
 

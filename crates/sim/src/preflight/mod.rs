@@ -13,6 +13,7 @@ mod warning;
 use serde::Serialize;
 
 use crate::scenario::{MAX_HALVINGS, Scenario, TimeSpec};
+use crate::sim::{Ending, Simulation};
 use crate::vehicle::Quadrotor;
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_core::text::at_least;
@@ -173,6 +174,13 @@ impl Preflight {
         // The shield limits the commands of the law. Only flights ask an external law for commands.
         if scenario.shield.is_none() && scenario.external_law.is_none() {
             found.start_peak_m_s2 = peak::start_peak_m_s2(scenario, law.as_mut());
+        }
+        // A flight makes the same start. Only flights ask an external law for commands.
+        if scenario.external_law.is_none()
+            && let Some(message) = ends_at_start(scenario)
+        {
+            let place = found.warnings.partition_point(|warning| warning.code < Code::EndsAtStart);
+            found.warnings.insert(place, Warning { code: Code::EndsAtStart, message });
         }
         let message = found.start_peak_m_s2.and_then(peak::extreme_acceleration);
         found.warnings.extend(message.map(|message| Warning { code: Code::ExtremeAcceleration, message }));
@@ -378,6 +386,20 @@ fn step_too_long(law: &dyn Law, scenario: &Scenario) -> Option<String> {
             warning::significant(shortest_s)
         )
     })
+}
+
+/// Returns a warning if the flight ends before its first step, with the law's command for the sensed start.
+fn ends_at_start(scenario: &Scenario) -> Option<String> {
+    // A scenario that cannot be flown at all is refused by its validation.
+    let simulation = Simulation::new(scenario).ok()?;
+    let ending = simulation.ending()?;
+    let remedy = match ending {
+        Ending::LawUndefined(error) if error.is_at_barrier() => {
+            "Move the vehicles of [start] apart, or reduce law.delta_m or the errors of [sensing]."
+        }
+        _ => "Reduce the numbers of [start], or the gains of [law].",
+    };
+    Some(format!("The flight ends at its start: {}. {remedy}", ending.reason()?.trim_end_matches('.')))
 }
 
 /// Returns the dimension of the affine subspace that forces along the lines between vehicles never leave. It moves with

@@ -41,6 +41,21 @@ fn ring(count: usize, graph: Graph, a22_per_s: f64) -> Scenario {
     swarm(Formation::circle(count, 10.0), graph, a22_per_s)
 }
 
+/// The law of the sensed start has no command, so a flight ends before its first step.
+#[test]
+fn a_flight_that_ends_at_its_start_is_refused() {
+    let mut ended = 0;
+    for seed in 0..20 {
+        let noisy = scenario("pentagon", &[&format!("noise.seed={seed}"), "sensing.position_noise_m=1"]);
+        let ends = Simulation::new(&noisy).expect("a flight").ending().is_some();
+        let found = check(&noisy);
+        assert_eq!(found.refusing().contains(&"ends-at-start"), ends, "seed {seed}: {:?}", found.warnings);
+        assert_eq!(found.warnings.iter().any(|warning| warning.message.contains("[sensing]")), ends, "seed {seed}");
+        ended += u32::from(ends);
+    }
+    assert!(ended > 0 && ended < 20, "{ended}");
+}
+
 #[test]
 fn the_pentagon_has_the_known_numbers() {
     let found = check(&scenario("pentagon", &[]));

@@ -30,6 +30,8 @@ pub enum Code {
     StepTooLong,
     /// The swarm drifts so far that numbers no longer resolve its positions.
     DriftUnresolved,
+    /// The flight ends before its first step.
+    EndsAtStart,
     /// Slots are nearer than the shield lets vehicles come.
     SlotsTooNear,
     /// Slots are nearer than the gap that vehicles under a shield keep by choice.
@@ -48,12 +50,13 @@ pub enum Code {
 
 impl Code {
     /// All codes, the most severe first.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::RelativeVelocityUnstable,
         Self::StartOnLine,
         Self::StartInPlane,
         Self::StepTooLong,
         Self::DriftUnresolved,
+        Self::EndsAtStart,
         Self::SlotsTooNear,
         Self::SlotsWithinEase,
         Self::BeyondMargin,
@@ -74,6 +77,7 @@ impl Code {
                 | Self::StartInPlane
                 | Self::StepTooLong
                 | Self::DriftUnresolved
+                | Self::EndsAtStart
                 | Self::SlotsTooNear
         )
     }
@@ -87,6 +91,7 @@ impl Code {
             Self::StartInPlane => "start-in-plane",
             Self::StepTooLong => "step-too-long",
             Self::DriftUnresolved => "drift-unresolved",
+            Self::EndsAtStart => "ends-at-start",
             Self::SlotsTooNear => "slots-too-near",
             Self::SlotsWithinEase => "slots-within-ease",
             Self::BeyondMargin => "beyond-margin",

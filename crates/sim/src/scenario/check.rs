@@ -14,6 +14,7 @@ use super::error::ScenarioError;
 use super::error::suggest;
 use super::limits::{LARGEST, SMALLEST};
 use super::schema::{Node, tables_with};
+use tautline_core::text::shortest;
 
 /// Longest part of an unknown name that a message repeats \[characters\].
 const NAME_CHARS: usize = 40;
@@ -35,6 +36,17 @@ impl SchemaError {
     fn child(mut self, key: impl Into<String>) -> Self {
         self.path.push(key.into());
         self
+    }
+
+    /// Returns the error about a value that the scenario does not give, with its dotted path as its key.
+    pub(super) fn of_filled_value(self) -> ScenarioError {
+        let error = self.without_text();
+        let path = error.field().map_or_else(String::new, |field| field.to_string());
+        let message = format!("{path}, which follows from other keys: {}", error.message());
+        ScenarioError::new(message)
+            .coded(error.code())
+            .with_help(format!("give {path} another value, or change the keys that it follows from"))
+            .at(path)
     }
 
     /// Returns the error with its dotted path as its key, for a scenario without a text.
@@ -301,14 +313,14 @@ fn in_range(name: &str, node: Node, number: &DeValue<'_>, span: Range<usize>) ->
         DeValue::Integer(written) => {
             let Ok(whole) = i64::from_str_radix(written.as_str(), written.radix()) else {
                 let most = if node.kind() == "integer" { i64::MAX.to_string() } else { format!("{LARGEST:e}") };
-                let message = format!("`{name}` must be at most {most} in magnitude, got {}", written.as_str());
+                let message = format!("`{name}` must be at most {most} in magnitude, got {}", short(written.as_str()));
                 return Err(SchemaError::new("scenario/out-of-range", message, description(node), span));
             };
             (whole.to_string(), whole as f64)
         }
         DeValue::Float(written) => {
             let number: f64 = written.as_str().parse().unwrap_or(f64::NAN);
-            (if number.is_finite() { number.to_string() } else { written.as_str().to_owned() }, number)
+            (if number.is_finite() { shortest(number) } else { short(written.as_str()) }, number)
         }
         _ => return Ok(()),
     };
@@ -355,8 +367,8 @@ fn wrong_type(name: &str, node: Node, value: &DeValue<'_>, span: Range<usize>) -
 fn found(value: &DeValue<'_>) -> String {
     match value {
         DeValue::String(text) => format!("the text \"{}\"", short(text)),
-        DeValue::Integer(number) => number.as_str().to_owned(),
-        DeValue::Float(number) => number.as_str().to_owned(),
+        DeValue::Integer(number) => short(number.as_str()),
+        DeValue::Float(number) => short(number.as_str()),
         DeValue::Boolean(flag) => flag.to_string(),
         DeValue::Datetime(_) => "a date".to_owned(),
         DeValue::Array(list) => format!("a list of {}", list.len()),

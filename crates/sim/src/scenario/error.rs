@@ -4,6 +4,8 @@ use std::borrow::Cow;
 use std::fmt;
 use std::ops::Range;
 
+use tautline_core::text::with_short_numbers;
+
 /// Error of a scenario.
 ///
 /// [`fmt::Display`] writes place, message and remedy. The accessors serve programs that show the text around the place.
@@ -202,9 +204,9 @@ fn floor_char_boundary(text: &str, index: usize) -> usize {
     (0..=index.min(text.len())).rev().find(|&i| text.is_char_boundary(i)).unwrap_or(0)
 }
 
-/// Escapes control characters, which could control the terminal.
+/// Shortens long numbers, and escapes control characters, which could control the terminal.
 fn printable(text: &str) -> String {
-    text.chars().fold(String::with_capacity(text.len()), |mut out, c| {
+    with_short_numbers(text).chars().fold(String::with_capacity(text.len()), |mut out, c| {
         if c.is_control() && c != '\n' {
             out.extend(c.escape_default());
         } else {

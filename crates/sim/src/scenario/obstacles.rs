@@ -85,6 +85,7 @@ struct Ball {
 #[serde(deny_unknown_fields)]
 struct Cuboid {
     /// Lengths along x, y and z in m, before the rotation.
+    #[schemars(extend("items" = { "type": "number", "exclusiveMinimum": 0 }))]
     size_m: [f64; 3],
     /// Rotation about the vertical in degrees, counterclockwise seen from above.
     #[serde(default)]

@@ -38,7 +38,7 @@ impl Scenario {
         let reference_travel_m = self.reference_travel_m(duration_s);
         let gained_s = |per_s: f64| if per_s == 0.0 { duration_s } else { (per_s * duration_s).exp_m1() / per_s };
         let is_held = self.reference.is_some();
-        let air_m_s = if is_held { 0.0 } else { self.wind.fastest_m_s() };
+        let air_m_s = if is_held { 0.0 } else { self.fastest_wind_m_s() };
         let blown_m_s = self.drag_per_s * air_m_s * gained_s(rate_per_s);
         // Replaces infinity and NaN (0 times infinity) by the largest number: `min` ignores NaN.
         let counted = |value: f64| value.min(f64::MAX);

@@ -27,12 +27,19 @@ impl Scenario {
     /// numbers. Equal scenarios have equal texts.
     #[must_use]
     pub fn resolved_toml(&self) -> String {
-        // Every key of the document can be written as TOML.
-        let tables = Table::try_from(Document::from(self)).unwrap_or_default();
-        let mut out = String::new();
-        // Writing to a string cannot fail.
-        let _ = write_document(&mut out, &tables);
-        out
+        written(&Document::from(self))
+    }
+
+    /// Returns [`Scenario::resolved_toml`] without the lists of points and edges.
+    pub(super) fn resolved_toml_without_lists(&self) -> String {
+        let mut document = Document::from(self);
+        let no_points = || FormationShape::Points { points_m: Vec::new() };
+        document.start.positions_m = None;
+        document.start.velocities_m_s = None;
+        document.formation.shape = no_points();
+        document.leg.iter_mut().for_each(|leg| leg.shape = Some(no_points()));
+        document.graph.kind = GraphKind::Complete {};
+        written(&document)
     }
 
     /// Returns the SHA-256 of [`Scenario::resolved_toml`] in hexadecimal, 64 characters: the identity of a flight.
@@ -42,6 +49,16 @@ impl Scenario {
             let _ = write!(hex, "{byte:02x}");
             hex
         })
+    }
+
+    /// Returns the hash of what determines the flight: as [`Scenario::sha256_hex`], without the seed of the noise if
+    /// nothing in flight is random. Scenarios with equal hashes have the same flight.
+    #[must_use]
+    pub fn flight_sha256_hex(&self) -> String {
+        if self.is_random_in_flight() || self.noise_seed == 0 {
+            return self.sha256_hex();
+        }
+        Self { noise_seed: 0, ..self.clone() }.sha256_hex()
     }
 
     fn leg_table(&self, leg: &Leg) -> LegTable {
@@ -132,6 +149,16 @@ fn per_vehicle(numbers: &[f64]) -> PerVehicle {
         [first, rest @ ..] if rest.iter().all(|other| other.to_bits() == first.to_bits()) => PerVehicle::All(*first),
         _ => PerVehicle::Each(numbers.to_vec()),
     }
+}
+
+/// Returns a document as TOML.
+fn written(document: &Document) -> String {
+    // Every key of the document can be written as TOML.
+    let tables = Table::try_from(document).unwrap_or_default();
+    let mut out = String::new();
+    // Writing to a string cannot fail.
+    let _ = write_document(&mut out, &tables);
+    out
 }
 
 fn write_document(out: &mut String, document: &Table) -> fmt::Result {

@@ -120,7 +120,7 @@ pub(super) fn finish(mut document: Document, text: &Text<'_>) -> Result<Scenario
     template::check_laws(&document.laws).map_err(|(law, error)| text.place_in_law(law, error))?;
     let jitter_m = document.start.jitter_m;
     let scenario = build::scenario(document).map_err(|error| text.place(error))?;
-    scenario.check().map_err(|error| text.place(error.with_jitter(jitter_m)))?;
+    scenario.check_built().map_err(|error| text.place(error.with_jitter(jitter_m)))?;
     Ok(scenario)
 }
 

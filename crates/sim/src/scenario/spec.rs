@@ -241,6 +241,13 @@ impl Scenario {
         }
     }
 
+    /// Returns an upper bound of the speed of the air at any vehicle during the flight \[m/s\]
+    /// ([`WindSpec::fastest_m_s`]).
+    #[must_use]
+    pub fn fastest_wind_m_s(&self) -> f64 {
+        self.wind.fastest_m_s(self.count(), self.time.duration_s)
+    }
+
     /// Returns the wind at time 0.
     #[must_use]
     pub fn air(&self) -> Wind {

@@ -35,7 +35,7 @@ const ORIGINS: [(&str, &[&str]); 7] = [
     ),
     ("graph.edges", &["graph.kind"]),
     ("reference.points_m", &["reference.file"]),
-    ("reference.times_s", &["reference.file"]),
+    ("reference.times_s", &["reference.file", "reference.speed_m_s"]),
     ("swarm.hull_radius_m", &["law.delta_m"]),
     ("swarm.count", &["start.positions_m", "formation.points_m", "formation.shape"]),
 ];

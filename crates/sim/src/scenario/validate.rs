@@ -11,6 +11,8 @@ use super::limits::{
 use super::spec::{Safety, Scenario, Space};
 use super::text::Text;
 use super::time::TimeSpec;
+use crate::sim::{self, SimError};
+use tautline_audit::ObstacleError;
 use tautline_core::swarm::{Pair, row};
 use tautline_core::text::{beside_limit, exact, metres};
 use tautline_laws::graph::{Graph, Pinning};
@@ -41,11 +43,22 @@ impl Scenario {
     /// [`ScenarioError`] for the first violated condition, with its keys and the remedy, without a place in a text.
     pub fn validate(&self) -> Result<(), ScenarioError> {
         self.check_noise()?;
-        let resolved = self.resolved_toml();
-        let mut tree = Text { name: &self.name, toml: &resolved, overrides: &[] }.tree()?;
         self.check_lengths()?;
-        check_schema(&mut tree, resolved.len() + 1).map_err(SchemaError::without_text)?;
+        self.check_written(&self.resolved_toml(), SchemaError::without_text)?;
         self.check()
+    }
+
+    /// Checks a scenario that was read: conditions on several keys, and the values that the program filled in.
+    pub(super) fn check_built(&self) -> Result<(), ScenarioError> {
+        self.check()?;
+        // The reader of a recording checks these values. Points and edges have no other limits than the checked ones.
+        self.check_written(&self.resolved_toml_without_lists(), SchemaError::of_filled_value)
+    }
+
+    /// Checks the text of the scenario against the schema.
+    fn check_written(&self, written: &str, of_key: fn(SchemaError) -> ScenarioError) -> Result<(), ScenarioError> {
+        let mut tree = Text { name: &self.name, toml: written, overrides: &[] }.tree()?;
+        check_schema(&mut tree, written.len() + 1).map_err(of_key)
     }
 
     /// Checks conditions on several keys; the schema checks single keys.
@@ -69,7 +82,32 @@ impl Scenario {
         self.check_arrival()?;
         self.check_deadlock()?;
         self.imperfections().into_iter().try_for_each(|imperfection| imperfection.check(self))?;
-        self.check_shield()
+        self.check_shield()?;
+        self.check_flight()
+    }
+
+    /// Builds the law and the judge as a flight does, so that a flight refuses no scenario that was accepted.
+    fn check_flight(&self) -> Result<(), ScenarioError> {
+        self.law().map_err(|error| of_law(&error))?;
+        sim::check_judge(self).map_err(|error| self.of_judge(&error))
+    }
+
+    /// Returns an error of the judge at its key.
+    fn of_judge(&self, error: &SimError) -> ScenarioError {
+        match error {
+            SimError::Obstacle(ObstacleError { name, .. }) => {
+                let found = ScenarioError::new(error.to_string())
+                    .coded("scenario/obstacle")
+                    .with_help("correct the shape, the position or the clearance_m of the obstacle");
+                match self.obstacles.iter().position(|obstacle| obstacle.name == *name) {
+                    Some(number) => found.at_entry("obstacle", number),
+                    None => found.at("obstacle"),
+                }
+            }
+            _ => ScenarioError::out_of_range(error.to_string())
+                .with_help("choose a safety distance and a number of vehicles that can be judged")
+                .at_keys(["law.delta_m", "safety.half_axes_m", "swarm.hull_radius_m", "swarm.count"]),
+        }
     }
 
     fn check_noise(&self) -> Result<(), ScenarioError> {
@@ -370,6 +408,35 @@ impl Scenario {
             .at_keys(["time.control_hz", "time.dt_s"]));
         }
         Ok(())
+    }
+}
+
+/// Returns an error of the parameters of a law at its key.
+fn of_law(error: &ParameterError) -> ScenarioError {
+    let found = ScenarioError::new(format!("no law has these parameters: {error}")).coded("law/parameter");
+    match *error {
+        ParameterError::Tension { pair, .. } => found
+            .with_help("enlarge the formation, or change law.delta_m")
+            .at_entry("formation.points_m", pair.second())
+            .at_entry("formation.points_m", pair.first())
+            .at("law.delta_m"),
+        ParameterError::ObstacleOverSlot { vehicle, obstacle, .. } => found
+            .with_help("move one of them away, or reduce the clearance_m of the obstacle")
+            .at_entry("formation.points_m", vehicle)
+            .at_entry("obstacle", obstacle),
+        ParameterError::Slot { vehicle } => {
+            found.with_help("give finite numbers").at_entry("formation.points_m", vehicle)
+        }
+        ParameterError::Counts { .. } | ParameterError::Disconnected { .. } => {
+            found.with_help("add edges until every vehicle can be reached from every other").at("graph.edges")
+        }
+        ParameterError::ReferenceUnknown | ParameterError::ReferenceNotHeard => found
+            .with_help("leave it out: then all vehicles know the reference; or add edges to the graph")
+            .at_keys(["reference.known_by", "reference.leader", "graph.edges"]),
+        ParameterError::NotFinite { .. } => found.with_help("give finite numbers").at("law.kind"),
+        ParameterError::Memory { .. } => {
+            found.with_help("use fewer vehicles, or a graph of fewer edges").at_keys(["swarm.count", "graph.kind"])
+        }
     }
 }
 

@@ -148,7 +148,7 @@ impl Scenario {
         let mut spec = alone.shield_keys().unwrap_or(given);
         // Limits of the reference do not depend on it.
         spec.tracking_error_m = Some(1.0);
-        let wind_m_s = rounded_up(self.wind.fastest_m_s());
+        let wind_m_s = rounded_up(self.fastest_wind_m_s());
         let is_free = given.disturbance_m_s2.is_none();
         let mut share = FIRST_SHARE;
         let (flown, limits) = 'rounds: {

@@ -14,7 +14,7 @@
 //! push         ((|a22| dt)^2 (|a22| V + A) + A (dt/lag)^2)/6
 //! ```
 //!
-//! The ideal plant moves on curves, which bend from the chord of a step by at most 1e-5 m; that is its path error.
+//! The ideal plant moves on curves, which bend from the chord of a step by at most 1e-5 delta; that is its path error.
 //!
 //! The flight measures the distance to the reference at each step and reports it as a share of the tube.
 
@@ -31,8 +31,9 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::scenario::{MAX_MEMORY_BYTES, Scenario, ScenarioError, Space};
-use crate::sim::MAX_BEND_M;
+use crate::sim::MAX_BEND;
 use tautline_core::swarm::row;
+use tautline_core::text::shortest;
 use tautline_laws::law::{Certificate, VoidReason};
 use tautline_laws::space::Shape;
 use tautline_shield::fleet::{PairRoom, closest_starts};
@@ -187,7 +188,7 @@ impl Scenario {
             ..Settings::new(self.delta_m, 1.0 / control_hz)
         };
         // The audit replaces the path within a step by its chord, with an error of at most this bend.
-        settings.path_error_m = MAX_BEND_M;
+        settings.path_error_m = MAX_BEND * self.delta_m;
         if self.has_engine() {
             let decay = (a22_per_s * dt_s).powi(2);
             let lag = if self.actuation.lag_s > 0.0 { accel_m_s2 * (dt_s / self.actuation.lag_s).powi(2) } else { 0.0 };
@@ -305,11 +306,14 @@ impl Scenario {
                 .at_keys([key, of]));
             }
         }
-        let push_m_s2 = self.drag_per_s * self.wind.fastest_m_s();
+        let push_m_s2 = self.drag_per_s * self.fastest_wind_m_s();
         let disturbance_m_s2 = spec.disturbance_m_s2.unwrap_or(0.0);
         if push_m_s2 > disturbance_m_s2 * (1.0 + SAME) && self.airframe.is_point() {
             return Err(refused(
-                &format!("shield.disturbance_m_s2 must be at least {push_m_s2}, which is drag times the fastest wind"),
+                &format!(
+                    "shield.disturbance_m_s2 must be at least {}, which is drag times the fastest wind",
+                    shortest(push_m_s2)
+                ),
                 disturbance_m_s2,
             )
             .with_help("raise it, or reduce the wind")
@@ -368,7 +372,7 @@ fn is_whole(number: f64) -> bool {
 
 /// Returns an error about a value: `PROBLEM (VALUE)`.
 fn refused(problem: &str, value: f64) -> ScenarioError {
-    ScenarioError::new(format!("{problem} ({value})")).coded("scenario/shield")
+    ScenarioError::new(format!("{problem} ({})", shortest(value))).coded("scenario/shield")
 }
 
 fn refused_with(problem: &str, help: &str) -> ScenarioError {

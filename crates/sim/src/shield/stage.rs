@@ -7,7 +7,8 @@ use rayon::prelude::*;
 
 use crate::link::{Radio, RadioUse, period};
 use crate::scenario::{Scenario, ScenarioError, Space};
-use tautline_core::swarm::{Rows, Swarm, row, set_row};
+use tautline_core::swarm::{Rows, Swarm, first_row_not_finite, row, set_row};
+use tautline_laws::law::LawError;
 use tautline_shield::report::Exceeded;
 use tautline_shield::{Broadcast, Counters, Fleet, Shield, State};
 
@@ -27,8 +28,10 @@ pub struct ShieldReport {
     pub counters: Counters,
     /// Worst vehicle for which an assumption did not hold. The certificate does not cover the flight then.
     pub breach: Option<ShieldBreach>,
-    /// Number of instants at which the law was undefined and all vehicles braked.
+    /// Number of instants at which the law had no finite command for some vehicle, which braked.
     pub undefined: u64,
+    /// Number of those instants at which the law failed or commanded numbers that are not finite: a defect of the law.
+    pub failed: u64,
     /// Number of messages of contracts, one for each receiver. Vehicles far from each other send none.
     pub sent: u64,
     /// Number of them that never arrive.
@@ -73,8 +76,10 @@ pub(crate) struct ShieldStage {
     measured: Vec<State>,
     wanted: Vec<Vector3<f64>>,
     commands: Vec<Vector3<f64>>,
-    /// Number of instants at which the law was undefined and all vehicles braked.
+    /// Number of instants at which the law had no finite command for some vehicle, which braked.
     undefined: u64,
+    /// Number of those instants at which the law failed or commanded numbers that are not finite.
+    failed: u64,
 }
 
 /// Messages of all vehicles at one instant.
@@ -126,13 +131,23 @@ impl ShieldStage {
             wanted: vec![Vector3::zeros(); count],
             commands: vec![Vector3::zeros(); count],
             undefined: 0,
+            failed: 0,
         }))
     }
 
-    /// Notes that the law is undefined at an instant; the shield then brakes.
-    pub(crate) fn note_undefined(&mut self, command: &mut Rows) {
-        self.undefined += 1;
-        command.fill(f64::NAN);
+    /// Counts an instant without a finite command of the law for some vehicle. The shield brakes such a vehicle, and
+    /// all vehicles where the law is undefined.
+    pub(crate) fn note_undefined(&mut self, commanded: Result<(), LawError>, command: &mut Rows) {
+        let is_failed = match commanded {
+            Ok(()) => first_row_not_finite(command).is_some(),
+            Err(error) => {
+                self.undefined += u64::from(error != LawError::Failed);
+                command.fill(f64::NAN);
+                error == LawError::Failed
+            }
+        };
+        self.undefined += u64::from(is_failed);
+        self.failed += u64::from(is_failed);
     }
 
     /// Replaces the law's commands at an instant \[m/s^2\], N x 3, by those of the shields. `own` is the knowledge of
@@ -274,6 +289,7 @@ impl ShieldStage {
             counters,
             breach,
             undefined: self.undefined,
+            failed: self.failed,
             sent,
             lost,
         }

@@ -1,8 +1,9 @@
 //! Quadrotors under a shield: keys from the measured `[tracking]` table of their model, and its conditions.
 
 use super::{SAME, ShieldSpec, refused, refused_with};
-use crate::scenario::{Scenario, ScenarioError, Space};
-use crate::vehicle::{Quadrotor, Tracking};
+use crate::scenario::{DEFAULT_ATTITUDE_HZ, Scenario, ScenarioError, Space};
+use crate::vehicle::{self, MODELS, Quadrotor, Tracking};
+use tautline_core::text::shortest;
 use tautline_laws::law::LawSpec;
 
 /// Default of the largest command without a measured table, as a share of what thrust and lift allow.
@@ -57,7 +58,7 @@ impl Scenario {
             ("shield.max_speed_m_s", given(spec.max_speed_m_s), of.max_speed_m_s),
             ("shield.position_error_m", spec.position_error_m, of.position_error_m),
             ("shield.velocity_error_m_s", spec.velocity_error_m_s, of.velocity_error_m_s),
-            ("the fastest wind in m/s", self.wind.fastest_m_s(), of.wind_m_s),
+            ("the fastest wind in m/s", self.fastest_wind_m_s(), of.wind_m_s),
         ];
         // A smaller push leaves more acceleration to the reference.
         let at_least = [("shield.disturbance_m_s2", given(spec.disturbance_m_s2), of.disturbance_m_s2)];
@@ -70,7 +71,7 @@ impl Scenario {
         let numbers = lists.into_iter().find_map(|(list, must, excess)| {
             let is_within = |value: f64, limit: f64| excess(value - limit) <= rounding(limit);
             let (key, value, limit) = list.iter().find(|(_, value, limit)| !is_within(*value, *limit))?;
-            Some(format!("{key} {must} {limit}, got {value}"))
+            Some(format!("{key} {must} {}, got {}", shortest(*limit), shortest(*value)))
         });
         let switches = [("vehicle.downwash", quadrotor.downwash), ("vehicle.ground_effect", quadrotor.ground_effect)];
         numbers.or_else(|| switches.iter().find(|(_, is_on)| *is_on).map(|(key, _)| format!("{key} must be false")))
@@ -81,7 +82,8 @@ impl Scenario {
         let Some(Quadrotor { model, .. }) = self.airframe.quadrotor() else { return Ok(()) };
         let most_m_s2 = model.most_accel_m_s2(self.space == Space::Plane);
         if let Some(accel_m_s2) = spec.accel_m_s2.filter(|accel_m_s2| *accel_m_s2 > most_m_s2) {
-            let problem = format!("shield.accel_m_s2 must be at most {most_m_s2}, which thrust and lift allow");
+            let most = shortest(most_m_s2);
+            let problem = format!("shield.accel_m_s2 must be at most {most}, which thrust and lift allow");
             return Err(refused(&problem, accel_m_s2)
                 .with_help("reduce it; the default is that of the model")
                 .at_keys(["shield.accel_m_s2", "vehicle.model"]));
@@ -90,13 +92,35 @@ impl Scenario {
             return Ok(());
         }
         let beyond = model.tracking.as_ref().and_then(|of| self.beyond_tracking(spec, of));
-        let problem = match beyond {
-            None => "the distance of a quadrotor to its reference has no computed bound".to_owned(),
-            Some(beyond) => {
+        let other_loop = self.other_attitude_loop();
+        let problem = match (beyond, other_loop) {
+            (None, None) => "the distance of a quadrotor to its reference has no computed bound".to_owned(),
+            (Some(beyond), _) => {
                 format!("the scenario is beyond the measured tracking error of {}: {beyond}", model.name)
             }
+            (None, Some((key, measured, value))) => format!(
+                "the scenario is beyond the measured tracking error of {}: {key} must be {}, got {}",
+                model.name,
+                shortest(measured),
+                shortest(value)
+            ),
         };
         let help = "measure it with `tautline check --identify`, and set shield.tracking_error_m";
-        Err(refused_with(&problem, help).at_keys(["shield.tracking_error_m", "vehicle.model"]))
+        let found = refused_with(&problem, help).at_keys(["shield.tracking_error_m", "vehicle.model"]);
+        Err(other_loop.into_iter().fold(found, |found, (key, ..)| found.at(key)))
+    }
+
+    /// Returns the first key of the attitude loop that differs from that of the measurement, with both values. The
+    /// measurement is that of the built-in model.
+    fn other_attitude_loop(&self) -> Option<(&'static str, f64, f64)> {
+        let Quadrotor { model, attitude_hz, .. } = self.airframe.quadrotor()?;
+        let (_, text) = MODELS.iter().find(|(name, _)| *name == model.name)?;
+        let measured = vehicle::read(text).ok().filter(|measured| measured.tracking.is_some())?;
+        let keys = [
+            ("vehicle.attitude_hz", DEFAULT_ATTITUDE_HZ, *attitude_hz),
+            ("vehicle.attitude_rad_s", measured.attitude_rad_s, model.attitude_rad_s),
+            ("vehicle.attitude_damping", measured.attitude_damping, model.attitude_damping),
+        ];
+        keys.into_iter().find(|(_, measured, value)| measured != value)
     }
 }

@@ -87,10 +87,7 @@ impl Controller {
         };
         let mut commanded = self.law.command(&at, &mut self.commanded);
         if let Some(shield) = &mut self.shield {
-            if commanded.is_err() {
-                shield.note_undefined(&mut self.commanded);
-                commanded = Ok(());
-            }
+            shield.note_undefined(std::mem::replace(&mut commanded, Ok(())), &mut self.commanded);
             shield.filter(time_s, truth, sensed.own, &mut self.commanded);
         }
         commanded.map_err(|error| error.with_true_distance(truth, self.metric, &self.obstacles))?;

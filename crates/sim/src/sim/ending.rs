@@ -10,9 +10,9 @@ use tautline_core::record::{DeadlockRecovery, EnergyRise, Reassignment, RecordEr
 use tautline_core::swarm::{Bounce, Pair, Swarm};
 use tautline_laws::law::{Certificate, LawError, ParameterError};
 
-/// Largest distance of a path from the swept straight line \[m\]; of two vehicles twice that. Steps with larger bends
-/// are halved.
-pub(crate) const MAX_BEND_M: f64 = 1e-5;
+/// Largest distance of a path from the swept straight line, as a share of delta; of two vehicles twice that. Steps with
+/// larger bends are halved.
+pub(crate) const MAX_BEND: f64 = 1e-5;
 /// Largest acceleration along any axis \[m/s^2\]. Motions up to this limit stay within the range of the audit and of
 /// readers of recordings.
 pub(super) const MAX_COMMAND_M_S2: f64 = 1e30;
@@ -183,12 +183,17 @@ pub enum Breakdown {
         step: u64,
     },
     /// A path bends too far from the swept straight line even in the shortest substep.
-    #[error("step {step}: a path bends by {bend_m:.1e} m from the audited line; at most {MAX_BEND_M:e} m are allowed")]
+    #[error(
+        "step {step}: a path bends by {bend_m:.1e} m from the audited line; at most {limit_m:.1e} m are allowed, \
+         {MAX_BEND:e} of delta; raise time.max_halvings, or reduce time.dt_s"
+    )]
     Bent {
         /// The step, from 1.
         step: u64,
         /// Largest bend \[m\].
         bend_m: f64,
+        /// Largest allowed bend \[m\].
+        limit_m: f64,
     },
     /// The audit refused a step.
     #[error("step {step}: {why}")]

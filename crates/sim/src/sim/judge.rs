@@ -51,6 +51,14 @@ pub(super) struct Judge {
     hulls_before: Vec<HullContact>,
 }
 
+/// Checks that the flight of a scenario can be judged.
+///
+/// # Errors
+/// As [`Judge::new`].
+pub(crate) fn check_judge(scenario: &Scenario) -> Result<(), SimError> {
+    Judge::new(scenario).map(drop)
+}
+
 /// Results of the audit of a whole flight.
 pub(super) struct AuditResults {
     pub(super) audit: AuditOutcome,

@@ -155,7 +155,7 @@ impl Simulation {
     /// A step that is too long for the law's fastest rate in the present state
     /// ([`crate::scenario::TimeSpec::max_rate_dt`]) is halved, at most [`crate::scenario::TimeSpec::max_halvings`]
     /// times; the law is evaluated in between. A step that takes more than half of the clearance of some pair above the
-    /// law's barrier is undone and halved. So is a step on which a path bends by more than 1e-5 m from the straight
+    /// law's barrier is undone and halved. So is a step on which a path bends by more than 1e-5 delta from the straight
     /// line that the audit sweeps. If even the shortest substep is too long, it is flown and counted
     /// ([`Flight::overlong_steps`]), and the certificate is void.
     pub fn step(&mut self) {

@@ -296,8 +296,14 @@ fn a_step_with_bent_paths_is_divided_so_that_the_audit_sees_the_violation() {
 #[test]
 fn a_bent_step_that_cannot_be_divided_ends_the_flight_with_a_reason() {
     let (flight, _) = baseline_in_long_steps(0);
-    assert!(matches!(flight.ending, Ending::BrokeDown(Breakdown::Bent { step: 1, bend_m }) if bend_m > 1e-5));
+    let is_beyond = |bend_m: f64, limit_m: f64| bend_m > limit_m && (limit_m - 1e-5 * 1.6).abs() < 1e-12;
+    let Ending::BrokeDown(Breakdown::Bent { step: 1, bend_m, limit_m }) = flight.ending else {
+        panic!("{:?}", flight.ending);
+    };
+    assert!(is_beyond(bend_m, limit_m), "{bend_m} {limit_m}");
     assert_eq!(flight.steps, 0, "the refused step does not count");
+    let reason = flight.ending.reason().expect("a reason");
+    assert!(reason.contains("time.max_halvings") && reason.contains("1.6e-5 m are allowed"), "{reason}");
 }
 
 #[test]

@@ -21,6 +21,7 @@ mod scenario_bytes;
 mod scenario_files;
 mod scenario_keys;
 mod schema;
+mod schema_properties;
 mod shapes;
 mod shield;
 mod simulation;

@@ -120,6 +120,58 @@ fn wrong_input_is_refused_at_its_place_with_a_remedy() {
     }
 }
 
+/// A recording holds the values that the program fills in, and its reader checks them.
+#[test]
+fn a_default_that_follows_from_other_keys_survives_write_and_read() {
+    for (sets, f2_per_s) in [
+        (&["law.kind=laplacian", "swarm.a22_per_s=-1.5"][..], 0.0),
+        (&["law.kind=laplacian", "swarm.a22_per_s=-0.25"], 0.75),
+        (&["law.kind=laplacian", "swarm.a22_per_s=0", "vehicle.drag_per_s=3"], 0.0),
+    ] {
+        let scenario = read_builtin("pentagon", sets).expect("valid");
+        let written = scenario.resolved_toml();
+        assert!(written.contains(&format!("f2_per_s = {f2_per_s:?}\n")), "{written}");
+        assert_eq!(read(&written), Ok(scenario), "{sets:?}");
+    }
+    // A pair of way points takes longer than a time may be.
+    let slow = "reference={kind=\"way-points\", points_m=[[0,0],[1e9,0]], speed_m_s=1e-3}";
+    let error = read_builtin("pentagon", &["law.kind=displacement", slow]).expect_err("no time is so long");
+    assert_eq!(error.code(), "scenario/out-of-range", "{error}");
+    assert!(error.message().contains("reference.times_s"), "{error}");
+}
+
+#[test]
+fn a_number_of_any_size_is_repeated_in_a_few_digits() {
+    for (set, says) in [
+        ("law.delta_m=1e300", "got 1e300"),
+        ("law.delta_m=1e-300", "got 1e-300"),
+        ("law.delta_m=-1e300", "got -1e300"),
+        ("sensing.latency_s=1e-300", "got 1e-300 s"),
+        ("law.delta_m=100000000000000000000000000000000000000000000000000000000000000", "got 1"),
+    ] {
+        let error = read_builtin("pentagon", &[set]).expect_err(set);
+        assert!(error.message().contains(says) && error.message().len() < 120, "{error}");
+    }
+}
+
+#[test]
+fn what_a_flight_refuses_is_refused_at_its_key() {
+    let obstacle = |shape: &str| format!("obstacle=[{{name=\"o\", at_m=[0,0,50], {shape}}}]");
+    for (set, code, says) in [
+        (obstacle("box={size_m=[-1,1,1]}"), "scenario/out-of-range", "`size_m` must be more than 0, got -1"),
+        (obstacle("box={size_m=[1,0,1]}"), "scenario/out-of-range", "`size_m` must be more than 0, got 0"),
+        (obstacle("half_space={normal=[0,0,1e-10]}"), "scenario/out-of-range", "the normal of obstacle"),
+    ] {
+        let error = read_builtin("pentagon", &[&set]).expect_err(&set);
+        assert_eq!((error.code(), error.place().is_some()), (code, true), "{error}");
+        assert!(error.message().contains(says), "{error}");
+    }
+    // A scenario in code has no schema before it.
+    let mut scenario = read_builtin("pentagon", &[&obstacle("ball={radius_m=1}")]).expect("valid");
+    scenario.obstacles[0].clearance_m = f64::INFINITY;
+    assert!(scenario.validate().is_err_and(|error| error.field().is_some()));
+}
+
 #[test]
 fn the_number_of_vehicles_is_required() {
     let text = RIGHT.replace("positions_m = [\n    [0.0, 0.0],\n    [4.0, 0.0],\n]", "shape = \"line\"\nspacing_m = 3");

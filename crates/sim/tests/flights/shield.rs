@@ -53,6 +53,10 @@ enum Adversary {
     Random(Box<ChaCha8Rng>),
     /// The law is undefined everywhere.
     Undefined,
+    /// The law writes NaN for one vehicle from some instant on.
+    NotANumber { vehicle: usize, left: u32 },
+    /// The law fails everywhere.
+    Failed,
 }
 
 impl Law for Adversary {
@@ -71,11 +75,17 @@ impl Law for Adversary {
                 Self::Centre => others.sum::<Vector3<f64>>(),
                 Self::Random(random) => Random(*random.clone()).vector(2, 20.0),
                 Self::Undefined => return Err(LawError::NotFinite { vehicle: i }),
+                Self::Failed => return Err(LawError::Failed),
+                Self::NotANumber { vehicle, left: 0 } if *vehicle == i => Vector3::repeat(f64::NAN),
+                Self::NotANumber { .. } => Vector3::zeros(),
             };
             if let Self::Random(random) = self {
                 (0..3).for_each(|_| _ = random.next_u64());
             }
             set_row(command, i, wanted);
+        }
+        if let Self::NotANumber { left, .. } = self {
+            *left = left.saturating_sub(1);
         }
         Ok(())
     }
@@ -254,8 +264,25 @@ fn a_law_that_is_undefined_makes_the_shield_brake() {
     let (flight, log) = fly_with(&scenario, Box::new(Adversary::Undefined), plant::of(&scenario));
     let flight = flight.expect("a flight");
     assert_eq!((flight.ending.reason(), flight.audit.status), (None, Status::Clear));
-    assert_eq!(report(&flight).undefined, 401);
+    assert_eq!((report(&flight).undefined, report(&flight).failed), (401, 0));
     assert!(log.samples.last().expect("samples").swarm.velocities_m_s.amax() < 1e-9, "both have stopped");
+}
+
+/// Without a shield a command that is not finite ends the flight. Under a shield the vehicle brakes, and the report
+/// counts the instants.
+#[test]
+fn commands_that_are_not_finite_are_counted() {
+    let scenario = read(&format!("{SWAP}\n[shield]"));
+    let counts = |law: Adversary| {
+        let (flight, _) = fly_with(&scenario, Box::new(law), plant::of(&scenario));
+        let flight = flight.expect("a flight");
+        assert_eq!(flight.ending.reason(), None);
+        (report(&flight).undefined, report(&flight).failed)
+    };
+    assert_eq!(counts(Adversary::NotANumber { vehicle: 0, left: 0 }), (401, 401), "throughout");
+    assert_eq!(counts(Adversary::NotANumber { vehicle: 1, left: 400 }), (1, 1), "at the last instant, for one vehicle");
+    assert_eq!(counts(Adversary::Failed), (401, 401));
+    assert_eq!(counts(Adversary::Centre), (0, 0));
 }
 
 #[test]
@@ -347,6 +374,13 @@ fn scenarios_that_do_not_fit_the_shield_are_refused_with_place_value_and_remedy(
         ),
         ("[shield]\n[sensing]\nrate_hz = 20\nposition_noise_m = 0.01", "shield.position_error_m", "raise it to 0.06"),
         ("[shield]\n[sensing]\nrate_hz = 30", "sensing.rate_hz", "set sensing.rate_hz to 20"),
+        ("[shield]\n[actuation]\nlag_s = 0.0001", "actuation.lag_s", "must be 0 or at least 0.001172 s"),
+        (
+            "[shield]\ndisturbance_m_s2 = 0.1\n[vehicle]\ndrag_per_s = 0.1\n[wind]\ngust = [\
+             {at_s = 0.5, rise_s = 0.5, velocity_m_s = [1, 0]}, {at_s = 0.5, rise_s = 0.5, velocity_m_s = [1, 0]}]",
+            "disturbance",
+            "must be at least 0.2",
+        ),
         ("[shield]\n[vehicle]\nmodel = \"crazyflie\"\nattitude_rad_s = 5", "shield.tracking_error_m", "--identify"),
         ("[shield]\nposition_error_m = 3\naccel_m_s2 = 40", "start.positions_m", "reserve segments"),
         ("[shield]\nbrake = 3", "brake", "brake_m_s2"),

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::Options;
 use crate::base::{BaseScenario, overlap};
 use tautline_core::swarm::{Rows, separation};
-use tautline_core::text::{as_toml, at_least, beside_limit};
+use tautline_core::text::{at_least, beside_limit, shortest};
 use tautline_report::request::Failure;
 use tautline_sim::scenario::{Scenario, ScenarioError};
 
@@ -172,7 +172,7 @@ impl SearchSpace {
     pub fn sets(&self, values: &[f64], k: u64) -> Vec<String> {
         let of_keys = self.options.vary.len();
         let keys = self.bounds.iter().zip(values).take(of_keys);
-        let mut sets: Vec<_> = keys.map(|(bound, &value)| format!("{}={}", bound.key, as_toml(value))).collect();
+        let mut sets: Vec<_> = keys.map(|(bound, &value)| format!("{}={}", bound.key, shortest(value))).collect();
         sets.extend(self.start(values.get(of_keys..).unwrap_or_default()));
         if self.options.seeds > 1 {
             sets.push(format!("noise.seed={}", self.noise_seed(k)));
@@ -259,7 +259,7 @@ impl SearchSpace {
     /// [`Failure`] if no tried value can be read, and for a fractional bound of a key that takes integers only.
     fn bound(&self, bound: &Bound) -> Result<(Bound, Scenario), Failure> {
         let Bound { ref key, low, high, .. } = *bound;
-        let read = |value: f64| self.base.with(&[format!("{key}={}", as_toml(value))]);
+        let read = |value: f64| self.base.with(&[format!("{key}={}", shortest(value))]);
         let refused = |value: f64, error: ScenarioError| Failure::from(error).under(&format!("with {key} = {value}"));
         let whole = self.base.takes_integers_only(key);
         if let Some(end) = [low, high].into_iter().find(|end| whole && end.fract() != 0.0) {
@@ -315,7 +315,7 @@ impl SearchSpace {
         let axes = self.base.own().space.dimensions();
         let value = |i: usize, axis: usize| values.and_then(|values| values.get(i * axes + axis).copied());
         let point = |i: usize| {
-            let number = |axis: usize| as_toml(value(i, axis).unwrap_or(rows[(i, axis)]));
+            let number = |axis: usize| shortest(value(i, axis).unwrap_or(rows[(i, axis)]));
             format!("[{}]", (0..axes).map(number).collect::<Vec<_>>().join(", "))
         };
         (0..rows.nrows()).map(point).collect::<Vec<_>>().join(", ")

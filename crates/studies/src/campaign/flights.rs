@@ -213,14 +213,14 @@ impl Campaign {
         Ok(())
     }
 
-    /// Returns whether nothing is varied, or only seeds that change none of the first flights.
+    /// Returns whether nothing is varied, or only seeds and keys of one value that change none of the first flights.
     fn runs_are_equal(&self) -> bool {
         let hash = |run: u64| {
             let scenario = self.scenario(run, &self.laws[0]);
-            scenario.map_or_else(|error| error.to_string(), |scenario| scenario.sha256_hex())
+            scenario.map_or_else(|error| error.to_string(), |scenario| scenario.flight_sha256_hex())
         };
-        let only_seeds = self.variations.values().all(|variation| *variation == Variation::Seed);
-        only_seeds && (1..self.manifest.runs.min(3)).all(|run| hash(run) == hash(0))
+        let is_fixed = |variation: &Variation| *variation == Variation::Seed || variation.is_constant();
+        self.variations.values().all(is_fixed) && (1..self.manifest.runs.min(3)).all(|run| hash(run) == hash(0))
     }
 
     /// Refuses values that their keys do not take under a law, and a law that cannot fly.

@@ -301,7 +301,7 @@ impl Quantiles {
         let estimate = |part| {
             let estimate = Estimate::quantile(values, part);
             let is_fixed = intervals == Intervals::ClopperPearson;
-            if is_fixed { estimate } else { Estimate { value: estimate.value, low: None, high: None } }
+            if is_fixed { estimate } else { estimate.without_interval() }
         };
         Self {
             min: values.iter().copied().reduce(f64::min),

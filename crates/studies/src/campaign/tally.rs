@@ -31,10 +31,7 @@ impl Intervals {
         let at = |count: u64| match self {
             Self::ClopperPearson => Proportion::new(count, of),
             Self::ConfidenceSequence => anytime(count, of),
-            Self::Exact => {
-                let share = (of > 0).then(|| count as f64 / of as f64);
-                Proportion { count, of, share, low: share.unwrap_or(0.0), high: share.unwrap_or(1.0), confidence: 1.0 }
-            }
+            Self::Exact => Proportion::exact(count, of),
         };
         let high = at(count.saturating_add(unknown).min(of)).high;
         Proportion { high, ..at(count) }

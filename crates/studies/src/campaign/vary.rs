@@ -116,6 +116,15 @@ impl Variation {
         }
     }
 
+    /// Returns whether all values are equal.
+    #[must_use]
+    pub fn is_constant(&self) -> bool {
+        match self {
+            Self::List(values) | Self::Grid(Grid::Listed(values)) => values.iter().all(|value| *value == values[0]),
+            _ => false,
+        }
+    }
+
     /// Returns whether the values are listed.
     #[must_use]
     pub fn is_listed(&self) -> bool {

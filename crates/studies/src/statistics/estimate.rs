@@ -32,6 +32,12 @@ impl Estimate {
         Self { value: Some(mean), low: half.map(|half| mean - half), high: half.map(|half| mean + half) }
     }
 
+    /// Returns the estimate without an interval, for values that are no sample.
+    #[must_use]
+    pub fn without_interval(self) -> Self {
+        Self { low: None, high: None, ..self }
+    }
+
     /// Returns the `p` quantile, 0 < p < 1: 0.5 is the median. Between two values it is their mean.
     ///
     /// The interval is that of order statistics, for any continuous distribution: the number of values below the true

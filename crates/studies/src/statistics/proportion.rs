@@ -31,6 +31,14 @@ impl Proportion {
         Self::between(count, of, clopper_pearson(count, of, TAIL))
     }
 
+    /// Returns `count` of `of` of flights that are no sample, such as all points of a grid. Both ends of the interval
+    /// are the share, with a confidence of 1. A count above `of` is reduced to `of`.
+    #[must_use]
+    pub fn exact(count: u64, of: u64) -> Self {
+        let share = (of > 0).then(|| count.min(of) as f64 / of as f64);
+        Self { confidence: 1.0, ..Self::between(count, of, [share.unwrap_or(0.0), share.unwrap_or(1.0)]) }
+    }
+
     /// Returns the one-sided upper bound of Clopper and Pearson: the largest share with which `count` or fewer of `of`
     /// have a probability of 1 - [`CONFIDENCE`]. All of the error probability is on one side; [`Proportion::new`] has
     /// half of it on either side. For a count of 0 the bound is `1 - (1 - CONFIDENCE)^(1 / of)`. A count above `of` is

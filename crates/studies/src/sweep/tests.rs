@@ -42,6 +42,7 @@ fn values_are_spaced_or_listed() {
         ("law.alpha=0,inf", "is not finite"),
         ("law.alpha=nan,1", "NaN is not finite"),
         ("law.alpha=1,2,1", "1 is given twice"),
+        ("law.alpha=1e300,2,1e300", "law.alpha: 1e300 is given twice"),
         ("=1,2", "the grid is empty"),
     ] {
         let failure = SweptKey::parse(text).expect_err(text);
@@ -102,12 +103,32 @@ fn swept_seeds_and_jitters_override_the_defaults() {
     assert_eq!(still.flights[0].state_hash, still.flights[1].state_hash, "a jitter of 0 moves nothing");
     assert_ne!(moved.flights[0].state_hash, moved.flights[1].state_hash);
     assert!(sweep.jitter_m.is_none());
+    assert!(still.repeated && !moved.repeated);
+    assert_eq!((still.held.low, still.held.high, still.held.confidence), (1.0, 1.0, 1.0), "no sample");
+    assert!(moved.held.low < 1.0, "two flights of a sample");
+    assert_eq!((still.min_median_m.low, still.min_median_m.high), (None, None));
+    let notes = sweep.notes().join("; ");
+    assert!(notes.contains("the 2 flights with start.jitter_m=0 are one flight repeated"), "{notes}");
+    assert!(!notes.contains("start.jitter_m=0.2"), "{notes}");
+    let text = sweep.records().text();
+    assert!(
+        text.contains("2 of 2 [") && text.lines().any(|line| line.starts_with("0 ") && !line.contains('[')),
+        "{text}"
+    );
     let seeds = swept(&options(&["start.seed=1,2", "start.jitter_m=0.2"], 1));
     assert_ne!(seeds.points[0].flights[0].state_hash, seeds.points[1].flights[0].state_hash);
     // Two runs of one seed are the same flight, which must not count twice.
     let equal = options(&["start.seed=1,2", "start.jitter_m=0.2"], 2);
     let refused = batch(1, &mut |batch| equal.fly(&base(pair(), &[]), batch)).expect_err("equal runs");
     assert_eq!(refused.code(), "request/equal-runs");
+}
+
+#[test]
+fn flights_without_noise_are_one_flight_at_the_points_without_noise() {
+    let sweep = swept(&options(&["sensing.position_noise_m=0,0.001"], 6));
+    let [exact, noisy] = &sweep.points[..] else { panic!("two points") };
+    assert!(exact.repeated && !noisy.repeated, "{:?}", sweep.jitter_m);
+    assert_eq!((exact.min_median_m.low, noisy.min_median_m.low.is_some()), (None, true));
 }
 
 #[test]

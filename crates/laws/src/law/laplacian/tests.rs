@@ -47,6 +47,13 @@ fn the_control_is_the_sum_over_the_neighbours() -> Result<(), Box<dyn std::error
 }
 
 #[test]
+fn the_default_gain_on_velocities_is_not_negative() {
+    let default = |a22_per_s: f64| LaplacianKeys::default().complete(a22_per_s).f2_per_s;
+    assert_eq!([0.1, -1.0, -1.5].map(default), [Some(1.1), Some(0.0), Some(0.0)]);
+    assert_eq!(LaplacianKeys { f2_per_s: Some(2.0), ..LaplacianKeys::default() }.complete(-9.0).f2_per_s, Some(2.0));
+}
+
+#[test]
 fn at_the_slots_with_a_common_velocity_the_command_is_zero() -> Result<(), Box<dyn std::error::Error>> {
     let formation = Formation::pentagon(3.0);
     let mut swarm = Swarm::at_rest(formation.slots_m.clone());

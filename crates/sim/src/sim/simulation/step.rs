@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use super::super::controller::Controller;
-use super::super::ending::{Breakdown, Ending, MAX_BEND_M, MAX_COMMAND_M_S2};
+use super::super::ending::{Breakdown, Ending, MAX_BEND, MAX_COMMAND_M_S2};
 use super::super::judge::longest_move_m;
 use super::super::monitors::Substep;
 use super::Simulation;
@@ -85,17 +85,17 @@ impl Simulation {
                 substeps.shortest = part.min(substeps.shortest);
             }
             let undefined = self.move_vehicles(step, seconds(part))?;
-            let bend_m = self.path.bend_m();
+            let (bend_m, limit_m) = (self.path.bend_m(), MAX_BEND * self.scenario.delta_m);
             let (is_refused, on_the_way_per_s) = self.is_step_too_long(seconds(part), rate_per_s);
-            if part > 1 && (bend_m > MAX_BEND_M || is_refused) {
+            if part > 1 && (bend_m > limit_m || is_refused) {
                 self.plant.restore(&self.state);
                 self.controller.link.forget_after(self.time_s);
                 part /= 2;
                 substeps.shortest = part.min(substeps.shortest);
                 continue;
             }
-            if bend_m > MAX_BEND_M {
-                return Err(undefined.map_or(Breakdown::Bent { step, bend_m }.into(), Ending::LawUndefined));
+            if bend_m > limit_m {
+                return Err(undefined.map_or(Breakdown::Bent { step, bend_m, limit_m }.into(), Ending::LawUndefined));
             }
             let [begun, way] = [rate_per_s.min(on_the_way_per_s), on_the_way_per_s].map(|rate| seconds(part) * rate);
             let is_honest = begun <= TimeSpec::DEFAULT_MAX_RATE_DT && way <= MAX_RATE_DT_ON_THE_WAY;

@@ -27,7 +27,7 @@ fn tube_share(flight: &Flight) -> f64 {
 fn crazyflies_change_places_below_a_shield_and_collide_without_it() {
     let scenario = builtin(SHIELDED, &["time.duration_s=48"]);
     let tracking = model("crazyflie").tracking.expect("a measured table");
-    assert!(scenario.wind.fastest_m_s() > 0.0 && scenario.network.loss > 0.0);
+    assert!(scenario.fastest_wind_m_s() > 0.0 && scenario.network.loss > 0.0);
     let (flight, _) = fly(&scenario);
     assert_eq!((flight.audit.status, flight.certificate.certified_m), (Status::Clear, Some(0.4)));
     let shield = flight.shield.as_ref().expect("a shield");
@@ -69,7 +69,9 @@ fn conditions_of_a_measured_table_are_checked() {
         ("time.control_hz=50", "time.control_hz must be 100"),
         ("vehicle.downwash=true", "vehicle.downwash must be false"),
         // Another attitude loop drops the table.
-        ("vehicle.attitude_rad_s=5", "has no computed bound"),
+        ("vehicle.attitude_rad_s=5", "vehicle.attitude_rad_s must be"),
+        ("vehicle.attitude_hz=250", "vehicle.attitude_hz must be 500, got 250"),
+        ("vehicle.attitude_damping=0.8", "vehicle.attitude_damping must be"),
     ] {
         let error = refused(&[set]);
         let help = error.help().unwrap_or_default();
