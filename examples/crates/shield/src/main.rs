@@ -52,7 +52,9 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("closest {nearest_m:.3} m");
     for (own, shield) in shields.iter().enumerate() {
         let counters = shield.counters();
-        println!("vehicle {}: {:.0} % of commands changed", own + 1, 100.0 * counters.changed_share());
+        // The others differ from the law's at most by the limits of the vehicle.
+        let by_planes = (counters.changed - counters.limited) as f64 / counters.commands as f64;
+        println!("vehicle {}: {:.0} % of commands changed by planes", own + 1, 100.0 * by_planes);
         if let Some(exceeded) = counters.exceeded() {
             println!("vehicle {}: {exceeded}", own + 1);
         }
