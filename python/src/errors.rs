@@ -19,8 +19,9 @@ create_exception!(
 
 /// Returns an exception for wrong input.
 pub(crate) fn wrong_input(message: impl Into<String>) -> PyErr {
+    let message: String = message.into();
     // A failure shortens long numbers.
-    Error::new_err(Failure::new("", false, message.into()).message().to_owned())
+    Error::new_err(Failure::new("", false, message).message().to_owned())
 }
 
 /// Returns an exception for an argument of a wrong type.

@@ -313,14 +313,14 @@ fn in_range(name: &str, node: Node, number: &DeValue<'_>, span: Range<usize>) ->
         DeValue::Integer(written) => {
             let Ok(whole) = i64::from_str_radix(written.as_str(), written.radix()) else {
                 let most = if node.kind() == "integer" { i64::MAX.to_string() } else { format!("{LARGEST:e}") };
-                let message = format!("`{name}` must be at most {most} in magnitude, got {}", short(written.as_str()));
+                let message = format!("`{name}` must be at most {most} in magnitude, got {}", written.as_str());
                 return Err(SchemaError::new("scenario/out-of-range", message, description(node), span));
             };
             (whole.to_string(), whole as f64)
         }
         DeValue::Float(written) => {
             let number: f64 = written.as_str().parse().unwrap_or(f64::NAN);
-            (if number.is_finite() { shortest(number) } else { short(written.as_str()) }, number)
+            (if number.is_finite() { shortest(number) } else { written.as_str().to_owned() }, number)
         }
         _ => return Ok(()),
     };
@@ -367,8 +367,8 @@ fn wrong_type(name: &str, node: Node, value: &DeValue<'_>, span: Range<usize>) -
 fn found(value: &DeValue<'_>) -> String {
     match value {
         DeValue::String(text) => format!("the text \"{}\"", short(text)),
-        DeValue::Integer(number) => short(number.as_str()),
-        DeValue::Float(number) => short(number.as_str()),
+        DeValue::Integer(number) => number.as_str().to_owned(),
+        DeValue::Float(number) => number.as_str().to_owned(),
         DeValue::Boolean(flag) => flag.to_string(),
         DeValue::Datetime(_) => "a date".to_owned(),
         DeValue::Array(list) => format!("a list of {}", list.len()),
