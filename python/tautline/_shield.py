@@ -273,5 +273,6 @@ def _rows(value: object, name: str, count: int | None) -> NDArray[np.float64]:
     rows = exact_array(value, name)
     if rows.ndim != 2 or rows.shape[1] not in (2, 3) or (count is not None and len(rows) != count):
         wanted = "N" if count is None else count
-        raise Error(f"{name}: must have the shape ({wanted}, 3) or ({wanted}, 2), got {rows.shape}; give a row per vehicle")
+        shapes = f"({wanted}, 3) or ({wanted}, 2), got {rows.shape}"
+        raise Error(f"{name}: must have the shape {shapes}; give a row per vehicle")
     return np.ascontiguousarray(np.pad(rows, ((0, 0), (0, 3 - rows.shape[1]))))
