@@ -566,7 +566,7 @@ mod tests {
             let expected = if *is_timed { Err("audit/guessed-time-unit".to_owned()) } else { Ok(()) };
             assert_eq!(code(folder.path(), arguments), expected, "--{option}: {arguments:?}");
             if *is_timed {
-                let with_unit = code(folder.path(), &[arguments, &["--time-unit", "s"][..]].concat());
+                let with_unit = code(folder.path(), &[*arguments, &["--time-unit", "s"]].concat());
                 assert_eq!(with_unit, Ok(()), "--{option} with a unit: {arguments:?}");
             }
         }

@@ -24,9 +24,8 @@ fn at_rest(from_s: i64) -> String {
 /// A ball of 1 m that drives from 20 m beside vehicle a to the vehicle and beyond, in 20 s from a time on.
 fn truck(from_s: f64) -> String {
     let [begin, end] = [from_s, from_s + 20.0].map(|t| format!("{t:?}"));
-    format!(
-        "[[obstacle]]\nname = \"truck\"\nball = {{ radius_m = 1.0 }}\npath = [[{begin}, -20, 0, 0], [{end}, 20, 0, 0]]\n"
-    )
+    let path = format!("path = [[{begin}, -20, 0, 0], [{end}, 20, 0, 0]]");
+    format!("[[obstacle]]\nname = \"truck\"\nball = {{ radius_m = 1.0 }}\n{path}\n")
 }
 
 fn folder(files: &[(&str, String)]) -> TempDir {
@@ -131,7 +130,7 @@ fn seconds_of_a_side_file_need_the_unit_of_the_recording() {
 #[test]
 fn an_offset_that_parts_the_vehicles_is_refused() {
     let folder = folder(&[("rest.csv", at_rest(0))]);
-    for (offset, exit) in [("b=20.5", 2), ("b=-1700000000", 2), ("b=5", 0), ("b=-20", 0)] {
+    for (offset, exit) in [("b=20.5", 2), ("b=-86400", 2), ("b=5", 0), ("b=-20", 0)] {
         let ran = audit(folder.path(), &["rest.csv", "--delta", "1", "--offset", offset]);
         assert_eq!(ran.exit, Some(exit), "{offset}: {ran:?}");
         if exit == 2 {
@@ -186,23 +185,4 @@ fn a_flight_in_space_is_within_a_plane_plan_in_the_plane_only() {
     // A flight without heights says so itself.
     let flat = audit(folder.path(), &["flat.csv", "--plan", "plane.csv", "--plan-delay", "0", "--tube", "1"]);
     assert!(flat.out.contains("no heights are known") && !flat.out.contains(assumed), "{flat:?}");
-}
-
-#[test]
-fn decimals_exactly_at_the_limit_are_named() {
-    let pair = |x: f64| format!("t_s,id,x,y,z\n0,a,0.1,0,0\n0,b,{x:?},0,0\n1,a,0.1,0,0\n1,b,{x:?},0,0\n");
-    let folder = folder(&[("equal.csv", pair(0.6)), ("below.csv", pair(0.599_999_999_999)), ("clear.csv", pair(0.4))]);
-    let equal = audit(folder.path(), &["equal.csv", "--delta", "0.5"]);
-    assert_eq!(equal.exit, Some(1), "{equal:?}");
-    assert!(
-        equal.out.lines().next().is_some_and(|line| line.contains(", with decimals exactly at the limit")),
-        "{equal:?}"
-    );
-    assert!(said(&equal).contains("exactly 0.5 m apart, and the doubles nearest to them are closer"), "{equal:?}");
-    let (_, remedy) = equal.err.split_once("--delta ").expect("a remedy");
-    let delta = remedy.split_whitespace().next().expect("a number");
-    assert_eq!(audit(folder.path(), &["equal.csv", "--delta", delta]).exit, Some(0), "{delta}");
-    let below = audit(folder.path(), &["below.csv", "--delta", "0.5"]);
-    assert!(below.exit == Some(1) && !below.out.contains("decimals") && !below.err.contains("decimals"), "{below:?}");
-    assert_eq!(audit(folder.path(), &["clear.csv", "--delta", "0.3"]).exit, Some(0));
 }

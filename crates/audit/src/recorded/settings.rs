@@ -180,7 +180,8 @@ impl Settings {
             has_plan,
             is_own_limit: _,
         } = self;
-        let mut timed = Vec::new();
+        let motion = motion.filter(|motion| motion.rests_on_seconds());
+        let mut timed: Vec<_> = motion.map(|motion| TimedSetting::of("motion", motion.name())).into_iter().collect();
         let mut add = |is_timed: bool, option: &'static str| {
             timed.extend(is_timed.then(|| TimedSetting::new(option)));
         };
@@ -192,7 +193,6 @@ impl Settings {
         add(accel_window_s.is_some(), "accel-window");
         add(*has_plan, "plan");
         add(well_clear.is_some_and(WellClear::rests_on_seconds), "well-clear");
-        timed.extend(motion.filter(|motion| motion.rests_on_seconds()).map(|of| TimedSetting::of("motion", of.name())));
         for (name, VehicleSettings { radius_m: _, offset_s, max_accel_m_s2 }) in vehicles {
             timed.extend((*offset_s != 0.0).then(|| TimedSetting::of("offset", name)));
             timed.extend(max_accel_m_s2.map(|_| TimedSetting::of("max-accel", name)));

@@ -263,7 +263,7 @@ impl ConfiguredAudit<'_> {
     }
 }
 
-/// A recording of which the first items are read.
+/// A recording with its first items.
 struct Opening<'a> {
     recording: Box<dyn Tracks<Error = ReadError> + 'a>,
     items: Vec<Item>,

@@ -245,17 +245,21 @@ impl<'a> AuditRequest<'a> {
         }
         let Some(timed) = self.rests_on_seconds(settings).into_iter().next() else { return Ok(()) };
         let (path, unit) = (self.subject.name(), clock.unit);
-        let (problem, help) = if unit == "s" {
+        let (problem, [unit, other]) = if unit == "s" {
             if 1000.0 * fastest_m_s(items) > FASTEST_M_S {
                 return Ok(());
             }
-            ("by their steps the times may be in seconds or milliseconds".to_owned(), "--time-unit ms".to_owned())
+            ("by their steps the times may be in seconds or milliseconds".to_owned(), ["s", "ms"])
         } else {
             let problem = format!("the unit of time {unit} is inferred from the steps of whole numbers only");
-            (problem, format!("--time-unit {unit}"))
+            (problem, [unit, "s"])
         };
         let message = format!("{path}: {problem}, and {timed} depends on it");
-        Err(Failure::input("audit/guessed-time-unit", message, format!("give --time-unit s, or {help}")))
+        Err(Failure::input(
+            "audit/guessed-time-unit",
+            message,
+            format!("give --time-unit {unit}, or --time-unit {other}"),
+        ))
     }
 
     /// Returns the parts of the question whose answer changes with the unit of time, in words.
