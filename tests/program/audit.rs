@@ -474,7 +474,7 @@ fn decimals_exactly_at_the_limit_are_named() {
     let headline = equal.out.lines().next().unwrap_or_default();
     assert!(equal.exit == Some(1) && headline.contains(", with decimals exactly at the limit"), "{equal:?}");
     let said = equal.err.split_whitespace().collect::<Vec<_>>().join(" ");
-    let (note, remedy) = said.split_once("--delta ").expect("a remedy");
+    let (note, remedy) = said.split_once("a limit of ").expect("a remedy");
     assert!(note.contains("exactly 0.5 m apart, and the doubles nearest to them are closer"), "{note}");
     let delta = remedy.split_whitespace().next().expect("a number");
     assert_eq!(audit(folder.path(), &["equal.csv", "--delta", delta]).exit, Some(0), "{delta}");

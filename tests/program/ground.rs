@@ -81,6 +81,16 @@ fn the_headline_states_how_long_vehicles_were_exempt() {
 }
 
 #[test]
+fn vehicles_that_never_leave_the_ground_are_not_judged() {
+    let folder = folder();
+    for question in [&["--delta", "1"], &["--well-clear", "do-365"]] {
+        let ran = audit(folder.path(), &[&["drive.csv", "--above", "1"], &question[..]].concat());
+        assert!(ran.exit == Some(1) && ran.out.starts_with("UNDECIDED: "), "{question:?}: {ran:?}");
+        assert!(ran.out.contains("exempt for 10.000 s of 10.000 s"), "{question:?}: {ran:?}");
+    }
+}
+
+#[test]
 fn an_obstacle_on_which_vehicles_land_is_exempt_while_they_are_on_the_ground() {
     let folder = folder();
     let ground = ["take-off.csv", "--delta", "1", "--obstacles", "ground.toml"];

@@ -388,7 +388,7 @@ fn decimal_tie(
     Ok(is_tie.then(|| {
         format!(
             "the decimals of {first} and {second} are exactly {limit_m:?} m apart, and the doubles nearest to them \
-             are closer; --delta {min_m:?} accepts them"
+             are closer; a limit of {min_m:?} m accepts them"
         )
     }))
 }
