@@ -129,8 +129,8 @@ impl AuditOptions {
     #[new]
     #[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
     #[pyo3(signature = (*, delta, motion, max_accel, radius, ellipsoid, obstacles, limit, fence, plan, plan_delay, tube,
-                        accel_window, config, cylinder, well_clear, rules, has_config, from_s, to_s, above, ids,
-                        offset, expect_vehicles, max_gap, require_presence, independent))]
+                        accel_window, config, cylinder, well_clear, rules, has_config, from_s, to_s, above, land_on,
+                        ids, offset, expect_vehicles, max_gap, require_presence, independent))]
     fn new(
         delta: Option<f64>,
         motion: Option<String>,
@@ -152,6 +152,7 @@ impl AuditOptions {
         from_s: Option<f64>,
         to_s: Option<f64>,
         above: Option<f64>,
+        land_on: Vec<String>,
         ids: Option<Vec<String>>,
         offset: Vec<(String, f64)>,
         expect_vehicles: Option<usize>,
@@ -171,6 +172,7 @@ impl AuditOptions {
             from_s,
             to_s,
             above_m: above,
+            land_on: land_on.into_iter().collect(),
             max_gap_s: max_gap,
             require_presence,
             accel_window_s: accel_window,

@@ -51,6 +51,7 @@ const OPTIONS: &[(&str, Kind)] = &[
     ("independent", Kind::Flag),
     ("join", Kind::Flag),
     ("key", Kind::Text),
+    ("land-on", Kind::Text),
     ("latex", Kind::Number),
     ("laws", Kind::Text),
     ("layout", Kind::Text),

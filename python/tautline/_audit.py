@@ -47,8 +47,8 @@ Outcome = tuple[str, str, str, str]
 #: Arguments of `audit`, in the order of the call that a page shows.
 SHOWN = (
     "delta", "motion", "max_accel", "radius", "ellipsoid", "cylinder", "well_clear", "rules", "obstacles", "limit",
-    "fence", "plan", "plan_delay", "tube", "accel_window", "config", "from_s", "to_s", "above", "ids", "offset",
-    "expect_vehicles", "max_gap",
+    "fence", "plan", "plan_delay", "tube", "accel_window", "config", "from_s", "to_s", "above", "land_on", "ids",
+    "offset", "expect_vehicles", "max_gap",
     "require_presence", "independent",
 )  # fmt: skip
 
@@ -268,6 +268,7 @@ class AuditOptions(TypedDict, total=False):
     from_s: float | None
     to_s: float | None
     above: float | None
+    land_on: Iterable[str] | None
     ids: Iterable[str] | None
     offset: Mapping[str, float] | None
     expect_vehicles: int | None
@@ -301,6 +302,7 @@ def audit(
     from_s: float | None = None,
     to_s: float | None = None,
     above: float | None = None,
+    land_on: Iterable[str] | None = None,
     ids: Iterable[str] | None = None,
     offset: Mapping[str, float] | None = None,
     expect_vehicles: int | None = None,
@@ -345,7 +347,8 @@ def audit(
     * ``config``: ``tautline.toml`` with defaults for arguments that are not given. For a recording the default is the
       ``tautline.toml`` beside it. False reads no file.
     * ``from_s``, ``to_s``: window of the audit [s].
-    * ``above``: leaves out pairs while both vehicles are at or below this height [m].
+    * ``above``: leaves out pairs of vehicles while both are at or below this height [m].
+    * ``land_on``: names of obstacles on which vehicles land: left out for a vehicle at or below ``above``.
     * ``ids``: names of the vehicles to audit.
     * ``offset``: clock corrections by name [s].
     * ``expect_vehicles``: number of vehicles; another number is an error.
@@ -375,7 +378,8 @@ def perform(given: Mapping[str, Any], findings: _native.FlightFindings | None = 
     t, positions, velocities, names = given["t"], given["positions"], given["velocities"], given["names"]
     obstacles, fence, plan, config = given["obstacles"], given["fence"], given["plan"], given["config"]
     ids = None if given["ids"] is None else name_list(given["ids"], "ids")
-    options = given_arguments({**given, "ids": ids}) | read_as
+    land_on = None if given["land_on"] is None else name_list(given["land_on"], "land_on")
+    options = given_arguments({**given, "ids": ids, "land_on": land_on}) | read_as
     if unknown := [word for word in read_as if word not in inspect.signature(read_options).parameters]:
         raise TypeError(f"audit() got an unexpected keyword argument '{unknown[0]}'")
     if plan is None and (given["plan_delay"] is not None or given["tube"] is not None):
@@ -405,6 +409,7 @@ def perform(given: Mapping[str, Any], findings: _native.FlightFindings | None = 
         from_s=optional_number(given["from_s"], "from_s"),
         to_s=optional_number(given["to_s"], "to_s"),
         above=optional_number(given["above"], "above"),
+        land_on=land_on or [],
         ids=ids,
         offset=numbers_by_name(given["offset"], "offset"),
         expect_vehicles=optional_count(given["expect_vehicles"], "expect_vehicles"),

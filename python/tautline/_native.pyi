@@ -346,6 +346,7 @@ class AuditOptions:
         from_s: float | None,
         to_s: float | None,
         above: float | None,
+        land_on: Sequence[str],
         ids: Sequence[str] | None,
         offset: Sequence[tuple[str, float]],
         expect_vehicles: int | None,

@@ -23,8 +23,11 @@ use tautline_report::request::audit::rules::{self, Rules};
 use tautline_report::request::outputs::NamedPath;
 use tautline_report::request::{AuditRequest, AuditedRecording, ConfigFile, Failure, Monitor as _, Subject};
 
-/// Recordings that could not be judged, with the failures.
-type Failures = [(String, Failure)];
+/// A recording of the command, with its audit or the failure.
+pub(super) struct Answer {
+    pub(super) recording: String,
+    pub(super) audited: Result<AuditedRecording, Failure>,
+}
 
 /// Judges each recording. The exit code is the worst of all. A failure does not stop the other recordings. `command` is
 /// the whole command line.
@@ -53,27 +56,24 @@ pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, 
     let quiet = arguments.quiet || arguments.annotations.is_some();
     let console = Console { data_on_stdout: arguments.json, quiet };
     let monitor = Terminal::that_abandons(console, "interrupted: the audit is incomplete; give the command again")?;
-    let (mut judged, mut failures) = (Vec::new(), Vec::new());
-    for (name, asked) in asked {
+    let mut answers = Vec::new();
+    for (recording, asked) in asked {
         if !is_one {
-            monitor.say(&format!("{name}:"));
+            monitor.say(&format!("{recording}:"));
         }
-        match asked.and_then(|asked| asked.judge(&monitor)) {
-            Ok(audited) => judged.push(audited),
-            Err(failure) => {
-                if !is_one {
-                    monitor.say(&format!("not judged: {}", failure.message()));
-                }
-                failures.push((name, failure));
-            }
+        let audited = asked.and_then(|asked| asked.judge(&monitor));
+        if let (false, Err(failure)) = (is_one, &audited) {
+            monitor.say(&format!("not judged: {}", failure.message()));
         }
+        answers.push(Answer { recording, audited });
     }
     if !is_one {
-        monitor.say(&audit_formats::counts(&judged, failures.len()));
+        monitor.say(&audit_formats::counts(&answers));
     }
-    answer(arguments, &judged, &failures, is_one)?;
-    let worst = judged.iter().map(|of| Exit::good_if(of.is_good())).max_by_key(|exit| *exit as u8);
-    match failures.into_iter().map(|(_, failure)| failure).max_by_key(|failure| Exit::of(failure) as u8) {
+    write_answers(arguments, &answers, is_one)?;
+    let (judged, failures): (Vec<_>, Vec<_>) = answers.into_iter().map(|of| of.audited).partition(Result::is_ok);
+    let worst = judged.iter().flatten().map(|of| Exit::good_if(of.is_good())).max_by_key(|exit| *exit as u8);
+    match failures.into_iter().filter_map(Result::err).max_by_key(|failure| Exit::of(failure) as u8) {
         // The annotation reports the failure.
         Some(failure) if arguments.annotations.is_some() => Ok(Exit::of(&failure)),
         Some(failure) => Err(failure),
@@ -81,56 +81,48 @@ pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, 
     }
 }
 
-/// Writes the machine-readable outputs: one report for one recording, a list with all failures for several.
-fn answer(
-    arguments: &AuditArguments,
-    judged: &[AuditedRecording],
-    failures: &Failures,
-    is_one: bool,
-) -> Result<(), Failure> {
+/// Writes the machine-readable outputs: one report for one recording, a list with all failures for several. Every list
+/// is in the order of the arguments.
+fn write_answers(arguments: &AuditArguments, answers: &[Answer], is_one: bool) -> Result<(), Failure> {
     if arguments.json {
-        match judged {
-            [] if is_one => {}
-            [of] if is_one => console::json(&of.report)?,
-            judged => console::json(&Answers::of(judged, failures))?,
+        match answers {
+            [Answer { audited: Ok(audited), .. }] if is_one => console::json(&audited.report)?,
+            _ if is_one => {}
+            answers => console::json(&answers.iter().map(JsonAnswer::new).collect::<Vec<_>>())?,
         }
     }
     if let Some(Annotations::Github) = arguments.annotations {
-        let lines = audit_formats::github(judged, failures);
+        let lines = audit_formats::github(answers);
         if arguments.json { console::beside(&lines) } else { console::data(&lines)? }
     }
     if let Some(file) = &arguments.events {
-        write_atomically(file, &audit_formats::csv(judged, !is_one)?)?;
+        write_atomically(file, &audit_formats::csv(answers, !is_one)?)?;
     }
     if let Some(file) = &arguments.junit {
-        write_atomically(file, audit_formats::junit(judged, failures)?.as_bytes())?;
+        write_atomically(file, audit_formats::junit(answers)?.as_bytes())?;
     }
     if let Some(file) = &arguments.summary {
         // The steps of a job append to the same page.
         let before = if file.is_file() { std::fs::read(file).unwrap_or_default() } else { Vec::new() };
-        write_atomically(file, &[before, audit_formats::markdown(judged, failures).into_bytes()].concat())?;
+        write_atomically(file, &[before, audit_formats::markdown(answers).into_bytes()].concat())?;
     }
     Ok(())
 }
 
-/// Reports of several recordings.
-#[derive(Serialize)]
-#[serde(transparent)]
-struct Answers<'a>(Vec<Answer<'a>>);
-
+/// Element of the list of several recordings.
 #[derive(Serialize)]
 #[serde(untagged)]
-enum Answer<'a> {
+enum JsonAnswer<'a> {
     Judged(&'a RecordedReport),
-    NotJudged { recording: &'a str, error: String },
+    NotJudged { recording: &'a str, error: &'a str },
 }
 
-impl<'a> Answers<'a> {
-    fn of(judged: &'a [AuditedRecording], failures: &'a Failures) -> Self {
-        let not_judged = failures
-            .iter()
-            .map(|(recording, failure)| Answer::NotJudged { recording, error: failure.message().to_owned() });
-        Self(judged.iter().map(|of| Answer::Judged(&of.report)).chain(not_judged).collect())
+impl<'a> JsonAnswer<'a> {
+    fn new(Answer { recording, audited }: &'a Answer) -> Self {
+        match audited {
+            Ok(audited) => Self::Judged(&audited.report),
+            Err(failure) => Self::NotJudged { recording, error: failure.message() },
+        }
     }
 }
 
@@ -219,9 +211,13 @@ pub(super) struct AuditArguments {
     /// End of the judged window [s].
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) to: Option<f64>,
-    /// Ignore pairs while both vehicles are at or below this height [m].
+    /// Ignore pairs of vehicles while both are at or below this height [m].
     #[arg(long, value_name = "Z", allow_negative_numbers = true, help_heading = "Judging")]
     pub(super) above: Option<f64>,
+    /// Obstacles on which vehicles land: ignore these for a vehicle at or below --above; quote a name with a comma.
+    /// Repeatable.
+    #[arg(long, value_name = "NAME,...", value_parser = listed, help_heading = "Judging")]
+    pub(super) land_on: Vec<Listed>,
     /// Judge only these vehicles; quote a name with a comma. Repeatable.
     #[arg(long, value_name = "NAME,...", value_parser = listed, help_heading = "Judging")]
     pub(super) ids: Vec<Listed>,
@@ -304,7 +300,7 @@ pub(super) enum Annotations {
 /// Number, for one vehicle if it has a name.
 pub(super) type Named = (Option<String>, f64);
 
-/// Names of vehicles.
+/// Names of vehicles or obstacles.
 #[derive(Clone, Debug)]
 pub(super) struct Listed(Vec<String>);
 
@@ -313,7 +309,7 @@ fn listed(text: &str) -> Result<Listed, String> {
     match lines.records().next() {
         Some(Ok(names)) => Ok(Listed(names.iter().map(str::to_owned).collect())),
         Some(Err(error)) => Err(error.to_string()),
-        None => Err("name at least one vehicle".to_owned()),
+        None => Err("give at least one name".to_owned()),
     }
 }
 
@@ -399,7 +395,10 @@ impl AuditArguments {
         for (name, value) in &self.offset {
             vehicles.entry(name.clone()).or_default().offset_s = *value;
         }
-        let only: BTreeSet<String> = self.ids.iter().flat_map(|Listed(names)| names.iter().cloned()).collect();
+        let names = |lists: &[Listed]| -> BTreeSet<String> {
+            lists.iter().flat_map(|Listed(names)| names.iter().cloned()).collect()
+        };
+        let only = names(&self.ids);
         Ok(Settings {
             delta_m: self.delta,
             motion: self.motion,
@@ -411,6 +410,7 @@ impl AuditArguments {
             from_s: self.from,
             to_s: self.to,
             above_m: self.above,
+            land_on: names(&self.land_on),
             max_gap_s: self.max_gap,
             require_presence: self.require_presence,
             accel_window_s: self.accel_window,
@@ -442,7 +442,144 @@ fn refuse_repeated<'a>(option: &str, names: impl Iterator<Item = Option<&'a str>
 
 #[cfg(test)]
 mod tests {
+    use std::path::Path;
+
+    use clap::{CommandFactory as _, FromArgMatches as _, Parser};
+
     use super::*;
+    use tautline_report::request::Silent;
+
+    #[derive(Parser)]
+    struct Command {
+        #[command(flatten)]
+        arguments: AuditArguments,
+    }
+
+    /// Files beside a recording whose times 0, 10 and 20 may be seconds or milliseconds.
+    fn folder_of_guessed_times() -> tempfile::TempDir {
+        let folder = tempfile::tempdir().expect("a folder");
+        let rows = [0, 10, 20].map(|t| format!("{t},a,{t},0,5\n{t},b,{t},20,5\n"));
+        for (name, content) in [
+            ("guessed.csv", format!("t,id,x,y,z\n{}", rows.concat())),
+            ("planned.csv", format!("t_s,id,x,y,z\n{}", rows.concat())),
+            ("rest.toml", "[[obstacle]]\nname = \"o\"\nball = { radius_m = 1.0 }\nat_m = [0, 90, 0]\n".to_owned()),
+            (
+                "moving.toml",
+                "[[obstacle]]\nname = \"o\"\nball = { radius_m = 1.0 }\npath = [[0, 0, 90, 0], [20, 9, 90, 0]]\n"
+                    .to_owned(),
+            ),
+            ("fence.toml", "[fence]\npolygon_m = [[-99, -99], [99, -99], [99, 99], [-99, 99]]\n".to_owned()),
+            ("lengths.toml", "[audit]\ndelta_m = 1.0\n".to_owned()),
+            ("times.toml", "[audit]\ndelta_m = 1.0\nmax_gap_s = 20.0\n".to_owned()),
+        ] {
+            std::fs::write(folder.path().join(name), content).expect("written");
+        }
+        folder
+    }
+
+    /// Judges the recording with these arguments, in which `@` stands for the folder. Returns the code of the failure.
+    fn code(folder: &Path, arguments: &[&str]) -> Result<(), String> {
+        let at = folder.display().to_string();
+        let recording = format!("{at}/guessed.csv");
+        let arguments = arguments.iter().map(|argument| argument.replace('@', &at));
+        let words = ["audit".to_owned(), recording.clone()].into_iter().chain(arguments);
+        let matches = Command::command().get_matches_from(words);
+        let parsed = Command::from_arg_matches(&matches).expect("valid arguments").arguments;
+        let (request, settings) = parsed.request(vec![PathBuf::from(recording)], "");
+        let settings = settings.expect("valid settings");
+        let asked = AuditRequest { settings, ..request }.configured().and_then(|asked| asked.judge(&Silent::default()));
+        asked.map(drop).map_err(|failure| failure.code().to_owned())
+    }
+
+    /// Every option, with arguments, and whether the answer changes with the unit of time.
+    const OPTIONS: &[(&str, &[&str], bool)] = &[
+        ("delta", &["--delta", "1"], false),
+        ("motion", &["--delta", "1", "--motion", "hold"], false),
+        ("motion", &["--delta", "1", "--motion", "bounded", "--max-accel", "1"], true),
+        ("max-accel", &["--delta", "1", "--motion", "bounded", "--max-accel", "a=1", "--max-accel", "b=1"], true),
+        ("radius", &["--radius", "1"], false),
+        ("ellipsoid", &["--ellipsoid", "1,1,2"], false),
+        ("cylinder", &["--cylinder", "1,2"], false),
+        ("well-clear", &["--well-clear", "do-365"], true),
+        ("well-clear", &["--well-clear", "5,5,0"], false),
+        ("rules", &["--delta", "1", "--rules", "none"], false),
+        ("rules", &["--delta", "1", "--rules", "skybrush"], true),
+        ("obstacles", &["--delta", "1", "--obstacles", "@/rest.toml"], false),
+        ("obstacles", &["--delta", "1", "--obstacles", "@/moving.toml"], true),
+        ("limit", &["--limit", "height=9,floor=1"], false),
+        ("limit", &["--limit", "speed=2"], true),
+        ("limit", &["--limit", "horizontal=2"], true),
+        ("limit", &["--limit", "climb=2"], true),
+        ("limit", &["--limit", "descent=2"], true),
+        ("limit", &["--limit", "accel=2"], true),
+        ("limit", &["--limit", "navigation-floor=2"], true),
+        ("limit", &["--limit", "yaw-rate=2"], true),
+        ("accel-window", &["--limit", "accel=2", "--accel-window", "1"], true),
+        ("fence", &["--fence", "@/fence.toml"], false),
+        ("plan", &["--plan", "@/planned.csv"], true),
+        ("plan-delay", &["--plan", "@/planned.csv", "--plan-delay", "0"], true),
+        ("tube", &["--plan", "@/planned.csv", "--tube", "1"], true),
+        ("from", &["--delta", "1", "--from", "0"], true),
+        ("to", &["--delta", "1", "--to", "20"], true),
+        ("above", &["--delta", "1", "--above", "1"], false),
+        ("land-on", &["--delta", "1", "--above", "1", "--land-on", "o", "--obstacles", "@/rest.toml"], false),
+        ("ids", &["--delta", "1", "--ids", "a,b"], false),
+        ("offset", &["--delta", "1", "--offset", "a=0.005"], true),
+        ("expect-vehicles", &["--delta", "1", "--expect-vehicles", "2"], false),
+        ("independent", &["--delta", "1", "--independent"], false),
+        ("require-presence", &["--delta", "1", "--require-presence"], false),
+        ("max-gap", &["--delta", "1", "--max-gap", "20"], true),
+        ("config", &["--config", "@/lengths.toml"], false),
+        ("config", &["--config", "@/times.toml"], true),
+        ("no-config", &["--delta", "1", "--no-config"], false),
+        ("json", &["--delta", "1", "--json"], false),
+        ("quiet", &["--delta", "1", "--quiet"], false),
+        ("junit", &["--delta", "1", "--junit", "@/o.xml"], false),
+        ("events", &["--delta", "1", "--events", "@/o.csv"], false),
+        ("html", &["--delta", "1", "--html", "@/o.html"], false),
+        ("figures", &["--delta", "1", "--html", "@/o.html", "--figures", "svg"], false),
+        ("proof", &["--delta", "1", "--proof", "@/o.json"], false),
+        ("summary", &["--delta", "1", "--summary", "@/o.md"], false),
+        ("annotations", &["--delta", "1", "--annotations", "github"], false),
+        ("allow-undecided", &["--delta", "1", "--allow-undecided"], false),
+        // A given unit is no guess.
+        ("time-unit", &["--limit", "speed=2", "--time-unit", "s"], false),
+        ("time-scale", &["--limit", "speed=2", "--time-scale", "1"], false),
+        ("fps", &["--limit", "speed=99", "--fps", "25"], false),
+        ("format", &["--delta", "1", "--format", "csv"], false),
+        ("join", &["--delta", "1", "--join"], false),
+        ("sort", &["--delta", "1", "--sort"], false),
+        ("duplicates", &["--delta", "1", "--duplicates", "first"], false),
+        ("scale", &["--delta", "1", "--scale", "1"], false),
+        ("axes", &["--delta", "1", "--axes", "enu"], false),
+        ("column", &["--delta", "1", "--column", "t=t"], false),
+    ];
+
+    /// Options of readers that the recording of the test does not allow. None of them is a part of the question.
+    const READING: [&str; 8] =
+        ["one-vehicle", "dimensions", "start", "layout", "frame", "topic", "origin", "allow-unfinished"];
+
+    #[test]
+    fn every_option_that_depends_on_seconds_is_refused_with_a_guessed_unit() {
+        let folder = folder_of_guessed_times();
+        for (option, arguments, is_timed) in OPTIONS {
+            let expected = if *is_timed { Err("audit/guessed-time-unit".to_owned()) } else { Ok(()) };
+            assert_eq!(code(folder.path(), arguments), expected, "--{option}: {arguments:?}");
+            if *is_timed {
+                let with_unit = code(folder.path(), &[*arguments, &["--time-unit", "s"]].concat());
+                assert_eq!(with_unit, Ok(()), "--{option} with a unit: {arguments:?}");
+            }
+        }
+        let listed: BTreeSet<_> = OPTIONS.iter().map(|(option, ..)| *option).chain(READING).collect();
+        let command = Command::command();
+        let options: BTreeSet<_> = command.get_arguments().filter_map(|argument| argument.get_long()).collect();
+        let options: BTreeSet<_> = options.into_iter().filter(|option| *option != "help").collect();
+        assert_eq!(listed, options, "an option without a row in OPTIONS");
+        for quantity in Quantity::NUMBERS {
+            let row = OPTIONS.iter().find(|(_, arguments, _)| arguments.iter().any(|of| of.contains(quantity.name())));
+            assert_eq!(row.map(|(.., is_timed)| *is_timed), Some(quantity.rests_on_seconds()), "{}", quantity.name());
+        }
+    }
 
     #[test]
     fn limits_are_read_by_their_names() {

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 
 use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
+use super::audit::Answer;
 use tautline_core::text::{beside_limit, counted, fixed};
 use tautline_report::report::Status;
 use tautline_report::report::recorded::{
@@ -16,12 +17,12 @@ const COLUMNS: [&str; 10] =
 
 /// Returns one row for each violation, undecided time, gap and early end, in order of time. With `named`, the first
 /// column is the recording.
-pub(super) fn csv(judged: &[AuditedRecording], named: bool) -> Result<Vec<u8>, Failure> {
+pub(super) fn csv(answers: &[Answer], named: bool) -> Result<Vec<u8>, Failure> {
     let failed =
         |error: csv::Error| Failure::machine("files/cannot-write", format!("cannot write the events: {error}"));
     let mut writer = csv::Writer::from_writer(Vec::new());
     writer.write_record(named.then_some("recording").into_iter().chain(COLUMNS)).map_err(failed)?;
-    for AuditedRecording { report, .. } in judged {
+    for AuditedRecording { report, .. } in judged(answers) {
         let recording = named.then(|| report.source.recording.clone());
         for row in rows(report) {
             writer.write_record(recording.iter().cloned().chain(row)).map_err(failed)?;
@@ -109,23 +110,27 @@ fn number(x: f64) -> String {
     format!("{x:?}")
 }
 
-/// Returns a suite for each recording, and an error for each failure. Undecided results fail, or are skipped if
+/// Returns a suite for each recording, which is an error for a failure. Undecided results fail, or are skipped if
 /// allowed.
-pub(super) fn junit(judged: &[AuditedRecording], failures: &[(String, Failure)]) -> Result<String, Failure> {
+pub(super) fn junit(answers: &[Answer]) -> Result<String, Failure> {
     let mut junit = Report::new("tautline audit");
-    junit.add_test_suites(judged.iter().map(suite));
-    junit.add_test_suites(failures.iter().map(|(recording, failure)| {
-        let mut error = TestCaseStatus::non_success(NonSuccessKind::Error);
-        error.set_message(failure.message());
-        let mut case = TestCase::new("separation", error);
-        case.set_classname("tautline.audit");
-        let mut suite = TestSuite::new(recording.as_str());
-        suite.add_test_case(case);
-        suite
+    junit.add_test_suites(answers.iter().map(|Answer { recording, audited }| match audited {
+        Ok(audited) => suite(audited),
+        Err(failure) => suite_of_failure(recording, failure),
     }));
     junit
         .to_string()
         .map_err(|error| Failure::machine("files/cannot-write", format!("cannot write the JUnit report: {error}")))
+}
+
+fn suite_of_failure(recording: &str, failure: &Failure) -> TestSuite {
+    let mut error = TestCaseStatus::non_success(NonSuccessKind::Error);
+    error.set_message(failure.message());
+    let mut case = TestCase::new("separation", error);
+    case.set_classname("tautline.audit");
+    let mut suite = TestSuite::new(recording);
+    suite.add_test_case(case);
+    suite
 }
 
 /// Returns a case for the verdict and a case for each finding.
@@ -186,11 +191,20 @@ fn suite(AuditedRecording { report, allows_undecided, .. }: &AuditedRecording) -
 }
 
 /// Returns a summary in Markdown: a row for each recording, then the findings of each recording that is not clear.
-pub(super) fn markdown(judged: &[AuditedRecording], failures: &[(String, Failure)]) -> String {
+pub(super) fn markdown(answers: &[Answer]) -> String {
     let mut text =
         "## tautline audit\n\n| recording | verdict | closest | vehicles | at |\n| --- | --- | --- | --- | --- |\n"
             .to_owned();
-    for AuditedRecording { report, .. } in judged {
+    for Answer { recording, audited } in answers {
+        let report = match audited {
+            Ok(AuditedRecording { report, .. }) => report,
+            Err(failure) => {
+                let [recording, failure] = [recording, &failure.in_words()].map(|text| escape_markdown(text));
+                // Writing to a string cannot fail.
+                let _ = writeln!(text, "| {recording} | \u{274c} not judged: {failure} | | | |");
+                continue;
+            }
+        };
         let closest = report.closest.first();
         let unit = report.unit();
         let cells = [
@@ -203,18 +217,9 @@ pub(super) fn markdown(judged: &[AuditedRecording], failures: &[(String, Failure
             closest.map_or(String::new(), |of| escape_markdown(&of.who.join(" and "))),
             closest.map_or(String::new(), |of| format!("{} s", fixed(of.finding.time_s, 2))),
         ];
-        // Writing to a string cannot fail.
         let _ = writeln!(text, "| {} |", cells.join(" | "));
     }
-    for (recording, failure) in failures {
-        let _ = writeln!(
-            text,
-            "| {} | \u{274c} not judged: {} | | | |",
-            escape_markdown(recording),
-            escape_markdown(&failure.in_words())
-        );
-    }
-    for AuditedRecording { report, .. } in judged {
+    for AuditedRecording { report, .. } in judged(answers) {
         let notes = report.source.notes.iter().map(|note| format!("note: {note}\n"));
         let (headline, found) = (report.headline(), report.text() + &notes.collect::<String>());
         let fence = "`".repeat(longest_run(&headline).max(longest_run(&found)).max(2) + 1);
@@ -229,13 +234,20 @@ pub(super) fn markdown(judged: &[AuditedRecording], failures: &[(String, Failure
 }
 
 /// Returns an annotation of GitHub Actions for each recording.
-pub(super) fn github(judged: &[AuditedRecording], failures: &[(String, Failure)]) -> String {
+pub(super) fn github(answers: &[Answer]) -> String {
     let mut text = String::new();
     let mut line = |level: &str, recording: &str, title: &str, message: &str| {
         // Writing to a string cannot fail.
         let _ = writeln!(text, "::{level} file={},title={}::{}", property(recording), property(title), data(message));
     };
-    for AuditedRecording { report, allows_undecided, asked_by } in judged {
+    for Answer { recording, audited } in answers {
+        let AuditedRecording { report, allows_undecided, asked_by } = match audited {
+            Ok(audited) => audited,
+            Err(failure) => {
+                line("error", recording, "not judged", &failure.in_words());
+                continue;
+            }
+        };
         let level = match report.status {
             Status::Clear => "notice",
             Status::Undecided if *allows_undecided => "warning",
@@ -244,15 +256,18 @@ pub(super) fn github(judged: &[AuditedRecording], failures: &[(String, Failure)]
         let asked = asked_by.iter().map(|asked| format!("; {asked}"));
         line(level, &report.source.recording, &report.verdict(), &(report.headline() + &asked.collect::<String>()));
     }
-    for (recording, failure) in failures {
-        line("error", recording, "not judged", &failure.in_words());
-    }
     text
 }
 
+/// Returns the audits of the recordings that were judged.
+fn judged(answers: &[Answer]) -> impl Iterator<Item = &AuditedRecording> {
+    answers.iter().filter_map(|answer| answer.audited.as_ref().ok())
+}
+
 /// Returns the numbers of recordings with each verdict in one line.
-pub(super) fn counts(judged: &[AuditedRecording], failures: usize) -> String {
-    let of = |status: Status| judged.iter().filter(|of| of.report.status == status).count() as u64;
+pub(super) fn counts(answers: &[Answer]) -> String {
+    let of = |status: Status| judged(answers).filter(|of| of.report.status == status).count() as u64;
+    let failures = answers.len() - judged(answers).count();
     let mut parts = vec![
         counted(of(Status::Clear), "recording clear", "recordings clear"),
         counted(of(Status::Violation), "violation", "violations"),
@@ -313,9 +328,9 @@ mod tests {
         assert_eq!(property("a,b:c%\n::error::"), "a%2Cb%3Ac%25%0A%3A%3Aerror%3A%3A");
         assert_eq!(data("\u{1b}[31m##[error]x"), "\u{fffd}[31m# #[error]x");
         assert_eq!((longest_run("a```b``"), longest_run("")), (3, 0));
-        let failures =
-            [("x\n::error::y.csv".to_owned(), Failure::input("recording/not-found", "no\nsuch file", "look"))];
-        assert_eq!(github(&[], &failures).lines().count(), 1);
-        assert!(markdown(&[], &failures).contains("not judged: no such file (look)"));
+        let audited = Err(Failure::input("recording/not-found", "no\nsuch file", "look"));
+        let failed = [Answer { recording: "x\n::error::y.csv".to_owned(), audited }];
+        assert_eq!(github(&failed).lines().count(), 1);
+        assert!(markdown(&failed).contains("not judged: no such file (look)"));
     }
 }

@@ -148,7 +148,7 @@ fn every_option_of_judging_works() {
         (&["--delta", "2", "--above", "0.5"], 1),
         (&["--delta", "2", "--above", "-0.5"], 1),
         (&["--delta", "0.5", "--ids", "alpha,bravo"], 0),
-        (&["--delta", "2", "--offset", "bravo=9"], 1),
+        (&["--delta", "2", "--offset", "bravo=0.5"], 1),
         (&["--delta", "0.5", "--expect-vehicles", "2"], 0),
         (&["--delta", "2", "--max-gap", "0.5"], 1),
         (&["--delta", "0.5", "--max-gap", "2"], 0),
@@ -463,4 +463,22 @@ fn wrong_options_are_in_the_machine_readable_files() {
     let ran = audit(folder.path(), &["in.csv", "--radius", "1", "--radius", "2", "--junit", "j.xml"]);
     assert_eq!(ran.exit, Some(2), "{ran:?}");
     assert!(fs::read_to_string(folder.path().join("j.xml")).expect("a file").contains("two values"));
+}
+
+#[test]
+fn decimals_exactly_at_the_limit_are_named() {
+    let pair = |x: f64| format!("t_s,id,x,y,z\n0,a,0.1,0,0\n0,b,{x:?},0,0\n1,a,0.1,0,0\n1,b,{x:?},0,0\n");
+    let [equal, below, clear] = [0.6, 0.599_999_999_999, 0.4].map(pair);
+    let folder = folder(&[("equal.csv", &equal), ("below.csv", &below), ("clear.csv", &clear)]);
+    let equal = audit(folder.path(), &["equal.csv", "--delta", "0.5"]);
+    let headline = equal.out.lines().next().unwrap_or_default();
+    assert!(equal.exit == Some(1) && headline.contains(", with decimals exactly at the limit"), "{equal:?}");
+    let said = equal.err.split_whitespace().collect::<Vec<_>>().join(" ");
+    let (note, remedy) = said.split_once("a limit of ").expect("a remedy");
+    assert!(note.contains("exactly 0.5 m apart, and the doubles nearest to them are closer"), "{note}");
+    let delta = remedy.split_whitespace().next().expect("a number");
+    assert_eq!(audit(folder.path(), &["equal.csv", "--delta", delta]).exit, Some(0), "{delta}");
+    let below = audit(folder.path(), &["below.csv", "--delta", "0.5"]);
+    assert!(below.exit == Some(1) && !below.out.contains("decimals") && !below.err.contains("decimals"), "{below:?}");
+    assert_eq!(audit(folder.path(), &["clear.csv", "--delta", "0.3"]).exit, Some(0));
 }

@@ -111,12 +111,30 @@ fn files_of_one_vehicle_each_are_one_recording() {
     let told = audit(folder.path(), &["nowhere.csv", "pair.csv", "--delta", "2.1", "--json", "--junit", "l.xml"]);
     let answers: serde_json::Value = serde_json::from_str(&told.out).expect("JSON");
     assert_eq!(
-        (told.exit, &answers[0]["status"], &answers[1]["recording"]),
-        (Some(2), &"violation".into(), &"nowhere.csv".into())
+        (told.exit, &answers[0]["recording"], &answers[1]["status"]),
+        (Some(2), &"nowhere.csv".into(), &"violation".into())
     );
-    assert!(answers[1]["error"].as_str().is_some_and(|error| error.contains("nowhere.csv")), "{answers}");
+    assert!(answers[0]["error"].as_str().is_some_and(|error| error.contains("nowhere.csv")), "{answers}");
     let suites = read("l.xml");
-    assert!(suites.contains("errors=\"1\"") && suites.contains("name=\"nowhere.csv\""), "{suites}");
+    assert!(suites.contains("errors=\"1\""), "{suites}");
+    // Every list is in the order of the arguments.
+    let arguments = ["pair.csv", "nowhere.csv", "flight", "--delta", "1.9"];
+    let outputs = ["--json", "--junit", "o.xml", "--summary", "o.md"];
+    let listed = audit(folder.path(), &[&arguments[..], &outputs].concat());
+    let answers: serde_json::Value = serde_json::from_str(&listed.out).expect("JSON");
+    let recordings: Vec<_> = answers.as_array().expect("a list").iter().map(|one| &one["recording"]).collect();
+    assert_eq!(recordings, arguments[..3]);
+    let first_three: [&str; 3] = arguments[..3].try_into().expect("three recordings");
+    for (text, names) in [
+        (read("o.xml"), first_three.map(|name| format!("<testsuite name=\"{name}\""))),
+        (read("o.md"), first_three.map(|name| format!("\n| {name} |"))),
+    ] {
+        let places: Vec<_> = names.iter().map(|name| text.find(name)).collect();
+        assert!(places.iter().all(Option::is_some) && places.is_sorted(), "{places:?}: {text}");
+    }
+    let annotated = audit(folder.path(), &[&arguments[..], &["--annotations", "github"]].concat());
+    let files: Vec<_> = annotated.out.lines().filter_map(|line| Some(line.split_once("file=")?.1)).collect();
+    assert!(arguments[..3].iter().zip(&files).all(|(name, line)| line.starts_with(name)), "{files:?}");
     let exported = ran_by(TAUTLINE, folder.path(), &["export", "flight", "-o", "both.csv"]);
     assert_eq!(exported.exit, Some(0), "{}", exported.err);
     assert_eq!(audit(folder.path(), &["both.csv", "--delta", "2.1"]).exit, Some(1));

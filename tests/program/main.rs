@@ -17,6 +17,7 @@ mod ellipsoids;
 mod exports;
 mod first_steps;
 mod fixes;
+mod ground;
 mod heights;
 mod imperfections;
 mod interruption;
@@ -38,6 +39,7 @@ mod rules;
 mod runs;
 mod scenarios;
 mod shapes;
+mod side_files;
 mod sweep;
 mod watch;
 

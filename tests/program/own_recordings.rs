@@ -113,7 +113,9 @@ fn other_options_are_judged_from_the_samples_with_a_note() {
     ] {
         let drawn = audit(folder.path(), &[&["flown"], more].concat());
         assert!(
-            drawn.exit == Some(0) && drawn.out.starts_with("CLEAR if straight between samples"),
+            drawn.exit == Some(0)
+                && drawn.out.starts_with("CLEAR ")
+                && drawn.out.contains(" if straight between samples"),
             "{more:?}: {drawn:?}"
         );
         assert!(

@@ -70,6 +70,29 @@ class Arrays(Case):
         self.refuses(tl.Error, "above 0, got 0.0", lambda: tl.audit(t, p, cylinder=(0, 1)))
         self.refuses(tl.Error, "unknown rules `foo`", lambda: tl.audit(t, p, rules="foo"))
 
+    def test_vehicles_land_on_named_obstacles_and_hit_all_others(self) -> None:
+        t = np.array([0.0, 10.0])
+        p = np.array([[[0.0, 0, 0], [5, 0, 0]], [[0, 0, 10], [5, 0, 10]]])
+        ground = "[[obstacle]]\nname = 'ground'\nhalf_space = { normal = [0, 0, 1] }\nclearance_m = 0.5\n"
+        solid = self.folder / "ground.toml"
+        solid.write_text(ground, encoding="utf-8")
+        options = {"delta": 1.0, "obstacles": solid, "above": 1.0}
+        self.assertEqual(tl.audit(t, p, **options).verdict, "VIOLATION")
+        landed = tl.audit(t, p, land_on=["ground"], **options)
+        self.assertEqual(landed.verdict, "CLEAR above 1.000 m if straight between samples")
+        self.assertIn("exempt for 1.000 s, landing on ground for 1.000 s of 10.000 s", landed.headline)
+        self.refuses(tl.Error, "no obstacle `pad`", lambda: tl.audit(t, p, land_on=["pad"], **options))
+
+    def test_seconds_of_an_obstacle_need_the_unit_of_time(self) -> None:
+        file, truck = self.folder / "steps.csv", self.folder / "truck.toml"
+        rows = [f"{t},a,0,0,0\n{t},b,0,30,0\n" for t in (0, 10, 20)]
+        file.write_text("t,id,x,y,z\n" + "".join(rows), encoding="utf-8")
+        path = "path = [[0, -20, 0, 0], [20, 20, 0, 0]]"
+        truck.write_text(f"[[obstacle]]\nname = 'truck'\nball = {{ radius_m = 1.0 }}\n{path}\n", encoding="utf-8")
+        options = {"delta": 1.0, "obstacles": truck}
+        self.refuses(tl.Error, "the path of the obstacle `truck` depends on it", lambda: tl.audit(file, **options))
+        self.assertEqual(tl.audit(file, time_unit="s", **options).verdict, "VIOLATION")
+
     def test_a_flight_is_compared_with_its_plan(self) -> None:
         t = np.array([0.0, 1.0])
         p = np.array([[[0.0, 0, 0], [0.0, 2, 0]], [[5.0, 0.1, 0], [5.0, 2, 0]]])

@@ -40,6 +40,7 @@ mod candidates;
 mod clearance;
 mod cross_check;
 mod cylinder;
+mod decimals;
 mod double_double;
 mod enclosure;
 pub mod envelope;
@@ -59,6 +60,7 @@ mod well_clear;
 pub use auditor::{AuditError, Auditor};
 pub use clearance::{ClearanceAuditor, ClearanceFinding, ClearanceOutcome, swept_distance_m};
 pub use cylinder::Cylinder;
+pub use decimals::are_decimals_apart;
 pub use findings::{LISTED, Tally};
 pub use obstacle::{Obstacle, ObstacleError, Shape};
 pub use outcome::{

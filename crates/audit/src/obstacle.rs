@@ -133,6 +133,13 @@ impl Obstacle {
         })
     }
 
+    /// Returns whether another unit of time changes the motion of the obstacle.
+    #[must_use]
+    pub fn rests_on_seconds(&self) -> bool {
+        let Self { name: _, shape: _, clearance_m: _, path } = self;
+        path.len() > 1
+    }
+
     /// Returns the obstacle with all lengths but the normal multiplied by a factor.
     #[must_use]
     pub fn scaled(&self, factor: f64) -> Self {

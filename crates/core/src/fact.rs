@@ -69,6 +69,10 @@ coded! {
         SideFileAxes = "side-file-axes",
         /// Vehicles at or below a height are not judged among each other.
         GroundExemption = "ground-exemption",
+        /// Obstacles on which vehicles land are not judged while a vehicle is at or below a height.
+        LandingExemption = "landing-exemption",
+        /// Motion of an obstacle outside the times of its path.
+        ObstacleMotion = "obstacle-motion",
         /// File of settings from which options were taken.
         SettingsFile = "settings-file",
         /// The announced starts of a pair, equal on both sides.

@@ -95,6 +95,22 @@ impl Quantity {
         matches!(self, Self::Height | Self::Floor | Self::NavigationFloor | Self::Fence)
     }
 
+    /// Returns whether another unit of time changes the quantity.
+    #[must_use]
+    pub fn rests_on_seconds(self) -> bool {
+        match self {
+            Self::Speed
+            | Self::HorizontalSpeed
+            | Self::Climb
+            | Self::Descent
+            | Self::Acceleration
+            | Self::YawRate
+            // The floor counts while the vehicle moves at a speed.
+            | Self::NavigationFloor => true,
+            Self::Height | Self::Floor | Self::Fence => false,
+        }
+    }
+
     /// Returns whether the quantity must not fall below its limit; the others must not exceed theirs.
     #[must_use]
     pub fn is_least(self) -> bool {

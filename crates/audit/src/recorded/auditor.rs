@@ -3,7 +3,7 @@
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-use super::outcome::{Gaps, Outcome, Rates, Tallies, absences, vehicles_without_others};
+use super::outcome::{ExemptTime, Gaps, Outcome, Rates, Tallies, absences, vehicles_without_others};
 use super::settings::{LARGEST, RecordedError, Settings};
 use super::smallest::SmallestDistances;
 use super::vehicle::Vehicle;
@@ -41,6 +41,8 @@ pub struct TrackAuditor {
     results: Results,
     gaps: Gaps,
     smallest: Option<SmallestDistances>,
+    /// Time on the ground, with a height of the ground.
+    exempt: Option<ExemptTime>,
     envelope: Option<LimitMonitor>,
     well_clear: Option<WellClearMonitor>,
     /// Smallest clock offset of any vehicle \[s\].
@@ -76,10 +78,11 @@ impl TrackAuditor {
         settings.check()?;
         Ok(Self {
             least_offset_s: settings.vehicles.values().map(|of| of.offset_s).fold(0.0, f64::min),
-            windows: Windows::new(settings.limits(), &settings.obstacles),
+            windows: Windows::new(settings.limits(), &settings.obstacles, &settings.land_on),
             envelope: (!settings.envelope.is_empty())
                 .then(|| LimitMonitor::new(&settings.envelope, settings.window(), settings.accel_window_s)),
             well_clear: settings.well_clear.map(WellClearMonitor::new),
+            exempt: settings.above_m.map(|_| ExemptTime::default()),
             settings,
             vehicles: Vec::new(),
             rates: None,
@@ -233,6 +236,9 @@ impl TrackAuditor {
         if let Some(smallest) = &mut self.smallest {
             smallest.follow(&self.vehicles, window);
         }
+        if let Some(exempt) = &mut self.exempt {
+            exempt.add(&self.vehicles, window);
+        }
         for vehicle in &mut self.vehicles {
             self.segments += vehicle.discard_until(to_s) as u64;
         }
@@ -324,6 +330,7 @@ impl TrackAuditor {
                 !violations.is_empty() || envelope.is_exceeded() || is_lost,
                 (decided || !is_separation_judged) && envelope.is_kept() && !is_open && is_presence_satisfied,
             ),
+            exempt: self.exempt.filter(|_| is_separation_judged || well_clear.is_some()),
             is_else_known: (are_pairs_known || !is_separation_judged)
                 && envelope.is_else_known()
                 && !is_open

@@ -51,8 +51,10 @@ mod window;
 
 pub use super::outcome::{Approach, ObjectPair, WIDTH_M};
 pub use auditor::{TrackAuditor, audit};
-pub use outcome::{Absence, Contradiction, Gap, Outcome, Presence, Tallies};
+pub use outcome::{Absence, Contradiction, ExemptTime, Gap, Outcome, Presence, Tallies};
 pub use plan::{Deviation as PlanDeviation, PlanComparison, PlanFindings, Unknown as PlanUnknown};
 pub use second_pass::{PairSample, PairSeries, PositionLookup};
-pub use settings::{Interpolation, RecordedError, Settings, TOUCHING_CYLINDER, TOUCHING_ELLIPSOIDS, VehicleSettings};
+pub use settings::{
+    Interpolation, RecordedError, Settings, TOUCHING_CYLINDER, TOUCHING_ELLIPSOIDS, TimedSetting, VehicleSettings,
+};
 pub use well_clear::{WellClearLoss, WellClearOutcome};

@@ -5,8 +5,10 @@ use std::collections::{BTreeMap, BTreeSet};
 use serde::Serialize;
 
 use super::settings::Settings;
+use super::smallest::for_each_run;
 use super::vehicle::Vehicle;
 use super::well_clear::WellClearOutcome;
+use super::window::within;
 use crate::envelope::EnvelopeOutcome;
 use crate::findings::{Finding, LISTED, Shortlist, Tally};
 use crate::obstacle::Obstacle;
@@ -98,6 +100,37 @@ pub(super) fn vehicles_without_others(presence: &[Option<Presence>]) -> Vec<usiz
     alone
 }
 
+/// Time at which vehicles are on the ground, at or below [`above_m`](super::Settings::above_m).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ExemptTime {
+    /// Time at which at least two vehicles are, so that a pair is exempt \[s\].
+    pub pairs_s: f64,
+    /// Time at which at least one vehicle is, so that obstacles on which it lands are exempt \[s\].
+    pub vehicles_s: f64,
+}
+
+impl ExemptTime {
+    /// Adds a window of time.
+    pub(super) fn add(&mut self, vehicles: &[Vehicle], window: Interval) {
+        let mut changes: Vec<(f64, i32)> = Vec::new();
+        for vehicle in vehicles {
+            let parts = vehicle.segments[within(&vehicle.segments, window)].iter();
+            for_each_run(parts.filter(|part| part.grounded == Some(true)), |run| {
+                let (from_s, to_s) = (run.from_s.max(window.from_s), run.to_s.min(window.to_s));
+                changes.extend([(from_s, 1), (to_s, -1)]);
+            });
+        }
+        changes.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let (mut grounded, mut since_s) = (0, window.from_s);
+        for (time_s, change) in changes {
+            let passed_s = time_s - since_s;
+            self.pairs_s += if grounded > 1 { passed_s } else { 0.0 };
+            self.vehicles_s += if grounded > 0 { passed_s } else { 0.0 };
+            (grounded, since_s) = (grounded + change, time_s);
+        }
+    }
+}
+
 /// Contradiction between a recording and the assumed bound on acceleration.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Contradiction {
@@ -158,6 +191,9 @@ pub struct Outcome {
     /// Vehicles that are never present together with another, if there are no obstacles. A wrong clock has the same
     /// effect.
     pub alone: Vec<usize>,
+    /// Time that is not judged because vehicles are on the ground; `None` without a height of the ground, or without
+    /// separations.
+    pub exempt: Option<ExemptTime>,
     /// Largest contradiction to the assumed bound on acceleration, if any; nothing is proved clear then.
     pub contradiction: Option<Contradiction>,
     /// Whether everything except the lists above is known.

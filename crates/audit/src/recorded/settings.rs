@@ -35,6 +35,16 @@ impl Interpolation {
     /// All kinds of interpolation.
     pub const ALL: [Self; 4] = [Self::Linear, Self::Hold, Self::Polynomial, Self::Bounded];
 
+    /// Returns whether another unit of time changes the motion.
+    #[must_use]
+    pub fn rests_on_seconds(self) -> bool {
+        match self {
+            // Scaled times change when vehicles are at a place, and not the places.
+            Self::Linear | Self::Hold | Self::Polynomial => false,
+            Self::Bounded => true,
+        }
+    }
+
     /// Returns the name for the option `--motion`.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -44,6 +54,25 @@ impl Interpolation {
             Self::Polynomial => "polynomial",
             Self::Bounded => "bounded",
         }
+    }
+}
+
+/// Setting whose effect changes with the unit of time.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct TimedSetting {
+    /// Name of the setting, which is that of the option of `tautline audit`.
+    pub option: &'static str,
+    /// Name of the vehicle, limit, obstacle or motion, if the setting is given for several.
+    pub of: Option<String>,
+}
+
+impl TimedSetting {
+    fn new(option: &'static str) -> Self {
+        Self { option, of: None }
+    }
+
+    fn of(option: &'static str, name: &str) -> Self {
+        Self { option, of: Some(name.to_owned()) }
     }
 }
 
@@ -85,9 +114,11 @@ pub struct Settings {
     pub from_s: Option<f64>,
     /// End of the judged window \[s\].
     pub to_s: Option<f64>,
-    /// Height at or below which vehicles are on the ground \[m\]. A pair is not judged while both are, and an obstacle
-    /// not while the vehicle is.
+    /// Height at or below which vehicles are on the ground \[m\]. A pair of vehicles is not judged while both are.
     pub above_m: Option<f64>,
+    /// Names of obstacles on which vehicles land, such as the ground or a pad. Their distance from a vehicle is not
+    /// judged while the vehicle is on the ground. They need [`Self::above_m`].
+    pub land_on: BTreeSet<String>,
     /// Largest time between two samples without a gap \[s\]; the motion in a gap is unknown. The default `None` uses
     /// one and a half of each vehicle's usual interval.
     pub max_gap_s: Option<f64>,
@@ -118,6 +149,60 @@ impl Settings {
     #[must_use]
     pub fn delta(delta_m: f64) -> Self {
         Self { delta_m: Some(delta_m), ..Self::default() }
+    }
+
+    /// Returns the settings whose effect changes with the unit of time. All other settings are lengths, names and
+    /// choices: the smallest distance of two straight or polynomial motions does not change if all times are scaled.
+    #[must_use]
+    pub fn rests_on_seconds(&self) -> Vec<TimedSetting> {
+        // Without `..`: a new setting has to be sorted here.
+        let Self {
+            delta_m: _,
+            motion,
+            max_accel_m_s2,
+            radius_m: _,
+            ellipsoid_m: _,
+            cylinder: _,
+            well_clear,
+            from_s,
+            to_s,
+            above_m: _,
+            land_on: _,
+            max_gap_s,
+            require_presence: _,
+            vehicles,
+            only: _,
+            obstacles,
+            // Yaw setpoints count with a limit of the yaw rate only.
+            yaw: _,
+            envelope,
+            accel_window_s,
+            has_plan,
+            is_own_limit: _,
+        } = self;
+        let motion = motion.filter(|motion| motion.rests_on_seconds());
+        let mut timed: Vec<_> = motion.map(|motion| TimedSetting::of("motion", motion.name())).into_iter().collect();
+        let mut add = |is_timed: bool, option: &'static str| {
+            timed.extend(is_timed.then(|| TimedSetting::new(option)));
+        };
+        add(from_s.is_some(), "from");
+        add(to_s.is_some(), "to");
+        // An infinite gap joins all samples, whatever their unit of time.
+        add(max_gap_s.is_some_and(f64::is_finite), "max-gap");
+        add(max_accel_m_s2.is_some(), "max-accel");
+        add(accel_window_s.is_some(), "accel-window");
+        add(*has_plan, "plan");
+        add(well_clear.is_some_and(WellClear::rests_on_seconds), "well-clear");
+        for (name, VehicleSettings { radius_m: _, offset_s, max_accel_m_s2 }) in vehicles {
+            timed.extend((*offset_s != 0.0).then(|| TimedSetting::of("offset", name)));
+            timed.extend(max_accel_m_s2.map(|_| TimedSetting::of("max-accel", name)));
+        }
+        let obstacles = obstacles.iter().filter(|obstacle| obstacle.rests_on_seconds());
+        timed.extend(obstacles.map(|obstacle| TimedSetting::of("obstacles", &obstacle.name)));
+        let Envelope { limits, fence: _ } = envelope;
+        let limits = limits.iter().map(|limit| limit.quantity).filter(|quantity| quantity.rests_on_seconds());
+        timed.extend(limits.map(|quantity| TimedSetting::of("limit", quantity.name())));
+        timed
     }
 
     pub(super) fn window(&self) -> Interval {
@@ -225,6 +310,14 @@ impl Settings {
         if self.ellipsoid_m.is_some() && !self.obstacles.is_empty() {
             return Err(RecordedError::ObstaclesAndEllipsoid);
         }
+        if let Some(name) = self.land_on.first().filter(|_| self.above_m.is_none()) {
+            return Err(RecordedError::NoGround { name: name.clone() });
+        }
+        let is_known = |name: &&String| self.obstacles.iter().any(|obstacle| obstacle.name == **name);
+        if let Some(name) = self.land_on.iter().find(|name| !is_known(name)) {
+            let known: Vec<_> = self.obstacles.iter().map(|obstacle| obstacle.name.as_str()).collect();
+            return Err(RecordedError::UnknownObstacle { name: name.clone(), known: known.join(", ") });
+        }
         self.obstacles.iter().try_for_each(|obstacle| Ok(obstacle.check()?))
     }
 }
@@ -316,6 +409,20 @@ pub enum RecordedError {
         /// Name in the settings.
         name: String,
         /// Names in the recording, shortened.
+        known: String,
+    },
+    /// Vehicles land on an obstacle, but the settings give no height of the ground.
+    #[error("land-on: the obstacle `{name}` is exempt at or below a height, which is not given")]
+    NoGround {
+        /// Name of the obstacle.
+        name: String,
+    },
+    /// Vehicles land on an obstacle that the settings do not have.
+    #[error("land-on: there is no obstacle `{name}`; the obstacles are {known}")]
+    UnknownObstacle {
+        /// Name in the settings.
+        name: String,
+        /// Names of the obstacles; empty without obstacles.
         known: String,
     },
     /// The recording has samples, but the motion is polynomial.

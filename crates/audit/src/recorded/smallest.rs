@@ -156,7 +156,7 @@ impl PresenceIntervals {
 }
 
 /// Calls `f` with each uninterrupted interval covered by segments, which are in order of time.
-fn for_each_run<'a>(mut segments: impl Iterator<Item = &'a Segment>, mut f: impl FnMut(Interval)) {
+pub(super) fn for_each_run<'a>(mut segments: impl Iterator<Item = &'a Segment>, mut f: impl FnMut(Interval)) {
     let Some(Segment { from_s, to_s, .. }) = segments.next() else { return };
     let mut run = Interval { from_s: *from_s, to_s: *to_s };
     for next in segments {

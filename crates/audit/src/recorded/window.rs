@@ -6,6 +6,7 @@
 //! swarms at rest and in common motion. Sort and sweep along the longest axis finds the pairs to compare. A window with
 //! too many remaining pairs is halved.
 
+use std::collections::BTreeSet;
 use std::mem;
 use std::ops::Range;
 
@@ -57,12 +58,22 @@ pub(super) struct Windows {
     limits: Limits,
     /// Whether distances are compared with the limits. If not, only the closest pairs are found.
     judges: bool,
-    /// Obstacles, each with its path.
-    obstacles: Vec<(Obstacle, Vec<Segment>)>,
+    obstacles: Vec<JudgedObstacle>,
     extents: Vec<Extent>,
     /// Axis of the sort, which is the first axis of the extents.
     axis: usize,
     near: Vec<ExtentPair>,
+    /// Number of these pairs whose chords are too far apart, so that only the deviations keep them.
+    by_deviation: usize,
+}
+
+/// Obstacle with its path.
+#[derive(Clone, Debug)]
+struct JudgedObstacle {
+    obstacle: Obstacle,
+    path: Vec<Segment>,
+    /// Whether vehicles land on the obstacle, which exempts it while they are on the ground.
+    is_landed_on: bool,
 }
 
 /// Pair of extents with the smallest distance of their chords, which is scaled with a cylinder.
@@ -100,18 +111,22 @@ impl ExtentPair {
 }
 
 impl Windows {
-    pub(super) fn new(limits: Limits, obstacles: &[Obstacle]) -> Self {
-        // A pair is skipped if both objects are on the ground, so an obstacle always counts as on the ground.
-        let grounded = |part| Segment { grounded: Some(true), ..part };
-        let with_path =
-            |obstacle: &Obstacle| (obstacle.clone(), obstacle.segments().into_iter().map(grounded).collect());
-        let obstacles = obstacles.iter().map(with_path).collect();
-        Self { limits, judges: true, obstacles, extents: Vec::new(), axis: 0, near: Vec::new() }
+    /// Returns windows that judge separations, and distances from obstacles; vehicles land on those in `land_on`.
+    pub(super) fn new(limits: Limits, obstacles: &[Obstacle], land_on: &BTreeSet<String>) -> Self {
+        let judged = |obstacle: &Obstacle| {
+            let is_landed_on = land_on.contains(&obstacle.name);
+            // A pair is skipped if both objects are on the ground.
+            let placed = |part| Segment { grounded: Some(is_landed_on), ..part };
+            let path = obstacle.segments().into_iter().map(placed).collect();
+            JudgedObstacle { obstacle: obstacle.clone(), path, is_landed_on }
+        };
+        let obstacles = obstacles.iter().map(judged).collect();
+        Self { limits, judges: true, obstacles, extents: Vec::new(), axis: 0, near: Vec::new(), by_deviation: 0 }
     }
 
     /// Returns windows that find only the closest pairs.
     pub(super) fn of_closest(limits: Limits) -> Self {
-        Self { judges: false, ..Self::new(limits, &[]) }
+        Self { judges: false, ..Self::new(limits, &[], &BTreeSet::new()) }
     }
 
     /// Judges all pairs in a window.
@@ -135,13 +150,17 @@ impl Windows {
             let curved = self.extents.iter().any(|extent| extent.chord.curved);
             let is_fine = segments < MIN_SEGMENTS * count && !curved;
             let middle_s = 0.5 * (window.from_s + window.to_s);
-            let is_whole = is_fine || halvings == MAX_HALVINGS || !(window.from_s < middle_s && middle_s < window.to_s);
-            let max_pairs = if is_whole { MAX_LISTED } else { PAIRS_PER_VEHICLE * count };
+            let is_whole = halvings == MAX_HALVINGS || !(window.from_s < middle_s && middle_s < window.to_s);
+            let mut max_pairs = if is_whole { MAX_LISTED } else { PAIRS_PER_VEHICLE * count };
             let mut done = self.collect_pairs(results, 0, max_pairs);
             if !is_whole && done < count {
-                self.judge_or_halve(vehicles, Interval { to_s: middle_s, ..window }, halvings + 1, results);
-                self.judge_or_halve(vehicles, Interval { from_s: middle_s, ..window }, halvings + 1, results);
-                return;
+                // Shorter windows of a few segments help only where vehicles turn within the window.
+                if !is_fine || 2 * self.by_deviation > self.near.len() {
+                    self.judge_or_halve(vehicles, Interval { to_s: middle_s, ..window }, halvings + 1, results);
+                    self.judge_or_halve(vehicles, Interval { from_s: middle_s, ..window }, halvings + 1, results);
+                    return;
+                }
+                max_pairs = MAX_LISTED;
             }
             loop {
                 for near in &self.near {
@@ -196,9 +215,10 @@ impl Windows {
     /// Lists the pairs that could matter, of the extents from `from` on with later ones, until they exceed `max_pairs`.
     /// Returns the index of the next extent.
     fn collect_pairs(&mut self, results: &Results, from: usize, max_pairs: usize) -> usize {
-        let Self { extents, near, limits, judges, axis, .. } = self;
+        let Self { extents, near, by_deviation, limits, judges, axis, .. } = self;
         let limit = |first: f64, second: f64| if *judges { limits.of_vehicles(first, second) } else { 0.0 };
         near.clear();
+        *by_deviation = 0;
         let radius = extents.iter().map(|extent| extent.radius).fold(0.0, f64::max);
         let threshold = results.closest.threshold;
         let mut reach = limits.reach_m(threshold.max(limit(radius, radius)));
@@ -212,7 +232,9 @@ impl Windows {
                 let aside = |axis: usize| (a.low[axis] - b.high[axis]).max(b.low[axis] - a.high[axis]);
                 if aside(1) <= reach[1] && aside(2) <= reach[2] && !(a.grounded && b.grounded) {
                     let of_both = ExtentPair::new(extents, k, l, limits.cylinder.as_ref());
-                    if of_both.may_come_within(threshold.max(limit(a.radius, b.radius))) {
+                    let distance = threshold.max(limit(a.radius, b.radius));
+                    if of_both.may_come_within(distance) {
+                        *by_deviation += usize::from(of_both.squared >= distance * distance);
                         near.push(of_both);
                     }
                 }
@@ -246,10 +268,11 @@ impl Windows {
     }
 
     fn sweep_obstacles(&self, vehicles: &[Vehicle], window: Interval, results: &mut Results) {
-        for (index, (obstacle, path)) in self.obstacles.iter().enumerate() {
+        for (index, JudgedObstacle { obstacle, path, is_landed_on }) in self.obstacles.iter().enumerate() {
             let path = &path[within(path, window)];
             let place = Chord::of_window(path, window);
-            for extent in self.extents.iter().filter(|extent| !extent.grounded) {
+            let above = self.limits.above.filter(|_| *is_landed_on);
+            for extent in self.extents.iter().filter(|extent| !(extent.grounded && *is_landed_on)) {
                 if !results.settle_and_continue() {
                     return;
                 }
@@ -260,7 +283,7 @@ impl Windows {
                 let least = between - chord.motion_deviation - place.motion_deviation;
                 if least < limit.max(cutoff) {
                     let (target, keep_out) = (Target::Shape(&obstacle.shape), KeepOut::new(limit));
-                    let (may_violate, above) = (least < limit, self.limits.above);
+                    let may_violate = least < limit;
                     PairSweep { pair, target, keep_out, cutoff, judges: self.judges, may_violate, above }.judge(
                         path,
                         extent.segments(vehicles),
@@ -440,8 +463,8 @@ mod tests {
             vehicle
         };
         let vehicles: Vec<_> = (0..40).map(vehicle).collect();
-        let found =
-            [Windows::new(settings.limits(), &[]), Windows::of_closest(settings.limits())].map(|mut windows| {
+        let found = [Windows::new(settings.limits(), &[], &BTreeSet::new()), Windows::of_closest(settings.limits())]
+            .map(|mut windows| {
                 let mut results = Results::default();
                 windows.judge(&vehicles, Interval { from_s: 0.0, to_s: 8.0 }, &mut results);
                 results

@@ -46,6 +46,13 @@ impl WellClear {
     pub const F3442: Self = Self { horizontal_m: 2000.0 * FOOT_M, vertical_m: 250.0 * FOOT_M, tau_s: 0.0 };
     /// Presets by their names.
     pub const PRESETS: [(&'static str, Self); 2] = [("do-365", Self::DO_365), ("f3442", Self::F3442)];
+
+    /// Returns whether another unit of time changes a loss of well clear.
+    #[must_use]
+    pub fn rests_on_seconds(self) -> bool {
+        let Self { horizontal_m: _, vertical_m: _, tau_s } = self;
+        tau_s != 0.0
+    }
 }
 
 /// Length of an international foot \[m\].

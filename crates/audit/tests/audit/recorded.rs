@@ -403,6 +403,56 @@ fn a_recording_in_parts_has_the_same_outcome() {
     assert_eq!(whole.status, Status::Violation);
 }
 
+#[test]
+fn noise_is_judged_without_sweeping_all_pairs() {
+    // 300 vehicles jump across a cube of 1 km between samples, each with its own sample times.
+    const VEHICLES: usize = 300;
+    let mut state = 1_u64;
+    let mut random = || {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 11) as f64 / (1_u64 << 53) as f64
+    };
+    let starts: Vec<_> = (0..VEHICLES).map(|_| random()).collect();
+    let mut items = Vec::new();
+    for k in 0..10 {
+        for (vehicle, start_s) in starts.iter().enumerate() {
+            let place = [1e3 * random(), 1e3 * random(), 1e3 * random()];
+            items.push(seen(vehicle, f64::from(k) + start_s, place));
+        }
+    }
+    items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
+    let names: Vec<_> = (0..VEHICLES).map(|k| k.to_string()).collect();
+    let outcome = audit(&names, &items, Settings::delta(1.0)).expect("a verdict");
+    let pairs = (VEHICLES * (VEHICLES - 1) / 2) as u64;
+    assert!(outcome.swept < pairs, "{} sweeps of {pairs} pairs in ten intervals", outcome.swept);
+}
+
+#[test]
+fn obstacles_count_on_the_ground_unless_vehicles_land_on_them() {
+    // Both climb through a height of 1 m at 5 s.
+    let items = [(0.0, 0.0), (10.0, 2.0)].map(|(t, z)| [seen(0, t, [0.0, 0.0, z]), seen(1, t, [5.0, 0.0, z])]).concat();
+    let ground = Obstacle {
+        clearance_m: Some(0.5),
+        ..obstacle_at(Shape::HalfSpace { normal: Vector3::new(0.0, 0.0, 1.0) }, [0.0; 3])
+    };
+    let name = ground.name.clone();
+    let above = Settings { above_m: Some(1.0), obstacles: vec![ground], ..Settings::delta(1.0) };
+    let hit = judge(&items, above.clone());
+    assert_eq!((hit.status, hit.obstacles[0].lower_m), (Status::Violation, 0.0));
+    let landing = Settings { land_on: [name].into(), ..above.clone() };
+    let landed = judge(&items, landing.clone());
+    assert_eq!((landed.status, landed.obstacles[0].lower_m), (Status::Clear, 1.0));
+    for outcome in [hit, landed] {
+        let exempt = outcome.exempt.expect("a height of the ground");
+        assert!((exempt.pairs_s - 5.0).abs() < ROUNDING && (exempt.vehicles_s - 5.0).abs() < ROUNDING, "{exempt:?}");
+    }
+    assert_eq!(judge(&items, Settings { above_m: None, land_on: BTreeSet::new(), ..landing.clone() }).exempt, None);
+    let unknown = Settings { land_on: ["pad".to_owned()].into(), ..above };
+    assert!(matches!(TrackAuditor::new(unknown), Err(RecordedError::UnknownObstacle { .. })));
+    let no_height = Settings { above_m: None, ..landing };
+    assert!(matches!(TrackAuditor::new(no_height), Err(RecordedError::NoGround { .. })));
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 3000, failure_persistence: None, ..ProptestConfig::default() })]
 

@@ -282,6 +282,14 @@ impl From<RecordedError> for Failure {
             RecordedError::UnknownVehicle { .. } => {
                 ("audit/unknown-vehicle", "use the names of the recording in --ids, --radius, --max-accel and --offset")
             }
+            RecordedError::NoGround { .. } => {
+                let help = "give the height of the ground with --above Z, or leave --land-on out";
+                return Self::input("audit/land-on", format!("--{error}"), help);
+            }
+            RecordedError::UnknownObstacle { .. } => {
+                let help = "use the names of the obstacles, or leave --land-on out";
+                return Self::input("audit/land-on", format!("--{error}"), help);
+            }
             RecordedError::NotACurve { .. } => ("audit/no-curves", "give --motion linear, hold or bounded"),
             RecordedError::NotSamples { .. } => ("audit/no-samples", "leave --motion out, or give --motion polynomial"),
             RecordedError::RadiusChanges { .. } => {

@@ -22,6 +22,8 @@ pub struct PlanReport {
     pub searched_s: Option<(f64, f64)>,
     /// Allowed distance from the plan \[m\]; null if none was given.
     pub tube_m: Option<f64>,
+    /// Whether the plan or the flight has no heights, so that distances are those in the plane of x and y.
+    pub planar: bool,
     /// Largest distance of each vehicle from its plan.
     pub vehicles: Vec<VehicleFinding<PlanDistance>>,
     /// Time to which the status is limited \[s\], with an estimated delay; null if it covers the whole window.
@@ -96,6 +98,7 @@ impl PlanReport {
             delay_s: found.delay_s,
             searched_s: found.searched_s,
             tube_m: found.tube_m,
+            planar: false,
             vehicles: found
                 .deviations
                 .iter()
@@ -126,6 +129,7 @@ impl PlanReport {
         let delay =
             format!("delay {} s{}", fixed(self.delay_s, 3), if self.searched_s.is_some() { " estimated" } else { "" });
         let tube = self.tube_m.map_or(String::new(), |m| format!("tube {} m, ", exact(m)));
+        let axes = if self.planar { " in the plane of x and y" } else { "" };
         let farthest = self.farthest().map(|VehicleFinding { vehicle, finding }| (vehicle, finding));
         match (self.status, farthest) {
             (Status::Clear, Some((vehicle, PlanDistance { upper_m, at_s, .. }))) => {
@@ -135,7 +139,7 @@ impl PlanReport {
                     format!("; {}{then}", of.words())
                 });
                 let common = self.common();
-                format!("within {most} m of the plan{common}, {vehicle} at {at} ({tube}{delay}){certified}")
+                format!("within {most} m of the plan{axes}{common}, {vehicle} at {at} ({tube}{delay}){certified}")
             }
             (Status::Violation, _) => {
                 let left = self.vehicles.iter().max_by(|a, b| a.finding.lower_m.total_cmp(&b.finding.lower_m));
@@ -145,7 +149,7 @@ impl PlanReport {
                         None => at_least(finding.lower_m, 6),
                     };
                     let at = seconds(finding.at_s);
-                    format!("{vehicle} is {least} m from the plan at {at} ({tube}{delay})")
+                    format!("{vehicle} is {least} m from the plan{axes} at {at} ({tube}{delay})")
                 })
             }
             (_, farthest) => match (self.unknown.first(), farthest) {
@@ -158,7 +162,7 @@ impl PlanReport {
                 }
                 (None, Some((vehicle, PlanDistance { upper_m, lower_m, .. }))) => {
                     let (low, high) = (at_least(*lower_m, 6), at_most(*upper_m, 6));
-                    format!("{vehicle} is between {low} m and {high} m from the plan ({tube}{delay})")
+                    format!("{vehicle} is between {low} m and {high} m from the plan{axes} ({tube}{delay})")
                 }
                 (None, None) => "no vehicle is present together with its plan".to_owned(),
             },

@@ -7,7 +7,7 @@ use super::plan::PlanReport;
 use super::well_clear::WellClearFindings;
 use crate::report::flight::{self, Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Separation, finite};
 use tautline_audit::recorded::{
-    Absence, Approach, Contradiction, Gap, ObjectPair, Outcome, Presence, Settings, TOUCHING_CYLINDER,
+    Absence, Approach, Contradiction, ExemptTime, Gap, ObjectPair, Outcome, Presence, Settings, TOUCHING_CYLINDER,
     TOUCHING_ELLIPSOIDS, Tallies,
 };
 use tautline_audit::{Status, Undecided, Violation};
@@ -140,9 +140,12 @@ pub struct RecordedReport {
     /// Verdict and finding up to the early end, if clear up to there.
     #[serde(skip)]
     pub(super) until_then: Option<String>,
-    /// Height at or below which vehicles are on the ground \[m\].
+    /// Time that is not judged because vehicles are on the ground.
     #[serde(skip)]
-    pub(super) above_m: Option<f64>,
+    pub(super) exemption: Option<Exemption>,
+    /// Whether the deepest violation is one of doubles only, whose decimals are exactly at the limit.
+    #[serde(skip)]
+    pub is_decimal_tie: bool,
     /// Reason why the run's own audit does not decide the question.
     #[serde(skip)]
     pub run_objection: Option<String>,
@@ -155,6 +158,27 @@ pub struct RecordedReport {
     /// Sampling rate that would decide all undecided pairs \[Hz\].
     #[serde(skip)]
     pub(super) deciding_rate_hz: Option<f64>,
+}
+
+/// Time that is not judged because vehicles are on the ground.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Exemption {
+    /// Height at or below which vehicles are on the ground \[m\].
+    pub(super) above_m: f64,
+    /// Exempt time of pairs, and of vehicles that land.
+    pub(super) exempt: ExemptTime,
+    /// Obstacles on which vehicles land.
+    pub(super) land_on: Vec<String>,
+    /// Length of the judged time \[s\].
+    pub(super) judged_s: f64,
+}
+
+impl Exemption {
+    fn new(outcome: &Outcome, settings: &Settings) -> Option<Self> {
+        let judged_s = outcome.span_s.map_or(0.0, |(from_s, to_s)| to_s - from_s);
+        let land_on = settings.land_on.iter().cloned().collect();
+        Some(Self { above_m: settings.above_m?, exempt: outcome.exempt?, land_on, judged_s })
+    }
 }
 
 /// Largest number of listed vehicles that are not seen throughout.
@@ -289,8 +313,9 @@ impl RecordedReport {
             plan: None,
             well_clear: outcome.well_clear.as_ref().map(|found| WellClearFindings::new(found, outcome)),
             ended_early: None,
-            above_m: settings.above_m,
+            exemption: Exemption::new(outcome, settings),
             until_then: None,
+            is_decimal_tie: false,
             run_objection: None,
             separation_asked: outcome.separation.is_some(),
             is_else_known: outcome.is_else_known,

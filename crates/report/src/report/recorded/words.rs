@@ -2,7 +2,7 @@
 
 use super::envelope::LimitFindings;
 use super::plan::PlanReport;
-use super::report::{EarlyEnd, PresenceSpan, RecordedReport};
+use super::report::{EarlyEnd, Exemption, PresenceSpan, RecordedReport};
 use super::report::{PairFinding, VehicleFinding};
 use super::well_clear::WellClearFindings;
 use crate::figures::Figure;
@@ -50,10 +50,11 @@ impl RecordedReport {
     /// Returns the verdict alone, such as `PROVED CLEAR`.
     #[must_use]
     pub fn verdict(&self) -> String {
+        let above = self.exemption.as_ref().map_or(String::new(), |of| format!(" above {} m", exact(of.above_m)));
         match self.status {
             Status::Clear if self.audit.judged_by_run => format!("PROVED CLEAR {}", self.motion),
-            Status::Clear if self.audit.proved => "PROVED CLEAR".to_owned(),
-            Status::Clear => format!("CLEAR if {}", self.audit.assumes.as_ref().unwrap_or(&self.motion)),
+            Status::Clear if self.audit.proved => format!("PROVED CLEAR{above}"),
+            Status::Clear => format!("CLEAR{above} if {}", self.audit.assumes.as_ref().unwrap_or(&self.motion)),
             Status::Violation => "VIOLATION".to_owned(),
             Status::Undecided => "UNDECIDED".to_owned(),
         }
@@ -75,13 +76,14 @@ impl RecordedReport {
         let well_clear = self.well_clear.iter().filter(|found| found.status == self.status);
         let limits = limits.chain(well_clear.map(WellClearFindings::brief));
         let of_pairs = self.separation_asked && self.audit.flight.status == self.status;
+        let exempt = self.exemption.as_ref().map(Exemption::words);
         let in_plane = self.source.planar.then(|| "in the plane of x and y: no heights are known".to_owned());
         let pairs = of_pairs.then(|| self.finding_of_pairs());
         let against_plan = self.plan.iter().filter(|plan| plan.status == self.status).map(PlanReport::brief);
         let found = pairs.into_iter().chain(limits).chain(against_plan).collect::<Vec<_>>();
         // All limits are kept, but a vehicle that must be present is not seen throughout.
         let nothing = found.is_empty().then(|| "not every vehicle is seen throughout".to_owned());
-        found.into_iter().chain(nothing).chain(in_plane).collect::<Vec<_>>().join("; ") + &self.window()
+        found.into_iter().chain(nothing).chain(exempt).chain(in_plane).collect::<Vec<_>>().join("; ") + &self.window()
     }
 
     fn finding_of_pairs(&self) -> String {
@@ -102,13 +104,14 @@ impl RecordedReport {
             Status::Violation => {
                 let over = |of: &PairFinding<Violation<ObjectPair>>| of.finding.min_m - of.finding.limit_m;
                 let deepest = self.violations.iter().min_by(|a, b| over(a).total_cmp(&over(b)));
+                let tie = if self.is_decimal_tie { ", with decimals exactly at the limit" } else { "" };
                 let others = match counted_in_words(self.findings.violations) {
                     _ if self.findings.violations.count <= 1 => String::new(),
                     count => format!("; {count} violations in all"),
                 };
                 deepest.map_or(String::new(), |PairFinding { who: [first, second], finding }| {
                     format!(
-                        "{first} and {second} came to {}{unit} (limit {}{unit}) at {}, {}{others}",
+                        "{first} and {second} came to {}{unit} (limit {}{unit}) at {}, {}{tie}{others}",
                         beside_limit(finding.min_m, finding.limit_m, 3),
                         exact(finding.limit_m),
                         seconds(finding.min_at_s),
@@ -163,7 +166,8 @@ impl RecordedReport {
         match &self.gaps[..] {
             [] if self.span_s.is_none() => "the window holds nothing to judge".to_owned(),
             [] => {
-                let above = self.above_m.map(|above_m| format!(", one of them above {} m (--above)", exact(above_m)));
+                let above = self.exemption.as_ref();
+                let above = above.map(|of| format!(", one of them above {} m (--above)", exact(of.above_m)));
                 format!("no two vehicles are present at the same time{}", above.unwrap_or_default())
             }
             [VehicleFinding { vehicle, finding }] => {
@@ -328,6 +332,21 @@ fn counted_in_words(tally: Tally) -> String {
 fn shortened_in_words(tally: Tally) -> String {
     let count = counted_in_words(tally);
     if tally.is_shortened() { format!("{count}, {} of them listed", tally.listed) } else { count }
+}
+
+impl Exemption {
+    /// Returns the exempt times in a clause.
+    fn words(&self) -> String {
+        let Self { above_m, exempt, land_on, judged_s } = self;
+        let (above, judged) = (exact(*above_m), fixed(*judged_s, 3));
+        let pairs =
+            format!("pairs at or below {above} m were exempt for {} s", at_most(exempt.pairs_s.min(*judged_s), 3));
+        let landed = (!land_on.is_empty()).then(|| {
+            let (names, time) = (land_on.join(", "), at_most(exempt.vehicles_s.min(*judged_s), 3));
+            format!(", landing on {names} for {time} s")
+        });
+        format!("{pairs}{} of {judged} s", landed.unwrap_or_default())
+    }
 }
 
 impl EarlyEnd {

@@ -3,15 +3,20 @@
 use std::path::{Path, PathBuf};
 
 use super::super::{Failure, Monitor};
+use super::side_files::ItemSpan;
 use super::{FASTEST_M_S, Open, fastest_m_s, open, recording_in};
 use crate::figures::{self, Figure};
 use crate::report::recorded::{PlanReport, RecordedReport};
 use tautline_audit::recorded::{Outcome, PlanComparison, PlanFindings, Settings, audit};
+use tautline_core::fact::{Fact, FactKind, Source};
+use tautline_core::text::seconds;
 use tautline_core::track::Item;
 use tautline_recordings::read::ReadOptions;
 
 /// Largest number of names in a message.
 const NAMES_LISTED: usize = 12;
+/// Assumption of the comparison of a flight in space with a plan without heights.
+const IN_PLANE: &str = "flight and plan have equal heights, which are not compared";
 /// Largest delay that may be given \[s\]: a century.
 const MOST_DELAY_S: f64 = 3.2e9;
 
@@ -52,12 +57,20 @@ pub(super) struct AuditedFlight<'a> {
     pub(super) is_planar: bool,
 }
 
-/// Compares a flight with its plan; returns the findings, notes and a figure.
+/// A flight that was compared with its plan.
+pub(super) struct ComparedPlan {
+    report: PlanReport,
+    notes: Vec<String>,
+    facts: Vec<Fact>,
+    figure: Figure,
+}
+
+/// Compares a flight with its plan.
 pub(super) fn compare(
     question: &PlanQuestion,
     flight: &AuditedFlight<'_>,
     monitor: &dyn Monitor,
-) -> Result<(PlanReport, Vec<String>, Figure), Failure> {
+) -> Result<ComparedPlan, Failure> {
     let path = recording_in(&question.path);
     let mut plan = open(std::slice::from_ref(&path), &ReadOptions::default())?;
     let (mut items, mut more) = (Vec::new(), true);
@@ -96,31 +109,68 @@ pub(super) fn compare(
         let pushed = comparison.push_flight(&flown);
         pushed.map_err(|error| Failure::from(error).of(Path::new(&flight.name)))?;
     }
-    let shift_s = shift_s(plan.clock().epoch_ns, flight.epoch_ns);
+    let shift = EpochShift::new(plan.clock().epoch_ns, flight.epoch_ns);
+    let shift_s = shift.seconds();
     let found = comparison.finish(shift_s, question.delay_s, question.tube_m).map_err(wrong)?;
+    check_common_time(&found, &items, shift_s, flight, &path)?;
     let asked = found.settings_of_plan(flight.settings, &flight.outcome.vehicles, shift_s + found.delay_s);
     let asked = asked.filter(|_| found.deviations.len() > 1);
     let audited = asked.map(|settings| audit(plan.vehicles(), &items, settings)).transpose().map_err(wrong)?;
     let mut report = PlanReport::new(path.display().to_string(), &found, flight.outcome, audited.as_ref());
-    let assumed = report.assumes.take().into_iter().chain(plan.assumed().map(|of| format!("the plan has {of}")));
-    let assumed = assumed.collect::<Vec<_>>().join(" and ");
+    report.planar = is_planar;
+    let assumed = report.assumes.take().into_iter();
+    let assumed = assumed.chain(plan.assumed().map(|of| format!("the plan has {of}")));
+    let assumed =
+        assumed.chain((is_planar && !flight.is_planar).then(|| IN_PLANE.to_owned())).collect::<Vec<_>>().join(" and ");
     report.assumes = (!assumed.is_empty()).then_some(assumed);
-    let mut notes: Vec<_> = plan.notes().iter().map(|note| format!("{}: {note}", path.display())).collect();
-    if is_planar {
-        notes.push("flight and plan are compared in the plane of x and y".to_owned());
+    let notes = plan.notes().iter().map(|note| format!("{}: {note}", path.display())).collect();
+    let axes = if is_planar { "x and y" } else { "x, y and z" };
+    let clock = match (shift, question.delay_s) {
+        (EpochShift::Known(_), _) => Fact::name(FactKind::SideFileClock, Source::Deduced, "plan by its epoch"),
+        (EpochShift::Unknown, Some(s)) => Fact::number(FactKind::SideFileClock, Source::Declared, s, "s"),
+        (EpochShift::Unknown, None) => Fact::number(FactKind::SideFileClock, Source::Inferred, found.delay_s, "s"),
+    };
+    let facts = vec![clock, Fact::name(FactKind::SideFileAxes, Source::Deduced, axes)];
+    let figure = figure(&found, flight.outcome);
+    Ok(ComparedPlan { report, notes, facts, figure })
+}
+
+/// Refuses a plan that shares no time with the judged flight.
+fn check_common_time(
+    found: &PlanFindings,
+    plan: &[Item],
+    shift_s: f64,
+    flight: &AuditedFlight<'_>,
+    path: &Path,
+) -> Result<(), Failure> {
+    let mut span = ItemSpan::default();
+    span.add(plan);
+    let Some((planned, (from_s, to_s))) = span.ends_s().zip(flight.outcome.span_s) else { return Ok(()) };
+    if !found.deviations.is_empty() {
+        return Ok(());
     }
-    Ok((report, notes, figure(&found, flight.outcome)))
+    let [start, end] = planned.map(|time_s| seconds(time_s + shift_s + found.delay_s));
+    let message = format!(
+        "{}: the plan is from {start} to {end} on the clock of the flight, with a delay of {}, and the judged flight \
+         from {} to {}",
+        path.display(),
+        seconds(found.delay_s),
+        seconds(from_s),
+        seconds(to_s)
+    );
+    let help = "give the time of the flight at which the plan begins with --plan-delay, or another plan";
+    Err(Failure::input("audit/side-file-clock", message, help))
 }
 
 /// Adds the findings to a report; also returns the figure. The run's audit does not cover distances from a plan
 /// between two samples (`is_by_run`).
 pub(super) fn attach(
     report: RecordedReport,
-    compared: Option<(PlanReport, Vec<String>, Figure)>,
+    compared: Option<ComparedPlan>,
     is_by_run: bool,
     monitor: &dyn Monitor,
 ) -> (RecordedReport, Option<Figure>) {
-    let Some((mut plan, notes, figure)) = compared else { return (report, None) };
+    let Some(ComparedPlan { report: mut plan, notes, facts, figure }) = compared else { return (report, None) };
     for note in &notes {
         monitor.warn(&format!("note: {note}"));
     }
@@ -130,12 +180,32 @@ pub(super) fn attach(
     }
     let mut report = report.with_plan(plan);
     report.source.notes.extend(notes);
+    report.source.facts.extend(facts);
     (report, Some(figure))
 }
 
-/// Returns the difference of two epochs \[s\]; 0 unless both clocks have one.
-fn shift_s(plan_ns: i64, flight_ns: i64) -> f64 {
-    if plan_ns == 0 || flight_ns == 0 { 0.0 } else { plan_ns.saturating_sub(flight_ns) as f64 * 1e-9 }
+/// Difference of the epochs of a plan and a flight.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum EpochShift {
+    /// Time from the epoch of the flight to that of the plan \[s\].
+    Known(f64),
+    /// One of the two clocks has no epoch.
+    Unknown,
+}
+
+impl EpochShift {
+    fn new(plan_ns: i64, flight_ns: i64) -> Self {
+        let is_known = plan_ns != 0 && flight_ns != 0;
+        if is_known { Self::Known(plan_ns.saturating_sub(flight_ns) as f64 * 1e-9) } else { Self::Unknown }
+    }
+
+    /// Returns the time that is added to the times of the plan \[s\].
+    fn seconds(self) -> f64 {
+        match self {
+            Self::Known(shift_s) => shift_s,
+            Self::Unknown => 0.0,
+        }
+    }
 }
 
 /// Moves an item to the plane of x and y.
@@ -193,7 +263,8 @@ mod tests {
 
     #[test]
     fn clocks_are_joined_by_their_epochs() {
-        assert_eq!(shift_s(5_000_000_000, 2_000_000_000), 3.0);
-        assert_eq!(shift_s(0, 2_000_000_000), 0.0, "a plan without an epoch begins at 0");
+        assert_eq!(EpochShift::new(5_000_000_000, 2_000_000_000), EpochShift::Known(3.0));
+        let unknown = EpochShift::new(0, 2_000_000_000);
+        assert_eq!((unknown, unknown.seconds()), (EpochShift::Unknown, 0.0), "a plan without an epoch begins at 0");
     }
 }

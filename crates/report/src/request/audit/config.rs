@@ -1,6 +1,6 @@
 //! `tautline.toml`: defaults for audits of the recordings beside it. Options of the request take precedence.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -39,6 +39,7 @@ struct AuditTable {
     obstacles: Option<PathBuf>,
     fence: Option<PathBuf>,
     above_m: Option<f64>,
+    land_on: BTreeSet<String>,
     max_gap_s: Option<f64>,
     expect_vehicles: Option<usize>,
     layout: Option<String>,
@@ -182,6 +183,9 @@ impl AuditTable {
             settings.max_accel_m_s2 = self.max_accel_m_s2;
         }
         settings.above_m = settings.above_m.or(self.above_m);
+        if settings.land_on.is_empty() {
+            settings.land_on = self.land_on;
+        }
         settings.max_gap_s = settings.max_gap_s.or(self.max_gap_s);
         settings.accel_window_s = settings.accel_window_s.or(self.accel_window_s);
         settings.require_presence |= self.require_presence.unwrap_or(false);

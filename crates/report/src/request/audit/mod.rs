@@ -8,6 +8,7 @@ mod proof;
 mod question;
 mod replays;
 pub mod rules;
+mod side_files;
 mod subject;
 mod toml_file;
 mod venue_file;
@@ -31,10 +32,12 @@ use crate::figures::{self, Format as FigureFormat};
 use crate::report::recorded::{Basis, Clock, RecordedReport, Source};
 use crate::report::{Status, write_atomically};
 use replays::Instants;
-use tautline_audit::Obstacle;
-use tautline_audit::recorded::{Outcome, Presence, Settings, TrackAuditor};
-use tautline_core::fact::Fact;
-use tautline_core::track::Item;
+use side_files::{ItemSpan, SideFiles};
+use tautline_audit::recorded::{ObjectPair, Outcome, PairSample, PairSeries, Presence, Settings, TrackAuditor};
+use tautline_audit::{Obstacle, Violation, are_decimals_apart};
+use tautline_core::fact::{Fact, FactKind, Source as FactSource};
+use tautline_core::track::{Item, Tracks};
+use tautline_recordings::read::ReadError;
 
 /// Number of items that are read before the first is judged. They determine the usual sampling intervals.
 const OPENING: usize = 65_536;
@@ -127,25 +130,33 @@ impl ConfiguredAudit<'_> {
         let open: &Open<'_> = &|| request.subject.open();
         let own = if request.independent { own.map(OwnRecording::independent) } else { own };
         let notes_on_rules = rules::fill(&mut settings, request, show.as_ref())?;
+        let side_obstacles = settings.obstacles.len();
         let taken = RecordedLimits::fill(&mut settings, request, own.as_ref());
         proof::check(request, &settings)?;
+        let opening = Opening::read(open, monitor)?;
+        let side_files = opening.align(&mut settings, side_obstacles)?;
         let mut auditor = TrackAuditor::new(settings.clone())?;
         if request.html.is_some() {
             auditor = auditor.with_smallest();
         }
         auditor = auditor.with_interruption(monitor.interruption().clone());
         let mut instants = request.html.as_ref().map(|_| Instants::default());
-        let JudgedRecording { mut outcome, clock, mut notes, mut facts, assumed, curves, is_planar } =
-            self.judged(auditor, &settings, open, monitor, &mut |items, names| {
+        let JudgedRecording { mut outcome, clock, mut notes, mut facts, assumed, curves, is_planar, span } = self
+            .judged(opening, auditor, &settings, monitor, &mut |items, names| {
                 if let Some(instants) = &mut instants {
                     instants.note(items, names, &settings);
                 }
             })?;
         request.check_count(&outcome, &settings)?;
+        side_files.check(&settings, &outcome)?;
+        side_files::check_offsets(&settings, &outcome, span.length_s())?;
         let answer = own.as_ref().map(|own| own.answer(&mut outcome, &settings, request, &mut notes));
         let answer = answer.unwrap_or(RunAnswer::Samples);
         let holds_every_step = own.as_ref().is_some_and(OwnRecording::holds_every_step);
-        let between = request.assumed_motion(curves, holds_every_step, &answer, assumed.as_deref());
+        let resting = side_files.assumed(&settings, &outcome);
+        facts.extend(side_files.facts(&settings, resting.as_deref()));
+        let assumed: Vec<_> = assumed.into_iter().chain(resting).collect();
+        let between = request.assumed_motion(curves, holds_every_step, &answer, &assumed);
         notes.extend(notes_on_rules);
         notes.extend(taken.notes(request, own.as_ref()));
         notes.extend(notes_on_alone(&outcome));
@@ -153,7 +164,7 @@ impl ConfiguredAudit<'_> {
         for note in &notes {
             monitor.warn(&format!("note: {note}"));
         }
-        facts.extend(request.facts(&between, self.asked_by.as_deref()));
+        facts.extend(request.facts(&between, &outcome, self.asked_by.as_deref()));
         let source = Source { recording: request.subject.name(), clock, planar: is_planar, notes, facts };
         let flight = AuditedFlight {
             open,
@@ -163,6 +174,7 @@ impl ConfiguredAudit<'_> {
             epoch_ns: source.clock.epoch_ns,
             is_planar,
         };
+        let tie = decimal_tie(open, &settings, &outcome, monitor)?;
         let compared = request.plan.as_ref().map(|plan| against_plan::compare(plan, &flight, monitor)).transpose()?;
         let early_end = own.as_ref().and_then(|own| own.early_end.clone());
         // An early end of the flight does not affect a window that ends before it.
@@ -175,6 +187,11 @@ impl ConfiguredAudit<'_> {
             report.run_objection = Some(why);
         }
         let mut report = early_end.into_iter().fold(report, RecordedReport::with_early_end);
+        if let Some(note) = tie {
+            monitor.warn(&format!("note: {note}"));
+            report.source.notes.push(note);
+            report.is_decimal_tie = true;
+        }
         let shortened = report.shortened();
         for note in &shortened {
             monitor.warn(&format!("note: {note}"));
@@ -204,47 +221,86 @@ impl ConfiguredAudit<'_> {
         Ok(AuditedRecording { report, allows_undecided: request.allow_undecided, asked_by: self.asked_by.clone() })
     }
 
-    /// Reads and judges all items.
+    /// Reads and judges all items, from the first ones on.
     fn judged(
         &self,
+        opening: Opening<'_>,
         mut auditor: TrackAuditor,
         settings: &Settings,
-        open: &Open<'_>,
         monitor: &dyn Monitor,
         note: &mut dyn FnMut(&[Item], &[String]),
     ) -> Result<JudgedRecording, Failure> {
         let called = self.request.subject.name();
-        let mut recording = open()?;
+        let Opening { mut recording, mut items, mut more } = opening;
         let is_planar = recording.is_planar();
         let level = places::refuse_unknown(&self.request, self.asked_by(), settings, recording.as_ref())?;
+        self.request.refuse_guessed_seconds(settings, recording.clock(), &items)?;
         monitor.begin(&called, None);
-        let mut items = Vec::new();
-        let (mut more, mut first, mut curves) = (true, true, true);
-        while more {
-            if monitor.is_interrupted() {
-                return Err(Failure::interrupted());
-            }
-            items.clear();
-            while more && (items.is_empty() || (first && items.len() < OPENING)) {
-                more = recording.read(&mut items)?;
-            }
-            if first && recording.clock().by_steps {
-                self.request.refuse_guessed_seconds(recording.clock().unit, &items)?;
-            }
-            first = false;
+        let (mut curves, mut span) = (true, ItemSpan::default());
+        loop {
             level.check(&called, recording.vehicles(), &items)?;
             curves &= items.iter().all(|item| matches!(item, Item::Piece(_)));
+            span.add(&items);
             auditor.push(recording.vehicles(), &items).map_err(|error| Failure::from(error).of(Path::new(&called)))?;
             note(&items, recording.vehicles());
             monitor.advance(items.len() as u64);
+            if !more {
+                break;
+            }
+            items.clear();
+            more = read_until(recording.as_mut(), &mut items, 1, monitor)?;
         }
         monitor.finish();
         let clock = recording.clock();
         let clock = Clock { unit: clock.unit.to_owned(), inferred: clock.inferred, epoch_ns: clock.epoch_ns };
         let outcome = auditor.finish().map_err(|error| Failure::from(error).of(Path::new(&called)))?;
         let (notes, assumed) = (recording.notes().to_vec(), recording.assumed().map(str::to_owned));
-        let facts = recording.facts().to_vec();
-        Ok(JudgedRecording { outcome, clock, notes, facts, assumed, curves, is_planar })
+        let mut facts = recording.facts().to_vec();
+        if clock.inferred && facts.iter().all(|fact| fact.kind != FactKind::TimeUnit) {
+            facts.push(Fact::name(FactKind::TimeUnit, FactSource::Inferred, &clock.unit));
+        }
+        Ok(JudgedRecording { outcome, clock, notes, facts, assumed, curves, is_planar, span })
+    }
+}
+
+/// A recording with its first items.
+struct Opening<'a> {
+    recording: Box<dyn Tracks<Error = ReadError> + 'a>,
+    items: Vec<Item>,
+    /// Whether there are more items.
+    more: bool,
+}
+
+impl<'a> Opening<'a> {
+    fn read(open: &Open<'a>, monitor: &dyn Monitor) -> Result<Self, Failure> {
+        let (mut recording, mut items) = (open()?, Vec::new());
+        let more = read_until(recording.as_mut(), &mut items, OPENING, monitor)?;
+        Ok(Self { recording, items, more })
+    }
+
+    /// Moves the paths of the first `side_obstacles` obstacles of the settings to the clock of the report.
+    fn align(&self, settings: &mut Settings, side_obstacles: usize) -> Result<SideFiles, Failure> {
+        let mut span = ItemSpan::default();
+        span.add(&self.items);
+        SideFiles::align(settings, side_obstacles, self.recording.clock().epoch_ns, span.first_s())
+    }
+}
+
+/// Reads items until there are `least`, or no more. Returns whether there are more.
+fn read_until(
+    recording: &mut dyn Tracks<Error = ReadError>,
+    items: &mut Vec<Item>,
+    least: usize,
+    monitor: &dyn Monitor,
+) -> Result<bool, Failure> {
+    loop {
+        if monitor.is_interrupted() {
+            return Err(Failure::interrupted());
+        }
+        let more = recording.read(items)?;
+        if !more || items.len() >= least {
+            return Ok(more);
+        }
     }
 }
 
@@ -299,6 +355,44 @@ impl<'a> RecordedLimits<'a> {
     }
 }
 
+/// Relative depth of a violation below which the written decimals may be at the limit.
+const JUST_BELOW: f64 = 1e-9;
+
+/// Returns a note if the deepest violation is one of the doubles only: the decimals of the two positions are exactly at
+/// the limit. Reads the recording again if the depth is that of rounding.
+fn decimal_tie(
+    open: &Open<'_>,
+    settings: &Settings,
+    outcome: &Outcome,
+    monitor: &dyn Monitor,
+) -> Result<Option<String>, Failure> {
+    let deepest = outcome.violations.iter().min_by(|a, b| (a.min_m - a.limit_m).total_cmp(&(b.min_m - b.limit_m)));
+    let is_in_metres = settings.ellipsoid_m.is_none() && settings.cylinder.is_none();
+    let is_just_below = |of: &&Violation<ObjectPair>| of.limit_m - of.min_m <= JUST_BELOW * of.limit_m;
+    let Some(deepest) = deepest.filter(is_just_below).filter(|of| is_in_metres && of.pair.vehicles().is_some()) else {
+        return Ok(None);
+    };
+    let mut series = PairSeries::new(settings, outcome, deepest.pair)?;
+    let (mut recording, mut more) = (open()?, true);
+    while more {
+        let mut items = Vec::new();
+        more = read_until(recording.as_mut(), &mut items, 1, monitor)?;
+        series.push(&items)?;
+    }
+    let closest = series.finish().into_iter().min_by(|a, b| a.distance_m.total_cmp(&b.distance_m));
+    let is_tie = closest.is_some_and(|PairSample { positions_m: [first, second], .. }| {
+        are_decimals_apart(first, second, deepest.limit_m)
+    });
+    let [first, second] = outcome.names(deepest.pair, &settings.obstacles);
+    let (limit_m, min_m) = (deepest.limit_m, deepest.min_m);
+    Ok(is_tie.then(|| {
+        format!(
+            "the decimals of {first} and {second} are exactly {limit_m:?} m apart, and the doubles nearest to them \
+             are closer; a limit of {min_m:?} m accepts them"
+        )
+    }))
+}
+
 /// Returns notes on vehicles that are never present together with another one.
 fn notes_on_alone(outcome: &Outcome) -> impl Iterator<Item = String> {
     outcome.alone.iter().take(MOST_ALONE).filter_map(|&vehicle| {
@@ -323,6 +417,8 @@ struct JudgedRecording {
     curves: bool,
     /// Whether the height of a vehicle is unknown.
     is_planar: bool,
+    /// Times of all items, without offsets.
+    span: ItemSpan,
 }
 
 /// Returns the folder of the figures of a page.

@@ -7,13 +7,15 @@ use nalgebra::Vector3;
 
 use super::super::{Failure, Monitor, outputs};
 use super::own::RunAnswer;
-use super::{ConfiguredAudit, PlanQuestion, RecordedLimits, Rules, Subject, config, recording_in, rules, venue_file};
+use super::{
+    ConfiguredAudit, Opening, PlanQuestion, RecordedLimits, Rules, Subject, config, recording_in, rules, venue_file,
+};
 use crate::figures::Format as FigureFormat;
 use crate::report::recorded::{AssumedMotion, Basis};
-use tautline_audit::recorded::{Interpolation, Outcome, RecordedError, Settings, VehicleSettings};
+use tautline_audit::recorded::{Interpolation, Outcome, RecordedError, Settings, TimedSetting, VehicleSettings};
 use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::text::counted;
-use tautline_core::track::Item;
+use tautline_core::track::{Clock as TrackClock, Item};
 
 /// Speed of sound \[m/s\], which no vehicle of a swarm reaches.
 pub(super) const FASTEST_M_S: f64 = 340.0;
@@ -187,7 +189,11 @@ impl<'a> AuditRequest<'a> {
         let mut settings = self.complete_settings()?;
         let (own, show) = self.subject.own(monitor)?;
         rules::fill(&mut settings, self, show.as_ref())?;
+        let side_obstacles = settings.obstacles.len();
         RecordedLimits::fill(&mut settings, self, own.as_ref());
+        if side_obstacles > 0 {
+            Opening::read(&|| self.subject.open(), monitor)?.align(&mut settings, side_obstacles)?;
+        }
         Ok(settings)
     }
 
@@ -226,49 +232,76 @@ impl<'a> AuditRequest<'a> {
         Ok(())
     }
 
-    /// Rejects options in seconds if the unit of time is a guess. Seconds are accepted if the unit milliseconds would
-    /// make the vehicles of these first items faster than sound.
-    pub(super) fn refuse_guessed_seconds(&self, unit: &str, items: &[Item]) -> Result<(), Failure> {
-        let settings = &self.settings;
-        let asked = [
-            (self.for_drones, "export --to"),
-            (settings.motion == Some(Interpolation::Bounded), "--motion bounded"),
-            (settings.from_s.is_some(), "--from"),
-            (settings.to_s.is_some(), "--to"),
-            (settings.max_gap_s.is_some(), "--max-gap"),
-            (settings.vehicles.values().any(|of| of.offset_s != 0.0), "--offset"),
-            (settings.envelope.limits.iter().any(|limit| limit.quantity.unit() != "m"), "--limit"),
-            (settings.has_plan || self.plan.is_some(), "--plan"),
-        ];
-        let Some((_, option)) = asked.into_iter().find(|(is_asked, _)| *is_asked) else { return Ok(()) };
-        let path = self.subject.name();
-        if unit != "s" {
-            let message = format!(
-                "{path}: the unit of time {unit} is inferred from the steps of whole numbers only, and {option} \
-                 depends on it"
-            );
-            return Err(Failure::input(
-                "audit/guessed-time-unit",
-                message,
-                format!("give --time-unit {unit}, or --time-unit s"),
-            ));
-        }
-        if 1000.0 * fastest_m_s(items) > FASTEST_M_S {
+    /// Rejects a question that depends on seconds if the unit of time is a guess. Seconds are accepted if the unit
+    /// milliseconds would make the vehicles of these first items faster than sound. `settings` are complete.
+    pub(super) fn refuse_guessed_seconds(
+        &self,
+        settings: &Settings,
+        clock: &TrackClock,
+        items: &[Item],
+    ) -> Result<(), Failure> {
+        if !clock.by_steps {
             return Ok(());
         }
-        let message =
-            format!("{path}: by their steps the times may be in seconds or milliseconds, and {option} depends on it");
-        Err(Failure::input("audit/guessed-time-unit", message, "give --time-unit s, or --time-unit ms"))
+        let Some(timed) = self.rests_on_seconds(settings).into_iter().next() else { return Ok(()) };
+        let (path, unit) = (self.subject.name(), clock.unit);
+        let (problem, [unit, other]) = if unit == "s" {
+            if 1000.0 * fastest_m_s(items) > FASTEST_M_S {
+                return Ok(());
+            }
+            ("by their steps the times may be in seconds or milliseconds".to_owned(), ["s", "ms"])
+        } else {
+            let problem = format!("the unit of time {unit} is inferred from the steps of whole numbers only");
+            (problem, [unit, "s"])
+        };
+        let message = format!("{path}: {problem}, and {timed} depends on it");
+        Err(Failure::input(
+            "audit/guessed-time-unit",
+            message,
+            format!("give --time-unit {unit}, or --time-unit {other}"),
+        ))
     }
 
-    /// Returns the motion between samples, for a recording of curves or of `tautline run`. Nothing is proved if the
-    /// samples themselves are assumed.
+    /// Returns the parts of the question whose answer changes with the unit of time, in words.
+    fn rests_on_seconds(&self, settings: &Settings) -> Vec<String> {
+        // Without `..`: a new part of the question has to be sorted here. The files of obstacles and fence, the rules
+        // and the file of settings are contained in the complete settings.
+        let Self {
+            subject: _,
+            settings: _,
+            obstacles: _,
+            fence: _,
+            plan,
+            rules: _,
+            expect_vehicles: _,
+            independent: _,
+            allow_undecided: _,
+            for_drones,
+            config: _,
+            command: _,
+            html: _,
+            formats: _,
+            // A proof is about separations, and its checker derives the unit of time itself.
+            proof: _,
+        } = self;
+        let in_words = |TimedSetting { option, of }: TimedSetting| match (option, of) {
+            ("obstacles", Some(name)) => format!("the path of the obstacle `{name}`"),
+            (option, Some(of)) => format!("--{option} {of}"),
+            (option, None) => format!("--{option}"),
+        };
+        let timed = for_drones.then(|| "export --to".to_owned()).into_iter();
+        let timed = timed.chain(plan.is_some().then(|| "--plan".to_owned()));
+        timed.chain(settings.rests_on_seconds().into_iter().map(in_words)).collect()
+    }
+
+    /// Returns the motion between samples, for a recording of curves or of `tautline run`. Nothing is proved under
+    /// further assumptions on the samples or on obstacles (`assumed`).
     pub(super) fn assumed_motion(
         &self,
         curves: bool,
         holds_every_step: bool,
         answer: &RunAnswer,
-        assumed: Option<&str>,
+        assumed: &[String],
     ) -> AssumedMotion {
         let most = || {
             let all = self.settings.max_accel_m_s2.map(|a| format!("{a:?} m/s^2"));
@@ -285,13 +318,13 @@ impl<'a> AuditRequest<'a> {
             _ => ("straight between samples".to_owned(), Basis::Assumed),
         };
         match assumed {
-            Some(assumed) => AssumedMotion { motion: format!("{motion}, {assumed}"), basis: Basis::Assumed },
-            None => AssumedMotion { motion, basis },
+            [] => AssumedMotion { motion, basis },
+            _ => AssumedMotion { motion: format!("{motion}, {}", assumed.join(", ")), basis: Basis::Assumed },
         }
     }
 
     /// Returns the facts that come from the request: motion, exemptions, file of settings.
-    pub(super) fn facts(&self, between: &AssumedMotion, settings_file: Option<&str>) -> Vec<Fact> {
+    pub(super) fn facts(&self, between: &AssumedMotion, outcome: &Outcome, settings_file: Option<&str>) -> Vec<Fact> {
         let declared = |is_declared: bool| if is_declared { Source::Declared } else { Source::Default };
         let motion = match between.basis {
             Basis::Recorded => Source::Recorded,
@@ -300,8 +333,13 @@ impl<'a> AuditRequest<'a> {
             Basis::Assumed => declared(self.settings.motion.is_some()),
         };
         let mut facts = vec![Fact::name(FactKind::Motion, motion, &between.motion)];
-        if let Some(above_m) = self.settings.above_m {
+        if let Some((above_m, exempt)) = self.settings.above_m.zip(outcome.exempt) {
             facts.push(Fact::number(FactKind::GroundExemption, Source::Declared, above_m, "m"));
+            facts.push(Fact::number(FactKind::GroundExemption, Source::Observed, exempt.pairs_s, "s"));
+            let landed_on = &self.settings.land_on;
+            facts.extend(landed_on.iter().map(|name| Fact::name(FactKind::LandingExemption, Source::Declared, name)));
+            let landed_s = (!landed_on.is_empty()).then_some(exempt.vehicles_s);
+            facts.extend(landed_s.map(|s| Fact::number(FactKind::LandingExemption, Source::Observed, s, "s")));
         }
         facts.extend(settings_file.map(|file| Fact::name(FactKind::SettingsFile, Source::Declared, file)));
         facts
