@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use tautline_core::fact::Fact;
 use tautline_core::text::{counted, metres, seconds};
 use tautline_sim::shield::ShieldReport;
 
@@ -10,6 +11,9 @@ use tautline_sim::shield::ShieldReport;
 pub struct ShieldNumbers {
     /// Certificate in words, with its assumptions.
     pub certificate: String,
+    /// Facts that the certificate rests on.
+    #[serde(skip_deserializing)]
+    pub facts: Vec<Fact>,
     /// Bound on the distance of a vehicle to its reference \[m\].
     pub tube_m: f64,
     /// Assumption that did not hold, with its vehicle. The certificate does not cover the flight then. Null if all of
@@ -53,6 +57,7 @@ impl From<&ShieldReport> for ShieldNumbers {
         let share = |share: f64| if share.is_finite() { share } else { f64::MAX };
         Self {
             certificate: of.certificate.clone(),
+            facts: of.facts.clone(),
             tube_m: of.tube_m,
             exceeded: of.breach.map(|breach| format!("vehicle {}: {}", breach.vehicle + 1, breach.exceeded)),
             commands: counters.commands,
