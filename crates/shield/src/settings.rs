@@ -349,9 +349,9 @@ impl Limits {
             format!(" on a level and {:.3} m in the vertical, outside the ellipsoid of these half axes", 2.0 * half)
         });
         format!(
-            "{certified}never closer than {:.3} m{height} under any law and any loss of messages. Assumed: {tracking}commands \
-             up to {} m/s^2 are carried out; position errors stay below {} m and velocity errors below {} m/s; pushes \
-             stay below {} m/s^2{delay}{lag} ({tube} {:.3} m)",
+            "{certified}never closer than {:.3} m{height} under any law and any loss of messages. Assumed: {tracking}\
+             commands up to {} m/s^2 are carried out; position errors stay below {} m and velocity errors below {} \
+             m/s; pushes stay below {} m/s^2{delay}{lag} ({tube} {:.3} m)",
             of.delta_m,
             of.accel_m_s2,
             of.position_error_m,

@@ -1,8 +1,8 @@
 //! Search for the sequence of wishes and winds with the largest tracking error.
 //!
-//! An evolution: each generation changes the worst plans so far in times, directions and winds, flies the changed plans,
-//! and keeps the worst of each line of descent. Every number comes from a seed, and a generation is drawn before it
-//! flies: the result is the same on any number of threads.
+//! An evolution: each generation changes the worst plans so far in times, directions and winds. It flies the changed
+//! plans and keeps the worst of each line of descent. Every number comes from a seed, and a generation is drawn before
+//! it flies: the result is the same on any number of threads.
 
 use nalgebra::Vector3;
 use rand_chacha::ChaCha8Rng;

@@ -349,7 +349,7 @@ impl Attitude {
     /// Returns the thrust \[N\] and the torque about the body axes \[N m\] that turn the body towards a force \[N\].
     /// `rates_rad_s` are about the body axes.
     ///
-    /// An error e alone turns the body at omega e/(2 zeta), and an acceleration of 2 zeta omega times this rate stops it.
+    /// An error e alone turns the body at omega e/(2 zeta). An acceleration of 2 zeta omega times this rate stops it.
     /// The loop asks for no faster rate and for no larger acceleration than the rotors give at every commanded thrust.
     /// Otherwise, commands that reverse faster than the body turns get more torque to one side than to the other.
     #[must_use]

@@ -22,16 +22,11 @@ const LAWS: [(&str, &[&str]); 9] = [
     ("flocking", &[]),
 ];
 
-fn file(name: &str) -> String {
-    let folder = std::env::var("EXPLORE_FOLDER").ok();
-    folder.map_or_else(|| name.to_owned(), |folder| format!("\"{folder}/{name}.toml\""))
-}
-
 /// Returns six vehicles of a model that change places across a circle.
 fn crossing(name: &str, law: (&str, &[&str]), more: &[String]) -> Scenario {
     let (radius_m, delta_m) = if name == "hummingbird" { (8.0, 0.8) } else { (2.6, 0.4) };
     let sets = [
-        format!("vehicle.model={}", file(name)),
+        format!("vehicle.model={name}"),
         format!("start.radius_m={radius_m}"),
         format!("formation.radius_m={radius_m}"),
         "swarm.count=6".to_owned(),
@@ -47,7 +42,7 @@ fn stacked(name: &str, law: (&str, &[&str]), more: &[String]) -> Scenario {
     let sets = [
         "swarm.count=2".to_owned(),
         "swarm.dimensions=3".to_owned(),
-        format!("vehicle.model={}", file(name)),
+        format!("vehicle.model={name}"),
         format!("start={{positions_m=[[0,0,0],[0.05,0.02,{height_m}]]}}"),
         format!("formation={{shape=\"points\",points_m=[[0,0,{height_m}],[0,0,0]]}}"),
         format!("law={{kind=\"{}\",delta_m={delta_m}}}", law.0),
@@ -75,11 +70,7 @@ fn fly(scenario: &Scenario) -> Flight {
 fn every_law_keeps_every_model_in_its_tube() {
     let is_long = std::env::var_os("TAUTLINE_LONG").is_some();
     let (seeds, duration_s) = if is_long { (0..6, 40) } else { (0..1, 12) };
-    let only = std::env::var("EXPLORE_ONLY").ok();
     for (name, _) in MODELS {
-        if only.as_ref().is_some_and(|only| only != name) {
-            continue;
-        }
         let wind_m_s = model(name).tracking.expect("a measured table").wind_m_s;
         let (mut flights, mut largest) = (0_u32, 0.0_f64);
         let mut check = |scenario: &Scenario, what: &str| {
@@ -87,10 +78,6 @@ fn every_law_keeps_every_model_in_its_tube() {
             let shield = flight.shield.as_ref().expect("a shield");
             let share = shield.counters.tracking_share;
             (flights, largest) = (flights + 1, largest.max(share));
-            if std::env::var_os("EXPLORE").is_some() {
-                println!("{name}, {what}: {share} {:?} {:?}", shield.breach, flight.ending);
-                return;
-            }
             assert_eq!(shield.breach, None, "{name}, {what}");
             assert!(share < 1.0, "{name}, {what}: {share} of the tube");
         };
@@ -112,29 +99,5 @@ fn every_law_keeps_every_model_in_its_tube() {
             check(&stacked(name, law, &more), &format!("{law:?} stacked"));
         }
         println!("{name}: {flights} flights, at most {largest} of the tube");
-    }
-}
-
-#[test]
-fn explore_identify() {
-    let Some(name) = std::env::var_os("EXPLORE_MODEL") else { return };
-    let name = name.to_str().expect("a name");
-    if name == "schema" {
-        std::fs::write("/tmp/veh_schema.json", tautline_sim::scenario::schema().to_string()).expect("written");
-        return;
-    }
-    let tracking = model(name).tracking.expect("a measured table");
-    let sets = std::env::var("EXPLORE_SETS").unwrap_or_default();
-    let more: Vec<_> = sets
-        .split_whitespace()
-        .map(str::to_owned)
-        .chain([format!("wind.mean_m_s=[{},0,0]", tracking.wind_m_s), "shield.tracking_error_m=0.001".to_owned()])
-        .collect();
-    let found = crossing(name, LAWS[0], &more).identify();
-    match found {
-        Ok(found) => {
-            println!("{name} {sets}: {found}\n{found:?}\n{}", toml::to_string(&found.tracking).unwrap_or_default())
-        }
-        Err(error) => println!("{name} {sets}: {error}"),
     }
 }
