@@ -169,7 +169,11 @@ impl Scenario {
                 let mut flown = measure(&alone, &limits, wind_m_s, 0);
                 let is_tight = room_m_s2 <= FEEDBACK_FACTOR * flown.feedback_m_s2 / NOT_TIGHT || round > 2;
                 if is_enough(&flown) && (!is_free || is_tight) {
-                    flown = measure(&alone, &limits, wind_m_s, GENERATIONS);
+                    // Commands beyond the largest one are refused below.
+                    let is_refused = flown.command_m_s2 > limits.settings().accel_m_s2;
+                    if !is_refused {
+                        flown = measure(&alone, &limits, wind_m_s, GENERATIONS);
+                    }
                     if is_enough(&flown) {
                         break 'rounds (flown, limits);
                     }

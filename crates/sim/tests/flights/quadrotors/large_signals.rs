@@ -21,7 +21,7 @@ const STOP_PER_S: f64 = 1.0;
 /// Largest height over reversals on a level \[m\].
 const HEIGHT_M: f64 = 2.0;
 /// Largest speed beyond that of the commanded motion \[m/s\].
-const SPEED_M_S: f64 = 10.0;
+const SPEED_M_S: f64 = 15.0;
 
 fn alone(model: &Model, space: Space) -> (Scenario, Fleet) {
     let mut scenario = Scenario::new("alone", Swarm::at_rest(Rows::zeros(1)), Formation::line(1, 1.0), 1.0, 1.0);

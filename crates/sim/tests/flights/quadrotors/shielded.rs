@@ -104,7 +104,7 @@ fn a_separation_is_certified_with_a_searched_tracking_error_and_assumed_with_any
         let sets = [format!("vehicle.model={name}"), "law.delta_m=0.6".to_owned()];
         let scenario = builtin(SHIELDED, &sets.each_ref().map(String::as_str));
         let (headline, source, value) = checked(&scenario);
-        assert!(headline.contains("READY: certified never closer than 0.6 m by the shield within"), "{headline}");
+        assert!(headline.contains("READY: certified never closer than 0.600 m by the shield within"), "{headline}");
         assert!(headline.contains("measured by a search of"), "{headline}");
         let Some(FactValue::Number(error_m, "m")) = value else { panic!("{value:?}") };
         assert_eq!(source, Source::Observed);
@@ -129,7 +129,7 @@ fn a_separation_is_certified_with_a_searched_tracking_error_and_assumed_with_any
         let (headline, source, _) = changed(change);
         assert_eq!(source, Source::Declared, "{headline}");
         assert!(
-            headline.contains("READY: never closer than 0.4 m by the shield if the assumed tracking"),
+            headline.contains("READY: never closer than 0.400 m by the shield if the assumed tracking"),
             "{headline}"
         );
     }
@@ -138,7 +138,7 @@ fn a_separation_is_certified_with_a_searched_tracking_error_and_assumed_with_any
     assert!(source == Source::Declared && headline.contains("if the assumed tracking error"), "{headline}");
     // The bound of points is computed.
     let points = checked(&builtin(SHIELDED, &["vehicle.model=point", "vehicle.drag_per_s=0"]));
-    assert!(points.1 == Source::Proved && points.0.contains("certified never closer than 0.4 m by the shield"));
+    assert!(points.1 == Source::Proved && points.0.contains("certified never closer than 0.400 m by the shield"));
 }
 
 #[test]
