@@ -42,7 +42,7 @@ LONG = {
     ("docs/campaigns.md", "tautline campaign shard"): "a thousand flights",
     ("docs/campaigns.md", "tautline campaign missing"): "of the shards above",
     ("docs/campaigns.md", "tautline campaign merge"): "of the shards above",
-    ("docs/shield.md", "tautline check shielded-crazyflies --identify"): "a hundred flights",
+    ("docs/shield.md", "tautline check shielded-crazyflies --set vehicle.model=hummingbird"): "a thousand flights",
     ("docs/compare.md", "tautline compare"): "sixty flights",
     ("docs/viewer.md", "tautline render out/pentagon/run.mcap --film"): "six hundred pictures",
     ("docs/viewer.md", "tautline render pentagon-laplacian"): "two hundred pictures",

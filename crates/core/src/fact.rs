@@ -91,6 +91,8 @@ coded! {
         Speed = "speed",
         /// Distance of a vehicle from its reference.
         TrackingError = "tracking-error",
+        /// Number of flights of the search for the largest distance of a vehicle from its reference.
+        TrackingSearch = "tracking-search",
         /// Length of the control period.
         Period = "period",
         /// Age of a measurement or message.

@@ -413,7 +413,8 @@ impl Limits {
         }
     }
 
-    /// Returns the certificate of a fleet with these limits in words, with its assumptions.
+    /// Returns the certificate of a fleet with these limits in words, with its assumptions. With `tracking_error_m` the
+    /// tube is an assumption itself, and the words do not call the separation certified.
     #[must_use]
     pub fn certificate(&self) -> String {
         let of = &self.settings;
@@ -424,15 +425,18 @@ impl Limits {
         };
         let lag =
             if of.actuator_lag_s > 0.0 { format!("; actuators lag by {} s", of.actuator_lag_s) } else { String::new() };
-        let tube = if of.tracking_error_m.is_some() { "assumed tube" } else { "tube" };
+        let (certified, tracking, tube) = match of.tracking_error_m {
+            Some(error_m) => ("", format!("vehicles stay within {error_m} m of their references; "), "assumed tube"),
+            None => ("certified ", String::new(), "tube"),
+        };
         let height = of.half_height_m.map_or_else(String::new, |half| {
             let vertical = at_least(2.0 * half, 3);
             format!(" on a level and {vertical} m in the vertical, outside the ellipsoid of these half axes")
         });
         format!(
-            "certified never closer than {} m{height} under any law and any loss of messages. Assumed: commands up \
-             to {} m/s^2 are carried out; position errors stay below {} m and velocity errors below {} m/s; pushes \
-             stay below {} m/s^2{delay}{lag} ({tube} {} m)",
+            "{certified}never closer than {} m{height} under any law and any loss of messages. Assumed: {tracking}\
+             commands up to {} m/s^2 are carried out; position errors stay below {} m and velocity errors below {} \
+             m/s; pushes stay below {} m/s^2{delay}{lag} ({tube} {} m)",
             exact(of.delta_m),
             of.accel_m_s2,
             of.position_error_m,
@@ -540,6 +544,12 @@ mod tests {
         // The assumed tube takes the place of the computed one; the feedback is still that of the loop.
         let assumed = Settings { tracking_error_m: Some(0.25), path_error_m: 0.125, ..settings }.limits().expect("ok");
         assert_eq!(assumed.tube(), Tube { error_m: 0.375, ..limits.tube() });
+        let words = assumed.certificate();
+        assert!(words.starts_with("never closer than 1.000 m under any law"), "{words}");
+        assert!(
+            words.contains("Assumed: vehicles stay within 0.25 m of their references; commands up to 5"),
+            "{words}"
+        );
     }
 
     #[test]

@@ -103,7 +103,7 @@ impl Report {
 
     fn assumptions(&self, scenario: &Scenario) -> Vec<String> {
         let certificate = if let (Some(shield), Some(_)) = (&self.shield, self.separation.certified_m) {
-            format!("The shield between law and vehicles keeps a certificate: {}.", shield.certificate)
+            format!("With the shield between law and vehicles: {}.", shield.certificate)
         } else if self.separation.certified_m.is_some() {
             scenario.flown_law().map_or_else(|error| error.to_string(), |law| law.capabilities().assumptions.to_owned())
         } else {

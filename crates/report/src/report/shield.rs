@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use tautline_core::fact::Fact;
 use tautline_core::text::{counted, seconds, up_to};
 use tautline_sim::shield::ShieldReport;
 
@@ -10,6 +11,9 @@ use tautline_sim::shield::ShieldReport;
 pub struct ShieldNumbers {
     /// Certificate in words, with its assumptions.
     pub certificate: String,
+    /// Facts that the certificate rests on.
+    #[serde(skip_deserializing)]
+    pub facts: Vec<Fact>,
     /// Bound on the distance of a vehicle to its reference \[m\].
     pub tube_m: f64,
     /// Assumption that did not hold, with its vehicle. The certificate does not cover the flight then. Null if all of
@@ -55,6 +59,7 @@ impl From<&ShieldReport> for ShieldNumbers {
         let periods_s = |periods: u64| periods as f64 * of.period_s;
         Self {
             certificate: of.certificate.clone(),
+            facts: of.facts.clone(),
             tube_m: of.tube_m,
             exceeded: of.breach.map(|breach| format!("vehicle {}: {}", breach.vehicle + 1, breach.exceeded)),
             commands: counters.commands,

@@ -250,8 +250,8 @@ fn broken_certificate(report: &Report) -> Option<String> {
         let [min, certified] = below_bound(closest.separation_m, certified_m);
         if report.shield.is_some() {
             return format!(
-                "The shield certifies {certified} m, but {} came to {min} m: the flown motion is not the one that the \
-                 proof covers.",
+                "The assumptions of the shield held and imply {certified} m, but {} came to {min} m: the flown motion \
+                 is not the one that the proof covers.",
                 vehicles(closest.pair),
             );
         }

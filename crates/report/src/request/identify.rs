@@ -1,5 +1,6 @@
 //! `identify`: measures the tracking error of a scenario's quadrotors, and writes it into the file of a model.
 
+use std::collections::BTreeMap;
 use std::io::ErrorKind;
 use std::path::Path;
 
@@ -42,8 +43,9 @@ pub fn identify(what: &ScenarioRequest, out: Option<&Path>) -> Result<Identified
 
 /// Returns the text of a model: that of the file if it holds the model, of the built-in model, or of its keys.
 fn model_text(path: &Path, model: &Model) -> Result<String, Failure> {
-    let is_same =
-        |text: &str| vehicle::read(text).is_ok_and(|other| Model { tracking: model.tracking, ..other } == *model);
+    let is_same = |text: &str| {
+        vehicle::read(text).is_ok_and(|other| Model { tracking: model.tracking.clone(), ..other } == *model)
+    };
     match std::fs::read_to_string(path) {
         Ok(text) if is_same(&text) => return Ok(text),
         Err(error) if error.kind() == ErrorKind::NotFound => {}
@@ -66,20 +68,19 @@ fn without_table(text: &str) -> String {
         return format!("{}\n", text.trim_end());
     };
     let comments = lines[..at].iter().rev().take_while(|line| line.starts_with('#')).count();
-    let after = lines[at + 1..].iter().position(|line| line.starts_with('[')).map_or(lines.len(), |next| at + 1 + next);
+    let is_other = |line: &&str| line.starts_with('[') && !line.starts_with("[tracking.");
+    let after = lines[at + 1..].iter().position(is_other).map_or(lines.len(), |next| at + 1 + next);
     let kept: Vec<_> = lines[..at - comments].iter().chain(&lines[after..]).copied().collect();
     format!("{}\n", kept.join("\n").trim_end())
 }
 
 /// Returns the table `[tracking]` with comments.
 fn tracking_table(tracking: &Tracking, measured: &Identification) -> String {
-    let keys = toml::to_string(tracking).unwrap_or_default();
+    let table = BTreeMap::from([("tracking", tracking)]);
+    let keys = toml::to_string(&table).unwrap_or_default();
     format!(
-        "\n# Measured by `tautline check --identify`, not proved: at most {} m in {} flights, times {}.\n# Worst: \
-         {}.\n[tracking]\n{keys}",
-        at_most(measured.largest_error_m, 4),
-        measured.flights,
-        measured.factor,
+        "\n# Measured by `tautline check --identify`, not proved: the largest error of the search times a margin.\n# \
+         Worst: {}.\n{keys}",
         measured.sequence
     )
 }
@@ -93,7 +94,7 @@ mod tests {
         for (_, text) in MODELS {
             let bare = without_table(text);
             assert!(bare.starts_with("# ") && !bare.contains("tracking") && bare.ends_with("attitude_damping = 1.0\n"));
-            let old = "\n# Measured by hand.\n[tracking]\nerror_m = 1.0\n";
+            let old = "\n# Measured by hand.\n[tracking]\nerror_m = 1.0\n\n[tracking.search]\nflights = 1\n";
             assert_eq!(without_table(&format!("{bare}{old}")), bare);
             assert_eq!(without_table(&bare), bare);
         }

@@ -3,7 +3,9 @@
 use serde::Serialize;
 
 use crate::scenario::Scenario;
-use tautline_core::text::{separation, significant, up_to};
+use crate::shield::TrackingBasis;
+use tautline_core::fact::Fact;
+use tautline_core::text::{exact, separation, significant, up_to};
 use tautline_shield::fleet::PairRoom;
 
 /// Shield of a scenario, in SI units.
@@ -11,6 +13,8 @@ use tautline_shield::fleet::PairRoom;
 pub struct ShieldCheck {
     /// Certificate in words, with its assumptions.
     pub certificate: String,
+    /// Facts that the certificate rests on.
+    pub facts: Vec<Fact>,
     /// Bound on the distance of a vehicle to its reference \[m\].
     pub tube_m: f64,
     /// Bound on the feedback of the tracker \[m/s^2\].
@@ -33,16 +37,19 @@ pub struct ShieldCheck {
     pub slot_room_m: f64,
     /// Gap that vehicles keep by choice \[m\].
     pub ease_m: f64,
+    #[serde(skip)]
+    pub(super) basis: TrackingBasis,
 }
 
 impl ShieldCheck {
     /// Returns the findings; `None` without a shield, or for a scenario that is not valid.
     pub(super) fn of(scenario: &Scenario) -> Option<Self> {
         let limits = scenario.shield_limits().ok()??;
-        let (start, slot) = scenario.shield_rooms()?;
+        let ((start, slot), basis) = (scenario.shield_rooms()?, scenario.tracking_basis()?);
         let numbers = |of: &PairRoom| [of.pair.0 + 1, of.pair.1 + 1];
         Some(Self {
-            certificate: limits.certificate(),
+            certificate: basis.certificate(&limits),
+            facts: basis.facts(limits.tube().error_m),
             tube_m: limits.tube().error_m,
             feedback_m_s2: limits.tube().feedback_m_s2,
             reference_m_s2: limits.reference_m_s2(),
@@ -54,7 +61,20 @@ impl ShieldCheck {
             slot_pair: numbers(&slot),
             slot_room_m: slot.room_m(),
             ease_m: limits.ease_m(),
+            basis,
         })
+    }
+
+    /// Returns the separation \[m\] with the basis of the tracking error, a part of the headline.
+    pub(super) fn brief(&self, certified_m: f64) -> String {
+        let never = format!("never closer than {} m by the shield", exact(certified_m));
+        match self.basis {
+            TrackingBasis::Proved => format!("certified {never}"),
+            TrackingBasis::Searched(flights) => {
+                format!("certified {never} within a tracking error measured by a search of {flights} flights")
+            }
+            TrackingBasis::Assumed => format!("{never} if the assumed tracking error of {} m holds", self.tube_m),
+        }
     }
 
     /// Returns the certificate and the worst pairs, one line.

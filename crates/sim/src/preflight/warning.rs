@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use super::{Connectivity, LegCertificate, Preflight, margins};
+use crate::shield::TrackingBasis;
 use crate::vehicle::Quadrotor;
 use tautline_core::text;
 use tautline_core::text::{at_least, beside_limit, counted, exact, seconds, table, up_to};
@@ -133,11 +134,9 @@ impl Preflight {
         if !refusing.is_empty() {
             return format!("REFUSED: {}", refusing.join(", "));
         }
-        let certificate = match self.certified_m {
-            Some(certified_m) if self.shield.is_some() => {
-                format!("certified never closer than {} m by the shield", exact(certified_m))
-            }
-            Some(certified_m) => {
+        let certificate = match (self.certified_m, &self.shield) {
+            (Some(certified_m), Some(shield)) => shield.brief(certified_m),
+            (Some(certified_m), None) => {
                 format!(
                     "certified never closer than {} m in continuous time (delta {} m){}",
                     beside_limit(certified_m, self.delta_m, 6),
@@ -149,7 +148,7 @@ impl Preflight {
                     }
                 )
             }
-            None => "no separation is certified".to_owned(),
+            (None, _) => "no separation is certified".to_owned(),
         };
         let warnings = match self.warnings.len() {
             0 => "no warnings".to_owned(),
@@ -220,7 +219,13 @@ impl Preflight {
     fn obstacles_line(&self, start_clearance_margin_m: f64) -> String {
         let certified = match self.certified_clearance_margin_m {
             Some(clearance_margin_m) => {
-                format!("certified {} m beyond every clearance", at_least(clearance_margin_m, 6))
+                let beyond = format!("{} m beyond every clearance", at_least(clearance_margin_m, 6));
+                let is_assumed = self.shield.as_ref().is_some_and(|shield| shield.basis == TrackingBasis::Assumed);
+                if is_assumed {
+                    format!("{beyond} if the assumed tracking error holds")
+                } else {
+                    format!("certified {beyond}")
+                }
             }
             None => "not certified".to_owned(),
         };

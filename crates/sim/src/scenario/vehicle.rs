@@ -221,7 +221,7 @@ impl From<&Scenario> for VehicleTable {
             let same_loop = (other.attitude_rad_s, other.attitude_damping, DEFAULT_ATTITUDE_HZ);
             let is_same_loop = (attitude_rad_s, attitude_damping, quadrotor.attitude_hz) == same_loop;
             // Another attitude loop drops the measured tracking error.
-            let tracking = other.tracking.filter(|_| is_same_loop);
+            let tracking = other.tracking.clone().filter(|_| is_same_loop);
             Model { attitude_rad_s, attitude_damping, tracking, ..other.clone() } == *model
         };
         let name = built_in.into_iter().find(is_it).map(|(name, _)| name.to_owned());

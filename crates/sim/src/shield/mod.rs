@@ -19,12 +19,14 @@
 //! The flight measures the distance to the reference at each step and reports it as a share of the tube.
 
 mod identify;
+mod search;
 mod stage;
 mod tracking;
 
 pub use identify::{Identification, TRACKING_FACTOR};
 pub(crate) use stage::ShieldStage;
 pub use stage::{ShieldBreach, ShieldReport};
+pub(crate) use tracking::TrackingBasis;
 
 use nalgebra::Vector3;
 use schemars::JsonSchema;

@@ -5,8 +5,10 @@ use std::collections::VecDeque;
 use nalgebra::Vector3;
 use rayon::prelude::*;
 
+use super::TrackingBasis;
 use crate::link::{Radio, RadioUse, period};
 use crate::scenario::{Scenario, ScenarioError, Space};
+use tautline_core::fact::Fact;
 use tautline_core::swarm::{Rows, Swarm, first_row_not_finite, row, set_row};
 use tautline_laws::law::LawError;
 use tautline_shield::report::Exceeded;
@@ -20,6 +22,8 @@ const SAME_S: f64 = 1e-9;
 pub struct ShieldReport {
     /// Certificate in words, with its assumptions.
     pub certificate: String,
+    /// Facts that the certificate rests on.
+    pub facts: Vec<Fact>,
     /// Bound on the distance of a vehicle to its reference \[m\].
     pub tube_m: f64,
     /// Period of the shield \[s\].
@@ -52,6 +56,7 @@ pub struct ShieldBreach {
 pub(crate) struct ShieldStage {
     fleet: Fleet,
     certificate: String,
+    facts: Vec<Fact>,
     period_s: f64,
     /// Whether references stay in the plane z = 0. Quadrotors there hold their height by themselves, up to the sag of
     /// a tilt, and ignore commands along z.
@@ -105,7 +110,7 @@ impl ShieldStage {
     /// Returns the shields of a scenario, at its start; `None` without a shield.
     pub(crate) fn of(scenario: &Scenario) -> Result<Option<Self>, ScenarioError> {
         let Some(limits) = scenario.shield_limits()? else { return Ok(None) };
-        let count = scenario.count();
+        let (count, basis) = (scenario.count(), scenario.tracking_basis().unwrap_or(TrackingBasis::Assumed));
         let starts: Vec<_> = scenario.shield_starts(&limits)?.iter().map(|start| start.state).collect();
         let fleet = scenario.shield_fleet(&limits, &starts)?;
         let mut failed_from_s = vec![f64::INFINITY; count];
@@ -114,7 +119,8 @@ impl ShieldStage {
         }
         Ok(Some(Self {
             fleet,
-            certificate: limits.certificate(),
+            certificate: basis.certificate(&limits),
+            facts: basis.facts(limits.tube().error_m),
             period_s: limits.settings().period_s,
             is_plane: scenario.space == Space::Plane,
             radio: Radio::new(scenario, count * (count - 1), RadioUse::Contracts),
@@ -284,6 +290,7 @@ impl ShieldStage {
         let first = self.fleet.shields().first().map(Shield::limits);
         ShieldReport {
             certificate: self.certificate.clone(),
+            facts: self.facts.clone(),
             tube_m: first.map_or(0.0, |limits| limits.tube().error_m),
             period_s: self.period_s,
             counters,

@@ -3,13 +3,64 @@
 use super::{SAME, ShieldSpec, refused, refused_with};
 use crate::scenario::{DEFAULT_ATTITUDE_HZ, Scenario, ScenarioError, Space};
 use crate::vehicle::{self, MODELS, Quadrotor, Tracking};
+use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::text::shortest;
 use tautline_laws::law::LawSpec;
+use tautline_shield::Limits;
 
 /// Default of the largest command without a measured table, as a share of what thrust and lift allow.
 const ACCEL_SHARE: f64 = 0.5;
 
+/// Basis of the bound on the distance of a vehicle to its reference.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum TrackingBasis {
+    /// Computed bound of the tracker's loop.
+    Proved,
+    /// Largest error of a search with this number of flights, times a margin.
+    Searched(u64),
+    /// Declared by the scenario, or by a table of the model without a search of this model.
+    Assumed,
+}
+
+impl TrackingBasis {
+    /// Returns the facts on the tracking error, with its bound \[m\].
+    pub(crate) fn facts(self, error_m: f64) -> Vec<Fact> {
+        let error = |source| Fact::number(FactKind::TrackingError, source, error_m, "m");
+        match self {
+            Self::Proved => vec![error(Source::Proved)],
+            Self::Assumed => vec![error(Source::Declared)],
+            Self::Searched(flights) => vec![
+                error(Source::Observed),
+                Fact::number(FactKind::TrackingSearch, Source::Recorded, flights as f64, "flights"),
+            ],
+        }
+    }
+
+    /// Returns the certificate of the shield in words.
+    pub(crate) fn certificate(self, limits: &Limits) -> String {
+        let words = limits.certificate();
+        match self {
+            Self::Proved | Self::Assumed => words,
+            Self::Searched(flights) => {
+                format!("certified {words}. The tracking error was measured by a search of {flights} flights")
+            }
+        }
+    }
+}
+
 impl Scenario {
+    /// Returns the basis of the bound on the tracking error; `None` without a shield.
+    pub(crate) fn tracking_basis(&self) -> Option<TrackingBasis> {
+        let given = self.shield?;
+        if given.tracking_error_m.is_some() {
+            return Some(TrackingBasis::Assumed);
+        }
+        let Some(quadrotor) = self.airframe.quadrotor() else { return Some(TrackingBasis::Proved) };
+        let dimensions = self.space.dimensions();
+        let search = quadrotor.model.tracking_search().filter(|search| search.dimensions.contains(&dimensions));
+        Some(search.map_or(TrackingBasis::Assumed, |search| TrackingBasis::Searched(search.flights)))
+    }
+
     /// Returns the table of the shield. For quadrotors, the measured table of the model replaces keys that are not
     /// given, and `tracking_error_m` if the scenario is within its conditions.
     pub(super) fn shield_keys(&self) -> Option<ShieldSpec> {

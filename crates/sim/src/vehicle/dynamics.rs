@@ -295,6 +295,10 @@ pub const LEAST_LIFT: f64 = 0.3;
 /// Share of the largest thrust that is reserved for the attitude loop.
 pub const THRUST_RESERVE: f64 = 0.1;
 
+/// Largest vertical thrust while the body turns towards a force, over the vertical part of the force. A body halfway to
+/// a steep tilt would climb otherwise. A turn to less than 48 degrees stays below it.
+const TURNING_LIFT: f64 = 1.25;
+
 /// Attitude loop of a model. It keeps the heading along the world's x axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Attitude {
@@ -304,15 +308,23 @@ pub struct Attitude {
     damping: f64,
     weight_n: f64,
     most_n: f64,
+    /// Largest acceleration about level axes for which the loop asks \[rad/s^2\].
+    most_turn_rad_s2: f64,
+    /// Largest error about level axes that counts. It turns the body at the fastest rate that this acceleration stops.
+    most_error: f64,
 }
 
 impl Attitude {
     /// Creates the attitude loop of a model.
     #[must_use]
     pub fn of(model: &Model) -> Self {
+        let inertia_kg_m2 = model.inertia_kg_m2.into();
+        let most_turn_rad_s2 = Mixer::new(model).map_or(0.0, |mixer| mixer.turn_rad_s2(&inertia_kg_m2));
         Self {
+            most_turn_rad_s2,
+            most_error: (2.0 * model.attitude_damping / model.attitude_rad_s).powi(2) * most_turn_rad_s2,
             mass_kg: model.mass_kg,
-            inertia_kg_m2: model.inertia_kg_m2.into(),
+            inertia_kg_m2,
             rad_s: model.attitude_rad_s,
             damping: model.attitude_damping,
             weight_n: model.weight_n(),
@@ -336,6 +348,10 @@ impl Attitude {
 
     /// Returns the thrust \[N\] and the torque about the body axes \[N m\] that turn the body towards a force \[N\].
     /// `rates_rad_s` are about the body axes.
+    ///
+    /// An error e alone turns the body at omega e/(2 zeta). An acceleration of 2 zeta omega times this rate stops it.
+    /// The loop asks for no faster rate and for no larger acceleration than the rotors give at every commanded thrust.
+    /// Otherwise, commands that reverse faster than the body turns get more torque to one side than to the other.
     #[must_use]
     pub fn wrench(
         &self,
@@ -346,11 +362,25 @@ impl Attitude {
         let body = attitude.to_rotation_matrix().into_inner();
         let asked = attitude_along(force_n);
         let off = asked.transpose() * body;
-        let error = 0.5 * Vector3::new(off[(2, 1)] - off[(1, 2)], off[(0, 2)] - off[(2, 0)], off[(1, 0)] - off[(0, 1)]);
-        let turn_rad_s2 = self.rad_s * (self.rad_s * error + 2.0 * self.damping * rates_rad_s);
+        let up = body.column(2);
+        let climbing_n = if up.z > 0.0 { TURNING_LIFT * force_n.z / up.z } else { f64::INFINITY };
+        let lift_n = force_n.dot(&up).max(0.0).min(climbing_n);
+        let mut error =
+            0.5 * Vector3::new(off[(2, 1)] - off[(1, 2)], off[(0, 2)] - off[(2, 0)], off[(1, 0)] - off[(0, 1)]);
+        let tilt = error.x.hypot(error.y);
+        if tilt > self.most_error {
+            error.x *= self.most_error / tilt;
+            error.y *= self.most_error / tilt;
+        }
+        let mut turn_rad_s2 = self.rad_s * (self.rad_s * error + 2.0 * self.damping * rates_rad_s);
+        let level_rad_s2 = turn_rad_s2.x.hypot(turn_rad_s2.y);
+        if level_rad_s2 > self.most_turn_rad_s2 {
+            turn_rad_s2.x *= self.most_turn_rad_s2 / level_rad_s2;
+            turn_rad_s2.y *= self.most_turn_rad_s2 / level_rad_s2;
+        }
         let momentum = self.inertia_kg_m2.component_mul(&rates_rad_s);
         let torque_n_m = rates_rad_s.cross(&momentum) - self.inertia_kg_m2.component_mul(&turn_rad_s2);
-        (force_n.dot(&body.column(2)).max(0.0), torque_n_m)
+        (lift_n, torque_n_m)
     }
 }
 

@@ -19,7 +19,7 @@ pub use dynamics::{Attitude, Drift, Dynamics, Ground, LEAST_LIFT, State, THRUST_
 pub use fleet::{Fleet, HEIGHT_RAD_S, RotorFailure};
 pub use model::{GRAVITY_M_S2, MODELS, Model, ModelError, ModelParseError, Quadrotor, RotorDirection, read};
 pub use rotors::{AIR_DENSITY_KG_M3, Downwash, Mixer, RotorCurve, RotorLag};
-pub use tracking::Tracking;
+pub use tracking::{Tracking, TrackingSearch};
 pub use unicycle::{Heading, Steering, Unicycle};
 
 /// Kind of body of a vehicle.

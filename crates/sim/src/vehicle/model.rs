@@ -257,6 +257,10 @@ impl Model {
                 let help = format!("its numbers must be from {least:e} to {most:e}; pushes, wind and errors may be 0");
                 return Err(refuse("tracking", format!("the table has the number {number}"), help));
             }
+            if let Some(problem) = tracking.search.as_ref().and_then(|search| search.contradiction(tracking.error_m)) {
+                let help = "measure the table with `tautline check --identify`, or leave out tracking.search";
+                return Err(refuse("tracking", problem, help.to_owned()));
+            }
         }
         let places = self.rotor_positions_m.iter().flatten().map(|&place| ("rotor_positions_m", place));
         let mut others = places.chain([("thrust_n_per_rpm", self.thrust_n_per_rpm)]);

@@ -58,6 +58,10 @@ impl RotorLag {
 /// Smallest determinant of the mixing matrix, with lengths relative to the arms, for independent thrust and torques.
 const LEAST_DETERMINANT: f64 = 1e-3;
 
+/// Share of the weight to which torques may raise a smaller total thrust. It is below 1, so that a vehicle whose
+/// attitude loop saturates can still descend.
+const RAISED_LIFT: f64 = 0.7;
+
 /// Mixing of rotors: their shares in thrust and torques about the body axes; all 0 by default.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Mixer {
@@ -66,6 +70,8 @@ pub struct Mixer {
     /// Thrust \[N\] of each rotor for a torque of 1 N m about x, y and z, without total thrust.
     turns: [Vector4<f64>; 3],
     most_n: f64,
+    /// Total thrust to which torques may raise a smaller one \[N\].
+    raised_n: f64,
 }
 
 impl Mixer {
@@ -85,11 +91,16 @@ impl Mixer {
         let share = |effect: usize, unit: f64| Vector4::from(inverse.column(effect)) / unit;
         let lift = share(0, 1.0);
         let turns = [share(1, arm_m), share(2, arm_m), share(3, model.torque_per_thrust_m)];
-        (lift.min() > 0.0).then_some(Self { lift, turns, most_n: model.max_thrust_n })
+        let (most_n, raised_n) = (model.max_thrust_n, RAISED_LIFT * model.weight_n());
+        (lift.min() > 0.0).then_some(Self { lift, turns, most_n, raised_n })
     }
 
     /// Returns the thrust of each rotor \[N\], from 0 to its largest, for a total thrust \[N\] and a torque about the
-    /// body axes \[N m\]. Where rotors saturate, roll and pitch have priority, then yaw, then thrust.
+    /// body axes \[N m\].
+    ///
+    /// Where rotors saturate, roll and pitch have priority, then yaw, then thrust. Torques may lower the total thrust,
+    /// but raise it only to 0.7 of the weight. Beyond that they are scaled down: a torque that is asked for
+    /// again and again must not lift the vehicle.
     #[must_use]
     pub fn thrusts_n(&self, lift_n: f64, torque_n_m: Vector3<f64>) -> Vector4<f64> {
         let [roll, pitch, yaw] = &self.turns;
@@ -97,10 +108,11 @@ impl Mixer {
         if all.iter().all(|thrust_n| (0.0..=self.most_n).contains(thrust_n)) {
             return all;
         }
+        let raised_n = lift_n.max(self.raised_n);
         let level = roll * torque_n_m.x + pitch * torque_n_m.y;
-        let level = level * self.largest_share(&Vector4::zeros(), &level);
+        let level = level * self.largest_share(raised_n, &Vector4::zeros(), &level);
         let yaw = yaw * torque_n_m.z;
-        let turning = level + yaw * self.largest_share(&level, &yaw);
+        let turning = level + yaw * self.largest_share(raised_n, &level, &yaw);
         let (mut least_n, mut most_n) = (0.0_f64, f64::INFINITY);
         for (turn, lift) in turning.iter().zip(&self.lift) {
             least_n = least_n.max(-turn / lift);
@@ -110,22 +122,35 @@ impl Mixer {
         (turning + self.lift * lift_n).map(|thrust_n| thrust_n.clamp(0.0, self.most_n))
     }
 
-    /// Returns the largest share of `more`, at most 1, for which some total thrust keeps every rotor within its limits.
-    /// For a share of 0 there must be such a thrust.
-    fn largest_share(&self, base: &Vector4<f64>, more: &Vector4<f64>) -> f64 {
+    /// Returns the largest share of `more`, at most 1, for which some total thrust up to `raised_n` keeps every rotor
+    /// within its limits. For a share of 0 there must be such a thrust.
+    fn largest_share(&self, raised_n: f64, base: &Vector4<f64>, more: &Vector4<f64>) -> f64 {
         let mut share = 1.0_f64;
+        let mut limit = |room: f64, grows: f64| {
+            if grows > 0.0 {
+                share = share.min((room / grows).max(0.0));
+            }
+        };
         for i in 0..4 {
+            // The total thrust that rotor i needs for its minimum must not exceed the largest one.
+            let needed = |turn: &Vector4<f64>| -turn[i] / self.lift[i];
+            limit(raised_n - needed(base), needed(more));
             for j in 0..4 {
-                // The total thrust that rotor i needs for its minimum must not exceed that at which rotor j reaches its
-                // maximum.
-                let spread = |of: &Vector4<f64>| of[j] / self.lift[j] - of[i] / self.lift[i];
-                let (room, grows) = (self.most_n / self.lift[j] - spread(base), spread(more));
-                if grows > 0.0 {
-                    share = share.min((room / grows).max(0.0));
-                }
+                // Nor must it exceed the total thrust at which rotor j reaches its maximum.
+                let spread = |turn: &Vector4<f64>| turn[j] / self.lift[j] + needed(turn);
+                limit(self.most_n / self.lift[j] - spread(base), spread(more));
             }
         }
         share
+    }
+
+    /// Returns the largest acceleration \[rad/s^2\] about any level axis that a body with these moments of inertia
+    /// \[kg m^2\] gets at every commanded thrust: that of 0.7 of the weight.
+    pub(super) fn turn_rad_s2(&self, inertia_kg_m2: &Vector3<f64>) -> f64 {
+        let [roll, pitch, _] = &self.turns;
+        (0..4)
+            .map(|i| self.raised_n * self.lift[i] / (roll[i] * inertia_kg_m2.x).hypot(pitch[i] * inertia_kg_m2.y))
+            .fold(f64::INFINITY, f64::min)
     }
 }
 
@@ -176,5 +201,49 @@ impl Downwash {
         let width_m = self.strength * (2.0 / std::f64::consts::PI).sqrt() / axis_m_s;
         let squared = (from_m.x * from_m.x + from_m.y * from_m.y) / (width_m * width_m);
         if squared > WIDTHS * WIDTHS { 0.0 } else { axis_m_s * axis_m_s * libm::exp(-2.0 * squared) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::model::{MODELS, read};
+    use super::*;
+
+    #[test]
+    fn torques_beyond_the_rotors_are_scaled_and_raise_only_a_small_thrust() {
+        for (name, text) in MODELS {
+            let model = read(text).expect("a model");
+            let (mixer, weight_n) = (Mixer::new(&model).expect("independent rotors"), model.weight_n());
+            let arm_m = model.rotor_positions_m[0][0].hypot(model.rotor_positions_m[0][1]);
+            for (lift, direction) in [
+                (0.0, Vector3::x()),
+                (0.3, Vector3::y()),
+                (1.0, Vector3::new(1.0, -2.0, 0.0)),
+                (1.2, Vector3::new(-1.0, 1.0, 0.5)),
+                (1.0, Vector3::z()),
+            ] {
+                let torque_n_m = direction * (10.0 * weight_n * arm_m);
+                let thrusts_n = mixer.thrusts_n(lift * weight_n, torque_n_m);
+                let most_n = lift.max(RAISED_LIFT) * weight_n * (1.0 + 1e-12);
+                assert!(thrusts_n.sum() <= most_n && thrusts_n.min() >= 0.0, "{name}, {lift}: {thrusts_n}");
+                // Roll and pitch keep their direction.
+                let places_m = model.rotor_positions_m;
+                let roll: f64 = (0..4).map(|i| places_m[i][1] * thrusts_n[i]).sum();
+                let pitch: f64 = (0..4).map(|i| -places_m[i][0] * thrusts_n[i]).sum();
+                let across = roll * direction.y - pitch * direction.x;
+                assert!(across.abs() < 1e-9 * weight_n && roll * direction.x + pitch * direction.y >= -1e-12, "{name}");
+                assert!(roll.hypot(pitch) > 0.05 * weight_n * arm_m || direction.xy().norm() == 0.0, "{name}, {lift}");
+            }
+        }
+    }
+
+    #[test]
+    fn thrusts_within_the_limits_are_exact() {
+        let model = read(MODELS[0].1).expect("a model");
+        let mixer = Mixer::new(&model).expect("independent rotors");
+        let (lift_n, torque_n_m) = (model.weight_n(), Vector3::new(2e-4, -1e-4, 1e-5));
+        let thrusts_n = mixer.thrusts_n(lift_n, torque_n_m);
+        let roll: f64 = (0..4).map(|i| model.rotor_positions_m[i][1] * thrusts_n[i]).sum();
+        assert!((thrusts_n.sum() - lift_n).abs() < 1e-12 && (roll - torque_n_m.x).abs() < 1e-15, "{thrusts_n}");
     }
 }

@@ -5,10 +5,11 @@ use serde::{Deserialize, Serialize};
 
 use super::dynamics::{LEAST_LIFT, THRUST_RESERVE};
 use super::model::{GRAVITY_M_S2, Model};
+use tautline_core::record::sha256_hex;
 
 /// Distance of a quadrotor to the reference of a shield, with the conditions under which it was measured: the table
 /// `[tracking]` of a model. `tautline check --identify` measures it. It is an assumption, not a proved bound.
-#[derive(Clone, Copy, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Tracking {
     /// Assumed bound on the distance to the reference in m.
@@ -41,6 +42,53 @@ pub struct Tracking {
     /// Error of the measured own velocity in m/s.
     #[schemars(extend("minimum" = 0))]
     pub velocity_error_m_s: f64,
+    /// Search that measured the error. A table without a search is an assumption of its author.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(with = "TrackingSearch")]
+    pub search: Option<TrackingSearch>,
+}
+
+/// Search for the largest tracking error of a model.
+#[derive(Clone, Debug, Deserialize, PartialEq, Serialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TrackingSearch {
+    /// Number of flights of the search.
+    #[schemars(extend("minimum" = 1))]
+    pub flights: u64,
+    /// Largest distance to the reference that the search found in m.
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub largest_error_m: f64,
+    /// Factor from the largest error to `error_m`, at least 1.
+    #[schemars(extend("minimum" = 1))]
+    pub margin: f64,
+    /// Numbers of dimensions in which the model flew: 2 for the plane z = 0, 3 for space. In others the table is an
+    /// assumption.
+    pub dimensions: Vec<usize>,
+    /// Fingerprint of the model that flew. A table of another model is an assumption.
+    pub model: String,
+}
+
+/// Relative rounding of `error_m` over its product.
+const ROUNDING: f64 = 1e-9;
+/// Number of hexadecimal digits of a fingerprint.
+const FINGERPRINT_DIGITS: usize = 16;
+
+impl TrackingSearch {
+    /// Returns why the search does not support a bound \[m\].
+    pub(super) fn contradiction(&self, error_m: f64) -> Option<String> {
+        let &Self { flights, largest_error_m, margin, .. } = self;
+        if flights == 0 {
+            return Some("tracking.search.flights is 0".to_owned());
+        }
+        if !(margin >= 1.0 && margin.is_finite()) {
+            return Some(format!("tracking.search.margin is {margin}, less than 1"));
+        }
+        let needed_m = margin * largest_error_m;
+        let is_covered = needed_m > 0.0 && needed_m <= error_m * (1.0 + ROUNDING);
+        (!is_covered).then(|| {
+            format!("tracking.error_m is {error_m}, not at least {margin} times the largest error {largest_error_m}")
+        })
+    }
 }
 
 impl Tracking {
@@ -55,6 +103,23 @@ impl Tracking {
 }
 
 impl Model {
+    /// Returns the fingerprint of the keys that a measurement depends on: all but the name and the table `[tracking]`.
+    #[must_use]
+    pub fn fingerprint(&self) -> String {
+        let keys = Self { name: String::new(), tracking: None, ..self.clone() };
+        let mut digits = sha256_hex(&toml::to_string(&keys).unwrap_or_default());
+        digits.truncate(FINGERPRINT_DIGITS);
+        digits
+    }
+
+    /// Returns the search that measured the tracking error of this very model; `None` for a table without a search, or
+    /// of another model.
+    #[must_use]
+    pub fn tracking_search(&self) -> Option<&TrackingSearch> {
+        let search = self.tracking.as_ref()?.search.as_ref()?;
+        (search.model == self.fingerprint()).then_some(search)
+    }
+
     /// Returns the largest acceleration \[m/s^2\] that lift and thrust allow in every direction. In the plane the
     /// rotors carry the weight, and the rest of the thrust accelerates sideways.
     #[must_use]

@@ -3,6 +3,8 @@
 mod attitude;
 mod closed_forms;
 mod flights;
+mod large_signals;
+mod laws;
 mod rotation;
 mod scenarios;
 mod shielded;

@@ -3,11 +3,13 @@
 //! `TAUTLINE_LONG=1` repeats the measurements of the built-in models.
 
 use tautline_audit::Status;
+use tautline_core::fact::{FactKind, FactValue, Source};
 use tautline_laws::formation::largest_edge_error_m;
 use tautline_shield::report::Exceeded;
 use tautline_sim::preflight::{Code, Preflight};
-use tautline_sim::scenario::{Override, Scenario, ScenarioError, Source};
+use tautline_sim::scenario::{self, Override, Scenario, ScenarioError};
 use tautline_sim::sim::Flight;
+use tautline_sim::vehicle::{self, Airframe, MODELS, Model};
 
 use super::model;
 use crate::flight::{builtin, fly};
@@ -16,7 +18,7 @@ const SHIELDED: &str = "shielded-crazyflies";
 
 fn refused(sets: &[&str]) -> ScenarioError {
     let sets: Vec<_> = sets.iter().map(|set| Override::parse(set).expect("a key")).collect();
-    Scenario::read(&Source::Builtin(SHIELDED.to_owned()), &sets).expect_err("refused")
+    Scenario::read(&scenario::Source::Builtin(SHIELDED.to_owned()), &sets).expect_err("refused")
 }
 
 fn tube_share(flight: &Flight) -> f64 {
@@ -81,9 +83,94 @@ fn conditions_of_a_measured_table_are_checked() {
     assert!(error.to_string().contains("which thrust and lift allow (9)"), "{error}");
     // An own assumption needs no table.
     assert!(builtin(SHIELDED, &["wind.mean_m_s=[1,0]", "shield.tracking_error_m=0.5"]).shield.is_some());
-    let again =
-        Scenario::read(&Source::Text { name: "again".to_owned(), text: builtin(SHIELDED, &[]).resolved_toml() }, &[]);
+    let again = Scenario::read(
+        &scenario::Source::Text { name: "again".to_owned(), text: builtin(SHIELDED, &[]).resolved_toml() },
+        &[],
+    );
     assert_eq!(again.expect("the same").shield_limits().expect("limits").expect("a shield").tube(), limits.tube());
+}
+
+/// Returns the headline of the check, and source and value of the fact on the tracking error.
+fn checked(scenario: &Scenario) -> (String, Source, Option<FactValue>) {
+    let found = Preflight::of(scenario).expect("a law");
+    let shield = found.shield.as_ref().expect("a shield");
+    let fact = shield.facts.iter().find(|fact| fact.kind == FactKind::TrackingError).expect("a fact");
+    let is_certified = shield.certificate.starts_with("certified");
+    assert_eq!(is_certified, found.headline().contains("certified"), "{} {}", found.headline(), shield.certificate);
+    (found.headline(), fact.source, fact.value.clone())
+}
+
+#[test]
+fn a_separation_is_certified_with_a_searched_tracking_error_and_assumed_with_any_other() {
+    for (name, _) in MODELS {
+        let sets = [format!("vehicle.model={name}"), "law.delta_m=0.6".to_owned()];
+        let scenario = builtin(SHIELDED, &sets.each_ref().map(String::as_str));
+        let (headline, source, value) = checked(&scenario);
+        assert!(headline.contains("READY: certified never closer than 0.600 m by the shield within"), "{headline}");
+        assert!(headline.contains("measured by a search of"), "{headline}");
+        let Some(FactValue::Number(error_m, "m")) = value else { panic!("{value:?}") };
+        assert_eq!(source, Source::Observed);
+        assert!(error_m >= model(name).tracking.expect("a table").error_m, "{error_m}");
+    }
+    // The table of a model whose keys changed after the measurement is an assumption. So is one without a search, or
+    // with a search in other dimensions.
+    let changed = |change: &dyn Fn(&mut Model)| {
+        let mut scenario = builtin(SHIELDED, &[]);
+        let mut quadrotor = scenario.airframe.quadrotor().expect("a quadrotor").clone();
+        change(&mut quadrotor.model);
+        scenario.set_airframe(Airframe::Quadrotor(Box::new(quadrotor)));
+        checked(&scenario)
+    };
+    let heavier = |model: &mut Model| model.mass_kg *= 1.02;
+    let unsearched = |model: &mut Model| model.tracking.as_mut().expect("a table").search = None;
+    let in_space = |model: &mut Model| {
+        let search = model.tracking.as_mut().and_then(|tracking| tracking.search.as_mut());
+        search.expect("a search").dimensions = vec![3];
+    };
+    for change in [&heavier as &dyn Fn(&mut Model), &unsearched, &in_space] {
+        let (headline, source, _) = changed(change);
+        assert_eq!(source, Source::Declared, "{headline}");
+        assert!(
+            headline.contains("READY: never closer than 0.400 m by the shield if the assumed tracking"),
+            "{headline}"
+        );
+    }
+    assert_eq!(changed(&|model: &mut Model| "renamed".clone_into(&mut model.name)).1, Source::Observed);
+    let (headline, source, _) = checked(&builtin(SHIELDED, &["shield.tracking_error_m=0.36"]));
+    assert!(source == Source::Declared && headline.contains("if the assumed tracking error"), "{headline}");
+    // The bound of points is computed.
+    let points = checked(&builtin(SHIELDED, &["vehicle.model=point", "vehicle.drag_per_s=0"]));
+    assert!(points.1 == Source::Proved && points.0.contains("certified never closer than 0.400 m by the shield"));
+}
+
+#[test]
+fn the_report_of_a_flight_has_the_basis_of_the_tracking_error() {
+    for (set, certified, source) in
+        [("law.delta_m=0.4", true, Source::Observed), ("shield.tracking_error_m=0.36", false, Source::Declared)]
+    {
+        let shield = fly(&builtin(SHIELDED, &["time.duration_s=1", set])).0.shield.expect("a shield");
+        assert_eq!(shield.certificate.starts_with("certified "), certified, "{}", shield.certificate);
+        assert_eq!((shield.facts[0].kind, shield.facts[0].source), (FactKind::TrackingError, source));
+    }
+}
+
+#[test]
+fn a_table_that_its_search_contradicts_is_refused() {
+    let (_, text) = MODELS[0];
+    let error_m = model("crazyflie").tracking.expect("a table").error_m;
+    for (key, value, says) in [
+        ("error_m", "0.2", "not at least 1.25 times the largest error"),
+        ("flights", "0", "flights is 0"),
+        ("margin", "0.9", "margin is 0.9, less than 1"),
+        ("largest_error_m", "nan", "not at least"),
+    ] {
+        let lines = text.lines().map(|line| match line.split_once(" = ") {
+            Some((name, _)) if name == key => format!("{key} = {value}"),
+            _ => line.to_owned(),
+        });
+        let error = vehicle::read(&lines.collect::<Vec<_>>().join("\n")).expect_err(key);
+        assert!(error.message.contains(says), "{key} of {error_m}: {}", error.message);
+    }
 }
 
 /// Each table covers the measured error times the stated factor, and is not far above it.
