@@ -76,7 +76,7 @@ fn every_law_keeps_every_model_in_its_tube() {
         let mut check = |scenario: &Scenario, what: &str| {
             let flight = fly(scenario);
             let shield = flight.shield.as_ref().expect("a shield");
-            let share = shield.counters.tracking_share;
+            let share = shield.counters.tracking_share.expect("an observed share");
             (flights, largest) = (flights + 1, largest.max(share));
             assert_eq!(shield.breach, None, "{name}, {what}");
             assert!(share < 1.0, "{name}, {what}: {share} of the tube");
