@@ -18,7 +18,7 @@ VIOLATION = 100.0
 
 
 class Worlds(VectorSimulation):
-    """Worlds of an environment. A new world passes over seeds without a valid start.
+    """Worlds of an environment. A new world skips seeds without a valid start.
 
     Raises :class:`Error` for a scenario with parts that an environment ignores.
     """

@@ -66,8 +66,8 @@ class Shield:
     vehicle that holds other starts voids the certificate.
 
     The certificate holds while commands up to ``accel_m_s2`` are carried out and the errors stay within their bounds;
-    ``report()`` names a bound that was exceeded, and lists what was checked. Shields can be copied and pickled; only
-    one of a shield and its copies may fly on.
+    ``report()`` names a bound that was exceeded, and lists the checked assumptions. Shields can be copied and pickled;
+    only one of a shield and its copies may fly on.
 
     Raises :class:`Error` for settings or starts that cannot be certified.
     """
@@ -167,7 +167,7 @@ class Shield:
     def messages(self) -> list[tuple[int, bytes]]:
         """Takes the messages to send after ``filter``: receivers, counted from 0, and 64 bytes each.
 
-        Vehicles far away get none.
+        Vehicles far away get no message.
         """
         return self._native.messages()
 
@@ -208,9 +208,9 @@ class Shield:
         """Returns the numbers so far. A share that was never observed is None.
 
         ``exceeded`` is an assumption that did not hold, in words, or None; ``exceeded_code`` is its code.
-        ``assumptions`` lists each assumption with its ``source``, and whether it ``held``: None where this cannot be
-        told from what was observed. Without :meth:`observe` and :meth:`observe_measurement` a shield cannot see a bias
-        of its own measurements.
+        ``assumptions`` lists each assumption with its ``source``, and whether it ``held``: None where the observations
+        do not decide it. Without :meth:`observe` and :meth:`observe_measurement` a shield cannot see a bias of its own
+        measurements.
         """
         counters, assumptions, exceeded = self._native.report()
         text, code = (None, None) if exceeded is None else exceeded

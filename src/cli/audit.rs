@@ -71,8 +71,8 @@ pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, 
         monitor.say(&audit_formats::counts(&answers));
     }
     write_answers(arguments, &answers, is_one)?;
-    let (judged, failures): (Vec<_>, Vec<_>) = answers.into_iter().map(|of| of.audited).partition(Result::is_ok);
-    let worst = judged.iter().flatten().map(|of| Exit::good_if(of.is_good())).max_by_key(|exit| *exit as u8);
+    let (judged, failures): (Vec<_>, Vec<_>) = answers.into_iter().map(|one| one.audited).partition(Result::is_ok);
+    let worst = judged.iter().flatten().map(|audit| Exit::good_if(audit.is_good())).max_by_key(|exit| *exit as u8);
     match failures.into_iter().filter_map(Result::err).max_by_key(|failure| Exit::of(failure) as u8) {
         // The annotation reports the failure.
         Some(failure) if arguments.annotations.is_some() => Ok(Exit::of(&failure)),
@@ -550,14 +550,16 @@ mod tests {
         ("join", &["--delta", "1", "--join"], false),
         ("sort", &["--delta", "1", "--sort"], false),
         ("duplicates", &["--delta", "1", "--duplicates", "first"], false),
+        ("distinct", &["--delta", "1", "--distinct"], false),
+        ("skip-incomplete", &["--delta", "1", "--skip-incomplete"], false),
         ("scale", &["--delta", "1", "--scale", "1"], false),
         ("axes", &["--delta", "1", "--axes", "enu"], false),
         ("column", &["--delta", "1", "--column", "t=t"], false),
     ];
 
     /// Options of readers that the recording of the test does not allow. None of them is a part of the question.
-    const READING: [&str; 8] =
-        ["one-vehicle", "dimensions", "start", "layout", "frame", "topic", "origin", "allow-unfinished"];
+    const READING: [&str; 9] =
+        ["one-vehicle", "dimensions", "start", "layout", "frame", "topic", "origin", "allow-unfinished", "clock"];
 
     #[test]
     fn every_option_that_depends_on_seconds_is_refused_with_a_guessed_unit() {

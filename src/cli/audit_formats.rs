@@ -266,7 +266,7 @@ fn judged(answers: &[Answer]) -> impl Iterator<Item = &AuditedRecording> {
 
 /// Returns the numbers of recordings with each verdict in one line.
 pub(super) fn counts(answers: &[Answer]) -> String {
-    let of = |status: Status| judged(answers).filter(|of| of.report.status == status).count() as u64;
+    let of = |status: Status| judged(answers).filter(|answer| answer.report.status == status).count() as u64;
     let failures = answers.len() - judged(answers).count();
     let mut parts = vec![
         counted(of(Status::Clear), "recording clear", "recordings clear"),

@@ -111,7 +111,8 @@ fn incomplete_rows_and_equal_vehicles_are_read_by_options() {
     let twins = "t_s,id,x,y\n0,a,0,0\n0,b,0,0\n1,a,1,0\n1,b,1,0\n2,a,2,0\n2,b,2,0\n";
     for (text, words, exit, expected) in [
         (gap, &[][..], 2, "recording/empty-cell"),
-        (gap, &["--skip-incomplete"], 0, "coordinates is empty: 1"),
+        (gap, &["--skip-incomplete"], 1, "UNDECIDED: a was not seen from 0.000 s to 2.000 s"),
+        (gap, &["--skip-incomplete", "--max-gap", "2"], 0, "coordinates is empty: 1"),
         (gap, &["--skip-incomplete", "--clock", "log"], 2, "recording/unused-option"),
         (twins, &[], 2, "recording/vehicle-twice"),
         (twins, &["--distinct"], 1, "VIOLATION"),

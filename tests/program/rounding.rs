@@ -29,7 +29,9 @@ fn texts(page: &str) -> String {
 fn numbers(text: &str, digits: &str) -> Vec<f64> {
     let is_of_number = |c: char| c.is_ascii_digit() || c == '.';
     let words = text.split(|c: char| !is_of_number(c)).map(|word| word.trim_end_matches('.'));
-    words.filter(|word| word.starts_with(digits)).filter_map(|word| word.parse().ok()).collect()
+    // Numbers with fewer decimals label axes.
+    let is_separation = |word: &&str| word.starts_with(digits) && word.len() > digits.len();
+    words.filter(is_separation).filter_map(|word| word.parse().ok()).collect()
 }
 
 /// Checks that each of these files shows a separation, and none a larger one than `apart_m`.

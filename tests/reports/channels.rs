@@ -79,8 +79,8 @@ fn every_channel_has_a_figure_with_a_line_per_vehicle() {
 
 #[test]
 fn an_extreme_of_one_sample_is_in_every_figure() {
-    let figures = figures_of(2, 10_000, |k| if k == 7777 { 3.0 } else { 0.1 });
-    for (figure, peak) in figures.iter().zip(["30.000°", "0.120 N", "15.000 m/s", "0.150 s"]) {
+    let figures = figures_of(2, 10_000, |k| if k == 7777 { 4.0 } else { 0.1 });
+    for (figure, peak) in figures.iter().zip(["40.000°", "0.160 N", "20.000 m/s", "0.200 s"]) {
         assert!(figure.description.contains(&format!("at most {peak}.")), "{}", figure.description);
     }
 }

@@ -166,10 +166,15 @@ fn the_page_of_an_audit_shows_the_smallest_distance_and_an_inset() {
     // The smallest separation of all pairs: 8 m except around the pass.
     let corners_of = |colour: &str| -> Vec<(f64, f64)> {
         let lines = figure.split("<polyline ").filter_map(|line| line.split('>').next());
-        let line = lines.filter(|line| line.contains(colour)).max_by_key(|line| line.len());
-        let corners = line.and_then(|line| line.split('"').find(|text| text.contains(','))).expect("a line").split(' ');
         let numbers = |(x, y): (&str, &str)| Some((x.parse().ok()?, y.parse().ok()?));
-        corners.filter_map(|corner| corner.split_once(',').and_then(numbers)).collect()
+        let corners = |line: &str| -> Vec<(f64, f64)> {
+            let corners = line.split('"').find(|text| text.contains(',')).expect("corners").split(' ');
+            corners.filter_map(|corner| corner.split_once(',').and_then(numbers)).collect()
+        };
+        // A line of the legend is short.
+        let width = |corners: &Vec<(f64, f64)>| corners[corners.len() - 1].0 - corners[0].0;
+        let all = lines.filter(|line| line.contains(colour)).map(corners);
+        all.max_by(|one, other| width(one).total_cmp(&width(other))).expect("a line")
     };
     let corners = corners_of("#0072B2");
     let lowest = corners.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).expect("corners");

@@ -1,7 +1,7 @@
 //! Exact distances of positions as decimals: the shortest decimals that read as the doubles of a recording.
 //!
-//! The doubles nearest to 0.1 and 0.6 are less than 0.5 apart. The verdict is that of the doubles; this module tells
-//! such a violation from one of the written numbers.
+//! The doubles nearest to 0.1 and 0.6 are less than 0.5 apart. The verdict is that of the doubles. This module
+//! distinguishes such a violation from a violation by the written numbers.
 
 use nalgebra::Vector3;
 use num_bigint::BigInt;

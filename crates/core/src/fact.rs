@@ -1,7 +1,7 @@
 //! Facts that a statement rests on, each with its source.
 //!
 //! A statement such as "clear" or "certified" carries the list of its [`Fact`]s. Printing, JSON and proofs read this
-//! list. A fact that data at hand contradict is refused or takes the statement away.
+//! list. A fact that the data contradict is refused, or voids the statement.
 
 use std::fmt;
 
@@ -41,7 +41,7 @@ macro_rules! coded {
 }
 
 coded! {
-    /// What a fact is about.
+    /// Subject of a fact.
     FactKind {
         /// Motion between two samples: straight, held, bounded or on curves.
         Motion = "motion",
@@ -154,7 +154,7 @@ impl fmt::Display for FactValue {
 /// Fact that a statement rests on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fact {
-    /// What the fact is about.
+    /// Subject of the fact.
     pub kind: FactKind,
     /// Source of the fact.
     pub source: Source,

@@ -191,8 +191,8 @@ pub fn table<N: std::fmt::Display>(rows: impl IntoIterator<Item = (N, String)>) 
     text
 }
 
-/// Formats a given number so that a message repeats it: the shortest decimal with the same bits, in powers of ten
-/// below 1e-5 and from 1e16 on. Integral values have no decimal point, so integer and float keys of TOML accept them.
+/// Formats a given number for a message: the shortest decimal with the same bits. Numbers below 1e-5 and from 1e16 on
+/// are in powers of ten. Integral values have no decimal point, so integer and float keys of TOML accept them.
 #[must_use]
 pub fn shortest(value: f64) -> String {
     let shown = format!("{value:?}");

@@ -19,14 +19,13 @@
 //!
 //! # Shared starts
 //! Each message carries a hash of the two starts of the pair. A vehicle that reads another hash holds other starts than
-//! its partner, and the base case fails. The contract is void from then on: the vehicle keeps the planes that it holds
-//! for ever, brakes before them, and takes no proposal and no decision. It still sends, so that the partner reads the
+//! its partner, and the base case fails. The contract is void from then on. The vehicle keeps its planes for ever,
+//! brakes before them, and takes no proposal and no decision. It still sends messages, so that the partner reads the
 //! other hash too. [`Counters::exceeded`](crate::Counters::exceeded) reports it.
 //!
 //! # Messages
 //! Every message of an owner repeats the pending proposal, every one of a follower its segment and the last decision. A
-//! message with a larger stamp therefore contains all that an older one can still say, and the newest message of a
-//! sender is the only one stored.
+//! message with a larger stamp therefore replaces all older ones. So only the newest message of a sender is stored.
 //!
 //! # When messages are sent
 //! Lemma 3 allows the loss of any message, so it allows that none is sent. A contract is due in the periods of
@@ -240,7 +239,7 @@ pub(crate) fn divider_of_starts(owner: &Start, follower: &Start) -> Option<Divid
     is_inside.then_some(divider)
 }
 
-/// What both vehicles of a pair must agree on before the first plane, and what was heard of it.
+/// Hash of the starts on which both vehicles of a pair must agree, and the state of their agreement.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Shared {
     /// Hash of the two starts; 0 until the contract has a record.
@@ -248,25 +247,25 @@ pub(crate) struct Shared {
     pub(crate) state: Agreement,
 }
 
-/// What a vehicle has heard of the starts that its partner holds.
+/// Whether the partner holds the same starts, by its messages.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) enum Agreement {
-    /// No message.
+    /// No message has arrived.
     Unheard,
-    /// The same hash.
+    /// The partner sent the same hash.
     Same,
-    /// Another hash. The contract is void.
+    /// The partner sent another hash. The contract is void.
     Void,
 }
 
-/// What became of a message.
+/// Result of a received message.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Heard {
-    /// It is stored.
+    /// The message is stored.
     Stored,
-    /// It is to another vehicle, older than another one, or of a void contract.
+    /// The message is to another vehicle, older than another one, or of a void contract.
     Ignored,
-    /// It has a number that no vehicle sends.
+    /// The message has a number that no vehicle sends.
     Invalid,
     /// The sender holds other starts.
     OtherStarts,

@@ -35,7 +35,7 @@
 //! - **A4** A message that arrives is what was sent, and arrives after it was sent. It may be late, lost, doubled or
 //!   overtaken.
 //! - **A5** All vehicles use one frame. The starts of a pair are announced values that both vehicles hold with the same
-//!   bits ([`Start`]); no vehicle computes the start of another one from its own settings. The first instant is at the
+//!   bits ([`Start`]). No vehicle computes the start of another one from its own settings. The first instant is at the
 //!   start.
 //!
 //! Each message carries a hash of the two starts of its pair. A vehicle that holds other starts is found by its first
@@ -67,7 +67,7 @@
 //! **Lemma 2** (a choice always exists). At each instant, after steps 1 and 2, p and s are inside all planes held, so
 //!  the brake is a choice. Both are inside at the start, because each vehicle tests p and s of both vehicles against
 //!  the first plane of the pair. A pair that fails the test does not start. The last command was accepted, or was that
-//!  of the brake, so the next p and s are inside all planes held over the period (Lemma 1). A plane is taken on only
+//!  of the brake. So the next p and s are inside all planes held over the period (Lemma 1). A plane is taken on only
 //!  after p and s were tested against it. Dropping a plane changes nothing.
 //!
 //! **Lemma 3** ([`contract`]). At every time the two vehicles of a pair hold a common plane. Its base case is the plane
@@ -75,8 +75,8 @@
 //!
 //! **Lemma 4** ([`obstacle`]). The vehicle may renew a plane before a convex obstacle alone, at any instant.
 //!
-//! **Theorem.** Let A1 to A5 hold, and let the segments of each pair pass the test of Lemma 2, for which they must be
-//!  at least delta + e1 + e2 apart. Let the segment of each vehicle be at least its clearance and e from each obstacle.
+//! **Theorem.** Let A1 to A5 hold, and let the segments of each pair pass the test of Lemma 2. For this they must be at
+//!  least delta + e1 + e2 apart. Let the segment of each vehicle be at least its clearance and e from each obstacle.
 //!  Then any two vehicles are at least delta apart at all times, and each vehicle keeps its clearance, under every law,
 //!  latency and loss.
 //!
@@ -84,14 +84,14 @@
 //!  side by m1 and the other one by m2. They are at least m1 + m2 = delta + e1 + e2 apart. Each vehicle is within its e
 //!  of its reference. Lemma 4 gives the clearance of obstacles.
 //!
-//! Doubles round: the margins of a pair contain 1e-6 m for it. [`settings`] lists what this covers, and refuses
-//! settings and starts beyond it.
+//! The margins of a pair contain 1e-6 m for the rounding of doubles. [`settings`] lists the covered operations, and
+//! refuses settings and starts beyond it.
 //!
 //! # What voids the certificate
-//! A vehicle that is dead, frozen or weaker than A voids it. So do a push or an error beyond its bound, other starts on
-//! the two sides of a pair, forged messages and a vehicle without a contract. A silent vehicle does not void it: the
-//! others stay behind the last common plane.
-//! [`Counters::exceeded`](report::Counters::exceeded) names an assumption that did not hold in a flight.
+//! A vehicle that is dead, frozen or weaker than A voids it. So do a push or an error beyond its bound, and other
+//! starts on the two sides of a pair. So do forged messages and a vehicle without a contract. A silent vehicle does not
+//! void it: the others stay behind the last common plane. [`Counters::exceeded`](report::Counters::exceeded) names an
+//! assumption that did not hold in a flight.
 //!
 //! Arrival is not proved. Planes that are not renewed stay safe, and vehicles wait behind them.
 

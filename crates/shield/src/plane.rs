@@ -13,7 +13,7 @@
 //! between the ends of the two segments along it. [`Divider::between`] takes the normal of the closest points if both
 //! bounds agree. They do not agree for long segments that are nearly parallel. It then takes the normal with the widest
 //! gap: of the closest points, of the four ends, or of the common perpendicular. The gap is computed from the ends, so
-//! a normal that is not the best one costs room but never safety.
+//! it is a lower bound for every normal.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -332,7 +332,7 @@ impl Divider {
     }
 
     /// Returns the divider with a normal of length 1. Both vehicles of a pair get the same numbers from the same
-    /// divider, so a normal that was rounded before it was proposed costs nothing.
+    /// divider, so the owner may round the normal before the proposal.
     #[inline]
     fn unit(&self) -> (Vector3<f64>, f64) {
         let normal = Vector3::from(self.normal);

@@ -21,7 +21,7 @@ pub struct Counters {
     pub commands: u64,
     /// Commands that differ from the law's own.
     pub changed: u64,
-    /// Those of them that differ only by the limits of acceleration and speed: the nearest command within them.
+    /// Changed commands that are the nearest command within the limits of acceleration and speed.
     pub limited: u64,
     /// Commands of the brake.
     pub brakes: u64,
@@ -41,7 +41,7 @@ pub struct Counters {
     pub invalid_messages: u64,
     /// Messages of vehicles that hold other starts. Each one voids the certificate.
     pub other_starts: u64,
-    /// First vehicle that sent such a message, counted from 0.
+    /// First vehicle that sent the hash of other starts, counted from 0.
     pub other_starts_of: Option<u16>,
     /// Messages to this vehicle from one without an announced start. Each one voids the certificate.
     pub unknown_senders: u64,
@@ -133,7 +133,7 @@ impl fmt::Display for Exceeded {
     }
 }
 
-/// Assumption of a certificate, and whether it held so far.
+/// Assumption of a certificate, and whether the assumption held so far.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Assumption {
     /// The assumption with its source and value.
@@ -141,7 +141,7 @@ pub struct Assumption {
     pub fact: Fact,
     /// Largest observed value over the bound; `None` if it was not observed.
     pub share: Option<f64>,
-    /// Whether the assumption held so far; `None` if it cannot be told from what was observed.
+    /// Whether the assumption held so far; `None` if the observations do not decide it.
     pub held: Option<bool>,
 }
 
@@ -162,7 +162,7 @@ impl Assumption {
         Self { fact: Fact::number(kind, Source::Declared, value, unit), share: None, held: None }
     }
 
-    /// Assumption that is observed at the true state, or else refuted by what contradicts it.
+    /// Assumption that is observed at the true state, or else refuted by an observation that contradicts it.
     pub(crate) fn observed(
         kind: FactKind,
         (value, unit): (f64, &'static str),
@@ -192,8 +192,8 @@ impl Assumption {
 
 /// Returns the assumptions of a certificate in the order of the theorem.
 ///
-/// An observation can refute each of them. It confirms only what it measures: without a true state the own error of
-/// measurement, pushes and the distance to the reference cannot be observed.
+/// An observation can refute each of them. It confirms only the measured quantities. Without a true state the own error
+/// of measurement, pushes and the distance to the reference cannot be observed.
 pub(crate) fn assumptions(limits: &Limits, counters: &Counters, starts: SharedStarts) -> Vec<Assumption> {
     let settings = limits.settings();
     let is_above = |share: Option<f64>| share.is_some_and(|share| share > 1.0);

@@ -47,7 +47,8 @@ use tautline_core::text::{at_least, at_most, exact, shortest};
 
 /// Largest coordinate of a start \[m\].
 pub(crate) const FARTHEST_M: f64 = 1e6;
-/// Part of the safety distance that is added because of rounding \[m\]. The module lists what it covers.
+/// Part of the safety distance that is added because of rounding \[m\]. The module documentation lists the covered
+/// operations.
 pub const ROUNDING_M: f64 = 1e-6;
 /// Part of the margin of a vehicle for its brake and its reference \[m\].
 const MOTION_M: f64 = 1.5e-7;
@@ -369,8 +370,8 @@ impl Limits {
         self.side.metric
     }
 
-    /// Largest coordinate of the reference and of its stop points that the margin for rounding covers \[m\]: 1e6, less
-    /// with long brakes or a slow tracker.
+    /// Largest coordinate of the reference and of its stop points that the margin for rounding covers \[m\]. It is 1e6
+    /// m, and less with long brakes or a slow tracker.
     #[must_use]
     pub fn farthest_m(&self) -> f64 {
         self.farthest_m

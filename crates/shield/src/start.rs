@@ -1,8 +1,8 @@
-//! Starts as the vehicles announce them, with a form in bytes, and the hash of the two starts of a pair.
+//! Announced starts of vehicles, their bytes, and the hash of the two starts of a pair.
 //!
 //! Each vehicle makes its own start from its own settings and sends the bytes to the others. The first plane of a pair
-//! is computed from both announced starts, never from own settings in the place of those of the other vehicle. So both
-//! sides compute the same plane, also with different brakes, periods, errors and limits.
+//! is computed from both announced starts. So both sides compute the same plane, also with different brakes, periods,
+//! errors and limits.
 //!
 //! # Bytes
 //! A start has [`Start::BYTES`] bytes, in little endian:
@@ -19,7 +19,7 @@
 //! | 128 to 135 | f64 | factor of vertical lengths; 1 for balls |
 //! | 136 to 143 | f64 | reach of a period at the largest speed, with the lead \[m\] |
 //!
-//! The number of the flight tells messages of an earlier flight with equal starts apart.
+//! The number of the flight distinguishes the messages of two flights with equal starts.
 
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};

@@ -28,7 +28,7 @@
 //!
 //! # Rounding
 //! The sums are computed in doubles, with u = 2^-53. Their rounding is bounded and added. Norms are the largest row
-//! sums, hats mark computed values, and products of m terms err by at most 1.01 m u times the product of the norms.
+//! sums, and hats mark computed values. Products of m terms err by at most 1.01 m u times the product of the norms.
 //!
 //! - **Cell.** E = exp(X) with |X| <= 0.5. X errs by 3.1 u |X| (length of a cell, rate of the lag, product). The k-th
 //!   term of the series errs by 6.2 k u |X|^k / k!, and the sum of 21 terms by 20.2 u exp(0.5). In all E errs by less
@@ -38,14 +38,14 @@
 //!   `eps_g` = 60 u n g^^2 / (1 - 60 u n g^).
 //! - **Step.** The map S from instant to instant is G times the lift, of norm l. It errs by
 //!   `eps_s` = (`eps_g` + 5.1 u g^) l. The map to the grid points has the same bound.
-//! - **Powers.** A computed power is S times the last one plus F with |F| <= phi |last one|, where
-//!   phi = `eps_s` + 1.01 o u |S^| and o is the order. As for the grid, the norms N of all true powers sum to at most
-//!   N^ / (1 - phi N^), and a power errs by at most phi N N^. The powers of a column x of inputs have norms that sum
-//!   to at most M = N (|x^| + 2 `eps_g`) / (1 - phi N). Their errors sum to at most N (`eps_g` + phi M).
-//! - **Sum.** Let Q be the norm of the map from the state to what is bounded, and `eps_q` its error. The sum over
-//!   all periods errs by Q N (`eps_g` + phi M) + `eps_q` M, times the bound of each input. The start errs by
-//!   (Q phi N N^ + `eps_q` N) times its bound. All terms of the sums are positive, so adding K periods errs by less
-//!   than (K + 400) u of the sum.
+//! - **Powers.** A computed power is S times the last one plus F with |F| <= phi |last one|. Here phi is `eps_s` + 1.01
+//!   o u |S^| and o is the order. As for the grid, the norms N of all true powers sum to at most N^ / (1 - phi N^). A
+//!   power errs by at most phi N N^. The powers of a column x of inputs have norms that sum to at most M = N (|x^| + 2
+//!   `eps_g`) / (1 - phi N). Their errors sum to at most N (`eps_g` + phi M).
+//! - **Sum.** Let Q be the norm of the map from the state to the bounded quantity, and `eps_q` its error. The sum over
+//!   all periods errs by Q N (`eps_g` + phi M) + `eps_q` M, times the bound of each input. The start errs by (Q phi N
+//!   N^ + `eps_q` N) times its bound. All terms of the sums are positive, so adding K periods errs by less than (K +
+//!   400) u of the sum.
 //!
 //! The numbers of this bound are rounded too: the terms above are doubled.
 
@@ -340,7 +340,7 @@ impl Sampled {
         let u = f64::EPSILON / 2.0;
         let order = self.order() as f64;
         let start = self.tracker.position_error_m + self.tracker.velocity_error_m_s;
-        let largest = self.grid.iter().map(|at| row_sum_norm(at)).fold(0.0, f64::max);
+        let largest = self.grid.iter().map(|map| row_sum_norm(map)).fold(0.0, f64::max);
         let grid = GRID_STEP * u * self.cells as f64 * largest;
         let eps_grid = 2.0 * grid * largest / (1.0 - grid);
         let lift = row_sum_norm(&self.lift);

@@ -490,7 +490,8 @@ impl UnicycleShield {
         SharedStarts { partners, agreed, is_one_list: false }
     }
 
-    /// Returns the assumptions of the certificate: where each comes from, what was observed of it, and whether it held.
+    /// Returns the assumptions of the certificate, each with its source, its largest observed share, and whether it
+    /// held.
     #[must_use]
     pub fn assumptions(&self) -> Vec<Assumption> {
         let (loiter, counters) = (&self.loiter, &self.counters);

@@ -21,8 +21,8 @@
 //! | 60 to 63 | u32 | CRC-32 of the bytes 0 to 59 |
 //!
 //! The numbers of a plane arrive bit for bit. The normal may have been rounded to single precision before it was
-//! proposed: both vehicles then divide by the same length. The segment of a follower helps to choose the next plane and
-//! no step of the proof uses it, so its direction is sent in single precision.
+//! proposed: both vehicles then divide by the same length. The segment of a follower helps to choose the next plane. No
+//! step of the proof uses it, so its direction is sent in single precision.
 
 use std::fmt;
 

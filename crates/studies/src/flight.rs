@@ -75,7 +75,7 @@ pub struct FlightSummary {
     pub overlong_steps: u64,
     /// SHA-256 of the resolved scenario.
     pub scenario_sha256: String,
-    /// Hash of what determines the flight ([`Scenario::flight_sha256_hex`]).
+    /// Hash of the settings that determine the flight ([`Scenario::flight_sha256_hex`]).
     #[serde(skip)]
     pub flight_sha256: String,
     /// Hash over the bits of every recorded state.
@@ -196,8 +196,8 @@ impl Outcome {
 
 /// Flights of one law or of one point: a sample, or one flight repeated.
 ///
-/// Flights of equal scenarios without randomness are one flight. They are no sample of anything, so numbers over them
-/// have no interval.
+/// Flights of equal scenarios without randomness are one flight. They are no sample, so numbers over them have no
+/// interval.
 #[derive(Clone, Copy, Debug)]
 pub struct FlightSample<'a> {
     flights: &'a [FlightSummary],
@@ -220,12 +220,12 @@ impl<'a> FlightSample<'a> {
         self.is_repeated
     }
 
-    /// Returns the number of flights that show something.
+    /// Returns the number of flights for which `shows` is true.
     pub fn count(self, shows: impl Fn(&FlightSummary) -> bool) -> u64 {
         self.flights.iter().filter(|flight| shows(flight)).count() as u64
     }
 
-    /// Returns the share of flights that show something.
+    /// Returns the share of flights for which `shows` is true.
     pub fn share(self, shows: impl Fn(&FlightSummary) -> bool) -> Proportion {
         let share = if self.is_repeated { Proportion::exact } else { Proportion::new };
         share(self.count(shows), self.flights.len() as u64)

@@ -219,7 +219,7 @@ impl Options {
 
 /// Returns the overrides of a point.
 fn sets(keys: &[SweptKey], values: &[f64]) -> Vec<String> {
-    keys.iter().zip(values).map(|(of, &value)| format!("{}={}", of.key, shortest(value))).collect()
+    keys.iter().zip(values).map(|(swept, &value)| format!("{}={}", swept.key, shortest(value))).collect()
 }
 
 impl Experiment for Options {

@@ -63,7 +63,7 @@ impl History {
         (1..self.len).rev().find(|&k| self.at(k).t_s <= t_s).unwrap_or(0)
     }
 
-    /// Returns how a stamp before the newest one lies among the stamps.
+    /// Returns the place of a late stamp among the stamps.
     pub(crate) fn late(&self, t_s: f64) -> Late {
         let mut late = Late { position_m: None, gap_s: None, least_gap_s: f64::INFINITY };
         for k in 0..self.len {

@@ -224,8 +224,8 @@ impl Session<'_> {
 
     fn pose(&mut self, pose: &OwnedPose, arrival_s: f64) -> io::Result<()> {
         self.pass_until(pose.t_s, arrival_s)?;
-        let of = pose.borrowed();
-        if let Some(taken) = self.monitor.take(&of, arrival_s) {
+        let borrowed = pose.borrowed();
+        if let Some(taken) = self.monitor.take(&borrowed, arrival_s) {
             self.output.pose(taken.time_s, pose)?;
         }
         self.pass_events()

@@ -8,7 +8,7 @@ use tautline_core::fact::{Fact, FactKind, Source};
 /// A multirotor that keeps its height accelerates by g tan(tilt). Autopilots limit the tilt to 45 degrees or less by
 /// default, which is g = 9.80665 m/s^2. A vehicle whose motors stop falls with g, too.
 pub const DEFAULT_ACCEL_M_S2: f64 = 9.81;
-/// Multiple of the standard deviation that a source reports which is taken as the bound on the error of a position.
+/// Multiple of the reported standard deviation that bounds the error of a position.
 ///
 /// With a normal error in each axis, fewer than one position of 200,000 lies farther away.
 pub const REPORTED_DEVIATIONS: f64 = 5.0;

@@ -10,8 +10,8 @@
 //! - `MAVLink` counts the messages of a component from 0 to 255. Lost messages leave out numbers, and a restart begins
 //!   again once. Numbers that go back and forth are two counts. [`SequenceOrder`] finds them.
 //!
-//! A message with the number and the checksum, or the stamp and the position, of an earlier one is its copy by another
-//! link, and no evidence.
+//! A copy of a message by another link is no evidence. It has the number and the checksum, or the stamp and the
+//! position, of the original.
 
 use crate::clock::STEP_S;
 

@@ -22,9 +22,9 @@
 //! u in B(c, r + A h)      if B(c, r) encloses the velocity at the reading before, h seconds earlier
 //! ```
 //!
-//! The velocity lies in the intersection of all these balls. The enclosure is the smallest ball around the
-//! intersection of two balls at a time, which contains it. The tighter ball decides: with sent velocities
-//! usually theirs, and without them the window with the smallest radius.
+//! The velocity lies in the intersection of all these balls. The enclosure intersects two balls at a time, and takes
+//! the smallest ball around the intersection. The tighter ball decides. With sent velocities it is usually a ball of a
+//! sent velocity. Without them it is the ball of the window with the smallest radius.
 //!
 //! # Agreement
 //!
@@ -40,11 +40,11 @@
 //! |v_n - v_k| <= 2 e + A T
 //! ```
 //!
-//! The second bound is [`Fault::OutOfBounds`]. A velocity that is wrong by `e + b` is found at the latest
-//! when `b T` is above `eps_n + eps_k + A sum of g^2 / 4`. Windows reach to `2 eps / e`, where both errors weigh the
-//! same, but at least to [`SHORTEST_REACH_S`] and at most to [`LONGEST_REACH_S`].
+//! The second bound is [`Fault::OutOfBounds`]. A velocity that is wrong by `e + b` is found at the latest when `b T` is
+//! above `eps_n + eps_k + A sum of g^2 / 4`. Windows reach to `2 eps / e`, where both errors are equal, but at least to
+//! [`SHORTEST_REACH_S`] and at most to [`LONGEST_REACH_S`].
 //!
-//! A first reading has no window, so its velocity is compared with nothing.
+//! A first reading has no window, so its velocity is not tested.
 //!
 //! A position that is repeated without the change of a bit is no new measurement. Then the errors of both ends are
 //! equal, and the summed velocities alone must be at most `e T + A sum of g^2 / 4`, with [`RESOLUTION_M`] for the
@@ -163,14 +163,14 @@ impl Mark {
         self.reading.t_s - from.reading.t_s
     }
 
-    /// Returns the bound on the rounding of a displacement: of the coordinates, and of stamps by a unit in the last
-    /// place at a speed \[m\].
+    /// Returns the bound on the rounding of a displacement \[m\]. It covers the coordinates, and stamps that err by a
+    /// unit in the last place at a speed.
     fn rounding_m(&self, speed_m_s: f64) -> f64 {
         1e-9 * (1.0 + self.reading.position_m.amax()) + speed_m_s * 4.0 * f64::EPSILON * self.reading.t_s.abs()
     }
 
-    /// Returns the velocities that the positions at both ends of a window allow at each of its ends; `None` for a
-    /// window that is too short.
+    /// Returns the velocities that the positions at both ends of a window allow at each of its ends. Returns `None` for
+    /// a window that is too short.
     fn quotient(&self, from: &Self, bounds: Bounds) -> Option<Ball> {
         let window_s = self.window_s(from);
         if window_s < LEAST_WINDOW_S {
@@ -221,7 +221,7 @@ impl Ring {
     }
 }
 
-/// Rings of the history, the newest reading, and what they enclose.
+/// Rings of the history, the newest reading, and the velocities that both allow.
 #[derive(Clone, Debug)]
 struct Track {
     rings: [Ring; LEVELS],

@@ -100,12 +100,12 @@ pub(super) fn vehicles_without_others(presence: &[Option<Presence>]) -> Vec<usiz
     alone
 }
 
-/// Time at which vehicles are on the ground, at or below [`above_m`](super::Settings::above_m).
+/// Time in which vehicles are on the ground, at or below [`above_m`](super::Settings::above_m).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ExemptTime {
-    /// Time at which at least two vehicles are, so that a pair is exempt \[s\].
+    /// Time in which at least two vehicles are on the ground, so that a pair is exempt \[s\].
     pub pairs_s: f64,
-    /// Time at which at least one vehicle is, so that obstacles on which it lands are exempt \[s\].
+    /// Time in which at least one vehicle is on the ground, so that obstacles on which it lands are exempt \[s\].
     pub vehicles_s: f64,
 }
 

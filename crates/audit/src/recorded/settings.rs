@@ -39,7 +39,7 @@ impl Interpolation {
     #[must_use]
     pub fn rests_on_seconds(self) -> bool {
         match self {
-            // Scaled times change when vehicles are at a place, and not the places.
+            // Scaled times leave the path of each vehicle unchanged.
             Self::Linear | Self::Hold | Self::Polynomial => false,
             Self::Bounded => true,
         }
@@ -155,7 +155,7 @@ impl Settings {
     /// choices: the smallest distance of two straight or polynomial motions does not change if all times are scaled.
     #[must_use]
     pub fn rests_on_seconds(&self) -> Vec<TimedSetting> {
-        // Without `..`: a new setting has to be sorted here.
+        // Without `..`, a new setting does not compile until it is listed here.
         let Self {
             delta_m: _,
             motion,

@@ -187,7 +187,7 @@ impl WellClearMonitor {
         };
         let mut reaches: Vec<_> = (0..vehicles.len()).filter_map(|k| Reach::of(k, segments(k))).collect();
         reaches.sort_by(|a, b| a.low.x.total_cmp(&b.low.x).then(a.vehicle.cmp(&b.vehicle)));
-        let is_in_air = |of: &Reach| segments(of.vehicle).iter().any(|part| part.grounded != Some(true));
+        let is_in_air = |reach: &Reach| segments(reach.vehicle).iter().any(|part| part.grounded != Some(true));
         self.has_judged |= reaches.len() > 1 && reaches.iter().any(is_in_air);
         let fastest_m_s = reaches.iter().map(|of| of.speed_m_s).fold(0.0, f64::max);
         for (k, a) in reaches.iter().enumerate() {

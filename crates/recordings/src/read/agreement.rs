@@ -68,7 +68,7 @@ impl Sums {
 }
 
 /// Returns the turn about the vertical, perhaps mirrored, that aligns the metric position best with the place on the
-/// Earth, and the products that it aligns.
+/// Earth. Also returns the products that the turn aligns.
 fn alignment(covariance: &Matrix3<f64>) -> Option<(Matrix3<f64>, f64)> {
     let across = covariance.fixed_view::<2, 2>(0, 0).into_owned().svd(true, true);
     let up = covariance[(2, 2)];

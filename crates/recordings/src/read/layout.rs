@@ -369,8 +369,8 @@ fn vehicles_of<'a>(first: Role, headings: &[(usize, Heading<'a>)]) -> BTreeSet<&
 
 /// Refuses vehicles whose positions are given in another frame only. `names` are the vehicles that are read.
 fn refuse_two_frames(in_other_frame: BTreeSet<&str>, names: &[String], on_earth: bool) -> Result<(), Fault> {
-    let is_part = |name: &str, of: &str| {
-        name.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '/', '_']))
+    let is_part = |name: &str, prefix: &str| {
+        name.strip_prefix(prefix).is_some_and(|rest| rest.is_empty() || rest.starts_with(['.', '/', '_']))
     };
     let is_known = |vehicle: &str| names.iter().any(|name| is_part(name, vehicle) || is_part(vehicle, name));
     let is_place = |vehicle: &str| PLACES.contains(&vehicle.to_lowercase().as_str());

@@ -88,7 +88,7 @@ trait ObjectText: Sized {
     /// Returns the current object.
     fn object(&self) -> &[u8];
 
-    /// Returns its number, from 1.
+    /// Returns the number of the current object, from 1.
     fn number(&self) -> u64;
 
     /// Returns the place of the object with this number.

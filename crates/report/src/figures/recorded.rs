@@ -89,9 +89,9 @@ pub struct LowerBound {
     pub distance: f64,
 }
 
-/// Draws the smallest separation of all pairs in each interval of time \[s\] as steps, with the limit and the closest
-/// approach of the closest pair. Steps never lie above the separation, as a line through the closest approaches does.
-/// They break where no distance is known.
+/// Draws the smallest separation of all pairs in each interval of time \[s\] as steps. Also draws the limit and the
+/// closest approach of the closest pair. Steps never lie above the separation; a line through the closest approaches
+/// may. Steps break where no distance is known.
 #[must_use]
 pub fn smallest(bounds: &[LowerBound], closest: &Encounter, title: &str) -> Figure {
     let Encounter { limit_m: limit, unit, .. } = *closest;

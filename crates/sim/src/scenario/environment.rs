@@ -15,7 +15,7 @@ use tautline_laws::target::{Guidance, ReferenceMotion};
 pub struct IgnoredPart {
     /// Key of the part.
     pub key: &'static str,
-    /// What the environment does not take into account.
+    /// Reason why the environment ignores the part.
     pub what: &'static str,
     /// Key and TOML value that turn the part off; `None` if the scenario must be written without it.
     pub off: Option<(&'static str, &'static str)>,
@@ -64,7 +64,7 @@ impl Template {
 
 impl Scenario {
     fn parts_ignored_by_environments(&self) -> Vec<IgnoredPart> {
-        // Every field is decided on: a new one does not compile until it is.
+        // Without `..`, a new field does not compile until it is listed here.
         let Self {
             // Known to the environment, or part of the motion and of the audit.
             name: _,

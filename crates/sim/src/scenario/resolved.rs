@@ -51,8 +51,8 @@ impl Scenario {
         })
     }
 
-    /// Returns the hash of what determines the flight: as [`Scenario::sha256_hex`], without the seed of the noise if
-    /// nothing in flight is random. Scenarios with equal hashes have the same flight.
+    /// Returns the hash of the settings that determine the flight. It is [`Scenario::sha256_hex`], but without the seed
+    /// of the noise if nothing in flight is random. Scenarios with equal hashes have the same flight.
     #[must_use]
     pub fn flight_sha256_hex(&self) -> String {
         if self.is_random_in_flight() || self.noise_seed == 0 {

@@ -147,18 +147,18 @@ fn change(plan: &mut Plan, at_s: f64, kept: &[Candidate], numbers: &mut Numbers,
     let before = plan.iter().position(|leg| leg.until_s >= at_s).map_or(plan.len(), |leg| leg + 1);
     let leg = numbers.index(before);
     match numbers.index(if has_wind { 12 } else { 8 }) {
-        // All times.
+        // Stretches all times.
         0 => {
             let factor = 1.0 + numbers.between(-0.15, 0.15);
             plan.iter_mut().for_each(|leg| leg.until_s *= factor);
         }
-        // The end of a leg, alone or with all later ones.
+        // Moves the end of a leg, alone or with all later ones.
         1 | 2 => {
             let shift_s = numbers.between(-1.0, 1.0) * numbers.between(0.0, 0.6);
             let count = if numbers.index(2) == 0 { 1 } else { plan.len() };
             plan[leg..].iter_mut().take(count).for_each(|leg| leg.until_s += shift_s);
         }
-        // The wish of a leg.
+        // Replaces the wish of a leg.
         3 => {
             plan[leg].wish = match numbers.index(6) {
                 0 => Vector3::zeros(),
@@ -167,7 +167,7 @@ fn change(plan: &mut Plan, at_s: f64, kept: &[Candidate], numbers: &mut Numbers,
                 _ => numbers.direction(space),
             };
         }
-        // All wishes a little, or one of them.
+        // Turns the wish of a leg, alone or with all later ones.
         4 => {
             let by = numbers.direction(space) * numbers.between(0.0, 0.6);
             let count = if numbers.index(2) == 0 { 1 } else { plan.len() };
@@ -175,7 +175,7 @@ fn change(plan: &mut Plan, at_s: f64, kept: &[Candidate], numbers: &mut Numbers,
                 leg.wish = (leg.wish + by).try_normalize(1e-3).unwrap_or(leg.wish);
             }
         }
-        // All directions: a reflection.
+        // Reflects all directions.
         5 => {
             let normal = numbers.direction(space);
             let reflected = |along: Vector3<f64>| along - normal * (2.0 * along.dot(&normal));
@@ -186,7 +186,7 @@ fn change(plan: &mut Plan, at_s: f64, kept: &[Candidate], numbers: &mut Numbers,
                 }
             }
         }
-        // A leg more or less.
+        // Removes or adds a leg.
         6 => {
             if numbers.index(2) == 0 && plan.len() > 1 {
                 plan.remove(leg);
@@ -197,7 +197,7 @@ fn change(plan: &mut Plan, at_s: f64, kept: &[Candidate], numbers: &mut Numbers,
                 plan.insert(leg, Leg { until_s, wish, ..plan[leg] });
             }
         }
-        // The end of another plan.
+        // Appends the end of another plan.
         7 => {
             let other = &kept[numbers.index(kept.len())];
             let cut_s = numbers.between(0.0, at_s.max(0.1));
@@ -205,14 +205,14 @@ fn change(plan: &mut Plan, at_s: f64, kept: &[Candidate], numbers: &mut Numbers,
             plan.retain(|leg| leg.until_s < cut_s);
             plan.extend(other.plan.iter().map(|leg| Leg { until_s: leg.until_s + shift_s, ..*leg }));
         }
-        // The wind of a leg, of all legs from one on, or turned around.
+        // Replaces the wind of a leg or of all later ones, or turns it around.
         8 => plan[leg].wind = numbers.wind(),
         9 => {
             let wind = numbers.wind();
             plan[leg..].iter_mut().for_each(|leg| leg.wind = wind);
         }
         10 => plan[leg..].iter_mut().for_each(|leg| leg.wind = -leg.wind),
-        // Wind along or against the wishes.
+        // Turns the wind along or against the wishes.
         _ => {
             let sign = if numbers.index(2) == 0 { 1.0 } else { -1.0 };
             plan.iter_mut().filter(|leg| leg.wish.norm() > 0.5).for_each(|leg| leg.wind = leg.wish * sign);

@@ -308,7 +308,7 @@ pub struct Attitude {
     damping: f64,
     weight_n: f64,
     most_n: f64,
-    /// Largest acceleration about level axes for which the loop asks \[rad/s^2\].
+    /// Largest acceleration about level axes that the loop commands \[rad/s^2\].
     most_turn_rad_s2: f64,
     /// Largest error about level axes that counts. It turns the body at the fastest rate that this acceleration stops.
     most_error: f64,
@@ -350,7 +350,7 @@ impl Attitude {
     /// `rates_rad_s` are about the body axes.
     ///
     /// An error e alone turns the body at omega e/(2 zeta). An acceleration of 2 zeta omega times this rate stops it.
-    /// The loop asks for no faster rate and for no larger acceleration than the rotors give at every commanded thrust.
+    /// The loop commands no faster rate and no larger acceleration than the rotors give at every commanded thrust.
     /// Otherwise, commands that reverse faster than the body turns get more torque to one side than to the other.
     #[must_use]
     pub fn wrench(

@@ -99,8 +99,8 @@ impl Mixer {
     /// body axes \[N m\].
     ///
     /// Where rotors saturate, roll and pitch have priority, then yaw, then thrust. Torques may lower the total thrust,
-    /// but raise it only to 0.7 of the weight. Beyond that they are scaled down: a torque that is asked for
-    /// again and again must not lift the vehicle.
+    /// but raise it only to 0.7 of the weight. Beyond that they are scaled down: a repeated torque must not lift the
+    /// vehicle.
     #[must_use]
     pub fn thrusts_n(&self, lift_n: f64, torque_n_m: Vector3<f64>) -> Vector4<f64> {
         let [roll, pitch, yaw] = &self.turns;
@@ -144,8 +144,8 @@ impl Mixer {
         share
     }
 
-    /// Returns the largest acceleration \[rad/s^2\] about any level axis that a body with these moments of inertia
-    /// \[kg m^2\] gets at every commanded thrust: that of 0.7 of the weight.
+    /// Returns the largest acceleration \[rad/s^2\] about any level axis that a body gets at every commanded thrust, by
+    /// its moments of inertia \[kg m^2\]. It is that at a thrust of 0.7 of the weight.
     pub(super) fn turn_rad_s2(&self, inertia_kg_m2: &Vector3<f64>) -> f64 {
         let [roll, pitch, _] = &self.turns;
         (0..4)

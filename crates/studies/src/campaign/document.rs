@@ -141,11 +141,11 @@ impl Summary {
         let rows: Vec<(String, Quantiles)> = self.laws.iter().flat_map(numbers).collect();
         Table::of("Quantiles over the flights, with 95 % intervals of order statistics", &rows)
             .column("", "Number", Kind::Text, |(name, _)| name.clone())
-            .column("", "Least", Kind::AtLeast, |(_, of)| of.min)
-            .column("", "5 %", Kind::AtLeast, |(_, of)| of.p05)
-            .column("", "Median", Kind::AtLeast, |(_, of)| of.median)
-            .column("", "95 %", Kind::AtLeast, |(_, of)| of.p95)
-            .column("", "Most", Kind::AtLeast, |(_, of)| of.max)
+            .column("", "Least", Kind::AtLeast, |(_, row)| row.min)
+            .column("", "5 %", Kind::AtLeast, |(_, row)| row.p05)
+            .column("", "Median", Kind::AtLeast, |(_, row)| row.median)
+            .column("", "95 %", Kind::AtLeast, |(_, row)| row.p95)
+            .column("", "Most", Kind::AtLeast, |(_, row)| row.max)
             .build()
     }
 

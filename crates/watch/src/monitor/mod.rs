@@ -195,7 +195,7 @@ impl Monitor {
         let mut facts = self.settings.facts(largest_m);
         let mut senders = present().filter(|vehicle| vehicle.sends_velocity).peekable();
         if senders.peek().is_some() {
-            // A first velocity is compared with nothing.
+            // A first velocity is not tested.
             let is_observed = senders.all(|vehicle| vehicle.velocity.is_measured());
             let source = if is_observed { Source::Observed } else { Source::NotObservable };
             facts.push(Fact::new(FactKind::VelocityAgreement, source));

@@ -138,7 +138,7 @@ struct Frame {
 }
 
 impl MavlinkReader {
-    /// Returns a reader that has read nothing.
+    /// Returns a reader before its first datagram.
     #[must_use]
     pub fn new(frame: MavlinkFrame) -> Self {
         Self { frame, senders: BTreeMap::new(), accuracies: BTreeMap::new() }
@@ -252,7 +252,7 @@ fn first_frame(bytes: &[u8]) -> Result<Frame, String> {
 }
 
 fn extra_of(message: u32) -> Option<u8> {
-    [LOCAL, GLOBAL, RECEIVER].into_iter().find(|of| of.0 == message).map(|of| of.2)
+    [LOCAL, GLOBAL, RECEIVER].into_iter().find(|known| known.0 == message).map(|known| known.2)
 }
 
 /// Returns the standard deviation of `GPS_RAW_INT` \[m\], `None` without a fix in space or an accuracy.

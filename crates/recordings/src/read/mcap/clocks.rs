@@ -126,8 +126,8 @@ impl Clocks {
         }
     }
 
-    /// Decides between stamps and log times. `gives` tells which sources are used, by topic and frame: `None` for an
-    /// unused source, and whether it gives the positions of a vehicle for others.
+    /// Decides between stamps and log times. `gives` returns, by topic and frame, whether a source gives the positions
+    /// of a vehicle. It returns `None` for an unused source.
     ///
     /// # Errors
     /// If only some of the sources have stamps, or if their stamps are of several clocks.

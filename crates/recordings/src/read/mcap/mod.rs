@@ -10,8 +10,8 @@
 //! | `traj_utils/msg/Bspline`, `traj_utils/msg/MINCOTraj`, `traj_utils/msg/PolyTraj` | cdr | the number of the drone |
 //! | `foxglove.PoseInFrame`, `geometry_msgs/msg/PoseStamped`, `PoseWithCovarianceStamped`, `PointStamped`, `nav_msgs/msg/Odometry`, `sensor_msgs/msg/NavSatFix` | the same | the topic |
 //!
-//! Times are those in the messages, or the log times if no message has one. All sources must have one clock. All
-//! positions must be in one frame, or be transformed to it. A file that was not closed is refused, unless the user
+//! Times are the stamps of the messages, or the log times if no message has a stamp. All sources must have one clock.
+//! All positions must be in one frame, or be transformed to it. A file that was not closed is refused, unless the user
 //! accepts its complete part.
 
 pub(super) mod bag;

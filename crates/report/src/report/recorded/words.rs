@@ -50,7 +50,7 @@ impl RecordedReport {
     /// Returns the verdict alone, such as `PROVED CLEAR`.
     #[must_use]
     pub fn verdict(&self) -> String {
-        let above = self.exemption.as_ref().map_or(String::new(), |of| format!(" above {} m", exact(of.above_m)));
+        let above = self.exemption.as_ref().map_or(String::new(), |time| format!(" above {} m", exact(time.above_m)));
         match self.status {
             Status::Clear if self.audit.judged_by_run => format!("PROVED CLEAR {}", self.motion),
             Status::Clear if self.audit.proved => format!("PROVED CLEAR{above}"),
@@ -167,7 +167,7 @@ impl RecordedReport {
             [] if self.span_s.is_none() => "the window holds nothing to judge".to_owned(),
             [] => {
                 let above = self.exemption.as_ref();
-                let above = above.map(|of| format!(", one of them above {} m (--above)", exact(of.above_m)));
+                let above = above.map(|time| format!(", one of them above {} m (--above)", exact(time.above_m)));
                 format!("no two vehicles are present at the same time{}", above.unwrap_or_default())
             }
             [VehicleFinding { vehicle, finding }] => {

@@ -119,7 +119,7 @@ pub(super) fn compare(
     let mut report = PlanReport::new(path.display().to_string(), &found, flight.outcome, audited.as_ref());
     report.planar = is_planar;
     let assumed = report.assumes.take().into_iter();
-    let assumed = assumed.chain(plan.assumed().map(|of| format!("the plan has {of}")));
+    let assumed = assumed.chain(plan.assumed().map(|item| format!("the plan has {item}")));
     let assumed =
         assumed.chain((is_planar && !flight.is_planar).then(|| IN_PLANE.to_owned())).collect::<Vec<_>>().join(" and ");
     report.assumes = (!assumed.is_empty()).then_some(assumed);

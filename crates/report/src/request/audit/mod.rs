@@ -368,8 +368,9 @@ fn decimal_tie(
 ) -> Result<Option<String>, Failure> {
     let deepest = outcome.violations.iter().min_by(|a, b| (a.min_m - a.limit_m).total_cmp(&(b.min_m - b.limit_m)));
     let is_in_metres = settings.ellipsoid_m.is_none() && settings.cylinder.is_none();
-    let is_just_below = |of: &&Violation<ObjectPair>| of.limit_m - of.min_m <= JUST_BELOW * of.limit_m;
-    let Some(deepest) = deepest.filter(is_just_below).filter(|of| is_in_metres && of.pair.vehicles().is_some()) else {
+    let is_just_below = |found: &&Violation<ObjectPair>| found.limit_m - found.min_m <= JUST_BELOW * found.limit_m;
+    let Some(deepest) = deepest.filter(is_just_below).filter(|one| is_in_metres && one.pair.vehicles().is_some())
+    else {
         return Ok(None);
     };
     let mut series = PairSeries::new(settings, outcome, deepest.pair)?;

@@ -22,7 +22,7 @@ use tautline_recordings::read::{ColumnNames, ReadOptions, TimeUnit};
 /// Names of the time column that the checker accepts, and the unit that a name gives.
 const TIMES: [(&str, Option<TimeUnit>); 4] =
     [("t_s", Some(TimeUnit::Seconds)), ("time_s", Some(TimeUnit::Seconds)), ("t", None), ("time", None)];
-/// Names of the other columns that it needs.
+/// Names of the other columns that the checker needs.
 const COLUMNS: [&str; 4] = ["id", "x", "y", "z"];
 /// Names of columns that do not change the reading; those of the exports of a run, besides velocities.
 const UNUSED: [&str; 18] = [

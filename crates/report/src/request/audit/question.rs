@@ -264,8 +264,8 @@ impl<'a> AuditRequest<'a> {
 
     /// Returns the parts of the question whose answer changes with the unit of time, in words.
     fn rests_on_seconds(&self, settings: &Settings) -> Vec<String> {
-        // Without `..`: a new part of the question has to be sorted here. The files of obstacles and fence, the rules
-        // and the file of settings are contained in the complete settings.
+        // Without `..`, a new part of the question does not compile until it is listed here. The files of obstacles and
+        // fence, the rules and the file of settings are contained in the complete settings.
         let Self {
             subject: _,
             settings: _,

@@ -123,7 +123,7 @@ impl SideFiles {
             let is_given = self.clocks.contains(&Some(clock));
             is_given.then(|| Fact::name(FactKind::SideFileClock, source, clock.name()))
         };
-        let has_offset = settings.vehicles.values().any(|of| of.offset_s != 0.0);
+        let has_offset = settings.vehicles.values().any(|vehicle| vehicle.offset_s != 0.0);
         let facts = [
             of_clock(PathClock::Report, Source::Convention),
             of_clock(PathClock::Recording, Source::Deduced),
@@ -134,11 +134,11 @@ impl SideFiles {
     }
 }
 
-/// Refuses an offset by which a vehicle cannot meet any other: beyond the span of the recording \[s\], or without a
-/// time at which another vehicle is present.
+/// Refuses an offset after which a vehicle cannot meet any other. Such an offset exceeds the span of the recording
+/// \[s\], or leaves no time at which another vehicle is present.
 pub(super) fn check_offsets(settings: &Settings, outcome: &Outcome, span_s: f64) -> Result<(), Failure> {
     for (vehicle, name) in outcome.vehicles.iter().enumerate() {
-        let offset_s = settings.vehicles.get(name).map_or(0.0, |of| of.offset_s);
+        let offset_s = settings.vehicles.get(name).map_or(0.0, |vehicle| vehicle.offset_s);
         let problem = if offset_s.abs() > span_s {
             format!("longer than the recording, {}", seconds(span_s))
         } else if offset_s != 0.0 && outcome.alone.contains(&vehicle) {
