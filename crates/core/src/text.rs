@@ -111,7 +111,9 @@ fn rounded_in_powers(number: f64, sign: f64) -> String {
     if sign * (rounded - number) >= 0.0 || !number.is_finite() {
         return shown;
     }
-    let exponent = shown.split_once('e').and_then(|(_, exponent)| exponent.parse::<i32>().ok()).unwrap_or_default();
+    // The exponent before rounding: 9.96e-4 is shown as 1.0e-3, and its next two digits below are 9.9e-4.
+    let digits = format!("{number:e}");
+    let exponent = digits.split_once('e').and_then(|(_, exponent)| exponent.parse::<i32>().ok()).unwrap_or_default();
     format!("{:.1e}", rounded + sign * 10_f64.powi(exponent - 1))
 }
 

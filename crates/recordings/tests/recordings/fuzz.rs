@@ -197,7 +197,7 @@ fn frames() -> Vec<u8> {
         ("/tf", TF, transform(4, "odom", "base_link")),
         ("/odom", "nav_msgs/msg/Odometry", cdr(&odometry, true)),
         ("/swarm/poses", "motion_capture_tracking_interfaces/msg/NamedPoseArray", cdr(&named, false)),
-        ("/gps/fix", "sensor_msgs/msg/NavSatFix", cdr(&fix, true)),
+        ("/car/gps/fix", "sensor_msgs/msg/NavSatFix", cdr(&fix, true)),
         ("/tf", TF, transform(9, "map", "odom")),
     ]
     .map(|(topic, schema, content)| (topic, schema, "cdr", 1, content))
