@@ -19,7 +19,7 @@
 //! | 1e-9 | sine of the turn of a straight unicycle | 1e-9 w / 2 | w <= 100 m | 5e-8 m |
 //! | 1e-9 | periods of slowing down of a unicycle | 0: the rest point is kept | | 0 |
 //! | 1e-12 | speeds of a unicycle, relative | 1e-12 w | w <= 100 m | 1e-10 m |
-//! | u | normal before an obstacle at d, with the reach R | 8 u C R / d | C by this row | 1e-7 m |
+//! | u | normal before an obstacle at d, with the reach R | 8 u C R / d | C by this row | 8e-8 m |
 //!
 //! *Brake.* In each of its periods the position errs by at most 8 u C, and the speed by at most 4 u V. The time left
 //! times V is at most twice the length of the segment, so the stop point moves by at most 8 u C. It errs by 16 u C
@@ -53,7 +53,7 @@ pub const ROUNDING_M: f64 = 1e-6;
 /// Part of the margin of a vehicle for its brake and its reference \[m\].
 const MOTION_M: f64 = 1.5e-7;
 /// Part of the margin before an obstacle for the rounding of its normal \[m\].
-pub(crate) const NORMAL_M: f64 = 1e-7;
+pub(crate) const NORMAL_M: f64 = 8e-8;
 /// Largest error of one rounded operation, relative to its result.
 pub(crate) const UNIT_ROUNDOFF: f64 = f64::EPSILON / 2.0;
 /// Largest quotient of the largest command and the gain on position \[m\].

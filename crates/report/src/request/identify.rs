@@ -5,7 +5,6 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use super::{Failure, ScenarioRequest, Silent, outputs};
-use tautline_core::text::at_most;
 use tautline_sim::shield::Identification;
 use tautline_sim::vehicle::{self, MODELS, Model, Tracking};
 

@@ -12,8 +12,8 @@ mod warning;
 
 use serde::Serialize;
 
-use crate::scenario::{MAX_HALVINGS, Scenario, TimeSpec};
-use crate::sim::{Ending, Simulation};
+use crate::scenario::{MAX_HALVINGS, PlantSpec, Scenario, TimeSpec};
+use crate::sim::{Breakdown, Ending, Simulation};
 use crate::vehicle::Quadrotor;
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_core::text::at_least;
@@ -388,18 +388,25 @@ fn step_too_long(law: &dyn Law, scenario: &Scenario) -> Option<String> {
     })
 }
 
-/// Returns a warning if the flight ends before its first step, with the law's command for the sensed start.
+/// Returns a warning if the flight ends before the end of its first step, with the law's command for the sensed start.
 fn ends_at_start(scenario: &Scenario) -> Option<String> {
     // A scenario that cannot be flown at all is refused by its validation.
-    let simulation = Simulation::new(scenario).ok()?;
-    let ending = simulation.ending()?;
+    let mut simulation = Simulation::new(scenario).ok()?;
+    // In continuous time the bend of the first paths is known only after the step.
+    if scenario.plant == PlantSpec::Ideal {
+        simulation.step();
+    }
+    let ending = simulation.ending().filter(|_| simulation.steps() == 0)?;
     let remedy = match ending {
+        // The reason has a remedy.
+        Ending::BrokeDown(Breakdown::Bent { .. }) => "",
         Ending::LawUndefined(error) if error.is_at_barrier() => {
             "Move the vehicles of [start] apart, or reduce law.delta_m or the errors of [sensing]."
         }
         _ => "Reduce the numbers of [start], or the gains of [law].",
     };
-    Some(format!("The flight ends at its start: {}. {remedy}", ending.reason()?.trim_end_matches('.')))
+    let message = format!("The flight ends at its start: {}. {remedy}", ending.reason()?.trim_end_matches('.'));
+    Some(message.trim_end().to_owned())
 }
 
 /// Returns the dimension of the affine subspace that forces along the lines between vehicles never leave. It moves with

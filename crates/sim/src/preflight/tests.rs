@@ -57,6 +57,19 @@ fn a_flight_that_ends_at_its_start_is_refused() {
 }
 
 #[test]
+fn a_first_step_that_bends_too_far_is_refused() {
+    for (halvings, is_refused) in [(0, true), (12, false)] {
+        let law = ["plant.kind=ideal", "shield.enabled=true", "law.kind=laplacian"];
+        let bent = scenario("swap", &[&law[..], &[&format!("time.max_halvings={halvings}")]].concat());
+        let found = check(&bent);
+        assert_eq!(found.refusing().contains(&"ends-at-start"), is_refused, "{halvings}: {:?}", found.warnings);
+        let mut simulation = Simulation::new(&bent).expect("a flight");
+        simulation.step();
+        assert_eq!(simulation.steps() == 0, is_refused, "{halvings}");
+    }
+}
+
+#[test]
 fn the_pentagon_has_the_known_numbers() {
     let found = check(&scenario("pentagon", &[]));
     assert!((found.certified_m.expect("a certificate") - 2.055_307).abs() < PRINTED_M);
