@@ -537,7 +537,7 @@ mod tests {
             limits.certificate(),
             "certified never closer than 1.000 m under any law and any loss of messages. Assumed: commands up to 5 \
              m/s^2 are carried out; position errors stay below 0.03 m and velocity errors below 0.05 m/s; pushes stay \
-             below 0.3 m/s^2 (tube 0.158 m)"
+             below 0.3 m/s^2 (tube 0.159 m)"
         );
         let late = Settings { measurement_delay_periods: 2, actuator_lag_s: 0.05, ..settings };
         let late = late.limits().expect("certified").certificate();
