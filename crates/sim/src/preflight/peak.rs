@@ -85,7 +85,7 @@ mod tests {
         // The command of vehicle 1 at the start of the pentagon is (0.860843, -0.021226) m/s^2.
         let peak_m_s2 = check("pentagon", &[]).start_peak_m_s2.expect("a command");
         assert!((peak_m_s2 - 0.860_843_f64.hypot(0.021_226)).abs() < 1e-5, "{peak_m_s2}");
-        assert!(check("pentagon", &[]).text().contains("control      0.861 m/s^2 at the start\n"));
+        assert!(check("pentagon", &[]).text().contains("control      0.862 m/s^2 at the start\n"));
         assert_eq!(check("pentagon", &["actuation.max_accel_m_s2=0.5"]).start_peak_m_s2, Some(0.5));
     }
 

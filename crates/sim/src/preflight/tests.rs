@@ -46,7 +46,8 @@ fn ring(count: usize, graph: Graph, a22_per_s: f64) -> Scenario {
 fn a_flight_that_ends_at_its_start_is_refused() {
     let mut ended = 0;
     for seed in 0..20 {
-        let noisy = scenario("pentagon", &[&format!("noise.seed={seed}"), "sensing.position_noise_m=1"]);
+        let noise = ["sensing.position_noise_m=1", "sensing.rate_hz=100"];
+        let noisy = scenario("pentagon", &[&[&*format!("noise.seed={seed}")], &noise[..]].concat());
         let ends = Simulation::new(&noisy).expect("a flight").ending().is_some();
         let found = check(&noisy);
         assert_eq!(found.refusing().contains(&"ends-at-start"), ends, "seed {seed}: {:?}", found.warnings);

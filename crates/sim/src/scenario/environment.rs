@@ -165,7 +165,7 @@ mod tests {
     fn a_part_is_ignored_by_itself_and_its_remedy_turns_it_off() {
         for (name, sets, key) in [
             ("pentagon", vec!["sensing.latency_s=0.1"], "sensing"),
-            ("pentagon", vec!["sensing.position_noise_m=0.1"], "sensing"),
+            ("pentagon", vec!["sensing.position_noise_m=0.1", "sensing.rate_hz=100"], "sensing"),
             ("pentagon", vec!["network={rate_hz=50, latency_s=0.1}"], "network"),
             ("pentagon", vec!["actuation.lag_s=0.2"], "actuation"),
             ("pentagon", vec!["actuation.max_accel_m_s2=1"], "actuation"),
