@@ -9,7 +9,7 @@ use super::obstacles::Obstacles;
 use super::shield::ShieldNumbers;
 use tautline_audit::Status;
 use tautline_core::record::EnergyRise;
-use tautline_core::text::{below_bound, beside_limit, counted, exact, seconds, up_to};
+use tautline_core::text::{below_bound, beside_limit, counted, exact, metres, seconds};
 use tautline_sim::metrics::Summary;
 use tautline_sim::scenario::TimeSpec;
 use tautline_sim::sim::Ending;
@@ -292,19 +292,19 @@ fn not_reached(report: &Report, result: &FlightResult<'_>) -> Option<String> {
         UnmetCriterion::Unknown => "no state at the end is known".to_owned(),
         UnmetCriterion::MaxEdgeErrorM => format!(
             "at the end the largest edge error is {} m (limit {} m)",
-            up_to(summary.max_edge_error_m),
+            metres(summary.max_edge_error_m),
             judge.edge_error_m
         ),
         UnmetCriterion::MaxPositionErrorM => format!(
             "at the end every edge error is within its limit, but the shape, its attitude or its place is another \
              one: the largest position error is {} m (limit {} m)",
-            up_to(summary.max_position_error_m),
+            metres(summary.max_position_error_m),
             judge.edge_error_m
         ),
         UnmetCriterion::Disagreement => format!(
             "at the end the largest speed relative to the mean velocity, or to that of the reference, is {} m/s \
              (limit {} m/s)",
-            up_to(summary.disagreement_m_s),
+            metres(summary.disagreement_m_s),
             judge.disagreement_m_s
         ),
     };

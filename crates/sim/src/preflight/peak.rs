@@ -2,7 +2,7 @@
 
 use crate::scenario::Scenario;
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
-use tautline_core::text::up_to;
+use tautline_core::text::metres;
 use tautline_laws::law::Law;
 use tautline_laws::observation::Observation;
 use tautline_laws::space::CellList;
@@ -63,7 +63,7 @@ pub(super) fn extreme_acceleration(peak_m_s2: f64) -> Option<String> {
             "At the start of a leg the law commands {} m/s^2, {peak_g:.1} times gravity. Few vehicles reach more than \
              {CREDIBLE_G} times gravity. Reduce the law's gains or the distance between start and slots, or set \
              actuation.max_accel_m_s2.",
-            up_to(peak_m_s2)
+            metres(peak_m_s2)
         )
     })
 }
@@ -85,7 +85,7 @@ mod tests {
         // The command of vehicle 1 at the start of the pentagon is (0.860843, -0.021226) m/s^2.
         let peak_m_s2 = check("pentagon", &[]).start_peak_m_s2.expect("a command");
         assert!((peak_m_s2 - 0.860_843_f64.hypot(0.021_226)).abs() < 1e-5, "{peak_m_s2}");
-        assert!(check("pentagon", &[]).text().contains("control      0.862 m/s^2 at the start\n"));
+        assert!(check("pentagon", &[]).text().contains("control      0.861 m/s^2 at the start\n"));
         assert_eq!(check("pentagon", &["actuation.max_accel_m_s2=0.5"]).start_peak_m_s2, Some(0.5));
     }
 

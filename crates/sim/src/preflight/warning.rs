@@ -6,7 +6,7 @@ use super::{Connectivity, LegCertificate, Preflight, margins};
 use crate::shield::TrackingBasis;
 use crate::vehicle::Quadrotor;
 use tautline_core::text;
-use tautline_core::text::{at_least, beside_limit, counted, seconds, table, up_to};
+use tautline_core::text::{at_least, beside_limit, counted, metres, seconds, table};
 
 /// Warning about a scenario.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
@@ -288,7 +288,7 @@ impl Preflight {
 
     fn peak_line(&self) -> Option<String> {
         let of_leg = if self.legs.is_empty() { "" } else { " of a leg" };
-        self.start_peak_m_s2.map(|peak_m_s2| format!("{} m/s^2 at the start{of_leg}", up_to(peak_m_s2)))
+        self.start_peak_m_s2.map(|peak_m_s2| format!("{} m/s^2 at the start{of_leg}", metres(peak_m_s2)))
     }
 
     fn rigidity_line(&self) -> String {
