@@ -522,6 +522,8 @@ def assumptions(claim: Claim, table: Table, motion: Motion, gaps: int, alone: li
         joined += ", or always for some" * (None in claim.max_gaps_s.values())
     facts = [
         f"time: {'the column of time holds dates' if table.is_dated else unit}",
+        "clocks: the times of all vehicles are of one clock",
+        "vehicles: each name in `id` is one vehicle",
         "positions: x, y and z are in metres, in one frame and without errors",
         f"motion: straight at constant speed between joined samples, which are up to {rounded(longest_s)} s apart",
         f"gaps: {joined}; longer gaps, not judged: {gaps}",

@@ -144,6 +144,8 @@ class Checker(unittest.TestCase):
             [
                 "CONFIRMED: clear, never closer than 3.0 m, a and b at t = 4.5 s (limit 1.0 m)",
                 "assumes  time: the column t is taken as s",
+                "assumes  clocks: the times of all vehicles are of one clock",
+                "assumes  vehicles: each name in `id` is one vehicle",
                 "assumes  positions: x, y and z are in metres, in one frame and without errors",
                 "assumes  motion: straight at constant speed between joined samples, which are up to 1 s apart",
                 "assumes  gaps: samples of a vehicle are joined up to 1.5 s apart; longer gaps, not judged: 0",

@@ -318,6 +318,10 @@ impl Settings {
             let known: Vec<_> = self.obstacles.iter().map(|obstacle| obstacle.name.as_str()).collect();
             return Err(RecordedError::UnknownObstacle { name: name.clone(), known: known.join(", ") });
         }
+        let count = |name: &String| self.obstacles.iter().filter(|obstacle| obstacle.name == *name).count();
+        if let Some(name) = self.land_on.iter().find(|name| count(name) > 1) {
+            return Err(RecordedError::AmbiguousObstacle { name: name.clone(), count: count(name) });
+        }
         self.obstacles.iter().try_for_each(|obstacle| Ok(obstacle.check()?))
     }
 }
@@ -416,6 +420,14 @@ pub enum RecordedError {
     NoGround {
         /// Name of the obstacle.
         name: String,
+    },
+    /// Vehicles land on an obstacle whose name several obstacles have.
+    #[error("land-on: {count} obstacles have the name `{name}`")]
+    AmbiguousObstacle {
+        /// Name of the obstacles.
+        name: String,
+        /// Number of obstacles with this name.
+        count: usize,
     },
     /// Vehicles land on an obstacle that the settings do not have.
     #[error("land-on: there is no obstacle `{name}`; the obstacles are {known}")]

@@ -447,8 +447,11 @@ fn obstacles_count_on_the_ground_unless_vehicles_land_on_them() {
         assert!((exempt.pairs_s - 5.0).abs() < ROUNDING && (exempt.vehicles_s - 5.0).abs() < ROUNDING, "{exempt:?}");
     }
     assert_eq!(judge(&items, Settings { above_m: None, land_on: BTreeSet::new(), ..landing.clone() }).exempt, None);
-    let unknown = Settings { land_on: ["pad".to_owned()].into(), ..above };
+    let unknown = Settings { land_on: ["pad".to_owned()].into(), ..above.clone() };
     assert!(matches!(TrackAuditor::new(unknown), Err(RecordedError::UnknownObstacle { .. })));
+    let twice = Settings { obstacles: [&above.obstacles[..], &above.obstacles[..]].concat(), ..landing.clone() };
+    assert!(matches!(TrackAuditor::new(twice.clone()), Err(RecordedError::AmbiguousObstacle { count: 2, .. })));
+    assert!(TrackAuditor::new(Settings { land_on: BTreeSet::new(), ..twice }).is_ok());
     let no_height = Settings { above_m: None, ..landing };
     assert!(matches!(TrackAuditor::new(no_height), Err(RecordedError::NoGround { .. })));
 }

@@ -11,7 +11,7 @@ use super::heading::Words;
 /// Names of columns that occur in data of aircraft only, without separators.
 const COLUMNS: Words = Words(
     "icao24 icao hex hexident callsign squawk groundspeed gs tas ias mach track verticalrate vertrate barorate \
-     geomrate altbaro altgeom",
+     geomrate altbaro altgeom flight flightid registration tailnumber aircraftid typecode adep ades",
 );
 
 /// Names of columns with the rate of the height, without separators.
@@ -21,6 +21,11 @@ const RATES: Words = Words(
 
 /// Units of a rate without a unit \[m/s\]: metres per second, feet per second, feet per minute, knots.
 const RATE_UNITS_M_S: [f64; 4] = [1.0, 0.3048, 0.3048 / 60.0, 1852.0 / 3600.0];
+
+/// Ends of names of rates in feet per minute, without separators.
+const FEET_PER_MINUTE: [&str; 4] = ["feetperminute", "ftpermin", "ftmin", "fpm"];
+
+const FOOT_PER_MINUTE_M_S: f64 = 0.3048 / 60.0;
 
 /// Largest factor between a height's slope and its rate that noise explains.
 const NOISE: f64 = 1.5;
@@ -43,7 +48,8 @@ pub(super) fn column_of_aircraft(header: &[String], id: Option<usize>, height: u
     let mut others = header.iter().enumerate().filter(|(column, _)| *column != height);
     // A column `track` that names the vehicle is the track of a sensor.
     let is_sensor_track = |column: usize| id == Some(column) && heading::joined(&header[column]) == "track";
-    let found = others.find(|(column, name)| COLUMNS.contains(&heading::joined(name)) && !is_sensor_track(*column));
+    let is_of_aircraft = |name: &str| COLUMNS.contains(&heading::joined(name)) || is_rate_in_feet_per_minute(name);
+    let found = others.find(|(column, name)| is_of_aircraft(name) && !is_sensor_track(*column));
     found.map(|(_, name)| name).filter(|_| !is_state_vectors(header))
 }
 
@@ -56,6 +62,9 @@ pub(super) fn is_state_vectors(header: &[String]) -> bool {
 /// Returns the column of the vertical rate, and the size of its unit \[m/s\] if its name has one.
 pub(super) fn rate_column(header: &[String]) -> Option<(usize, Option<f64>)> {
     header.iter().enumerate().find_map(|(column, name)| {
+        if is_rate_in_feet_per_minute(name) {
+            return Some((column, Some(FOOT_PER_MINUTE_M_S)));
+        }
         let (stem, unit) = match heading::bracketed(name) {
             (stem, Some(unit)) => (stem, Some(unit)),
             (stem, None) => {
@@ -66,6 +75,12 @@ pub(super) fn rate_column(header: &[String]) -> Option<(usize, Option<f64>)> {
         let size = unit.and_then(|unit| heading::size_of(unit, true));
         RATES.contains(&heading::joined(stem)).then_some((column, size))
     })
+}
+
+/// Returns whether a column is a rate in feet per minute by its name, such as `vertical_rate_fpm`.
+fn is_rate_in_feet_per_minute(name: &str) -> bool {
+    let name = heading::joined(name);
+    FEET_PER_MINUTE.iter().any(|end| name.strip_suffix(end).is_some_and(|stem| RATES.contains(stem)))
 }
 
 /// Comparison of heights with their recorded rate, over all vehicles.
@@ -206,7 +221,29 @@ mod tests {
         assert_eq!(found("time,icao24,lat,lon,velocity,heading,vertrate,callsign,baroaltitude", Some(1)), None);
         assert_eq!(found("t,track,lat,lon,alt", Some(1)), None);
         assert_eq!(found("t,id,lat,lon,alt,yaw", Some(1)), None);
+        for name in [
+            "flight",
+            "flight_id",
+            "registration",
+            "tail_number",
+            "aircraft_id",
+            "typecode",
+            "adep",
+            "ades",
+            "vertical_rate_fpm",
+        ] {
+            assert_eq!(found(&format!("t,{name},lat,lon,alt"), Some(1)).as_deref(), Some(name));
+        }
+        assert_eq!(found("t,id,lat,lon,alt,climb_cm_s", Some(1)), None);
         assert_eq!(rate_column(&header("t,alt,vertical_rate [ft/min]")), Some((2, Some(0.3048 / 60.0))));
         assert_eq!(rate_column(&header("t,climb_m_s")), Some((1, Some(1.0))));
+        for (name, unit_m_s) in [
+            ("vertical_rate_fpm", FOOT_PER_MINUTE_M_S),
+            ("vertical_rate_ftmin", FOOT_PER_MINUTE_M_S),
+            ("vertical_rate_ft_min", FOOT_PER_MINUTE_M_S),
+            ("vertical_rate_cm_s", 0.01),
+        ] {
+            assert_eq!(rate_column(&header(&format!("t,alt,{name}"))), Some((2, Some(unit_m_s))), "{name}");
+        }
     }
 }

@@ -165,6 +165,80 @@ fn vehicles_of_transforms_have_one_clock_too() {
     assert_refused(&error, "recording/several-clocks", "");
 }
 
+/// Returns messages of a pose topic at each time \[ms\], with the delay from stamp to log time \[ms\].
+fn dated(topic: &'static str, frame: &str, y: f64, delays_ms: &[(i64, i64)]) -> Vec<Message> {
+    let message = |&(log_ms, delay_ms): &(i64, i64)| {
+        let (log_ns, stamp_ns) = (UNIX + log_ms * MS, UNIX + (log_ms - delay_ms) * MS);
+        let parts = (stamp_ns.div_euclid(1_000_000_000), stamp_ns.rem_euclid(1_000_000_000));
+        let stamp = (i32::try_from(parts.0).expect("seconds"), u32::try_from(parts.1).expect("nanoseconds"));
+        let place = [log_ms as f64 / 1e3, y, 1.0];
+        (topic, POSE, "cdr", log_ns.cast_unsigned(), cdr(&((stamp, frame), (place, NO_TURN)), true))
+    };
+    delays_ms.iter().map(message).collect()
+}
+
+#[track_caller]
+fn has_one_clock(topics: &[Vec<Message>], options: &ReadOptions, expected: bool) {
+    let found = read_bytes("bag.mcap", &mcap_of(&in_log_order(topics)), options);
+    match found {
+        Ok(_) => assert!(expected, "read"),
+        Err(error) if expected => panic!("{error}"),
+        Err(error) => assert_refused(&error, "recording/several-clocks", ""),
+    }
+}
+
+#[test]
+fn clocks_are_compared_at_low_rates_and_in_every_part_of_a_recording() {
+    let every = |step_ms: i64, from_ms: i64, to_ms: i64, delay_ms: fn(i64) -> i64| -> Vec<(i64, i64)> {
+        let count = (to_ms - from_ms) / step_ms;
+        (0..count).map(|k| from_ms + k * step_ms).map(|log_ms| (log_ms, delay_ms(log_ms))).collect()
+    };
+    let fast = every(100, 0, 10_000, |_| 10);
+    let slow = every(1000, 0, 10_000, |_| 10);
+    for (a, b, expected) in [
+        // One message per second.
+        (&slow, every(1000, 10, 10_010, |_| 3010), false),
+        (&fast, every(1000, 10, 10_010, |_| 410), false),
+        (&slow, every(1000, 10, 10_010, |_| 90), true),
+        // A clock that drifts, and one that is set during the recording.
+        (&fast, every(100, 0, 10_000, |log_ms| 10 + log_ms / 10), false),
+        (&fast, every(100, 0, 10_000, |log_ms| if log_ms < 5000 { 10 } else { -990 }), false),
+        // A recorder that writes the messages of one topic every 2 s.
+        (&fast, every(100, 0, 10_000, |log_ms| 2000 - log_ms % 2000), true),
+        // Vehicles that are never present together.
+        (&fast, every(100, 10_000, 20_000, |_| 3010), false),
+        (&fast, every(100, 10_000, 20_000, |_| 80), true),
+    ] {
+        has_one_clock(&[dated("/a/pose", "world", 0.0, a), dated("/b/pose", "world", 2.0, &b)], &usual(), expected);
+    }
+    // A simulation at a tenth of real time, in which one vehicle appears later, has one clock.
+    let sim = |from_ms| every(100, from_ms, 10_000, |log_ms| log_ms - log_ms / 10);
+    let sources = [dated("/a/pose", "world", 0.0, &sim(0)), dated("/b/pose", "world", 2.0, &sim(4000))];
+    has_one_clock(&sources, &usual(), true);
+}
+
+#[test]
+fn clocks_of_transforms_between_frames_are_compared_with_those_of_poses() {
+    let transforms = |delay_ms: i64| -> Vec<Message> {
+        let transform = |k: i64| {
+            let stamp_ns = UNIX + (100 * k - delay_ms) * MS;
+            let parts = (stamp_ns.div_euclid(1_000_000_000), stamp_ns.rem_euclid(1_000_000_000));
+            let stamp = (i32::try_from(parts.0).expect("seconds"), u32::try_from(parts.1).expect("nanoseconds"));
+            let sent = ((stamp, "map"), "a/odom", ([k as f64, 0.0, 0.0], NO_TURN));
+            ("/tf", TF, "cdr", (UNIX + 100 * k * MS).cast_unsigned(), cdr(&(vec![sent],), true))
+        };
+        (0..100).map(transform).collect()
+    };
+    let options = ReadOptions { frame: Some("map".to_owned()), ..usual() };
+    let times: Vec<_> = (30..70).map(|k| (100 * k, 10)).collect();
+    // A publisher may date its transforms forward by 1 s.
+    for (delay_ms, expected) in [(10, true), (-900, true), (2010, false), (410, false), (-2000, false)] {
+        let poses = [dated("/a/pose", "a/odom", 0.0, &times), dated("/b/pose", "map", 2.0, &times)];
+        let [a, b] = poses;
+        has_one_clock(&[a, b, transforms(delay_ms)], &options, expected);
+    }
+}
+
 #[test]
 fn clock_option_needs_messages() {
     for (name, text) in

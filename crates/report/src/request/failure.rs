@@ -286,6 +286,10 @@ impl From<RecordedError> for Failure {
                 let help = "give the height of the ground with --above Z, or leave --land-on out";
                 return Self::input("audit/land-on", format!("--{error}"), help);
             }
+            RecordedError::AmbiguousObstacle { .. } => {
+                let help = "give each obstacle its own name, or leave --land-on out";
+                return Self::input("audit/land-on", format!("--{error}"), help);
+            }
             RecordedError::UnknownObstacle { .. } => {
                 let help = "use the names of the obstacles, or leave --land-on out";
                 return Self::input("audit/land-on", format!("--{error}"), help);

@@ -13,9 +13,13 @@ use super::super::options::MessageClock;
 /// so the latency of a position is below 0.1 s.
 const LARGEST_DIFFERENCE_NS: i128 = 100_000_000;
 
-/// Length of a window of log times in which delays are compared \[ns\]. In a short window the clock of a slow
-/// simulation drifts little.
-const WINDOW_NS: u64 = 1_000_000_000;
+/// Largest time by which publishers of transforms date them forward \[ns\].
+const LARGEST_FORWARD_NS: i128 = 1_000_000_000;
+
+/// Lengths of the windows of log times in which delays are compared \[ns\]. In a short window the clock of a slow
+/// simulation drifts little. A long window has several messages of a slow source. The last one is the whole recording,
+/// which compares sources that are never present together.
+const WINDOWS_NS: [u64; 3] = [1_000_000_000, 10_000_000_000, u64::MAX];
 
 /// Number of sources, from the first on, with which all others are compared.
 const MOST_COMPARED: usize = 64;
@@ -31,7 +35,8 @@ struct SourceClock {
     is_mixed: bool,
     /// Last message: log time and stamp \[ns\].
     last: Option<(u64, i64)>,
-    window: Option<Delays>,
+    /// Delays in the current window of each length.
+    delays: [Option<Delays>; WINDOWS_NS.len()],
 }
 
 /// Delays of the stamped messages of a source in one window \[ns\].
@@ -42,11 +47,18 @@ struct Delays {
     count: u64,
 }
 
-/// Difference of the smallest delays of two sources in the window with the smallest spread \[ns\].
+/// Difference of the smallest delays of two sources, in the window where it exceeds its tolerance most \[ns\].
 #[derive(Clone, Copy, Debug)]
 struct Difference {
-    spread: i128,
+    excess: i128,
     delays: [i128; 2],
+}
+
+/// Current window of one length: its number, and the sources with messages in it.
+#[derive(Debug, Default)]
+struct Window {
+    number: u64,
+    sources: Vec<usize>,
 }
 
 /// Clocks of all sources, by topic and moving frame.
@@ -55,19 +67,20 @@ pub(super) struct Clocks {
     sources: Vec<SourceClock>,
     /// Index of each source, by topic and frame; the frame is empty unless the topic holds transforms.
     indices: BTreeMap<String, BTreeMap<String, usize>>,
+    /// Differences beyond their tolerance, by the source with the larger delay and the other source.
     differences: BTreeMap<(usize, usize), Difference>,
-    /// Number of the current window, and the sources with messages in it.
-    window: u64,
-    in_window: Vec<usize>,
+    windows: [Window; WINDOWS_NS.len()],
 }
 
 impl Clocks {
     /// Records the log time and the stamp of a message; a stamp of 0 may be a missing one.
     pub(super) fn observe(&mut self, topic: &str, frame: &str, log_ns: u64, stamp_ns: i64) {
-        let window = log_ns / WINDOW_NS;
-        if window != self.window {
-            self.close_window();
-            self.window = window;
+        for (length, window_ns) in WINDOWS_NS.into_iter().enumerate() {
+            let number = log_ns / window_ns;
+            if number != self.windows[length].number {
+                self.close_window(length);
+                self.windows[length].number = number;
+            }
         }
         let index = self.index(topic, frame);
         let source = &mut self.sources[index];
@@ -84,15 +97,17 @@ impl Clocks {
             return;
         }
         source.stamped += 1;
-        match &mut source.window {
-            Some(window) => {
-                window.smallest = window.smallest.min(delay);
-                window.largest = window.largest.max(delay);
-                window.count += 1;
-            }
-            window @ None => {
-                *window = Some(Delays { smallest: delay, largest: delay, count: 1 });
-                self.in_window.push(index);
+        for (known, window) in source.delays.iter_mut().zip(&mut self.windows) {
+            match known {
+                Some(known) => {
+                    known.smallest = known.smallest.min(delay);
+                    known.largest = known.largest.max(delay);
+                    known.count += 1;
+                }
+                None => {
+                    *known = Some(Delays { smallest: delay, largest: delay, count: 1 });
+                    window.sources.push(index);
+                }
             }
         }
     }
@@ -102,24 +117,46 @@ impl Clocks {
             return index;
         }
         let name = if frame.is_empty() { quoted(topic) } else { format!("{} on {}", quoted(frame), quoted(topic)) };
-        self.sources.push(SourceClock { name, stamped: 0, unstamped: 0, is_mixed: false, last: None, window: None });
+        self.sources.push(SourceClock {
+            name,
+            stamped: 0,
+            unstamped: 0,
+            is_mixed: false,
+            last: None,
+            delays: Default::default(),
+        });
         let index = self.sources.len() - 1;
         self.indices.entry(topic.to_owned()).or_default().insert(frame.to_owned(), index);
         index
     }
 
-    /// Compares the delays in the current window.
-    pub(super) fn close_window(&mut self) {
-        self.in_window.sort_unstable();
-        let delays = self.in_window.drain(..).filter_map(|index| Some((index, self.sources[index].window.take()?)));
+    /// Compares the delays in the last window of each length.
+    pub(super) fn close(&mut self) {
+        for length in 0..WINDOWS_NS.len() {
+            self.close_window(length);
+        }
+    }
+
+    /// Compares the delays in the current window of a length.
+    fn close_window(&mut self, length: usize) {
+        let window = &mut self.windows[length].sources;
+        window.sort_unstable();
+        let delays = window.drain(..).filter_map(|index| Some((index, self.sources[index].delays[length].take()?)));
         // A single message gives no spread.
         let delays: Vec<_> = delays.filter(|(_, delays)| delays.count > 1).collect();
         for (place, (first, a)) in delays.iter().enumerate().take_while(|(_, (first, _))| *first < MOST_COMPARED) {
             for (second, b) in &delays[place + 1..] {
                 let spread = (a.largest - a.smallest) + (b.largest - b.smallest);
-                let found = Difference { spread, delays: [a.smallest, b.smallest] };
-                let known = self.differences.entry((*first, *second)).or_insert(found);
-                if spread < known.spread {
+                let apart = (a.smallest - b.smallest).abs();
+                let excess = apart - LARGEST_DIFFERENCE_NS.max(2 * spread);
+                if excess <= 0 {
+                    continue;
+                }
+                let a_is_later = a.smallest > b.smallest;
+                let pair = if a_is_later { (*first, *second) } else { (*second, *first) };
+                let found = Difference { excess, delays: [a.smallest.max(b.smallest), a.smallest.min(b.smallest)] };
+                let known = self.differences.entry(pair).or_insert(found);
+                if excess > known.excess {
                     *known = found;
                 }
             }
@@ -127,7 +164,7 @@ impl Clocks {
     }
 
     /// Decides between stamps and log times. `gives` returns, by topic and frame, whether a source gives the positions
-    /// of a vehicle. It returns `None` for an unused source.
+    /// of a vehicle; other sources may be dated forward. It returns `None` for an unused source.
     ///
     /// # Errors
     /// If only some of the sources have stamps, or if their stamps are of several clocks.
@@ -139,12 +176,12 @@ impl Clocks {
         if let Some(given) = given {
             return Ok(given);
         }
-        let (mut used, mut of_vehicles) = (Vec::new(), vec![false; self.sources.len()]);
+        let (mut used, mut of_vehicles) = (Vec::new(), vec![None; self.sources.len()]);
         for (topic, frames) in &self.indices {
             for (frame, &index) in frames {
                 let Some(is_of_vehicle) = gives(topic, frame) else { continue };
                 used.push(&self.sources[index]);
-                of_vehicles[index] = is_of_vehicle;
+                of_vehicles[index] = Some(is_of_vehicle);
             }
         }
         if used.iter().all(|source| source.stamped == 0) {
@@ -161,12 +198,12 @@ impl Clocks {
             let problem = format!("the messages of {} have stamps, those of {} have none", with.name, without.name);
             return Err(several_clocks(problem));
         }
-        let is_apart = |difference: &Difference| {
-            let apart = (difference.delays[0] - difference.delays[1]).abs();
-            apart > LARGEST_DIFFERENCE_NS.max(2 * difference.spread)
-        };
-        let mut apart = self.differences.iter().filter(|((a, b), _)| of_vehicles[*a] && of_vehicles[*b]);
-        match apart.find(|(_, difference)| is_apart(difference)) {
+        let mut apart = self.differences.iter().filter(|((larger, smaller), difference)| {
+            let forward_ns =
+                of_vehicles[*smaller].map(|is_of_vehicle| if is_of_vehicle { 0 } else { LARGEST_FORWARD_NS });
+            of_vehicles[*larger].is_some() && forward_ns.is_some_and(|forward_ns| difference.excess > forward_ns)
+        });
+        match apart.next() {
             None => Ok(MessageClock::Stamp),
             Some(((a, b), difference)) => {
                 let [a, b] = [a, b].map(|index| &self.sources[*index].name);

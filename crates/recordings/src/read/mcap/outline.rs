@@ -86,7 +86,7 @@ impl Outline {
                 .and_then(|()| all.into_iter().try_for_each(|observation| outline.learn(&message, observation)));
             learnt.map_err(|fault| fault.at(place(number, &message)))
         })?;
-        outline.clocks.close_window();
+        outline.clocks.close();
         Ok(outline)
     }
 
