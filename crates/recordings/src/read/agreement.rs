@@ -147,12 +147,9 @@ impl Worst {
     }
 
     /// Returns the one of both that exceeds its tolerance by more.
-    fn max(known: Option<Self>, other: Self) -> Option<Self> {
+    fn or(self, known: Option<Self>) -> Self {
         let excess_m = |worst: &Self| worst.difference_m - worst.tolerance_m;
-        match known {
-            Some(known) if excess_m(&known) >= excess_m(&other) => Some(known),
-            _ => Some(other),
-        }
+        known.filter(|known| excess_m(known) >= excess_m(&self)).unwrap_or(self)
     }
 }
 
@@ -178,12 +175,11 @@ impl FrameAgreement {
         place: Geodetic,
         has_heights: bool,
     ) -> Result<(), RowContradiction> {
-        let (local, height, origin) = match self.origin {
-            Some(origin) => origin,
-            None => {
-                let local = LocalFrame::at(place).map_err(RowContradiction::NotOnEarth)?;
-                *self.origin.insert((local, place.z, metric))
-            }
+        let (local, height, origin) = if let Some(origin) = self.origin {
+            origin
+        } else {
+            let local = LocalFrame::at(place).map_err(RowContradiction::NotOnEarth)?;
+            *self.origin.insert((local, place.z, metric))
         };
         // Without a height, the place is taken at the height of the first one.
         let place = if has_heights { place } else { Vector3::new(place.x, place.y, height) };
@@ -248,7 +244,8 @@ impl FrameAgreement {
             for (second, other_shift, other_mean) in &shifts[k + 1..] {
                 let tolerance_m = evidence_m + PROJECTION * (mean - other_mean).norm();
                 let difference_m = (shift - other_shift).norm();
-                worst = Worst::max(worst, Worst { vehicles: [*first, *second], difference_m, tolerance_m });
+                let pair = Worst { vehicles: [*first, *second], difference_m, tolerance_m };
+                worst = Some(pair.or(worst));
             }
         }
         worst
@@ -273,7 +270,8 @@ impl FrameAgreement {
                     + BAROMETRIC * (height - other_height).abs()
                     + curvature_m((mean - other_mean).norm());
                 let difference_m = (shift - other_shift).abs();
-                worst = Worst::max(worst, Worst { vehicles: [*first, *second], difference_m, tolerance_m });
+                let pair = Worst { vehicles: [*first, *second], difference_m, tolerance_m };
+                worst = Some(pair.or(worst));
             }
         }
         worst
@@ -284,7 +282,8 @@ impl FrameAgreement {
         self.seen().fold(None, |worst, (vehicle, sums)| {
             let evidence_m = (SMALLEST_EVIDENCE_M + 2.0 * sums.noise_m()).min(LARGEST_RESIDUAL_M);
             let tolerance_m = evidence_m + PROJECTION * (sums.squares() / sums.count).sqrt();
-            Worst::max(worst, Worst { vehicles: [vehicle; 2], difference_m: sums.residual_m(turn), tolerance_m })
+            let motion = Worst { vehicles: [vehicle; 2], difference_m: sums.residual_m(turn), tolerance_m };
+            Some(motion.or(worst))
         })
     }
 
