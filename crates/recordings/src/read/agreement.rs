@@ -1,21 +1,43 @@
 //! Comparison of two positions of each vehicle in one table: in metres, and as latitude and longitude.
 //!
 //! Both describe one motion if a turn about the vertical and a shift, common to all vehicles and times, bring one onto
-//! the other. Positions from each vehicle's own start have no common shift.
+//! the other. Positions from each vehicle's own start have no common shift. The plane and the heights are compared
+//! apart, because heights may come from different sensors.
 
-use nalgebra::{Matrix3, Vector3};
+use nalgebra::{Matrix2, Vector2, Vector3};
+use tautline_core::fact::{Fact, FactKind, Source};
 
 use super::earth::{Geodetic, LocalFrame};
-use super::error::{Fault, quoted};
+use super::error::{Fault, list, quoted};
 
 /// Largest error of the difference of two fixes \[m\]: an uncorrected receiver is within 5 m (95 %).
 const LARGEST_ERROR_M: f64 = 10.0;
 
-/// Smallest difference that is evidence \[m\]: local origins are converted with errors of this size.
+/// Smallest difference of two shifts that is evidence \[m\]: local origins are converted with errors of this size.
 const SMALLEST_EVIDENCE_M: f64 = 0.5;
+
+/// Largest part of the tolerance of two shifts that follows the noise \[m\].
+const MOST_NOISE_M: f64 = 2.5;
+
+/// Largest root mean square deviation of the rows of a vehicle \[m\]: twice that of an uncorrected receiver.
+const LARGEST_RESIDUAL_M: f64 = 5.0;
+
+/// Largest difference of two shifts of heights \[m\]: one height may be barometric, the other from a receiver.
+const HEIGHT_EVIDENCE_M: f64 = 5.0;
+
+/// Largest relative error of differences of barometric heights: 15 K beside the standard atmosphere.
+const BAROMETRIC: f64 = 0.05;
 
 /// Largest relative error of lengths of a map projection. The scale of UTM differs from 1 by 0.0004.
 const PROJECTION: f64 = 1e-3;
+
+/// Radius of the Earth \[m\].
+const EARTH_M: f64 = 6.371e6;
+
+/// Returns how far a plane is from the surface of the Earth, at this distance from the point of contact \[m\].
+fn curvature_m(distance_m: f64) -> f64 {
+    distance_m * distance_m / (2.0 * EARTH_M)
+}
 
 /// Columns of the second position of a vehicle: latitude, longitude, and height if both positions have one.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,14 +51,25 @@ pub(super) struct SecondPosition {
 #[derive(Clone, Copy, Debug, Default)]
 struct Sums {
     count: f64,
-    metric: Vector3<f64>,
-    earth: Vector3<f64>,
+    metric: Vector2<f64>,
+    earth: Vector2<f64>,
     metric_squared: f64,
     earth_squared: f64,
     /// Sum of `earth * metric^T`.
-    products: Matrix3<f64>,
+    products: Matrix2<f64>,
     /// First positions.
-    first: [Vector3<f64>; 2],
+    first: [Vector2<f64>; 2],
+    heights: Heights,
+}
+
+/// Sums over the rows of a vehicle with both heights.
+#[derive(Clone, Copy, Debug, Default)]
+struct Heights {
+    count: f64,
+    metric: f64,
+    earth: f64,
+    products: f64,
+    first: [f64; 2],
 }
 
 impl Sums {
@@ -47,10 +80,14 @@ impl Sums {
         self.metric_squared += other.metric_squared;
         self.earth_squared += other.earth_squared;
         self.products += other.products;
+        self.heights.count += other.heights.count;
+        self.heights.metric += other.heights.metric;
+        self.heights.earth += other.heights.earth;
+        self.heights.products += other.heights.products;
     }
 
     /// Returns the products about the means.
-    fn covariance(&self) -> Matrix3<f64> {
+    fn covariance(&self) -> Matrix2<f64> {
         self.products - self.earth * self.metric.transpose() / self.count
     }
 
@@ -65,25 +102,63 @@ impl Sums {
         let aligned = alignment(&self.covariance()).map_or(0.0, |(_, aligned)| 2.0 * aligned);
         ((self.squares() - aligned).max(0.0) / self.count).sqrt()
     }
+
+    /// Returns the root mean square deviation after this turn and the best shift of this vehicle \[m\].
+    fn residual_m(&self, turn: &Matrix2<f64>) -> f64 {
+        let turned = 2.0 * (turn.transpose() * self.covariance()).trace();
+        ((self.squares() - turned).max(0.0) / self.count).sqrt()
+    }
+
+    /// Returns the shift from the turned mean position in metres to the mean place on the Earth.
+    fn shift(&self, turn: &Matrix2<f64>) -> Vector2<f64> {
+        (self.earth - turn * self.metric) / self.count
+    }
 }
 
-/// Returns the turn about the vertical, perhaps mirrored, that aligns the metric position best with the place on the
-/// Earth. Also returns the products that the turn aligns.
-fn alignment(covariance: &Matrix3<f64>) -> Option<(Matrix3<f64>, f64)> {
-    let across = covariance.fixed_view::<2, 2>(0, 0).into_owned().svd(true, true);
-    let up = covariance[(2, 2)];
-    let mut turn = Matrix3::identity();
-    turn.fixed_view_mut::<2, 2>(0, 0).copy_from(&(across.u? * across.v_t?));
-    turn[(2, 2)] = 1.0_f64.copysign(up);
-    Some((turn, across.singular_values.sum() + up.abs()))
+/// Returns the turn, perhaps mirrored, that aligns the metric position best with the place on the Earth. Also returns
+/// the products that the turn aligns.
+fn alignment(covariance: &Matrix2<f64>) -> Option<(Matrix2<f64>, f64)> {
+    let across = covariance.svd(true, true);
+    Some((across.u? * across.v_t?, across.singular_values.sum()))
+}
+
+/// Contradiction of the two positions in a row: distances of a vehicle from its first position, or a place that is not
+/// on the Earth.
+#[derive(Debug)]
+pub(super) enum RowContradiction {
+    /// Distances in the plane, in metres and on the Earth.
+    Plane([f64; 2]),
+    /// Differences of heights, in metres and on the Earth.
+    Height([f64; 2]),
+    NotOnEarth(Fault),
+}
+
+/// Largest difference in relation to its tolerance.
+#[derive(Clone, Copy, Debug)]
+struct Worst {
+    vehicles: [usize; 2],
+    difference_m: f64,
+    tolerance_m: f64,
+}
+
+impl Worst {
+    fn is_contradiction(&self) -> bool {
+        self.difference_m > self.tolerance_m
+    }
+
+    /// Returns the one of both that exceeds its tolerance by more.
+    fn or(self, known: Option<Self>) -> Self {
+        let excess_m = |worst: &Self| worst.difference_m - worst.tolerance_m;
+        known.filter(|known| excess_m(known) >= excess_m(&self)).unwrap_or(self)
+    }
 }
 
 /// Comparison over all rows.
 #[derive(Debug, Default)]
 pub(super) struct FrameAgreement {
     vehicles: Vec<Sums>,
-    /// Frame of the first place, and the metric position there.
-    origin: Option<(LocalFrame, Vector3<f64>)>,
+    /// Frame of the first place, its height, and the metric position there.
+    origin: Option<(LocalFrame, f64, Vector3<f64>)>,
 }
 
 impl FrameAgreement {
@@ -92,19 +167,28 @@ impl FrameAgreement {
         *self = Self::default();
     }
 
-    /// Records both positions in a row of a vehicle. Returns the distances from its first position in metres and on
-    /// the Earth, if they contradict each other.
-    pub(super) fn observe(&mut self, vehicle: usize, metric: Vector3<f64>, place: Geodetic) -> Option<[f64; 2]> {
-        if self.origin.is_none() {
-            self.origin = Some((LocalFrame::at(place).ok()?, metric));
-        }
-        let (local, origin) = self.origin?;
-        let earth = local.place(place).ok()?;
-        let metric = metric - origin;
+    /// Records both positions in a row of a vehicle. `has_heights`: whether both have a height.
+    pub(super) fn observe(
+        &mut self,
+        vehicle: usize,
+        metric: Vector3<f64>,
+        place: Geodetic,
+        has_heights: bool,
+    ) -> Result<(), RowContradiction> {
+        let (local, height, origin) = if let Some(origin) = self.origin {
+            origin
+        } else {
+            let local = LocalFrame::at(place).map_err(RowContradiction::NotOnEarth)?;
+            *self.origin.insert((local, place.z, metric))
+        };
+        // Without a height, the place is taken at the height of the first one.
+        let place = if has_heights { place } else { Vector3::new(place.x, place.y, height) };
+        let earth = local.place(place).map_err(RowContradiction::NotOnEarth)?.xy();
         if vehicle >= self.vehicles.len() {
             self.vehicles.resize(vehicle + 1, Sums::default());
         }
         let sums = &mut self.vehicles[vehicle];
+        let (metric, metric_up, earth_up) = ((metric - origin).xy(), metric.z - origin.z, place.z);
         if sums.count == 0.0 {
             sums.first = [metric, earth];
         }
@@ -116,43 +200,155 @@ impl FrameAgreement {
         sums.products += earth * metric.transpose();
         let [first, first_earth] = sums.first;
         let far = [(metric - first).norm(), (earth - first_earth).norm()];
-        let largest_m = LARGEST_ERROR_M + PROJECTION * far[0].max(far[1]);
-        ((far[0] - far[1]).abs() > largest_m).then_some(far)
+        let longest_m = far[0].max(far[1]);
+        if (far[0] - far[1]).abs() > LARGEST_ERROR_M + PROJECTION * longest_m {
+            return Err(RowContradiction::Plane(far));
+        }
+        if !has_heights {
+            return Ok(());
+        }
+        let heights = &mut sums.heights;
+        if heights.count == 0.0 {
+            heights.first = [metric_up, earth_up];
+        }
+        heights.count += 1.0;
+        heights.metric += metric_up;
+        heights.earth += earth_up;
+        heights.products += earth_up * metric_up;
+        let risen = [metric_up - heights.first[0], earth_up - heights.first[1]].map(f64::abs);
+        let most_m = LARGEST_ERROR_M + BAROMETRIC * risen[0].max(risen[1]) + curvature_m(longest_m);
+        if (risen[0] - risen[1]).abs() > most_m {
+            return Err(RowContradiction::Height(risen));
+        }
+        Ok(())
     }
 
-    /// Returns the vehicle with the largest deviation after the best common turn and shift, and the deviation \[m\],
-    /// if it contradicts a common frame.
-    fn contradiction(&self) -> Option<(usize, f64)> {
-        let seen = || self.vehicles.iter().enumerate().filter(|(_, sums)| sums.count > 0.0);
+    fn seen(&self) -> impl Iterator<Item = (usize, &Sums)> + Clone {
+        self.vehicles.iter().enumerate().filter(|(_, sums)| sums.count > 0.0)
+    }
+
+    fn total(&self) -> Sums {
         let mut all = Sums::default();
-        seen().for_each(|(_, sums)| all.add(sums));
-        if seen().count() < 2 {
-            return None;
+        self.seen().for_each(|(_, sums)| all.add(sums));
+        all
+    }
+
+    /// Returns the worst pair by the shifts in the plane that a common turn leaves.
+    fn worst_in_plane(&self, all: &Sums, turn: &Matrix2<f64>) -> Option<Worst> {
+        let noise = self.seen().map(|(_, sums)| sums.count * sums.noise_m().powi(2)).sum::<f64>() / all.count;
+        let evidence_m = SMALLEST_EVIDENCE_M + noise.sqrt().min(MOST_NOISE_M);
+        let shifts: Vec<_> =
+            self.seen().map(|(vehicle, sums)| (vehicle, sums.shift(turn), sums.earth / sums.count)).collect();
+        let mut worst = None;
+        for (k, (first, shift, mean)) in shifts.iter().enumerate() {
+            for (second, other_shift, other_mean) in &shifts[k + 1..] {
+                let tolerance_m = evidence_m + PROJECTION * (mean - other_mean).norm();
+                let difference_m = (shift - other_shift).norm();
+                let pair = Worst { vehicles: [*first, *second], difference_m, tolerance_m };
+                worst = Some(pair.or(worst));
+            }
         }
-        let (turn, _) = alignment(&all.covariance())?;
-        let noise = seen().map(|(_, sums)| sums.count * sums.noise_m().powi(2)).sum::<f64>() / all.count;
-        let extent_m = (all.squares() / all.count).sqrt();
-        let evidence_m = (2.0 * noise.sqrt()).clamp(SMALLEST_EVIDENCE_M, LARGEST_ERROR_M) + PROJECTION * extent_m;
-        let deviation_m = |sums: &Sums| {
-            let shift = (sums.earth / sums.count - all.earth / all.count)
-                - turn * (sums.metric / sums.count - all.metric / all.count);
-            let turned = 2.0 * (turn.transpose() * sums.covariance()).trace();
-            (shift.norm_squared() + (sums.squares() - turned).max(0.0) / sums.count).sqrt()
-        };
-        let worst = seen().map(|(vehicle, sums)| (vehicle, deviation_m(sums))).max_by(|a, b| a.1.total_cmp(&b.1));
-        worst.filter(|(_, deviation_m)| *deviation_m > evidence_m)
+        worst
+    }
+
+    /// Returns the worst pair by the differences between its heights.
+    fn worst_in_height(&self, all: &Sums) -> Option<Worst> {
+        let all = all.heights;
+        let up = 1.0_f64.copysign(all.products - all.earth * all.metric / all.count);
+        let shifts: Vec<_> = self
+            .seen()
+            .filter(|(_, sums)| sums.heights.count > 0.0)
+            .map(|(vehicle, sums)| {
+                let Heights { count, metric, earth, .. } = sums.heights;
+                (vehicle, (earth - up * metric) / count, earth / count, sums.earth / sums.count)
+            })
+            .collect();
+        let mut worst = None;
+        for (k, (first, shift, height, mean)) in shifts.iter().enumerate() {
+            for (second, other_shift, other_height, other_mean) in &shifts[k + 1..] {
+                let tolerance_m = HEIGHT_EVIDENCE_M
+                    + BAROMETRIC * (height - other_height).abs()
+                    + curvature_m((mean - other_mean).norm());
+                let difference_m = (shift - other_shift).abs();
+                let pair = Worst { vehicles: [*first, *second], difference_m, tolerance_m };
+                worst = Some(pair.or(worst));
+            }
+        }
+        worst
+    }
+
+    /// Returns the vehicle whose rows deviate most after a common turn and its own shift.
+    fn worst_motion(&self, turn: &Matrix2<f64>) -> Option<Worst> {
+        self.seen().fold(None, |worst, (vehicle, sums)| {
+            let evidence_m = (SMALLEST_EVIDENCE_M + 2.0 * sums.noise_m()).min(LARGEST_RESIDUAL_M);
+            let tolerance_m = evidence_m + PROJECTION * (sums.squares() / sums.count).sqrt();
+            let motion = Worst { vehicles: [vehicle; 2], difference_m: sums.residual_m(turn), tolerance_m };
+            Some(motion.or(worst))
+        })
+    }
+
+    /// Returns the worst pair in the plane, the worst pair in height, and the worst motion of a vehicle.
+    fn worst(&self) -> [Option<Worst>; 3] {
+        let all = self.total();
+        let turn = alignment(&all.covariance()).map(|(turn, _)| turn).filter(|_| self.seen().count() > 1);
+        turn.map_or([None; 3], |turn| {
+            [self.worst_in_plane(&all, &turn), self.worst_in_height(&all), self.worst_motion(&turn)]
+        })
     }
 
     /// Returns the fault of positions without a common frame.
     pub(super) fn fault(&self, names: &[String], header: &[String], columns: &Compared) -> Option<Fault> {
-        let (vehicle, deviation_m) = self.contradiction()?;
-        let name = quoted(names.get(vehicle).map_or("", String::as_str));
+        let [plane, height, motion] = self.worst().map(|worst| worst.filter(Worst::is_contradiction));
+        let called = |vehicle: usize| quoted(names.get(vehicle).map_or("", String::as_str));
         let (metric, earth) = columns.names(header);
-        let problem = format!(
-            "{metric} and {earth} give different distances between vehicles: no common origin and direction brings \
-             them closer than {deviation_m:.3} m at vehicle {name}"
-        );
+        let said = |worst: Worst, what: &str, remains: &str| {
+            let [first, second] = worst.vehicles.map(called);
+            let vehicles =
+                if first == second { format!("vehicle {first}") } else { format!("vehicles {first} and {second}") };
+            let Worst { difference_m, tolerance_m, .. } = worst;
+            format!(
+                "{metric} and {earth} give different {what} {vehicles}: {remains} {difference_m:.3} m, and at most \
+                 {tolerance_m:.3} m is tolerated"
+            )
+        };
+        let problem = if let Some(worst) = plane {
+            said(worst, "distances between", "a common origin and direction leave a difference of")
+        } else if let Some(worst) = height {
+            said(worst, "differences of height between", "a common origin leaves a difference of")
+        } else {
+            said(motion?, "motions of", "a common direction leaves a root mean square deviation of")
+        };
         Some(columns.fault(problem, header))
+    }
+
+    /// Returns the largest tolerances with which the positions were compared.
+    pub(super) fn fact(&self) -> Fact {
+        match self.worst() {
+            [Some(plane), height, _] => {
+                let plane = format!("metres agree with degrees within {:.3} m in the plane", plane.tolerance_m);
+                let height = height.map(|worst| format!(" and {:.3} m in height", worst.tolerance_m));
+                Fact::name(FactKind::Frame, Source::Observed, plane + &height.unwrap_or_default())
+            }
+            _ if self.seen().next().is_some() => {
+                let said = format!("metres agree with degrees within {LARGEST_ERROR_M:?} m of the first position");
+                Fact::name(FactKind::Frame, Source::Observed, said)
+            }
+            _ => Fact::name(FactKind::Frame, Source::NotObservable, "no row has both metres and degrees"),
+        }
+    }
+
+    /// Returns the notes on the comparison.
+    pub(super) fn notes(&self, names: &[String]) -> Vec<String> {
+        const LISTED: usize = 12;
+        let is_seen = |vehicle: usize| self.vehicles.get(vehicle).is_some_and(|sums| sums.count > 0.0);
+        let unseen: Vec<_> =
+            (0..names.len()).filter(|vehicle| !is_seen(*vehicle)).map(|vehicle| names[vehicle].clone()).collect();
+        let mut notes = Vec::new();
+        notes.extend(self.fact().value.map(|value| value.to_string()));
+        if !unseen.is_empty() && unseen.len() < names.len() {
+            notes.push(format!("positions in metres are not compared with degrees for {}", list(&unseen, LISTED)));
+        }
+        notes
     }
 }
 
@@ -162,6 +358,8 @@ pub(super) struct Compared {
     pub(super) earth: [Option<usize>; 3],
     /// Whether the names of the columns in metres give directions, which columns chosen by the user do not have.
     pub(super) has_directions: bool,
+    /// Whether the header names several vehicles, whose columns the user cannot choose by role.
+    pub(super) is_wide: bool,
 }
 
 impl Compared {
@@ -174,13 +372,22 @@ impl Compared {
         (listed(&self.metric), listed(&self.earth))
     }
 
-    /// Returns the fault of a row with contradicting distances from the vehicle's first position.
-    pub(super) fn fault_of_row(&self, header: &[String], name: &str, far_m: [f64; 2]) -> Fault {
-        let (metric, earth) = self.names(header);
-        let (name, [by_metric, by_earth]) = (quoted(name), far_m);
-        let problem = format!(
-            "vehicle {name} is {by_metric:.3} m from its first position by {metric}, but {by_earth:.3} m by {earth}"
-        );
+    /// Returns the fault of a row with contradicting positions.
+    pub(super) fn fault_of_row(&self, header: &[String], name: &str, found: &RowContradiction) -> Fault {
+        let ((metric, earth), name) = (self.names(header), quoted(name));
+        let problem = match found {
+            RowContradiction::Plane([by_metric, by_earth]) => format!(
+                "vehicle {name} is {by_metric:.3} m from its first position in the plane by {metric}, but \
+                 {by_earth:.3} m by {earth}"
+            ),
+            RowContradiction::Height([by_metric, by_earth]) => format!(
+                "vehicle {name} is {by_metric:.3} m above or below its first position by {metric}, but \
+                 {by_earth:.3} m by {earth}"
+            ),
+            RowContradiction::NotOnEarth(fault) => {
+                format!("vehicle {name} has a position by {metric}, but {earth} are not a place on the Earth: {fault}")
+            }
+        };
         self.fault(problem, header)
     }
 
@@ -189,22 +396,26 @@ impl Compared {
         let chosen = |columns: &[Option<usize>; 3], roles: [&str; 3]| {
             let given = columns.iter().zip(roles).filter_map(|(column, role)| Some((role, (*column)?)));
             let given: Vec<_> = given.map(|(role, column)| format!("--column {role}={}", header[column])).collect();
-            given.join(" ")
+            format!("with {}", given.join(" "))
         };
-        let metric = if self.has_directions {
-            format!("by removing the columns {}", self.names(header).1)
+        let (metric, earth) = self.names(header);
+        let (metric, earth) = if self.is_wide {
+            let removing = |kind: &str, names: &str| format!("by removing all columns in {kind}, such as {names}");
+            (removing("degrees", &earth), removing("metres", &metric))
+        } else if self.has_directions {
+            let degrees = chosen(&self.earth, ["lat", "lon", "alt"]);
+            (format!("by removing the columns {earth}"), degrees)
         } else {
-            format!("with {}", chosen(&self.metric, ["x", "y", "z"]))
+            (chosen(&self.metric, ["x", "y", "z"]), chosen(&self.earth, ["lat", "lon", "alt"]))
         };
-        let earth = chosen(&self.earth, ["lat", "lon", "alt"]);
-        let remedy = format!("choose the positions that have one origin for all vehicles, {metric}, or with {earth}");
+        let remedy = format!("choose the positions that have one origin for all vehicles, {metric}, or {earth}");
         Fault::coded("recording/several-frames", problem, remedy)
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::{Rotation3, vector};
+    use nalgebra::{Matrix3, Rotation3, vector};
 
     use super::*;
 
@@ -220,12 +431,12 @@ mod tests {
                 let metric = rotation * (true_m - home);
                 let degree_m = 111_194.93;
                 let place = vector![(true_m.y + wave) / degree_m, true_m.x / degree_m, true_m.z];
-                if agreement.observe(vehicle, metric, place).is_some() {
+                if agreement.observe(vehicle, metric, place, true).is_err() {
                     return true;
                 }
             }
         }
-        agreement.contradiction().is_some()
+        agreement.worst().iter().flatten().any(Worst::is_contradiction)
     }
 
     #[test]
@@ -238,7 +449,9 @@ mod tests {
             assert!(!contradicts([home; 2], rotation, 2.0), "noise of receivers");
             assert!(contradicts([Vector3::zeros(), vector![0.0, 10.0, 0.0]], rotation, 0.0));
             assert!(contradicts([Vector3::zeros(), vector![0.0, 1.2, 0.0]], rotation, 0.0));
-            assert!(contradicts([Vector3::zeros(), vector![0.0, 0.0, 1.2]], rotation, 0.0));
+            assert!(contradicts([Vector3::zeros(), vector![0.0, 8.0, 0.0]], rotation, 2.0), "noise hides no home");
+            assert!(contradicts([Vector3::zeros(), vector![0.0, 0.0, 8.0]], rotation, 0.0));
+            assert!(!contradicts([Vector3::zeros(), vector![0.0, 0.0, 3.0]], rotation, 0.0), "barometric heights");
         }
     }
 

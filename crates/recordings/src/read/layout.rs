@@ -56,8 +56,10 @@ pub(super) struct Layout {
     pub(super) counts_from_boot: bool,
     /// Column of the vertical rate of a long table, and the size of its unit \[m/s\] if its name has one.
     pub(super) rate: Option<(usize, Option<f64>)>,
-    /// Second position of each vehicle, on the Earth, beside the one that is read.
-    pub(super) second: Vec<SecondPosition>,
+    /// Second position of each vehicle, on the Earth, beside the one that is read. Empty if no vehicle has one.
+    pub(super) second: Vec<Option<SecondPosition>>,
+    /// Whether the names of the position columns contain the names of vehicles.
+    pub(super) has_named_positions: bool,
     /// Whether a vehicle has no height column: then no height is used.
     pub(super) is_planar: bool,
     /// Facts that follow from the header and the options.
@@ -92,9 +94,7 @@ impl Layout {
         let others = (0..header.len()).filter(|&column| !is_taken(column));
         let names = &convention.header;
         let mut headings: Vec<_> = others.filter_map(|column| Some((column, Heading::of(&names[column])?))).collect();
-        // A table with both metres and degrees is read in metres.
-        let gives = |role: Role| headings.iter().any(|(_, of)| of.role == role) || columns.get("", role).is_some();
-        let on_earth = gives(EARTH) && gives(EARTH + 1) && !(gives(POSITION) && gives(POSITION + 1));
+        let on_earth = columns.are_on_earth(&headings)?;
         columns.place = if on_earth { EARTH } else { POSITION };
         let places = if on_earth || convention.reference.is_some() { Vec::new() } else { headings.clone() };
         let in_other_frame = vehicles_of(if on_earth { POSITION } else { EARTH }, &headings);
@@ -138,6 +138,7 @@ impl Layout {
             bodies,
             on_earth,
             is_planar,
+            has_named_positions: !one && id.is_none(),
             counts_from_boot: convention.counts_from_boot || heading::is_boot_time(&header[time]),
             ..Self::default()
         };
@@ -281,42 +282,57 @@ impl Layout {
     ) -> Result<(), Fault> {
         let has_height = |body: &VehicleColumns| body.position[2].is_some();
         self.rate = aviation::rate_column(header).filter(|_| matches!(&self.bodies[..], [body] if has_height(body)));
-        let is_chosen = options.columns.given().any(|(role, _)| !matches!(role, TIME | ID | RADIUS));
+        let is_chosen = ["x", "y"].iter().all(|role| options.columns.get(role).is_some());
         if self.on_earth || is_chosen {
             return Ok(());
         }
-        let place_of = |vehicle: &String, body: &VehicleColumns| {
-            let only = |is_role: &dyn Fn(Role) -> bool| {
+        let mut notes = Vec::new();
+        let mut place_of = |vehicle: &String, body: &VehicleColumns| {
+            let found = |is_role: &dyn Fn(Role) -> bool| {
                 let is_meant = |(_, found): &&(usize, Heading<'_>)| found.vehicle == vehicle && is_role(found.role);
-                let mut found = places.iter().filter(is_meant);
-                found.next().filter(|_| found.next().is_none()).copied()
+                places.iter().filter(is_meant).copied().collect::<Vec<_>>()
             };
-            let [lat, lon] = [0, 1].map(|axis| only(&|role| role == EARTH + axis));
-            let height = only(&|role| matches!(role, HEIGHT | DEPTH)).filter(|_| body.position[2].is_some());
-            let degrees = |found: Heading<'_>| found.unit.map_or(Some(1.0), heading::degrees);
+            // Of several pairs of degrees, the first is compared.
+            let [lat, lon] = [0, 1].map(|axis| found(&|role| role == EARTH + axis).first().copied());
             let ((lat, of_lat), (lon, of_lon)) = (lat?, lon?);
+            // Several heights may be measured from different surfaces.
+            let height = match found(&|role| matches!(role, HEIGHT | DEPTH))[..] {
+                [height] if body.position[2].is_some() => Some(height),
+                _ => None,
+            };
+            let degrees = |found: Heading<'_>| found.unit.map_or(Some(1.0), heading::degrees);
             let up = height.map_or(1.0, |(_, found)| {
                 let metres = found.unit.and_then(|unit| heading::size_of(unit, false)).unwrap_or(1.0);
                 if found.role == DEPTH { -metres } else { metres }
             });
             let columns = [Some(lat), Some(lon), height.map(|(column, _)| column)];
-            Some(SecondPosition { columns, units: [degrees(of_lat)?, degrees(of_lon)?, up] })
+            let Some((lat_degrees, lon_degrees)) = degrees(of_lat).zip(degrees(of_lon)) else {
+                let [lat, lon] = [lat, lon].map(|column| quoted(&header[column]));
+                notes.push(format!("positions are not compared with {lat} and {lon}: the unit is unknown"));
+                return None;
+            };
+            Some(SecondPosition { columns, units: [lat_degrees, lon_degrees, up] })
         };
-        let second: Option<Vec<_>> =
-            vehicles.iter().zip(&self.bodies).map(|(vehicle, body)| place_of(vehicle, body)).collect();
-        self.second = second.unwrap_or_default();
-        if let Some(compared) = self.compared(0).filter(|_| options.is_joined) {
+        let second: Vec<_> = vehicles.iter().zip(&self.bodies).map(|(vehicle, body)| place_of(vehicle, body)).collect();
+        self.notes.extend(notes);
+        self.second = if second.iter().any(Option::is_some) { second } else { Vec::new() };
+        if let Some(compared) = self.first_compared().filter(|_| options.is_joined) {
             let problem = "it has positions in metres and on the Earth, which are not compared between files";
             return Err(compared.fault(problem.to_owned(), header));
         }
         Ok(())
     }
 
+    /// Returns the columns of both positions of the first vehicle that has two.
+    pub(super) fn first_compared(&self) -> Option<Compared> {
+        (0..self.second.len()).find_map(|vehicle| self.compared(vehicle))
+    }
+
     /// Returns the columns of both positions of a vehicle, if it has two.
     pub(super) fn compared(&self, vehicle: usize) -> Option<Compared> {
-        let (second, body) = self.second.get(vehicle).zip(self.bodies.get(vehicle))?;
-        let has_directions = self.convention.has_directions();
-        Some(Compared { metric: body.position, earth: second.columns, has_directions })
+        let (second, body) = self.second.get(vehicle)?.as_ref().zip(self.bodies.get(vehicle))?;
+        let (has_directions, is_wide) = (self.convention.has_directions(), self.has_named_positions);
+        Some(Compared { metric: body.position, earth: second.columns, has_directions, is_wide })
     }
 
     /// Returns the columns that are read or examined, each once, in ascending order.
@@ -328,7 +344,7 @@ impl Layout {
             .chain(self.suspects.iter().copied())
             .chain(self.slots.watched.iter().flatten().copied())
             .chain(self.rate.map(|(column, _)| column))
-            .chain(self.second.iter().flat_map(|second| second.columns).flatten())
+            .chain(self.second.iter().flatten().flat_map(|second| second.columns).flatten())
             .collect();
         columns.into_iter().collect()
     }
@@ -484,6 +500,22 @@ impl<'a> Columns<'a> {
             columns.units.extend(unit.map(|unit| (column, unit)));
         }
         Ok(columns)
+    }
+
+    /// Returns whether positions are read in degrees: the user names the columns, or no columns give metres.
+    ///
+    /// # Errors
+    /// If the user names columns that would not be read.
+    fn are_on_earth(&self, headings: &[(usize, Heading<'_>)]) -> Result<bool, Fault> {
+        let is_given = |role: Role| self.get("", role).is_some();
+        let gives = |role: Role| is_given(role) || headings.iter().any(|(_, found)| found.role == role);
+        let chosen = is_given(EARTH) && is_given(EARTH + 1);
+        let on_earth = chosen || gives(EARTH) && gives(EARTH + 1) && !(gives(POSITION) && gives(POSITION + 1));
+        let unread = if on_earth { [POSITION, POSITION + 1] } else { [EARTH, EARTH + 1] };
+        let Some(role) = unread.into_iter().find(|role| is_given(*role)) else { return Ok(on_earth) };
+        let (kind, option) = (if on_earth { "degrees" } else { "metres" }, ColumnNames::ROLES[role]);
+        let problem = format!("--column {option} would be ignored, because the positions are read in {kind}");
+        refuse("recording/contradicts-option", problem, "name the columns of either x and y, or lat and lon")
     }
 
     pub(super) fn get(&self, vehicle: &str, role: Role) -> Option<usize> {

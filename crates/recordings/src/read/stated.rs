@@ -131,7 +131,7 @@ struct Twins {
 /// State of a vehicle in the search.
 #[derive(Clone, Copy, Debug, Default)]
 struct Seen {
-    is_seen: bool,
+    is_present: bool,
     partner: Option<usize>,
     /// Number of common times with the partner, and of changes of position between them.
     times: u32,
@@ -158,7 +158,7 @@ impl Twins {
         if vehicle >= self.vehicles.len() {
             self.vehicles.resize(vehicle + 1, Seen::default());
         }
-        self.has_new |= !self.vehicles[vehicle].is_seen;
+        self.has_new |= !self.vehicles[vehicle].is_present;
         // Adding 0 converts -0 to +0.
         self.instant.push((vehicle, [0, 1, 2].map(|axis| (position_m[axis] + 0.0).to_bits())));
     }
@@ -207,7 +207,7 @@ impl Twins {
         }
         for &(vehicle, _) in &instant {
             let seen = &mut self.vehicles[vehicle];
-            (seen.now, seen.is_seen) = (None, true);
+            (seen.now, seen.is_present) = (None, true);
         }
         self.instant = instant;
     }
@@ -227,12 +227,12 @@ impl Twins {
     fn pair_new(&mut self, instant: &[(usize, Bits)]) {
         let mut groups: HashMap<Bits, usize> = HashMap::new();
         // Earlier vehicles come first: a vehicle with samples before cannot be paired with another one of these.
-        let known = instant.iter().filter(|(vehicle, _)| self.vehicles[*vehicle].is_seen);
+        let known = instant.iter().filter(|(vehicle, _)| self.vehicles[*vehicle].is_present);
         for &(vehicle, bits) in known {
             groups.entry(bits).or_insert(vehicle);
         }
         for &(vehicle, bits) in instant {
-            if self.vehicles[vehicle].is_seen {
+            if self.vehicles[vehicle].is_present {
                 continue;
             }
             let first = *groups.entry(bits).or_insert(vehicle);

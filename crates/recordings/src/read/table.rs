@@ -269,30 +269,28 @@ impl<C: Cells> Table<C> {
             climb.observe(row.vehicle, row.stamp, row.position.z, rate);
         }
         let Some((agreement, axes)) = &mut self.agreement else { return Ok(()) };
-        let Some(second) = self.layout.second.get(place) else { return Ok(()) };
+        let Some(Some(second)) = self.layout.second.get(place) else { return Ok(()) };
         let mut there = Vector3::zeros();
+        let mut has_heights = false;
         for (axis, (column, unit)) in second.columns.iter().zip(second.units).enumerate() {
             let Some(column) = *column else { continue };
             match self.cells.number(column).filter(|number| number.is_finite()) {
-                Some(number) => there[axis] = number * unit,
+                Some(number) => (there[axis], has_heights) = (number * unit, axis == 2),
+                // Without a height, the plane is still compared.
+                None if axis == 2 => {}
                 None => return Ok(()),
             }
-        }
-        let mut metric = axes.turn(row.position);
-        if second.columns[2].is_none() {
-            metric.z = 0.0;
         }
         if is_no_fix(&there) {
             return Ok(());
         }
-        let far_m = agreement.observe(row.vehicle, metric, there);
-        match far_m.zip(self.layout.compared(place)) {
-            None => Ok(()),
-            Some((far_m, compared)) => {
-                let name = self.names.all().get(row.vehicle).map_or("", String::as_str);
-                Err(compared.fault_of_row(self.cells.header(), name, far_m))
-            }
-        }
+        let Err(found) = agreement.observe(row.vehicle, axes.turn(row.position), there, has_heights) else {
+            return Ok(());
+        };
+        self.layout.compared(place).map_or(Ok(()), |compared| {
+            let name = self.names.all().get(row.vehicle).map_or("", String::as_str);
+            Err(compared.fault_of_row(self.cells.header(), name, &found))
+        })
     }
 
     /// Returns the fault of heights that contradict the vertical rate.
@@ -451,12 +449,14 @@ impl<C: Cells> Rows for Table<C> {
         if let Some(fault) = self.contradicting_rate().filter(|_| self.is_height_unit_given) {
             notes.push(format!("the given unit of heights is used, but {fault}"));
         }
+        notes.extend(self.agreement.iter().flat_map(|(agreement, _)| agreement.notes(self.names.all())));
         notes
     }
 
     fn late_facts(&self) -> Vec<Fact> {
         let incomplete = Fact::number(FactKind::Rows, Source::Declared, self.incomplete as f64, "incomplete");
-        (self.incomplete > 0).then_some(incomplete).into_iter().collect()
+        let agreement = self.agreement.as_ref().map(|(agreement, _)| agreement.fact());
+        (self.incomplete > 0).then_some(incomplete).into_iter().chain(agreement).collect()
     }
 
     /// Returns the fault of heights or positions that contradict other columns of the table.
@@ -464,7 +464,7 @@ impl<C: Cells> Rows for Table<C> {
         let of_heights = self.contradicting_rate().filter(|_| !self.is_height_unit_given);
         of_heights.or_else(|| {
             let (agreement, _) = self.agreement.as_ref()?;
-            agreement.fault(self.names.all(), self.cells.header(), &self.layout.compared(0)?)
+            agreement.fault(self.names.all(), self.cells.header(), &self.layout.first_compared()?)
         })
     }
 

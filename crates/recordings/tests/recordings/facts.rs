@@ -383,7 +383,7 @@ fn two_positions(home: [f64; 3], is_sorted_by_vehicle: bool) -> String {
 #[test]
 fn positions_from_own_homes_are_refused_beside_degrees() {
     for is_sorted in [false, true] {
-        for home in [[0.0, 10.0, 0.0], [0.0, -2.0, 0.0], [0.0, 0.0, 3.0]] {
+        for home in [[0.0, 10.0, 0.0], [0.0, -2.0, 0.0], [0.0, 0.0, 8.0], [0.0, 0.9, 0.0]] {
             let text = two_positions(home, is_sorted);
             let error = refused(&text, &usual(), "recording/several-frames");
             for remedy in
@@ -391,11 +391,22 @@ fn positions_from_own_homes_are_refused_beside_degrees() {
             {
                 assert!(error.help().contains(remedy), "{}", error.help());
             }
-            for chosen in [&[("x", "x"), ("y", "y"), ("z", "z")], &[("lat", "lat"), ("lon", "lon"), ("alt", "alt")]] {
+            let metres_m = (100.0 + home.iter().map(|axis| axis * axis).sum::<f64>()).sqrt();
+            // Latitude and longitude 0 of both drones at one time are no fix.
+            for (chosen, true_m, count) in [
+                (&[("x", "x"), ("y", "y"), ("z", "z")], metres_m, 200),
+                (&[("lat", "lat"), ("lon", "lon"), ("alt", "alt")], 10.0, 198),
+            ] {
                 let mut options = usual();
                 assert!(chosen.iter().all(|(role, name)| options.columns.set(role, name)));
                 let found = read(&text, &options).unwrap_or_else(|error| panic!("{error}\n{}", error.help()));
-                assert_eq!(found.items.len(), 200);
+                let samples = found.samples();
+                assert_eq!(samples.len(), count);
+                let first =
+                    |name: &str| samples.iter().find(|sample| sample.0 == 0.0 && sample.1 == name).expect("a sample").2;
+                let [one, two] = ["1", "2"].map(first);
+                let apart_m = (0..3).map(|axis| (one[axis] - two[axis]).powi(2)).sum::<f64>().sqrt();
+                assert!((apart_m - true_m).abs() < 1e-3, "{chosen:?}: {apart_m} m instead of {true_m} m");
             }
         }
         assert!(read(&two_positions([0.0; 3], is_sorted), &usual()).is_ok());
@@ -424,6 +435,93 @@ fn positions_from_own_homes_are_refused_beside_degrees() {
     }
 }
 
+/// Replaces the last cell of each row, or removes it, and appends cells; `header` is the new header.
+fn with_last(text: &str, header: &str, last: impl Fn(&[&str]) -> String) -> String {
+    let rows = text.lines().skip(1).map(|line| {
+        let cells: Vec<_> = line.split(',').collect();
+        cells[..cells.len() - 1].join(",") + &last(&cells) + "\n"
+    });
+    format!("{header}\n") + &rows.collect::<String>()
+}
+
+#[test]
+fn the_plane_is_compared_whatever_other_columns_hold() {
+    let usual_header = "t,drone_id,x,y,z,lat,lon,alt";
+    let of_drone = |cells: &[&str], first: &str, second: &str| if cells[1] == "1" { first } else { second }.to_owned();
+    let variants: [(&str, &dyn Fn(&[&str]) -> String); 7] = [
+        (usual_header, &|_| ",".to_owned()),
+        (usual_header, &|_| ",nan".to_owned()),
+        (usual_header, &|cells| of_drone(cells, ",", ",5")),
+        ("t,drone_id,x,y,z,lat,lon", &|_| String::new()),
+        ("t,drone_id,x,y,z,lat,lon,alt,east_speed,north_speed,up_speed", &|_| ",5,0,0,0".to_owned()),
+        ("t,drone_id,x,y,z,lat,lon,alt,gps_lat,gps_lon", &|cells| format!(",5,{},{}", cells[5], cells[6])),
+        ("t,drone_id,x,y,z,lat,lon,alt,rel_alt", &|_| ",5,5".to_owned()),
+    ];
+    for (header, last) in variants {
+        let mut options = usual();
+        if header.contains("speed") {
+            for (role, name) in [("vx", "east_speed"), ("vy", "north_speed"), ("vz", "up_speed")] {
+                assert!(options.columns.set(role, name));
+            }
+        }
+        let text = |home| with_last(&two_positions(home, false), header, last);
+        refused(&text([0.0, 10.0, 0.0]), &options, "recording/several-frames");
+        read(&text([0.0; 3]), &options).unwrap_or_else(|error| panic!("{header}: {error}"));
+    }
+}
+
+#[test]
+fn degrees_off_the_earth_contradict_metres() {
+    let row = |k: u32| format!("{k},{},{},0,{},80000000\n", k % 2, f64::from(k) / 2.0, 470_000_000 + k);
+    let text = "t,id,x,y,lat,lon\n".to_owned() + &(0..20).map(row).collect::<String>();
+    let error = refused(&text, &usual(), "recording/several-frames");
+    assert!(error.to_string().contains("not a place on the Earth"), "{error}");
+    let mut options = usual();
+    assert!(["x", "y"].iter().all(|role| options.columns.set(role, role)));
+    assert_eq!(read(&text, &options).expect("metres are chosen").items.len(), 20);
+}
+
+#[test]
+fn the_tolerance_between_metres_and_degrees_is_stated() {
+    // A barometer and a receiver may differ by some metres.
+    let text = two_positions([0.0, 0.0, 3.0], false);
+    let facts = facts("flight.csv", text.as_bytes(), &usual());
+    let said = |fact: &&[String; 3]| fact[0] == "frame" && fact[1] == "observed";
+    let stated = facts.iter().find(said).expect("a fact");
+    assert!(stated[2].starts_with("metres agree with degrees within 0.50"), "{stated:?}");
+    assert!(stated[2].ends_with("m in height"), "{stated:?}");
+    let notes = read(&text, &usual()).expect("read").notes;
+    assert!(notes.iter().any(|note| note.contains("metres agree with degrees within")), "{notes:?}");
+    // The tolerance does not grow without bound with the noise.
+    let noisy = |home: f64| {
+        let row = |k: u32| {
+            let (drone, wave) = (k % 2, if k % 4 < 2 { 4.0 } else { -4.0 });
+            let (x, y) = (f64::from(k), 20.0 * f64::from(drone) + wave);
+            let (lat, lon) = ((y - wave) / 110_574.0, x / 111_319.5);
+            format!("{k},{drone},{x},{},{lat},{lon}\n", y - home * f64::from(drone))
+        };
+        "t,id,x,y,lat,lon\n".to_owned() + &(0..200).map(row).collect::<String>()
+    };
+    read(&noisy(0.0), &usual()).unwrap_or_else(|error| panic!("{error}"));
+    refused(&noisy(6.0), &usual(), "recording/several-frames");
+}
+
+#[test]
+fn columns_that_would_be_ignored_are_refused() {
+    let text = two_positions([0.0; 3], false);
+    for given in [&["lat"][..], &["lon"], &["lat", "lon", "x"], &["lat", "lon", "y"], &["x", "y", "lat", "lon"]] {
+        let mut options = usual();
+        assert!(given.iter().all(|role| options.columns.set(role, role)));
+        let error = refused(&text, &options, "recording/contradicts-option");
+        assert!(error.to_string().contains("would be ignored"), "{error}");
+    }
+    // One of both columns may be recognised by its name.
+    let mut options = usual();
+    assert!(options.columns.set("lat", "breite"));
+    let one = "t,id,breite,lon,alt\n0,a,47,8,1\n1,a,47,8,1\n";
+    assert_eq!(read(one, &options).expect("read").items.len(), 2);
+}
+
 #[test]
 fn wide_tables_with_two_positions_are_compared() {
     let text = |home: f64| {
@@ -434,7 +532,18 @@ fn wide_tables_with_two_positions_are_compared() {
         "t,a.x,a.y,a.lat,a.lon,b.x,b.y,b.lat,b.lon\n".to_owned() + &(0..50).map(row).collect::<String>()
     };
     assert!(read(&text(0.0), &usual()).is_ok());
-    refused(&text(11.0), &usual(), "recording/several-frames");
+    let error = refused(&text(11.0), &usual(), "recording/several-frames");
+    assert!(error.help().contains("by removing all columns in degrees, such as `a.lat`, `a.lon`"), "{}", error.help());
+    assert!(!error.help().contains("--column"), "{}", error.help());
+    // A vehicle without degrees leaves the others compared.
+    let partly = |home| {
+        let rows = text(home);
+        let (header, rows) = rows.split_once('\n').expect("lines");
+        format!("z.x,z.y,{header}\n") + &rows.lines().map(|row| format!("0,90,{row}\n")).collect::<String>()
+    };
+    let notes = read(&partly(0.0), &usual()).expect("read").notes;
+    assert!(notes.iter().any(|note| note.contains("not compared with degrees for `z`")), "{notes:?}");
+    refused(&partly(11.0), &usual(), "recording/several-frames");
 }
 
 #[test]

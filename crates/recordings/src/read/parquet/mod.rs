@@ -89,7 +89,7 @@ pub(in crate::read) fn open(source: &Source, options: &ReadOptions) -> Result<Re
     layout.alternative_ids.retain(can_name);
     layout.suspects.retain(can_name);
     layout.rate = layout.rate.filter(|(column, _)| can_name(column));
-    if !layout.second.iter().flat_map(|second| second.columns).flatten().all(|column| can_name(&column)) {
+    if !layout.second.iter().flatten().flat_map(|second| second.columns).flatten().all(|column| can_name(&column)) {
         layout.second.clear();
     }
     let unit = layout.time.and_then(|time| unit_of(&schema.column(time)));
