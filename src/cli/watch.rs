@@ -262,6 +262,7 @@ impl WatchArguments {
             max_vehicles: self.max_vehicles,
             time_base: self.time,
             clocks: self.clock_scope(source),
+            has_message_counts: matches!(source, Address::Mavlink(_)),
         })
     }
 

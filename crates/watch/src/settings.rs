@@ -109,6 +109,8 @@ pub struct Settings {
     pub time_base: TimeBase,
     /// Clocks of the stamps.
     pub clocks: ClockScope,
+    /// Whether the source numbers the messages of each vehicle, as `MAVLink` does.
+    pub has_message_counts: bool,
 }
 
 impl Default for Settings {
@@ -127,6 +129,7 @@ impl Default for Settings {
             max_vehicles: 2000,
             time_base: TimeBase::Arrival,
             clocks: ClockScope::Common,
+            has_message_counts: false,
         }
     }
 }
@@ -144,6 +147,20 @@ pub struct SettingsError {
 }
 
 impl Settings {
+    /// Returns the clocks of the stamps. Stamps as the time base need a common one.
+    pub(crate) fn clock_scope(&self) -> ClockScope {
+        match self.time_base {
+            TimeBase::Arrival => self.clocks,
+            TimeBase::Stamps => ClockScope::Common,
+        }
+    }
+
+    /// Returns whether messages show that one name carries two vehicles. The stamps of a common clock do not differ
+    /// between two vehicles, and without counts nothing else does.
+    pub(crate) fn shows_two_streams(&self) -> bool {
+        self.has_message_counts || self.clock_scope() == ClockScope::PerVehicle
+    }
+
     /// Returns the time by which a stamp may lie after the present of its clock \[s\]; from there it is a step.
     pub(crate) fn largest_step_s(&self) -> f64 {
         STEP_S.min(self.max_age_s.value / 2.0)

@@ -40,11 +40,15 @@
 //! |v_n - v_k| <= 2 e + A T
 //! ```
 //!
+//! The sum runs over the readings with a velocity alone. With other readings between them, g is the time between two
+//! sent velocities. The bound on the trapezoidal rule holds for it as well.
+//!
 //! The second bound is [`Fault::OutOfBounds`]. A velocity that is wrong by `e + b` is found at the latest when `b T` is
 //! above `eps_n + eps_k + A sum of g^2 / 4`. Windows reach to `2 eps / e`, where both errors are equal, but at least to
 //! [`SHORTEST_REACH_S`] and at most to [`LONGEST_REACH_S`].
 //!
-//! A first reading has no window, so its velocity is not tested.
+//! A first reading has no window, so its velocity is not tested. A first sent velocity after other readings is tested
+//! against their windows alone.
 //!
 //! A position that is repeated without the change of a bit is no new measurement. Then the errors of both ends are
 //! equal, and the summed velocities alone must be at most `e T + A sum of g^2 / 4`, with [`RESOLUTION_M`] for the
@@ -52,8 +56,9 @@
 //!
 //! # Memory
 //!
-//! The history has [`LEVELS`] rings of [`MARKS`] readings. The readings of a ring are [`SPACINGS_S`] apart, so that the
-//! windows have the same lengths at every rate. Nothing is allocated after the first reading.
+//! The history has [`LEVELS`] rings of [`MARKS`] readings, and as many rings of readings with a velocity. The readings
+//! of a ring are [`SPACINGS_S`] apart, so that the windows have the same lengths at every rate. Nothing is allocated
+//! after the first reading.
 
 use nalgebra::Vector3;
 
@@ -131,42 +136,15 @@ impl Ball {
     }
 }
 
-/// Reading with the sums of the sent velocities up to it.
-#[derive(Clone, Copy, Debug)]
-struct Mark {
-    reading: Reading,
-    /// Sum of the sent velocities times their steps, by the trapezoidal rule \[m\].
-    travel_m: Vector3<f64>,
-    /// Sum of the squares of the steps, divided by 4 \[s^2\].
-    squares_s2: f64,
-    /// Number of readings without a velocity so far; sums with different numbers are not comparable.
-    breaks: u64,
-}
-
-impl Mark {
-    fn first(reading: Reading) -> Self {
-        Self { reading, travel_m: Vector3::zeros(), squares_s2: 0.0, breaks: 0 }
-    }
-
-    fn next(&self, reading: Reading) -> Self {
-        let step_s = reading.t_s - self.reading.t_s;
-        let mean = self.reading.velocity_m_s.zip(reading.velocity_m_s).map(|(from, to)| (from + to) * 0.5);
-        Self {
-            reading,
-            travel_m: self.travel_m + mean.map_or_else(Vector3::zeros, |mean| mean * step_s),
-            squares_s2: self.squares_s2 + step_s * step_s / 4.0,
-            breaks: self.breaks + u64::from(mean.is_none()),
-        }
-    }
-
+impl Reading {
     fn window_s(&self, from: &Self) -> f64 {
-        self.reading.t_s - from.reading.t_s
+        self.t_s - from.t_s
     }
 
     /// Returns the bound on the rounding of a displacement \[m\]. It covers the coordinates, and stamps that err by a
     /// unit in the last place at a speed.
     fn rounding_m(&self, speed_m_s: f64) -> f64 {
-        1e-9 * (1.0 + self.reading.position_m.amax()) + speed_m_s * 4.0 * f64::EPSILON * self.reading.t_s.abs()
+        1e-9 * (1.0 + self.position_m.amax()) + speed_m_s * 4.0 * f64::EPSILON * self.t_s.abs()
     }
 
     /// Returns the velocities that the positions at both ends of a window allow at each of its ends. Returns `None` for
@@ -176,63 +154,157 @@ impl Mark {
         if window_s < LEAST_WINDOW_S {
             return None;
         }
-        let centre = (self.reading.position_m - from.reading.position_m) / window_s;
-        let errors_m = self.reading.position_error_m + from.reading.position_error_m;
+        let centre = (self.position_m - from.position_m) / window_s;
+        let errors_m = self.position_error_m + from.position_error_m;
         let rounding_m = self.rounding_m(centre.norm());
         Some(Ball { centre, radius: (errors_m + rounding_m) / window_s + bounds.accel_m_s2 * window_s / 2.0 })
     }
 
+    fn sent(&self, bounds: Bounds) -> Option<Ball> {
+        self.velocity_m_s.map(|centre| Ball { centre, radius: bounds.velocity_error_m_s })
+    }
+}
+
+/// Reading with a velocity, and the sums of the sent velocities up to it.
+#[derive(Clone, Copy, Debug)]
+struct Mark {
+    reading: Reading,
+    velocity_m_s: Vector3<f64>,
+    /// Sum of the sent velocities times their steps, by the trapezoidal rule \[m\].
+    travel_m: Vector3<f64>,
+    /// Sum of the squares of the steps, divided by 4 \[s^2\].
+    squares_s2: f64,
+}
+
+impl Mark {
+    fn first(reading: Reading, velocity_m_s: Vector3<f64>) -> Self {
+        Self { reading, velocity_m_s, travel_m: Vector3::zeros(), squares_s2: 0.0 }
+    }
+
+    /// Returns the mark of the next reading with a velocity.
+    fn next(&self, reading: Reading, velocity_m_s: Vector3<f64>) -> Self {
+        let step_s = reading.window_s(&self.reading);
+        Self {
+            reading,
+            velocity_m_s,
+            travel_m: self.travel_m + (self.velocity_m_s + velocity_m_s) * (0.5 * step_s),
+            squares_s2: self.squares_s2 + step_s * step_s / 4.0,
+        }
+    }
+
+    fn window_s(&self, from: &Self) -> f64 {
+        self.reading.window_s(&from.reading)
+    }
+
     /// Returns whether the sum of the sent velocities over a window agrees with the positions at its ends.
-    fn agrees(&self, from: &Self, speed_m_s: f64, bounds: Bounds) -> bool {
+    fn agrees(&self, from: &Self, bounds: Bounds) -> bool {
         let window_s = self.window_s(from);
         let errors_m = self.reading.position_error_m + from.reading.position_error_m;
         let most_m = errors_m
             + bounds.velocity_error_m_s * window_s
             + bounds.accel_m_s2 * (self.squares_s2 - from.squares_s2)
             + 1e-9 * self.travel_m.norm()
-            + self.rounding_m(speed_m_s + bounds.accel_m_s2 * window_s);
+            + self.reading.rounding_m(self.velocity_m_s.norm() + bounds.accel_m_s2 * window_s);
         let moved_m = self.reading.position_m - from.reading.position_m;
         (moved_m - (self.travel_m - from.travel_m)).norm() <= most_m
     }
+
+    /// Returns whether the sent velocity changed by no more than the acceleration and the errors allow.
+    fn changes_within(&self, from: &Self, bounds: Bounds) -> bool {
+        let most_m_s = 2.0 * bounds.velocity_error_m_s + bounds.accel_m_s2 * self.window_s(from);
+        let rounding_m_s = 1e-9 * (1.0 + self.velocity_m_s.amax());
+        (self.velocity_m_s - from.velocity_m_s).norm() <= most_m_s + rounding_m_s
+    }
+
+    /// Returns whether the sent velocities move the vehicle over a window in which its position was repeated.
+    fn moves(&self, held: &Self, bounds: Bounds) -> bool {
+        let window_s = self.window_s(held);
+        let most_m = RESOLUTION_M
+            + bounds.velocity_error_m_s * window_s
+            + bounds.accel_m_s2 * (self.squares_s2 - held.squares_s2)
+            + 1e-9 * self.travel_m.norm();
+        window_s >= HELD_S && (self.travel_m - held.travel_m).norm() > most_m
+    }
 }
 
-/// Newest readings with a smallest time between two of them.
-#[derive(Clone, Debug)]
-struct Ring {
-    marks: [Mark; MARKS],
+/// Item of a ring.
+trait Stamped: Copy {
+    fn t_s(&self) -> f64;
+}
+
+impl Stamped for Reading {
+    fn t_s(&self) -> f64 {
+        self.t_s
+    }
+}
+
+impl Stamped for Mark {
+    fn t_s(&self) -> f64 {
+        self.reading.t_s
+    }
+}
+
+/// Newest items with a smallest time between two of them.
+#[derive(Clone, Copy, Debug)]
+struct Ring<T> {
+    items: [T; MARKS],
     count: usize,
 }
 
-impl Ring {
-    fn newest(&self) -> &Mark {
-        &self.marks[(self.count - 1) % MARKS]
-    }
-
-    fn push(&mut self, mark: Mark, spacing_s: f64) {
-        if mark.window_s(self.newest()) >= spacing_s {
-            self.marks[self.count % MARKS] = mark;
+impl<T: Stamped> Ring<T> {
+    fn push(&mut self, item: T, spacing_s: f64) {
+        let newest = &self.items[(self.count - 1) % MARKS];
+        if item.t_s() - newest.t_s() >= spacing_s {
+            self.items[self.count % MARKS] = item;
             self.count += 1;
         }
     }
 
-    /// Returns the readings, the newest first.
-    fn iter(&self) -> impl Iterator<Item = &Mark> {
-        (0..self.count.min(MARKS)).map(|age| &self.marks[(self.count - 1 - age) % MARKS])
+    /// Returns the items, the newest first.
+    fn iter(&self) -> impl Iterator<Item = &T> {
+        (0..self.count.min(MARKS)).map(|age| &self.items[(self.count - 1 - age) % MARKS])
     }
 }
 
-/// Rings of the history, the newest reading, and the velocities that both allow.
+/// Rings of the history, and the newest item.
+#[derive(Clone, Copy, Debug)]
+struct Rings<T> {
+    rings: [Ring<T>; LEVELS],
+    newest: T,
+}
+
+impl<T: Stamped> Rings<T> {
+    fn new(first: T) -> Self {
+        Self { rings: [Ring { items: [first; MARKS], count: 1 }; LEVELS], newest: first }
+    }
+
+    fn push(&mut self, item: T) {
+        for (ring, spacing_s) in self.rings.iter_mut().zip(SPACINGS_S) {
+            ring.push(item, spacing_s);
+        }
+        self.newest = item;
+    }
+
+    fn iter(&self) -> impl Iterator<Item = &T> {
+        self.rings.iter().flat_map(Ring::iter)
+    }
+}
+
+/// Readings of a vehicle, and the velocities that they allow.
 #[derive(Clone, Debug)]
 struct Track {
-    rings: [Ring; LEVELS],
-    newest: Mark,
+    readings: Rings<Reading>,
+    /// Readings with a velocity; `None` before the first one.
+    marks: Option<Rings<Mark>>,
     /// Velocities that the positions allow.
     measured: Option<Ball>,
     /// Velocities that positions and sent velocities allow.
     velocity: Option<Ball>,
-    /// First reading with the position of the newest one.
-    held: Mark,
-    /// Number of readings with this position after the first one.
+    /// Whether positions bounded the velocity when the newest velocity was sent.
+    is_compared: bool,
+    /// First reading with a velocity that has the position of the newest reading.
+    held: Option<Mark>,
+    /// Number of readings with this position after that one.
     repeated: u32,
 }
 
@@ -248,9 +320,10 @@ impl VelocityEnclosure {
         self.track.as_ref()?.velocity
     }
 
-    /// Returns whether positions bound the velocity, so that a sent velocity was compared with them.
-    pub(crate) fn is_measured(&self) -> bool {
-        self.track.as_ref().is_some_and(|track| track.measured.is_some())
+    /// Returns whether the newest velocity that was sent was compared with positions; `None` if none was sent.
+    pub(crate) fn is_compared(&self) -> Option<bool> {
+        let track = self.track.as_ref()?;
+        track.marks.as_ref().map(|_| track.is_compared)
     }
 
     /// Forgets all readings.
@@ -283,52 +356,41 @@ fn common(a: Option<Ball>, b: Option<Ball>) -> Result<Option<Ball>, Disjoint> {
     }
 }
 
-fn sent(reading: &Reading, bounds: Bounds) -> Option<Ball> {
-    reading.velocity_m_s.map(|centre| Ball { centre, radius: bounds.velocity_error_m_s })
-}
-
 impl Track {
     fn new(reading: Reading, bounds: Bounds) -> Self {
-        let mark = Mark::first(reading);
-        let ring = Ring { marks: [mark; MARKS], count: 1 };
-        let rings = std::array::from_fn(|_| ring.clone());
-        Self { rings, newest: mark, measured: None, velocity: sent(&reading, bounds), held: mark, repeated: 0 }
-    }
-
-    /// Starts anew with one reading.
-    fn restart(&mut self, reading: Reading, bounds: Bounds) {
-        let mark = Mark::first(reading);
-        for ring in &mut self.rings {
-            (ring.marks[0], ring.count) = (mark, 1);
+        let first = reading.velocity_m_s.map(|velocity_m_s| Mark::first(reading, velocity_m_s));
+        Self {
+            readings: Rings::new(reading),
+            marks: first.map(Rings::new),
+            measured: None,
+            velocity: reading.sent(bounds),
+            is_compared: false,
+            held: first,
+            repeated: 0,
         }
-        (self.newest, self.held, self.repeated) = (mark, mark, 0);
-        (self.measured, self.velocity) = (None, sent(&reading, bounds));
     }
 
     fn take(&mut self, reading: Reading, bounds: Bounds) -> Option<Fault> {
-        let mark = self.newest.next(reading);
-        let Ok(measured) = self.measure(&mark, bounds) else {
+        let Ok(measured) = self.measure(&reading, bounds) else {
             // Positions before a jump bound no velocity after it.
-            self.restart(reading, bounds);
+            *self = Self::new(reading, bounds);
             return Some(Fault::OutOfBounds);
         };
-        let agrees = self.agrees(&mark, bounds);
-        let moves = self.moves_while_held(&mark, bounds);
-        let is_within = self.changes_within(&mark, bounds);
-        let earlier = self.velocity.map(|ball| ball.grown(bounds.accel_m_s2 * mark.window_s(&self.newest)));
-        let sent = sent(&reading, bounds);
-        for (ring, spacing_s) in self.rings.iter_mut().zip(SPACINGS_S) {
-            ring.push(mark, spacing_s);
-        }
-        (self.newest, self.measured) = (mark, measured);
+        let step_s = reading.window_s(&self.readings.newest);
+        let earlier = self.velocity.map(|ball| ball.grown(bounds.accel_m_s2 * step_s));
+        let sent = reading.sent(bounds);
+        self.readings.push(reading);
+        self.measured = measured;
+        let fault = self.take_sent(reading, bounds);
         let velocity = match common(measured, sent) {
             Err(Disjoint) => Err(Fault::VelocityDisagrees),
-            Ok(_) if !agrees || moves => Err(Fault::VelocityDisagrees),
-            Ok(_) if !is_within => Err(Fault::OutOfBounds),
-            Ok(both) => common(both, earlier).map_err(|Disjoint| match sent {
-                Some(_) => Fault::OutOfBounds,
-                None => Fault::VelocityDisagrees,
-            }),
+            Ok(both) => match fault {
+                Some(fault) => Err(fault),
+                None => common(both, earlier).map_err(|Disjoint| match sent {
+                    Some(_) => Fault::OutOfBounds,
+                    None => Fault::VelocityDisagrees,
+                }),
+            },
         };
         // After a contradiction the positions alone decide.
         self.velocity = velocity.unwrap_or(measured.or(sent));
@@ -336,58 +398,50 @@ impl Track {
     }
 
     /// Returns the velocities that the positions allow, if they allow a bound.
-    fn measure(&self, mark: &Mark, bounds: Bounds) -> Result<Option<Ball>, Disjoint> {
-        let step = mark.quotient(&self.newest, bounds);
-        let growth = bounds.accel_m_s2 * mark.window_s(&self.newest);
+    fn measure(&self, reading: &Reading, bounds: Bounds) -> Result<Option<Ball>, Disjoint> {
+        let newest = &self.readings.newest;
+        let step = reading.quotient(newest, bounds);
+        let growth = bounds.accel_m_s2 * reading.window_s(newest);
         // The quotient of the step bounds the velocity at both of its ends.
         let before = common(self.measured, step)?.map(|ball| ball.grown(growth));
         let mut measured = common(before, step)?;
-        for from in self.rings.iter().flat_map(Ring::iter) {
-            measured = common(measured, mark.quotient(from, bounds))?;
+        for from in self.readings.iter() {
+            measured = common(measured, reading.quotient(from, bounds))?;
         }
         Ok(measured)
     }
 
-    /// Returns the readings from which windows to a reading with sent velocities throughout begin: the newest one, and
-    /// those within reach.
-    fn windows<'a>(&'a self, mark: &'a Mark, bounds: Bounds) -> impl Iterator<Item = &'a Mark> {
-        let balanced_s = 2.0 * mark.reading.position_error_m / bounds.velocity_error_m_s;
+    /// Compares a sent velocity with the earlier ones and with the positions. Returns the fault of a contradiction.
+    fn take_sent(&mut self, reading: Reading, bounds: Bounds) -> Option<Fault> {
+        if self.held.is_some_and(|held| held.reading.position_m != reading.position_m) {
+            self.held = None;
+        }
+        self.repeated = if self.held.is_some() { self.repeated.saturating_add(1) } else { 0 };
+        let velocity_m_s = reading.velocity_m_s?;
+        self.is_compared = self.measured.is_some();
+        let Some(marks) = &mut self.marks else {
+            let first = Mark::first(reading, velocity_m_s);
+            (self.marks, self.held) = (Some(Rings::new(first)), Some(first));
+            return None;
+        };
+        let mark = marks.newest.next(reading, velocity_m_s);
+        let balanced_s = 2.0 * reading.position_error_m / bounds.velocity_error_m_s;
         // `max` also replaces the quotient of two zeros.
         let reach_s = balanced_s.max(SHORTEST_REACH_S).min(LONGEST_REACH_S);
-        let marks = self.rings.iter().flat_map(Ring::iter).filter(move |from| mark.window_s(from) <= reach_s);
-        std::iter::once(&self.newest).chain(marks).filter(move |from| from.breaks == mark.breaks)
-    }
-
-    fn agrees(&self, mark: &Mark, bounds: Bounds) -> bool {
-        let Some(velocity) = mark.reading.velocity_m_s else { return true };
-        let speed_m_s = velocity.norm();
-        self.windows(mark, bounds).all(|from| mark.agrees(from, speed_m_s, bounds))
-    }
-
-    /// Returns whether sent velocities changed by no more than the acceleration and their errors allow.
-    fn changes_within(&self, mark: &Mark, bounds: Bounds) -> bool {
-        let Some(velocity) = mark.reading.velocity_m_s else { return true };
-        self.windows(mark, bounds).all(|from| {
-            let most_m_s = 2.0 * bounds.velocity_error_m_s + bounds.accel_m_s2 * mark.window_s(from);
-            let rounding_m_s = 1e-9 * (1.0 + velocity.amax());
-            from.reading.velocity_m_s.is_none_or(|before| (velocity - before).norm() <= most_m_s + rounding_m_s)
-        })
-    }
-
-    /// Counts repetitions of a position. Returns whether the sent velocities contradict them.
-    fn moves_while_held(&mut self, mark: &Mark, bounds: Bounds) -> bool {
-        if mark.reading.position_m != self.held.reading.position_m || mark.breaks != self.held.breaks {
-            (self.held, self.repeated) = (*mark, 0);
-            return false;
+        let within_reach = marks.iter().filter(|from| mark.window_s(from) <= reach_s);
+        // The newest velocity is compared even if it is older.
+        let (mut agrees, mut is_within) = (true, true);
+        for from in std::iter::once(&marks.newest).chain(within_reach) {
+            agrees &= mark.agrees(from, bounds);
+            is_within &= mark.changes_within(from, bounds);
         }
-        self.repeated = self.repeated.saturating_add(1);
-        let window_s = mark.window_s(&self.held);
-        let most_m = RESOLUTION_M
-            + bounds.velocity_error_m_s * window_s
-            + bounds.accel_m_s2 * (mark.squares_s2 - self.held.squares_s2)
-            + 1e-9 * mark.travel_m.norm();
-        let moved_m = (mark.travel_m - self.held.travel_m).norm();
-        self.repeated >= HELD_READINGS && window_s >= HELD_S && moved_m > most_m
+        marks.push(mark);
+        let held = self.held.get_or_insert(mark);
+        let moves = self.repeated >= HELD_READINGS && mark.moves(held, bounds);
+        if !agrees || moves {
+            return Some(Fault::VelocityDisagrees);
+        }
+        (!is_within).then_some(Fault::OutOfBounds)
     }
 }
 
@@ -466,6 +520,45 @@ mod tests {
         for (error_m_s, is_found) in [(0.099, false), (0.3, true)] {
             let found = first_fault(50.0, |t_s| reading(t_s, 2.0 * t_s, Some(2.0 + error_m_s)), BOUNDS);
             assert_eq!(found.map(|(_, fault)| fault), is_found.then_some(Fault::VelocityDisagrees), "{error_m_s}");
+        }
+    }
+
+    #[test]
+    fn a_wrong_velocity_that_comes_in_a_part_of_the_readings_is_found() {
+        // Positions within 2 m, 4 m/s, and accelerations within 2 m/s^2.
+        let bounds = Bounds { accel_m_s2: 2.0, velocity_error_m_s: 0.1 };
+        for every in 1..=5_u32 {
+            let found = |sent_m_s: f64| {
+                let mut enclosure = VelocityEnclosure::default();
+                (0..60).find_map(|k| {
+                    let t_s = 0.2 * f64::from(k);
+                    let coarse = reading(t_s, 4.0 * t_s, (k % every == 0).then_some(sent_m_s));
+                    let fault = enclosure.take(Reading { position_error_m: 2.0, ..coarse }, bounds)?;
+                    Some((t_s, fault))
+                })
+            };
+            let (t_s, fault) = found(0.0).expect("a fault");
+            assert!(fault == Fault::VelocityDisagrees && t_s < 2.1, "every {every}: {fault:?} {t_s}");
+            // Negative twin: the right velocity.
+            assert_eq!(found(4.0), None, "every {every}");
+        }
+    }
+
+    #[test]
+    fn a_position_that_comes_back_between_two_sent_velocities_is_not_repeated() {
+        let coarse = |k: u32, x_m: f64, vx: Option<f64>| Reading {
+            position_error_m: 5.0,
+            ..reading(0.1 * f64::from(k), x_m, vx)
+        };
+        // Each third reading has a velocity. All positions, or those with a velocity alone, are the same.
+        for (between_m, is_found) in [(3.0, true), (3.1, false)] {
+            let mut enclosure = VelocityEnclosure::default();
+            let found = (0..10).find_map(|k| {
+                let sends = k % 3 == 0;
+                let vx = sends.then_some(2.0);
+                enclosure.take(coarse(k, if sends { 3.0 } else { between_m }, vx), BOUNDS)
+            });
+            assert_eq!(found, is_found.then_some(Fault::VelocityDisagrees), "{between_m}");
         }
     }
 

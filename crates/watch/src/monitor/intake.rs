@@ -22,10 +22,7 @@ impl Monitor {
             self.fault(Fault::OutOfRange, None, arrival_s);
             return None;
         }
-        let scope = match self.settings.time_base {
-            TimeBase::Arrival => self.settings.clocks,
-            TimeBase::Stamps => ClockScope::Common,
-        };
+        let scope = self.settings.clock_scope();
         let is_first = self.vehicles.is_empty() && scope == ClockScope::Common;
         if is_first {
             // Times of the monitor are those of the first source from here on.
@@ -178,7 +175,6 @@ impl Monitor {
         };
         let own = &mut self.vehicles[vehicle as usize];
         own.position_error_m = error_m;
-        own.sends_velocity = pose.velocity_m_s.is_some();
         let fault = if let Some(position_error_m) = error_m {
             let Pose { t_s, position_m, velocity_m_s, .. } = *pose;
             own.velocity.take(Reading { t_s, position_m, position_error_m, velocity_m_s }, bounds)

@@ -63,8 +63,6 @@ struct Vehicle {
     taken_s: Option<f64>,
     /// Velocities at the newest position that the bounds allow.
     velocity: VelocityEnclosure,
-    /// Whether the newest pose has a velocity.
-    sends_velocity: bool,
     /// Bound on the error of the newest position \[m\], if known.
     position_error_m: Option<f64>,
     /// Order of the stamps.
@@ -193,14 +191,13 @@ impl Monitor {
         let present = || self.vehicles.iter().filter(|vehicle| vehicle.signed_off_s.is_none());
         let largest_m = present().filter_map(|vehicle| vehicle.position_error_m).reduce(f64::max);
         let mut facts = self.settings.facts(largest_m);
-        let mut senders = present().filter(|vehicle| vehicle.sends_velocity).peekable();
-        if senders.peek().is_some() {
-            // A first velocity is not tested.
-            let is_observed = senders.all(|vehicle| vehicle.velocity.is_measured());
-            let source = if is_observed { Source::Observed } else { Source::NotObservable };
-            facts.push(Fact::new(FactKind::VelocityAgreement, source));
+        let seen = |is_observed: bool| if is_observed { Source::Observed } else { Source::NotObservable };
+        // A first velocity is not tested.
+        if let Some(is_observed) = present().filter_map(|vehicle| vehicle.velocity.is_compared()).reduce(|a, b| a && b)
+        {
+            facts.push(Fact::new(FactKind::VelocityAgreement, seen(is_observed)));
         }
-        facts.push(Fact::new(FactKind::OneStream, Source::Observed));
+        facts.push(Fact::new(FactKind::OneStream, seen(self.settings.shows_two_streams())));
         facts
     }
 
@@ -279,7 +276,6 @@ impl Monitor {
             judged_t_s: None,
             taken_s: None,
             velocity: VelocityEnclosure::default(),
-            sends_velocity: false,
             position_error_m: None,
             streams: StampOrder::default(),
             has_two_streams: false,

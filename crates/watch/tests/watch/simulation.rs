@@ -105,10 +105,37 @@ enum Sent {
     Stuck(f64),
 }
 
+/// Readings that have a velocity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Part {
+    /// Each reading of this number.
+    Every(u32),
+    /// A random half.
+    Random,
+}
+
+impl Part {
+    fn has(self, reading: u32, random: &mut Random) -> bool {
+        match self {
+            Self::Every(number) => reading % number == 0,
+            Self::Random => random.share() < 0.5,
+        }
+    }
+
+    /// Returns the number of readings for one velocity.
+    fn readings(self) -> f64 {
+        match self {
+            Self::Every(number) => f64::from(number),
+            Self::Random => 2.0,
+        }
+    }
+}
+
 /// Sender of the poses of one vehicle.
 struct Sender {
     motion: Motion,
     sent: Sent,
+    readings: u32,
     period_s: f64,
     /// Constant part of the errors, as shares of their bounds.
     bias: [Vector3<f64>; 2],
@@ -161,8 +188,9 @@ fn faults(monitor: &Monitor) -> u64 {
     Fault::ALL.into_iter().map(|fault| monitor.faults(fault)).sum()
 }
 
-/// Flies two vehicles towards each other. One of them sends what is given, the other one what is right.
-fn fly(sent: Sent, seed: u64) -> Run {
+/// Flies two vehicles towards each other. One of them sends what is given, the other one what is right. Both send
+/// velocities in a part of the readings.
+fn fly(sent: Sent, part: Part, seed: u64) -> Run {
     let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1);
     let time_base = if random.share() < 0.5 { TimeBase::Arrival } else { TimeBase::Stamps };
     let mut monitor = monitor(Settings {
@@ -179,10 +207,10 @@ fn fly(sent: Sent, seed: u64) -> Run {
         let velocity = Vector3::x() * (towards * speed) + random.within(1.0);
         let position = Vector3::x() * x + random.within(0.5);
         let motion = Motion::new(position, velocity, &mut random);
-        // Rates from 2 to 500 Hz.
-        let period_s = 0.5 * 0.004_f64.powf(random.share());
+        // Rates of velocities from 2 to 500 Hz.
+        let period_s = 0.5 * 0.004_f64.powf(random.share()) / part.readings();
         let bias = [random.direction(), random.direction()];
-        Sender { motion, sent: Sent::Right, period_s, bias, next_s: 0.0, frozen_m_s: None, stuck: None }
+        Sender { motion, sent: Sent::Right, readings: 0, period_s, bias, next_s: 0.0, frozen_m_s: None, stuck: None }
     });
     senders[0].sent = sent;
     if sent == Sent::PositionsOnly {
@@ -222,13 +250,15 @@ fn fly(sent: Sent, seed: u64) -> Run {
             judge(&mut monitor, &mut run, now_s);
         }
         let (position_m, velocity_m_s) = senders[k].pose(t_s, &mut random);
+        let velocity_m_s = velocity_m_s.filter(|_| part.has(senders[k].readings, &mut random));
+        senders[k].readings += 1;
         let before = faults(&monitor);
         monitor.take(&Pose { t_s, id: ["a", "b"][k], position_m, velocity_m_s, accuracy_m: None }, t_s);
         if faults(&monitor) > before {
             run.fault_s = run.fault_s.min(t_s);
         }
-        taken += u32::from(k == 0);
-        // One position contradicts no velocity.
+        taken += u32::from(k == 0 && (velocity_m_s.is_some() || sent == Sent::PositionsOnly));
+        // A first velocity is not tested.
         if taken > 1 || matches!(sent, Sent::Right | Sent::PositionsOnly) {
             judge(&mut monitor, &mut run, t_s);
         }
@@ -239,12 +269,12 @@ fn fly(sent: Sent, seed: u64) -> Run {
 
 /// Counts the runs with a fault, the judgements that were CLEAR, and the runs with a violation before the time of CLEAR
 /// and before any fault.
-fn count(sent: impl Fn(&mut Random) -> Sent, runs: u64) -> [u64; 3] {
+fn count(sent: impl Fn(&mut Random) -> Sent, part: Part, runs: u64) -> [u64; 3] {
     let mut found = [0; 3];
     for seed in 0..runs {
         let mut random = Random(seed);
         random.share();
-        let run = fly(sent(&mut random), seed);
+        let run = fly(sent(&mut random), part, seed);
         found[0] += u64::from(run.fault_s < f64::INFINITY);
         found[1] += u64::from(run.clear);
         found[2] += u64::from(run.broken_s < run.fault_s);
@@ -254,10 +284,16 @@ fn count(sent: impl Fn(&mut Random) -> Sent, runs: u64) -> [u64; 3] {
 
 #[test]
 fn right_input_has_no_fault_and_no_violation_before_the_time_of_clear() {
-    for sent in [Sent::Right, Sent::PositionsOnly] {
-        let [faults, clear, broken] = count(|_| sent, 2000);
-        assert_eq!((faults, broken), (0, 0), "{sent:?}");
-        assert!(clear > 50_000, "{sent:?}: {clear}");
+    for (sent, part) in [
+        (Sent::Right, Part::Every(1)),
+        (Sent::Right, Part::Every(2)),
+        (Sent::Right, Part::Every(3)),
+        (Sent::Right, Part::Random),
+        (Sent::PositionsOnly, Part::Every(1)),
+    ] {
+        let [faults, clear, broken] = count(|_| sent, part, 2000);
+        assert_eq!((faults, broken), (0, 0), "{sent:?} {part:?}");
+        assert!(clear > 50_000, "{sent:?} {part:?}: {clear}");
     }
 }
 
@@ -274,8 +310,10 @@ fn wrong_velocities_and_stuck_positions_are_found_before_a_violation() {
         ("stuck", |random| Sent::Stuck(random.between(0.0, 2.0))),
     ];
     for (name, kind) in kinds {
-        let [faults, clear, broken] = count(kind, 1000);
-        assert_eq!(broken, 0, "{name}: {faults} faults, {clear} CLEAR");
-        assert!(faults > 500 && clear > 500, "{name}: {faults} faults, {clear} CLEAR");
+        for part in [Part::Every(1), Part::Every(2), Part::Every(3), Part::Random] {
+            let [faults, clear, broken] = count(kind, part, 1000);
+            assert_eq!(broken, 0, "{name} {part:?}: {faults} faults, {clear} CLEAR");
+            assert!(faults > 500 && clear > 500, "{name} {part:?}: {faults} faults, {clear} CLEAR");
+        }
     }
 }

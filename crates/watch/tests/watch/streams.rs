@@ -86,7 +86,7 @@ struct Radio {
 
 impl Radio {
     fn new(settings: Settings) -> Self {
-        let settings = Settings { clocks: ClockScope::PerVehicle, ..settings };
+        let settings = Settings { clocks: ClockScope::PerVehicle, has_message_counts: true, ..settings };
         Self { reader: MavlinkReader::new(MavlinkFrame::Local), monitor: monitor(settings) }
     }
 
@@ -192,6 +192,61 @@ fn a_name_with_two_clocks_is_not_clear_in_any_source() {
             assert_eq!(monitor.faults(Fault::TwoStreams), u64::from(is_found), "{time_base:?} {offset_s}");
             let state = monitor.assess(1009.9).state;
             assert_eq!(state == State::Clear, !is_found, "{time_base:?} {offset_s}: {state:?}");
+        }
+    }
+}
+
+#[test]
+fn one_stream_is_observed_only_where_two_would_show() {
+    for (clocks, has_message_counts, time_base, is_observed) in [
+        (ClockScope::Common, false, TimeBase::Arrival, false),
+        (ClockScope::Common, false, TimeBase::Stamps, false),
+        (ClockScope::PerVehicle, false, TimeBase::Stamps, false),
+        (ClockScope::PerVehicle, false, TimeBase::Arrival, true),
+        (ClockScope::Common, true, TimeBase::Arrival, true),
+    ] {
+        let mut monitor = monitor(Settings { clocks, has_message_counts, time_base, ..settings() });
+        for k in 0..20 {
+            let now_s = 0.1 * f64::from(k);
+            rest(&mut monitor, "b", now_s, 6.0, now_s);
+            // Two vehicles have the name `a` and one clock, which the fact must not exclude.
+            rest(&mut monitor, "a", now_s - 0.05 * f64::from(k % 2), 0.001 * f64::from(k % 2), now_s);
+        }
+        assert_eq!(monitor.faults(Fault::TwoStreams), 0);
+        let source = monitor.facts().into_iter().find(|fact| fact.kind == FactKind::OneStream).map(|fact| fact.source);
+        let expected = if is_observed { Source::Observed } else { Source::NotObservable };
+        assert_eq!(source, Some(expected), "{clocks:?} {has_message_counts} {time_base:?}");
+    }
+}
+
+#[test]
+fn a_wrong_velocity_in_a_part_of_the_messages_is_not_clear() {
+    // `a` moves with 4 m/s, `b` rests 62 m away. The pair violates at 15.25 s.
+    for every in [1, 2, 3] {
+        for sent_m_s in [0.0, 4.0] {
+            let mut monitor = monitor(Settings {
+                time_base: TimeBase::Stamps,
+                accel_m_s2: Bound::declared(2.0),
+                position_error_m: Some(Bound::declared(2.0)),
+                max_age_s: Bound::declared(5.0),
+                ..Settings::default()
+            });
+            for k in 0..76 {
+                let t_s = 0.2 * f64::from(k);
+                let velocity_m_s = (k % every == 0).then_some(Vector3::x() * sent_m_s);
+                let position_m = Vector3::new(4.0 * t_s, 0.0, 2.0);
+                monitor.take(&Pose { t_s, id: "a", position_m, velocity_m_s, accuracy_m: None }, t_s);
+                rest(&mut monitor, "b", t_s, 62.0, t_s);
+                let state = monitor.assess(t_s).state;
+                if sent_m_s == 0.0 && t_s > 2.1 {
+                    assert_eq!(state, State::NotKnown(Reason::Doubt(Fault::VelocityDisagrees)), "{every} {t_s}");
+                } else if sent_m_s > 0.0 && t_s > 0.1 && t_s < 10.0 {
+                    assert_eq!(state, State::Clear, "{every} {t_s}");
+                }
+                let agreement = monitor.facts().into_iter().find(|fact| fact.kind == FactKind::VelocityAgreement);
+                let expected = if k < every { Source::NotObservable } else { Source::Observed };
+                assert_eq!(agreement.map(|fact| fact.source), Some(expected), "{every} {t_s}");
+            }
         }
     }
 }
