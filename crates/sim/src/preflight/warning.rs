@@ -6,7 +6,7 @@ use super::{Connectivity, LegCertificate, Preflight, margins};
 use crate::shield::TrackingBasis;
 use crate::vehicle::Quadrotor;
 use tautline_core::text;
-use tautline_core::text::{at_least, beside_limit, counted, exact, seconds, table, up_to};
+use tautline_core::text::{at_least, beside_limit, counted, seconds, table, up_to};
 
 /// Warning about a scenario.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
