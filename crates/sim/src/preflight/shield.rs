@@ -73,7 +73,9 @@ impl ShieldCheck {
             TrackingBasis::Searched(flights) => {
                 format!("certified {never} within a tracking error measured by a search of {flights} flights")
             }
-            TrackingBasis::Assumed => format!("{never} if the assumed tracking error of {} m holds", self.tube_m),
+            TrackingBasis::Assumed => {
+                format!("{never} if the assumed tracking error of {} m holds", up_to(self.tube_m))
+            }
         }
     }
 

@@ -21,7 +21,7 @@ use super::{ShieldSpec, refused, refused_with};
 use crate::link;
 use crate::plant::{self, StepPath};
 use crate::scenario::{Scenario, ScenarioError, Space};
-use crate::vehicle::{Tracking, TrackingSearch};
+use crate::vehicle::{Model, Tracking, TrackingSearch};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_core::text::significant;
@@ -205,9 +205,9 @@ impl Scenario {
             largest_error_m,
             margin: TRACKING_FACTOR,
             dimensions: vec![alone.space.dimensions()],
-            model: quadrotor.model.fingerprint(),
+            model: String::new(),
         };
-        let tracking = Tracking {
+        let mut tracking = Tracking {
             error_m: rounded_up(TRACKING_FACTOR * largest_error_m),
             search: Some(search),
             accel_m_s2: settings.accel_m_s2,
@@ -220,6 +220,10 @@ impl Scenario {
             position_error_m: settings.position_error_m,
             velocity_error_m_s: settings.velocity_error_m_s,
         };
+        let fingerprint = Model { tracking: Some(tracking.clone()), ..quadrotor.model.clone() }.fingerprint();
+        if let Some(search) = &mut tracking.search {
+            search.model = fingerprint;
+        }
         Ok(Identification {
             model: quadrotor.model.name.clone(),
             largest_error_m: flown.worst.error_m,

@@ -156,14 +156,21 @@ impl Scenario {
                 .with_help(format!("set time.control_hz, such as {SHIELD_CONTROL_HZ}"))
                 .at("shield"));
         };
-        let dt_s = self.time.dt_s;
         let most_m_s2 = self.actuation.max_accel_m_s2;
-        let accel_m_s2 = spec.accel_m_s2.or(most_m_s2).unwrap_or(ACCEL_M_S2);
+        let settings = self.shield_settings(spec, control_hz)?;
+        let accel_m_s2 = settings.accel_m_s2;
         if most_m_s2.is_some_and(|most_m_s2| accel_m_s2 > most_m_s2) {
             return Err(refused("shield.accel_m_s2 is more than actuation.max_accel_m_s2 carries out", accel_m_s2)
                 .with_help(format!("reduce it to at most {}", most_m_s2.unwrap_or_default()))
                 .at_keys(["shield.accel_m_s2", "actuation.max_accel_m_s2"]));
         }
+        settings.limits().map(Some).map_err(|error| of_shield(&error))
+    }
+
+    /// Returns the settings of a table of the shield at a rate of commands \[Hz\].
+    fn shield_settings(&self, spec: &ShieldSpec, control_hz: f64) -> Result<Settings, ScenarioError> {
+        let dt_s = self.time.dt_s;
+        let accel_m_s2 = spec.accel_m_s2.or(self.actuation.max_accel_m_s2).unwrap_or(ACCEL_M_S2);
         let max_speed_m_s = spec.max_speed_m_s.or(self.law_speed_m_s()).unwrap_or(SPEED_M_S);
         // The command compensates the drag of a quadrotor, too.
         let drag_per_s = self.airframe.quadrotor().map_or(0.0, |quadrotor| quadrotor.model.hover_drag_per_s());
@@ -203,7 +210,7 @@ impl Scenario {
                 settings.path_error_m += accel_m_s2 * dt_s * dt_s / 6.0;
             }
         }
-        settings.limits().map(Some).map_err(|error| of_shield(&error))
+        Ok(settings)
     }
 
     /// Returns the age of a measurement of the own state at an instant of command, in periods.

@@ -17,6 +17,8 @@ use tautline_laws::wind::{Gust, WindSpec};
 pub(super) const GENERATIONS: u64 = 40;
 /// Number of plans in a generation.
 const CHILDREN: usize = 32;
+/// Number of flights with changed plans in one search.
+pub(super) const CHANGED_FLIGHTS: u64 = GENERATIONS * CHILDREN as u64;
 /// Number of plans of one line of descent that are kept.
 const KEPT_OF_LINE: usize = 2;
 /// Number of plans that are kept.

@@ -1,8 +1,9 @@
 //! Quadrotors under a shield: keys from the measured `[tracking]` table of their model, and its conditions.
 
-use super::{SAME, ShieldSpec, refused, refused_with};
+use super::search::CHANGED_FLIGHTS;
+use super::{SAME, ShieldSpec, TRACKING_FACTOR, refused, refused_with};
 use crate::scenario::{DEFAULT_ATTITUDE_HZ, Scenario, ScenarioError, Space};
-use crate::vehicle::{self, MODELS, Quadrotor, Tracking};
+use crate::vehicle::{self, MODELS, Quadrotor, Tracking, TrackingSearch};
 use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::text::shortest;
 use tautline_laws::law::LawSpec;
@@ -18,7 +19,8 @@ pub(crate) enum TrackingBasis {
     Proved,
     /// Largest error of a search with this number of flights, times a margin.
     Searched(u64),
-    /// Declared by the scenario, or by a table of the model without a search of this model.
+    /// Declared by the scenario, or by a table of the model without a full search of this model and this table. So is
+    /// the error of a reference that accelerates more than that of the search.
     Assumed,
 }
 
@@ -48,6 +50,11 @@ impl TrackingBasis {
     }
 }
 
+/// Returns whether a search has the flights of a full one in each of its dimensions, and the margin of `--identify`.
+fn is_full(search: &TrackingSearch) -> bool {
+    search.margin >= TRACKING_FACTOR && search.flights >= CHANGED_FLIGHTS * search.dimensions.len() as u64
+}
+
 impl Scenario {
     /// Returns the basis of the bound on the tracking error; `None` without a shield.
     pub(crate) fn tracking_basis(&self) -> Option<TrackingBasis> {
@@ -57,8 +64,32 @@ impl Scenario {
         }
         let Some(quadrotor) = self.airframe.quadrotor() else { return Some(TrackingBasis::Proved) };
         let dimensions = self.space.dimensions();
-        let search = quadrotor.model.tracking_search().filter(|search| search.dimensions.contains(&dimensions));
+        let search = quadrotor.model.tracking_search().filter(|search| {
+            is_full(search) && search.dimensions.contains(&dimensions) && self.accelerates_as_searched()
+        });
         Some(search.map_or(TrackingBasis::Assumed, |search| TrackingBasis::Searched(search.flights)))
+    }
+
+    /// Returns whether the reference accelerates at most as that of the search. A smaller speed or smaller errors than
+    /// those of the table leave more of the commands to the reference.
+    fn accelerates_as_searched(&self) -> bool {
+        let table = self.airframe.quadrotor().and_then(|quadrotor| quadrotor.model.tracking.as_ref());
+        let (Some(table), Some(spec)) = (table, self.shield_keys()) else { return false };
+        let searched = ShieldSpec {
+            accel_m_s2: Some(table.accel_m_s2),
+            brake_m_s2: None,
+            max_speed_m_s: Some(table.max_speed_m_s),
+            position_error_m: table.position_error_m,
+            velocity_error_m_s: table.velocity_error_m_s,
+            disturbance_m_s2: Some(table.disturbance_m_s2),
+            ..spec
+        };
+        let most_m_s2 = |spec: &ShieldSpec| {
+            let limits = self.shield_settings(spec, table.control_hz).ok()?.limits().ok()?;
+            Some(limits.reference_m_s2())
+        };
+        let (Some(flown_m_s2), Some(searched_m_s2)) = (most_m_s2(&spec), most_m_s2(&searched)) else { return false };
+        flown_m_s2 <= searched_m_s2 * (1.0 + SAME)
     }
 
     /// Returns the table of the shield. For quadrotors, the measured table of the model replaces keys that are not

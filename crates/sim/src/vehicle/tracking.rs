@@ -64,7 +64,8 @@ pub struct TrackingSearch {
     /// Numbers of dimensions in which the model flew: 2 for the plane z = 0, 3 for space. In others the table is an
     /// assumption.
     pub dimensions: Vec<usize>,
-    /// Fingerprint of the model that flew. A table of another model is an assumption.
+    /// Fingerprint of the model that flew and of all numbers of its table. An edited table is an assumption, and so is
+    /// that of another model.
     pub model: String,
 }
 
@@ -103,17 +104,21 @@ impl Tracking {
 }
 
 impl Model {
-    /// Returns the fingerprint of the keys that a measurement depends on: all but the name and the table `[tracking]`.
+    /// Returns the fingerprint of a measurement: of all keys of the model and of its table `[tracking]`, without the
+    /// name and the fingerprint itself.
     #[must_use]
     pub fn fingerprint(&self) -> String {
-        let keys = Self { name: String::new(), tracking: None, ..self.clone() };
+        let mut keys = Self { name: String::new(), ..self.clone() };
+        if let Some(search) = keys.tracking.as_mut().and_then(|tracking| tracking.search.as_mut()) {
+            search.model.clear();
+        }
         let mut digits = sha256_hex(&toml::to_string(&keys).unwrap_or_default());
         digits.truncate(FINGERPRINT_DIGITS);
         digits
     }
 
-    /// Returns the search that measured the tracking error of this very model; `None` for a table without a search, or
-    /// of another model.
+    /// Returns the search that measured this very table with this very model; `None` for a table without a search, with
+    /// an edited number, or of another model.
     #[must_use]
     pub fn tracking_search(&self) -> Option<&TrackingSearch> {
         let search = self.tracking.as_ref()?.search.as_ref()?;
@@ -141,6 +146,51 @@ impl Model {
 #[cfg(test)]
 mod tests {
     use super::super::model::{MODELS, read};
+    use super::{Model, Tracking, TrackingSearch};
+
+    #[test]
+    fn built_in_tables_have_their_fingerprints() {
+        for (name, text) in MODELS {
+            let model = read(text).expect("a model");
+            let search = model.tracking.as_ref().and_then(|tracking| tracking.search.as_ref()).expect("a search");
+            assert_eq!(search.model, model.fingerprint(), "tracking.search.model of {name}");
+        }
+    }
+
+    #[test]
+    fn a_fingerprint_covers_each_number_of_the_table_and_of_its_search() {
+        let changes: [fn(&mut Tracking); 10] = [
+            |table| table.error_m *= 2.0,
+            |table| table.accel_m_s2 *= 2.0,
+            |table| table.disturbance_m_s2 *= 0.5,
+            |table| table.max_speed_m_s *= 2.0,
+            |table| table.tracker_per_s2 *= 2.0,
+            |table| table.tracker_per_s *= 2.0,
+            |table| table.control_hz *= 2.0,
+            |table| table.wind_m_s *= 2.0,
+            |table| table.position_error_m += 0.1,
+            |table| table.velocity_error_m_s += 0.1,
+        ];
+        let of_search: [fn(&mut TrackingSearch); 4] = [
+            |search| search.flights += 1,
+            |search| search.largest_error_m *= 0.5,
+            |search| search.margin *= 0.9,
+            |search| search.dimensions = vec![2, 3],
+        ];
+        let model = read(MODELS[0].1).expect("a model");
+        assert!(model.tracking_search().is_some());
+        let edited = |change: &dyn Fn(&mut Tracking)| {
+            let mut edited = model.clone();
+            change(edited.tracking.as_mut().expect("a table"));
+            edited
+        };
+        let unsearched: Vec<Model> = (changes.iter().map(|change| edited(change)))
+            .chain(of_search.iter().map(|change| edited(&|table| change(table.search.as_mut().expect("a search")))))
+            .collect();
+        assert!(unsearched.iter().all(|model| model.tracking_search().is_none()));
+        let renamed = Model { name: "own".to_owned(), ..model };
+        assert!(renamed.tracking_search().is_some());
+    }
 
     #[test]
     fn acceleration_in_every_direction_is_limited_by_climb_or_sinking() {

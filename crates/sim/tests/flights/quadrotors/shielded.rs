@@ -9,7 +9,7 @@ use tautline_shield::report::Exceeded;
 use tautline_sim::preflight::{Code, Preflight};
 use tautline_sim::scenario::{self, Override, Scenario, ScenarioError};
 use tautline_sim::sim::Flight;
-use tautline_sim::vehicle::{self, Airframe, MODELS, Model};
+use tautline_sim::vehicle::{self, Airframe, MODELS, Model, TrackingSearch};
 
 use super::model;
 use crate::flight::{builtin, fly};
@@ -127,17 +127,39 @@ fn a_separation_is_certified_with_a_searched_tracking_error_and_assumed_with_any
         let search = model.tracking.as_mut().and_then(|tracking| tracking.search.as_mut());
         search.expect("a search").dimensions = vec![3];
     };
-    for change in [&heavier as &dyn Fn(&mut Model), &unsearched, &in_space] {
+    // So is a table with an edited number, and one with less than a full search or its margin.
+    let windier = |model: &mut Model| model.tracking.as_mut().expect("a table").wind_m_s = 9.0;
+    let search = |model: &mut Model, change: &dyn Fn(&mut TrackingSearch)| {
+        change(model.tracking.as_mut().and_then(|tracking| tracking.search.as_mut()).expect("a search"));
+    };
+    let signed = |model: &mut Model, change: &dyn Fn(&mut TrackingSearch)| {
+        search(model, change);
+        let fingerprint = model.fingerprint();
+        search(model, &|found| found.model.clone_from(&fingerprint));
+        assert!(model.tracking_search().is_some());
+    };
+    let few = |model: &mut Model| signed(model, &|search| search.flights = 12);
+    let tight = |model: &mut Model| signed(model, &|search| search.margin = 1.1);
+    for change in [&heavier as &dyn Fn(&mut Model), &unsearched, &in_space, &windier, &few, &tight] {
         let (headline, source, _) = changed(change);
         assert_eq!(source, Source::Declared, "{headline}");
         assert!(
             headline.contains("READY: never closer than 0.400 m by the shield if the assumed tracking"),
             "{headline}"
         );
+        let (_, error_m) = headline.split_once("tracking error of ").expect("an error");
+        assert!(error_m.split(' ').next().is_some_and(|error_m| error_m.len() == 5), "{headline}");
     }
+    let more = |model: &mut Model| signed(model, &|search| search.flights = 5000);
+    assert_eq!(changed(&more).1, Source::Observed);
     assert_eq!(changed(&|model: &mut Model| "renamed".clone_into(&mut model.name)).1, Source::Observed);
     let (headline, source, _) = checked(&builtin(SHIELDED, &["shield.tracking_error_m=0.36"]));
     assert!(source == Source::Declared && headline.contains("if the assumed tracking error"), "{headline}");
+    // A slower reference may accelerate more than the search did; with smaller commands it does not.
+    let slower = checked(&builtin(SHIELDED, &["shield.max_speed_m_s=0.3"]));
+    assert_eq!(slower.1, Source::Declared, "{}", slower.0);
+    let weaker = checked(&builtin(SHIELDED, &["shield.max_speed_m_s=0.3", "shield.accel_m_s2=2.3"]));
+    assert_eq!(weaker.1, Source::Observed, "{}", weaker.0);
     // The bound of points is computed.
     let points = checked(&builtin(SHIELDED, &["vehicle.model=point", "vehicle.drag_per_s=0"]));
     assert!(points.1 == Source::Proved && points.0.contains("certified never closer than 0.400 m by the shield"));
