@@ -102,6 +102,8 @@ impl Radio {
                 other => panic!("{other:?}"),
             }
         }
+        // Not more messages than the history keeps come between two judgements.
+        self.monitor.assess(arrival_s);
     }
 
     fn state(&mut self, arrival_s: f64) -> State {
