@@ -309,11 +309,14 @@ fn wrong_velocities_and_stuck_positions_are_found_before_a_violation() {
         ("stuck position", |random| Sent::StuckPosition(random.between(0.0, 2.0))),
         ("stuck", |random| Sent::Stuck(random.between(0.0, 2.0))),
     ];
+    let mut wrong = Vec::new();
     for (name, kind) in kinds {
         for part in [Part::Every(1), Part::Every(2), Part::Every(3), Part::Random] {
             let [faults, clear, broken] = count(kind, part, 1000);
-            assert_eq!(broken, 0, "{name} {part:?}: {faults} faults, {clear} CLEAR");
-            assert!(faults > 500 && clear > 500, "{name} {part:?}: {faults} faults, {clear} CLEAR");
+            if broken > 0 || faults <= 500 || clear <= 500 {
+                wrong.push(format!("{name} {part:?}: {broken} broken, {faults} faults, {clear} CLEAR"));
+            }
         }
     }
+    assert!(wrong.is_empty(), "{wrong:#?}");
 }
