@@ -197,8 +197,7 @@ mod tests {
             assert_eq!(ignored("swap", &["deadlock.mode=off", &reference]), expected, "{motion}");
         }
         assert_eq!(ignored("pentagon-leader", &["deadlock.mode=off"]), ["reference.leader"]);
-        // Recovery moves no slots under a law that does not spread them, and an assignment to a fixed start is fixed.
-        assert_eq!(ignored("pentagon", &["deadlock.mode=start"]), [""; 0]);
+        // An assignment to a fixed start is fixed.
         assert_eq!(ignored("pentagon", &["formation.assignment=optimal"]), [""; 0]);
         assert_eq!(ignored("swap", &["formation.assignment=when-stalled"]), ["formation.assignment", "deadlock"]);
     }

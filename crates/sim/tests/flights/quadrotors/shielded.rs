@@ -27,7 +27,7 @@ fn tube_share(flight: &Flight) -> f64 {
 
 #[test]
 fn crazyflies_change_places_below_a_shield_and_collide_without_it() {
-    let scenario = builtin(SHIELDED, &["time.duration_s=48"]);
+    let scenario = builtin(SHIELDED, &[]);
     let tracking = model("crazyflie").tracking.expect("a measured table");
     assert!(scenario.fastest_wind_m_s() > 0.0 && scenario.network.loss > 0.0);
     let (flight, _) = fly(&scenario);
@@ -161,7 +161,8 @@ fn a_separation_is_certified_with_a_searched_tracking_error_and_assumed_with_any
     let weaker = checked(&builtin(SHIELDED, &["shield.max_speed_m_s=0.3", "shield.accel_m_s2=2.3"]));
     assert_eq!(weaker.1, Source::Observed, "{}", weaker.0);
     // The bound of points is computed.
-    let points = checked(&builtin(SHIELDED, &["vehicle.model=point", "vehicle.drag_per_s=0"]));
+    let points =
+        checked(&builtin(SHIELDED, &["vehicle.model=point", "vehicle.drag_per_s=0", "swarm.hull_radius_m=0.1"]));
     assert!(points.1 == Source::Proved && points.0.contains("certified never closer than 0.400 m by the shield"));
 }
 
