@@ -268,7 +268,9 @@ impl Counters {
             (&mut self.position_share, other.position_share),
             (&mut self.velocity_share, other.velocity_share),
         ];
-        shares.into_iter().for_each(|(share, other)| raise(share, other));
+        for (share, other) in shares {
+            raise(share, other);
+        }
     }
 
     /// Largest error of a measurement over its bound.

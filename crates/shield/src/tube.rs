@@ -340,7 +340,7 @@ impl Sampled {
         let u = f64::EPSILON / 2.0;
         let order = self.order() as f64;
         let start = self.tracker.position_error_m + self.tracker.velocity_error_m_s;
-        let largest = self.grid.iter().map(|map| row_sum_norm(map)).fold(0.0, f64::max);
+        let largest = self.grid.iter().map(row_sum_norm).fold(0.0, f64::max);
         let grid = GRID_STEP * u * self.cells as f64 * largest;
         let eps_grid = 2.0 * grid * largest / (1.0 - grid);
         let lift = row_sum_norm(&self.lift);
