@@ -192,7 +192,9 @@ mod tests {
             let bytes = message.to_bytes();
             let flipped = |bits: &[usize]| {
                 let mut altered = bytes;
-                bits.iter().for_each(|bit| altered[bit / 8] ^= 1 << (bit % 8));
+                for bit in bits {
+                    altered[bit / 8] ^= 1 << (bit % 8);
+                }
                 altered
             };
             let count = 8 * Message::BYTES;

@@ -231,7 +231,7 @@ fn answer(mut stream: TcpStream, number: u64, shared: &Shared) -> io::Result<()>
             if !lock(&shared.connections).admit(number) {
                 return Ok(());
             }
-            let answered = answer_valid(stream, request, head.len(), shared);
+            let answered = answer_valid(stream, &request, head.len(), shared);
             lock(&shared.connections).admitted -= 1;
             answered
         }
@@ -243,7 +243,7 @@ fn answer(mut stream: TcpStream, number: u64, shared: &Shared) -> io::Result<()>
 }
 
 /// Answers a valid request.
-fn answer_valid(mut stream: TcpStream, request: Request, head: usize, shared: &Shared) -> io::Result<()> {
+fn answer_valid(mut stream: TcpStream, request: &Request, head: usize, shared: &Shared) -> io::Result<()> {
     match request {
         Request::Page => {
             read_head(&mut stream, head)?;

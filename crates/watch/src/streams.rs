@@ -171,13 +171,11 @@ mod tests {
         let mut order: Option<SequenceOrder> = None;
         messages.into_iter().enumerate().position(|(k, (number, checksum))| {
             let (number, at_s) = (number.to_le_bytes()[0], k as f64 / rate_hz);
-            match &mut order {
-                Some(order) => order.take(number, checksum, at_s),
-                None => {
-                    order = Some(SequenceOrder::new(number, checksum, at_s));
-                    false
-                }
+            if let Some(order) = &mut order {
+                return order.take(number, checksum, at_s);
             }
+            order = Some(SequenceOrder::new(number, checksum, at_s));
+            false
         })
     }
 

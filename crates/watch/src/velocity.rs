@@ -334,13 +334,11 @@ impl VelocityEnclosure {
     /// Takes a reading with a later stamp than the newest one. Returns the fault of a reading that contradicts the
     /// bounds.
     pub(crate) fn take(&mut self, reading: Reading, bounds: Bounds) -> Option<Fault> {
-        match &mut self.track {
-            Some(track) => track.take(reading, bounds),
-            None => {
-                self.track = Some(Box::new(Track::new(reading, bounds)));
-                None
-            }
+        if let Some(track) = &mut self.track {
+            return track.take(reading, bounds);
         }
+        self.track = Some(Box::new(Track::new(reading, bounds)));
+        None
     }
 }
 
@@ -427,7 +425,7 @@ impl Track {
         let mark = marks.newest.next(reading, velocity_m_s);
         let balanced_s = 2.0 * reading.position_error_m / bounds.velocity_error_m_s;
         // `max` also replaces the quotient of two zeros.
-        let reach_s = balanced_s.max(SHORTEST_REACH_S).min(LONGEST_REACH_S);
+        let reach_s = balanced_s.clamp(SHORTEST_REACH_S, LONGEST_REACH_S);
         let within_reach = marks.iter().filter(|from| mark.window_s(from) <= reach_s);
         // The newest velocity is compared even if it is older.
         let (mut agrees, mut is_within) = (true, true);

@@ -348,7 +348,7 @@ mod tests {
             (state >> 11) as f64 / (1_u64 << 53) as f64
         };
         for case in 0..200 {
-            let gusts = (0..1 + case % 5).map(|_| Gust {
+            let gusts = (0..=case % 5).map(|_| Gust {
                 at_s: 8.0 * unit(),
                 rise_s: 0.01 + 3.0 * unit(),
                 hold_s: if unit() < 0.5 { 0.0 } else { 2.0 * unit() },

@@ -134,7 +134,9 @@ fn stamps_of_several_clocks_are_refused() {
     let slow = |topic, y| {
         // A simulation at half speed: the log time runs twice as fast.
         let mut messages = poses(topic, y, 0, 0, |_| true);
-        messages.iter_mut().for_each(|message| message.3 = UNIX.cast_unsigned() + 2 * message.3);
+        for message in &mut messages {
+            message.3 = UNIX.cast_unsigned() + 2 * message.3;
+        }
         messages
     };
     for both in [
@@ -662,7 +664,9 @@ fn twins_of_random_tables_are_those_of_a_comparison_of_all_pairs() {
                 positions = positions.iter().enumerate().map(|(k, own)| kept(k).or(*own)).collect();
             }
             if !is_whole {
-                positions.iter_mut().for_each(|place| *place = place.filter(|_| random(4) > 0));
+                for place in &mut positions {
+                    *place = place.filter(|_| random(4) > 0);
+                }
             }
             vehicles.push(positions);
         }

@@ -301,8 +301,8 @@ fn invalid_numbers_and_messages_leave_the_reference_finite_and_are_counted() {
 
 /// Returns shields of vehicles with these settings, each from the announced bytes of all, at 0 and `apart_m` along x.
 /// The second one flies at the first one at 1.5 m/s.
-fn announced(settings: [Settings; 2], apart_m: f64) -> Result<[Shield; 2], ShieldError> {
-    let limits = settings.map(|settings| settings.limits().expect("valid"));
+fn announced(settings: &[Settings; 2], apart_m: f64) -> Result<[Shield; 2], ShieldError> {
+    let limits = settings.each_ref().map(|settings| settings.limits().expect("valid"));
     let states = [[0.0, 0.0], [apart_m, -1.5]]
         .map(|[x, v]| State { position_m: Vector3::x() * x, velocity_m_s: Vector3::x() * v });
     let sent = [0, 1].map(|i| limits[i].start(states[i]).expect("valid").to_bytes());
@@ -347,16 +347,16 @@ fn vehicles_with_different_settings_stay_apart_by_the_starts_that_they_announce(
         [period(0.02), period(0.2)],
         [error(0.0), error(0.1)],
     ] {
-        let apart = [2.2, 2.4, 2.8, 3.2].into_iter().find_map(|apart_m| announced(settings, apart_m).ok());
+        let apart = [2.2, 2.4, 2.8, 3.2].into_iter().find_map(|apart_m| announced(&settings, apart_m).ok());
         let closest = closest_without_radio(apart.expect("far enough"));
         assert!((1.0..1.6).contains(&closest), "{settings:?}: {closest}");
     }
     // delta and ellipsoid are shared.
     let other = Settings { delta_m: 2.0, ..base };
-    let error = announced([base, other], 9.0).expect_err("delta").to_string();
+    let error = announced(&[base, other], 9.0).expect_err("delta").to_string();
     assert!(error.starts_with("delta_m: vehicle 2 has another value (1)"), "{error}");
     let other = Settings { half_height_m: Some(0.3), ..base };
-    let error = announced([base, other], 9.0).expect_err("ellipsoid").to_string();
+    let error = announced(&[base, other], 9.0).expect_err("ellipsoid").to_string();
     assert!(error.starts_with("half_height_m: vehicle 2 has another value"), "{error}");
 }
 
@@ -443,9 +443,13 @@ fn messages_of_an_earlier_flight_void_the_certificate_and_are_not_read() {
         [0, 1].map(|i| Shield::new(&limits, i, &starts).expect("apart"))
     };
     let period = |shields: &mut [Shield; 2], wanted: f64| {
-        shields.iter_mut().for_each(|shield| _ = shield.filter(shield.next_reference(), Vector3::x() * wanted));
+        for shield in shields.iter_mut() {
+            shield.filter(shield.next_reference(), Vector3::x() * wanted);
+        }
         let sent: Vec<_> = shields.iter_mut().flat_map(Shield::messages).collect();
-        sent.iter().for_each(|message| shields[message.to as usize].hear(message));
+        for message in &sent {
+            shields[message.to as usize].hear(message);
+        }
         sent
     };
     let mut earlier = flight(1);
@@ -455,7 +459,9 @@ fn messages_of_an_earlier_flight_void_the_certificate_and_are_not_read() {
     for (now, is_void) in [(2, true), (1, false)] {
         let mut shields = flight(now);
         period(&mut shields, 0.0);
-        old.iter().for_each(|message| shields[message.to as usize].hear(message));
+        for message in &old {
+            shields[message.to as usize].hear(message);
+        }
         // Without a number of the flight nothing tells the messages apart.
         let is_read = shields.iter().any(|shield| shield.counters().exceeded().is_none());
         assert_eq!(is_read, !is_void);

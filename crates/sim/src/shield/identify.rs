@@ -55,6 +55,8 @@ const TRIAL_M_S2: f64 = 1e-3;
 const SAME_DIRECTION: f64 = 0.99;
 /// Distance to the reference from which the vehicle is lost \[m\].
 const LOST_M: f64 = 2.0;
+/// Wind at a time \[s\], with the wish of the law.
+type Wind<'a> = &'a dyn Fn(f64, Vector3<f64>) -> Vector3<f64>;
 /// Bound on the memory of the search for the worst sequence, as speeds times periods.
 const MOST_CHOICES: f64 = 4e6;
 /// Wish of nearly no acceleration; zero brakes.
@@ -392,7 +394,7 @@ fn in_winds(name: &str, plan: &[Leg], (along, at_s): (Vector3<f64>, f64), has_wi
     let turning =
         |sign: f64| move |from_s: f64, _: Vector3<f64>| if from_s < turns_s { along * sign } else { along * -sign };
     let with = |sign: f64| move |_: f64, wish: Vector3<f64>| if wish.norm() > 0.5 { wish * sign } else { along * sign };
-    let winds: [(&str, &dyn Fn(f64, Vector3<f64>) -> Vector3<f64>); 7] = [
+    let winds: [(&str, Wind<'_>); 7] = [
         ("wind along its axis", &constant(along)),
         ("wind against its axis", &constant(-along)),
         ("wind across its axis", &constant(across)),

@@ -152,7 +152,9 @@ fn change(plan: &mut Plan, at_s: f64, kept: &[Candidate], numbers: &mut Numbers,
         // Stretches all times.
         0 => {
             let factor = 1.0 + numbers.between(-0.15, 0.15);
-            plan.iter_mut().for_each(|leg| leg.until_s *= factor);
+            for leg in plan.iter_mut() {
+                leg.until_s *= factor;
+            }
         }
         // Moves the end of a leg, alone or with all later ones.
         1 | 2 => {

@@ -98,16 +98,13 @@ impl Clocks {
         }
         source.stamped += 1;
         for (known, window) in source.delays.iter_mut().zip(&mut self.windows) {
-            match known {
-                Some(known) => {
-                    known.smallest = known.smallest.min(delay);
-                    known.largest = known.largest.max(delay);
-                    known.count += 1;
-                }
-                None => {
-                    *known = Some(Delays { smallest: delay, largest: delay, count: 1 });
-                    window.sources.push(index);
-                }
+            if let Some(known) = known {
+                known.smallest = known.smallest.min(delay);
+                known.largest = known.largest.max(delay);
+                known.count += 1;
+            } else {
+                *known = Some(Delays { smallest: delay, largest: delay, count: 1 });
+                window.sources.push(index);
             }
         }
     }
