@@ -452,6 +452,7 @@ fn with_last(text: &str, header: &str, last: impl Fn(&[&str]) -> String) -> Stri
 fn the_plane_is_compared_whatever_other_columns_hold() {
     let usual_header = "t,drone_id,x,y,z,lat,lon,alt";
     let of_drone = |cells: &[&str], first: &str, second: &str| if cells[1] == "1" { first } else { second }.to_owned();
+    #[allow(clippy::type_complexity)]
     let variants: [(&str, &dyn Fn(&[&str]) -> String); 7] = [
         (usual_header, &|_| ",".to_owned()),
         (usual_header, &|_| ",nan".to_owned()),
@@ -543,7 +544,7 @@ fn wide_tables_with_two_positions_are_compared() {
     let partly = |home| {
         let rows = text(home);
         let (header, rows) = rows.split_once('\n').expect("lines");
-        format!("z.x,z.y,{header}\n") + &rows.lines().map(|row| format!("0,90,{row}\n")).collect::<String>()
+        format!("z.x,z.y,{header}\n") + &rows.lines().flat_map(|row| ["0,90,", row, "\n"]).collect::<String>()
     };
     let notes = read(&partly(0.0), &usual()).expect("read").notes;
     assert!(notes.iter().any(|note| note.contains("not compared with degrees for `z`")), "{notes:?}");

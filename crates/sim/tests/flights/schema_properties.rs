@@ -183,7 +183,7 @@ fn text(seed: u64, schema: &Schema) -> String {
     let built_ins: Vec<_> = builtin::all().iter().filter(|built_in| built_in.toml.len() < 20_000).collect();
     let base = generator.pick(&built_ins).toml;
     let mut scenario: Table = base.parse().expect("a built-in scenario is TOML");
-    for _ in 0..1 + generator.numbers.below(4) {
+    for _ in 0..=generator.numbers.below(4) {
         mutate(&mut generator, &mut scenario);
     }
     toml::to_string(&scenario).expect("every table is TOML")

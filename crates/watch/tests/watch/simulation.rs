@@ -117,7 +117,7 @@ enum Part {
 impl Part {
     fn has(self, reading: u32, random: &mut Random) -> bool {
         match self {
-            Self::Every(number) => reading % number == 0,
+            Self::Every(number) => reading.is_multiple_of(number),
             Self::Random => random.share() < 0.5,
         }
     }
@@ -299,6 +299,7 @@ fn right_input_has_no_fault_and_no_violation_before_the_time_of_clear() {
 
 #[test]
 fn wrong_velocities_and_stuck_positions_are_found_before_a_violation() {
+    #[allow(clippy::type_complexity)]
     let kinds: [(&str, fn(&mut Random) -> Sent); 8] = [
         ("zero", |_| Sent::Zero),
         ("frozen", |_| Sent::Frozen),

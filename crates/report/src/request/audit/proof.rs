@@ -132,8 +132,8 @@ pub(super) fn check(request: &AuditRequest<'_>, settings: &Settings) -> Result<(
                     at most those of an export besides";
         return no_proof(what, EXPORT);
     };
-    let contradicts = |unit: &TimeUnit| options.time_unit.is_some_and(|given| given != *unit);
-    if time.filter(contradicts).is_some() {
+    let contradicts = |unit: TimeUnit| options.time_unit.is_some_and(|given| given != unit);
+    if time.is_some_and(contradicts) {
         return no_proof("times in another unit than the name of their column", "rename the column to t");
     }
     Ok(())
