@@ -1,5 +1,7 @@
 //! `tautline audit --proof`, and its independent checker.
 
+#![allow(clippy::cast_possible_truncation, clippy::format_collect)]
+
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -58,7 +60,7 @@ fn recording(number: u64) -> String {
                 0 => digits(time_s),
                 1 => format!("{:.0}", 1e3 * (f64::from(start_s) + time_s)),
                 2 => format!("2023-11-14T22:13:{:09.6}Z", 20.0 + time_s),
-                _ => format!("{:e}", time_s),
+                _ => format!("{time_s:e}"),
             };
             let [x, y, z] = position.map(digits);
             let id = if is_quoted { format!("\"v{vehicle}\"") } else { format!("v{vehicle}") };
@@ -76,7 +78,7 @@ fn recording(number: u64) -> String {
         rows.sort_by(|(a, _), (b, _)| a.total_cmp(b));
     }
     let more = if has_more { ",vx,vy,vz,qw" } else { "" };
-    let comment = if number % 5 == 0 { format!("# a comment, of no table{end}{end}") } else { String::new() };
+    let comment = if number.is_multiple_of(5) { format!("# a comment, of no table{end}{end}") } else { String::new() };
     let rows: String = rows.into_iter().map(|(_, row)| row).collect();
     format!("{comment}{time_name},id,x,y,z{more}{end}{rows}")
 }

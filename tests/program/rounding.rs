@@ -40,7 +40,7 @@ fn check(folder: &Path, files: &[&str], apart_m: f64) {
     let digits = &format!("{apart_m:.3}")[..4];
     for file in files {
         let content = fs::read_to_string(folder.join(file)).expect(file);
-        let is_page = file.ends_with(".html") || file.ends_with(".svg");
+        let is_page = Path::new(file).extension().is_some_and(|kind| kind == "html" || kind == "svg");
         let found = numbers(&if is_page { texts(&content) } else { content }, digits);
         assert!(!found.is_empty(), "{file} shows no separation of {digits}... m");
         assert!(found.iter().all(|shown| *shown <= apart_m), "{file}: {found:?} above {apart_m:?}");
