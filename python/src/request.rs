@@ -41,6 +41,7 @@ impl ReadOptions {
     #[pyo3(signature = (*, format, time_unit, fps, time_scale, sort, duplicates, one_vehicle, skip_incomplete,
                         distinct, clock, scale, axes, dimensions, column, start, layout, frame, topic, origin,
                         allow_unfinished))]
+    #[allow(clippy::fn_params_excessive_bools)]
     fn new(
         format: Option<String>,
         time_unit: Option<String>,

@@ -235,6 +235,7 @@ impl Shield {
     }
 
     /// Numbers so far and assumptions as JSON; text and code of the assumption that did not hold.
+    #[allow(clippy::type_complexity)]
     fn report(&self) -> PyResult<(String, String, Option<(String, &'static str)>)> {
         let (counters, assumptions) = match &self.shields {
             Shields::All(fleet) => (fleet.report(), fleet.assumptions()),
