@@ -287,11 +287,3 @@ fn what_is_accepted_can_be_written_read_and_flown() {
     assert!(faults.is_empty(), "{} faults\n{}", faults.len(), faults.join("\n"));
     assert!(accepted > refused / 10 && refused > accepted / 10, "both kinds occur: {accepted} and {refused}");
 }
-
-/// Prints the text of a random scenario.
-#[test]
-#[ignore = "shows the scenario of a seed: TAUTLINE_RANDOM_SCENARIO=SEED"]
-fn text_of_a_seed() {
-    let seed = std::env::var("TAUTLINE_RANDOM_SCENARIO").map_or(0, |seed| seed.parse().expect("a seed"));
-    println!("{}", text(seed, &scenario::schema()));
-}
