@@ -240,6 +240,9 @@ enum Cell {
     Text(String),
 }
 
+/// Key of a predicted position in `TrajNet++`, with the number of the prediction.
+const PREDICTION: &str = "track.prediction_number";
+
 /// Objects of a file, one by one.
 struct Objects<T> {
     source: Source,
@@ -276,6 +279,13 @@ impl<T: ObjectText> Objects<T> {
                 if *lengths.entry(list.clone()).or_insert(length) != length {
                     objects.uneven.entry(list).or_insert(objects.text.number());
                 }
+            }
+            if objects.flat.iter().any(|(key, cell)| key == PREDICTION && !matches!(cell, Cell::Empty)) {
+                let problem = format!("it has a `{PREDICTION}`: a predicted position beside measured ones");
+                let remedy =
+                    "remove the lines of predictions, or judge each prediction as a file of its own, without this key";
+                let fault = Fault::coded("recording/ambiguous-layout", problem, remedy);
+                return Err(fault.at(T::place(objects.text.number())));
             }
             for (key, _) in &objects.flat {
                 if objects.columns.contains_key(key) {

@@ -571,6 +571,8 @@ fn two_topics_of_one_robot_need_the_topic_option() {
     for topics in [
         ["/a/pose", "/a/pose_raw"],
         ["/a/pose", "/a/camera"],
+        ["/a/left", "/a/right"],
+        ["/a/left/fix", "/a/right/fix"],
         ["/uav1/mavros/local_position/pose", "/uav1/ground_truth/pose"],
         ["/pose", "/pose_filtered"],
     ] {
@@ -738,6 +740,13 @@ fn trajnet_scenes_hold_no_positions() {
     let found = read_bytes("biwi.ndjson", text.as_bytes(), &rate).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(found.samples()[2], (0.8, "1", [2.5, 2.0, 0.0]));
     has(&facts("biwi.ndjson", text.as_bytes(), &rate), ["time-unit", "declared", "0.04 s"]);
+    // A prediction is no measured position.
+    let predicted = |number: &str| {
+        format!("{text}{{\"track\": {{\"f\": 30, \"p\": 1, \"x\": 3.5, \"y\": 2, \"prediction_number\": {number}}}}}\n")
+    };
+    let error = read_bytes("biwi.ndjson", predicted("0").as_bytes(), &rate).expect_err("a prediction");
+    assert_refused(&error, "recording/ambiguous-layout", "line 7");
+    assert_eq!(read_bytes("biwi.ndjson", predicted("null").as_bytes(), &rate).expect("measured").samples().len(), 5);
 }
 
 #[test]

@@ -152,17 +152,16 @@ impl VehicleTable {
                 })?
             }
         };
-        let of_model = (model.attitude_rad_s, model.attitude_damping, DEFAULT_ATTITUDE_HZ);
+        let of_model = (model.attitude_rad_s, model.attitude_damping);
         model.attitude_rad_s = self.attitude_rad_s.unwrap_or(model.attitude_rad_s);
         model.attitude_damping = self.attitude_damping.unwrap_or(model.attitude_damping);
-        let attitude_hz = self.attitude_hz.unwrap_or(DEFAULT_ATTITUDE_HZ);
-        if (model.attitude_rad_s, model.attitude_damping, attitude_hz) != of_model {
+        if (model.attitude_rad_s, model.attitude_damping) != of_model {
             // Measured with another attitude loop.
             model.tracking = None;
         }
         Ok(Airframe::Quadrotor(Box::new(Quadrotor {
             model,
-            attitude_hz,
+            attitude_hz: self.attitude_hz.unwrap_or(DEFAULT_ATTITUDE_HZ),
             ground_effect: self.ground_effect.unwrap_or_default(),
             downwash: self.downwash.unwrap_or_default(),
         })))
@@ -218,8 +217,7 @@ impl From<&Scenario> for VehicleTable {
         let built_in = MODELS.iter().filter_map(|(name, text)| Some((*name, vehicle::read(text).ok()?)));
         let is_it = |(_, other): &(&str, Model)| {
             let (attitude_rad_s, attitude_damping) = (model.attitude_rad_s, model.attitude_damping);
-            let same_loop = (other.attitude_rad_s, other.attitude_damping, DEFAULT_ATTITUDE_HZ);
-            let is_same_loop = (attitude_rad_s, attitude_damping, quadrotor.attitude_hz) == same_loop;
+            let is_same_loop = (attitude_rad_s, attitude_damping) == (other.attitude_rad_s, other.attitude_damping);
             // Another attitude loop drops the measured tracking error.
             let tracking = other.tracking.clone().filter(|_| is_same_loop);
             Model { attitude_rad_s, attitude_damping, tracking, ..other.clone() } == *model

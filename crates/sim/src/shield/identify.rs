@@ -218,6 +218,8 @@ impl Scenario {
             tracker_per_s2: settings.tracker_per_s2,
             tracker_per_s: settings.tracker_per_s,
             control_hz: alone.time.control_hz.unwrap_or_default(),
+            attitude_hz: quadrotor.attitude_hz,
+            dt_s: alone.time.dt_s,
             wind_m_s,
             position_error_m: settings.position_error_m,
             velocity_error_m_s: settings.velocity_error_m_s,

@@ -2,7 +2,7 @@
 
 use super::search::CHANGED_FLIGHTS;
 use super::{SAME, ShieldSpec, TRACKING_FACTOR, refused, refused_with};
-use crate::scenario::{DEFAULT_ATTITUDE_HZ, Scenario, ScenarioError, Space};
+use crate::scenario::{Scenario, ScenarioError, Space};
 use crate::vehicle::{self, MODELS, Quadrotor, Tracking, TrackingSearch};
 use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::text::shortest;
@@ -132,6 +132,7 @@ impl Scenario {
             ("shield.tracker_per_s2", given(spec.tracker_per_s2), of.tracker_per_s2),
             ("shield.tracker_per_s", given(spec.tracker_per_s), of.tracker_per_s),
             ("time.control_hz", given(self.time.control_hz), of.control_hz),
+            ("vehicle.attitude_hz", quadrotor.attitude_hz, of.attitude_hz),
             ("sensing.latency_s", self.sensing.latency_s, 0.0),
             ("actuation.lag_s", self.actuation.lag_s, 0.0),
         ];
@@ -140,11 +141,13 @@ impl Scenario {
             ("shield.max_speed_m_s", given(spec.max_speed_m_s), of.max_speed_m_s),
             ("shield.position_error_m", spec.position_error_m, of.position_error_m),
             ("shield.velocity_error_m_s", spec.velocity_error_m_s, of.velocity_error_m_s),
+            ("time.dt_s", self.time.dt_s, of.dt_s),
             ("the fastest wind in m/s", self.fastest_wind_m_s(), of.wind_m_s),
         ];
         // A smaller push leaves more acceleration to the reference.
         let at_least = [("shield.disturbance_m_s2", given(spec.disturbance_m_s2), of.disturbance_m_s2)];
-        let rounding = |limit: f64| SAME * limit.abs().max(1.0);
+        // Speeds and errors may be 0, steps are short.
+        let rounding = |limit: f64| SAME * limit.abs().max(1e-3);
         let lists = [
             (&same[..], "must be", f64::abs as fn(f64) -> f64),
             (&at_most[..], "must be at most", |excess| excess),
@@ -195,11 +198,10 @@ impl Scenario {
     /// Returns the first key of the attitude loop that differs from that of the measurement, with both values. The
     /// measurement is that of the built-in model.
     fn other_attitude_loop(&self) -> Option<(&'static str, f64, f64)> {
-        let Quadrotor { model, attitude_hz, .. } = self.airframe.quadrotor()?;
+        let Quadrotor { model, .. } = self.airframe.quadrotor()?;
         let (_, text) = MODELS.iter().find(|(name, _)| *name == model.name)?;
         let measured = vehicle::read(text).ok().filter(|measured| measured.tracking.is_some())?;
         let keys = [
-            ("vehicle.attitude_hz", DEFAULT_ATTITUDE_HZ, *attitude_hz),
             ("vehicle.attitude_rad_s", measured.attitude_rad_s, model.attitude_rad_s),
             ("vehicle.attitude_damping", measured.attitude_damping, model.attitude_damping),
         ];

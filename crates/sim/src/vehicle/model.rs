@@ -249,10 +249,9 @@ impl Model {
             return Err(refuse(key, format!("{key} is {number}"), format!("it must be from 0 to {most:e}")));
         }
         if let Some(tracking) = &self.tracking {
-            let [positive @ .., _, _, _, _] = tracking.numbers();
+            let (positive, from_zero) = tracking.numbers();
             let wrong = |least: f64| move |number: &f64| !(least..=most).contains(number);
-            let found =
-                positive.into_iter().find(wrong(least)).or_else(|| tracking.numbers().into_iter().find(wrong(0.0)));
+            let found = positive.into_iter().find(wrong(least)).or_else(|| from_zero.into_iter().find(wrong(0.0)));
             if let Some(number) = found {
                 let help = format!("its numbers must be from {least:e} to {most:e}; pushes, wind and errors may be 0");
                 return Err(refuse("tracking", format!("the table has the number {number}"), help));

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::dynamics::{LEAST_LIFT, THRUST_RESERVE};
 use super::model::{GRAVITY_M_S2, Model};
+use crate::scenario::{DEFAULT_ATTITUDE_HZ, QUADROTOR_DT_S};
 use tautline_core::record::sha256_hex;
 
 /// Distance of a quadrotor to the reference of a shield, with the conditions under which it was measured: the table
@@ -33,6 +34,14 @@ pub struct Tracking {
     /// Rate of held commands in Hz.
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub control_hz: f64,
+    /// Rate of the attitude loop in Hz.
+    #[serde(default = "attitude_hz")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub attitude_hz: f64,
+    /// Longest step of the simulation in s.
+    #[serde(default = "dt_s")]
+    #[schemars(extend("exclusiveMinimum" = 0))]
+    pub dt_s: f64,
     /// Fastest wind in m/s.
     #[schemars(extend("minimum" = 0))]
     pub wind_m_s: f64,
@@ -46,6 +55,14 @@ pub struct Tracking {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(with = "TrackingSearch")]
     pub search: Option<TrackingSearch>,
+}
+
+fn attitude_hz() -> f64 {
+    DEFAULT_ATTITUDE_HZ
+}
+
+fn dt_s() -> f64 {
+    QUADROTOR_DT_S
 }
 
 /// Search for the largest tracking error of a model.
@@ -93,13 +110,14 @@ impl TrackingSearch {
 }
 
 impl Tracking {
-    /// Returns the keys with their values.
-    pub(super) fn numbers(&self) -> [f64; 10] {
-        let Self { error_m, accel_m_s2, disturbance_m_s2, max_speed_m_s, tracker_per_s2, .. } = *self;
-        let Self { tracker_per_s, control_hz, wind_m_s, position_error_m, velocity_error_m_s, .. } = *self;
-        let loops = [tracker_per_s2, tracker_per_s, control_hz, wind_m_s, position_error_m, velocity_error_m_s];
-        let [a, b, c, d, e, f] = loops;
-        [error_m, accel_m_s2, max_speed_m_s, a, b, c, disturbance_m_s2, d, e, f]
+    /// Returns the values of the keys that must be above 0, and of those that may be 0.
+    pub(super) fn numbers(&self) -> ([f64; 8], [f64; 4]) {
+        let &Self { error_m, accel_m_s2, max_speed_m_s, tracker_per_s2, tracker_per_s, control_hz, .. } = self;
+        let &Self { attitude_hz, dt_s, disturbance_m_s2, wind_m_s, position_error_m, velocity_error_m_s, .. } = self;
+        (
+            [error_m, accel_m_s2, max_speed_m_s, tracker_per_s2, tracker_per_s, control_hz, attitude_hz, dt_s],
+            [disturbance_m_s2, wind_m_s, position_error_m, velocity_error_m_s],
+        )
     }
 }
 
@@ -159,7 +177,7 @@ mod tests {
 
     #[test]
     fn a_fingerprint_covers_each_number_of_the_table_and_of_its_search() {
-        let changes: [fn(&mut Tracking); 10] = [
+        let changes: [fn(&mut Tracking); 12] = [
             |table| table.error_m *= 2.0,
             |table| table.accel_m_s2 *= 2.0,
             |table| table.disturbance_m_s2 *= 0.5,
@@ -167,6 +185,8 @@ mod tests {
             |table| table.tracker_per_s2 *= 2.0,
             |table| table.tracker_per_s *= 2.0,
             |table| table.control_hz *= 2.0,
+            |table| table.attitude_hz *= 0.5,
+            |table| table.dt_s *= 2.0,
             |table| table.wind_m_s *= 2.0,
             |table| table.position_error_m += 0.1,
             |table| table.velocity_error_m_s += 0.1,

@@ -364,7 +364,8 @@ const MEASUREMENT_WORDS: Words = Words(concat!(
     "measurement measurements smooth smoothed corrected interpolated cov covariance with stamped current latest truth ",
     "ground gt true data msg msgs message info topic out output mavros fmu ",
     "px4 vicon mocap optitrack qualisys motive natnet vrpn ekf ekf2 ukf kf amcl ",
-    "slam vio vins mapping localization localizer localisation self sensor enu ned",
+    "slam vio vins mapping localization localizer localisation self sensor enu ned ",
+    "left right front rear primary secondary backup",
 ));
 
 /// Returns the words of a topic that may name a robot: `cf1` of `/cf1/pose_raw` and of `/mocap/cf1`.

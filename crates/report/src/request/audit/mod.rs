@@ -213,7 +213,8 @@ impl ConfiguredAudit<'_> {
         }
         if let Some((file, (path, _))) = request.proof.as_ref().zip(request.subject.only_file()) {
             let recording = &report.source.recording;
-            let refused = proof::write(file, path, recording, (&settings, &outcome), &report.source.clock)?;
+            let judged = (&settings, &outcome, report.is_decimal_tie);
+            let refused = proof::write(file, path, recording, judged, &report.source.clock)?;
             if let Some(why) = refused {
                 monitor.warn(&format!("note: {why}"));
             }

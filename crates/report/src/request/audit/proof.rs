@@ -170,12 +170,15 @@ pub(super) fn write(
     file: &Path,
     path: &Path,
     recording: &str,
-    (settings, outcome): (&Settings, &Outcome),
+    (settings, outcome, is_decimal_tie): (&Settings, &Outcome, bool),
     clock: &Clock,
 ) -> Result<Option<String>, Failure> {
     let none = |why: &str| Ok(Some(format!("no proof is written: {why}")));
     if outcome.status == Status::Undecided {
         return none("the verdict is undecided");
+    }
+    if is_decimal_tie {
+        return none("the checker computes with the written decimals, which are at the limit and not below it");
     }
     let closest = outcome.closest.first().and_then(|closest| Some((closest, closest.pair.vehicles()?)));
     let (Some((closest, pair)), Some(distance_m)) = (closest, settings.delta_m) else {
