@@ -42,7 +42,7 @@ use crate::choice::{Choice, Envelope};
 use crate::contract::Side;
 use crate::plane::{Metric, Segment};
 use crate::start::Start;
-use crate::tube::{TrackerLoop, Tube, TubeError, shortest_lag_s};
+use crate::tube::{TrackerLoop, Tube, TubeError, largest_drag_per_s, longest_period_s, shortest_lag_s};
 use tautline_core::text::{at_least, at_most, exact, shortest};
 
 /// Largest coordinate of a start \[m\].
@@ -168,10 +168,15 @@ impl Settings {
             measurement_delay_periods: self.measurement_delay_periods,
             actuator_lag_s: self.actuator_lag_s,
         };
-        let mut tube = tracker.tube().map_err(|error| self.no_tube(error))?;
+        let mut tube = tracker.tube().map_err(|error| self.no_tube(error, &tracker))?;
         tube.error_m = self.tracking_error_m.unwrap_or(tube.error_m) + self.path_error_m;
         let drag = self.a22_per_s.abs() * self.max_speed_m_s;
         let reference = self.accel_m_s2 - tube.feedback_m_s2 - drag;
+        if drag >= self.accel_m_s2 {
+            let (of, speed) = (shortest(self.accel_m_s2), shortest(self.max_speed_m_s));
+            let problem = format!("drag takes {drag:.4} of `accel_m_s2` {of} at `max_speed_m_s` {speed}");
+            return Err(ShieldError::new("a22_per_s", problem, self.a22_per_s, "lower its size or the largest speed"));
+        }
         if reference <= 0.0 {
             return Err(ShieldError::new(
                 "accel_m_s2",
@@ -213,7 +218,11 @@ impl Settings {
         let fails = |place, problem, value, remedy| Err(ShieldError::new(place, problem, value, remedy));
         if margin_m > FARTHEST_M {
             let problem = format!("margins must be at most {FARTHEST_M} m, which the margin for rounding covers");
-            let place = if self.half_height_m.is_some() { "half_height_m" } else { "delta_m" };
+            let place = match (self.tracking_error_m, self.half_height_m) {
+                (Some(error_m), _) if error_m > FARTHEST_M / 2.0 => "tracking_error_m",
+                (_, Some(_)) => "half_height_m",
+                (_, None) => "delta_m",
+            };
             return fails(place, problem, margin_m, "use a shorter distance, smaller errors or a rounder ellipsoid");
         }
         if self.accel_m_s2 / self.tracker_per_s2 > STIFF_M {
@@ -233,7 +242,11 @@ impl Settings {
             "a brake over {longest_m} m in {periods} periods, with this tracker, leaves coordinates up to \
              {farthest_m} m to the margin for rounding"
         );
-        fails("max_speed_m_s", problem, self.max_speed_m_s, "lower it, brake harder, or lengthen the period")
+        let remedy = "lower the speed, brake harder, or lengthen the period";
+        match self.brake_m_s2 {
+            Some(brake_m_s2) => fails("brake_m_s2", problem, brake_m_s2, remedy),
+            None => fails("max_speed_m_s", problem, self.max_speed_m_s, remedy),
+        }
     }
 
     fn check_ranges(&self) -> Result<(), ShieldError> {
@@ -278,38 +291,60 @@ impl Settings {
         Ok(())
     }
 
-    fn no_tube(&self, error: TubeError) -> ShieldError {
-        match error {
-            TubeError::Unstable => ShieldError::new(
-                "tracker_per_s",
-                format!(
-                    "the tracker is unstable with `tracker_per_s2` {}, a period of {} s and measurements {} periods \
-                     old",
-                    self.tracker_per_s2, self.period_s, self.measurement_delay_periods
-                ),
-                self.tracker_per_s,
-                "lower both gains or shorten the period",
-            ),
-            TubeError::Slow => ShieldError::new(
-                "tracker_per_s2",
-                format!(
-                    "the tracker settles too slowly or not at all with `tracker_per_s` {} and a period of {} s",
-                    self.tracker_per_s, self.period_s
-                ),
-                self.tracker_per_s2,
-                "raise the gain that is small beside 1/s, or lengthen the period",
-            ),
-            TubeError::ShortLag => ShieldError::new(
-                "actuator_lag_s",
-                format!(
-                    "must be 0 or at least {} s for a period of {} s",
-                    at_most(shortest_lag_s(self.period_s), 6),
-                    shortest(self.period_s)
-                ),
-                self.actuator_lag_s,
-                "round it up to this lag, or down to 0",
-            ),
-        }
+    fn no_tube(&self, error: TubeError, tracker: &TrackerLoop) -> ShieldError {
+        let has_lag = self.actuator_lag_s > 0.0;
+        let of_period = format!("for a period of {} s", shortest(self.period_s));
+        let place = match error {
+            TubeError::ShortLag => "actuator_lag_s",
+            TubeError::LongPeriod => "period_s",
+            TubeError::LargeDrag => "a22_per_s",
+            // The setting without which there is a tube.
+            TubeError::Unstable | TubeError::Slow => {
+                let holds = |of: TrackerLoop| of.tube().is_ok();
+                if has_lag && holds(TrackerLoop { actuator_lag_s: 0.0, ..*tracker }) {
+                    "actuator_lag_s"
+                } else if self.a22_per_s != 0.0 && holds(TrackerLoop { a22_per_s: 0.0, ..*tracker }) {
+                    "a22_per_s"
+                } else if error == TubeError::Unstable {
+                    "tracker_per_s"
+                } else {
+                    "tracker_per_s2"
+                }
+            }
+        };
+        let (value, remedy) = match (error, place) {
+            (TubeError::ShortLag, _) => (self.actuator_lag_s, "round it up to this lag, or down to 0"),
+            (_, "actuator_lag_s") => (self.actuator_lag_s, "lower it, or both gains of the tracker"),
+            (_, "period_s") => (self.period_s, "shorten it"),
+            (_, "a22_per_s") => (self.a22_per_s, "lower its size, or shorten the period"),
+            (TubeError::Slow, _) => {
+                (self.tracker_per_s2, "raise the gain that is small beside 1/s, or lengthen the period")
+            }
+            (..) => (self.tracker_per_s, "lower both gains or shorten the period"),
+        };
+        let of_loop = format!(
+            "with `tracker_per_s2` {}, `tracker_per_s` {}, a period of {} s, measurements {} periods old, drag {} and \
+             a lag of {} s",
+            shortest(self.tracker_per_s2),
+            shortest(self.tracker_per_s),
+            shortest(self.period_s),
+            self.measurement_delay_periods,
+            shortest(self.a22_per_s),
+            shortest(self.actuator_lag_s)
+        );
+        let problem = match error {
+            TubeError::Unstable => format!("the tracker is unstable {of_loop}"),
+            TubeError::Slow => format!("the tracker settles too slowly or not at all {of_loop}"),
+            TubeError::ShortLag => {
+                format!("must be 0 or at least {} s {of_period}", at_most(shortest_lag_s(self.period_s), 6))
+            }
+            TubeError::LongPeriod => format!("must be at most {}", shortest(longest_period_s(has_lag))),
+            TubeError::LargeDrag => {
+                let largest_per_s = largest_drag_per_s(self.period_s, has_lag);
+                format!("its size must be at most {} {of_period}", at_least(largest_per_s, 3))
+            }
+        };
+        ShieldError::new(place, problem, value, remedy)
     }
 }
 
@@ -502,7 +537,7 @@ impl ShieldError {
 impl fmt::Display for ShieldError {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         // Rounding of the last digits is left out.
-        let value = if self.value.abs() < 1e6 { (self.value * 1e9).round() / 1e9 } else { self.value };
+        let value = if (1e-6..1e6).contains(&self.value.abs()) { (self.value * 1e9).round() / 1e9 } else { self.value };
         write!(out, "{}: {} ({}); {}", self.place, self.problem, shortest(value), self.remedy)
     }
 }
@@ -568,9 +603,9 @@ mod tests {
         let refused = |change| limits(change).expect_err("refused").to_string();
         let slow = refused(|settings| (settings.max_speed_m_s, settings.period_s) = (300.0, 0.001));
         assert!(slow.starts_with("max_speed_m_s: a brake over 15000") && slow.contains("in 100000 periods"), "{slow}");
-        assert!(slow.ends_with("(300); lower it, brake harder, or lengthen the period"), "{slow}");
+        assert!(slow.ends_with("(300); lower the speed, brake harder, or lengthen the period"), "{slow}");
         let weak = refused(|settings| settings.brake_m_s2 = Some(1e-300));
-        assert!(weak.starts_with("max_speed_m_s: a brake over"), "{weak}");
+        assert!(weak.starts_with("brake_m_s2: a brake over"), "{weak}");
         assert!(refused(|settings| settings.delta_m = 1e7).starts_with("delta_m: margins must be at most 1000000 m"));
         assert!(refused(|settings| settings.accel_m_s2 = 1e5).starts_with("accel_m_s2: must be at most 10000 m times"));
         // Starts and their stop points are within it.
@@ -592,13 +627,28 @@ mod tests {
         );
         assert_eq!(
             refused(|settings| settings.tracker_per_s = 50.0),
-            "tracker_per_s: the tracker is unstable with `tracker_per_s2` 4, a period of 0.05 s and measurements 0 \
-             periods old (50); lower both gains or shorten the period"
+            "tracker_per_s: the tracker is unstable with `tracker_per_s2` 4, `tracker_per_s` 50, a period of 0.05 s, \
+             measurements 0 periods old, drag 0 and a lag of 0 s (50); lower both gains or shorten the period"
         );
+        // The setting without which the loop settles.
+        assert!(refused(|settings| settings.actuator_lag_s = 100.0).starts_with("actuator_lag_s: the tracker "));
+        assert!(refused(|settings| settings.a22_per_s = 5.0).starts_with("a22_per_s: the tracker "));
+        assert_eq!(
+            refused(|settings| settings.actuator_lag_s = 1e-300),
+            "actuator_lag_s: must be 0 or at least 0.001172 s for a period of 0.05 s (1e-300); \
+             round it up to this lag, or down to 0"
+        );
+        assert_eq!(refused(|settings| settings.period_s = 1000.0), "period_s: must be at most 128 (1000); shorten it");
+        assert!(refused(|settings| settings.a22_per_s = -5000.0).contains("its size must be at most 2559.000 for a"));
+        assert!(refused(|settings| settings.tracking_error_m = Some(1e7)).starts_with("tracking_error_m: margins"));
         assert!(
             refused(|settings| settings.disturbance_m_s2 = 9.0).starts_with("accel_m_s2: feedback takes up to 11.")
         );
-        assert!(refused(|settings| settings.a22_per_s = -3.0).contains("drag 6.0000; nothing is left (5); raise it"));
+        assert_eq!(
+            refused(|settings| settings.a22_per_s = -3.0),
+            "a22_per_s: drag takes 6.0000 of `accel_m_s2` 5 at `max_speed_m_s` 2 (-3); lower its size or the largest \
+             speed"
+        );
         assert!(refused(|settings| settings.period_s = 0.0).starts_with("period_s: must be above 0 (0)"));
         assert!(refused(|settings| settings.delta_m = f64::NAN).starts_with("delta_m: must be above 0 (NaN)"));
         assert!(refused(|settings| settings.ease_m = Some(-0.1)).starts_with("ease_m: must not be negative (-0.1)"));

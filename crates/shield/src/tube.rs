@@ -128,19 +128,42 @@ pub enum TubeError {
     Slow,
     /// The lag is too short a part of the period for the enclosure.
     ShortLag,
+    /// The period is too long for the enclosure, whatever the lag and the drag are.
+    LongPeriod,
+    /// The drag over a period is too large for the enclosure.
+    LargeDrag,
 }
+
+/// Largest product of the norm of the continuous dynamics and the period.
+const PERIOD_RATE: f64 = CELL_RATE * MAX_CELLS as f64;
 
 /// Returns the shortest lag of a period that the enclosure covers \[s\].
 pub(crate) fn shortest_lag_s(period_s: f64) -> f64 {
     // The row of the actuator has three entries of 1/lag.
-    3.0 * period_s / (CELL_RATE * MAX_CELLS as f64)
+    3.0 * period_s / PERIOD_RATE
+}
+
+/// Returns the longest period that the enclosure covers \[s\].
+pub(crate) fn longest_period_s(has_lag: bool) -> f64 {
+    PERIOD_RATE / entries_of_velocity(has_lag)
+}
+
+/// Returns the largest size of the drag over a period that the enclosure covers \[1/s\].
+pub(crate) fn largest_drag_per_s(period_s: f64, has_lag: bool) -> f64 {
+    PERIOD_RATE / period_s - entries_of_velocity(has_lag)
+}
+
+/// Returns the number of entries of 1 in the row of the velocity, beside the drag.
+fn entries_of_velocity(has_lag: bool) -> f64 {
+    if has_lag { 2.0 } else { 1.0 }
 }
 
 impl TrackerLoop {
     /// Returns the tube.
     ///
     /// # Errors
-    /// If the loop is unstable, contracts too slowly, or the lag is below about a fortieth of the period.
+    /// If the loop is unstable or contracts too slowly, the lag is below about a fortieth of the period, or period or
+    /// drag are too large for the enclosure.
     pub fn tube(&self) -> Result<Tube, TubeError> {
         let sampled = Sampled::new(self)?;
         if !sampled.step.iter().all(|value| value.is_finite()) {
@@ -237,7 +260,14 @@ impl Sampled {
         let rate = magnitude.row_iter().map(|row| row.sum()).fold(0.0, f64::max);
         let cells = (rate * of.period_s / CELL_RATE).ceil();
         if cells > MAX_CELLS as f64 {
-            return Err(TubeError::ShortLag);
+            let has_lag = of.actuator_lag_s > 0.0;
+            return Err(if has_lag && of.actuator_lag_s < shortest_lag_s(of.period_s) {
+                TubeError::ShortLag
+            } else if of.period_s > longest_period_s(has_lag) {
+                TubeError::LongPeriod
+            } else {
+                TubeError::LargeDrag
+            });
         }
         // In 0..=MAX_CELLS.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]

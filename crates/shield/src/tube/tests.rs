@@ -190,6 +190,8 @@ fn loops_that_do_not_contract_are_refused() {
     assert_eq!(of(4.0, 4.0, 12), Err(TubeError::Unstable));
     assert_eq!(of(f64::NAN, 4.0, 0), Err(TubeError::Unstable));
     assert_eq!(TrackerLoop { actuator_lag_s: 1e-6, ..BASE }.tube(), Err(TubeError::ShortLag));
+    assert_eq!(TrackerLoop { period_s: 1000.0, ..BASE }.tube(), Err(TubeError::LongPeriod));
+    assert_eq!(TrackerLoop { a22_per_s: -1e5, ..BASE }.tube(), Err(TubeError::LargeDrag));
     // Slow but stable: poles near 0.05 and 1 per second.
     let slow = of(0.05, 1.0, 0).expect("stable");
     assert!(slow.error_m >= 0.3 / 0.05, "{slow:?}");

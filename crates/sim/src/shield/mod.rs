@@ -400,7 +400,15 @@ fn of_shield(error: &ShieldError) -> ScenarioError {
         "brake_m_s2" => "shield.brake_m_s2",
         "max_speed_m_s" => "shield.max_speed_m_s",
         "tracker_per_s" => "shield.tracker_per_s",
+        "tracker_per_s2" => "shield.tracker_per_s2",
         "disturbance_m_s2" => "shield.disturbance_m_s2",
+        "position_error_m" => "shield.position_error_m",
+        "velocity_error_m_s" => "shield.velocity_error_m_s",
+        "tracking_error_m" => "shield.tracking_error_m",
+        "ease_m" => "shield.ease_m",
+        "turn" => "shield.turn",
+        "half_height_m" => "safety.half_axes_m",
+        "path_error_m" | "integration_error_m_s2" => "time.dt_s",
         _ => "shield",
     };
     let found = refused(&error.problem, error.value).with_help(error.remedy);

@@ -375,6 +375,12 @@ fn scenarios_that_do_not_fit_the_shield_are_refused_with_place_value_and_remedy(
         ("[shield]\n[sensing]\nrate_hz = 20\nposition_noise_m = 0.01", "shield.position_error_m", "raise it to 0.06"),
         ("[shield]\n[sensing]\nrate_hz = 30", "sensing.rate_hz", "set sensing.rate_hz to 20"),
         ("[shield]\n[actuation]\nlag_s = 0.0001", "actuation.lag_s", "must be 0 or at least 0.001172 s"),
+        ("[shield]\n[actuation]\nlag_s = 1e-300", "actuation.lag_s", "(1e-300)"),
+        ("[shield]\n[actuation]\nlag_s = 100", "actuation.lag_s", "the tracker settles too slowly or not at all"),
+        ("[shield]\nbrake_m_s2 = 1e-9", "shield.brake_m_s2", "a brake over"),
+        ("[shield]\ntracking_error_m = 1e7", "shield.tracking_error_m", "margins must be at most"),
+        ("[shield]\n[swarm]\na22_per_s = 5", "swarm.a22_per_s", "the tracker is unstable"),
+        ("[shield]\n[swarm]\na22_per_s = -50", "swarm.a22_per_s", "drag takes 100.0000 of"),
         (
             "[shield]\ndisturbance_m_s2 = 0.1\n[vehicle]\ndrag_per_s = 0.1\n[wind]\ngust = [\
              {at_s = 0.5, rise_s = 0.5, velocity_m_s = [1, 0]}, {at_s = 0.5, rise_s = 0.5, velocity_m_s = [1, 0]}]",
