@@ -12,6 +12,7 @@ use crate::contract::{
 };
 use crate::fleet::{PairRoom, closest_starts};
 use crate::plane::Segment;
+use crate::report::SharedStarts;
 use crate::settings::ShieldError;
 use crate::start::{Start, hash_of_pair};
 #[cfg(test)]
@@ -187,12 +188,12 @@ impl Contracts {
         heard
     }
 
-    /// Returns the number of other vehicles, and of those that sent the hash of the same starts.
-    pub(crate) fn agreed(&self) -> [usize; 2] {
+    /// Returns how many other vehicles sent the hash of the same starts.
+    pub(crate) fn shared_starts(&self) -> SharedStarts {
         let followed = self.followed.iter().map(|contract| contract.shared);
         let shared = followed.chain(self.owned.iter().map(|contract| contract.shared));
-        let same = shared.filter(|shared| shared.state == Agreement::Same).count();
-        [self.starts.len() - 1, same]
+        let agreed = shared.filter(|shared| shared.state == Agreement::Same).count();
+        SharedStarts { partners: self.starts.len() - 1, agreed, is_one_list: false }
     }
 
     /// Reads the newest messages, decides and proposes at an instant, in the order of the other vehicles. Adds the

@@ -486,8 +486,7 @@ impl UnicycleShield {
     /// Returns how many partners hold the same starts, by their messages.
     #[must_use]
     pub fn shared_starts(&self) -> SharedStarts {
-        let [partners, agreed] = self.contracts.agreed();
-        SharedStarts { partners, agreed, is_one_list: false }
+        self.contracts.shared_starts()
     }
 
     /// Returns the assumptions of the certificate, each with its source, its largest observed share, and whether it

@@ -10,6 +10,17 @@ use crate::unicycle::{Loiter, Pose, Steering, UnicycleShield};
 use crate::{Fleet, Limits, Settings, Shield, State};
 
 const DELTA_M: f64 = 1.0;
+/// Unicycle that slows down over 28.8 km.
+const FAST_LOITER: Loiter = Loiter {
+    delta_m: DELTA_M,
+    period_s: 0.1,
+    min_speed_m_s: 5.0,
+    max_speed_m_s: 240.0,
+    accel_m_s2: 1.0,
+    turn_rad_s: 2.0,
+    tracking_error_m: 0.0,
+    is_left: true,
+};
 /// Room that rounding of long segments may cost a start \[m\].
 const LOST_M: f64 = 2e-5;
 
@@ -141,16 +152,7 @@ fn the_starts_that_flew_too_near_are_refused_and_ones_with_room_are_not() {
 #[test]
 fn unicycles_that_slow_down_over_kilometres_at_small_angles_keep_the_safety_distance() {
     let mut random = Random::new(82);
-    let of = Loiter {
-        delta_m: DELTA_M,
-        period_s: 0.1,
-        min_speed_m_s: 5.0,
-        max_speed_m_s: 240.0,
-        accel_m_s2: 1.0,
-        turn_rad_s: 2.0,
-        tracking_error_m: 0.0,
-        is_left: true,
-    };
+    let of = FAST_LOITER;
     // Both loiter beside each other with the discs 2 r + delta apart.
     let length_m = (240.0_f64 * 240.0 - 25.0) / 2.0;
     let (mut accepted, mut refused) = (0, 0);
@@ -222,16 +224,7 @@ fn a_unicycle_loiters_at_its_rest_point_for_ever() {
 
 #[test]
 fn starts_of_unicycles_are_limited_like_those_of_points() {
-    let of = Loiter {
-        delta_m: DELTA_M,
-        period_s: 0.1,
-        min_speed_m_s: 5.0,
-        max_speed_m_s: 240.0,
-        accel_m_s2: 1.0,
-        turn_rad_s: 2.0,
-        tracking_error_m: 0.0,
-        is_left: true,
-    };
+    let of = FAST_LOITER;
     let at = |x: f64| Pose { position_m: Vector3::x() * x, heading_rad: 0.0, speed_m_s: 240.0 };
     assert!(of.start(&at(900_000.0)).is_ok());
     // The place, and the end of 28.8 km.
