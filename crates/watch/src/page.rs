@@ -418,7 +418,6 @@ mod tests {
         let port = page.shared.address.port();
         let (_, query) = page.url().split_once('?').map(|(a, b)| (a.to_owned(), b.to_owned())).expect("a token");
         let is_served = || get(&page, &format!("/?{query}"), "Host: 127.0.0.1:PORT").starts_with("HTTP/1.1 200");
-        let begun = Instant::now();
         let mut idle = Vec::new();
         // Idle connections, and connections that sent a part of a request.
         for k in 0..3 * MOST_PENDING {
@@ -436,7 +435,8 @@ mod tests {
         for _ in 0..2 * MOST_PENDING {
             idle.push(TcpStream::connect(("127.0.0.1", port)).expect("connects"));
         }
-        assert!(is_served() && begun.elapsed() < REQUEST_PATIENCE, "{:?}", begun.elapsed());
+        // The newest idle connections did not have to end first.
+        assert!(is_served() && !lock(&page.shared.connections).pending.is_empty());
         page.send(&Value::from("still here"));
         assert!(viewer.read().is_ok_and(|message| message.to_text().is_ok_and(|text| text.contains("still here"))));
         // An idle connection ends after its time.
@@ -444,7 +444,8 @@ mod tests {
         last.set_read_timeout(Some(3 * REQUEST_PATIENCE)).expect("a limit");
         assert!(last.read(&mut [0]).is_ok_and(|length| length == 0));
         let is_empty = || lock(&page.shared.connections).pending.is_empty();
-        while !is_empty() && begun.elapsed() < 4 * REQUEST_PATIENCE {
+        let end = Instant::now() + 30 * REQUEST_PATIENCE;
+        while !is_empty() && Instant::now() < end {
             std::thread::yield_now();
         }
         assert!(is_empty());

@@ -201,7 +201,9 @@ impl Scenario {
         if self.has_engine() {
             let decay = (a22_per_s * dt_s).powi(2);
             let lag = if self.actuation.lag_s > 0.0 { accel_m_s2 * (dt_s / self.actuation.lag_s).powi(2) } else { 0.0 };
-            settings.integration_error_m_s2 = (decay * (a22_per_s.abs() * max_speed_m_s + accel_m_s2) + lag) / 6.0;
+            let push_m_s2 = (decay * (a22_per_s.abs() * max_speed_m_s + accel_m_s2) + lag) / 6.0;
+            // An infinite push comes from a lag that is refused as too short.
+            settings.integration_error_m_s2 = push_m_s2.min(f64::MAX);
             let gains = (1.0 + tracker_per_s) / (12.0 * tracker_per_s2);
             let largest_m_s2 = accel_m_s2 + settings.disturbance_m_s2 + a22_per_s.abs() * max_speed_m_s;
             settings.path_error_m =

@@ -376,7 +376,7 @@ fn scenarios_that_do_not_fit_the_shield_are_refused_with_place_value_and_remedy(
         ("[shield]\n[sensing]\nrate_hz = 30", "sensing.rate_hz", "set sensing.rate_hz to 20"),
         ("[shield]\n[actuation]\nlag_s = 0.0001", "actuation.lag_s", "must be 0 or at least 0.001172 s"),
         ("[shield]\n[actuation]\nlag_s = 1e-300", "actuation.lag_s", "(1e-300)"),
-        ("[shield]\n[actuation]\nlag_s = 100", "actuation.lag_s", "the tracker settles too slowly or not at all"),
+        ("[shield]\n[actuation]\nlag_s = 100", "actuation.lag_s", "the tracker is unstable"),
         ("[shield]\nbrake_m_s2 = 1e-9", "shield.brake_m_s2", "a brake over"),
         ("[shield]\ntracking_error_m = 1e7", "shield.tracking_error_m", "margins must be at most"),
         ("[shield]\n[swarm]\na22_per_s = 5", "swarm.a22_per_s", "the tracker is unstable"),

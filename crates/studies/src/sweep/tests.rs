@@ -125,7 +125,7 @@ fn swept_seeds_and_jitters_override_the_defaults() {
 
 #[test]
 fn flights_without_noise_are_one_flight_at_the_points_without_noise() {
-    let sweep = swept(&options(&["sensing.position_noise_m=0,0.001"], 6));
+    let sweep = swept(&options(&["sensing.position_noise_m=0,0.001", "start.jitter_m=0"], 6));
     let [exact, noisy] = &sweep.points[..] else { panic!("two points") };
     assert!(exact.repeated && !noisy.repeated, "{:?}", sweep.jitter_m);
     assert_eq!((exact.min_median_m.low, noisy.min_median_m.low.is_some()), (None, true));

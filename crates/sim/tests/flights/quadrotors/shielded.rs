@@ -161,8 +161,9 @@ fn a_separation_is_certified_with_a_searched_tracking_error_and_assumed_with_any
     let weaker = checked(&builtin(SHIELDED, &["shield.max_speed_m_s=0.3", "shield.accel_m_s2=2.3"]));
     assert_eq!(weaker.1, Source::Observed, "{}", weaker.0);
     // The bound of points is computed.
-    let points =
-        checked(&builtin(SHIELDED, &["vehicle.model=point", "vehicle.drag_per_s=0", "swarm.hull_radius_m=0.1"]));
+    let sets =
+        ["vehicle.model=point", "vehicle.drag_per_s=0.1", "shield.disturbance_m_s2=0.1", "swarm.hull_radius_m=0.1"];
+    let points = checked(&builtin(SHIELDED, &sets));
     assert!(points.1 == Source::Proved && points.0.contains("certified never closer than 0.400 m by the shield"));
 }
 
