@@ -30,6 +30,7 @@ __all__ = [
     "proportion",
     "read",
     "scenarios",
+    "separation_text",
     "sweep",
     "validate",
 ]

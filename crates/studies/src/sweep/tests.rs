@@ -12,8 +12,13 @@ fn options(keys: &[&str], runs: u64) -> Options {
 }
 
 fn swept(options: &Options) -> Sweep {
+    swept_from(&[], options)
+}
+
+/// Sweeps the pair with some keys set.
+fn swept_from(sets: &[&str], options: &Options) -> Sweep {
     options.check().expect("a grid");
-    let base = base(pair(), &[]);
+    let base = base(pair(), sets);
     let [one, two] =
         [1, 2].map(|threads| batch(threads, &mut |batch| options.fly(&base, batch)).expect("flown").expect("points"));
     assert_eq!(one.to_json().expect("JSON"), two.to_json().expect("JSON"), "the number of threads changes nothing");
@@ -125,10 +130,11 @@ fn swept_seeds_and_jitters_override_the_defaults() {
 
 #[test]
 fn flights_without_noise_are_one_flight_at_the_points_without_noise() {
-    let sweep = swept(&options(&["sensing.position_noise_m=0,0.001", "start.jitter_m=0"], 6));
+    let noise = ["sensing.rate_hz=60", "sensing.position_noise_m=0.01"];
+    let sweep = swept_from(&noise, &options(&["sensing.position_noise_m=0,0.001"], 6));
     let [exact, noisy] = &sweep.points[..] else { panic!("two points") };
     assert!(exact.repeated && !noisy.repeated, "{:?}", sweep.jitter_m);
-    assert_eq!((exact.min_median_m.low, noisy.min_median_m.low.is_some()), (None, true));
+    assert_eq!((exact.min_median_m.low, noisy.min_median_m.low.is_some()), (None, true), "{noisy:?}");
 }
 
 #[test]
