@@ -10,6 +10,7 @@ use clap::builder::PossibleValue;
 
 use super::console::{self, Console, Exit, Terminal};
 use super::reading::{one_of, origin};
+use tautline_core::track::EarthOrigin;
 use tautline_recordings::read::{self, EarthFrame, ReadError, ReadOptions};
 use tautline_report::report::page::live_page;
 use tautline_report::request::{ExportRequest, Failure, Monitor as _, Silent, export_file};
@@ -273,7 +274,8 @@ impl WatchArguments {
             return Err(Failure::input("watch/setting", message, "give a number of seconds"));
         }
         let unread = |error: ReadError| Failure::from(error).under("--plan");
-        let mut recording = read::open(path, &ReadOptions::default()).map_err(unread)?;
+        let origin = self.origin.map(|place| EarthOrigin { place, is_inferred: false });
+        let mut recording = read::open_plan(path, origin.as_ref()).map_err(unread)?;
         let refused = |problem: &str, help: &str| {
             let message = format!("--plan: {}: {problem}", path.display());
             Err(Failure::input("watch/plan", message, help))

@@ -186,3 +186,73 @@ fn a_flight_in_space_is_within_a_plane_plan_in_the_plane_only() {
     let flat = audit(folder.path(), &["flat.csv", "--plan", "plane.csv", "--plan-delay", "0", "--tube", "1"]);
     assert!(flat.out.contains("no heights are known") && !flat.out.contains(assumed), "{flat:?}");
 }
+
+#[test]
+fn a_plan_has_the_origin_of_its_flight() {
+    // Two vehicles at rest, 111 m apart in latitude.
+    let table = |south: f64| {
+        let rows = |t: u8| format!("{t},a,{:?},8,500\n{t},b,{:?},8,500\n", 47.0 - south, 47.001 - south);
+        format!("t_s,id,lat,lon,altitude_m\n{}{}", rows(0), rows(10))
+    };
+    let metres = "t_s,id,x,y,z\n0,a,0,0,0\n0,b,0,111.2,0\n10,a,0,0,0\n10,b,0,111.2,0\n".to_owned();
+    let folder = folder(&[("flown.csv", table(0.0)), ("south.csv", table(0.001)), ("metres.csv", metres)]);
+    let asked = |flight, plan| [flight, "--plan", plan, "--plan-delay", "0", "--tube", "0.5"];
+    let judged = |arguments: &[&str]| audit(folder.path(), arguments);
+    fs::copy(folder.path().join("flown.csv"), folder.path().join("planned.csv")).expect("a copy");
+    assert_eq!(judged(&asked("flown.csv", "planned.csv")).exit, Some(0));
+    let frame = facts(folder.path(), &asked("flown.csv", "planned.csv"), "side-file-frame");
+    assert_eq!(frame, [("deduced".to_owned(), "east, north and up of 47.0,8.0,500.0".to_owned())]);
+    for origin in [&[][..], &["--origin", "47,8,500"], &["--origin", "46.999,8,500"]] {
+        let away = judged(&[&asked("flown.csv", "south.csv")[..], origin].concat());
+        assert!(away.exit == Some(1) && away.out.contains("111.1"), "{origin:?}: {away:?}");
+    }
+    // Metres need an origin on the Earth.
+    for (flight, plan) in [("flown.csv", "metres.csv"), ("metres.csv", "flown.csv")] {
+        let mixed = judged(&asked(flight, plan));
+        assert_eq!((mixed.exit, mixed.code()), (Some(2), "recording/several-frames"), "{mixed:?}");
+    }
+    let declared = [&asked("flown.csv", "metres.csv")[..], &["--origin", "47,8,500"]].concat();
+    assert_eq!(judged(&declared).exit, Some(0));
+    assert_eq!(facts(folder.path(), &declared, "side-file-frame")[0].0, "declared");
+    let live = ran_by(TAUTLINE, folder.path(), &["watch", "-", "--delta", "1", "--plan", "south.csv", "--tube", "1"]);
+    assert_eq!((live.exit, live.code()), (Some(2), "recording/several-frames"), "{live:?}");
+}
+
+#[test]
+fn a_guessed_unit_of_time_is_not_exported() {
+    let table = |name: &str| at_rest(0).replace("t_s,", &format!("{name},"));
+    let folder = folder(&[("guess.csv", table("t")), ("seconds.csv", table("t_s"))]);
+    let export = |arguments: &[&str]| ran_by(TAUTLINE, folder.path(), &[&["export"], arguments].concat());
+    let refused = export(&["guess.csv", "--output", "out.csv"]);
+    assert_eq!((refused.exit, refused.code()), (Some(2), "export/guessed-time-unit"), "{refused:?}");
+    assert!(!folder.path().join("out.csv").exists());
+    assert_eq!(export(&["guess.csv", "--time-unit", "s", "--output", "out.csv"]).exit, Some(0));
+    assert_eq!(export(&["seconds.csv", "--output", "other.csv"]).exit, Some(0));
+    // A unit that contradicts the name of the column.
+    let other = audit(folder.path(), &["seconds.csv", "--delta", "1", "--time-unit", "ms"]);
+    assert_eq!((other.exit, other.code()), (Some(2), "recording/unit-conflict"), "{other:?}");
+}
+
+#[test]
+fn one_jump_does_not_show_that_times_are_in_seconds() {
+    // 30 m/s, in milliseconds with decimals, with a jump of 10 m.
+    let table = |jump_m: f64| {
+        let row = |k: u32| {
+            let x = 0.5 * f64::from(k) + if k == 7 { jump_m } else { 0.0 };
+            format!("{:?},a,{x:?},0,1\n{:?},b,{x:?},20,1\n", 16.667 * f64::from(k), 16.667 * f64::from(k))
+        };
+        format!("t,id,x,y,z\n{}", (0..60).map(row).collect::<String>())
+    };
+    let uptime = (0..60).map(|k| {
+        let (t, x) = (500_000_000 + 10_000 * k, 0.3 * f64::from(k));
+        format!("{t},a,{x:?},0,1\n{},b,{x:?},20,1\n", t + 300)
+    });
+    let uptime = format!("timestamp,id,x,y,z\n{}", uptime.collect::<String>());
+    let folder = folder(&[("smooth.csv", table(0.0)), ("jump.csv", table(10.0)), ("uptime.csv", uptime)]);
+    for name in ["smooth.csv", "jump.csv", "uptime.csv"] {
+        let ran = audit(folder.path(), &[name, "--delta", "1", "--limit", "speed=5"]);
+        assert_eq!((ran.exit, ran.code()), (Some(2), "audit/guessed-time-unit"), "{name}: {ran:?}");
+    }
+    let given = audit(folder.path(), &["uptime.csv", "--delta", "1", "--limit", "speed=5", "--time-unit", "us"]);
+    assert_eq!(given.exit, Some(1), "{given:?}");
+}

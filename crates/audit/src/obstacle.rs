@@ -7,6 +7,8 @@ use super::sweep::{MAX_LENGTH_M, RelativeMotion};
 
 /// Bound of the time before the first and after the last point of a path, during which the obstacle stands still \[s\].
 const ALWAYS_S: f64 = 1e300;
+/// Distance from a box, relative to its size and place, from which a path does not enter it.
+const INSIDE: f64 = 1e-9;
 
 /// Object that vehicles must stay clear of.
 ///
@@ -207,10 +209,15 @@ impl Shape {
             }
             start = end;
         }
-        match self {
-            Self::Box { half_m, .. } if best.0 == 0.0 => deepest(half_m, from, to),
-            _ => (best.0.sqrt() - self.radius(), best.1),
+        let outside = (best.0.sqrt() - self.radius(), best.1);
+        let Self::Box { half_m, .. } = self else { return outside };
+        // The ends of the part inside are rounded, so that they may lie outside.
+        let rounding = INSIDE * (from.amax() + to.amax() + half_m.amax());
+        if outside.0 > rounding {
+            return outside;
         }
+        let inside = deepest(half_m, from, to);
+        if inside.0 <= 0.0 { inside } else { outside }
     }
 
     pub(super) fn radius(&self) -> f64 {
@@ -329,6 +336,30 @@ mod tests {
                 assert!((shape.distance(from + (to - from) * u) - found).abs() < 1e-12, "{shape:?}");
             }
         }
+    }
+
+    #[test]
+    fn a_path_through_a_box_is_as_deep_as_its_deepest_sample() {
+        let mut state = 1_u64;
+        let mut random = |low: f64, high: f64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            // Few decimals let edges of the box and ends of the path coincide.
+            ((low + (high - low) * ((state >> 11) as f64 / (1_u64 << 53) as f64)) * 10.0).round() / 10.0
+        };
+        let mut entered = 0;
+        for _ in 0..20_000 {
+            let half_m = Vector3::from_fn(|_, _| random(0.1, 3.0));
+            let yaw_rad = if random(0.0, 1.0) < 0.5 { 0.0 } else { random(-3.0, 3.0) };
+            let shape = Shape::Box { half_m, yaw_rad };
+            let [from, to] = [0; 2].map(|_| Vector3::from_fn(|_, _| random(-9.0, 9.0)));
+            let (found, u) = shape.closest(from, to);
+            let sampled = (0..=40).map(|s| shape.distance(from + (to - from) * (f64::from(s) / 40.0)));
+            let sampled = sampled.fold(f64::INFINITY, f64::min);
+            assert!(found <= sampled + 1e-12, "{shape:?} {from:?} {to:?}: {found} {sampled}");
+            assert!((shape.distance(from + (to - from) * u) - found).abs() < 1e-12, "{shape:?} {from:?} {to:?}");
+            entered += u32::from(found < 0.0);
+        }
+        assert!(entered > 1000, "{entered}");
     }
 
     #[test]

@@ -67,6 +67,8 @@ coded! {
         SideFileClock = "side-file-clock",
         /// Axes in which a recording and its plan are compared.
         SideFileAxes = "side-file-axes",
+        /// Frame and origin of a plan beside the recording.
+        SideFileFrame = "side-file-frame",
         /// Vehicles at or below a height are not judged among each other.
         GroundExemption = "ground-exemption",
         /// Obstacles on which vehicles land are not judged while a vehicle is at or below a height.

@@ -16,5 +16,5 @@ pub mod mcap;
 pub mod read;
 mod segments;
 
-pub use read::{ReadError, ReadOptions, Recording, open};
+pub use read::{ReadError, ReadOptions, Recording, open, open_plan};
 pub use tautline_core::track;

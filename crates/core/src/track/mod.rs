@@ -3,6 +3,8 @@
 //! A recording is a stream of [`Item`]s in order of time: positions of vehicles at instants, or pieces of their curves.
 //! The motion between two instants is an assumption of the judge and not part of this data.
 
+use std::fmt;
+
 use nalgebra::Vector3;
 
 use crate::fact::Fact;
@@ -36,13 +38,21 @@ pub struct Piece {
 }
 
 /// Origin of local east, north and up coordinates.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EarthOrigin {
-    /// Latitude and longitude \[degrees\] and height above the ellipsoid \[m\], separated by commas.
-    pub place: String,
+    /// Latitude and longitude \[degrees\], and height above the ellipsoid \[m\].
+    pub place: [f64; 3],
     /// Whether the origin is the first place of the recording because the user gave none. Then only differences of
     /// positions can be judged, not heights or places.
     pub is_inferred: bool,
+}
+
+/// Formats the place: latitude, longitude and height, separated by commas.
+impl fmt::Display for EarthOrigin {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [latitude, longitude, height_m] = self.place;
+        write!(out, "{latitude:?},{longitude:?},{height_m:?}")
+    }
 }
 
 /// Element of a recording's stream.

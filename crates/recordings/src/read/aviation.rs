@@ -10,13 +10,15 @@ use super::heading::Words;
 
 /// Names of columns that occur in data of aircraft only, without separators.
 const COLUMNS: Words = Words(
-    "icao24 icao hex hexident callsign squawk groundspeed gs tas ias mach track verticalrate vertrate barorate \
-     geomrate altbaro altgeom flight flightid registration tailnumber aircraftid typecode adep ades",
+    "icao24 icao hex hexident modes callsign squawk groundspeed gspeed gs tas ias mach track verticalrate vertrate \
+     vspeed vs barorate geomrate altbaro altgeom baroaltitude geoaltitude fl flightlevel flight flightid fr24id \
+     registration tailnumber aircraftid typecode adep ades",
 );
 
 /// Names of columns with the rate of the height, without separators.
 const RATES: Words = Words(
-    "verticalrate vertrate barorate geomrate verticalspeed verticalvelocity climbrate rateofclimb climb roc rocd vrate",
+    "verticalrate vertrate vspeed vs barorate geomrate verticalspeed verticalvelocity climbrate rateofclimb climb roc \
+     rocd vrate",
 );
 
 /// Units of a rate without a unit \[m/s\]: metres per second, feet per second, feet per minute, knots.
@@ -48,7 +50,12 @@ pub(super) fn column_of_aircraft(header: &[String], id: Option<usize>, height: u
     let mut others = header.iter().enumerate().filter(|(column, _)| *column != height);
     // A column `track` that names the vehicle is the track of a sensor.
     let is_sensor_track = |column: usize| id == Some(column) && heading::joined(&header[column]) == "track";
-    let is_of_aircraft = |name: &str| COLUMNS.contains(&heading::joined(name)) || is_rate_in_feet_per_minute(name);
+    // Columns of several vehicles have the vehicle before the quantity: `DLH1.gs`.
+    let quantity = |name: &str| name.rsplit(['.', '/']).next().map(str::to_owned).unwrap_or_default();
+    let is_of_aircraft = |name: &str| {
+        let names = [heading::joined(name), heading::joined(&quantity(name))];
+        names.iter().any(|name| COLUMNS.contains(name)) || is_rate_in_feet_per_minute(&quantity(name))
+    };
     let found = others.find(|(column, name)| is_of_aircraft(name) && !is_sensor_track(*column));
     found.map(|(_, name)| name).filter(|_| !is_state_vectors(header))
 }
@@ -233,6 +240,9 @@ mod tests {
             "vertical_rate_fpm",
         ] {
             assert_eq!(found(&format!("t,{name},lat,lon,alt"), Some(1)).as_deref(), Some(name));
+        }
+        for name in ["DLH1.gs", "planes.1.hex", "vs", "vspeed", "fl", "mode_s", "fr24_id", "DLH1.vertical_rate_fpm"] {
+            assert_eq!(found(&format!("t,id,lat,lon,alt,{name}"), Some(1)).as_deref(), Some(name));
         }
         assert_eq!(found("t,id,lat,lon,alt,climb_cm_s", Some(1)), None);
         assert_eq!(rate_column(&header("t,alt,vertical_rate [ft/min]")), Some((2, Some(0.3048 / 60.0))));

@@ -13,8 +13,11 @@ use tautline_core::track::Clock;
 /// Distance from zero from which a clock is counted from an epoch \[s\]: doubles are coarser than 0.1 ns there.
 const EPOCH_FROM_S: f64 = 1e6;
 
-/// Longest step of times taken as times since 1970 \[s\]. A longer step means smaller units from another zero.
+/// Longest usual step of times taken as times since 1970 \[s\]. A longer step means smaller units from another zero.
 const LONGEST_STEP_S: f64 = 1e3;
+
+/// Years 2000 to 2100 \[s since 1970\], of which recordings with times since 1970 are.
+const RECORDED_S: std::ops::Range<f64> = 946_684_800.0..4_102_444_800.0;
 
 /// Reason for inferring a unit shorter than a second from whole numbers.
 const BY_STEPS: &str = "because they are whole numbers with steps of that size";
@@ -179,6 +182,8 @@ pub(super) struct Probe {
     last: Stamp,
     /// Smallest step between two different times \[units\].
     step: f64,
+    /// Sum and number of the steps between different times \[units\].
+    steps: (f64, f64),
     /// Whether all times are written as whole numbers.
     whole: bool,
     /// Whether all times are whole numbers in any notation.
@@ -190,7 +195,7 @@ pub(super) struct Probe {
 impl Probe {
     pub(super) fn new(first: Stamp) -> Self {
         let (whole, integral) = (matches!(first, Stamp::Whole(_)), first.whole().is_some());
-        Self { first, last: first, step: f64::INFINITY, whole, integral, in_order: true }
+        Self { first, last: first, step: f64::INFINITY, steps: (0.0, 0.0), whole, integral, in_order: true }
     }
 
     pub(super) fn observe(&mut self, stamp: Stamp) {
@@ -201,7 +206,9 @@ impl Probe {
         self.in_order &= order == Ordering::Less;
         self.whole &= matches!(stamp, Stamp::Whole(_));
         self.integral &= stamp.whole().is_some();
-        self.step = self.step.min((stamp.since(0) - self.last.since(0)).abs());
+        let step = (stamp.since(0) - self.last.since(0)).abs();
+        self.step = self.step.min(step);
+        self.steps = (self.steps.0 + step, self.steps.1 + 1.0);
         if self.first.compare(stamp) == Ordering::Greater {
             self.first = stamp;
         }
@@ -210,18 +217,22 @@ impl Probe {
 
     /// Returns the most likely unit for times of this size and step, the reason, and whether another unit fits as well.
     ///
-    /// Times since 1970 are recognised by size, unless their step is too long. Other whole numbers are recognised by
-    /// their step: vehicles are recorded up to 500 times a second, and rarely more slowly than every two seconds. All
-    /// other times are in seconds.
+    /// Times since 1970 are recognised by size, unless their step is usually too long. With usual steps above two
+    /// seconds they may also be the time since a computer started, in a smaller unit. Other whole numbers are
+    /// recognised by their step: vehicles are recorded up to 500 times a second, and rarely more slowly than every two
+    /// seconds. All other times are in seconds.
     fn likely_unit(&self) -> (TimeUnit, &'static str, bool) {
         let size = self.first.approximately();
+        // Rows of several vehicles have short steps between them.
+        let usual = self.steps.0 / self.steps.1;
         let by_size = TimeUnit::ALL.into_iter().find(|unit| {
             let per_second = unit.per_second() as f64;
-            let fits = !self.step.is_finite() || self.step <= LONGEST_STEP_S * per_second;
-            fits && (1e8 * per_second..1e10 * per_second).contains(&size)
+            let fits = usual.is_nan() || usual <= LONGEST_STEP_S * per_second;
+            fits && (RECORDED_S.start * per_second..RECORDED_S.end * per_second).contains(&size)
         });
         if let Some(unit) = by_size {
-            return (unit, "because they are of the size of times since 1970", false);
+            let is_unsure = usual > LONG_STEP * unit.per_second() as f64;
+            return (unit, "because they are of the size of times since 1970", is_unsure);
         }
         let (unit, why) = match self.step {
             step if !self.whole || !step.is_finite() => (TimeUnit::Seconds, "which is the default"),
@@ -424,10 +435,23 @@ fn both(header: &[String], a: &Candidate, b: &Candidate) -> Fault {
     Fault::coded("recording/ambiguous-column", problem, "name one of them with --column t=NAME, or remove the other")
 }
 
-/// Returns the unit in the name of a time column, unless the user gives the unit.
+/// Returns the unit in the name of a time column, unless the user gives the unit. A given unit must be that of the name.
 pub(super) fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<TimeUnit>, Fault> {
-    if options.time_unit.is_some() || options.times_per_second.is_some() {
-        return Ok(None);
+    let given = options.time_unit.map(|unit| unit.per_second() as f64).or(options.times_per_second);
+    if let Some(given) = given {
+        let named = heading::unit_of_time_name(name).and_then(|unit| TimeUnit::from_name(&unit));
+        return match named.filter(|unit| unit.per_second() as f64 != given) {
+            None => Ok(None),
+            Some(unit) => {
+                let problem = format!(
+                    "column {} has times in {} by its name, and another unit is given",
+                    quoted(name),
+                    unit.name()
+                );
+                let remedy = "omit --time-unit, --fps and --time-scale, or rename the column if its name is wrong";
+                Err(Fault::coded("recording/unit-conflict", problem, remedy))
+            }
+        };
     }
     if heading::is_frame(name) {
         return Err(Fault::frames(format!("its times are the numbers of frames in column {}", quoted(name))));
@@ -493,7 +517,10 @@ mod tests {
             (["0.5", "10.5"], "s", true),
             (["1700000000000", "1700000000010"], "ms", false),
             (["1700000000000000", "1700000000010000"], "us", false),
-            (["1700000000", "1700000600"], "s", false),
+            (["1700000000", "1700000002"], "s", false),
+            (["1700000000", "1700000600"], "s", true),
+            (["500000000", "500000300"], "ms", true),
+            (["1500000000", "1500005000"], "us", true),
             (["1500000000", "1510000000"], "ns", true),
             (["200000000", "200010000"], "us", true),
             (["500000000000", "500010000000"], "ns", true),
@@ -512,6 +539,21 @@ mod tests {
             assert_eq!((clock.unit, clock.by_steps), ("s", by_steps), "{texts:?}");
             assert!(!timing(&texts, Some(TimeUnit::Seconds)).0.clock.by_steps);
         }
+    }
+
+    #[test]
+    fn rows_of_several_vehicles_are_no_steps_of_times_since_1970() {
+        // Microseconds since a computer started, at 100 Hz, with a row of another vehicle 1 us later.
+        let uptime: Vec<String> =
+            (0..50).flat_map(|k| [0, 1].map(|vehicle| (1_500_000_000 + 10_000 * k + vehicle).to_string())).collect();
+        let texts: Vec<&str> = uptime.iter().map(String::as_str).collect();
+        assert!(timing(&texts, None).0.clock.by_steps);
+        // Two vehicles every second since 1970, in seconds.
+        let since_1970: Vec<String> =
+            (0..50).flat_map(|k| [0.0, 0.3].map(|later| format!("{:?}", 1.7e9 + f64::from(k) + later))).collect();
+        let texts: Vec<&str> = since_1970.iter().map(String::as_str).collect();
+        let clock = timing(&texts, None).0.clock;
+        assert_eq!((clock.unit, clock.by_steps), ("s", false));
     }
 
     #[test]

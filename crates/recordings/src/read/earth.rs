@@ -97,7 +97,7 @@ impl LocalFrame {
 
     /// Returns the origin with a flag whether it was inferred.
     pub(super) fn measured_from(&self, given: Option<[f64; 3]>) -> EarthOrigin {
-        EarthOrigin { place: self.origin(), is_inferred: given.is_none() }
+        EarthOrigin { place: self.origin.into(), is_inferred: given.is_none() }
     }
 
     /// Returns the note for the user.

@@ -66,6 +66,7 @@ use folder::{ARCHIVE, Folder};
 use mcap::bag;
 use readers::recognise;
 use source::Source;
+use tautline_core::track::EarthOrigin;
 
 /// Opens a recording: a file, the folder of a ROS 2 bag, or a folder or archive with one file per vehicle.
 ///
@@ -82,6 +83,36 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
         .and_then(|recording| axes::turned(recording, options))
         .map(|recording| stated::stated(recording, options, path))
         .map_err(|error| error.of(path))
+}
+
+/// Opens the plan of a flight, with its positions in the frame of the flight. `of_flight` is the origin of a flight with
+/// places on the Earth.
+///
+/// # Errors
+/// As [`open`], and if one of flight and plan has places on the Earth and the other has metres of an unknown origin.
+pub fn open_plan(path: &Path, of_flight: Option<&EarthOrigin>) -> Result<Recording, ReadError> {
+    let from_place = |place: [f64; 3]| open(path, &ReadOptions { origin: Some(place), ..ReadOptions::default() });
+    let opened = open(path, &ReadOptions::default());
+    let plan = match (opened, of_flight) {
+        // Several files of places on the Earth need an origin.
+        (Err(error), Some(origin)) if error.code() == "recording/no-origin" => return from_place(origin.place),
+        (opened, _) => opened?,
+    };
+    let (problem, remedy) = match (plan.earth_origin(), of_flight) {
+        (Some(own), Some(origin)) if own.place == origin.place => return Ok(plan),
+        (Some(_), Some(origin)) => return from_place(origin.place),
+        (None, None) => return Ok(plan),
+        (None, Some(origin)) if !origin.is_inferred => return Ok(plan),
+        (None, Some(_)) => (
+            "the plan is in metres, and the flight has places on the Earth from an origin that is not given",
+            "give the origin of the plan with --origin LAT,LON,HEIGHT",
+        ),
+        (Some(_), None) => (
+            "the plan has places on the Earth, and the flight is in metres of an unknown origin",
+            "give a plan in the metres of the flight",
+        ),
+    };
+    Err(ReadError::new(path, Fault::coded("recording/several-frames", problem, remedy)))
 }
 
 /// Opens several files as one recording, with one vehicle per file, named after the file. Folders and archives

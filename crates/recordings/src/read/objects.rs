@@ -10,7 +10,7 @@ use std::io::{BufReader, Bytes, Read};
 use serde::de::{DeserializeSeed, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use super::clock::Stamp;
-use super::error::{Fault, Place, ReadError, quoted};
+use super::error::{Fault, Place, ReadError, quoted, refuse};
 use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::Recording;
@@ -50,6 +50,9 @@ const BOM: [u8; 3] = [0xef, 0xbb, 0xbf];
 
 fn open_objects<T: ObjectText + 'static>(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let objects = Objects::<T>::open(source)?;
+    if objects.is_trajnet {
+        objects.scenes.check(options)?;
+    }
     let layout = Layout::of(&objects.header, options, &source.stem())?;
     let is_of =
         |list: &str, column: &usize| objects.header[*column].strip_prefix(list).is_some_and(|end| end.starts_with('.'));
@@ -243,12 +246,77 @@ enum Cell {
 /// Key of a predicted position in `TrajNet++`, with the number of the prediction.
 const PREDICTION: &str = "track.prediction_number";
 
+/// Rate of positions that the scenes of `TrajNet++` state, and the step of its frames.
+#[derive(Debug, Default)]
+struct Scenes {
+    /// Positions of a pedestrian per second; the first one that a scene states.
+    fps: Option<f64>,
+    /// Another rate of a later scene.
+    other_fps: Option<f64>,
+    /// Last frame of each pedestrian.
+    frames: HashMap<i64, f64>,
+    /// Smallest step between two frames of a pedestrian.
+    step: Option<f64>,
+}
+
+impl Scenes {
+    /// Records the rate of a scene, or a frame of a pedestrian.
+    fn observe(&mut self, flat: &[(String, Cell)]) {
+        if !flat.first().is_some_and(|(key, _)| key.starts_with("track.") || key.starts_with("scene.")) {
+            return;
+        }
+        let number = |name: &str| match flat.iter().find(|(key, _)| key == name)?.1 {
+            Cell::Whole(whole) => Some(whole as f64),
+            Cell::Real(real) => Some(real),
+            Cell::Empty | Cell::Text(_) => None,
+        };
+        if let Some(fps) = number("scene.fps") {
+            let first = *self.fps.get_or_insert(fps);
+            self.other_fps = self.other_fps.or((first != fps).then_some(fps));
+        }
+        let pedestrian = flat.iter().find_map(|(key, cell)| match cell {
+            Cell::Whole(pedestrian) if key == "track.p" => Some(*pedestrian),
+            _ => None,
+        });
+        let Some((pedestrian, frame)) = pedestrian.zip(number("track.f")) else { return };
+        let step = self.frames.insert(pedestrian, frame).map(|before| (frame - before).abs());
+        if let Some(step) = step.filter(|&step| step > 0.0 && self.step.is_none_or(|least| step < least)) {
+            self.step = Some(step);
+        }
+    }
+
+    /// Refuses a rate of frames that contradicts the scenes, and names the right one if none is given.
+    fn check(&self, options: &ReadOptions) -> Result<(), Fault> {
+        /// Relative rounding of a rate.
+        const ROUNDING: f64 = 1e-6;
+        let Some((fps, step)) = self.fps.zip(self.step) else { return Ok(()) };
+        let rate = fps * step;
+        let given = options.times_per_second.or(options.time_unit.map(|unit| unit.per_second() as f64));
+        let states = format!("its scenes state {fps} positions per second, and frames have steps of {step}");
+        let remedy = format!("give --fps {rate}");
+        match (given, self.other_fps) {
+            (_, Some(other)) => {
+                let problem = format!("its scenes state {fps} and {other} positions per second");
+                refuse("recording/frames", problem, "judge the scenes of each rate by themselves")
+            }
+            (None, None) => {
+                refuse("recording/frames", format!("its times are the numbers of frames; {states}"), remedy)
+            }
+            (Some(given), None) if (given - rate).abs() > ROUNDING * rate => {
+                refuse("recording/unit-conflict", format!("{states}, which are not {given} frames per second"), remedy)
+            }
+            (Some(_), None) => Ok(()),
+        }
+    }
+}
+
 /// Objects of a file, one by one.
 struct Objects<T> {
     source: Source,
     text: T,
     /// Whether objects without a key of `track` hold no position.
     is_trajnet: bool,
+    scenes: Scenes,
     header: Vec<String>,
     columns: HashMap<String, usize>,
     cells: Vec<Cell>,
@@ -266,6 +334,7 @@ impl<T: ObjectText> Objects<T> {
             source: source.clone(),
             text: T::open(source)?,
             is_trajnet: false,
+            scenes: Scenes::default(),
             header: Vec::new(),
             columns: HashMap::new(),
             cells: Vec::new(),
@@ -287,6 +356,7 @@ impl<T: ObjectText> Objects<T> {
                 let fault = Fault::coded("recording/ambiguous-layout", problem, remedy);
                 return Err(fault.at(T::place(objects.text.number())));
             }
+            objects.scenes.observe(&objects.flat);
             for (key, _) in &objects.flat {
                 if objects.columns.contains_key(key) {
                     continue;

@@ -33,7 +33,7 @@ fn completed(metadata: &Metadata, options: &ReadOptions) -> Metadata {
     let frame = match &metadata.earth_origin {
         Some(origin) => {
             let source = declared(!origin.is_inferred, Source::Deduced);
-            Fact::name(FactKind::Frame, source, format!("east, north and up of {}", origin.place))
+            Fact::name(FactKind::Frame, source, format!("east, north and up of {origin}"))
         }
         None if !options.turn().is_identity() => Fact::name(FactKind::Frame, Source::Declared, options.turn().note()),
         None if metadata.has_directions => Fact::name(FactKind::Frame, Source::Deduced, "east, north and up"),

@@ -740,6 +740,14 @@ fn trajnet_scenes_hold_no_positions() {
     let found = read_bytes("biwi.ndjson", text.as_bytes(), &rate).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(found.samples()[2], (0.8, "1", [2.5, 2.0, 0.0]));
     has(&facts("biwi.ndjson", text.as_bytes(), &rate), ["time-unit", "declared", "0.04 s"]);
+    // The rate of the scenes is that of positions, not of frames.
+    assert!(error.help().contains("--fps 25"), "{error} {}", error.help());
+    let wrong = ReadOptions { times_per_second: Some(2.5), ..usual() };
+    let error = read_bytes("biwi.ndjson", text.as_bytes(), &wrong).expect_err("another rate");
+    assert_refused(&error, "recording/unit-conflict", "");
+    let mixed = text.replacen("2.5, \"tag\": 1", "5, \"tag\": 1", 1);
+    let error = read_bytes("biwi.ndjson", mixed.as_bytes(), &rate).expect_err("two rates");
+    assert_refused(&error, "recording/frames", "");
     // A prediction is no measured position.
     let predicted = |number: &str| {
         format!("{text}{{\"track\": {{\"f\": 30, \"p\": 1, \"x\": 3.5, \"y\": 2, \"prediction_number\": {number}}}}}\n")

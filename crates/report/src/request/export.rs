@@ -1,7 +1,7 @@
 //! `export_file`: writes a recording in another format.
 
 use std::io::ErrorKind;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -9,7 +9,7 @@ use super::audit::{open, own_recording, recording_in};
 use super::{Failure, Monitor, outputs};
 use crate::report::write_atomically_with;
 use tautline_core::text::counted;
-use tautline_core::track::{Item, Metadata, Tracks};
+use tautline_core::track::{Clock, Item, Metadata, Tracks};
 use tautline_recordings::export::{self, ExportOptions, WRITTEN};
 use tautline_recordings::read::{self, Fault, Format, ReadError, ReadOptions, Recording};
 
@@ -91,7 +91,9 @@ pub fn export_file(request: &ExportRequest, monitor: &dyn Monitor) -> Result<(),
     let interrupted = monitor.interruption();
     let tracks = || -> Result<Recording, ReadError> {
         let path = paths.first().cloned().unwrap_or_default();
-        Ok(Box::new(Interruptible { tracks: open(paths, options)?, path, interrupted: Arc::clone(interrupted) }))
+        let tracks = open(paths, options)?;
+        refuse_guessed_seconds(&path, tracks.clock())?;
+        Ok(Box::new(Interruptible { tracks, path, interrupted: Arc::clone(interrupted) }))
     };
     let channels = || match &paths[..] {
         [path] if options.format.is_none_or(|format| format == Format::MCAP) => read::open_channels(path),
@@ -109,9 +111,22 @@ pub fn export_file(request: &ExportRequest, monitor: &dyn Monitor) -> Result<(),
     for note in exported.notes.iter().chain(&lost(request, monitor)) {
         monitor.warn(&format!("note: {note}"));
     }
+    if let Some(assumed) = tracks()?.assumed() {
+        monitor.warn(&format!("note: {file} does not hold that this is assumed: {assumed}"));
+    }
     let vehicles = counted(exported.vehicles as u64, "vehicle", "vehicles");
     monitor.say(&format!("{file}: {} samples of {vehicles}", exported.samples));
     Ok(())
+}
+
+/// Refuses a guessed unit of time: the output would hold it as a fact.
+fn refuse_guessed_seconds(path: &Path, clock: &Clock) -> Result<(), ReadError> {
+    if !clock.by_steps {
+        return Ok(());
+    }
+    let problem = format!("the unit of time {} is a guess, and the output is in seconds", clock.unit);
+    let remedy = format!("give --time-unit {}, or the right unit", clock.unit);
+    Err(ReadError::new(path, Fault::Content { code: "export/guessed-time-unit", problem, remedy }))
 }
 
 /// Returns a note if the run's audit, which is not exported, holds more than the samples.

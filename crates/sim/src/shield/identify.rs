@@ -211,7 +211,7 @@ impl Scenario {
         };
         let mut tracking = Tracking {
             error_m: rounded_up(TRACKING_FACTOR * largest_error_m),
-            search: Some(search),
+            search: alone.has_engine().then_some(search),
             accel_m_s2: settings.accel_m_s2,
             disturbance_m_s2: spec.disturbance_m_s2.unwrap_or(0.0),
             max_speed_m_s: settings.max_speed_m_s,

@@ -65,7 +65,9 @@ impl Scenario {
         let Some(quadrotor) = self.airframe.quadrotor() else { return Some(TrackingBasis::Proved) };
         let dimensions = self.space.dimensions();
         let search = quadrotor.model.tracking_search().filter(|search| {
-            is_full(search) && search.dimensions.contains(&dimensions) && self.accelerates_as_searched()
+            // Searches fly in the engine.
+            let is_searched = is_full(search) && search.dimensions.contains(&dimensions) && self.has_engine();
+            is_searched && self.accelerates_as_searched()
         });
         Some(search.map_or(TrackingBasis::Assumed, |search| TrackingBasis::Searched(search.flights)))
     }

@@ -4,14 +4,14 @@ use std::path::{Path, PathBuf};
 
 use super::super::{Failure, Monitor};
 use super::side_files::ItemSpan;
-use super::{FASTEST_M_S, Open, fastest_m_s, open, recording_in};
+use super::{FASTEST_M_S, Open, recording_in, usual_speed_m_s};
 use crate::figures::{self, Figure};
 use crate::report::recorded::{PlanReport, RecordedReport};
 use tautline_audit::recorded::{Outcome, PlanComparison, PlanFindings, Settings, audit};
 use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::text::seconds;
 use tautline_core::track::Item;
-use tautline_recordings::read::ReadOptions;
+use tautline_recordings::open_plan;
 
 /// Largest number of names in a message.
 const NAMES_LISTED: usize = 12;
@@ -72,7 +72,8 @@ pub(super) fn compare(
     monitor: &dyn Monitor,
 ) -> Result<ComparedPlan, Failure> {
     let path = recording_in(&question.path);
-    let mut plan = open(std::slice::from_ref(&path), &ReadOptions::default())?;
+    let origin = (flight.open)()?.earth_origin().copied();
+    let mut plan = open_plan(&path, origin.as_ref())?;
     let (mut items, mut more) = (Vec::new(), true);
     while more {
         if monitor.is_interrupted() {
@@ -80,7 +81,7 @@ pub(super) fn compare(
         }
         more = plan.read(&mut items)?;
     }
-    let is_in_seconds = plan.clock().unit == "s" && 1000.0 * fastest_m_s(&items) > FASTEST_M_S;
+    let is_in_seconds = plan.clock().unit == "s" && 1000.0 * usual_speed_m_s(&items) > FASTEST_M_S;
     if plan.clock().by_steps && !is_in_seconds {
         let message =
             format!("{}: the unit of time of the plan is inferred from steps of whole numbers only", path.display());
@@ -130,7 +131,14 @@ pub(super) fn compare(
         (EpochShift::Unknown, Some(s)) => Fact::number(FactKind::SideFileClock, Source::Declared, s, "s"),
         (EpochShift::Unknown, None) => Fact::number(FactKind::SideFileClock, Source::Inferred, found.delay_s, "s"),
     };
-    let facts = vec![clock, Fact::name(FactKind::SideFileAxes, Source::Deduced, axes)];
+    let of_origin =
+        |source, origin| Fact::name(FactKind::SideFileFrame, source, format!("east, north and up of {origin}"));
+    let frame = match (plan.earth_origin(), origin) {
+        (_, None) => Fact::name(FactKind::SideFileFrame, Source::Default, "the frame of the flight"),
+        (Some(_), Some(origin)) => of_origin(Source::Deduced, origin),
+        (None, Some(origin)) => of_origin(Source::Declared, origin),
+    };
+    let facts = vec![clock, Fact::name(FactKind::SideFileAxes, Source::Deduced, axes), frame];
     let figure = figure(&found, flight.outcome);
     Ok(ComparedPlan { report, notes, facts, figure })
 }

@@ -25,7 +25,7 @@ pub use subject::{Open, Subject, open, own_recording, recording_in};
 
 use self::against_plan::AuditedFlight;
 use self::own::RunAnswer;
-use self::question::{FASTEST_M_S, fastest_m_s};
+use self::question::{FASTEST_M_S, usual_speed_m_s};
 use super::run::{figure_files, write_files};
 use super::{Failure, Monitor, outputs};
 use crate::figures::{self, Format as FigureFormat};

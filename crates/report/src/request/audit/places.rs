@@ -5,7 +5,7 @@ use super::AuditRequest;
 use tautline_audit::Obstacle;
 use tautline_audit::envelope::Quantity;
 use tautline_audit::recorded::Settings;
-use tautline_core::track::{EarthOrigin, Item, Tracks};
+use tautline_core::track::{Item, Tracks};
 use tautline_recordings::read::ReadError;
 
 /// Largest drop of level ground below the tangent plane of the origin at which z counts as a height \[m\].
@@ -98,7 +98,7 @@ pub(super) fn refuse_unknown<'a>(
     };
     let origin = recording.earth_origin();
     let of_places = || {
-        let EarthOrigin { place, .. } = origin.filter(|origin| origin.is_inferred)?;
+        let place = origin.filter(|origin| origin.is_inferred)?;
         let asked = asked.of_places()?;
         let help = "give the origin with --origin LAT,LON,HEIGHT; a HEIGHT of 0 is the ellipsoid";
         Some((format!("positions are relative to the first one, {place}, and {asked} depends on that"), help))

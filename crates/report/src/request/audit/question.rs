@@ -233,7 +233,7 @@ impl<'a> AuditRequest<'a> {
     }
 
     /// Rejects a question that depends on seconds if the unit of time is a guess. Seconds are accepted if the unit
-    /// milliseconds would make the vehicles of these first items faster than sound. `settings` are complete.
+    /// milliseconds would make the vehicles of these first items usually faster than sound. `settings` are complete.
     pub(super) fn refuse_guessed_seconds(
         &self,
         settings: &Settings,
@@ -246,7 +246,7 @@ impl<'a> AuditRequest<'a> {
         let Some(timed) = self.rests_on_seconds(settings).into_iter().next() else { return Ok(()) };
         let (path, unit) = (self.subject.name(), clock.unit);
         let (problem, [unit, other]) = if unit == "s" {
-            if 1000.0 * fastest_m_s(items) > FASTEST_M_S {
+            if 1000.0 * usual_speed_m_s(items) > FASTEST_M_S {
                 return Ok(());
             }
             ("by their steps the times may be in seconds or milliseconds".to_owned(), ["s", "ms"])
@@ -346,8 +346,9 @@ impl<'a> AuditRequest<'a> {
     }
 }
 
-/// Returns the largest speed of a vehicle between two samples \[m/s\]; 0 for curves.
-pub(super) fn fastest_m_s(items: &[Item]) -> f64 {
+/// Returns the speed between two samples that a quarter of all pairs of samples exceed \[m/s\]; 0 for curves. Single
+/// jumps do not change it.
+pub(super) fn usual_speed_m_s(items: &[Item]) -> f64 {
     let mut last: BTreeMap<usize, (f64, Vector3<f64>)> = BTreeMap::new();
     let samples = items.iter().filter_map(|item| match item {
         Item::Sample(sample) => Some((sample.vehicle, (sample.time_s, sample.position_m))),
@@ -357,5 +358,7 @@ pub(super) fn fastest_m_s(items: &[Item]) -> f64 {
         let (before_s, before_m) = last.insert(vehicle, (time_s, position_m))?;
         Some((position_m - before_m).norm() / (time_s - before_s))
     });
-    speeds.fold(0.0, f64::max)
+    let mut speeds: Vec<f64> = speeds.filter(|speed| speed.is_finite()).collect();
+    speeds.sort_unstable_by(f64::total_cmp);
+    speeds.get(speeds.len() * 3 / 4).copied().unwrap_or_default()
 }
