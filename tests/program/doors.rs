@@ -135,7 +135,7 @@ fn files_of_one_vehicle_each_are_one_recording() {
     let annotated = audit(folder.path(), &[&arguments[..], &["--annotations", "github"]].concat());
     let files: Vec<_> = annotated.out.lines().filter_map(|line| Some(line.split_once("file=")?.1)).collect();
     assert!(arguments[..3].iter().zip(&files).all(|(name, line)| line.starts_with(name)), "{files:?}");
-    let exported = ran_by(TAUTLINE, folder.path(), &["export", "flight", "-o", "both.csv"]);
+    let exported = ran_by(TAUTLINE, folder.path(), &["export", "flight", "--time-unit", "s", "-o", "both.csv"]);
     assert_eq!(exported.exit, Some(0), "{}", exported.err);
     assert_eq!(audit(folder.path(), &["both.csv", "--delta", "2.1"]).exit, Some(1));
     let two = ran_by(TAUTLINE, folder.path(), &["export", "flight/a.csv", "flight/b.csv", "-o", "x.csv"]);

@@ -104,7 +104,7 @@ fn positions_by_interpolated_transforms_are_not_proved() {
 #[test]
 fn exports_of_bags_and_geographic_positions_have_the_same_verdict() {
     let folder = tempfile::tempdir().expect("a folder");
-    let gps = "t,id,lat,lon,alt\n0,a,47,8,400\n0,b,47.0001,8,400\n1,a,47,8,401\n1,b,47.0001,8,401\n";
+    let gps = "t_s,id,lat,lon,alt\n0,a,47,8,400\n0,b,47.0001,8,400\n1,a,47,8,401\n1,b,47.0001,8,401\n";
     fs::write(folder.path().join("gps.csv"), gps).expect("written");
     let split = bag("split");
     let lost = "the file does not contain: transforms uniform between their samples";

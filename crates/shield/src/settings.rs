@@ -323,8 +323,7 @@ impl Settings {
             (..) => (self.tracker_per_s, "lower both gains or shorten the period"),
         };
         let of_loop = format!(
-            "with `tracker_per_s2` {}, `tracker_per_s` {}, a period of {} s, measurements {} periods old, drag {} and \
-             a lag of {} s",
+            "(`tracker_per_s2` {}, `tracker_per_s` {}, period {} s, measurements {} periods old, drag {}, lag {} s)",
             shortest(self.tracker_per_s2),
             shortest(self.tracker_per_s),
             shortest(self.period_s),
@@ -627,8 +626,8 @@ mod tests {
         );
         assert_eq!(
             refused(|settings| settings.tracker_per_s = 50.0),
-            "tracker_per_s: the tracker is unstable with `tracker_per_s2` 4, `tracker_per_s` 50, a period of 0.05 s, \
-             measurements 0 periods old, drag 0 and a lag of 0 s (50); lower both gains or shorten the period"
+            "tracker_per_s: the tracker is unstable (`tracker_per_s2` 4, `tracker_per_s` 50, period 0.05 s, \
+             measurements 0 periods old, drag 0, lag 0 s) (50); lower both gains or shorten the period"
         );
         // The setting without which the loop settles.
         assert!(refused(|settings| settings.actuator_lag_s = 100.0).starts_with("actuator_lag_s: the tracker "));

@@ -9,11 +9,11 @@ use super::heading;
 use super::heading::Words;
 
 /// Names of columns that occur in data of aircraft only, without separators.
-const COLUMNS: Words = Words(
-    "icao24 icao hex hexident modes callsign squawk groundspeed gspeed gs tas ias mach track verticalrate vertrate \
-     vspeed vs barorate geomrate altbaro altgeom baroaltitude geoaltitude fl flightlevel flight flightid fr24id \
-     registration tailnumber aircraftid typecode adep ades",
-);
+const COLUMNS: Words = Words(concat!(
+    "icao24 icao hex hexident modes callsign squawk groundspeed gspeed gs tas ias mach track ",
+    "verticalrate vertrate vspeed vs barorate geomrate altbaro altgeom fl flightlevel ",
+    "flight flightid fr24id registration tailnumber aircraftid typecode adep ades",
+));
 
 /// Names of columns with the rate of the height, without separators.
 const RATES: Words = Words(

@@ -16,7 +16,7 @@ const EPOCH_FROM_S: f64 = 1e6;
 /// Longest usual step of times taken as times since 1970 \[s\]. A longer step means smaller units from another zero.
 const LONGEST_STEP_S: f64 = 1e3;
 
-/// Years 2000 to 2100 \[s since 1970\], of which recordings with times since 1970 are.
+/// Years 2000 to 2100 in seconds since 1970: times of this size may be times since 1970.
 const RECORDED_S: std::ops::Range<f64> = 946_684_800.0..4_102_444_800.0;
 
 /// Reason for inferring a unit shorter than a second from whole numbers.
@@ -435,7 +435,7 @@ fn both(header: &[String], a: &Candidate, b: &Candidate) -> Fault {
     Fault::coded("recording/ambiguous-column", problem, "name one of them with --column t=NAME, or remove the other")
 }
 
-/// Returns the unit in the name of a time column, unless the user gives the unit. A given unit must be that of the name.
+/// Returns the unit in the name of a time column, unless the user gives the unit, which must not contradict the name.
 pub(super) fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<TimeUnit>, Fault> {
     let given = options.time_unit.map(|unit| unit.per_second() as f64).or(options.times_per_second);
     if let Some(given) = given {

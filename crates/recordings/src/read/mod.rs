@@ -85,8 +85,9 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
         .map_err(|error| error.of(path))
 }
 
-/// Opens the plan of a flight, with its positions in the frame of the flight. `of_flight` is the origin of a flight with
-/// places on the Earth.
+/// Opens the plan of a flight, with its positions in the frame of the flight.
+///
+/// `of_flight` is the origin of a flight with places on the Earth.
 ///
 /// # Errors
 /// As [`open`], and if one of flight and plan has places on the Earth and the other has metres of an unknown origin.

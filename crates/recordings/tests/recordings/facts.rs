@@ -804,9 +804,9 @@ fn unit_of_time_names_its_source() {
         ),
         (
             "t_ms,id,x,y\n0,a,1,2\n5,a,1,2\n",
-            ReadOptions { time_unit: Some(TimeUnit::Seconds), ..usual() },
+            ReadOptions { time_unit: Some(TimeUnit::Milliseconds), ..usual() },
             "declared",
-            "s",
+            "ms",
         ),
         ("t,id,x,y\n0,a,1,2\n5,a,1,2\n", ReadOptions { times_per_second: Some(5.0), ..usual() }, "declared", "0.2 s"),
         ("t,id,x,y\n2023-11-14T22:13:20Z,a,1,2\n", usual(), "deduced", "ns"),
@@ -819,4 +819,10 @@ fn unit_of_time_names_its_source() {
     }
     let bag = mcap_of(&poses("/a/pose", 0.0, UNIX, 0, |_| true));
     has(&facts("bag.mcap", &bag, &usual()), ["time-unit", "convention", "ns"]);
+    for other in [
+        ReadOptions { time_unit: Some(TimeUnit::Seconds), ..usual() },
+        ReadOptions { times_per_second: Some(10.0), ..usual() },
+    ] {
+        refused("t_ms,id,x,y\n0,a,1,2\n5,a,1,2\n", &other, "recording/unit-conflict");
+    }
 }

@@ -160,7 +160,11 @@ fn options_of(seed: &str) -> ReadOptions {
     let is_mcap = ["mcap", "planned", "foreign", "zstd", "frames", "metadata.yaml", "bag_0.mcap", "bag_1.mcap.zstd"]
         .contains(&seed);
     let frame = (seed == "frames").then(|| "map".to_owned());
-    let times_per_second = ["trajnet", "scenes"].contains(&seed).then_some(30.0);
+    let times_per_second = match seed {
+        "trajnet" => Some(30.0),
+        "scenes" => Some(5.0),
+        _ => None,
+    };
     ReadOptions { frame, times_per_second, allow_unfinished: is_mcap, ..ReadOptions::default() }
 }
 

@@ -309,18 +309,29 @@ fn fly(sent: Sent, part: Part, seed: u64) -> Run {
     }
 }
 
-/// Counts the runs with a fault, the judgements that were CLEAR, the runs with a violation before the time of CLEAR and
-/// before any fault, and those of them in which what was sent contradicted itself before.
-fn count(sent: impl Fn(&mut Random) -> Sent, part: Part, runs: u64) -> [u64; 4] {
-    let mut found = [0; 4];
+/// Counts of runs and judgements.
+#[derive(Default)]
+struct Counts {
+    /// Runs with a fault.
+    faults: u64,
+    /// Judgements that were CLEAR.
+    clear: u64,
+    /// Runs with a violation before the time of CLEAR and before any fault.
+    broken: u64,
+    /// Broken runs in which what was sent contradicted itself before.
+    contradicted: u64,
+}
+
+fn count(sent: impl Fn(&mut Random) -> Sent, part: Part, runs: u64) -> Counts {
+    let mut found = Counts::default();
     for seed in 0..runs {
         let mut random = Random(seed);
         random.share();
         let run = fly(sent(&mut random), part, seed);
-        found[0] += u64::from(run.fault_s < f64::INFINITY);
-        found[1] += u64::from(run.clear);
-        found[2] += u64::from(run.broken_s < run.fault_s);
-        found[3] += u64::from(run.was_contradicted);
+        found.faults += u64::from(run.fault_s < f64::INFINITY);
+        found.clear += u64::from(run.clear);
+        found.broken += u64::from(run.broken_s < run.fault_s);
+        found.contradicted += u64::from(run.was_contradicted);
     }
     found
 }
@@ -334,7 +345,7 @@ fn right_input_has_no_fault_and_no_violation_before_the_time_of_clear() {
         (Sent::Right, Part::Random),
         (Sent::PositionsOnly, Part::Every(1)),
     ] {
-        let [faults, clear, broken, _] = count(|_| sent, part, 2000);
+        let Counts { faults, clear, broken, .. } = count(|_| sent, part, 2000);
         assert_eq!((faults, broken), (0, 0), "{sent:?} {part:?}");
         assert!(clear > 50_000, "{sent:?} {part:?}: {clear}");
     }
@@ -356,7 +367,7 @@ fn wrong_velocities_and_stuck_positions_are_found_before_a_violation() {
     let mut wrong = Vec::new();
     for (name, kind) in kinds {
         for part in [Part::Every(1), Part::Every(2), Part::Every(3), Part::Random] {
-            let [faults, clear, _, contradicted] = count(kind, part, 500);
+            let Counts { faults, clear, contradicted, .. } = count(kind, part, 500);
             // A velocity that is wrong by less than any window shows is not found (docs/watch-proof.md).
             if contradicted > 0 || faults <= 250 || clear <= 500 {
                 wrong.push(format!("{name} {part:?}: {contradicted} contradicted, {faults} faults, {clear} CLEAR"));
