@@ -276,10 +276,21 @@ impl WatchArguments {
         let unread = |error: ReadError| Failure::from(error).under("--plan");
         let origin = self.origin.map(|place| EarthOrigin { place, is_inferred: false });
         let mut recording = read::open_plan(path, origin.as_ref()).map_err(unread)?;
+        let (mut items, mut more) = (Vec::new(), recording.clock().other_unit.is_some());
+        while more {
+            more = recording.read(&mut items).map_err(unread)?;
+        }
         let refused = |problem: &str, help: &str| {
             let message = format!("--plan: {}: {problem}", path.display());
             Err(Failure::input("watch/plan", message, help))
         };
+        if let Some(other) = recording.clock().doubt(&items) {
+            let problem = format!("its times may be in {} or {other}", recording.clock().unit);
+            return refused(&problem, "name the column of times time_s or time_ms");
+        }
+        if !items.is_empty() {
+            recording = read::open_plan(path, origin.as_ref()).map_err(unread)?;
+        }
         let epoch_s = match self.clock_scope(source) {
             // The reader counts times since 1970 from a whole second.
             ClockScope::Common => recording.clock().epoch_ns as f64 * 1e-9,
@@ -290,10 +301,6 @@ impl WatchArguments {
             return refused("too long to keep in memory", "give a plan with at most 20 million positions");
         };
         let metadata = recording.metadata();
-        if metadata.clock.by_steps {
-            let problem = format!("the unit of its times is a guess ({})", metadata.clock.unit);
-            return refused(&problem, "name the column of times time_s or time_ms");
-        }
         if metadata.is_planar {
             return refused("it has no heights, so a deviation in height is not known", "add the heights to the plan");
         }

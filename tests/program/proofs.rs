@@ -234,7 +234,7 @@ fn recordings_without_a_proof_are_refused_with_a_remedy() {
 fn decimals_at_the_limit_have_no_proof() {
     let folder = tempfile::tempdir().expect("a folder");
     let file = folder.path().join("proof.json");
-    // The doubles are closer than the limit in both cases. The decimals are below it in the second one only.
+    // The doubles are closer than the limit in both cases, the decimals in the second case only.
     for (other, has_proof) in [("0.6", false), ("0.59", true)] {
         let rows = |t: u8| format!("{t},a,0.1,0,0\n{t},b,{other},0,0\n");
         fs::write(folder.path().join("two.csv"), format!("t,id,x,y,z\n{}{}", rows(0), rows(1))).expect("a file");

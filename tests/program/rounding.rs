@@ -61,7 +61,7 @@ fn outputs_of_an_audit_round_separations_down() {
         fs::write(folder.path().join("out.txt"), &ran.out).expect("a file");
         let figures = ["encounters", "closest-approach", "smallest"].map(|name| format!("page-figures/{name}.svg"));
         let mut files = vec!["out.txt", "page.html", "summary.md"];
-        // A passed case of JUnit has no words.
+        // A passed JUnit case has no message.
         if exit == 1 {
             files.push("junit.xml");
         }

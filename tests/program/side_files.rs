@@ -214,6 +214,8 @@ fn a_plan_has_the_origin_of_its_flight() {
     let declared = [&asked("flown.csv", "metres.csv")[..], &["--origin", "47,8,500"]].concat();
     assert_eq!(judged(&declared).exit, Some(0));
     assert_eq!(facts(folder.path(), &declared, "side-file-frame")[0].0, "declared");
+    let folder_plan = judged(&asked("metres.csv", "."));
+    assert_eq!((folder_plan.exit, folder_plan.out.as_str()), (Some(2), ""), "{folder_plan:?}");
     let live = ran_by(TAUTLINE, folder.path(), &["watch", "-", "--delta", "1", "--plan", "south.csv", "--tube", "1"]);
     assert_eq!((live.exit, live.code()), (Some(2), "recording/several-frames"), "{live:?}");
 }
@@ -228,7 +230,7 @@ fn a_guessed_unit_of_time_is_not_exported() {
     assert!(!folder.path().join("out.csv").exists());
     assert_eq!(export(&["guess.csv", "--time-unit", "s", "--output", "out.csv"]).exit, Some(0));
     assert_eq!(export(&["seconds.csv", "--output", "other.csv"]).exit, Some(0));
-    // A unit that contradicts the name of the column.
+    // A unit that contradicts the name of the column is refused.
     let other = audit(folder.path(), &["seconds.csv", "--delta", "1", "--time-unit", "ms"]);
     assert_eq!((other.exit, other.code()), (Some(2), "recording/unit-conflict"), "{other:?}");
 }
@@ -255,4 +257,30 @@ fn one_jump_does_not_show_that_times_are_in_seconds() {
     }
     let given = audit(folder.path(), &["uptime.csv", "--delta", "1", "--limit", "speed=5", "--time-unit", "us"]);
     assert_eq!(given.exit, Some(1), "{given:?}");
+}
+
+#[test]
+fn a_plan_has_the_axes_and_heights_of_its_flight() {
+    let earth = |height: &str| {
+        let rows = |t: u8| format!("{t},a,47,8,500\n{t},b,47.001,8,500\n");
+        format!("t_s,id,lat,lon,{height}\n{}{}", rows(0), rows(10))
+    };
+    let folder = folder(&[
+        ("metres.csv", at_rest(0)),
+        ("sea.csv", earth("alt_msl_m")),
+        ("ground.csv", earth("relative_alt_m")),
+        ("level.csv", earth("alt_m")),
+    ]);
+    let asked = |flight, plan, more: &[&str]| {
+        audit(folder.path(), &[&[flight, "--plan", plan, "--plan-delay", "0", "--tube", "1"][..], more].concat())
+    };
+    for more in [&["--axes", "ned"][..], &["--scale", "0.001"]] {
+        let turned = asked("metres.csv", "metres.csv", more);
+        assert_eq!((turned.exit, turned.code()), (Some(2), "audit/plan-frame"), "{turned:?}");
+    }
+    let other = asked("sea.csv", "ground.csv", &[]);
+    assert_eq!((other.exit, other.code()), (Some(2), "audit/plan-frame"), "{other:?}");
+    assert!(!asked("sea.csv", "sea.csv", &[]).out.contains("one reference"));
+    let assumed = asked("sea.csv", "level.csv", &[]);
+    assert!(assumed.exit == Some(0) && assumed.out.contains("heights of flight and plan have one reference"));
 }

@@ -7,7 +7,7 @@ use super::sweep::{MAX_LENGTH_M, RelativeMotion};
 
 /// Bound of the time before the first and after the last point of a path, during which the obstacle stands still \[s\].
 const ALWAYS_S: f64 = 1e300;
-/// Distance from a box, relative to its size and place, from which a path does not enter it.
+/// Largest computed distance from a box, relative to the coordinates, at which a path may still enter the box.
 const INSIDE: f64 = 1e-9;
 
 /// Object that vehicles must stay clear of.
@@ -211,7 +211,7 @@ impl Shape {
         }
         let outside = (best.0.sqrt() - self.radius(), best.1);
         let Self::Box { half_m, .. } = self else { return outside };
-        // The ends of the part inside are rounded, so that they may lie outside.
+        // The ends of the part inside the box are rounded and may lie outside.
         let rounding = INSIDE * (from.amax() + to.amax() + half_m.amax());
         if outside.0 > rounding {
             return outside;

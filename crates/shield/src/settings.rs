@@ -175,7 +175,7 @@ impl Settings {
         if drag >= self.accel_m_s2 {
             let (of, speed) = (shortest(self.accel_m_s2), shortest(self.max_speed_m_s));
             let problem = format!("drag takes {drag:.4} of `accel_m_s2` {of} at `max_speed_m_s` {speed}");
-            return Err(ShieldError::new("a22_per_s", problem, self.a22_per_s, "lower its size or the largest speed"));
+            return Err(ShieldError::new("a22_per_s", problem, self.a22_per_s, "lower its magnitude or the speed"));
         }
         if reference <= 0.0 {
             return Err(ShieldError::new(
@@ -298,7 +298,7 @@ impl Settings {
             TubeError::ShortLag => "actuator_lag_s",
             TubeError::LongPeriod => "period_s",
             TubeError::LargeDrag => "a22_per_s",
-            // The setting without which there is a tube.
+            // Name the setting that leaves a tube when it is 0.
             TubeError::Unstable | TubeError::Slow => {
                 let holds = |of: TrackerLoop| of.tube().is_ok();
                 if has_lag && holds(TrackerLoop { actuator_lag_s: 0.0, ..*tracker }) {
@@ -315,15 +315,16 @@ impl Settings {
         let (value, remedy) = match (error, place) {
             (TubeError::ShortLag, _) => (self.actuator_lag_s, "round it up to this lag, or down to 0"),
             (_, "actuator_lag_s") => (self.actuator_lag_s, "lower it, or both gains of the tracker"),
-            (_, "period_s") => (self.period_s, "shorten it"),
-            (_, "a22_per_s") => (self.a22_per_s, "lower its size, or shorten the period"),
+            (_, "period_s") => (self.period_s, "shorten the period"),
+            (_, "a22_per_s") => (self.a22_per_s, "lower the magnitude, or shorten the period"),
             (TubeError::Slow, _) => {
                 (self.tracker_per_s2, "raise the gain that is small beside 1/s, or lengthen the period")
             }
             (..) => (self.tracker_per_s, "lower both gains or shorten the period"),
         };
         let of_loop = format!(
-            "(`tracker_per_s2` {}, `tracker_per_s` {}, period {} s, measurements {} periods old, drag {}, lag {} s)",
+            "with `tracker_per_s2` {}, `tracker_per_s` {}, period {} s, measurements {} periods old, `a22_per_s` {}, \
+             lag {} s",
             shortest(self.tracker_per_s2),
             shortest(self.tracker_per_s),
             shortest(self.period_s),
@@ -337,10 +338,13 @@ impl Settings {
             TubeError::ShortLag => {
                 format!("must be 0 or at least {} s {of_period}", at_most(shortest_lag_s(self.period_s), 6))
             }
-            TubeError::LongPeriod => format!("must be at most {}", shortest(longest_period_s(has_lag))),
+            TubeError::LongPeriod => {
+                let (period_s, longest_s) = (shortest(self.period_s), shortest(longest_period_s(has_lag)));
+                format!("a period of {period_s} s is longer than {longest_s} s")
+            }
             TubeError::LargeDrag => {
                 let largest_per_s = largest_drag_per_s(self.period_s, has_lag);
-                format!("its size must be at most {} {of_period}", at_least(largest_per_s, 3))
+                format!("magnitude must be at most {} {of_period}", at_least(largest_per_s, 3))
             }
         };
         ShieldError::new(place, problem, value, remedy)
@@ -626,10 +630,10 @@ mod tests {
         );
         assert_eq!(
             refused(|settings| settings.tracker_per_s = 50.0),
-            "tracker_per_s: the tracker is unstable (`tracker_per_s2` 4, `tracker_per_s` 50, period 0.05 s, \
-             measurements 0 periods old, drag 0, lag 0 s) (50); lower both gains or shorten the period"
+            "tracker_per_s: the tracker is unstable with `tracker_per_s2` 4, `tracker_per_s` 50, period 0.05 s, \
+             measurements 0 periods old, `a22_per_s` 0, lag 0 s (50); lower both gains or shorten the period"
         );
-        // The setting without which the loop settles.
+        // The error names the setting that keeps the loop from settling.
         assert!(refused(|settings| settings.actuator_lag_s = 100.0).starts_with("actuator_lag_s: the tracker "));
         assert!(refused(|settings| settings.a22_per_s = 5.0).starts_with("a22_per_s: the tracker "));
         assert_eq!(
@@ -637,15 +641,18 @@ mod tests {
             "actuator_lag_s: must be 0 or at least 0.001172 s for a period of 0.05 s (1e-300); \
              round it up to this lag, or down to 0"
         );
-        assert_eq!(refused(|settings| settings.period_s = 1000.0), "period_s: must be at most 128 (1000); shorten it");
-        assert!(refused(|settings| settings.a22_per_s = -5000.0).contains("its size must be at most 2559.000 for a"));
+        assert_eq!(
+            refused(|settings| settings.period_s = 1000.0),
+            "period_s: a period of 1000 s is longer than 128 s (1000); shorten the period"
+        );
+        assert!(refused(|settings| settings.a22_per_s = -5000.0).contains("magnitude must be at most 2559.000 for a"));
         assert!(refused(|settings| settings.tracking_error_m = Some(1e7)).starts_with("tracking_error_m: margins"));
         assert!(
             refused(|settings| settings.disturbance_m_s2 = 9.0).starts_with("accel_m_s2: feedback takes up to 11.")
         );
         assert_eq!(
             refused(|settings| settings.a22_per_s = -3.0),
-            "a22_per_s: drag takes 6.0000 of `accel_m_s2` 5 at `max_speed_m_s` 2 (-3); lower its size or the largest \
+            "a22_per_s: drag takes 6.0000 of `accel_m_s2` 5 at `max_speed_m_s` 2 (-3); lower its magnitude or the \
              speed"
         );
         assert!(refused(|settings| settings.period_s = 0.0).starts_with("period_s: must be above 0 (0)"));

@@ -130,7 +130,7 @@ pub enum TubeError {
     ShortLag,
     /// The period is too long for the enclosure, whatever the lag and the drag are.
     LongPeriod,
-    /// The drag over a period is too large for the enclosure.
+    /// The drag is too large for the enclosure with this period.
     LargeDrag,
 }
 
@@ -148,12 +148,12 @@ pub(crate) fn longest_period_s(has_lag: bool) -> f64 {
     PERIOD_RATE / entries_of_velocity(has_lag)
 }
 
-/// Returns the largest size of the drag over a period that the enclosure covers \[1/s\].
+/// Returns the largest magnitude of the drag that the enclosure covers with a period \[1/s\].
 pub(crate) fn largest_drag_per_s(period_s: f64, has_lag: bool) -> f64 {
     PERIOD_RATE / period_s - entries_of_velocity(has_lag)
 }
 
-/// Returns the number of entries of 1 in the row of the velocity, beside the drag.
+/// Returns the sum of the entries in the row of the velocity without the drag.
 fn entries_of_velocity(has_lag: bool) -> f64 {
     if has_lag { 2.0 } else { 1.0 }
 }
@@ -162,8 +162,8 @@ impl TrackerLoop {
     /// Returns the tube.
     ///
     /// # Errors
-    /// If the loop is unstable or contracts too slowly, the lag is below about a fortieth of the period, or period or
-    /// drag are too large for the enclosure.
+    /// If the loop is unstable or contracts too slowly. If the lag is below about a fortieth of the period, or the
+    /// period or the drag is too large for the enclosure.
     pub fn tube(&self) -> Result<Tube, TubeError> {
         let sampled = Sampled::new(self)?;
         if !sampled.step.iter().all(|value| value.is_finite()) {

@@ -435,7 +435,7 @@ mod tests {
         for _ in 0..2 * MOST_PENDING {
             idle.push(TcpStream::connect(("127.0.0.1", port)).expect("connects"));
         }
-        // The newest idle connections did not have to end first.
+        // The page is served while the newest idle connections are still open.
         assert!(is_served() && !lock(&page.shared.connections).pending.is_empty());
         page.send(&Value::from("still here"));
         assert!(viewer.read().is_ok_and(|message| message.to_text().is_ok_and(|text| text.contains("still here"))));

@@ -3,6 +3,7 @@
 //! A recording is a stream of [`Item`]s in order of time: positions of vehicles at instants, or pieces of their curves.
 //! The motion between two instants is an assumption of the judge and not part of this data.
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use nalgebra::Vector3;
@@ -91,11 +92,46 @@ pub struct Clock {
     pub unit: &'static str,
     /// Whether the unit was inferred from the values, as neither the format nor the user gives it.
     pub inferred: bool,
-    /// Whether another unit fits as well. Then the unit was inferred from integral values, or from steps of two units
-    /// or more, and no time is as large as a time since 1970. Limits in seconds must not rest on such a unit.
-    pub by_steps: bool,
+    /// Another unit that fits as well. Then the unit was inferred from integral values, or from steps of two seconds or
+    /// more. Limits in seconds must not rest on such a unit.
+    pub other_unit: Option<&'static str>,
     /// Offset that was subtracted from every time \[ns\], so that times in nanoseconds lose no digit.
     pub epoch_ns: i64,
+}
+
+impl Clock {
+    /// Units from the longest to the shortest.
+    const UNITS: [&'static str; 4] = ["s", "ms", "us", "ns"];
+    /// Speed of sound, which vehicles do not usually exceed \[m/s\].
+    const FASTEST_M_S: f64 = 340.0;
+
+    /// Returns the other unit in which the times of these items may be. A shorter one is excluded if it would make the
+    /// vehicles faster than sound.
+    #[must_use]
+    pub fn doubt(&self, items: &[Item]) -> Option<&'static str> {
+        let other = self.other_unit?;
+        let place = |unit| Self::UNITS.iter().position(|known| *known == unit);
+        let is_shorter = place(other) > place(self.unit);
+        let is_excluded = is_shorter && 1000.0 * usual_speed_m_s(items) > Self::FASTEST_M_S;
+        (!is_excluded).then_some(other)
+    }
+}
+
+/// Returns the upper quartile of the speeds between two samples of a vehicle \[m/s\]; 0 for curves. Single jumps do not
+/// change the quartile.
+fn usual_speed_m_s(items: &[Item]) -> f64 {
+    let mut last: BTreeMap<usize, (f64, Vector3<f64>)> = BTreeMap::new();
+    let samples = items.iter().filter_map(|item| match item {
+        Item::Sample(sample) => Some((sample.vehicle, (sample.time_s, sample.position_m))),
+        Item::Piece(_) => None,
+    });
+    let speeds = samples.filter_map(|(vehicle, (time_s, position_m))| {
+        let (before_s, before_m) = last.insert(vehicle, (time_s, position_m))?;
+        Some((position_m - before_m).norm() / (time_s - before_s))
+    });
+    let mut speeds: Vec<f64> = speeds.filter(|speed| speed.is_finite()).collect();
+    speeds.sort_unstable_by(f64::total_cmp);
+    speeds.get(speeds.len() * 3 / 4).copied().unwrap_or_default()
 }
 
 /// Properties of a recording as a whole.

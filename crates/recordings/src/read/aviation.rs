@@ -10,10 +10,18 @@ use super::heading::Words;
 
 /// Names of columns that occur in data of aircraft only, without separators.
 const COLUMNS: Words = Words(concat!(
-    "icao24 icao hex hexident modes callsign squawk groundspeed gspeed gs tas ias mach track ",
-    "verticalrate vertrate vspeed vs barorate geomrate altbaro altgeom fl flightlevel ",
+    "icao24 icao hex hexident callsign squawk groundspeed gspeed gs tas ias mach track ",
+    "verticalrate vertrate vspeed vs barorate geomrate altbaro altgeom flightlevel ",
     "flight flightid fr24id registration tailnumber aircraftid typecode adep ades",
 ));
+
+/// Names of these columns that are also unambiguous after the name of a vehicle, as in `DLH1.gs`.
+const OF_ONE: Words = Words(
+    "icao24 callsign squawk gspeed gs tas ias mach verticalrate vertrate vspeed vs barorate geomrate altbaro altgeom",
+);
+
+/// Names that need their separator: a column `modes` does not mean Mode S.
+const SEPARATED: [&str; 2] = ["mode_s", "mode-s"];
 
 /// Names of columns with the rate of the height, without separators.
 const RATES: Words = Words(
@@ -50,11 +58,12 @@ pub(super) fn column_of_aircraft(header: &[String], id: Option<usize>, height: u
     let mut others = header.iter().enumerate().filter(|(column, _)| *column != height);
     // A column `track` that names the vehicle is the track of a sensor.
     let is_sensor_track = |column: usize| id == Some(column) && heading::joined(&header[column]) == "track";
-    // Columns of several vehicles have the vehicle before the quantity: `DLH1.gs`.
-    let quantity = |name: &str| name.rsplit(['.', '/']).next().map(str::to_owned).unwrap_or_default();
     let is_of_aircraft = |name: &str| {
-        let names = [heading::joined(name), heading::joined(&quantity(name))];
-        names.iter().any(|name| COLUMNS.contains(name)) || is_rate_in_feet_per_minute(&quantity(name))
+        let quantity = name.rsplit(['.', '/']).next().unwrap_or(name);
+        COLUMNS.contains(&heading::joined(name))
+            || OF_ONE.contains(&heading::joined(quantity))
+            || is_rate_in_feet_per_minute(quantity)
+            || SEPARATED.contains(&name.trim().to_lowercase().as_str())
     };
     let found = others.find(|(column, name)| is_of_aircraft(name) && !is_sensor_track(*column));
     found.map(|(_, name)| name).filter(|_| !is_state_vectors(header))
@@ -241,10 +250,12 @@ mod tests {
         ] {
             assert_eq!(found(&format!("t,{name},lat,lon,alt"), Some(1)).as_deref(), Some(name));
         }
-        for name in ["DLH1.gs", "planes.1.hex", "vs", "vspeed", "fl", "mode_s", "fr24_id", "DLH1.vertical_rate_fpm"] {
+        for name in ["DLH1.gs", "planes.1.squawk", "vs", "vspeed", "mode_s", "fr24_id", "DLH1.vertical_rate_fpm"] {
             assert_eq!(found(&format!("t,id,lat,lon,alt,{name}"), Some(1)).as_deref(), Some(name));
         }
-        assert_eq!(found("t,id,lat,lon,alt,climb_cm_s", Some(1)), None);
+        for name in ["fl", "modes", "mission.flight", "gps/track", "VFR_HUD.groundspeed", "climb_cm_s"] {
+            assert_eq!(found(&format!("t,id,lat,lon,alt,{name}"), Some(1)), None, "{name}");
+        }
         assert_eq!(rate_column(&header("t,alt,vertical_rate [ft/min]")), Some((2, Some(0.3048 / 60.0))));
         assert_eq!(rate_column(&header("t,climb_m_s")), Some((1, Some(1.0))));
         for (name, unit_m_s) in [

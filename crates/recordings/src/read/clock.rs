@@ -13,10 +13,10 @@ use tautline_core::track::Clock;
 /// Distance from zero from which a clock is counted from an epoch \[s\]: doubles are coarser than 0.1 ns there.
 const EPOCH_FROM_S: f64 = 1e6;
 
-/// Longest usual step of times taken as times since 1970 \[s\]. A longer step means smaller units from another zero.
+/// Length of a step from which times are not times since 1970, if most steps are as long \[s\]. The unit is smaller.
 const LONGEST_STEP_S: f64 = 1e3;
 
-/// Years 2000 to 2100 in seconds since 1970: times of this size may be times since 1970.
+/// Years 2000 to 2100 in seconds since 1970. Times in this range may be times since 1970.
 const RECORDED_S: std::ops::Range<f64> = 946_684_800.0..4_102_444_800.0;
 
 /// Reason for inferring a unit shorter than a second from whole numbers.
@@ -176,14 +176,17 @@ impl Stamp {
 const LONG_STEP: f64 = 2.0;
 
 /// Properties of the times of a recording.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Probe {
     first: Stamp,
     last: Stamp,
     /// Smallest step between two different times \[units\].
     step: f64,
-    /// Sum and number of the steps between different times \[units\].
-    steps: (f64, f64),
+    /// Last time of each vehicle \[units\].
+    last_of: Vec<Option<f64>>,
+    /// Number of steps of one vehicle, and of those that are at least 2 and at least 1000 seconds in each unit.
+    steps: u64,
+    long_steps: [[u64; 2]; TimeUnit::ALL.len()],
     /// Whether all times are written as whole numbers.
     whole: bool,
     /// Whether all times are whole numbers in any notation.
@@ -195,10 +198,34 @@ pub(super) struct Probe {
 impl Probe {
     pub(super) fn new(first: Stamp) -> Self {
         let (whole, integral) = (matches!(first, Stamp::Whole(_)), first.whole().is_some());
-        Self { first, last: first, step: f64::INFINITY, steps: (0.0, 0.0), whole, integral, in_order: true }
+        Self {
+            first,
+            last: first,
+            step: f64::INFINITY,
+            last_of: Vec::new(),
+            steps: 0,
+            long_steps: Default::default(),
+            whole,
+            integral,
+            in_order: true,
+        }
     }
 
-    pub(super) fn observe(&mut self, stamp: Stamp) {
+    /// Records the time of a row of a vehicle.
+    pub(super) fn observe(&mut self, stamp: Stamp, vehicle: usize) {
+        if vehicle >= self.last_of.len() {
+            self.last_of.resize(vehicle + 1, None);
+        }
+        let time = stamp.since(0);
+        if let Some(before) = self.last_of[vehicle].replace(time).filter(|before| *before != time) {
+            self.steps += 1;
+            for (counts, unit) in self.long_steps.iter_mut().zip(TimeUnit::ALL) {
+                let step_s = (time - before).abs() / unit.per_second() as f64;
+                for (count, least_s) in counts.iter_mut().zip([LONG_STEP, LONGEST_STEP_S]) {
+                    *count += u64::from(step_s >= least_s);
+                }
+            }
+        }
         let order = self.last.compare(stamp);
         if order == Ordering::Equal {
             return;
@@ -206,33 +233,30 @@ impl Probe {
         self.in_order &= order == Ordering::Less;
         self.whole &= matches!(stamp, Stamp::Whole(_));
         self.integral &= stamp.whole().is_some();
-        let step = (stamp.since(0) - self.last.since(0)).abs();
-        self.step = self.step.min(step);
-        self.steps = (self.steps.0 + step, self.steps.1 + 1.0);
+        self.step = self.step.min((time - self.last.since(0)).abs());
         if self.first.compare(stamp) == Ordering::Greater {
             self.first = stamp;
         }
         self.last = stamp;
     }
 
-    /// Returns the most likely unit for times of this size and step, the reason, and whether another unit fits as well.
+    /// Returns the most likely unit for times of this size and step, the reason, and the other unit that fits as well.
     ///
-    /// Times since 1970 are recognised by size, unless their step is usually too long. With usual steps above two
-    /// seconds they may also be the time since a computer started, in a smaller unit. Other whole numbers are
+    /// Times since 1970 are recognised by size, unless most steps of a vehicle are too long. With most steps of two
+    /// seconds or more they may also be times since a computer started, in a smaller unit. Other whole numbers are
     /// recognised by their step: vehicles are recorded up to 500 times a second, and rarely more slowly than every two
     /// seconds. All other times are in seconds.
-    fn likely_unit(&self) -> (TimeUnit, &'static str, bool) {
+    fn likely_unit(&self) -> (TimeUnit, &'static str, Option<TimeUnit>) {
         let size = self.first.approximately();
-        // Rows of several vehicles have short steps between them.
-        let usual = self.steps.0 / self.steps.1;
-        let by_size = TimeUnit::ALL.into_iter().find(|unit| {
+        let are_most = |count: u64| 2 * count > self.steps;
+        let mut units = TimeUnit::ALL.into_iter().zip(self.long_steps);
+        let by_size = units.find(|(unit, [_, longest])| {
             let per_second = unit.per_second() as f64;
-            let fits = usual.is_nan() || usual <= LONGEST_STEP_S * per_second;
-            fits && (RECORDED_S.start * per_second..RECORDED_S.end * per_second).contains(&size)
+            !are_most(*longest) && (RECORDED_S.start * per_second..RECORDED_S.end * per_second).contains(&size)
         });
-        if let Some(unit) = by_size {
-            let is_unsure = usual > LONG_STEP * unit.per_second() as f64;
-            return (unit, "because they are of the size of times since 1970", is_unsure);
+        if let Some((unit, [long, _])) = by_size {
+            let smaller = units.next().map(|(smaller, _)| smaller);
+            return (unit, "because they are of the size of times since 1970", smaller.filter(|_| are_most(long)));
         }
         let (unit, why) = match self.step {
             step if !self.whole || !step.is_finite() => (TimeUnit::Seconds, "which is the default"),
@@ -242,7 +266,9 @@ impl Probe {
             _ => (TimeUnit::Seconds, "which is the default"),
         };
         // A long step in seconds may be a short step in a smaller unit.
-        (unit, why, self.step.is_finite() && (self.integral || self.step >= LONG_STEP))
+        let other = if unit == TimeUnit::Seconds { TimeUnit::Milliseconds } else { TimeUnit::Seconds };
+        let is_unsure = self.step.is_finite() && (self.integral || self.step >= LONG_STEP);
+        (unit, why, is_unsure.then_some(other))
     }
 }
 
@@ -259,10 +285,10 @@ impl Timing {
     /// Returns a clock for the probed times, and a note if its unit was inferred.
     pub(super) fn settle(probe: &Probe, known: Option<TimeUnit>) -> (Self, Option<String>) {
         let inferred = || {
-            let (unit, why, unsure) = probe.likely_unit();
-            (unit, Some(why), unsure)
+            let (unit, why, other) = probe.likely_unit();
+            (unit, Some(why), other)
         };
-        let (unit, why, by_steps) = known.map_or_else(inferred, |unit| (unit, None, false));
+        let (unit, why, other) = known.map_or_else(inferred, |unit| (unit, None, None));
         let name = unit.name();
         let note = why
             .map(|why| format!("times carry no unit and are taken as {name}, {why} (confirm with --time-unit {name})"));
@@ -272,7 +298,7 @@ impl Timing {
         let seconds = Some(seconds).filter(|&seconds| fits && (seconds as f64).abs() >= EPOCH_FROM_S);
         let epoch = seconds.and_then(|s| Some((s.checked_mul(per_second)?, s.checked_mul(1_000_000_000)?)));
         let (epoch, epoch_ns) = epoch.unwrap_or((0, 0));
-        let clock = Clock { unit: name, inferred: why.is_some(), by_steps, epoch_ns };
+        let clock = Clock { unit: name, inferred: why.is_some(), other_unit: other.map(TimeUnit::name), epoch_ns };
         (Self { clock, per_second: per_second as f64, epoch }, note)
     }
 
@@ -289,7 +315,7 @@ impl Timing {
     /// Returns the longest duration that a difference of times can mean \[s\]: with a guessed unit, the numbers may be
     /// seconds.
     pub(super) fn longest_s(&self, difference_s: f64) -> f64 {
-        if self.clock.by_steps { difference_s * self.per_second } else { difference_s }
+        if self.clock.other_unit.is_some() { difference_s * self.per_second } else { difference_s }
     }
 
     /// Returns the seconds since the epoch.
@@ -435,19 +461,30 @@ fn both(header: &[String], a: &Candidate, b: &Candidate) -> Fault {
     Fault::coded("recording/ambiguous-column", problem, "name one of them with --column t=NAME, or remove the other")
 }
 
-/// Returns the unit in the name of a time column, unless the user gives the unit, which must not contradict the name.
+/// Relative rounding of a unit of time.
+const ROUNDING: f64 = 1e-9;
+
+/// Returns the number of units of a name per second, also of units that are longer than a second.
+fn units_per_second(name: &str) -> Option<f64> {
+    let seconds = match name {
+        "min" | "mins" | "minute" | "minutes" => 60.0,
+        "h" | "hr" | "hrs" | "hour" | "hours" => 3600.0,
+        "d" | "day" | "days" => 86_400.0,
+        _ => return TimeUnit::from_name(name).map(|unit| unit.per_second() as f64),
+    };
+    Some(1.0 / seconds)
+}
+
+/// Returns the unit in the name of a time column, unless the user gives the unit. Refuses a given unit that contradicts
+/// the name.
 pub(super) fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<TimeUnit>, Fault> {
     let given = options.time_unit.map(|unit| unit.per_second() as f64).or(options.times_per_second);
     if let Some(given) = given {
-        let named = heading::unit_of_time_name(name).and_then(|unit| TimeUnit::from_name(&unit));
-        return match named.filter(|unit| unit.per_second() as f64 != given) {
+        let named = heading::unit_of_time_name(name).and_then(|unit| Some((units_per_second(&unit)?, unit)));
+        return match named.filter(|(per_second, _)| (per_second / given - 1.0).abs() > ROUNDING) {
             None => Ok(None),
-            Some(unit) => {
-                let problem = format!(
-                    "column {} has times in {} by its name, and another unit is given",
-                    quoted(name),
-                    unit.name()
-                );
+            Some((_, unit)) => {
+                let problem = format!("column {} is in {} by its name, but another unit is given", quoted(name), unit);
                 let remedy = "omit --time-unit, --fps and --time-scale, or rename the column if its name is wrong";
                 Err(Fault::coded("recording/unit-conflict", problem, remedy))
             }
@@ -461,7 +498,7 @@ pub(super) fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<T
     let Some(unit) = heading::unit_of_time_name(name).filter(|unit| !is_zone(unit)) else { return Ok(None) };
     TimeUnit::from_name(&unit).map(Some).ok_or_else(|| {
         let problem = format!("column {} has an unknown unit of time, {}", quoted(name), quoted(&unit));
-        let remedy = "set its length in seconds with --time-scale, such as 60 for minutes, or name it with --time-unit";
+        let remedy = "set its length in seconds with --time-scale, such as 60 for minutes";
         Fault::coded("recording/unknown-unit", problem, remedy)
     })
 }
@@ -474,7 +511,7 @@ mod tests {
         let stamps: Vec<_> = texts.iter().map(|text| Stamp::parse(text).expect("a number")).collect();
         let mut probe = Probe::new(stamps[0]);
         for &stamp in &stamps {
-            probe.observe(stamp);
+            probe.observe(stamp, 0);
         }
         let (timing, note) = Timing::settle(&probe, known);
         let seconds = stamps.iter().map(|&stamp| timing.seconds(stamp)).collect();
@@ -486,7 +523,7 @@ mod tests {
         let (timing, note, seconds) = timing(&["1700000000123456789", "1700000000123456790"], None);
         assert_eq!(
             timing.clock,
-            Clock { unit: "ns", inferred: true, by_steps: false, epoch_ns: 1_700_000_000_000_000_000 }
+            Clock { unit: "ns", inferred: true, other_unit: None, epoch_ns: 1_700_000_000_000_000_000 }
         );
         assert_eq!(seconds, [0.123_456_789, 0.123_456_790]);
         assert!(note.is_some_and(|note| note.contains("taken as ns")));
@@ -517,7 +554,8 @@ mod tests {
             (["0.5", "10.5"], "s", true),
             (["1700000000000", "1700000000010"], "ms", false),
             (["1700000000000000", "1700000000010000"], "us", false),
-            (["1700000000", "1700000002"], "s", false),
+            (["1700000000", "1700000001"], "s", false),
+            (["1700000000", "1700000002"], "s", true),
             (["1700000000", "1700000600"], "s", true),
             (["500000000", "500000300"], "ms", true),
             (["1500000000", "1500005000"], "us", true),
@@ -526,7 +564,21 @@ mod tests {
             (["500000000000", "500010000000"], "ns", true),
         ] {
             let clock = timing(&texts, None).0.clock;
-            assert_eq!((clock.unit, clock.by_steps), (unit, by_steps), "{texts:?}");
+            assert_eq!((clock.unit, clock.other_unit.is_some()), (unit, by_steps), "{texts:?}");
+        }
+    }
+
+    #[test]
+    fn a_given_unit_is_that_of_the_name() {
+        let given = |name: &str, per_second: f64| {
+            unit_of_time(name, &ReadOptions { times_per_second: Some(per_second), ..ReadOptions::default() })
+        };
+        // A reciprocal is rounded.
+        for (name, per_second) in [("t_ns", 1e-9_f64.recip()), ("t_min", 60.0_f64.recip()), ("t", 7.0), ("t_s", 1.0)] {
+            assert_eq!(given(name, per_second).ok(), Some(None), "{name}");
+        }
+        for (name, per_second) in [("t_ms", 1.0), ("t_min", 3600.0_f64.recip()), ("t_min", 1e9), ("t_s", 1000.0)] {
+            assert!(given(name, per_second).is_err(), "{name}");
         }
     }
 
@@ -536,24 +588,40 @@ mod tests {
             [(["0.0", "10.0"], true), (["0", "1"], true), (["0.0", "10.5"], true), (["0.0", "1.5"], false)]
         {
             let clock = timing(&texts, None).0.clock;
-            assert_eq!((clock.unit, clock.by_steps), ("s", by_steps), "{texts:?}");
-            assert!(!timing(&texts, Some(TimeUnit::Seconds)).0.clock.by_steps);
+            assert_eq!((clock.unit, clock.other_unit.is_some()), ("s", by_steps), "{texts:?}");
+            assert_eq!(timing(&texts, Some(TimeUnit::Seconds)).0.clock.other_unit, None);
         }
     }
 
+    /// Returns the clock of rows: times and vehicles.
+    fn clock_of(rows: impl Iterator<Item = (i64, usize)>) -> Clock {
+        let mut probe: Option<Probe> = None;
+        for (time, vehicle) in rows {
+            let stamp = Stamp::Whole(time);
+            probe.get_or_insert_with(|| Probe::new(stamp)).observe(stamp, vehicle);
+        }
+        Timing::settle(&probe.expect("rows"), None).0.clock
+    }
+
     #[test]
-    fn rows_of_several_vehicles_are_no_steps_of_times_since_1970() {
-        // Microseconds since a computer started, at 100 Hz, with a row of another vehicle 1 us later.
-        let uptime: Vec<String> =
-            (0..50).flat_map(|k| [0, 1].map(|vehicle| (1_500_000_000 + 10_000 * k + vehicle).to_string())).collect();
-        let texts: Vec<&str> = uptime.iter().map(String::as_str).collect();
-        assert!(timing(&texts, None).0.clock.by_steps);
-        // Two vehicles every second since 1970, in seconds.
-        let since_1970: Vec<String> =
-            (0..50).flat_map(|k| [0.0, 0.3].map(|later| format!("{:?}", 1.7e9 + f64::from(k) + later))).collect();
-        let texts: Vec<&str> = since_1970.iter().map(String::as_str).collect();
-        let clock = timing(&texts, None).0.clock;
-        assert_eq!((clock.unit, clock.by_steps), ("s", false));
+    fn steps_are_those_of_one_vehicle() {
+        // Times since the start of a computer, at 100 Hz, in each unit. All vehicles have times of their own.
+        for (start, step, other) in
+            [(1_500_000_000, 10, "ms"), (1_500_000_000_000, 10_000, "us"), (1_500_000_000_000_000, 10_000_000, "ns")]
+        {
+            let row = |k: i64| (0..6).map(move |vehicle| (start + step * k + step / 8 * vehicle, vehicle as usize));
+            let clock = clock_of((0..50).flat_map(row));
+            assert_eq!(clock.other_unit, Some(other), "{clock:?}");
+        }
+        // Unix times at 1 Hz with a gap, of 20 vehicles one after another over a day.
+        let blocks = (0..20).flat_map(|vehicle| {
+            (0..100).map(move |k| (1_700_000_000 + 4000 * vehicle + k + if k > 50 { 700 } else { 0 }, vehicle as usize))
+        });
+        let clock = clock_of(blocks);
+        assert_eq!((clock.unit, clock.other_unit), ("s", None));
+        // Every five seconds, seconds and milliseconds fit.
+        let clock = clock_of((0..50).map(|k| (1_700_000_000_000 + 5000 * k, 0)));
+        assert_eq!((clock.unit, clock.other_unit), ("ms", Some("us")));
     }
 
     #[test]
@@ -587,9 +655,9 @@ mod tests {
     #[test]
     fn decreasing_time_is_detected() {
         let mut probe = Probe::new(Stamp::Whole(2));
-        probe.observe(Stamp::Whole(2));
+        probe.observe(Stamp::Whole(2), 0);
         assert!(probe.in_order);
-        probe.observe(Stamp::Whole(1));
+        probe.observe(Stamp::Whole(1), 0);
         assert!(!probe.in_order);
     }
 }

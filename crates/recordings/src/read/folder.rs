@@ -264,7 +264,7 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
     }
     let clock = Clock {
         inferred: clocks.iter().any(|clock| clock.inferred),
-        by_steps: clocks.iter().any(|clock| clock.by_steps),
+        other_unit: clocks.iter().find_map(|clock| clock.other_unit),
         epoch_ns: first.epoch_ns,
         unit: clocks[0].unit,
     };

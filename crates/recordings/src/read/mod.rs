@@ -87,34 +87,38 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
 
 /// Opens the plan of a flight, with its positions in the frame of the flight.
 ///
-/// `of_flight` is the origin of a flight with places on the Earth.
+/// `of_flight` is the origin of the flight if the flight has places on the Earth.
 ///
 /// # Errors
-/// As [`open`], and if one of flight and plan has places on the Earth and the other has metres of an unknown origin.
+/// As [`open`]. Also if one of flight and plan has places on the Earth, and the other is in metres from an unknown
+/// origin.
 pub fn open_plan(path: &Path, of_flight: Option<&EarthOrigin>) -> Result<Recording, ReadError> {
     let from_place = |place: [f64; 3]| open(path, &ReadOptions { origin: Some(place), ..ReadOptions::default() });
-    let opened = open(path, &ReadOptions::default());
-    let plan = match (opened, of_flight) {
+    let (problem, remedy) = match (open(path, &ReadOptions::default()), of_flight) {
         // Several files of places on the Earth need an origin.
-        (Err(error), Some(origin)) if error.code() == "recording/no-origin" => return from_place(origin.place),
-        (opened, _) => opened?,
-    };
-    let (problem, remedy) = match (plan.earth_origin(), of_flight) {
-        (Some(own), Some(origin)) if own.place == origin.place => return Ok(plan),
-        (Some(_), Some(origin)) => return from_place(origin.place),
-        (None, None) => return Ok(plan),
-        (None, Some(origin)) if !origin.is_inferred => return Ok(plan),
-        (None, Some(_)) => (
-            "the plan is in metres, and the flight has places on the Earth from an origin that is not given",
-            "give the origin of the plan with --origin LAT,LON,HEIGHT",
-        ),
-        (Some(_), None) => (
-            "the plan has places on the Earth, and the flight is in metres of an unknown origin",
-            "give a plan in the metres of the flight",
-        ),
+        (Err(error), Some(origin)) if error.code() == NO_ORIGIN => return from_place(origin.place),
+        (Err(error), _) if error.code() != NO_ORIGIN => return Err(error),
+        (Ok(plan), _) => match (plan.earth_origin(), of_flight) {
+            (Some(own), Some(origin)) if own.place != origin.place => return from_place(origin.place),
+            (Some(_), None) => ON_EARTH,
+            (None, Some(origin)) if origin.is_inferred => (
+                "the plan is in metres, but the flight has places on the Earth and no origin is given",
+                "give the origin of plan and flight with --origin LAT,LON,HEIGHT",
+            ),
+            _ => return Ok(plan),
+        },
+        (Err(_), _) => ON_EARTH,
     };
     Err(ReadError::new(path, Fault::coded("recording/several-frames", problem, remedy)))
 }
+
+/// Code of several files with places on the Earth.
+const NO_ORIGIN: &str = "recording/no-origin";
+/// Problem and remedy of a plan on the Earth of a flight in metres.
+const ON_EARTH: (&str, &str) = (
+    "the plan has places on the Earth, but the flight is in metres from an unknown origin",
+    "give a plan in the metres of the flight",
+);
 
 /// Opens several files as one recording, with one vehicle per file, named after the file. Folders and archives
 /// contribute all their files.

@@ -243,70 +243,97 @@ enum Cell {
     Text(String),
 }
 
+impl fmt::Display for Cell {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Empty => Ok(()),
+            Self::Whole(whole) => write!(out, "{whole}"),
+            Self::Real(real) => write!(out, "{real}"),
+            Self::Text(text) => out.write_str(text),
+        }
+    }
+}
+
 /// Key of a predicted position in `TrajNet++`, with the number of the prediction.
 const PREDICTION: &str = "track.prediction_number";
 
-/// Rate of positions that the scenes of `TrajNet++` state, and the step of its frames.
+/// Rates of positions that the scenes of `TrajNet++` state, and the step of its frames.
 #[derive(Debug, Default)]
 struct Scenes {
-    /// Positions of a pedestrian per second; the first one that a scene states.
-    fps: Option<f64>,
+    /// Positions per second that the first scene states, as text.
+    fps: Option<String>,
     /// Another rate of a later scene.
-    other_fps: Option<f64>,
-    /// Last frame of each pedestrian.
-    frames: HashMap<i64, f64>,
-    /// Smallest step between two frames of a pedestrian.
-    step: Option<f64>,
+    other_fps: Option<String>,
+    first_frame: Option<u64>,
+    /// Greatest common divisor of the distances between frames; 0 for one frame.
+    step: u64,
+    /// Whether a frame is not a whole number.
+    is_uneven: bool,
 }
 
 impl Scenes {
-    /// Records the rate of a scene, or a frame of a pedestrian.
+    /// Records the rate of a scene or the frame of a position.
     fn observe(&mut self, flat: &[(String, Cell)]) {
-        if !flat.first().is_some_and(|(key, _)| key.starts_with("track.") || key.starts_with("scene.")) {
-            return;
-        }
-        let number = |name: &str| match flat.iter().find(|(key, _)| key == name)?.1 {
-            Cell::Whole(whole) => Some(whole as f64),
-            Cell::Real(real) => Some(real),
-            Cell::Empty | Cell::Text(_) => None,
-        };
-        if let Some(fps) = number("scene.fps") {
-            let first = *self.fps.get_or_insert(fps);
-            self.other_fps = self.other_fps.or((first != fps).then_some(fps));
-        }
-        let pedestrian = flat.iter().find_map(|(key, cell)| match cell {
-            Cell::Whole(pedestrian) if key == "track.p" => Some(*pedestrian),
-            _ => None,
-        });
-        let Some((pedestrian, frame)) = pedestrian.zip(number("track.f")) else { return };
-        let step = self.frames.insert(pedestrian, frame).map(|before| (frame - before).abs());
-        if let Some(step) = step.filter(|&step| step > 0.0 && self.step.is_none_or(|least| step < least)) {
-            self.step = Some(step);
+        for (key, cell) in flat {
+            match key.as_str() {
+                "scene.fps" => {
+                    let fps = cell.to_string();
+                    match &self.fps {
+                        None => self.fps = Some(fps),
+                        Some(first) if *first != fps => self.other_fps = Some(fps),
+                        Some(_) => {}
+                    }
+                }
+                "track.f" => self.observe_frame(cell),
+                _ => {}
+            }
         }
     }
 
+    fn observe_frame(&mut self, cell: &Cell) {
+        let Some(frame) = cell.to_string().parse::<f64>().ok().and_then(|frame| Stamp::Real(frame).whole()) else {
+            self.is_uneven = true;
+            return;
+        };
+        let frame = frame.unsigned_abs();
+        let first = *self.first_frame.get_or_insert(frame);
+        let (mut one, mut other) = (self.step, frame.abs_diff(first));
+        while other != 0 {
+            (one, other) = (other, one % other);
+        }
+        self.step = one;
+    }
+
     /// Refuses a rate of frames that contradicts the scenes, and names the right one if none is given.
+    ///
+    /// The step of the frames is that of positions, or a multiple of it if all vehicles miss positions.
     fn check(&self, options: &ReadOptions) -> Result<(), Fault> {
         /// Relative rounding of a rate.
         const ROUNDING: f64 = 1e-6;
-        let Some((fps, step)) = self.fps.zip(self.step) else { return Ok(()) };
-        let rate = fps * step;
-        let given = options.times_per_second.or(options.time_unit.map(|unit| unit.per_second() as f64));
-        let states = format!("its scenes state {fps} positions per second, and frames have steps of {step}");
-        let remedy = format!("give --fps {rate}");
-        match (given, self.other_fps) {
-            (_, Some(other)) => {
-                let problem = format!("its scenes state {fps} and {other} positions per second");
-                refuse("recording/frames", problem, "judge the scenes of each rate by themselves")
-            }
-            (None, None) => {
-                refuse("recording/frames", format!("its times are the numbers of frames; {states}"), remedy)
-            }
-            (Some(given), None) if (given - rate).abs() > ROUNDING * rate => {
-                refuse("recording/unit-conflict", format!("{states}, which are not {given} frames per second"), remedy)
-            }
-            (Some(_), None) => Ok(()),
+        let Some(stated) = &self.fps else { return Ok(()) };
+        if let Some(other) = &self.other_fps {
+            let problem = format!("its scenes state {stated} and {other} positions per second");
+            return refuse("recording/frames", problem, "write the scenes of each rate to a file of their own");
         }
+        let Some(fps) = stated.parse().ok().filter(|&fps: &f64| fps > 0.0 && fps.is_finite()) else {
+            let problem = format!("its scenes state {} positions per second", quoted(stated));
+            return refuse("recording/frames", problem, "correct `fps` of the scenes, or remove it");
+        };
+        if self.is_uneven || self.step == 0 {
+            return Ok(());
+        }
+        let rate = fps * self.step as f64;
+        let states = format!("its scenes state {fps} positions per second, and frames have steps of {}", self.step);
+        let remedy = format!("give --fps {rate}");
+        let Some(given) = options.times_per_second.or(options.time_unit.map(|unit| unit.per_second() as f64)) else {
+            return refuse("recording/frames", format!("its times are the numbers of frames; {states}"), remedy);
+        };
+        let is = |other: f64| (given / other - 1.0).abs() <= ROUNDING;
+        let parts = (rate / given).round();
+        if is(rate) || (parts > 1.0 && is(rate / parts) && !is(fps)) {
+            return Ok(());
+        }
+        refuse("recording/unit-conflict", format!("{states}, but {given} frames per second are given"), remedy)
     }
 }
 
@@ -350,7 +377,7 @@ impl<T: ObjectText> Objects<T> {
                 }
             }
             if objects.flat.iter().any(|(key, cell)| key == PREDICTION && !matches!(cell, Cell::Empty)) {
-                let problem = format!("it has a `{PREDICTION}`: a predicted position beside measured ones");
+                let problem = format!("`{PREDICTION}` marks a predicted position beside measured positions");
                 let remedy =
                     "remove the lines of predictions, or judge each prediction as a file of its own, without this key";
                 let fault = Fault::coded("recording/ambiguous-layout", problem, remedy);

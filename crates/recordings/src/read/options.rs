@@ -290,6 +290,12 @@ impl ReadOptions {
         self.axes.unwrap_or_default().scaled(self.scale.unwrap_or_default().each)
     }
 
+    /// Returns whether positions are turned or scaled as they are read.
+    #[must_use]
+    pub fn changes_positions(&self) -> bool {
+        self.metres() != 1.0 || !self.turn().is_identity()
+    }
+
     /// Refuses values out of range.
     pub(super) fn check(&self) -> Result<(), Fault> {
         let metres = self.metres();

@@ -439,7 +439,7 @@ fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, ReadError> {
     let mut batch = Vec::new();
     while rows.next(&mut batch)? {
         for row in batch.drain(..) {
-            probe.get_or_insert_with(|| Probe::new(row.stamp)).observe(row.stamp);
+            probe.get_or_insert_with(|| Probe::new(row.stamp)).observe(row.stamp, row.vehicle);
         }
     }
     Ok(probe)
@@ -449,7 +449,7 @@ fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, ReadError> {
 pub(super) fn probe(rows: &[Row]) -> Option<Probe> {
     let mut probe = Probe::new(rows.first()?.stamp);
     for row in rows {
-        probe.observe(row.stamp);
+        probe.observe(row.stamp, row.vehicle);
     }
     Some(probe)
 }

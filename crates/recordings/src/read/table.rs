@@ -498,7 +498,7 @@ impl<C: Cells> Rows for Table<C> {
         while self.cells.advance()? {
             let stamp = self.stamp().and_then(|stamp| self.vehicle(id).map(|_| stamp));
             let stamp = stamp.map_err(|fault| self.at_row(fault))?;
-            probe.get_or_insert_with(|| Probe::new(stamp)).observe(stamp);
+            probe.get_or_insert_with(|| Probe::new(stamp)).observe(stamp, self.vehicle);
             rows += 1;
             is_one_instant &= *first.get_or_insert(stamp) == stamp;
             for alternative in &mut self.alternative_ids {

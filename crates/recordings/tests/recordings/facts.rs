@@ -740,7 +740,7 @@ fn trajnet_scenes_hold_no_positions() {
     let found = read_bytes("biwi.ndjson", text.as_bytes(), &rate).unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(found.samples()[2], (0.8, "1", [2.5, 2.0, 0.0]));
     has(&facts("biwi.ndjson", text.as_bytes(), &rate), ["time-unit", "declared", "0.04 s"]);
-    // The rate of the scenes is that of positions, not of frames.
+    // Scenes state positions per second; `--fps` is frames per second.
     assert!(error.help().contains("--fps 25"), "{error} {}", error.help());
     let wrong = ReadOptions { times_per_second: Some(2.5), ..usual() };
     let error = read_bytes("biwi.ndjson", text.as_bytes(), &wrong).expect_err("another rate");
@@ -748,7 +748,21 @@ fn trajnet_scenes_hold_no_positions() {
     let mixed = text.replacen("2.5, \"tag\": 1", "5, \"tag\": 1", 1);
     let error = read_bytes("biwi.ndjson", mixed.as_bytes(), &rate).expect_err("two rates");
     assert_refused(&error, "recording/frames", "");
-    // A prediction is no measured position.
+    // Names and rates may be text, and other keys may come first.
+    for other in [
+        text.replace("\"p\": 1,", "\"p\": \"1\",").replace("\"p\": 2,", "\"p\": \"2\","),
+        text.replace("\"fps\": 2.5", "\"fps\": \"2.5\""),
+        text.replace("{\"track\"", "{\"dataset\": \"a\", \"track\""),
+    ] {
+        let error = read_bytes("biwi.ndjson", other.as_bytes(), &wrong).expect_err("another rate");
+        assert_refused(&error, "recording/unit-conflict", "");
+    }
+    let zero = text.replace("\"fps\": 2.5", "\"fps\": 0");
+    assert_refused(&read_bytes("biwi.ndjson", zero.as_bytes(), &rate).expect_err("no rate"), "recording/frames", "");
+    // All pedestrians may miss each second position, so frames of 50 a second may be frames of 25.
+    let sparse = text.replace("\"f\": 20", "\"f\": 30");
+    assert!(read_bytes("biwi.ndjson", sparse.as_bytes(), &rate).is_ok());
+    // Predictions are refused.
     let predicted = |number: &str| {
         format!("{text}{{\"track\": {{\"f\": 30, \"p\": 1, \"x\": 3.5, \"y\": 2, \"prediction_number\": {number}}}}}\n")
     };

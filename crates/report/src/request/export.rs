@@ -1,7 +1,7 @@
 //! `export_file`: writes a recording in another format.
 
 use std::io::ErrorKind;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -9,7 +9,7 @@ use super::audit::{open, own_recording, recording_in};
 use super::{Failure, Monitor, outputs};
 use crate::report::write_atomically_with;
 use tautline_core::text::counted;
-use tautline_core::track::{Clock, Item, Metadata, Tracks};
+use tautline_core::track::{Item, Metadata, Tracks};
 use tautline_recordings::export::{self, ExportOptions, WRITTEN};
 use tautline_recordings::read::{self, Fault, Format, ReadError, ReadOptions, Recording};
 
@@ -89,11 +89,10 @@ pub fn export_file(request: &ExportRequest, monitor: &dyn Monitor) -> Result<(),
     let format = request.checked()?;
     let ExportRequest { paths, options, output, sample_hz, .. } = request;
     let interrupted = monitor.interruption();
+    let assumed = examine(&mut open(paths, options)?)?;
     let tracks = || -> Result<Recording, ReadError> {
         let path = paths.first().cloned().unwrap_or_default();
-        let tracks = open(paths, options)?;
-        refuse_guessed_seconds(&path, tracks.clock())?;
-        Ok(Box::new(Interruptible { tracks, path, interrupted: Arc::clone(interrupted) }))
+        Ok(Box::new(Interruptible { tracks: open(paths, options)?, path, interrupted: Arc::clone(interrupted) }))
     };
     let channels = || match &paths[..] {
         [path] if options.format.is_none_or(|format| format == Format::MCAP) => read::open_channels(path),
@@ -111,22 +110,28 @@ pub fn export_file(request: &ExportRequest, monitor: &dyn Monitor) -> Result<(),
     for note in exported.notes.iter().chain(&lost(request, monitor)) {
         monitor.warn(&format!("note: {note}"));
     }
-    if let Some(assumed) = tracks()?.assumed() {
-        monitor.warn(&format!("note: {file} does not hold that this is assumed: {assumed}"));
+    if let Some(assumed) = assumed {
+        monitor.warn(&format!("note: {file} does not contain this assumption: {assumed}"));
     }
     let vehicles = counted(exported.vehicles as u64, "vehicle", "vehicles");
     monitor.say(&format!("{file}: {} samples of {vehicles}", exported.samples));
     Ok(())
 }
 
-/// Refuses a guessed unit of time: the output would hold it as a fact.
-fn refuse_guessed_seconds(path: &Path, clock: &Clock) -> Result<(), ReadError> {
-    if !clock.by_steps {
-        return Ok(());
+/// Number of items from which the unit of time is judged.
+const JUDGED_ITEMS: usize = 10_000;
+
+/// Refuses a guessed unit of time, because the output would contain the guess as a fact. Returns the assumption of the
+/// recording.
+fn examine(tracks: &mut Recording) -> Result<Option<String>, Failure> {
+    let (mut items, mut more) = (Vec::new(), true);
+    while more && items.len() < JUDGED_ITEMS && tracks.clock().other_unit.is_some() {
+        more = tracks.read(&mut items)?;
     }
-    let problem = format!("the unit of time {} is a guess, and the output is in seconds", clock.unit);
-    let remedy = format!("give --time-unit {}, or the right unit", clock.unit);
-    Err(ReadError::new(path, Fault::Content { code: "export/guessed-time-unit", problem, remedy }))
+    let Some(other) = tracks.clock().doubt(&items) else { return Ok(tracks.assumed().map(str::to_owned)) };
+    let unit = tracks.clock().unit;
+    let message = format!("the times may be in {unit} or {other}, and the output is in seconds");
+    Err(Failure::input("export/guessed-time-unit", message, format!("give --time-unit {unit}, or --time-unit {other}")))
 }
 
 /// Returns a note if the run's audit, which is not exported, holds more than the samples.

@@ -164,7 +164,7 @@ impl Scenario {
                 .with_help(format!("reduce it to at most {}", most_m_s2.unwrap_or_default()))
                 .at_keys(["shield.accel_m_s2", "actuation.max_accel_m_s2"]));
         }
-        settings.limits().map(Some).map_err(|error| of_shield(&error))
+        settings.limits().map(Some).map_err(|error| self.of_shield(&error))
     }
 
     /// Returns the settings of a table of the shield at a rate of commands \[Hz\].
@@ -202,7 +202,7 @@ impl Scenario {
             let decay = (a22_per_s * dt_s).powi(2);
             let lag = if self.actuation.lag_s > 0.0 { accel_m_s2 * (dt_s / self.actuation.lag_s).powi(2) } else { 0.0 };
             let push_m_s2 = (decay * (a22_per_s.abs() * max_speed_m_s + accel_m_s2) + lag) / 6.0;
-            // An infinite push comes from a lag that is refused as too short.
+            // A lag so short that the push is infinite is refused below.
             settings.integration_error_m_s2 = push_m_s2.min(f64::MAX);
             let gains = (1.0 + tracker_per_s) / (12.0 * tracker_per_s2);
             let largest_m_s2 = accel_m_s2 + settings.disturbance_m_s2 + a22_per_s.abs() * max_speed_m_s;
@@ -240,7 +240,7 @@ impl Scenario {
         let start = |i: usize| {
             let state =
                 State { position_m: row(&self.start.positions_m, i), velocity_m_s: row(&self.start.velocities_m_s, i) };
-            limits.start(state).map_err(|error| of_shield(&error).at_entry("start.positions_m", i))
+            limits.start(state).map_err(|error| self.of_shield(&error).at_entry("start.positions_m", i))
         };
         (0..self.count()).map(start).collect()
     }
@@ -254,7 +254,7 @@ impl Scenario {
         let obstacles: Vec<_> = self.obstacles.iter().map(keep_out).collect();
         let fleet = Fleet::new(&vec![*limits; self.count()], states);
         let fleet = fleet.and_then(|fleet| fleet.with_obstacles(&obstacles));
-        fleet.map_err(|error| of_shield(&error).at("start.positions_m"))
+        fleet.map_err(|error| self.of_shield(&error).at("start.positions_m"))
     }
 
     /// Returns the pair of starts with the least room, and the pair of slots of any leg; `None` without a shield.
@@ -335,11 +335,40 @@ impl Scenario {
         let starts = self.shield_starts(&limits)?;
         if let Some(worst) = closest_starts(&starts).filter(|worst| worst.room_m() < 0.0) {
             let (i, j) = worst.pair;
-            let error = of_shield(&worst.too_near());
+            let error = self.of_shield(&worst.too_near());
             return Err(error.at_entry("start.positions_m", i).at_entry("start.positions_m", j));
         }
         let states: Vec<_> = starts.iter().map(|start| start.state).collect();
         self.shield_fleet(&limits, &states).map(drop)
+    }
+
+    /// Returns an error of the shield at the key of the scenario.
+    fn of_shield(&self, error: &ShieldError) -> ScenarioError {
+        let key = match error.place {
+            "delta_m" => "law.delta_m",
+            "period_s" => "time.control_hz",
+            // Drag of the rotors at the largest speed.
+            "a22_per_s" if self.airframe.quadrotor().is_some() => "shield.max_speed_m_s",
+            "a22_per_s" => "swarm.a22_per_s",
+            "actuator_lag_s" => "actuation.lag_s",
+            "measurement_delay_periods" => "sensing.latency_s",
+            "accel_m_s2" => "shield.accel_m_s2",
+            "brake_m_s2" => "shield.brake_m_s2",
+            "max_speed_m_s" => "shield.max_speed_m_s",
+            "tracker_per_s" => "shield.tracker_per_s",
+            "tracker_per_s2" => "shield.tracker_per_s2",
+            "disturbance_m_s2" => "shield.disturbance_m_s2",
+            "position_error_m" => "shield.position_error_m",
+            "velocity_error_m_s" => "shield.velocity_error_m_s",
+            "tracking_error_m" => "shield.tracking_error_m",
+            "ease_m" => "shield.ease_m",
+            "turn" => "shield.turn",
+            "half_height_m" => "safety.half_axes_m",
+            "path_error_m" | "integration_error_m_s2" => "time.dt_s",
+            _ => "shield",
+        };
+        let found = refused(&error.problem, error.value).with_help(error.remedy);
+        if error.place == "start" { found } else { found.at(key) }
     }
 
     fn check_shield_memory(&self) -> Result<(), ScenarioError> {
@@ -388,31 +417,4 @@ fn refused(problem: &str, value: f64) -> ScenarioError {
 
 fn refused_with(problem: &str, help: &str) -> ScenarioError {
     ScenarioError::new(problem).coded("scenario/shield").with_help(help)
-}
-
-/// Returns an error of the shield at the key of the scenario.
-fn of_shield(error: &ShieldError) -> ScenarioError {
-    let key = match error.place {
-        "delta_m" => "law.delta_m",
-        "period_s" => "time.control_hz",
-        "a22_per_s" => "swarm.a22_per_s",
-        "actuator_lag_s" => "actuation.lag_s",
-        "measurement_delay_periods" => "sensing.latency_s",
-        "accel_m_s2" => "shield.accel_m_s2",
-        "brake_m_s2" => "shield.brake_m_s2",
-        "max_speed_m_s" => "shield.max_speed_m_s",
-        "tracker_per_s" => "shield.tracker_per_s",
-        "tracker_per_s2" => "shield.tracker_per_s2",
-        "disturbance_m_s2" => "shield.disturbance_m_s2",
-        "position_error_m" => "shield.position_error_m",
-        "velocity_error_m_s" => "shield.velocity_error_m_s",
-        "tracking_error_m" => "shield.tracking_error_m",
-        "ease_m" => "shield.ease_m",
-        "turn" => "shield.turn",
-        "half_height_m" => "safety.half_axes_m",
-        "path_error_m" | "integration_error_m_s2" => "time.dt_s",
-        _ => "shield",
-    };
-    let found = refused(&error.problem, error.value).with_help(error.remedy);
-    if error.place == "start" { found } else { found.at(key) }
 }

@@ -9,6 +9,8 @@ use tautline_core::text::shortest;
 use tautline_laws::law::LawSpec;
 use tautline_shield::Limits;
 
+/// Key of the wind.
+const WIND: &str = "wind";
 /// Default of the largest command without a measured table, as a share of what thrust and lift allow.
 const ACCEL_SHARE: f64 = 0.5;
 
@@ -65,7 +67,7 @@ impl Scenario {
         let Some(quadrotor) = self.airframe.quadrotor() else { return Some(TrackingBasis::Proved) };
         let dimensions = self.space.dimensions();
         let search = quadrotor.model.tracking_search().filter(|search| {
-            // Searches fly in the engine.
+            // Searches use the engine, so that they do not cover the ideal plant.
             let is_searched = is_full(search) && search.dimensions.contains(&dimensions) && self.has_engine();
             is_searched && self.accelerates_as_searched()
         });
@@ -126,8 +128,8 @@ impl Scenario {
         }
     }
 
-    /// Returns the first condition of the measured table that the scenario does not meet, in words.
-    fn beyond_tracking(&self, spec: &ShieldSpec, of: &Tracking) -> Option<String> {
+    /// Returns the key and the text of the first condition of the measured table that the scenario does not meet.
+    fn beyond_tracking(&self, spec: &ShieldSpec, of: &Tracking) -> Option<(&'static str, String)> {
         let quadrotor = self.airframe.quadrotor()?;
         let given = |key: Option<f64>| key.unwrap_or(f64::NAN);
         let same = [
@@ -144,11 +146,11 @@ impl Scenario {
             ("shield.position_error_m", spec.position_error_m, of.position_error_m),
             ("shield.velocity_error_m_s", spec.velocity_error_m_s, of.velocity_error_m_s),
             ("time.dt_s", self.time.dt_s, of.dt_s),
-            ("the fastest wind in m/s", self.fastest_wind_m_s(), of.wind_m_s),
+            (WIND, self.fastest_wind_m_s(), of.wind_m_s),
         ];
         // A smaller push leaves more acceleration to the reference.
         let at_least = [("shield.disturbance_m_s2", given(spec.disturbance_m_s2), of.disturbance_m_s2)];
-        // Speeds and errors may be 0, steps are short.
+        // Limits of 0 need a floor that is small against a step of 0.002 s.
         let rounding = |limit: f64| SAME * limit.abs().max(1e-3);
         let lists = [
             (&same[..], "must be", f64::abs as fn(f64) -> f64),
@@ -158,10 +160,13 @@ impl Scenario {
         let numbers = lists.into_iter().find_map(|(list, must, excess)| {
             let is_within = |value: f64, limit: f64| excess(value - limit) <= rounding(limit);
             let (key, value, limit) = list.iter().find(|(_, value, limit)| !is_within(*value, *limit))?;
-            Some(format!("{key} {must} {}, got {}", shortest(*limit), shortest(*value)))
+            let name = if *key == WIND { "the fastest wind in m/s" } else { key };
+            Some((*key, format!("{name} {must} {}, got {}", shortest(*limit), shortest(*value))))
         });
         let switches = [("vehicle.downwash", quadrotor.downwash), ("vehicle.ground_effect", quadrotor.ground_effect)];
-        numbers.or_else(|| switches.iter().find(|(_, is_on)| *is_on).map(|(key, _)| format!("{key} must be false")))
+        numbers.or_else(|| {
+            switches.iter().find(|(_, is_on)| *is_on).map(|&(key, _)| (key, format!("{key} must be false")))
+        })
     }
 
     /// Checks that the vehicles can carry out the largest command, and that their tracking error is known.
@@ -179,22 +184,19 @@ impl Scenario {
             return Ok(());
         }
         let beyond = model.tracking.as_ref().and_then(|of| self.beyond_tracking(spec, of));
-        let other_loop = self.other_attitude_loop();
-        let problem = match (beyond, other_loop) {
-            (None, None) => "the distance of a quadrotor to its reference has no computed bound".to_owned(),
-            (Some(beyond), _) => {
+        let other_loop = self.other_attitude_loop().map(|(key, measured, value)| {
+            (key, format!("{key} must be {}, got {}", shortest(measured), shortest(value)))
+        });
+        let found = beyond.or(other_loop);
+        let problem = match &found {
+            None => "the distance of a quadrotor to its reference has no computed bound".to_owned(),
+            Some((_, beyond)) => {
                 format!("the scenario is beyond the measured tracking error of {}: {beyond}", model.name)
             }
-            (None, Some((key, measured, value))) => format!(
-                "the scenario is beyond the measured tracking error of {}: {key} must be {}, got {}",
-                model.name,
-                shortest(measured),
-                shortest(value)
-            ),
         };
         let help = "measure it with `tautline check --identify`, and set shield.tracking_error_m";
-        let found = refused_with(&problem, help).at_keys(["shield.tracking_error_m", "vehicle.model"]);
-        Err(other_loop.into_iter().fold(found, |found, (key, ..)| found.at(key)))
+        let error = refused_with(&problem, help).at_keys(["shield.tracking_error_m", "vehicle.model"]);
+        Err(found.into_iter().fold(error, |error, (key, _)| error.at(key)))
     }
 
     /// Returns the first key of the attitude loop that differs from that of the measurement, with both values. The

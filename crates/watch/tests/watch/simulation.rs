@@ -17,7 +17,7 @@ const COMPARED_S: f64 = 6.0;
 const PIECE_S: f64 = 0.25;
 /// Time between two compared separations \[s\].
 const STEP_S: f64 = 0.005;
-/// Length of windows that show a wrong velocity \[s\]: `2 eps / e`.
+/// Longest window in which a wrong velocity is searched for \[s\]: `2 eps / e`.
 const REACH_S: f64 = 2.0 * POSITION_ERROR_M / VELOCITY_ERROR_M_S;
 
 #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "from 0 to COMPARED_S / STEP_S")]
@@ -144,13 +144,13 @@ struct Sender {
     next_s: f64,
     frozen_m_s: Option<Vector3<f64>>,
     stuck: Option<(Vector3<f64>, Vector3<f64>)>,
-    /// Time, position before its error, and velocity of the readings with a velocity.
+    /// Time, position without error, and velocity of each reading with a velocity.
     said: Vec<(f64, Vector3<f64>, Vector3<f64>)>,
 }
 
 impl Sender {
-    /// Returns whether what was sent contradicts itself in some window, whatever the errors of the positions are: the
-    /// sum of the velocities leaves its bound by more than these errors.
+    /// Returns whether the readings contradict themselves in a window for all errors of the positions within their
+    /// bound. Then the integral of the velocities leaves its bound by more than these errors.
     fn contradicts_itself(&self) -> bool {
         let shows = |from: usize| {
             let (mut travel_m, mut squares_s2) = (Vector3::zeros(), 0.0);
@@ -195,7 +195,7 @@ impl Sender {
         }
     }
 
-    /// Notes what was sent.
+    /// Records a reading with a velocity.
     fn note(&mut self, t_s: f64, velocity_m_s: Option<Vector3<f64>>) {
         let position_m = self.stuck.map_or_else(|| self.motion.state(t_s).0, |(position_m, _)| position_m);
         self.said.extend(velocity_m_s.map(|velocity_m_s| (t_s, position_m, velocity_m_s)));
@@ -210,7 +210,7 @@ struct Run {
     fault_s: f64,
     /// Earliest violation before the time of an earlier CLEAR \[s\].
     broken_s: f64,
-    /// Whether what was sent contradicted itself before the first such CLEAR.
+    /// Whether the readings contradicted themselves at such a CLEAR, before the first fault.
     was_contradicted: bool,
 }
 
@@ -318,7 +318,7 @@ struct Counts {
     clear: u64,
     /// Runs with a violation before the time of CLEAR and before any fault.
     broken: u64,
-    /// Broken runs in which what was sent contradicted itself before.
+    /// Runs whose readings contradicted themselves at a wrong CLEAR, before the first fault.
     contradicted: u64,
 }
 
@@ -368,7 +368,7 @@ fn wrong_velocities_and_stuck_positions_are_found_before_a_violation() {
     for (name, kind) in kinds {
         for part in [Part::Every(1), Part::Every(2), Part::Every(3), Part::Random] {
             let Counts { faults, clear, contradicted, .. } = count(kind, part, 500);
-            // A velocity that is wrong by less than any window shows is not found (docs/watch-proof.md).
+            // An error of a velocity that shows in no window is not found (docs/watch-proof.md).
             if contradicted > 0 || faults <= 250 || clear <= 500 {
                 wrong.push(format!("{name} {part:?}: {contradicted} contradicted, {faults} faults, {clear} CLEAR"));
             }

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 
 use super::super::{Failure, Monitor};
 use super::side_files::ItemSpan;
-use super::{FASTEST_M_S, Open, recording_in, usual_speed_m_s};
+use super::{AuditRequest, Open, Subject, recording_in};
 use crate::figures::{self, Figure};
 use crate::report::recorded::{PlanReport, RecordedReport};
 use tautline_audit::recorded::{Outcome, PlanComparison, PlanFindings, Settings, audit};
@@ -46,6 +46,17 @@ impl PlanQuestion {
     }
 }
 
+/// Refuses options that turn or scale the positions of the flight alone.
+pub(super) fn refuse_changed_positions(request: &AuditRequest<'_>) -> Result<(), Failure> {
+    let (Some(plan), Subject::Files { options, .. }) = (&request.plan, &request.subject) else { return Ok(()) };
+    if !options.changes_positions() {
+        return Ok(());
+    }
+    let message = format!("{}: --axes and --scale change only the positions of the flight", plan.path.display());
+    let help = "export flight and plan with these options, and compare the exported files";
+    Err(Failure::input("audit/plan-frame", message, help))
+}
+
 /// A flight that was audited.
 pub(super) struct AuditedFlight<'a> {
     pub(super) open: &'a Open<'a>,
@@ -72,8 +83,10 @@ pub(super) fn compare(
     monitor: &dyn Monitor,
 ) -> Result<ComparedPlan, Failure> {
     let path = recording_in(&question.path);
-    let origin = (flight.open)()?.earth_origin().copied();
+    let flown = (flight.open)()?;
+    let origin = flown.earth_origin().copied();
     let mut plan = open_plan(&path, origin.as_ref())?;
+    let heights = compare_heights(flown.facts(), plan.facts(), &path)?;
     let (mut items, mut more) = (Vec::new(), true);
     while more {
         if monitor.is_interrupted() {
@@ -81,10 +94,9 @@ pub(super) fn compare(
         }
         more = plan.read(&mut items)?;
     }
-    let is_in_seconds = plan.clock().unit == "s" && 1000.0 * usual_speed_m_s(&items) > FASTEST_M_S;
-    if plan.clock().by_steps && !is_in_seconds {
-        let message =
-            format!("{}: the unit of time of the plan is inferred from steps of whole numbers only", path.display());
+    if let Some(other) = plan.clock().doubt(&items) {
+        let unit = plan.clock().unit;
+        let message = format!("{}: the times of the plan may be in {unit} or {other}", path.display());
         let help = "name the column of the times of the plan by their unit, such as t_s or t_ms";
         return Err(Failure::input("audit/guessed-time-unit", message, help));
     }
@@ -121,8 +133,8 @@ pub(super) fn compare(
     report.planar = is_planar;
     let assumed = report.assumes.take().into_iter();
     let assumed = assumed.chain(plan.assumed().map(|item| format!("the plan has {item}")));
-    let assumed =
-        assumed.chain((is_planar && !flight.is_planar).then(|| IN_PLANE.to_owned())).collect::<Vec<_>>().join(" and ");
+    let assumed = assumed.chain((is_planar && !flight.is_planar).then(|| IN_PLANE.to_owned()));
+    let assumed = assumed.chain(heights.filter(|_| !is_planar)).collect::<Vec<_>>().join(" and ");
     report.assumes = (!assumed.is_empty()).then_some(assumed);
     let notes = plan.notes().iter().map(|note| format!("{}: {note}", path.display())).collect();
     let axes = if is_planar { "x and y" } else { "x, y and z" };
@@ -141,6 +153,25 @@ pub(super) fn compare(
     let facts = vec![clock, Fact::name(FactKind::SideFileAxes, Source::Deduced, axes), frame];
     let figure = figure(&found, flight.outcome);
     Ok(ComparedPlan { report, notes, facts, figure })
+}
+
+/// Refuses heights of different references. Returns the assumption if only one of both is known.
+fn compare_heights(flown: &[Fact], planned: &[Fact], path: &Path) -> Result<Option<String>, Failure> {
+    let reference = |facts: &[Fact]| {
+        let known = facts.iter().find(|fact| fact.kind == FactKind::HeightReference);
+        known.filter(|fact| fact.source != Source::Default).and_then(|fact| fact.value.clone())
+    };
+    let (flight, plan) = match (reference(flown), reference(planned)) {
+        (None, None) => return Ok(None),
+        (Some(flight), Some(plan)) if flight == plan => return Ok(None),
+        (Some(flight), Some(plan)) => (flight, plan),
+        (Some(_), None) | (None, Some(_)) => {
+            return Ok(Some("the heights of flight and plan have one reference".to_owned()));
+        }
+    };
+    let message =
+        format!("{}: heights of the plan are above {plan}, those of the flight above {flight}", path.display());
+    Err(Failure::input("audit/plan-frame", message, "give a plan with the heights of the flight"))
 }
 
 /// Refuses a plan that shares no time with the judged flight.

@@ -25,7 +25,6 @@ pub use subject::{Open, Subject, open, own_recording, recording_in};
 
 use self::against_plan::AuditedFlight;
 use self::own::RunAnswer;
-use self::question::{FASTEST_M_S, usual_speed_m_s};
 use super::run::{figure_files, write_files};
 use super::{Failure, Monitor, outputs};
 use crate::figures::{self, Format as FigureFormat};
@@ -133,6 +132,7 @@ impl ConfiguredAudit<'_> {
         let side_obstacles = settings.obstacles.len();
         let taken = RecordedLimits::fill(&mut settings, request, own.as_ref());
         proof::check(request, &settings)?;
+        against_plan::refuse_changed_positions(request)?;
         let opening = Opening::read(open, monitor)?;
         let side_files = opening.align(&mut settings, side_obstacles)?;
         let mut auditor = TrackAuditor::new(settings.clone())?;

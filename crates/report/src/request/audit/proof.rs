@@ -178,7 +178,7 @@ pub(super) fn write(
         return none("the verdict is undecided");
     }
     if is_decimal_tie {
-        return none("the checker computes with the written decimals, which are at the limit and not below it");
+        return none("the checker computes with the written decimals, which are exactly at the limit");
     }
     let closest = outcome.closest.first().and_then(|closest| Some((closest, closest.pair.vehicles()?)));
     let (Some((closest, pair)), Some(distance_m)) = (closest, settings.delta_m) else {

@@ -1,9 +1,7 @@
 //! The question of an audit: its options, and the checks of their combination.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::path::PathBuf;
-
-use nalgebra::Vector3;
 
 use super::super::{Failure, Monitor, outputs};
 use super::own::RunAnswer;
@@ -16,9 +14,6 @@ use tautline_audit::recorded::{Interpolation, Outcome, RecordedError, Settings, 
 use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::text::counted;
 use tautline_core::track::{Clock as TrackClock, Item};
-
-/// Speed of sound \[m/s\], which no vehicle of a swarm reaches.
-pub(super) const FASTEST_M_S: f64 = 340.0;
 
 /// Choice of the `tautline.toml` that fills options which the request leaves open.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -232,29 +227,18 @@ impl<'a> AuditRequest<'a> {
         Ok(())
     }
 
-    /// Rejects a question that depends on seconds if the unit of time is a guess. Seconds are accepted if the unit
-    /// milliseconds would make the vehicles of these first items usually faster than sound. `settings` are complete.
+    /// Rejects a question that depends on seconds if the unit of time is a guess that these first items leave open.
+    /// `settings` are complete.
     pub(super) fn refuse_guessed_seconds(
         &self,
         settings: &Settings,
         clock: &TrackClock,
         items: &[Item],
     ) -> Result<(), Failure> {
-        if !clock.by_steps {
-            return Ok(());
-        }
+        let Some(other) = clock.doubt(items) else { return Ok(()) };
         let Some(timed) = self.rests_on_seconds(settings).into_iter().next() else { return Ok(()) };
         let (path, unit) = (self.subject.name(), clock.unit);
-        let (problem, [unit, other]) = if unit == "s" {
-            if 1000.0 * usual_speed_m_s(items) > FASTEST_M_S {
-                return Ok(());
-            }
-            ("by their steps the times may be in seconds or milliseconds".to_owned(), ["s", "ms"])
-        } else {
-            let problem = format!("the unit of time {unit} is inferred from the steps of whole numbers only");
-            (problem, [unit, "s"])
-        };
-        let message = format!("{path}: {problem}, and {timed} depends on it");
+        let message = format!("{path}: the times may be in {unit} or {other}, and {timed} depends on it");
         Err(Failure::input(
             "audit/guessed-time-unit",
             message,
@@ -344,21 +328,4 @@ impl<'a> AuditRequest<'a> {
         facts.extend(settings_file.map(|file| Fact::name(FactKind::SettingsFile, Source::Declared, file)));
         facts
     }
-}
-
-/// Returns the speed between two samples that a quarter of all pairs of samples exceed \[m/s\]; 0 for curves. Single
-/// jumps do not change it.
-pub(super) fn usual_speed_m_s(items: &[Item]) -> f64 {
-    let mut last: BTreeMap<usize, (f64, Vector3<f64>)> = BTreeMap::new();
-    let samples = items.iter().filter_map(|item| match item {
-        Item::Sample(sample) => Some((sample.vehicle, (sample.time_s, sample.position_m))),
-        Item::Piece(_) => None,
-    });
-    let speeds = samples.filter_map(|(vehicle, (time_s, position_m))| {
-        let (before_s, before_m) = last.insert(vehicle, (time_s, position_m))?;
-        Some((position_m - before_m).norm() / (time_s - before_s))
-    });
-    let mut speeds: Vec<f64> = speeds.filter(|speed| speed.is_finite()).collect();
-    speeds.sort_unstable_by(f64::total_cmp);
-    speeds.get(speeds.len() * 3 / 4).copied().unwrap_or_default()
 }

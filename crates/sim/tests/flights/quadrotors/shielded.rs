@@ -155,7 +155,7 @@ fn a_separation_is_certified_with_a_searched_tracking_error_and_assumed_with_any
     assert_eq!(changed(&|model: &mut Model| "renamed".clone_into(&mut model.name)).1, Source::Observed);
     let (headline, source, _) = checked(&builtin(SHIELDED, &["shield.tracking_error_m=0.36"]));
     assert!(source == Source::Declared && headline.contains("if the assumed tracking error"), "{headline}");
-    // Searches fly in the engine.
+    // Searches do not cover the ideal plant.
     let (headline, source, _) = checked(&builtin(SHIELDED, &["plant.kind=ideal"]));
     assert!(source == Source::Declared && headline.contains("if the assumed tracking error"), "{headline}");
     // A slower reference may accelerate more than the search did; with smaller commands it does not.
