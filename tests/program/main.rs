@@ -17,6 +17,7 @@ mod ellipsoids;
 mod exports;
 mod first_steps;
 mod fixes;
+mod golden;
 mod ground;
 mod heights;
 mod imperfections;
