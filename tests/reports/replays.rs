@@ -293,7 +293,7 @@ fn audited(folder: &Path, table: &str, more: &[&str]) -> PathBuf {
 #[test]
 fn the_state_shows_only_findings_up_to_the_current_time() {
     let folder = tempfile::tempdir().expect("a folder");
-    let (mut gap, mut leap) = ("t,id,x,y,z\n".to_owned(), "t,id,x,y,z\n".to_owned());
+    let (mut gap, mut leap) = ("t_s,id,x,y,z\n".to_owned(), "t_s,id,x,y,z\n".to_owned());
     for t in 0..=20_i32 {
         let _ = writeln!(gap, "{t},a,0,0,0\n{t},c,{},0,0", f64::from((t - 14).abs()) + 0.25);
         let _ = if (4..8).contains(&t) { Ok(()) } else { writeln!(gap, "{t},b,0,50,0") };
