@@ -140,8 +140,8 @@ impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
         self.violations.add(new)
     }
 
-    /// Adds an undecided time; adjacent undecided times of a pair are merged.
-    pub(super) fn add_undecided(&mut self, new: Undecided<P>) {
+    /// Adds an undecided time; adjacent undecided times of a pair are merged. Returns whether it continues none.
+    fn add_undecided(&mut self, new: Undecided<P>) -> bool {
         self.deciding_rate_hz = self.deciding_rate_hz.zip(new.rate_hz).map(|(a, b)| a.max(b));
         let last = self.undecided.indices_of(new.pair).last().copied();
         match last.and_then(|last| self.undecided.get_mut(last)) {
@@ -150,9 +150,11 @@ impl<P: Copy + Ord + fmt::Debug> Ledger<P> {
                 last.lower_m = last.lower_m.min(new.lower_m);
                 last.upper_m = last.upper_m.min(new.upper_m);
                 last.rate_hz = last.rate_hz.zip(new.rate_hz).map(|(a, b)| a.max(b));
+                false
             }
             _ => {
                 self.undecided.add(new);
+                true
             }
         }
     }
@@ -269,6 +271,8 @@ pub(super) struct Results {
     pub(super) obstacles: ClosestPairs,
     /// Number of pairs of segments that were swept.
     pub(super) swept: u64,
+    /// Number of undecided times of obstacles.
+    pub(super) undecided_of_obstacles: u64,
     /// Flag that stops the sweep.
     pub(super) interruption: Interruption,
 }
@@ -284,6 +288,12 @@ impl Results {
     pub(super) fn settle_and_continue(&mut self) -> bool {
         self.ledger.settle();
         !self.interruption.is_set()
+    }
+
+    /// Adds an undecided time of a pair.
+    pub(super) fn add_undecided(&mut self, new: Undecided<ObjectPair>) {
+        let is_new = self.ledger.add_undecided(new);
+        self.undecided_of_obstacles += u64::from(is_new && new.pair.vehicles().is_none());
     }
 
     /// Returns the table of closest approaches that a pair belongs to.

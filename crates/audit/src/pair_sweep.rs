@@ -280,11 +280,11 @@ impl PairSweep<'_> {
                         .add_violation(Violation { pair, from_s, to_s, min_m, min_at_s, limit_m }, from_start);
                     enter = enter.or(Some(from));
                 } else {
-                    results.ledger.add_undecided(undecided(from_s, to_s, lower(&lowest), min_m, &lowest));
+                    results.add_undecided(undecided(from_s, to_s, lower(&lowest), min_m, &lowest));
                 }
             }
         } else if lower_m < limit_m {
-            results.ledger.add_undecided(undecided(interval.from_s, interval.to_s, lower_m, upper_m, &drawn));
+            results.add_undecided(undecided(interval.from_s, interval.to_s, lower_m, upper_m, &drawn));
         }
         if self.may_violate {
             let check = cross_check(&search, &self.keep_out, &drawn, rounding);

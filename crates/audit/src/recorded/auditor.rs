@@ -102,7 +102,9 @@ impl TrackAuditor {
     /// [`push`](Self::push).
     #[must_use]
     pub fn with_smallest(mut self) -> Self {
-        self.smallest = Some(SmallestDistances::new(&self.settings));
+        let mut smallest = SmallestDistances::new(&self.settings);
+        smallest.set_interruption(self.results.interruption.clone());
+        self.smallest = Some(smallest);
         self
     }
 
@@ -316,7 +318,7 @@ impl TrackAuditor {
         if self.results.interruption.is_set() {
             return Err(RecordedError::Interrupted);
         }
-        let Results { ledger, closest, obstacles, swept, .. } = self.results;
+        let Results { ledger, closest, obstacles, swept, undecided_of_obstacles, .. } = self.results;
         let has_approach = !(closest.kept.is_empty() && obstacles.kept.is_empty());
         let alone = if obstructed || !is_separation_judged { Vec::new() } else { vehicles_without_others(&presence) };
         let decided = has_approach && ledger.is_decided() && is_gapless && contradiction.is_none();
@@ -350,6 +352,7 @@ impl TrackAuditor {
             undecided,
             gaps,
             tallies,
+            undecided_of_obstacles,
             deciding_rate_hz,
             alone,
             contradiction,

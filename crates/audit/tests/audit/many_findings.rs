@@ -8,10 +8,10 @@ use std::time::{Duration, Instant};
 use nalgebra::Vector3;
 use tautline_audit::envelope::{Envelope, Fence, Limit, Quantity};
 use tautline_audit::recorded::{Interpolation, Outcome, RecordedError, Settings, TrackAuditor, audit};
-use tautline_audit::{LISTED, Status};
+use tautline_audit::{LISTED, Obstacle, Shape, Status};
 use tautline_core::track::{Item, Piece, Sample};
 
-use crate::recorded::seen;
+use crate::recorded::{obstacle_at, seen};
 
 fn numbered(count: usize) -> Vec<String> {
     (1..=count).map(|k| k.to_string()).collect()
@@ -201,4 +201,23 @@ fn an_interruption_stops_any_sweep_soon() {
     let settings = Settings { envelope: Envelope { limits: Vec::new(), fence }, ..Settings::default() };
     let of_fence = time_to_stop(&numbered(1), &along, settings);
     assert!(of_fence < max_delay, "a fence: {of_fence:?}");
+}
+
+#[test]
+fn undecided_times_of_obstacles_are_counted_apart() {
+    // Vehicles far from each other, whose bounded motion may take them below the clearance above the ground.
+    let count = 2600;
+    let at = |k: usize, t_s: f64| seen(k, t_s, [50.0 * k as f64, 0.0, 1.001]);
+    let items: Vec<_> = [0.0, 1.0].iter().flat_map(|&t_s| (0..count).map(move |k| at(k, t_s))).collect();
+    let ground = obstacle_at(Shape::HalfSpace { normal: Vector3::z() }, [0.0; 3]);
+    let settings = Settings {
+        motion: Some(Interpolation::Bounded),
+        max_accel_m_s2: Some(1.0),
+        obstacles: vec![Obstacle { clearance_m: Some(1.0), ..ground }],
+        ..Settings::delta(1.0)
+    };
+    let outcome = judge(count, &items, settings);
+    let tally = outcome.tallies.undecided;
+    assert!(outcome.status == Status::Undecided && tally.listed < count, "{tally:?}");
+    assert_eq!((tally.count, outcome.undecided_of_obstacles), (count as u64, count as u64));
 }

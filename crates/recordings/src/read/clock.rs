@@ -609,13 +609,16 @@ mod tests {
         for (start, step, other) in
             [(1_500_000_000, 10, "ms"), (1_500_000_000_000, 10_000, "us"), (1_500_000_000_000_000, 10_000_000, "ns")]
         {
-            let row = |k: i64| (0..6).map(move |vehicle| (start + step * k + step / 8 * vehicle, vehicle as usize));
+            let row = |k: i64| {
+                (0_u8..6).map(move |vehicle| (start + step * k + step / 8 * i64::from(vehicle), vehicle.into()))
+            };
             let clock = clock_of((0..50).flat_map(row));
             assert_eq!(clock.other_unit, Some(other), "{clock:?}");
         }
         // Unix times at 1 Hz with a gap, of 20 vehicles one after another over a day.
-        let blocks = (0..20).flat_map(|vehicle| {
-            (0..100).map(move |k| (1_700_000_000 + 4000 * vehicle + k + if k > 50 { 700 } else { 0 }, vehicle as usize))
+        let blocks = (0_u8..20).flat_map(|vehicle| {
+            let start = 1_700_000_000 + 4000 * i64::from(vehicle);
+            (0..100).map(move |k| (start + k + if k > 50 { 700 } else { 0 }, vehicle.into()))
         });
         let clock = clock_of(blocks);
         assert_eq!((clock.unit, clock.other_unit), ("s", None));

@@ -298,7 +298,7 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
         joined.push(JoinedFile { path, tracks, shift_s, waiting, until_s: f64::NEG_INFINITY });
     }
     let assumed = joined.iter().find_map(|part| part.tracks.assumed()).map(str::to_owned);
-    let earth_origin = joined.iter().find_map(|part| part.tracks.earth_origin()).cloned();
+    let earth_origin = joined.iter().find_map(|part| part.tracks.earth_origin()).copied();
     let metadata = Metadata { clock, notes, facts, assumed, is_planar, earth_origin, ..Metadata::default() };
     Ok(Box::new(Joined { vehicles, parts: joined, metadata }))
 }

@@ -141,11 +141,11 @@ impl<Delta> Separation<Delta> {
     }
 }
 
-/// Findings of the audit.
+/// Findings of the audit. `S` is [`Status`], or an optional one where separations may not be asked.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Audit {
+pub struct Audit<S = Status> {
     /// Status of separations and obstacles, the worse of the two. At best undecided if the flight ended early.
-    pub status: Status,
+    pub status: S,
     /// Intervals in which a pair was below delta.
     pub violations: Vec<Violation>,
     /// Number of undecided times of pairs, counted beside violations too.

@@ -76,9 +76,9 @@ pub enum Basis {
 /// Findings of the audit of a recording: the keys of a flight's `audit`, and whether the verdict is proved.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct RecordedAudit {
-    /// Keys of a flight.
+    /// Keys of a flight. The status is null if only limits of single vehicles were asked.
     #[serde(flatten)]
-    pub flight: Audit,
+    pub flight: Audit<Option<Status>>,
     /// Whether the verdict is clear without an assumption about the time between samples.
     pub proved: bool,
     /// Whether the verdict is clear by the run's audit of every step, which the recording holds.
@@ -149,9 +149,6 @@ pub struct RecordedReport {
     /// Reason why the run's own audit does not decide the question.
     #[serde(skip)]
     pub run_objection: Option<String>,
-    /// Whether separations are judged, not limits of single vehicles alone.
-    #[serde(skip)]
-    pub(super) separation_asked: bool,
     /// Whether everything beyond the listed findings is decided.
     #[serde(skip)]
     pub(super) is_else_known: bool,
@@ -281,15 +278,13 @@ impl RecordedReport {
             },
             audit: RecordedAudit {
                 flight: Audit {
-                    status: outcome.separation.unwrap_or_default(),
+                    status: outcome.separation,
                     violations: outcome
                         .violations
                         .iter()
                         .filter_map(|v| Some(flight::Violation::new(v.pair.vehicles()?, v)))
                         .collect(),
-                    undecided: outcome.tallies.undecided.count.saturating_sub(
-                        outcome.undecided.iter().filter(|of| of.pair.vehicles().is_none()).count() as u64,
-                    ),
+                    undecided: outcome.tallies.undecided.count - outcome.undecided_of_obstacles,
                     steps: outcome.segments,
                     pairs_checked: outcome.swept,
                     closed_form: ClosedForm { min_m },
@@ -317,7 +312,6 @@ impl RecordedReport {
             until_then: None,
             is_decimal_tie: false,
             run_objection: None,
-            separation_asked: outcome.separation.is_some(),
             is_else_known: outcome.is_else_known,
             gaps: outcome.gaps.iter().map(|gap| VehicleFinding::new(outcome, gap.vehicle, *gap)).collect(),
             alone: alone.collect(),
@@ -331,7 +325,7 @@ impl RecordedReport {
     pub fn with_early_end(mut self, end: EarlyEnd) -> Self {
         self.until_then = (self.status == Status::Clear).then(|| self.headline());
         self.status = self.status.and(Status::Undecided);
-        self.audit.flight.status = self.audit.flight.status.and(Status::Undecided);
+        self.audit.flight.status = self.audit.flight.status.map(|status| status.and(Status::Undecided));
         self.audit.proved = false;
         for limit in &mut self.limits {
             limit.status = limit.status.and(Status::Undecided);
@@ -352,7 +346,7 @@ impl RecordedReport {
     /// Returns the status of separations alone; `None` if only limits of single vehicles were judged.
     #[must_use]
     pub fn separation(&self) -> Option<Status> {
-        self.separation_asked.then_some(self.audit.flight.status)
+        self.audit.flight.status
     }
 
     /// Returns the report as indented JSON with a final line break.

@@ -75,7 +75,7 @@ impl RecordedReport {
         let limits = self.limits.iter().filter(decides).map(LimitFindings::brief);
         let well_clear = self.well_clear.iter().filter(|found| found.status == self.status);
         let limits = limits.chain(well_clear.map(WellClearFindings::brief));
-        let of_pairs = self.separation_asked && self.audit.flight.status == self.status;
+        let of_pairs = self.audit.flight.status == Some(self.status);
         let exempt = self.exemption.as_ref().map(Exemption::words);
         let in_plane = self.source.planar.then(|| "in the plane of x and y: no heights are known".to_owned());
         let pairs = of_pairs.then(|| self.finding_of_pairs());
