@@ -2,6 +2,8 @@
 //!
 //! `golden.txt` holds a line for each command. `TAUTLINE_WRITE_GOLDEN=1` writes it again. A difference needs a reason.
 
+#![allow(clippy::format_collect)]
+
 use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
@@ -19,6 +21,102 @@ const FENCE: &str = "[fence]\npolygon_m = [[-12, -12], [12, -12], [12, 12], [-12
 
 /// Number of random recordings.
 const RECORDINGS: u64 = 8;
+
+/// Scenarios that are checked and flown.
+const FLIGHTS: &[&str] = &[
+    "pentagon --set time.duration_s=20",
+    "pentagon-laplacian --set time.duration_s=20",
+    "pentagon-collinear --set time.duration_s=20",
+    "pentagon-leader --set time.duration_s=10",
+    "leader-lossy",
+    "swap",
+    "obstacles --set time.duration_s=15",
+    "obstacles --set law.kind=laplacian --set time.duration_s=15",
+    "crazyflies --set time.duration_s=4",
+    "shielded-crazyflies --set time.duration_s=4",
+    "shielded-crazyflies --set shield.tracking_error_m=0.01 --set time.duration_s=4",
+    "gusts",
+    "hexagon --set plant.kind=ideal --set time.duration_s=5",
+    "hexagon --set time.dt_s=0.2 --set time.duration_s=5",
+    "swap --set law.kind=cbf-qp --set time.duration_s=8",
+    "swap --set law.kind=orca --set time.duration_s=8",
+    "swap --set law.kind=flocking --set time.duration_s=8",
+    "swap --set law.kind=potential --set time.duration_s=8",
+    "swap --set law.kind=laplacian --set shield.enabled=true --set time.duration_s=8",
+    "swap --set vehicle.model=unicycle --set time.duration_s=8",
+    "swap --set law.delta_m=9",
+];
+
+/// Questions to each random recording.
+const QUESTIONS: &[&str] = &[
+    "--delta 0.5",
+    "--delta 1",
+    "--delta 3",
+    "--delta 1 --motion bounded --max-accel 2",
+    "--delta 1 --motion hold",
+    "--delta 1 --max-gap 1 --require-presence",
+    "--delta 1 --limit speed=2,climb=1",
+    "--delta 1 --fence fence.toml --obstacles obstacles.toml",
+    "--ellipsoid 0.5,0.5,1",
+    "--cylinder 1,2",
+    "--delta 1 --from 2 --to 6",
+    "--delta 1 --above 0.5",
+    "--delta 1 --allow-undecided --max-gap 1",
+];
+
+/// Recordings with their questions.
+const AUDITS: &[&str] = &[
+    "touch.csv --delta 1",
+    "touch.csv --delta 1.0000000001",
+    "near.csv --delta 1 --independent",
+    "far.csv --delta 1 --obstacles truck.toml",
+    "far.csv --delta 1 --obstacles obstacles.toml",
+    "pass.csv --delta 1",
+    "pass.csv --delta 1.000001",
+    "pass.csv --delta 0.5 --limit speed=1",
+    "pass.csv --limit speed=1",
+    "pass.csv --limit speed=3",
+    "pass.csv --radius 0.3",
+    "pass.csv --well-clear 5,5,35",
+    "pass.csv --delta 0.9 --offset bravo=0.4",
+    "pass.csv --delta 1 --ids alpha",
+    "late.csv --delta 1 --require-presence",
+    "late.csv --delta 1 --expect-vehicles 4",
+    "late.csv --delta 1 --expect-vehicles 3",
+    "gap.csv --delta 0.5",
+    "gap.csv --delta 0.5 --max-gap 0.6",
+    "gap.csv --delta 0.5 --motion bounded --max-accel 0.1",
+    "alone.csv --delta 1",
+    "backwards.csv --delta 1",
+    "guess.csv --delta 1",
+    "guess.csv --delta 1 --limit speed=5",
+    "plane.csv --delta 1",
+    "plane.csv --delta 1 --limit climb=1",
+    "pass.csv",
+    "none.csv --delta 1",
+    "pass.csv near.csv far.csv --delta 1",
+    "pass.csv backwards.csv --delta 1",
+    "out/pentagon",
+    "out/pentagon --independent",
+    "out/pentagon --delta 2.5",
+    "out/pentagon-laplacian",
+    "out/pentagon-collinear",
+    "out/leader-lossy",
+    "out/swap",
+    "out/obstacles",
+    "out/obstacles --independent",
+    "out/crazyflies",
+    "out/hexagon",
+    "out/gusts --to 2",
+];
+
+/// Studies.
+const STUDIES: &[&str] = &[
+    "compare swap --runs 1 --set time.duration_s=8 --json -",
+    "sweep pentagon --key law.alpha=0.5,1 --runs 1 --set time.duration_s=8 --json -",
+    "attack pentagon-laplacian --start 0.1 --flights 4 --set time.duration_s=6 --json -",
+    "margin swap --key law.delta_m --from 0.5 --to 1.5 --scan 2 --halvings 1 --runs 1 --set time.duration_s=8 --json -",
+];
 
 /// `SplitMix64` (Steele, Lea, Flood 2014): the same recordings on every machine.
 struct Random(u64);
@@ -86,111 +184,14 @@ fn files() -> Vec<(String, String)> {
 
 /// Commands of the corpus. Flights come first: audits read their recordings.
 fn commands() -> Vec<String> {
-    let mut commands = Vec::new();
-    let mut add = |command: String| commands.push(command);
-    for flight in [
-        "pentagon --set time.duration_s=20",
-        "pentagon-laplacian --set time.duration_s=20",
-        "pentagon-collinear --set time.duration_s=20",
-        "pentagon-leader --set time.duration_s=10",
-        "leader-lossy",
-        "swap",
-        "obstacles --set time.duration_s=15",
-        "obstacles --set law.kind=laplacian --set time.duration_s=15",
-        "crazyflies --set time.duration_s=4",
-        "shielded-crazyflies --set time.duration_s=4",
-        "shielded-crazyflies --set shield.tracking_error_m=0.01 --set time.duration_s=4",
-        "gusts",
-        "hexagon --set plant.kind=ideal --set time.duration_s=5",
-        "hexagon --set time.dt_s=0.2 --set time.duration_s=5",
-        "swap --set law.kind=cbf-qp --set time.duration_s=8",
-        "swap --set law.kind=orca --set time.duration_s=8",
-        "swap --set law.kind=flocking --set time.duration_s=8",
-        "swap --set law.kind=potential --set time.duration_s=8",
-        "swap --set law.kind=laplacian --set shield.enabled=true --set time.duration_s=8",
-        "swap --set vehicle.model=unicycle --set time.duration_s=8",
-        "swap --set law.delta_m=9",
-    ] {
-        add(format!("run {flight} --force --json"));
-        add(format!("check {} --json", flight.replace(" --force", "")));
-    }
-    for delta in [0.5, 1.0, 3.0] {
-        for k in 0..RECORDINGS {
-            add(format!("audit r{k}.csv --delta {delta} --json"));
-        }
-    }
-    for k in 0..RECORDINGS {
-        for asked in [
-            "--delta 1 --motion bounded --max-accel 2",
-            "--delta 1 --motion hold",
-            "--delta 1 --max-gap 1 --require-presence",
-            "--delta 1 --limit speed=2,climb=1",
-            "--delta 1 --fence fence.toml --obstacles obstacles.toml",
-            "--ellipsoid 0.5,0.5,1",
-            "--cylinder 1,2",
-            "--delta 1 --from 2 --to 6",
-            "--delta 1 --above 0.5",
-            "--delta 1 --allow-undecided --max-gap 1",
-        ] {
-            add(format!("audit r{k}.csv {asked} --json"));
-        }
-        add(format!("audit r{k}.csv --plan r{k}.csv --plan-delay 0.1 --tube 0.25 --json"));
-    }
-    for asked in [
-        "touch.csv --delta 1",
-        "touch.csv --delta 1.0000000001",
-        "near.csv --delta 1 --independent",
-        "far.csv --delta 1 --obstacles truck.toml",
-        "far.csv --delta 1 --obstacles obstacles.toml",
-        "pass.csv --delta 1",
-        "pass.csv --delta 1.000001",
-        "pass.csv --delta 0.5 --limit speed=1",
-        "pass.csv --limit speed=1",
-        "pass.csv --limit speed=3",
-        "pass.csv --radius 0.3",
-        "pass.csv --well-clear 5,5,35",
-        "pass.csv --delta 0.9 --offset bravo=0.4",
-        "pass.csv --delta 1 --ids alpha",
-        "late.csv --delta 1 --require-presence",
-        "late.csv --delta 1 --expect-vehicles 4",
-        "late.csv --delta 1 --expect-vehicles 3",
-        "gap.csv --delta 0.5",
-        "gap.csv --delta 0.5 --max-gap 0.6",
-        "gap.csv --delta 0.5 --motion bounded --max-accel 0.1",
-        "alone.csv --delta 1",
-        "backwards.csv --delta 1",
-        "guess.csv --delta 1",
-        "guess.csv --delta 1 --limit speed=5",
-        "plane.csv --delta 1",
-        "plane.csv --delta 1 --limit climb=1",
-        "pass.csv",
-        "none.csv --delta 1",
-        "pass.csv near.csv far.csv --delta 1",
-        "pass.csv backwards.csv --delta 1",
-        "out/pentagon",
-        "out/pentagon --independent",
-        "out/pentagon --delta 2.5",
-        "out/pentagon-laplacian",
-        "out/pentagon-collinear",
-        "out/leader-lossy",
-        "out/swap",
-        "out/obstacles",
-        "out/obstacles --independent",
-        "out/crazyflies",
-        "out/hexagon",
-        "out/gusts --to 2",
-    ] {
-        add(format!("audit {asked} --json"));
-    }
-    for study in [
-        "compare swap --runs 1 --set time.duration_s=8 --json -",
-        "sweep pentagon --key law.alpha=0.5,1 --runs 1 --set time.duration_s=8 --json -",
-        "attack pentagon-laplacian --start 0.1 --flights 4 --set time.duration_s=6 --json -",
-        "margin swap --key law.delta_m --from 0.5 --to 1.5 --scan 2 --halvings 1 --runs 1 --set time.duration_s=8 --json -",
-    ] {
-        add(study.to_owned());
-    }
-    commands
+    let both = |flight: &&str| [format!("run {flight} --force --json"), format!("check {flight} --json")];
+    let random = (0..RECORDINGS).flat_map(|k| {
+        let asked = QUESTIONS.iter().map(move |asked| format!("audit r{k}.csv {asked} --json"));
+        asked.chain([format!("audit r{k}.csv --plan r{k}.csv --plan-delay 0.1 --tube 0.25 --json")])
+    });
+    let audits = AUDITS.iter().map(|asked| format!("audit {asked} --json"));
+    let studies = STUDIES.iter().map(|study| (*study).to_owned());
+    FLIGHTS.iter().flat_map(both).chain(random).chain(audits).chain(studies).collect()
 }
 
 /// Returns what decides about a report: each statement by its path, without texts, lists and measured numbers.
