@@ -185,7 +185,8 @@ pub struct Outcome {
     pub deciding_rate_hz: Option<f64>,
     /// Numbers of findings.
     pub tallies: Tallies,
-    /// Number of undecided times of obstacles, which [`Tallies::undecided`] counts too.
+    /// Number of undecided times of obstacles, which [`Tallies::undecided`] counts too; an upper bound if that tally is
+    /// not exact.
     pub undecided_of_obstacles: u64,
     /// Listed gaps in order of time; [`Tallies`] counts all. A gap counts if another vehicle or an obstacle is present,
     /// or if limits of single vehicles are judged. The motion in a gap is not known.

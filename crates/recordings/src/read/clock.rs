@@ -485,7 +485,7 @@ pub(super) fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<T
             None => Ok(None),
             Some((_, unit)) => {
                 let problem = format!("column {} is in {} by its name, but another unit is given", quoted(name), unit);
-                let remedy = "omit --time-unit, --fps and --time-scale, or rename the column if its name is wrong";
+                let remedy = "leave the unit to the name, or rename the column if its name is wrong";
                 Err(Fault::coded("recording/unit-conflict", problem, remedy))
             }
         };
@@ -498,7 +498,7 @@ pub(super) fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<T
     let Some(unit) = heading::unit_of_time_name(name).filter(|unit| !is_zone(unit)) else { return Ok(None) };
     TimeUnit::from_name(&unit).map(Some).ok_or_else(|| {
         let problem = format!("column {} has an unknown unit of time, {}", quoted(name), quoted(&unit));
-        let remedy = "set its length in seconds with --time-scale, such as 60 for minutes";
+        let remedy = "give the length of the unit in seconds, such as 60 for minutes";
         Fault::coded("recording/unknown-unit", problem, remedy)
     })
 }

@@ -103,7 +103,7 @@ pub fn open_plan(path: &Path, of_flight: Option<&EarthOrigin>) -> Result<Recordi
             (Some(_), None) => ON_EARTH,
             (None, Some(origin)) if origin.is_inferred => (
                 "the plan is in metres, but the flight has places on the Earth and no origin is given",
-                "give the origin of plan and flight with --origin LAT,LON,HEIGHT",
+                "give the origin of plan and flight: latitude, longitude and height",
             ),
             _ => return Ok(plan),
         },

@@ -324,13 +324,13 @@ impl Scenes {
         }
         let rate = fps * self.step as f64;
         let states = format!("its scenes state {fps} positions per second, and frames have steps of {}", self.step);
-        let remedy = format!("give --fps {rate}");
+        let remedy = format!("give a rate of {rate} frames per second");
         let Some(given) = options.times_per_second.or(options.time_unit.map(|unit| unit.per_second() as f64)) else {
             return refuse("recording/frames", format!("its times are the numbers of frames; {states}"), remedy);
         };
-        let is = |other: f64| (given / other - 1.0).abs() <= ROUNDING;
+        let equals = |other: f64| (given / other - 1.0).abs() <= ROUNDING;
         let parts = (rate / given).round();
-        if is(rate) || (parts > 1.0 && is(rate / parts) && !is(fps)) {
+        if equals(rate) || (parts > 1.0 && equals(rate / parts) && !equals(fps)) {
             return Ok(());
         }
         refuse("recording/unit-conflict", format!("{states}, but {given} frames per second are given"), remedy)

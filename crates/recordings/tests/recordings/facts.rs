@@ -741,7 +741,7 @@ fn trajnet_scenes_hold_no_positions() {
     assert_eq!(found.samples()[2], (0.8, "1", [2.5, 2.0, 0.0]));
     has(&facts("biwi.ndjson", text.as_bytes(), &rate), ["time-unit", "declared", "0.04 s"]);
     // Scenes state positions per second; `--fps` is frames per second.
-    assert!(error.help().contains("--fps 25"), "{error} {}", error.help());
+    assert!(error.help().contains("25 frames per second"), "{error} {}", error.help());
     let wrong = ReadOptions { times_per_second: Some(2.5), ..usual() };
     let error = read_bytes("biwi.ndjson", text.as_bytes(), &wrong).expect_err("another rate");
     assert_refused(&error, "recording/unit-conflict", "");

@@ -284,7 +284,9 @@ impl RecordedReport {
                         .iter()
                         .filter_map(|v| Some(flight::Violation::new(v.pair.vehicles()?, v)))
                         .collect(),
-                    undecided: outcome.tallies.undecided.count - outcome.undecided_of_obstacles,
+                    // A bounded list may find a time of an obstacle again. The difference is then a lower bound, as the
+                    // tally is.
+                    undecided: outcome.tallies.undecided.count.saturating_sub(outcome.undecided_of_obstacles),
                     steps: outcome.segments,
                     pairs_checked: outcome.swept,
                     closed_form: ClosedForm { min_m },

@@ -52,7 +52,8 @@ pub(super) fn refuse_changed_positions(request: &AuditRequest<'_>) -> Result<(),
     if !options.changes_positions() {
         return Ok(());
     }
-    let message = format!("{}: --axes and --scale change only the positions of the flight", plan.path.display());
+    let message =
+        format!("{}: other axes or another scale would change only the positions of the flight", plan.path.display());
     let help = "export flight and plan with these options, and compare the exported files";
     Err(Failure::input("audit/plan-frame", message, help))
 }
