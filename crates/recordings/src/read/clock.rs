@@ -498,7 +498,7 @@ pub(super) fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<T
     let Some(unit) = heading::unit_of_time_name(name).filter(|unit| !is_zone(unit)) else { return Ok(None) };
     TimeUnit::from_name(&unit).map(Some).ok_or_else(|| {
         let problem = format!("column {} has an unknown unit of time, {}", quoted(name), quoted(&unit));
-        let remedy = "give the length of the unit in seconds, such as 60 for minutes";
+        let remedy = "set its length in seconds with --time-scale, such as 60 for minutes";
         Fault::coded("recording/unknown-unit", problem, remedy)
     })
 }
