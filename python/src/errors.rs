@@ -8,8 +8,6 @@ use tautline::request::Failure;
 use tautline::scenario::ScenarioError;
 use tautline::sim::SimError;
 
-use crate::words::in_python;
-
 create_exception!(
     tautline,
     Error,
@@ -42,7 +40,7 @@ pub(crate) trait IntoException {
 
 impl IntoException for Failure {
     fn into_exception(self) -> PyErr {
-        let text = in_python(&self.to_string(), Some(self.code()));
+        let text = self.to_string();
         let is_of_system = self.is_machine() || self.code() == "files/no-folder";
         with_code(if is_of_system { PyOSError::new_err(text) } else { wrong_input(text) }, self.code())
     }
@@ -62,7 +60,7 @@ fn with_code(error: PyErr, code: &str) -> PyErr {
 
 impl IntoException for ScenarioError {
     fn into_exception(self) -> PyErr {
-        with_code(wrong_input(in_python(&self.to_string(), Some(self.code()))), self.code())
+        with_code(wrong_input(self.to_string()), self.code())
     }
 }
 

@@ -13,6 +13,7 @@ mod history;
 mod law;
 mod numbers;
 mod observation;
+mod options;
 mod program;
 mod read;
 mod request;
@@ -21,7 +22,6 @@ mod shield;
 mod simulation;
 mod studies;
 mod vector;
-mod words;
 mod work;
 
 use pyo3::prelude::*;
@@ -55,13 +55,14 @@ mod _native {
     use super::vector::VectorSimulation;
 
     #[pymodule_export]
-    use super::words::{in_python, separation_text};
+    use super::numbers::separation_text;
 
     /// Initialises the module. Campaigns record the hash of this library as their program, not that of the interpreter.
     #[pymodule_init]
     fn init(module: &pyo3::Bound<'_, pyo3::types::PyModule>) -> pyo3::PyResult<()> {
         use pyo3::types::PyAnyMethods as _;
         crate::work::remember_process();
+        tautline::option::spell_with(crate::options::as_argument);
         // Errors that are raised in Python have no code.
         module.getattr("Error")?.setattr("code", module.py().None())?;
         let origin: std::path::PathBuf = module.getattr("__spec__")?.getattr("origin")?.extract()?;

@@ -77,3 +77,9 @@ pub(crate) fn vectors(py: Python<'_>, numbers: Vec<f64>) -> PyResult<Bound<'_, P
 pub(crate) fn cube<T: Element>(py: Python<'_>, numbers: Vec<T>, shape: [usize; 3]) -> PyResult<Bound<'_, PyArray3<T>>> {
     PyArray1::from_vec(py, numbers).reshape(shape)
 }
+
+/// Returns a separation [m] with at most six decimals, rounded down.
+#[pyfunction]
+pub(crate) fn separation_text(distance_m: f64) -> String {
+    tautline::text::at_least(distance_m, 6)
+}

@@ -15,7 +15,6 @@ use crate::errors::{IntoException as _, internal_error, wrong_input, wrong_input
 use crate::numbers::shape_text;
 use crate::scenario::Scenario;
 use crate::simulation::Simulation;
-use crate::words::in_python;
 use crate::work::{ProcessPool, Signals, run_detached};
 
 /// Worlds in progress, and the arrays that hold their states.
@@ -322,9 +321,7 @@ fn copied<T: Element + Copy + Into<f64>>(given: &Bound<'_, PyAny>) -> PyResult<V
 fn raised(error: VectorError) -> PyErr {
     let text = error.to_string();
     match error {
-        VectorError::Seed { why, .. } | VectorError::NoSeed { why, .. } => {
-            wrong_input_with_code(why.code(), in_python(&text, Some(why.code())))
-        }
+        VectorError::Seed { why, .. } | VectorError::NoSeed { why, .. } => wrong_input_with_code(why.code(), text),
         VectorError::Sim(why) => why.into_exception(),
         _ => wrong_input(text),
     }

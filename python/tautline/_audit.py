@@ -83,8 +83,7 @@ class Audit:
     def _of(cls, outcome: Outcome, repeat: Callable[..., Outcome]) -> Audit:
         """Returns the audit with this outcome; ``repeat`` repeats it."""
         audit = cls.__new__(cls)
-        audit.verdict, audit.headline, text, audit._json = outcome
-        audit.text = _native.in_python(text)
+        audit.verdict, audit.headline, audit.text, audit._json = outcome
         audit._repeat = repeat
         return audit
 
@@ -188,7 +187,7 @@ class Audit:
     @property
     def notes(self) -> list[str]:
         """Notes on how the recording was read, a sentence each."""
-        return [_native.in_python(note) for note in self._report["notes"]]
+        return list(self._report["notes"])
 
     def to_dict(self) -> dict[str, Any]:
         """Returns the JSON report as a dictionary."""

@@ -24,7 +24,6 @@ __all__ = [
     "compare",
     "export",
     "fly",
-    "in_python",
     "main",
     "margin",
     "proportion",
@@ -415,7 +414,6 @@ def export(
 def fly(
     scenario: Scenario, law: object | None, record: str | None, html: str | None, command: str, keep: bool
 ) -> FlightData: ...
-def in_python(text: str, code: str | None = None) -> str: ...
 def main(arguments: Sequence[str]) -> int: ...
 def margin(
     scenario: Scenario,

@@ -52,7 +52,7 @@ class Recording(Table):
     @property
     def notes(self) -> list[str]:
         """Notes on how the recording was read, a sentence each."""
-        return [_native.in_python(note) for note in self._data.notes]
+        return list(self._data.notes)
 
     @property
     def is_planar(self) -> bool:

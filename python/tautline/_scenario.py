@@ -199,8 +199,7 @@ class Check:
 
     def __init__(self, found: tuple[bool, str, str, str]) -> None:
         #: Whether the check does not refuse the flight.
-        self.is_good, self.headline, text, self._json = found
-        self.text = _native.in_python(text)
+        self.is_good, self.headline, self.text, self._json = found
         self._found: dict[str, Any] = json.loads(self._json)
 
     @property

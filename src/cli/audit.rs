@@ -424,7 +424,7 @@ impl AuditArguments {
     /// Returns the output files that cover all recordings, with their options.
     pub(super) fn outputs(&self) -> Vec<NamedPath<'_>> {
         let outputs = [("--events", &self.events), ("--junit", &self.junit), ("--summary", &self.summary)];
-        outputs.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?))).collect()
+        outputs.into_iter().filter_map(|(option, path)| Some((option.to_owned(), path.as_deref()?))).collect()
     }
 }
 

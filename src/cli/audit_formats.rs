@@ -6,10 +6,8 @@ use quick_junit::{NonSuccessKind, Report, TestCase, TestCaseStatus, TestSuite};
 
 use super::audit::Answer;
 use tautline_core::text::{beside_limit, counted, fixed};
-use tautline_report::report::Status;
-use tautline_report::report::recorded::{
-    LimitFindings, PairFinding, RecordedReport, VehicleFinding, WellClearFindings,
-};
+use tautline_report::report::recorded::{RecordedReport, VehicleFinding};
+use tautline_report::report::{Answer as PartAnswer, Enclosure, Finding, Part, Status};
 use tautline_report::request::{AuditedRecording, Failure};
 
 const COLUMNS: [&str; 10] =
@@ -33,27 +31,19 @@ pub(super) fn csv(answers: &[Answer], named: bool) -> Result<Vec<u8>, Failure> {
         .map_err(|error| Failure::machine("files/cannot-write", format!("cannot write the events: {error}")))
 }
 
+/// Time span, words and numbers of a row.
+type Row = ([f64; 2], [String; 3], [Option<f64>; 5]);
+
 /// Returns the rows of one recording.
 fn rows(report: &RecordedReport) -> impl Iterator<Item = Vec<String>> {
-    let violations = report.violations.iter().map(|PairFinding { who: [first, second], finding: v }| {
-        let numbers = [Some(v.min_m), Some(v.min_m), Some(v.min_at_s), Some(v.limit_m), None];
-        ("violation", [first.as_str(), second], [v.from_s, v.to_s], numbers)
-    });
-    let undecided = report.undecided.iter().map(|PairFinding { who: [first, second], finding: u }| {
-        let numbers = [Some(u.lower_m), Some(u.upper_m), None, Some(u.limit_m), u.rate_hz];
-        ("undecided", [first.as_str(), second], [u.from_s, u.to_s], numbers)
-    });
     let gaps = report.gaps.iter().map(|VehicleFinding { vehicle, finding: gap }| {
-        ("gap", [vehicle.as_str(), ""], [gap.from_s, gap.to_s], [None; 5])
+        ([gap.from_s, gap.to_s], ["gap".to_owned(), vehicle.clone(), String::new()], [None; 5])
     });
-    let early_end =
-        report.ended_early.iter().map(|end| ("ended-early", ["", ""], [end.at_s, end.duration_s], [None; 5]));
-    let rows = violations.chain(undecided).chain(gaps).chain(early_end).map(|(kind, who, span_s, numbers)| {
-        let words = [kind].into_iter().chain(who).map(str::to_owned);
-        (span_s, words.collect::<Vec<_>>(), numbers)
-    });
-    let rows = rows.chain(report.limits.iter().flat_map(beyond)).chain(from_plan(report));
-    let mut rows: Vec<_> = rows.chain(report.well_clear.iter().flat_map(not_well_clear)).collect();
+    let early_end = report
+        .ended_early
+        .iter()
+        .map(|end| ([end.at_s, end.duration_s], ["ended-early", "", ""].map(str::to_owned), [None; 5]));
+    let mut rows: Vec<Row> = report.answers().iter().flat_map(rows_of_part).chain(gaps).chain(early_end).collect();
     rows.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
     rows.into_iter().map(|(span_s, words, numbers)| {
         let numbers = span_s.map(Some).into_iter().chain(numbers).map(|x| x.map_or_else(String::new, number));
@@ -61,48 +51,22 @@ fn rows(report: &RecordedReport) -> impl Iterator<Item = Vec<String>> {
     })
 }
 
-/// Time span, words and numbers of a row.
-type Row = ([f64; 2], Vec<String>, [Option<f64>; 5]);
-
-/// Returns the rows of a limit of single vehicles; the name of the limit is in the column of the second vehicle.
-fn beyond(limit: &LimitFindings) -> impl Iterator<Item = Row> + '_ {
-    let violations = limit.violations.iter().map(|of| ("violation", of));
-    let undecided = limit.undecided.iter().map(|of| ("undecided", of));
-    violations.chain(undecided).map(|(kind, VehicleFinding { vehicle, finding })| {
-        let words = vec![kind.to_owned(), vehicle.clone(), limit.quantity.to_owned()];
-        let numbers = [Some(finding.lower), Some(finding.upper), Some(finding.at_s), Some(limit.allowed), None];
-        ([finding.from_s, finding.to_s], words, numbers)
-    })
-}
-
-/// Returns the rows of distances beyond the tube around the plan, and of times in which a distance is not known. The
-/// second name is `plan`.
-fn from_plan(report: &RecordedReport) -> impl Iterator<Item = Row> + '_ {
-    report.plan.iter().flat_map(|plan| {
-        let words = |kind: &str, vehicle: &str| [kind, vehicle, "plan"].map(str::to_owned).to_vec();
-        let beyond = plan.vehicles.iter().filter_map(move |VehicleFinding { vehicle, finding }| {
-            let kind =
-                if plan.tube_m.is_some_and(|tube_m| finding.lower_m > tube_m) { "violation" } else { "undecided" };
-            let numbers = [Some(finding.lower_m), Some(finding.upper_m), Some(finding.at_s), plan.tube_m, None];
-            let is_beyond = plan.tube_m.is_some_and(|tube_m| finding.upper_m > tube_m);
-            is_beyond.then(|| ([finding.at_s; 2], words(kind, vehicle), numbers))
-        });
-        let unknown = plan.unknown.iter().map(move |VehicleFinding { vehicle, finding }| {
-            ([finding.from_s, finding.to_s], words("undecided", vehicle), [None, None, None, plan.tube_m, None])
-        });
-        beyond.chain(unknown)
-    })
-}
-
-/// Returns the rows of losses of well clear, with horizontal distances.
-fn not_well_clear(found: &WellClearFindings) -> impl Iterator<Item = Row> + '_ {
-    let violations = found.violations.iter().map(|of| ("not-well-clear", of));
-    let undecided = found.undecided.iter().map(|of| ("undecided", of));
-    violations.chain(undecided).map(|(kind, PairFinding { who: [first, second], finding })| {
-        let words = vec![kind.to_owned(), first.clone(), second.clone()];
-        let (distance, limit) = (Some(finding.horizontal_m), Some(found.horizontal_m));
-        ([finding.from_s, finding.to_s], words, [distance, distance, None, limit, None])
-    })
+/// Returns the rows of violations and undecided times of a part. A finding on one vehicle has the name of the part in
+/// the column of the second vehicle.
+fn rows_of_part(answer: &PartAnswer) -> Vec<Row> {
+    let beyond = if answer.part == Part::WellClear { "not-well-clear" } else { "violation" };
+    let violations = answer.violations.listed.iter().map(|finding| (beyond, finding));
+    let undecided = answer.undecided.listed.iter().map(|finding| ("undecided", finding));
+    let row = |(kind, finding): (&str, &Finding)| {
+        let span_s = finding.from_s.zip(finding.to_s).or(finding.at_s.map(|at_s| (at_s, at_s)))?;
+        let mut subjects = finding.subjects.iter().cloned();
+        let first = subjects.next().unwrap_or_default();
+        let second = subjects.next().unwrap_or_else(|| answer.part.name().to_owned());
+        let Enclosure { lower, upper, .. } = finding.value;
+        let numbers = [lower, upper, finding.at_s, finding.limit, finding.rate_hz];
+        Some((span_s.into(), [kind.to_owned(), first, second], numbers))
+    };
+    violations.chain(undecided).filter_map(row).collect()
 }
 
 /// Returns all digits of a number, with a power of ten if it is very large or small.
@@ -148,33 +112,30 @@ fn suite(AuditedRecording { report, allows_undecided, .. }: &AuditedRecording) -
         status.set_message(message);
         status
     };
-    let headline = report.headline();
     let verdict = |status: Status, words: &str| match status {
         Status::Clear => TestCaseStatus::success(),
         Status::Violation => failed(words),
         Status::Undecided => doubtful(words),
     };
-    let mut cases: Vec<_> =
-        report.separation().map(|status| TestCase::new("separation", verdict(status, &headline))).into_iter().collect();
-    cases
-        .extend(report.limits.iter().map(|limit| TestCase::new(limit.quantity, verdict(limit.status, &limit.brief()))));
-    cases.extend(report.plan.iter().map(|plan| TestCase::new("plan", verdict(plan.status, &plan.brief()))));
-    cases.extend(
-        report.well_clear.iter().map(|found| TestCase::new("well_clear", verdict(found.status, &found.brief()))),
-    );
-    if report.presence.required {
-        let partly = report.presence.partly as u64;
-        let status = if partly == 0 { Status::Clear } else { Status::Undecided };
-        let words = format!("{} not seen throughout", counted(partly, "vehicle is", "vehicles are"));
-        cases.push(TestCase::new("presence", verdict(status, &words)));
+    let answers = report.answers();
+    let parts = answers
+        .iter()
+        .map(|answer| TestCase::new(answer.part.name(), verdict(answer.status, &report.brief(answer.part))));
+    let mut cases: Vec<_> = parts.collect();
+    let of_pairs = answers.iter().filter(|answer| answer.part == Part::Separation);
+    let value = |bound: Option<f64>| bound.map_or_else(|| "unknown".to_owned(), number);
+    for finding in of_pairs.clone().flat_map(|answer| &answer.violations.listed) {
+        let [limit, from, to] = [finding.limit, finding.from_s, finding.to_s].map(value);
+        let words = format!("{} below {limit} from {from} s to {to} s", value(finding.value.upper));
+        let at = fixed(finding.at_s.unwrap_or(f64::NAN), 3);
+        cases.push(TestCase::new(format!("{} at {at} s", finding.subjects.join(" and ")), failed(&words)));
     }
-    for PairFinding { who: [first, second], finding: v } in &report.violations {
-        let words = format!("{:?} below {:?} from {:?} s to {:?} s", v.min_m, v.limit_m, v.from_s, v.to_s);
-        cases.push(TestCase::new(format!("{first} and {second} at {:.3} s", v.min_at_s), failed(&words)));
-    }
-    for PairFinding { who: [first, second], finding: u } in &report.undecided {
-        let words = format!("between {:?} and {:?} against {:?} by {:?} s", u.lower_m, u.upper_m, u.limit_m, u.to_s);
-        cases.push(TestCase::new(format!("{first} and {second} from {:.3} s", u.from_s), doubtful(&words)));
+    for finding in of_pairs.flat_map(|answer| &answer.undecided.listed) {
+        let [lower, upper, limit, to] =
+            [finding.value.lower, finding.value.upper, finding.limit, finding.to_s].map(value);
+        let words = format!("between {lower} and {upper} against {limit} by {to} s");
+        let from = fixed(finding.from_s.unwrap_or(f64::NAN), 3);
+        cases.push(TestCase::new(format!("{} from {from} s", finding.subjects.join(" and ")), doubtful(&words)));
     }
     for VehicleFinding { vehicle, finding: gap } in &report.gaps {
         let words = format!("not seen from {:?} s to {:?} s", gap.from_s, gap.to_s);

@@ -32,6 +32,7 @@ use std::sync::Once;
 use clap::{Parser, Subcommand};
 
 use console::Exit;
+use tautline_core::option::{Opt, spell_with};
 use tautline_recordings::read;
 use tautline_report::request::{Failure, command_line};
 
@@ -45,6 +46,7 @@ pub fn main() -> ExitCode {
 #[must_use]
 pub fn entry(arguments: &[OsString]) -> u8 {
     quiet_guarded_panics();
+    spell_with(as_argument);
     if completions::answer(arguments) {
         return Exit::Good as u8;
     }
@@ -138,6 +140,12 @@ enum Command {
     Completions(completions::CompletionsArguments),
 }
 
+/// Writes an option as on the command line, such as `--time-unit ms`.
+fn as_argument(option: Opt, value: Option<&str>, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+    out.write_str(&option.argument())?;
+    value.map_or(Ok(()), |value| write!(out, " {value}"))
+}
+
 /// Silences the panic hook for panics that become errors.
 fn quiet_guarded_panics() {
     static ONCE: Once = Once::new();
@@ -183,12 +191,27 @@ fn dispatch(command: Command, line: &str) -> Result<Exit, Failure> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use clap::CommandFactory as _;
+    use tautline_core::option;
 
     use super::Arguments;
 
     #[test]
     fn the_arguments_are_consistent() {
         Arguments::command().debug_assert();
+    }
+
+    #[test]
+    fn every_option_of_a_message_is_an_option_of_a_command() {
+        fn add(command: &clap::Command, names: &mut BTreeSet<String>) {
+            names.extend(command.get_arguments().filter_map(|argument| argument.get_long()).map(str::to_owned));
+            command.get_subcommands().for_each(|command| add(command, names));
+        }
+        let mut names = BTreeSet::new();
+        add(&Arguments::command(), &mut names);
+        let unknown: Vec<_> = option::ALL.iter().filter(|option| !names.contains(option.name)).collect();
+        assert!(unknown.is_empty(), "{unknown:?}");
     }
 }

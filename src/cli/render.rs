@@ -164,11 +164,11 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let frames = film.map_or(Ok(Vec::new()), |_| film_times(fps, arguments.speed, range_s))?;
     let sheet = arguments.sheet.map(|sheet| sheet_plan(sheet, arguments.size, range_s)).transpose()?;
     let sheet_path = folder.join("sheet.png");
-    let outputs: Vec<NamedPath<'_>> = (stills.iter().map(|still| ("the picture", still.path.as_path())))
-        .chain(sheet.iter().map(|_| ("the sheet", sheet_path.as_path())))
-        .chain(film.map(|(path, _)| ("--film", path)))
+    let outputs: Vec<NamedPath<'_>> = (stills.iter().map(|still| ("the picture".to_owned(), still.path.as_path())))
+        .chain(sheet.iter().map(|_| ("the sheet".to_owned(), sheet_path.as_path())))
+        .chain(film.map(|(path, _)| ("--film".to_owned(), path)))
         .collect();
-    let inputs: Vec<NamedPath<'_>> = paths.iter().map(|path| ("the recording", *path)).collect();
+    let inputs: Vec<NamedPath<'_>> = paths.iter().map(|path| ("the recording".to_owned(), *path)).collect();
     outputs::check(&inputs, &outputs)?;
     let trail_s = arguments.trail.map(|trail_s| positive(trail_s, "--trail")).transpose()?;
     let (theme, colouring, [width, height]) = (arguments.theme, arguments.colour, arguments.size);

@@ -224,32 +224,56 @@ fn statements(report: &Value, row: &mut String) {
         let _ = write!(row, " {name}={shown}");
     };
     let at = |path: &str| report.pointer(path).unwrap_or(&Value::Null);
+    let part = |name: &str| {
+        let answers = at("/answers").as_array().map_or(&[][..], Vec::as_slice);
+        answers.iter().find(|answer| answer["part"] == name).unwrap_or(&Value::Null)
+    };
+    let is_audit = !at("/judged").is_null();
+    let is_flight = !at("/reasons").is_null();
+    let separation = part("separation");
+    let refusals = at("/reasons").as_array().into_iter().flatten().find(|reason| reason["code"] == "refused");
+    let refused = refusals.map_or(&Value::Null, |reason| &reason["data"]["warnings"]);
+    let none = Value::Array(Vec::new());
+    if is_audit {
+        add("status", at("/status"));
+    }
+    add("ready", at("/ready"));
+    if is_flight {
+        add("pass", at("/pass"));
+        add("refused", if refused.is_null() { &none } else { refused });
+    }
+    add("reasons", at("/reasons"));
+    add("separation", &separation["status"]);
+    if is_audit {
+        add("proved", at("/proved"));
+        let is_clear = at("/status") == "clear";
+        let is_run_audit = |fact: &Value| fact["fact"] == "motion" && fact["value"] == "run-audit";
+        let by_run = at("/facts").as_array().into_iter().flatten().any(is_run_audit);
+        add("by_run", &Value::Bool(is_clear && by_run));
+    }
     for (name, path) in [
-        ("status", "/status"),
-        ("ready", "/ready"),
-        ("pass", "/verdict/pass"),
-        ("refused", "/verdict/refused"),
-        ("reasons", "/verdict/reasons"),
-        ("separation", "/audit/status"),
-        ("proved", "/audit/proved"),
-        ("by_run", "/audit/judged_by_run"),
-        ("void", "/separation/certificate_void"),
+        ("void", "/certificate/void"),
         ("voided", "/certificate_void"),
         ("reached", "/formation/reached"),
         ("vehicles", "/judged"),
         ("partly", "/presence/partly"),
-        ("violations", "/findings/violations/count"),
-        ("undecided", "/findings/undecided/count"),
-        ("gaps", "/findings/gaps/count"),
-        ("alone", "/alone"),
-        ("ended_early", "/ended_early/at_s"),
-        ("plan", "/plan/status"),
-        ("well_clear", "/well_clear/status"),
-        ("code", "/code"),
     ] {
         add(name, at(path));
     }
-    for (name, path) in [("certifies", "/separation/certified_m"), ("certifies", "/certified_m")] {
+    if is_audit {
+        let zero = Value::from(0);
+        let count = |kind: &str| if separation.is_null() { &zero } else { &separation[kind]["count"] };
+        add("violations", count("violations"));
+        add("undecided", count("undecided"));
+    }
+    for (name, path) in
+        [("gaps", "/gaps/count"), ("alone", "/alone"), ("ended_early", "/ended_early/at_s"), ("plan", "/plan/status")]
+    {
+        add(name, at(path));
+    }
+    add("well_clear", &part("well_clear")["status"]);
+    add("code", at("/code"));
+    for (name, path) in [("certifies", "/certificate/separation_m"), ("certifies", "/certified_m")] {
         if report.pointer(path).is_some() {
             add(name, &Value::Bool(at(path).is_number()));
         }
@@ -257,12 +281,15 @@ fn statements(report: &Value, row: &mut String) {
     for warning in at("/warnings").as_array().into_iter().flatten() {
         add("warning", &warning["code"]);
     }
-    if at("/findings").is_null() {
-        add("violations", at("/audit/violations"));
-        add("undecided", at("/audit/undecided"));
+    if is_flight {
+        add("violations", &separation["violations"]["count"]);
+        add("undecided", &separation["undecided"]["count"]);
     }
-    for limit in at("/limits").as_array().into_iter().flatten() {
-        add(limit["quantity"].as_str().unwrap_or_default(), &limit["status"]);
+    for answer in at("/answers").as_array().into_iter().flatten() {
+        let name = answer["part"].as_str().unwrap_or_default();
+        if !["separation", "well_clear", "presence", "plan"].contains(&name) {
+            add(name, &answer["status"]);
+        }
     }
 }
 

@@ -5,6 +5,7 @@
 
 use std::fmt;
 
+use crate::option::ACCEL_WINDOW;
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
@@ -12,6 +13,21 @@ use serde::{Serialize, Serializer};
 pub trait Coded {
     /// Returns the code, in lower case with hyphens.
     fn code(&self) -> &'static str;
+}
+
+/// Code and sentence of a value, as in JSON.
+#[derive(Serialize)]
+struct Statement {
+    code: &'static str,
+    text: String,
+}
+
+/// Serialises values as objects with `code` and `text`.
+///
+/// # Errors
+/// Those of the serialiser.
+pub fn serialize_coded<T: Coded + fmt::Display, S: Serializer>(values: &[T], serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_seq(values.iter().map(|value| Statement { code: value.code(), text: value.to_string() }))
 }
 
 /// Declares an enum without data and the code of each value.
@@ -55,6 +71,14 @@ coded! {
         HeightReference = "height-reference",
         /// Clock of the vehicles: one for all, with stamps or log times.
         Clock = "clock",
+        /// The clocks of all vehicles started together.
+        CommonStart = "common-start",
+        /// The clock of each vehicle is set by GPS.
+        GpsClocks = "gps-clocks",
+        /// Positions are taken at their times of logging.
+        LogTimes = "log-times",
+        /// Transforms of frames are uniform between their samples.
+        UniformTransforms = "uniform-transforms",
         /// Frame and origin of the positions.
         Frame = "frame",
         /// Which column, file or topic is which vehicle.
@@ -73,8 +97,20 @@ coded! {
         GroundExemption = "ground-exemption",
         /// Obstacles on which vehicles land are not judged while a vehicle is at or below a height.
         LandingExemption = "landing-exemption",
-        /// Motion of an obstacle outside the times of its path.
+        /// An obstacle stands still outside the times of its path.
         ObstacleMotion = "obstacle-motion",
+        /// Motion of a plan between its samples.
+        PlanMotion = "plan-motion",
+        /// The heights of flight and plan have one reference.
+        PlanHeights = "plan-heights",
+        /// Flight and plan are compared in the plane of x and y.
+        PlanPlane = "plan-plane",
+        /// Accelerations are means over windows.
+        MeanAcceleration = "mean-acceleration",
+        /// Accelerations are those of the parabolas through three samples in a row.
+        SampledAcceleration = "sampled-acceleration",
+        /// Vehicles round off the corners of their curves, where the velocity jumps.
+        RoundedCorners = "rounded-corners",
         /// File of settings from which options were taken.
         SettingsFile = "settings-file",
         /// The announced starts of a pair, equal on both sides.
@@ -162,25 +198,121 @@ pub struct Fact {
     pub source: Source,
     /// Value, if the fact has one.
     pub value: Option<FactValue>,
+    /// Vehicle, obstacle or file that the fact is about; `None` for a fact about all.
+    pub subject: Option<String>,
 }
 
 impl Fact {
     /// Fact without a value.
     #[must_use]
     pub fn new(kind: FactKind, source: Source) -> Self {
-        Self { kind, source, value: None }
+        Self { kind, source, value: None, subject: None }
     }
 
     /// Fact with a number in a unit.
     #[must_use]
     pub fn number(kind: FactKind, source: Source, value: f64, unit: &'static str) -> Self {
-        Self { kind, source, value: Some(FactValue::Number(value, unit)) }
+        Self { value: Some(FactValue::Number(value, unit)), ..Self::new(kind, source) }
     }
 
     /// Fact with a name.
     #[must_use]
     pub fn name(kind: FactKind, source: Source, value: impl Into<String>) -> Self {
-        Self { kind, source, value: Some(FactValue::Name(value.into())) }
+        Self { value: Some(FactValue::Name(value.into())), ..Self::new(kind, source) }
+    }
+
+    /// Returns whether the value is this name.
+    #[must_use]
+    pub fn is_named(&self, name: &str) -> bool {
+        matches!(&self.value, Some(FactValue::Name(own)) if own == name)
+    }
+
+    /// Returns the fact about one vehicle, obstacle or file.
+    #[must_use]
+    pub fn about(self, subject: impl Into<String>) -> Self {
+        Self { subject: Some(subject.into()), ..self }
+    }
+
+    /// Returns whether a clear verdict rests on the fact as an assumption: the data leave another case open. A verdict
+    /// with an assumption is not proved.
+    #[must_use]
+    pub fn is_assumption(&self) -> bool {
+        match self.kind {
+            FactKind::Motion => self.is_named(STRAIGHT) || self.is_named(HELD),
+            // A recording with latitudes and longitudes may have heights in feet.
+            FactKind::HeightUnit => self.source == Source::Default,
+            FactKind::CommonStart
+            | FactKind::GpsClocks
+            | FactKind::LogTimes
+            | FactKind::UniformTransforms
+            | FactKind::ObstacleMotion
+            | FactKind::PlanMotion
+            | FactKind::PlanHeights
+            | FactKind::PlanPlane
+            | FactKind::MeanAcceleration
+            | FactKind::SampledAcceleration
+            | FactKind::RoundedCorners => true,
+            _ => false,
+        }
+    }
+}
+
+/// Name of straight motion between two samples.
+pub const STRAIGHT: &str = "straight";
+/// Name of rest between two samples, with a jump at each.
+pub const HELD: &str = "held";
+/// Name of any motion whose accelerations stay within a bound.
+pub const BOUNDED: &str = "bounded";
+/// Name of motion on recorded curves.
+pub const CURVES: &str = "curves";
+/// Name of the motion of a run of which each step is recorded.
+pub const EVERY_STEP: &str = "every-step";
+/// Name of the motion along the chords of steps, from which paths differ by less than a bound.
+pub const CHORDS: &str = "chords";
+/// Name of the motion that the audit of a run has judged step by step.
+pub const RUN_AUDIT: &str = "run-audit";
+
+/// The fact as a clause, such as `straight between samples`.
+impl fmt::Display for Fact {
+    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let value = self.value.as_ref().map_or_else(String::new, ToString::to_string);
+        let subject = self.subject.as_deref().unwrap_or_default();
+        match self.kind {
+            FactKind::Motion => out.write_str(match value.as_str() {
+                STRAIGHT => "straight between samples",
+                HELD => "held between samples, jumps swept",
+                BOUNDED => "accelerations within their bounds",
+                CURVES => "on the recording's curves",
+                EVERY_STEP => "on every step of the run",
+                CHORDS => "along the chords of every step",
+                RUN_AUDIT => "by the run's audit of every step",
+                other => other,
+            }),
+            FactKind::HeightUnit => write!(out, "heights are in {}", if value == "m" { "metres" } else { &value }),
+            FactKind::CommonStart => out.write_str("the clocks of all vehicles started together"),
+            FactKind::GpsClocks => out.write_str("clocks set by the GPS of each vehicle"),
+            FactKind::LogTimes => out.write_str("positions at their times of logging"),
+            FactKind::UniformTransforms => out.write_str("transforms uniform between their samples"),
+            FactKind::ObstacleMotion => write!(out, "the obstacle {subject} stands still {value}"),
+            FactKind::PlanMotion => out.write_str("the plan is straight between its samples"),
+            FactKind::PlanHeights => out.write_str("the heights of flight and plan have one reference"),
+            FactKind::PlanPlane => out.write_str("flight and plan have equal heights, which are not compared"),
+            FactKind::MeanAcceleration => write!(out, "accelerations are means over {value}"),
+            FactKind::SampledAcceleration => {
+                out.write_str("accelerations are those of the parabolas through three samples in a row")
+            }
+            FactKind::RoundedCorners => write!(
+                out,
+                "vehicles round off corners (the velocity of {subject} jumps by {value}; {ACCEL_WINDOW} judges them)"
+            ),
+            kind => {
+                out.write_str(kind.code())?;
+                if !subject.is_empty() {
+                    write!(out, " of {subject}")?;
+                }
+                if value.is_empty() { Ok(()) } else { write!(out, ": {value}") }
+            }
+        }
     }
 }
 
@@ -190,10 +322,10 @@ impl Coded for Fact {
     }
 }
 
-/// An object with the keys `fact`, `source`, `value` and `unit`; the last two are null without a value or a unit.
+/// An object with the keys `fact`, `source`, `value`, `unit` and `subject`; the last three may be null.
 impl Serialize for Fact {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let mut object = serializer.serialize_struct("Fact", 4)?;
+        let mut object = serializer.serialize_struct("Fact", 5)?;
         object.serialize_field("fact", &self.kind)?;
         object.serialize_field("source", &self.source)?;
         match &self.value {
@@ -210,6 +342,7 @@ impl Serialize for Fact {
                 object.serialize_field("unit", &None::<&str>)?;
             }
         }
+        object.serialize_field("subject", &self.subject)?;
         object.end()
     }
 }
@@ -223,15 +356,15 @@ mod tests {
         let json = |fact: Fact| serde_json::to_string(&fact).expect("serializable");
         assert_eq!(
             json(Fact::number(FactKind::PositionError, Source::Declared, 0.5, "m")),
-            r#"{"fact":"position-error","source":"declared","value":0.5,"unit":"m"}"#
+            r#"{"fact":"position-error","source":"declared","value":0.5,"unit":"m","subject":null}"#
         );
         assert_eq!(
-            json(Fact::name(FactKind::TimeUnit, Source::Inferred, "ms")),
-            r#"{"fact":"time-unit","source":"inferred","value":"ms","unit":null}"#
+            json(Fact::name(FactKind::TimeUnit, Source::Inferred, "ms").about("a")),
+            r#"{"fact":"time-unit","source":"inferred","value":"ms","unit":null,"subject":"a"}"#
         );
         assert_eq!(
             json(Fact::new(FactKind::SharedStarts, Source::Exchanged)),
-            r#"{"fact":"shared-starts","source":"exchanged","value":null,"unit":null}"#
+            r#"{"fact":"shared-starts","source":"exchanged","value":null,"unit":null,"subject":null}"#
         );
     }
 }

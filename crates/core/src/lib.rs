@@ -6,6 +6,7 @@
 //! | [`track`] | recorded motion of any origin: instants, pieces of curves, clocks |
 //! | [`record`] | a flight's samples as they are made, and the traits that receive them |
 //! | [`fact`] | facts that a statement rests on, with their sources |
+//! | [`option`] | options that messages name |
 //! | [`text`] | formatting of numbers |
 //! | [`half_spaces`] | the point nearest to a wish in half-spaces and a ball, for laws and the shield |
 //!
@@ -16,6 +17,7 @@
 
 pub mod fact;
 pub mod half_spaces;
+pub mod option;
 pub mod record;
 pub mod swarm;
 pub mod text;

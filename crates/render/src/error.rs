@@ -1,5 +1,8 @@
 //! Errors of pictures, films and the window.
 
+use std::borrow::Cow;
+
+use tautline_core::option::{ADAPTER, FPS, SIZE};
 use tautline_core::record::RecordError;
 use tautline_report::request::Failure;
 
@@ -102,30 +105,36 @@ impl RenderError {
 
     /// Returns a remedy, if there is one.
     #[must_use]
-    pub fn help(&self) -> Option<&'static str> {
+    pub fn help(&self) -> Option<Cow<'static, str>> {
         use RenderError as E;
         Some(match self {
-            E::TooFar(_) => "correct the recording, or check that its lengths are in metres",
-            E::Empty(_) => "give a recording that holds at least one sample, such as a run's run.mcap",
-            E::NoVehicle(_) => "give the name of a vehicle of the recording",
-            E::Camera(_) => {
-                "give auto, perspective, top, front, side, follow, follow:ID, closest, or \
+            E::TooFar(_) => "correct the recording, or check that its lengths are in metres".into(),
+            E::Empty(_) => "give a recording that holds at least one sample, such as a run's run.mcap".into(),
+            E::NoVehicle(_) => "give the name of a vehicle of the recording".into(),
+            E::Camera(_) => "give auto, perspective, top, front, side, follow, follow:ID, closest, or \
                  AZIMUTH,ELEVATION,DISTANCE in degrees and metres such as -60,30,25"
-            }
+                .into(),
             E::NoAdapter => {
-                "install a driver; Debian has one in software: apt-get install mesa-vulkan-drivers libvulkan1"
+                "install a driver; Debian has one in software: apt-get install mesa-vulkan-drivers libvulkan1".into()
             }
             E::NoSuchAdapter(_) => {
-                "give hardware, software or a part of the name of an existing adapter with --adapter"
+                let help =
+                    format!("give hardware, software or a part of the name of an existing adapter with {ADAPTER}");
+                help.into()
             }
-            E::PictureSize(_) => "give another size with --size",
-            E::Driver(_) => "try a smaller picture, or another driver with --adapter software",
-            E::UnknownFilm(_) => "name the film something.mp4 or something.gif",
-            E::FilmRate(_) => "give another rate with --fps",
-            E::FilmSize(_) => "give another size with --size, or another format",
-            E::Write(_) => "free some space or write to another folder",
-            E::NoFfmpeg => "install ffmpeg, build tautline with --features film, or name a .gif film",
-            E::NoDisplay(_) => "run it on a machine with a screen, or draw without one: tautline render RECORDING",
+            E::PictureSize(_) => format!("give another size with {SIZE}").into(),
+            E::Driver(_) => {
+                let software = ADAPTER.set("software");
+                format!("try a smaller picture, or another driver with {software}").into()
+            }
+            E::UnknownFilm(_) => "name the film something.mp4 or something.gif".into(),
+            E::FilmRate(_) => format!("give another rate with {FPS}").into(),
+            E::FilmSize(_) => format!("give another size with {SIZE}, or another format").into(),
+            E::Write(_) => "free some space or write to another folder".into(),
+            E::NoFfmpeg => "install ffmpeg, build tautline with --features film, or name a .gif film".into(),
+            E::NoDisplay(_) => {
+                "run it on a machine with a screen, or draw without one: tautline render RECORDING".into()
+            }
             E::Record(_) | E::Picture(_) | E::Film(_) | E::NoWindow(_) => return None,
         })
     }

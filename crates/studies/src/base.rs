@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::flight::{FlightSummary, Outcome};
 use crate::{MOST_RUNS, SEEDS};
+use tautline_core::option::{RUNS, SEED};
 use tautline_core::text::metres;
 use tautline_report::request::{Failure, ScenarioRequest, in_range};
 use tautline_sim::scenario::{ExternalLaw, Override, Scenario, ScenarioError, Source, Template, takes_integers_only};
@@ -134,8 +135,9 @@ impl Runs {
         if self.count <= 1 || differ {
             return Ok(());
         }
-        let message = format!("--runs {}: must be 1 for values of {key}", self.count);
-        Err(Failure::input("request/equal-runs", message, "leave --runs out: all runs of one seed are the same flight"))
+        let message = format!("{}: must be 1 for values of {key}", RUNS.set(self.count));
+        let help = format!("leave {RUNS} out: all runs of one seed are the same flight");
+        Err(Failure::input("request/equal-runs", message, help))
     }
 
     /// Returns the seed of a run, from 0.
@@ -186,8 +188,8 @@ pub(crate) fn overlap(one: &str, other: &str) -> bool {
 
 /// Refuses numbers of runs and seeds out of range.
 pub(crate) fn check_runs(runs: u64, seed: u64) -> Result<(), Failure> {
-    in_range("--runs", &runs, &(1..=MOST_RUNS))?;
-    in_range("--seed", &seed, &SEEDS)
+    in_range(RUNS, &runs, &(1..=MOST_RUNS))?;
+    in_range(SEED, &seed, &SEEDS)
 }
 
 /// Returns the note on the jitter of a start without randomness.

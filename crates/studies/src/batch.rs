@@ -6,6 +6,7 @@ use std::thread;
 
 use crate::THREADS;
 use crate::flight::{FlightSummary, fly};
+use tautline_core::option;
 use tautline_report::request::{Failure, Monitor, in_range};
 use tautline_sim::scenario::{ExternalLaw, Scenario};
 use tautline_sim::sim::SimError;
@@ -30,7 +31,7 @@ impl<'a> Batch<'a> {
     /// [`Failure`] for a number of threads outside [`THREADS`].
     pub fn new(threads: Option<usize>, monitor: &'a dyn Monitor) -> Result<Self, Failure> {
         let threads = threads.unwrap_or_else(|| rayon::current_num_threads().min(*THREADS.end()));
-        in_range("--threads", &threads, &THREADS)?;
+        in_range(option::THREADS, &threads, &THREADS)?;
         Ok(Self { threads, monitor, finishes_flights: false, on_calling_thread: false })
     }
 
@@ -47,8 +48,9 @@ impl<'a> Batch<'a> {
         let Some(law) = laws.into_iter().find(|law| law.requires_calling_thread()) else { return Ok(batch) };
         if let Some(threads) = threads.filter(|&threads| threads != 1) {
             let name = law.name();
-            let message = format!("--threads {threads}: must be 1 for the law `{name}`, which runs on one thread");
-            return Err(Failure::input("request/one-thread", message, "leave --threads out"));
+            let given = option::THREADS.set(threads);
+            let message = format!("{given}: must be 1 for the law `{name}`, which runs on one thread");
+            return Err(Failure::input("request/one-thread", message, format!("leave {} out", option::THREADS)));
         }
         Ok(Self { threads: 1, on_calling_thread: true, ..batch })
     }

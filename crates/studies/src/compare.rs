@@ -10,6 +10,7 @@ use crate::flight::{FlightSample, FlightSummary, Outcome};
 use crate::statistics::{CONFIDENCE, Estimate, Proportion};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
+use tautline_core::option::{LAWS, RUNS, SEED};
 use tautline_core::text::{at_least, counted};
 use tautline_report::figures::{Figure, OfLaw, at_closest, by_law};
 use tautline_report::flight_log::FlightLog;
@@ -158,8 +159,8 @@ impl Experiment for Options {
 
     fn arguments(&self, study: &Comparison) -> Vec<String> {
         let laws: Vec<_> = study.laws.iter().map(|law| law.name.as_str()).collect();
-        let (runs, seed) = (self.runs.to_string(), self.seed.to_string());
-        ["--laws", &laws.join(","), "--runs", &runs, "--seed", &seed].map(str::to_owned).to_vec()
+        let all = [(LAWS, laws.join(",")), (RUNS, self.runs.to_string()), (SEED, self.seed.to_string())];
+        all.into_iter().flat_map(|(option, value)| [option.argument(), value]).collect()
     }
 
     fn fly(&self, base: &BaseScenario, batch: &Batch<'_>) -> Result<Option<Comparison>, Failure> {
@@ -231,12 +232,13 @@ impl Options {
         let names = if self.shield { Template::with_and_without_shield(&names) } else { names };
         if names.is_empty() {
             let help = "give the kind of a law, such as edge-tension";
-            return Err(Failure::input("compare/no-law", "--laws: must name at least one law", help));
+            let message = format!("{LAWS}: must name at least one law");
+            return Err(Failure::input("compare/no-law", message, help));
         }
         if let Some((_, twice)) = names.iter().enumerate().find(|&(k, name)| names[..k].contains(name)) {
             return Err(Failure::input(
                 "compare/law-twice",
-                format!("--laws {}: `{twice}` is named twice", names.join(",")),
+                format!("{}: `{twice}` is named twice", LAWS.set(names.join(","))),
                 "name each law once; variants of a law are tables [laws.NAME] with the same `kind`",
             ));
         }

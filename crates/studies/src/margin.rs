@@ -10,6 +10,7 @@ use crate::flight::{FlightSample, FlightSummary};
 use crate::statistics::{CONFIDENCE, Proportion};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
+use tautline_core::option::{self, KEY, LOG, MARGIN_FROM, MARGIN_TO, RUNS, SCAN, SEED, VERDICT};
 use tautline_core::text::{counted, shortest, significant};
 use tautline_report::figures::{Separation, Share, margin as figure, separations, verdicts};
 use tautline_report::report::page::{Badge, Tone};
@@ -155,38 +156,40 @@ impl Experiment for Options {
 
     fn check(&self) -> Result<(), Failure> {
         check_runs(self.runs, self.seed)?;
-        in_range("--scan", &self.range.scan, &SCANS)?;
-        in_range("--halvings", &self.range.halvings, &HALVINGS)?;
+        in_range(SCAN, &self.range.scan, &SCANS)?;
+        in_range(option::HALVINGS, &self.range.halvings, &HALVINGS)?;
         let Range { from, to, logarithmic, .. } = self.range;
+        let given = format!("{} {}", MARGIN_FROM.set(from), MARGIN_TO.set(to));
         let why = if !from.is_finite() || !to.is_finite() {
-            format!("--from {from} --to {to}: the range is not finite")
+            format!("{given}: the range is not finite")
         } else if from == to {
-            format!("--from {from} --to {to}: both ends of the range are equal")
+            format!("{given}: both ends of the range are equal")
         } else if logarithmic && (from <= 0.0 || to <= 0.0) {
-            format!("--from {from} --to {to}: the range is not positive, as --log requires")
+            format!("{given}: the range is not positive, as {LOG} requires")
         } else {
             return Ok(());
         };
-        let help = "give --from and --to two different finite numbers, with --log both more than 0";
+        let help =
+            format!("give {MARGIN_FROM} and {MARGIN_TO} two different finite numbers, with {LOG} both more than 0");
         Err(Failure::input("margin/range", why, help))
     }
 
     fn arguments(&self, _study: &Margin) -> Vec<String> {
         let Self { key, range, question, runs, seed } = self;
         let mut arguments: Vec<_> = [
-            ("--key", key.clone()),
-            ("--from", format!("{:?}", range.from)),
-            ("--to", format!("{:?}", range.to)),
-            ("--runs", runs.to_string()),
-            ("--seed", seed.to_string()),
-            ("--verdict", question.name().to_owned()),
-            ("--scan", range.scan.to_string()),
-            ("--halvings", range.halvings.to_string()),
+            (KEY, key.clone()),
+            (MARGIN_FROM, format!("{:?}", range.from)),
+            (MARGIN_TO, format!("{:?}", range.to)),
+            (RUNS, runs.to_string()),
+            (SEED, seed.to_string()),
+            (VERDICT, question.name().to_owned()),
+            (SCAN, range.scan.to_string()),
+            (option::HALVINGS, range.halvings.to_string()),
         ]
         .into_iter()
-        .flat_map(|(option, value)| [option.to_owned(), value])
+        .flat_map(|(option, value)| [option.argument(), value])
         .collect();
-        arguments.extend(range.logarithmic.then(|| "--log".to_owned()));
+        arguments.extend(range.logarithmic.then(|| LOG.argument()));
         arguments
     }
 

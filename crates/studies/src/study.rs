@@ -11,6 +11,7 @@ use serde::Serialize;
 use crate::base::BaseScenario;
 use crate::batch::Batch;
 use crate::table::Table;
+use tautline_core::option::{CSV, FORCE, HTML, JSON, LATEX};
 use tautline_report::figures::Figure;
 use tautline_report::report::page::{self, Badge, Markup, Page};
 use tautline_report::report::{ScenarioIdentity, Tool};
@@ -279,8 +280,8 @@ pub struct StudyFiles {
 impl StudyFiles {
     /// Returns the requested files, each with its option.
     pub fn outputs(&self) -> impl Iterator<Item = NamedPath<'_>> {
-        let all = [("--json", &self.json), ("--csv", &self.csv), ("--latex", &self.latex), ("--html", &self.html)];
-        all.into_iter().filter_map(|(option, file)| Some((option, file.as_deref()?)))
+        let all = [(JSON, &self.json), (CSV, &self.csv), (LATEX, &self.latex), (HTML, &self.html)];
+        all.into_iter().filter_map(|(option, file)| Some((option.to_string(), file.as_deref()?)))
     }
 
     /// Returns whether a file goes to standard output.
@@ -327,7 +328,7 @@ pub fn answer<E: Experiment>(
     let has_command = scenario.external_law.is_none() && options.external_laws().is_empty();
     let repeats = if has_command { study.repeats(scenario) } else { Vec::new() };
     let repeated = match &repeats[..] {
-        [_, _, _, ..] => vec!["--html writes a page with the command that repeats each of these flights".to_owned()],
+        [_, _, _, ..] => vec![format!("{HTML} writes a page with the command that repeats each of these flights")],
         few => few.iter().map(|(what, command)| format!("{what}\n  {command}")).collect(),
     };
     monitor.say(&format!("{}\n\n{}\n{}", study.headline(), study.text(), repeated.join("\n")));
@@ -356,7 +357,11 @@ pub fn answer<E: Experiment>(
     }
     if monitor.is_interrupted() {
         let wrote_files = files.outputs().any(|(_, file)| !is_standard_output(file));
-        let again = if wrote_files { " with --force begins again and replaces the files" } else { " begins again" };
+        let again = if wrote_files {
+            format!(" with {FORCE} begins again and replaces the files")
+        } else {
+            " begins again".to_owned()
+        };
         monitor.warn(&format!("interrupted: the answer counts the flights up to here; the same command{again}"));
     }
     options.conclude(scenario, &study, pictures, monitor)?;

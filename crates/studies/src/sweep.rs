@@ -11,6 +11,7 @@ use crate::flight::{FlightSample, FlightSummary, Outcome};
 use crate::statistics::{CONFIDENCE, Estimate, Proportion};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
+use tautline_core::option::{RUNS, SEED, SET, SWEEP_KEY, VERDICT};
 use tautline_core::text::{beside_limit, counted, shortest};
 use tautline_report::figures::{Figure, GridAxis, Separation, Share, heat_map, separations, shares};
 use tautline_report::report::page::{Badge, Tone};
@@ -128,11 +129,11 @@ impl SweptKey {
     /// [`Failure`] `sweep/key`.
     pub fn parse(text: &str) -> Result<Self, Failure> {
         let Some((key, values)) = text.split_once('=') else {
-            return Err(wrong(&format!("--key {text}: is not KEY=VALUES")));
+            return Err(wrong(&format!("{}: is not KEY=VALUES", SWEEP_KEY.set(text))));
         };
         let number = |text: &str| {
             let number = text.trim().parse::<f64>();
-            number.map_err(|_| wrong(&format!("--key {key}: `{}` is not a number", text.trim())))
+            number.map_err(|_| wrong(&format!("{}: `{}` is not a number", SWEEP_KEY.set(key), text.trim())))
         };
         match values.split(':').collect::<Vec<_>>()[..] {
             [list] => Self::new(key, list.split(',').map(number).collect::<Result<_, _>>()?),
@@ -140,18 +141,20 @@ impl SweptKey {
                 let most = MOST_POINTS;
                 let count =
                     count.trim().parse::<usize>().ok().filter(|count| (2..=most).contains(count)).ok_or_else(|| {
-                        wrong(&format!("--key {text}: the count must be from 2 to {most}, got `{}`", count.trim()))
+                        let option = SWEEP_KEY.set(text);
+                        wrong(&format!("{option}: the count must be from 2 to {most}, got `{}`", count.trim()))
                     })?;
                 let (from, to) = (number(from)?, number(to)?);
                 if from == to || !(to - from).is_finite() {
-                    return Err(wrong(&format!("--key {text}: the ends must be two different finite numbers")));
+                    let option = SWEEP_KEY.set(text);
+                    return Err(wrong(&format!("{option}: the ends must be two different finite numbers")));
                 }
                 let range = Bound { key: key.to_owned(), low: from.min(to), high: from.max(to), whole: false };
                 let part = |k: usize| k as f64 / (count - 1) as f64;
                 let value = |k: usize| range.at(if from <= to { part(k) } else { 1.0 - part(k) });
                 Self::new(key, (0..count).map(value).collect())
             }
-            _ => Err(wrong(&format!("--key {text}: is neither KEY=FROM:TO:COUNT nor a list"))),
+            _ => Err(wrong(&format!("{}: is neither KEY=FROM:TO:COUNT nor a list", SWEEP_KEY.set(text)))),
         }
     }
 
@@ -166,12 +169,13 @@ impl SweptKey {
     /// [`Failure`] `sweep/key` for an empty key, no values, a value given twice, or a value that is not finite.
     pub fn new(key: &str, values: Vec<f64>) -> Result<Self, Failure> {
         let key = key.trim().to_owned();
+        let option = SWEEP_KEY.set(&key);
         let twice = values.iter().enumerate().find(|(k, value)| values[..*k].contains(value));
         match (values.iter().find(|value| !value.is_finite()), twice) {
-            (Some(value), _) => Err(wrong_values(&format!("--key {key}: {value} is not finite"))),
-            (None, Some((_, value))) => Err(wrong_values(&format!("--key {key}: {value} is given twice"))),
+            (Some(value), _) => Err(wrong_values(&format!("{option}: {value} is not finite"))),
+            (None, Some((_, value))) => Err(wrong_values(&format!("{option}: {value} is given twice"))),
             (None, None) if values.is_empty() || key.is_empty() => {
-                Err(wrong_values(&format!("--key {key}: the grid is empty")))
+                Err(wrong_values(&format!("{option}: the grid is empty")))
             }
             (None, None) => Ok(Self { key, values }),
         }
@@ -183,26 +187,28 @@ impl Options {
     fn check_grid(&self) -> Result<(), Failure> {
         let grid = |why: String, help: &str| Err(Failure::input("sweep/grid", why, help));
         if self.keys.is_empty() || self.keys.len() > 2 {
-            let why = format!("--key: a sweep has one key or two, got {}", self.keys.len());
-            return grid(why, "give --key once or twice; other keys are set with --set");
+            let why = format!("{SWEEP_KEY}: a sweep has one key or two, got {}", self.keys.len());
+            let help = format!("give one key or two with {SWEEP_KEY}; give other keys a value with {SET}");
+            return grid(why, &help);
         }
         if let [one, other] = &self.keys[..]
             && overlap(&one.key, &other.key)
         {
-            let why = format!("--key {} --key {}: the keys overlap", one.key, other.key);
-            return grid(why, "give two different keys; all values of a key are in one --key");
+            let why = format!("{} {}: the keys overlap", SWEEP_KEY.set(&one.key), SWEEP_KEY.set(&other.key));
+            return grid(why, "give two different keys, each once with all its values");
         }
         let points = self.keys.iter().map(|key| key.values.len()).fold(1, usize::saturating_mul);
         let flights = (points as u64).saturating_mul(self.runs);
         if points > MOST_POINTS || flights > *FLIGHTS.end() {
-            let keys = self.keys.iter().map(|key| format!("--key {} ({})", key.key, key.values.len()));
+            let keys = self.keys.iter().map(|key| format!("{} ({})", SWEEP_KEY.set(&key.key), key.values.len()));
             let keys = keys.collect::<Vec<_>>().join(" and ");
             if points > MOST_POINTS {
                 let why = format!("{keys}: the grid must have at most {MOST_POINTS} points, got {points}");
                 return grid(why, "give fewer values of a key");
             }
             let most = FLIGHTS.end();
-            let why = format!("--runs {}: {points} points must have at most {most} flights, got {flights}", self.runs);
+            let runs = RUNS.set(self.runs);
+            let why = format!("{runs}: {points} points must have at most {most} flights, got {flights}");
             return grid(why, "give fewer runs, or fewer values of a key");
         }
         Ok(())
@@ -235,18 +241,18 @@ impl Experiment for Options {
     fn arguments(&self, _study: &Sweep) -> Vec<String> {
         let keys = self.keys.iter().flat_map(|SweptKey { key, values }| {
             let values: Vec<_> = values.iter().copied().map(shortest).collect();
-            ["--key".to_owned(), format!("{key}={}", values.join(","))]
+            [SWEEP_KEY.argument(), format!("{key}={}", values.join(","))]
         });
-        let (verdict, runs, seed) = (self.question.name(), self.runs.to_string(), self.seed.to_string());
-        let rest = ["--verdict", verdict, "--runs", &runs, "--seed", &seed].map(str::to_owned);
-        keys.chain(rest).collect()
+        let verdict = self.question.name().to_owned();
+        let rest = [(VERDICT, verdict), (RUNS, self.runs.to_string()), (SEED, self.seed.to_string())];
+        keys.chain(rest.into_iter().flat_map(|(option, value)| [option.argument(), value])).collect()
     }
 
     fn fly(&self, base: &BaseScenario, batch: &Batch<'_>) -> Result<Option<Sweep>, Failure> {
         for SweptKey { key, values } in &self.keys {
             let fraction = values.iter().find(|value| value.fract() != 0.0 && base.takes_integers_only(key));
             if let Some(value) = fraction {
-                let why = format!("--key {key}: the key takes integers only, got {value}");
+                let why = format!("{}: the key takes integers only, got {value}", SWEEP_KEY.set(key));
                 return Err(Failure::input(
                     "sweep/grid",
                     why,
@@ -270,7 +276,7 @@ impl Experiment for Options {
             return Err(scenario(&points[0])
                 .map_err(refused)
                 .err()
-                .unwrap_or_else(|| wrong_values("--key: the grid is empty")));
+                .unwrap_or_else(|| wrong_values(&format!("{SWEEP_KEY}: the grid is empty"))));
         };
         let keys: Vec<_> = self.keys.iter().map(|of| &*of.key).collect();
         let runs = Runs::new(self.runs, self.seed, base, is_random || keys.contains(&JITTER_KEY));

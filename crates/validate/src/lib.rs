@@ -32,6 +32,7 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use claim::{ClaimsResult, MeasureError, Progress};
+use tautline_core::option::THREADS;
 use tautline_report::figures::Format;
 use tautline_report::report::write_atomically;
 use tautline_report::request::{Failure, Monitor, OutFolder, figure_files, in_range, threads, write_files};
@@ -122,7 +123,7 @@ pub struct ValidateRequest {
 /// [`Failure`] if the folder holds a finished validation, or a file cannot be written.
 pub fn validate_into(request: &ValidateRequest, monitor: &dyn Monitor) -> Result<Validation, Failure> {
     if let Some(number) = &request.threads {
-        in_range("--threads", number, &(1..=MOST_THREADS))?;
+        in_range(THREADS, number, &(1..=MOST_THREADS))?;
     }
     let folder = OutFolder::at(&request.out, "validation", "validate.json");
     let _lock = folder.open(request.force)?;

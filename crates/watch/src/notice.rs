@@ -6,6 +6,7 @@ use crate::event::{Assessment, Event, Fault, Pair, PairTime, Reason, Refusal, St
 use crate::monitor::Monitor;
 use crate::settings::REPORTED_DEVIATIONS;
 use tautline_core::fact::{Coded as _, Fact, FactKind, FactValue, Source};
+use tautline_core::option::{ACCEL, MAX_VEHICLES, POSITION_ERROR};
 
 /// Notice for the user: a state, or an event.
 #[derive(Clone, Debug, PartialEq)]
@@ -212,7 +213,7 @@ fn state_text(of: &Assessment, monitor: &Monitor) -> String {
                 Reason::Stale(vehicle, age_s) => format!("{} not heard for {} s", name(vehicle), fixed(age_s)),
                 Reason::SpeedUnknown(vehicle) => format!("the velocity of {} is not known yet", name(vehicle)),
                 Reason::ErrorUnknown(vehicle) => {
-                    format!("{} reports no accuracy of its positions; give --position-error", name(vehicle))
+                    format!("{} reports no accuracy of its positions; give {POSITION_ERROR}", name(vehicle))
                 }
                 Reason::TwoStreams(vehicle) => fault_text(Fault::TwoStreams, Some(&name(vehicle))),
                 Reason::ClockStepped(vehicle) => format!("{} not heard since the step of the clock", name(vehicle)),
@@ -270,15 +271,15 @@ fn fault_text(fault: Fault, vehicle: Option<&str>) -> String {
     match fault {
         Fault::Garbage => "a message cannot be read".to_owned(),
         Fault::OutOfRange => "a message has a number out of range".to_owned(),
-        Fault::TooManyVehicles => "a message of a vehicle beyond --max-vehicles".to_owned(),
+        Fault::TooManyVehicles => format!("a message of a vehicle beyond {MAX_VEHICLES}"),
         Fault::ClockStep => format!("the clock of {of} stepped or is too fast"),
         Fault::Conflict => format!("{of} has two positions at one time"),
-        Fault::OutOfBounds => format!("{of} moved farther than --accel and the errors allow"),
+        Fault::OutOfBounds => format!("{of} moved farther than {ACCEL} and the errors allow"),
         Fault::VelocityDisagrees => {
             format!("{of} sends velocities that contradict its positions; check their frame, unit and time")
         }
         Fault::Inaccurate => {
-            format!("{of} reports an accuracy that is worse than --position-error; give a larger --position-error")
+            format!("{of} reports an accuracy that is worse than {POSITION_ERROR}; give a larger {POSITION_ERROR}")
         }
         Fault::TwoStreams => format!(
             "the messages of {of} are those of two vehicles; give each vehicle a name or system id of its own and one \

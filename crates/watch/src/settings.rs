@@ -2,6 +2,10 @@
 
 use crate::clock::STEP_S;
 use tautline_core::fact::{Fact, FactKind, Source};
+use tautline_core::option::{
+    ACCEL, BRAKE, DELTA, EXPECT, HORIZON, IDS, LATENCY, MAX_AGE, MAX_VEHICLES, Opt, POSITION_ERROR, TUBE,
+    VELOCITY_ERROR,
+};
 
 /// Default bound on the acceleration \[m/s^2\].
 ///
@@ -138,10 +142,10 @@ impl Default for Settings {
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[error("{option}: {problem} ({value})")]
 pub struct SettingsError {
-    /// Option of the command line.
-    pub option: &'static str,
+    /// The option.
+    pub option: Opt,
     /// Required range.
-    pub problem: &'static str,
+    pub problem: String,
     /// Given value.
     pub value: String,
 }
@@ -203,18 +207,18 @@ impl Settings {
         let positive = "must be above 0 and at most 1e6";
         let not_negative = "must be from 0 to 1e6";
         for (option, value, least, problem) in [
-            ("--delta", self.delta_m, f64::MIN_POSITIVE, positive),
-            ("--accel", self.accel_m_s2.value, 0.0, not_negative),
-            ("--position-error", self.position_error_m.map_or(0.0, |bound| bound.value), 0.0, not_negative),
-            ("--velocity-error", self.velocity_error_m_s.value, 0.0, not_negative),
-            ("--brake", self.brake_m_s2, f64::MIN_POSITIVE, positive),
-            ("--max-age", self.max_age_s.value, f64::MIN_POSITIVE, positive),
-            ("--latency", self.latency_s.value, 0.0, not_negative),
-            ("--horizon", self.horizon_s, f64::MIN_POSITIVE, positive),
-            ("--tube", self.tube_m, f64::MIN_POSITIVE, positive),
+            (DELTA, self.delta_m, f64::MIN_POSITIVE, positive),
+            (ACCEL, self.accel_m_s2.value, 0.0, not_negative),
+            (POSITION_ERROR, self.position_error_m.map_or(0.0, |bound| bound.value), 0.0, not_negative),
+            (VELOCITY_ERROR, self.velocity_error_m_s.value, 0.0, not_negative),
+            (BRAKE, self.brake_m_s2, f64::MIN_POSITIVE, positive),
+            (MAX_AGE, self.max_age_s.value, f64::MIN_POSITIVE, positive),
+            (LATENCY, self.latency_s.value, 0.0, not_negative),
+            (HORIZON, self.horizon_s, f64::MIN_POSITIVE, positive),
+            (TUBE, self.tube_m, f64::MIN_POSITIVE, positive),
         ] {
             if !(least..=1e6).contains(&value) {
-                return Err(SettingsError { option, problem, value: value.to_string() });
+                return Err(SettingsError { option, problem: problem.to_owned(), value: value.to_string() });
             }
         }
         let count = match &self.expected {
@@ -223,8 +227,8 @@ impl Settings {
             Expected::Names(names) => names.len(),
         };
         if !(2..=self.max_vehicles).contains(&count) {
-            let option = if matches!(self.expected, Expected::Count(_)) { "--expect" } else { "--ids" };
-            let problem = "must give 2 vehicles or more, and at most the number of --max-vehicles";
+            let option = if matches!(self.expected, Expected::Count(_)) { EXPECT } else { IDS };
+            let problem = format!("must give 2 vehicles or more, and at most the number of {MAX_VEHICLES}");
             return Err(SettingsError { option, problem, value: count.to_string() });
         }
         Ok(())

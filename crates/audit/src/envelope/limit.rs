@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::fence::Fence;
 use crate::findings::Tally;
 use crate::outcome::Status;
+use tautline_core::fact::Fact;
 
 /// Excess that counts as rounding, as a fraction of the limit or of 1, whichever is larger.
 const ALLOWANCE: f64 = 1e-9;
@@ -223,7 +224,7 @@ pub struct LimitOutcome {
     /// Vehicles for which no value is known.
     pub unknown: Vec<usize>,
     /// Assumption about the quantity, in addition to the motion between samples.
-    pub assumes: Option<String>,
+    pub assumes: Option<Fact>,
     /// Corners of curves, which are not compared with the limit; `None` without corners.
     pub corners: Option<Corners>,
 }

@@ -13,6 +13,7 @@ use crate::ledger::Interruption;
 use crate::outcome::Status;
 use crate::polynomial::{chord_deviation, rescale, value};
 use crate::sweep::Interval;
+use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::track::{Item, Piece, Sample};
 
 /// Largest jump at which two pieces form one smooth curve: of the position \[m\] and of the velocity \[m/s\]. Files
@@ -22,14 +23,6 @@ const SMOOTH: f64 = 1e-3;
 const SAME_INSTANT_S: f64 = 1e-6;
 /// Resolution of the smallest clearance margin of a curve, as a fraction of the margin.
 const COARSE: f64 = 1e-3;
-/// Assumption about accelerations between samples without a bound.
-const BY_THREE_SAMPLES: &str = "accelerations are those of the parabolas through three samples in a row";
-
-/// Returns the assumption about accelerations averaged over windows \[s\].
-fn by_windows(length_s: f64) -> String {
-    format!("accelerations are means over {length_s:?} s")
-}
-
 /// Context in which an item is judged.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ItemContext {
@@ -146,7 +139,7 @@ impl LimitMonitor {
             for found in self.means[vehicle].take(velocity.clone(), length_s, self.window, goal) {
                 of.note(vehicle, Some(found));
             }
-            of.assumes = Some(by_windows(length_s));
+            of.assumes = Some(Fact::number(FactKind::MeanAcceleration, Source::Declared, length_s, "s"));
         }
     }
 
@@ -181,7 +174,7 @@ impl LimitMonitor {
         });
         if bounded_by_m_s2.is_none() {
             let accelerations = self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::Acceleration);
-            accelerations.for_each(|of| of.assumes = Some(BY_THREE_SAMPLES.to_owned()));
+            accelerations.for_each(|of| of.assumes = Some(Fact::new(FactKind::SampledAcceleration, Source::Default)));
         }
     }
 
@@ -420,7 +413,7 @@ pub(super) struct LimitRecord {
     /// Whether any value is known, for each vehicle.
     observed: Vec<bool>,
     /// Assumption about the quantity.
-    pub(super) assumes: Option<String>,
+    pub(super) assumes: Option<Fact>,
     /// Corners at which a velocity jumps; these are not compared with the limit.
     corners: Option<Corners>,
 }

@@ -11,6 +11,10 @@ use crate::envelope::{Envelope, Limit, Quantity};
 use crate::obstacle::{Obstacle, ObstacleError};
 use crate::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
 use crate::well_clear::WellClear;
+use tautline_core::option::{
+    ABOVE, ACCEL_WINDOW, CYLINDER, DELTA, ELLIPSOID, FROM, LAND_ON, LIMIT, MAX_ACCEL, MAX_GAP, MOTION, OBSTACLES,
+    OFFSET, Opt, PLAN, RADIUS, TO, WELL_CLEAR,
+};
 
 /// Largest accepted number: a length \[m\], a time \[s\] or an acceleration \[m/s^2\].
 pub(super) const LARGEST: f64 = MAX_LENGTH_M;
@@ -45,7 +49,7 @@ impl Interpolation {
         }
     }
 
-    /// Returns the name for the option `--motion`.
+    /// Returns the name of the interpolation.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -60,18 +64,18 @@ impl Interpolation {
 /// Setting whose effect changes with the unit of time.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TimedSetting {
-    /// Name of the setting, which is that of the option of `tautline audit`.
-    pub option: &'static str,
+    /// The setting.
+    pub option: Opt,
     /// Name of the vehicle, limit, obstacle or motion, if the setting is given for several.
     pub of: Option<String>,
 }
 
 impl TimedSetting {
-    fn new(option: &'static str) -> Self {
+    fn new(option: Opt) -> Self {
         Self { option, of: None }
     }
 
-    fn of(option: &'static str, name: &str) -> Self {
+    fn of(option: Opt, name: &str) -> Self {
         Self { option, of: Some(name.to_owned()) }
     }
 }
@@ -181,27 +185,27 @@ impl Settings {
             is_own_limit: _,
         } = self;
         let motion = motion.filter(|motion| motion.rests_on_seconds());
-        let mut timed: Vec<_> = motion.map(|motion| TimedSetting::of("motion", motion.name())).into_iter().collect();
-        let mut add = |is_timed: bool, option: &'static str| {
+        let mut timed: Vec<_> = motion.map(|motion| TimedSetting::of(MOTION, motion.name())).into_iter().collect();
+        let mut add = |is_timed: bool, option: Opt| {
             timed.extend(is_timed.then(|| TimedSetting::new(option)));
         };
-        add(from_s.is_some(), "from");
-        add(to_s.is_some(), "to");
+        add(from_s.is_some(), FROM);
+        add(to_s.is_some(), TO);
         // An infinite gap joins all samples, whatever their unit of time.
-        add(max_gap_s.is_some_and(f64::is_finite), "max-gap");
-        add(max_accel_m_s2.is_some(), "max-accel");
-        add(accel_window_s.is_some(), "accel-window");
-        add(*has_plan, "plan");
-        add(well_clear.is_some_and(WellClear::rests_on_seconds), "well-clear");
+        add(max_gap_s.is_some_and(f64::is_finite), MAX_GAP);
+        add(max_accel_m_s2.is_some(), MAX_ACCEL);
+        add(accel_window_s.is_some(), ACCEL_WINDOW);
+        add(*has_plan, PLAN);
+        add(well_clear.is_some_and(WellClear::rests_on_seconds), WELL_CLEAR);
         for (name, VehicleSettings { radius_m: _, offset_s, max_accel_m_s2 }) in vehicles {
-            timed.extend((*offset_s != 0.0).then(|| TimedSetting::of("offset", name)));
-            timed.extend(max_accel_m_s2.map(|_| TimedSetting::of("max-accel", name)));
+            timed.extend((*offset_s != 0.0).then(|| TimedSetting::of(OFFSET, name)));
+            timed.extend(max_accel_m_s2.map(|_| TimedSetting::of(MAX_ACCEL, name)));
         }
         let obstacles = obstacles.iter().filter(|obstacle| obstacle.rests_on_seconds());
-        timed.extend(obstacles.map(|obstacle| TimedSetting::of("obstacles", &obstacle.name)));
+        timed.extend(obstacles.map(|obstacle| TimedSetting::of(OBSTACLES, &obstacle.name)));
         let Envelope { limits, fence: _ } = envelope;
         let limits = limits.iter().map(|limit| limit.quantity).filter(|quantity| quantity.rests_on_seconds());
-        timed.extend(limits.map(|quantity| TimedSetting::of("limit", quantity.name())));
+        timed.extend(limits.map(|quantity| TimedSetting::of(LIMIT, quantity.name())));
         timed
     }
 
@@ -249,29 +253,29 @@ impl Settings {
             _ => Ok(()),
         };
         let check = |option, value, range| check_of(option, None, value, range);
-        check("delta", self.delta_m, POSITIVE)?;
-        check("radius", self.radius_m, NOT_NEGATIVE)?;
-        check("max-accel", self.max_accel_m_s2, NOT_NEGATIVE)?;
+        check(DELTA, self.delta_m, POSITIVE)?;
+        check(RADIUS, self.radius_m, NOT_NEGATIVE)?;
+        check(MAX_ACCEL, self.max_accel_m_s2, NOT_NEGATIVE)?;
         for axis in self.ellipsoid_m.iter().flatten() {
-            check("ellipsoid", Some(*axis), POSITIVE)?;
+            check(ELLIPSOID, Some(*axis), POSITIVE)?;
         }
         if let Some(Cylinder { horizontal_m, vertical_m }) = self.cylinder {
-            check("cylinder", Some(horizontal_m), POSITIVE)?;
-            check("cylinder", Some(vertical_m), POSITIVE)?;
+            check(CYLINDER, Some(horizontal_m), POSITIVE)?;
+            check(CYLINDER, Some(vertical_m), POSITIVE)?;
             let others = [
-                ("delta", self.delta_m.is_some()),
-                ("ellipsoid", self.ellipsoid_m.is_some()),
-                ("radius", self.radius_m.is_some() || self.vehicles.values().any(|of| of.radius_m.is_some())),
-                ("obstacles", !self.obstacles.is_empty()),
+                (DELTA, self.delta_m.is_some()),
+                (ELLIPSOID, self.ellipsoid_m.is_some()),
+                (RADIUS, self.radius_m.is_some() || self.vehicles.values().any(|of| of.radius_m.is_some())),
+                (OBSTACLES, !self.obstacles.is_empty()),
             ];
             if let Some((other, _)) = others.into_iter().find(|(_, is_given)| *is_given) {
                 return Err(RecordedError::CylinderAnd { other });
             }
         }
         if let Some(WellClear { horizontal_m, vertical_m, tau_s }) = self.well_clear {
-            check("well-clear", Some(horizontal_m), POSITIVE)?;
-            check("well-clear", Some(vertical_m), POSITIVE)?;
-            check("well-clear", Some(tau_s), NOT_NEGATIVE)?;
+            check(WELL_CLEAR, Some(horizontal_m), POSITIVE)?;
+            check(WELL_CLEAR, Some(vertical_m), POSITIVE)?;
+            check(WELL_CLEAR, Some(tau_s), NOT_NEGATIVE)?;
             let motion = self.motion.filter(|motion| matches!(motion, Interpolation::Hold | Interpolation::Bounded));
             if let Some(motion) = motion {
                 return Err(RecordedError::WellClearMotion { motion: motion.name() });
@@ -280,26 +284,26 @@ impl Settings {
                 return Err(RecordedError::WellClearAndEllipsoid);
             }
         }
-        check("from", self.from_s, FINITE)?;
-        check("to", self.to_s, FINITE)?;
-        check("above", self.above_m, FINITE)?;
+        check(FROM, self.from_s, FINITE)?;
+        check(TO, self.to_s, FINITE)?;
+        check(ABOVE, self.above_m, FINITE)?;
         // An infinite gap joins all samples.
-        check("max-gap", self.max_gap_s.filter(|gap_s| *gap_s != f64::INFINITY), NOT_NEGATIVE)?;
+        check(MAX_GAP, self.max_gap_s.filter(|gap_s| *gap_s != f64::INFINITY), NOT_NEGATIVE)?;
         let Interval { from_s, to_s } = self.window();
         if from_s > to_s {
             return Err(RecordedError::EmptyWindow { from_s, to_s });
         }
         for (name, of) in &self.vehicles {
-            check_of("radius", Some(name), of.radius_m, NOT_NEGATIVE)?;
-            check_of("offset", Some(name), Some(of.offset_s), FINITE)?;
-            check_of("max-accel", Some(name), of.max_accel_m_s2, NOT_NEGATIVE)?;
+            check_of(RADIUS, Some(name), of.radius_m, NOT_NEGATIVE)?;
+            check_of(OFFSET, Some(name), Some(of.offset_s), FINITE)?;
+            check_of(MAX_ACCEL, Some(name), of.max_accel_m_s2, NOT_NEGATIVE)?;
         }
         for Limit { quantity, allowed } in &self.envelope.limits {
             let is_height = quantity.derivative() == 0 || *quantity == Quantity::NavigationFloor;
             let range = if is_height { FINITE } else { POSITIVE };
-            check_of("limit", Some(quantity.name()), Some(*allowed), range)?;
+            check_of(LIMIT, Some(quantity.name()), Some(*allowed), range)?;
         }
-        check("accel-window", self.accel_window_s, POSITIVE)?;
+        check(ACCEL_WINDOW, self.accel_window_s, POSITIVE)?;
         let is_limited = self.envelope.limits.iter().any(|limit| limit.quantity == Quantity::Acceleration);
         if self.accel_window_s.is_some() && (!is_limited || self.motion == Some(Interpolation::Bounded)) {
             return Err(RecordedError::NoAccelWindow);
@@ -378,8 +382,8 @@ pub enum RecordedError {
     /// A number of the settings is out of range.
     #[error("{option}: must be {range}, got {}{value:?}", of.as_ref().map(|of| format!("{of}=")).unwrap_or_default())]
     OutOfRange {
-        /// Name of the setting, which is that of the option of `tautline audit`.
-        option: &'static str,
+        /// The setting.
+        option: Opt,
         /// Name of the vehicle or of the limit, if the setting is given for several.
         of: Option<String>,
         /// Allowed range.
@@ -416,13 +420,13 @@ pub enum RecordedError {
         known: String,
     },
     /// Vehicles land on an obstacle, but the settings give no height of the ground.
-    #[error("land-on: the obstacle `{name}` is exempt at or below a height, which is not given")]
+    #[error("{LAND_ON}: the obstacle `{name}` is exempt at or below a height, which is not given")]
     NoGround {
         /// Name of the obstacle.
         name: String,
     },
     /// Vehicles land on an obstacle whose name several obstacles have.
-    #[error("land-on: {count} obstacles have the name `{name}`")]
+    #[error("{LAND_ON}: {count} obstacles have the name `{name}`")]
     AmbiguousObstacle {
         /// Name of the obstacles.
         name: String,
@@ -430,7 +434,7 @@ pub enum RecordedError {
         count: usize,
     },
     /// Vehicles land on an obstacle that the settings do not have.
-    #[error("land-on: there is no obstacle `{name}`; the obstacles are {known}")]
+    #[error("{LAND_ON}: there is no obstacle `{name}`; the obstacles are {known}")]
     UnknownObstacle {
         /// Name in the settings.
         name: String,
@@ -515,19 +519,19 @@ pub enum RecordedError {
     #[error("the window of accelerations has no effect without a limit on the acceleration, or if motion is bounded")]
     NoAccelWindow,
     /// A cylinder is combined with another measure of separations.
-    #[error("cylinder: cannot be combined with {other}; give one of them")]
+    #[error("{CYLINDER}: cannot be combined with {other}; give one of them")]
     CylinderAnd {
-        /// Name of the other setting.
-        other: &'static str,
+        /// The other setting.
+        other: Opt,
     },
     /// Well clear of motion without velocities.
-    #[error("well-clear: needs velocities, which motion {motion} does not define")]
+    #[error("{WELL_CLEAR}: needs velocities, which motion {motion} does not define")]
     WellClearMotion {
         /// Motion between samples.
         motion: &'static str,
     },
     /// Well clear is combined with an ellipsoid.
-    #[error("well-clear: cannot be combined with an ellipsoid, which scales all lengths")]
+    #[error("{WELL_CLEAR}: cannot be combined with an ellipsoid, which scales all lengths")]
     WellClearAndEllipsoid,
     /// Obstacles are combined with an ellipsoid.
     #[error("obstacles cannot be combined with an ellipsoid")]

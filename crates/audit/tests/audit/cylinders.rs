@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use nalgebra::Vector3;
 use tautline_audit::recorded::{Interpolation, ObjectPair, RecordedError, Settings, audit};
 use tautline_audit::{Cylinder, Status};
+use tautline_core::option::CYLINDER;
 
 use super::recorded::{judge, seen, status};
 use super::recorded_curves::curves;
@@ -157,7 +158,7 @@ fn a_cylinder_excludes_other_measures_and_needs_positive_distances() {
     let refused = |settings: Settings| audit(&[], &[], settings).expect_err("refused");
     for (horizontal_m, vertical_m) in [(0.0, 1.0), (1.0, -2.0), (f64::NAN, 1.0), (1.0, f64::INFINITY)] {
         let error = refused(cylinder(horizontal_m, vertical_m));
-        assert!(matches!(error, RecordedError::OutOfRange { option: "cylinder", .. }), "{error}");
+        assert!(matches!(error, RecordedError::OutOfRange { option: CYLINDER, .. }), "{error}");
     }
     for other in [
         Settings { delta_m: Some(1.0), ..cylinder(1.0, 1.0) },

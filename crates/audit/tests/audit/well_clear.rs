@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use nalgebra::Vector3;
 use tautline_audit::recorded::{Interpolation, Outcome, RecordedError, Settings, audit};
 use tautline_audit::{Status, WellClear};
+use tautline_core::option::WELL_CLEAR;
 use tautline_core::track::{Item, Piece};
 
 use super::recorded::{judge, seen};
@@ -133,7 +134,7 @@ fn thresholds_and_motions_out_of_range_are_refused() {
         WellClear { vertical_m: -1.0, ..WellClear::F3442 },
         WellClear { tau_s: f64::NAN, ..WellClear::F3442 },
     ] {
-        assert!(matches!(refused(well_clear(of)), RecordedError::OutOfRange { option: "well-clear", .. }));
+        assert!(matches!(refused(well_clear(of)), RecordedError::OutOfRange { option: WELL_CLEAR, .. }));
     }
     for motion in [Interpolation::Hold, Interpolation::Bounded] {
         let settings = Settings { motion: Some(motion), ..well_clear(WellClear::F3442) };

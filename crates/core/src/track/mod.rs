@@ -142,11 +142,8 @@ pub struct Metadata {
     /// Notes for the user on how the recording was read, one sentence each, such as: rows were sorted.
     pub notes: Vec<String>,
     /// Facts behind times, positions and names of vehicles, each with its source. Facts may be added as the recording
-    /// is read.
+    /// is read. Nothing is proved of a recording with a fact that is an assumption ([`Fact::is_assumption`]).
     pub facts: Vec<Fact>,
-    /// Assumption behind the positions, as a phrase after "if"; `None` if the recording holds all positions of its
-    /// items. A recording with an assumption proves nothing.
-    pub assumed: Option<String>,
     /// Whether the height of a vehicle is unknown. Then z is 0 in every item, and only distances in the plane of x and
     /// y can be judged.
     pub is_planar: bool,
@@ -198,11 +195,6 @@ pub trait Tracks {
     /// [`Metadata::facts`].
     fn facts(&self) -> &[Fact] {
         &self.metadata().facts
-    }
-
-    /// [`Metadata::assumed`].
-    fn assumed(&self) -> Option<&str> {
-        self.metadata().assumed.as_deref()
     }
 
     /// [`Metadata::is_planar`].

@@ -19,6 +19,7 @@ use std::io;
 
 use crate::read::{Channels, ReadError, Recording};
 use source::Source;
+use tautline_core::option::SAMPLE_HZ;
 
 /// Formats that can be written; the extension of a file is the name of its format.
 pub const WRITTEN: &[Format] = &[Format::CSV, Format::PARQUET, Format::NPZ, Format::MCAP];
@@ -123,8 +124,10 @@ impl ExportError {
                 "write it to a file: this format goes back to what it has written"
             }
             Self::Write(_) => "free some space or write to another folder",
-            Self::Curves => "set the sampling rate with --sample-hz; the motion between samples is lost",
-            Self::NoCurves => "omit --sample-hz",
+            Self::Curves => {
+                return format!("set the sampling rate with {SAMPLE_HZ}; the motion between samples is lost");
+            }
+            Self::NoCurves => return format!("omit {SAMPLE_HZ}"),
             Self::SampleRate(_) => "give a positive rate that yields at most 1e9 samples",
             Self::NotWritten(_) => "use csv, parquet, npz or mcap",
             Self::Name(_) => "export to mcap or parquet",

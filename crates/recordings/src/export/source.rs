@@ -85,8 +85,8 @@ impl Source<'_> {
         info.axes = if recording.is_planar() { 2 } else { 3 };
         info.clock = recording.clock().clone();
         info.notes = recording.notes().to_vec();
-        if let Some(assumed) = recording.assumed() {
-            info.notes.push(format!("the samples rest on an assumption that the file does not contain: {assumed}"));
+        for fact in recording.facts().iter().filter(|fact| fact.is_assumption()) {
+            info.notes.push(format!("the samples rest on an assumption that the file does not contain: {fact}"));
         }
         if let Some(hz) = self.sample_hz {
             info.notes.push(format!("curves were sampled at {hz} Hz; the motion between samples is lost"));

@@ -6,6 +6,7 @@
 
 use nalgebra::{Matrix2, Vector2, Vector3};
 use tautline_core::fact::{Fact, FactKind, Source};
+use tautline_core::option::COLUMN;
 
 use super::earth::{Geodetic, LocalFrame};
 use super::error::{Fault, list, quoted};
@@ -395,7 +396,8 @@ impl Compared {
     pub(super) fn fault(&self, problem: String, header: &[String]) -> Fault {
         let chosen = |columns: &[Option<usize>; 3], roles: [&str; 3]| {
             let given = columns.iter().zip(roles).filter_map(|(column, role)| Some((role, (*column)?)));
-            let given: Vec<_> = given.map(|(role, column)| format!("--column {role}={}", header[column])).collect();
+            let named = |(role, column): (&str, usize)| COLUMN.set(format!("{role}={}", header[column])).to_string();
+            let given: Vec<_> = given.map(named).collect();
             format!("with {}", given.join(" "))
         };
         let (metric, earth) = self.names(header);

@@ -7,6 +7,7 @@ use super::clock::Stamp;
 use super::error::{Fault, quoted};
 use super::heading;
 use super::heading::Words;
+use tautline_core::option::SCALE;
 
 /// Names of columns that occur in data of aircraft only, without separators.
 const COLUMNS: Words = Words(concat!(
@@ -188,8 +189,10 @@ impl ClimbMonitor {
              and unit of the rate, which is not {unit}"
         );
         let remedy = format!(
-            "if the heights are in feet, use --scale 0.3048; if heights and times are read in their units, confirm \
-             metres with --scale 1 or remove column {rate}"
+            "if the heights are in feet, use {}; if heights and times are read in their units, confirm metres with {} \
+             or remove column {rate}",
+            SCALE.set("0.3048"),
+            SCALE.set("1")
         );
         Some(Fault::coded("recording/unit-conflict", problem, remedy))
     }

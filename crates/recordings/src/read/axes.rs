@@ -19,6 +19,7 @@ use super::error::{Fault, ReadError, quoted, refuse};
 use super::heading;
 use super::options::{ColumnNames, ReadOptions};
 use super::order::Recording;
+use tautline_core::option::{AXES, COLUMN, SCALE};
 use tautline_core::track::{Item, Metadata, Tracks};
 
 /// Mapping of the axes of a recording to x, y and z: a permutation with factors.
@@ -147,8 +148,9 @@ pub(super) fn turned(recording: Recording, options: &ReadOptions) -> Result<Reco
         return Ok(recording);
     }
     if recording.is_planar() && !options.turn().keeps_plane() {
-        let problem = "--axes maps its third axis to x or y, but it has none";
-        let remedy = "name the column of the third axis with --column z=NAME, or keep z in --axes";
+        let problem = format!("{AXES} maps its third axis to x or y, but it has none");
+        let column = COLUMN.set("z=NAME");
+        let remedy = format!("name the column of the third axis with {column}, or keep z in {AXES}");
         return refuse("recording/contradicts-option", problem, remedy);
     }
     let mut metadata = recording.metadata().clone();
@@ -164,7 +166,7 @@ pub(super) fn refuse_known(options: &ReadOptions, what: &str) -> Result<(), Faul
     refuse(
         "recording/contradicts-option",
         format!("{what} gives the directions of its axes"),
-        "omit --axes and the signs of --scale",
+        format!("omit {AXES} and the signs of {SCALE}"),
     )
 }
 
@@ -174,8 +176,9 @@ pub(super) fn refuse_turned_height(options: &ReadOptions, column: &str) -> Resul
         return Ok(());
     }
     let problem =
-        format!("column {} is a height by its name, but --axes or --scale change its direction", quoted(column));
-    let remedy = format!("keep z in --axes and --scale, or take the numbers as z with --column z={column}");
+        format!("column {} is a height by its name, but {AXES} or {SCALE} change its direction", quoted(column));
+    let named = COLUMN.set(format!("z={column}"));
+    let remedy = format!("keep z in {AXES} and {SCALE}, or take the numbers as z with {named}");
     refuse("recording/contradicts-option", problem, remedy)
 }
 
@@ -199,8 +202,9 @@ impl Tracks for MappedRecording {
             match item {
                 Item::Sample(sample) => {
                     if sample.radius_m.is_some() && !self.axes.keeps_lengths() {
-                        let problem = "--scale has different factors for its axes, but vehicles have a radius";
-                        return refuse("recording/contradicts-option", problem, "give one factor in --scale");
+                        let problem = format!("{SCALE} has different factors for its axes, but vehicles have a radius");
+                        let remedy = format!("give one factor in {SCALE}");
+                        return refuse("recording/contradicts-option", problem, remedy);
                     }
                     sample.position_m = self.axes.turn(sample.position_m);
                     sample.velocity_m_s = sample.velocity_m_s.map(|velocity| self.axes.turn(velocity));

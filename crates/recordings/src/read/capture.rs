@@ -31,6 +31,7 @@ use super::options::ReadOptions;
 use super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
 use super::readers::{FormatOption, Packing, Reader};
 use super::source::{Lines, Source};
+use tautline_core::option::SCALE;
 
 /// Source of the time of a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,8 +100,8 @@ fn note_of_markers(vehicles: &[MarkerColumns]) -> Option<String> {
 /// Opens a take with these columns.
 fn open(source: &Source, capture: Capture, options: &ReadOptions) -> Result<Recording, ReadError> {
     if options.metres() != 1.0 {
-        let problem = format!("it has a unit of length, which contradicts --scale {}", options.metres());
-        return refuse("recording/contradicts-option", problem, "omit --scale");
+        let problem = format!("it has a unit of length, which contradicts {}", SCALE.set(options.metres()));
+        return refuse("recording/contradicts-option", problem, format!("omit {SCALE}"));
     }
     let names = capture.vehicles.iter().map(|(name, _)| name.clone()).collect();
     let (unit, notes) = (Some(TimeUnit::Seconds), capture.notes.clone());

@@ -8,6 +8,7 @@ use chrono::{DateTime, NaiveDateTime};
 use super::error::{Fault, quoted, refuse};
 use super::heading;
 use super::options::ReadOptions;
+use tautline_core::option::{COLUMN, FPS, TIME_SCALE, TIME_UNIT};
 use tautline_core::track::Clock;
 
 /// Distance from zero from which a clock is counted from an epoch \[s\]: doubles are coarser than 0.1 ns there.
@@ -290,8 +291,10 @@ impl Timing {
         };
         let (unit, why, other) = known.map_or_else(inferred, |unit| (unit, None, None));
         let name = unit.name();
-        let note = why
-            .map(|why| format!("times carry no unit and are taken as {name}, {why} (confirm with --time-unit {name})"));
+        let note = why.map(|why| {
+            let confirmed = TIME_UNIT.set(name);
+            format!("times carry no unit and are taken as {name}, {why} (confirm with {confirmed})")
+        });
         let per_second = unit.per_second();
         let seconds = probe.first.digits().0.div_euclid(per_second);
         let fits = probe.first.approximately().abs() < TOP;
@@ -380,7 +383,7 @@ impl SubunitColumn {
             }
             (_, None) => format!("column {own} holds {}, which is not a whole number", rest.approximately()),
         };
-        let remedy = "if one of the two is the whole time, name it with --column t=NAME";
+        let remedy = format!("if one of the two is the whole time, name it with {}", COLUMN.set("t=NAME"));
         refuse("recording/time-format", problem, remedy)
     }
 }
@@ -419,7 +422,8 @@ pub(super) fn time_columns(
             if options.time_unit.is_some() || options.times_per_second.is_some() {
                 let (whole, own) = (quoted(&header[whole.column]), quoted(&header[rest.column]));
                 let problem = format!("times are split over the columns {whole} and {own}, whose units are known");
-                return refuse("recording/contradicts-option", problem, "omit --time-unit, --fps and --time-scale");
+                let remedy = format!("omit {TIME_UNIT}, {FPS} and {TIME_SCALE}");
+                return refuse("recording/contradicts-option", problem, remedy);
             }
             Ok(Some((whole.column, Some(rest))))
         }
@@ -458,7 +462,8 @@ fn split(whole: &Candidate, rest: &Candidate) -> Option<SubunitColumn> {
 fn both(header: &[String], a: &Candidate, b: &Candidate) -> Fault {
     let (first, second) = (quoted(&header[a.column]), quoted(&header[b.column]));
     let problem = format!("the columns {first} and {second} both give the time");
-    Fault::coded("recording/ambiguous-column", problem, "name one of them with --column t=NAME, or remove the other")
+    let remedy = format!("name one of them with {}, or remove the other", COLUMN.set("t=NAME"));
+    Fault::coded("recording/ambiguous-column", problem, remedy)
 }
 
 /// Relative rounding of a unit of time.
@@ -498,7 +503,7 @@ pub(super) fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<T
     let Some(unit) = heading::unit_of_time_name(name).filter(|unit| !is_zone(unit)) else { return Ok(None) };
     TimeUnit::from_name(&unit).map(Some).ok_or_else(|| {
         let problem = format!("column {} has an unknown unit of time, {}", quoted(name), quoted(&unit));
-        let remedy = "set its length in seconds with --time-scale, such as 60 for minutes";
+        let remedy = format!("set its length in seconds with {TIME_SCALE}, such as 60 for minutes");
         Fault::coded("recording/unknown-unit", problem, remedy)
     })
 }

@@ -18,6 +18,7 @@ use super::order::Recording;
 use super::readers::{Format, FormatOption, Packing, Reader};
 use super::source::Source;
 use super::table::{Cells as _, number};
+use tautline_core::option::START;
 use tautline_core::track::Item;
 
 pub(super) const READER: Reader = Reader {
@@ -62,7 +63,7 @@ pub(super) fn curves_of(
     let (several, mut has_sequence_note) = (vehicles.len() > 1, false);
     let mut curves = VehicleItems::new();
     if let Some(name) = options.starts.keys().find(|name| vehicles.iter().all(|(known, _)| known != *name)) {
-        let problem = format!("--start names the unknown vehicle {}", quoted(name));
+        let problem = format!("{START} names the unknown vehicle {}", quoted(name));
         return refuse("recording/unknown-vehicle", problem, "use the names of the files without their extension");
     }
     for (name, files) in vehicles {
@@ -88,8 +89,8 @@ pub(super) fn curves_of(
         _ => None,
     };
     if curves.windows(2).any(|pair| first(&pair[0].1) == first(&pair[1].1)) {
-        let note = "curves start at one position: if they are relative, set each origin with --start NAME=X,Y,Z";
-        notes.push(note.to_owned());
+        let start = START.set("NAME=X,Y,Z");
+        notes.push(format!("curves start at one position: if they are relative, set each origin with {start}"));
     }
     Ok((curves, notes))
 }

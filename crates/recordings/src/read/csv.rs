@@ -10,7 +10,7 @@ use std::str;
 use csv_core::ReadRecordResult;
 
 use super::clock::{Stamp, TimeUnit};
-use super::error::{Fault, Place, ReadError, quoted, refuse};
+use super::error::{Fault, Place, ReadError, one_of, quoted, refuse};
 use super::layout::{Layout, VehicleColumns};
 use super::options::{Dimensions, ReadOptions};
 use super::order::Recording;
@@ -66,6 +66,7 @@ pub(super) const TRAJNET: Reader = Reader {
     supports: FormatOption::TABLE,
     packing: Packing::Any,
 };
+use tautline_core::option::{DIMENSIONS, FORMAT};
 
 /// Returns whether a line is CSV rather than numbers between blanks or brackets.
 fn has_separators(line: &[u8]) -> bool {
@@ -125,7 +126,8 @@ fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Record
             TrajnetMatch::Possible => {
                 let problem = "each line may be a frame, a vehicle, x and y, or a time, x, y and z: the first two \
                                numbers are whole";
-                let remedy = "use --format trajnet, or --dimensions 3 for a time and a position";
+                let remedy =
+                    format!("use {}, or {} for a time and a position", FORMAT.set("trajnet"), DIMENSIONS.set("3"));
                 return refuse("recording/ambiguous-layout", problem, remedy);
             }
             TrajnetMatch::None => {}
@@ -141,7 +143,8 @@ fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Record
     let layout = match Layout::of(&text.header, options, &stem) {
         _ if !text.named => numbers(),
         _ if options.dimensions.is_some() => {
-            refuse("recording/contradicts-option", "its header defines the numbers of a vehicle", "omit --dimensions")
+            let remedy = format!("omit {DIMENSIONS}");
+            refuse("recording/contradicts-option", "its header defines the numbers of a vehicle", remedy)
         }
         // A line above numbers may be a comment instead of a header.
         Err(fault) if !first.is_empty() => numbers().map_err(|_| fault),
@@ -207,7 +210,8 @@ impl TextTable {
             above.filter(|_| !named(&self.header)).find(|names| names.len() == self.header.len() && named(names));
         if format == Format::TRAJNET && !(numeric && self.header.len() == TRAJNET_COLUMNS.len()) {
             let problem = format!("its first line has {} fields that are not all numbers", self.header.len());
-            let remedy = "a TrajNet table has frame, vehicle, x and y in each line, and no header; omit --format";
+            let remedy =
+                format!("a TrajNet table has frame, vehicle, x and y in each line, and no header; omit {FORMAT}");
             return refuse("recording/wrong-format", problem, remedy);
         }
         if numeric {
@@ -547,10 +551,8 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
         (None, [_, ..]) => {
             let problem = format!("the number of columns per vehicle is ambiguous for {count} columns");
             let ways: Vec<_> = known.iter().map(|dimensions| dimensions.name()).collect();
-            let remedy = format!(
-                "use --dimensions {}: x and y, x, y and z, and +2 or +3 for their velocities",
-                ways.join(" or ")
-            );
+            let remedy =
+                format!("use {}: x and y, x, y and z, and +2 or +3 for their velocities", one_of(DIMENSIONS, &ways));
             return refuse("recording/ambiguous-layout", problem, remedy);
         }
         (None, []) if count == 12 => {
@@ -562,11 +564,8 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
         (given, _) => {
             let each = given.map_or(3, |given| given.counts().1);
             let problem = format!("the line has {count} numbers, expected time and {each} for each vehicle");
-            return refuse(
-                "recording/field-count",
-                problem,
-                "write t x y z x y z ..., one line per time, or set --dimensions",
-            );
+            let remedy = format!("write t x y z x y z ..., one line per time, or set {DIMENSIONS}");
+            return refuse("recording/field-count", problem, remedy);
         }
     };
     let (axes, each) = dimensions.counts();

@@ -12,6 +12,7 @@ use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::Row;
 use super::table::{Cells, number, vector};
+use tautline_core::option::ORIGIN;
 use tautline_core::track::EarthOrigin;
 
 /// Semi-major axis a \[m\].
@@ -62,7 +63,7 @@ impl LocalFrame {
         }
         // Other files would have other first places.
         let problem = "several files need one origin for their places on the Earth";
-        let remedy = format!("set it with --origin, such as --origin {}", local.origin());
+        let remedy = format!("set it with {ORIGIN}, such as {}", ORIGIN.set(local.origin()));
         refuse("recording/no-origin", problem, remedy)
     }
 
@@ -103,7 +104,8 @@ impl LocalFrame {
     /// Returns the note for the user.
     pub(super) fn note(&self) -> String {
         let origin = self.origin();
-        format!("positions are metres east, north and up of {origin} on WGS 84 (confirm with --origin {origin})")
+        let confirmed = ORIGIN.set(&origin);
+        format!("positions are metres east, north and up of {origin} on WGS 84 (confirm with {confirmed})")
     }
 }
 
@@ -181,8 +183,11 @@ pub(super) fn origin<C: Cells>(
 ) -> Result<Option<LocalFrame>, ReadError> {
     let reference = layout.convention.reference;
     if !layout.on_earth && reference.is_none() {
-        let needless =
-            Fault::coded("recording/unused-option", "it has no columns of latitude and longitude", "omit --origin");
+        let needless = Fault::coded(
+            "recording/unused-option",
+            "it has no columns of latitude and longitude",
+            format!("omit {ORIGIN}"),
+        );
         return if options.origin.is_some() { Err(needless.into()) } else { Ok(None) };
     }
     axes::refuse_known(options, "a table of latitudes and longitudes")?;

@@ -1,9 +1,11 @@
 //! Errors of readers: file, place, fault and remedy.
 
+use std::borrow::Cow;
 use std::path::Path;
 use std::{fmt, io};
 
 use super::readers::Format;
+use tautline_core::option::{ALLOW_UNFINISHED, COLUMN, FORMAT, FPS, Opt, SCALE, SKIP_INCOMPLETE, SORT, TIME_SCALE};
 
 /// Longest quoted value in a message \[characters\].
 const LONGEST_QUOTE: usize = 60;
@@ -50,8 +52,8 @@ impl ReadError {
     #[must_use]
     pub fn help(&self) -> String {
         match self.fault {
-            Fault::UnknownFormat => format!("set --format to one of {}", Format::names()),
-            ref fault => fault.help().to_owned(),
+            Fault::UnknownFormat => format!("set {FORMAT} to one of {}", Format::names()),
+            ref fault => fault.help().into_owned(),
         }
     }
 
@@ -198,29 +200,37 @@ impl Fault {
 
     /// Returns the fault of an empty cell beside other coordinates.
     pub(super) fn empty_coordinate(column: &str) -> Self {
-        let remedy = "fill it, leave all cells of the position empty if the vehicle was not seen, or read such rows as \
-                      rows without a position with --skip-incomplete";
+        let remedy = format!(
+            "fill it, leave all cells of the position empty if the vehicle was not seen, or read such rows as rows \
+             without a position with {SKIP_INCOMPLETE}"
+        );
         Self::coded("recording/empty-cell", format!("column `{column}` is empty"), remedy)
     }
 
     /// Returns the fault of decreasing time.
     pub(super) fn time_backwards(time_s: f64, before_s: f64) -> Self {
         let problem = format!("time runs backwards: {time_s} s comes after {before_s} s");
-        let remedy = "check whether the clock was set; if rows belong to several vehicles, name their column with \
-                      --column id=NAME; if rows are only out of order, use --sort";
+        let remedy = format!(
+            "check whether the clock was set; if rows belong to several vehicles, name their column with {}; if rows \
+             are only out of order, use {SORT}",
+            COLUMN.set("id=NAME")
+        );
         Self::coded("recording/time-backwards", problem, remedy)
     }
 
     /// Returns the fault of times that count frames of unknown duration.
     pub(super) fn frames(problem: impl Into<String>) -> Self {
-        let remedy = "set the frame rate with --fps, such as --fps 30, or the duration of a frame in seconds with \
-                      --time-scale";
+        let remedy = format!(
+            "set the frame rate with {FPS}, such as {}, or the duration of a frame in seconds with {TIME_SCALE}",
+            FPS.set("30")
+        );
         Self::coded("recording/frames", problem, remedy)
     }
 
     /// Returns the fault of a value that overflows in metres or seconds.
     pub(super) fn out_of_range() -> Self {
-        Self::coded("recording/overflow", "a value exceeds the range of numbers", "check --scale and the values")
+        let remedy = format!("check {SCALE} and the values");
+        Self::coded("recording/overflow", "a value exceeds the range of numbers", remedy)
     }
 
     fn code(&self) -> &'static str {
@@ -240,21 +250,26 @@ impl Fault {
         }
     }
 
-    fn help(&self) -> &str {
-        match self {
+    fn help(&self) -> Cow<'_, str> {
+        let remedy = match self {
             Self::System(error) if error.kind() == io::ErrorKind::NotFound => "check the path",
             Self::System(_) => "check the permissions of the file, and the disk",
             Self::Empty => NOTHING_RECORDED,
-            Self::UnknownFormat => "set --format",
-            Self::WrongFormat(_) => "omit --format to recognise the content, or set another format",
+            Self::UnknownFormat => return format!("set {FORMAT}").into(),
+            Self::WrongFormat(_) => {
+                return format!("omit {FORMAT} to recognise the content, or set another format").into();
+            }
             Self::LineTooLong(_) => "check the line ends; a recording has one line per time",
             Self::NotUtf8 => "save it as UTF-8",
             Self::Truncated(_) => "copy or record it again",
-            Self::Unfinished => "copy or record it again, or accept the complete part with --allow-unfinished",
+            Self::Unfinished => {
+                return format!("copy or record it again, or accept the complete part with {ALLOW_UNFINISHED}").into();
+            }
             Self::Bomb(_) => "if the size is expected, unpack it and give the unpacked file",
-            Self::Damaged(_) => "copy or record it again, or set --format",
+            Self::Damaged(_) => return format!("copy or record it again, or set {FORMAT}").into(),
             Self::Content { remedy, .. } => remedy,
-        }
+        };
+        remedy.into()
     }
 }
 
@@ -265,6 +280,13 @@ pub(super) fn refuse<T, E: From<Fault>>(
     remedy: impl Into<String>,
 ) -> Result<T, E> {
     Err(Fault::coded(code, problem, remedy).into())
+}
+
+/// Returns an option with its possible values, such as `--layout A or B`.
+pub(super) fn one_of(option: Opt, values: &[impl AsRef<str>]) -> String {
+    let Some((first, others)) = values.split_first() else { return option.to_string() };
+    let first = option.set(first.as_ref()).to_string();
+    others.iter().fold(first, |text, value| format!("{text} or {}", value.as_ref()))
 }
 
 /// Quotes a value with backticks, shortened and without control characters.

@@ -11,6 +11,7 @@ use super::order::Recording;
 use super::readers::is_prose;
 use super::source::{Archive, Source};
 use tautline_core::fact::{self, Fact, FactKind};
+use tautline_core::option::TIME_UNIT;
 use tautline_core::track::{Clock, Item, Metadata, Tracks};
 
 /// Longest number in a file name that is sorted by value \[digits\].
@@ -259,7 +260,7 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
         } else {
             continue;
         };
-        let remedy = "set the unit with --time-unit, and record all files with one clock";
+        let remedy = format!("set the unit with {TIME_UNIT}, and record all files with one clock");
         return Err(ReadError::new(path, Fault::coded("recording/several-clocks", problem, remedy)));
     }
     let clock = Clock {
@@ -297,9 +298,8 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
         let waiting = Vec::new().into_iter().peekable();
         joined.push(JoinedFile { path, tracks, shift_s, waiting, until_s: f64::NEG_INFINITY });
     }
-    let assumed = joined.iter().find_map(|part| part.tracks.assumed()).map(str::to_owned);
     let earth_origin = joined.iter().find_map(|part| part.tracks.earth_origin()).copied();
-    let metadata = Metadata { clock, notes, facts, assumed, is_planar, earth_origin, ..Metadata::default() };
+    let metadata = Metadata { clock, notes, facts, is_planar, earth_origin, ..Metadata::default() };
     Ok(Box::new(Joined { vehicles, parts: joined, metadata }))
 }
 

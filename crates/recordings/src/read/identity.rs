@@ -7,6 +7,7 @@ use nalgebra::Vector3;
 use super::error::{Fault, quoted, refuse};
 use super::heading;
 use super::heading::Heading;
+use tautline_core::option::{COLUMN, ONE_VEHICLE};
 
 /// Number of distinct values above which a column does not name vehicles.
 const MOST_VALUES: usize = 1000;
@@ -303,9 +304,10 @@ impl SuspectColumn {
         }
         let count = self.values.len();
         let (whose, otherwise) = match named {
-            None => ("its rows".to_owned(), "if all rows are of one vehicle, use --one-vehicle".to_owned()),
+            None => ("its rows".to_owned(), format!("if all rows are of one vehicle, use {ONE_VEHICLE}")),
             Some((name, id)) => {
-                let otherwise = format!("if column {id} does name the vehicles, confirm it with --column id={id}");
+                let confirmed = COLUMN.set(format!("id={id}"));
+                let otherwise = format!("if column {id} does name the vehicles, confirm it with {confirmed}");
                 (format!("the rows of vehicle {}", quoted(name)), otherwise)
             }
         };
@@ -313,7 +315,8 @@ impl SuspectColumn {
             "{whose} look like those of several vehicles: column {} has {count} values that alternate",
             quoted(called)
         );
-        let remedy = format!("name the column of the vehicle with --column id={called}; {otherwise}");
+        let column = COLUMN.set(format!("id={called}"));
+        let remedy = format!("name the column of the vehicle with {column}; {otherwise}");
         Some(Fault::coded("recording/several-vehicles", problem, remedy))
     }
 }

@@ -6,6 +6,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use tautline_core::fact::{Fact, FactKind, Source};
+use tautline_core::option::{COLUMN, ONE_VEHICLE, SCALE};
 
 use super::agreement::{Compared, SecondPosition};
 use super::axes::Convention;
@@ -212,15 +213,16 @@ impl Layout {
     fn check(&mut self, header: &[String], options: &ReadOptions, one: bool) -> Result<(), Fault> {
         let (convention, used) = (&self.convention, self.columns());
         if convention.reference.is_some() && options.metres() != 1.0 {
-            let problem = format!("its positions are in metres, but --scale is {}", options.metres());
-            return refuse("recording/contradicts-option", problem, "omit --scale");
+            let problem = format!("its positions are in metres, but {SCALE} is {}", options.metres());
+            return refuse("recording/contradicts-option", problem, format!("omit {SCALE}"));
         }
         let several = self
             .id
             .map(|id| format!("column {}", quoted(&header[id])))
             .or_else(|| (self.names.len() > 1).then(|| "its header".to_owned()));
         if let Some(namer) = several.filter(|_| options.one_vehicle && !options.is_joined) {
-            return refuse("recording/contradicts-option", format!("{namer} names the vehicles"), "omit --one-vehicle");
+            let problem = format!("{namer} names the vehicles");
+            return refuse("recording/contradicts-option", problem, format!("omit {ONE_VEHICLE}"));
         }
         let is_one_vehicle = options.one_vehicle || options.is_joined;
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
@@ -253,7 +255,7 @@ impl Layout {
         if self.id.is_none() && one && !is_decided && !unused.iter().all(|name| heading::is_not_vehicle_column(name)) {
             return Err(match missing(header, ID, "") {
                 Fault::Content { code, problem, remedy } => {
-                    let remedy = format!("{remedy}; if all rows are of one vehicle, use --one-vehicle");
+                    let remedy = format!("{remedy}; if all rows are of one vehicle, use {ONE_VEHICLE}");
                     Fault::coded(code, problem, remedy)
                 }
                 fault => fault,
@@ -459,8 +461,8 @@ const WORDS: [&str; 12] = [
 /// Returns the fault of a missing column for a role.
 pub(super) fn missing(header: &[String], role: Role, of: &str) -> Fault {
     let problem = format!("no column gives {}{of}; its columns are {}", WORDS[role], list(header, 12));
-    let option = ColumnNames::ROLES[role];
-    let remedy = format!("name the column with --column {option}=NAME, or rename it");
+    let column = COLUMN.set(format!("{}=NAME", ColumnNames::ROLES[role]));
+    let remedy = format!("name the column with {column}, or rename it");
     Fault::coded(code_of_missing(role), problem, remedy)
 }
 
@@ -512,9 +514,11 @@ impl<'a> Columns<'a> {
         let chosen = is_given(EARTH) && is_given(EARTH + 1);
         let on_earth = chosen || gives(EARTH) && gives(EARTH + 1) && !(gives(POSITION) && gives(POSITION + 1));
         let unread = if on_earth { [POSITION, POSITION + 1] } else { [EARTH, EARTH + 1] };
-        let Some(role) = unread.into_iter().find(|role| is_given(*role)) else { return Ok(on_earth) };
-        let (kind, option) = (if on_earth { "degrees" } else { "metres" }, ColumnNames::ROLES[role]);
-        let problem = format!("--column {option} would be ignored, because the positions are read in {kind}");
+        let given = unread.into_iter().find_map(|role| Some((role, self.get("", role)?)));
+        let Some((role, column)) = given else { return Ok(on_earth) };
+        let kind = if on_earth { "degrees" } else { "metres" };
+        let given = COLUMN.set(format!("{}={}", ColumnNames::ROLES[role], self.header[column]));
+        let problem = format!("{given} would be ignored, because the positions are read in {kind}");
         refuse("recording/contradicts-option", problem, "name the columns of either x and y, or lat and lon")
     }
 
@@ -535,8 +539,12 @@ impl<'a> Columns<'a> {
             let [height, other] = [&self.header[first], other].map(|name| quoted(name));
             let problem =
                 format!("column {height} has no unit, and column {other} beside it occurs in data of aircraft");
-            let remedy = "data of aircraft have heights in feet or metres: give --scale 0.3048 for feet or --scale 1 \
-                          for metres, or put the unit into the name, as in `altitude_ft`";
+            let remedy = format!(
+                "data of aircraft have heights in feet or metres: give {} for feet or {} for metres, or put the unit \
+                 into the name, as in `altitude_ft`",
+                SCALE.set("0.3048"),
+                SCALE.set("1")
+            );
             return refuse("recording/unknown-unit", problem, remedy);
         }
         if self.place != EARTH {
@@ -549,8 +557,8 @@ impl<'a> Columns<'a> {
             None if aviation::is_state_vectors(self.header) && options.scale.is_none() => {
                 ", in metres as in the state vectors of OpenSky".to_owned()
             }
-            None if self.place == EARTH && scale != 1.0 => format!(", in units of {scale} m (--scale)"),
-            None if self.place == EARTH => ", in metres: the name has no unit (--scale sets another)".to_owned(),
+            None if self.place == EARTH && scale != 1.0 => format!(", in units of {scale} m ({SCALE})"),
+            None if self.place == EARTH => format!(", in metres: the name has no unit ({SCALE} sets another)"),
             _ => String::new(),
         };
         let columns = if used.len() > 1 { "columns" } else { "column" };
@@ -570,7 +578,9 @@ impl<'a> Columns<'a> {
         let unit = |kind: FactKind, unit: Option<String>| match (options.scale, unit) {
             (Some(_), _) => Fact::number(kind, Source::Declared, options.metres(), "m"),
             (None, Some(unit)) => Fact::name(kind, Source::Deduced, unit),
-            (None, None) => Fact::name(kind, Source::Default, "m"),
+            // Heights beside latitudes and longitudes may be in feet. Other numbers have one unit of length.
+            (None, None) if kind == FactKind::HeightUnit && layout.on_earth => Fact::name(kind, Source::Default, "m"),
+            (None, None) => Fact::name(kind, Source::Convention, "m"),
         };
         if !layout.on_earth {
             facts.push(unit(FactKind::LengthUnit, lengths.clone().find_map(unit_of)));
@@ -595,7 +605,8 @@ impl<'a> Columns<'a> {
         let Some(first) = self.found.insert((vehicle.to_owned(), heading.role), column) else { return Ok(()) };
         let (first, second) = (&self.header[first], &self.header[column]);
         let problem = format!("the columns `{first}` and `{second}` both give {}{of}", WORDS[heading.role]);
-        refuse("recording/ambiguous-column", problem, "name one of them with --column, or remove the other")
+        let remedy = format!("name one of them with {COLUMN}, or remove the other");
+        refuse("recording/ambiguous-column", problem, remedy)
     }
 
     /// Finds the vehicles of a wide table; returns their names in order of appearance.
@@ -675,8 +686,9 @@ impl<'a> Columns<'a> {
             let what = if is_velocity(role) { "velocity" } else { "length" };
             let size = heading::size_of(unit, is_velocity(role)).ok_or_else(|| {
                 let problem = format!("column {name} has an unknown unit of {what}, {}", quoted(unit));
-                let remedy =
-                    "use one of m, cm, mm, km, ft, in; or name the column with --column and set its unit with --scale";
+                let remedy = format!(
+                    "use one of m, cm, mm, km, ft, in; or name the column with {COLUMN} and set its unit with {SCALE}"
+                );
                 Fault::coded("recording/unknown-unit", problem, remedy)
             })?;
             metres[column] = size;
@@ -707,12 +719,10 @@ impl<'a> Columns<'a> {
             );
         }
         if scale != 1.0 {
-            let problem = format!("column {other} has a unit in its name, which contradicts --scale {scale}");
-            return refuse(
-                "recording/contradicts-option",
-                problem,
-                "omit --scale, or remove the units from the header",
-            );
+            let given = SCALE.set(scale);
+            let problem = format!("column {other} has a unit in its name, which contradicts {given}");
+            let remedy = format!("omit {SCALE}, or remove the units from the header");
+            return refuse("recording/contradicts-option", problem, remedy);
         }
         Ok(metres)
     }

@@ -66,6 +66,7 @@ use folder::{ARCHIVE, Folder};
 use mcap::bag;
 use readers::recognise;
 use source::Source;
+use tautline_core::option::JOIN;
 use tautline_core::track::EarthOrigin;
 
 /// Opens a recording: a file, the folder of a ROS 2 bag, or a folder or archive with one file per vehicle.
@@ -183,7 +184,7 @@ fn folder_of(path: &Path) -> Result<Option<Folder>, ReadError> {
     let data = fs::metadata(path)?;
     if data.is_dir() {
         if bag::is_bag(path) {
-            let remedy = "open it without --join; its topics are the vehicles";
+            let remedy = format!("open it without {JOIN}; its topics are the vehicles");
             return refuse("recording/several-vehicles", "it is a ROS 2 bag, not a file with one vehicle", remedy);
         }
         let folder = Folder::open(path)?;

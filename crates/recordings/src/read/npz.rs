@@ -19,7 +19,7 @@ use std::collections::BTreeSet;
 use nalgebra::Vector3;
 
 use super::clock::{Stamp, TimeUnit};
-use super::error::{Fault, Place, ReadError, refuse};
+use super::error::{Fault, Place, ReadError, one_of, refuse};
 use super::identity::Names;
 use super::npy::Array;
 use super::options::{ArrayAxis, ArrayLayout, ReadOptions};
@@ -45,6 +45,7 @@ pub(super) const READER: Reader = Reader {
     ],
     packing: Packing::Any,
 };
+use tautline_core::option::{COLUMN, LAYOUT};
 
 const TIMES: [&str; 4] = ["t", "time", "times", "timestamps"];
 const POSITIONS: [&str; 4] = ["positions", "position", "pos", "xyz"];
@@ -136,13 +137,15 @@ fn layout(shape: [usize; 3], times: usize, known_axes: &[ArrayAxis]) -> Result<A
         // If the last axis is not x, y, z, an axis of two or three vehicles could be it.
         [only] if only[2] == ArrayAxis::Axis || !known_axes.is_empty() => Ok(only),
         [] => {
-            let remedy = "save T x N x 3 positions, with T the number of times, or name the axes with --layout, such \
-                          as --layout time,vehicle,axis";
+            let remedy = format!(
+                "save T x N x 3 positions, with T the number of times, or name the axes with {LAYOUT}, such as {}",
+                LAYOUT.set("time,vehicle,axis")
+            );
             refuse("recording/array-shape", problem(""), remedy)
         }
         _ => {
             let ways: Vec<_> = fitting.iter().map(|layout| ArrayAxis::layout_name(*layout)).collect();
-            let remedy = format!("name its axes with --layout {}", ways.join(" or "));
+            let remedy = format!("name its axes with {}", one_of(LAYOUT, &ways));
             refuse("recording/ambiguous-layout", problem("; several layouts fit"), remedy)
         }
     }
@@ -173,7 +176,11 @@ impl Arrays {
         match (found.next(), found.next()) {
             (Some(first), Some(second)) => {
                 let problem = format!("the arrays `{first}` and `{second}` both give the {}", names[1]);
-                refuse("recording/ambiguous-column", problem, format!("name one of them with --column {option}=NAME"))
+                refuse(
+                    "recording/ambiguous-column",
+                    problem,
+                    format!("name one of them with {}", COLUMN.set(format!("{option}=NAME"))),
+                )
             }
             (first, _) => Ok(first),
         }
@@ -185,7 +192,7 @@ impl Arrays {
             names.iter().filter_map(|name| name.strip_suffix(".npy")).map(super::error::quoted).collect();
         let option = if usual == "t" { "t" } else { "x" };
         let problem = format!("no array gives the {role}; its arrays are {}", names.join(", "));
-        let remedy = format!("save it as `{usual}`, or name it with --column {option}=NAME");
+        let remedy = format!("save it as `{usual}`, or name it with {}", COLUMN.set(format!("{option}=NAME")));
         Fault::coded(code, problem, remedy)
     }
 

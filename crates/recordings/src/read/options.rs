@@ -1,12 +1,17 @@
 //! Options of readers: facts about a recording that its file does not contain.
 
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::str::FromStr;
 
 use super::axes::Axes;
 use super::clock::TimeUnit;
 use super::error::{Fault, quoted, refuse};
 use super::readers::{Format, FormatOption};
+use tautline_core::option::{
+    ALLOW_UNFINISHED, AXES, CLOCK, COLUMN, DIMENSIONS, DUPLICATES, FPS, FRAME, LAYOUT, ONE_VEHICLE, ORIGIN, SCALE,
+    SKIP_INCOMPLETE, SORT, START, TIME_SCALE, TIME_UNIT, TOPIC,
+};
 
 /// Meaning of an axis of an array of positions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -300,7 +305,7 @@ impl ReadOptions {
     pub(super) fn check(&self) -> Result<(), Fault> {
         let metres = self.metres();
         if !(metres.is_finite() && metres > 0.0) {
-            let problem = format!("--scale must be positive, got {metres}");
+            let problem = format!("{SCALE} must be positive, got {metres}");
             return refuse(
                 "recording/option-out-of-range",
                 problem,
@@ -309,22 +314,20 @@ impl ReadOptions {
         }
         if let Some(rate) = self.times_per_second.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
             let problem = format!("the number of time units per second must be positive, got {rate}");
-            return refuse(
-                "recording/option-out-of-range",
-                problem,
-                "give a positive number with --fps or --time-scale",
-            );
+            let remedy = format!("give a positive number with {FPS} or {TIME_SCALE}");
+            return refuse("recording/option-out-of-range", problem, remedy);
         }
         if let Some(unit) = self.time_unit.filter(|_| self.times_per_second.is_some()) {
-            let problem =
-                format!("the unit of time is given twice: --time-unit {}, and --fps or --time-scale", unit.name());
-            let remedy = "omit --time-unit, or --fps and --time-scale";
+            let given = TIME_UNIT.set(unit.name());
+            let problem = format!("the unit of time is given twice: {given}, and {FPS} or {TIME_SCALE}");
+            let remedy = format!("omit {TIME_UNIT}, or {FPS} and {TIME_SCALE}");
             return refuse("recording/two-time-units", problem, remedy);
         }
         if let Some([latitude, longitude, height_m]) = self.origin {
             let is_on_earth = latitude.abs() <= 90.0 && longitude.abs() <= 360.0 && height_m.is_finite();
             if !is_on_earth {
-                let problem = format!("--origin {latitude},{longitude},{height_m} is not on the Earth");
+                let given = ORIGIN.set(format!("{latitude},{longitude},{height_m}"));
+                let problem = format!("{given} is not on the Earth");
                 let remedy = "give a latitude within 90 degrees and a longitude within 360 degrees";
                 return refuse("recording/option-out-of-range", problem, remedy);
             }
@@ -334,7 +337,7 @@ impl ReadOptions {
             return refuse("recording/option-out-of-range", problem, "give three finite numbers in metres");
         }
         if !self.turn().are_finite() {
-            let problem = "a factor of --scale is 0 or not finite";
+            let problem = format!("a factor of {SCALE} is 0 or not finite");
             return refuse(
                 "recording/option-out-of-range",
                 problem,
@@ -348,33 +351,24 @@ impl ReadOptions {
     pub(super) fn refuse_unsupported_options(&self, format: Format) -> Result<(), Fault> {
         let (is_turned, has_columns) = (!self.turn().is_identity(), self.columns != ColumnNames::default());
         let is_one_vehicle = self.one_vehicle && !self.is_joined;
-        let given = [
-            (self.time_unit.is_some(), FormatOption::TimeUnit, "--time-unit", "has a fixed unit of time"),
-            (
-                self.times_per_second.is_some(),
-                FormatOption::TimeUnit,
-                "--fps and --time-scale",
-                "has a fixed unit of time",
-            ),
-            (self.clock.is_some(), FormatOption::Clock, "--clock", "has no messages with log times"),
-            (self.skip_incomplete, FormatOption::Incomplete, "--skip-incomplete", "has no rows with empty cells"),
-            (self.sort, FormatOption::Rows, "--sort", "holds curves in order of time"),
-            (self.duplicates.is_some(), FormatOption::Rows, "--duplicates", "holds curves, not rows"),
-            (self.dimensions.is_some(), FormatOption::Dimensions, "--dimensions", "defines the numbers of a vehicle"),
-            (!self.starts.is_empty(), FormatOption::Starts, "--start", "does not hold relative curves"),
-            (has_columns, FormatOption::Columns, "--column", "has no columns"),
-            (self.layout.is_some(), FormatOption::Layout, "--layout", "has no arrays"),
-            (self.origin.is_some(), FormatOption::Origin, "--origin", "has no latitudes and longitudes"),
-            (self.frame.is_some(), FormatOption::Frame, "--frame", "has no frames"),
-            (!self.topics.is_empty(), FormatOption::Topics, "--topic", "has no topics"),
-            (is_turned, FormatOption::Axes, "--axes", "gives the directions of its axes"),
-            (is_one_vehicle, FormatOption::OneVehicle, "--one-vehicle", "names its vehicles"),
-            (
-                self.allow_unfinished,
-                FormatOption::Unfinished,
-                "--allow-unfinished",
-                "cannot be read before it is closed",
-            ),
+        let rate = format!("{FPS} and {TIME_SCALE}");
+        let given: [(_, _, &dyn Display, _); 16] = [
+            (self.time_unit.is_some(), FormatOption::TimeUnit, &TIME_UNIT, "has a fixed unit of time"),
+            (self.times_per_second.is_some(), FormatOption::TimeUnit, &rate, "has a fixed unit of time"),
+            (self.clock.is_some(), FormatOption::Clock, &CLOCK, "has no messages with log times"),
+            (self.skip_incomplete, FormatOption::Incomplete, &SKIP_INCOMPLETE, "has no rows with empty cells"),
+            (self.sort, FormatOption::Rows, &SORT, "holds curves in order of time"),
+            (self.duplicates.is_some(), FormatOption::Rows, &DUPLICATES, "holds curves, not rows"),
+            (self.dimensions.is_some(), FormatOption::Dimensions, &DIMENSIONS, "defines the numbers of a vehicle"),
+            (!self.starts.is_empty(), FormatOption::Starts, &START, "does not hold relative curves"),
+            (has_columns, FormatOption::Columns, &COLUMN, "has no columns"),
+            (self.layout.is_some(), FormatOption::Layout, &LAYOUT, "has no arrays"),
+            (self.origin.is_some(), FormatOption::Origin, &ORIGIN, "has no latitudes and longitudes"),
+            (self.frame.is_some(), FormatOption::Frame, &FRAME, "has no frames"),
+            (!self.topics.is_empty(), FormatOption::Topics, &TOPIC, "has no topics"),
+            (is_turned, FormatOption::Axes, &AXES, "gives the directions of its axes"),
+            (is_one_vehicle, FormatOption::OneVehicle, &ONE_VEHICLE, "names its vehicles"),
+            (self.allow_unfinished, FormatOption::Unfinished, &ALLOW_UNFINISHED, "cannot be read before it is closed"),
         ];
         match given.into_iter().find(|(is_given, of, ..)| *is_given && !format.supports.contains(of)) {
             Some((.., option, why)) => {

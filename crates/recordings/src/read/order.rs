@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use nalgebra::Vector3;
 use tautline_core::fact::{Fact, FactKind, Source};
+use tautline_core::option::{COLUMN, DUPLICATES, SORT, TIME_UNIT};
 
 use super::clock::{Probe, Stamp, TimeUnit, Timing};
 use super::error::{Fault, Place, ReadError, quoted};
@@ -126,8 +127,7 @@ impl<R: Rows> Ordered<R> {
         timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(info.epoch_ns);
         rows.settle_clock(timing.per_second());
         metadata.notes.extend(note);
-        // After a survey, notes and the assumption cover all rows.
-        metadata.assumed = rows.assumed();
+        // After a survey, notes and facts cover all rows.
         metadata.notes.extend(rows.notes());
         metadata.facts.extend(rows.facts());
         if !rows.is_wide() {
@@ -264,8 +264,13 @@ impl<R: Rows> Ordered<R> {
     fn duplicate_fault(&self, time_s: f64, before: &Row, row: &Row) -> Fault {
         let (vehicle, first) = (self.name(row), self.rows.place(before.place));
         let problem = format!("vehicle {vehicle} has a second row at {time_s} s; the first is at {first}");
-        let remedy = "remove one of the two, or choose one with --duplicates first or --duplicates last; if the rows \
-                      belong to several vehicles, name their column with --column id=NAME";
+        let remedy = format!(
+            "remove one of the two, or choose one with {} or {}; if the rows belong to several vehicles, name their \
+             column with {}",
+            DUPLICATES.set("first"),
+            DUPLICATES.set("last"),
+            COLUMN.set("id=NAME")
+        );
         Fault::coded("recording/duplicate-row", problem, remedy)
     }
 
@@ -275,8 +280,10 @@ impl<R: Rows> Ordered<R> {
         let (jump_km, within_s) = (jump_m / 1e3, time_s - before_s);
         let problem =
             format!("vehicle {vehicle} jumps {jump_km:.0} km in {within_s:.3} s; its previous position is at {first}");
-        let remedy = "leave latitude and longitude empty where the receiver had no fix, or correct the unit of the \
-                      times with --time-unit";
+        let remedy = format!(
+            "leave latitude and longitude empty where the receiver had no fix, or correct the unit of the times with \
+             {TIME_UNIT}"
+        );
         Fault::coded("recording/position-jump", problem, remedy)
     }
 
@@ -409,11 +416,6 @@ pub(super) trait Rows {
     /// Receives the number of time units per second.
     fn settle_clock(&mut self, _per_second: f64) {}
 
-    /// Assumption that the positions and their times rest on, if there is one.
-    fn assumed(&self) -> Option<String> {
-        None
-    }
-
     /// Returns the place in the file for the number in [`Row::place`].
     fn place(&self, number: u64) -> Place;
 
@@ -469,8 +471,11 @@ pub(super) fn refuse_steps_back(rows: &[Row], of: &impl Rows, timing: &Timing) -
                 "vehicle {name} goes back in time: {time_s} s comes after {before_s} s at {}",
                 of.place(before.place)
             );
-            let remedy = "check whether its clock was set; if the rows belong to several vehicles, name their column \
-                          with --column id=NAME; if the rows are only out of order, use --sort";
+            let remedy = format!(
+                "check whether its clock was set; if the rows belong to several vehicles, name their column with {}; \
+                 if the rows are only out of order, use {SORT}",
+                COLUMN.set("id=NAME")
+            );
             return Err(Fault::coded("recording/time-backwards", problem, remedy).at(of.place(row.place)));
         }
     }

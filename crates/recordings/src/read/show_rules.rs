@@ -7,6 +7,7 @@
 use std::collections::BTreeMap;
 
 use serde_json::{Map, Value};
+use tautline_core::option::{AXES, SCALE};
 
 /// Rules of a show.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -141,7 +142,7 @@ impl ShowRules {
             }
         }
         if !are_axes_kept {
-            self.not_judged.push("the geofence, since --axes or --scale map the axes".to_owned());
+            self.not_judged.push(format!("the geofence, since {AXES} or {SCALE} map the axes"));
             return;
         }
         let others = fence.iter().filter(|(key, value)| !GEOFENCE_KEYS.contains(&key.as_str()) && !value.is_null());

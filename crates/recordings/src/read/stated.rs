@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use tautline_core::fact::{Fact, FactKind, Source};
+use tautline_core::option::{DISTINCT, TOPIC};
 use tautline_core::track::{Item, Metadata, Sample, Tracks};
 
 use super::error::{Fault, ReadError, quoted};
@@ -103,8 +104,9 @@ fn fault(names: &[String], first: usize, second: usize) -> Fault {
     let problem = format!(
         "the vehicles {first} and {second} have equal positions at all common times, as one vehicle under two names has"
     );
-    let remedy = "leave one of them out (for messages, choose topics with --topic), or confirm two vehicles with \
-                  --distinct";
+    let remedy = format!(
+        "leave one of them out (for messages, choose topics with {TOPIC}), or confirm two vehicles with {DISTINCT}"
+    );
     Fault::coded("recording/vehicle-twice", problem, remedy)
 }
 

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use nalgebra::Vector3;
 use tautline_core::fact::{Fact, FactKind, Source};
+use tautline_core::option::{COLUMN, FPS, TIME_SCALE, TIME_UNIT};
 
 use super::agreement::FrameAgreement;
 use super::aviation::ClimbMonitor;
@@ -73,7 +74,8 @@ pub(super) fn open<C: Cells + 'static>(
     if let (Some(rest), Some(_)) = (layout.rest, unit) {
         let problem =
             format!("it has a column of time stamps and a second time column {}", quoted(&cells.header()[rest.column]));
-        return refuse("recording/ambiguous-column", problem, "name one of them with --column t=NAME");
+        let remedy = format!("name one of them with {}", COLUMN.set("t=NAME"));
+        return refuse("recording/ambiguous-column", problem, remedy);
     }
     let dates = dates(&mut cells, &layout, options)?;
     let unit = if dates.is_some() { Some(TimeUnit::Nanoseconds) } else { unit.or(layout.unit) };
@@ -136,7 +138,8 @@ fn dates<C: Cells>(cells: &mut C, layout: &Layout, options: &ReadOptions) -> Res
     let first = if cells.advance()? { cells.text(column).ok().and_then(|text| Date::parse(&text)) } else { None };
     if first.is_some() && (options.time_unit.is_some() || options.times_per_second.is_some()) {
         let problem = format!("the times in column {} are dates", quoted(&cells.header()[column]));
-        return refuse("recording/contradicts-option", problem, "omit --time-unit, --fps and --time-scale");
+        let remedy = format!("omit {TIME_UNIT}, {FPS} and {TIME_SCALE}");
+        return refuse("recording/contradicts-option", problem, remedy);
     }
     Ok(first)
 }
@@ -350,15 +353,16 @@ impl<C: Cells> Table<C> {
             };
             let problem =
                 format!("column {} has a different value in each row and so names no vehicle{others}", called(id));
-            let remedy = "name the column of the vehicle with --column id=NAME, or remove this one";
+            let column = COLUMN.set("id=NAME");
+            let remedy = format!("name the column of the vehicle with {column}, or remove this one");
             return refuse("recording/ambiguous-vehicle", problem, remedy);
         }
         if let Some(alternative) = self.alternative_ids.iter().find(|alternative| alternative.is_one()) {
             let (first, other) = (called(id), called(alternative.column));
             let problem =
                 format!("the columns {first} and {other} could both name the vehicle, but contradict each other");
-            let [first, other] = [&header[id], &header[alternative.column]];
-            let remedy = format!("choose one with --column id={first} or --column id={other}");
+            let [first, other] = [id, alternative.column].map(|column| COLUMN.set(format!("id={}", header[column])));
+            let remedy = format!("choose one with {first} or {other}");
             return refuse("recording/ambiguous-vehicle", problem, remedy);
         }
         Ok(())
@@ -480,10 +484,11 @@ impl<C: Cells> Rows for Table<C> {
         self.layout.id.is_none()
     }
 
-    fn assumed(&self) -> Option<String> {
+    fn facts(&self) -> Vec<Fact> {
         // After a survey all names of a long table are known.
         let is_of_several = self.layout.counts_from_boot && self.names.all().len() > 1;
-        (self.has_own_clock || is_of_several).then(|| "the clocks of all vehicles started together".to_owned())
+        let is_assumed = self.has_own_clock || is_of_several;
+        is_assumed.then(|| Fact::new(FactKind::CommonStart, Source::Default)).into_iter().collect()
     }
 
     /// Reads only times and names, which is several times faster.

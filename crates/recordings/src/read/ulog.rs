@@ -16,6 +16,7 @@ use std::str;
 
 use nalgebra::Vector3;
 use tautline_core::fact::{self, Fact, FactKind};
+use tautline_core::option::TOPIC;
 
 use super::axes;
 use super::clock::{Stamp, TimeUnit};
@@ -65,7 +66,11 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         [topic] if topic == GLOBAL || topic == LOCAL => Some(topic.as_str()),
         [topic, ..] => {
             let problem = format!("{} is not a position topic", quoted(topic));
-            return refuse("recording/unknown-topic", problem, format!("use --topic {GLOBAL} or --topic {LOCAL}"));
+            return refuse(
+                "recording/unknown-topic",
+                problem,
+                format!("use {} or {}", TOPIC.set(GLOBAL), TOPIC.set(LOCAL)),
+            );
         }
     };
     let mut log = Log::default();
@@ -82,9 +87,9 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let rows = log.rows(fixes, &local)?;
     notes.push(local.note());
     notes.push(format!("positions are read from {topic}"));
-    let (clock, assumed) = match log.boot_us {
-        Some(_) => ("times are set to UTC by GPS", "clocks set by the GPS of each vehicle"),
-        None => ("times count from the start of the vehicle's computer", "the clocks of all vehicles started together"),
+    let (clock, several) = match log.boot_us {
+        Some(_) => ("times are set to UTC by GPS", FactKind::GpsClocks),
+        None => ("times count from the start of the vehicle's computer", FactKind::CommonStart),
     };
     notes.push(clock.to_owned());
     notes.extend(no_fixes(if topic == GLOBAL { log.no_fixes } else { 0 }, ""));
@@ -98,8 +103,8 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         Fact::name(FactKind::HeightUnit, fact::Source::Convention, "m"),
         Fact::name(FactKind::HeightReference, fact::Source::Convention, "sea level"),
     ];
-    let assumed = options.is_joined.then(|| assumed.to_owned());
-    let rows = Positions { names: vec![source.stem()], rows: rows.into_iter(), assumed };
+    info.metadata.facts.extend(options.is_joined.then(|| Fact::new(several, fact::Source::Default)));
+    let rows = Positions { names: vec![source.stem()], rows: rows.into_iter() };
     Ok(Box::new(Ordered::open(rows, info)?))
 }
 
@@ -427,7 +432,6 @@ fn format_of(text: &str) -> Result<(String, Vec<Field>), Fault> {
 struct Positions {
     names: Vec<String>,
     rows: std::vec::IntoIter<Row>,
-    assumed: Option<String>,
 }
 
 impl Rows for Positions {
@@ -439,10 +443,6 @@ impl Rows for Positions {
 
     fn vehicles(&self) -> &[String] {
         &self.names
-    }
-
-    fn assumed(&self) -> Option<String> {
-        self.assumed.clone()
     }
 
     fn place(&self, number: u64) -> Place {

@@ -117,7 +117,7 @@ fn px4_local_positions_share_one_origin() {
     let folder = folder(&[("a.csv", &a), ("b.csv", &b)]);
     let asked = Whole::read(folder.path(), &ReadOptions::default()).expect_err("no origin");
     assert_refused(&asked, "recording/no-origin", "line 2");
-    assert!(asked.help().contains("--origin 47.0,8.0,400.0"), "{}", asked.help());
+    assert!(asked.help().contains("origin=47.0,8.0,400.0"), "{}", asked.help());
     let options = ReadOptions { origin: Some([47.0, 8.0, 400.0]), ..ReadOptions::default() };
     let found = Whole::read(folder.path(), &options).expect("read");
     let samples = found.samples();
@@ -178,7 +178,7 @@ fn height_columns_are_inverted_once() {
         for options in [turned("ned", [1.0; 3]), turned("x,y,z", [1.0, 1.0, -1.0]), turned("x,z,y", [1.0; 3])] {
             let error = read_with(&text, &options).expect_err("both");
             assert_refused(&error, "recording/contradicts-option", "line 1");
-            assert!(error.help().ends_with(&format!("--column z={name}")), "{error} {}", error.help());
+            assert!(error.help().ends_with(&format!("column=z={name}")), "{error} {}", error.help());
         }
         assert_eq!(read_with(&text, &turned("y,x,z", [1.0; 3])).expect("read").samples()[0].2, [2.0, 1.0, z]);
         let mut plain = turned("ned", [1.0; 3]);

@@ -180,7 +180,7 @@ fn invalid_motive_takes_are_refused() {
     assert_refused(&read(&none).expect_err("none"), "recording/no-positions", "line 7");
     let scaled = ReadOptions { scale: Some(0.1.into()), ..ReadOptions::default() };
     let error = read_bytes("take.csv", MOTIVE.as_bytes(), &scaled).expect_err("scaled");
-    assert_eq!(error.help(), "omit --scale");
+    assert_eq!(error.help(), "omit scale");
 }
 
 const NEXUS: &str = "\

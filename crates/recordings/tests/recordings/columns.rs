@@ -172,7 +172,7 @@ fn ambiguous_plain_numbers_require_dimensions() {
     // speed.
     for (count, ways) in [(5, "2 or 2+2"), (7, "2 or 3 or 3+3"), (10, "3"), (11, "2"), (13, "2 or 3 or 2+2 or 3+3")] {
         let error = vehicles(count, None).expect_err("asked");
-        assert!(error.help().contains(&format!("--dimensions {ways}:")), "{}", error.help());
+        assert!(error.help().contains(&format!("use dimensions={ways}:")), "{}", error.help());
     }
     for (count, dimensions, expected) in [
         (4, Some(Dimensions::Space), 1),

@@ -320,7 +320,7 @@ fn npz_time_unit_is_read_and_square_shape_is_ambiguous() {
     let square = archive(&[("t.npy", t), ("positions.npy", positions)], true);
     let refused = read_bytes("square.npz", &square, &ReadOptions::default()).expect_err("refused");
     assert_refused(&refused, "recording/ambiguous-layout", "array `positions`");
-    assert!(refused.help().contains("--layout time,vehicle,axis or vehicle,time,axis"), "{}", refused.help());
+    assert!(refused.help().contains("layout=time,vehicle,axis or vehicle,time,axis"), "{}", refused.help());
     let found = read_bytes("square.npz", &square, &laid_out(0)).expect("read");
     assert_eq!(found.samples(), NPZ_TRUTH[..4]);
     let turned = read_bytes("square.npz", &square, &laid_out(1)).expect("read");

@@ -38,7 +38,7 @@ fn single_vehicle_table_is_read_without_a_folder() {
     let text = "t_s,x,y,z,eph,mode\n0,1,2,3,0.5,4\n1,1,2,4,0.5,4\n";
     let error = read("cf1.csv", text).expect_err("any column may name vehicles");
     assert_refused(&error, "recording/no-vehicle-column", "line 1");
-    assert!(error.help().ends_with("--one-vehicle"), "{}", error.help());
+    assert!(error.help().ends_with("use one_vehicle"), "{}", error.help());
     let one = ReadOptions { one_vehicle: true, ..ReadOptions::default() };
     let found = read_bytes("cf1.csv", text.as_bytes(), &one).expect("read");
     assert_eq!(found.samples(), [(0.0, "cf1", [1.0, 2.0, 3.0]), (1.0, "cf1", [1.0, 2.0, 4.0])]);

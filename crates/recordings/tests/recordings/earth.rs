@@ -99,7 +99,7 @@ fn origin_option_is_used_and_metres_take_precedence() {
     assert_eq!(both.samples(), [(0.0, "a", [1.0, 2.0, 3.0])]);
     assert!(both.notes.iter().any(|note| note == "columns not used: lat, lon"), "{:?}", both.notes);
     let needless = read("t,id,x,y,z\n0,a,1,2,3\n", &origin).expect_err("refused");
-    assert_eq!(needless.help(), "omit --origin");
+    assert_eq!(needless.help(), "omit origin");
 }
 
 #[test]
@@ -136,10 +136,10 @@ fn scale_applies_to_heights_and_missing_unit_is_noted() {
         read(&format!("t,id,lat,lon,{height}\n{rows}"), &options)
     };
     let metres = read("alt", 1.0).expect("read");
-    let note = "heights are read from column `alt`, in metres: the name has no unit (--scale sets another)";
+    let note = "heights are read from column `alt`, in metres: the name has no unit (scale sets another)";
     assert!(metres.notes.iter().any(|said| said == note), "{:?}", metres.notes);
     let feet = read("alt", 0.3048).expect("read");
-    let note = "heights are read from column `alt`, in units of 0.3048 m (--scale)";
+    let note = "heights are read from column `alt`, in units of 0.3048 m (scale)";
     assert!(feet.notes.iter().any(|said| said == note), "{:?}", feet.notes);
     let heights = |found: &Whole| found.samples().iter().map(|(_, _, position)| position[2]).collect::<Vec<_>>();
     assert!((heights(&metres)[0] - 695.2).abs() < 1e-8 && heights(&feet)[0].abs() < 1e-8);
@@ -147,7 +147,7 @@ fn scale_applies_to_heights_and_missing_unit_is_noted() {
     // The scale does not apply to horizontal positions; a unit in the name has the same effect.
     let named = read("alt [ft]", 1.0).expect("read");
     assert_eq!(named.samples(), feet.samples());
-    assert!(named.samples()[2].2[0] > 70.0 && !named.notes.iter().any(|note| note.contains("--scale sets")));
+    assert!(named.samples()[2].2[0] > 70.0 && !named.notes.iter().any(|note| note.contains("scale sets")));
     assert_refused(&read("alt [ft]", 0.5).expect_err("refused"), "recording/contradicts-option", "line 1");
 }
 
@@ -219,7 +219,7 @@ fn degrees_and_metres_in_one_table_are_refused() {
     for header in ["t,x,y,z,B.x,B.y,B.z", "t,x,y,z,b.lat,b.lon,b.alt"] {
         let error = read(&format!("{header}\n0,1,2,3,4,5,6\n"), &ReadOptions::default()).expect_err(header);
         assert_refused(&error, "recording/no-vehicle-column", "line 1");
-        assert!(error.help().ends_with("--one-vehicle"), "{}", error.help());
+        assert!(error.help().ends_with("use one_vehicle"), "{}", error.help());
     }
 }
 
@@ -231,7 +231,7 @@ fn joined_files_share_one_origin() {
     }
     let error = Whole::read(folder.path(), &ReadOptions::default()).expect_err("refused");
     assert_refused(&error, "recording/no-origin", "line 2");
-    assert!(error.help().contains("--origin 47.397742,8.545594,488.0"), "{error}\n{}", error.help());
+    assert!(error.help().contains("origin=47.397742,8.545594,488.0"), "{error}\n{}", error.help());
     let origin = ReadOptions { origin: Some(ORIGIN), ..ReadOptions::default() };
     let found = Whole::read(folder.path(), &origin).expect("read");
     assert!((found.samples()[1].2[0] - KNOWN[1].1[0]).abs() < 2.0 * ROUNDING_M, "{:?}", found.samples());
@@ -266,5 +266,5 @@ fn nav_sat_fixes_are_read_unless_status_is_no_fix() {
     let error = refused(&[messages[2].clone(), pose.clone()], &ReadOptions::default());
     assert_refused(&error, "recording/several-frames", "message 2 on topic `/r2/pose`");
     let origin = ReadOptions { origin: Some(ORIGIN), ..ReadOptions::default() };
-    assert_eq!(refused(&[pose], &origin).help(), "omit --origin");
+    assert_eq!(refused(&[pose], &origin).help(), "omit origin");
 }

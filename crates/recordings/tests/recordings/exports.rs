@@ -119,7 +119,7 @@ fn curves_require_a_sampling_rate() {
     let (folder, source) = folder_with("cf1.csv", PARABOLA);
     let target = folder.path().join("target.csv");
     let refused = export(&source, &target, Format::CSV, &ExportOptions::default()).expect_err("refused");
-    assert!(matches!(refused, ExportError::Curves) && refused.help().contains("--sample-hz"), "{refused}");
+    assert!(matches!(refused, ExportError::Curves) && refused.help().contains("with sample_hz;"), "{refused}");
 
     export(&source, &target, Format::CSV, &ExportOptions { sample_hz: Some(2.0) }).expect("exported");
     let positions: Vec<_> = whole(&target).samples().iter().map(|&(t, _, p)| (t, p[0])).collect();

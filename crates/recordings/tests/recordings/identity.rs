@@ -127,7 +127,7 @@ fn vehicles_under_unknown_columns_are_not_merged() {
     for times in [2, 3, 40] {
         for names in [&["1", "2"][..], &["alpha", "bravo", "charlie"], &["7", "9", "11", "13"], &["1.0", "2.0"]] {
             let file = interleaved("t,whose,x,y", names, times);
-            is_refused(folder(&[("a.csv", &file), alone]), SEVERAL, &["a.csv", "--column id=whose"]);
+            is_refused(folder(&[("a.csv", &file), alone]), SEVERAL, &["a.csv", "column=id=whose"]);
             // A known name column with a single value does not hide it.
             let file = interleaved("t,whose,x,y,id", names, times).replace('\n', ",cf1\n").replacen(",cf1", "", 1);
             is_refused(folder(&[("a.csv", &file), alone]), SEVERAL, &["`whose`"]);
@@ -190,7 +190,7 @@ fn contradictory_name_columns_are_refused() {
         &["0,1,A,0,0", "0.5,1,B,5,0", "1,1,A,0,0", "1.5,1,B,5,0"],
         &["0,1,A,0,0", "0,2,A,5,0", "0,3,B,9,0", "1,1,A,0,0"],
     ] {
-        is_refused(read(&table(rows)), AMBIGUOUS, &["--column id=id or --column id=callsign"]);
+        is_refused(read(&table(rows)), AMBIGUOUS, &["column=id=id or column=id=callsign"]);
         by_column(&table(&rows[..2]), "id").expect("the user says which");
     }
     for rows in [
@@ -235,7 +235,7 @@ fn two_spellings_of_a_name_are_refused() {
 
 #[test]
 fn decreasing_time_may_mean_several_vehicles_or_a_clock_change() {
-    let options = ["--column id=NAME", "--sort"];
+    let options = ["column=id=NAME", "use sort"];
     is_refused(read("t,id,x,y\n0,a,0,0\n2,a,2,0\n1,a,1,0\n"), "recording/time-backwards", &options);
     let files = [("a.csv", "t,x,y\n0,0,0\n2,2,0\n1,1,0\n"), ("b.csv", ALONE)];
     is_refused(folder(&files), "recording/time-backwards", &options);
@@ -245,9 +245,9 @@ fn decreasing_time_may_mean_several_vehicles_or_a_clock_change() {
     fs::write(files.path().join("a.csv"), merged).expect("written");
     fs::write(files.path().join("b.csv"), ALONE).expect("written");
     let sorted = ReadOptions { sort: true, ..ReadOptions::default() };
-    is_refused(Whole::read(files.path(), &sorted), SEVERAL, &["`whose`", "--one-vehicle"]);
+    is_refused(Whole::read(files.path(), &sorted), SEVERAL, &["`whose`", "use one_vehicle"]);
     fs::write(files.path().join("a.csv"), interleaved("t,whose,x,y", &["1", "2"], 3)).expect("written");
-    is_refused(Whole::read(files.path(), &ReadOptions::default()), SEVERAL, &["`whose`", "--one-vehicle"]);
+    is_refused(Whole::read(files.path(), &ReadOptions::default()), SEVERAL, &["`whose`", "use one_vehicle"]);
     let known = ReadOptions { one_vehicle: true, ..ReadOptions::default() };
     assert_eq!(Whole::read(files.path(), &known).expect("read").vehicles, ["a", "b"]);
 }

@@ -21,6 +21,7 @@ pub(crate) struct Whole {
     pub(crate) items: Vec<Item>,
     pub(crate) clock: Clock,
     pub(crate) notes: Vec<String>,
+    /// Facts that are assumptions, as clauses.
     pub(crate) assumed: Option<String>,
 }
 
@@ -31,7 +32,9 @@ impl Whole {
         while tracks.read(&mut items)? {}
         let vehicles = tracks.vehicles().to_vec();
         let (clock, notes) = (tracks.clock().clone(), tracks.notes().to_vec());
-        Ok(Self { vehicles, items, clock, notes, assumed: tracks.assumed().map(str::to_owned) })
+        let assumed = tracks.facts().iter().filter(|fact| fact.is_assumption()).map(ToString::to_string);
+        let assumed = assumed.reduce(|all, next| all + ", " + &next);
+        Ok(Self { vehicles, items, clock, notes, assumed })
     }
 
     /// Returns the samples as (time, name, position).

@@ -92,7 +92,7 @@ fn messages_name_file_place_value_and_remedy() {
     assert!(error.to_string().ends_with("line 5: column `x` holds `one`, which is not a number"), "{error}");
     assert_eq!(error.help(), "write a number with a decimal point");
     let error = refused("flight.csv", LONG.replacen("t,id", "when,id", 1).as_bytes());
-    assert!(error.help().starts_with("name the column with --column t=NAME"), "{}", error.help());
+    assert!(error.help().starts_with("name the column with column=t=NAME"), "{}", error.help());
 }
 
 #[test]
@@ -375,9 +375,9 @@ fn forced_format_must_match_the_content() {
     let error = refused_with("cf1.csv", b"duration,x^0,y^0,z^0\n1,0,0,0\n", &unit);
     assert_refused(&error, "recording/unused-option", "");
     for (options, option) in [
-        (ReadOptions { frame: Some("map".to_owned()), ..ReadOptions::default() }, "--frame"),
-        (ReadOptions { layout: Some(ArrayAxis::LAYOUTS[0]), ..ReadOptions::default() }, "--layout"),
-        (ReadOptions { allow_unfinished: true, ..ReadOptions::default() }, "--allow-unfinished"),
+        (ReadOptions { frame: Some("map".to_owned()), ..ReadOptions::default() }, "frame"),
+        (ReadOptions { layout: Some(ArrayAxis::LAYOUTS[0]), ..ReadOptions::default() }, "layout"),
+        (ReadOptions { allow_unfinished: true, ..ReadOptions::default() }, "allow_unfinished"),
     ] {
         let error = refused_with("flight.csv", LONG.as_bytes(), &options);
         assert_eq!(error.help(), format!("omit {option}"), "{error}");

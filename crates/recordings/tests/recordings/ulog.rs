@@ -103,7 +103,7 @@ fn joined_logs_share_origin_and_clock() {
     }
     let asked = Whole::read(folder.path(), &ReadOptions::default()).expect_err("no origin");
     assert_refused(&asked, "recording/no-origin", "");
-    assert!(asked.help().contains("--origin 47.0,8.0,400.0"), "{}", asked.help());
+    assert!(asked.help().contains("origin=47.0,8.0,400.0"), "{}", asked.help());
     let options = ReadOptions { origin: Some([47.0, 8.0, 400.0]), ..ReadOptions::default() };
     let found = Whole::read(folder.path(), &options).expect("read");
     let times: Vec<_> = found.samples().iter().map(|sample| sample.0).collect();

@@ -154,7 +154,7 @@ const CURVE: &str = "Duration,x^0,x^1,y^0,y^1,z^0,z^1\n1,0,1,0,0,1,0\n";
 fn start_option_shifts_relative_curves() {
     let folder = folder(&[("cf1.csv", CURVE), ("cf2.csv", CURVE)]);
     let found = whole(folder.path()).expect("read");
-    assert!(found.notes.iter().any(|note| note.contains("--start")), "{:?}", found.notes);
+    assert!(found.notes.iter().any(|note| note.contains("start=NAME=X,Y,Z")), "{:?}", found.notes);
     let mut options = ReadOptions::default();
     options.starts.insert("cf2".to_owned(), [0.0, 3.0, 0.5]);
     let found = Whole::read(folder.path(), &options).expect("read");
@@ -163,7 +163,7 @@ fn start_option_shifts_relative_curves() {
         Item::Sample(_) => panic!("a sample"),
     });
     assert_eq!(begins.collect::<Vec<_>>(), [(0, vec![0.0, 0.0, 1.0], 1.0), (1, vec![0.0, 3.0, 1.5], 1.0)]);
-    assert!(!found.notes.iter().any(|note| note.contains("--start")), "{:?}", found.notes);
+    assert!(!found.notes.iter().any(|note| note.contains("start=NAME=X,Y,Z")), "{:?}", found.notes);
     options.starts.insert("cf3".to_owned(), [0.0; 3]);
     let refused = Whole::read(folder.path(), &options).expect_err("refused");
     assert_refused(&refused, "recording/unknown-vehicle", "");

@@ -2,15 +2,18 @@
 
 use std::path::Path;
 
-use serde::{Deserialize, Serialize};
+use serde::{Serialize, Serializer};
 
+use super::answer::{Answer, Detectors, Enclosure, Finding, FindingList, Judgement, Part, Question};
 use super::artefact::{ArtefactError, write_atomically};
 use super::hulls::Hulls;
 use super::legs::LegNumbers;
-use super::obstacles::Obstacles;
+use super::obstacles::{ObstacleApproach, Obstacles};
 use super::shield::ShieldNumbers;
-use super::verdict::{UnmetCriterion, Verdict, at_rest, energy_rises};
+use super::verdict::{Reason, UnmetCriterion, Verdict, at_rest, energy_rises};
+use super::words::early_end;
 use tautline_audit::{self as audit, Status};
+use tautline_core::fact::{CHORDS, EVERY_STEP, Fact, FactKind, Source, serialize_coded};
 use tautline_core::record::{DeadlockRecovery, Reassignment};
 use tautline_core::swarm::{ClosestApproach, Pair};
 use tautline_laws::law::{Certificate, VoidReason};
@@ -18,54 +21,62 @@ use tautline_sim::link::Traffic;
 use tautline_sim::metrics::{LegSummary, QuadrotorPeaks, Summary};
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::{Failure, FailureKind, Scenario};
-use tautline_sim::sim::{Breakdown, Ending, Flight};
+use tautline_sim::sim::{Ending, Flight};
 
 /// Version of the keys. It increases when a key is renamed or removed or changes its meaning.
-pub const SCHEMA_VERSION: u32 = 2;
+pub const SCHEMA_VERSION: u32 = 3;
 
-/// Content of `report.json`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// Report on a flight, the content of `report.json`. In JSON the keys of a [`Judgement`] come first, then `reasons`,
+/// `certificate` and `ellipsoid`, then the fields from [`Self::scenario`] on.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(remote = "Self")]
 pub struct Report {
-    /// [`SCHEMA_VERSION`].
-    pub schema_version: u32,
+    /// The question.
+    #[serde(skip)]
+    pub question: Question,
+    /// Facts that the answers rest on.
+    #[serde(skip)]
+    pub facts: Vec<Fact>,
+    /// Verdict on the flight.
+    #[serde(skip)]
+    pub verdict: Verdict,
+    /// Smallest separation and certificate.
+    #[serde(skip)]
+    pub separation: Separation,
+    /// Findings of the audit.
+    #[serde(skip)]
+    pub audit: Audit,
+    /// Findings on obstacles, if the scenario has any.
+    #[serde(skip)]
+    pub obstacles: Option<Obstacles>,
     /// Scenario of the flight.
     pub scenario: ScenarioIdentity,
     /// Program that flew the scenario.
     pub tool: Tool,
-    /// Verdict on the flight.
-    pub verdict: Verdict,
-    /// Smallest separation and certificate.
-    pub separation: Separation,
-    /// Findings of the audit.
-    pub audit: Audit,
     /// Extremes of tilt and thrust of quadrotors.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub vehicle: Option<VehicleNumbers>,
     /// Statistics of the network, if messages are sent one by one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub network: Option<Traffic>,
     /// Numbers of the shield, if the scenario has one.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub shield: Option<ShieldNumbers>,
     /// Vehicles with a failed part, in the order of the scenario.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub failures: Vec<FailedVehicle>,
-    /// Findings on obstacles, if the scenario has any.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub obstacles: Option<Obstacles>,
     /// Collisions of hulls, or pairs of points whose hulls would have collided.
-    #[serde(default)]
     pub hulls: Hulls,
     /// Errors of the formation at the end, for the last leg that began.
     pub formation: FormationNumbers,
     /// Legs in their order, if the scenario has several.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub legs: Vec<LegNumbers>,
     /// Times at which the slots were spread to let vehicles pass each other.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub deadlock_recoveries: Vec<DeadlockRecovery>,
     /// Every time that interchangeable vehicles were given other slots.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[serde(skip_serializing_if = "Vec::is_empty")]
     pub assignments: Vec<Reassignment>,
     /// Energy of the law.
     pub energy: Energy,
@@ -76,16 +87,16 @@ pub struct Report {
     /// Duration, steps and hash of the run.
     pub run: Run,
     /// Result of the second flight at half the step, if the request asks for it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub verification: Option<Verification>,
     /// Wall-clock times, the only part that differs between two runs of one scenario. Absent if a campaign repeats a
     /// run.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[serde(skip_serializing_if = "Option::is_none")]
     pub performance: Option<Performance>,
 }
 
 /// Identity of a scenario.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct ScenarioIdentity {
     /// Name of the scenario.
     pub name: String,
@@ -94,7 +105,7 @@ pub struct ScenarioIdentity {
 }
 
 /// Identity of the program.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct Tool {
     /// Name of the program.
     pub name: String,
@@ -103,10 +114,10 @@ pub struct Tool {
 }
 
 /// Smallest separation of two vehicles, and the certificate.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Separation<Delta = f64> {
-    /// Safety distance delta \[m\]; `None` for a recording that is judged by radii alone.
-    pub delta_m: Delta,
+#[derive(Clone, Debug, PartialEq)]
+pub struct Separation {
+    /// Safety distance delta \[m\].
+    pub delta_m: f64,
     /// Smallest separation of any pair over the flight \[m\].
     pub min_m: Option<f64>,
     /// Time of `min_m` \[s\].
@@ -116,17 +127,15 @@ pub struct Separation<Delta = f64> {
     /// Separation that the law certified before the first step, or after slots were spread if that is smaller \[m\].
     pub certified_m: Option<f64>,
     /// Time up to which `certified_m` holds \[s\]; null if it has no end or nothing is certified.
-    #[serde(default)]
     pub certified_until_s: Option<f64>,
-    /// Reasons why nothing is certified, a sentence each.
-    pub certificate_void: Vec<String>,
+    /// Reasons why nothing is certified, objects with `code` and `text`.
+    pub certificate_void: Vec<VoidReason>,
     /// Ellipsoid that must stay empty around each vehicle. The distances above and in the audit are then scaled
     /// lengths.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
     pub ellipsoid: Option<Ellipsoid>,
 }
 
-impl<Delta> Separation<Delta> {
+impl Separation {
     /// Returns the closest approach of two vehicles over the flight.
     #[must_use]
     pub fn closest(&self) -> Option<ClosestApproach> {
@@ -141,11 +150,11 @@ impl<Delta> Separation<Delta> {
     }
 }
 
-/// Findings of the audit. `S` is [`Status`], or an optional one where separations may not be asked.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Audit<S = Status> {
+/// Findings of the audit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Audit {
     /// Status of separations and obstacles, the worse of the two. At best undecided if the flight ended early.
-    pub status: S,
+    pub status: Status,
     /// Intervals in which a pair was below delta.
     pub violations: Vec<Violation>,
     /// Number of undecided times of pairs, counted beside violations too.
@@ -163,7 +172,7 @@ pub struct Audit<S = Status> {
 }
 
 /// An interval in which a pair was below delta.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Violation {
     /// The two vehicles.
     pub pair: Pair,
@@ -186,14 +195,14 @@ impl Violation {
 }
 
 /// Result of the closed-form sweep.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ClosedForm {
     /// Smallest separation \[m\].
     pub min_m: Option<f64>,
 }
 
 /// Result of the shape cast.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Parry {
     /// Time of the first contact of two keep-out balls \[s\]; null without a contact.
     pub min_toi_s: Option<f64>,
@@ -202,14 +211,14 @@ pub struct Parry {
 }
 
 /// Contacts of the engine's own collision detection.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Rapier {
     /// Number of pairs whose keep-out balls overlapped at the end of a step; null for a plant without an engine.
     pub contact_pairs: Option<u64>,
 }
 
 /// Errors of the formation at the end, and its arrival.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FormationNumbers {
     /// Whether the formation was reached and kept to the end. False for a flight that ended early.
     pub reached: bool,
@@ -231,7 +240,7 @@ pub struct FormationNumbers {
 }
 
 /// Energy of the law \[m^2/s^2\].
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Energy {
     /// At the start.
     pub initial: Option<f64>,
@@ -241,16 +250,14 @@ pub struct Energy {
     /// Largest energy of any step over the initial energy.
     pub max_over_initial: Option<f64>,
     /// Largest energy of any step over the energy at the last change of the target.
-    #[serde(default)]
     pub max_over_leg_start: Option<f64>,
     /// Whether the energy rose on any leg by more than integration and rounding explain, although it is proved never to
     /// grow.
-    #[serde(default)]
     pub rose: bool,
 }
 
 /// Largest commanded acceleration of any vehicle.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Control {
     /// Over all steps \[m/s^2\].
     pub peak_m_s2: Option<f64>,
@@ -259,7 +266,7 @@ pub struct Control {
 }
 
 /// Velocities at the end.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Velocity {
     /// Largest speed relative to the swarm's mean velocity \[m/s\].
     pub disagreement_m_s: Option<f64>,
@@ -268,7 +275,7 @@ pub struct Velocity {
 }
 
 /// Ellipsoid that must stay empty around a vehicle, and the smallest separation in metres.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Ellipsoid {
     /// Half axes \[m\]. A scaled length divides heights by the ratio of the third half axis to the first.
     pub half_axes_m: [f64; 3],
@@ -281,7 +288,7 @@ pub struct Ellipsoid {
 }
 
 /// Extremes of quadrotors over all samples.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct VehicleNumbers {
     /// Name of the quadrotor model.
     pub model: String,
@@ -292,7 +299,7 @@ pub struct VehicleNumbers {
 }
 
 /// A vehicle with a failed part. The failure lasts to the end of the flight.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FailedVehicle {
     /// Number of the vehicle, from 1.
     pub vehicle: u64,
@@ -314,11 +321,8 @@ impl From<&Failure> for FailedVehicle {
     }
 }
 
-/// Reason of a run that its user stopped.
-pub const INTERRUPTED: &str = "interrupted";
-
 /// Duration, steps and hash of a run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Run {
     /// Time flown \[s\].
     pub duration_s: f64,
@@ -327,22 +331,35 @@ pub struct Run {
     /// Steps flown.
     pub steps: u64,
     /// Steps that were flown in parts, because the law was too fast for them or vehicles were too close.
-    #[serde(default)]
     pub refined_steps: u64,
     /// Steps whose shortest part was still longer than the law allows. From there on the motion is not that of
     /// the law.
-    #[serde(default)]
     pub overlong_steps: u64,
-    /// Reason why the run ended early, such as [`INTERRUPTED`]; null if it did not.
-    pub ended_early: Option<String>,
+    /// Early end of the run, an object with `code` and `text`; null if it was flown to its end.
+    #[serde(serialize_with = "super::words::serialize_early_end")]
+    pub ended_early: Option<Ending>,
     /// Number of vehicles N.
     pub vehicles: usize,
     /// [`tautline_core::record::StateHash`] of the recorded states.
     pub state_hash: String,
 }
 
+impl Run {
+    /// Returns whether the user interrupted the run.
+    #[must_use]
+    pub fn is_interrupted(&self) -> bool {
+        self.ended_early == Some(Ending::Interrupted)
+    }
+
+    /// Returns the reason of an early end in a sentence, with a remedy.
+    #[must_use]
+    pub fn early_end(&self) -> Option<String> {
+        self.ended_early.as_ref().map(early_end)
+    }
+}
+
 /// Wall-clock times. Times of parallel work are added up.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Performance {
     /// From first to last step \[s\].
     pub wall_s: f64,
@@ -351,12 +368,10 @@ pub struct Performance {
     /// In the law \[s\].
     pub law_s: f64,
     /// In the law's energy \[s\].
-    #[serde(default)]
     pub energy_s: f64,
     /// In the plant \[s\].
     pub physics_s: f64,
     /// Part of `physics_s` in forces, rotors and attitude loops \[s\].
-    #[serde(default)]
     pub airframe_s: f64,
     /// In the audit \[s\].
     pub audit_s: f64,
@@ -368,7 +383,7 @@ pub struct Performance {
 ///
 /// A flight that bounces hard off a barrier is chaotic: 10 to 20 of 100 such flights end elsewhere at any step. A
 /// verdict on which both steps agree is called firm.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Verification {
     /// Longest step of the second flight \[s\].
     pub dt_s: f64,
@@ -430,17 +445,6 @@ impl FlightResult<'_> {
             && self.flight.certificate.void.iter().all(holds)
     }
 
-    /// Returns the reason why the run ended early, with a remedy.
-    fn ended_early(&self) -> Option<String> {
-        match &self.flight.ending {
-            Ending::BrokeDown(why @ Breakdown::Unresolved { .. }) => {
-                Some(format!("{why}; shorten time.duration_s, or reduce the drift of the mean velocity"))
-            }
-            Ending::BrokeDown(why) => Some(format!("{why}; shorten time.dt_s, or look for speeds and gains that grow")),
-            ending => ending.reason(),
-        }
-    }
-
     fn run(&self) -> Run {
         let Flight { duration_s, steps, refined_steps, overlong_steps, .. } = *self.flight;
         Run {
@@ -449,7 +453,7 @@ impl FlightResult<'_> {
             steps,
             refined_steps,
             overlong_steps,
-            ended_early: self.ended_early(),
+            ended_early: Some(self.flight.ending.clone()).filter(|ending| *ending != Ending::Completed),
             vehicles: self.scenario.count(),
             state_hash: self.state_hash.to_owned(),
         }
@@ -485,7 +489,7 @@ impl FlightResult<'_> {
             min_pair,
             certified_m: certified_m.and_then(finite),
             certified_until_s: certified_until_s.and_then(finite),
-            certificate_void: void.iter().map(ToString::to_string).collect(),
+            certificate_void: void.clone(),
             ellipsoid: half_axes_m.map(|half_axes_m| Ellipsoid {
                 half_axes_m,
                 min_distance_m,
@@ -531,10 +535,22 @@ impl Report {
         let FlightResult { scenario, flight, summary, .. } = *result;
         let failed = scenario.failures.iter().filter(|failure| failure.at_s <= flight.duration_s);
         let mut report = Self {
-            schema_version: SCHEMA_VERSION,
+            question: Question {
+                delta: Some(scenario.delta_m),
+                unit: if scenario.half_axes_m().is_some() { "m, scaled" } else { "m" },
+                ellipsoid_m: scenario.half_axes_m(),
+                obstacles: scenario.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect(),
+                ..Question::default()
+            },
+            facts: vec![if scenario.has_engine() {
+                Fact::name(FactKind::Motion, Source::Proved, EVERY_STEP)
+            } else {
+                // A path leaves the chord of its step by less than a bound, which the audit adds.
+                Fact::name(FactKind::Motion, Source::Deduced, CHORDS)
+            }],
             scenario: ScenarioIdentity { name: scenario.name.clone(), sha256: scenario.sha256_hex() },
             tool: Tool { name: tautline_core::PROGRAM.to_owned(), version: tautline_core::VERSION.to_owned() },
-            verdict: Verdict { pass: false, refused: Vec::new(), reasons: Vec::new() },
+            verdict: Verdict { pass: false, reasons: Vec::new() },
             separation: result.separation(),
             audit: result.audit(),
             vehicle: result.vehicle(),
@@ -579,6 +595,52 @@ impl Report {
         report
     }
 
+    /// Returns the answer on separations and obstacles. Of many violations the deepest are listed.
+    #[must_use]
+    pub fn answer(&self) -> Answer {
+        let (delta_m, unit) = (self.separation.delta_m, self.question.unit);
+        let names = |pair: Pair| pair.numbers().map(|number| number.to_string()).to_vec();
+        let finding = |subjects, span_s: Option<(f64, f64)>, min_m, at_s, limit_m, unit| Finding {
+            subjects,
+            from_s: span_s.map(|span| span.0),
+            to_s: span_s.map(|span| span.1),
+            at_s: Some(at_s),
+            value: Enclosure::new(min_m, min_m, unit),
+            limit: Some(limit_m),
+            rate_hz: None,
+        };
+        let of_obstacle = |span_s, found: &ObstacleApproach| {
+            let subjects = vec![found.vehicle.to_string(), found.obstacle.clone()];
+            finding(subjects, span_s, found.min_m, found.min_at_s, found.clearance_m, "m")
+        };
+        let closest = self.separation.closest();
+        let closest = closest.map(|of| finding(names(of.pair), None, of.separation_m, of.time_s, delta_m, unit));
+        let obstacles = || self.obstacles.iter();
+        let nearest = obstacles().flat_map(|of| &of.closest).map(|found| of_obstacle(None, found));
+        let of_pairs = self.audit.violations.iter().map(|found| {
+            finding(names(found.pair), Some((found.from_s, found.to_s)), found.min_m, found.min_at_s, delta_m, unit)
+        });
+        let of_obstacles = obstacles().flat_map(|of| &of.violations);
+        let of_obstacles = of_obstacles.map(|of| of_obstacle(Some((of.from_s, of.to_s)), &of.approach));
+        let violations: Vec<_> = of_pairs.chain(of_obstacles).collect();
+        let undecided = self.audit.undecided + obstacles().map(|of| of.undecided).sum::<u64>();
+        Answer {
+            closest: closest.into_iter().chain(nearest).collect(),
+            violations: FindingList::deepest(violations),
+            undecided: FindingList { count: undecided, is_exact: true, listed: Vec::new() },
+            detectors: Some(Detectors {
+                steps: Some(self.audit.steps),
+                segments: None,
+                pairs_swept: self.audit.pairs_checked,
+                parry_contact_s: self.audit.parry.min_toi_s,
+                parry_disagreements: self.audit.parry.disagreements
+                    + obstacles().map(|of| of.disagreements).sum::<u64>(),
+                rapier_contact_pairs: self.audit.rapier.contact_pairs,
+            }),
+            ..Answer::new(Part::Separation, self.audit.status)
+        }
+    }
+
     /// Returns the report as indented JSON with a final line break.
     ///
     /// # Errors
@@ -595,6 +657,68 @@ impl Report {
         let json = self.to_json().map_err(|error| ArtefactError::new(path, error.into()))?;
         write_atomically(path, json.as_bytes())
     }
+}
+
+/// Content of `report.json`.
+impl Serialize for Report {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        struct Rest<'a>(&'a Report);
+        impl Serialize for Rest<'_> {
+            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                Report::serialize(self.0, serializer)
+            }
+        }
+        #[derive(Serialize)]
+        struct Document<'a> {
+            #[serde(flatten)]
+            judgement: Judgement,
+            reasons: &'a [Reason],
+            certificate: FlightCertificate<'a>,
+            #[serde(skip_serializing_if = "Option::is_none")]
+            ellipsoid: Option<&'a Ellipsoid>,
+            #[serde(flatten)]
+            rest: Rest<'a>,
+        }
+        let status = self.audit.status;
+        let separation = &self.separation;
+        let document = Document {
+            judgement: Judgement {
+                schema_version: SCHEMA_VERSION,
+                status,
+                pass: self.verdict.pass,
+                proved: status == Status::Clear && !self.facts.iter().any(Fact::is_assumption),
+                question: self.question.clone(),
+                answers: vec![self.answer()],
+                facts: self.facts.clone(),
+                window_s: Some((0.0, self.run.duration_s)),
+                vehicles: (1..=self.run.vehicles).map(|number| number.to_string()).collect(),
+            },
+            reasons: &self.verdict.reasons,
+            certificate: FlightCertificate {
+                separation_m: separation.certified_m,
+                clearance_margin_m: self.obstacles.as_ref().and_then(|of| of.certified_clearance_margin_m),
+                until_s: separation.certified_until_s,
+                void: &separation.certificate_void,
+            },
+            ellipsoid: separation.ellipsoid.as_ref(),
+            rest: Rest(self),
+        };
+        document.serialize(serializer)
+    }
+}
+
+/// Certificate of a flight, before the first step or after slots were spread if that is smaller.
+#[derive(Serialize)]
+struct FlightCertificate<'a> {
+    /// Certified separation \[m\]; null if nothing is certified.
+    separation_m: Option<f64>,
+    /// Certified distance beyond the clearance of every obstacle \[m\]; null without obstacles or certificate.
+    clearance_margin_m: Option<f64>,
+    /// Time up to which the certificate holds \[s\]; null if it has no end or nothing is certified.
+    until_s: Option<f64>,
+    /// Reasons why nothing is certified, objects with `code` and `text`.
+    #[serde(serialize_with = "serialize_coded")]
+    void: &'a [VoidReason],
 }
 
 /// Returns the number if it is finite.

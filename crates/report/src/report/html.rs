@@ -107,7 +107,10 @@ impl Report {
         } else if self.separation.certified_m.is_some() {
             scenario.flown_law().map_or_else(|error| error.to_string(), |law| law.capabilities().assumptions.to_owned())
         } else {
-            format!("No distance is certified. {}", self.separation.certificate_void.join(" "))
+            {
+                let void: Vec<_> = self.separation.certificate_void.iter().map(ToString::to_string).collect();
+                format!("No distance is certified. {}", void.join(" "))
+            }
         };
         let moved = match scenario.flown_law().map(|law| law.capabilities().controls.freedom()) {
             Ok(Freedom::Fixed) => "where the reference has moved it",

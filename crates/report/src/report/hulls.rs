@@ -1,14 +1,13 @@
 //! Collisions of hulls. After the first collision the motion is not governed by the law alone.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::flight::FlightResult;
 use tautline_audit::AuditOutcome;
 use tautline_core::swarm::{Bounce, Pair};
-use tautline_core::text::{beside_limit, exact, seconds, up_to};
 
 /// Collisions of solid hulls, or the pair of points whose hulls would have collided.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Hulls {
     /// All collisions in order of time; null for a plant whose vehicles are points.
     pub bounces: Option<Vec<Bounce>>,
@@ -18,7 +17,7 @@ pub struct Hulls {
 }
 
 /// A pair that came closer than the sum of its hull radii without a collision.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PassedThrough {
     /// The two vehicles.
     pub pair: Pair,
@@ -52,53 +51,6 @@ impl Hulls {
         });
         let passed_through = through.min_by(|a, b| a.min_at_s.total_cmp(&b.min_at_s));
         Self { bounces, passed_through }
-    }
-
-    /// Returns the findings in a few words, as `label: detail`.
-    pub(super) fn brief(&self) -> Option<String> {
-        let through = self.passed_through.map(|through| {
-            let how = if self.bounces.is_none() { "as points" } else { "in one step" };
-            format!("passed through each other: {}, {how}", vehicles(through.pair))
-        });
-        let hits = self.hits();
-        through.into_iter().chain(hits).reduce(|all, next| all + "; " + &next)
-    }
-
-    fn hits(&self) -> Option<String> {
-        let bounces = self.bounces.as_deref().unwrap_or_default();
-        let &Bounce { pair, time_s, closing_m_s } = bounces.first()?;
-        let first = format!("{} at {} with {} m/s", vehicles(pair), seconds(time_s), up_to(closing_m_s));
-        Some(match bounces.len() {
-            1 => format!("hulls hit once: {first}"),
-            times => format!("hulls hit {times} times: first {first}"),
-        })
-    }
-
-    /// Returns the findings as sentences with their consequence for the flight.
-    pub(super) fn reason(&self) -> Option<String> {
-        let through = self.passed_through.map(|PassedThrough { pair, min_at_s, min_m, touching_m }| {
-            let [first, second] = pair.numbers();
-            let why = match self.bounces {
-                None => "Vehicles of the ideal plant are points",
-                Some(_) => "A step skipped the collision: shorten time.dt_s",
-            };
-            format!(
-                "Vehicles {first} and {second} passed through each other: their hulls touch at {} m, and they came to \
-                 {} m at {}. {why}. Solid hulls would move otherwise from then on.",
-                exact(touching_m),
-                beside_limit(min_m, touching_m, 3),
-                seconds(min_at_s)
-            )
-        });
-        let hits = self.hits().map(|hits| {
-            let (first, rest) = hits.split_at(1);
-            format!(
-                "{}{rest}. After the first collision the motion is not governed by the law; the point vehicles of the \
-                 ideal plant move otherwise.",
-                first.to_uppercase()
-            )
-        });
-        through.into_iter().chain(hits).reduce(|all, next| all + " " + &next)
     }
 }
 
@@ -141,38 +93,13 @@ mod tests {
         assert_eq!(of_points(&[0.75]).passed_through, None, "they touch");
         let through = of_points(&[1.0, 0.7, 0.1]);
         assert_eq!(through.passed_through.map(|first| (first.min_at_s, first.touching_m)), Some((1.25, 0.75)));
-        let reason = through.reason().expect("a reason");
-        assert!(
-            reason.starts_with("Vehicles 1 and 2 passed through each other: their hulls touch at 0.750 m"),
-            "{reason}"
-        );
-    }
-
-    #[test]
-    fn solid_hulls_report_the_number_of_hits_and_the_first_pair() {
-        let first = Bounce { pair: Pair::new(1, 2), time_s: 3.625, closing_m_s: 1.25 };
-        let solid = |bounces: &[Bounce]| Hulls { bounces: Some(bounces.to_vec()), passed_through: None };
-        assert_eq!(solid(&[]).brief(), None);
-        assert_eq!(solid(&[]).reason(), None);
-        assert_eq!(
-            solid(&[first]).brief().as_deref(),
-            Some("hulls hit once: vehicles 2 and 3 at 3.62 s with 1.250 m/s")
-        );
-        let reason = solid(&[first, first]).reason().expect("a reason");
-        assert!(
-            reason.starts_with("Hulls hit 2 times: first vehicles 2 and 3 at 3.62 s with 1.250 m/s. After"),
-            "{reason}"
-        );
     }
 
     #[test]
     fn solid_hulls_can_pass_through_within_one_step() {
         let points = audit(&[0.1]);
         let leapt = Hulls::new(Some(Vec::new()), &points, &[0.25, 0.5], 0.004);
-        assert_eq!(leapt.brief().as_deref(), Some("passed through each other: vehicles 1 and 2, in one step"));
-        assert!(
-            leapt.reason().is_some_and(|reason| reason.contains("A step skipped the collision: shorten time.dt_s"))
-        );
+        assert!(leapt.passed_through.is_some());
         // A collision of the same pair in that violation clears it; one of another pair or time does not.
         let hit = |pair, time_s| [Bounce { pair, time_s, closing_m_s: 1.0 }];
         let of = |bounces: &[Bounce]| Hulls::new(Some(bounces.to_vec()), &points, &[0.25, 0.5], 0.004).passed_through;

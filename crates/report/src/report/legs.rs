@@ -1,13 +1,13 @@
 //! Legs of a flight with several formations.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::flight::{FlightResult, finite};
 use tautline_core::text::{at_least, seconds};
 use tautline_sim::metrics::LegSummary;
 
 /// Numbers of a leg, the flight to one of several formations.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct LegNumbers {
     /// Number of the leg, from 1.
     pub leg: usize,
@@ -48,37 +48,6 @@ impl LegNumbers {
         };
         (0..count).map(number).collect()
     }
-}
-
-/// Returns the reason against a pass: a leg before the last that was not reached, or a leg that never began.
-pub(super) fn reason(legs: &[LegNumbers]) -> Option<String> {
-    let (last, before) = legs.split_last()?;
-    let missed: Vec<_> = before.iter().filter(|leg| leg.from_s.is_some() && leg.reached_at_s.is_none()).collect();
-    let never = legs.iter().find(|leg| leg.from_s.is_none());
-    let missed = missed.first().filter(|leg| leg.leg < last.leg).and_then(|leg| {
-        let next_began = legs.get(leg.leg).is_some_and(|next| next.from_s.is_some());
-        next_began.then(|| {
-            let at = leg.to_s.map(seconds).unwrap_or_default();
-            format!("Leg {} was not reached before leg {} began at {at}.", leg.leg, leg.leg + 1)
-        })
-    });
-    let never = never.map(|leg| {
-        let before = &legs[leg.leg - 2];
-        let why = match before.reached_at_s {
-            Some(_) => "the flight ended before".to_owned(),
-            None => format!("leg {} was not reached", before.leg),
-        };
-        format!("Leg {} never began: {why}.", leg.leg)
-    });
-    let said: Vec<_> = missed.into_iter().chain(never).collect();
-    (!said.is_empty()).then(|| said.join(" "))
-}
-
-/// Returns the first leg that was not reached, as `not reached: detail`.
-pub(super) fn missed(legs: &[LegNumbers]) -> Option<String> {
-    let leg = legs.iter().find(|leg| leg.reached_at_s.is_none())?;
-    let until = leg.to_s.map(|to_s| format!(" until {}", seconds(to_s)));
-    Some(format!("not reached: leg {}{}", leg.leg, until.unwrap_or_default()))
 }
 
 /// Returns the number of reached legs in a few words; `None` for a flight of one leg.

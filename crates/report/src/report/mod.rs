@@ -4,6 +4,7 @@
 //! page, as a verdict line and as a short table. The JSON keys are the fields of the structures below, in their order.
 //! Units are in the names, and vehicles are numbered from 1. Numbers that do not apply or are not finite are null.
 
+mod answer;
 mod artefact;
 mod flight;
 mod html;
@@ -18,11 +19,12 @@ mod shield;
 mod verdict;
 mod words;
 
+pub use answer::{Answer, Detectors, Enclosure, Finding, FindingList, Judgement, Part, Question};
 pub use artefact::{ArtefactError, write_atomically, write_atomically_with, write_beside};
 pub use flight::{
-    Audit, ClosedForm, Control, Ellipsoid, Energy, FailedVehicle, FlightResult, FormationNumbers, INTERRUPTED, Parry,
-    Performance, Rapier, Report, Run, SCHEMA_VERSION, ScenarioIdentity, Separation, Tool, VehicleNumbers, Velocity,
-    Verification, Violation,
+    Audit, ClosedForm, Control, Ellipsoid, Energy, FailedVehicle, FlightResult, FormationNumbers, Parry, Performance,
+    Rapier, Report, Run, SCHEMA_VERSION, ScenarioIdentity, Separation, Tool, VehicleNumbers, Velocity, Verification,
+    Violation,
 };
 pub use html::RunPage;
 pub use hulls::{Hulls, PassedThrough};
@@ -30,7 +32,7 @@ pub use legs::LegNumbers;
 pub use obstacles::{ObstacleApproach, ObstacleViolation, Obstacles};
 pub use shield::ShieldNumbers;
 pub use tautline_audit::Status;
-pub use verdict::{UnmetCriterion, Verdict};
+pub use verdict::{PairApproach, Reason, UnmetCriterion, Verdict};
 
 #[cfg(test)]
 mod tests;

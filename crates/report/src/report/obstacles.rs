@@ -1,6 +1,6 @@
 //! Findings on the distances of vehicles from obstacles.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::flight::{FlightResult, finite};
 use super::section::Section;
@@ -10,7 +10,7 @@ use tautline_core::text::{at_least, beside_limit, counted, exact, seconds, separ
 use tautline_sim::sim::Ending;
 
 /// Findings of the audit on obstacles.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Obstacles {
     /// Status of obstacles alone, which is also part of the status of the audit. At best undecided if the flight ended
     /// early.
@@ -28,7 +28,7 @@ pub struct Obstacles {
 }
 
 /// Closest approach of a vehicle to an obstacle.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ObstacleApproach {
     /// Number of the vehicle, from 1.
     pub vehicle: usize,
@@ -43,10 +43,9 @@ pub struct ObstacleApproach {
 }
 
 /// An interval in which a vehicle was closer to an obstacle than its clearance.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ObstacleViolation {
     /// Vehicle, obstacle and smallest distance.
-    #[serde(flatten)]
     pub approach: ObstacleApproach,
     /// Start \[s\].
     pub from_s: f64,
@@ -84,7 +83,7 @@ impl Obstacles {
     }
 
     /// Returns the deepest violation.
-    fn deepest(&self) -> Option<&ObstacleApproach> {
+    pub(super) fn deepest(&self) -> Option<&ObstacleApproach> {
         let room = |approach: &ObstacleApproach| approach.min_m - approach.clearance_m;
         let approaches = self.violations.iter().map(|violation| &violation.approach);
         approaches.min_by(|a, b| room(a).total_cmp(&room(b)))
@@ -110,49 +109,10 @@ impl Obstacles {
 
     /// Returns the certified distance beyond every clearance \[m\] and the approach that breaks it by more than the
     /// error of integration.
-    fn certified_and_tightest(&self) -> Option<(f64, &ObstacleApproach)> {
+    pub(super) fn broken_certificate(&self) -> Option<(f64, &ObstacleApproach)> {
         let certified_m = self.certified_clearance_margin_m?;
         let (clearance_margin_m, tightest) = self.tightest()?;
         (clearance_margin_m < certified_m * (1.0 - INTEGRATION)).then_some((certified_m, tightest))
-    }
-
-    /// The approach that breaks the certificate, in a few words.
-    pub(super) fn broken_certificate(&self) -> Option<String> {
-        let (certified_m, tightest) = self.certified_and_tightest()?;
-        Some(format!("{}, certified {} m beyond it", tightest.brief(), separation(certified_m)))
-    }
-
-    /// Returns the reasons against a pass as sentences.
-    pub(super) fn reason(&self) -> Option<String> {
-        let violation = self.deepest().filter(|_| self.status == Status::Violation).map(|deepest| {
-            let others = match self.violations.len() - 1 {
-                0 => String::new(),
-                1 => " There is 1 other violation.".to_owned(),
-                n => format!(" There are {n} other violations."),
-            };
-            format!("A vehicle came too near to an obstacle: {}.{others}", deepest.brief())
-        });
-        let broken = self.certified_and_tightest().filter(|_| violation.is_none()).map(|(certified_m, tightest)| {
-            format!(
-                "The law certifies {} m beyond every clearance in continuous time, and {}: the flown motion is not \
-                 the one that the proof covers. Shorten time.dt_s.",
-                separation(certified_m),
-                tightest.brief()
-            )
-        });
-        let disagree = (self.disagreements > 0).then(|| {
-            let times = counted(self.disagreements, "time", "times");
-            format!("The two detectors disagree {times} on the distance from an obstacle, so one of them is wrong.")
-        });
-        let open = (self.status == Status::Undecided && self.disagreements == 0).then(|| match self.deepest() {
-            Some(deepest) => format!(
-                "The step cannot resolve whether the clearance of obstacles is kept. In the flown motion {}, but the \
-                 integration error of steps that are too long for the law may be larger.",
-                deepest.brief()
-            ),
-            None => "The audit cannot decide whether every vehicle kept its clearance from the obstacles.".to_owned(),
-        });
-        violation.into_iter().chain(broken).chain(disagree).chain(open).reduce(|all, next| all + " " + &next)
     }
 
     /// Returns the sections of the closest approaches and of the violations.
@@ -206,7 +166,7 @@ impl Obstacles {
 }
 
 impl ObstacleApproach {
-    fn brief(&self) -> String {
+    pub(super) fn brief(&self) -> String {
         let Self { vehicle, obstacle, clearance_m, min_m, min_at_s } = self;
         let (clearance, at) = (exact(*clearance_m), seconds(*min_at_s));
         if *min_m < 0.0 {

@@ -1,18 +1,17 @@
-//! Numbers of a shielded flight, and the reason against a pass if an assumption of the shield did not hold.
+//! Numbers of a shielded flight.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use tautline_core::fact::Fact;
 use tautline_core::text::{counted, seconds, up_to};
 use tautline_sim::shield::ShieldReport;
 
 /// Numbers of the shield, of all vehicles together.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ShieldNumbers {
     /// Certificate in words, with its assumptions.
     pub certificate: String,
     /// Facts that the certificate rests on.
-    #[serde(skip_deserializing)]
     pub facts: Vec<Fact>,
     /// Bound on the distance of a vehicle to its reference \[m\].
     pub tube_m: f64,
@@ -45,7 +44,6 @@ pub struct ShieldNumbers {
     pub law_undefined: u64,
     /// Number of those instants at which the law failed or commanded numbers that are not finite. The flight does not
     /// pass then.
-    #[serde(default)]
     pub law_failed: u64,
     /// Number of messages of the shield, one for each receiver.
     pub messages_sent: u64,
@@ -82,31 +80,6 @@ impl From<&ShieldReport> for ShieldNumbers {
 }
 
 impl ShieldNumbers {
-    /// Returns the reason against a pass.
-    pub(super) fn reason(&self) -> Option<String> {
-        let exceeded = self.exceeded.as_ref()?;
-        Some(format!(
-            "A bound that the shield assumes was exceeded ({exceeded}), so its certificate does not cover this flight. \
-             Raise the bound in [shield], or reduce the errors, the wind or the lag."
-        ))
-    }
-
-    /// Returns the reason of a law that failed. Without a shield such a flight ends early.
-    pub(super) fn failed_law(&self) -> Option<String> {
-        (self.law_failed > 0).then(|| {
-            let instants = counted(self.law_failed, "instant", "instants");
-            format!(
-                "The law failed or commanded numbers that are not finite at {instants}, where the shield braked. \
-                 Correct the law: it gives every vehicle a finite command at every instant."
-            )
-        })
-    }
-
-    /// Returns a short form of the reason.
-    pub(super) fn brief(&self) -> Option<String> {
-        self.exceeded.as_ref().map(|exceeded| format!("bound of the shield exceeded: {exceeded}"))
-    }
-
     /// Returns the numbers in one line.
     pub(super) fn line(&self) -> String {
         let percent = |share: f64| format!("{:.1} %", 100.0 * share);

@@ -1,63 +1,267 @@
-//! Verdict on a flight and its reasons.
+//! Verdict on a flight and its reasons, as data. [`super::words`] turns reasons into sentences.
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::flight::{FailedVehicle, FlightResult, Report};
-use super::hulls::vehicles;
-use super::legs;
-use super::obstacles::Obstacles;
-use super::shield::ShieldNumbers;
-use tautline_audit::Status;
+use super::hulls::PassedThrough;
+use super::legs::LegNumbers;
+use super::obstacles::{ObstacleApproach, Obstacles};
+use tautline_audit::{Disagreement, Status, Violation};
+use tautline_core::fact::Coded;
 use tautline_core::record::EnergyRise;
-use tautline_core::text::{below_bound, beside_limit, counted, exact, metres, seconds};
+use tautline_core::swarm::{Bounce, Pair};
 use tautline_sim::metrics::Summary;
-use tautline_sim::scenario::TimeSpec;
 use tautline_sim::sim::Ending;
 
 /// Verdict on a flight.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Verdict {
-    /// Whether the flight is clear, reached its formation, was flown to its end and was not refused by the check.
+    /// Whether the flight is clear, reached its formation, was flown to its end and was not refused by the check: there
+    /// is no reason against a pass.
     pub pass: bool,
-    /// Stable names of the warnings that refuse the flight, such as `start-on-line`.
-    pub refused: Vec<String>,
-    /// Reasons against a pass, a sentence each.
-    pub reasons: Vec<String>,
+    /// Reasons against a pass.
+    pub reasons: Vec<Reason>,
+}
+
+/// Closest approach of a pair of vehicles, beside its limit.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct PairApproach {
+    /// The two vehicles.
+    pub pair: Pair,
+    /// Smallest separation \[m\].
+    pub min_m: f64,
+    /// Time of `min_m` \[s\].
+    pub min_at_s: f64,
+    /// Separation that is required or certified \[m\].
+    pub limit_m: f64,
+}
+
+/// Reason against a pass. In JSON an object with `code`, `text` and `data`, the fields of the variant.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(remote = "Self", untagged)]
+#[non_exhaustive]
+pub enum Reason {
+    /// The check refuses the flight.
+    Refused {
+        /// Codes of its warnings, such as `start-on-line`.
+        warnings: Vec<String>,
+    },
+    /// A pair came below delta.
+    Violation {
+        /// Deepest violation.
+        #[serde(flatten)]
+        deepest: PairApproach,
+        /// Number of violations of pairs.
+        violations: usize,
+    },
+    /// A pair came below delta in the flown motion, and integration may have caused it.
+    UnresolvedByStep(PairApproach),
+    /// A vehicle came below the clearance of an obstacle.
+    ObstacleViolation {
+        /// Deepest violation.
+        #[serde(flatten)]
+        deepest: ObstacleApproach,
+        /// Number of violations of obstacles.
+        violations: usize,
+    },
+    /// A vehicle came nearer to an obstacle than certified.
+    ObstacleCertificateBroken {
+        /// The approach.
+        #[serde(flatten)]
+        approach: ObstacleApproach,
+        /// Certified distance beyond every clearance \[m\].
+        certified_clearance_margin_m: f64,
+    },
+    /// The two detectors disagree on the distance from an obstacle.
+    ObstacleDetectorsDisagree {
+        /// Number of disagreements.
+        disagreements: u64,
+    },
+    /// A vehicle came below a clearance in the flown motion, and integration may have caused it.
+    ObstacleUnresolvedByStep(ObstacleApproach),
+    /// Not every distance from an obstacle is decided.
+    ObstacleUndecided {
+        /// Number of undecided times.
+        undecided: u64,
+    },
+    /// Two hulls passed through each other.
+    PassedThrough {
+        /// The pair.
+        #[serde(flatten)]
+        through: PassedThrough,
+        /// Whether the vehicles are points; otherwise a step skipped the collision.
+        are_points: bool,
+    },
+    /// Hulls collided. After the first collision the motion is not governed by the law.
+    HullsHit {
+        /// First collision.
+        #[serde(flatten)]
+        first: Bounce,
+        /// Number of collisions.
+        collisions: usize,
+    },
+    /// The two detectors disagree on a pair of vehicles.
+    DetectorsDisagree {
+        /// Number of disagreements.
+        disagreements: u64,
+        /// The first one.
+        #[serde(skip)]
+        first: Option<Disagreement>,
+    },
+    /// Paths may bend by more than a pair's distance from delta.
+    PathsBend {
+        /// Number of such steps.
+        steps: u64,
+    },
+    /// Not every pair and step was judged.
+    NotJudged {},
+    /// A pair came closer than certified.
+    CertificateBroken {
+        /// The approach, with the certified separation.
+        #[serde(flatten)]
+        approach: PairApproach,
+        /// Whether the shield certifies; otherwise the law does.
+        by_shield: bool,
+    },
+    /// A bound that the shield assumes was exceeded.
+    ShieldBoundExceeded {
+        /// The bound and its vehicle.
+        exceeded: String,
+    },
+    /// The law failed behind the shield.
+    LawFailed {
+        /// Number of instants.
+        instants: u64,
+    },
+    /// Steps were longer than the law allows.
+    StepsTooLong {
+        /// Number of steps.
+        steps: u64,
+    },
+    /// The energy rose although it is proved never to grow.
+    EnergyRose {
+        /// Energy at the last change of the target \[m^2/s^2\].
+        from: f64,
+        /// Largest energy after it \[m^2/s^2\].
+        to: f64,
+        /// Largest energy that integration and rounding explain \[m^2/s^2\].
+        explained: f64,
+    },
+    /// The run ended early.
+    EndedEarly {
+        /// Time of the end \[s\].
+        at_s: f64,
+        /// Code of the ending, such as `interrupted`.
+        ending: &'static str,
+        /// The ending.
+        #[serde(skip)]
+        cause: Ending,
+    },
+    /// The formation was not reached.
+    NotReached {
+        /// Criterion that is not met.
+        criterion: UnmetCriterion,
+        /// Value of the criterion at the end; null if it is unknown.
+        value: Option<f64>,
+        /// Limit of the criterion.
+        limit: Option<f64>,
+        /// Whether the vehicles have come to rest elsewhere; null if unknown.
+        at_rest: Option<bool>,
+        /// Whether more time may help: the vehicles are moving and the check does not refuse the flight.
+        more_time_may_help: bool,
+        /// Vehicles with a failed part.
+        failed: Vec<FailedVehicle>,
+    },
+    /// A leg was not reached before the next one began.
+    LegNotReached {
+        /// Number of the leg, from 1.
+        leg: usize,
+        /// Start of the next leg \[s\].
+        until_s: Option<f64>,
+    },
+    /// A leg never began.
+    LegNeverBegan {
+        /// Number of the leg, from 1.
+        leg: usize,
+        /// Whether the leg before was reached, so that the flight ended first.
+        is_before_reached: bool,
+    },
+    /// The start has fewer dimensions than the formation, and the law acts along the lines between vehicles.
+    StartTooFlat {
+        /// Dimensions of the start.
+        start_dimension: usize,
+        /// Dimensions of the formation.
+        formation_dimension: usize,
+    },
+}
+
+impl Coded for Reason {
+    fn code(&self) -> &'static str {
+        match self {
+            Self::Refused { .. } => "refused",
+            Self::Violation { .. } => "violation",
+            Self::UnresolvedByStep(_) => "unresolved-by-step",
+            Self::ObstacleViolation { .. } => "obstacle-violation",
+            Self::ObstacleCertificateBroken { .. } => "obstacle-certificate-broken",
+            Self::ObstacleDetectorsDisagree { .. } => "obstacle-detectors-disagree",
+            Self::ObstacleUnresolvedByStep(_) => "obstacle-unresolved-by-step",
+            Self::ObstacleUndecided { .. } => "obstacle-undecided",
+            Self::PassedThrough { .. } => "passed-through",
+            Self::HullsHit { .. } => "hulls-hit",
+            Self::DetectorsDisagree { .. } => "detectors-disagree",
+            Self::PathsBend { .. } => "paths-bend",
+            Self::NotJudged {} => "not-judged",
+            Self::CertificateBroken { .. } => "certificate-broken",
+            Self::ShieldBoundExceeded { .. } => "shield-bound-exceeded",
+            Self::LawFailed { .. } => "law-failed",
+            Self::StepsTooLong { .. } => "steps-too-long",
+            Self::EnergyRose { .. } => "energy-rose",
+            Self::EndedEarly { .. } => "ended-early",
+            Self::NotReached { .. } => "not-reached",
+            Self::LegNotReached { .. } => "leg-not-reached",
+            Self::LegNeverBegan { .. } => "leg-never-began",
+            Self::StartTooFlat { .. } => "start-too-flat",
+        }
+    }
 }
 
 impl Verdict {
+    /// Returns whether a reason has this code.
+    #[must_use]
+    pub fn has(&self, code: &str) -> bool {
+        self.reasons.iter().any(|reason| reason.code() == code)
+    }
+
     /// Returns the verdict. A flight passes if the check does not refuse it, the audit is clear and both detectors
     /// agree. The certificate and the energy bound must hold, every leg must be reached, and the run must be flown to
     /// its end.
     pub(super) fn of(report: &Report, result: &FlightResult<'_>) -> Self {
-        let reasons: Vec<_> = [
-            refused(result),
-            violation(report, result),
-            unresolved_by_step(result),
-            report.obstacles.as_ref().and_then(Obstacles::reason),
-            report.hulls.reason(),
-            disagreement(result),
-            undecided(result),
-            broken_certificate(report),
-            report.shield.as_ref().and_then(ShieldNumbers::reason),
-            report.shield.as_ref().and_then(ShieldNumbers::failed_law),
-            steps_too_long(result),
-            risen_energy(result),
-            ended_early(report),
-            not_reached(report, result),
-            legs::reason(&report.legs),
-            too_flat(result),
-        ]
-        .into_iter()
-        .flatten()
-        .collect();
-        let refused = result.preflight.refusing().into_iter().map(str::to_owned).collect();
-        Self { pass: reasons.is_empty(), refused, reasons }
+        let mut reasons = Vec::new();
+        let warnings: Vec<_> = result.preflight.refusing().into_iter().map(str::to_owned).collect();
+        reasons.extend((!warnings.is_empty()).then_some(Reason::Refused { warnings }));
+        reasons.extend(of_pairs(report, result));
+        reasons.extend(report.obstacles.iter().flat_map(of_obstacles));
+        reasons.extend(of_hulls(report));
+        reasons.extend(undecided(result));
+        reasons.extend(broken_certificate(report));
+        reasons.extend(of_shield(report));
+        let steps = result.flight.overlong_steps;
+        reasons.extend((steps > 0).then_some(Reason::StepsTooLong { steps }));
+        reasons.extend(risen_energy(result));
+        reasons.extend(ended_early(result));
+        reasons.extend(not_reached(report, result));
+        reasons.extend(of_legs(&report.legs));
+        reasons.extend(too_flat(result));
+        // A status without a reason never passes.
+        if reasons.is_empty() && report.audit.status != Status::Clear {
+            reasons.push(Reason::NotJudged {});
+        }
+        Self { pass: reasons.is_empty(), reasons }
     }
 }
 
 /// Criterion that keeps a formation from being reached, by its key.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum UnmetCriterion {
     /// The formation was reached, but the flight ended early.
@@ -70,7 +274,6 @@ pub enum UnmetCriterion {
     MaxEdgeErrorM,
     /// Largest distance of a vehicle from its slot: all edges have their length, but the shape or its place is another
     /// one.
-    #[serde(alias = "rms_position_error_m")]
     MaxPositionErrorM,
     /// Largest speed relative to the mean velocity.
     #[serde(rename = "disagreement_m_s")]
@@ -125,44 +328,18 @@ pub(super) fn at_rest(result: &FlightResult<'_>) -> Option<bool> {
     if stands && !is_left_alone && result.is_disturbed() { None } else { Some(is_left_alone) }
 }
 
-fn refused(result: &FlightResult<'_>) -> Option<String> {
-    let codes = result.preflight.refusing().join(", ");
-    (!codes.is_empty()).then(|| format!("The check refuses the flight: {codes}."))
-}
-
-fn violation(report: &Report, result: &FlightResult<'_>) -> Option<String> {
-    if result.flight.audit.status != Status::Violation {
-        return None;
-    }
-    let others = match report.audit.violations.len().saturating_sub(1) {
-        0 => String::new(),
-        1 => " There is 1 other violation.".to_owned(),
-        n => format!(" There are {n} other violations."),
-    };
-    Some(report.deepest_violation() + &others)
-}
-
-impl Report {
-    /// Returns the reasons without the deepest violation of two vehicles, which the headline has.
-    pub(super) fn reasons_beside_headline(&self) -> Vec<String> {
-        let deepest = self.deepest_violation();
-        let rest = self.verdict.reasons.iter().map(|reason| reason.strip_prefix(&deepest).unwrap_or(reason).trim());
-        rest.filter(|reason| !reason.is_empty()).map(str::to_owned).collect()
-    }
-
-    /// Returns the violation of two vehicles with the smallest separation, in a sentence.
-    fn deepest_violation(&self) -> String {
-        let delta_m = self.separation.delta_m;
-        match self.audit.violations.iter().min_by(|a, b| a.min_m.total_cmp(&b.min_m)) {
-            None => format!("Two vehicles came closer than {} m.", exact(delta_m)),
-            Some(deepest) => format!(
-                "Vehicles {} came to {} m at {}; the safety distance is {} m.",
-                deepest.pair,
-                beside_limit(deepest.min_m, delta_m, 3),
-                seconds(deepest.min_at_s),
-                exact(delta_m),
-            ),
-        }
+/// Returns the violation of a pair, or the one that integration may have caused.
+fn of_pairs(report: &Report, result: &FlightResult<'_>) -> Option<Reason> {
+    let audit = &result.flight.audit;
+    let limit_m = report.separation.delta_m;
+    let deepest = audit.violations.iter().min_by(|a, b| a.min_m.total_cmp(&b.min_m));
+    let deepest =
+        deepest.map(|&Violation { pair, min_m, min_at_s, .. }| PairApproach { pair, min_m, min_at_s, limit_m })?;
+    let violations = audit.violations.len();
+    match audit.status {
+        Status::Violation => Some(Reason::Violation { deepest, violations }),
+        status => is_unresolved_by_step(status, result.flight.overlong_steps, violations)
+            .then_some(Reason::UnresolvedByStep(deepest)),
     }
 }
 
@@ -172,48 +349,63 @@ pub(super) fn is_unresolved_by_step(status: Status, overlong_steps: u64, violati
     status == Status::Undecided && overlong_steps > 0 && violations > 0
 }
 
-fn unresolved_by_step(result: &FlightResult<'_>) -> Option<String> {
+fn of_obstacles(found: &Obstacles) -> Vec<Reason> {
+    let &Obstacles { status, undecided, disagreements, .. } = found;
+    let violations = found.violations.len();
+    let deepest = found.deepest().cloned();
+    let mut reasons = Vec::new();
+    match (status, deepest.clone()) {
+        (Status::Violation, Some(deepest)) => reasons.push(Reason::ObstacleViolation { deepest, violations }),
+        _ => reasons.extend(found.broken_certificate().map(|(certified_clearance_margin_m, approach)| {
+            Reason::ObstacleCertificateBroken { approach: approach.clone(), certified_clearance_margin_m }
+        })),
+    }
+    reasons.extend((disagreements > 0).then_some(Reason::ObstacleDetectorsDisagree { disagreements }));
+    if status == Status::Undecided && disagreements == 0 {
+        reasons.push(deepest.map_or(Reason::ObstacleUndecided { undecided }, Reason::ObstacleUnresolvedByStep));
+    }
+    reasons
+}
+
+fn of_hulls(report: &Report) -> impl Iterator<Item = Reason> {
+    let hulls = &report.hulls;
+    let are_points = hulls.bounces.is_none();
+    let through = hulls.passed_through.map(|through| Reason::PassedThrough { through, are_points });
+    let bounces = hulls.bounces.as_deref().unwrap_or_default();
+    let hit = bounces.first().map(|&first| Reason::HullsHit { first, collisions: bounces.len() });
+    through.into_iter().chain(hit)
+}
+
+/// Returns the reasons of pairs and steps that are not decided.
+fn undecided(result: &FlightResult<'_>) -> Vec<Reason> {
     let audit = &result.flight.audit;
-    if !is_unresolved_by_step(audit.status, result.flight.overlong_steps, audit.violations.len()) {
-        return None;
+    let disagreements = audit.parry.disagreements;
+    let first = audit.parry.first_disagreement;
+    let mut reasons = Vec::new();
+    reasons.extend((disagreements > 0).then_some(Reason::DetectorsDisagree { disagreements, first }));
+    if audit.violations.is_empty() && audit.status == Status::Undecided {
+        if audit.unresolved > 0 {
+            reasons.push(Reason::PathsBend { steps: audit.unresolved });
+        } else if disagreements == 0 {
+            reasons.push(Reason::NotJudged {});
+        }
     }
-    let deepest = audit.violations.iter().min_by(|a, b| a.min_m.total_cmp(&b.min_m))?;
-    let [first, second] = deepest.pair.numbers();
-    Some(format!(
-        "The step cannot resolve whether the safety distance of {} m is kept. In the flown motion vehicles {first} and \
-         {second} came to {} m at {}, but the integration error of steps that are too long for the law may be larger.",
-        exact(result.scenario.delta_m),
-        beside_limit(deepest.min_m, result.scenario.delta_m, 3),
-        seconds(deepest.min_at_s),
-    ))
+    reasons
 }
 
-fn disagreement(result: &FlightResult<'_>) -> Option<String> {
-    let parry = &result.flight.audit.parry;
-    let first = parry.first_disagreement.as_ref().map(|first| format!(" First: {first}.")).unwrap_or_default();
-    let count = parry.disagreements;
-    let times = if count == 1 { "once".to_owned() } else { format!("{count} times") };
-    (count > 0).then(|| format!("The two detectors of the audit disagree {times}, so one of them is wrong.{first}"))
+/// Returns the early end of the run.
+fn ended_early(result: &FlightResult<'_>) -> Option<Reason> {
+    let cause = &result.flight.ending;
+    let at_s = result.flight.duration_s;
+    (*cause != Ending::Completed).then(|| Reason::EndedEarly { at_s, ending: cause.code(), cause: cause.clone() })
 }
 
-fn undecided(result: &FlightResult<'_>) -> Option<String> {
-    if !result.flight.audit.violations.is_empty() {
-        return None;
-    }
-    if result.flight.audit.status == Status::Undecided && result.flight.audit.unresolved > 0 {
-        return Some(
-            "Two vehicles came so close to delta that the audit cannot decide: the bound on the bend of their paths \
-             within a step exceeds their distance from delta."
-                .to_owned(),
-        );
-    }
-    (result.flight.audit.status == Status::Undecided && result.flight.audit.parry.disagreements == 0)
-        .then(|| "The audit could not judge every pair and step, so it does not exclude a violation.".to_owned())
-}
-
-fn ended_early(report: &Report) -> Option<String> {
-    let why = report.run.ended_early.as_deref()?.trim_end_matches('.');
-    Some(format!("The run ended early, at {}: {why}.", seconds(report.run.duration_s)))
+fn of_shield(report: &Report) -> impl Iterator<Item = Reason> {
+    let shield = report.shield.as_ref();
+    let exceeded = shield.and_then(|shield| shield.exceeded.clone());
+    let instants = shield.map_or(0, |shield| shield.law_failed);
+    let failed = (instants > 0).then_some(Reason::LawFailed { instants });
+    exceeded.map(|exceeded| Reason::ShieldBoundExceeded { exceeded }).into_iter().chain(failed)
 }
 
 /// Returns whether a separation is below the certified one by more than the integration error. The error is relative to
@@ -223,126 +415,67 @@ pub(super) fn breaks_certificate(separation_m: f64, certified_m: f64, delta_m: f
     separation_m - delta_m < (certified_m - delta_m) * (1.0 - INTEGRATION)
 }
 
-/// Returns whether the energy rose although it is proved never to grow. A rise shows a step that is too long for the
-/// law, or loss of digits.
+/// Returns the rise of an energy that is proved never to grow. A rise shows a step that is too long for the law, or loss
+/// of digits.
+fn risen_energy(result: &FlightResult<'_>) -> Option<Reason> {
+    let EnergyRise { from, to } = result.flight.energy_rise?;
+    let explained = largest_explained_energy(from, result.summary, result.scenario.count());
+    (result.energy_falls() && to > explained).then_some(Reason::EnergyRose { from, to, explained })
+}
+
+/// Returns whether the energy rose although it is proved never to grow.
 pub(super) fn energy_rises(result: &FlightResult<'_>) -> bool {
     risen_energy(result).is_some()
 }
 
-fn risen_energy(result: &FlightResult<'_>) -> Option<String> {
-    let (summary, vehicles) = (result.summary, result.scenario.count());
-    let EnergyRise { from: initial, to: most } = result.flight.energy_rise?;
-    let allowed = largest_explained_energy(initial, summary, vehicles);
-    (result.energy_falls() && most > allowed).then(|| {
-        format!(
-            "The energy rose from {initial:.4e} to {most:.4e} m^2/s^2, although the law never lets it grow. \
-             Integration and rounding explain {allowed:.4e}. The flown motion is not that of the law. Shorten \
-             time.dt_s, or raise time.max_halvings.",
-        )
-    })
-}
-
 /// Returns the reason of a broken certificate. The proof is of continuous time: a separation below the certified one
 /// shows a step that is too long for the law's barrier, or loss of digits.
-fn broken_certificate(report: &Report) -> Option<String> {
-    let (certified_m, closest) = (report.separation.certified_m?, report.separation.closest()?);
-    report.breaks_certificate().then(|| {
-        let [min, certified] = below_bound(closest.separation_m, certified_m);
-        if report.shield.is_some() {
-            return format!(
-                "The assumptions of the shield held and imply {certified} m, but {} came to {min} m: the flown motion \
-                 is not the one that the proof covers.",
-                vehicles(closest.pair),
-            );
-        }
-        format!(
-            "The law certifies {certified} m in continuous time, but {} came to {min} m: the flown motion is not the \
-             one that the proof covers. Shorten time.dt_s, and look for positions so large that their differences lose \
-             digits.",
-            vehicles(closest.pair),
-        )
-    })
+fn broken_certificate(report: &Report) -> Option<Reason> {
+    let (limit_m, closest) = (report.separation.certified_m?, report.separation.closest()?);
+    let approach = PairApproach { pair: closest.pair, min_m: closest.separation_m, min_at_s: closest.time_s, limit_m };
+    let by_shield = report.shield.is_some();
+    report.breaks_certificate().then_some(Reason::CertificateBroken { approach, by_shield })
 }
 
-/// Returns the reason of steps whose shortest part is too long for the law. From there on the motion is not that of the
-/// law.
-fn steps_too_long(result: &FlightResult<'_>) -> Option<String> {
-    let overlong = result.flight.overlong_steps;
-    (overlong > 0).then(|| {
-        format!(
-            "{} longer than the law allows, even after all halvings: the flown motion is not that of the law. Shorten \
-             time.dt_s, raise time.max_halvings, leave time.max_rate_dt at no more than {}, or make the law \
-             gentler.",
-            counted(overlong, "step was", "steps were"),
-            TimeSpec::DEFAULT_MAX_RATE_DT
-        )
-    })
-}
-
-fn not_reached(report: &Report, result: &FlightResult<'_>) -> Option<String> {
+fn not_reached(report: &Report, result: &FlightResult<'_>) -> Option<Reason> {
     let (summary, judge) = (result.summary, result.scenario.arrival);
-    let why = match report.formation.fails? {
+    let criterion = report.formation.fails?;
+    let (value, limit) = match criterion {
         // The early end has a reason of its own.
         UnmetCriterion::EndedEarly => return None,
-        UnmetCriterion::HeldS => format!(
-            "it was kept for the last {} only; {} is required",
-            seconds(summary.held_s.unwrap_or_default()),
-            seconds(judge.hold_s)
-        ),
-        UnmetCriterion::Unknown => "no state at the end is known".to_owned(),
-        UnmetCriterion::MaxEdgeErrorM => format!(
-            "at the end the largest edge error is {} m (limit {} m)",
-            metres(summary.max_edge_error_m),
-            judge.edge_error_m
-        ),
-        UnmetCriterion::MaxPositionErrorM => format!(
-            "at the end every edge error is within its limit, but the shape, its attitude or its place is another \
-             one: the largest position error is {} m (limit {} m)",
-            metres(summary.max_position_error_m),
-            judge.edge_error_m
-        ),
-        UnmetCriterion::Disagreement => format!(
-            "at the end the largest speed relative to the mean velocity, or to that of the reference, is {} m/s \
-             (limit {} m/s)",
-            metres(summary.disagreement_m_s),
-            judge.disagreement_m_s
-        ),
+        UnmetCriterion::HeldS => (Some(summary.held_s.unwrap_or_default()), Some(judge.hold_s)),
+        UnmetCriterion::Unknown => (None, None),
+        UnmetCriterion::MaxEdgeErrorM => (Some(summary.max_edge_error_m), Some(judge.edge_error_m)),
+        UnmetCriterion::MaxPositionErrorM => (Some(summary.max_position_error_m), Some(judge.edge_error_m)),
+        UnmetCriterion::Disagreement => (Some(summary.disagreement_m_s), Some(judge.disagreement_m_s)),
     };
-    let failed = (!report.failures.is_empty()).then(|| format!(" Failed: {}.", FailedVehicle::line(&report.failures)));
-    let then = match report.formation.at_rest {
-        _ if failed.is_some() => "",
-        Some(true) if summary.held_s.is_none() => {
-            " The vehicles have come to rest elsewhere: ten times the duration would not suffice."
-        }
-        Some(false) if summary.held_s.is_none() && !result.preflight.refuses() => {
-            " The vehicles are still moving: more time may help."
-        }
-        Some(false) if summary.held_s.is_none() => " The vehicles are still moving.",
-        _ => "",
-    };
-    Some(format!("The formation was not reached: {why}.{then}{}", failed.unwrap_or_default()))
+    let at_rest = report.formation.at_rest;
+    let more_time_may_help = at_rest == Some(false) && !result.preflight.refuses();
+    Some(Reason::NotReached { criterion, value, limit, at_rest, more_time_may_help, failed: report.failures.clone() })
+}
+
+/// Returns the first leg that was not reached before the next one began, and the first leg that never began.
+fn of_legs(legs: &[LegNumbers]) -> impl Iterator<Item = Reason> {
+    let missed = legs.windows(2).find_map(|pair| {
+        let (leg, next) = (&pair[0], &pair[1]);
+        let is_missed = leg.from_s.is_some() && leg.reached_at_s.is_none() && next.from_s.is_some();
+        is_missed.then_some(Reason::LegNotReached { leg: leg.leg, until_s: leg.to_s })
+    });
+    let never = legs
+        .windows(2)
+        .find(|pair| pair[1].from_s.is_none())
+        .map(|pair| Reason::LegNeverBegan { leg: pair[1].leg, is_before_reached: pair[0].reached_at_s.is_some() });
+    missed.into_iter().chain(never)
 }
 
 /// Returns the reason of a start of fewer dimensions than the formation: forces along the lines between vehicles never
 /// leave it.
-fn too_flat(result: &FlightResult<'_>) -> Option<String> {
+fn too_flat(result: &FlightResult<'_>) -> Option<Reason> {
     if result.reached_at_s().is_some() {
         return None;
     }
-    let (start, trap) = match result.preflight.trap_dimension()? {
-        0 => ("at one point", "point"),
-        1 => ("on a line", "line"),
-        _ => ("in a plane", "plane"),
-    };
-    let formation = match result.preflight.formation_dimension {
-        1 => "a line",
-        2 => "a plane",
-        _ => "space",
-    };
-    Some(format!(
-        "The start lies {start}, but the formation needs {formation}: a law that acts along the lines between vehicles \
-         never leaves that {trap}."
-    ))
+    let start_dimension = result.preflight.trap_dimension()?;
+    Some(Reason::StartTooFlat { start_dimension, formation_dimension: result.preflight.formation_dimension })
 }
 
 /// Largest error of integration, relative to an energy or to a clearance that the energy keeps.

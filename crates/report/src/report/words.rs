@@ -1,12 +1,357 @@
-//! Report of a flight in words: a verdict line and a table.
+//! Report of a flight in words: reasons, a verdict line and a table.
+
+use std::fmt::{self, Display, Formatter};
+
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
 
 use super::flight::{Ellipsoid, FailedVehicle, Performance, Report, VehicleNumbers, Verification};
+use super::hulls::{PassedThrough, vehicles};
 use super::obstacles::Obstacles;
 use super::shield::ShieldNumbers;
-use super::verdict::{UnmetCriterion, breaks_certificate, is_unresolved_by_step};
+use super::verdict::{PairApproach, Reason, UnmetCriterion, breaks_certificate, is_unresolved_by_step};
 use tautline_audit::Status;
-use tautline_core::text::{at_least, below_bound, beside_limit, counted, exact, metres, seconds, table};
+use tautline_core::fact::Coded;
+use tautline_core::swarm::Bounce;
+use tautline_core::text::{
+    at_least, below_bound, beside_limit, counted, exact, metres, seconds, separation, table, up_to,
+};
 use tautline_sim::link::Traffic;
+use tautline_sim::scenario::TimeSpec;
+use tautline_sim::sim::{Breakdown, Ending};
+
+/// Serialises a reason as an object with `code`, `text` and `data`.
+impl Serialize for Reason {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        struct Data<'a>(&'a Reason);
+        impl Serialize for Data<'_> {
+            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                Reason::serialize(self.0, serializer)
+            }
+        }
+        let mut object = serializer.serialize_struct("Reason", 3)?;
+        object.serialize_field("code", self.code())?;
+        object.serialize_field("text", &self.to_string())?;
+        object.serialize_field("data", &Data(self))?;
+        object.end()
+    }
+}
+
+/// Serialises an early end as an object with `code` and `text`.
+#[expect(clippy::ref_option, reason = "the form that serde calls")]
+pub(super) fn serialize_early_end<S: Serializer>(end: &Option<Ending>, serializer: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct EarlyEnd {
+        code: &'static str,
+        text: String,
+    }
+    end.as_ref().map(|end| EarlyEnd { code: end.code(), text: early_end(end) }).serialize(serializer)
+}
+
+/// Returns the reason of an early end, with a remedy.
+pub(super) fn early_end(end: &Ending) -> String {
+    match end {
+        Ending::BrokeDown(why @ Breakdown::Unresolved { .. }) => {
+            format!("{why}; shorten time.duration_s, or reduce the drift of the mean velocity")
+        }
+        Ending::BrokeDown(why) => format!("{why}; shorten time.dt_s, or look for speeds and gains that grow"),
+        ending => ending.reason().unwrap_or_default(),
+    }
+}
+
+/// Returns the number of further violations in a sentence.
+fn others(violations: usize) -> String {
+    match violations.saturating_sub(1) {
+        0 => String::new(),
+        1 => " There is 1 other violation.".to_owned(),
+        n => format!(" There are {n} other violations."),
+    }
+}
+
+fn came_to(PairApproach { pair, min_m, min_at_s, limit_m }: &PairApproach) -> String {
+    format!("{} came to {} m at {}", vehicles(*pair), beside_limit(*min_m, *limit_m, 3), seconds(*min_at_s))
+}
+
+/// The reason in sentences, with a remedy.
+impl Display for Reason {
+    #[expect(clippy::too_many_lines, reason = "one text for each reason")]
+    fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Refused { warnings } => write!(out, "The check refuses the flight: {}.", warnings.join(", ")),
+            Self::Violation { deepest, violations } => write!(
+                out,
+                "{}; the safety distance is {} m.{}",
+                capitalised(&came_to(deepest)),
+                exact(deepest.limit_m),
+                others(*violations)
+            ),
+            Self::UnresolvedByStep(deepest) => write!(
+                out,
+                "The step cannot resolve whether the safety distance of {} m is kept. In the flown motion {}, but the \
+                 integration error of steps that are too long for the law may be larger.",
+                exact(deepest.limit_m),
+                came_to(deepest)
+            ),
+            Self::ObstacleViolation { deepest, violations } => {
+                write!(out, "A vehicle came too near to an obstacle: {}.{}", deepest.brief(), others(*violations))
+            }
+            Self::ObstacleCertificateBroken { approach, certified_clearance_margin_m } => write!(
+                out,
+                "The law certifies {} m beyond every clearance in continuous time, and {}: the flown motion is not \
+                 the one that the proof covers. Shorten time.dt_s.",
+                separation(*certified_clearance_margin_m),
+                approach.brief()
+            ),
+            Self::ObstacleDetectorsDisagree { disagreements } => write!(
+                out,
+                "The two detectors disagree {} on the distance from an obstacle, so one of them is wrong.",
+                counted(*disagreements, "time", "times")
+            ),
+            Self::ObstacleUnresolvedByStep(deepest) => write!(
+                out,
+                "The step cannot resolve whether the clearance of obstacles is kept. In the flown motion {}, but the \
+                 integration error of steps that are too long for the law may be larger.",
+                deepest.brief()
+            ),
+            Self::ObstacleUndecided { .. } => {
+                out.write_str("The audit cannot decide whether every vehicle kept its clearance from the obstacles.")
+            }
+            Self::PassedThrough { through: PassedThrough { pair, min_at_s, min_m, touching_m }, are_points } => write!(
+                out,
+                "{} passed through each other: their hulls touch at {} m, and they came to {} m at {}. {}. Solid \
+                 hulls would move otherwise from then on.",
+                capitalised(&vehicles(*pair)),
+                exact(*touching_m),
+                beside_limit(*min_m, *touching_m, 3),
+                seconds(*min_at_s),
+                if *are_points {
+                    "Vehicles of the ideal plant are points"
+                } else {
+                    "A step skipped the collision: shorten time.dt_s"
+                }
+            ),
+            Self::HullsHit { first, collisions } => write!(
+                out,
+                "{}. After the first collision the motion is not governed by the law; the point vehicles of the ideal \
+                 plant move otherwise.",
+                capitalised(&hits(first, *collisions))
+            ),
+            Self::DetectorsDisagree { disagreements, first } => {
+                let times = if *disagreements == 1 { "once".to_owned() } else { format!("{disagreements} times") };
+                write!(out, "The two detectors of the audit disagree {times}, so one of them is wrong.")?;
+                first.as_ref().map_or(Ok(()), |first| write!(out, " First: {first}."))
+            }
+            Self::PathsBend { .. } => out.write_str(
+                "Two vehicles came so close to delta that the audit cannot decide: the bound on the bend of their \
+                 paths within a step exceeds their distance from delta.",
+            ),
+            Self::NotJudged {} => {
+                out.write_str("The audit could not judge every pair and step, so it does not exclude a violation.")
+            }
+            Self::CertificateBroken { approach, by_shield } => {
+                let [min, certified] = below_bound(approach.min_m, approach.limit_m);
+                let pair = vehicles(approach.pair);
+                let broken = format!("{pair} came to {min} m: the flown motion is not the one that the proof covers");
+                if *by_shield {
+                    return write!(out, "The assumptions of the shield held and imply {certified} m, but {broken}.");
+                }
+                write!(
+                    out,
+                    "The law certifies {certified} m in continuous time, but {broken}. Shorten time.dt_s, and look for \
+                     positions so large that their differences lose digits."
+                )
+            }
+            Self::ShieldBoundExceeded { exceeded } => write!(
+                out,
+                "A bound that the shield assumes was exceeded ({exceeded}), so its certificate does not cover this \
+                 flight. Raise the bound in [shield], or reduce the errors, the wind or the lag."
+            ),
+            Self::LawFailed { instants } => write!(
+                out,
+                "The law failed or commanded numbers that are not finite at {}, where the shield braked. Correct the \
+                 law: it gives every vehicle a finite command at every instant.",
+                counted(*instants, "instant", "instants")
+            ),
+            Self::StepsTooLong { steps } => write!(
+                out,
+                "{} longer than the law allows, even after all halvings: the flown motion is not that of the law. \
+                 Shorten time.dt_s, raise time.max_halvings, leave time.max_rate_dt at no more than {}, or make the \
+                 law gentler.",
+                counted(*steps, "step was", "steps were"),
+                TimeSpec::DEFAULT_MAX_RATE_DT
+            ),
+            Self::EnergyRose { from, to, explained } => write!(
+                out,
+                "The energy rose from {from:.4e} to {to:.4e} m^2/s^2, although the law never lets it grow. Integration \
+                 and rounding explain {explained:.4e}. The flown motion is not that of the law. Shorten time.dt_s, or \
+                 raise time.max_halvings."
+            ),
+            Self::EndedEarly { at_s, cause, .. } => {
+                let why = early_end(cause);
+                write!(out, "The run ended early, at {}: {}.", seconds(*at_s), why.trim_end_matches('.'))
+            }
+            Self::NotReached { criterion, value, limit, at_rest, more_time_may_help, failed } => {
+                let (value, limit) = (value.unwrap_or(f64::NAN), limit.unwrap_or(f64::NAN));
+                let why = match criterion {
+                    UnmetCriterion::EndedEarly | UnmetCriterion::Unknown => "no state at the end is known".to_owned(),
+                    UnmetCriterion::HeldS => {
+                        format!("it was kept for the last {} only; {} is required", seconds(value), seconds(limit))
+                    }
+                    UnmetCriterion::MaxEdgeErrorM => {
+                        format!("at the end the largest edge error is {} m (limit {limit} m)", metres(value))
+                    }
+                    UnmetCriterion::MaxPositionErrorM => format!(
+                        "at the end every edge error is within its limit, but the shape, its attitude or its place is \
+                         another one: the largest position error is {} m (limit {limit} m)",
+                        metres(value)
+                    ),
+                    UnmetCriterion::Disagreement => format!(
+                        "at the end the largest speed relative to the mean velocity, or to that of the reference, is \
+                         {} m/s (limit {limit} m/s)",
+                        metres(value)
+                    ),
+                };
+                write!(out, "The formation was not reached: {why}.")?;
+                if !failed.is_empty() {
+                    return write!(out, " Failed: {}.", FailedVehicle::line(failed));
+                }
+                match at_rest {
+                    _ if *criterion == UnmetCriterion::HeldS => Ok(()),
+                    Some(true) => out.write_str(
+                        " The vehicles have come to rest elsewhere: ten times the duration would not suffice.",
+                    ),
+                    Some(false) if *more_time_may_help => {
+                        out.write_str(" The vehicles are still moving: more time may help.")
+                    }
+                    Some(false) => out.write_str(" The vehicles are still moving."),
+                    None => Ok(()),
+                }
+            }
+            Self::LegNotReached { leg, until_s } => {
+                let at = until_s.map(seconds).unwrap_or_default();
+                write!(out, "Leg {leg} was not reached before leg {} began at {at}.", leg + 1)
+            }
+            Self::LegNeverBegan { leg, is_before_reached: true } => {
+                write!(out, "Leg {leg} never began: the flight ended before.")
+            }
+            Self::LegNeverBegan { leg, is_before_reached: false } => {
+                write!(out, "Leg {leg} never began: leg {} was not reached.", leg - 1)
+            }
+            Self::StartTooFlat { start_dimension, formation_dimension } => {
+                let (start, trap) = match start_dimension {
+                    0 => ("at one point", "point"),
+                    1 => ("on a line", "line"),
+                    _ => ("in a plane", "plane"),
+                };
+                let formation = match formation_dimension {
+                    1 => "a line",
+                    2 => "a plane",
+                    _ => "space",
+                };
+                write!(
+                    out,
+                    "The start lies {start}, but the formation needs {formation}: a law that acts along the lines \
+                     between vehicles never leaves that {trap}."
+                )
+            }
+        }
+    }
+}
+
+impl Reason {
+    /// Returns the reason in a few words, as `label: detail`; `None` for a reason that the status of the audit states.
+    fn brief(&self) -> Option<String> {
+        Some(match self {
+            Self::Refused { warnings } => format!("refused by check: {}", warnings.join(", ")),
+            Self::ObstacleCertificateBroken { approach, certified_clearance_margin_m } => format!(
+                "certificate broken: {}, certified {} m beyond it",
+                approach.brief(),
+                separation(*certified_clearance_margin_m)
+            ),
+            Self::PassedThrough { through, are_points } => format!(
+                "passed through each other: {}, {}",
+                vehicles(through.pair),
+                if *are_points { "as points" } else { "in one step" }
+            ),
+            Self::HullsHit { first, collisions } => hits(first, *collisions),
+            Self::CertificateBroken { approach, .. } => {
+                let [min, certified] = below_bound(approach.min_m, approach.limit_m);
+                let (pair, at) = (vehicles(approach.pair), seconds(approach.min_at_s));
+                format!("certificate broken: {pair} came to {min} m at {at}, certified {certified} m")
+            }
+            Self::ShieldBoundExceeded { exceeded } => format!("bound of the shield exceeded: {exceeded}"),
+            Self::LawFailed { instants } => format!("law failed: at {}", counted(*instants, "instant", "instants")),
+            Self::StepsTooLong { steps } => {
+                format!("step too long: {} longer than the law allows", counted(*steps, "step", "steps"))
+            }
+            Self::EnergyRose { from, to, .. } if (to / from).is_finite() => {
+                format!("energy rose: to {:.3} of its start", to / from)
+            }
+            Self::EnergyRose { .. } => "energy rose: it is proved never to grow".to_owned(),
+            Self::EndedEarly { at_s, .. } => format!("the flight ended early at {}", seconds(*at_s)),
+            Self::NotReached { criterion, value, at_rest, .. } => {
+                let number = value.map_or("-".to_owned(), metres);
+                let what = match criterion {
+                    UnmetCriterion::EndedEarly | UnmetCriterion::Unknown => {
+                        return Some("not reached: no state at the end is known".to_owned());
+                    }
+                    UnmetCriterion::HeldS => {
+                        let held = seconds(value.unwrap_or_default());
+                        return Some(format!("not reached: kept for the last {held} only"));
+                    }
+                    UnmetCriterion::MaxEdgeErrorM => format!("largest edge error {number} m"),
+                    UnmetCriterion::MaxPositionErrorM => {
+                        format!("another shape or place, largest position error {number} m")
+                    }
+                    UnmetCriterion::Disagreement => format!("largest relative speed {number} m/s"),
+                };
+                let then = match at_rest {
+                    Some(true) => ", at rest elsewhere",
+                    Some(false) => ", still moving",
+                    None => "",
+                };
+                format!("not reached: {what}{then}")
+            }
+            Self::LegNotReached { leg, until_s } => {
+                let until = until_s.map(|until_s| format!(" until {}", seconds(until_s)));
+                format!("not reached: leg {leg}{}", until.unwrap_or_default())
+            }
+            Self::LegNeverBegan { leg, .. } => format!("not reached: leg {leg}"),
+            Self::Violation { .. }
+            | Self::UnresolvedByStep(_)
+            | Self::ObstacleViolation { .. }
+            | Self::ObstacleDetectorsDisagree { .. }
+            | Self::ObstacleUnresolvedByStep(_)
+            | Self::ObstacleUndecided { .. }
+            | Self::DetectorsDisagree { .. }
+            | Self::PathsBend { .. }
+            | Self::NotJudged {}
+            | Self::StartTooFlat { .. } => return None,
+        })
+    }
+
+    /// Returns whether the reason concerns the law or the goal, which a violation leaves without meaning.
+    fn is_of_law(&self) -> bool {
+        matches!(
+            self,
+            Self::ObstacleCertificateBroken { .. }
+                | Self::CertificateBroken { .. }
+                | Self::EnergyRose { .. }
+                | Self::NotReached { .. }
+                | Self::LegNotReached { .. }
+                | Self::LegNeverBegan { .. }
+        )
+    }
+}
+
+/// Returns the number of collisions of hulls, and the first one.
+fn hits(&Bounce { pair, time_s, closing_m_s }: &Bounce, collisions: usize) -> String {
+    let first = format!("{} at {} with {} m/s", vehicles(pair), seconds(time_s), up_to(closing_m_s));
+    match collisions {
+        1 => format!("hulls hit once: {first}"),
+        times => format!("hulls hit {times} times: first {first}"),
+    }
+}
 
 impl Report {
     /// Returns the verdict in one line. It begins with `CLEAR` only if the flight passes, otherwise with what failed:
@@ -24,7 +369,10 @@ impl Report {
             }
             Status::Clear => match failures.split_first() {
                 Some((first, rest)) => [&[capital_label(first)], rest].concat(),
-                None => vec![format!("NOT PASSED: {}", self.verdict.reasons.join(" ").trim_end_matches('.'))],
+                None => {
+                    let reasons: Vec<_> = self.verdict.reasons.iter().map(ToString::to_string).collect();
+                    vec![format!("NOT PASSED: {}", reasons.join(" ").trim_end_matches('.'))]
+                }
             },
             Status::Violation => [&[format!("VIOLATION: {}", self.deepest_in_words())], &failures[..]].concat(),
             Status::Undecided => [&[format!("UNDECIDED: {}", self.undecided_in_words())], &failures[..]].concat(),
@@ -37,50 +385,27 @@ impl Report {
         findings.join("; ") + &clear.unwrap_or_default() + &notes.collect::<String>()
     }
 
-    /// Returns the failures beside the status of the audit, as `label: detail`, in the order of the reasons of the
-    /// verdict.
+    /// Returns the failures beside the status of the audit, as `label: detail`.
     fn failures(&self) -> Vec<String> {
-        let has_no_violation = self.audit.status != Status::Violation;
-        let codes = &self.verdict.refused;
-        let refused = (!codes.is_empty()).then(|| format!("refused by check: {}", codes.join(", ")));
-        let broken =
-            self.separation.certified_m.filter(|_| has_no_violation && self.breaks_certificate()).map(|certified_m| {
-                let closest = self.separation.closest().map(|closest| {
-                    let [first, second] = closest.pair.numbers();
-                    let [min, certified] = below_bound(closest.separation_m, certified_m);
-                    let at = seconds(closest.time_s);
-                    format!("vehicles {first} and {second} came to {min} m at {at}, certified {certified} m")
-                });
-                format!("certificate broken: {}", closest.unwrap_or_default())
-            });
-        let past_obstacles =
-            self.obstacles.as_ref().filter(|_| has_no_violation).and_then(Obstacles::broken_certificate);
-        let past_obstacles = past_obstacles.map(|broken| format!("certificate broken: {broken}"));
-        let overlong = self.run.overlong_steps;
-        let overlong = (overlong > 0)
-            .then(|| format!("step too long: {} longer than the law allows", counted(overlong, "step", "steps")));
-        let rose = self.energy.rose.then(|| match self.energy.max_over_leg_start {
-            Some(ratio) => format!("energy rose: to {ratio:.3} of its start"),
-            None => "energy rose: it is proved never to grow".to_owned(),
-        });
+        let is_violation = self.audit.status == Status::Violation;
         let is_in_lead = self.is_clear_until_its_early_end();
-        let ended = (self.run.ended_early.is_some() && !is_in_lead)
-            .then(|| format!("the flight ended early at {}", seconds(self.run.duration_s)));
-        [
-            refused,
-            past_obstacles,
-            self.hulls.brief(),
-            self.shield.as_ref().and_then(ShieldNumbers::brief),
-            broken,
-            overlong,
-            rose.filter(|_| has_no_violation),
-            ended,
-            self.missing().filter(|_| has_no_violation),
-            super::legs::missed(&self.legs).filter(|_| has_no_violation && self.formation.reached),
-        ]
-        .into_iter()
-        .flatten()
-        .collect()
+        let is_told = |reason: &&Reason| match reason {
+            Reason::EndedEarly { .. } => !is_in_lead,
+            // The errors at the end are those of the last leg that began.
+            Reason::LegNotReached { .. } | Reason::LegNeverBegan { .. } => !is_violation && self.formation.reached,
+            reason => !(is_violation && reason.is_of_law()),
+        };
+        self.verdict.reasons.iter().filter(is_told).filter_map(Reason::brief).collect()
+    }
+
+    /// Returns the reasons beside those that the headline states in full: the deepest violation of two vehicles, if it
+    /// is the only one.
+    pub(super) fn reasons_beside_headline(&self) -> Vec<String> {
+        let reasons = self.verdict.reasons.iter().filter_map(|reason| match reason {
+            Reason::Violation { violations, .. } => Some(others(*violations).trim().to_owned()),
+            reason => Some(reason.to_string()),
+        });
+        reasons.filter(|reason| !reason.is_empty()).collect()
     }
 
     /// Returns the words that mark a scaled length.
@@ -160,31 +485,6 @@ impl Report {
     fn arrival(&self) -> String {
         let at = self.formation.reached_at_s.map(|at_s| format!(" at {}", seconds(at_s)));
         format!("formation reached{}", at.unwrap_or_default())
-    }
-
-    /// Returns the criterion that keeps the formation from being reached, as `not reached: detail`. If the formation
-    /// had been reached before an early end, the failure is the early end alone.
-    fn missing(&self) -> Option<String> {
-        let formation = &self.formation;
-        let (what, number, unit) = match formation.fails? {
-            UnmetCriterion::EndedEarly => return None,
-            UnmetCriterion::Unknown => return Some("not reached: no state at the end is known".to_owned()),
-            UnmetCriterion::HeldS => {
-                let held_s = formation.held_s.unwrap_or_default();
-                return Some(format!("not reached: kept for the last {} only", seconds(held_s)));
-            }
-            UnmetCriterion::MaxEdgeErrorM => ("largest edge error", formation.max_edge_error_m, "m"),
-            UnmetCriterion::MaxPositionErrorM => {
-                ("another shape or place, largest position error", formation.max_position_error_m, "m")
-            }
-            UnmetCriterion::Disagreement => ("largest relative speed", self.velocity.disagreement_m_s, "m/s"),
-        };
-        let then = match formation.at_rest {
-            Some(true) => ", at rest elsewhere",
-            Some(false) => ", still moving",
-            None => "",
-        };
-        Some(format!("not reached: {what} {} {unit}{then}", or_dash(number)))
     }
 
     fn deepest_in_words(&self) -> String {
@@ -392,6 +692,12 @@ fn network_line(&Traffic { sent, lost, age_p95_s }: &Traffic) -> String {
     let age = age_p95_s
         .map_or_else(String::new, |age_s| format!("; 95 % of the states held were no older than {age_s:.3} s"));
     format!("{lost} of {sent} messages lost ({share:.1} %){age}")
+}
+
+/// Returns a text with its first letter in upper case.
+fn capitalised(text: &str) -> String {
+    let (first, rest) = text.split_at(text.chars().next().map_or(0, char::len_utf8));
+    first.to_uppercase() + rest
 }
 
 /// Writes the label of `label: detail` in capitals.

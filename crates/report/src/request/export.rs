@@ -8,6 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::audit::{open, own_recording, recording_in};
 use super::{Failure, Monitor, outputs};
 use crate::report::write_atomically_with;
+use tautline_core::fact::Fact;
+use tautline_core::option::{EXPORT_FORMAT, FORCE, OUTPUT, TIME_UNIT};
 use tautline_core::text::counted;
 use tautline_core::track::{Item, Metadata, Tracks};
 use tautline_recordings::export::{self, ExportOptions, WRITTEN};
@@ -66,15 +68,16 @@ impl ExportRequest {
         };
         let format = self.format.or_else(by_extension).ok_or_else(|| {
             let message = format!("the file name `{}` has no extension of a known format", path.display());
-            let help = "name the format with --format csv, parquet, npz or mcap";
+            let help = format!("name the format with {}, parquet, npz or mcap", EXPORT_FORMAT.set("csv"));
             Failure::input("export/unknown-format", message, help)
         })?;
         if path.exists() && !self.force {
             let message = format!("`{}` exists", path.display());
-            return Err(Failure::input("files/exists", message, "overwrite it with --force, or write another file"));
+            let help = format!("overwrite it with {FORCE}, or write another file");
+            return Err(Failure::input("files/exists", message, help));
         }
-        let inputs: Vec<_> = self.paths.iter().map(|path| ("the recording", path.as_path())).collect();
-        outputs::check(&inputs, &[("--output", path)])?;
+        let inputs: Vec<_> = self.paths.iter().map(|path| ("the recording".to_owned(), path.as_path())).collect();
+        outputs::check(&inputs, &[(OUTPUT.to_string(), path)])?;
         Ok(format)
     }
 }
@@ -110,7 +113,7 @@ pub fn export_file(request: &ExportRequest, monitor: &dyn Monitor) -> Result<(),
     for note in exported.notes.iter().chain(&lost(request, monitor)) {
         monitor.warn(&format!("note: {note}"));
     }
-    if let Some(assumed) = assumed {
+    for assumed in assumed {
         monitor.warn(&format!("note: {file} does not contain this assumption: {assumed}"));
     }
     let vehicles = counted(exported.vehicles as u64, "vehicle", "vehicles");
@@ -121,17 +124,20 @@ pub fn export_file(request: &ExportRequest, monitor: &dyn Monitor) -> Result<(),
 /// Number of items from which the unit of time is judged.
 const JUDGED_ITEMS: usize = 10_000;
 
-/// Refuses a guessed unit of time, because the output would contain the guess as a fact. Returns the assumption of the
-/// recording.
-fn examine(tracks: &mut Recording) -> Result<Option<String>, Failure> {
+/// Refuses a guessed unit of time, because the output would contain the guess as a fact. Returns the assumptions of
+/// the recording.
+fn examine(tracks: &mut Recording) -> Result<Vec<Fact>, Failure> {
     let (mut items, mut more) = (Vec::new(), true);
     while more && items.len() < JUDGED_ITEMS && tracks.clock().other_unit.is_some() {
         more = tracks.read(&mut items)?;
     }
-    let Some(other) = tracks.clock().doubt(&items) else { return Ok(tracks.assumed().map(str::to_owned)) };
+    let Some(other) = tracks.clock().doubt(&items) else {
+        return Ok(tracks.facts().iter().filter(|fact| fact.is_assumption()).cloned().collect());
+    };
     let unit = tracks.clock().unit;
     let message = format!("the times may be in {unit} or {other}, and the output is in seconds");
-    Err(Failure::input("export/guessed-time-unit", message, format!("give --time-unit {unit}, or --time-unit {other}")))
+    let help = format!("give {}, or {}", TIME_UNIT.set(unit), TIME_UNIT.set(other));
+    Err(Failure::input("export/guessed-time-unit", message, help))
 }
 
 /// Returns a note if the run's audit, which is not exported, holds more than the samples.

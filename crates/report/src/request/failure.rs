@@ -5,6 +5,10 @@ use std::ops::RangeInclusive;
 use std::path::Path;
 
 use tautline_audit::recorded::RecordedError;
+use tautline_core::option::{
+    ABOVE, ACCEL_WINDOW, CYLINDER, DELTA, ELLIPSOID, FENCE, FROM, IDS, LAND_ON, LIMIT, MAX_ACCEL, MOTION, OFFSET, OUT,
+    Opt, RADIUS, TIME_SCALE, TO, WELL_CLEAR,
+};
 use tautline_core::record::RecordError;
 use tautline_core::text::with_short_numbers;
 use tautline_laws::law::ParameterError;
@@ -147,16 +151,16 @@ pub fn blanked(text: &str) -> String {
     text.chars().map(blank).collect()
 }
 
-/// Checks that a number is in its range. `option` names it, such as `--runs`.
+/// Checks that the number of an option is in its range.
 ///
 /// # Errors
 /// [`Failure`] with the code `request/out-of-range`.
-pub fn in_range<T: PartialOrd + Display>(option: &str, value: &T, range: &RangeInclusive<T>) -> Result<(), Failure> {
+pub fn in_range<T: PartialOrd + Display>(option: Opt, value: &T, range: &RangeInclusive<T>) -> Result<(), Failure> {
     if range.contains(value) {
         return Ok(());
     }
     let (least, most) = (range.start(), range.end());
-    let message = format!("{option} {value}: must be from {least} to {most}");
+    let message = format!("{}: must be from {least} to {most}", option.set(value));
     Err(Failure::input("request/out-of-range", message, "give a number in this range"))
 }
 
@@ -179,8 +183,9 @@ impl From<ScenarioError> for Failure {
 impl From<RecordError> for Failure {
     fn from(error: RecordError) -> Self {
         match error {
-            RecordError::Write { .. } => Self::machine("files/cannot-write", error.to_string())
-                .with_help("the recording up to here is readable; free some space or give another folder with --out"),
+            RecordError::Write { .. } => Self::machine("files/cannot-write", error.to_string()).with_help(format!(
+                "the recording up to here is readable; free some space or give another folder with {OUT}"
+            )),
             RecordError::Open { .. } => Self::new("files/cannot-read", false, error.to_string()),
             RecordError::Read { .. } => Self::new("recording/malformed", false, error.to_string()),
         }
@@ -253,81 +258,146 @@ impl From<SimError> for Failure {
 
 impl From<RecordedError> for Failure {
     fn from(error: RecordedError) -> Self {
-        let (code, help) = match &error {
+        let message = error.to_string();
+        let (code, message, help) = match &error {
             RecordedError::Interrupted => return Self::interrupted(),
             RecordedError::OutOfRange { option, of, range, .. } => {
                 let name = if of.is_some() { "NAME=" } else { "" };
                 let help = match *option {
-                    "cylinder" => "give --cylinder R,H with two numbers above 0, such as 2,4".to_owned(),
-                    "well-clear" => "give --well-clear PRESET, or D,Z,T such as 1219.2,137.16,35".to_owned(),
-                    _ => format!("give --{option} {name}NUMBER, where NUMBER is {range}"),
+                    CYLINDER => format!("give {} with two numbers above 0, such as 2,4", CYLINDER.set("R,H")),
+                    WELL_CLEAR => format!("give {}, or D,Z,T such as 1219.2,137.16,35", WELL_CLEAR.set("PRESET")),
+                    _ => format!("give {}, where NUMBER is {range}", option.set(format!("{name}NUMBER"))),
                 };
-                return Self::input("audit/out-of-range", format!("--{error}"), &help);
+                ("audit/out-of-range", message, help)
             }
-            RecordedError::EmptyWindow { .. } => ("audit/empty-window", "give a --to that is at least --from"),
-            RecordedError::NoBound { .. } => (
-                "audit/no-acceleration-bound",
-                "give the largest acceleration with --max-accel A or --max-accel NAME=A",
-            ),
+            RecordedError::EmptyWindow { .. } => {
+                ("audit/empty-window", message, format!("give a {TO} that is at least {FROM}"))
+            }
+            RecordedError::NoBound { .. } => {
+                let [of_all, of_one] = ["A", "NAME=A"].map(|value| MAX_ACCEL.set(value));
+                let help = format!("give the largest acceleration with {of_all} or {of_one}");
+                ("audit/no-acceleration-bound", message, help)
+            }
             RecordedError::NoLimit { .. } => {
-                ("audit/no-limit", "give --delta, or --radius NAME=R; or give --limit and --fence alone")
+                let radius = RADIUS.set("NAME=R");
+                let help = format!("give {DELTA}, or {radius}; or give {LIMIT} and {FENCE} alone");
+                ("audit/no-limit", message, help)
             }
-            RecordedError::NoAccelWindow => (
-                "audit/acceleration-window",
-                "add --limit accel=A and leave --motion bounded out, or leave --accel-window out",
-            ),
+            RecordedError::NoAccelWindow => {
+                let [limit, motion] = [LIMIT.set("accel=A"), MOTION.set("bounded")];
+                let help = format!("add {limit} and leave {motion} out, or leave {ACCEL_WINDOW} out");
+                ("audit/acceleration-window", message, help)
+            }
             RecordedError::LimitOfJumps { .. } => {
-                ("audit/limit-of-jumps", "give --motion linear, or bounded with --max-accel")
+                let help = format!("give {}, or bounded with {MAX_ACCEL}", MOTION.set("linear"));
+                ("audit/limit-of-jumps", message, help)
             }
             RecordedError::UnknownVehicle { .. } => {
-                ("audit/unknown-vehicle", "use the names of the recording in --ids, --radius, --max-accel and --offset")
+                let help = format!("use the names of the recording in {IDS}, {RADIUS}, {MAX_ACCEL} and {OFFSET}");
+                ("audit/unknown-vehicle", message, help)
             }
             RecordedError::NoGround { .. } => {
-                let help = "give the height of the ground with --above Z, or leave --land-on out";
-                return Self::input("audit/land-on", format!("--{error}"), help);
+                let help = format!("give the height of the ground with {}, or leave {LAND_ON} out", ABOVE.set("Z"));
+                ("audit/land-on", message, help)
             }
             RecordedError::AmbiguousObstacle { .. } => {
-                let help = "give each obstacle its own name, or leave --land-on out";
-                return Self::input("audit/land-on", format!("--{error}"), help);
+                let help = format!("give each obstacle its own name, or leave {LAND_ON} out");
+                ("audit/land-on", message, help)
             }
             RecordedError::UnknownObstacle { .. } => {
-                let help = "use the names of the obstacles, or leave --land-on out";
-                return Self::input("audit/land-on", format!("--{error}"), help);
+                let help = format!("use the names of the obstacles, or leave {LAND_ON} out");
+                ("audit/land-on", message, help)
             }
-            RecordedError::NotACurve { .. } => ("audit/no-curves", "give --motion linear, hold or bounded"),
-            RecordedError::NotSamples { .. } => ("audit/no-samples", "leave --motion out, or give --motion polynomial"),
+            RecordedError::NotACurve { .. } => {
+                ("audit/no-curves", message, format!("give {}, hold or bounded", MOTION.set("linear")))
+            }
+            RecordedError::NotSamples { .. } => {
+                let help = format!("leave {MOTION} out, or give {}", MOTION.set("polynomial"));
+                ("audit/no-samples", message, help)
+            }
             RecordedError::RadiusChanges { .. } => {
-                ("audit/radius-changes", "give one radius of the vehicle with --radius NAME=R")
+                let help = format!("give one radius of the vehicle with {}", RADIUS.set("NAME=R"));
+                ("audit/radius-changes", message, help)
             }
             RecordedError::ObstaclesAndEllipsoid => {
-                ("audit/obstacles-and-ellipsoid", "judge obstacles by --delta or --radius, and ellipsoids without them")
+                let help = format!("judge obstacles by {DELTA} or {RADIUS}, and ellipsoids without them");
+                ("audit/obstacles-and-ellipsoid", message, help)
             }
             RecordedError::CylinderAnd { other } => {
-                let help = format!("leave --cylinder or --{other} out");
-                return Self::input("audit/cylinder", format!("--{error}"), help);
+                let help = format!("leave {CYLINDER} or {other} out");
+                ("audit/cylinder", message, help)
             }
             RecordedError::WellClearMotion { .. } => {
-                let help = "give --motion linear, or leave --motion out";
-                return Self::input("audit/well-clear", format!("--{error}"), help);
+                let help = format!("give {}, or leave {MOTION} out", MOTION.set("linear"));
+                ("audit/well-clear", message, help)
             }
             RecordedError::WellClearAndEllipsoid => {
-                let help = "leave --ellipsoid or --well-clear out";
-                return Self::input("audit/well-clear", format!("--{error}"), help);
+                let help = format!("leave {ELLIPSOID} or {WELL_CLEAR} out");
+                ("audit/well-clear", message, help)
             }
-            RecordedError::Obstacle(_) => ("audit/obstacle", "correct the obstacle file"),
-            RecordedError::TwoClocks { .. } => (
-                "audit/two-clocks",
-                "correct a clock with --offset NAME=SECONDS, or judge vehicles of one clock with --ids, or a time with \
-                 --from",
-            ),
+            RecordedError::Obstacle(_) => ("audit/obstacle", message, "correct the obstacle file".to_owned()),
+            RecordedError::TwoClocks { .. } => {
+                let offset = OFFSET.set("NAME=SECONDS");
+                let help = format!(
+                    "correct a clock with {offset}, or judge vehicles of one clock with {IDS}, or a time with {FROM}"
+                );
+                ("audit/two-clocks", message, help)
+            }
             RecordedError::Unnamed { .. }
             | RecordedError::TimeNotIncreasing { .. }
             | RecordedError::OutOfOrder { .. }
-            | RecordedError::Item { .. } => (
-                "audit/malformed",
-                "correct the recording there, exclude the vehicle with --ids, or check --offset and --time-scale",
-            ),
+            | RecordedError::Item { .. } => {
+                let help = format!(
+                    "correct the recording there, exclude the vehicle with {IDS}, or check {OFFSET} and {TIME_SCALE}"
+                );
+                ("audit/malformed", message, help)
+            }
         };
-        Self::input(code, error.to_string(), help)
+        Self::input(code, message, help)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tautline_audit::recorded::{Settings, TrackAuditor, VehicleSettings};
+    use tautline_core::option::RUNS;
+
+    use super::*;
+
+    #[test]
+    fn errors_of_an_audit_name_options() {
+        let delta = Settings::delta(1.0);
+        let of_one = VehicleSettings { max_accel_m_s2: Some(-1.0), ..VehicleSettings::default() };
+        let land_on = [String::from("pad")].into();
+        for (settings, expected) in [
+            (
+                Settings { vehicles: [("a".to_owned(), of_one)].into(), ..delta.clone() },
+                "max_accel: must be a finite number of at least 0, got a=-1.0 \
+                 (give max_accel=NAME=NUMBER, where NUMBER is a finite number of at least 0)",
+            ),
+            (
+                Settings { from_s: Some(f64::NAN), ..delta.clone() },
+                "from_s: must be a finite number, got NaN (give from_s=NUMBER, where NUMBER is a finite number)",
+            ),
+            (
+                Settings { to_s: Some(f64::NAN), ..delta.clone() },
+                "to_s: must be a finite number, got NaN (give to_s=NUMBER, where NUMBER is a finite number)",
+            ),
+            (
+                Settings { land_on, ..delta },
+                "land_on: the obstacle `pad` is exempt at or below a height, which is not given \
+                 (give the height of the ground with above=Z, or leave land_on out)",
+            ),
+        ] {
+            let error = TrackAuditor::new(settings).expect_err("refused");
+            assert_eq!(Failure::from(error).to_string(), expected);
+        }
+    }
+
+    #[test]
+    fn a_number_out_of_range_is_named_by_its_option() {
+        let failure = in_range(RUNS, &0, &(1..=9)).expect_err("refused");
+        assert_eq!(failure.to_string(), "runs=0: must be from 1 to 9 (give a number in this range)");
+        assert!(in_range(RUNS, &9, &(1..=9)).is_ok());
     }
 }

@@ -5,6 +5,7 @@ use std::io::ErrorKind;
 use std::path::Path;
 
 use super::{Failure, ScenarioRequest, Silent, outputs};
+use tautline_core::option::IDENTIFY;
 use tautline_sim::shield::Identification;
 use tautline_sim::vehicle::{self, MODELS, Model, Tracking};
 
@@ -78,8 +79,9 @@ fn tracking_table(tracking: &Tracking, measured: &Identification) -> String {
     let table = BTreeMap::from([("tracking", tracking)]);
     let keys = toml::to_string(&table).unwrap_or_default();
     format!(
-        "\n# Measured by `tautline check --identify`, not proved: the largest error of the search times a margin.\n# \
+        "\n# Measured by `tautline check {}`, not proved: the largest error of the search times a margin.\n# \
          Worst: {}.\n{keys}",
+        IDENTIFY.argument(),
         measured.sequence
     )
 }

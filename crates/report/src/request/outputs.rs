@@ -6,23 +6,26 @@ use std::io;
 use std::path::{Component, Path, PathBuf};
 
 use serde_json::Value;
+use tautline_core::fact::Coded;
+use tautline_core::option::{FORCE, OUT};
+use tautline_sim::sim::Ending;
 
 use super::{Failure, Monitor};
-use crate::report::{INTERRUPTED, write_atomically};
+use crate::report::write_atomically;
 
 /// Name that stands for standard output.
 const STANDARD_OUTPUT: &str = "-";
 
-/// File with its name in messages, such as `--events` or `the recording`.
-pub type NamedPath<'a> = (&'static str, &'a Path);
+/// File with its name in messages: an option, or words such as `the recording`.
+pub type NamedPath<'a> = (String, &'a Path);
 
 /// Rejects outputs that would overwrite an input or each other, or become part of an input folder of CSV files.
 ///
 /// # Errors
 /// [`Failure`] that names both files.
 pub fn check(inputs: &[NamedPath<'_>], outputs: &[NamedPath<'_>]) -> Result<(), Failure> {
-    let mut taken: BTreeMap<_, _> = inputs.iter().filter_map(|&(called, path)| Some((place(path)?, called))).collect();
-    for &(option, path) in outputs {
+    let mut taken: BTreeMap<_, _> = inputs.iter().filter_map(|(called, path)| Some((place(path)?, called))).collect();
+    for (option, path) in outputs {
         let Some(place) = place(path) else { continue };
         let csv = place.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
         let within = if csv { usize::MAX } else { 1 };
@@ -46,12 +49,12 @@ pub fn check(inputs: &[NamedPath<'_>], outputs: &[NamedPath<'_>]) -> Result<(), 
 /// [`Failure`] that names the file.
 pub fn check_new<'a>(scenario: &str, outputs: impl Iterator<Item = NamedPath<'a>>, force: bool) -> Result<(), Failure> {
     let (piped, files): (Vec<_>, Vec<_>) = outputs.partition(|(_, file)| is_standard_output(file));
-    if let [(first, _), (second, _), ..] = piped[..] {
+    if let [(first, _), (second, _), ..] = &piped[..] {
         let message = format!("{first} and {second} are both to go to standard output");
         return Err(Failure::input("files/one-standard-output", message, "write one of them into a file"));
     }
     let scenario = Path::new(scenario);
-    let inputs: Vec<_> = scenario.is_file().then_some(("the scenario", scenario)).into_iter().collect();
+    let inputs: Vec<_> = scenario.is_file().then_some(("the scenario".to_owned(), scenario)).into_iter().collect();
     check(&inputs, &files)?;
     for (option, file) in files {
         let shown = file.display();
@@ -63,7 +66,7 @@ pub fn check_new<'a>(scenario: &str, outputs: impl Iterator<Item = NamedPath<'a>
             return Err(Failure::input(
                 "files/exists",
                 format!("{shown} exists"),
-                "overwrite it with --force, or write another file",
+                format!("overwrite it with {FORCE}, or write another file"),
             ));
         }
         let is_new_or_plain = file.metadata().map_or(true, |there| there.is_file());
@@ -164,17 +167,17 @@ impl OutFolder {
             return Err(Failure::input(
                 "files/finished",
                 format!("{} holds a finished {}", self.path.display(), self.what),
-                format!("give another folder with --out, or overwrite the {} with --force", self.what),
+                format!("give another folder with {OUT}, or overwrite the {} with {FORCE}", self.what),
             ));
         }
         let machine = |path: &Path, error: &io::Error| {
             Failure::machine("files/cannot-write", format!("cannot write {}: {error}", path.display()))
-                .with_help("give a writable folder with --out")
+                .with_help(format!("give a writable folder with {OUT}"))
         };
         fs::create_dir_all(&self.path).map_err(|error| match error.kind() {
             io::ErrorKind::AlreadyExists => {
-                let message = format!("--out: {} is a file", self.path.display());
-                Failure::input("files/no-folder", message, "give a folder with --out")
+                let message = format!("{OUT}: {} is a file", self.path.display());
+                Failure::input("files/no-folder", message, format!("give a folder with {OUT}"))
             }
             _ => machine(&self.path, &error),
         })?;
@@ -183,7 +186,7 @@ impl OutFolder {
             return Err(Failure::input(
                 "files/busy",
                 format!("another {} is writing to {}", self.what, self.path.display()),
-                "wait for it, or give another folder with --out",
+                format!("wait for it, or give another folder with {OUT}"),
             ));
         }
         // Checked before the work begins and before old files are removed.
@@ -202,7 +205,12 @@ impl OutFolder {
 /// Returns whether a report is that of an interrupted run.
 fn was_interrupted(report: &Path) -> bool {
     let text = fs::read_to_string(report).unwrap_or_default();
-    serde_json::from_str::<Value>(&text).is_ok_and(|report| report["run"]["ended_early"] == INTERRUPTED)
+    let interrupted = Ending::Interrupted.code();
+    serde_json::from_str::<Value>(&text).is_ok_and(|report| {
+        // Reports of schema 2 have the word alone.
+        let end = &report["run"]["ended_early"];
+        end["code"] == interrupted || *end == interrupted
+    })
 }
 
 /// Makes a folder, and makes and removes a file in it.
@@ -218,8 +226,10 @@ pub fn try_to_write_in(folder: &Path) -> io::Result<()> {
 mod tests {
     use super::*;
 
-    fn clash(inputs: &[NamedPath<'_>], outputs: &[NamedPath<'_>]) -> Option<String> {
-        check(inputs, outputs).err().map(|failure| failure.message().to_owned())
+    fn clash(inputs: &[(&str, &Path)], outputs: &[(&str, &Path)]) -> Option<String> {
+        let [inputs, outputs] = [inputs, outputs]
+            .map(|files| files.iter().map(|&(called, path)| (called.to_owned(), path)).collect::<Vec<NamedPath<'_>>>());
+        check(&inputs, &outputs).err().map(|failure| failure.message().to_owned())
     }
 
     #[test]
@@ -234,10 +244,13 @@ mod tests {
             ("new/deep/end.png", "new/./deep//end.png"),
         ] {
             let (one, other) = (at(one), at(other));
-            let said = clash(&[], &[("the picture", &one), ("--film", &other)]).expect("they clash");
-            assert!(said.ends_with("would overwrite the picture, or be part of it"), "{said}");
+            let said = clash(&[], &[("the picture", &one), ("film", &other)]).expect("they clash");
+            assert!(
+                said.starts_with("film ") && said.ends_with("would overwrite the picture, or be part of it"),
+                "{said}"
+            );
         }
-        assert_eq!(clash(&[], &[("the picture", &at("new/end.png")), ("--film", &at("end.png"))]), None);
+        assert_eq!(clash(&[], &[("the picture", &at("new/end.png")), ("film", &at("end.png"))]), None);
     }
 
     #[test]
@@ -245,8 +258,8 @@ mod tests {
         let folder = tempfile::tempdir().expect("a folder");
         let [csv, png] = ["flights/new.csv", "flights/new.png"].map(|name| folder.path().join(name));
         let read = [("the recording", folder.path())];
-        assert!(clash(&read, &[("--output", &csv)]).is_some());
-        assert_eq!(clash(&read, &[("--output", &png)]), None);
+        assert!(clash(&read, &[("output", &csv)]).is_some());
+        assert_eq!(clash(&read, &[("output", &png)]), None);
     }
 
     #[cfg(unix)]
@@ -256,7 +269,7 @@ mod tests {
         let [link, end, round] = ["link.png", "end.png", "round.png"].map(|name| folder.path().join(name));
         std::os::unix::fs::symlink("end.png", &link).expect("a link");
         std::os::unix::fs::symlink("round.png", &round).expect("a link");
-        assert!(clash(&[], &[("the picture", &end), ("--film", &link)]).is_some());
-        assert_eq!(clash(&[], &[("the picture", &end), ("--film", &round)]), None);
+        assert!(clash(&[], &[("the picture", &end), ("film", &link)]).is_some());
+        assert_eq!(clash(&[], &[("the picture", &end), ("film", &round)]), None);
     }
 }

@@ -14,7 +14,7 @@ use super::{Failure, Monitor, NamedPicture, OutFolder, Pictures};
 use crate::figures::{self, Criteria, Figure, Format};
 use crate::flight_log::FlightLog;
 use crate::replay::{NoReplay, PAGE_BYTES, Replay, Stage};
-use crate::report::{INTERRUPTED, Report, RunPage, write_atomically};
+use crate::report::{Report, RunPage, write_atomically};
 use crate::run::{run_while, verify};
 use tautline_core::text::seconds;
 use tautline_recordings::mcap::{Header, McapRecorder};
@@ -112,7 +112,7 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
     }
     let log = Arc::new(log);
     report.performance = report.performance.filter(|_| request.is_timed);
-    if request.verify && report.run.ended_early.as_deref() != Some(INTERRUPTED) {
+    if request.verify && !report.run.is_interrupted() {
         report.verification = Some(within(&threads, scenario, || verify(scenario, &report))?);
     }
     let pictures = pictures.draw(scenario, &report, &log, folder.path(), monitor)?;
@@ -131,10 +131,10 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
 
     monitor.say(&format!("{}\n{}", report.headline(), report.text()));
     for reason in &report.verdict.reasons {
-        monitor.say(reason);
+        monitor.say(&reason.to_string());
     }
     monitor.say(&format!("wrote {}: {RECORDING}, report.json and report.html", folder.path().display()));
-    if report.run.ended_early.as_deref() == Some(INTERRUPTED) {
+    if report.run.is_interrupted() {
         let at = seconds(report.run.duration_s);
         monitor.warn(&format!(
             "interrupted: the files hold the flight up to {at}; the same command begins again and replaces them"

@@ -1,6 +1,7 @@
 //! Scenario of a request.
 
 use super::Failure;
+use tautline_core::option::SET;
 use tautline_sim::scenario::{ExternalLaw, Override, Scenario, Source, Template};
 
 /// A scenario with overrides.
@@ -61,17 +62,18 @@ impl ScenarioRequest {
         after: impl IntoIterator<Item = &'a str>,
         sets: impl IntoIterator<Item = &'a String>,
     ) -> String {
-        let sets = self.overrides.iter().chain(sets).flat_map(|text| ["--set", text.as_str()]);
-        let words: Vec<_> = [command, &self.argument].into_iter().chain(after).chain(sets).collect();
-        command_line(words.iter().copied())
+        let sets = self.overrides.iter().chain(sets).flat_map(|text| [SET.argument(), text.clone()]);
+        let words = [command, &self.argument].into_iter().chain(after).map(str::to_owned);
+        let words: Vec<_> = words.chain(sets).collect();
+        command_line(words.iter().map(String::as_str))
     }
 
     /// Returns the command line that flies this scenario with `sets` instead of the overrides.
     #[must_use]
     pub fn run_command<'a>(&'a self, sets: impl IntoIterator<Item = &'a String>) -> String {
-        let sets = sets.into_iter().flat_map(|text| ["--set", text.as_str()]);
-        let words: Vec<_> = ["run", &self.argument].into_iter().chain(sets).collect();
-        command_line(words.iter().copied())
+        let sets = sets.into_iter().flat_map(|text| [SET.argument(), text.clone()]);
+        let words: Vec<_> = ["run", &self.argument].map(str::to_owned).into_iter().chain(sets).collect();
+        command_line(words.iter().map(String::as_str))
     }
 }
 

@@ -11,6 +11,7 @@ use tautline_laws::formation::Formation;
 use tautline_laws::graph::{Graph, Pinning};
 use tautline_laws::law::{DisplacementKeys, LawSpec, VoidReason};
 use tautline_laws::target::{DeadlockMode, Guidance, Leg, LegTrigger, ReferenceMotion};
+use tautline_report::report::Reason;
 use tautline_report::run::run;
 use tautline_sim::scenario::{PlantSpec, Scenario};
 use tautline_sim::sim::Simulation;
@@ -143,7 +144,7 @@ fn mission_reaches_every_leg_and_reports_each() {
     let hurried = read(&MISSION.replace("start_s = 40.0", "start_s = 20.5"));
     let report = run(&hurried, &mut ()).expect("a report");
     assert!(!report.verdict.pass);
-    assert!(report.verdict.reasons.iter().any(|why| why.starts_with("Leg 2 was not reached before leg 3")));
+    assert!(report.verdict.reasons.iter().any(|why| matches!(why, Reason::LegNotReached { leg: 2, .. })));
 }
 
 const MISSION: &str = r#"

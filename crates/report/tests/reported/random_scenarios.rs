@@ -5,11 +5,12 @@
 //! --nocapture` flies 2,000 and prints the numbers of docs/validation.md.
 
 use tautline_audit::Status;
+use tautline_core::fact::Coded;
 use tautline_core::record::OwnedSample;
 use tautline_core::swarm::{Rows, Swarm, separation};
 use tautline_laws::formation::Formation;
 use tautline_laws::law::{EdgeTension, EdgeTensionKeys, LawSpec};
-use tautline_report::report::Report;
+use tautline_report::report::{Reason, Report};
 use tautline_report::run::{run, verify};
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::{CONTACT_PREDICTION_M, PlantSpec, Scenario};
@@ -102,9 +103,9 @@ fn fly(scenario: &Scenario) -> Flown {
 }
 
 /// Returns the faults of a single flight.
-fn faults(report: &Report) -> impl Iterator<Item = &String> {
-    let wrong = ["never grows", "certifies", "detectors", "ended early", "came to"];
-    report.verdict.reasons.iter().filter(move |reason| wrong.iter().any(|word| reason.contains(word)))
+fn faults(report: &Report) -> impl Iterator<Item = &Reason> {
+    let wrong = ["energy-rose", "certificate-broken", "detectors-disagree", "ended-early", "violation", "hulls-hit"];
+    report.verdict.reasons.iter().filter(move |reason| wrong.contains(&reason.code()))
 }
 
 #[derive(Default)]

@@ -15,6 +15,7 @@ use serde::Serialize;
 use crate::scenario::{MAX_HALVINGS, PlantSpec, Scenario, TimeSpec};
 use crate::sim::{Breakdown, Ending, Simulation};
 use crate::vehicle::Quadrotor;
+use tautline_core::fact::serialize_coded;
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_core::text::at_least;
 use tautline_laws::formation::affine_dimension;
@@ -88,8 +89,9 @@ pub struct Preflight {
     pub reassigns: bool,
     /// Requirements of the law besides links, such as a sensor, in a few words each.
     pub needs: Vec<&'static str>,
-    /// Reasons why no separation is certified, one sentence each.
-    pub certificate_void: Vec<String>,
+    /// Reasons why no separation is certified, objects with `code` and `text` in JSON.
+    #[serde(serialize_with = "serialize_coded")]
+    pub certificate_void: Vec<VoidReason>,
     /// Shield of the scenario, whose certificate replaces that of the law.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub shield: Option<ShieldCheck>,
@@ -230,7 +232,7 @@ impl Preflight {
                 && scenario.deadlock.is_on()
                 && scenario.legs.iter().any(|leg| leg.interchangeable),
             needs: capabilities.needs.to_vec(),
-            certificate_void: certificate.void.iter().map(ToString::to_string).collect(),
+            certificate_void: certificate.void.clone(),
             shield: ShieldCheck::of(scenario),
             certified_edges_m: None,
             drift_m: drift.distance_m,
@@ -364,7 +366,7 @@ impl Preflight {
                 "The energy decays, so pairs joined by an edge never come closer than {least} m in continuous time."
             )
         });
-        self.certificate_void.iter().cloned().chain(edges).collect::<Vec<_>>().join(" ")
+        self.certificate_void.iter().map(ToString::to_string).chain(edges).collect::<Vec<_>>().join(" ")
     }
 
     /// Returns whether the formation is flat in space although it has enough vehicles to span it.

@@ -282,10 +282,12 @@ fn the_constraints_needed_are_those_of_a_rigid_body() {
 #[test]
 fn nothing_is_certified_without_a_barrier_or_a_complete_graph() {
     let star = ring(5, Graph::star(5), 0.0);
-    for (scenario, reason) in [(star, "graph is not complete"), (scenario("pentagon-laplacian", &[]), "no barrier")] {
+    for (scenario, reason) in
+        [(star, VoidReason::GraphNotComplete), (scenario("pentagon-laplacian", &[]), VoidReason::NoBarrier)]
+    {
         let found = check(&scenario);
         assert!(codes(&scenario).contains(&Code::NoCertificate) && found.certified_m.is_none());
-        assert!(found.certificate_void.iter().any(|void| void.contains(reason)), "{:?}", found.certificate_void);
+        assert!(found.certificate_void.contains(&reason), "{:?}", found.certificate_void);
     }
     assert!(!codes(&ring(5, Graph::complete(5), 0.0)).contains(&Code::NoCertificate));
 }
@@ -411,11 +413,7 @@ fn a_law_whose_links_are_too_fast_for_the_shortest_steps_is_refused() {
 fn a_certificate_within_the_resolution_of_delta_is_void() {
     let faint = ["law.kind=displacement", "law.alpha=1e-9", "graph.kind=path", "start.positions_m.4.x=-1e5"];
     let found = check(&scenario("pentagon", &faint));
-    assert!(
-        found.certified_m.is_none()
-            && found.certificate_void[0].contains("exceeds delta by less than the position resolution"),
-        "{found:?}"
-    );
+    assert!(found.certified_m.is_none() && found.certificate_void[0] == VoidReason::Unresolved, "{found:?}");
     assert!(found.energy_initial.is_some());
     assert!(check(&scenario("pentagon", &faint[..1])).certified_m.is_some());
 }

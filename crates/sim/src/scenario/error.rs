@@ -33,7 +33,7 @@ pub struct Field {
 /// Place of an error in a text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Place {
-    /// Name of the text: a path, the name of a built-in scenario, or `--set` for an override.
+    /// Name of the text: a path, the name of a built-in scenario, or `set` for an override.
     pub source: String,
     /// The whole text.
     pub text: String,

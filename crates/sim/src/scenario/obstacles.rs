@@ -28,6 +28,7 @@ use serde::{Deserialize, Serialize};
 use super::error::ScenarioError;
 use super::limits::{CONTACT_PREDICTION_M, SLOT_MARGIN, SMALLEST};
 use super::spec::Scenario;
+use tautline_core::option::OBSTACLES;
 use tautline_core::swarm::{Rows, row, set_row};
 use tautline_core::text::beside_limit;
 use tautline_laws::space::{Obstacle, Shape, smallest_clearance_margin};
@@ -162,8 +163,9 @@ impl ObstacleTable {
         let Solid { shape, path, clearance_m: own_m } =
             self.clone().solid().map_err(|said| wrong(said).with_help(OBSTACLE_HELP))?;
         let [(_, place_m)] = path[..] else {
+            let command = format!("tautline audit {}", OBSTACLES.argument());
             return Err(wrong(format!("obstacle `{}` moves", self.name))
-                .with_help("give at_m = [x, y, z]; only `tautline audit --obstacles` takes obstacles that move"));
+                .with_help(format!("give at_m = [x, y, z]; only `{command}` takes obstacles that move")));
         };
         Ok(Obstacle { name: self.name.clone(), place_m, shape, clearance_m: own_m.unwrap_or(clearance_m) })
     }

@@ -13,6 +13,7 @@ use toml::{Spanned, map::Map};
 use super::check::check_schema;
 use super::document::{Document, TimeKeys};
 use super::error::{Field, Place, ScenarioError};
+use tautline_core::option::SET;
 
 /// Keys from which a missing key takes its value, in order. An error about the missing key is placed at one of these.
 const ORIGINS: [(&str, &[&str]); 7] = [
@@ -166,9 +167,6 @@ fn first_span_from(value: &Spanned<DeValue<'_>>, least: usize) -> Option<Range<u
     value.get_ref().as_array()?.iter().find_map(|entry| first_span_from(entry, least))
 }
 
-/// Name of the text of an override in messages.
-const SOURCE: &str = "--set";
-
 /// Override: a key of the scenario set to another value.
 ///
 /// The path is dotted: `law.delta_m=1.5`. Missing keys and tables are created: `plant.kind=ideal`. Entries of lists are
@@ -193,7 +191,7 @@ impl Override {
     /// [`ScenarioError`] if `=` is missing, a part of the path is not a key, or the value is neither TOML nor a bare
     /// word.
     pub fn parse(text: &str) -> Result<Self, ScenarioError> {
-        let place = |span: Range<usize>| Place::new(SOURCE, text, span);
+        let place = |span: Range<usize>| Place::new(&SET.to_string(), text, span);
         let Some(equals) = text.find('=') else {
             return Err(ScenarioError::new("an override has no `=`")
                 .coded("scenario/override")
@@ -242,7 +240,7 @@ impl Override {
 
     /// Returns the place of a span of bytes of the override.
     pub(super) fn place(&self, span: Range<usize>) -> Place {
-        Place::new(SOURCE, &self.text, span)
+        Place::new(&SET.to_string(), &self.text, span)
     }
 
     /// Sets the key in a document and creates missing tables. Spans of the new value count from `base`.

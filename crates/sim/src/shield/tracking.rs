@@ -5,6 +5,7 @@ use super::{SAME, ShieldSpec, TRACKING_FACTOR, refused, refused_with};
 use crate::scenario::{Scenario, ScenarioError, Space};
 use crate::vehicle::{self, MODELS, Quadrotor, Tracking, TrackingSearch};
 use tautline_core::fact::{Fact, FactKind, Source};
+use tautline_core::option::IDENTIFY;
 use tautline_core::text::shortest;
 use tautline_laws::law::LawSpec;
 use tautline_shield::Limits;
@@ -194,8 +195,9 @@ impl Scenario {
                 format!("the scenario is beyond the measured tracking error of {}: {beyond}", model.name)
             }
         };
-        let help = "measure it with `tautline check --identify`, and set shield.tracking_error_m";
-        let error = refused_with(&problem, help).at_keys(["shield.tracking_error_m", "vehicle.model"]);
+        let command = format!("tautline check {}", IDENTIFY.argument());
+        let help = format!("measure it with `{command}`, and set shield.tracking_error_m");
+        let error = refused_with(&problem, &help).at_keys(["shield.tracking_error_m", "vehicle.model"]);
         Err(found.into_iter().fold(error, |error, (key, _)| error.at(key)))
     }
 

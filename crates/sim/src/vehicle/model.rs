@@ -8,6 +8,7 @@ use toml::de::DeTable;
 
 use super::rotors::Mixer;
 use super::tracking::Tracking;
+use tautline_core::option::IDENTIFY;
 
 /// Standard acceleration of gravity \[m/s^2\]. Some published models use 9.8 or 9.81.
 pub const GRAVITY_M_S2: f64 = 9.80665;
@@ -257,8 +258,9 @@ impl Model {
                 return Err(refuse("tracking", format!("the table has the number {number}"), help));
             }
             if let Some(problem) = tracking.search.as_ref().and_then(|search| search.contradiction(tracking.error_m)) {
-                let help = "measure the table with `tautline check --identify`, or leave out tracking.search";
-                return Err(refuse("tracking", problem, help.to_owned()));
+                let command = format!("tautline check {}", IDENTIFY.argument());
+                let help = format!("measure the table with `{command}`, or leave out tracking.search");
+                return Err(refuse("tracking", problem, help));
             }
         }
         let places = self.rotor_positions_m.iter().flatten().map(|&place| ("rotor_positions_m", place));

@@ -347,6 +347,6 @@ fn a_wrong_imperfection_is_refused_at_its_place() {
         let error = Scenario::read(&Source::Builtin("pentagon".to_owned()), &overrides).expect_err(code);
         assert_eq!(error.code(), code, "{sets:?}: {error}");
         assert!(error.help().is_some(), "{sets:?}: {error}");
-        assert!(error.place().is_some_and(|place| place.source == "--set"), "{sets:?}: {error}");
+        assert!(error.place().is_some_and(|place| place.source == "set"), "{sets:?}: {error}");
     }
 }

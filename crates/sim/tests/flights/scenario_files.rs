@@ -336,7 +336,7 @@ fn an_error_caused_by_an_override_is_placed_in_the_override() {
         let error = read_builtin("pentagon", &[set]).expect_err(set);
         assert_eq!(error.code(), code, "{error}");
         assert_eq!(place(&error), (1, column), "{error}");
-        assert!(error.place().is_some_and(|place| place.source == "--set" && place.text == set), "{error}");
+        assert!(error.place().is_some_and(|place| place.source == "set" && place.text == set), "{error}");
         assert!(error.help().is_some(), "{error}");
     }
     // The file has the key too.

@@ -172,7 +172,7 @@ fn a_flight_shorter_than_hold_s_is_refused_at_the_override() {
     let sets = [Override::parse("time.duration_s=0.5").expect("an override")];
     let error = Scenario::read(&Source::Builtin("thousand".to_owned()), &sets).expect_err("too short");
     assert_eq!(error.code(), "scenario/outside-flight", "{error}");
-    assert!(error.place().is_some_and(|place| place.source == "--set" && place.text.contains("0.5")), "{error}");
+    assert!(error.place().is_some_and(|place| place.source == "set" && place.text.contains("0.5")), "{error}");
 }
 
 #[test]

@@ -21,6 +21,7 @@ use crate::flight::{FlightSummary, Outcome};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
 use cma_es::{Optimiser, folded};
+use tautline_core::option::{self, APART, SEED, SEEDS, START, VARY, VELOCITY};
 use tautline_core::text::{beside_limit, counted, exact, seconds};
 use tautline_report::figures::attack as figure;
 use tautline_report::report::page::{Badge, Tone};
@@ -42,13 +43,12 @@ const MOST_PLACES: usize = 4;
 const CAVEAT: &str = "This is a search, not a proof: worse flights may exist within the bounds.";
 
 /// Assumptions of the numbers.
-const ASSUMED: [&str; 4] = [
+const ASSUMED: [&str; 3] = [
     CAVEAT,
     "The search minimises the smallest separation of two vehicles, also between samples. Clearances of obstacles are \
      judged, but not minimised.",
     "Bounds are a box: each number varies independently of the others. Candidates that cannot be flown, such as a \
      start of two vehicles within delta, cost no flight.",
-    "Noise has the seed of the scenario, or with --seeds also the next: a seed does not make a scenario harder.",
 ];
 
 /// Options of an attack.
@@ -151,17 +151,17 @@ impl Experiment for Options {
     const COMMAND: &'static str = "attack";
 
     fn check(&self) -> Result<(), Failure> {
-        in_range("--flights", &self.flights, &FLIGHTS)?;
-        in_range("--seeds", &self.seeds, &SEEDS_OF_A_CANDIDATE)
+        in_range(option::FLIGHTS, &self.flights, &FLIGHTS)?;
+        in_range(SEEDS, &self.seeds, &SEEDS_OF_A_CANDIDATE)
     }
 
     fn arguments(&self, _study: &Attack) -> Vec<String> {
-        let vary = self.vary.iter().map(|of| ("--vary", of.to_string()));
-        let reaches = [("--start", self.start_m), ("--velocity", self.velocity_m_s), ("--apart", self.apart_m)];
+        let vary = self.vary.iter().map(|of| (VARY, of.to_string()));
+        let reaches = [(START, self.start_m), (VELOCITY, self.velocity_m_s), (APART, self.apart_m)];
         let reaches = reaches.into_iter().filter_map(|(option, by)| Some((option, format!("{:?}", by?))));
-        let counts = [("--flights", self.flights), ("--seeds", self.seeds), ("--seed", self.seed)];
+        let counts = [(option::FLIGHTS, self.flights), (SEEDS, self.seeds), (SEED, self.seed)];
         let counts = counts.into_iter().map(|(option, count)| (option, count.to_string()));
-        vary.chain(reaches).chain(counts).flat_map(|(option, value)| [option.to_owned(), value]).collect()
+        vary.chain(reaches).chain(counts).flat_map(|(option, value)| [option.argument(), value]).collect()
     }
 
     fn fly(&self, base: &BaseScenario, batch: &Batch<'_>) -> Result<Option<Attack>, Failure> {
@@ -444,7 +444,7 @@ impl Study for Attack {
         note(self.refused > 0, format!("{candidates} could not be flown and cost no flight{first}"));
         note(
             worst.is_some_and(|of| of.min_at_s == Some(0.0)),
-            "the smallest separation is that of two starts; --apart keeps starts farther apart".to_owned(),
+            format!("the smallest separation is that of two starts; {APART} keeps starts farther apart"),
         );
         note(
             self.ended_early > 0,
@@ -507,7 +507,10 @@ impl Study for Attack {
     }
 
     fn assumptions(&self) -> Vec<String> {
-        ASSUMED.map(str::to_owned).to_vec()
+        let seeds = format!(
+            "Noise has the seed of the scenario, or with {SEEDS} also the next: a seed does not make a scenario harder."
+        );
+        ASSUMED.map(str::to_owned).into_iter().chain([seeds]).collect()
     }
 
     fn is_good(&self) -> bool {

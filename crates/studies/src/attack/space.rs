@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::Options;
 use crate::base::{BaseScenario, overlap};
+use tautline_core::option::{APART, FLIGHTS, SEEDS, START, VARY, VELOCITY};
 use tautline_core::swarm::{Rows, separation};
 use tautline_core::text::{at_least, beside_limit, shortest};
 use tautline_report::request::Failure;
@@ -47,9 +48,9 @@ impl Bound {
     /// [`Failure`] `attack/variation`.
     pub fn parse(text: &str) -> Result<Self, Failure> {
         let parts = text.split_once('=').and_then(|(key, range)| Some((key.trim(), range.split_once("..")?)));
-        let Some((key, (low, high))) = parts else { return Err(wrong(&format!("{text}: is not KEY=LOW..HIGH"))) };
+        let Some((key, (low, high))) = parts else { return Err(wrong(text, "is not KEY=LOW..HIGH")) };
         let number = |end: &str| {
-            end.trim().parse::<f64>().map_err(|_| wrong(&format!("{text}: `{}` is not a number", end.trim())))
+            end.trim().parse::<f64>().map_err(|_| wrong(text, &format!("`{}` is not a number", end.trim())))
         };
         Self::new(key, number(low)?, number(high)?)
     }
@@ -60,10 +61,10 @@ impl Bound {
     /// [`Failure`] `attack/variation` unless the values are finite and in increasing order.
     pub fn new(key: &str, low: f64, high: f64) -> Result<Self, Failure> {
         if !(low.is_finite() && high.is_finite() && (high - low).is_finite()) {
-            return Err(wrong(&format!("{key}={low}..{high}: the range must be finite")));
+            return Err(wrong(&format!("{key}={low}..{high}"), "the range must be finite"));
         }
         if low >= high {
-            return Err(wrong(&format!("{key}={low}..{high}: the range must be in increasing order")));
+            return Err(wrong(&format!("{key}={low}..{high}"), "the range must be in increasing order"));
         }
         Ok(Self { key: key.to_owned(), low, high, whole: false })
     }
@@ -86,12 +87,10 @@ impl Bound {
 }
 
 /// Returns the failure of an argument of `--vary`.
-fn wrong(why: &str) -> Failure {
-    Failure::input(
-        "attack/variation",
-        format!("--vary {why}"),
-        "write a numeric key and two finite numbers in increasing order, such as --vary network.loss=0..0.3",
-    )
+fn wrong(text: &str, why: &str) -> Failure {
+    let example = VARY.set("network.loss=0..0.3");
+    let help = format!("write a numeric key and two finite numbers in increasing order, such as {example}");
+    Failure::input("attack/variation", format!("{}: {why}", VARY.set(text)), help)
 }
 
 /// Varied numbers of a search, and the scenario that they change.
@@ -113,7 +112,7 @@ impl SearchSpace {
         if seeds == 0 || flights < seeds {
             return Err(Failure::input(
                 "attack/too-few-flights",
-                format!("--flights {flights}: must be at least {seeds}, the number of --seeds"),
+                format!("{}: must be at least {seeds}, the number of {SEEDS}", FLIGHTS.set(flights)),
                 "give more flights or fewer seeds",
             ));
         }
@@ -125,30 +124,32 @@ impl SearchSpace {
             is_random |= varied.is_random_in_flight();
             space.bounds.push(bound);
         }
-        let reaches = [("--start", start_m), ("--velocity", velocity_m_s)];
+        let reaches = [(START, start_m), (VELOCITY, velocity_m_s)];
         for (option, by) in reaches.into_iter().filter_map(|(option, by)| Some((option, by?))) {
             if !(by.is_finite() && by > 0.0) {
                 return Err(Failure::input(
                     "attack/out-of-range",
-                    format!("{option} {by}: must be a finite number above 0"),
-                    "give --start in metres and --velocity in metres per second",
+                    format!("{}: must be a finite number above 0", option.set(by)),
+                    format!("give {START} in metres and {VELOCITY} in metres per second"),
                 ));
             }
         }
         space.check_apart()?;
         space.bounds.extend(space.start_bounds());
         if space.bounds.is_empty() {
+            let (start, key) = (START.set(1), VARY.set("network.loss=0..0.3"));
             return Err(Failure::input(
                 "attack/nothing-varied",
                 "nothing is varied",
-                "vary starts, such as --start 1 (up to 1 m), or a key, such as --vary network.loss=0..0.3",
+                format!("vary starts, such as {start} (up to 1 m), or a key, such as {key}"),
             ));
         }
         if seeds > 1 && !is_random {
+            let given = SEEDS.set(seeds);
             return Err(Failure::input(
                 "attack/nothing-random",
-                format!("--seeds {seeds}: nothing in the flight is random, so all seeds give the same flight"),
-                "leave --seeds out, or add turbulence, noise of measurement, loss or jitter to the scenario",
+                format!("{given}: nothing in the flight is random, so all seeds give the same flight"),
+                format!("leave {SEEDS} out, or add turbulence, noise of measurement, loss or jitter to the scenario"),
             ));
         }
         Ok(space)
@@ -198,7 +199,7 @@ impl SearchSpace {
             match near_m {
                 Some((apart_m, near_m)) if near_m < apart_m => {
                     let near = beside_limit(near_m, apart_m, 3);
-                    Err(format!("two vehicles start {near} m apart, less than --apart {apart_m} m"))
+                    Err(format!("two vehicles start {near} m apart, less than {} m", APART.set(apart_m)))
                 }
                 _ => Ok(scenario),
             }
@@ -221,15 +222,16 @@ impl SearchSpace {
         if twice || of_start {
             return Err(Failure::input(
                 "attack/key-twice",
-                format!("--vary {key}: the key is varied twice"),
-                "vary each key once; --start and --velocity vary the whole of [start]",
+                format!("{}: the key is varied twice", VARY.set(key)),
+                format!("vary each key once; {START} and {VELOCITY} vary the whole of [start]"),
             ));
         }
         if key.rsplit('.').next() == Some("seed") {
+            let (given, seeds) = (VARY.set(key), SEEDS.set("K"));
             return Err(Failure::input(
                 "attack/seed-varied",
-                format!("--vary {key}: the key is a seed, and varying a seed does not make a scenario harder"),
-                "leave the seed out; --seeds K flies each candidate with K seeds of noise",
+                format!("{given}: the key is a seed, and varying a seed does not make a scenario harder"),
+                format!("leave the seed out; {seeds} flies each candidate with K seeds of noise"),
             ));
         }
         Ok(())
@@ -245,11 +247,12 @@ impl SearchSpace {
         Err(Failure::input(
             "attack/out-of-range",
             format!(
-                "--apart {apart_m}: must be more than delta ({delta_m} m) and at most {} m, the smallest separation \
-                 of the scenario's start",
+                "{}: must be more than delta ({delta_m} m) and at most {} m, the smallest separation of the scenario's \
+                 start",
+                APART.set(apart_m),
                 at_least(own_m, 3)
             ),
-            "give a distance in this range, or leave --apart out",
+            format!("give a distance in this range, or leave {APART} out"),
         ))
     }
 

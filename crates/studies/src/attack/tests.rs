@@ -147,11 +147,11 @@ fn starts_keep_the_separation_of_apart() {
     let (near_m, attack) = nearest(&Options { apart_m: Some(4.0), ..wide.clone() });
     assert!(near_m >= 4.0 && attack.refused > anywhere.refused, "{near_m}");
     let why = attack.first_refusal.expect("a reason");
-    assert!(why.contains("less than --apart 4 m"), "{why}");
+    assert!(why.contains("less than apart=4 m"), "{why}");
     for apart_m in [1.0, 5.1, f64::NAN] {
         let refused =
             space(&sets, &Options { apart_m: Some(apart_m), ..wide.clone() }).expect_err("refused").to_string();
-        assert!(refused.contains(&format!("--apart {apart_m}: must be more than delta (1 m)")), "{refused}");
+        assert!(refused.contains(&format!("apart={apart_m}: must be more than delta (1 m)")), "{refused}");
         assert!(refused.contains("at most 5.000 m, the smallest separation of the scenario's start"), "{refused}");
     }
 }
@@ -202,14 +202,10 @@ fn wrong_options_are_refused() {
     let refused = |options: Options| space(&[], &options).expect_err("refused").to_string();
     let start = || start_options(10);
     assert!(refused(varied(&[], 10)).contains("nothing is varied"));
-    assert!(refused(Options { start_m: Some(0.0), ..start() }).contains("--start 0: must be a finite number above 0"));
+    assert!(refused(Options { start_m: Some(0.0), ..start() }).contains("start=0: must be a finite number above 0"));
     assert!(refused(Options { velocity_m_s: Some(f64::NAN), ..start() }).contains("velocity"));
-    assert!(
-        refused(Options { flights: 0, ..start() }).contains("--flights 0: must be at least 1, the number of --seeds")
-    );
-    assert!(
-        refused(Options { seeds: 11, ..start() }).contains("--flights 10: must be at least 11, the number of --seeds")
-    );
+    assert!(refused(Options { flights: 0, ..start() }).contains("flights=0: must be at least 1, the number of seeds"));
+    assert!(refused(Options { seeds: 11, ..start() }).contains("flights=10: must be at least 11, the number of seeds"));
     assert!(refused(Options { seeds: 2, ..start() }).contains("nothing in the flight is random"));
     assert!(refused(varied(&["law.f1=0..1"], 10)).contains("f1"));
     assert!(refused(varied(&["law.kind=0..1"], 10)).contains("law.kind = 0"));
@@ -219,7 +215,7 @@ fn wrong_options_are_refused() {
     let x = ["start.positions_m.1.x=0..1", "start.positions_m.1.1=0..1"];
     assert!(refused(varied(&x, 10)).contains("varied twice"));
     let both = Options { start_m: Some(1.0), ..varied(&["start.positions_m.1.x=0..1"], 10) };
-    assert!(refused(both).contains("--vary start.positions_m.1.x: the key is varied twice"));
+    assert!(refused(both).contains("vary=start.positions_m.1.x: the key is varied twice"));
 }
 
 #[test]

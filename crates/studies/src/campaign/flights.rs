@@ -14,6 +14,7 @@ use crate::SCHEMA_VERSION;
 use crate::base::BaseScenario;
 use crate::batch::Batch;
 use crate::splitting::{self, SplittingSettings};
+use tautline_core::option::SHARDS;
 use tautline_report::request::Failure;
 use tautline_sim::scenario::{ExternalLaw, Override, Scenario, ScenarioError, Source};
 
@@ -97,8 +98,8 @@ impl Campaign {
         manifest.shards = shards.unwrap_or_else(|| manifest.runs.div_ceil(RUNS_OF_A_SHARD));
         if manifest.shards == 0 || manifest.shards > manifest.runs {
             let (runs, shards) = (manifest.runs, manifest.shards);
-            let problem = format!("--shards {shards}: must be from 1 to {runs}, the number of runs");
-            return Err(refused(problem, "give a number in this range, or leave --shards out"));
+            let problem = format!("{}: must be from 1 to {runs}, the number of runs", SHARDS.set(shards));
+            return Err(refused(problem, format!("give a number in this range, or leave {SHARDS} out")));
         }
         let mut campaign = Self::read(manifest, spec, external_law)?;
         campaign.check(spec)?;

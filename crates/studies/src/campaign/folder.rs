@@ -16,6 +16,7 @@ use super::summary::{Summary, SummaryAccumulator};
 use crate::SCHEMA_VERSION;
 use crate::study::Study as _;
 use crate::table::{Cell, ParquetTable};
+use tautline_core::option::{OUT, SHARD, SHARDS};
 use tautline_core::text::counted;
 use tautline_report::report::{write_atomically, write_atomically_with};
 use tautline_report::request::{Failure, command_line};
@@ -63,18 +64,19 @@ impl Folder {
                     return Self::raise(path, campaign, there);
                 }
                 let problem = format!("the folder holds campaign {}, and this is {}", there.campaign, here.campaign);
-                return Err(other_campaign(path, problem, "give another folder with --out"));
+                return Err(other_campaign(path, problem, format!("give another folder with {OUT}")));
             }
             if shards_asked && here.shards != there.shards {
                 let problem = format!("the folder holds this campaign in {} shards, not {}", there.shards, here.shards);
-                let remedy = "leave --shards out to continue, or give another folder with --out";
+                let remedy = format!("leave {SHARDS} out to continue, or give another folder with {OUT}");
                 return Err(other_campaign(path, problem, remedy));
             }
             return Ok(Self { path: path.to_owned(), campaign: Campaign::of(there, path, campaign.external_law())? });
         }
         if let Some(there) = LEFT.iter().map(|name| path.join(name)).find(|there| there.exists()) {
             let problem = "the file exists, and the folder has no manifest of a campaign";
-            return Err(other_campaign(&there, problem, "give another folder with --out, or move the file"));
+            let remedy = format!("give another folder with {OUT}, or move the file");
+            return Err(other_campaign(&there, problem, remedy));
         }
         let folder = Self { path: path.to_owned(), campaign };
         folder.create_parts()?;
@@ -229,7 +231,7 @@ impl Folder {
         Failure::input(
             "campaign/missing-shards",
             format!("{} of {of} {are} {what}: {list}{damages}", missing.len()),
-            command_line(["campaign", "shard", &path, "--shard", &list].into_iter()),
+            command_line(["campaign", "shard", &path, &SHARD.argument(), &list].into_iter()),
         )
     }
 }
@@ -344,7 +346,7 @@ pub fn listed(shards: &[u64]) -> String {
 pub fn parse(list: &str, shards: u64) -> Result<Vec<u64>, Failure> {
     let wrong = |problem: String| {
         let remedy = "give numbers from 0 on, such as 7, 3-5, 13,500-502, or env:SLURM_ARRAY_TASK_ID";
-        refused(format!("--shard {list}: {problem}"), remedy)
+        refused(format!("{}: {problem}", SHARD.set(list)), remedy)
     };
     if let Some(name) = list.strip_prefix("env:") {
         let value = std::env::var(name).map_err(|_| wrong(format!("no environment variable `{name}`")))?;
@@ -493,7 +495,8 @@ impl Manifest {
         let text = match fs::read_to_string(path) {
             Ok(text) => text,
             Err(error) if error.kind() == std::io::ErrorKind::NotFound => {
-                return foreign("no such campaign", "plan one with: tautline campaign plan SPEC.toml --out FOLDER");
+                let remedy = format!("plan one with: tautline campaign plan SPEC.toml {} FOLDER", OUT.argument());
+                return foreign("no such campaign", &remedy);
             }
             Err(error) => return Err(file_failure("read", path)(error)),
         };

@@ -9,6 +9,7 @@ use super::{Campaign, Folder, Law, Row, Summary, ViolatedRun, Worst};
 use crate::flight::Outcome;
 use crate::splitting::{self, StateHashAtStep};
 use crate::study::{Block, Section};
+use tautline_core::option::{BAD, LAW, OUT, Opt, RUN, SET};
 use tautline_core::text::{beside_limit, separation, up_to};
 use tautline_recordings::mcap::{Header, McapRecorder};
 use tautline_report::replay::{NoReplay, PAGE_BYTES, Replay};
@@ -144,7 +145,8 @@ impl FlightId<'_> {
             return format!("in Python, tautline.fly under the law {} with: {sets}", law.name());
         }
         let sets = campaign.sets(self.run, self.law);
-        let sets = sets.iter().flat_map(|set| ["--set", set.as_str()]);
+        let option = SET.argument();
+        let sets = sets.iter().flat_map(|set| [option.as_str(), set.as_str()]);
         let words: Vec<_> = ["run", campaign.scenario_argument()].into_iter().chain(sets).collect();
         command_line(words.into_iter())
     }
@@ -169,12 +171,12 @@ pub fn replay(
     let Some(law) = law else {
         let names: Vec<_> = campaign.laws().iter().map(|law| law.name.as_str()).collect();
         let name = request.law.as_deref().unwrap_or_default();
-        let problem = format!("--law {name}: the campaign has no such law");
+        let problem = format!("{}: the campaign has no such law", LAW.set(name));
         return Err(Failure::input("campaign/unknown-law", problem, format!("its laws are {}", names.join(", "))));
     };
     let (run, last) = (request.run, campaign.manifest().runs - 1);
     if run > last {
-        let problem = format!("--run {run}: must be from 0 to {last}");
+        let problem = format!("{}: must be from 0 to {last}", RUN.set(run));
         return Err(Failure::input("campaign/no-run", problem, "give the number of a run of the campaign, from 0"));
     }
     let bad = campaign.splitting().map(|_| request.bad.unwrap_or_default());
@@ -187,7 +189,7 @@ pub fn replay(
     }
     if request.out.is_some() && out.join("report.json").exists() {
         let message = format!("{} holds a finished run", out.display());
-        return Err(Failure::input("files/finished", message, "give another folder with --out"));
+        return Err(Failure::input("files/finished", message, format!("give another folder with {OUT}")));
     }
     let scenario = flight.scenario(campaign)?;
     let left = run_into(&RunRequest::reproducible(&scenario, flight.command(campaign), out), pictures, monitor)?;
@@ -271,7 +273,8 @@ fn repeat_violated_flight(folder: &Folder, law: &Law, bad: &ViolatedRun) -> Resu
     fly_violated_flight(folder, flight, bad.bad, &flight.create_chosen(folder)?)?;
     let (run, number) = (bad.run.to_string(), bad.bad.to_string());
     // Relative to the folder of the page, so that the page has the same bytes for any path of the campaign.
-    let command = ["campaign", "replay", ".", "--run", &run, "--law", &law.name, "--bad", &number];
+    let options = [RUN, LAW, BAD].map(Opt::argument);
+    let command = ["campaign", "replay", ".", &options[0], &run, &options[1], &law.name, &options[2], &number];
     let description = format!(
         "Violated flight {number} of run {run} under {}: {} m below delta in step {}. To repeat it, in the folder of \
          this page:",
@@ -295,7 +298,7 @@ fn repeat_violated_flight(folder: &Folder, law: &Law, bad: &ViolatedRun) -> Resu
 fn fly_violated_flight(folder: &Folder, flight: FlightId<'_>, bad: usize, out: &Path) -> Result<String, Failure> {
     let kept = flight.row(folder)?.and_then(|row| row.splitting).map(|splitting| splitting.bad).unwrap_or_default();
     let Some(violated) = kept.get(bad) else {
-        let problem = format!("--bad {bad}: the campaign has no {}", flight.words());
+        let problem = format!("{}: the campaign has no {}", BAD.set(bad), flight.words());
         let remedy = match kept.len() {
             0 => "this run kept no violated flight: give another run".to_owned(),
             kept => format!("give a number from 0 to {}", kept - 1),
@@ -319,8 +322,7 @@ fn fly_violated_flight(folder: &Folder, flight: FlightId<'_>, bad: usize, out: &
 /// Refuses a flight whose state hash is not that of the campaign, unless it was interrupted.
 fn check(flight: FlightId<'_>, left: &RunFiles, state_hash: &str) -> Result<(), Failure> {
     let run = &left.report.run;
-    let is_interrupted = run.ended_early.as_deref() == Some(tautline_report::report::INTERRUPTED);
-    if is_interrupted { Ok(()) } else { flight.compare(&run.state_hash, state_hash) }
+    if run.is_interrupted() { Ok(()) } else { flight.compare(&run.state_hash, state_hash) }
 }
 
 /// Returns one of the worst flights with its description and picture.

@@ -9,6 +9,7 @@ use super::{ANSWER, Campaign, Folder, Program, RESULTS, Shard, Spec, Stop, Summa
 use crate::Criterion;
 use crate::batch::Batch;
 use crate::study::{Study as _, StudyPage};
+use tautline_core::option::WORST;
 use tautline_core::text::counted;
 use tautline_report::report::write_atomically;
 use tautline_report::request::{Failure, Monitor, Pictures, command_line, in_range};
@@ -115,7 +116,7 @@ pub fn campaign(
     pictures: &dyn Pictures,
     monitor: &dyn Monitor,
 ) -> Result<Option<CampaignAnswer>, Failure> {
-    in_range("--worst", &request.worst, &(0..=MOST_WORST))?;
+    in_range(WORST, &request.worst, &(0..=MOST_WORST))?;
     let batch = Batch::for_laws(request.threads, monitor, &request.external_law)?;
     let folder = request.plan()?;
     let campaign = folder.campaign();
@@ -234,7 +235,7 @@ fn answer(
     pictures: &dyn Pictures,
     monitor: &dyn Monitor,
 ) -> Result<Option<CampaignAnswer>, Failure> {
-    in_range("--worst", &worst, &(0..=MOST_WORST))?;
+    in_range(WORST, &worst, &(0..=MOST_WORST))?;
     for note in summary.notes() {
         monitor.warn(&format!("note: {note}"));
     }
@@ -242,7 +243,8 @@ fn answer(
     let again = summary.laws.iter().map(|law| law.worst.len() + law.bad.len()).sum::<usize>().min(worst);
     if again > 0 {
         let flights = counted(again as u64, "flight", "flights");
-        monitor.warn(&format!("flying {flights} with the least clearance again for the page; --worst 0 leaves it out"));
+        let option = WORST.set(0);
+        monitor.warn(&format!("flying {flights} with the least clearance again for the page; {option} leaves it out"));
     }
     let flights = fly_worst_again(folder, &summary, worst, pictures, monitor)?;
     let path = folder.file(PAGE);

@@ -13,11 +13,10 @@ use super::vary::{BY_RUN, FORMS, Variation};
 use crate::Criterion;
 use crate::base::overlap;
 use crate::splitting::SplittingSettings;
+use tautline_core::option::SET;
 use tautline_report::request::Failure;
 use tautline_sim::scenario::{Place, ScenarioError, TomlSchema, edit_distance};
 
-/// Source of overrides in errors of a scenario.
-const SET: &str = "--set";
 /// Names of distributions. A table in `[vary]` with these keys is a variation; any other table holds scenario keys.
 const DRAWS: [&str; 6] = ["uniform", "log_uniform", "normal", "integer", "list", "grid"];
 
@@ -189,7 +188,7 @@ impl Spec {
         let failure = Failure::from(error);
         let failure = if situation.is_empty() { failure } else { failure.under(situation) };
         match place {
-            Some(place) if place.source == SET => match self.place_of_override(&place) {
+            Some(place) if place.source == SET.to_string() => match self.place_of_override(&place) {
                 Some(place) => failure.at(&place),
                 None => self.at(key, failure),
             },
@@ -303,7 +302,7 @@ impl Spec {
         let is_key = |key: &&String| key.split('.').all(|part| !part.is_empty() && part.chars().all(is_word));
         if let Some(key) = sets.keys().chain(variations.keys()).find(|key| !is_key(key)) {
             let place = format!("{}.{key}", if sets.contains_key(key) { "set" } else { "vary" });
-            let remedy = "write the key as --set takes it: time.dt_s";
+            let remedy = "write the key as words with dots between them, such as time.dt_s";
             return Err(self.refuse(&place, format!("{place}: not a key of a scenario"), remedy));
         }
         let all: Vec<_> = sets.keys().chain(variations.keys()).collect();

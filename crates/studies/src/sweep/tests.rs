@@ -168,7 +168,7 @@ fn wrong_grids_are_refused() {
     assert!(
         refused(&options(&["law.alpha=0:1:50"], 1_000_000))
             .1
-            .contains("--runs 1000000: 50 points must have at most 10000000 flights, got 50000000")
+            .contains("runs=1000000: 50 points must have at most 10000000 flights, got 50000000")
     );
     let (code, said) = refused(&key("time.max_halvings=0:5:3"));
     assert!(code == "sweep/grid" && said.contains("takes integers only, got 2.5"), "{said}");

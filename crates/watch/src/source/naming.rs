@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::OwnedPose;
+use tautline_core::option::{FRAME, ORIGIN, TOPIC};
 use tautline_recordings::read::{EarthFrame, LivePose};
 
 /// Options for poses of topics.
@@ -55,12 +56,14 @@ impl Naming {
         }
         let position_m = if of.is_on_earth {
             let Some(earth) = &self.options.earth else {
-                return Err(format!("{topic}: the positions are on the Earth; set --origin LAT,LON,HEIGHT"));
+                let origin = ORIGIN.set("LAT,LON,HEIGHT");
+                return Err(format!("{topic}: the positions are on the Earth; set {origin}"));
             };
             earth.position_m(of.position.into())?
         } else {
             if of.is_transform && self.options.frame.is_none() {
-                return Err(format!("{topic}: transforms have several frames; set --frame, such as --frame world"));
+                let example = FRAME.set("world");
+                return Err(format!("{topic}: transforms have several frames; set {FRAME}, such as {example}"));
             }
             let frame = self.frame.get_or_insert_with(|| of.frame.clone());
             if *frame != of.frame {
@@ -68,7 +71,7 @@ impl Naming {
                 return if of.is_transform {
                     Ok(None)
                 } else {
-                    Err(problem() + "; give the topics of one frame with --topic")
+                    Err(format!("{}; give the topics of one frame with {TOPIC}", problem()))
                 };
             }
             of.position
@@ -90,7 +93,7 @@ impl Naming {
         match self.topics.get(base) {
             Some(own) if own == topic => Ok(()),
             Some(own) => {
-                Err(format!("{topic}: vehicle {base:?} has the topic {own}, too; give one of them with --topic"))
+                Err(format!("{topic}: vehicle {base:?} has the topic {own}, too; give one of them with {TOPIC}"))
             }
             None if self.topics.len() >= MOST_TOPICS => Err(format!("{topic}: more than {MOST_TOPICS} topics")),
             None => {

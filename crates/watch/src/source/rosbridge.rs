@@ -9,6 +9,7 @@ use serde_json::{Value, json};
 use super::websocket::{Incoming, Protocol, websocket};
 use super::{Feed, Input, Naming, NamingOptions};
 use crate::event::Fault;
+use tautline_core::option::TOPIC;
 use tautline_recordings::read::LivePose;
 
 /// Connects to a server of rosbridge and subscribes to the topics of the options.
@@ -17,7 +18,8 @@ use tautline_recordings::read::LivePose;
 /// A sentence if the address is wrong or no topic is given.
 pub fn rosbridge(url: &str, options: NamingOptions, feed: Feed) -> Result<(), String> {
     if options.topics.is_empty() {
-        return Err("rosbridge: no topic is given; give each with --topic, such as --topic /cf1/pose".to_owned());
+        let example = TOPIC.set("/cf1/pose");
+        return Err(format!("rosbridge: no topic is given; give each with {TOPIC}, such as {example}"));
     }
     let topics = options.topics.clone();
     websocket(url, feed, Rosbridge { topics, naming: Naming::new(options) })

@@ -192,7 +192,11 @@ fn a_refused_sign_off_is_reported_with_its_cause_and_a_remedy() {
             "repeated",
             ["with the stamp 1.10 s is ignored (newest position 1.00 s)", "; send one"],
         ),
-        (refused(doubted, 1.0), "out-of-bounds", ["moved farther than --accel", "; sign off again after 1 s without"]),
+        (
+            refused(doubted, 1.0),
+            "out-of-bounds",
+            ["moved farther than accel and the errors allow", "; sign off again after 1 s without"],
+        ),
         (refused(stale, 2.5), "stale", ["a was not heard for 1 s", "; sign off again after a new position of a"]),
         (refused(near, 1.0), "uncertain", ["c-d may be as near as 0.99 m (delta 1 m)", "; sign off again when"]),
     ] {

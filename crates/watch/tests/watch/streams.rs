@@ -292,7 +292,8 @@ fn clear_names_the_error_of_positions_with_its_source() {
         (3, "age", "default", 1.0, "s"),
         (4, "latency", "default", 0.0, "s"),
     ] {
-        let expected = serde_json::json!({ "fact": kind, "source": source, "value": value, "unit": unit });
+        let expected =
+            serde_json::json!({ "fact": kind, "source": source, "value": value, "unit": unit, "subject": null });
         assert_eq!(json[k], expected, "{json}");
     }
     assert_eq!((&json[5]["fact"], &json[6]["fact"]), (&"velocity-agreement".into(), &"one-stream".into()));
@@ -304,7 +305,7 @@ fn clear_names_the_error_of_positions_with_its_source() {
     // Without a bound, and with one that the receiver contradicts, nothing is clear.
     let (state, notice, monitor) = with_receivers(None, None);
     assert_eq!((state, fact(&monitor, FactKind::PositionError)), (State::NotKnown(Reason::ErrorUnknown(0)), None));
-    assert!(notice.text.contains("give --position-error") && notice.json["facts"].is_null(), "{}", notice.text);
+    assert!(notice.text.contains("give position_error") && notice.json["facts"].is_null(), "{}", notice.text);
     for bound in [Bound::declared(0.4), Bound::default_of(0.05)] {
         let (state, ..) = with_receivers(Some(bound), Some([300, 400]));
         assert_eq!(state, State::NotKnown(Reason::Doubt(Fault::Inaccurate)), "{bound:?}");

@@ -290,7 +290,7 @@ mod tests {
         let options = DroneOptions { tolerance_m: Some(0.03), ..DroneOptions::new(Dialect::Crazyflie) };
         let refused = encode(&flight, &options, &|| false).expect_err("refused");
         assert!(matches!(refused, DroneError::TooLong { pieces: 32.., most: 4096, compresses: true, .. }), "{refused}");
-        assert!(refused.help().contains("--compressed"));
+        assert!(refused.help().contains("from_s and until_s, or compressed"));
         let options = DroneOptions { is_compressed: true, ..options };
         let encoded = encode(&flight, &options, &|| false).expect("encoded");
         let bytes = &encoded.files[0].bytes;

@@ -23,6 +23,7 @@ use self::fit::{FitError, Piece};
 use self::motion::{Arc, Deviation, Motion, deviation};
 use crate::read::ReadError;
 use crate::segments::Trajectory;
+use tautline_core::option::{COMPRESSED, FROM, SAMPLE_HZ, SKYB_VERSION, TOLERANCE, UNTIL};
 use tautline_core::track::{Item, Sample, Tracks};
 
 /// Format that drones fly.
@@ -382,11 +383,11 @@ fn labels(flight: &[(String, Motion)], dialect: Dialect) -> Result<Vec<String>, 
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum DroneError {
     /// The tolerance is not a positive number.
-    #[error("--tolerance: must be a positive number of metres, got {0:?}")]
+    #[error("{TOLERANCE}: must be a positive number of metres, got {0:?}")]
     Tolerance(f64),
     /// The tolerance is below the rounding of the format.
     #[error(
-        "--tolerance: the format rounds positions by up to {rounding_m:.6} m, got a tolerance of {tolerance_m:?} m"
+        "{TOLERANCE}: the format rounds positions by up to {rounding_m:.6} m, got a tolerance of {tolerance_m:?} m"
     )]
     Resolution {
         /// Tolerance \[m\].
@@ -395,10 +396,10 @@ pub enum DroneError {
         rounding_m: f64,
     },
     /// The version of `.skyb` is unknown.
-    #[error("--skyb-version: must be 1 or 2, got {0}")]
+    #[error("{SKYB_VERSION}: must be 1 or 2, got {0}")]
     SkybVersion(u8),
     /// The sampling rate is out of range.
-    #[error("--sample-hz: must be a positive rate that gives at most 10 million samples of a vehicle, got {0:?}")]
+    #[error("{SAMPLE_HZ}: must be a positive rate that gives at most 10 million samples of a vehicle, got {0:?}")]
     SampleRate(f64),
     /// A vehicle moves too fast for the tolerance.
     #[error("vehicle {vehicle} at {time_s:.3} s: no curve of the format is within {tolerance_m:?} m of the flight")]
@@ -497,25 +498,27 @@ impl DroneError {
 
     /// Returns the remedy, as a sentence without a full stop.
     #[must_use]
-    pub fn help(&self) -> &'static str {
+    pub fn help(&self) -> String {
         match self {
-            Self::Tolerance(_) => "give a tolerance in metres, such as 0.01",
-            Self::Resolution { .. } => "give a larger --tolerance, or move the origin nearer to the flight",
-            Self::SkybVersion(_) => "leave --skyb-version out, or give 1 or 2",
-            Self::SampleRate(_) => "give a rate such as 20",
+            Self::Tolerance(_) => "give a tolerance in metres, such as 0.01".to_owned(),
+            Self::Resolution { .. } => format!("give a larger {TOLERANCE}, or move the origin nearer to the flight"),
+            Self::SkybVersion(_) => format!("leave {SKYB_VERSION} out, or give 1 or 2"),
+            Self::SampleRate(_) => "give a rate such as 20".to_owned(),
             Self::TooFast { .. } => {
-                "give a larger --tolerance, or leave a jump of the recording out by --from and --until"
+                format!("give a larger {TOLERANCE}, or leave a jump of the recording out by {FROM} and {UNTIL}")
             }
-            Self::TooCoarse { .. } => "give a larger --sample-hz or --tolerance",
+            Self::TooCoarse { .. } => format!("give a larger {SAMPLE_HZ} or {TOLERANCE}"),
             Self::TooLong { compresses: true, .. } => {
-                "give a larger --tolerance, a shorter flight by --from and --until, or --compressed"
+                format!("give a larger {TOLERANCE}, a shorter flight by {FROM} and {UNTIL}, or {COMPRESSED}")
             }
-            Self::Duration { .. } => "check the unit of time, or give a shorter flight by --from and --until",
-            Self::TooLong { .. } => "give a larger --tolerance, or a shorter flight by --from and --until",
-            Self::TooFar { .. } => "move the origin nearer to the flight, or export to skyc, px4-show or vviz",
-            Self::Name { .. } => "rename the vehicle in the recording",
-            Self::Write(_) => "free some space or write to another folder",
-            Self::Interrupted => "run the command again",
+            Self::Duration { .. } => format!("check the unit of time, or give a shorter flight by {FROM} and {UNTIL}"),
+            Self::TooLong { .. } => format!("give a larger {TOLERANCE}, or a shorter flight by {FROM} and {UNTIL}"),
+            Self::TooFar { .. } => {
+                "move the origin nearer to the flight, or export to skyc, px4-show or vviz".to_owned()
+            }
+            Self::Name { .. } => "rename the vehicle in the recording".to_owned(),
+            Self::Write(_) => "free some space or write to another folder".to_owned(),
+            Self::Interrupted => "run the command again".to_owned(),
         }
     }
 

@@ -187,7 +187,10 @@ mod tests {
         // 1.118 m/s for 50 ms.
         assert!(encode(&flight(), &at(0.057), &|| false).is_ok());
         let refused = encode(&flight(), &at(0.055), &|| false).expect_err("refused");
-        assert!(matches!(refused, DroneError::TooCoarse { .. }) && refused.help().contains("--sample-hz"), "{refused}");
+        assert!(
+            matches!(refused, DroneError::TooCoarse { .. }) && refused.help().contains("sample_hz or tolerance"),
+            "{refused}"
+        );
         for hz in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e9] {
             let options = DroneOptions { sample_hz: Some(hz), ..DroneOptions::new(Dialect::Vviz) };
             assert!(matches!(encode(&flight(), &options, &|| false), Err(DroneError::SampleRate(_))), "{hz}");

@@ -8,6 +8,7 @@ use std::collections::BTreeMap;
 
 use super::super::error::{Fault, quoted};
 use super::super::options::MessageClock;
+use tautline_core::option::CLOCK;
 
 /// Largest difference of the delays of two sources with one clock \[ns\]. Controllers use positions at 10 Hz or faster,
 /// so the latency of a position is below 0.1 s.
@@ -216,7 +217,10 @@ impl Clocks {
 }
 
 fn several_clocks(problem: String) -> Fault {
-    let remedy = "judge by the times of logging with --clock log, or confirm that all stamps are of one clock with \
-                  --clock stamp";
+    let remedy = format!(
+        "judge by the times of logging with {}, or confirm that all stamps are of one clock with {}",
+        CLOCK.set("log"),
+        CLOCK.set("stamp")
+    );
     Fault::coded("recording/several-clocks", problem, remedy)
 }

@@ -2,6 +2,7 @@
 
 use nalgebra::{Point3, Vector3};
 use tautline_core::fact::{self, Fact, FactKind};
+use tautline_core::option::{FRAME, TOPIC};
 
 use super::super::clock::{Stamp, TimeUnit};
 use super::super::earth::{is_no_fix, no_fixes};
@@ -98,10 +99,6 @@ impl Rows for ForeignRows {
 
     fn notes(&self) -> Vec<String> {
         self.poses.notes()
-    }
-
-    fn assumed(&self) -> Option<String> {
-        self.poses.assumed()
     }
 
     fn facts(&self) -> Vec<Fact> {
@@ -290,11 +287,8 @@ impl Poses {
         };
         if target_frame == EARTH {
             let problem = format!("{EARTH} is not a metric frame: its positions are latitudes and longitudes");
-            return refuse(
-                "recording/unusable-frame",
-                problem,
-                "omit --frame, or name a frame of poses; choose topics with --topic",
-            );
+            let remedy = format!("omit {FRAME}, or name a frame of poses; choose topics with {TOPIC}");
+            return refuse("recording/unusable-frame", problem, remedy);
         }
         if *target_frame == observation.frame {
             return Ok(Some(observation.position));
@@ -354,28 +348,27 @@ impl Poses {
                 let (known, first, frame) = (quoted(known), quoted(first), quoted(frame));
                 let problem =
                     format!("positions are in the frame {known} on topic {first}, but in the frame {frame} here");
-                let remedy = "name the frame to which all are transformed, or the only one to read, with --frame";
+                let remedy =
+                    format!("name the frame to which all are transformed, or the only one to read, with {FRAME}");
                 return refuse("recording/several-frames", problem, remedy);
             }
         }
         Ok(())
     }
 
-    /// Returns the assumption behind log times and interpolated transforms, if there are any.
-    pub(super) fn assumed(&self) -> Option<String> {
-        let log_times = (self.plan.clock == MessageClock::Log).then_some("positions at their times of logging");
-        let transforms = (self.conversions.interpolated > 0).then_some("transforms uniform between their samples");
-        let all: Vec<_> = log_times.into_iter().chain(transforms).collect();
-        (!all.is_empty()).then(|| all.join(", "))
-    }
-
-    /// Returns the facts on clock, vehicles and frame.
+    /// Returns the facts on clock, vehicles, frame and transforms.
     pub(super) fn facts(&self) -> Vec<Fact> {
         let mut facts = self.plan.facts();
         if let Some((frame, _)) = &self.frame
             && frame != EARTH
         {
             facts.push(Fact::name(FactKind::Frame, fact::Source::Recorded, frame));
+        }
+        if self.plan.clock == MessageClock::Log {
+            facts.push(Fact::new(FactKind::LogTimes, fact::Source::Default));
+        }
+        if self.conversions.interpolated > 0 {
+            facts.push(Fact::new(FactKind::UniformTransforms, fact::Source::Default));
         }
         facts
     }

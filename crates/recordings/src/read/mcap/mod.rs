@@ -37,6 +37,7 @@ use super::source::Source;
 use crate::mcap::topic::{Part, TopicReader};
 use crate::mcap::{McapRecording, SWARM_SCHEMA};
 use foreign::SplitFiles;
+use tautline_core::option::CLOCK;
 use tautline_core::record::{ReadFault, RecordError};
 
 pub(in crate::read) const READER: Reader = Reader {
@@ -96,7 +97,8 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let mut topics = TopicReader::open(&source.path)?;
     let origin = origin(&mut topics)?;
     if options.clock.is_some() && matches!(origin, Some(Origin::Run | Origin::Export)) {
-        return refuse("recording/unused-option", "it is a recording of tautline, which has one clock", "omit --clock");
+        let problem = "it is a recording of tautline, which has one clock";
+        return refuse("recording/unused-option", problem, format!("omit {CLOCK}"));
     }
     match origin {
         Some(Origin::Run) => return own::open_samples(source, options),

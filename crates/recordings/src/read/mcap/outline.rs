@@ -13,12 +13,15 @@ use super::messages::{EARTH, FIXES, Observation, PoseKind, VehicleKey, is_of_tra
 use super::planned;
 use super::tree::{FramePose, Tree, VehicleFrame};
 use crate::mcap::topic::{DeclaredTopic, Message, Part};
+use tautline_core::option::{FRAME, TOPIC};
 
 /// Largest number of topic parts searched for a namespace of transforms.
 const DEEPEST: usize = 16;
 
-/// Remedy for an ambiguous choice of topics.
-const CHOOSE: &str = "choose the topics to read with --topic NAME, once per topic";
+/// Returns the remedy for an ambiguous choice of topics.
+pub(super) fn choose_topics() -> String {
+    format!("choose the topics to read with {}, once per topic", TOPIC.set("NAME"))
+}
 
 /// Topic with positions.
 #[derive(Debug, Default)]
@@ -137,12 +140,11 @@ impl Outline {
                 "it lists {listed} poses, but earlier messages {}: indices then do not identify vehicles",
                 described.listed
             );
-            return refuse(
-                "recording/list-length",
-                problem,
+            let remedy = format!(
                 "record a pose of every vehicle in every list, or messages with names; if the list contains no \
-                 vehicles, choose other topics with --topic",
+                 vehicles, choose other topics with {TOPIC}"
             );
+            return refuse("recording/list-length", problem, remedy);
         }
         described.listed = listed;
         Ok(())
@@ -207,7 +209,7 @@ impl Outline {
         let known = self.names();
         let Some(name) = self.named.iter().find(|topic| !known.contains(topic)) else { return Ok(()) };
         let problem = format!("it has no topic {} with positions; such topics are {}", quoted(name), known.join(", "));
-        refuse("recording/unknown-topic", problem, "choose one of these with --topic")
+        refuse("recording/unknown-topic", problem, format!("choose one of these with {TOPIC}"))
     }
 
     /// Returns whether a topic named by the user has transforms of a namespace.
@@ -221,7 +223,7 @@ impl Outline {
         let is_chosen = !self.named.is_empty();
         let twice = |first: &str, second: &str, vehicle: &str| {
             let problem = format!("topics {} and {} both describe {vehicle}", quoted(first), quoted(second));
-            let remedy = if is_chosen { "name only one of the two with --topic" } else { CHOOSE };
+            let remedy = if is_chosen { format!("name only one of the two with {TOPIC}") } else { choose_topics() };
             Fault::coded("recording/ambiguous-topics", problem, remedy)
         };
         let called = |space: &str| if space.is_empty() { "the same robot".to_owned() } else { quoted(space) };
@@ -276,7 +278,7 @@ impl Outline {
         let Some((setpoint, other)) = self.setpoints().next().zip(others.next()) else { return Ok(()) };
         let (setpoint, other) = (quoted(setpoint), quoted(other));
         let problem = format!("topic {setpoint} has the name of a setpoint, but {other} beside it does not");
-        refuse("recording/ambiguous-topics", problem, CHOOSE)
+        refuse("recording/ambiguous-topics", problem, choose_topics())
     }
 
     /// Returns the topics with names of setpoints, unless the user names the topics.
@@ -341,7 +343,8 @@ pub(super) fn refuse_local_frames<'a>(given: impl Iterator<Item = (&'a str, &'a 
         let problem = format!(
             "{first} and {source_name} give positions in a frame {shown}, which is usually local to each robot"
         );
-        let remedy = format!("confirm a common frame with --frame {frame}, or name a frame that transforms lead to");
+        let common = FRAME.set(frame);
+        let remedy = format!("confirm a common frame with {common}, or name a frame that transforms lead to");
         return refuse("recording/several-frames", problem, remedy);
     }
     Ok(())

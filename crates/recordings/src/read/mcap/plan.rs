@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Vector3};
 use tautline_core::fact::{Fact, FactKind, Source};
+use tautline_core::option::ORIGIN;
 
 use super::super::axes;
 use super::super::earth::LocalFrame;
@@ -11,7 +12,7 @@ use super::super::error::{Fault, ReadError, quoted, refuse};
 use super::super::options::{MessageClock, ReadOptions};
 use super::foreign::SplitFiles;
 use super::messages::{EARTH, PoseKind, VehicleKey};
-use super::outline::{Outline, is_static, place, refuse_local_frames, space};
+use super::outline::{Outline, choose_topics, is_static, place, refuse_local_frames, space};
 use super::tree::{Chain, FramePose, TransformAt, Tree, VehicleFrame};
 use crate::mcap::topic::Part;
 
@@ -67,7 +68,7 @@ impl ReadPlan {
             axes::refuse_known(options, "a recording with places on the Earth")?;
         }
         if options.origin.is_some() && first_fix.is_none() {
-            return refuse("recording/unused-option", "it has no place on the Earth", "omit --origin");
+            return refuse("recording/unused-option", "it has no place on the Earth", format!("omit {ORIGIN}"));
         }
         plan.check()?;
         plan.find_bodies()?;
@@ -118,7 +119,7 @@ impl ReadPlan {
         if let Some(name) = uncovered.first() {
             let problem = format!("transforms describe {}, but topics of poses describe other vehicles", quoted(name));
             let known = self.outline.names().join(", ");
-            let remedy = format!("choose the topics to read with --topic NAME, once per topic; it has {known}");
+            let remedy = format!("{}; it has {known}", choose_topics());
             return refuse("recording/ambiguous-topics", problem, remedy);
         }
         if !covered.is_empty() {

@@ -25,6 +25,7 @@ use super::messages::nanoseconds;
 use super::outline::Outline;
 use crate::mcap::topic::{CDR, Part as FilePart, decode};
 use tautline_core::fact::{self, Fact, FactKind};
+use tautline_core::option::{CLOCK, DUPLICATES, FRAME, ORIGIN, SORT, TOPIC};
 use tautline_core::text::counted;
 use tautline_core::track::{Clock, Item, Metadata};
 
@@ -40,8 +41,10 @@ const HIGHEST_DEGREE: i32 = 15;
 
 const NS_PER_S: i64 = 1_000_000_000;
 
-/// Remedy for a curve that contradicts itself.
-const REPLAN: &str = "check the planner and its version, and record again; or choose other topics with --topic";
+/// Returns the remedy for a curve that contradicts itself.
+fn replan() -> String {
+    format!("check the planner and its version, and record again; or choose other topics with {TOPIC}")
+}
 
 /// Returns whether the messages of a schema are curves of a planner.
 pub(super) fn is_curve(schema: &str) -> bool {
@@ -59,14 +62,15 @@ pub(super) fn open(
     if let Some(other) = outline.pose_topics().find(|other| options.topics.is_empty() || options.topics.contains(other))
     {
         let problem = format!("topic {} holds curves of a planner, but {} positions", quoted(topic), quoted(other));
-        return refuse("recording/ambiguous-topics", problem, "choose the topics of one kind with --topic");
+        let remedy = format!("choose the topics of one kind with {TOPIC}");
+        return refuse("recording/ambiguous-topics", problem, remedy);
     }
     let unused = [
-        (options.frame.is_some(), "--frame", "curves of planners name no frame"),
-        (options.origin.is_some(), "--origin", "curves of planners have no place on the Earth"),
-        (options.clock.is_some(), "--clock", "curves of planners have their own times of start"),
-        (options.sort, "--sort", "curves of planners are sorted by their starts"),
-        (options.duplicates.is_some(), "--duplicates", "curves of planners are no rows"),
+        (options.frame.is_some(), FRAME, "curves of planners name no frame"),
+        (options.origin.is_some(), ORIGIN, "curves of planners have no place on the Earth"),
+        (options.clock.is_some(), CLOCK, "curves of planners have their own times of start"),
+        (options.sort, SORT, "curves of planners are sorted by their starts"),
+        (options.duplicates.is_some(), DUPLICATES, "curves of planners are no rows"),
     ];
     if let Some((_, option, why)) = unused.into_iter().find(|(is_given, ..)| *is_given) {
         return refuse("recording/unused-option", why, format!("omit {option}"));
@@ -95,7 +99,7 @@ pub(super) fn open(
             }
             Some(_) => {
                 let problem = format!("another curve of drone {drone} starts at {start_ns} ns");
-                let remedy = "record each planner on a topic of its own, and choose the topics with --topic";
+                let remedy = format!("record each planner on a topic of its own, and choose the topics with {TOPIC}");
                 Err(Fault::coded("recording/duplicate-row", problem, remedy).at(at()))
             }
         }
@@ -202,7 +206,7 @@ impl Plan {
         let Bspline { drone, degree, start, knots, points, .. } = decoded(encoding, bytes)?;
         if !(1..=HIGHEST_DEGREE).contains(&degree) {
             let problem = format!("order: must be 1 to {HIGHEST_DEGREE}, got {degree}");
-            return refuse("recording/degree", problem, REPLAN);
+            return refuse("recording/degree", problem, replan());
         }
         let degree = degree.unsigned_abs() as usize;
         refuse_not_finite("knots", &knots)?;
@@ -210,23 +214,23 @@ impl Plan {
         if points.len() <= degree {
             let least = counted(degree as u64, "point", "points");
             let problem = format!("pos_pts: a curve of order {degree} needs more than {least}, got {}", points.len());
-            return refuse("recording/knots", problem, REPLAN);
+            return refuse("recording/knots", problem, replan());
         }
         let expected = points.len() + degree + 1;
         if knots.len() != expected {
             let problem =
                 format!("knots: {} points of order {degree} need {expected} knots, got {}", points.len(), knots.len());
-            return refuse("recording/knots", problem, REPLAN);
+            return refuse("recording/knots", problem, replan());
         }
         if let Some(k) = (1..knots.len()).find(|&k| knots[k] < knots[k - 1]) {
             let problem =
                 format!("knots[{k}]: must not be below the knot before it, {}, got {}", knots[k - 1], knots[k]);
-            return refuse("recording/knots", problem, REPLAN);
+            return refuse("recording/knots", problem, replan());
         }
         let (first, last) = (knots[degree], knots[points.len()]);
         if first >= last {
             let problem = format!("knots: the curve must end after it starts, got {first} and {last}");
-            return refuse("recording/duration", problem, REPLAN);
+            return refuse("recording/duration", problem, replan());
         }
         let points: Vec<_> = points.into_iter().map(Vector3::from).collect();
         let parts = b_spline(degree, &knots, &points);
@@ -245,7 +249,7 @@ impl Plan {
             refuse_not_finite(name, numbers)?;
             if numbers.len() + 1 != pieces {
                 let problem = format!("{name}: {} one number less, got {}", need(pieces), numbers.len());
-                return refuse("recording/field-count", problem, REPLAN);
+                return refuse("recording/field-count", problem, replan());
             }
         }
         for (name, states) in [("start", &minco.start), ("end", &minco.end)] {
@@ -272,7 +276,7 @@ impl Plan {
             if numbers.len() != terms * pieces {
                 let needed = need(pieces);
                 let problem = format!("{name}: {needed} {} numbers, got {}", terms * pieces, numbers.len());
-                return refuse("recording/field-count", problem, REPLAN);
+                return refuse("recording/field-count", problem, replan());
             }
         }
         let (mut parts, mut from_s) = (Vec::with_capacity(pieces), 0.0);
@@ -293,7 +297,7 @@ fn start_ns((sec, nanosec): (i32, u32)) -> Result<i64, Fault> {
         return Ok(nanoseconds(sec.into(), nanosec.into()));
     }
     let problem = format!("start_time.nanosec: must be below {NS_PER_S}, got {nanosec}");
-    refuse("recording/time-format", problem, REPLAN)
+    refuse("recording/time-format", problem, replan())
 }
 
 fn wide(numbers: &[f32]) -> Vec<f64> {
@@ -309,7 +313,7 @@ fn refuse_degree(order: u8) -> Result<(), Fault> {
     if order == DEGREE {
         return Ok(());
     }
-    refuse("recording/degree", format!("order: must be {DEGREE}, got {order}"), REPLAN)
+    refuse("recording/degree", format!("order: must be {DEGREE}, got {order}"), replan())
 }
 
 /// Returns the durations of the pieces \[s\], at least one.
@@ -317,12 +321,12 @@ fn durations(lengths: &[f32]) -> Result<Vec<f64>, Fault> {
     let durations = wide(lengths);
     refuse_not_finite("duration", &durations)?;
     if durations.is_empty() {
-        return refuse("recording/field-count", "duration: a curve needs at least one piece, got none", REPLAN);
+        return refuse("recording/field-count", "duration: a curve needs at least one piece, got none", replan());
     }
     match durations.iter().position(|duration_s| *duration_s <= 0.0) {
         Some(k) => {
             let problem = format!("duration[{k}]: must be positive, got {} s", durations[k]);
-            refuse("recording/duration", problem, REPLAN)
+            refuse("recording/duration", problem, replan())
         }
         None => Ok(durations),
     }
@@ -339,7 +343,7 @@ fn refuse_not_finite(name: &str, numbers: &[f64]) -> Result<(), Fault> {
     match numbers.iter().position(|number| !number.is_finite()) {
         Some(k) => {
             let problem = format!("{name}[{k}]: must be a finite number, got {}", numbers[k]);
-            refuse("recording/not-finite", problem, REPLAN)
+            refuse("recording/not-finite", problem, replan())
         }
         None => Ok(()),
     }

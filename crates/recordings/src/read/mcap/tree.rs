@@ -9,6 +9,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
 use super::super::error::{Fault, UNSEEN, quoted, refuse};
+use tautline_core::option::{FRAME, TOPIC};
 
 /// Largest depth of a frame.
 const DEEPEST: usize = 64;
@@ -123,7 +124,7 @@ impl Tree {
                     quoted(&edge.parent),
                     quoted(second_parent)
                 );
-                let remedy = "record robots in separate namespaces, or choose topics of poses with --topic";
+                let remedy = format!("record robots in separate namespaces, or choose topics of poses with {TOPIC}");
                 return refuse("recording/transforms", problem, remedy);
             }
             if way.len() > DEEPEST {
@@ -274,7 +275,7 @@ impl FramePose {
         let quaternion = Quaternion::new(w, x, y, z);
         if (quaternion.norm() - 1.0).abs() > NORM {
             let problem = format!("the quaternion {x}, {y}, {z}, {w} is not normalized");
-            return refuse("recording/transforms", problem, "record again, or omit --frame");
+            return refuse("recording/transforms", problem, format!("record again, or omit {FRAME}"));
         }
         Ok(Isometry3::from_parts(Translation3::from(self.position), UnitQuaternion::new_normalize(quaternion)))
     }

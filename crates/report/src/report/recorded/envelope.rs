@@ -3,13 +3,15 @@
 use serde::Serialize;
 
 use super::report::VehicleFinding;
+use crate::report::answer::{Answer, Enclosure, Finding, FindingList, Part};
 use tautline_audit::envelope::{Corner, Exceedance, Limit, LimitOutcome};
 use tautline_audit::recorded::Outcome;
 use tautline_audit::{Status, Tally};
-use tautline_core::text::{at_least, at_most, counted, exact, fixed, seconds};
+use tautline_core::fact::{Fact, FactKind, Source};
+use tautline_core::text::{at_least, at_most, exact, fixed, seconds};
 
 /// Findings on one limit of each vehicle by itself.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct LimitFindings {
     /// Limited quantity with its unit, such as `speed_m_s`.
     pub quantity: &'static str,
@@ -19,8 +21,6 @@ pub struct LimitFindings {
     pub status: Status,
     /// Value closest to the limit or farthest beyond it; null if no value is known.
     pub extreme: Option<VehicleFinding<Exceedance>>,
-    /// Assumptions beyond the motion between samples; null without any.
-    pub assumes: Option<String>,
     /// Corners of curves, where the velocity jumps and the limit is not applied; null without corners.
     pub corners: Option<CornerFindings>,
     /// Number of violations, and how many are listed.
@@ -33,7 +33,6 @@ pub struct LimitFindings {
     pub undecided: Vec<VehicleFinding<Exceedance>>,
     /// Vehicles for which the quantity is unknown.
     pub unknown: Vec<String>,
-    #[serde(skip)]
     limit: Limit,
 }
 
@@ -48,14 +47,9 @@ pub struct CornerFindings {
 
 impl CornerFindings {
     /// Returns the assumption of a clear verdict about corners.
-    fn assumed(&self) -> String {
+    pub(super) fn fact(&self) -> Fact {
         let VehicleFinding { vehicle, finding } = &self.largest;
-        format!(
-            "vehicles round off {} (velocity jumps by at most {} m/s, {vehicle} at {}; --accel-window judges them)",
-            counted(self.count, "corner", "corners"),
-            at_most(finding.by_m_s, 3),
-            seconds(finding.at_s)
-        )
+        Fact::number(FactKind::RoundedCorners, Source::Default, finding.by_m_s, "m/s").about(vehicle)
     }
 }
 
@@ -64,14 +58,11 @@ impl LimitFindings {
         let named = |of: &Exceedance| VehicleFinding::new(outcome, of.vehicle, *of);
         let largest = |of: Corner| VehicleFinding::new(outcome, of.vehicle, of);
         let corners = found.corners.map(|of| CornerFindings { count: of.count, largest: largest(of.largest) });
-        let assumes: Vec<_> =
-            found.assumes.iter().cloned().chain(corners.as_ref().map(CornerFindings::assumed)).collect();
         Self {
             quantity: found.limit.quantity.key(),
             allowed: found.limit.allowed,
             status: found.status,
             extreme: found.extreme.as_ref().map(named),
-            assumes: (!assumes.is_empty()).then(|| assumes.join(" and ")),
             corners,
             violations_tally: found.violations_tally,
             undecided_tally: found.undecided_tally,
@@ -79,6 +70,37 @@ impl LimitFindings {
             undecided: found.undecided.iter().map(named).collect(),
             unknown: found.unknown.iter().map(|&vehicle| outcome.name(vehicle)).collect(),
             limit: found.limit,
+        }
+    }
+
+    /// Returns the answer on the limit.
+    pub(super) fn answer(&self) -> Answer {
+        let finding = |VehicleFinding { vehicle, finding }: &VehicleFinding<Exceedance>| Finding {
+            subjects: vec![vehicle.clone()],
+            from_s: Some(finding.from_s),
+            to_s: Some(finding.to_s),
+            at_s: Some(finding.at_s),
+            value: Enclosure::new(finding.lower, finding.upper, self.unit()),
+            limit: Some(self.allowed),
+            rate_hz: None,
+        };
+        let unknown = self.unknown.iter().map(|vehicle| Finding {
+            subjects: vec![vehicle.clone()],
+            from_s: None,
+            to_s: None,
+            at_s: None,
+            value: Enclosure { lower: None, upper: None, unit: self.unit() },
+            limit: Some(self.allowed),
+            rate_hz: None,
+        });
+        let undecided: Vec<_> = self.undecided.iter().map(finding).chain(unknown).collect();
+        let undecided_tally =
+            Tally { count: self.undecided_tally.count + self.unknown.len() as u64, ..self.undecided_tally };
+        Answer {
+            closest: self.extreme.iter().map(finding).collect(),
+            violations: FindingList::new(self.violations_tally, self.violations.iter().map(finding).collect()),
+            undecided: FindingList::new(undecided_tally, undecided),
+            ..Answer::new(Part::Limit(self.quantity), self.status)
         }
     }
 
@@ -132,8 +154,13 @@ impl LimitFindings {
     /// Returns the finding in a few words, such as `speed at most 3.200 m/s (limit 5.000 m/s)`.
     #[must_use]
     pub fn brief(&self) -> String {
+        self.brief_as(self.status)
+    }
+
+    /// Returns the finding in the words of a status.
+    pub(super) fn brief_as(&self, status: Status) -> String {
         let quantity = self.quantity_name();
-        match self.status {
+        match status {
             Status::Clear => {
                 let least = self.limit.quantity.is_least();
                 let most = self.extreme.as_ref().map_or(String::new(), |of| {

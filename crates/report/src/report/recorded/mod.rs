@@ -1,6 +1,6 @@
 //! The report on a recording: as JSON, in words, and as a page.
 //!
-//! The keys of `separation` and `audit` are those of a flight's `report.json`.
+//! The first keys of its JSON are those of a flight's `report.json` ([`Judgement`](crate::report::Judgement)).
 
 mod envelope;
 mod moments;
@@ -11,10 +11,8 @@ mod words;
 
 pub use envelope::{CornerFindings, LimitFindings};
 pub use plan::{PlanCertificate, PlanDistance, PlanReport, PlanUnknown};
-pub use report::{
-    AssumedMotion, Basis, Clock, EarlyEnd, Obstacles, PresenceSpan, PresenceSummary, RecordedAudit, RecordedReport,
-    Source,
-};
+pub use report::{Clock, EarlyEnd, PresenceSpan, PresenceSummary, RecordedReport, RunObjection, Source};
 pub use report::{PairFinding, VehicleFinding, unit};
 pub use well_clear::WellClearFindings;
+pub(crate) use words::THE_PLAN;
 pub use words::interval;

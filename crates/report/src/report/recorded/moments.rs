@@ -17,7 +17,7 @@ impl RecordedReport {
         let over = |of: &Violation<ObjectPair>| of.min_m - of.limit_m;
         let mut violations: Vec<_> = self.violations.iter().map(PairFinding::short).collect();
         violations.sort_by(|a, b| over(&a.finding).total_cmp(&over(&b.finding)));
-        let closest = self.closest.first().or(self.obstacles.closest.first());
+        let closest = self.closest.first().or(self.closest_to_obstacles.first());
         let unit = self.judgement().unit;
         let closest = closest.map(PairFinding::short).map(|of| {
             let &Approach { pair, lower_m, upper_m, time_s, limit_m } = &of.finding;
@@ -35,7 +35,7 @@ impl RecordedReport {
     /// Returns the limit of separations, and whether the audit decided everything else.
     #[must_use]
     pub fn judgement(&self) -> JudgementContext {
-        JudgementContext { is_else_known: self.is_else_known, limit: self.separation.delta_m, unit: self.unit() }
+        JudgementContext { is_else_known: self.is_else_known, limit: self.question.delta, unit: self.unit() }
     }
 
     fn moments_of_limits(&self) -> Vec<Moment> {

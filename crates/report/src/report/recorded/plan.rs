@@ -2,10 +2,12 @@
 
 use serde::Serialize;
 
-use super::report::{RecordedReport, VehicleFinding};
+use super::report::VehicleFinding;
+use crate::report::answer::{Answer, Enclosure, Finding, FindingList, Part};
 use crate::report::section::Section;
 use tautline_audit::recorded::{Outcome, PlanFindings};
-use tautline_audit::{Status, recorded};
+use tautline_audit::{Status, Tally, recorded};
+use tautline_core::option::{FROM, TO};
 use tautline_core::text::{at_least, at_most, beside_limit, exact, fixed, seconds};
 
 /// Findings on a flight against its plan.
@@ -32,8 +34,6 @@ pub struct PlanReport {
     pub unknown: Vec<VehicleFinding<PlanUnknown>>,
     /// Separation that follows from the plan; null if nothing follows.
     pub certificate: Option<PlanCertificate>,
-    /// Assumptions about the motion of plan and flight beyond that of the audit; null without one.
-    pub assumes: Option<String>,
 }
 
 /// Largest distance of a vehicle from its plan, between the samples too.
@@ -107,7 +107,6 @@ impl PlanReport {
             unknown: found.unknown.iter().map(|of| VehicleFinding::new(outcome, of.vehicle, unknown(of))).collect(),
             common_s: found.common_s,
             certificate: audited.filter(|_| !is_contradictory).and_then(PlanCertificate::of),
-            assumes: (!found.has_curves).then(|| "the plan is straight between its samples".to_owned()),
         }
     }
 
@@ -123,15 +122,53 @@ impl PlanReport {
         })
     }
 
+    /// Returns the answer on the distances from the plan. A distance without a tube has no limit.
+    pub(super) fn answer(&self) -> Answer {
+        let distance = |VehicleFinding { vehicle, finding }: &VehicleFinding<PlanDistance>| Finding {
+            subjects: vec![vehicle.clone()],
+            from_s: None,
+            to_s: None,
+            at_s: Some(finding.at_s),
+            value: Enclosure::new(finding.lower_m, finding.upper_m, "m"),
+            limit: self.tube_m,
+            rate_hz: None,
+        };
+        let unknown = self.unknown.iter().map(|VehicleFinding { vehicle, finding }| Finding {
+            subjects: vec![vehicle.clone()],
+            from_s: Some(finding.from_s),
+            to_s: Some(finding.to_s),
+            at_s: None,
+            value: Enclosure { lower: None, upper: None, unit: "m" },
+            limit: self.tube_m,
+            rate_hz: None,
+        });
+        let is_beyond = |of: &&VehicleFinding<PlanDistance>| self.tube_m.is_some_and(|m| of.finding.lower_m > m);
+        let is_open = |of: &&VehicleFinding<PlanDistance>| self.tube_m.is_some_and(|m| of.finding.upper_m > m);
+        let beyond: Vec<_> = self.vehicles.iter().filter(is_beyond).map(distance).collect();
+        let open = self.vehicles.iter().filter(|of| is_open(of) && !is_beyond(of)).map(distance);
+        let open: Vec<_> = open.chain(unknown).collect();
+        Answer {
+            closest: self.farthest().map(distance).into_iter().collect(),
+            violations: FindingList::new(Tally::all(beyond.len()), beyond),
+            undecided: FindingList::new(Tally::all(open.len()), open),
+            ..Answer::new(Part::Plan, self.status)
+        }
+    }
+
     /// Returns the findings with the status of the verdict in a clause.
     #[must_use]
     pub fn brief(&self) -> String {
+        self.brief_as(self.status)
+    }
+
+    /// Returns the findings in the words of a status.
+    pub(super) fn brief_as(&self, status: Status) -> String {
         let delay =
             format!("delay {} s{}", fixed(self.delay_s, 3), if self.searched_s.is_some() { " estimated" } else { "" });
         let tube = self.tube_m.map_or(String::new(), |m| format!("tube {} m, ", exact(m)));
         let axes = if self.planar { " in the plane of x and y" } else { "" };
         let farthest = self.farthest().map(|VehicleFinding { vehicle, finding }| (vehicle, finding));
-        match (self.status, farthest) {
+        match (status, farthest) {
             (Status::Clear, Some((vehicle, PlanDistance { upper_m, at_s, .. }))) => {
                 let (most, at) = (at_most(*upper_m, 6), seconds(*at_s));
                 let certified = self.certificate.as_ref().map_or(String::new(), |of| {
@@ -157,7 +194,7 @@ impl PlanReport {
                     let (from, to) = (fixed(*from_s, 3), fixed(*to_s, 3));
                     format!(
                         "the distance of {vehicle} from the plan is not known from {from} s to {to} s: no {missing}; \
-                         --from and --to select the time to judge ({delay})"
+                         {FROM} and {TO} select the time to judge ({delay})"
                     )
                 }
                 (None, Some((vehicle, PlanDistance { upper_m, lower_m, .. }))) => {
@@ -233,19 +270,5 @@ impl PlanCertificate {
         } else {
             format!("the plan does not keep delta + 2e ({first} and {second}: {keeps} m at {at}, {needs} m needed)")
         }
-    }
-}
-
-impl RecordedReport {
-    /// Returns the report with the findings against a plan. Its status is the worse of the two.
-    #[must_use]
-    pub fn with_plan(mut self, plan: PlanReport) -> Self {
-        self.status = self.status.and(plan.status);
-        self.audit.proved &= plan.status == Status::Clear && plan.assumes.is_none();
-        self.audit.judged_by_run &= plan.status == Status::Clear && plan.assumes.is_none();
-        let assumes: Vec<_> = self.audit.assumes.take().into_iter().chain(plan.assumes.clone()).collect();
-        self.audit.assumes = (!assumes.is_empty()).then(|| assumes.join(" and "));
-        self.plan = Some(plan);
-        self
     }
 }

@@ -1,18 +1,18 @@
-//! Content of `tautline audit --json`.
+//! Judged recording, and its form as JSON.
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
-use super::envelope::LimitFindings;
+use super::envelope::{CornerFindings, LimitFindings};
 use super::plan::PlanReport;
 use super::well_clear::WellClearFindings;
-use crate::report::flight::{self, Audit, ClosedForm, Parry, Rapier, SCHEMA_VERSION, Separation, finite};
+use crate::report::answer::{Answer, Detectors, Enclosure, Finding, FindingList, Judgement, Part, Question};
+use crate::report::flight::{SCHEMA_VERSION, finite};
 use tautline_audit::recorded::{
     Absence, Approach, Contradiction, ExemptTime, Gap, ObjectPair, Outcome, Presence, Settings, TOUCHING_CYLINDER,
     TOUCHING_ELLIPSOIDS, Tallies,
 };
 use tautline_audit::{Status, Undecided, Violation};
-use tautline_core::fact::Fact;
-use tautline_core::swarm::Pair;
+use tautline_core::fact::{BOUNDED, Fact, FactKind, RUN_AUDIT};
 
 /// The recording and how it was read.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -26,6 +26,7 @@ pub struct Source {
     /// Notes on the reading, a sentence each.
     pub notes: Vec<String>,
     /// Facts that the verdict rests on, with their sources.
+    #[serde(skip)]
     pub facts: Vec<Fact>,
 }
 
@@ -40,15 +41,6 @@ pub struct Clock {
     pub epoch_ns: i64,
 }
 
-/// Motion between two samples, and its basis.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct AssumedMotion {
-    /// Motion in words, such as `straight between samples`.
-    pub motion: String,
-    /// Basis of the motion.
-    pub basis: Basis,
-}
-
 /// Early end of a recorded flight.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct EarlyEnd {
@@ -60,47 +52,34 @@ pub struct EarlyEnd {
     pub reason: Option<String>,
 }
 
-/// Basis of the motion between two samples.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Basis {
-    /// The recording defines the motion: curves, or every step of an engine that moves vehicles on straight lines.
-    Recorded,
-    /// The run's audit of every step answers the question.
-    Run,
-    /// A bound on every possible motion.
-    Bounded,
-    /// An assumption.
-    Assumed,
+/// Reason why the audit of a run leaves its recording undecided, although the samples are clear.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(tag = "code", rename_all = "kebab-case")]
+pub enum RunObjection {
+    /// The audit of the run is undecided itself.
+    RunUndecided {},
+    /// The audit of the run found two objects closer than the limit.
+    RunFoundCloser {
+        /// The vehicle, and the other vehicle or the obstacle.
+        who: [String; 2],
+        /// Smallest distance \[m\], or in half axes.
+        min: f64,
+        /// Unit of the distance.
+        unit: &'static str,
+        /// Time of the smallest distance \[s\].
+        at_s: f64,
+    },
 }
 
-/// Findings of the audit of a recording: the keys of a flight's `audit`, and whether the verdict is proved.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct RecordedAudit {
-    /// Keys of a flight. The status is null if only limits of single vehicles were asked.
-    #[serde(flatten)]
-    pub flight: Audit<Option<Status>>,
-    /// Whether the verdict is clear without an assumption about the time between samples.
-    pub proved: bool,
-    /// Whether the verdict is clear by the run's audit of every step, which the recording holds.
-    pub judged_by_run: bool,
-    /// Assumption about the motion between samples; null without one.
-    pub assumes: Option<String>,
-}
-
-/// Content of `tautline audit --json`.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+/// Judged recording: its answers with the findings, and the facts that they rest on.
+#[derive(Clone, Debug, PartialEq)]
 pub struct RecordedReport {
-    /// Version of the keys.
-    pub schema_version: u32,
     /// Status of the whole audit.
     pub status: Status,
+    /// The question.
+    pub question: Question,
     /// The recording.
-    #[serde(flatten)]
     pub source: Source,
-    /// `metres`; `ellipsoids` or `cylinders` if distances are scaled by the half axes of an ellipsoid or by a cylinder.
-    pub measure: &'static str,
-    /// Motion between samples in words.
-    pub motion: String,
     /// Names of the vehicles. The numbers of pairs count them from 1.
     pub vehicles: Vec<String>,
     /// Number of judged vehicles: selected and present.
@@ -109,18 +88,18 @@ pub struct RecordedReport {
     pub span_s: Option<(f64, f64)>,
     /// Presence of the vehicles in the window.
     pub presence: PresenceSummary,
-    /// Smallest separation.
-    pub separation: Separation<Option<f64>>,
-    /// Findings of the audit.
-    pub audit: RecordedAudit,
+    /// Status of separations; `None` if only limits of single vehicles were asked.
+    pub separation: Option<Status>,
+    /// Results of the detectors of separations.
+    pub detectors: Detectors,
     /// Number of findings, and how many are listed.
     pub findings: Tallies,
     /// Violations of pairs and obstacles in order of time; of a long list the worst, and the first of each pair.
     pub violations: Vec<PairFinding<Violation<ObjectPair>>>,
     /// The ten closest pairs.
     pub closest: Vec<PairFinding<Approach>>,
-    /// Findings on obstacles.
-    pub obstacles: Obstacles,
+    /// The ten closest approaches to obstacles.
+    pub closest_to_obstacles: Vec<PairFinding<Approach>>,
     /// Findings on the limits of single vehicles.
     pub limits: Vec<LimitFindings>,
     /// Findings on well clear of air traffic; null if it was not asked.
@@ -137,24 +116,53 @@ pub struct RecordedReport {
     pub plan: Option<PlanReport>,
     /// Early end of the flight inside the judged window. The rest of the window is unknown.
     pub ended_early: Option<EarlyEnd>,
-    /// Verdict and finding up to the early end, if clear up to there.
-    #[serde(skip)]
-    pub(super) until_then: Option<String>,
+    /// Whether everything was clear up to the early end.
+    pub(super) was_clear_until_end: bool,
     /// Time that is not judged because vehicles are on the ground.
-    #[serde(skip)]
     pub(super) exemption: Option<Exemption>,
     /// Whether the deepest violation is one of doubles only, whose decimals are exactly at the limit.
-    #[serde(skip)]
     pub is_decimal_tie: bool,
     /// Reason why the run's own audit does not decide the question.
-    #[serde(skip)]
-    pub run_objection: Option<String>,
+    pub run_objection: Option<RunObjection>,
     /// Whether everything beyond the listed findings is decided.
-    #[serde(skip)]
     pub(super) is_else_known: bool,
     /// Sampling rate that would decide all undecided pairs \[Hz\].
-    #[serde(skip)]
     pub(super) deciding_rate_hz: Option<f64>,
+}
+
+/// Content of `tautline audit --json`.
+#[derive(Serialize)]
+struct Document<'a> {
+    #[serde(flatten)]
+    judgement: Judgement,
+    #[serde(flatten)]
+    source: &'a Source,
+    /// Number of judged vehicles: selected and present.
+    judged: usize,
+    presence: &'a PresenceSummary,
+    alone: &'a [VehicleFinding<Presence>],
+    gaps: Gaps<'a>,
+    corners: Vec<Corners<'a>>,
+    contradiction: Option<&'a VehicleFinding<Contradiction>>,
+    run_objection: Option<&'a RunObjection>,
+    plan: Option<&'a PlanReport>,
+    ended_early: Option<&'a EarlyEnd>,
+}
+
+/// Intervals in which vehicles are not seen, with their number.
+#[derive(Serialize)]
+struct Gaps<'a> {
+    count: u64,
+    is_exact: bool,
+    listed: &'a [VehicleFinding<Gap>],
+}
+
+/// Corners of curves, at which a limit is not applied.
+#[derive(Serialize)]
+struct Corners<'a> {
+    part: &'static str,
+    #[serde(flatten)]
+    found: &'a CornerFindings,
 }
 
 /// Time that is not judged because vehicles are on the ground.
@@ -224,94 +232,49 @@ impl PresenceSummary {
     }
 }
 
-/// Findings on obstacles.
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
-pub struct Obstacles {
-    /// The ten closest approaches.
-    pub closest: Vec<PairFinding<Approach>>,
-    /// Intervals in which a vehicle was below its clearance.
-    pub violations: Vec<PairFinding<Violation<ObjectPair>>>,
-}
-
 impl RecordedReport {
-    /// Returns the report on the outcome of an audit.
+    /// Returns the report on the outcome of an audit. The facts of `source` include the motion between samples.
     #[must_use]
-    pub fn new(outcome: &Outcome, settings: &Settings, source: Source, between: AssumedMotion) -> Self {
-        let first = outcome.closest.first();
-        let scaled = settings.ellipsoid_m.is_some();
-        let min_m = first.and_then(|first| finite(first.certain_m()));
+    pub fn new(outcome: &Outcome, settings: &Settings, mut source: Source) -> Self {
         let limits: Vec<_> = outcome.envelope.limits.iter().map(|found| LimitFindings::new(found, outcome)).collect();
-        let by_limits = limits.iter().filter_map(|limit| limit.assumes.clone());
-        let by_motion = (!matches!(between.basis, Basis::Recorded | Basis::Run)).then_some(between.motion.clone());
-        let assumes: Vec<_> = by_motion.into_iter().chain(by_limits).collect();
-        let is_assumed = between.basis == Basis::Assumed || limits.iter().any(|limit| limit.assumes.is_some());
+        for (limit, found) in limits.iter().zip(&outcome.envelope.limits) {
+            let facts = found.assumes.iter().cloned().chain(limit.corners.as_ref().map(CornerFindings::fact));
+            source.facts.extend(facts);
+        }
         let names = |pair: ObjectPair| outcome.names(pair, &settings.obstacles);
         let closest = |of: &[Approach]| of.iter().map(|a| PairFinding { who: names(a.pair), finding: *a }).collect();
-        let violations = outcome.violations.iter().map(|v| PairFinding { who: names(v.pair), finding: *v });
-        let violations: Vec<_> = violations.collect();
         let alone = outcome.alone.iter();
         let alone = alone.filter_map(|&of| Some(VehicleFinding::new(outcome, of, outcome.presence[of]?)));
+        let is_by_run = source.facts.iter().any(|fact| fact.kind == FactKind::Motion && fact.is_named(RUN_AUDIT));
+        let judged_by_run = is_by_run.then_some(outcome.segments);
         Self {
-            schema_version: SCHEMA_VERSION,
             status: outcome.status,
+            question: Question::of(settings),
             source,
-            measure: measure(settings),
-            motion: between.motion,
             vehicles: outcome.vehicles.clone(),
             judged: outcome.presence.iter().flatten().count(),
             span_s: outcome.span_s,
             presence: PresenceSummary::new(outcome, settings),
             findings: outcome.tallies,
             deciding_rate_hz: outcome.deciding_rate_hz,
-            separation: Separation {
-                delta_m: settings
-                    .delta_m
-                    .or(scaled.then_some(TOUCHING_ELLIPSOIDS))
-                    .or(settings.cylinder.map(|_| TOUCHING_CYLINDER)),
-                min_m,
-                min_at_s: first.and_then(|first| finite(first.time_s)),
-                min_pair: first.and_then(|first| first.pair.vehicles()).map(Pair::numbers),
-                certified_m: None,
-                certified_until_s: None,
-                certificate_void: Vec::new(),
-                ellipsoid: None,
-            },
-            audit: RecordedAudit {
-                flight: Audit {
-                    status: outcome.separation,
-                    violations: outcome
-                        .violations
-                        .iter()
-                        .filter_map(|v| Some(flight::Violation::new(v.pair.vehicles()?, v)))
-                        .collect(),
-                    // A bounded list may find a time of an obstacle again. The difference is then a lower bound, as the
-                    // tally is.
-                    undecided: outcome.tallies.undecided.count.saturating_sub(outcome.undecided_of_obstacles),
-                    steps: outcome.segments,
-                    pairs_checked: outcome.swept,
-                    closed_form: ClosedForm { min_m },
-                    parry: Parry {
-                        min_toi_s: outcome.parry.min_toi_s.and_then(finite),
-                        disagreements: outcome.parry.disagreements,
-                    },
-                    rapier: Rapier { contact_pairs: None },
-                },
-                proved: outcome.status == Status::Clear && !is_assumed,
-                judged_by_run: outcome.status == Status::Clear && between.basis == Basis::Run,
-                assumes: (!assumes.is_empty()).then(|| assumes.join(" and ")),
+            separation: outcome.separation,
+            detectors: Detectors {
+                steps: judged_by_run,
+                segments: if is_by_run { None } else { Some(outcome.segments) },
+                pairs_swept: outcome.swept,
+                parry_contact_s: outcome.parry.min_toi_s.and_then(finite),
+                parry_disagreements: outcome.parry.disagreements,
+                rapier_contact_pairs: None,
             },
             closest: closest(&outcome.closest),
-            obstacles: Obstacles {
-                closest: closest(&outcome.obstacles),
-                violations: violations.iter().filter(|v| v.finding.pair.vehicles().is_none()).cloned().collect(),
-            },
-            violations,
+            closest_to_obstacles: closest(&outcome.obstacles),
+            violations: outcome.violations.iter().map(|v| PairFinding { who: names(v.pair), finding: *v }).collect(),
             limits,
             plan: None,
             well_clear: outcome.well_clear.as_ref().map(|found| WellClearFindings::new(found, outcome)),
             ended_early: None,
             exemption: Exemption::new(outcome, settings),
-            until_then: None,
+            was_clear_until_end: false,
             is_decimal_tie: false,
             run_objection: None,
             is_else_known: outcome.is_else_known,
@@ -322,33 +285,100 @@ impl RecordedReport {
         }
     }
 
+    /// Returns the report with the findings against a plan. Its status is the worse of the two.
+    #[must_use]
+    pub fn with_plan(mut self, plan: PlanReport, facts: Vec<Fact>) -> Self {
+        self.status = self.status.and(plan.status);
+        self.question.plan = Some(plan.file.clone());
+        self.source.facts.extend(facts);
+        self.plan = Some(plan);
+        self
+    }
+
     /// Returns the report with an early end: undecided at best.
     #[must_use]
     pub fn with_early_end(mut self, end: EarlyEnd) -> Self {
-        self.until_then = (self.status == Status::Clear).then(|| self.headline());
-        self.status = self.status.and(Status::Undecided);
-        self.audit.flight.status = self.audit.flight.status.map(|status| status.and(Status::Undecided));
-        self.audit.proved = false;
-        for limit in &mut self.limits {
-            limit.status = limit.status.and(Status::Undecided);
-        }
-        if let Some(well_clear) = &mut self.well_clear {
-            well_clear.status = well_clear.status.and(Status::Undecided);
+        self.was_clear_until_end = self.status == Status::Clear;
+        let limits = self.limits.iter_mut().map(|limit| &mut limit.status);
+        let well_clear = self.well_clear.iter_mut().map(|found| &mut found.status);
+        for status in limits.chain(well_clear).chain(&mut self.separation).chain([&mut self.status]) {
+            *status = status.and(Status::Undecided);
         }
         self.ended_early = Some(end);
         self
     }
 
+    /// Returns whether the recording is clear, and no fact that the answers rest on is an assumption.
+    #[must_use]
+    pub fn is_proved(&self) -> bool {
+        self.status == Status::Clear && !self.source.facts.iter().any(Fact::is_assumption)
+    }
+
+    /// Returns whether the motion between samples is judged by the run's audit of every step.
+    pub(super) fn is_by_run(&self) -> bool {
+        self.detectors.steps.is_some()
+    }
+
     /// Returns the unit of distances.
     #[must_use]
     pub fn unit(&self) -> &'static str {
-        unit_of(self.measure)
+        self.question.unit
     }
 
-    /// Returns the status of separations alone; `None` if only limits of single vehicles were judged.
+    /// Returns the answers to all asked parts.
     #[must_use]
-    pub fn separation(&self) -> Option<Status> {
-        self.audit.flight.status
+    pub fn answers(&self) -> Vec<Answer> {
+        let of_pairs = self.separation.map(|status| self.answer_on_separations(status));
+        let of_limits = self.limits.iter().map(LimitFindings::answer);
+        let of_well_clear = self.well_clear.iter().map(WellClearFindings::answer);
+        let of_plan = self.plan.iter().map(PlanReport::answer);
+        let is_partly = self.presence.partly > 0;
+        let presence = Answer::new(Part::Presence, if is_partly { Status::Undecided } else { Status::Clear });
+        let of_presence = self.presence.required.then_some(presence);
+        of_pairs.into_iter().chain(of_limits).chain(of_well_clear).chain(of_plan).chain(of_presence).collect()
+    }
+
+    fn answer_on_separations(&self, status: Status) -> Answer {
+        let unit = self.unit();
+        let near = |PairFinding { who, finding }: &PairFinding<Approach>| Finding {
+            subjects: who.to_vec(),
+            from_s: None,
+            to_s: None,
+            at_s: finite(finding.time_s),
+            value: Enclosure::new(finding.lower_m, finding.upper_m, unit),
+            limit: Some(finding.limit_m),
+            rate_hz: None,
+        };
+        // Under bounds on the motion only an upper bound of the smallest distance is known.
+        let is_exact = !self.source.facts.iter().any(|fact| fact.kind == FactKind::Motion && fact.is_named(BOUNDED));
+        let violation = |PairFinding { who, finding }: &PairFinding<Violation<ObjectPair>>| {
+            let lower_m = if is_exact { finding.min_m } else { f64::NEG_INFINITY };
+            Finding {
+                subjects: who.to_vec(),
+                from_s: Some(finding.from_s),
+                to_s: Some(finding.to_s),
+                at_s: Some(finding.min_at_s),
+                value: Enclosure::new(lower_m, finding.min_m, unit),
+                limit: Some(finding.limit_m),
+                rate_hz: None,
+            }
+        };
+        let undecided = |PairFinding { who, finding }: &PairFinding<Undecided<ObjectPair>>| Finding {
+            subjects: who.to_vec(),
+            from_s: Some(finding.from_s),
+            to_s: Some(finding.to_s),
+            at_s: None,
+            value: Enclosure::new(finding.lower_m, finding.upper_m, unit),
+            limit: Some(finding.limit_m),
+            rate_hz: finding.rate_hz,
+        };
+        Answer {
+            closest: self.closest.iter().chain(&self.closest_to_obstacles).map(near).collect(),
+            violations: FindingList::new(self.findings.violations, self.violations.iter().map(violation).collect()),
+            undecided: FindingList::new(self.findings.undecided, self.undecided.iter().map(undecided).collect()),
+            detectors: Some(self.detectors),
+            ..Answer::new(Part::Separation, status)
+        }
     }
 
     /// Returns the report as indented JSON with a final line break.
@@ -360,24 +390,73 @@ impl RecordedReport {
     }
 }
 
-/// Returns the measure of distances with these settings: `metres`, `ellipsoids` or `cylinders`.
-fn measure(settings: &Settings) -> &'static str {
-    match (settings.ellipsoid_m, settings.cylinder) {
-        (Some(_), _) => "ellipsoids",
-        (None, Some(_)) => "cylinders",
-        (None, None) => "metres",
+/// Content of `tautline audit --json`.
+impl Serialize for RecordedReport {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let corners = self
+            .limits
+            .iter()
+            .filter_map(|limit| limit.corners.as_ref().map(|found| Corners { part: limit.quantity, found }));
+        let document = Document {
+            judgement: Judgement {
+                schema_version: SCHEMA_VERSION,
+                status: self.status,
+                pass: self.status == Status::Clear,
+                proved: self.is_proved(),
+                question: self.question.clone(),
+                answers: self.answers(),
+                facts: self.source.facts.clone(),
+                window_s: self.span_s,
+                vehicles: self.vehicles.clone(),
+            },
+            source: &self.source,
+            judged: self.judged,
+            presence: &self.presence,
+            alone: &self.alone,
+            gaps: Gaps { count: self.findings.gaps.count, is_exact: self.findings.gaps.is_exact, listed: &self.gaps },
+            corners: corners.collect(),
+            contradiction: self.contradiction.as_ref(),
+            run_objection: self.run_objection.as_ref(),
+            plan: self.plan.as_ref(),
+            ended_early: self.ended_early.as_ref(),
+        };
+        document.serialize(serializer)
     }
 }
 
-/// Returns the unit of distances with these settings.
-#[must_use]
-pub fn unit(settings: &Settings) -> &'static str {
-    unit_of(measure(settings))
+impl Question {
+    /// Returns the question of complete settings.
+    fn of(settings: &Settings) -> Self {
+        let scaled = settings.ellipsoid_m.is_some();
+        Self {
+            delta: settings
+                .delta_m
+                .or(scaled.then_some(TOUCHING_ELLIPSOIDS))
+                .or(settings.cylinder.map(|_| TOUCHING_CYLINDER)),
+            unit: unit(settings),
+            radius_m: settings.radius_m,
+            ellipsoid_m: settings.ellipsoid_m.map(Into::into),
+            cylinder_m: settings.cylinder.map(|of| [of.horizontal_m, of.vertical_m]),
+            obstacles: settings.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect(),
+            limits: settings.envelope.limits.iter().map(|limit| (limit.quantity.key(), limit.allowed)).collect(),
+            well_clear: settings.well_clear.map(|of| [of.horizontal_m, of.vertical_m, of.tau_s]),
+            require_presence: settings.require_presence,
+            plan: None,
+            above_m: settings.above_m,
+            from_s: settings.from_s,
+            to_s: settings.to_s,
+        }
+    }
 }
 
-/// Returns the unit of a measure.
-pub(super) fn unit_of(measure: &'static str) -> &'static str {
-    if measure == "metres" { "m" } else { measure }
+/// Returns the unit of distances with these settings: `m`, or `ellipsoids` or `cylinders` for scaled distances.
+#[must_use]
+pub fn unit(settings: &Settings) -> &'static str {
+    match (settings.ellipsoid_m, settings.cylinder) {
+        (Some(_), _) => "ellipsoids",
+        (None, Some(_)) => "cylinders",
+        (None, None) => "m",
+    }
 }
 
 /// A finding on a pair of vehicles, or a vehicle and an obstacle, with their names.

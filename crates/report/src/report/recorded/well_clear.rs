@@ -1,14 +1,13 @@
 //! Findings on well clear of air traffic.
 
-use serde::Serialize;
-
 use super::report::PairFinding;
+use crate::report::answer::{Answer, Enclosure, Finding, FindingList, Part};
 use tautline_audit::recorded::{Outcome, WellClearLoss, WellClearOutcome};
 use tautline_audit::{Status, Tally};
 use tautline_core::text::{at_least, exact, fixed};
 
 /// Findings on well clear.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct WellClearFindings {
     /// Horizontal distance: DMOD, and threshold of the horizontal miss distance \[m\].
     pub horizontal_m: f64,
@@ -51,11 +50,36 @@ impl WellClearFindings {
         format!("{} m, {} m high{tau}", exact(self.horizontal_m), exact(self.vertical_m))
     }
 
+    /// Returns the answer on well clear. Values are smallest horizontal distances.
+    pub(super) fn answer(&self) -> Answer {
+        let finding = |PairFinding { who, finding }: &PairFinding<WellClearLoss>| Finding {
+            subjects: who.to_vec(),
+            from_s: Some(finding.from_s),
+            to_s: Some(finding.to_s),
+            at_s: None,
+            value: Enclosure::new(finding.horizontal_m, finding.horizontal_m, "m"),
+            limit: Some(self.horizontal_m),
+            rate_hz: None,
+        };
+        let closest = self.violations.iter().min_by(|a, b| a.finding.horizontal_m.total_cmp(&b.finding.horizontal_m));
+        Answer {
+            closest: closest.map(finding).into_iter().collect(),
+            violations: FindingList::new(self.violations_tally, self.violations.iter().map(finding).collect()),
+            undecided: FindingList::new(self.undecided_tally, self.undecided.iter().map(finding).collect()),
+            ..Answer::new(Part::WellClear, self.status)
+        }
+    }
+
     /// Returns the finding in a few words.
     #[must_use]
     pub fn brief(&self) -> String {
+        self.brief_as(self.status)
+    }
+
+    /// Returns the finding in the words of a status.
+    pub(super) fn brief_as(&self, status: Status) -> String {
         let thresholds = self.thresholds();
-        match self.status {
+        match status {
             Status::Clear => format!("well clear ({thresholds})"),
             Status::Violation => {
                 let closest =

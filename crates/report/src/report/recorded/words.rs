@@ -2,21 +2,25 @@
 
 use super::envelope::LimitFindings;
 use super::plan::PlanReport;
-use super::report::{EarlyEnd, Exemption, PresenceSpan, RecordedReport};
+use super::report::{EarlyEnd, Exemption, PresenceSpan, RecordedReport, RunObjection};
 use super::report::{PairFinding, VehicleFinding};
 use super::well_clear::WellClearFindings;
 use crate::figures::Figure;
 use crate::replay::{NoReplay, Replay};
+use crate::report::answer::Part;
 use crate::report::page::{self, Badge, Page, Start, Tone};
 use crate::report::section::Section;
 use tautline_audit::recorded::{Approach, Gap, ObjectPair, WIDTH_M};
 use tautline_audit::{LISTED, Status, Tally, Undecided, Violation};
-use tautline_core::fact::Coded;
+use tautline_core::fact::{BOUNDED, CURVES, Coded, EVERY_STEP, Fact, FactKind, RUN_AUDIT};
+use tautline_core::option::{ABOVE, MAX_GAP, REQUIRE_PRESENCE};
 use tautline_core::text::{at_least, at_most, beside_limit, counted, exact, fixed, in_order, seconds};
 
 /// Largest numbers of violations in the text, and on the page.
 const LISTED_IN_WORDS: usize = 10;
 const LISTED_ON_PAGE: usize = 100;
+/// Subject of facts about a plan.
+pub(crate) const THE_PLAN: &str = "the plan";
 /// Largest number of vehicles in the headline that are not seen throughout.
 const NAMED_IN_HEADLINE: usize = 3;
 
@@ -27,19 +31,36 @@ impl RecordedReport {
         one_line(&format!("{}: {}", self.verdict(), self.finding()))
     }
 
+    /// Returns the answer to a part in a few words; the headline for separations.
+    #[must_use]
+    pub fn brief(&self, part: Part) -> String {
+        let of_limit = |key| self.limits.iter().find(|limit| limit.quantity == key).map(LimitFindings::brief);
+        let brief = match part {
+            Part::Separation => Some(self.headline()),
+            Part::Limit(key) => of_limit(key),
+            Part::WellClear => self.well_clear.as_ref().map(WellClearFindings::brief),
+            Part::Plan => self.plan.as_ref().map(PlanReport::brief),
+            Part::Presence => {
+                let partly = counted(self.presence.partly as u64, "vehicle is", "vehicles are");
+                Some(format!("{partly} not seen throughout"))
+            }
+        };
+        brief.unwrap_or_default()
+    }
+
     /// Returns the window of the verdict, and the first vehicles that are not seen throughout.
-    fn window(&self) -> String {
+    fn window(&self, status: Status) -> String {
         let presence = &self.presence;
         let window = presence.window_s.map_or(String::new(), |(from_s, to_s)| format!("; from {}", span(from_s, to_s)));
         if presence.partly == 0 {
-            return if self.status == Status::Clear { window } else { String::new() };
+            return if status == Status::Clear { window } else { String::new() };
         }
         let named = presence.listed.iter().take(NAMED_IN_HEADLINE).map(VehicleFinding::<PresenceSpan>::words);
         let rest = presence.partly.saturating_sub(NAMED_IN_HEADLINE);
         let more = (rest > 0).then(|| format!("and {rest} more"));
         let named = named.chain(more).collect::<Vec<_>>().join(", ");
         let all = presence.partly + presence.throughout;
-        let required = if presence.required { ", which --require-presence asks for" } else { "" };
+        let required = if presence.required { format!(", which {REQUIRE_PRESENCE} asks for") } else { String::new() };
         format!(
             "{window}, over which {} of {all} vehicles {} not seen throughout{required}: {named}",
             presence.partly,
@@ -50,55 +71,115 @@ impl RecordedReport {
     /// Returns the verdict alone, such as `PROVED CLEAR`.
     #[must_use]
     pub fn verdict(&self) -> String {
+        self.verdict_as(self.status)
+    }
+
+    fn verdict_as(&self, status: Status) -> String {
         let above = self.exemption.as_ref().map_or(String::new(), |time| format!(" above {} m", exact(time.above_m)));
-        match self.status {
-            Status::Clear if self.audit.judged_by_run => format!("PROVED CLEAR {}", self.motion),
-            Status::Clear if self.audit.proved => format!("PROVED CLEAR{above}"),
-            Status::Clear => format!("CLEAR{above} if {}", self.audit.assumes.as_ref().unwrap_or(&self.motion)),
+        match status {
+            Status::Clear if self.source.facts.iter().any(Fact::is_assumption) => {
+                format!("CLEAR{above} if {}", self.conditions())
+            }
+            Status::Clear if self.is_by_run() => format!("PROVED CLEAR {}", self.motion()),
+            Status::Clear => format!("PROVED CLEAR{above}"),
             Status::Violation => "VIOLATION".to_owned(),
             Status::Undecided => "UNDECIDED".to_owned(),
         }
     }
 
+    /// Returns the motion between samples, with the assumptions on the samples and on obstacles.
+    #[must_use]
+    pub fn motion(&self) -> String {
+        let of_motion = |fact: &&Fact| fact.kind == FactKind::Motion || fact.is_assumption() && !is_of_part(fact);
+        self.clauses(of_motion).join(", ")
+    }
+
+    /// Returns the conditions of a clear verdict.
+    fn conditions(&self) -> String {
+        let is_recorded = |fact: &Fact| {
+            fact.kind == FactKind::Motion && [CURVES, EVERY_STEP, RUN_AUDIT].iter().any(|name| fact.is_named(name))
+        };
+        let is_condition = |fact: &&Fact| {
+            !is_of_part(fact) && !is_recorded(fact) && (fact.kind == FactKind::Motion || fact.is_assumption())
+        };
+        let of_parts = self.clauses(|fact| is_of_part(fact));
+        let of_motion = self.clauses(is_condition);
+        let of_motion = (!of_motion.is_empty()).then(|| of_motion.join(", "));
+        of_motion.into_iter().chain(of_parts).collect::<Vec<_>>().join(" and ")
+    }
+
+    /// Returns facts as clauses, the first obstacle that stands still with the number of the others.
+    fn clauses(&self, is_told: impl Fn(&&Fact) -> bool) -> Vec<String> {
+        let mut clauses = Vec::new();
+        let mut resting = 0;
+        for fact in self.source.facts.iter().filter(is_told) {
+            resting += u64::from(fact.kind == FactKind::ObstacleMotion);
+            match fact.kind {
+                FactKind::ObstacleMotion if resting > 1 => {}
+                FactKind::Motion if fact.is_named(BOUNDED) => clauses.push(self.bounds()),
+                _ => clauses.push(fact.to_string()),
+            }
+        }
+        if resting > 1 {
+            clauses.push(format!("{} outside the paths", counted(resting - 1, "other obstacle", "other obstacles")));
+        }
+        clauses
+    }
+
+    /// Returns the bounds on accelerations.
+    fn bounds(&self) -> String {
+        let bounds = self.source.facts.iter().filter(|fact| fact.kind == FactKind::Acceleration);
+        let bounds = bounds.map(|fact| {
+            let value = fact.value.as_ref().map_or_else(String::new, ToString::to_string);
+            fact.subject.as_ref().map_or(value.clone(), |vehicle| format!("{value} for {vehicle}"))
+        });
+        format!("accelerations of at most {}", bounds.collect::<Vec<_>>().join(", "))
+    }
+
     /// Returns the headline without the verdict.
     fn finding(&self) -> String {
-        match (&self.ended_early, &self.until_then) {
-            (None, _) => self.finding_of_motion(),
-            (Some(end), Some(until_then)) => format!("{}; until then {until_then}", end.words()),
-            (Some(end), None) => format!("{}; {}", self.finding_of_motion(), end.words()),
+        match &self.ended_early {
+            None => self.finding_as(self.status),
+            Some(end) if self.was_clear_until_end => {
+                let verdict = self.verdict_as(Status::Clear);
+                format!("{}; until then {verdict}: {}", end.words(), self.finding_as(Status::Clear))
+            }
+            Some(end) => format!("{}; {}", self.finding_as(self.status), end.words()),
         }
     }
 
-    /// Returns the findings with the status of the verdict, on pairs and on limits.
-    fn finding_of_motion(&self) -> String {
-        let decides = |limit: &&LimitFindings| limit.status == self.status;
-        let limits = self.limits.iter().filter(decides).map(LimitFindings::brief);
-        let well_clear = self.well_clear.iter().filter(|found| found.status == self.status);
-        let limits = limits.chain(well_clear.map(WellClearFindings::brief));
-        let of_pairs = self.audit.flight.status == Some(self.status);
+    /// Returns the findings that decide the status, on pairs and on limits. Up to an early end of a clear flight all of
+    /// them are clear.
+    fn finding_as(&self, status: Status) -> String {
+        let decides = |own: Status| own == status || self.was_clear_until_end;
+        let limits = self.limits.iter().filter(|limit| decides(limit.status)).map(|limit| limit.brief_as(status));
+        let well_clear = self.well_clear.iter().filter(|found| decides(found.status));
+        let limits = limits.chain(well_clear.map(|found| found.brief_as(status)));
+        let of_pairs = self.separation.is_some_and(decides);
         let exempt = self.exemption.as_ref().map(Exemption::words);
         let in_plane = self.source.planar.then(|| "in the plane of x and y: no heights are known".to_owned());
-        let pairs = of_pairs.then(|| self.finding_of_pairs());
-        let against_plan = self.plan.iter().filter(|plan| plan.status == self.status).map(PlanReport::brief);
+        let pairs = of_pairs.then(|| self.finding_of_pairs(status));
+        let against_plan = self.plan.iter().filter(|plan| decides(plan.status)).map(|plan| plan.brief_as(status));
         let found = pairs.into_iter().chain(limits).chain(against_plan).collect::<Vec<_>>();
         // All limits are kept, but a vehicle that must be present is not seen throughout.
         let nothing = found.is_empty().then(|| "not every vehicle is seen throughout".to_owned());
-        found.into_iter().chain(nothing).chain(exempt).chain(in_plane).collect::<Vec<_>>().join("; ") + &self.window()
+        found.into_iter().chain(nothing).chain(exempt).chain(in_plane).collect::<Vec<_>>().join("; ")
+            + &self.window(status)
     }
 
-    fn finding_of_pairs(&self) -> String {
+    fn finding_of_pairs(&self, status: Status) -> String {
         let unit = format!(" {}", self.unit());
-        let delta = self.separation.delta_m.map_or("by radii".to_owned(), |m| format!("delta {}{unit}", exact(m)));
-        match self.status {
+        let delta = self.question.delta.map_or("by radii".to_owned(), |m| format!("delta {}{unit}", exact(m)));
+        match status {
             Status::Clear => {
-                let all = self.closest.iter().chain(&self.obstacles.closest);
+                let all = self.closest.iter().chain(&self.closest_to_obstacles);
                 let lowest = all.min_by(|a, b| a.finding.lower_m.total_cmp(&b.finding.lower_m));
                 let closest = lowest.map_or(String::new(), |PairFinding { who: [first, second], finding }| {
                     let (least, at) = (beside_limit(finding.lower_m, finding.limit_m, 6), seconds(finding.time_s));
                     format!("never closer than {least}{unit}, {first} and {second} at {at} ")
                 });
-                let is_in_verdict = self.audit.judged_by_run || !self.audit.proved;
-                let motion = if is_in_verdict { String::new() } else { format!(", {}", self.motion) };
+                let is_in_verdict = self.is_by_run() || self.source.facts.iter().any(Fact::is_assumption);
+                let motion = if is_in_verdict { String::new() } else { format!(", {}", self.motion()) };
                 format!("{closest}({delta}{motion}){}", self.never_with_another())
             }
             Status::Violation => {
@@ -115,11 +196,11 @@ impl RecordedReport {
                         beside_limit(finding.min_m, finding.limit_m, 3),
                         exact(finding.limit_m),
                         seconds(finding.min_at_s),
-                        self.motion
+                        self.motion()
                     )
                 })
             }
-            Status::Undecided => format!("{} ({delta}, {})", self.why_undecided(), self.motion),
+            Status::Undecided => format!("{} ({delta}, {})", self.why_undecided(), self.motion()),
         }
     }
 
@@ -134,11 +215,11 @@ impl RecordedReport {
 
     fn why_undecided(&self) -> String {
         let unit = format!(" {}", self.unit());
-        if self.audit.flight.parry.disagreements > 0 {
+        if self.detectors.parry_disagreements > 0 {
             return "the two detectors disagree".to_owned();
         }
-        if let Some(why) = &self.run_objection {
-            return why.clone();
+        if let Some(objection) = &self.run_objection {
+            return objection.words();
         }
         if let Some(VehicleFinding { vehicle, finding }) = &self.contradiction {
             return format!(
@@ -162,12 +243,12 @@ impl RecordedReport {
         }
         let longest_s = self.gaps.iter().map(|gap| gap.finding.joined_by_s).fold(0.0, f64::max);
         // Rounded up, so that the printed gap is long enough.
-        let joined = format!("--max-gap {} would judge across", (longest_s * 1e6).ceil() / 1e6);
+        let joined = format!("{} would judge across", MAX_GAP.set((longest_s * 1e6).ceil() / 1e6));
         match &self.gaps[..] {
             [] if self.span_s.is_none() => "the window holds nothing to judge".to_owned(),
             [] => {
                 let above = self.exemption.as_ref();
-                let above = above.map(|time| format!(", one of them above {} m (--above)", exact(time.above_m)));
+                let above = above.map(|time| format!(", one of them above {} m ({ABOVE})", exact(time.above_m)));
                 format!("no two vehicles are present at the same time{}", above.unwrap_or_default())
             }
             [VehicleFinding { vehicle, finding }] => {
@@ -213,7 +294,7 @@ impl RecordedReport {
         let open = open.chain(well_clear().flat_map(WellClearFindings::undecided_in_words)).collect();
         let sections = [
             closest("Closest pairs", &self.closest),
-            closest("Closest to obstacles", &self.obstacles.closest),
+            closest("Closest to obstacles", &self.closest_to_obstacles),
             Section::table("Each vehicle by itself", limits, columns, self.limits.iter().map(LimitFindings::row)),
             Section::list(
                 "Presence",
@@ -268,8 +349,8 @@ impl RecordedReport {
         let judged = format!(
             "judged       {span}, {}, {} of motion, {} swept",
             counted(self.judged as u64, "vehicle", "vehicles"),
-            counted(self.audit.flight.steps, "stretch", "stretches"),
-            self.audit.flight.pairs_checked
+            counted(self.detectors.steps.or(self.detectors.segments).unwrap_or_default(), "stretch", "stretches"),
+            self.detectors.pairs_swept
         );
         let lines = self.sections().into_iter().flat_map(|section| section.text(LISTED_IN_WORDS));
         std::iter::once(judged).chain(lines).map(|line| one_line(&line) + "\n").collect()
@@ -294,21 +375,48 @@ impl RecordedReport {
         );
         page.sections.extend(self.sections().iter().map(|section| section.html(LISTED_ON_PAGE)));
         page.add("How it was read", "Decisions of the reader of this file format.", [page::list(&self.source.notes)]);
-        let known = if self.audit.assumes.is_some() { "assumed" } else { "as recorded" };
+        let is_recorded = self.conditions().is_empty();
         let assumed = [
-            format!("Motion: {} ({known}).", self.motion),
+            format!("Motion: {} ({}).", self.motion(), if is_recorded { "as recorded" } else { "assumed" }),
             "A distance strictly below its limit is a violation; equality is not.".to_owned(),
             format!("Time 0 s is {} ns on the recording's clock.", self.source.clock.epoch_ns),
         ];
         page.add("Assumptions", "The verdict holds under these assumptions.", [page::list(&assumed)]);
         let facts = self.source.facts.iter().map(|fact| {
-            let value = fact.value.as_ref().map_or_else(String::new, ToString::to_string);
+            let value = fact.value.as_ref().map(ToString::to_string);
+            let value = fact.subject.iter().cloned().chain(value).collect::<Vec<_>>().join(": ");
             [fact.code().to_owned(), fact.source.code().to_owned(), one_line(&value)]
         });
         let columns = ["Fact", "Source", "Value"];
         page.add("Facts", "The verdict rests on these facts.", [page::words("Facts and sources", &columns, facts)]);
         page.add("Reproduce", "This command judges the recording again.", [page::command(command)]);
         page.render()
+    }
+}
+
+/// Returns whether a fact concerns limits of single vehicles or the plan, and not the motion of the recording.
+fn is_of_part(fact: &Fact) -> bool {
+    matches!(
+        fact.kind,
+        FactKind::MeanAcceleration
+            | FactKind::SampledAcceleration
+            | FactKind::RoundedCorners
+            | FactKind::PlanMotion
+            | FactKind::PlanHeights
+            | FactKind::PlanPlane
+    ) || fact.subject.as_deref() == Some(THE_PLAN)
+}
+
+impl RunObjection {
+    /// Returns the objection in a clause.
+    fn words(&self) -> String {
+        match self {
+            Self::RunUndecided {} => "the run's own audit of every step is undecided (see its report.json)".to_owned(),
+            Self::RunFoundCloser { who: [first, second], min, unit, at_s } => {
+                let (min, at) = (at_least(*min, 3), seconds(*at_s));
+                format!("the run's audit of every step found {first} and {second} {min} {unit} apart at {at}")
+            }
+        }
     }
 }
 

@@ -6,17 +6,16 @@ use super::super::{Failure, Monitor};
 use super::side_files::ItemSpan;
 use super::{AuditRequest, Open, Subject, recording_in};
 use crate::figures::{self, Figure};
-use crate::report::recorded::{PlanReport, RecordedReport};
+use crate::report::recorded::{PlanReport, RecordedReport, THE_PLAN};
 use tautline_audit::recorded::{Outcome, PlanComparison, PlanFindings, Settings, audit};
 use tautline_core::fact::{Fact, FactKind, Source};
+use tautline_core::option::{IDS, PLAN_DELAY, TUBE};
 use tautline_core::text::seconds;
 use tautline_core::track::Item;
 use tautline_recordings::open_plan;
 
 /// Largest number of names in a message.
 const NAMES_LISTED: usize = 12;
-/// Assumption of the comparison of a flight in space with a plan without heights.
-const IN_PLANE: &str = "flight and plan have equal heights, which are not compared";
 /// Largest delay that may be given \[s\]: a century.
 const MOST_DELAY_S: f64 = 3.2e9;
 
@@ -35,11 +34,11 @@ impl PlanQuestion {
     /// Refuses numbers out of range.
     pub(super) fn check(&self) -> Result<(), Failure> {
         if let Some(tube_m) = self.tube_m.filter(|tube_m| !(tube_m.is_finite() && *tube_m > 0.0)) {
-            let message = format!("--tube: must be a finite number above 0, got {tube_m:?}");
+            let message = format!("{TUBE}: must be a finite number above 0, got {tube_m:?}");
             return Err(Failure::input("audit/out-of-range", message, "give the largest allowed distance in metres"));
         }
         if let Some(delay_s) = self.delay_s.filter(|delay_s| delay_s.is_nan() || delay_s.abs() > MOST_DELAY_S) {
-            let message = format!("--plan-delay: must be a finite number of at most {MOST_DELAY_S} s, got {delay_s:?}");
+            let message = format!("{PLAN_DELAY}: must be a finite number of at most {MOST_DELAY_S} s, got {delay_s:?}");
             return Err(Failure::input("audit/out-of-range", message, "give the delay in seconds"));
         }
         Ok(())
@@ -87,7 +86,7 @@ pub(super) fn compare(
     let flown = (flight.open)()?;
     let origin = flown.earth_origin().copied();
     let mut plan = open_plan(&path, origin.as_ref())?;
-    let heights = compare_heights(flown.facts(), plan.facts(), &path)?;
+    let are_heights_assumed = compare_heights(flown.facts(), plan.facts(), &path)?;
     let (mut items, mut more) = (Vec::new(), true);
     while more {
         if monitor.is_interrupted() {
@@ -132,11 +131,6 @@ pub(super) fn compare(
     let audited = asked.map(|settings| audit(plan.vehicles(), &items, settings)).transpose().map_err(wrong)?;
     let mut report = PlanReport::new(path.display().to_string(), &found, flight.outcome, audited.as_ref());
     report.planar = is_planar;
-    let assumed = report.assumes.take().into_iter();
-    let assumed = assumed.chain(plan.assumed().map(|item| format!("the plan has {item}")));
-    let assumed = assumed.chain((is_planar && !flight.is_planar).then(|| IN_PLANE.to_owned()));
-    let assumed = assumed.chain(heights.filter(|_| !is_planar)).collect::<Vec<_>>().join(" and ");
-    report.assumes = (!assumed.is_empty()).then_some(assumed);
     let notes = plan.notes().iter().map(|note| format!("{}: {note}", path.display())).collect();
     let axes = if is_planar { "x and y" } else { "x, y and z" };
     let clock = match (shift, question.delay_s) {
@@ -151,24 +145,27 @@ pub(super) fn compare(
         (Some(_), Some(origin)) => of_origin(Source::Deduced, origin),
         (None, Some(origin)) => of_origin(Source::Declared, origin),
     };
-    let facts = vec![clock, Fact::name(FactKind::SideFileAxes, Source::Deduced, axes), frame];
+    let assumed = |kind| Fact::new(kind, Source::Default);
+    let mut facts = vec![clock, Fact::name(FactKind::SideFileAxes, Source::Deduced, axes), frame];
+    facts.extend((!found.has_curves).then(|| assumed(FactKind::PlanMotion)));
+    facts.extend(plan.facts().iter().filter(|fact| fact.is_assumption()).map(|fact| fact.clone().about(THE_PLAN)));
+    facts.extend((is_planar && !flight.is_planar).then(|| assumed(FactKind::PlanPlane)));
+    facts.extend((!is_planar && are_heights_assumed).then(|| assumed(FactKind::PlanHeights)));
     let figure = figure(&found, flight.outcome);
     Ok(ComparedPlan { report, notes, facts, figure })
 }
 
-/// Refuses heights of different references. Returns the assumption if only one of both is known.
-fn compare_heights(flown: &[Fact], planned: &[Fact], path: &Path) -> Result<Option<String>, Failure> {
+/// Refuses heights of different references. Returns whether only one of both is known, so that one is assumed.
+fn compare_heights(flown: &[Fact], planned: &[Fact], path: &Path) -> Result<bool, Failure> {
     let reference = |facts: &[Fact]| {
         let known = facts.iter().find(|fact| fact.kind == FactKind::HeightReference);
         known.filter(|fact| fact.source != Source::Default).and_then(|fact| fact.value.clone())
     };
     let (flight, plan) = match (reference(flown), reference(planned)) {
-        (None, None) => return Ok(None),
-        (Some(flight), Some(plan)) if flight == plan => return Ok(None),
+        (None, None) => return Ok(false),
+        (Some(flight), Some(plan)) if flight == plan => return Ok(false),
         (Some(flight), Some(plan)) => (flight, plan),
-        (Some(_), None) | (None, Some(_)) => {
-            return Ok(Some("the heights of flight and plan have one reference".to_owned()));
-        }
+        (Some(_), None) | (None, Some(_)) => return Ok(true),
     };
     let message =
         format!("{}: heights of the plan are above {plan}, those of the flight above {flight}", path.display());
@@ -198,7 +195,7 @@ fn check_common_time(
         seconds(from_s),
         seconds(to_s)
     );
-    let help = "give the time of the flight at which the plan begins with --plan-delay, or another plan";
+    let help = format!("give the time of the flight at which the plan begins with {PLAN_DELAY}, or another plan");
     Err(Failure::input("audit/side-file-clock", message, help))
 }
 
@@ -210,17 +207,15 @@ pub(super) fn attach(
     is_by_run: bool,
     monitor: &dyn Monitor,
 ) -> (RecordedReport, Option<Figure>) {
-    let Some(ComparedPlan { report: mut plan, notes, facts, figure }) = compared else { return (report, None) };
+    let Some(ComparedPlan { report: plan, notes, mut facts, figure }) = compared else { return (report, None) };
     for note in &notes {
         monitor.warn(&format!("note: {note}"));
     }
     if is_by_run {
-        let between = "the flight is straight between samples".to_owned();
-        plan.assumes = Some(plan.assumes.map_or(between.clone(), |of| format!("{between} and {of}")));
+        facts.insert(0, Fact::new(FactKind::PlanMotion, Source::Default).about("the flight"));
     }
-    let mut report = report.with_plan(plan);
+    let mut report = report.with_plan(plan, facts);
     report.source.notes.extend(notes);
-    report.source.facts.extend(facts);
     (report, Some(figure))
 }
 
@@ -273,7 +268,7 @@ fn check_names(comparison: &PlanComparison, flight: &str, path: &Path) -> Result
     };
     let (flown, planned) = (listed(&flown), listed(&planned));
     let message = format!("{}: the vehicles of the plan are {planned}, those of {flight} are {flown}", path.display());
-    let help = "give the plan of these vehicles, with the same names, or select common vehicles with --ids";
+    let help = format!("give the plan of these vehicles, with the same names, or select common vehicles with {IDS}");
     Err(Failure::input("audit/plan-vehicles", message, help))
 }
 

@@ -12,12 +12,17 @@ use super::{AuditRequest, ConfigFile, ConfiguredAudit, Subject};
 use tautline_audit::Cylinder;
 use tautline_audit::envelope::{Limit, Quantity};
 use tautline_audit::recorded::Interpolation;
+use tautline_core::option::NO_CONFIG;
 use tautline_recordings::read::{ArrayAxis, Axes, Scale};
 
 /// Name of the file.
 const NAME: &str = "tautline.toml";
-const FILE: TomlFile = TomlFile { code: "audit/settings-file", help: HELP, most_bytes: 1 << 20 };
-const HELP: &str = "docs/ci.md lists the keys of [audit]; --no-config ignores the file";
+const FILE: TomlFile = TomlFile { code: "audit/settings-file", help, most_bytes: 1 << 20 };
+
+/// Returns the remedy for a wrong file.
+fn help() -> String {
+    format!("docs/ci.md lists the keys of [audit]; {NO_CONFIG} ignores the file")
+}
 
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -96,7 +101,7 @@ pub(super) fn configured(mut request: AuditRequest<'_>) -> Result<ConfiguredAudi
     if request.config == ConfigFile::Nearest
         && let Some(path) = found.as_ref().filter(|path| !path.is_file())
     {
-        return Err(Failure::input("audit/settings-file", format!("{} is not a file", path.display()), HELP));
+        return Err(Failure::input("audit/settings-file", format!("{} is not a file", path.display()), help()));
     }
     request.config = found.map_or(ConfigFile::None, ConfigFile::File);
     match request.config.clone() {
@@ -140,7 +145,7 @@ impl AuditTable {
     /// Fills options that the request leaves open. Relative paths start at the folder of `tautline.toml`.
     fn fill<'a>(self, mut request: AuditRequest<'a>, path: &Path) -> Result<ConfiguredAudit<'a>, Failure> {
         let wrong =
-            |message: String| Failure::input("audit/settings-file", format!("{}: {message}", path.display()), HELP);
+            |message: String| Failure::input("audit/settings-file", format!("{}: {message}", path.display()), help());
         let folder = path.parent().unwrap_or(Path::new(""));
         let is_silent = request.is_silent();
         let is_bounded = self.motion.is_some_and(|motion| motion == Interpolation::Bounded);

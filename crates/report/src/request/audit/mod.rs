@@ -27,14 +27,15 @@ use self::against_plan::AuditedFlight;
 use self::own::RunAnswer;
 use super::run::{figure_files, write_files};
 use super::{Failure, Monitor, outputs};
-use crate::figures::{self, Format as FigureFormat};
-use crate::report::recorded::{Basis, Clock, RecordedReport, Source};
+use crate::figures::{self, Figure, Format as FigureFormat};
+use crate::report::recorded::{Clock, RecordedReport, Source};
 use crate::report::{Status, write_atomically};
 use replays::Instants;
 use side_files::{ItemSpan, SideFiles};
 use tautline_audit::recorded::{ObjectPair, Outcome, PairSample, PairSeries, Presence, Settings, TrackAuditor};
 use tautline_audit::{Obstacle, Violation, are_decimals_apart};
 use tautline_core::fact::{Fact, FactKind, Source as FactSource};
+use tautline_core::option::{OBSTACLES, OFFSET};
 use tautline_core::track::{Item, Tracks};
 use tautline_recordings::read::ReadError;
 
@@ -118,90 +119,143 @@ impl ConfiguredAudit<'_> {
         self.request.check_outputs(more)
     }
 
-    /// Judges the recording.
+    /// Judges the recording: settles the question, reads and judges the motion, answers, and writes.
     ///
     /// # Errors
     /// As [`audit_files`].
     pub fn judge(&self, monitor: &dyn Monitor) -> Result<AuditedRecording, Failure> {
+        let settled = self.settle(monitor)?;
+        let mut judged = self.judge_motion(settled, monitor)?;
+        let (report, plan_figure) = self.answer(&mut judged, monitor)?;
+        // Print the verdict before writing files, so that a write error does not hide it.
+        monitor.say(&format!("{}\n{}", report.headline(), report.text()));
+        self.write(judged, &report, plan_figure, monitor)?;
+        Ok(AuditedRecording { report, allows_undecided: self.request.allow_undecided, asked_by: self.asked_by.clone() })
+    }
+
+    /// Completes the question: limits of the recording, rules, side files. Reads the first items.
+    fn settle(&self, monitor: &dyn Monitor) -> Result<Settled<'_>, Failure> {
         let request = &self.request;
         let mut settings = request.complete_settings()?;
         let (own, show) = request.subject.own(monitor)?;
-        let open: &Open<'_> = &|| request.subject.open();
         let own = if request.independent { own.map(OwnRecording::independent) } else { own };
-        let notes_on_rules = rules::fill(&mut settings, request, show.as_ref())?;
+        let mut notes = rules::fill(&mut settings, request, show.as_ref())?;
         let side_obstacles = settings.obstacles.len();
         let taken = RecordedLimits::fill(&mut settings, request, own.as_ref());
+        notes.extend(taken.notes(request, own.as_ref()));
         proof::check(request, &settings)?;
         against_plan::refuse_changed_positions(request)?;
-        let opening = Opening::read(open, monitor)?;
+        let opening = Opening::read(&|| request.subject.open(), monitor)?;
         let side_files = opening.align(&mut settings, side_obstacles)?;
-        let mut auditor = TrackAuditor::new(settings.clone())?;
+        Ok(Settled { settings, own, opening, side_files, notes })
+    }
+
+    /// Reads and judges all items, from the first ones on.
+    fn judge_motion(&self, settled: Settled<'_>, monitor: &dyn Monitor) -> Result<JudgedRecording, Failure> {
+        let request = &self.request;
+        let called = request.subject.name();
+        let Settled { settings, own, opening, side_files, notes: notes_on_question } = settled;
+        let mut auditor = TrackAuditor::new(settings.clone())?.with_interruption(monitor.interruption().clone());
         if request.html.is_some() {
             auditor = auditor.with_smallest();
         }
-        auditor = auditor.with_interruption(monitor.interruption().clone());
         let mut instants = request.html.as_ref().map(|_| Instants::default());
-        let JudgedRecording { mut outcome, clock, mut notes, mut facts, assumed, curves, is_planar, span } = self
-            .judged(opening, auditor, &settings, monitor, &mut |items, names| {
-                if let Some(instants) = &mut instants {
-                    instants.note(items, names, &settings);
-                }
-            })?;
+        let Opening { mut recording, mut items, mut more } = opening;
+        let is_planar = recording.is_planar();
+        let level = places::refuse_unknown(request, self.asked_by(), &settings, recording.as_ref())?;
+        request.refuse_guessed_seconds(&settings, recording.clock(), &items)?;
+        monitor.begin(&called, None);
+        let (mut curves, mut span) = (true, ItemSpan::default());
+        loop {
+            level.check(&called, recording.vehicles(), &items)?;
+            curves &= items.iter().all(|item| matches!(item, Item::Piece(_)));
+            span.add(&items);
+            auditor.push(recording.vehicles(), &items).map_err(|error| Failure::from(error).of(Path::new(&called)))?;
+            if let Some(instants) = &mut instants {
+                instants.note(&items, recording.vehicles(), &settings);
+            }
+            monitor.advance(items.len() as u64);
+            if !more {
+                break;
+            }
+            items.clear();
+            more = read_until(recording.as_mut(), &mut items, 1, monitor)?;
+        }
+        monitor.finish();
+        let clock = recording.clock();
+        let clock = Clock { unit: clock.unit.to_owned(), inferred: clock.inferred, epoch_ns: clock.epoch_ns };
+        let outcome = auditor.finish().map_err(|error| Failure::from(error).of(Path::new(&called)))?;
+        let mut facts = recording.facts().to_vec();
+        if clock.inferred && facts.iter().all(|fact| fact.kind != FactKind::TimeUnit) {
+            facts.push(Fact::name(FactKind::TimeUnit, FactSource::Inferred, &clock.unit));
+        }
+        let notes = recording.notes().to_vec();
         request.check_count(&outcome, &settings)?;
         side_files.check(&settings, &outcome)?;
         side_files::check_offsets(&settings, &outcome, span.length_s())?;
-        let answer = own.as_ref().map(|own| own.answer(&mut outcome, &settings, request, &mut notes));
-        let answer = answer.unwrap_or(RunAnswer::Samples);
-        let holds_every_step = own.as_ref().is_some_and(OwnRecording::holds_every_step);
-        let resting = side_files.assumed(&settings, &outcome);
-        facts.extend(side_files.facts(&settings, resting.as_deref()));
-        let assumed: Vec<_> = assumed.into_iter().chain(resting).collect();
-        let between = request.assumed_motion(curves, holds_every_step, &answer, &assumed);
-        notes.extend(notes_on_rules);
-        notes.extend(taken.notes(request, own.as_ref()));
-        notes.extend(notes_on_alone(&outcome));
-        notes.extend(self.asked_by.clone());
-        for note in &notes {
-            monitor.warn(&format!("note: {note}"));
-        }
-        facts.extend(request.facts(&between, &outcome, self.asked_by.as_deref()));
-        let source = Source { recording: request.subject.name(), clock, planar: is_planar, notes, facts };
+        facts.extend(side_files.facts(&settings, &outcome));
+        let source = Source { recording: called, clock, planar: is_planar, notes, facts };
+        Ok(JudgedRecording { settings, own, outcome, source, notes_on_question, curves, instants })
+    }
+
+    /// Answers the question: by the samples or by the run's own audit, against a plan, with an early end.
+    fn answer(
+        &self,
+        judged: &mut JudgedRecording,
+        monitor: &dyn Monitor,
+    ) -> Result<(RecordedReport, Option<Figure>), Failure> {
+        let request = &self.request;
+        let open: &Open<'_> = &|| request.subject.open();
+        let JudgedRecording { settings, own, outcome, source, notes_on_question, curves, .. } = judged;
+        let (settings, own) = (&*settings, own.as_ref());
+        let answer = own.map(|own| own.answer(outcome, settings, request, &mut source.notes));
+        let is_by_run = answer == Some(RunAnswer::Repeated);
+        let holds_every_step = own.is_some_and(OwnRecording::holds_every_step);
+        source.notes.append(notes_on_question);
+        source.notes.extend(notes_on_alone(outcome));
+        source.notes.extend(self.asked_by.clone());
+        tell(monitor, &source.notes);
+        source.facts.extend(request.facts((*curves, holds_every_step, is_by_run), outcome, self.asked_by()));
         let flight = AuditedFlight {
             open,
             name: request.subject.name(),
-            settings: &settings,
-            outcome: &outcome,
+            settings,
+            outcome,
             epoch_ns: source.clock.epoch_ns,
-            is_planar,
+            is_planar: source.planar,
         };
-        let tie = decimal_tie(open, &settings, &outcome, monitor)?;
+        let tie = decimal_tie(open, settings, outcome, monitor)?;
         let compared = request.plan.as_ref().map(|plan| against_plan::compare(plan, &flight, monitor)).transpose()?;
-        let early_end = own.as_ref().and_then(|own| own.early_end.clone());
-        // An early end of the flight does not affect a window that ends before it.
-        let is_beyond = |to_s: f64| outcome.span_s.is_none_or(|(_, end_s)| to_s > end_s);
-        let early_end = early_end.filter(|_| settings.to_s.is_none_or(is_beyond));
-        let is_by_run = between.basis == Basis::Run;
-        let report = RecordedReport::new(&outcome, &settings, source, between);
+        let report = RecordedReport::new(outcome, settings, source.clone());
         let (mut report, plan_figure) = against_plan::attach(report, compared, is_by_run, monitor);
-        if let RunAnswer::Undecided(why) = answer {
+        if let Some(RunAnswer::Undecided(why)) = answer {
             report.run_objection = Some(why);
         }
+        // An early end of the flight does not affect a window that ends before it.
+        let is_beyond = |to_s: f64| outcome.span_s.is_none_or(|(_, end_s)| to_s > end_s);
+        let early_end = own.and_then(|own| own.early_end.clone());
+        let early_end = early_end.filter(|_| settings.to_s.is_none_or(is_beyond));
         let mut report = early_end.into_iter().fold(report, RecordedReport::with_early_end);
-        if let Some(note) = tie {
-            monitor.warn(&format!("note: {note}"));
-            report.source.notes.push(note);
-            report.is_decimal_tie = true;
-        }
-        let shortened = report.shortened();
-        for note in &shortened {
-            monitor.warn(&format!("note: {note}"));
-        }
-        report.source.notes.extend(shortened);
+        report.is_decimal_tie = tie.is_some();
+        let late: Vec<_> = tie.into_iter().chain(report.shortened()).collect();
+        tell(monitor, &late);
+        report.source.notes.extend(late);
+        Ok((report, plan_figure))
+    }
 
-        // Print the verdict before writing files, so that a write error does not hide it.
-        monitor.say(&format!("{}\n{}", report.headline(), report.text()));
+    /// Writes the page, its figures and the proof that the request asks for.
+    fn write(
+        &self,
+        judged: JudgedRecording,
+        report: &RecordedReport,
+        plan_figure: Option<Figure>,
+        monitor: &dyn Monitor,
+    ) -> Result<(), Failure> {
+        let request = &self.request;
+        let open: &Open<'_> = &|| request.subject.open();
+        let JudgedRecording { settings, outcome, instants, .. } = judged;
         if let Some((html, instants)) = request.html.as_ref().zip(instants) {
-            let (replay, mut figures) = replays::of_recording(open, monitor, &settings, &outcome, &report, instants)?;
+            let (replay, mut figures) = replays::of_recording(open, monitor, &settings, &outcome, report, instants)?;
             figures.extend(plan_figure);
             write_atomically(html, report.to_html(&replay, &figures, &request.command).as_bytes())?;
             if !request.formats.is_empty() {
@@ -215,53 +269,28 @@ impl ConfiguredAudit<'_> {
             let recording = &report.source.recording;
             let judged = (&settings, &outcome, report.is_decimal_tie);
             let refused = proof::write(file, path, recording, judged, &report.source.clock)?;
-            if let Some(why) = refused {
-                monitor.warn(&format!("note: {why}"));
-            }
+            tell(monitor, refused.as_slice());
         }
-        Ok(AuditedRecording { report, allows_undecided: request.allow_undecided, asked_by: self.asked_by.clone() })
+        Ok(())
     }
+}
 
-    /// Reads and judges all items, from the first ones on.
-    fn judged(
-        &self,
-        opening: Opening<'_>,
-        mut auditor: TrackAuditor,
-        settings: &Settings,
-        monitor: &dyn Monitor,
-        note: &mut dyn FnMut(&[Item], &[String]),
-    ) -> Result<JudgedRecording, Failure> {
-        let called = self.request.subject.name();
-        let Opening { mut recording, mut items, mut more } = opening;
-        let is_planar = recording.is_planar();
-        let level = places::refuse_unknown(&self.request, self.asked_by(), settings, recording.as_ref())?;
-        self.request.refuse_guessed_seconds(settings, recording.clock(), &items)?;
-        monitor.begin(&called, None);
-        let (mut curves, mut span) = (true, ItemSpan::default());
-        loop {
-            level.check(&called, recording.vehicles(), &items)?;
-            curves &= items.iter().all(|item| matches!(item, Item::Piece(_)));
-            span.add(&items);
-            auditor.push(recording.vehicles(), &items).map_err(|error| Failure::from(error).of(Path::new(&called)))?;
-            note(&items, recording.vehicles());
-            monitor.advance(items.len() as u64);
-            if !more {
-                break;
-            }
-            items.clear();
-            more = read_until(recording.as_mut(), &mut items, 1, monitor)?;
-        }
-        monitor.finish();
-        let clock = recording.clock();
-        let clock = Clock { unit: clock.unit.to_owned(), inferred: clock.inferred, epoch_ns: clock.epoch_ns };
-        let outcome = auditor.finish().map_err(|error| Failure::from(error).of(Path::new(&called)))?;
-        let (notes, assumed) = (recording.notes().to_vec(), recording.assumed().map(str::to_owned));
-        let mut facts = recording.facts().to_vec();
-        if clock.inferred && facts.iter().all(|fact| fact.kind != FactKind::TimeUnit) {
-            facts.push(Fact::name(FactKind::TimeUnit, FactSource::Inferred, &clock.unit));
-        }
-        Ok(JudgedRecording { outcome, clock, notes, facts, assumed, curves, is_planar, span })
+/// Tells notes to the user.
+fn tell(monitor: &dyn Monitor, notes: &[String]) {
+    for note in notes {
+        monitor.warn(&format!("note: {note}"));
     }
+}
+
+/// A complete question, and the first items of the recording.
+struct Settled<'a> {
+    settings: Settings,
+    /// Limits, obstacles and audit of a flight of `tautline run`.
+    own: Option<OwnRecording>,
+    opening: Opening<'a>,
+    side_files: SideFiles,
+    /// Notes on the limits that rules and the recording add.
+    notes: Vec<String>,
 }
 
 /// A recording with its first items.
@@ -342,9 +371,9 @@ impl<'a> RecordedLimits<'a> {
         }));
         if self.obstacles.is_none() && own.is_some_and(|own| !own.obstacles.is_empty()) {
             let why = if request.obstacles.is_some() {
-                "--obstacles names others"
+                format!("{OBSTACLES} names others")
             } else {
-                "obstacles are not judged with ellipsoids or cylinders"
+                "obstacles are not judged with ellipsoids or cylinders".to_owned()
             };
             notes.push(format!("the obstacles of the recording are not judged: {why}"));
         }
@@ -402,25 +431,23 @@ fn notes_on_alone(outcome: &Outcome) -> impl Iterator<Item = String> {
         let name = outcome.name(vehicle);
         Some(format!(
             "{name}, present from {from_s:?} s to {to_s:?} s, is never present with another and is not judged \
-             (--offset {name}=SECONDS corrects a clock)"
+             ({} corrects a clock)",
+            OFFSET.set(format!("{name}=SECONDS"))
         ))
     })
 }
 
 /// A recording after its audit.
 struct JudgedRecording {
+    settings: Settings,
+    own: Option<OwnRecording>,
     outcome: Outcome,
-    clock: Clock,
-    notes: Vec<String>,
-    facts: Vec<Fact>,
-    /// Assumption about the samples themselves.
-    assumed: Option<String>,
+    source: Source,
+    notes_on_question: Vec<String>,
     /// Whether the recording has curves instead of samples.
     curves: bool,
-    /// Whether the height of a vehicle is unknown.
-    is_planar: bool,
-    /// Times of all items, without offsets.
-    span: ItemSpan,
+    /// Instants of the replay, if a page is asked for.
+    instants: Option<Instants>,
 }
 
 /// Returns the folder of the figures of a page.

@@ -6,13 +6,14 @@ use nalgebra::Vector3;
 
 use super::super::{Failure, Monitor};
 use super::AuditRequest;
-use crate::report::recorded::EarlyEnd;
+use crate::report::recorded::{EarlyEnd, RunObjection};
 use crate::report::{ObstacleApproach, Report};
 use tautline_audit::recorded::{Approach, ObjectPair, Outcome, Settings, TOUCHING_ELLIPSOIDS, VehicleSettings};
 use tautline_audit::{LISTED, Obstacle, ParryEvidence, Status, Tally, Violation};
+use tautline_core::option::{DELTA, INDEPENDENT};
 use tautline_core::record::Event;
 use tautline_core::swarm::Pair;
-use tautline_core::text::{at_least, counted, exact, seconds};
+use tautline_core::text::{counted, exact};
 use tautline_recordings::mcap::{Entry, RunAudit, RunFinding, StoredAudit};
 use tautline_recordings::read;
 use tautline_recordings::read::ReadOptions;
@@ -49,12 +50,12 @@ pub struct OwnRecording {
 }
 
 /// Use of the run's audit in the audit of its recording.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) enum RunAnswer {
     /// The verdict is that of the samples.
     Samples,
     /// The samples are clear, but the run's audit leaves the question undecided, for this reason.
-    Undecided(String),
+    Undecided(RunObjection),
     /// The verdict is that of the run's audit.
     Repeated,
 }
@@ -91,7 +92,7 @@ pub fn run_audit(scenario: &Scenario, report: &Report) -> RunAudit {
     let time = &scenario.time;
     RunAudit {
         status: report.audit.status.name().to_owned(),
-        ended_early: report.run.ended_early.clone().unwrap_or_default(),
+        ended_early: report.run.early_end().unwrap_or_default(),
         holds_every_step: scenario.has_engine() && report.run.refined_steps == 0 && time.samples() > time.steps(),
         limit_m,
         duration_s: report.run.duration_s,
@@ -154,7 +155,7 @@ impl OwnRecording {
             let why = why.lines().next().unwrap_or_default();
             let message =
                 format!("{} was flown by another tautline: its scenario cannot be read: {why}", path.display());
-            let help = "audit it with the tautline that flew it, or export it as CSV and give --delta";
+            let help = format!("audit it with the tautline that flew it, or export it as CSV and give {DELTA}");
             Failure::input("recording/foreign-scenario", message, help)
         })?;
         let mut own = Self::of(&scenario, header.delta_m, options.metres());
@@ -220,7 +221,7 @@ impl OwnRecording {
                 && audit.violations_count > 0
             {
                 let count = counted(audit.violations_count, "violation", "violations");
-                notes.push(format!("--independent leaves out the audit of the run, which found {count}"));
+                notes.push(format!("{INDEPENDENT} leaves out the audit of the run, which found {count}"));
             }
             return RunAnswer::Samples;
         }
@@ -279,9 +280,7 @@ impl OwnRecording {
                 notes.push(UNDECIDED_RUN.to_owned());
                 RunAnswer::Samples
             }
-            Status::Undecided => {
-                undecided(outcome, "the run's own audit of every step is undecided (see its report.json)".to_owned())
-            }
+            Status::Undecided => undecided(outcome, RunObjection::RunUndecided {}),
         }
     }
 
@@ -296,7 +295,7 @@ impl OwnRecording {
     /// Returns the reason why a clear answer of the samples is not certain: between samples the run found a pair closer
     /// than the request allows. Distances of another metric are compared by an upper bound. Motion that `--offset`
     /// shifts in time is not that of the run.
-    fn objection(&self, outcome: &Outcome, settings: &Settings, findings: &[&[RunFinding]]) -> Option<String> {
+    fn objection(&self, outcome: &Outcome, settings: &Settings, findings: &[&[RunFinding]]) -> Option<RunObjection> {
         if outcome.separation != Some(Status::Clear) {
             return None;
         }
@@ -340,8 +339,8 @@ impl OwnRecording {
                 obstacle => format!("obstacle {obstacle}"),
             };
             let unit = if self.ellipsoid_m.is_some() && found.obstacle == 0 { "half axes" } else { "m" };
-            let (min, at) = (at_least(found.min_m, 3), seconds(found.min_at_s));
-            format!("the run's audit of every step found {} and {other} {min} {unit} apart at {at}", found.vehicle)
+            let who = [found.vehicle.to_string(), other];
+            RunObjection::RunFoundCloser { who, min: found.min_m, unit, at_s: found.min_at_s }
         })
     }
 
@@ -419,7 +418,7 @@ fn run_finding(event: &Event, scenario: &Scenario) -> Option<RunFinding> {
 }
 
 /// Leaves the answer of the samples undecided, for a reason of the run's audit.
-fn undecided(outcome: &mut Outcome, why: String) -> RunAnswer {
+fn undecided(outcome: &mut Outcome, why: RunObjection) -> RunAnswer {
     outcome.status = outcome.status.and(Status::Undecided);
     outcome.separation = outcome.separation.map(|status| status.and(Status::Undecided));
     RunAnswer::Undecided(why)

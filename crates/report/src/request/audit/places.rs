@@ -5,6 +5,7 @@ use super::AuditRequest;
 use tautline_audit::Obstacle;
 use tautline_audit::envelope::Quantity;
 use tautline_audit::recorded::Settings;
+use tautline_core::option::{ABOVE, COLUMN, CYLINDER, FROM, IDS, ORIGIN, TO, WELL_CLEAR};
 use tautline_core::track::{Item, Tracks};
 use tautline_recordings::read::ReadError;
 
@@ -35,13 +36,13 @@ impl RequestedLimits<'_> {
     }
 
     fn above(&self) -> Option<String> {
-        self.settings.above_m.map(|_| "--above".to_owned())
+        self.settings.above_m.map(|_| ABOVE.to_string())
     }
 
     /// Returns the measure of separations that needs the vertical distance of two vehicles.
     fn vertical_distance(&self) -> Option<String> {
-        let cylinder = self.settings.cylinder.map(|_| "--cylinder".to_owned());
-        cylinder.or_else(|| self.settings.well_clear.map(|_| "--well-clear".to_owned()))
+        let cylinder = self.settings.cylinder.map(|_| CYLINDER.to_string());
+        cylinder.or_else(|| self.settings.well_clear.map(|_| WELL_CLEAR.to_string()))
     }
 
     fn obstacle(&self, is_asked: fn(&Obstacle) -> bool) -> Option<String> {
@@ -93,14 +94,14 @@ pub(super) fn refuse_unknown<'a>(
     let asked = RequestedLimits { settings };
     let of_heights = || {
         let asked = asked.of_heights().filter(|_| recording.is_planar())?;
-        let help = "name the column of the height with --column z=NAME, or remove the limit";
+        let help = format!("name the column of the height with {}, or remove the limit", COLUMN.set("z=NAME"));
         Some((format!("the heights of its vehicles are unknown, and {asked} needs them"), help))
     };
     let origin = recording.earth_origin();
     let of_places = || {
         let place = origin.filter(|origin| origin.is_inferred)?;
         let asked = asked.of_places()?;
-        let help = "give the origin with --origin LAT,LON,HEIGHT; a HEIGHT of 0 is the ellipsoid";
+        let help = format!("give the origin with {}; a HEIGHT of 0 is the ellipsoid", ORIGIN.set("LAT,LON,HEIGHT"));
         Some((format!("positions are relative to the first one, {place}, and {asked} depends on that"), help))
     };
     let Some((problem, help)) = of_heights().or_else(of_places) else {
@@ -132,10 +133,12 @@ impl HeightCheck<'_> {
             if drop_m > MOST_DROP_M && is_judged(name, sample.time_s) {
                 let (time_s, away_km) = (sample.time_s, away_m / 1000.0);
                 let message = format!(
-                    "{path}: {name} is {away_km:.1} km from --origin at {time_s:?} s, where level ground is \
+                    "{path}: {name} is {away_km:.1} km from {ORIGIN} at {time_s:?} s, where level ground is \
                      {drop_m:.1} m lower, and {asked} needs heights above the ground"
                 );
-                let help = "give an --origin within 3 km of all vehicles, or judge a part with --ids, --from and --to";
+                let help = format!(
+                    "give an {ORIGIN} within 3 km of all vehicles, or judge a part with {IDS}, {FROM} and {TO}"
+                );
                 return Err(Failure::input("audit/far-from-origin", message, help));
             }
         }

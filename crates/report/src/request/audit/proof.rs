@@ -17,6 +17,9 @@ use crate::report::recorded::Clock;
 use crate::report::write_atomically;
 use tautline_audit::Status;
 use tautline_audit::recorded::{Interpolation, Outcome, Settings};
+use tautline_core::option::{
+    ABOVE, CYLINDER, DELTA, ELLIPSOID, FENCE, FROM, IDS, LIMIT, MAX_GAP, OFFSET, PROOF, RADIUS, TO, WELL_CLEAR,
+};
 use tautline_recordings::read::{ColumnNames, ReadOptions, TimeUnit};
 
 /// Names of the time column that the checker accepts, and the unit that a name gives.
@@ -106,23 +109,26 @@ pub(super) fn check(request: &AuditRequest<'_>, settings: &Settings) -> Result<(
         return Ok(());
     }
     let no_proof = |what: &str, remedy: &str| {
-        Err(Failure::input("audit/no-proof", format!("--proof: no proof of {what}"), remedy))
+        Err(Failure::input("audit/no-proof", format!("{PROOF}: no proof of {what}"), remedy))
     };
     let is_other = [
-        (settings.delta_m.is_none(), "a limit that is not --delta"),
-        (settings.motion.is_some_and(|motion| motion != Interpolation::Linear), "a motion that is not linear"),
-        (settings.radius_m.is_some() || settings.vehicles.values().any(|of| of.radius_m.is_some()), "--radius"),
-        (settings.ellipsoid_m.is_some(), "--ellipsoid"),
-        (settings.cylinder.is_some(), "--cylinder"),
-        (settings.well_clear.is_some(), "--well-clear"),
-        (!settings.obstacles.is_empty(), "obstacles"),
-        (!settings.envelope.is_empty(), "--limit and --fence"),
-        (settings.above_m.is_some(), "--above"),
-        (settings.from_s.is_some() || settings.to_s.is_some(), "a part of a recording (--from, --to)"),
-        (settings.only.is_some(), "some of the vehicles (--ids)"),
+        (settings.delta_m.is_none(), format!("a limit that is not {DELTA}")),
+        (
+            settings.motion.is_some_and(|motion| motion != Interpolation::Linear),
+            "a motion that is not linear".to_owned(),
+        ),
+        (settings.radius_m.is_some() || settings.vehicles.values().any(|of| of.radius_m.is_some()), RADIUS.to_string()),
+        (settings.ellipsoid_m.is_some(), ELLIPSOID.to_string()),
+        (settings.cylinder.is_some(), CYLINDER.to_string()),
+        (settings.well_clear.is_some(), WELL_CLEAR.to_string()),
+        (!settings.obstacles.is_empty(), "obstacles".to_owned()),
+        (!settings.envelope.is_empty(), format!("{LIMIT} and {FENCE}")),
+        (settings.above_m.is_some(), ABOVE.to_string()),
+        (settings.from_s.is_some() || settings.to_s.is_some(), format!("a part of a recording ({FROM}, {TO})")),
+        (settings.only.is_some(), format!("some of the vehicles ({IDS})")),
     ];
     if let Some((_, what)) = is_other.iter().find(|(is_asked, _)| *is_asked) {
-        return no_proof(what, "ask for --delta alone, with --offset and --max-gap as needed");
+        return no_proof(what, &format!("ask for {DELTA} alone, with {OFFSET} and {MAX_GAP} as needed"));
     }
     let Some((path, options)) = request.subject.only_file() else {
         return no_proof("a recording that is not one file", EXPORT);

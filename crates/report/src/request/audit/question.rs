@@ -4,14 +4,16 @@ use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use super::super::{Failure, Monitor, outputs};
-use super::own::RunAnswer;
 use super::{
     ConfiguredAudit, Opening, PlanQuestion, RecordedLimits, Rules, Subject, config, recording_in, rules, venue_file,
 };
 use crate::figures::Format as FigureFormat;
-use crate::report::recorded::{AssumedMotion, Basis};
 use tautline_audit::recorded::{Interpolation, Outcome, RecordedError, Settings, TimedSetting, VehicleSettings};
-use tautline_core::fact::{Fact, FactKind, Source};
+use tautline_core::fact::{BOUNDED, CURVES, EVERY_STEP, Fact, FactKind, HELD, RUN_AUDIT, STRAIGHT, Source};
+use tautline_core::option::{
+    COLUMN, ELLIPSOID, EXPECT_VEHICLES, FENCE, FRAME, FROM, HTML, IDS, LIMIT, MAX_ACCEL, MOTION, OBSTACLES, PLAN,
+    PROOF, RADIUS, TIME_UNIT, TO,
+};
 use tautline_core::text::counted;
 use tautline_core::track::{Clock as TrackClock, Item};
 
@@ -108,14 +110,15 @@ impl<'a> AuditRequest<'a> {
     pub fn check_outputs(&self, more: &[outputs::NamedPath<'_>]) -> Result<(), Failure> {
         let Self { subject, obstacles, fence, plan, html, proof, .. } = self;
         let settings = config::file_of(self);
-        let mut inputs: Vec<_> = subject.paths().iter().map(|path| ("the recording", path.as_path())).collect();
-        inputs.extend(obstacles.as_deref().map(|path| ("the file of obstacles", path)));
-        inputs.extend(settings.as_deref().map(|path| ("the file of settings", path)));
-        inputs.extend(fence.as_deref().map(|path| ("the file of the fence", path)));
-        inputs.extend(plan.as_ref().map(|plan| ("the plan", plan.path.as_path())));
-        let own = [("--html", html), ("--proof", proof)];
-        let own = own.into_iter().filter_map(|(option, path)| Some((option, path.as_deref()?)));
-        outputs::check(&inputs, &more.iter().copied().chain(own).collect::<Vec<_>>())
+        let mut inputs: Vec<_> =
+            subject.paths().iter().map(|path| ("the recording".to_owned(), path.as_path())).collect();
+        inputs.extend(obstacles.as_deref().map(|path| ("the file of obstacles".to_owned(), path)));
+        inputs.extend(settings.as_deref().map(|path| ("the file of settings".to_owned(), path)));
+        inputs.extend(fence.as_deref().map(|path| ("the file of the fence".to_owned(), path)));
+        inputs.extend(plan.as_ref().map(|plan| ("the plan".to_owned(), plan.path.as_path())));
+        let own = [(HTML, html), (PROOF, proof)];
+        let own = own.into_iter().filter_map(|(option, path)| Some((option.to_string(), path.as_deref()?)));
+        outputs::check(&inputs, &more.iter().cloned().chain(own).collect::<Vec<_>>())
     }
 
     /// Returns whether a radius is given, for all vehicles or for one.
@@ -138,16 +141,17 @@ impl<'a> AuditRequest<'a> {
     /// Returns the settings with the obstacles and the fence of the files.
     pub(super) fn complete_settings(&self) -> Result<Settings, Failure> {
         if self.has_max_accel() && self.settings.motion != Some(Interpolation::Bounded) {
+            let bounded = MOTION.set("bounded");
             return Err(Failure::input(
                 "audit/unused-acceleration",
-                "--max-accel has no effect without --motion bounded",
-                "add --motion bounded, or leave --max-accel out",
+                format!("{MAX_ACCEL} has no effect without {bounded}"),
+                format!("add {bounded}, or leave {MAX_ACCEL} out"),
             ));
         }
         if self.settings.ellipsoid_m.is_some() && self.has_radius() {
             return Err(Failure::input(
                 "audit/radius-and-ellipsoid",
-                "--radius and --ellipsoid are both given",
+                format!("{RADIUS} and {ELLIPSOID} are both given"),
                 "an ellipsoid has its own size: leave one of them out",
             ));
         }
@@ -156,13 +160,13 @@ impl<'a> AuditRequest<'a> {
             return Err(RecordedError::WellClearMotion { motion: motion.name() }.into());
         }
         if self.settings.only.as_ref().is_some_and(BTreeSet::is_empty) {
-            let help = "name at least one vehicle, or leave --ids out to judge all";
-            return Err(Failure::input("audit/nothing-to-judge", "--ids names no vehicle", help));
+            let help = format!("name at least one vehicle, or leave {IDS} out to judge all");
+            return Err(Failure::input("audit/nothing-to-judge", format!("{IDS} names no vehicle"), help));
         }
         let limits = &self.settings.envelope.limits;
         for (k, limit) in limits.iter().enumerate() {
             if limits[..k].iter().any(|before| before.quantity == limit.quantity) {
-                let message = format!("--limit {} is given twice", limit.quantity.name());
+                let message = format!("{LIMIT}: {} is given twice", limit.quantity.name());
                 return Err(Failure::input("audit/limit-twice", message, "give each limit once"));
             }
         }
@@ -203,7 +207,7 @@ impl<'a> AuditRequest<'a> {
             return Err(Failure::input(
                 "audit/vehicle-count",
                 message,
-                "look for missing or additional vehicles, or give another --expect-vehicles",
+                format!("look for missing or additional vehicles, or give another {EXPECT_VEHICLES}"),
             ));
         }
         let asked =
@@ -212,12 +216,14 @@ impl<'a> AuditRequest<'a> {
         if asked < 2 && settings.obstacles.is_empty() && settings.envelope.is_empty() && !settings.has_plan {
             let message =
                 format!("{path}: {} to judge, but no second object", counted(asked as u64, "vehicle", "vehicles"));
-            let help = "judge two vehicles or more (--ids, --frame, --column id=NAME select them), or --obstacles, \
-                 --limit, --fence";
+            let help = format!(
+                "judge two vehicles or more ({IDS}, {FRAME}, {} select them), or {OBSTACLES}, {LIMIT}, {FENCE}",
+                COLUMN.set("id=NAME")
+            );
             return Err(Failure::input("audit/nothing-to-judge", message, help));
         }
         if judged == 0 && (self.settings.from_s.is_some() || self.settings.to_s.is_some()) {
-            let message = format!("{path}: no vehicle is present between --from and --to");
+            let message = format!("{path}: no vehicle is present between {FROM} and {TO}");
             return Err(Failure::input(
                 "audit/empty-window",
                 message,
@@ -242,7 +248,7 @@ impl<'a> AuditRequest<'a> {
         Err(Failure::input(
             "audit/guessed-time-unit",
             message,
-            format!("give --time-unit {unit}, or --time-unit {other}"),
+            format!("give {}, or {}", TIME_UNIT.set(unit), TIME_UNIT.set(other)),
         ))
     }
 
@@ -269,54 +275,45 @@ impl<'a> AuditRequest<'a> {
             proof: _,
         } = self;
         let in_words = |TimedSetting { option, of }: TimedSetting| match (option, of) {
-            ("obstacles", Some(name)) => format!("the path of the obstacle `{name}`"),
-            (option, Some(of)) => format!("--{option} {of}"),
-            (option, None) => format!("--{option}"),
+            (OBSTACLES, Some(name)) => format!("the path of the obstacle `{name}`"),
+            (MOTION, Some(motion)) => MOTION.set(motion).to_string(),
+            (option, Some(of)) => option.set(of).to_string(),
+            (option, None) => option.to_string(),
         };
-        let timed = for_drones.then(|| "export --to".to_owned()).into_iter();
-        let timed = timed.chain(plan.is_some().then(|| "--plan".to_owned()));
+        let timed = for_drones.then(|| "an export for drones".to_owned()).into_iter();
+        let timed = timed.chain(plan.is_some().then(|| PLAN.to_string()));
         timed.chain(settings.rests_on_seconds().into_iter().map(in_words)).collect()
     }
 
-    /// Returns the motion between samples, for a recording of curves or of `tautline run`. Nothing is proved under
-    /// further assumptions on the samples or on obstacles (`assumed`).
-    pub(super) fn assumed_motion(
-        &self,
-        curves: bool,
-        holds_every_step: bool,
-        answer: &RunAnswer,
-        assumed: &[String],
-    ) -> AssumedMotion {
-        let most = || {
-            let all = self.settings.max_accel_m_s2.map(|a| format!("{a:?} m/s^2"));
-            let by_name =
-                |(name, of): (&String, &VehicleSettings)| of.max_accel_m_s2.map(|a| format!("{a:?} m/s^2 for {name}"));
-            all.into_iter().chain(self.settings.vehicles.iter().filter_map(by_name)).collect::<Vec<_>>().join(", ")
-        };
-        let (motion, basis) = match self.settings.motion {
-            Some(Interpolation::Hold) => ("held between samples, jumps swept".to_owned(), Basis::Assumed),
-            Some(Interpolation::Bounded) => (format!("accelerations of at most {}", most()), Basis::Bounded),
-            _ if curves => ("on the recording's curves".to_owned(), Basis::Recorded),
-            _ if *answer == RunAnswer::Repeated => ("by the run's audit of every step".to_owned(), Basis::Run),
-            _ if holds_every_step => ("on every step of the run".to_owned(), Basis::Recorded),
-            _ => ("straight between samples".to_owned(), Basis::Assumed),
-        };
-        match assumed {
-            [] => AssumedMotion { motion, basis },
-            _ => AssumedMotion { motion: format!("{motion}, {}", assumed.join(", ")), basis: Basis::Assumed },
+    /// Returns the motion between samples, for a recording of curves or of `tautline run`, and its bounds.
+    fn motion(&self, curves: bool, holds_every_step: bool, is_by_run: bool) -> Vec<Fact> {
+        let motion = |source, name| Fact::name(FactKind::Motion, source, name);
+        let straight = if self.settings.motion.is_some() { Source::Declared } else { Source::Default };
+        let mut facts = vec![match self.settings.motion {
+            Some(Interpolation::Hold) => motion(Source::Declared, HELD),
+            Some(Interpolation::Bounded) => motion(Source::Declared, BOUNDED),
+            _ if curves => motion(Source::Recorded, CURVES),
+            _ if is_by_run => motion(Source::Proved, RUN_AUDIT),
+            _ if holds_every_step => motion(Source::Recorded, EVERY_STEP),
+            _ => motion(straight, STRAIGHT),
+        }];
+        if self.settings.motion == Some(Interpolation::Bounded) {
+            let bound = |most_m_s2| Fact::number(FactKind::Acceleration, Source::Declared, most_m_s2, "m/s^2");
+            facts.extend(self.settings.max_accel_m_s2.map(bound));
+            let of_vehicle = |(name, of): (&String, &VehicleSettings)| Some(bound(of.max_accel_m_s2?).about(name));
+            facts.extend(self.settings.vehicles.iter().filter_map(of_vehicle));
         }
+        facts
     }
 
     /// Returns the facts that come from the request: motion, exemptions, file of settings.
-    pub(super) fn facts(&self, between: &AssumedMotion, outcome: &Outcome, settings_file: Option<&str>) -> Vec<Fact> {
-        let declared = |is_declared: bool| if is_declared { Source::Declared } else { Source::Default };
-        let motion = match between.basis {
-            Basis::Recorded => Source::Recorded,
-            Basis::Run => Source::Proved,
-            Basis::Bounded => Source::Declared,
-            Basis::Assumed => declared(self.settings.motion.is_some()),
-        };
-        let mut facts = vec![Fact::name(FactKind::Motion, motion, &between.motion)];
+    pub(super) fn facts(
+        &self,
+        (curves, holds_every_step, is_by_run): (bool, bool, bool),
+        outcome: &Outcome,
+        settings_file: Option<&str>,
+    ) -> Vec<Fact> {
+        let mut facts = self.motion(curves, holds_every_step, is_by_run);
         if let Some((above_m, exempt)) = self.settings.above_m.zip(outcome.exempt) {
             facts.push(Fact::number(FactKind::GroundExemption, Source::Declared, above_m, "m"));
             facts.push(Fact::number(FactKind::GroundExemption, Source::Observed, exempt.pairs_s, "s"));

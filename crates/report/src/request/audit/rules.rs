@@ -8,6 +8,7 @@ use super::{AuditRequest, Failure};
 use tautline_audit::envelope::{Fence, Limit, Quantity};
 use tautline_audit::recorded::Settings;
 use tautline_audit::{Cylinder, WellClear};
+use tautline_core::option::{DELTA, FENCE, LIMIT, RULES};
 use tautline_recordings::read::{ShowPolygon, ShowRules};
 
 /// Half axes of ellipsoids by their names \[m\].
@@ -156,10 +157,11 @@ pub(super) fn fill(
     );
     settings.envelope.limits.extend(limits);
     if !taken.is_empty() {
-        notes.push(format!("limits of {origin}: {} (--rules none ignores them)", taken.join(", ")));
+        notes.push(format!("limits of {origin}: {} ({} ignores them)", taken.join(", "), RULES.set("none")));
     }
     if let Some(show) = show.filter(|show| !show.polygons.is_empty() && settings.envelope.fence.is_none()) {
-        settings.envelope.fence = Some(fence(show).map_err(|problem| unreadable(request, &problem, Some("--fence")))?);
+        settings.envelope.fence =
+            Some(fence(show).map_err(|problem| unreadable(request, &problem, Some(FENCE.to_string())))?);
         notes.push(format!("the fence is that of the show file, {} polygons", show.polygons.len()));
     }
     if !not_judged.is_empty() {
@@ -188,15 +190,15 @@ fn check(settings: &Settings, request: &AuditRequest<'_>, show: &ShowRules) -> R
             Some("maxYawRate") => &[Quantity::YawRate],
             _ => &[],
         };
-        let named = quantities.iter().map(|quantity| format!("--limit {}=NUMBER", quantity.name()));
+        let named = quantities.iter().map(|quantity| LIMIT.set(format!("{}=NUMBER", quantity.name())).to_string());
         let (is_replaced, option) = match &**key {
-            "validation.minDistance" => (!request.is_silent(), Some("--delta".to_owned())),
-            "geofence" => (settings.envelope.fence.is_some(), Some("--fence".to_owned())),
+            "validation.minDistance" => (!request.is_silent(), Some(DELTA.to_string())),
+            "geofence" => (settings.envelope.fence.is_some(), Some(FENCE.to_string())),
             _ if quantities.is_empty() => (false, None),
             _ => (quantities.iter().all(|of| is_limited(*of)), Some(named.collect::<Vec<_>>().join(" and "))),
         };
         if !is_replaced {
-            return Err(unreadable(request, problem, option.as_deref()));
+            return Err(unreadable(request, problem, option));
         }
     }
     let is_yaw_limited_by_rules = match request.rules {
@@ -207,7 +209,8 @@ fn check(settings: &Settings, request: &AuditRequest<'_>, show: &ShowRules) -> R
     match show.unreadable_yaw.first() {
         Some(problem) if is_limited(Quantity::YawRate) => {
             let message = format!("{}: {problem}", request.subject.name());
-            Err(Failure::input("recording/malformed", message, "correct the show, or leave --limit yaw-rate out"))
+            let help = format!("correct the show, or leave {} out", LIMIT.set("yaw-rate=NUMBER"));
+            Err(Failure::input("recording/malformed", message, help))
         }
         Some(problem) if is_yaw_limited_by_rules => Err(unreadable(request, problem, None)),
         _ => Ok(()),
@@ -215,9 +218,9 @@ fn check(settings: &Settings, request: &AuditRequest<'_>, show: &ShowRules) -> R
 }
 
 /// Returns the failure for a rule that cannot be read. `option` replaces the rule.
-fn unreadable(request: &AuditRequest<'_>, problem: &str, option: Option<&str>) -> Failure {
+fn unreadable(request: &AuditRequest<'_>, problem: &str, option: Option<String>) -> Failure {
     let option = option.map_or(String::new(), |option| format!("replace the rule with {option}, or "));
-    let help = format!("correct the show, or {option}ignore all rules with --rules none");
+    let help = format!("correct the show, or {option}ignore all rules with {}", RULES.set("none"));
     Failure::input("recording/malformed", format!("{}: {problem}", request.subject.name()), help)
 }
 

@@ -5,7 +5,8 @@ use super::super::Failure;
 use tautline_audit::Obstacle;
 use tautline_audit::recorded::{Outcome, Settings};
 use tautline_core::fact::{Fact, FactKind, Source};
-use tautline_core::text::{counted, seconds};
+use tautline_core::option::OFFSET;
+use tautline_core::text::seconds;
 use tautline_core::track::Item;
 
 /// Clock of the path of an obstacle.
@@ -98,27 +99,22 @@ impl SideFiles {
         Ok(())
     }
 
-    /// Returns the assumption that obstacles stand still outside their paths, if the judged window goes beyond them.
-    pub(super) fn assumed(&self, settings: &Settings, outcome: &Outcome) -> Option<String> {
-        let [from_s, to_s] = window_s(settings, outcome)?;
+    /// Returns the assumptions that obstacles stand still outside their paths, if the judged window goes beyond them.
+    fn resting(&self, settings: &Settings, outcome: &Outcome) -> Vec<Fact> {
+        let Some([from_s, to_s]) = window_s(settings, outcome) else { return Vec::new() };
         let resting = settings.obstacles.iter().take(self.count).filter_map(|obstacle| {
             let [start_s, end_s] = span_s(obstacle)?;
             let (before, after) = (format!("before {}", seconds(start_s)), format!("after {}", seconds(end_s)));
             let when = [(start_s > from_s).then_some(before), (end_s < to_s).then_some(after)];
             let when = when.into_iter().flatten().collect::<Vec<_>>().join(" and ");
-            (!when.is_empty()).then(|| format!("the obstacle {} stands still {when}", obstacle.name))
+            let name = &obstacle.name;
+            (!when.is_empty()).then(|| Fact::name(FactKind::ObstacleMotion, Source::Convention, when).about(name))
         });
-        let resting: Vec<_> = resting.collect();
-        let (first, rest) = resting.split_first()?;
-        let others = match rest.len() {
-            0 => String::new(),
-            count => format!(" and {} outside the paths", counted(count as u64, "other", "others")),
-        };
-        Some(format!("{first}{others}"))
+        resting.collect()
     }
 
-    /// Returns the facts on the clocks of side files, and on clocks that the user corrects.
-    pub(super) fn facts(&self, settings: &Settings, assumed: Option<&str>) -> Vec<Fact> {
+    /// Returns the facts on the clocks of side files, on clocks that the user corrects, and on obstacles at rest.
+    pub(super) fn facts(&self, settings: &Settings, outcome: &Outcome) -> Vec<Fact> {
         let of_clock = |clock: PathClock, source: Source| {
             let is_given = self.clocks.contains(&Some(clock));
             is_given.then(|| Fact::name(FactKind::SideFileClock, source, clock.name()))
@@ -128,9 +124,8 @@ impl SideFiles {
             of_clock(PathClock::Report, Source::Convention),
             of_clock(PathClock::Recording, Source::Deduced),
             has_offset.then(|| Fact::name(FactKind::SideFileClock, Source::Declared, "offsets of vehicles")),
-            assumed.map(|assumed| Fact::name(FactKind::ObstacleMotion, Source::Convention, assumed)),
         ];
-        facts.into_iter().flatten().collect()
+        facts.into_iter().flatten().chain(self.resting(settings, outcome)).collect()
     }
 }
 
@@ -146,7 +141,7 @@ pub(super) fn check_offsets(settings: &Settings, outcome: &Outcome, span_s: f64)
         } else {
             continue;
         };
-        let message = format!("--offset {name}={offset_s:?}: the offset is {problem}");
+        let message = format!("{}: the offset is {problem}", OFFSET.set(format!("{name}={offset_s:?}")));
         let help = "give the seconds that are added to the times of the vehicle";
         return Err(Failure::input("audit/side-file-clock", message, help));
     }

@@ -13,7 +13,7 @@ pub(super) struct TomlFile {
     /// Error code of a wrong file.
     pub(super) code: &'static str,
     /// Remedy for a wrong file.
-    pub(super) help: &'static str,
+    pub(super) help: fn() -> String,
     /// Largest file that is read \[bytes\].
     pub(super) most_bytes: u64,
 }
@@ -22,7 +22,7 @@ impl TomlFile {
     /// Returns the text of a file. Rejects files above the size limit, and endless ones such as a device.
     pub(super) fn read(&self, path: &Path) -> Result<String, Failure> {
         let cannot = |error: std::io::Error| {
-            let help = if error.kind() == ErrorKind::NotFound { "check the path" } else { self.help };
+            let help = if error.kind() == ErrorKind::NotFound { "check the path".to_owned() } else { (self.help)() };
             let message = format!("{}: cannot read the file: {error}", path.display());
             Failure::input("files/cannot-read", message, help)
         };
@@ -32,7 +32,7 @@ impl TomlFile {
         if text.len() as u64 > self.most_bytes {
             let most = self.most_bytes;
             let message = format!("{} has more than the {most} bytes that are read of such a file", path.display());
-            return Err(Failure::input("files/too-large", message, self.help));
+            return Err(Failure::input("files/too-large", message, (self.help)()));
         }
         Ok(text)
     }
@@ -48,6 +48,6 @@ impl TomlFile {
     /// Returns the failure for a problem at this byte of a text.
     pub(super) fn wrong(&self, text: &str, path: &Path, start: usize, message: &str) -> Failure {
         let line = 1 + text[..start.min(text.len())].matches('\n').count();
-        Failure::input(self.code, format!("{}, line {line}: {message}", path.display()), self.help)
+        Failure::input(self.code, format!("{}, line {line}: {message}", path.display()), (self.help)())
     }
 }

@@ -13,8 +13,9 @@ use tautline_sim::sim;
 
 /// Largest size of a file \[bytes\].
 const MOST_BYTES: u64 = 64 << 20;
-const OBSTACLES: TomlFile = TomlFile { code: "audit/obstacle-file", help: OBSTACLE_HELP, most_bytes: MOST_BYTES };
-const FENCE: TomlFile = TomlFile { code: "audit/fence-file", help: FENCE_HELP, most_bytes: MOST_BYTES };
+const OBSTACLES: TomlFile =
+    TomlFile { code: "audit/obstacle-file", help: || OBSTACLE_HELP.to_owned(), most_bytes: MOST_BYTES };
+const FENCE: TomlFile = TomlFile { code: "audit/fence-file", help: || FENCE_HELP.to_owned(), most_bytes: MOST_BYTES };
 const FENCE_HELP: &str =
     "write [fence] with polygon_m = [[x, y], ...] in metres, and where needed height_m = [from, to] and margin_m";
 

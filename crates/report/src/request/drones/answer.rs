@@ -8,6 +8,7 @@ use super::super::Failure;
 use super::{DroneExportRequest, Flight};
 use crate::report::Status;
 use crate::report::recorded::RecordedReport;
+use tautline_core::option::{SAMPLE_HZ, TOLERANCE};
 use tautline_core::text::{at_least, at_most, counted, fixed};
 use tautline_recordings::export::drones::EncodedVehicle;
 use tautline_recordings::export::drones::motion::Deviation;
@@ -50,7 +51,7 @@ impl DroneExport {
     /// Adds a verdict on the written motion, whose times begin `start_s` after those of the flight. The worst one is
     /// kept.
     pub(super) fn add(&mut self, report: RecordedReport, start_s: f64) {
-        let closest = report.closest.iter().chain(&report.obstacles.closest);
+        let closest = report.closest.iter().chain(&report.closest_to_obstacles);
         let name = |label: &String| {
             self.vehicles.iter().find(|of| of.label == *label).map_or_else(|| label.clone(), |of| of.name.clone())
         };
@@ -65,7 +66,8 @@ impl DroneExport {
             let shift =
                 if start_s == 0.0 { String::new() } else { format!(", whose 0 s are {start_s:?} s of the flight") };
             let message = format!("the flight is clear, but not the written motion{shift}: {}", report.headline());
-            let help = "give a smaller --tolerance or a larger --sample-hz, or fly it with a larger separation";
+            let help =
+                format!("give a smaller {TOLERANCE} or a larger {SAMPLE_HZ}, or fly it with a larger separation");
             self.refusal = Some(Failure::input("export/violation", message, help));
         }
         if is_less || self.audit.is_none() {

@@ -19,6 +19,9 @@ use crate::report::Status;
 use crate::report::recorded::RecordedReport;
 use tautline_audit::envelope::{Limit, Quantity};
 use tautline_audit::recorded::Settings;
+use tautline_core::option::{
+    COLUMN, COMPRESSED, DELTA, DRONE_FORMAT, ELLIPSOID, FORCE, FROM, OBSTACLES, OUTPUT, SAMPLE_HZ, SKYB_VERSION, UNTIL,
+};
 use tautline_recordings::export::drones::{self, Dialect, DroneOptions, FlownVehicle};
 use tautline_recordings::read::ReadOptions;
 
@@ -103,7 +106,8 @@ pub fn export_drones(request: &DroneExportRequest, monitor: &dyn Monitor) -> Res
     }
     if flight.audit.status == Status::Violation {
         let message = format!("the flight itself is not clear: {}", flight.audit.headline());
-        let help = "fly it with a larger separation, or export a part without the violation by --from and --until";
+        let help =
+            format!("fly it with a larger separation, or export a part without the violation by {FROM} and {UNTIL}");
         let refusal = Some(Failure::input("export/violation", message, help));
         return Ok(DroneExport { span_s: flight.span_s, refusal, ..DroneExport::empty() });
     }
@@ -130,16 +134,17 @@ impl DroneExportRequest {
         let Self { drones, output, .. } = self;
         let dialect = drones.dialect;
         let unused = [
-            (drones.is_compressed && dialect != Dialect::Crazyflie, "--compressed", "crazyflie"),
-            (drones.skyb_version != 2 && dialect != Dialect::Skyb, "--skyb-version", "skyb"),
-            (drones.sample_hz.is_some() && !dialect.is_sampled(), "--sample-hz", "px4-show and vviz"),
+            (drones.is_compressed && dialect != Dialect::Crazyflie, COMPRESSED, "crazyflie", ""),
+            (drones.skyb_version != 2 && dialect != Dialect::Skyb, SKYB_VERSION, "skyb", ""),
+            (drones.sample_hz.is_some() && !dialect.is_sampled(), SAMPLE_HZ, "px4-show", " or vviz"),
         ];
-        if let Some((_, option, of)) = unused.into_iter().find(|(is_unused, ..)| *is_unused) {
-            let message = format!("{option}: has no effect with --to {}", dialect.name());
-            return Err(Failure::input("export/unused-option", message, format!("leave it out, or give --to {of}")));
+        if let Some((_, option, format, others)) = unused.into_iter().find(|(is_unused, ..)| *is_unused) {
+            let message = format!("{option}: has no effect with {}", DRONE_FORMAT.set(dialect.name()));
+            let help = format!("leave it out, or give {}{others}", DRONE_FORMAT.set(format));
+            return Err(Failure::input("export/unused-option", message, help));
         }
         if self.ellipsoid_m.is_some() && self.obstacles.is_some() {
-            let message = "--ellipsoid and --obstacles: must not both be given";
+            let message = format!("{ELLIPSOID} and {OBSTACLES}: must not both be given");
             return Err(Failure::input("export/unused-option", message, "leave one of them out"));
         }
         let replaceable = match fs::read_dir(output) {
@@ -152,25 +157,25 @@ impl DroneExportRequest {
             } else if self.force {
                 "give another folder: it holds other files than an export".to_owned()
             } else {
-                "overwrite it with --force, or give another path".to_owned()
+                format!("overwrite it with {FORCE}, or give another path")
             };
             return Err(Failure::input("files/exists", format!("`{}` exists", output.display()), help));
         }
         let parent = output.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
         if !parent.is_dir() {
-            let message = format!("--output: there is no folder {}", parent.display());
+            let message = format!("{OUTPUT}: there is no folder {}", parent.display());
             return Err(Failure::input("files/no-folder", message, "make this folder, or give another path"));
         }
-        let mut inputs: Vec<_> = self.paths.iter().map(|path| ("the recording", path.as_path())).collect();
-        inputs.extend(self.obstacles.as_deref().map(|path| ("the file of obstacles", path)));
+        let mut inputs: Vec<_> = self.paths.iter().map(|path| ("the recording".to_owned(), path.as_path())).collect();
+        inputs.extend(self.obstacles.as_deref().map(|path| ("the file of obstacles".to_owned(), path)));
         let replaced = fs::canonicalize(output).ok();
         let is_within =
             |path: &Path| fs::canonicalize(path).ok().zip(replaced.as_ref()).is_some_and(|(a, b)| a.starts_with(b));
         if let Some((called, path)) = inputs.iter().find(|(_, path)| is_within(path)) {
-            let message = format!("--output {} would overwrite {called}, {}", output.display(), path.display());
+            let message = format!("{OUTPUT} {} would overwrite {called}, {}", output.display(), path.display());
             return Err(Failure::input("files/overwrites-input", message, "give another path"));
         }
-        outputs::check(&inputs, &[("--output", output)])
+        outputs::check(&inputs, &[(OUTPUT.to_string(), output)])
     }
 
     /// Returns the request for the audit of the flight.
@@ -189,7 +194,7 @@ impl DroneExportRequest {
 
     /// Checks the window before anything is read.
     fn check_window(&self) -> Result<(), Failure> {
-        for (option, given) in [("--from", self.from_s), ("--until", self.until_s)] {
+        for (option, given) in [(FROM, self.from_s), (UNTIL, self.until_s)] {
             if let Some(given) = given.filter(|given| !given.is_finite()) {
                 let message = format!("{option}: must be a finite number of seconds, got {given:?}");
                 return Err(Failure::input("export/window", message, format!("give {option} a time such as 2.5")));
@@ -197,8 +202,8 @@ impl DroneExportRequest {
         }
         match (self.from_s, self.until_s) {
             (Some(from_s), Some(until_s)) if until_s <= from_s => {
-                let message = format!("--until: must be after --from, got {until_s:?} s and {from_s:?} s");
-                Err(Failure::input("export/window", message, "give a larger --until or a smaller --from"))
+                let message = format!("{UNTIL}: must be after {FROM}, got {until_s:?} s and {from_s:?} s");
+                Err(Failure::input("export/window", message, format!("give a larger {UNTIL} or a smaller {FROM}")))
             }
             _ => Ok(()),
         }
@@ -221,7 +226,8 @@ impl DroneExportRequest {
             };
             let message = format!("vehicle {}: it {seen}", absent.vehicle);
             let help = if is_seen && from_s < to_s {
-                format!("export the part in which all vehicles are present: --from {from_s:?} --until {to_s:?}")
+                let [from, until] = [FROM.set(format!("{from_s:?}")), UNTIL.set(format!("{to_s:?}"))];
+                format!("export the part in which all vehicles are present: {from} {until}")
             } else {
                 let part = if is_window { ", or export a part in which all vehicles are present" } else { "" };
                 format!("leave the vehicle out of the recording{part}")
@@ -232,7 +238,7 @@ impl DroneExportRequest {
             let (from_s, to_s) = (gap.finding.from_s, gap.finding.to_s);
             let message =
                 format!("vehicle {}: its motion from {from_s:?} s to {to_s:?} s is unknown, a gap", gap.vehicle);
-            let help = "export a part without the gap by --from and --until, or record all samples";
+            let help = format!("export a part without the gap by {FROM} and {UNTIL}, or record all samples");
             return Err(Failure::input("export/gap", message, help));
         }
         Ok(())
@@ -246,17 +252,21 @@ impl DroneExportRequest {
                 let first_s = spans().map(|span| span.0).fold(f64::INFINITY, f64::min);
                 let last_s = spans().map(|span| span.1).fold(f64::NEG_INFINITY, f64::max);
                 let (option, given) = match (self.from_s, self.until_s) {
-                    (Some(from_s), until_s) if until_s.is_none() || from_s > last_s => ("--from", from_s),
-                    (_, until_s) => ("--until", until_s.unwrap_or(last_s)),
+                    (Some(from_s), until_s) if until_s.is_none() || from_s > last_s => (FROM, from_s),
+                    (_, until_s) => (UNTIL, until_s.unwrap_or(last_s)),
                 };
                 let message = format!(
                     "{option}: no vehicle is present in the exported part, got {given:?} s; the recording has \
                      {first_s:?} s to {last_s:?} s"
                 );
-                return Failure::input("export/window", message, "give --from and --until within the recording");
+                return Failure::input(
+                    "export/window",
+                    message,
+                    format!("give {FROM} and {UNTIL} within the recording"),
+                );
             }
-            "audit/no-limit" => "give --delta or --ellipsoid",
-            "audit/obstacles-and-ellipsoid" => "give --delta, or leave --obstacles out",
+            "audit/no-limit" => format!("give {DELTA} or {ELLIPSOID}"),
+            "audit/obstacles-and-ellipsoid" => format!("give {DELTA}, or leave {OBSTACLES} out"),
             _ => return failure,
         };
         failure.with_help(help)
@@ -297,7 +307,7 @@ impl Flight {
             let mut recording = audit.subject.open()?;
             if recording.is_planar() {
                 let message = format!("{}: no heights are known", audit.subject.name());
-                let help = "name the column of the height with --column z=NAME";
+                let help = format!("name the column of the height with {}", COLUMN.set("z=NAME"));
                 return Err(Failure::input("export/no-heights", message, help));
             }
             drones::motions(recording.as_mut(), false)?
@@ -321,7 +331,8 @@ impl Flight {
         let until_s = spans.iter().map(|span| span.1).fold(request.until_s.unwrap_or(f64::INFINITY), f64::min);
         if until_s <= from_s {
             let message = format!("the exported part from {from_s:?} s to {until_s:?} s is empty");
-            return Err(Failure::input("export/absent", message, "give --from and --until within the recording"));
+            let help = format!("give {FROM} and {UNTIL} within the recording");
+            return Err(Failure::input("export/absent", message, help));
         }
         for vehicle in &mut vehicles {
             vehicle.motion = vehicle.motion.window(from_s, until_s);

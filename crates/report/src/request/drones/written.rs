@@ -12,6 +12,7 @@ use super::super::{Failure, Monitor, Quiet};
 use super::{DroneExport, Flight};
 use crate::report::{ArtefactError, write_atomically};
 use tautline_audit::recorded::{Interpolation, Settings};
+use tautline_core::option::{OUTPUT, TOLERANCE};
 use tautline_core::track::Tracks;
 use tautline_recordings::export::drones::motion::Motion;
 use tautline_recordings::export::drones::{self, Dialect, DroneOptions, Encoded, deviation_with_rests};
@@ -30,7 +31,7 @@ pub(super) struct Written<'a> {
 impl<'a> Written<'a> {
     pub(super) fn new(output: &'a Path, options: &DroneOptions, encoded: &Encoded) -> Result<Self, Failure> {
         let name = output.file_name().ok_or_else(|| {
-            let message = format!("--output: {} has no name", output.display());
+            let message = format!("{OUTPUT}: {} has no name", output.display());
             Failure::input("files/no-folder", message, "give the path of a file or folder")
         })?;
         // Several machines may write into one folder, so the number of the process is not enough.
@@ -89,7 +90,7 @@ impl<'a> Written<'a> {
             && options.tolerance_m.is_some_and(|tolerance_m| found.bound_m > tolerance_m)
         {
             let message = format!("vehicle {vehicle}: the written file is {:?} m from the flight", found.bound_m);
-            return Err(Failure::input("export/too-fast", message, "give a larger --tolerance"));
+            return Err(Failure::input("export/too-fast", message, format!("give a larger {TOLERANCE}")));
         }
         let mut answer = DroneExport {
             vehicles: encoded.vehicles,
