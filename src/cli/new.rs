@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::Exit;
 use super::console::Console;
-use tautline_report::report::write_atomically;
+use tautline_core::files::write_atomically;
 use tautline_report::request::{Failure, command_line};
 use tautline_sim::scenario::builtin;
 

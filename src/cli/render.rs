@@ -10,11 +10,11 @@ use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 use super::console::{Console, Terminal};
 use super::reading::{self, ReadArguments};
 use super::{Exit, completions, drawing};
+use tautline_core::files::{write_atomically, write_atomically_with};
 use tautline_render::{
     CameraSpec, Colouring, Extent, Film, FilmFormat, Picture, RenderError, Renderer, Scene, Theme, Timeline, View,
     contact_sheet,
 };
-use tautline_report::report::{write_atomically, write_atomically_with};
 use tautline_report::request::audit::recording_in;
 use tautline_report::request::outputs::{self, NamedPath};
 use tautline_report::request::{Failure, Monitor as _, try_to_write_in};

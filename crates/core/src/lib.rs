@@ -8,6 +8,8 @@
 //! | [`fact`] | facts that a statement rests on, with their sources |
 //! | [`option`] | options that messages name |
 //! | [`text`] | formatting of numbers |
+//! | [`failure`], [`monitor`] | errors of requests, and their interface to a caller |
+//! | [`files`] | atomic writes |
 //! | [`half_spaces`] | the point nearest to a wish in half-spaces and a ball, for laws and the shield |
 //!
 //! SI units; each name ends with its unit (`clearance_m`). One inertial frame, z up. Vehicles count from 0 in code and
@@ -16,7 +18,10 @@
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
 pub mod fact;
+pub mod failure;
+pub mod files;
 pub mod half_spaces;
+pub mod monitor;
 pub mod option;
 pub mod record;
 pub mod swarm;

@@ -2,9 +2,9 @@
 
 use std::borrow::Cow;
 
+use tautline_core::failure::Failure;
 use tautline_core::option::{ADAPTER, FPS, SIZE};
 use tautline_core::record::RecordError;
-use tautline_report::request::Failure;
 
 /// Largest coordinate and radius that can be drawn \[m\]: more than twice the distance of the Moon. Pictures use single
 /// precision, in which fourth powers of lengths must not overflow.

@@ -7,12 +7,14 @@ use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
 use crate::scene::metres;
 use crate::{Extent, FoxgloveScene, Picture, RenderError, Renderer, Scene, Theme, Timeline, View, data_uri};
+use tautline_core::failure::Failure;
+use tautline_core::monitor::Monitor;
 use tautline_core::record::Event;
 use tautline_core::swarm::Pair;
 use tautline_recordings::mcap::ExtraTopic;
 use tautline_report::flight_log::{FlightLog, PICTURED};
 use tautline_report::report::{Report, page};
-use tautline_report::request::{Failure, Monitor, NamedPicture, PICTURES_BYTES, Pictures, write_files};
+use tautline_report::request::{NamedPicture, PICTURES_BYTES, Pictures, write_files};
 use tautline_sim::scenario::Scenario;
 
 /// Size of the pictures of a run \[pixels\]. A page shows them at less than half of it.

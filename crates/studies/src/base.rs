@@ -5,9 +5,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::flight::{FlightSummary, Outcome};
 use crate::{MOST_RUNS, SEEDS};
+use tautline_core::failure::{Failure, in_range};
 use tautline_core::option::{RUNS, SEED};
 use tautline_core::text::metres;
-use tautline_report::request::{Failure, ScenarioRequest, in_range};
+use tautline_report::request::ScenarioRequest;
 use tautline_sim::scenario::{ExternalLaw, Override, Scenario, ScenarioError, Source, Template, takes_integers_only};
 
 /// Jitter of a start without randomness along each axis, as a part of delta.

@@ -6,8 +6,9 @@ use std::thread;
 
 use crate::THREADS;
 use crate::flight::{FlightSummary, fly};
+use tautline_core::failure::{Failure, in_range};
+use tautline_core::monitor::Monitor;
 use tautline_core::option;
-use tautline_report::request::{Failure, Monitor, in_range};
 use tautline_sim::scenario::{ExternalLaw, Scenario};
 use tautline_sim::sim::SimError;
 
@@ -169,7 +170,7 @@ impl<'a> Batch<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use tautline_report::request::Silent;
+    use tautline_core::monitor::Silent;
 
     #[test]
     fn results_come_in_order_once_each_for_any_number_of_threads() {

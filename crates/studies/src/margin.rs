@@ -10,11 +10,12 @@ use crate::flight::{FlightSample, FlightSummary};
 use crate::statistics::{CONFIDENCE, Proportion};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
+use tautline_core::failure::{Failure, in_range};
 use tautline_core::option::{self, KEY, LOG, MARGIN_FROM, MARGIN_TO, RUNS, SCAN, SEED, VERDICT};
 use tautline_core::text::{counted, shortest, significant};
 use tautline_report::figures::{Separation, Share, margin as figure, separations, verdicts};
 use tautline_report::report::page::{Badge, Tone};
-use tautline_report::request::{Failure, ScenarioRequest, in_range};
+use tautline_report::request::ScenarioRequest;
 use tautline_sim::preflight::{Bound, ContactState, PredictedMargin, Preflight};
 use tautline_sim::scenario::Scenario;
 

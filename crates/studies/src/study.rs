@@ -11,12 +11,14 @@ use serde::Serialize;
 use crate::base::BaseScenario;
 use crate::batch::Batch;
 use crate::table::Table;
+use tautline_core::failure::Failure;
+use tautline_core::monitor::Monitor;
 use tautline_core::option::{CSV, FORCE, HTML, JSON, LATEX};
 use tautline_report::figures::Figure;
 use tautline_report::report::page::{self, Badge, Markup, Page};
 use tautline_report::report::{ScenarioIdentity, Tool};
 use tautline_report::request::outputs::{self, NamedPath, is_standard_output, write};
-use tautline_report::request::{Failure, Monitor, Pictures, ScenarioRequest};
+use tautline_report::request::{Pictures, ScenarioRequest};
 use tautline_sim::scenario::{ExternalLaw, Scenario};
 
 /// Version of the keys of every JSON file of this crate. It rises if a key is renamed, removed or changes its meaning.

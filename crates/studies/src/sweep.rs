@@ -11,11 +11,12 @@ use crate::flight::{FlightSample, FlightSummary, Outcome};
 use crate::statistics::{CONFIDENCE, Estimate, Proportion};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
+use tautline_core::failure::Failure;
 use tautline_core::option::{RUNS, SEED, SET, SWEEP_KEY, VERDICT};
 use tautline_core::text::{beside_limit, counted, shortest};
 use tautline_report::figures::{Figure, GridAxis, Separation, Share, heat_map, separations, shares};
 use tautline_report::report::page::{Badge, Tone};
-use tautline_report::request::{Failure, ScenarioRequest};
+use tautline_report::request::ScenarioRequest;
 use tautline_sim::sim::SimError;
 
 /// Most points of a grid.

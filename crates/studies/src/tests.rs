@@ -5,7 +5,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 use crate::base::BaseScenario;
 use crate::batch::Batch;
-use tautline_report::request::{Monitor, Silent};
+use tautline_core::monitor::{Monitor, Silent};
 use tautline_sim::scenario::{Override, Source};
 
 /// Scenario of two vehicles that approach each other.

@@ -3,7 +3,9 @@
 use std::fs;
 use std::sync::atomic::Ordering;
 
-use tautline_report::request::{Failure, Monitor, ScenarioRequest, Silent};
+use tautline_core::failure::Failure;
+use tautline_core::monitor::{Monitor, Silent};
+use tautline_report::request::ScenarioRequest;
 use tautline_studies::campaign::{CampaignRequest, campaign};
 use tautline_studies::{Experiment, StudyFiles, StudyRequest, answer, attack, compare, margin, sweep};
 

@@ -32,10 +32,12 @@ use std::time::Instant;
 use rayon::prelude::*;
 
 use claim::{ClaimsResult, MeasureError, Progress};
+use tautline_core::failure::{Failure, in_range};
+use tautline_core::files::write_atomically;
+use tautline_core::monitor::Monitor;
 use tautline_core::option::THREADS;
 use tautline_report::figures::Format;
-use tautline_report::report::write_atomically;
-use tautline_report::request::{Failure, Monitor, OutFolder, figure_files, in_range, threads, write_files};
+use tautline_report::request::{OutFolder, figure_files, threads, write_files};
 
 /// Group of claims: name, subject, units of work, and measurement.
 type Part = (&'static str, &'static str, u64, fn(&Progress<'_>) -> ClaimsResult);

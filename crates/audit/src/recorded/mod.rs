@@ -40,6 +40,7 @@
 //! ```
 
 mod auditor;
+mod failure;
 mod outcome;
 mod plan;
 mod second_pass;

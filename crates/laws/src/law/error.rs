@@ -3,6 +3,7 @@
 use crate::formation::Formation;
 use crate::graph::Graph;
 use crate::space::{Metric, Obstacle};
+use tautline_core::failure::Failure;
 use tautline_core::swarm::{Pair, Swarm, first_row_not_finite, row};
 use tautline_core::text::{beside_limit, exact};
 
@@ -246,5 +247,11 @@ impl ParameterError {
             Some(&(name, value)) => Err(Self::NotFinite { name, value }),
             None => Ok(()),
         }
+    }
+}
+
+impl From<ParameterError> for Failure {
+    fn from(error: ParameterError) -> Self {
+        Self::new("law/parameter", false, error.to_string())
     }
 }

@@ -5,7 +5,6 @@ use std::path::Path;
 use serde::{Serialize, Serializer};
 
 use super::answer::{Answer, Detectors, Enclosure, Finding, FindingList, Judgement, Part, Question};
-use super::artefact::{ArtefactError, write_atomically};
 use super::hulls::Hulls;
 use super::legs::LegNumbers;
 use super::obstacles::{ObstacleApproach, Obstacles};
@@ -14,6 +13,7 @@ use super::verdict::{Reason, UnmetCriterion, Verdict, at_rest, energy_rises};
 use super::words::early_end;
 use tautline_audit::{self as audit, Status};
 use tautline_core::fact::{CHORDS, EVERY_STEP, Fact, FactKind, Source, serialize_coded};
+use tautline_core::files::{FileError, write_atomically};
 use tautline_core::record::{DeadlockRecovery, Reassignment};
 use tautline_core::swarm::{ClosestApproach, Pair};
 use tautline_laws::law::{Certificate, VoidReason};
@@ -652,9 +652,9 @@ impl Report {
     /// Writes the report as JSON to `path` atomically.
     ///
     /// # Errors
-    /// [`ArtefactError`] if the file cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), ArtefactError> {
-        let json = self.to_json().map_err(|error| ArtefactError::new(path, error.into()))?;
+    /// [`FileError`] if the file cannot be written.
+    pub fn write(&self, path: &Path) -> Result<(), FileError> {
+        let json = self.to_json().map_err(|error| FileError::new(path, error.into()))?;
         write_atomically(path, json.as_bytes())
     }
 }

@@ -5,7 +5,6 @@
 //! Units are in the names, and vehicles are numbered from 1. Numbers that do not apply or are not finite are null.
 
 mod answer;
-mod artefact;
 mod flight;
 mod html;
 mod hulls;
@@ -20,7 +19,6 @@ mod verdict;
 mod words;
 
 pub use answer::{Answer, Detectors, Enclosure, Finding, FindingList, Judgement, Part, Question};
-pub use artefact::{ArtefactError, write_atomically, write_atomically_with, write_beside};
 pub use flight::{
     Audit, ClosedForm, Control, Ellipsoid, Energy, FailedVehicle, FlightResult, FormationNumbers, Parry, Performance,
     Rapier, Report, Run, SCHEMA_VERSION, ScenarioIdentity, Separation, Tool, VehicleNumbers, Velocity, Verification,

@@ -7,8 +7,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::audit::{open, own_recording, recording_in};
 use super::{Failure, Monitor, outputs};
-use crate::report::write_atomically_with;
 use tautline_core::fact::Fact;
+use tautline_core::files::write_atomically_with;
 use tautline_core::option::{EXPORT_FORMAT, FORCE, OUTPUT, TIME_UNIT};
 use tautline_core::text::counted;
 use tautline_core::track::{Item, Metadata, Tracks};

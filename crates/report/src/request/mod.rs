@@ -15,22 +15,22 @@
 pub mod audit;
 mod drones;
 mod export;
-mod failure;
 mod identify;
-mod monitor;
 pub mod outputs;
+mod pictures;
 mod run;
 mod scenario;
 
 pub use audit::{AuditRequest, AuditedRecording, ConfigFile, OwnRecording, Subject, audit_files, run_audit};
 pub use drones::{DroneChoices, DroneExport, DroneExportRequest, export_drones};
 pub use export::{ExportRequest, export_file};
-pub use failure::{Failure, blanked, in_range};
 pub use identify::{IdentifiedModel, identify};
-pub use monitor::{Monitor, NamedPicture, PICTURES_BYTES, Pictures, Quiet, Silent};
 pub use outputs::{OutFolder, try_to_write_in};
+pub use pictures::{NamedPicture, PICTURES_BYTES, Pictures};
 pub use run::{
     RECORDING, RunFiles, RunRequest, figure_files, flight_page, replay_of_run, run_into, threads, write_files,
 };
 pub use scenario::{ScenarioRequest, command_line};
+pub use tautline_core::failure::{Failure, blanked, in_range};
+pub use tautline_core::monitor::{Monitor, Quiet, Silent};
 pub use tautline_recordings::read::ReadOptions;

@@ -11,7 +11,7 @@ use tautline_core::option::{FORCE, OUT};
 use tautline_sim::sim::Ending;
 
 use super::{Failure, Monitor};
-use crate::report::write_atomically;
+use tautline_core::files::write_atomically;
 
 /// Name that stands for standard output.
 const STANDARD_OUTPUT: &str = "-";

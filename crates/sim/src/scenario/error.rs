@@ -2,8 +2,8 @@
 
 use std::borrow::Cow;
 use std::fmt;
-use std::ops::Range;
 
+use tautline_core::failure::{Failure, LONGEST_LINE, Place};
 use tautline_core::text::with_short_numbers;
 
 /// Error of a scenario.
@@ -28,21 +28,6 @@ pub struct Field {
     pub entry: Option<usize>,
     /// Leg that has the key, from 0: the first is `[formation]`, the others are `[[leg]]`. 0 for keys outside legs.
     pub leg: usize,
-}
-
-/// Place of an error in a text.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Place {
-    /// Name of the text: a path, the name of a built-in scenario, or `set` for an override.
-    pub source: String,
-    /// The whole text.
-    pub text: String,
-    /// Offending bytes of the text.
-    pub span: Range<usize>,
-    /// Line of the first offending byte, from 1.
-    pub line: usize,
-    /// Column of the first offending byte, from 1, in characters.
-    pub column: usize,
 }
 
 impl ScenarioError {
@@ -181,29 +166,6 @@ impl fmt::Display for Field {
     }
 }
 
-impl Place {
-    /// Returns the place of a span of bytes in a text. A span beyond the text or within a character moves to the
-    /// nearest boundary before it.
-    #[must_use]
-    pub fn new(source: &str, text: &str, span: Range<usize>) -> Self {
-        let start = floor_char_boundary(text, span.start);
-        let end = floor_char_boundary(text, span.end).max(start);
-        let line_start = text[..start].rfind('\n').map_or(0, |newline| newline + 1);
-        Self {
-            source: source.to_owned(),
-            text: text.to_owned(),
-            span: start..end,
-            line: text[..start].bytes().filter(|&byte| byte == b'\n').count() + 1,
-            column: text[line_start..start].chars().count() + 1,
-        }
-    }
-}
-
-/// Returns the largest character boundary that is at most `index`.
-fn floor_char_boundary(text: &str, index: usize) -> usize {
-    (0..=index.min(text.len())).rev().find(|&i| text.is_char_boundary(i)).unwrap_or(0)
-}
-
 /// Shortens long numbers, and escapes control characters, which could control the terminal.
 fn printable(text: &str) -> String {
     with_short_numbers(text).chars().fold(String::with_capacity(text.len()), |mut out, c| {
@@ -247,6 +209,22 @@ pub fn edit_distance(a: &str, b: &str) -> usize {
     row[b.len()]
 }
 
+impl From<ScenarioError> for Failure {
+    fn from(error: ScenarioError) -> Self {
+        // The message of the error shows a part of a line of any length.
+        if error.place().is_some_and(|place| place.text.lines().any(|line| line.len() > LONGEST_LINE)) {
+            return Self::new(error.code(), false, error.to_string());
+        }
+        let message = match error.field().filter(|_| error.place().is_none()) {
+            Some(field) => format!("{field}: {}", error.message()),
+            None => error.message().to_owned(),
+        };
+        let failure = Self::new(error.code(), false, message);
+        let failure = error.help().into_iter().fold(failure, |failure, help| failure.with_help(help));
+        error.place().into_iter().fold(failure, Self::at)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -269,12 +247,6 @@ mod tests {
     fn control_characters_of_the_input_do_not_reach_the_terminal() {
         let error = ScenarioError::new("key \u{1b}[2J").with_place(Place::new("f", "\u{1b}[2J", 0..1));
         assert!(!error.to_string().contains('\u{1b}'));
-    }
-
-    #[test]
-    fn a_span_outside_the_text_or_within_a_character_is_moved_into_it() {
-        assert_eq!(Place::new("f", "aä", 2..99).span, 1..3);
-        assert_eq!(Place::new("f", "", 7..9).span, 0..0);
     }
 
     #[test]

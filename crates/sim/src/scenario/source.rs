@@ -5,13 +5,14 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::document::Document;
+use super::error::ScenarioError;
 use super::error::suggest;
-use super::error::{Place, ScenarioError};
 use super::limits::{MAX_NAME_CHARS, is_name_character};
 use super::spec::Scenario;
 use super::text::Override;
 use super::text::Text;
 use super::{build, builtin, template};
+use tautline_core::failure::Place;
 
 /// Size limit of a scenario file \[bytes\]: 250,000 vehicles with a position, a velocity, a slot and an edge each.
 /// Reading takes 45 to 100 times the size of the file in memory.

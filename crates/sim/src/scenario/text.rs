@@ -12,7 +12,8 @@ use toml::{Spanned, map::Map};
 
 use super::check::check_schema;
 use super::document::{Document, TimeKeys};
-use super::error::{Field, Place, ScenarioError};
+use super::error::{Field, ScenarioError};
+use tautline_core::failure::Place;
 use tautline_core::option::SET;
 
 /// Keys from which a missing key takes its value, in order. An error about the missing key is placed at one of these.

@@ -5,13 +5,14 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::error::ScenarioError;
 use super::error::suggest;
-use super::error::{Place, ScenarioError};
 use super::files;
 use super::spec::{PlantSpec, Scenario, Space};
 use crate::vehicle::{
     self, Airframe, Fleet, Ground, Heading, MODELS, Model, ModelError, ModelParseError, Quadrotor, Unicycle,
 };
+use tautline_core::failure::Place;
 use tautline_core::swarm::row;
 use tautline_laws::space::{Obstacle, Shape};
 

@@ -7,6 +7,7 @@ use crate::scenario::ScenarioError;
 use crate::shield::ShieldReport;
 use tautline_audit::{AuditError, AuditOutcome, ClearanceOutcome, ObstacleError, Status};
 use tautline_core::fact::Coded;
+use tautline_core::failure::Failure;
 use tautline_core::record::{DeadlockRecovery, EnergyRise, Reassignment, RecordError};
 use tautline_core::swarm::{Bounce, Pair, Swarm};
 use tautline_laws::law::{Certificate, LawError, ParameterError};
@@ -275,6 +276,31 @@ impl Coded for Ending {
             Self::BrokeDown(Breakdown::Stalled { .. }) => "solver-stalled",
             Self::BrokeDown(Breakdown::Bent { .. }) => "path-bends",
             Self::BrokeDown(Breakdown::Audit { .. }) => "audit-refused",
+        }
+    }
+}
+
+impl From<SimError> for Failure {
+    fn from(error: SimError) -> Self {
+        match error {
+            SimError::Record(error) => error.into(),
+            SimError::Law(error) => error.into(),
+            SimError::NoLeg
+            | SimError::Obstacle(_)
+            | SimError::Vehicles { .. }
+            | SimError::Commands { .. }
+            | SimError::ShieldedCommands => Self::new("simulation/inconsistent", false, error.to_string()),
+            SimError::Shield(error) => error.into(),
+            SimError::ExternalLaw { .. } => Self::input(
+                "simulation/law-failed",
+                error.to_string(),
+                "correct the law; it gives every vehicle a finite command at every instant",
+            ),
+            SimError::Audit(error) => Self::input(
+                "simulation/cannot-judge",
+                error.to_string(),
+                "choose a safety distance and a number of vehicles that can be judged",
+            ),
         }
     }
 }

@@ -21,13 +21,13 @@ use crate::flight::{FlightSummary, Outcome};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
 use cma_es::{Optimiser, folded};
+use tautline_core::failure::{Failure, in_range};
+use tautline_core::monitor::{Monitor, Quiet};
 use tautline_core::option::{self, APART, SEED, SEEDS, START, VARY, VELOCITY};
 use tautline_core::text::{beside_limit, counted, exact, seconds};
 use tautline_report::figures::attack as figure;
 use tautline_report::report::page::{Badge, Tone};
-use tautline_report::request::{
-    Failure, Monitor, OutFolder, Pictures, Quiet, RECORDING, RunRequest, ScenarioRequest, in_range, run_into,
-};
+use tautline_report::request::{OutFolder, Pictures, RECORDING, RunRequest, ScenarioRequest, run_into};
 use tautline_sim::scenario::Scenario;
 
 /// Admitted numbers of flights of a search.

@@ -6,10 +6,10 @@ use serde::Serialize;
 
 use super::Options;
 use crate::base::{BaseScenario, overlap};
+use tautline_core::failure::Failure;
 use tautline_core::option::{APART, FLIGHTS, SEEDS, START, VARY, VELOCITY};
 use tautline_core::swarm::{Rows, separation};
 use tautline_core::text::{at_least, beside_limit, shortest};
-use tautline_report::request::Failure;
 use tautline_sim::scenario::{Scenario, ScenarioError};
 
 /// Point between the bounds, neither an end nor the middle, at which a key is tried.

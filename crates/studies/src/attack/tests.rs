@@ -8,7 +8,7 @@ use crate::batch::Batch;
 use crate::flight::{Outcome, fly};
 use crate::study::{Experiment as _, Study as _, StudyPage};
 use crate::tests::{InterruptAfter, base, batch};
-use tautline_report::request::Failure;
+use tautline_core::failure::Failure;
 use tautline_sim::scenario::Source;
 
 /// Two vehicles that exchange their places, one offset to the side, under a law without avoidance.

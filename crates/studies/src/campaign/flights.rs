@@ -14,8 +14,8 @@ use crate::SCHEMA_VERSION;
 use crate::base::BaseScenario;
 use crate::batch::Batch;
 use crate::splitting::{self, SplittingSettings};
+use tautline_core::failure::Failure;
 use tautline_core::option::SHARDS;
-use tautline_report::request::Failure;
 use tautline_sim::scenario::{ExternalLaw, Override, Scenario, ScenarioError, Source};
 
 /// Largest number of runs of a campaign.

@@ -16,10 +16,11 @@ use super::summary::{Summary, SummaryAccumulator};
 use crate::SCHEMA_VERSION;
 use crate::study::Study as _;
 use crate::table::{Cell, ParquetTable};
+use tautline_core::failure::Failure;
+use tautline_core::files::{write_atomically, write_atomically_with};
 use tautline_core::option::{OUT, SHARD, SHARDS};
 use tautline_core::text::counted;
-use tautline_report::report::{write_atomically, write_atomically_with};
-use tautline_report::request::{Failure, command_line};
+use tautline_report::request::command_line;
 
 /// File name of the table in the folder of a campaign.
 pub const RESULTS: &str = "results.parquet";

@@ -8,7 +8,7 @@ use super::flights::Campaign;
 use super::folder::{Folder, JOURNAL, Manifest, file_failure, other_campaign};
 use super::shard::{Journal, PartState};
 use super::spec::Spec;
-use tautline_report::request::Failure;
+use tautline_core::failure::Failure;
 
 impl Manifest {
     /// Returns whether this is the campaign `there` with another number of runs.

@@ -9,14 +9,14 @@ use super::{Campaign, Folder, Law, Row, Summary, ViolatedRun, Worst};
 use crate::flight::Outcome;
 use crate::splitting::{self, StateHashAtStep};
 use crate::study::{Block, Section};
+use tautline_core::failure::Failure;
+use tautline_core::monitor::{Monitor, Quiet};
 use tautline_core::option::{BAD, LAW, OUT, Opt, RUN, SET};
 use tautline_core::text::{beside_limit, separation, up_to};
 use tautline_recordings::mcap::{Header, McapRecorder};
 use tautline_report::replay::{NoReplay, PAGE_BYTES, Replay};
 use tautline_report::report::page::{self, Picture, Start};
-use tautline_report::request::{
-    Failure, Monitor, Pictures, Quiet, RECORDING, RunFiles, RunRequest, command_line, replay_of_run, run_into,
-};
+use tautline_report::request::{Pictures, RECORDING, RunFiles, RunRequest, command_line, replay_of_run, run_into};
 use tautline_sim::scenario::Scenario;
 
 /// Folder of the worst flights, in the folder of the campaign.

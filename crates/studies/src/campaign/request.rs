@@ -9,10 +9,12 @@ use super::{ANSWER, Campaign, Folder, Program, RESULTS, Shard, Spec, Stop, Summa
 use crate::Criterion;
 use crate::batch::Batch;
 use crate::study::{Study as _, StudyPage};
+use tautline_core::failure::{Failure, in_range};
+use tautline_core::files::write_atomically;
+use tautline_core::monitor::Monitor;
 use tautline_core::option::WORST;
 use tautline_core::text::counted;
-use tautline_report::report::write_atomically;
-use tautline_report::request::{Failure, Monitor, Pictures, command_line, in_range};
+use tautline_report::request::{Pictures, command_line};
 use tautline_sim::scenario::ExternalLaw;
 
 /// File name of the page.

@@ -23,8 +23,8 @@ use crate::batch::Batch;
 use crate::flight::{FlightSummary, Outcome};
 use crate::splitting::Splitting;
 use crate::table::{Cell, Column, Kind};
-use tautline_report::report::write_beside;
-use tautline_report::request::Failure;
+use tautline_core::failure::Failure;
+use tautline_core::files::write_beside;
 
 /// Flights of a finished shard.
 #[derive(Clone, Debug, PartialEq)]
@@ -70,7 +70,7 @@ impl Folder {
         self.remove_journals(shard)?;
         let (seconds, threads) = (began.elapsed().as_secs_f64(), batch.threads());
         let times = format!("{{\"wall_s\": {seconds:.3}, \"threads\": {threads}, \"flights\": {flown}}}\n");
-        tautline_report::report::write_atomically(&self.times_path(shard), times.as_bytes())?;
+        tautline_core::files::write_atomically(&self.times_path(shard), times.as_bytes())?;
         Ok(Some(Shard { rows, flown: flown as u64 }))
     }
 

@@ -13,9 +13,10 @@ use super::vary::{BY_RUN, FORMS, Variation};
 use crate::Criterion;
 use crate::base::overlap;
 use crate::splitting::SplittingSettings;
+use tautline_core::failure::Failure;
+use tautline_core::failure::Place;
 use tautline_core::option::SET;
-use tautline_report::request::Failure;
-use tautline_sim::scenario::{Place, ScenarioError, TomlSchema, edit_distance};
+use tautline_sim::scenario::{ScenarioError, TomlSchema, edit_distance};
 
 /// Names of distributions. A table in `[vary]` with these keys is a variation; any other table holds scenario keys.
 const DRAWS: [&str; 6] = ["uniform", "log_uniform", "normal", "integer", "list", "grid"];

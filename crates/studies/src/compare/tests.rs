@@ -5,7 +5,7 @@ use crate::base::BaseScenario;
 use crate::batch::Batch;
 use crate::study::{Experiment as _, Study as _};
 use crate::tests::{InterruptAfter, base, batch};
-use tautline_report::request::Failure;
+use tautline_core::failure::Failure;
 use tautline_sim::scenario::Source;
 
 fn pentagon() -> BaseScenario {

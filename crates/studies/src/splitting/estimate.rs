@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use super::levels::{RandomProcess, SplitResult, SplittingRule, split};
 use super::lineage::{Genealogy, Lineage};
 use crate::statistics::{CONFIDENCE, Estimate, Proportion};
+use tautline_core::failure::Failure;
 use tautline_core::record::{Event, RecordError, Sample, Sink, StateHash, Step};
-use tautline_report::request::Failure;
 use tautline_sim::scenario::Scenario;
 use tautline_sim::sim::{Flight, SavedState, SimError, Simulation, continue_flight};
 

@@ -14,9 +14,9 @@ use sha2::{Digest as _, Sha256};
 use super::super::Failure;
 use super::AuditRequest;
 use crate::report::recorded::Clock;
-use crate::report::write_atomically;
 use tautline_audit::Status;
 use tautline_audit::recorded::{Interpolation, Outcome, Settings};
+use tautline_core::files::write_atomically;
 use tautline_core::option::{
     ABOVE, CYLINDER, DELTA, ELLIPSOID, FENCE, FROM, IDS, LIMIT, MAX_GAP, OFFSET, PROOF, RADIUS, TO, WELL_CLEAR,
 };

@@ -10,8 +10,8 @@ use rayon::prelude::*;
 use super::super::audit::{AuditRequest, ConfigFile, Subject};
 use super::super::{Failure, Monitor, Quiet};
 use super::{DroneExport, Flight};
-use crate::report::{ArtefactError, write_atomically};
 use tautline_audit::recorded::{Interpolation, Settings};
+use tautline_core::files::{FileError, write_atomically};
 use tautline_core::option::{OUTPUT, TOLERANCE};
 use tautline_core::track::Tracks;
 use tautline_recordings::export::drones::motion::Motion;
@@ -53,7 +53,7 @@ impl<'a> Written<'a> {
     }
 
     fn error(&self, source: std::io::Error) -> Failure {
-        ArtefactError { path: self.output.display().to_string(), source }.into()
+        FileError { path: self.output.display().to_string(), source }.into()
     }
 
     /// Opens the files with the public readers.

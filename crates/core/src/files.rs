@@ -13,15 +13,17 @@ use std::path::{Path, PathBuf};
 /// Error of a file that could not be written.
 #[derive(Debug, thiserror::Error)]
 #[error("cannot write {path}: {source}")]
-pub struct ArtefactError {
+pub struct FileError {
     /// Path of the file.
     pub path: String,
     /// Error of the operating system.
     pub source: io::Error,
 }
 
-impl ArtefactError {
-    pub(super) fn new(path: &Path, source: io::Error) -> Self {
+impl FileError {
+    /// Error of a path.
+    #[must_use]
+    pub fn new(path: &Path, source: io::Error) -> Self {
         Self { path: path.display().to_string(), source }
     }
 }
@@ -34,20 +36,20 @@ impl ArtefactError {
 /// a device, is written into directly.
 ///
 /// # Errors
-/// [`ArtefactError`] when the system refuses.
-pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), ArtefactError> {
-    write_atomically_with(path, |file| file.write_all(bytes).map_err(|source| ArtefactError::new(path, source)))
+/// [`FileError`] when the system refuses.
+pub fn write_atomically(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
+    write_atomically_with(path, |file| file.write_all(bytes).map_err(|source| FileError::new(path, source)))
 }
 
 /// Writes a file like [`write_atomically`], piece by piece.
 ///
 /// # Errors
-/// The error of `write`, or [`ArtefactError`] when the system refuses.
-pub fn write_atomically_with<T, E: From<ArtefactError>>(
+/// The error of `write`, or [`FileError`] when the system refuses.
+pub fn write_atomically_with<T, E: From<FileError>>(
     path: &Path,
     write: impl FnOnce(&mut File) -> Result<T, E>,
 ) -> Result<T, E> {
-    let error = |source| E::from(ArtefactError::new(path, source));
+    let error = |source| E::from(FileError::new(path, source));
     if fs::metadata(path).is_ok_and(|there| !there.is_file() && !there.is_dir()) {
         return write(&mut File::options().write(true).open(path).map_err(error)?);
     }
@@ -62,11 +64,11 @@ pub fn write_atomically_with<T, E: From<ArtefactError>>(
 ///
 /// # Errors
 /// As [`write_atomically_with`]; the file is removed.
-pub fn write_beside<T, E: From<ArtefactError>>(
+pub fn write_beside<T, E: From<FileError>>(
     target: &Path,
     write: impl FnOnce(&mut File) -> Result<T, E>,
 ) -> Result<(PathBuf, T), E> {
-    let error = |source| E::from(ArtefactError::new(target, source));
+    let error = |source| E::from(FileError::new(target, source));
     let no_name = || error(io::Error::new(io::ErrorKind::InvalidInput, "the path has no file name"));
     let mut name = OsString::from(".");
     name.push(target.file_name().ok_or_else(no_name)?);
