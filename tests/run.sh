@@ -1,7 +1,7 @@
 #!/bin/sh
 # Sets up and runs the tests. From anywhere: sh tests/run.sh [--long] [arguments of cargo test]
 #
-# --long adds tests that take minutes: ignored tests, release bits, MP4 films, fuzz targets, two of tests/mutants,
+# --long adds tests that take minutes: ignored tests, release bits, MP4 films, fuzz targets, three of tests/mutants,
 # clusters, notebooks and the commands of the docs. TAUTLINE_LONG=1 adds random cases, an hour of fuzzing, and
 # the slowest commands of the docs.
 set -eu
@@ -28,8 +28,8 @@ if [ "$long" ]; then
     cargo test -p tautline-render --features mp4 film
     # A minute for all fuzz targets, with the same inputs in each run; TAUTLINE_LONG=1 takes an hour, with others.
     sh fuzz/run.sh "${TAUTLINE_LONG:+170}"
-    # Two mutants, one of the law and one of the audit.
-    sh tests/mutants.sh 03-a22 07-sweep-off
+    # A mutant of the law and one of the audit, and one that empties sentences, on which no verdict may depend.
+    sh tests/mutants.sh 03-a22 07-sweep-off 11-reasons-without-text
 fi
 
 # With the debug build: the GitHub action, hook and archives; with --long also clusters and every command of the docs.

@@ -56,6 +56,7 @@ pub struct ClearanceFinding<'a> {
 
 /// Verdict on a flight past obstacles, with its evidence.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ClearanceOutcome {
     /// Verdict.
     pub status: Status,

@@ -165,6 +165,7 @@ pub struct StepFinding<'a> {
 
 /// Verdict on a flight, with its evidence.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct AuditOutcome {
     /// Verdict.
     pub status: Status,
@@ -209,6 +210,7 @@ impl<P> Default for ParryEvidence<P> {
 
 /// Contradicting results of the two detectors for one segment of motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Disagreement<P = Pair> {
     /// Pair of objects.
     pub pair: P,

@@ -172,6 +172,7 @@ coded! {
 
 /// Value of a fact.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub enum FactValue {
     /// Number with its unit.
     Number(f64, &'static str),
@@ -191,6 +192,7 @@ impl fmt::Display for FactValue {
 
 /// Fact that a statement rests on.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Fact {
     /// Subject of the fact.
     pub kind: FactKind,

@@ -198,6 +198,7 @@ impl Envelope {
 
 /// Findings for all limits on single vehicles.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[non_exhaustive]
 pub struct EnvelopeOutcome {
     /// Findings for each limit, in the given order; that of the fence last.
     pub limits: Vec<LimitOutcome>,
@@ -205,6 +206,7 @@ pub struct EnvelopeOutcome {
 
 /// Findings for one limit.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct LimitOutcome {
     /// Limit.
     pub limit: Limit,

@@ -147,6 +147,7 @@ pub struct Contradiction {
 
 /// Verdict on a recording, with its evidence.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Outcome {
     /// Verdict. Clear if everything was judged and every limit was kept. Violation if a separation or a vehicle was
     /// beyond its limit, whatever else was found. Undecided if something could not be decided, or if there never were

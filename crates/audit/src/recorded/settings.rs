@@ -378,6 +378,7 @@ impl Limits {
 
 /// Reason why a recording cannot be judged with the settings.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum RecordedError {
     /// A number of the settings is out of range.
     #[error("{option}: must be {range}, got {}{value:?}", of.as_ref().map(|of| format!("{of}=")).unwrap_or_default())]

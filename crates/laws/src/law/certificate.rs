@@ -37,6 +37,7 @@ pub struct LegBound {
 
 /// Reason why a certificate is void.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
 pub enum VoidReason {
     /// The law does not push vehicles apart.
     #[error("The law has no barrier: it does not keep vehicles apart.")]

@@ -35,8 +35,8 @@ fn facts_of(path: &Path, options: &ReadOptions) -> Vec<[String; 3]> {
     let mut items = Vec::new();
     while tracks.read(&mut items).expect("read") {}
     let value = |fact: &Fact| match &fact.value {
-        Some(FactValue::Name(name)) => name.clone(),
         Some(FactValue::Number(number, unit)) => format!("{number} {unit}"),
+        Some(name) => name.to_string(),
         None => String::new(),
     };
     let texts = |fact: &Fact| [fact.kind.code().to_owned(), fact.source.code().to_owned(), value(fact)];

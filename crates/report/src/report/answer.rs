@@ -9,6 +9,7 @@ use tautline_core::fact::Fact;
 
 /// Statement on a flight or on a recording: the first keys of both reports.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Judgement {
     /// Version of the keys, [`SCHEMA_VERSION`](super::SCHEMA_VERSION).
     pub schema_version: u32,
@@ -33,6 +34,7 @@ pub struct Judgement {
 
 /// Question to a flight or to a recording. Lengths are in metres. A key is null if the question does not have it.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Question {
     /// Safety distance delta \[m\], or as a scaled length with an ellipsoid or a cylinder.
     pub delta: Option<f64>,
@@ -101,6 +103,7 @@ impl Serialize for Part {
 
 /// Answer to a part of a question.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Answer {
     /// The part.
     pub part: Part,
@@ -127,6 +130,7 @@ impl Answer {
 
 /// Findings of one kind.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct FindingList {
     /// Number of findings; a lower bound if `is_exact` is false.
     pub count: u64,
@@ -160,6 +164,7 @@ impl FindingList {
 
 /// Finding on one or two subjects. Times are null where they are not known.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Finding {
     /// Names: two vehicles, a vehicle and an obstacle, or one vehicle.
     pub subjects: Vec<String>,
@@ -179,6 +184,7 @@ pub struct Finding {
 
 /// Interval that contains a value; an end is null where it is not known.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Enclosure {
     /// Lower bound.
     pub lower: Option<f64>,
@@ -199,6 +205,7 @@ impl Enclosure {
 
 /// Results of the detectors of separations.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Detectors {
     /// Steps of a flight that were swept; null for a recording that is judged by its samples.
     pub steps: Option<u64>,

@@ -30,6 +30,7 @@ pub const SCHEMA_VERSION: u32 = 3;
 /// `certificate` and `ellipsoid`, then the fields from [`Self::scenario`] on.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(remote = "Self")]
+#[non_exhaustive]
 pub struct Report {
     /// The question.
     #[serde(skip)]
@@ -115,6 +116,7 @@ pub struct Tool {
 
 /// Smallest separation of two vehicles, and the certificate.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Separation {
     /// Safety distance delta \[m\].
     pub delta_m: f64,
@@ -152,6 +154,7 @@ impl Separation {
 
 /// Findings of the audit.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct Audit {
     /// Status of separations and obstacles, the worse of the two. At best undecided if the flight ended early.
     pub status: Status,
@@ -219,6 +222,7 @@ pub struct Rapier {
 
 /// Errors of the formation at the end, and its arrival.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct FormationNumbers {
     /// Whether the formation was reached and kept to the end. False for a flight that ended early.
     pub reached: bool,
@@ -323,6 +327,7 @@ impl From<&Failure> for FailedVehicle {
 
 /// Duration, steps and hash of a run.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Run {
     /// Time flown \[s\].
     pub duration_s: f64,

@@ -66,7 +66,7 @@ impl Obstacles {
             }),
             ObjectPair::Vehicles(_) => None,
         };
-        let ClearanceOutcome { status, closest, violations, undecided, unresolved, parry, refused } = outcome;
+        let ClearanceOutcome { status, closest, violations, undecided, unresolved, parry, refused, .. } = outcome;
         let of_violation = |found: &Violation<ObjectPair>| {
             let &Violation { pair, from_s, to_s, min_m, min_at_s, limit_m } = found;
             Some(ObstacleViolation { approach: approach(pair, limit_m, min_m, min_at_s)?, from_s, to_s })

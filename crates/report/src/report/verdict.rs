@@ -15,6 +15,7 @@ use tautline_sim::sim::Ending;
 
 /// Verdict on a flight.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct Verdict {
     /// Whether the flight is clear, reached its formation, was flown to its end and was not refused by the check: there
     /// is no reason against a pass.
@@ -25,6 +26,7 @@ pub struct Verdict {
 
 /// Closest approach of a pair of vehicles, beside its limit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct PairApproach {
     /// The two vehicles.
     pub pair: Pair,

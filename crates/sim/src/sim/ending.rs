@@ -209,6 +209,7 @@ pub enum Breakdown {
 
 /// Error that prevents a flight.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum SimError {
     /// The audit does not support the scenario.
     #[error(transparent)]

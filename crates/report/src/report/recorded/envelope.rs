@@ -12,6 +12,7 @@ use tautline_core::text::{at_least, at_most, exact, fixed, seconds};
 
 /// Findings on one limit of each vehicle by itself.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct LimitFindings {
     /// Limited quantity with its unit, such as `speed_m_s`.
     pub quantity: &'static str,

@@ -12,6 +12,7 @@ use tautline_core::text::{at_least, at_most, beside_limit, exact, fixed, seconds
 
 /// Findings on a flight against its plan.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct PlanReport {
     /// Path of the plan.
     pub file: String,

@@ -43,6 +43,7 @@ pub struct Clock {
 
 /// Early end of a recorded flight.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct EarlyEnd {
     /// Time of the last sample \[s\].
     pub at_s: f64,
@@ -55,6 +56,7 @@ pub struct EarlyEnd {
 /// Reason why the audit of a run leaves its recording undecided, although the samples are clear.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(tag = "code", rename_all = "kebab-case")]
+#[non_exhaustive]
 pub enum RunObjection {
     /// The audit of the run is undecided itself.
     RunUndecided {},
@@ -73,6 +75,7 @@ pub enum RunObjection {
 
 /// Judged recording: its answers with the findings, and the facts that they rest on.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct RecordedReport {
     /// Status of the whole audit.
     pub status: Status,
@@ -191,6 +194,7 @@ const ABSENT_LISTED: usize = 1000;
 
 /// Presence of the vehicles in the window.
 #[derive(Clone, Debug, PartialEq, Serialize)]
+#[non_exhaustive]
 pub struct PresenceSummary {
     /// Window of the verdict \[s\]: the requested one, or that of the recording; null if nothing was judged.
     pub window_s: Option<(f64, f64)>,

@@ -8,6 +8,7 @@ use tautline_core::text::{at_least, exact, fixed};
 
 /// Findings on well clear.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct WellClearFindings {
     /// Horizontal distance: DMOD, and threshold of the horizontal miss distance \[m\].
     pub horizontal_m: f64,
