@@ -43,7 +43,7 @@ fn rows(report: &RecordedReport) -> impl Iterator<Item = Vec<String>> {
         .ended_early
         .iter()
         .map(|end| ([end.at_s, end.duration_s], ["ended-early", "", ""].map(str::to_owned), [None; 5]));
-    let mut rows: Vec<Row> = report.answers().iter().flat_map(rows_of_part).chain(gaps).chain(early_end).collect();
+    let mut rows: Vec<Row> = report.answers.iter().flat_map(rows_of_part).chain(gaps).chain(early_end).collect();
     rows.sort_by(|a, b| a.0[0].total_cmp(&b.0[0]));
     rows.into_iter().map(|(span_s, words, numbers)| {
         let numbers = span_s.map(Some).into_iter().chain(numbers).map(|x| x.map_or_else(String::new, number));
@@ -54,7 +54,7 @@ fn rows(report: &RecordedReport) -> impl Iterator<Item = Vec<String>> {
 /// Returns the rows of violations and undecided times of a part. A finding on one vehicle has the name of the part in
 /// the column of the second vehicle.
 fn rows_of_part(answer: &PartAnswer) -> Vec<Row> {
-    let beyond = if answer.part == Part::WellClear { "not-well-clear" } else { "violation" };
+    let beyond = if matches!(answer.part, Part::WellClear(_)) { "not-well-clear" } else { "violation" };
     let violations = answer.violations.listed.iter().map(|finding| (beyond, finding));
     let undecided = answer.undecided.listed.iter().map(|finding| ("undecided", finding));
     let row = |(kind, finding): (&str, &Finding)| {
@@ -117,7 +117,7 @@ fn suite(AuditedRecording { report, allows_undecided, .. }: &AuditedRecording) -
         Status::Violation => failed(words),
         Status::Undecided => doubtful(words),
     };
-    let answers = report.answers();
+    let answers = &report.answers;
     let parts = answers
         .iter()
         .map(|answer| TestCase::new(answer.part.name(), verdict(answer.status, &report.brief(answer.part))));
@@ -166,17 +166,16 @@ pub(super) fn markdown(answers: &[Answer]) -> String {
                 continue;
             }
         };
-        let closest = report.closest.first();
+        let closest = report.separation().and_then(|answer| answer.closest.first());
         let unit = report.unit();
         let cells = [
             escape_markdown(&report.source.recording),
             format!("{} {}", mark(report.status), escape_markdown(&report.verdict())),
             closest.map_or(String::new(), |of| {
-                let finding = &of.finding;
-                format!("{} {unit}", beside_limit(finding.lower_m, finding.limit_m, 3))
+                format!("{} {unit}", beside_limit(of.value.lower_bound(), of.limit.unwrap_or_default(), 3))
             }),
-            closest.map_or(String::new(), |of| escape_markdown(&of.who.join(" and "))),
-            closest.map_or(String::new(), |of| format!("{} s", fixed(of.finding.time_s, 2))),
+            closest.map_or(String::new(), |of| escape_markdown(&of.subjects.join(" and "))),
+            closest.and_then(|of| of.at_s).map_or(String::new(), |at_s| format!("{} s", fixed(at_s, 2))),
         ];
         let _ = writeln!(text, "| {} |", cells.join(" | "));
     }

@@ -4,9 +4,11 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
+use serde_json::{Value, json};
 use tempfile::TempDir;
 
 use crate::program::{Ran, TAUTLINE, ran_by};
+use crate::report::{SEPARATION, at, closest, facts, motion, part, status, violations};
 
 /// Two vehicles pass each other within a second, 1 m apart in the middle and far apart in every sample.
 const PASS: &str = "t,id,x,y,z\n0,alpha,-5,0,0\n0,bravo,5,1,0\n1,alpha,5,0,0\n1,bravo,-5,1,0\n";
@@ -88,16 +90,17 @@ fn a_tautline_recording_has_a_default_delta() {
 fn json_goes_to_standard_output_with_the_keys_of_a_report() {
     let folder = folder(&[("pass.csv", PASS)]);
     let ran = audit(folder.path(), &["pass.csv", "--delta", "2", "--json"]);
-    let json: serde_json::Value = serde_json::from_str(&ran.out).expect("JSON alone");
-    assert_eq!(json["status"], "violation");
-    assert_eq!(json["separation"]["min_m"], 1.0);
-    assert_eq!(json["separation"]["min_pair"], serde_json::json!([1, 2]));
-    assert_eq!(json["audit"]["violations"][0]["pair"], serde_json::json!([1, 2]));
-    assert_eq!(json["audit"]["parry"]["disagreements"], 0);
+    let json: Value = serde_json::from_str(&ran.out).expect("JSON alone");
+    assert_eq!((&json["status"], status(&json, SEPARATION)), (&"violation".into(), "violation"));
+    assert_eq!(closest(&json)["value"], json!({"lower": 1.0, "upper": 1.0, "unit": "m"}));
+    for found in [closest(&json), &violations(&json)[0]] {
+        assert_eq!((&found["subjects"], &found["limit"]), (&json!(["alpha", "bravo"]), &2.0.into()));
+    }
+    let separation = part(&json, SEPARATION);
+    assert_eq!(separation["detectors"]["parry_disagreements"], 0);
     assert_eq!(json["clock"]["unit"], "s");
-    assert_eq!(json["closest"][0]["who"], serde_json::json!(["alpha", "bravo"]));
-    for key in ["gaps", "undecided"] {
-        assert_eq!(json[key], serde_json::json!([]), "{key}");
+    for found in [at(&json, "/gaps"), at(separation, "/undecided")] {
+        assert_eq!(*found, json!({"count": 0, "is_exact": true, "listed": []}));
     }
     assert!(ran.err.contains("VIOLATION"), "talk goes beside it: {ran:?}");
 }
@@ -118,6 +121,25 @@ fn junit_events_and_page_are_written() {
     let clear = audit(folder.path(), &[&["pass.csv", "--delta", "0.5"][..], &files].concat());
     assert_eq!(clear.exit, Some(0), "{clear:?}");
     assert!(read("a.xml").contains("failures=\"0\"") && !read("a.csv").contains("violation"));
+}
+
+#[test]
+fn a_violation_of_bounded_motion_has_an_upper_bound_alone() {
+    let folder = folder(&[("pass.csv", PASS)]);
+    let bounded = ["--time-unit", "s", "--motion", "bounded", "--max-accel", "0.01"];
+    for (more, lower) in [(&[][..], Value::from(1.0)), (&bounded, Value::Null)] {
+        let asked = [&["pass.csv", "--delta", "2", "--json", "--events", "a.csv"], more].concat();
+        let json: Value = serde_json::from_str(&audit(folder.path(), &asked).out).expect("JSON alone");
+        let [found] = violations(&json) else { panic!("{json}") };
+        assert_eq!(found["value"]["lower"], lower);
+        let upper = found["value"]["upper"].as_f64().expect("a bound");
+        assert!((1.0..1.1).contains(&upper), "{found}");
+        let events = fs::read_to_string(folder.path().join("a.csv")).expect("events");
+        let [names, row] = [0, 1].map(|k| events.lines().nth(k).expect("a row").split(',').collect::<Vec<_>>());
+        let cell = |name: &str| row[names.iter().position(|found| *found == name).expect(name)].to_owned();
+        let shown = lower.as_f64().map_or_else(String::new, |lower| format!("{lower:?}"));
+        assert_eq!((cell("kind"), cell("lower_m"), cell("upper_m")), ("violation".into(), shown, format!("{upper:?}")));
+    }
 }
 
 #[test]
@@ -275,9 +297,9 @@ fn the_text_has_the_closest_pair_and_every_limit() {
         "[[obstacle]]\nname = \"mast\"\nball = { radius_m = 1.0 }\nat_m = [-5.0, -1.5, 0.0]\nclearance_m = 0\n";
     let folder = folder(&[("lim.csv", &rows), ("pass.csv", PASS), ("mast.toml", obstacle)]);
     let limits = audit(folder.path(), &["lim.csv", "--json", "--events", "lim.ev.csv", "--quiet"]);
-    let json: serde_json::Value = serde_json::from_str(&limits.out).expect("JSON alone");
-    assert_eq!(json["separation"]["delta_m"], serde_json::Value::Null);
-    assert_eq!(json["violations"][0]["limit_m"], 10.0);
+    let json: Value = serde_json::from_str(&limits.out).expect("JSON alone");
+    assert_eq!(*at(&json, "/question/delta"), Value::Null);
+    assert_eq!(violations(&json)[0]["limit"], 10.0);
     let events = fs::read_to_string(folder.path().join("lim.ev.csv")).expect("events");
     assert!(events.contains("violation,big,too,0.0,0.0,9.0,9.0,0.0,10.0,"), "{events}");
     // The mast is closer to a vehicle than the vehicles ever are to each other, and contact with it is allowed.
@@ -327,19 +349,22 @@ fn headline_and_keys_distinguish_proof_and_assumption() {
     }
     let said = |arguments: &[&str]| {
         let ran = audit(folder.path(), &[arguments, &["--json"]].concat());
-        let json: serde_json::Value = serde_json::from_str(&ran.out).expect("JSON alone");
+        let json: Value = serde_json::from_str(&ran.out).expect("JSON alone");
         let headline = ran.err.lines().find(|line| line.contains("CLEAR")).unwrap_or_default().to_owned();
-        (ran.exit, headline, json["audit"]["proved"].clone(), json["audit"]["assumes"].clone())
+        let facts = ["motion", "acceleration"].map(|kind| facts(&json, kind));
+        let facts: Vec<_> = facts.iter().flatten().map(|fact| json!([fact["source"], fact["value"]])).collect();
+        (ran.exit, headline, at(&json, "/proved").clone(), json!(facts))
     };
     let drawn = said(&["pass.csv", "--delta", "0.5"]);
     assert!(drawn.1.starts_with("CLEAR if straight between samples: "), "{drawn:?}");
-    assert_eq!((drawn.0, drawn.2, drawn.3), (Some(0), false.into(), "straight between samples".into()));
+    assert_eq!((drawn.0, drawn.2, drawn.3), (Some(0), false.into(), json!([["default", "straight"]])));
     let bounded = said(&["pass.csv", "--delta", "0.5", "--motion", "bounded", "--max-accel", "1"]);
     assert!(bounded.1.starts_with("PROVED CLEAR: "), "{bounded:?}");
-    assert_eq!((bounded.0, bounded.2, bounded.3), (Some(0), true.into(), "accelerations of at most 1.0 m/s^2".into()));
+    let bounds = json!([["declared", "bounded"], ["declared", 1.0]]);
+    assert_eq!((bounded.0, bounded.2, bounded.3), (Some(0), true.into(), bounds));
     let curves = said(&["curves", "--delta", "0.5"]);
     assert!(curves.1.starts_with("PROVED CLEAR: "), "{curves:?}");
-    assert_eq!((curves.0, curves.2, curves.3), (Some(0), true.into(), serde_json::Value::Null));
+    assert_eq!((curves.0, curves.2, curves.3), (Some(0), true.into(), json!([["recorded", "curves"]])));
     let violation = said(&["pass.csv", "--delta", "2"]);
     assert_eq!((violation.0, violation.2), (Some(1), false.into()));
     // A limit is printed with all its digits.
@@ -397,21 +422,20 @@ fn the_verdict_on_a_recording_is_never_better_than_that_of_its_run() {
         let arguments: Vec<_> = ["run", scenario].into_iter().chain(fixed).chain(sets).collect();
         ran_by(TAUTLINE, folder.path(), &arguments);
         let report = fs::read_to_string(folder.path().join(out).join("report.json")).expect("a report");
-        let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
+        let report: Value = serde_json::from_str(&report).expect("JSON");
         let recording = format!("{out}/run.mcap");
         let ran = audit(folder.path(), &[&recording, "--json"]);
-        let json: serde_json::Value = serde_json::from_str(&ran.out).expect("JSON");
-        assert_eq!(json["separation"]["min_m"], report["separation"]["min_m"], "{out}: {ran:?}");
+        let json: Value = serde_json::from_str(&ran.out).expect("JSON");
+        let [judged, flown] = [&json, &report].map(closest);
+        assert_eq!(at(judged, "/value"), at(flown, "/value"), "{out}: {ran:?}");
         // With samples of every step, another of two pairs at the same distance may come first.
         let is_repeated = out != "every";
-        assert!(!is_repeated || json["separation"]["min_pair"] == report["separation"]["min_pair"], "{out}");
-        assert_eq!(json["status"], report["audit"]["status"], "{out}");
-        let [told, flown] = [&json, &report].map(|of| of["audit"]["violations"].as_array().expect("a list"));
-        let ended = flown.iter().filter(|v| v["to_s"].as_f64() < report["run"]["duration_s"].as_f64());
+        assert!(!is_repeated || judged["subjects"] == flown["subjects"], "{out}");
+        assert_eq!(at(&json, "/status"), at(&report, "/status"), "{out}");
+        let [judged, flown] = [&json, &report].map(violations);
+        let ended = flown.iter().filter(|found| found["to_s"].as_f64() < report["run"]["duration_s"].as_f64());
         for violation in ended {
-            let same =
-                |v: &&serde_json::Value| ["pair", "from_s", "to_s", "min_m"].iter().all(|key| v[key] == violation[key]);
-            assert_eq!(told.iter().filter(same).count(), 1, "{out}: {violation} in {told:?}");
+            assert_eq!(judged.iter().filter(|found| *found == violation).count(), 1, "{out}: {violation} {judged:?}");
         }
         (ran.exit, json)
     };
@@ -421,18 +445,13 @@ fn the_verdict_on_a_recording_is_never_better_than_that_of_its_run() {
     assert_eq!((exit, &coarse["status"]), (Some(1), &"violation".into()));
     // Straight lines between the samples give a violation, but the run is clear.
     let (exit, apart) = fly("swap.toml", "apart", &[]);
-    assert_eq!((exit, &apart["audit"]["proved"]), (Some(0), &true.into()), "{apart}");
-    assert_eq!(
-        (&apart["audit"]["judged_by_run"], &apart["audit"]["assumes"]),
-        (&true.into(), &serde_json::Value::Null)
-    );
+    assert_eq!((exit, &apart["proved"], motion(&apart)), (Some(0), &true.into(), "run-audit"), "{apart}");
     ran_by(TAUTLINE, folder.path(), &["export", "apart/run.mcap", "-o", "apart.csv"]);
     let drawn = audit(folder.path(), &["apart.csv", "--delta", "1"]);
     assert!(drawn.out.starts_with("VIOLATION: 1 and 2 came to 0.000"), "{drawn:?}");
     // Every step is recorded: proved.
     let (exit, every) = fly("pentagon-laplacian", "every", &["time.duration_s=2", "time.record_hz=240"]);
-    assert_eq!((exit, &every["audit"]["proved"]), (Some(0), &true.into()), "{every}");
-    assert_eq!(every["audit"]["assumes"], serde_json::Value::Null);
+    assert_eq!((exit, &every["proved"], motion(&every)), (Some(0), &true.into(), "every-step"), "{every}");
 }
 
 #[test]

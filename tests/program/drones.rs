@@ -173,7 +173,7 @@ fn wrong_input_ends_with_2_and_leaves_nothing() {
             "export/window",
             ["--until: must be", "3.0 s and 5.0 s"],
         ),
-        ("steps.csv", "crazyflie", &[], "audit/guessed-time-unit", ["export --to", "--time-unit ms"]),
+        ("steps.csv", "crazyflie", &[], "audit/guessed-time-unit", ["an export for drones", "--time-unit ms"]),
         ("wide.csv", "skyb", &[], "export/absent", ["vehicle b: it is not seen at any time", "leave the vehicle out"]),
         (
             "late.csv",
@@ -215,7 +215,9 @@ fn a_part_of_a_flight_counts_from_its_start() {
     assert_eq!(done.exit, Some(0), "{}", said(&done));
     assert!(said(&done).contains("1.500 s to 4.250 s; 1.5 s of the flight are 0 s of the files"), "{}", said(&done));
     let again = ran(folder.path(), &["audit", "part.skyc", "--json"]);
-    assert!(again.out.contains("\"delta_m\": 1.0") && again.out.contains("2.75"), "{}", again.out);
+    let report: serde_json::Value = serde_json::from_str(&again.out).expect("JSON alone");
+    assert_eq!(report["question"]["delta"], 1.0, "{report}");
+    assert_eq!(report["window_s"], serde_json::json!([0.0, 2.75]), "{report}");
     // An existing output needs --force, and is replaced as a whole.
     assert_eq!(ran(folder.path(), &arguments).code(), "files/exists");
     assert_eq!(ran(folder.path(), &[&arguments[..], &["--force", "--quiet"]].concat()).exit, Some(0));

@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::program::{Ran, TAUTLINE, ran_by};
+use crate::report::facts;
 
 fn audit(folder: &Path, words: &[&str]) -> Ran {
     ran_by(TAUTLINE, folder, &[&["audit"], words].concat())
@@ -89,6 +90,27 @@ fn without_heights_the_plane_is_judged_with_a_note() {
     let json = audit(folder.path(), &["flat.csv", "--delta", "1", "--json"]).out;
     let report: serde_json::Value = serde_json::from_str(&json).expect("a report");
     assert_eq!(report["planar"], true);
+}
+
+#[test]
+fn heights_beside_latitudes_are_assumed_in_metres_without_a_unit() {
+    let folder = recordings();
+    let bounded = ["--delta", "1", "--motion", "bounded", "--max-accel", "0.1"];
+    for (column, is_assumed, verdict) in [
+        ("alt", true, "CLEAR if heights are in metres, accelerations of at most 0.1 m/s^2: "),
+        ("alt_m", false, "PROVED CLEAR: "),
+    ] {
+        let rows: Vec<_> = (0..10).map(|t| format!("{t},a,47,8,400\n{t},b,47.001,8,400\n")).collect();
+        fs::write(folder.path().join("field.csv"), format!("t_s,id,lat,lon,{column}\n{}", rows.concat()))
+            .expect("written");
+        let ran = audit(folder.path(), &[&["field.csv"], &bounded[..]].concat());
+        assert!(ran.exit == Some(0) && ran.out.starts_with(verdict), "{column}: {ran:?}");
+        let json = audit(folder.path(), &[&["field.csv"], &bounded[..], &["--json"]].concat()).out;
+        let report: serde_json::Value = serde_json::from_str(&json).expect("a report");
+        assert_eq!(report["proved"], !is_assumed, "{column}");
+        let by_default = facts(&report, "height-unit").into_iter().filter(|fact| fact["source"] == "default");
+        assert_eq!(by_default.count(), usize::from(is_assumed), "{column}: {}", report["facts"]);
+    }
 }
 
 #[test]

@@ -1,7 +1,8 @@
-//! docs/report.md lists exactly the keys of the JSON of `run` and `check`, with units; docs/study-json.md those of
-//! studies.
+//! docs/report.md lists exactly the keys of the JSON of `run`, `audit` and `check`, with units; docs/study-json.md
+//! those of studies.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::RangeInclusive;
 use std::path::Path;
 
 use crate::program::{TAUTLINE, ran_by};
@@ -18,9 +19,18 @@ const KINDS: [&[&str]; 4] = [
     &["only_first", "only_second", "of", "p_value", "first_of_discordant", "difference", "low", "high", "confidence"],
 ];
 
+/// Returns the text of a section of a page, without its further sections of this level.
+fn section(page: &'static str, mark: &str, heading: &str) -> &'static str {
+    page.split(mark).find(|text| text.starts_with(heading)).expect("a section")
+}
+
 /// Returns the keys of a section of a page, each with its unit.
-fn documented(page: &'static str, section: &str) -> BTreeMap<&'static str, &'static str> {
-    let text = page.split("\n## ").find(|text| text.starts_with(section)).expect("a section");
+fn documented(page: &'static str, heading: &str) -> BTreeMap<&'static str, &'static str> {
+    rows(section(page, "\n## ", heading))
+}
+
+/// Returns the keys of tables, each with its unit.
+fn rows(text: &'static str) -> BTreeMap<&'static str, &'static str> {
     let row = |line: &'static str| {
         let mut cells = line.trim_matches('|').split(" | ").map(str::trim);
         Some((cells.next()?.strip_prefix('`')?.strip_suffix('`')?, cells.next()?))
@@ -28,10 +38,51 @@ fn documented(page: &'static str, section: &str) -> BTreeMap<&'static str, &'sta
     text.lines().map(|line| line.replace("| |", "| - |")).map(|line| &*line.leak()).filter_map(row).collect()
 }
 
+/// Returns the keys of a finding, from the table whose first cells hold one key or several.
+fn keys_of_a_finding() -> BTreeSet<String> {
+    let table = section(PAGE, "\n## ", "Answers and findings").split("| key of a finding |").nth(1).expect("a table");
+    let cells = table.lines().filter_map(|line| line.strip_prefix("| `")?.split_once("` |"));
+    let keys = cells.flat_map(|(cell, _)| cell.split("`, `"));
+    keys.map(|key| key.trim_end_matches("[]").to_owned()).collect()
+}
+
+/// Replaces each finding by a word, and the data of each reason, whose keys depend on the code.
+fn without_findings(value: Value) -> Value {
+    let mut paths = BTreeSet::new();
+    match value {
+        Value::Object(table) if table.contains_key("subjects") => {
+            keys(&Value::Object(table.clone()), "", &mut paths);
+            if paths == keys_of_a_finding() { Value::from("a finding") } else { Value::Object(table) }
+        }
+        Value::Object(mut table) if table.contains_key("data") => {
+            assert_documented_reason(&table);
+            table.insert("data".to_owned(), Value::from("keys of the code"));
+            Value::Object(table)
+        }
+        Value::Object(table) => table.into_iter().map(|(key, value)| (key, without_findings(value))).collect(),
+        Value::Array(list) => {
+            let list: Vec<_> = list.into_iter().map(without_findings).collect();
+            let are_findings = !list.is_empty() && list.iter().all(|entry| entry == "a finding");
+            if are_findings { Value::from("findings") } else { list.into() }
+        }
+        plain => plain,
+    }
+}
+
+/// Asserts that the row of a reason's code names every key of its data.
+fn assert_documented_reason(reason: &serde_json::Map<String, Value>) {
+    let text = section(PAGE, "\n## ", "Reasons against a pass");
+    let code = reason["code"].as_str().expect("a code");
+    let row = text.lines().find(|line| line.starts_with(&format!("| `{code}` |"))).unwrap_or_else(|| panic!("{code}"));
+    for key in reason["data"].as_object().expect("an object").keys() {
+        assert!(row.contains(&format!("`{key}`")) || row.contains(&format!("`{key}[]`")), "{code}: {key}");
+    }
+}
+
 /// Collects the paths of all keys of a JSON value.
 fn keys(value: &Value, path: &str, found: &mut BTreeSet<String>) {
     match value {
-        Value::Object(table) => {
+        Value::Object(table) if !table.is_empty() => {
             for (key, value) in table {
                 let path = if path.is_empty() { key.clone() } else { format!("{path}.{key}") };
                 keys(value, &path, found);
@@ -75,10 +126,14 @@ fn by_kind(value: Value) -> Value {
 
 /// Returns the keys that commands print.
 fn printed(commands: &[&[&str]], simplify: impl Fn(Value) -> Value) -> BTreeSet<String> {
-    let folder = tempfile::tempdir().expect("a folder");
+    printed_in(tempfile::tempdir().expect("a folder").path(), commands, simplify)
+}
+
+/// Returns the keys that commands print in a folder.
+fn printed_in(folder: &Path, commands: &[&[&str]], simplify: impl Fn(Value) -> Value) -> BTreeSet<String> {
     let mut found = BTreeSet::new();
     for command in commands {
-        let ran = ran_by(TAUTLINE, Path::new(folder.path()), command);
+        let ran = ran_by(TAUTLINE, folder, command);
         keys(&simplify(serde_json::from_str(&ran.out).expect("JSON")), "", &mut found);
     }
     let (empty, mut found): (BTreeSet<_>, BTreeSet<_>) = found.into_iter().partition(|key| key.ends_with("[]"));
@@ -88,20 +143,33 @@ fn printed(commands: &[&[&str]], simplify: impl Fn(Value) -> Value) -> BTreeSet<
     found
 }
 
+/// Returns the keys without those of tables that are null or empty in one output and have keys in another one.
+fn whole(keys: &BTreeSet<String>) -> BTreeSet<String> {
+    let is_table = |key: &String| {
+        keys.iter()
+            .any(|other| ["{key}.", "{key}[]."].iter().any(|form| other.starts_with(&form.replace("{key}", key))))
+    };
+    keys.iter().filter(|key| !is_table(key)).cloned().collect()
+}
+
 /// Returns the documented keys without list marks.
 fn plain(documented: &BTreeMap<&str, &str>) -> BTreeSet<String> {
     documented.keys().map(|key| key.trim_end_matches("[]").to_owned()).collect()
 }
 
-fn assert_documented(section: &str, commands: &[&[&str]]) {
-    let documented = documented(PAGE, section);
-    assert_eq!(plain(&documented), printed(commands, |json| json), "{section}");
+fn assert_documented(documented: &BTreeMap<&'static str, &'static str>, printed: &BTreeSet<String>) {
+    assert_eq!(plain(documented), *printed);
+    assert_units(documented);
+}
+
+fn assert_units(documented: &BTreeMap<&'static str, &'static str>) {
     for (key, unit) in documented {
+        let key = key.trim_end_matches("[]");
         let units = [("_deg", "deg"), ("_m_s2", "m/s^2"), ("_m_s", "m/s"), ("_per_s", "1/s"), ("_m", "m"), ("_s", "s")];
         match units.iter().find(|(suffix, _)| key.ends_with(suffix)) {
-            Some((_, expected)) => assert_eq!(unit, *expected, "{key}"),
-            None if key.ends_with("_bytes") => assert_eq!(unit, "B", "{key}"),
-            None => assert!(["-", "m^2/s^2"].contains(&unit), "{key}: {unit}"),
+            Some((_, expected)) => assert_eq!(unit, expected, "{key}"),
+            None if key.ends_with("_bytes") => assert_eq!(*unit, "B", "{key}"),
+            None => assert!(["-", "m^2/s^2"].contains(unit), "{key}: {unit}"),
         }
     }
 }
@@ -138,10 +206,59 @@ fn every_key_of_the_report_is_on_its_page() {
     ];
     let heard = [&["run", "pentagon", "--force"], &quick[..], &radio].concat();
     let shielded = [&["run", "pentagon", "--force", "--set", "shield.enabled=true"], &quick[..]].concat();
-    assert_documented(
-        "report.json",
-        &[&hit, &passed_through, &mission, &among, &assigned, &tilting, &heard, &shielded],
-    );
+    let commands = [&hit, &passed_through, &mission, &among, &assigned, &tilting, &heard, &shielded].map(|of| &of[..]);
+    assert_documented(&documented(PAGE, "report.json"), &printed(&commands, without_findings));
+}
+
+#[test]
+fn every_key_of_an_audit_is_on_its_page() {
+    /// Vehicle b is not seen from 2 s to 5 s, and c is alone.
+    const LATE: [(&str, u32, RangeInclusive<u32>); 4] =
+        [("a", 0, 0..=8), ("b", 9, 0..=2), ("b", 9, 5..=8), ("c", 18, 20..=22)];
+    let folder = tempfile::tempdir().expect("a folder");
+    let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).expect("written");
+    let seen = LATE.into_iter().flat_map(|(id, x, times)| times.map(move |t| format!("{t},{id},{x},0,0\n")));
+    write("late.csv", &format!("t_s,id,x,y,z\n{}", seen.collect::<Vec<_>>().concat()));
+    // Vehicle a turns, and its plan ends earlier than the flight.
+    let turn = "t_s,id,x,y,z\n0,a,0,0,0\n0,b,0,9,0\n1,a,5,0,0\n1,b,0,9,0\n2,a,0,0,0\n2,b,0,9,0\n";
+    write("turn.csv", turn);
+    write("plan.csv", turn.rsplit_once("2,a").expect("a row").0);
+    std::fs::create_dir(folder.path().join("corners")).expect("a folder");
+    for (name, y) in [("a.csv", 0), ("b.csv", 9)] {
+        let corner = format!("duration,x^0,x^1,y^0,y^1,z^0,z^1\n1,0,3,{y},0,1,0\n1,3,-3,{y},0,1,0\n");
+        write(&format!("corners/{name}"), &corner);
+    }
+    let fly = |scenario: &str, out: &str, sets: &[&str]| {
+        let sets = sets.iter().flat_map(|set| ["--set", set]);
+        let fixed = ["run", scenario, "--out", out, "--no-figures", "--no-snapshots", "--force", "--quiet"];
+        ran_by(TAUTLINE, folder.path(), &fixed.into_iter().chain(sets).collect::<Vec<_>>());
+    };
+    // The mean velocity grows until rounding moves vehicles.
+    fly("pentagon", "drifting", &["swarm.a22_per_s=2.0", "time.duration_s=60"]);
+    let stiff = ["law.f1_per_s2=30", "law.f2_per_s=1", "time.record_hz=1", "time.duration_s=20", "arrival.hold_s=20"];
+    fly("pentagon-laplacian", "stiff", &stiff);
+    let bounded = ["turn.csv", "--delta", "1", "--motion", "bounded", "--max-accel", "0.1"];
+    let planned = ["turn.csv", "--delta", "1", "--plan", "plan.csv", "--plan-delay", "0"];
+    let commands = [
+        &["late.csv", "--delta", "1", "--limit", "speed=5", "--require-presence"][..],
+        &bounded,
+        &planned,
+        &["turn.csv", "--delta", "1", "--plan", "turn.csv"],
+        &["corners", "--limit", "accel=9"],
+        &["drifting"],
+        &["stiff", "--delta", "1.99"],
+    ];
+    let commands: Vec<_> = commands.iter().map(|command| [&["audit"], *command, &["--json"]].concat()).collect();
+    let commands: Vec<_> = commands.iter().map(Vec::as_slice).collect();
+    let simplify = |mut report: Value| {
+        // Keys of limits depend on the question.
+        report["question"]["limits"] = Value::from("keys of limits");
+        without_findings(report)
+    };
+    let mut documented = documented(PAGE, "audit --json");
+    documented.extend(rows(section(PAGE, "\n### ", "First keys")));
+    assert_eq!(whole(&plain(&documented)), whole(&printed_in(folder.path(), &commands, simplify)));
+    assert_units(&documented);
 }
 
 #[test]
@@ -149,7 +266,7 @@ fn every_key_of_the_check_is_on_its_page() {
     let mission = ["check", "pentagon-leader", "--json", "--set", "leg=[{scale=1.2}]"];
     let among = ["check", "obstacles", "--json", "--set", ELLIPSOID];
     let drifting = ["check", "--json", "--set", "graph.kind=ring", "--set", "time.duration_s=310"];
-    assert_documented("check --json", &[&drifting, &mission, &among]);
+    assert_documented(&documented(PAGE, "check --json"), &printed(&[&drifting, &mission, &among], |json| json));
 }
 
 #[test]
@@ -187,11 +304,7 @@ fn every_key_of_a_campaign_is_on_its_page() {
     }
     // Null in one campaign, a table or a list in the other.
     let named: BTreeSet<_> = found.iter().map(|key| key.trim_end_matches("[]").to_owned()).collect();
-    let is_whole = |key: &String| {
-        !named.iter().any(|other| other.starts_with(&format!("{key}.")) || other.starts_with(&format!("{key}[]")))
-    };
-    let whole: BTreeSet<_> = named.iter().filter(|key| is_whole(key)).cloned().collect();
-    assert_eq!(plain(&documented(STUDIES, "campaign.json")), whole);
+    assert_eq!(plain(&documented(STUDIES, "campaign.json")), whole(&named));
 }
 
 #[test]

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::fs;
 
 use crate::program::{Ran, TAUTLINE, ran_by};
+use crate::report::{at, facts, parts, status};
 
 /// A vehicle that moves along x with 5 m/s and rises with 1 m/s from 2 s on, and a static one.
 fn recording() -> String {
@@ -64,11 +65,8 @@ fn without_delta_no_separation_is_judged() {
     );
     let (ran, _) = audit(&["--limit", "speed=6", "--json"]);
     let report: serde_json::Value = serde_json::from_str(&ran.out).expect("JSON");
-    assert_eq!((&report["status"], &report["audit"]["status"]), (&"clear".into(), &serde_json::Value::Null));
-    assert_eq!(
-        (&report["separation"]["min_m"], &report["limits"][0]["status"]),
-        (&serde_json::Value::Null, &"clear".into())
-    );
+    assert_eq!((&report["status"], parts(&report)), (&"clear".into(), vec!["speed_m_s"]));
+    assert_eq!((status(&report, "speed_m_s"), at(&report, "/question/delta")), ("clear", &serde_json::Value::Null));
     let (ran, _) = audit(&["--limit", "speed=6", "--delta", "1"]);
     assert!(
         ran.exit == Some(0) && ran.out.contains("never closer than") && ran.out.contains("; speed at most"),
@@ -127,9 +125,11 @@ fn corners_of_a_show_are_one_note_and_a_window_judges_them() {
                 --accel-window judges them): ";
     assert!(plain.out.starts_with(said), "{plain:?}");
     let report: serde_json::Value = serde_json::from_str(&audit(&["--limit", "accel=4", "--json"]).out).expect("JSON");
-    let corners = &report["limits"][0]["corners"];
-    assert_eq!((&corners["count"], &corners["largest"]["by_m_s"]), (&78.into(), &6.0.into()));
-    assert_eq!(report["audit"]["proved"], false);
+    let corners = &report["corners"][0];
+    assert_eq!((&corners["part"], &corners["count"]), (&"accel_m_s2".into(), &78.into()));
+    let largest = serde_json::json!({"vehicle": "cf1", "at_s": 1.0, "by_m_s": 6.0});
+    assert_eq!(corners["largest"], largest);
+    assert_eq!((&report["proved"], facts(&report, "rounded-corners").len()), (&false.into(), 1));
     let strict = audit(&["--limit", "accel=4", "--accel-window", "0.2"]);
     assert_eq!(strict.exit, Some(1), "{strict:?}");
     assert!(strict.out.starts_with("VIOLATION: accel") && strict.out.contains("30.000 m/s^2"), "{strict:?}");

@@ -2,6 +2,8 @@
 
 #[path = "../support/program.rs"]
 mod program;
+#[path = "../support/report.rs"]
+mod report;
 
 mod archives;
 mod attack;

@@ -5,6 +5,7 @@ use std::fs;
 use serde_json::Value;
 
 use crate::program::{Ran, TAUTLINE, ran_by};
+use crate::report::{closest_obstacle, number, reason, reasons, violations};
 
 const SCENARIO: &str = r#"[swarm]
 count = 3
@@ -74,19 +75,18 @@ fn obstacles_are_in_check_run_report_and_audit() {
     let flown = ran(&folder, &["run", "among.toml", "--json", "--no-figures", "--no-snapshots"]);
     assert_eq!(flown.exit, Some(0), "{}", flown.err);
     let report = json(&flown);
-    assert_eq!((report["verdict"]["pass"].as_bool(), report["audit"]["status"].as_str()), (Some(true), Some("clear")));
-    let obstacles = &report["obstacles"];
-    assert_eq!(obstacles["certified_clearance_margin_m"].as_f64(), Some(promised_m));
-    let nearest = &obstacles["closest"][0];
-    let (min_m, clearance_m) = (nearest["min_m"].as_f64().expect("m"), nearest["clearance_m"].as_f64().expect("m"));
-    assert!(nearest["obstacle"] == "tower" && clearance_m == 0.5 && min_m >= clearance_m + promised_m, "{nearest}");
-    assert_eq!(obstacles["violations"].as_array().map(Vec::len), Some(0));
+    assert_eq!((report["pass"].as_bool(), report["status"].as_str()), (Some(true), Some("clear")));
+    assert_eq!(number(&report, "/certificate/clearance_margin_m"), promised_m);
+    let nearest = closest_obstacle(&report);
+    let (min_m, clearance_m) = (number(nearest, "/value/lower"), number(nearest, "/limit"));
+    assert!(nearest["subjects"][1] == "tower" && clearance_m == 0.5 && min_m >= clearance_m + promised_m, "{nearest}");
+    assert!(violations(&report).is_empty(), "{report}");
 
     let audited = ran(&folder, &["audit", "out/among/run.mcap", "--json"]);
     let audit = json(&audited);
     assert_eq!((audited.exit, audit["status"].as_str()), (Some(0), Some("clear")), "{}", audited.err);
     assert!(audited.err.contains("the obstacles are the recording's own: tower, wall"), "{}", audited.err);
-    assert_eq!(audit["obstacles"]["closest"][0]["who"][1], "tower");
+    assert_eq!(closest_obstacle(&audit)["subjects"], nearest["subjects"]);
     let other = "[[obstacle]]\nname = \"tree\"\nball = { radius_m = 0.5 }\nat_m = [6.0, 1.0, 0.0]\n";
     fs::write(folder.path().join("other.toml"), other).expect("a file");
     let other = ran(&folder, &["audit", "out/among/run.mcap", "--obstacles", "other.toml"]);
@@ -95,7 +95,7 @@ fn obstacles_are_in_check_run_report_and_audit() {
     assert!(other.err.contains("are not judged: --obstacles names others"), "{}", other.err);
     let scaled = json(&ran(&folder, &["audit", "out/among/run.mcap", "--scale", "2", "--json"]));
     let drawn = json(&ran(&folder, &["audit", "out/among/run.mcap", "--independent", "--json"]));
-    let least_m = |audit: &Value| audit["obstacles"]["closest"][0]["lower_m"].as_f64().expect("m");
+    let least_m = |audit: &Value| number(closest_obstacle(audit), "/value/lower");
     assert!((least_m(&scaled) - 2.0 * least_m(&drawn)).abs() < 1e-9, "obstacles are scaled as positions are");
     assert!((least_m(&audit) - min_m).abs() < 1e-12, "the run's audit is repeated");
     fs::write(folder.path().join("none.toml"), "").expect("a file");
@@ -118,11 +118,17 @@ fn a_collision_with_an_obstacle_fails_in_every_output_and_between_samples() {
     let folder = folder(HIT);
     let flown = ran(&folder, &["run", "among.toml", "--json", "--no-figures", "--no-snapshots"]);
     let report = json(&flown);
-    assert_eq!((flown.exit, report["audit"]["status"].as_str()), (Some(1), Some("violation")), "{}", flown.err);
-    assert_eq!(report["obstacles"]["violations"][0]["obstacle"], "tower");
-    assert_eq!(report["audit"]["violations"].as_array().map(Vec::len), Some(0));
-    let reason = report["verdict"]["reasons"][0].as_str().expect("a reason");
-    assert!(reason.starts_with("A vehicle came too near to an obstacle: vehicle 1"), "{reason}");
+    assert_eq!((flown.exit, report["status"].as_str()), (Some(1), Some("violation")), "{}", flown.err);
+    let found = violations(&report);
+    assert!(
+        !found.is_empty() && found.iter().all(|found| found["subjects"][1] == "tower"),
+        "no two vehicles: {report}"
+    );
+    assert_eq!(reasons(&report)[0], "obstacle-violation");
+    let reason = reason(&report, "obstacle-violation");
+    assert_eq!((&reason["data"]["vehicle"], &reason["data"]["obstacle"]), (&1.into(), &"tower".into()), "{reason}");
+    let text = reason["text"].as_str().expect("a text");
+    assert!(text.starts_with("A vehicle came too near to an obstacle: vehicle 1"), "{reason}");
     let words = ran(&folder, &["run", "among.toml", "--force", "--no-figures", "--no-snapshots"]);
     assert!(words.out.starts_with("VIOLATION: vehicle 1 came to 0.25"), "{}", words.out);
     let audited = ran(&folder, &["audit", "out/among/run.mcap"]);
@@ -136,7 +142,7 @@ fn a_collision_with_an_obstacle_fails_in_every_output_and_between_samples() {
         let audit = json(&audited);
         assert_eq!((audited.exit, audit["status"].as_str()), (Some(exit), Some(status)), "{}", audited.err);
         assert!(audited.err.contains("the obstacles are the recording's own: tower"), "{}", audited.err);
-        assert_eq!(audit["obstacles"]["closest"][0]["who"], serde_json::json!([vehicle, "tower"]));
+        assert_eq!(closest_obstacle(&audit)["subjects"], serde_json::json!([vehicle, "tower"]));
     }
 }
 

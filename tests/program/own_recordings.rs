@@ -10,6 +10,7 @@ use tautline::swarm::{Rows, Swarm};
 use tempfile::TempDir;
 
 use crate::program::{Ran, TAUTLINE, ran_by};
+use crate::report::{SEPARATION, at, closest, least, motion, number, status, violations};
 
 /// Built-in scenarios with the duration of their flights in short tests \[s\].
 const BUILT_IN: [(&str, &str); 14] = [
@@ -63,17 +64,15 @@ fn recordings_of_built_in_scenarios_have_the_verdicts_of_their_runs() {
         let report = json(&fs::read_to_string(folder.path().join("flown/report.json")).expect("a report"));
         let judged = audit(folder.path(), &["flown", "--json"]);
         let found = json(&judged.out);
-        assert_eq!(found["status"], report["audit"]["status"], "{scenario}: {judged:?}");
-        for key in ["delta_m", "min_m", "min_pair", "min_at_s"] {
-            // With ellipsoids the run measures in its delta, the audit in half axes.
-            if report["separation"]["ellipsoid"].is_null() {
-                assert_eq!(found["separation"][key], report["separation"][key], "{scenario}: {key}");
-            }
+        assert_eq!(at(&found, "/status"), at(&report, "/status"), "{scenario}: {judged:?}");
+        // With ellipsoids the run measures in its delta, the audit in half axes.
+        if at(&report, "/question/ellipsoid_m").is_null() {
+            assert_eq!(at(&found, "/question/delta"), at(&report, "/question/delta"), "{scenario}");
+            assert_eq!(closest(&found), closest(&report), "{scenario}");
         }
-        if found["status"] == "clear" {
-            let is_word = found["audit"]["judged_by_run"] == true || found["audit"]["proved"] == true;
-            assert!(is_word && found["audit"]["assumes"].is_null(), "{scenario}: {}", found["audit"]);
-        }
+        let is_by_run = ["run-audit", "every-step"].contains(&motion(&found));
+        assert!(is_by_run, "{scenario}: {}", found["facts"]);
+        assert_eq!(found["proved"] == true, found["status"] == "clear", "{scenario}: {}", found["facts"]);
     }
 }
 
@@ -86,7 +85,7 @@ fn a_recording_has_the_verdict_of_its_run() {
                 never closer than 2.460355 m, 2 and 3 at 2.15 s (delta 2.000 m); from 0.000 s to 4.000 s";
     assert_eq!(judged.out.lines().next(), Some(said));
     let found = json(&audit(folder.path(), &["flown", "--json"]).out);
-    assert_eq!((&found["audit"]["proved"], &found["audit"]["judged_by_run"]), (&true.into(), &true.into()));
+    assert_eq!((&found["proved"], motion(&found)), (&true.into(), "run-audit"));
     for same in [&["--delta", "2"][..], &["--require-presence", "--expect-vehicles", "5"]] {
         let again = audit(folder.path(), &[&["flown"], same].concat());
         assert!(
@@ -188,7 +187,7 @@ fn a_changed_or_truncated_recording_is_judged_from_its_samples() {
     let recording = McapRecording::open(&folder.path().join("flown/run.mcap")).expect("a recording");
     let (samples, _) = recording.read_all().expect("whole");
     let coordinate = samples[samples.len() - 1].swarm.positions_m[(0, 0)];
-    let closest_m = json(&said(&["flown", "--json"]).out)["separation"]["min_m"].as_f64().expect("known");
+    let closest_m = least(&json(&said(&["flown", "--json"]).out));
     for value in [coordinate, closest_m] {
         altered(folder.path(), "changed.mcap", |bytes| {
             replace(bytes, value, value + 1e-3);
@@ -304,7 +303,7 @@ fn straight_lines_do_not_overrule_the_run_for_obstacles() {
     let report = json(&fs::read_to_string(folder.path().join("flown/report.json")).expect("a report"));
     let judged = audit(folder.path(), &["flown", "--json"]);
     let found = json(&judged.out);
-    assert_eq!((&report["audit"]["status"], &found["status"]), (&"clear".into(), &"clear".into()), "{judged:?}");
+    assert_eq!((&report["status"], &found["status"]), (&"clear".into(), &"clear".into()), "{judged:?}");
     let drawn = audit(folder.path(), &["flown", "--independent"]);
     assert!(drawn.out.starts_with("VIOLATION: "), "straight lines alone say otherwise: {drawn:?}");
 }
@@ -336,10 +335,8 @@ fn violations_between_samples_are_in_the_audit_of_the_recording() {
     let judged = audit(folder.path(), &["flown", "--json"]);
     let whole = json(&judged.out);
     assert_eq!((judged.exit, &whole["recording"]), (Some(1), &"flown/run.mcap".into()));
-    for key in ["min_m", "min_at_s", "min_pair"] {
-        assert_eq!(whole["separation"][key], report["separation"][key]);
-    }
-    assert_eq!(whole["audit"]["violations"], report["audit"]["violations"]);
+    assert_eq!(closest(&whole), closest(&report));
+    assert_eq!(violations(&whole), violations(&report));
     // Limits of single vehicles do not hide the violations.
     assert!(audit(folder.path(), &["flown", "--limit", "speed=100"]).out.starts_with("VIOLATION: "));
     let exported = ran_by(TAUTLINE, folder.path(), &["export", "flown", "-o", "drawn.csv"]);
@@ -347,17 +344,18 @@ fn violations_between_samples_are_in_the_audit_of_the_recording() {
     let drawn = ran_by(TAUTLINE, folder.path(), &["audit", "drawn.csv", "--delta", "2"]);
     assert_eq!(drawn.exit, Some(0), "straight lines show the opposite: {drawn:?}");
     // Other options are not clear either if the run found a smaller separation between the samples.
-    let found = &report["audit"]["violations"][0];
-    let ids = format!("{},{}", found["pair"][0], found["pair"][1]);
+    let found = &violations(&report)[0];
+    let [first, second] = [0, 1].map(|k| found["subjects"][k].as_str().expect("a name"));
+    let ids = format!("{first},{second}");
     for more in [&["--from", "0"][..], &["--ids", &ids], &["--delta", "1.99"], &["--motion", "linear"]] {
         let part = audit(folder.path(), &[&["flown"], more].concat());
         let said = "UNDECIDED: the run's audit of every step found ";
         assert!(part.exit == Some(1) && part.out.starts_with(said), "{more:?}: {part:?}");
         assert!(part.err.contains("another question (VIOLATION: "), "{more:?}: {part:?}");
     }
-    let before = (0.5 * found["from_s"].as_f64().expect("a time")).to_string();
-    let deepest = report["audit"]["violations"].as_array().into_iter().flatten();
-    let deepest = deepest.map(|of| of["min_m"].as_f64().expect("a distance")).fold(f64::INFINITY, f64::min);
+    let before = (0.5 * number(found, "/from_s")).to_string();
+    let all = violations(&report).iter();
+    let deepest = all.map(|violation| number(violation, "/value/lower")).fold(f64::INFINITY, f64::min);
     let least = (0.99 * deepest).to_string();
     for more in [&["--ids", &ids, "--delta", &least][..], &["--to", &before], &["--delta", &least], &["--independent"]]
     {
@@ -382,10 +380,10 @@ fn violations_of_obstacles_between_samples_are_in_the_audit_of_the_recording() {
     fly(folder.path(), "past.toml", &[]);
     let report = json(&fs::read_to_string(folder.path().join("flown/report.json")).expect("a report"));
     let whole = json(&audit(folder.path(), &["flown", "--json", "--junit", "found.xml"]).out);
-    assert_eq!((&whole["status"], &whole["audit"]["status"]), (&"violation".into(), &"violation".into()));
-    for key in ["min_m", "min_at_s", "from_s", "to_s"] {
-        assert_eq!(whole["violations"][0][key], report["obstacles"]["violations"][0][key]);
-    }
+    assert_eq!((&whole["status"], status(&whole, SEPARATION)), (&"violation".into(), "violation"));
+    let found = violations(&report);
+    assert_eq!(found[0]["subjects"][1], "ball");
+    assert_eq!(violations(&whole), found);
     assert!(audit(folder.path(), &["flown"]).out.starts_with("VIOLATION: 1 and ball came to "));
     let cases = fs::read_to_string(folder.path().join("found.xml")).expect("cases");
     assert!(!cases.contains("<testcase name=\"separation\" classname=\"tautline.audit\"/>"), "{cases}");

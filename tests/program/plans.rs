@@ -7,6 +7,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::program::{Ran, TAUTLINE, ran_by};
+use crate::report::{facts, number, part, parts, status};
 
 const HEADER: &str = "#duration,p0x,p0y,p0z,...\n";
 
@@ -63,8 +64,14 @@ fn curves_near_their_plan_are_proved_and_certified() {
     let plan = &report["plan"];
     assert_eq!((&plan["status"], &plan["certificate"]["holds"]), (&Value::from("clear"), &Value::from(true)));
     assert!((plan["vehicles"][0]["upper_m"].as_f64().expect("a number") - 0.2).abs() < 1e-8, "{plan}");
+    assert_eq!((parts(&report), status(&report, "plan")), (vec!["separation", "plan"], "clear"));
+    assert!((number(part(&report, "plan"), "/closest/0/value/upper") - 0.2).abs() < 1e-8, "{report}");
     assert!(plan["delay_s"].as_f64().expect("a number").abs() < 1e-5, "{plan}");
-    assert!(json(folder.path(), &asked[..3])["plan"].is_null());
+    let alone = json(folder.path(), &asked[..3]);
+    assert_eq!(
+        (&alone["plan"], &alone["question"]["plan"], parts(&alone)),
+        (&Value::Null, &Value::Null, vec!["separation"])
+    );
     // A plan that keeps less than delta + 2e certifies nothing; the verdict on the flight stands.
     let wide = audit(folder.path(), &[&asked[..], &["--tube", "0.26"]].concat());
     assert_eq!(wide.exit, Some(0), "{wide:?}");
@@ -112,6 +119,28 @@ fn samples_are_clear_only_under_their_assumption() {
     // A wrong delay is a large distance.
     let late = audit(folder.path(), &["samples.csv", "--plan", "plan", "--plan-delay", "0.5", "--tube", "0.3"]);
     assert!(late.exit == Some(1) && late.out.starts_with("VIOLATION: cf"), "{late:?}");
+}
+
+#[test]
+fn an_assumption_of_the_plan_is_not_one_of_the_flight() {
+    let rows = "0,a,0,0,0\n0,b,0,9,0\n1000,a,0,0,0\n1000,b,0,9,0\n";
+    let folder = folder();
+    for (name, time) in [("boot.csv", "time_boot_ms"), ("known.csv", "t_ms")] {
+        fs::write(folder.path().join(name), format!("{time},id,x,y,z\n{rows}")).expect("a file");
+    }
+    let assumed = "the clocks of all vehicles started together";
+    for (flight, plan, said, subjects) in [
+        ("known.csv", "boot.csv", format!("between its samples and in the plan {assumed}: "), [Some("the plan")]),
+        ("boot.csv", "known.csv", format!("CLEAR if {assumed}, straight between samples and the plan is "), [None]),
+    ] {
+        let asked = [flight, "--plan", plan, "--plan-delay", "0", "--tube", "1"];
+        let ran = audit(folder.path(), &asked);
+        assert!(ran.exit == Some(0) && ran.out.contains(&said), "{said}: {ran:?}");
+        assert_eq!(ran.out.matches(assumed).count(), 1, "{ran:?}");
+        let report = json(folder.path(), &asked);
+        let found: Vec<_> = facts(&report, "common-start").iter().map(|fact| fact["subject"].as_str()).collect();
+        assert_eq!((found.as_slice(), &report["proved"]), (&subjects[..], &Value::from(false)));
+    }
 }
 
 #[test]

@@ -4,6 +4,7 @@ use std::fmt::Write as _;
 use std::fs;
 
 use crate::program::{Ran, TAUTLINE, ran_by};
+use crate::report::{parts, status};
 
 /// Vehicles in a row, each with a sample every second up to its own time \[s\].
 fn recording(until_s: &[u32]) -> String {
@@ -70,6 +71,11 @@ fn presence_is_in_the_keys_and_the_text_stays_short_for_thousands() {
     assert_eq!((&presence["throughout"], &presence["partly"]), (&1000.into(), &1000.into()));
     assert_eq!(presence["window_s"], serde_json::json!([0.0, 4.0]));
     assert_eq!(presence["listed"][0], serde_json::json!({"vehicle": "v1", "from_s": 0.0, "to_s": 3.0}));
+    assert_eq!((parts(&report), &report["status"]), (vec!["separation"], &"clear".into()), "presence is not asked");
+    let (required, _) = audit(&until_s, &["--delta", "1", "--require-presence", "--json"]);
+    let required: serde_json::Value = serde_json::from_str(&required.out).expect("JSON");
+    assert_eq!((status(&required, "separation"), status(&required, "presence")), ("clear", "undecided"));
+    assert_eq!(required["status"], "undecided");
     let (text, _) = audit(&until_s, &["--delta", "1"]);
     let headline = text.out.lines().next().expect("a headline");
     assert!(headline.ends_with(", and 997 more") && headline.len() < 500, "{headline}");

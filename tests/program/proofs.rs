@@ -9,6 +9,7 @@ use std::process::{Command, Output};
 use serde_json::json;
 
 use crate::program::{Ran, TAUTLINE, ran_by};
+use crate::report::least;
 
 /// Number of recordings; more with `TAUTLINE_LONG=1`.
 const CASES: u64 = 60;
@@ -98,7 +99,7 @@ fn python(folder: &Path, script: &Path, arguments: &[&str]) -> Output {
 
 fn smallest_m(folder: &Path, arguments: &[&str]) -> f64 {
     let report: serde_json::Value = serde_json::from_str(&audit(folder, arguments).out).expect("a report");
-    report["separation"]["min_m"].as_f64().expect("a separation")
+    least(&report)
 }
 
 #[test]

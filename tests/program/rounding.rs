@@ -4,6 +4,7 @@ use std::fs;
 use std::path::Path;
 
 use crate::program::{TAUTLINE, ran_by};
+use crate::report::least;
 
 /// Separation whose nearest numbers of three and of six decimals are larger \[m\].
 const APART_M: f64 = 2.504_729_6;
@@ -81,7 +82,7 @@ fn outputs_of_a_flight_round_separations_down() {
         fs::write(folder.path().join("out.txt"), &ran.out).expect("a file");
         let text = fs::read_to_string(folder.path().join("out/pentagon/report.json")).expect("a report");
         let report: serde_json::Value = serde_json::from_str(&text).expect("JSON");
-        let min_m = report["separation"]["min_m"].as_f64().expect("a separation");
+        let min_m = least(&report);
         let nearest: f64 = format!("{min_m:.3}").parse().expect("a number");
         (nearest > min_m).then_some(min_m)
     });

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 
 use crate::program::{Ran, TAUTLINE, ran_by};
+use crate::report::{SEPARATION, at, closest, number, part, reason, reasons, refusals, violations};
 use serde_json::Value;
 use tautline::mcap::McapRecording;
 use tautline::record::Event;
@@ -38,7 +39,7 @@ fn json(text: &str) -> Value {
 /// Collects the paths of all keys; lists are values.
 fn key_paths(value: &Value, path: &str, found: &mut Vec<String>) {
     match value {
-        Value::Object(object) => {
+        Value::Object(object) if !object.is_empty() => {
             for (key, value) in object {
                 key_paths(value, &format!("{path}.{key}"), found);
             }
@@ -55,40 +56,47 @@ fn the_pentagon_as_json_is_the_reference_flight() {
     assert_eq!(exit, GOOD, "{err}");
     assert_eq!(fs::read_to_string(folder.path().join("out/report.json")).expect("a report"), out, "one JSON, alone");
 
-    let number = |pointer: &str| report.pointer(pointer).and_then(Value::as_f64).expect(pointer);
-    let near = |pointer: &str, expected: f64, tolerance: f64| {
-        let found = number(pointer);
-        assert!((found - expected).abs() <= tolerance, "{pointer}: {found}, expected {expected}");
+    let near = |value: &Value, path: &str, expected: f64, tolerance: f64| {
+        let found = number(value, path);
+        assert!((found - expected).abs() <= tolerance, "{path}: {found}, expected {expected}");
     };
+    let closest = closest(&report);
     // Reference values, with the error of a step of 1/240 s, from crates/sim/tests/flights/reference_flights.rs.
-    near("/separation/min_m", 2.460_353, 1e-4);
-    near("/separation/min_at_s", 2.151, 0.02);
-    near("/separation/certified_m", 2.055_307, 1e-5);
-    near("/energy/initial", 3.656_743, 1e-5);
-    near("/formation/reached_at_s", 37.0, 1.0);
-    assert!([vec![2, 3], vec![1, 3]].map(Value::from).contains(&report["separation"]["min_pair"]));
-    assert_eq!(report["verdict"], json(r#"{"pass": true, "refused": [], "reasons": []}"#));
-    assert_eq!(report["audit"]["status"], "clear");
-    assert_eq!(report["audit"]["violations"], json("[]"));
-    assert_eq!(report["audit"]["closed_form"]["min_m"], report["separation"]["min_m"]);
-    assert_eq!(report["audit"]["parry"], json(r#"{"min_toi_s": null, "disagreements": 0}"#));
-    assert_eq!(report["audit"]["pairs_checked"], 28_801 * 10);
+    near(closest, "/value/lower", 2.460_353, 1e-4);
+    near(closest, "/at_s", 2.151, 0.02);
+    near(&report, "/certificate/separation_m", 2.055_307, 1e-5);
+    near(&report, "/energy/initial", 3.656_743, 1e-5);
+    near(&report, "/formation/reached_at_s", 37.0, 1.0);
+    assert!([vec!["2", "3"], vec!["1", "3"]].map(Value::from).contains(&closest["subjects"]));
+    assert_eq!(closest["value"]["upper"], closest["value"]["lower"]);
+    assert_eq!(
+        (&report["schema_version"], &report["pass"], &report["proved"]),
+        (&3.into(), &true.into(), &true.into())
+    );
+    assert_eq!(reasons(&report), [""; 0]);
+    let separation = part(&report, SEPARATION);
+    assert_eq!((&report["status"], &separation["status"]), (&"clear".into(), &"clear".into()));
+    assert!(violations(&report).is_empty(), "{separation}");
+    let detectors = serde_json::json!({
+        "steps": 28_800, "segments": null, "pairs_swept": 28_801 * 10,
+        "parry_contact_s": null, "parry_disagreements": 0, "rapier_contact_pairs": 0,
+    });
+    assert_eq!(separation["detectors"], detectors);
     assert_eq!(report["formation"]["reached"], true);
-    assert!(number("/energy/max_over_initial") <= 1.0 + 1e-6);
+    assert!(number(&report, "/energy/max_over_initial") <= 1.0 + 1e-6);
     assert_eq!(report["run"]["steps"], 28_800);
 }
 
 #[test]
 fn the_keys_of_the_report_are_the_documented_ones() {
     let expected = [
-        "schema_version",
+        "schema_version status pass proved answers facts window_s vehicles reasons",
+        "question.delta question.unit question.radius_m question.ellipsoid_m question.cylinder_m question.obstacles",
+        "question.limits question.well_clear question.require_presence question.plan question.above_m",
+        "question.from_s question.to_s",
+        "certificate.separation_m certificate.clearance_margin_m certificate.until_s certificate.void",
         "scenario.name scenario.sha256",
         "tool.name tool.version",
-        "verdict.pass verdict.refused verdict.reasons",
-        "separation.delta_m separation.min_m separation.min_at_s separation.min_pair separation.certified_m",
-        "separation.certified_until_s separation.certificate_void",
-        "audit.status audit.violations audit.undecided audit.steps audit.pairs_checked audit.closed_form.min_m",
-        "audit.parry.min_toi_s audit.parry.disagreements audit.rapier.contact_pairs",
         "hulls.bounces hulls.passed_through",
         "formation.reached formation.reached_at_s formation.held_s formation.fails formation.at_rest",
         "formation.max_edge_error_m formation.rms_position_error_m formation.max_position_error_m",
@@ -108,9 +116,19 @@ fn the_keys_of_the_report_are_the_documented_ones() {
     found.sort_unstable();
     assert_eq!(found, expected);
 
-    let violation = report["audit"]["violations"][0].as_object().expect("a violation");
-    let keys: Vec<&str> = violation.keys().map(String::as_str).collect();
-    assert_eq!(keys, ["from_s", "min_at_s", "min_m", "pair", "to_s"]);
+    let keys = |value: &Value| value.as_object().expect("an object").keys().cloned().collect::<Vec<_>>().join(" ");
+    assert_eq!(keys(part(&report, SEPARATION)), "closest detectors part status undecided violations");
+    for finding in [closest(&report), &violations(&report)[0]] {
+        assert_eq!(keys(finding), "at_s from_s limit rate_hz subjects to_s value");
+        assert_eq!(keys(&finding["value"]), "lower unit upper");
+    }
+    for (path, expected) in [
+        ("/reasons/0", "code data text"),
+        ("/facts/0", "fact source subject unit value"),
+        ("/certificate/void/0", "code text"),
+    ] {
+        assert_eq!(keys(at(&report, path)), expected, "{path}");
+    }
 }
 
 #[test]
@@ -166,7 +184,11 @@ fn the_baseline_violates_and_the_line_reaches_no_formation() {
     );
     assert!(collinear.out.contains("The start lies on a line"), "{}", collinear.out);
     let report = json(&fs::read_to_string(folder.path().join("out/report.json")).expect("a report"));
-    assert!(report["verdict"]["reasons"].to_string().contains("on a line"), "{report}");
+    assert_eq!(reasons(&report), ["refused", "not-reached", "start-too-flat"]);
+    assert_eq!(refusals(&report), ["start-on-line"]);
+    let flat = reason(&report, "start-too-flat");
+    assert_eq!(flat["data"], json(r#"{"start_dimension": 1, "formation_dimension": 2}"#));
+    assert!(flat["text"].as_str().is_some_and(|text| text.contains("on a line")), "{flat}");
 }
 
 #[test]
@@ -185,11 +207,14 @@ fn colliding_hulls_end_the_judged_flight_and_points_pass_through() {
         "{}",
         solid.err
     );
-    assert!(
-        report["verdict"]["reasons"]
-            .to_string()
-            .contains("After the first collision the motion is not governed by the law")
+    let hit = reason(&report, "hulls-hit");
+    assert_eq!(
+        (&hit["data"]["collisions"], &hit["data"]["time_s"]),
+        (&bounces.len().into(), &first["time_s"]),
+        "{hit}"
     );
+    let said = "After the first collision the motion is not governed by the law";
+    assert!(hit["text"].as_str().is_some_and(|text| text.contains(said)), "{hit}");
     let page = fs::read_to_string(folder.path().join("out/report.html")).expect("a page");
     assert!(page.contains("Hulls that hit") && page.contains("hulls hit, "), "a table, and marks in the figure");
     let (_, events) = McapRecording::open(&folder.path().join("out/run.mcap"))
@@ -211,7 +236,11 @@ fn colliding_hulls_end_the_judged_flight_and_points_pass_through() {
     let through = &report["hulls"]["passed_through"];
     assert!(through["min_m"].as_f64() < through["touching_m"].as_f64(), "{through}");
     assert!(points.err.contains("passed through each other: vehicles "), "{}", points.err);
-    assert!(report["verdict"]["reasons"].to_string().contains("Solid hulls would move otherwise"));
+    let passed = reason(&report, "passed-through");
+    let data = (&passed["data"]["are_points"], &passed["data"]["min_m"]);
+    assert_eq!(data, (&true.into(), &through["min_m"]), "{passed}");
+    let said = "Solid hulls would move otherwise";
+    assert!(passed["text"].as_str().is_some_and(|text| text.contains(said)), "{passed}");
 
     // A flight without a collision has no such note.
     let clear = run(folder.path(), &["--json", "--force", "--no-snapshots"]);
@@ -270,7 +299,7 @@ fn an_override_changes_the_flight_and_is_part_of_its_identity() {
     };
     let plain = report("a", &["time.duration_s=1"]);
     let changed = report("b", &["time.duration_s=1", "law.delta_m=1.5", "name=mine", "time.dt_s=0.01"]);
-    assert_eq!(changed["separation"]["delta_m"], 1.5);
+    assert_eq!(changed["question"]["delta"], 1.5);
     assert_eq!(changed["scenario"]["name"], "mine");
     assert_eq!(changed["run"]["steps"], 100);
     assert_ne!(changed["scenario"]["sha256"], plain["scenario"]["sha256"]);

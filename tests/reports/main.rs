@@ -4,6 +4,8 @@
 mod browser;
 #[path = "../support/replays.rs"]
 mod replays_in_browser;
+#[path = "../support/report.rs"]
+mod report;
 
 mod attacks;
 mod channels;

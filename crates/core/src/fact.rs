@@ -125,8 +125,6 @@ coded! {
         VelocityError = "velocity-error",
         /// Largest coordinate, for the rounding of doubles.
         Coordinates = "coordinates",
-        /// Largest speed.
-        Speed = "speed",
         /// Distance of a vehicle from its reference.
         TrackingError = "tracking-error",
         /// Number of flights of the search for the largest distance of a vehicle from its reference.
@@ -296,7 +294,8 @@ impl fmt::Display for Fact {
             FactKind::LogTimes => out.write_str("positions at their times of logging"),
             FactKind::UniformTransforms => out.write_str("transforms uniform between their samples"),
             FactKind::ObstacleMotion => write!(out, "the obstacle {subject} stands still {value}"),
-            FactKind::PlanMotion => out.write_str("the plan is straight between its samples"),
+            FactKind::PlanMotion if subject.is_empty() => out.write_str("the plan is straight between its samples"),
+            FactKind::PlanMotion => write!(out, "{subject} is straight between samples"),
             FactKind::PlanHeights => out.write_str("the heights of flight and plan have one reference"),
             FactKind::PlanPlane => out.write_str("flight and plan have equal heights, which are not compared"),
             FactKind::MeanAcceleration => write!(out, "accelerations are means over {value}"),

@@ -158,6 +158,7 @@ impl Coded for VoidReason {
             Self::StepsTooLong => "steps-too-long",
             Self::ShieldExceeded => "shield-exceeded",
             Self::Unresolved => "unresolved",
+            Self::StartRefused(LawError::Collision { .. }) => "start-too-close",
             Self::StartRefused(_) => "start-refused",
         }
     }
@@ -207,42 +208,6 @@ impl Certificate {
             self.void.push(reason);
         }
         self
-    }
-}
-
-impl VoidReason {
-    /// Stable code for files, such as `graph-not-complete`.
-    #[must_use]
-    pub fn code(&self) -> &'static str {
-        match self {
-            Self::NoBarrier => "no-barrier",
-            Self::GraphNotComplete => "graph-not-complete",
-            Self::VelocityUndamped => "velocity-undamped",
-            Self::CommandLimited => "command-limited",
-            Self::TargetChanges => "target-changes",
-            Self::InexactLink => "inexact-link",
-            Self::SensingDelayed => "sensing-delayed",
-            Self::SensingInexact => "sensing-inexact",
-            Self::MessagesDelayed => "messages-delayed",
-            Self::MessagesLost => "messages-lost",
-            Self::AccelerationLimited => "acceleration-limited",
-            Self::AccelerationLagged => "acceleration-late",
-            Self::VehicleFails => "vehicle-fails",
-            Self::ExternalCommands => "commands-from-outside",
-            Self::CommandsHeld => "commands-held",
-            Self::WindNotCovered => "wind-not-covered",
-            Self::WindUnbounded => "wind-unbounded",
-            Self::LeaderInWind => "leader-in-wind",
-            Self::VehicleNotPoint => "not-a-point",
-            Self::NoFeedForward => "no-feed-forward",
-            Self::ObstaclesNotAvoided => "obstacles-unknown",
-            Self::ReferenceAmongObstacles => "reference-among-obstacles",
-            Self::StepsTooLong => "steps-too-long",
-            Self::ShieldExceeded => "shield-exceeded",
-            Self::Unresolved => "certificate-unresolved",
-            Self::StartRefused(LawError::Collision { .. }) => "start-too-close",
-            Self::StartRefused(_) => "start-refused",
-        }
     }
 }
 
@@ -317,20 +282,20 @@ mod tests {
             "messages-delayed",
             "messages-lost",
             "acceleration-limited",
-            "acceleration-late",
+            "acceleration-lagged",
             "vehicle-fails",
-            "commands-from-outside",
+            "external-commands",
             "commands-held",
             "wind-not-covered",
             "wind-unbounded",
             "leader-in-wind",
-            "not-a-point",
+            "vehicle-not-point",
             "no-feed-forward",
-            "obstacles-unknown",
+            "obstacles-not-avoided",
             "reference-among-obstacles",
             "steps-too-long",
             "shield-exceeded",
-            "certificate-unresolved",
+            "unresolved",
             "start-too-close",
             "start-refused",
         ];

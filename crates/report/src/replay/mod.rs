@@ -25,8 +25,6 @@ pub use viewpoint::{Viewpoint, is_between};
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD as BASE64;
 use nalgebra::Vector3;
-use tautline_audit::{ObjectPair, Violation};
-use tautline_core::text::{beside_limit, exact, fixed};
 
 /// Largest size of the replays of a page \[bytes\].
 pub const PAGE_BYTES: usize = 1_000_000;
@@ -74,38 +72,6 @@ pub struct Moment {
     pub brief: String,
     /// Finding in a sentence, with the distance and time of the audit.
     pub said: String,
-}
-
-impl Moment {
-    /// Returns a finding on a pair.
-    #[must_use]
-    pub fn new(kind: Kind, pair: ObjectPair, span: Span, brief: String, said: String) -> Self {
-        let (vehicles, obstacle) = match pair {
-            ObjectPair::Vehicles(pair) => (vec![pair.first(), pair.second()], None),
-            ObjectPair::Obstacle { vehicle, obstacle } => (vec![vehicle], Some(obstacle)),
-        };
-        Self { kind, vehicles, obstacle, span, brief, said }
-    }
-
-    /// Returns the closest approach of all, with the names of the pair and the distance with its unit.
-    #[must_use]
-    pub fn closest(pair: ObjectPair, names: &str, distance: &str, at_s: f64) -> Self {
-        let said = format!("Closest approach: {distance}, {names} at {} s", fixed(at_s, 3));
-        Self::new(Kind::Closest, pair, Span { from_s: at_s, to_s: at_s, at_s }, String::new(), said)
-    }
-
-    /// Returns a violation, with the names of the pair and the unit of distances.
-    #[must_use]
-    pub fn violation(found: &Violation<ObjectPair>, names: &str, unit: &str) -> Self {
-        let &Violation { pair, from_s, to_s, min_m, min_at_s, limit_m } = found;
-        let (least, limit) = (beside_limit(min_m, limit_m, 3), exact(limit_m));
-        let [at, from, to] = [min_at_s, from_s, to_s].map(|time_s| fixed(time_s, 3));
-        let brief = format!("{names} come to {least} {unit} (limit {limit})");
-        let said = format!(
-            "Violation: {names} came to {least} {unit} (limit {limit}) at {at} s, below it from {from} s to {to} s"
-        );
-        Self::new(Kind::Violation, pair, Span { from_s, to_s, at_s: min_at_s }, brief, said)
-    }
 }
 
 /// Reason why a flight has no replay.

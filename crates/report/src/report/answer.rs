@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 
 use serde::{Serialize, Serializer};
 
-use tautline_audit::{LISTED, Status, Tally};
+use tautline_audit::envelope::{Exceedance, Limit};
+use tautline_audit::recorded::WellClearLoss;
+use tautline_audit::{Approach, LISTED, ObjectPair, Status, Tally, Undecided, Violation, WellClear};
 use tautline_core::fact::Fact;
 
 /// Statement on a flight or on a recording: the first keys of both reports.
@@ -66,15 +68,15 @@ pub struct Question {
 }
 
 /// Part of a question.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Part {
     /// Separations of vehicles, and their distances from obstacles.
     Separation,
-    /// Limit of single vehicles, by its key such as `speed_m_s`.
-    Limit(&'static str),
-    /// Well clear of air traffic.
-    WellClear,
+    /// Limit of single vehicles.
+    Limit(Limit),
+    /// Well clear of air traffic, with its thresholds.
+    WellClear(WellClear),
     /// Presence of all vehicles over the whole window.
     Presence,
     /// Distance from a plan.
@@ -82,13 +84,13 @@ pub enum Part {
 }
 
 impl Part {
-    /// Returns the name of the part in JSON.
+    /// Returns the name of the part in JSON, such as `separation` or `speed_m_s`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Separation => "separation",
-            Self::Limit(key) => key,
-            Self::WellClear => "well_clear",
+            Self::Limit(limit) => limit.quantity.key(),
+            Self::WellClear(_) => "well_clear",
             Self::Presence => "presence",
             Self::Plan => "plan",
         }
@@ -151,14 +153,19 @@ impl FindingList {
     #[must_use]
     pub(super) fn deepest(mut violations: Vec<Finding>) -> Self {
         let count = violations.len() as u64;
-        let excess = |of: &Finding| of.value.upper.zip(of.limit).map_or(0.0, |(min, limit)| min - limit);
         if violations.len() > LISTED {
-            violations.sort_by(|a, b| excess(a).total_cmp(&excess(b)));
+            violations.sort_by(|a, b| a.largest_margin().total_cmp(&b.largest_margin()));
             violations.truncate(LISTED);
         }
         let start_s = |of: &Finding| of.from_s.unwrap_or(f64::NEG_INFINITY);
         violations.sort_by(|a, b| start_s(a).total_cmp(&start_s(b)));
         Self { count, is_exact: true, listed: violations }
+    }
+
+    /// Returns whether the list holds fewer findings than were found.
+    #[must_use]
+    pub fn is_shortened(&self) -> bool {
+        self.count > self.listed.len() as u64 || !self.is_exact
     }
 }
 
@@ -166,6 +173,9 @@ impl FindingList {
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Finding {
+    /// Indices of the subjects.
+    #[serde(skip)]
+    pub objects: Objects,
     /// Names: two vehicles, a vehicle and an obstacle, or one vehicle.
     pub subjects: Vec<String>,
     /// Start \[s\]; null for a closest approach.
@@ -180,6 +190,103 @@ pub struct Finding {
     pub limit: Option<f64>,
     /// Sampling rate that would decide an undecided time \[Hz\]; null for other findings, or if no rate would.
     pub rate_hz: Option<f64>,
+    /// Smallest vertical distance of a loss of well clear \[m\], whose value is the horizontal one; absent for others.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub vertical_m: Option<f64>,
+}
+
+/// Indices of the subjects of a finding, from 0.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Objects {
+    /// Two vehicles, or a vehicle and an obstacle.
+    Pair(ObjectPair),
+    /// One vehicle.
+    Vehicle(usize),
+}
+
+impl Finding {
+    fn new(objects: Objects, subjects: impl Into<Vec<String>>, value: Enclosure, limit: Option<f64>) -> Self {
+        let (subjects, from_s, to_s, at_s, rate_hz, vertical_m) = (subjects.into(), None, None, None, None, None);
+        Self { objects, subjects, from_s, to_s, at_s, value, limit, rate_hz, vertical_m }
+    }
+
+    /// Sets start and end.
+    pub(super) fn over(self, from_s: f64, to_s: f64) -> Self {
+        Self { from_s: Some(from_s), to_s: Some(to_s), ..self }
+    }
+
+    fn at(self, at_s: f64) -> Self {
+        Self { at_s: Some(at_s).filter(|at_s| at_s.is_finite()), ..self }
+    }
+
+    /// Closest approach of a pair.
+    pub(super) fn approach(found: &Approach, names: [String; 2], unit: &'static str) -> Self {
+        let value = Enclosure::new(found.lower_m, found.upper_m, unit);
+        Self::new(Objects::Pair(found.pair), names, value, Some(found.limit_m)).at(found.time_s)
+    }
+
+    /// Violation of a pair. Under bounds on the motion only an upper bound of the smallest distance is known.
+    pub(super) fn violation(
+        found: &Violation<ObjectPair>,
+        names: [String; 2],
+        unit: &'static str,
+        is_exact: bool,
+    ) -> Self {
+        let lower = if is_exact { found.min_m } else { f64::NEG_INFINITY };
+        let value = Enclosure::new(lower, found.min_m, unit);
+        let finding = Self::new(Objects::Pair(found.pair), names, value, Some(found.limit_m));
+        finding.over(found.from_s, found.to_s).at(found.min_at_s)
+    }
+
+    /// Undecided time of a pair.
+    pub(super) fn undecided(found: &Undecided<ObjectPair>, names: [String; 2], unit: &'static str) -> Self {
+        let value = Enclosure::new(found.lower_m, found.upper_m, unit);
+        let finding = Self::new(Objects::Pair(found.pair), names, value, Some(found.limit_m));
+        Self { rate_hz: found.rate_hz, ..finding.over(found.from_s, found.to_s) }
+    }
+
+    /// Value of a vehicle against a limit.
+    pub(super) fn exceedance(found: &Exceedance, name: String, limit: Limit) -> Self {
+        let value = Enclosure::new(found.lower, found.upper, limit.quantity.unit());
+        let finding = Self::new(Objects::Vehicle(found.vehicle), [name], value, Some(limit.allowed));
+        finding.over(found.from_s, found.to_s).at(found.at_s)
+    }
+
+    /// Vehicle whose value is not known.
+    pub(super) fn unknown(vehicle: usize, name: String, unit: &'static str, limit: Option<f64>) -> Self {
+        let value = Enclosure { lower: None, upper: None, unit };
+        Self::new(Objects::Vehicle(vehicle), [name], value, limit)
+    }
+
+    /// Loss of well clear, with its horizontal and vertical distance.
+    pub(super) fn well_clear(found: &WellClearLoss, names: [String; 2], limits: WellClear) -> Self {
+        let value = Enclosure::new(found.horizontal_m, found.horizontal_m, "m");
+        let objects = Objects::Pair(ObjectPair::Vehicles(found.pair));
+        let finding = Self::new(objects, names, value, Some(limits.horizontal_m)).over(found.from_s, found.to_s);
+        Self { vertical_m: Some(found.vertical_m), ..finding }
+    }
+
+    /// Distance of a vehicle from its plan.
+    pub(super) fn distance(vehicle: usize, name: &str, value: Enclosure, limit: Option<f64>, at_s: f64) -> Self {
+        Self::new(Objects::Vehicle(vehicle), [name.to_owned()], value, limit).at(at_s)
+    }
+
+    /// Returns whether the finding concerns an obstacle.
+    #[must_use]
+    pub fn is_of_obstacle(&self) -> bool {
+        matches!(self.objects, Objects::Pair(ObjectPair::Obstacle { .. }))
+    }
+
+    /// Returns the value less its limit: negative for a distance below it. Unknown values count as infinite.
+    #[must_use]
+    pub fn margin(&self) -> f64 {
+        self.value.lower_bound() - self.limit.unwrap_or(0.0)
+    }
+
+    /// Returns the upper bound of the value less its limit.
+    pub(super) fn largest_margin(&self) -> f64 {
+        self.value.upper_bound() - self.limit.unwrap_or(0.0)
+    }
 }
 
 /// Interval that contains a value; an end is null where it is not known.
@@ -200,6 +307,18 @@ impl Enclosure {
     pub fn new(lower: f64, upper: f64, unit: &'static str) -> Self {
         let known = |bound: f64| Some(bound).filter(|bound| bound.is_finite());
         Self { lower: known(lower), upper: known(upper), unit }
+    }
+
+    /// Returns the lower bound; -inf if it is not known.
+    #[must_use]
+    pub fn lower_bound(&self) -> f64 {
+        self.lower.unwrap_or(f64::NEG_INFINITY)
+    }
+
+    /// Returns the upper bound; inf if it is not known.
+    #[must_use]
+    pub fn upper_bound(&self) -> f64 {
+        self.upper.unwrap_or(f64::INFINITY)
     }
 }
 

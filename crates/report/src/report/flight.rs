@@ -4,14 +4,14 @@ use std::path::Path;
 
 use serde::{Serialize, Serializer};
 
-use super::answer::{Answer, Detectors, Enclosure, Finding, FindingList, Judgement, Part, Question};
+use super::answer::{Answer, Detectors, Finding, FindingList, Judgement, Part, Question};
 use super::hulls::Hulls;
 use super::legs::LegNumbers;
-use super::obstacles::{ObstacleApproach, Obstacles};
+use super::obstacles::{ObstacleApproach, ObstacleViolation, Obstacles};
 use super::shield::ShieldNumbers;
 use super::verdict::{Reason, UnmetCriterion, Verdict, at_rest, energy_rises};
 use super::words::early_end;
-use tautline_audit::{self as audit, Status};
+use tautline_audit::{self as audit, Approach, ObjectPair, Status};
 use tautline_core::fact::{CHORDS, EVERY_STEP, Fact, FactKind, Source, serialize_coded};
 use tautline_core::files::{FileError, write_atomically};
 use tautline_core::record::{DeadlockRecovery, Reassignment};
@@ -603,30 +603,38 @@ impl Report {
     /// Returns the answer on separations and obstacles. Of many violations the deepest are listed.
     #[must_use]
     pub fn answer(&self) -> Answer {
-        let (delta_m, unit) = (self.separation.delta_m, self.question.unit);
-        let names = |pair: Pair| pair.numbers().map(|number| number.to_string()).to_vec();
-        let finding = |subjects, span_s: Option<(f64, f64)>, min_m, at_s, limit_m, unit| Finding {
-            subjects,
-            from_s: span_s.map(|span| span.0),
-            to_s: span_s.map(|span| span.1),
-            at_s: Some(at_s),
-            value: Enclosure::new(min_m, min_m, unit),
-            limit: Some(limit_m),
-            rate_hz: None,
+        let (limit_m, unit) = (self.separation.delta_m, self.question.unit);
+        let names = |pair: Pair| pair.numbers().map(|number| number.to_string());
+        let of_obstacle = |found: &ObstacleApproach| {
+            let named = self.question.obstacles.iter().position(|name| *name == found.obstacle);
+            let obstacle = named.unwrap_or(self.question.obstacles.len());
+            let names = [found.vehicle.to_string(), found.obstacle.clone()];
+            (ObjectPair::Obstacle { vehicle: found.vehicle - 1, obstacle }, names)
         };
-        let of_obstacle = |span_s, found: &ObstacleApproach| {
-            let subjects = vec![found.vehicle.to_string(), found.obstacle.clone()];
-            finding(subjects, span_s, found.min_m, found.min_at_s, found.clearance_m, "m")
-        };
-        let closest = self.separation.closest();
-        let closest = closest.map(|of| finding(names(of.pair), None, of.separation_m, of.time_s, delta_m, unit));
-        let obstacles = || self.obstacles.iter();
-        let nearest = obstacles().flat_map(|of| &of.closest).map(|found| of_obstacle(None, found));
-        let of_pairs = self.audit.violations.iter().map(|found| {
-            finding(names(found.pair), Some((found.from_s, found.to_s)), found.min_m, found.min_at_s, delta_m, unit)
+        let approach =
+            |pair, min_m, time_s, limit_m| Approach { pair, lower_m: min_m, upper_m: min_m, time_s, limit_m };
+        let closest = self.separation.closest().map(|of| {
+            let pair = ObjectPair::Vehicles(of.pair);
+            Finding::approach(&approach(pair, of.separation_m, of.time_s, limit_m), names(of.pair), unit)
         });
-        let of_obstacles = obstacles().flat_map(|of| &of.violations);
-        let of_obstacles = of_obstacles.map(|of| of_obstacle(Some((of.from_s, of.to_s)), &of.approach));
+        let obstacles = || self.obstacles.iter();
+        let nearest = obstacles().flat_map(|of| &of.closest).map(|found| {
+            let (pair, names) = of_obstacle(found);
+            Finding::approach(&approach(pair, found.min_m, found.min_at_s, found.clearance_m), names, "m")
+        });
+        let of_pairs = self.audit.violations.iter().map(|found| {
+            let &Violation { pair, from_s, to_s, min_m, min_at_s } = found;
+            let numbers = names(pair);
+            let pair = ObjectPair::Vehicles(pair);
+            Finding::violation(&audit::Violation { pair, from_s, to_s, min_m, min_at_s, limit_m }, numbers, unit, true)
+        });
+        let of_obstacles =
+            obstacles().flat_map(|of| &of.violations).map(|ObstacleViolation { approach, from_s, to_s }| {
+                let (pair, names) = of_obstacle(approach);
+                let &ObstacleApproach { min_m, min_at_s, clearance_m: limit_m, .. } = approach;
+                let (from_s, to_s) = (*from_s, *to_s);
+                Finding::violation(&audit::Violation { pair, from_s, to_s, min_m, min_at_s, limit_m }, names, "m", true)
+            });
         let violations: Vec<_> = of_pairs.chain(of_obstacles).collect();
         let undecided = self.audit.undecided + obstacles().map(|of| of.undecided).sum::<u64>();
         Answer {

@@ -5,6 +5,7 @@
 //! Units are in the names, and vehicles are numbered from 1. Numbers that do not apply or are not finite are null.
 
 mod answer;
+mod findings;
 mod flight;
 mod html;
 mod hulls;
@@ -18,7 +19,7 @@ mod shield;
 mod verdict;
 mod words;
 
-pub use answer::{Answer, Detectors, Enclosure, Finding, FindingList, Judgement, Part, Question};
+pub use answer::{Answer, Detectors, Enclosure, Finding, FindingList, Judgement, Objects, Part, Question};
 pub use flight::{
     Audit, ClosedForm, Control, Ellipsoid, Energy, FailedVehicle, FlightResult, FormationNumbers, Parry, Performance,
     Rapier, Report, Run, SCHEMA_VERSION, ScenarioIdentity, Separation, Tool, VehicleNumbers, Velocity, Verification,

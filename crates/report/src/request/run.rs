@@ -200,9 +200,8 @@ pub fn replay_of_run(
     report: &Report,
     room_bytes: usize,
 ) -> Result<Replay, NoReplay> {
-    let names: Vec<_> = scenario.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect();
     let stage = Stage::of(scenario, scenario.obstacles.iter().map(sim::audit_obstacle).collect());
-    Replay::new(&stage, log, &report.moments(&names), report.judgement(), room_bytes)
+    Replay::new(&stage, log, &report.moments(), report.judgement(), room_bytes)
 }
 
 /// Returns the charts of a run.

@@ -125,31 +125,21 @@ impl PlanReport {
 
     /// Returns the answer on the distances from the plan. A distance without a tube has no limit.
     pub(super) fn answer(&self) -> Answer {
-        let distance = |VehicleFinding { vehicle, finding }: &VehicleFinding<PlanDistance>| Finding {
-            subjects: vec![vehicle.clone()],
-            from_s: None,
-            to_s: None,
-            at_s: Some(finding.at_s),
-            value: Enclosure::new(finding.lower_m, finding.upper_m, "m"),
-            limit: self.tube_m,
-            rate_hz: None,
+        let distance = |(k, VehicleFinding { vehicle, finding }): (usize, &VehicleFinding<PlanDistance>)| {
+            let value = Enclosure::new(finding.lower_m, finding.upper_m, "m");
+            Finding::distance(k, vehicle, value, self.tube_m, finding.at_s)
         };
-        let unknown = self.unknown.iter().map(|VehicleFinding { vehicle, finding }| Finding {
-            subjects: vec![vehicle.clone()],
-            from_s: Some(finding.from_s),
-            to_s: Some(finding.to_s),
-            at_s: None,
-            value: Enclosure { lower: None, upper: None, unit: "m" },
-            limit: self.tube_m,
-            rate_hz: None,
+        let all: Vec<_> = self.vehicles.iter().enumerate().map(distance).collect();
+        let unknown = self.unknown.iter().enumerate().map(|(k, VehicleFinding { vehicle, finding })| {
+            Finding::unknown(k, vehicle.clone(), "m", self.tube_m).over(finding.from_s, finding.to_s)
         });
-        let is_beyond = |of: &&VehicleFinding<PlanDistance>| self.tube_m.is_some_and(|m| of.finding.lower_m > m);
-        let is_open = |of: &&VehicleFinding<PlanDistance>| self.tube_m.is_some_and(|m| of.finding.upper_m > m);
-        let beyond: Vec<_> = self.vehicles.iter().filter(is_beyond).map(distance).collect();
-        let open = self.vehicles.iter().filter(|of| is_open(of) && !is_beyond(of)).map(distance);
-        let open: Vec<_> = open.chain(unknown).collect();
+        let is_beyond = |of: &&Finding| of.limit.is_some() && of.margin() > 0.0;
+        let is_open = |of: &&Finding| of.limit.is_some() && of.largest_margin() > 0.0 && !is_beyond(of);
+        let beyond: Vec<_> = all.iter().filter(is_beyond).cloned().collect();
+        let open: Vec<_> = all.iter().filter(is_open).cloned().chain(unknown).collect();
+        let farthest = all.iter().max_by(|a, b| a.value.upper_bound().total_cmp(&b.value.upper_bound()));
         Answer {
-            closest: self.farthest().map(distance).into_iter().collect(),
+            closest: farthest.cloned().into_iter().collect(),
             violations: FindingList::new(Tally::all(beyond.len()), beyond),
             undecided: FindingList::new(Tally::all(open.len()), open),
             ..Answer::new(Part::Plan, self.status)

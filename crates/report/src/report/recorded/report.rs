@@ -2,17 +2,16 @@
 
 use serde::{Serialize, Serializer};
 
-use super::envelope::{CornerFindings, LimitFindings};
 use super::plan::PlanReport;
-use super::well_clear::WellClearFindings;
-use crate::report::answer::{Answer, Detectors, Enclosure, Finding, FindingList, Judgement, Part, Question};
+use crate::report::answer::{Answer, Detectors, Finding, FindingList, Judgement, Part, Question};
 use crate::report::flight::{SCHEMA_VERSION, finite};
+use tautline_audit::envelope::{self, Corner, Exceedance, LimitOutcome};
 use tautline_audit::recorded::{
-    Absence, Approach, Contradiction, ExemptTime, Gap, ObjectPair, Outcome, Presence, Settings, TOUCHING_CYLINDER,
-    TOUCHING_ELLIPSOIDS, Tallies,
+    Absence, Contradiction, ExemptTime, Gap, ObjectPair, Outcome, Presence, Settings, TOUCHING_CYLINDER,
+    TOUCHING_ELLIPSOIDS, WellClearLoss, WellClearOutcome,
 };
-use tautline_audit::{Status, Undecided, Violation};
-use tautline_core::fact::{BOUNDED, Fact, FactKind, RUN_AUDIT};
+use tautline_audit::{Status, Tally};
+use tautline_core::fact::{BOUNDED, Fact, FactKind, RUN_AUDIT, Source as FactSource};
 
 /// The recording and how it was read.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -91,28 +90,18 @@ pub struct RecordedReport {
     pub span_s: Option<(f64, f64)>,
     /// Presence of the vehicles in the window.
     pub presence: PresenceSummary,
-    /// Status of separations; `None` if only limits of single vehicles were asked.
-    pub separation: Option<Status>,
+    /// Answers to all asked parts.
+    pub answers: Vec<Answer>,
     /// Results of the detectors of separations.
     pub detectors: Detectors,
-    /// Number of findings, and how many are listed.
-    pub findings: Tallies,
-    /// Violations of pairs and obstacles in order of time; of a long list the worst, and the first of each pair.
-    pub violations: Vec<PairFinding<Violation<ObjectPair>>>,
-    /// The ten closest pairs.
-    pub closest: Vec<PairFinding<Approach>>,
-    /// The ten closest approaches to obstacles.
-    pub closest_to_obstacles: Vec<PairFinding<Approach>>,
-    /// Findings on the limits of single vehicles.
-    pub limits: Vec<LimitFindings>,
-    /// Findings on well clear of air traffic; null if it was not asked.
-    pub well_clear: Option<WellClearFindings>,
+    /// Corners of curves, at which a limit is not applied.
+    pub corners: Vec<Corners>,
+    /// Number of gaps, and how many are listed.
+    pub gaps_tally: Tally,
     /// Intervals in which a vehicle was not seen.
     pub gaps: Vec<VehicleFinding<Gap>>,
     /// Vehicles that are never present together with another one, with their intervals, unless an obstacle is judged.
     pub alone: Vec<VehicleFinding<Presence>>,
-    /// Intervals in which the separation of a pair is undecided.
-    pub undecided: Vec<PairFinding<Undecided<ObjectPair>>>,
     /// Time at which the recording contradicts the assumed bound on acceleration.
     pub contradiction: Option<VehicleFinding<Contradiction>>,
     /// Findings against a plan; null without one.
@@ -145,7 +134,7 @@ struct Document<'a> {
     presence: &'a PresenceSummary,
     alone: &'a [VehicleFinding<Presence>],
     gaps: Gaps<'a>,
-    corners: Vec<Corners<'a>>,
+    corners: &'a [Corners],
     contradiction: Option<&'a VehicleFinding<Contradiction>>,
     run_objection: Option<&'a RunObjection>,
     plan: Option<&'a PlanReport>,
@@ -160,12 +149,23 @@ struct Gaps<'a> {
     listed: &'a [VehicleFinding<Gap>],
 }
 
-/// Corners of curves, at which a limit is not applied.
-#[derive(Serialize)]
-struct Corners<'a> {
-    part: &'static str,
-    #[serde(flatten)]
-    found: &'a CornerFindings,
+/// Corners of curves, where the velocity jumps and a limit is not applied.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Corners {
+    /// Part of the question, such as `accel_m_s2`.
+    pub part: Part,
+    /// Number of corners of all vehicles.
+    pub count: u64,
+    /// Corner with the largest jump of the velocity.
+    pub largest: VehicleFinding<Corner>,
+}
+
+impl Corners {
+    /// Returns the assumption that vehicles round off the corners.
+    pub(super) fn fact(&self) -> Fact {
+        let VehicleFinding { vehicle, finding } = &self.largest;
+        Fact::number(FactKind::RoundedCorners, FactSource::Default, finding.by_m_s, "m/s").about(vehicle)
+    }
 }
 
 /// Time that is not judged because vehicles are on the ground.
@@ -240,17 +240,35 @@ impl RecordedReport {
     /// Returns the report on the outcome of an audit. The facts of `source` include the motion between samples.
     #[must_use]
     pub fn new(outcome: &Outcome, settings: &Settings, mut source: Source) -> Self {
-        let limits: Vec<_> = outcome.envelope.limits.iter().map(|found| LimitFindings::new(found, outcome)).collect();
-        for (limit, found) in limits.iter().zip(&outcome.envelope.limits) {
-            let facts = found.assumes.iter().cloned().chain(limit.corners.as_ref().map(CornerFindings::fact));
-            source.facts.extend(facts);
-        }
-        let names = |pair: ObjectPair| outcome.names(pair, &settings.obstacles);
-        let closest = |of: &[Approach]| of.iter().map(|a| PairFinding { who: names(a.pair), finding: *a }).collect();
+        let limits = &outcome.envelope.limits;
+        let corners = limits.iter().filter_map(|found| {
+            let envelope::Corners { count, largest } = found.corners?;
+            let largest = VehicleFinding::new(outcome, largest.vehicle, largest);
+            Some(Corners { part: Part::Limit(found.limit), count, largest })
+        });
+        let corners: Vec<_> = corners.collect();
+        source.facts.extend(limits.iter().filter_map(|found| found.assumes.clone()));
+        source.facts.extend(corners.iter().map(Corners::fact));
         let alone = outcome.alone.iter();
         let alone = alone.filter_map(|&of| Some(VehicleFinding::new(outcome, of, outcome.presence[of]?)));
         let is_by_run = source.facts.iter().any(|fact| fact.kind == FactKind::Motion && fact.is_named(RUN_AUDIT));
-        let judged_by_run = is_by_run.then_some(outcome.segments);
+        let detectors = Detectors {
+            steps: is_by_run.then_some(outcome.segments),
+            segments: (!is_by_run).then_some(outcome.segments),
+            pairs_swept: outcome.swept,
+            parry_contact_s: outcome.parry.min_toi_s.and_then(finite),
+            parry_disagreements: outcome.parry.disagreements,
+            rapier_contact_pairs: None,
+        };
+        // Under bounds on the motion only an upper bound of the smallest distance is known.
+        let is_exact = !source.facts.iter().any(|fact| fact.kind == FactKind::Motion && fact.is_named(BOUNDED));
+        let of_pairs = outcome.separation.map(|status| separations(outcome, settings, status, detectors, is_exact));
+        let of_limits = limits.iter().map(|found| on_limit(found, outcome));
+        let of_well_clear = outcome.well_clear.iter().map(|found| on_well_clear(found, outcome));
+        let presence = PresenceSummary::new(outcome, settings);
+        let is_present = if presence.partly > 0 { Status::Undecided } else { Status::Clear };
+        let of_presence = presence.required.then(|| Answer::new(Part::Presence, is_present));
+        let answers = of_pairs.into_iter().chain(of_limits).chain(of_well_clear).chain(of_presence).collect();
         Self {
             status: outcome.status,
             question: Question::of(settings),
@@ -258,24 +276,13 @@ impl RecordedReport {
             vehicles: outcome.vehicles.clone(),
             judged: outcome.presence.iter().flatten().count(),
             span_s: outcome.span_s,
-            presence: PresenceSummary::new(outcome, settings),
-            findings: outcome.tallies,
+            presence,
+            answers,
+            detectors,
+            corners,
+            gaps_tally: outcome.tallies.gaps,
             deciding_rate_hz: outcome.deciding_rate_hz,
-            separation: outcome.separation,
-            detectors: Detectors {
-                steps: judged_by_run,
-                segments: if is_by_run { None } else { Some(outcome.segments) },
-                pairs_swept: outcome.swept,
-                parry_contact_s: outcome.parry.min_toi_s.and_then(finite),
-                parry_disagreements: outcome.parry.disagreements,
-                rapier_contact_pairs: None,
-            },
-            closest: closest(&outcome.closest),
-            closest_to_obstacles: closest(&outcome.obstacles),
-            violations: outcome.violations.iter().map(|v| PairFinding { who: names(v.pair), finding: *v }).collect(),
-            limits,
             plan: None,
-            well_clear: outcome.well_clear.as_ref().map(|found| WellClearFindings::new(found, outcome)),
             ended_early: None,
             exemption: Exemption::new(outcome, settings),
             was_clear_until_end: false,
@@ -284,7 +291,6 @@ impl RecordedReport {
             is_else_known: outcome.is_else_known,
             gaps: outcome.gaps.iter().map(|gap| VehicleFinding::new(outcome, gap.vehicle, *gap)).collect(),
             alone: alone.collect(),
-            undecided: outcome.undecided.iter().map(|u| PairFinding { who: names(u.pair), finding: *u }).collect(),
             contradiction: outcome.contradiction.map(|of| VehicleFinding::new(outcome, of.vehicle, of)),
         }
     }
@@ -293,6 +299,7 @@ impl RecordedReport {
     #[must_use]
     pub fn with_plan(mut self, plan: PlanReport, facts: Vec<Fact>) -> Self {
         self.status = self.status.and(plan.status);
+        self.answers.push(plan.answer());
         self.question.plan = Some(plan.file.clone());
         self.source.facts.extend(facts);
         self.plan = Some(plan);
@@ -303,9 +310,7 @@ impl RecordedReport {
     #[must_use]
     pub fn with_early_end(mut self, end: EarlyEnd) -> Self {
         self.was_clear_until_end = self.status == Status::Clear;
-        let limits = self.limits.iter_mut().map(|limit| &mut limit.status);
-        let well_clear = self.well_clear.iter_mut().map(|found| &mut found.status);
-        for status in limits.chain(well_clear).chain(&mut self.separation).chain([&mut self.status]) {
+        for status in self.answers.iter_mut().map(|answer| &mut answer.status).chain([&mut self.status]) {
             *status = status.and(Status::Undecided);
         }
         self.ended_early = Some(end);
@@ -329,60 +334,10 @@ impl RecordedReport {
         self.question.unit
     }
 
-    /// Returns the answers to all asked parts.
+    /// Returns the answer on separations; `None` if only limits of single vehicles were judged.
     #[must_use]
-    pub fn answers(&self) -> Vec<Answer> {
-        let of_pairs = self.separation.map(|status| self.answer_on_separations(status));
-        let of_limits = self.limits.iter().map(LimitFindings::answer);
-        let of_well_clear = self.well_clear.iter().map(WellClearFindings::answer);
-        let of_plan = self.plan.iter().map(PlanReport::answer);
-        let is_partly = self.presence.partly > 0;
-        let presence = Answer::new(Part::Presence, if is_partly { Status::Undecided } else { Status::Clear });
-        let of_presence = self.presence.required.then_some(presence);
-        of_pairs.into_iter().chain(of_limits).chain(of_well_clear).chain(of_plan).chain(of_presence).collect()
-    }
-
-    fn answer_on_separations(&self, status: Status) -> Answer {
-        let unit = self.unit();
-        let near = |PairFinding { who, finding }: &PairFinding<Approach>| Finding {
-            subjects: who.to_vec(),
-            from_s: None,
-            to_s: None,
-            at_s: finite(finding.time_s),
-            value: Enclosure::new(finding.lower_m, finding.upper_m, unit),
-            limit: Some(finding.limit_m),
-            rate_hz: None,
-        };
-        // Under bounds on the motion only an upper bound of the smallest distance is known.
-        let is_exact = !self.source.facts.iter().any(|fact| fact.kind == FactKind::Motion && fact.is_named(BOUNDED));
-        let violation = |PairFinding { who, finding }: &PairFinding<Violation<ObjectPair>>| {
-            let lower_m = if is_exact { finding.min_m } else { f64::NEG_INFINITY };
-            Finding {
-                subjects: who.to_vec(),
-                from_s: Some(finding.from_s),
-                to_s: Some(finding.to_s),
-                at_s: Some(finding.min_at_s),
-                value: Enclosure::new(lower_m, finding.min_m, unit),
-                limit: Some(finding.limit_m),
-                rate_hz: None,
-            }
-        };
-        let undecided = |PairFinding { who, finding }: &PairFinding<Undecided<ObjectPair>>| Finding {
-            subjects: who.to_vec(),
-            from_s: Some(finding.from_s),
-            to_s: Some(finding.to_s),
-            at_s: None,
-            value: Enclosure::new(finding.lower_m, finding.upper_m, unit),
-            limit: Some(finding.limit_m),
-            rate_hz: finding.rate_hz,
-        };
-        Answer {
-            closest: self.closest.iter().chain(&self.closest_to_obstacles).map(near).collect(),
-            violations: FindingList::new(self.findings.violations, self.violations.iter().map(violation).collect()),
-            undecided: FindingList::new(self.findings.undecided, self.undecided.iter().map(undecided).collect()),
-            detectors: Some(self.detectors),
-            ..Answer::new(Part::Separation, status)
-        }
+    pub fn separation(&self) -> Option<&Answer> {
+        self.answers.iter().find(|answer| answer.part == Part::Separation)
     }
 
     /// Returns the report as indented JSON with a final line break.
@@ -397,10 +352,6 @@ impl RecordedReport {
 /// Content of `tautline audit --json`.
 impl Serialize for RecordedReport {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let corners = self
-            .limits
-            .iter()
-            .filter_map(|limit| limit.corners.as_ref().map(|found| Corners { part: limit.quantity, found }));
         let document = Document {
             judgement: Judgement {
                 schema_version: SCHEMA_VERSION,
@@ -408,7 +359,7 @@ impl Serialize for RecordedReport {
                 pass: self.status == Status::Clear,
                 proved: self.is_proved(),
                 question: self.question.clone(),
-                answers: self.answers(),
+                answers: self.answers.clone(),
                 facts: self.source.facts.clone(),
                 window_s: self.span_s,
                 vehicles: self.vehicles.clone(),
@@ -417,14 +368,61 @@ impl Serialize for RecordedReport {
             judged: self.judged,
             presence: &self.presence,
             alone: &self.alone,
-            gaps: Gaps { count: self.findings.gaps.count, is_exact: self.findings.gaps.is_exact, listed: &self.gaps },
-            corners: corners.collect(),
+            gaps: Gaps { count: self.gaps_tally.count, is_exact: self.gaps_tally.is_exact, listed: &self.gaps },
+            corners: &self.corners,
             contradiction: self.contradiction.as_ref(),
             run_objection: self.run_objection.as_ref(),
             plan: self.plan.as_ref(),
             ended_early: self.ended_early.as_ref(),
         };
         document.serialize(serializer)
+    }
+}
+
+fn separations(outcome: &Outcome, settings: &Settings, status: Status, detectors: Detectors, is_exact: bool) -> Answer {
+    let unit = unit(settings);
+    let names = |pair: ObjectPair| outcome.names(pair, &settings.obstacles);
+    let closest = outcome.closest.iter().chain(&outcome.obstacles);
+    let violations = outcome.violations.iter().map(|of| Finding::violation(of, names(of.pair), unit, is_exact));
+    let undecided = outcome.undecided.iter().map(|of| Finding::undecided(of, names(of.pair), unit));
+    Answer {
+        closest: closest.map(|of| Finding::approach(of, names(of.pair), unit)).collect(),
+        violations: FindingList::new(outcome.tallies.violations, violations.collect()),
+        undecided: FindingList::new(outcome.tallies.undecided, undecided.collect()),
+        detectors: Some(detectors),
+        ..Answer::new(Part::Separation, status)
+    }
+}
+
+/// Returns the answer on a limit. A vehicle whose quantity is not known is undecided.
+fn on_limit(found: &LimitOutcome, outcome: &Outcome) -> Answer {
+    let limit = found.limit;
+    let finding = |of: &Exceedance| Finding::exceedance(of, outcome.name(of.vehicle), limit);
+    let unknown = found
+        .unknown
+        .iter()
+        .map(|&vehicle| Finding::unknown(vehicle, outcome.name(vehicle), limit.quantity.unit(), Some(limit.allowed)));
+    let undecided: Vec<_> = found.undecided.iter().map(finding).chain(unknown).collect();
+    let count = found.undecided_tally.count + found.unknown.len() as u64;
+    Answer {
+        closest: found.extreme.iter().map(finding).collect(),
+        violations: FindingList::new(found.violations_tally, found.violations.iter().map(finding).collect()),
+        undecided: FindingList::new(Tally { count, ..found.undecided_tally }, undecided),
+        ..Answer::new(Part::Limit(limit), found.status)
+    }
+}
+
+fn on_well_clear(found: &WellClearOutcome, outcome: &Outcome) -> Answer {
+    let finding = |of: &WellClearLoss| {
+        let names = [outcome.name(of.pair.first()), outcome.name(of.pair.second())];
+        Finding::well_clear(of, names, found.thresholds)
+    };
+    let closest = found.violations.iter().min_by(|a, b| a.horizontal_m.total_cmp(&b.horizontal_m));
+    Answer {
+        closest: closest.map(finding).into_iter().collect(),
+        violations: FindingList::new(found.violations_tally, found.violations.iter().map(finding).collect()),
+        undecided: FindingList::new(found.undecided_tally, found.undecided.iter().map(finding).collect()),
+        ..Answer::new(Part::WellClear(found.thresholds), found.status)
     }
 }
 
@@ -461,16 +459,6 @@ pub fn unit(settings: &Settings) -> &'static str {
         (None, Some(_)) => "cylinders",
         (None, None) => "m",
     }
-}
-
-/// A finding on a pair of vehicles, or a vehicle and an obstacle, with their names.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct PairFinding<T> {
-    /// The two names.
-    pub who: [String; 2],
-    /// The finding.
-    #[serde(flatten)]
-    pub finding: T,
 }
 
 /// A finding on a vehicle, with its name.

@@ -1,19 +1,17 @@
 //! The report on a recording in words and as a page.
 
-use super::envelope::LimitFindings;
 use super::plan::PlanReport;
-use super::report::{EarlyEnd, Exemption, PresenceSpan, RecordedReport, RunObjection};
-use super::report::{PairFinding, VehicleFinding};
-use super::well_clear::WellClearFindings;
+use super::report::{Corners, EarlyEnd, Exemption, PresenceSpan, RecordedReport, RunObjection, VehicleFinding};
 use crate::figures::Figure;
 use crate::replay::{NoReplay, Replay};
-use crate::report::answer::Part;
+use crate::report::answer::{Answer, Finding, FindingList, Part};
+use crate::report::findings::{interval, span};
 use crate::report::page::{self, Badge, Page, Start, Tone};
 use crate::report::section::Section;
-use tautline_audit::recorded::{Approach, Gap, ObjectPair, WIDTH_M};
-use tautline_audit::{LISTED, Status, Tally, Undecided, Violation};
+use tautline_audit::recorded::Gap;
+use tautline_audit::{LISTED, Status, Tally};
 use tautline_core::fact::{BOUNDED, CURVES, Coded, EVERY_STEP, Fact, FactKind, RUN_AUDIT};
-use tautline_core::option::{ABOVE, MAX_GAP, REQUIRE_PRESENCE};
+use tautline_core::option::{ABOVE, ACCEL_WINDOW, MAX_GAP, REQUIRE_PRESENCE};
 use tautline_core::text::{at_least, at_most, beside_limit, counted, exact, fixed, in_order, seconds};
 
 /// Largest numbers of violations in the text, and on the page.
@@ -34,18 +32,18 @@ impl RecordedReport {
     /// Returns the answer to a part in a few words; the headline for separations.
     #[must_use]
     pub fn brief(&self, part: Part) -> String {
-        let of_limit = |key| self.limits.iter().find(|limit| limit.quantity == key).map(LimitFindings::brief);
-        let brief = match part {
-            Part::Separation => Some(self.headline()),
-            Part::Limit(key) => of_limit(key),
-            Part::WellClear => self.well_clear.as_ref().map(WellClearFindings::brief),
-            Part::Plan => self.plan.as_ref().map(PlanReport::brief),
+        match part {
+            Part::Separation => self.headline(),
+            Part::Plan => self.plan.as_ref().map_or_else(String::new, |plan| plan.brief_as(plan.status)),
             Part::Presence => {
                 let partly = counted(self.presence.partly as u64, "vehicle is", "vehicles are");
-                Some(format!("{partly} not seen throughout"))
+                format!("{partly} not seen throughout")
             }
-        };
-        brief.unwrap_or_default()
+            part => {
+                let answer = self.answers.iter().find(|answer| answer.part == part);
+                answer.map_or_else(String::new, |answer| answer.brief_as(answer.status))
+            }
+        }
     }
 
     /// Returns the window of the verdict, and the first vehicles that are not seen throughout.
@@ -117,6 +115,8 @@ impl RecordedReport {
             match fact.kind {
                 FactKind::ObstacleMotion if resting > 1 => {}
                 FactKind::Motion if fact.is_named(BOUNDED) => clauses.push(self.bounds()),
+                FactKind::RoundedCorners => clauses.push(self.corners_in_words(fact)),
+                _ if fact.subject.as_deref() == Some(THE_PLAN) => clauses.push(format!("in {THE_PLAN} {fact}")),
                 _ => clauses.push(fact.to_string()),
             }
         }
@@ -136,6 +136,12 @@ impl RecordedReport {
         format!("accelerations of at most {}", bounds.collect::<Vec<_>>().join(", "))
     }
 
+    /// Returns the assumption on the corners of curves, with their number.
+    fn corners_in_words(&self, fact: &Fact) -> String {
+        let corners = self.corners.iter().find(|corners| corners.fact() == *fact);
+        corners.map_or_else(|| fact.to_string(), Corners::words)
+    }
+
     /// Returns the headline without the verdict.
     fn finding(&self) -> String {
         match &self.ended_early {
@@ -152,55 +158,59 @@ impl RecordedReport {
     /// them are clear.
     fn finding_as(&self, status: Status) -> String {
         let decides = |own: Status| own == status || self.was_clear_until_end;
-        let limits = self.limits.iter().filter(|limit| decides(limit.status)).map(|limit| limit.brief_as(status));
-        let well_clear = self.well_clear.iter().filter(|found| decides(found.status));
-        let limits = limits.chain(well_clear.map(|found| found.brief_as(status)));
-        let of_pairs = self.separation.is_some_and(decides);
+        let answers = self.answers.iter().filter(|answer| decides(answer.status));
+        let found = answers.filter_map(|answer| match answer.part {
+            Part::Separation => Some(self.finding_of_pairs(answer, status)),
+            Part::Plan => self.plan.as_ref().map(|plan| plan.brief_as(status)),
+            Part::Presence => None,
+            _ => Some(answer.brief_as(status)),
+        });
+        let found: Vec<_> = found.collect();
         let exempt = self.exemption.as_ref().map(Exemption::words);
         let in_plane = self.source.planar.then(|| "in the plane of x and y: no heights are known".to_owned());
-        let pairs = of_pairs.then(|| self.finding_of_pairs(status));
-        let against_plan = self.plan.iter().filter(|plan| decides(plan.status)).map(|plan| plan.brief_as(status));
-        let found = pairs.into_iter().chain(limits).chain(against_plan).collect::<Vec<_>>();
         // All limits are kept, but a vehicle that must be present is not seen throughout.
         let nothing = found.is_empty().then(|| "not every vehicle is seen throughout".to_owned());
         found.into_iter().chain(nothing).chain(exempt).chain(in_plane).collect::<Vec<_>>().join("; ")
             + &self.window(status)
     }
 
-    fn finding_of_pairs(&self, status: Status) -> String {
+    fn finding_of_pairs(&self, answer: &Answer, status: Status) -> String {
         let unit = format!(" {}", self.unit());
+        let lower = |of: &Finding| of.value.lower_bound();
+        let at = |of: &Finding| seconds(of.at_s.unwrap_or(f64::NAN));
         let delta = self.question.delta.map_or("by radii".to_owned(), |m| format!("delta {}{unit}", exact(m)));
         match status {
             Status::Clear => {
-                let all = self.closest.iter().chain(&self.closest_to_obstacles);
-                let lowest = all.min_by(|a, b| a.finding.lower_m.total_cmp(&b.finding.lower_m));
-                let closest = lowest.map_or(String::new(), |PairFinding { who: [first, second], finding }| {
-                    let (least, at) = (beside_limit(finding.lower_m, finding.limit_m, 6), seconds(finding.time_s));
-                    format!("never closer than {least}{unit}, {first} and {second} at {at} ")
+                let lowest = answer.closest.iter().min_by(|a, b| lower(a).total_cmp(&lower(b)));
+                let closest = lowest.map_or(String::new(), |of| {
+                    let least = beside_limit(lower(of), of.limit.unwrap_or_default(), 6);
+                    format!("never closer than {least}{unit}, {} at {} ", of.names(), at(of))
                 });
                 let is_in_verdict = self.is_by_run() || self.source.facts.iter().any(Fact::is_assumption);
                 let motion = if is_in_verdict { String::new() } else { format!(", {}", self.motion()) };
                 format!("{closest}({delta}{motion}){}", self.never_with_another())
             }
             Status::Violation => {
-                let over = |of: &PairFinding<Violation<ObjectPair>>| of.finding.min_m - of.finding.limit_m;
-                let deepest = self.violations.iter().min_by(|a, b| over(a).total_cmp(&over(b)));
+                let listed = answer.violations.listed.iter();
+                let deepest = listed.min_by(|a, b| a.largest_margin().total_cmp(&b.largest_margin()));
                 let tie = if self.is_decimal_tie { ", with decimals exactly at the limit" } else { "" };
-                let others = match counted_in_words(self.findings.violations) {
-                    _ if self.findings.violations.count <= 1 => String::new(),
+                let others = match counted_in_words(&answer.violations) {
+                    _ if answer.violations.count <= 1 => String::new(),
                     count => format!("; {count} violations in all"),
                 };
-                deepest.map_or(String::new(), |PairFinding { who: [first, second], finding }| {
+                deepest.map_or(String::new(), |of| {
+                    let limit = of.limit.unwrap_or_default();
                     format!(
-                        "{first} and {second} came to {}{unit} (limit {}{unit}) at {}, {}{tie}{others}",
-                        beside_limit(finding.min_m, finding.limit_m, 3),
-                        exact(finding.limit_m),
-                        seconds(finding.min_at_s),
+                        "{} came to {}{unit} (limit {}{unit}) at {}, {}{tie}{others}",
+                        of.names(),
+                        beside_limit(of.value.upper_bound(), limit, 3),
+                        exact(limit),
+                        at(of),
                         self.motion()
                     )
                 })
             }
-            Status::Undecided => format!("{} ({delta}, {})", self.why_undecided(), self.motion()),
+            Status::Undecided => format!("{} ({delta}, {})", self.why_undecided(answer), self.motion()),
         }
     }
 
@@ -213,7 +223,7 @@ impl RecordedReport {
         })
     }
 
-    fn why_undecided(&self) -> String {
+    fn why_undecided(&self, answer: &Answer) -> String {
         let unit = format!(" {}", self.unit());
         if self.detectors.parry_disagreements > 0 {
             return "the two detectors disagree".to_owned();
@@ -229,16 +239,18 @@ impl RecordedReport {
                 finding.assumed_m_s2
             );
         }
-        let closest = self.undecided.iter().min_by(|a, b| a.finding.lower_m.total_cmp(&b.finding.lower_m));
-        if let Some(PairFinding { who: [first, second], finding }) = closest {
+        let listed = answer.undecided.listed.iter();
+        if let Some(of) = listed.min_by(|a, b| a.value.lower_bound().total_cmp(&b.value.lower_bound())) {
             let rate = self
                 .deciding_rate_hz
                 .map_or(String::new(), |hz| format!("; sampling at {} Hz would decide", at_most(hz, 1)));
-            let (low, high, at) = (at_least(finding.lower_m, 6), at_most(finding.upper_m, 6), seconds(finding.to_s));
-            return if finding.upper_m.is_finite() {
-                format!("{first} and {second} came to between {low}{unit} and {high}{unit} by {at}{rate}")
-            } else {
-                format!("the distance of {first} and {second} at {at} is unknown")
+            let (names, by) = (of.names(), seconds(of.to_s.unwrap_or(f64::NAN)));
+            let low = at_least(of.value.lower_bound(), 6);
+            return match of.value.upper {
+                Some(upper) => {
+                    format!("{names} came to between {low}{unit} and {}{unit} by {by}{rate}", at_most(upper, 6))
+                }
+                None => format!("the distance of {names} at {by} is unknown"),
             };
         }
         let longest_s = self.gaps.iter().map(|gap| gap.finding.joined_by_s).fold(0.0, f64::max);
@@ -255,7 +267,7 @@ impl RecordedReport {
                 format!("{vehicle} was not seen from {}; {joined}", span(finding.from_s, finding.to_s))
             }
             [VehicleFinding { vehicle, finding }, ..] => {
-                let (count, at) = (counted_in_words(self.findings.gaps), seconds(finding.from_s));
+                let (count, at) = (tally_in_words(self.gaps_tally), seconds(finding.from_s));
                 format!("{count} gaps, the first of {vehicle} at {at}; {joined}")
             }
         }
@@ -264,47 +276,44 @@ impl RecordedReport {
     /// Returns the sections of the text and of the page.
     fn sections(&self) -> Vec<Section> {
         let caption = format!("smallest distances in {}", self.unit());
-        let closest = |heading: &'static str, closest: &[PairFinding<Approach>]| {
-            let row = |PairFinding { who: [first, second], finding }: &PairFinding<Approach>| {
-                let apart = interval(finding.lower_m, finding.upper_m, finding.limit_m);
-                [format!("{first} and {second}"), apart, fixed(finding.time_s, 3), exact(finding.limit_m)]
+        let closest = |heading: &'static str, is_of_obstacle: bool| {
+            let closest = self.separation().into_iter().flat_map(|answer| &answer.closest);
+            let row = |of: &Finding| {
+                let limit = of.limit.unwrap_or_default();
+                let apart = interval(of.value.lower_bound(), of.value.upper_bound(), limit);
+                [of.names(), apart, fixed(of.at_s.unwrap_or(f64::NAN), 3), exact(limit)]
             };
             let columns = &["who", "smallest distance", "at [s]", "limit"];
-            Section::table(heading, &caption, columns, closest.iter().map(row))
+            let rows = closest.filter(|of| of.is_of_obstacle() == is_of_obstacle).map(row);
+            Section::table(heading, &caption, columns, rows)
         };
         let columns = &["what", "worst", "vehicle", "at [s]", "limit", "verdict"];
-        let limits = "limits, and the vehicles closest to them";
+        let limits = self.answers.iter().filter_map(|answer| match answer.part {
+            Part::Limit(limit) => Some(answer.row(limit)),
+            _ => None,
+        });
         let presence = &self.presence;
         let seen = format!("{} seen throughout, {} not", presence.throughout, presence.partly);
-        let all = |of: Tally, tally: fn(&LimitFindings) -> Tally| self.limits.iter().map(tally).fold(of, sum);
-        let unknown = self.limits.iter().map(|limit| limit.unknown.len()).sum();
-        let well_clear = || self.well_clear.iter();
-        let violations = all(self.findings.violations, |limit| limit.violations_tally);
-        let violations = well_clear().map(|found| found.violations_tally).fold(violations, sum);
-        let undecided = sum(all(self.findings.undecided, |limit| limit.undecided_tally), Tally::all(unknown));
-        let undecided = well_clear().map(|found| found.undecided_tally).fold(undecided, sum);
+        // The plan has sections of its own.
+        let answers = || self.answers.iter().filter(|answer| answer.part != Part::Plan);
+        let violations = sum(answers().map(|answer| &answer.violations));
+        let undecided = sum(answers().map(|answer| &answer.undecided));
         let list = |heading: &'static str, tally: Tally, lines: Vec<String>| {
             Section::list(heading, shortened_in_words(tally), lines)
         };
-        let violated = self.violations.iter().map(PairFinding::<Violation<_>>::words);
-        let violated = violated.chain(self.limits.iter().flat_map(LimitFindings::violations_in_words));
-        let violated = violated.chain(well_clear().flat_map(WellClearFindings::violations_in_words)).collect();
-        let open = self.undecided.iter().map(PairFinding::<Undecided<_>>::words);
-        let open = open.chain(self.limits.iter().flat_map(LimitFindings::undecided_in_words));
-        let open = open.chain(well_clear().flat_map(WellClearFindings::undecided_in_words)).collect();
         let sections = [
-            closest("Closest pairs", &self.closest),
-            closest("Closest to obstacles", &self.closest_to_obstacles),
-            Section::table("Each vehicle by itself", limits, columns, self.limits.iter().map(LimitFindings::row)),
+            closest("Closest pairs", false),
+            closest("Closest to obstacles", true),
+            Section::table("Each vehicle by itself", "limits, and the vehicles closest to them", columns, limits),
             Section::list(
                 "Presence",
                 seen,
                 presence.listed.iter().map(VehicleFinding::<PresenceSpan>::words).collect(),
             )
             .of_all(presence.partly),
-            list("Violations", violations, violated),
-            list("Undecided", undecided, open),
-            list("Gaps", self.findings.gaps, self.gaps.iter().map(VehicleFinding::<Gap>::words).collect()),
+            list("Violations", violations, answers().flat_map(Answer::violations_in_words).collect()),
+            list("Undecided", undecided, answers().flat_map(Answer::undecided_in_words).collect()),
+            list("Gaps", self.gaps_tally, self.gaps.iter().map(VehicleFinding::<Gap>::words).collect()),
         ];
         let against_plan = self.plan.iter().flat_map(PlanReport::sections);
         sections.into_iter().chain(against_plan).filter(|section| !section.rows.is_empty()).collect()
@@ -313,27 +322,20 @@ impl RecordedReport {
     /// Returns the lists that are cut, a sentence each.
     #[must_use]
     pub fn shortened(&self) -> Vec<String> {
-        let of_pairs = [
-            ("violations", self.findings.violations),
-            ("undecided times", self.findings.undecided),
-            ("gaps", self.findings.gaps),
-        ];
-        let of_limits = self.limits.iter().flat_map(|limit| {
-            [("violations", limit.violations_tally), ("undecided times", limit.undecided_tally)]
-                .map(|(what, tally)| (format!("{what} of {}", limit.quantity), tally))
+        let of_parts = self.answers.iter().flat_map(|answer| {
+            let [violations, undecided] = match answer.part {
+                Part::Limit(limit) => {
+                    ["violations", "undecided times"].map(|what| format!("{what} of {}", limit.quantity.key()))
+                }
+                Part::WellClear(_) => ["losses of well clear", "undecided times of well clear"].map(str::to_owned),
+                _ => ["violations", "undecided times"].map(str::to_owned),
+            };
+            [(violations, sum([&answer.violations])), (undecided, sum([&answer.undecided]))]
         });
-        let all = of_pairs.map(|(what, tally)| (what.to_owned(), tally)).into_iter().chain(of_limits);
-        let of_traffic = self.well_clear.iter().flat_map(|found| {
-            let tallies = [
-                ("losses of well clear", found.violations_tally),
-                ("undecided times of well clear", found.undecided_tally),
-            ];
-            tallies.map(|(what, tally)| (what.to_owned(), tally))
-        });
-        let shortened = all.chain(of_traffic).filter(|(_, tally)| tally.is_shortened());
-        shortened
+        let all = of_parts.chain([("gaps".to_owned(), self.gaps_tally)]);
+        all.filter(|(_, tally)| tally.is_shortened())
             .map(|(what, tally)| {
-                let (count, listed) = (counted_in_words(tally), tally.listed);
+                let (count, listed) = (tally_in_words(tally), tally.listed);
                 format!(
                     "{count} {what} were found and {listed} are listed: the worst, and the first of each pair or \
                      vehicle, {LISTED} of either at most"
@@ -407,6 +409,19 @@ fn is_of_part(fact: &Fact) -> bool {
     ) || fact.subject.as_deref() == Some(THE_PLAN)
 }
 
+impl Corners {
+    /// Returns the assumption on corners in a clause.
+    fn words(&self) -> String {
+        let VehicleFinding { vehicle, finding } = &self.largest;
+        let (count, jump) = (counted(self.count, "corner", "corners"), at_most(finding.by_m_s, 3));
+        let at = seconds(finding.at_s);
+        format!(
+            "vehicles round off {count} (velocity jumps by at most {jump} m/s, {vehicle} at {at}; {ACCEL_WINDOW} \
+             judges them)"
+        )
+    }
+}
+
 impl RunObjection {
     /// Returns the objection in a clause.
     fn words(&self) -> String {
@@ -426,19 +441,27 @@ fn one_line(words: &str) -> String {
 }
 
 /// Adds the numbers of found and of listed findings.
-fn sum(a: Tally, b: Tally) -> Tally {
-    Tally { count: a.count + b.count, listed: a.listed + b.listed, is_exact: a.is_exact && b.is_exact }
+fn sum<'a>(lists: impl IntoIterator<Item = &'a FindingList>) -> Tally {
+    lists.into_iter().fold(Tally::all(0), |all, list| Tally {
+        count: all.count + list.count,
+        listed: all.listed + list.listed.len(),
+        is_exact: all.is_exact && list.is_exact,
+    })
 }
 
 /// Returns the number of findings in words, such as `at least 12`.
-fn counted_in_words(tally: Tally) -> String {
+fn counted_in_words(list: &FindingList) -> String {
+    tally_in_words(sum([list]))
+}
+
+fn tally_in_words(tally: Tally) -> String {
     let least = if tally.is_exact { "" } else { "at least " };
     format!("{least}{}", tally.count)
 }
 
 /// Returns the number of findings, and the number of the listed ones if the list is cut.
 fn shortened_in_words(tally: Tally) -> String {
-    let count = counted_in_words(tally);
+    let count = tally_in_words(tally);
     if tally.is_shortened() { format!("{count}, {} of them listed", tally.listed) } else { count }
 }
 
@@ -469,36 +492,6 @@ impl EarlyEnd {
     }
 }
 
-impl PairFinding<Violation<ObjectPair>> {
-    pub(super) fn words(&self) -> String {
-        let Self { who: [first, second], finding } = self;
-        let min = beside_limit(finding.min_m, finding.limit_m, 3);
-        format!(
-            "{first} and {second}: {min} at {} s, below {} from {}",
-            fixed(finding.min_at_s, 3),
-            exact(finding.limit_m),
-            span(finding.from_s, finding.to_s)
-        )
-    }
-}
-
-impl PairFinding<Undecided<ObjectPair>> {
-    pub(super) fn words(&self) -> String {
-        let Self { who: [first, second], finding } = self;
-        let rate = finding.rate_hz.map_or(String::new(), |hz| format!("; {} Hz would decide", at_most(hz, 1)));
-        let apart = if finding.upper_m.is_finite() {
-            interval(finding.lower_m, finding.upper_m, finding.limit_m)
-        } else {
-            "not known".to_owned()
-        };
-        format!(
-            "{first} and {second}: {apart} from {}, limit {}{rate}",
-            span(finding.from_s, finding.to_s),
-            exact(finding.limit_m)
-        )
-    }
-}
-
 impl VehicleFinding<Gap> {
     pub(super) fn words(&self) -> String {
         format!("{} was not seen from {}", self.vehicle, span(self.finding.from_s, self.finding.to_s))
@@ -514,17 +507,4 @@ impl VehicleFinding<PresenceSpan> {
             _ => format!("{} is not seen", self.vehicle),
         }
     }
-}
-
-/// Formats an interval of time.
-fn span(from_s: f64, to_s: f64) -> String {
-    format!("{} s to {} s", fixed(from_s, 3), fixed(to_s, 3))
-}
-
-/// Formats a distance beside its limit with six decimals, rounded down. If the bounds differ, returns an interval that
-/// contains both.
-#[must_use]
-pub fn interval(lower: f64, upper: f64, limit: f64) -> String {
-    let (low, high) = (beside_limit(lower, limit, 6), at_most(upper, 6));
-    if upper - lower <= 2.0 * WIDTH_M || low == high { low } else { format!("{low} .. {high}") }
 }

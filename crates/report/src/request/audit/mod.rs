@@ -216,7 +216,9 @@ impl ConfiguredAudit<'_> {
         source.notes.extend(notes_on_alone(outcome));
         source.notes.extend(self.asked_by.clone());
         tell(monitor, &source.notes);
-        source.facts.extend(request.facts((*curves, holds_every_step, is_by_run), outcome, self.asked_by()));
+        let is_unaltered = own.is_some_and(OwnRecording::is_unaltered);
+        let motion = [*curves, holds_every_step, is_by_run, is_unaltered];
+        source.facts.extend(request.facts(motion, outcome, self.asked_by()));
         let flight = AuditedFlight {
             open,
             name: request.subject.name(),

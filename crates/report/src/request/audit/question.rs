@@ -309,11 +309,21 @@ impl<'a> AuditRequest<'a> {
     /// Returns the facts that come from the request: motion, exemptions, file of settings.
     pub(super) fn facts(
         &self,
-        (curves, holds_every_step, is_by_run): (bool, bool, bool),
+        [curves, holds_every_step, is_by_run, is_unaltered]: [bool; 4],
         outcome: &Outcome,
         settings_file: Option<&str>,
     ) -> Vec<Fact> {
         let mut facts = self.motion(curves, holds_every_step, is_by_run);
+        if !curves {
+            facts.push(match self.settings.max_gap_s {
+                Some(gap_s) if gap_s.is_finite() => Fact::number(FactKind::LongestGap, Source::Declared, gap_s, "s"),
+                Some(_) => Fact::name(FactKind::LongestGap, Source::Declared, "all samples are joined"),
+                None if is_unaltered => {
+                    Fact::name(FactKind::LongestGap, Source::Recorded, "every vehicle in each sample")
+                }
+                None => Fact::name(FactKind::LongestGap, Source::Default, "1.5 times a vehicle's usual interval"),
+            });
+        }
         if let Some((above_m, exempt)) = self.settings.above_m.zip(outcome.exempt) {
             facts.push(Fact::number(FactKind::GroundExemption, Source::Declared, above_m, "m"));
             facts.push(Fact::number(FactKind::GroundExemption, Source::Observed, exempt.pairs_s, "s"));

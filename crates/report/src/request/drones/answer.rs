@@ -51,12 +51,14 @@ impl DroneExport {
     /// Adds a verdict on the written motion, whose times begin `start_s` after those of the flight. The worst one is
     /// kept.
     pub(super) fn add(&mut self, report: RecordedReport, start_s: f64) {
-        let closest = report.closest.iter().chain(&report.closest_to_obstacles);
+        let closest = report.separation().into_iter().flat_map(|answer| &answer.closest);
         let name = |label: &String| {
             self.vehicles.iter().find(|of| of.label == *label).map_or_else(|| label.clone(), |of| of.name.clone())
         };
-        let margins =
-            closest.map(|of| (of.finding.lower_m - of.finding.limit_m, of.who.each_ref().map(name), of.finding.time_s));
+        let margins = closest.filter_map(|of| {
+            let [first, second] = &of.subjects[..] else { return None };
+            Some((of.margin(), [first, second].map(name), of.at_s.unwrap_or_default()))
+        });
         let least = margins.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(margin, who, at_s)| (margin, who, at_s + start_s));
         let is_less = match (&least, &self.margin) {
             (Some((new, ..)), Some((old, ..))) => new < old,
