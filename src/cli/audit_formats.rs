@@ -127,8 +127,8 @@ fn suite(AuditedRecording { report, allows_undecided, .. }: &AuditedRecording) -
     for finding in of_pairs.clone().flat_map(|answer| &answer.violations.listed) {
         let [limit, from, to] = [finding.limit, finding.from_s, finding.to_s].map(value);
         let words = format!("{} below {limit} from {from} s to {to} s", value(finding.value.upper));
-        let at = fixed(finding.at_s.unwrap_or(f64::NAN), 3);
-        cases.push(TestCase::new(format!("{} at {at} s", finding.subjects.join(" and ")), failed(&words)));
+        let time = fixed(finding.at_s.unwrap_or(f64::NAN), 3);
+        cases.push(TestCase::new(format!("{} at {time} s", finding.subjects.join(" and ")), failed(&words)));
     }
     for finding in of_pairs.flat_map(|answer| &answer.undecided.listed) {
         let [lower, upper, limit, to] =
@@ -171,11 +171,11 @@ pub(super) fn markdown(answers: &[Answer]) -> String {
         let cells = [
             escape_markdown(&report.source.recording),
             format!("{} {}", mark(report.status), escape_markdown(&report.verdict())),
-            closest.map_or(String::new(), |of| {
-                format!("{} {unit}", beside_limit(of.value.lower_bound(), of.limit.unwrap_or_default(), 3))
+            closest.map_or(String::new(), |finding| {
+                format!("{} {unit}", beside_limit(finding.value.lower_bound(), finding.limit.unwrap_or_default(), 3))
             }),
-            closest.map_or(String::new(), |of| escape_markdown(&of.subjects.join(" and "))),
-            closest.and_then(|of| of.at_s).map_or(String::new(), |at_s| format!("{} s", fixed(at_s, 2))),
+            closest.map_or(String::new(), |finding| escape_markdown(&finding.subjects.join(" and "))),
+            closest.and_then(|finding| finding.at_s).map_or(String::new(), |at_s| format!("{} s", fixed(at_s, 2))),
         ];
         let _ = writeln!(text, "| {} |", cells.join(" | "));
     }

@@ -203,19 +203,19 @@ pub struct Fact {
 }
 
 impl Fact {
-    /// Fact without a value.
+    /// Returns a fact without a value.
     #[must_use]
     pub fn new(kind: FactKind, source: Source) -> Self {
         Self { kind, source, value: None, subject: None }
     }
 
-    /// Fact with a number in a unit.
+    /// Returns a fact with a number in a unit.
     #[must_use]
     pub fn number(kind: FactKind, source: Source, value: f64, unit: &'static str) -> Self {
         Self { value: Some(FactValue::Number(value, unit)), ..Self::new(kind, source) }
     }
 
-    /// Fact with a name.
+    /// Returns a fact with a name as its value.
     #[must_use]
     pub fn name(kind: FactKind, source: Source, value: impl Into<String>) -> Self {
         Self { value: Some(FactValue::Name(value.into())), ..Self::new(kind, source) }
@@ -265,14 +265,14 @@ pub const HELD: &str = "held";
 pub const BOUNDED: &str = "bounded";
 /// Name of motion on recorded curves.
 pub const CURVES: &str = "curves";
-/// Name of the motion of a run of which each step is recorded.
+/// Name of the motion of a run whose every step is recorded.
 pub const EVERY_STEP: &str = "every-step";
 /// Name of the motion along the chords of steps, from which paths differ by less than a bound.
 pub const CHORDS: &str = "chords";
 /// Name of the motion that the audit of a run has judged step by step.
 pub const RUN_AUDIT: &str = "run-audit";
 
-/// The fact as a clause, such as `straight between samples`.
+/// Writes the fact as a clause, such as `straight between samples`.
 impl fmt::Display for Fact {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
         let value = self.value.as_ref().map_or_else(String::new, ToString::to_string);
@@ -323,7 +323,7 @@ impl Coded for Fact {
     }
 }
 
-/// An object with the keys `fact`, `source`, `value`, `unit` and `subject`; the last three may be null.
+/// Writes an object with the keys `fact`, `source`, `value`, `unit` and `subject`; the last three may be null.
 impl Serialize for Fact {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let mut object = serializer.serialize_struct("Fact", 5)?;

@@ -1,4 +1,4 @@
-//! Errors of requests, of which each crate converts its own errors.
+//! Errors of requests. Each crate converts its own errors to them.
 
 use std::fmt::{self, Display};
 use std::ops::{Range, RangeInclusive};

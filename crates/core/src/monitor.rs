@@ -46,10 +46,10 @@ pub trait Monitor: Sync {
 pub struct Quiet<'a>(&'a Arc<AtomicBool>);
 
 impl<'a> Quiet<'a> {
-    /// Returns a monitor with the interruption of `of`.
+    /// Returns a monitor with the interruption of `monitor`.
     #[must_use]
-    pub fn new(of: &'a dyn Monitor) -> Self {
-        Self(of.interruption())
+    pub fn new(monitor: &'a dyn Monitor) -> Self {
+        Self(monitor.interruption())
     }
 }
 

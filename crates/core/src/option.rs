@@ -32,7 +32,7 @@ pub enum ValueKind {
     NamedWord,
 }
 
-/// An option of a command, and field of its request.
+/// Option of a command, and field of its request.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Opt {
     /// Name on the command line, without dashes, such as `time-unit`.
@@ -43,7 +43,7 @@ pub struct Opt {
     pub kind: ValueKind,
 }
 
-/// An option and a value of it, such as a remedy proposes.
+/// Option with a value, as in a remedy.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct OptWithValue {
     /// The option.
@@ -89,14 +89,14 @@ fn as_field(option: Opt, value: Option<&str>, out: &mut Formatter<'_>) -> fmt::R
     }
 }
 
-/// The option in the spelling of the process.
+/// Writes the option in the spelling of the process.
 impl Display for Opt {
     fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
         spelling()(*self, None, out)
     }
 }
 
-/// The option and its value in the spelling of the process.
+/// Writes the option and its value in the spelling of the process.
 impl Display for OptWithValue {
     fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
         spelling()(self.option, Some(&self.value), out)

@@ -173,8 +173,8 @@ impl LimitMonitor {
             (over.from_s < over.to_s).then_some((over, Enclosure { lower, upper, at }))
         });
         if bounded_by_m_s2.is_none() {
-            let accelerations = self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::Acceleration);
-            accelerations.for_each(|of| of.assumes = Some(Fact::new(FactKind::SampledAcceleration, Source::Default)));
+            let limits = self.of.iter_mut().filter(|limit| limit.limit.quantity == Quantity::Acceleration);
+            limits.for_each(|limit| limit.assumes = Some(Fact::new(FactKind::SampledAcceleration, Source::Default)));
         }
     }
 

@@ -13,8 +13,8 @@ impl From<RecordedError> for Failure {
         let message = error.to_string();
         let (code, message, help) = match &error {
             RecordedError::Interrupted => return Self::interrupted(),
-            RecordedError::OutOfRange { option, of, range, .. } => {
-                let name = if of.is_some() { "NAME=" } else { "" };
+            RecordedError::OutOfRange { option, of: subject, range, .. } => {
+                let name = if subject.is_some() { "NAME=" } else { "" };
                 let help = match *option {
                     CYLINDER => format!("give {} with two numbers above 0, such as 2,4", CYLINDER.set("R,H")),
                     WELL_CLEAR => format!("give {}, or D,Z,T such as 1219.2,137.16,35", WELL_CLEAR.set("PRESET")),

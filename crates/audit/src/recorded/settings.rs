@@ -265,7 +265,7 @@ impl Settings {
             let others = [
                 (DELTA, self.delta_m.is_some()),
                 (ELLIPSOID, self.ellipsoid_m.is_some()),
-                (RADIUS, self.radius_m.is_some() || self.vehicles.values().any(|of| of.radius_m.is_some())),
+                (RADIUS, self.radius_m.is_some() || self.vehicles.values().any(|vehicle| vehicle.radius_m.is_some())),
                 (OBSTACLES, !self.obstacles.is_empty()),
             ];
             if let Some((other, _)) = others.into_iter().find(|(_, is_given)| *is_given) {
@@ -293,10 +293,10 @@ impl Settings {
         if from_s > to_s {
             return Err(RecordedError::EmptyWindow { from_s, to_s });
         }
-        for (name, of) in &self.vehicles {
-            check_of(RADIUS, Some(name), of.radius_m, NOT_NEGATIVE)?;
-            check_of(OFFSET, Some(name), Some(of.offset_s), FINITE)?;
-            check_of(MAX_ACCEL, Some(name), of.max_accel_m_s2, NOT_NEGATIVE)?;
+        for (name, vehicle) in &self.vehicles {
+            check_of(RADIUS, Some(name), vehicle.radius_m, NOT_NEGATIVE)?;
+            check_of(OFFSET, Some(name), Some(vehicle.offset_s), FINITE)?;
+            check_of(MAX_ACCEL, Some(name), vehicle.max_accel_m_s2, NOT_NEGATIVE)?;
         }
         for Limit { quantity, allowed } in &self.envelope.limits {
             let is_height = quantity.derivative() == 0 || *quantity == Quantity::NavigationFloor;

@@ -9,18 +9,18 @@ use tautline_audit::recorded::WellClearLoss;
 use tautline_audit::{Approach, LISTED, ObjectPair, Status, Tally, Undecided, Violation, WellClear};
 use tautline_core::fact::Fact;
 
-/// Statement on a flight or on a recording: the first keys of both reports.
+/// Judgement of a flight or of a recording: the first keys of both reports.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Judgement {
     /// Version of the keys, [`SCHEMA_VERSION`](super::SCHEMA_VERSION).
     pub schema_version: u32,
-    /// The worst status of all answers.
+    /// Worst status of all answers.
     pub status: Status,
     /// Whether the exit code is 0 by default. A recording passes if it is clear. A flight passes if there is also no
     /// reason against it.
     pub pass: bool,
-    /// Whether the status is clear, and no fact that it rests on is an assumption.
+    /// Whether the status is clear and rests on no assumption.
     pub proved: bool,
     /// The question, with all limits.
     pub question: Question,
@@ -34,7 +34,7 @@ pub struct Judgement {
     pub vehicles: Vec<String>,
 }
 
-/// Question to a flight or to a recording. Lengths are in metres. A key is null if the question does not have it.
+/// Question about a flight or a recording. Lengths are in metres. A key that the question does not use is null.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 #[non_exhaustive]
 pub struct Question {
@@ -59,11 +59,11 @@ pub struct Question {
     pub require_presence: bool,
     /// File of the plan.
     pub plan: Option<String>,
-    /// Height at or below which vehicles are not judged among each other \[m\].
+    /// Height at or below which pairs are exempt \[m\].
     pub above_m: Option<f64>,
-    /// Asked start and end \[s\].
+    /// Given start of the window \[s\].
     pub from_s: Option<f64>,
-    /// Asked end \[s\].
+    /// Given end of the window \[s\].
     pub to_s: Option<f64>,
 }
 
@@ -109,7 +109,7 @@ impl Serialize for Part {
 pub struct Answer {
     /// The part.
     pub part: Part,
-    /// Its status. At best undecided if a flight ended early.
+    /// Status of the part; not clear if a flight ended early.
     pub status: Status,
     /// Findings nearest to their limits, at most ten of vehicles and ten of obstacles, the nearest first of each.
     pub closest: Vec<Finding>,
@@ -122,7 +122,7 @@ pub struct Answer {
 }
 
 impl Answer {
-    /// Answer without findings.
+    /// Returns an answer without findings.
     #[must_use]
     pub fn new(part: Part, status: Status) -> Self {
         let none = FindingList::new(Tally::all(0), Vec::new());
@@ -143,13 +143,13 @@ pub struct FindingList {
 }
 
 impl FindingList {
-    /// List of findings with their number.
+    /// Returns a list of findings with their number.
     #[must_use]
     pub fn new(tally: Tally, listed: Vec<Finding>) -> Self {
         Self { count: tally.count, is_exact: tally.is_exact, listed }
     }
 
-    /// List of all violations of distances. Of many the deepest [`LISTED`] are listed.
+    /// Returns a list of violations of distances. It counts all and holds the deepest [`LISTED`].
     #[must_use]
     pub(super) fn deepest(mut violations: Vec<Finding>) -> Self {
         let count = violations.len() as u64;
@@ -157,7 +157,7 @@ impl FindingList {
             violations.sort_by(|a, b| a.largest_margin().total_cmp(&b.largest_margin()));
             violations.truncate(LISTED);
         }
-        let start_s = |of: &Finding| of.from_s.unwrap_or(f64::NEG_INFINITY);
+        let start_s = |finding: &Finding| finding.from_s.unwrap_or(f64::NEG_INFINITY);
         violations.sort_by(|a, b| start_s(a).total_cmp(&start_s(b)));
         Self { count, is_exact: true, listed: violations }
     }
@@ -219,13 +219,13 @@ impl Finding {
         Self { at_s: Some(at_s).filter(|at_s| at_s.is_finite()), ..self }
     }
 
-    /// Closest approach of a pair.
+    /// Returns the closest approach of a pair.
     pub(super) fn approach(found: &Approach, names: [String; 2], unit: &'static str) -> Self {
         let value = Enclosure::new(found.lower_m, found.upper_m, unit);
         Self::new(Objects::Pair(found.pair), names, value, Some(found.limit_m)).at(found.time_s)
     }
 
-    /// Violation of a pair. Under bounds on the motion only an upper bound of the smallest distance is known.
+    /// Returns the violation of a pair. If `is_exact` is false, the smallest distance has only an upper bound.
     pub(super) fn violation(
         found: &Violation<ObjectPair>,
         names: [String; 2],
@@ -238,27 +238,27 @@ impl Finding {
         finding.over(found.from_s, found.to_s).at(found.min_at_s)
     }
 
-    /// Undecided time of a pair.
+    /// Returns an undecided time of a pair.
     pub(super) fn undecided(found: &Undecided<ObjectPair>, names: [String; 2], unit: &'static str) -> Self {
         let value = Enclosure::new(found.lower_m, found.upper_m, unit);
         let finding = Self::new(Objects::Pair(found.pair), names, value, Some(found.limit_m));
         Self { rate_hz: found.rate_hz, ..finding.over(found.from_s, found.to_s) }
     }
 
-    /// Value of a vehicle against a limit.
+    /// Returns the value of a vehicle that is compared with a limit.
     pub(super) fn exceedance(found: &Exceedance, name: String, limit: Limit) -> Self {
         let value = Enclosure::new(found.lower, found.upper, limit.quantity.unit());
         let finding = Self::new(Objects::Vehicle(found.vehicle), [name], value, Some(limit.allowed));
         finding.over(found.from_s, found.to_s).at(found.at_s)
     }
 
-    /// Vehicle whose value is not known.
+    /// Returns the finding that the value of a vehicle is not known.
     pub(super) fn unknown(vehicle: usize, name: String, unit: &'static str, limit: Option<f64>) -> Self {
         let value = Enclosure { lower: None, upper: None, unit };
         Self::new(Objects::Vehicle(vehicle), [name], value, limit)
     }
 
-    /// Loss of well clear, with its horizontal and vertical distance.
+    /// Returns a loss of well clear, with its horizontal and vertical distance.
     pub(super) fn well_clear(found: &WellClearLoss, names: [String; 2], limits: WellClear) -> Self {
         let value = Enclosure::new(found.horizontal_m, found.horizontal_m, "m");
         let objects = Objects::Pair(ObjectPair::Vehicles(found.pair));
@@ -266,7 +266,7 @@ impl Finding {
         Self { vertical_m: Some(found.vertical_m), ..finding }
     }
 
-    /// Distance of a vehicle from its plan.
+    /// Returns the distance of a vehicle from its plan.
     pub(super) fn distance(vehicle: usize, name: &str, value: Enclosure, limit: Option<f64>, at_s: f64) -> Self {
         Self::new(Objects::Vehicle(vehicle), [name.to_owned()], value, limit).at(at_s)
     }
@@ -302,7 +302,7 @@ pub struct Enclosure {
 }
 
 impl Enclosure {
-    /// Interval between two bounds; an infinite bound is unknown.
+    /// Returns the interval between two bounds; an infinite bound is unknown.
     #[must_use]
     pub fn new(lower: f64, upper: f64, unit: &'static str) -> Self {
         let known = |bound: f64| Some(bound).filter(|bound| bound.is_finite());

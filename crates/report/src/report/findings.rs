@@ -24,8 +24,8 @@ impl Answer {
         match status {
             Status::Clear => {
                 let least = limit.quantity.is_least();
-                let most = extreme.map_or(String::new(), |of| {
-                    let value = of.value;
+                let most = extreme.map_or(String::new(), |finding| {
+                    let value = finding.value;
                     let bound = if least { at_least(value.lower_bound(), 3) } else { at_most(value.upper_bound(), 3) };
                     // A clear value that rounding moves beyond the limit is shown as the limit.
                     let is_beyond = bound
@@ -37,17 +37,19 @@ impl Answer {
                 format!("{quantity}{most} (limit {allowed})")
             }
             Status::Violation => {
-                let worst = extreme.map_or(String::new(), |of| {
-                    let at = of.at_s.map_or(String::new(), |at_s| format!(" at {}", seconds(at_s)));
-                    format!(" of {} was {}{at}", of.names(), of.shown_value(limit))
+                let worst = extreme.map_or(String::new(), |finding| {
+                    let time = finding.at_s.map_or(String::new(), |at_s| format!(" at {}", seconds(at_s)));
+                    format!(" of {} was {}{time}", finding.names(), finding.shown_value(limit))
                 });
                 format!("{quantity}{worst} (limit {allowed})")
             }
             Status::Undecided => {
                 let why = match self.undecided.listed.first() {
-                    Some(of) => match of.to_s {
-                        Some(to_s) => format!("{} of {} by {}", of.shown_value(limit), of.names(), seconds(to_s)),
-                        None => format!("unknown for {}", of.names()),
+                    Some(finding) => match finding.to_s {
+                        Some(to_s) => {
+                            format!("{} of {} by {}", finding.shown_value(limit), finding.names(), seconds(to_s))
+                        }
+                        None => format!("unknown for {}", finding.names()),
                     },
                     None => "unknown at times".to_owned(),
                 };
@@ -68,10 +70,10 @@ impl Answer {
                 };
                 self.closest
                     .first()
-                    .map_or(String::new(), |of| format!("{} ({thresholds}){others}", of.loss("are not")))
+                    .map_or(String::new(), |finding| format!("{} ({thresholds}){others}", finding.loss("are not")))
             }
             Status::Undecided => match self.undecided.listed.first() {
-                Some(of) => format!("{} ({thresholds})", of.loss("may not be")),
+                Some(finding) => format!("{} ({thresholds})", finding.loss("may not be")),
                 None => format!("well clear is unknown at times ({thresholds})"),
             },
         }
@@ -82,9 +84,9 @@ impl Answer {
         let extreme = self.closest.first();
         [
             quantity(limit.quantity).to_owned(),
-            extreme.map_or("not known".to_owned(), |of| of.shown_value(limit)),
+            extreme.map_or("not known".to_owned(), |finding| finding.shown_value(limit)),
             extreme.map_or(String::new(), Finding::names),
-            extreme.and_then(|of| of.at_s).map_or(String::new(), |at_s| fixed(at_s, 3)),
+            extreme.and_then(|finding| finding.at_s).map_or(String::new(), |at_s| fixed(at_s, 3)),
             limit_in_words(limit),
             match self.status {
                 Status::Clear => "kept",
@@ -97,61 +99,63 @@ impl Answer {
 
     /// Returns the violations, a sentence each.
     pub(super) fn violations_in_words(&self) -> impl Iterator<Item = String> + '_ {
-        self.violations.listed.iter().map(|of| of.sentence(self.part, true))
+        self.violations.listed.iter().map(|finding| finding.sentence(self.part, true))
     }
 
     /// Returns the undecided times, a sentence each.
     pub(super) fn undecided_in_words(&self) -> impl Iterator<Item = String> + '_ {
-        self.undecided.listed.iter().map(|of| of.sentence(self.part, false))
+        self.undecided.listed.iter().map(|finding| finding.sentence(self.part, false))
     }
 
     /// Returns the closest approach as a moment of a replay.
     fn closest_moment(&self) -> Option<Moment> {
-        let of = self.closest.first().filter(|_| self.part == Part::Separation)?.short();
-        let at_s = of.at_s.unwrap_or_default();
-        let distance = interval(of.value.lower_bound(), of.value.upper_bound(), of.limit.unwrap_or_default());
-        let said = format!("Closest approach: {distance} {}, {} at {} s", of.value.unit, of.names(), fixed(at_s, 3));
-        Some(of.moment(Kind::Closest, Span { from_s: at_s, to_s: at_s, at_s }, String::new(), said))
+        let finding = self.closest.first().filter(|_| self.part == Part::Separation)?.short();
+        let at_s = finding.at_s.unwrap_or_default();
+        let distance =
+            interval(finding.value.lower_bound(), finding.value.upper_bound(), finding.limit.unwrap_or_default());
+        let said =
+            format!("Closest approach: {distance} {}, {} at {} s", finding.value.unit, finding.names(), fixed(at_s, 3));
+        Some(finding.moment(Kind::Closest, Span { from_s: at_s, to_s: at_s, at_s }, String::new(), said))
     }
 
-    /// Returns violations as moments of a replay, those of separations by their depth.
+    /// Returns the violations as moments of a replay. Those of separations begin with the deepest.
     fn violation_moments(&self) -> Vec<Moment> {
         let mut listed: Vec<_> = self.violations.listed.iter().map(Finding::short).collect();
         if self.part == Part::Separation {
             listed.sort_by(|a, b| a.largest_margin().total_cmp(&b.largest_margin()));
         }
-        let moment = |of: &Finding| {
+        let moment = |finding: &Finding| {
             let (brief, said) = match self.part {
                 Part::Separation => {
-                    let come = of.too_close();
-                    let at = of.at_s.map_or(String::new(), |at_s| format!(" at {} s", fixed(at_s, 3)));
+                    let come = finding.too_close();
+                    let time = finding.at_s.map_or(String::new(), |at_s| format!(" at {} s", fixed(at_s, 3)));
                     let said = format!(
-                        "Violation: {} came to {come}{at}, below it from {}",
-                        of.names(),
-                        span(of.from_s.unwrap_or_default(), of.to_s.unwrap_or_default())
+                        "Violation: {} came to {come}{time}, below it from {}",
+                        finding.names(),
+                        span(finding.from_s.unwrap_or_default(), finding.to_s.unwrap_or_default())
                     );
-                    (format!("{} come to {come}", of.names()), said)
+                    (format!("{} come to {come}", finding.names()), said)
                 }
-                part => (of.brief(part, true), of.said(part, true)),
+                part => (finding.brief(part, true), finding.said(part, true)),
             };
-            of.moment(Kind::Violation, of.span(), brief, said)
+            finding.moment(Kind::Violation, finding.span(), brief, said)
         };
         listed.iter().map(moment).collect()
     }
 
-    /// Returns undecided times as moments of a replay.
+    /// Returns the undecided times as moments of a replay.
     fn undecided_moments(&self) -> Vec<Moment> {
-        let timed = self.undecided.listed.iter().filter(|of| of.from_s.is_some()).map(Finding::short);
-        let moment = |of: Finding| {
-            let (brief, said) = (of.brief(self.part, false), of.said(self.part, false));
-            of.moment(Kind::Undecided, of.span(), brief, said)
+        let timed = self.undecided.listed.iter().filter(|finding| finding.from_s.is_some()).map(Finding::short);
+        let moment = |finding: Finding| {
+            let (brief, said) = (finding.brief(self.part, false), finding.said(self.part, false));
+            finding.moment(Kind::Undecided, finding.span(), brief, said)
         };
         timed.map(moment).collect()
     }
 }
 
 /// Returns the closest approach, the violations and the undecided times, the gravest first. Distances and times are
-/// those of the audit. Findings against a plan are no moments.
+/// those of the audit. Findings against a plan are left out.
 pub(super) fn moments(answers: &[Answer]) -> impl Iterator<Item = Moment> + '_ {
     let answers = answers.iter().filter(|answer| answer.part != Part::Plan);
     let violations = answers.clone().flat_map(Answer::violation_moments);

@@ -613,12 +613,12 @@ impl Report {
         };
         let approach =
             |pair, min_m, time_s, limit_m| Approach { pair, lower_m: min_m, upper_m: min_m, time_s, limit_m };
-        let closest = self.separation.closest().map(|of| {
-            let pair = ObjectPair::Vehicles(of.pair);
-            Finding::approach(&approach(pair, of.separation_m, of.time_s, limit_m), names(of.pair), unit)
+        let closest = self.separation.closest().map(|closest| {
+            let pair = ObjectPair::Vehicles(closest.pair);
+            Finding::approach(&approach(pair, closest.separation_m, closest.time_s, limit_m), names(closest.pair), unit)
         });
         let obstacles = || self.obstacles.iter();
-        let nearest = obstacles().flat_map(|of| &of.closest).map(|found| {
+        let nearest = obstacles().flat_map(|judged| &judged.closest).map(|found| {
             let (pair, names) = of_obstacle(found);
             Finding::approach(&approach(pair, found.min_m, found.min_at_s, found.clearance_m), names, "m")
         });
@@ -629,14 +629,14 @@ impl Report {
             Finding::violation(&audit::Violation { pair, from_s, to_s, min_m, min_at_s, limit_m }, numbers, unit, true)
         });
         let of_obstacles =
-            obstacles().flat_map(|of| &of.violations).map(|ObstacleViolation { approach, from_s, to_s }| {
+            obstacles().flat_map(|judged| &judged.violations).map(|ObstacleViolation { approach, from_s, to_s }| {
                 let (pair, names) = of_obstacle(approach);
                 let &ObstacleApproach { min_m, min_at_s, clearance_m: limit_m, .. } = approach;
                 let (from_s, to_s) = (*from_s, *to_s);
                 Finding::violation(&audit::Violation { pair, from_s, to_s, min_m, min_at_s, limit_m }, names, "m", true)
             });
         let violations: Vec<_> = of_pairs.chain(of_obstacles).collect();
-        let undecided = self.audit.undecided + obstacles().map(|of| of.undecided).sum::<u64>();
+        let undecided = self.audit.undecided + obstacles().map(|judged| judged.undecided).sum::<u64>();
         Answer {
             closest: closest.into_iter().chain(nearest).collect(),
             violations: FindingList::deepest(violations),
@@ -647,7 +647,7 @@ impl Report {
                 pairs_swept: self.audit.pairs_checked,
                 parry_contact_s: self.audit.parry.min_toi_s,
                 parry_disagreements: self.audit.parry.disagreements
-                    + obstacles().map(|of| of.disagreements).sum::<u64>(),
+                    + obstacles().map(|judged| judged.disagreements).sum::<u64>(),
                 rapier_contact_pairs: self.audit.rapier.contact_pairs,
             }),
             ..Answer::new(Part::Separation, self.audit.status)
@@ -709,7 +709,7 @@ impl Serialize for Report {
             reasons: &self.verdict.reasons,
             certificate: FlightCertificate {
                 separation_m: separation.certified_m,
-                clearance_margin_m: self.obstacles.as_ref().and_then(|of| of.certified_clearance_margin_m),
+                clearance_margin_m: self.obstacles.as_ref().and_then(|judged| judged.certified_clearance_margin_m),
                 until_s: separation.certified_until_s,
                 void: &separation.certificate_void,
             },

@@ -417,8 +417,8 @@ pub(super) fn breaks_certificate(separation_m: f64, certified_m: f64, delta_m: f
     separation_m - delta_m < (certified_m - delta_m) * (1.0 - INTEGRATION)
 }
 
-/// Returns the rise of an energy that is proved never to grow. A rise shows a step that is too long for the law, or loss
-/// of digits.
+/// Returns the rise of an energy that is proved never to grow. A rise shows a step that is too long for the law, or a
+/// loss of digits.
 fn risen_energy(result: &FlightResult<'_>) -> Option<Reason> {
     let EnergyRise { from, to } = result.flight.energy_rise?;
     let explained = largest_explained_energy(from, result.summary, result.scenario.count());

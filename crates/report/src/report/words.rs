@@ -72,7 +72,7 @@ fn came_to(PairApproach { pair, min_m, min_at_s, limit_m }: &PairApproach) -> St
     format!("{} came to {} m at {}", vehicles(*pair), beside_limit(*min_m, *limit_m, 3), seconds(*min_at_s))
 }
 
-/// The reason in sentences, with a remedy.
+/// Writes the reason in sentences, with a remedy.
 impl Display for Reason {
     #[expect(clippy::too_many_lines, reason = "one text for each reason")]
     fn fmt(&self, out: &mut Formatter<'_>) -> fmt::Result {
@@ -228,8 +228,8 @@ impl Display for Reason {
                 }
             }
             Self::LegNotReached { leg, until_s } => {
-                let at = until_s.map(seconds).unwrap_or_default();
-                write!(out, "Leg {leg} was not reached before leg {} began at {at}.", leg + 1)
+                let time = until_s.map(seconds).unwrap_or_default();
+                write!(out, "Leg {leg} was not reached before leg {} began at {time}.", leg + 1)
             }
             Self::LegNeverBegan { leg, is_before_reached: true } => {
                 write!(out, "Leg {leg} never began: the flight ended before.")
@@ -276,8 +276,8 @@ impl Reason {
             Self::HullsHit { first, collisions } => hits(first, *collisions),
             Self::CertificateBroken { approach, .. } => {
                 let [min, certified] = below_bound(approach.min_m, approach.limit_m);
-                let (pair, at) = (vehicles(approach.pair), seconds(approach.min_at_s));
-                format!("certificate broken: {pair} came to {min} m at {at}, certified {certified} m")
+                let (pair, time) = (vehicles(approach.pair), seconds(approach.min_at_s));
+                format!("certificate broken: {pair} came to {min} m at {time}, certified {certified} m")
             }
             Self::ShieldBoundExceeded { exceeded } => format!("bound of the shield exceeded: {exceeded}"),
             Self::LawFailed { instants } => format!("law failed: at {}", counted(*instants, "instant", "instants")),
@@ -330,7 +330,7 @@ impl Reason {
         })
     }
 
-    /// Returns whether the reason concerns the law or the goal, which a violation leaves without meaning.
+    /// Returns whether the reason concerns the law or the goal. A violation makes such a reason meaningless.
     fn is_of_law(&self) -> bool {
         matches!(
             self,
@@ -367,13 +367,12 @@ impl Report {
             Status::Clear if self.verdict.pass => {
                 vec![format!("CLEAR: {}, {}", self.clearance([" (", ")"]), self.arrival())]
             }
-            Status::Clear => match failures.split_first() {
-                Some((first, rest)) => [&[capital_label(first)], rest].concat(),
-                None => {
-                    let reasons: Vec<_> = self.verdict.reasons.iter().map(ToString::to_string).collect();
-                    vec![format!("NOT PASSED: {}", reasons.join(" ").trim_end_matches('.'))]
-                }
-            },
+            Status::Clear => {
+                let reasons = || self.verdict.reasons.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
+                let alone = || vec![format!("NOT PASSED: {}", reasons().trim_end_matches('.'))];
+                let labelled = |(first, rest): (&String, &[String])| [&[capital_label(first)], rest].concat();
+                failures.split_first().map_or_else(alone, labelled)
+            }
             Status::Violation => [&[format!("VIOLATION: {}", self.deepest_in_words())], &failures[..]].concat(),
             Status::Undecided => [&[format!("UNDECIDED: {}", self.undecided_in_words())], &failures[..]].concat(),
         };
@@ -401,9 +400,9 @@ impl Report {
     /// Returns the reasons beside those that the headline states in full: the deepest violation of two vehicles, if it
     /// is the only one.
     pub(super) fn reasons_beside_headline(&self) -> Vec<String> {
-        let reasons = self.verdict.reasons.iter().filter_map(|reason| match reason {
-            Reason::Violation { violations, .. } => Some(others(*violations).trim().to_owned()),
-            reason => Some(reason.to_string()),
+        let reasons = self.verdict.reasons.iter().map(|reason| match reason {
+            Reason::Violation { violations, .. } => others(*violations).trim().to_owned(),
+            reason => reason.to_string(),
         });
         reasons.filter(|reason| !reason.is_empty()).collect()
     }

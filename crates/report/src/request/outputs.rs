@@ -207,7 +207,7 @@ fn was_interrupted(report: &Path) -> bool {
     let text = fs::read_to_string(report).unwrap_or_default();
     let interrupted = Ending::Interrupted.code();
     serde_json::from_str::<Value>(&text).is_ok_and(|report| {
-        // Reports of schema 2 have the word alone.
+        // In reports of schema 2 the code is the value itself.
         let end = &report["run"]["ended_early"];
         end["code"] == interrupted || *end == interrupted
     })

@@ -220,7 +220,7 @@ impl From<ScenarioError> for Failure {
             None => error.message().to_owned(),
         };
         let failure = Self::new(error.code(), false, message);
-        let failure = error.help().into_iter().fold(failure, |failure, help| failure.with_help(help));
+        let failure = error.help().into_iter().fold(failure, Failure::with_help);
         error.place().into_iter().fold(failure, Self::at)
     }
 }

@@ -156,7 +156,7 @@ impl Experiment for Options {
     }
 
     fn arguments(&self, _study: &Attack) -> Vec<String> {
-        let vary = self.vary.iter().map(|of| (VARY, of.to_string()));
+        let vary = self.vary.iter().map(|range| (VARY, range.to_string()));
         let reaches = [(START, self.start_m), (VELOCITY, self.velocity_m_s), (APART, self.apart_m)];
         let reaches = reaches.into_iter().filter_map(|(option, by)| Some((option, format!("{:?}", by?))));
         let counts = [(option::FLIGHTS, self.flights), (SEEDS, self.seeds), (SEED, self.seed)];

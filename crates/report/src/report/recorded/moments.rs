@@ -20,10 +20,10 @@ impl RecordedReport {
     }
 }
 
-fn unseen(of: &VehicleFinding<Gap>) -> Moment {
-    let of = VehicleFinding { vehicle: cut(&of.vehicle, LONGEST_NAME), finding: of.finding };
-    let Gap { vehicle, from_s, to_s, .. } = of.finding;
+fn unseen(gap: &VehicleFinding<Gap>) -> Moment {
+    let gap = VehicleFinding { vehicle: cut(&gap.vehicle, LONGEST_NAME), finding: gap.finding };
+    let Gap { vehicle, from_s, to_s, .. } = gap.finding;
     let span = Span { from_s, to_s, at_s: f64::midpoint(from_s, to_s) };
-    let (brief, said) = (format!("{} is not seen", of.vehicle), format!("Undecided: {}", of.words()));
+    let (brief, said) = (format!("{} is not seen", gap.vehicle), format!("Undecided: {}", gap.words()));
     Moment { kind: Kind::Unseen, vehicles: vec![vehicle], obstacle: None, span, brief, said }
 }

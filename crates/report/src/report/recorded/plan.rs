@@ -133,8 +133,9 @@ impl PlanReport {
         let unknown = self.unknown.iter().enumerate().map(|(k, VehicleFinding { vehicle, finding })| {
             Finding::unknown(k, vehicle.clone(), "m", self.tube_m).over(finding.from_s, finding.to_s)
         });
-        let is_beyond = |of: &&Finding| of.limit.is_some() && of.margin() > 0.0;
-        let is_open = |of: &&Finding| of.limit.is_some() && of.largest_margin() > 0.0 && !is_beyond(of);
+        let is_beyond = |finding: &&Finding| finding.limit.is_some() && finding.margin() > 0.0;
+        let is_open =
+            |finding: &&Finding| finding.limit.is_some() && finding.largest_margin() > 0.0 && !is_beyond(finding);
         let beyond: Vec<_> = all.iter().filter(is_beyond).cloned().collect();
         let open: Vec<_> = all.iter().filter(is_open).cloned().chain(unknown).collect();
         let farthest = all.iter().max_by(|a, b| a.value.upper_bound().total_cmp(&b.value.upper_bound()));

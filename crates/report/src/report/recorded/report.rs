@@ -317,7 +317,7 @@ impl RecordedReport {
         self
     }
 
-    /// Returns whether the recording is clear, and no fact that the answers rest on is an assumption.
+    /// Returns whether the recording is clear and the answers rest on no assumption.
     #[must_use]
     pub fn is_proved(&self) -> bool {
         self.status == Status::Clear && !self.source.facts.iter().any(Fact::is_assumption)
@@ -383,10 +383,11 @@ fn separations(outcome: &Outcome, settings: &Settings, status: Status, detectors
     let unit = unit(settings);
     let names = |pair: ObjectPair| outcome.names(pair, &settings.obstacles);
     let closest = outcome.closest.iter().chain(&outcome.obstacles);
-    let violations = outcome.violations.iter().map(|of| Finding::violation(of, names(of.pair), unit, is_exact));
-    let undecided = outcome.undecided.iter().map(|of| Finding::undecided(of, names(of.pair), unit));
+    let violations =
+        outcome.violations.iter().map(|found| Finding::violation(found, names(found.pair), unit, is_exact));
+    let undecided = outcome.undecided.iter().map(|found| Finding::undecided(found, names(found.pair), unit));
     Answer {
-        closest: closest.map(|of| Finding::approach(of, names(of.pair), unit)).collect(),
+        closest: closest.map(|found| Finding::approach(found, names(found.pair), unit)).collect(),
         violations: FindingList::new(outcome.tallies.violations, violations.collect()),
         undecided: FindingList::new(outcome.tallies.undecided, undecided.collect()),
         detectors: Some(detectors),
@@ -397,7 +398,7 @@ fn separations(outcome: &Outcome, settings: &Settings, status: Status, detectors
 /// Returns the answer on a limit. A vehicle whose quantity is not known is undecided.
 fn on_limit(found: &LimitOutcome, outcome: &Outcome) -> Answer {
     let limit = found.limit;
-    let finding = |of: &Exceedance| Finding::exceedance(of, outcome.name(of.vehicle), limit);
+    let finding = |exceedance: &Exceedance| Finding::exceedance(exceedance, outcome.name(exceedance.vehicle), limit);
     let unknown = found
         .unknown
         .iter()
@@ -413,9 +414,9 @@ fn on_limit(found: &LimitOutcome, outcome: &Outcome) -> Answer {
 }
 
 fn on_well_clear(found: &WellClearOutcome, outcome: &Outcome) -> Answer {
-    let finding = |of: &WellClearLoss| {
-        let names = [outcome.name(of.pair.first()), outcome.name(of.pair.second())];
-        Finding::well_clear(of, names, found.thresholds)
+    let finding = |loss: &WellClearLoss| {
+        let names = [outcome.name(loss.pair.first()), outcome.name(loss.pair.second())];
+        Finding::well_clear(loss, names, found.thresholds)
     };
     let closest = found.violations.iter().min_by(|a, b| a.horizontal_m.total_cmp(&b.horizontal_m));
     Answer {
@@ -438,10 +439,10 @@ impl Question {
             unit: unit(settings),
             radius_m: settings.radius_m,
             ellipsoid_m: settings.ellipsoid_m.map(Into::into),
-            cylinder_m: settings.cylinder.map(|of| [of.horizontal_m, of.vertical_m]),
+            cylinder_m: settings.cylinder.map(|cylinder| [cylinder.horizontal_m, cylinder.vertical_m]),
             obstacles: settings.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect(),
             limits: settings.envelope.limits.iter().map(|limit| (limit.quantity.key(), limit.allowed)).collect(),
-            well_clear: settings.well_clear.map(|of| [of.horizontal_m, of.vertical_m, of.tau_s]),
+            well_clear: settings.well_clear.map(|limits| [limits.horizontal_m, limits.vertical_m, limits.tau_s]),
             require_presence: settings.require_presence,
             plan: None,
             above_m: settings.above_m,

@@ -58,7 +58,7 @@ impl RecordedReport {
         let more = (rest > 0).then(|| format!("and {rest} more"));
         let named = named.chain(more).collect::<Vec<_>>().join(", ");
         let all = presence.partly + presence.throughout;
-        let required = if presence.required { format!(", which {REQUIRE_PRESENCE} asks for") } else { String::new() };
+        let required = if presence.required { format!(", which {REQUIRE_PRESENCE} requires") } else { String::new() };
         format!(
             "{window}, over which {} of {all} vehicles {} not seen throughout{required}: {named}",
             presence.partly,
@@ -106,7 +106,7 @@ impl RecordedReport {
         of_motion.into_iter().chain(of_parts).collect::<Vec<_>>().join(" and ")
     }
 
-    /// Returns facts as clauses, the first obstacle that stands still with the number of the others.
+    /// Returns the facts as clauses. Obstacles that stand still give two: the first one, and the number of the others.
     fn clauses(&self, is_told: impl Fn(&&Fact) -> bool) -> Vec<String> {
         let mut clauses = Vec::new();
         let mut resting = 0;
@@ -176,15 +176,15 @@ impl RecordedReport {
 
     fn finding_of_pairs(&self, answer: &Answer, status: Status) -> String {
         let unit = format!(" {}", self.unit());
-        let lower = |of: &Finding| of.value.lower_bound();
-        let at = |of: &Finding| seconds(of.at_s.unwrap_or(f64::NAN));
+        let lower = |finding: &Finding| finding.value.lower_bound();
+        let time = |finding: &Finding| seconds(finding.at_s.unwrap_or(f64::NAN));
         let delta = self.question.delta.map_or("by radii".to_owned(), |m| format!("delta {}{unit}", exact(m)));
         match status {
             Status::Clear => {
                 let lowest = answer.closest.iter().min_by(|a, b| lower(a).total_cmp(&lower(b)));
-                let closest = lowest.map_or(String::new(), |of| {
-                    let least = beside_limit(lower(of), of.limit.unwrap_or_default(), 6);
-                    format!("never closer than {least}{unit}, {} at {} ", of.names(), at(of))
+                let closest = lowest.map_or(String::new(), |finding| {
+                    let least = beside_limit(lower(finding), finding.limit.unwrap_or_default(), 6);
+                    format!("never closer than {least}{unit}, {} at {} ", finding.names(), time(finding))
                 });
                 let is_in_verdict = self.is_by_run() || self.source.facts.iter().any(Fact::is_assumption);
                 let motion = if is_in_verdict { String::new() } else { format!(", {}", self.motion()) };
@@ -198,14 +198,14 @@ impl RecordedReport {
                     _ if answer.violations.count <= 1 => String::new(),
                     count => format!("; {count} violations in all"),
                 };
-                deepest.map_or(String::new(), |of| {
-                    let limit = of.limit.unwrap_or_default();
+                deepest.map_or(String::new(), |finding| {
+                    let limit = finding.limit.unwrap_or_default();
                     format!(
                         "{} came to {}{unit} (limit {}{unit}) at {}, {}{tie}{others}",
-                        of.names(),
-                        beside_limit(of.value.upper_bound(), limit, 3),
+                        finding.names(),
+                        beside_limit(finding.value.upper_bound(), limit, 3),
                         exact(limit),
-                        at(of),
+                        time(finding),
                         self.motion()
                     )
                 })
@@ -240,13 +240,13 @@ impl RecordedReport {
             );
         }
         let listed = answer.undecided.listed.iter();
-        if let Some(of) = listed.min_by(|a, b| a.value.lower_bound().total_cmp(&b.value.lower_bound())) {
+        if let Some(finding) = listed.min_by(|a, b| a.value.lower_bound().total_cmp(&b.value.lower_bound())) {
             let rate = self
                 .deciding_rate_hz
                 .map_or(String::new(), |hz| format!("; sampling at {} Hz would decide", at_most(hz, 1)));
-            let (names, by) = (of.names(), seconds(of.to_s.unwrap_or(f64::NAN)));
-            let low = at_least(of.value.lower_bound(), 6);
-            return match of.value.upper {
+            let (names, by) = (finding.names(), seconds(finding.to_s.unwrap_or(f64::NAN)));
+            let low = at_least(finding.value.lower_bound(), 6);
+            return match finding.value.upper {
                 Some(upper) => {
                     format!("{names} came to between {low}{unit} and {}{unit} by {by}{rate}", at_most(upper, 6))
                 }
@@ -267,8 +267,8 @@ impl RecordedReport {
                 format!("{vehicle} was not seen from {}; {joined}", span(finding.from_s, finding.to_s))
             }
             [VehicleFinding { vehicle, finding }, ..] => {
-                let (count, at) = (tally_in_words(self.gaps_tally), seconds(finding.from_s));
-                format!("{count} gaps, the first of {vehicle} at {at}; {joined}")
+                let (count, time) = (tally_in_words(self.gaps_tally), seconds(finding.from_s));
+                format!("{count} gaps, the first of {vehicle} at {time}; {joined}")
             }
         }
     }
@@ -278,13 +278,13 @@ impl RecordedReport {
         let caption = format!("smallest distances in {}", self.unit());
         let closest = |heading: &'static str, is_of_obstacle: bool| {
             let closest = self.separation().into_iter().flat_map(|answer| &answer.closest);
-            let row = |of: &Finding| {
-                let limit = of.limit.unwrap_or_default();
-                let apart = interval(of.value.lower_bound(), of.value.upper_bound(), limit);
-                [of.names(), apart, fixed(of.at_s.unwrap_or(f64::NAN), 3), exact(limit)]
+            let row = |finding: &Finding| {
+                let limit = finding.limit.unwrap_or_default();
+                let apart = interval(finding.value.lower_bound(), finding.value.upper_bound(), limit);
+                [finding.names(), apart, fixed(finding.at_s.unwrap_or(f64::NAN), 3), exact(limit)]
             };
             let columns = &["who", "smallest distance", "at [s]", "limit"];
-            let rows = closest.filter(|of| of.is_of_obstacle() == is_of_obstacle).map(row);
+            let rows = closest.filter(|finding| finding.is_of_obstacle() == is_of_obstacle).map(row);
             Section::table(heading, &caption, columns, rows)
         };
         let columns = &["what", "worst", "vehicle", "at [s]", "limit", "verdict"];
@@ -414,9 +414,9 @@ impl Corners {
     fn words(&self) -> String {
         let VehicleFinding { vehicle, finding } = &self.largest;
         let (count, jump) = (counted(self.count, "corner", "corners"), at_most(finding.by_m_s, 3));
-        let at = seconds(finding.at_s);
+        let time = seconds(finding.at_s);
         format!(
-            "vehicles round off {count} (velocity jumps by at most {jump} m/s, {vehicle} at {at}; {ACCEL_WINDOW} \
+            "vehicles round off {count} (velocity jumps by at most {jump} m/s, {vehicle} at {time}; {ACCEL_WINDOW} \
              judges them)"
         )
     }
@@ -428,8 +428,8 @@ impl RunObjection {
         match self {
             Self::RunUndecided {} => "the run's own audit of every step is undecided (see its report.json)".to_owned(),
             Self::RunFoundCloser { who: [first, second], min, unit, at_s } => {
-                let (min, at) = (at_least(*min, 3), seconds(*at_s));
-                format!("the run's audit of every step found {first} and {second} {min} {unit} apart at {at}")
+                let (min, time) = (at_least(*min, 3), seconds(*at_s));
+                format!("the run's audit of every step found {first} and {second} {min} {unit} apart at {time}")
             }
         }
     }

@@ -278,7 +278,7 @@ impl ConfiguredAudit<'_> {
     }
 }
 
-/// Tells notes to the user.
+/// Passes notes to the monitor.
 fn tell(monitor: &dyn Monitor, notes: &[String]) {
     for note in notes {
         monitor.warn(&format!("note: {note}"));

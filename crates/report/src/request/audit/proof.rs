@@ -117,7 +117,10 @@ pub(super) fn check(request: &AuditRequest<'_>, settings: &Settings) -> Result<(
             settings.motion.is_some_and(|motion| motion != Interpolation::Linear),
             "a motion that is not linear".to_owned(),
         ),
-        (settings.radius_m.is_some() || settings.vehicles.values().any(|of| of.radius_m.is_some()), RADIUS.to_string()),
+        (
+            settings.radius_m.is_some() || settings.vehicles.values().any(|vehicle| vehicle.radius_m.is_some()),
+            RADIUS.to_string(),
+        ),
         (settings.ellipsoid_m.is_some(), ELLIPSOID.to_string()),
         (settings.cylinder.is_some(), CYLINDER.to_string()),
         (settings.well_clear.is_some(), WELL_CLEAR.to_string()),

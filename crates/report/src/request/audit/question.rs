@@ -277,7 +277,7 @@ impl<'a> AuditRequest<'a> {
         let in_words = |TimedSetting { option, of }: TimedSetting| match (option, of) {
             (OBSTACLES, Some(name)) => format!("the path of the obstacle `{name}`"),
             (MOTION, Some(motion)) => MOTION.set(motion).to_string(),
-            (option, Some(of)) => option.set(of).to_string(),
+            (option, Some(name)) => option.set(name).to_string(),
             (option, None) => option.to_string(),
         };
         let timed = for_drones.then(|| "an export for drones".to_owned()).into_iter();
@@ -300,7 +300,8 @@ impl<'a> AuditRequest<'a> {
         if self.settings.motion == Some(Interpolation::Bounded) {
             let bound = |most_m_s2| Fact::number(FactKind::Acceleration, Source::Declared, most_m_s2, "m/s^2");
             facts.extend(self.settings.max_accel_m_s2.map(bound));
-            let of_vehicle = |(name, of): (&String, &VehicleSettings)| Some(bound(of.max_accel_m_s2?).about(name));
+            let of_vehicle =
+                |(name, vehicle): (&String, &VehicleSettings)| Some(bound(vehicle.max_accel_m_s2?).about(name));
             facts.extend(self.settings.vehicles.iter().filter_map(of_vehicle));
         }
         facts

@@ -53,11 +53,14 @@ impl DroneExport {
     pub(super) fn add(&mut self, report: RecordedReport, start_s: f64) {
         let closest = report.separation().into_iter().flat_map(|answer| &answer.closest);
         let name = |label: &String| {
-            self.vehicles.iter().find(|of| of.label == *label).map_or_else(|| label.clone(), |of| of.name.clone())
+            self.vehicles
+                .iter()
+                .find(|vehicle| vehicle.label == *label)
+                .map_or_else(|| label.clone(), |vehicle| vehicle.name.clone())
         };
-        let margins = closest.filter_map(|of| {
-            let [first, second] = &of.subjects[..] else { return None };
-            Some((of.margin(), [first, second].map(name), of.at_s.unwrap_or_default()))
+        let margins = closest.filter_map(|finding| {
+            let [first, second] = &finding.subjects[..] else { return None };
+            Some((finding.margin(), [first, second].map(name), finding.at_s.unwrap_or_default()))
         });
         let least = margins.min_by(|a, b| a.0.total_cmp(&b.0)).map(|(margin, who, at_s)| (margin, who, at_s + start_s));
         let is_less = match (&least, &self.margin) {
