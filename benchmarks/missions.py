@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from program import Point, Program, Unusable
+from program import Point, Program, Unusable, separation_m
 from scenes import Mission, Scene, missions
 
 Row = dict[str, Any]
@@ -64,7 +64,7 @@ def fly(program: Program, mission: Mission, law: str, shield: bool) -> Row:
             report = program.fly(scene.text(law, shield))
         except Unusable as refusal:
             return entry | {"status": "skipped", "why": str(refusal)}
-        status = report["audit"]["status"]
+        status = report["status"]
         reached = bool(report["formation"]["reached"])
         counts["flights"] += 1
         counts["safe"] += status == "clear"
@@ -78,7 +78,7 @@ def fly(program: Program, mission: Mission, law: str, shield: bool) -> Row:
             unseen = how_unseen(scene, program.samples(), report["run"]["ended_early"] is not None)
             if unseen:
                 counts[unseen] += 1
-        least_m = min(least_m, report["separation"]["min_m"])
+        least_m = min(least_m, separation_m(report))
         wall_s += report["performance"]["wall_s"]
     times.sort()
     entry |= counts

@@ -116,6 +116,12 @@ class Program:
         return rows
 
 
+def separation_m(report: Mapping[str, Any]) -> float:
+    """Returns the smallest separation of two vehicles [m], of the report on a flight or a recording."""
+    smallest: float = report["answers"][0]["closest"][0]["value"]["lower"]
+    return smallest
+
+
 def message(text: str) -> str:
     """Returns the sentence of an error message, without its marker and its place in the file."""
     lines = [line.strip() for line in text.splitlines() if line.strip()]

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from itertools import combinations
 from typing import Any
 
-from program import Point, Program, Unusable
+from program import Point, Program, Unusable, separation_m
 
 Row = dict[str, Any]
 
@@ -93,14 +93,14 @@ def flight(program: Program, name: str, scenario: str, sets: Sequence[str]) -> I
         entry = row(name, rate)
         try:
             report = program.fly(scenario, *sets, f"time.record_hz={rate}")
-            delta_m = report["separation"]["delta_m"]
+            delta_m = report["question"]["delta"]
             samples = [sample for _, sample in program.samples()]
             straight, _ = program.audit("flight/run.csv", "--delta", repr(delta_m))
         except Unusable as refusal:
             yield entry | {"status": "skipped", "why": str(refusal)}
             continue
-        entry |= {"delta_m": delta_m, "true_m": report["separation"]["min_m"], "samples_m": least(samples)}
-        yield judged(entry | {"straight_m": straight["separation"]["min_m"]})
+        entry |= {"delta_m": delta_m, "true_m": separation_m(report), "samples_m": least(samples)}
+        yield judged(entry | {"straight_m": separation_m(straight)})
 
 
 def source(folder: pathlib.Path) -> str:
@@ -127,8 +127,8 @@ def curves(program: Program, folder: pathlib.Path) -> Iterator[Row]:
         except Unusable as refusal:
             yield entry | {"status": "skipped", "why": str(refusal)}
             continue
-        entry |= {"delta_m": delta_m, "true_m": report["separation"]["min_m"], "samples_m": least(samples)}
-        yield judged(entry | {"straight_m": straight["separation"]["min_m"]})
+        entry |= {"delta_m": delta_m, "true_m": separation_m(report), "samples_m": least(samples)}
+        yield judged(entry | {"straight_m": separation_m(straight)})
 
 
 def row(name: str, rate_hz: float) -> Row:

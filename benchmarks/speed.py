@@ -14,7 +14,7 @@ from collections.abc import Iterator, Sequence
 from typing import Any
 
 from peers import PLAIN, Peers, Skipped
-from program import Point, Program, points, scenario
+from program import Point, Program, points, scenario, separation_m
 
 Row = dict[str, Any]
 
@@ -179,7 +179,7 @@ def quadrotors(
     for _ in range(rounds):
         report = program.fly(scenario("quadrotors", tables))
         if report["run"]["ended_early"]:
-            entry |= {"status": "not comparable", "why": f"tautline: {report['run']['ended_early']}"}
+            entry |= {"status": "not comparable", "why": f"tautline: {report['run']['ended_early']['text']}"}
             break
         if not arrived(entry, "ours", "tautline", farthest(program.samples()[-1][1], slots)):
             break
@@ -262,7 +262,7 @@ def sweep(program: Program, peers: Peers, method: str, count: int, instants: int
             break
         theirs.append(answer["wall_s"])
         entry["peer"]["version"] = answer["version"]
-        least_m = report["separation"]["min_m"]
+        least_m = separation_m(report)
         entry |= {"ours_min_m": least_m, "peer_min_m": answer["min_m"]}
         # A vehicle moves at most 1.4 m/s: the true minimum of a pair is at most 0.03 m below that of the samples.
         if not least_m - 1e-9 <= answer["min_m"] <= least_m + 0.03:

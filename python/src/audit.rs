@@ -7,6 +7,7 @@ use numpy::ndarray::{Ix1, Ix3};
 use numpy::{PyReadonlyArray1, PyReadonlyArray3, PyUntypedArrayMethods as _};
 use pyo3::prelude::*;
 use tautline::audit::recorded::{self, Settings};
+use tautline::fact::Fact;
 use tautline::mcap::RunAudit;
 use tautline::report::recorded::RecordedReport;
 use tautline::request::audit::Open;
@@ -20,12 +21,13 @@ use crate::numbers::{borrowed, shape_text};
 use crate::request::{AuditOptions, ReadOptions};
 use crate::work::run_in_thread;
 
-/// Verdict in words, headline, summary, and report as JSON.
-type AuditTexts = (String, String, String, String);
+/// Verdict in words, headline, summary, report as JSON, and whether each of its facts is an assumption.
+type AuditOutcome = (String, String, String, String, Vec<bool>);
 
-fn judged(report: &RecordedReport) -> PyResult<AuditTexts> {
+fn judged(report: &RecordedReport) -> PyResult<AuditOutcome> {
     let json = serde_json::to_string(report).map_err(|error| internal_error(&error.to_string()))?;
-    Ok((report.verdict(), report.headline(), report.text(), json))
+    let assumed = report.source.facts.iter().map(Fact::is_assumption).collect();
+    Ok((report.verdict(), report.headline(), report.text(), json, assumed))
 }
 
 /// Limits, obstacles and audit of a flight, as in its recording.
@@ -121,7 +123,7 @@ pub(crate) fn audit_files(
     paths: Vec<PathBuf>,
     options: &ReadOptions,
     html: Option<PathBuf>,
-) -> PyResult<AuditTexts> {
+) -> PyResult<AuditOutcome> {
     let subject = Subject::Files { paths, options: Box::new(options.0.clone()) };
     let monitor = Silent::default();
     let request = question.request(subject, command, html);
@@ -142,7 +144,7 @@ pub(crate) fn audit_arrays<'py>(
     names: Vec<String>,
     findings: Option<&FlightFindings>,
     html: Option<PathBuf>,
-) -> PyResult<AuditTexts> {
+) -> PyResult<AuditOutcome> {
     let given = AuditArrays::new(times, positions, velocities)?;
     if names.len() != given.positions.shape()[1] {
         return Err(wrong_input(format!("names: {} for {} vehicles", names.len(), given.positions.shape()[1])));

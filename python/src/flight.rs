@@ -70,7 +70,6 @@ impl Sink for Samples {
 /// Result of a flight: its report in words and as JSON, and its samples.
 #[pyclass(frozen, get_all, module = "tautline._native")]
 pub(crate) struct FlightData {
-    passed: bool,
     headline: String,
     text: String,
     report: String,
@@ -86,7 +85,6 @@ impl FlightData {
     fn new(py: Python<'_>, report: &Report, samples: Samples, findings: FlightFindings) -> PyResult<Self> {
         let shape = [samples.times_s.len(), samples.vehicles, 3];
         Ok(Self {
-            passed: report.verdict.pass,
             headline: report.headline(),
             text: report.text(),
             report: serde_json::to_string(report).map_err(|error| internal_error(&error.to_string()))?,
@@ -176,7 +174,7 @@ pub(crate) fn fly(
         return Err(wrong_input(format!("{why} (elements of `out` that `control` does not write are NaN)")));
     }
     if let (Some(page), Some(path)) = (page, html) {
-        tautline::report::write_atomically(&path, page.as_bytes())
+        tautline::files::write_atomically(&path, page.as_bytes())
             .map_err(|error| PyOSError::new_err(error.to_string()))?;
     }
     let (other_law, reason) = (samples.other_law.clone(), samples.ended_early.clone());

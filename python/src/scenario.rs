@@ -54,6 +54,12 @@ impl Scenario {
         self.scenario.delta_m
     }
 
+    /// Unit of separations.
+    #[getter]
+    fn unit(&self) -> &str {
+        if self.scenario.half_axes_m().is_some() { "m, scaled" } else { "m" }
+    }
+
     #[getter]
     fn duration_s(&self) -> f64 {
         self.scenario.time.end_s(self.scenario.time.steps())

@@ -38,8 +38,8 @@ struct State {
     history: History,
 }
 
-/// Numbers of a pair in violation, begin and end \[s\], and smallest separation \[m\].
-type Violation = ((usize, usize), f64, f64, f64);
+/// Numbers of a pair in violation, begin and end \[s\], smallest separation \[m\] and its time \[s\].
+type Violation = ((usize, usize), f64, f64, f64, f64);
 
 /// Numbers of the closest pair, separation \[m\] and time \[s\].
 type Closest = ((usize, usize), f64, f64);
@@ -299,7 +299,8 @@ impl Simulation {
     fn judged(&self, py: Python<'_>) -> PyResult<(String, Vec<Violation>)> {
         let (flight, is_over) =
             self.with(py, |simulation| (simulation.clone().finish(), simulation.ending().is_some()))?;
-        let found = flight.audit.violations.iter().map(|of| (numbers(of.pair), of.from_s, of.to_s, of.min_m));
+        let found =
+            flight.audit.violations.iter().map(|of| (numbers(of.pair), of.from_s, of.to_s, of.min_m, of.min_at_s));
         let status = if is_over { flight.status() } else { flight.status_so_far() };
         Ok((status.name().to_owned(), found.collect()))
     }

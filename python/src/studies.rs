@@ -8,12 +8,13 @@ use tautline::campaign::CampaignRequest;
 use tautline::export::WRITTEN;
 use tautline::export::drones::Dialect;
 use tautline::margin::Range;
+use tautline::report::recorded::RecordedReport;
 use tautline::request::{
     DroneChoices, ExportRequest, Failure, Monitor, ScenarioRequest, Silent, export_drones, export_file,
 };
 use tautline::scenario::{ExternalLaw, builtin};
 use tautline::statistics::Proportion;
-use tautline::studies::{Criterion, Experiment, Study as _, StudyFiles, StudyRequest};
+use tautline::studies::{Criterion, Experiment, Study, StudyFiles, StudyRequest};
 use tautline::sweep::SweptKey;
 use tautline::validate::{ValidateRequest, validate_into};
 
@@ -23,8 +24,8 @@ use crate::request::{ReadOptions, choice};
 use crate::scenario::Scenario;
 use crate::work::{SignalMonitor, run_detached, run_in_thread_with_pool};
 
-/// Whether a result is good, and the result as JSON.
-type Answer = (bool, String);
+/// Whether a result is good, its headline, its summary, and the result as JSON.
+type Answer = (bool, String, String, String);
 
 /// Runs a request without the interpreter's lock: on all threads, or on this one for laws in Python.
 fn answered<T: Send>(
@@ -118,7 +119,10 @@ pub(crate) fn export(
     };
     let request = request.for_drones(dialect, drones.into());
     let exported = answered(py, false, |monitor| export_drones(&request, monitor))?;
-    Ok(Some((exported.is_good(), exported.to_json())))
+    let refusal = exported.refusal.as_ref().map(Failure::in_words);
+    let headline = refusal.or_else(|| exported.audit.as_ref().map(RecordedReport::headline));
+    let headline = headline.unwrap_or_else(|| "not judged: there is one vehicle and no obstacle".to_owned());
+    Ok(Some((exported.is_good(), headline, String::new(), exported.to_json())))
 }
 
 /// Files and threads of a study.
@@ -159,7 +163,11 @@ where
     let scenario = ScenarioRequest { external_law, ..scenario.request.clone() };
     let request = StudyRequest { scenario, options, files, threads };
     let study = whole(answered(py, has_law, |monitor| tautline::studies::answer(&request, &(), monitor))?)?;
-    Ok((study.is_good(), json(study.to_json())?))
+    answer_of(&study)
+}
+
+fn answer_of(study: &impl Study) -> PyResult<Answer> {
+    Ok((study.is_good(), study.headline(), study.text(), json(study.to_json())?))
 }
 
 fn question(verdict: String) -> PyResult<Criterion> {
@@ -264,10 +272,10 @@ pub(crate) fn attack(
 pub(crate) fn validate(py: Python<'_>, out: PathBuf, force: bool, threads: Option<usize>) -> PyResult<Answer> {
     let request = ValidateRequest { out, force, threads };
     let validation = answered(py, false, |monitor| validate_into(&request, monitor))?;
-    Ok((validation.pass, json(validation.to_json())?))
+    Ok((validation.pass, validation.headline(), validation.text(), json(validation.to_json())?))
 }
 
-/// Flies a campaign. Returns whether no flight had a violation, the result as JSON, and the folder.
+/// Flies a campaign. Returns its answer and its folder.
 #[pyfunction]
 #[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
 pub(crate) fn campaign(
@@ -280,7 +288,7 @@ pub(crate) fn campaign(
     until_width: Option<f64>,
     until_decided: Option<f64>,
     worst: usize,
-) -> PyResult<(bool, String, PathBuf)> {
+) -> PyResult<(Answer, PathBuf)> {
     let external_law = law.map(|law| external(law, None)).transpose()?;
     let has_law = external_law.is_some();
     let request = CampaignRequest {
@@ -294,7 +302,7 @@ pub(crate) fn campaign(
         ..CampaignRequest::new(spec)
     };
     let answer = whole(answered(py, has_law, |monitor| tautline::campaign::campaign(&request, &(), monitor))?)?;
-    Ok((answer.summary.is_good(), json(serde_json::to_string(&answer.summary))?, answer.folder))
+    Ok((answer_of(&answer.summary)?, answer.folder))
 }
 
 /// Returns share, lower and upper bound of `count` of `of` (Clopper and Pearson, 95 %).

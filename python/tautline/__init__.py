@@ -12,18 +12,20 @@ Vehicle numbers start at 0 in arrays and indices, and at 1 in names, pairs and m
 ``FileNotFoundError``. Reading, audits and flights release the interpreter's lock.
 """
 
+from ._answers import Answer, Comparison, Margin, Sweep
 from ._arguments import ReadOptions
 from ._audit import Audit, AuditOptions, ViolationError, audit
 from ._campaign import Campaign, Proportion, campaign, proportion
 from ._flight import Flight, fly
+from ._judgement import Fact, Finding
 from ._law import ControlLaw, Law
 from ._native import Error, Observation
-from ._program import Answer, attack, compare, export, margin, sweep, validate
+from ._program import attack, compare, export, margin, sweep, validate
 from ._recording import Recording, read
 from ._scenario import Check, Scenario, check, scenarios
 from ._shield import Shield
 from ._simulation import Simulation
-from ._tables import Finding, Findings, Table
+from ._tables import Row, Rows, Table
 from ._vector import VectorSimulation
 
 __all__ = [
@@ -32,19 +34,24 @@ __all__ = [
     "AuditOptions",
     "Campaign",
     "Check",
+    "Comparison",
     "ControlLaw",
     "Error",
+    "Fact",
     "Finding",
-    "Findings",
     "Flight",
     "Law",
+    "Margin",
     "Observation",
     "Proportion",
     "ReadOptions",
     "Recording",
+    "Row",
+    "Rows",
     "Scenario",
     "Shield",
     "Simulation",
+    "Sweep",
     "Table",
     "VectorSimulation",
     "ViolationError",

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import functools
 import inspect
-import json
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, Literal, TypedDict
@@ -32,17 +30,18 @@ from ._arguments import (
     single_recording,
     with_files,
 )
+from ._judgement import Fact, Judgement
 from ._native import Error
 from ._pickles import sealed, unsealed
-from ._tables import Findings
+from ._tables import OpenRow, Row, Rows
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from ._words import Motion, Rules
 
-#: Verdict, headline, summary, and the report as JSON.
-Outcome = tuple[str, str, str, str]
+#: Verdict, headline, summary, the report as JSON, and whether each of its facts is an assumption.
+Outcome = tuple[str, str, str, str, list[bool]]
 
 #: Arguments of `audit`, in the order of the call that a page shows.
 SHOWN = (
@@ -64,135 +63,67 @@ class ViolationError(Error):
         return ViolationError, (self.audit,)
 
 
-class Audit:
+class Gap(Row):
+    """A time in which a vehicle is not seen. ``joined_by_s`` is the smallest ``max_gap`` that closes it."""
+
+    vehicle: str
+    from_s: float
+    to_s: float
+    joined_by_s: float
+
+
+class EarlyEnd(Row):
+    """Early end of a recorded flight whose scenario asks for ``duration_s``."""
+
+    at_s: float
+    duration_s: float
+    reason: str | None
+
+
+class Audit(Judgement):
     """Result of an audit. :func:`audit` returns it. It can be pickled."""
 
-    _json: str
-    _repeat: Callable[..., Outcome]
+    _truth = "is_clear or raise_for_violation()"
     #: Verdict in words: ``PROVED CLEAR``, ``CLEAR if straight between samples``, ``VIOLATION``, ``UNDECIDED``, ...
     verdict: str
-    #: Verdict with its reason, in a line.
-    headline: str
-    #: Summary that the command line prints.
-    text: str
+    #: Early end of a flight; None where the whole window was flown.
+    ended_early: EarlyEnd | None
+    #: Findings against the plan: ``status``, ``delay_s``, ``tube_m``, ``vehicles``, ``unknown``, ``certificate``. None
+    #: without a plan.
+    plan: OpenRow | None
+    #: Notes on how the recording was read, a sentence each.
+    notes: list[str]
 
     def __init__(self) -> None:
         raise TypeError("an audit is the result of tautline.audit(...)")
 
-    @classmethod
-    def _of(cls, outcome: Outcome, repeat: Callable[..., Outcome]) -> Audit:
-        """Returns the audit with this outcome; ``repeat`` repeats it."""
-        audit = cls.__new__(cls)
-        audit.verdict, audit.headline, audit.text, audit._json = outcome
-        audit._repeat = repeat
-        return audit
-
-    @functools.cached_property
-    def _report(self) -> dict[str, Any]:
-        report: dict[str, Any] = json.loads(self._json)
-        return report
-
-    def _findings(self, key: str) -> Findings:
-        return Findings(self._report[key], self.vehicles)
-
-    @property
-    def status(self) -> str:
-        """``clear``, ``violation`` or ``undecided``."""
-        return str(self._report["status"])
+    def _restore(self, outcome: Outcome, repeat: Callable[..., Outcome]) -> Audit:
+        """Sets the attributes; ``repeat`` repeats the audit."""
+        self.verdict, *found, self._assumed = outcome
+        super().__init__(*found)
+        self._repeat = repeat
+        return self
 
     @property
     def is_clear(self) -> bool:
-        """Whether the recording is clear: proved, or under an assumption on the motion between samples."""
+        """Whether the recording is clear: proved, or under assumptions."""
         return self.status == "clear"
 
     @property
-    def is_proved(self) -> bool:
-        """Whether the recording is clear without an assumption on the motion between samples."""
-        return bool(self._report["audit"]["proved"])
-
-    @property
-    def assumes(self) -> str | None:
-        """Assumed motion between samples; None where the recording defines it."""
-        assumption: str | None = self._report["audit"]["assumes"]
-        return assumption
+    def assumptions(self) -> Rows[Fact]:
+        """Those of :attr:`facts` that are assumptions, such as straight motion between samples: the data leave another
+        case open. A clear audit without assumptions is proved."""
+        return Rows(Fact, [fact for fact, assumed in zip(self.facts, self._assumed, strict=True) if assumed])
 
     @property
     def is_planar(self) -> bool:
         """Whether the height of a vehicle is unknown; distances and speeds are then those in the plane of x and y."""
-        return bool(self._report["planar"])
+        return bool(self["planar"])
 
     @property
-    def delta_m(self) -> float | None:
-        """Safety distance [m], a scaled distance with an ellipsoid; None where only radii are given."""
-        delta: float | None = self._report["separation"]["delta_m"]
-        return delta
-
-    @property
-    def separation_m(self) -> float | None:
-        """Smallest separation [m], scaled with an ellipsoid; a lower bound for curves and bounded motion. None where
-        two vehicles are never present together."""
-        smallest: float | None = self._report["separation"]["min_m"]
-        return smallest
-
-    @property
-    def closest(self) -> Findings:
-        """Ten closest pairs: ``pair``, ``lower_m``, ``upper_m``, ``time_s``, ``limit_m``."""
-        return self._findings("closest")
-
-    @property
-    def violations(self) -> Findings:
-        """Violations in order of time: ``pair``, ``from_s``, ``to_s``, ``min_m``, ``min_at_s``, ``limit_m``. If there
-        are many, the worst ones and the first one of each pair."""
-        return self._findings("violations")
-
-    @property
-    def undecided(self) -> Findings:
-        """Undecided intervals: ``pair``, ``from_s``, ``to_s``, ``lower_m``, ``upper_m``, ``limit_m``, ``rate_hz``."""
-        return self._findings("undecided")
-
-    @property
-    def gaps(self) -> Findings:
-        """Gaps, in which a vehicle is not seen: ``vehicle``, ``from_s``, ``to_s``."""
-        return self._findings("gaps")
-
-    @property
-    def ended_early(self) -> dict[str, Any] | None:
-        """Early end of a flight: ``at_s``, ``duration_s`` of the scenario and ``reason``. None where the whole window
-        was flown."""
-        end: dict[str, Any] | None = self._report["ended_early"]
-        return end
-
-    @property
-    def obstacles(self) -> Findings:
-        """Closest approaches to obstacles, with the keys of :attr:`closest`."""
-        return Findings(self._report["obstacles"]["closest"], self.vehicles)
-
-    @property
-    def limits(self) -> Findings:
-        """Limits on single vehicles (``limit``, ``fence``), each with its verdict."""
-        return self._findings("limits")
-
-    @property
-    def plan(self) -> dict[str, Any] | None:
-        """Findings against the plan: ``status``, ``delay_s``, ``tube_m``, ``vehicles``, ``unknown``, ``certificate``.
-        None without a plan."""
-        plan: dict[str, Any] | None = self._report["plan"]
-        return plan
-
-    @property
-    def vehicles(self) -> list[str]:
-        """Names of the vehicles."""
-        return list(self._report["vehicles"])
-
-    @property
-    def notes(self) -> list[str]:
-        """Notes on how the recording was read, a sentence each."""
-        return list(self._report["notes"])
-
-    def to_dict(self) -> dict[str, Any]:
-        """Returns the JSON report as a dictionary."""
-        report: dict[str, Any] = json.loads(self._json)
-        return report
+    def gaps(self) -> Rows[Gap]:
+        """Gaps, in which a vehicle is not seen."""
+        return Rows(Gap, self["gaps"]["listed"], self.vehicles)
 
     def to_html(self, file: PathLike) -> None:
         """Writes a page with figures. Repeats the audit for them.
@@ -214,30 +145,23 @@ class Audit:
         if not (self.is_clear or (allow_undecided and self.status == "undecided")):
             raise ViolationError(self)
 
-    def __bool__(self) -> bool:
-        raise TypeError("an audit is neither true nor false; use is_clear or raise_for_violation()")
-
     def __reduce__(self) -> tuple[Callable[..., Audit], tuple[Any, ...]]:
-        return unpickle, sealed(self.verdict, self.headline, self.text, self._json)
-
-    def __repr__(self) -> str:
-        return f"<Audit {self.headline}>"
-
-    def __str__(self) -> str:
-        return f"{self.headline}\n{self.text}"
+        return unpickle, sealed(self.verdict, self.headline, self.text, self._json, self._assumed)
 
     def _repr_html_(self) -> str:
         tone = {"clear": "good", "violation": "bad"}.get(self.status, "open")
-        closest = self._report["closest"]
+        closest = self._findings("closest", self.vehicles)
         rows = [
             ("finding", self.headline.partition(": ")[2]),
-            ("vehicles", str(self._report["judged"])),
-            *((kind, str(self._report["findings"][kind]["count"])) for kind in ("violations", "undecided", "gaps")),
+            ("vehicles", str(self["judged"])),
+            ("violations", str(sum(part.violations for part in self.answers))),
+            ("undecided", str(sum(part.undecided for part in self.answers))),
+            ("gaps", str(self["gaps"]["count"])),
         ]
         drawing = _display.draw_bars(
-            [" ".join(near["who"]) for near in closest],
-            [near["lower_m"] for near in closest],
-            [near["limit_m"] for near in closest],
+            [" ".join(near.subjects) for near in closest],
+            [near.lower or 0.0 for near in closest],
+            [near.limit or 0.0 for near in closest],
             "Separations of the closest pairs, with their limits",
         )
         return _display.make_card(tone, self.verdict, rows, drawing)
@@ -474,7 +398,7 @@ def audit_files(
     def repeat(html: str | None = None) -> Outcome:
         return with_files(files + more_files, lambda: _native.audit_files(question, command, files, options, html))
 
-    return Audit._of(repeat(), repeat)
+    return Audit.__new__(Audit)._restore(repeat(), repeat)
 
 
 def audit_arrays(
@@ -494,14 +418,14 @@ def audit_arrays(
     def repeat(html: str | None = None) -> Outcome:
         return _native.audit_arrays(question, command, t, positions, velocities, vehicles, findings, html)
 
-    return Audit._of(repeat(), repeat)
+    return Audit.__new__(Audit)._restore(repeat(), repeat)
 
 
 def unpickle(*pickled: Any) -> Audit:
     """Returns an audit of another process, which cannot be repeated. Raises :class:`Error` for damaged bytes."""
-    verdict, headline, text, report = unsealed("Audit", *pickled)
+    outcome = unsealed("Audit", *pickled)
 
     def repeat(html: str | None = None) -> Outcome:
         raise Error("to_html: the recording is not at hand here; write the page in the process of the audit")
 
-    return Audit._of((verdict, headline, text, report), repeat)
+    return Audit.__new__(Audit)._restore((*outcome,), repeat)

@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 from . import _native
+from ._answers import Answer, LawResult
 from ._arguments import PathLike, count, optional_count, optional_number, optional_path, path, with_files
 from ._law import ControlLaw, check_law
 from ._native import Error
-from ._program import Answer
-from ._tables import Table, import_pyarrow
+from ._tables import Rows, Table, import_pyarrow
 
 if TYPE_CHECKING:
     import pandas
@@ -20,8 +20,10 @@ if TYPE_CHECKING:
 class Campaign(Answer, Table):
     """Result of a campaign: the keys of ``campaign.json``, its folder, and a table with a row for each flight."""
 
-    def __init__(self, is_good: bool, text: str, folder: Path) -> None:
-        super().__init__(is_good, text)
+    laws: Rows[LawResult]
+
+    def __init__(self, is_good: bool, headline: str, text: str, found: str, folder: Path) -> None:
+        super().__init__(is_good, headline, text, found)
         self._folder = folder
 
     @property
@@ -69,8 +71,7 @@ def campaign(
     until = optional_number(until_width, "until_width"), optional_number(until_decided, "until_decided")
     check_law(law)
     answer = with_files([file], lambda: _native.campaign(file, law, folder, *many, *until, count(worst, "worst")))
-    is_good, text, at = answer
-    return Campaign(is_good, text, Path(at).absolute())
+    return Campaign(*answer[0], Path(answer[1]).absolute())
 
 
 class Proportion(NamedTuple):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -13,11 +12,12 @@ from numpy.typing import NDArray
 from . import _display, _native
 from ._arguments import PathLike, boolean, path
 from ._audit import Audit, AuditOptions, audit_with
+from ._judgement import Judgement, Statement
 from ._law import ControlLaw, check_law
 from ._native import Error
 from ._pickles import sealed, unsealed
 from ._scenario import Scenario, restore, to_scenario
-from ._tables import Table
+from ._tables import Column, Row, Rows, Table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -27,7 +27,23 @@ if TYPE_CHECKING:
 ARRAYS = ("t", "positions", "velocities", "commands", "separations_m")
 
 
-class Flight(Table):
+class Reason(Statement):
+    """A reason against a pass of a flight, with its numbers."""
+
+    data: Mapping[str, object]
+
+
+class Certificate(Row):
+    """Certificate of a flight: certified separation, and distance beyond the clearance of every obstacle. Without an
+    end ``until_s`` is None. ``void`` has the reasons why nothing is certified."""
+
+    separation_m: float | None
+    clearance_margin_m: float | None
+    until_s: float | None
+    void: Rows[Statement]
+
+
+class Flight(Judgement, Table):
     """A flight: T recorded instants of N vehicles, and the report of all steps. :func:`fly` returns it.
 
     As a table it has a row for each instant and vehicle. Its columns are the time ``t``, the number ``id`` of the
@@ -48,25 +64,21 @@ class Flight(Table):
     #: (T,) smallest separation over the steps since the previous instant [m].
     separations_m: NDArray[np.float64]
 
+    _truth = "passed or status"
     #: The scenario.
     scenario: Scenario
-    #: Verdict in a line.
-    headline: str
-    #: Summary that the command line prints.
-    text: str
-    #: Whether the flight passes: it is clear and reaches its formation.
-    passed: bool
-    #: Contents of ``report.json``.
-    report: dict[str, Any]
+    #: Reasons against a pass.
+    reasons: Rows[Reason]
+    #: Certificate of the flight.
+    certificate: Certificate
 
     def __init__(self) -> None:
         raise TypeError("a flight is the result of tautline.fly(...)")
 
     def _restore(self, scenario: Scenario, state: dict[str, Any]) -> Flight:
         """Sets the attributes."""
-        self.scenario, self._json, self._findings = scenario, state["report"], state["findings"]
-        self.headline, self.text, self.passed = state["headline"], state["text"], state["passed"]
-        self.report = json.loads(self._json)
+        super().__init__(state["headline"], state["text"], state["report"])
+        self.scenario, self._audited = scenario, state["findings"]
         for name in ARRAYS:
             setattr(self, name, state[name])
         # The run's audit holds for this motion only.
@@ -75,44 +87,38 @@ class Flight(Table):
         return self
 
     def __reduce__(self) -> tuple[Any, ...]:
-        state = {name: getattr(self, name) for name in (*ARRAYS, "headline", "text", "passed")}
-        state |= {"report": self._json, "findings": self._findings.json}
+        state = {name: getattr(self, name) for name in (*ARRAYS, "headline", "text")}
+        state |= {"report": self._json, "findings": self._audited.json}
         return unpickle_flight, sealed(self.scenario._source_state(), self.scenario.to_toml(), state)
 
     @property
-    def status(self) -> str:
-        """Verdict: ``clear``, ``violation`` or ``undecided``. A flight that ended early is never ``clear``."""
-        return str(self.report["audit"]["status"])
+    def report(self) -> dict[str, Any]:
+        """Contents of ``report.json``."""
+        return self._values
+
+    @property
+    def passed(self) -> bool:
+        """Whether the flight passes: it is clear and reaches its formation."""
+        return bool(self["pass"])
 
     @property
     def ended_early(self) -> str | None:
         """Reason why the flight ended before the scenario's duration; None where it did not."""
-        reason: str | None = self.report["run"]["ended_early"]
-        return reason
+        end = self["run"]["ended_early"]
+        return None if end is None else str(end["text"])
 
     @property
     def reached(self) -> bool:
         """Whether the formation was reached and kept to the scenario's end; False for a flight that ended early."""
-        return bool(self.report["formation"]["reached"])
+        return bool(self["formation"]["reached"])
 
-    @property
-    def separation_m(self) -> float | None:
-        """Smallest separation over all steps [m]; None for one vehicle."""
-        smallest: float | None = self.report["separation"]["min_m"]
-        return smallest
-
-    def to_dict(self) -> dict[str, Any]:
-        """Returns a copy of :attr:`report`."""
-        report: dict[str, Any] = json.loads(self._json)
-        return report
-
-    def _columns(self) -> dict[str, Any]:
+    def _columns(self) -> dict[str, Column]:
         instants, vehicles = self.positions.shape[:2]
         indices = np.tile(np.arange(vehicles), instants)
-        columns: dict[str, Any] = {"t": np.repeat(self.t, vehicles), "id": indices + 1, "index": indices}
+        columns = {"t": (np.repeat(self.t, vehicles), float), "id": (indices + 1, int), "index": (indices, int)}
         for prefix, vectors in (("", self.positions), ("v", self.velocities), ("a", self.commands)):
             for axis, letter in enumerate("xyz"):
-                columns[prefix + letter] = vectors[:, :, axis].ravel()
+                columns[prefix + letter] = vectors[:, :, axis].ravel(), float
         return columns
 
     def audit(self, **options: Unpack[AuditOptions]) -> Audit:
@@ -122,7 +128,7 @@ class Flight(Table):
         audit. Other options are evaluated on the recorded instants. A flight that ended early is ``UNDECIDED`` unless
         a violation was found, or ``to_s`` ends the window earlier.
         """
-        return audit_with(self._findings, self.t, self.positions, options)
+        return audit_with(self._audited, self.t, self.positions, options)
 
     def plot(self) -> Figure:
         """Draws the paths from above, and the smallest separation over time with delta. Imports matplotlib."""
@@ -141,23 +147,14 @@ class Flight(Table):
         beside.legend()
         return figure
 
-    def __bool__(self) -> bool:
-        raise TypeError("a flight is neither true nor false; use passed or status")
-
-    def __repr__(self) -> str:
-        return f"<Flight {self.headline}>"
-
-    def __str__(self) -> str:
-        return f"{self.headline}\n{self.text}"
-
     def _repr_html_(self) -> str:
-        reached = self.report["formation"]["reached_at_s"]
+        reached = self["formation"]["reached_at_s"]
         nearest, delta = self.separation_m, f"delta {self.scenario.delta_m:g} m"
         rows = [
             ("scenario", self.scenario.name),
             ("vehicles", str(len(self.scenario))),
             ("smallest separation", "-" if nearest is None else f"{_native.separation_text(nearest)} m ({delta})"),
-            ("violations", str(len(self.report["audit"]["violations"]))),
+            ("violations", str(sum(part.violations for part in self.answers))),
             ("formation reached", "no" if reached is None else f"at {reached:.4g} s"),
         ]
         rows += [] if self.ended_early is None else [("ended early", self.ended_early)]
@@ -198,7 +195,7 @@ def fly(
     page = None if html is None else path(html, "html")
     call = f"tautline.fly({flown!r})" if law is None else f"tautline.fly({flown!r}, law={type(law).__name__}(...))"
     found = _native.fly(flown._native, law, record_to, page, call, boolean(keep, "keep"))
-    state = {name: getattr(found, name) for name in (*ARRAYS, "headline", "text", "passed", "report", "findings")}
+    state = {name: getattr(found, name) for name in (*ARRAYS, "headline", "text", "report", "findings")}
     return Flight.__new__(Flight)._restore(flown, state)
 
 

@@ -1,4 +1,4 @@
-"""Pickles that detect damaged bytes: a SHA-256 over all values, checked when the pickle is loaded."""
+"""Pickles that detect damaged bytes and other versions: a SHA-256 over a version and all values, checked on loading."""
 
 from __future__ import annotations
 
@@ -11,17 +11,23 @@ import numpy as np
 from ._native import Error
 
 
+#: Version of the values in pickles. It increases when their keys or their order change.
+VERSION = "tautline 2"
+
+
 def sealed(*values: Any) -> tuple[Any, ...]:
-    """Returns the values and their SHA-256."""
-    return *values, hash_of(values)
+    """Returns the version, the values and their SHA-256."""
+    return VERSION, *values, hash_of((VERSION, *values))
 
 
 def unsealed(what: str, *values: Any) -> tuple[Any, ...]:
-    """Returns the values without their SHA-256. Raises :class:`Error` where they do not have it."""
+    """Returns the values alone. Raises :class:`Error` for another SHA-256 or version."""
     *found, hash = values
     if hash != hash_of(found):
         raise Error(f"{what}: the bytes of the pickle are damaged; pickle the object again")
-    return tuple(found)
+    if found[:1] != [VERSION]:
+        raise Error(f"{what}: the pickle is of another version of tautline; make the object again with this version")
+    return tuple(found[1:])
 
 
 def hash_of(value: Any) -> str:

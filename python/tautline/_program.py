@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import tempfile
 from collections.abc import Iterable, Mapping, Sequence
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from . import _display, _native
+from . import _native
+from ._answers import Answer, Comparison, Margin, Sweep
 from ._arguments import (
     PathLike,
     ReadOptions,
@@ -29,51 +28,12 @@ from ._arguments import (
     with_files,
 )
 from ._law import ControlLaw, check_law
-from ._pickles import sealed, unsealed
 from ._scenario import Scenario, to_scenario
-from ._tables import Finding, Findings, format_cell
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
     from ._words import ExportFormat, Verdict
-
-
-class Answer(Finding):
-    """Result of a study or an export: a mapping with the keys of its JSON, which are attributes as well. As attributes,
-    lists of rows are tables."""
-
-    def __init__(self, is_good: bool, text: str) -> None:
-        super().__init__(json.loads(text))
-        self._is_good = is_good
-
-    @property
-    def is_good(self) -> bool:
-        """Whether the exit code of the command line would be 0."""
-        return self._is_good
-
-    def __bool__(self) -> bool:
-        raise TypeError("an answer is neither true nor false; use is_good")
-
-    def __getstate__(self) -> tuple[Any, ...]:
-        return sealed(vars(self))
-
-    def __setstate__(self, state: tuple[Any, ...]) -> None:
-        (attributes,) = unsealed(type(self).__name__, *state)
-        self.__dict__.update(attributes)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Returns the JSON that the command prints, as a dictionary."""
-        return dict(self)
-
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__} {'good' if self.is_good else 'bad'}: {', '.join(self)}>"
-
-    def _repr_html_(self) -> str:
-        plain = [(key, format_cell(value, key)) for key, value in self.items() if not isinstance(value, (list, dict))]
-        tables = [(key, value) for key in self if isinstance(value := getattr(self, key), Findings)]
-        shown = "".join(f"<h4>{escape(key)}</h4>{value._repr_html_()}" for key, value in tables)
-        return _display.make_card("good" if self.is_good else "bad", type(self).__name__, plain) + shown
 
 
 def export(
@@ -173,7 +133,7 @@ def compare(
     html: PathLike | None = None,
     overwrite: bool = False,
     threads: int | None = None,
-) -> Answer:
+) -> Comparison:
     """Flies laws from the same starts, on all cores. ``answer.laws.to_pandas()`` has a row for each law.
 
     ``laws`` are kinds, names of tables ``[laws.NAME]``, and laws in Python, by default all that the scenario has. Laws
@@ -181,7 +141,7 @@ def compare(
     law twice, as ``NAME+bare`` and under the shield as ``NAME+shield``. ``overwrite``
     replaces existing files. More in docs/compare.md.
     """
-    return Answer(
+    return Comparison(
         *_native.compare(
             study_scenario(scenario, set),
             laws=None if laws is None else names_and_laws(laws),
@@ -212,13 +172,13 @@ def margin(
     html: PathLike | None = None,
     overwrite: bool = False,
     threads: int | None = None,
-) -> Answer:
+) -> Margin:
     """Searches between ``start`` and ``stop`` for the two values of a key between which a verdict turns.
 
     ``verdict`` is ``pass``, ``clear`` or ``reached``. A law in Python flies in place of the scenario's law, on the
     calling thread alone. More in docs/margins.md.
     """
-    return Answer(
+    return Margin(
         *_native.margin(
             study_scenario(scenario, set),
             law=checked_law(law),
@@ -250,7 +210,7 @@ def sweep(
     html: PathLike | None = None,
     overwrite: bool = False,
     threads: int | None = None,
-) -> Answer:
+) -> Sweep:
     """Flies a grid over one key or two, such as ``{"network.loss": np.linspace(0, 0.5, 11)}``.
 
     ``answer.points.to_pandas()`` has a row for each point, with the share of runs that have the ``verdict``.
@@ -262,7 +222,7 @@ def sweep(
         if isinstance(values, (str, bytes)) or not hasattr(values, "__iter__"):
             raise TypeError(f"keys: {key} needs a list of numbers, not {values!r}")
         swept.append((str(key), [number(value, key) for value in values]))
-    return Answer(
+    return Sweep(
         *_native.sweep(
             study_scenario(scenario, set),
             law=checked_law(law),

@@ -14,7 +14,7 @@ from ._arguments import PathLike, ReadOptions, number, paths, read_options, sing
 from ._audit import Audit, AuditOptions, audit
 from ._native import Error
 from ._pickles import sealed, unsealed
-from ._tables import Table
+from ._tables import Column, Table
 
 if TYPE_CHECKING:
     from typing_extensions import Unpack
@@ -145,19 +145,19 @@ class Recording(Table):
                 at = at * since + coefficient
             out[within] = at
 
-    def _columns(self) -> dict[str, Any]:
+    def _columns(self) -> dict[str, Column]:
         if self.has_curves:
             raise Error("the recording has curves, which have no rows; use to_numpy(hz=...)")
         columns = self._data
         names = np.array(self.vehicles, dtype=object)[columns.vehicle]
-        rows: dict[str, Any] = {"t": columns.t, "id": names, "index": columns.vehicle}
+        rows: dict[str, Column] = {"t": (columns.t, float), "id": (names, str), "index": (columns.vehicle, int)}
         letters = "xy" if self.is_planar else "xyz"
         for axis, letter in enumerate(letters):
-            rows[letter] = columns.position[:, axis]
+            rows[letter] = columns.position[:, axis], float
         if not np.isnan(columns.velocity).all():
-            rows |= {f"v{letter}": columns.velocity[:, axis] for axis, letter in enumerate(letters)}
+            rows |= {f"v{letter}": (columns.velocity[:, axis], float) for axis, letter in enumerate(letters)}
         if not np.isnan(columns.radius).all():
-            rows["radius"] = columns.radius
+            rows["radius"] = columns.radius, float
         return rows
 
     def audit(self, **options: Unpack[AuditOptions]) -> Audit:

@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from . import _display, _native
+from ._answers import Answer
 from ._arguments import PathLike, mapping, with_files
+from ._judgement import Statement
 from ._native import Error
-from ._tables import Finding, Findings
+from ._tables import Row, Rows
 
 
 class Scenario:
@@ -194,46 +196,23 @@ def scenarios() -> list[str]:
     return _native.scenarios()
 
 
-class Check:
-    """Check of a scenario before the first step. The keys of ``tautline check --json`` are attributes as well."""
+class CheckWarning(Row):
+    """A warning of a check, with a code that programs may compare."""
 
-    def __init__(self, found: tuple[bool, str, str, str]) -> None:
-        #: Whether the check does not refuse the flight.
-        self.is_good, self.headline, self.text, self._json = found
-        self._found: dict[str, Any] = json.loads(self._json)
+    code: str
+    message: str
 
-    @property
-    def certified_m(self) -> float | None:
-        """Certified smallest separation [m]; None without a certificate (``certificate_void`` has the reason)."""
-        certified: float | None = self._found["certified_m"]
-        return certified
 
-    @property
-    def warnings(self) -> Findings:
-        """Warnings, the worst one first: ``code`` and ``message``."""
-        return Findings(self._found["warnings"])
+class Check(Answer):
+    """Check of a scenario before the first step, with the keys of ``tautline check --json``. It is good if it does not
+    refuse the flight."""
 
-    def to_dict(self) -> dict[str, Any]:
-        """Returns the JSON of ``tautline check --json`` as a dictionary."""
-        found: dict[str, Any] = json.loads(self._json)
-        return found
-
-    def __bool__(self) -> bool:
-        raise TypeError("a check is neither true nor false; use is_good")
-
-    def __getattr__(self, key: str) -> Any:
-        if key.startswith("_"):
-            raise AttributeError(key)
-        return getattr(Finding(self._found), key)
-
-    def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *self._found})
-
-    def __repr__(self) -> str:
-        return f"<Check {self.headline}>"
-
-    def __str__(self) -> str:
-        return f"{self.headline}\n{self.text}"
+    #: Certified smallest separation [m]; None without a certificate.
+    certified_m: float | None
+    #: Reasons why nothing is certified.
+    certificate_void: Rows[Statement]
+    #: Warnings, the worst one first.
+    warnings: Rows[CheckWarning]
 
     def _repr_html_(self) -> str:
         rows = [(warning.code, warning.message) for warning in self.warnings]
@@ -245,4 +224,4 @@ def check(scenario: Scenario | PathLike, *, set: Mapping[str, Any] | None = None
 
     Raises :class:`Error` for a wrong scenario.
     """
-    return Check(to_scenario(scenario, set)._native.check())
+    return Check(*to_scenario(scenario, set)._native.check())

@@ -10,10 +10,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from . import _display, _native
 from ._arguments import PathLike, exact_array
+from ._judgement import Finding
 from ._law import ControlLaw, check_law
 from ._native import Error
 from ._scenario import Scenario, to_scenario
-from ._tables import Finding, Findings
+from ._tables import Rows
 
 
 class Simulation:
@@ -62,6 +63,13 @@ class Simulation:
     def _names(self) -> list[str]:
         return [str(number) for number in range(1, len(self.scenario) + 1)]
 
+    def _finding(
+        self, pair: tuple[int, int], from_s: float | None, to_s: float | None, separation_m: float, at_s: float
+    ) -> Finding:
+        subjects, unit = [str(number) for number in pair], self.scenario._native.unit
+        found = subjects, from_s, to_s, at_s, separation_m, separation_m, unit, self.scenario.delta_m, None
+        return Finding(dict(zip(Finding._kinds, found, strict=True)), self._names)
+
     @property
     def t(self) -> float:
         """Time flown [s]."""
@@ -95,13 +103,9 @@ class Simulation:
 
     @property
     def closest(self) -> Finding | None:
-        """Closest approach so far: ``pair`` (numbers from 1), ``separation_m``, ``time_s``."""
+        """Closest approach of two vehicles so far."""
         found = self._native.closest
-        if found is None:
-            return None
-        (first, second), separation_m, time_s = found
-        values = {"who": [str(first), str(second)], "separation_m": separation_m, "time_s": time_s}
-        return Finding(values, self._names)
+        return None if found is None else self._finding(found[0], None, None, *found[1:])
 
     @property
     def least_clearance_m(self) -> float | None:
@@ -116,13 +120,9 @@ class Simulation:
         return self._native.judged()[0]
 
     @property
-    def violations(self) -> Findings:
-        """Violations of pairs so far: ``pair``, ``from_s``, ``to_s``, ``min_m``."""
-        found = self._native.judged()[1]
-        return Findings(
-            [{"who": [str(i), str(j)], "from_s": a, "to_s": b, "min_m": least} for (i, j), a, b, least in found],
-            self._names,
-        )
+    def violations(self) -> Rows[Finding]:
+        """Violations of pairs so far."""
+        return Rows(Finding, [self._finding(*found) for found in self._native.judged()[1]], self._names)
 
     @property
     def ending(self) -> str | None:
@@ -193,15 +193,13 @@ class Simulation:
         return len(self.scenario)
 
     def _repr_html_(self) -> str:
-        status, closest = self.status, self.closest
+        status, closest = self.status, self._native.closest
         rows = [
             ("time", f"{self.t:g} s of {self.scenario.duration_s:g} s"),
             ("ending", self.ending or "in progress"),
             (
                 "smallest separation so far",
-                "-"
-                if closest is None
-                else f"{_native.separation_text(closest.separation_m)} m at {closest.time_s:.4g} s",
+                "-" if closest is None else f"{_native.separation_text(closest[1])} m at {closest[2]:.4g} s",
             ),
         ]
         tone = {"clear": "open", "violation": "bad"}.get(status, "open")

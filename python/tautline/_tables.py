@@ -1,10 +1,13 @@
-"""Findings, and their tables."""
+"""Rows with typed attributes, and their tables."""
 
 from __future__ import annotations
 
 import html
+import inspect
+import types
+import typing
 from collections.abc import Iterator, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, overload
+from typing import TYPE_CHECKING, Any, TypeVar, overload
 
 from . import _native
 
@@ -12,37 +15,59 @@ if TYPE_CHECKING:
     import pandas
     import pyarrow
 
+#: Types of the values of a column: in pandas, in pandas with missing values, and in Arrow.
+DTYPES = {
+    float: ("float64", "float64", "float64"),
+    int: ("int64", "Int64", "int64"),
+    bool: ("bool", "boolean", "bool_"),
+    str: ("string", "string", "string"),
+}
+#: Values of a column, and their type as an annotation; None for a type that is inferred.
+Column = tuple[Any, Any]
+
 
 class Table:
     """A flat table: a row for each finding, instant or flight, and a column of plain values for each key.
 
-    Libraries of data frames read it without a copy through Arrow, such as ``polars.DataFrame(table)``.
+    Its columns and their types do not depend on the number of rows. Libraries of data frames read it without a copy
+    through Arrow, such as ``polars.DataFrame(table)``.
     """
 
-    def _columns(self) -> dict[str, Any]:
+    def _columns(self) -> dict[str, Column]:
         raise NotImplementedError
 
     def to_pandas(self) -> pandas.DataFrame:
         """Returns a data frame of pandas. Imports pandas."""
-        return to_frame(self._columns())
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError("tables need pandas: pip install pandas") from None
+        return pandas.DataFrame({name: to_series(pandas, *column) for name, column in self._columns().items()})
 
     def to_arrow(self) -> pyarrow.Table:
         """Returns a table of Arrow. Imports pyarrow."""
         pyarrow = import_pyarrow()
-        return pyarrow.table({name: to_arrow_column(values) for name, values in self._columns().items()})
+        return pyarrow.table({name: to_arrow_column(*column) for name, column in self._columns().items()})
 
     def __arrow_c_stream__(self, requested_schema: object | None = None) -> object:
         """Exports the table to any library that reads the Arrow PyCapsule interface. Imports pyarrow."""
         return self.to_arrow().__arrow_c_stream__(requested_schema)
 
 
-class Finding(Mapping[str, Any]):
-    """A finding. The keys of the command line's JSON are attributes as well (``finding.min_m``). As attributes, nested
-    objects are findings and lists of objects are tables."""
+class Row(Mapping[str, Any]):
+    """A row of a result: a mapping with the keys of its JSON, which are attributes as well. As attributes, objects are
+    rows and lists of objects are tables. Subclasses annotate their keys."""
+
+    _kinds: Mapping[str, Any] = {}
+
+    def __init_subclass__(cls) -> None:
+        own = inspect.get_annotations(cls, eval_str=True)
+        cls._kinds = {**cls._kinds, **{key: kind for key, kind in own.items() if not key.startswith("_")}}
 
     def __init__(self, values: Mapping[str, Any], vehicles: Sequence[str] = ()) -> None:
-        self._values = dict(values)
-        self._vehicles = vehicles
+        self._values, self._vehicles = dict(values), vehicles
+        # A key such as `values` replaces the method of this name.
+        self.__dict__.update({key: value for key, value in self._values.items() if hasattr(Mapping, key)})
 
     def __getitem__(self, key: str) -> Any:
         return self._values[key]
@@ -58,48 +83,56 @@ class Finding(Mapping[str, Any]):
 
     __hash__ = None  # type: ignore[assignment]
 
-    def __getattr__(self, key: str) -> Any:
-        if key.startswith("_") or key not in self._values:
-            raise AttributeError(f"{type(self).__name__} has no attribute or key {key!r}")
-        value = self._values[key]
-        if isinstance(value, Mapping):
-            return Finding(value, self._vehicles)
-        is_rows = isinstance(value, list) and value and all(isinstance(row, Mapping) for row in value)
-        return Findings(value, self._vehicles) if is_rows else value
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, key):
+            if key.startswith("_") or not (key in self._values or key in self._kinds):
+                raise AttributeError(f"{type(self).__name__} has no attribute or key {key!r}")
+            kind, value = without_none(self._kinds.get(key)), self._values.get(key)
+            if typing.get_origin(kind) is Rows:
+                return Rows(typing.get_args(kind)[0], value or (), self._vehicles)
+            if kind is None and isinstance(value, list) and value and all(isinstance(row, Mapping) for row in value):
+                return Rows(Row, value, self._vehicles)
+            if isinstance(value, Mapping) and (kind is None or is_row(kind)):
+                return (kind or Row)(value, self._vehicles)
+            return tuple(value) if typing.get_origin(kind) is tuple else value
 
     def __dir__(self) -> list[str]:
-        return sorted({*super().__dir__(), *(key for key in self._values if key.isidentifier())})
-
-    @property
-    def pair(self) -> tuple[str, str]:
-        """Names of the two vehicles, or of the vehicle and the obstacle."""
-        if "who" not in self._values:
-            raise AttributeError(f"{type(self).__name__} has no pair")
-        first, second = self._values["who"]
-        return first, second
+        return sorted({*super().__dir__(), *self._kinds, *filter(str.isidentifier, self._values)})
 
     @property
     def indices(self) -> tuple[int | None, ...]:
-        """Indices of the vehicles of the finding, from 0; None for an obstacle. Empty where it names no vehicle."""
-        names = self._values.get("who", [self._values["vehicle"]] if "vehicle" in self._values else [])
-        return tuple(index_of(name, self._vehicles) for name in names)
+        """Indices of the vehicles of the row, from 0; None for an obstacle. Empty where it names no vehicle."""
+        names = self._values.get("subjects", [self._values["vehicle"]] if "vehicle" in self._values else [])
+        return tuple(self._vehicles.index(name) if name in self._vehicles else None for name in names)
 
     def __repr__(self) -> str:
         return f"{type(self).__name__}({', '.join(f'{key}={value!r}' for key, value in self._values.items())})"
 
 
-class Findings(Sequence[Finding], Table):
-    """A list of findings, and a table with a row for each. ``first`` and ``second`` name a pair, ``first_index`` and
-    ``second_index`` are the indices from 0. Nested keys are joined by dots; nested tables are left out."""
+class OpenRow(Row):
+    """A row with more keys than those that are annotated."""
 
-    def __init__(self, rows: Sequence[Mapping[str, Any]], vehicles: Sequence[str] = ()) -> None:
-        self._rows = [Finding(row, vehicles) for row in rows]
+    if TYPE_CHECKING:
+
+        def __getattr__(self, key: str) -> Any: ...
+
+
+R = TypeVar("R", bound=Row, covariant=True)
+
+
+class Rows(Sequence[R], Table):
+    """A list of rows, and a table. In the table nested keys are joined by dots, and nested tables are left out.
+    ``first`` and ``second`` are the subjects, ``first_index`` and ``second_index`` their indices from 0."""
+
+    def __init__(self, kind: type[R], rows: Sequence[Mapping[str, Any]], vehicles: Sequence[str] = ()) -> None:
+        self._kind, self._rows = kind, [kind(row, vehicles) for row in rows]
 
     @overload
-    def __getitem__(self, index: int) -> Finding: ...
+    def __getitem__(self, index: int) -> R: ...
     @overload
-    def __getitem__(self, index: slice) -> list[Finding]: ...
-    def __getitem__(self, index: int | slice) -> Finding | list[Finding]:
+    def __getitem__(self, index: slice) -> list[R]: ...
+    def __getitem__(self, index: int | slice) -> R | list[R]:
         return self._rows[index]
 
     def __len__(self) -> int:
@@ -110,45 +143,58 @@ class Findings(Sequence[Finding], Table):
 
     __hash__ = None  # type: ignore[assignment]
 
-    def _columns(self) -> dict[str, Any]:
-        rows = [flatten(row) for row in self._rows]
-        names = dict.fromkeys(name for row in rows for name in row)
-        return {name: [row.get(name) for row in rows] for name in names}
+    def _columns(self) -> dict[str, Column]:
+        columns = to_columns(self._kind, self._rows)
+        for k, name in enumerate(name for name in ("first", "second", "vehicle") if name in columns):
+            indices = [row.indices[k] if k < len(row.indices) else None for row in self._rows]
+            columns[f"{name}_index"] = indices, int | None
+        return columns
 
     def __repr__(self) -> str:
-        return f"Findings({self._rows!r})"
+        return f"Rows({self._rows!r})"
 
     def _repr_html_(self) -> str:
-        return make_table([flatten(row) for row in self._rows])
+        return make_table(self._columns(), len(self))
 
 
-def index_of(name: str, vehicles: Sequence[str]) -> int | None:
-    """Returns the index of a vehicle; None for an obstacle."""
-    return vehicles.index(name) if name in vehicles else None
+def without_none(kind: Any) -> Any:
+    """Returns an annotation without None. Several types are those of any object."""
+    if typing.get_origin(kind) not in (typing.Union, types.UnionType):
+        return kind
+    kinds = [one for one in typing.get_args(kind) if one is not type(None)]
+    return kinds[0] if len(kinds) == 1 else object
 
 
-def flatten(row: Finding) -> dict[str, Any]:
-    """Returns plain values by key, with the names and indices of a pair in cells of their own."""
-    cells: dict[str, Any] = {}
+def is_row(kind: Any) -> bool:
+    """Whether an annotation is a class of rows."""
+    return isinstance(kind, type) and issubclass(kind, Row)
 
-    def add(prefix: str, values: Mapping[str, Any]) -> None:
-        for key, value in values.items():
-            name = prefix + key
-            if isinstance(value, Mapping):
-                add(f"{name}.", value)
-            elif key == "who":
-                cells[f"{prefix}first"], cells[f"{prefix}second"] = value
-            elif key.endswith("pair") and isinstance(value, (list, tuple)) and len(value) == 2:
-                cells[f"{name}.first"], cells[f"{name}.second"] = value
-            elif not (isinstance(value, list) and any(isinstance(one, (Mapping, list)) for one in value)):
-                cells[name] = value
 
-    add("", row)
-    if "who" in row and row._vehicles:
-        cells["first_index"], cells["second_index"] = row.indices
-    elif "vehicle" in row and row._vehicles:
-        (cells["vehicle_index"],) = row.indices
-    return cells
+def to_columns(kind: type[Row], rows: Sequence[Mapping[str, Any] | None], prefix: str = "") -> dict[str, Column]:
+    """Returns values and type of each column: of the annotated keys, then of other keys of the rows."""
+    columns: dict[str, Column] = {}
+    for key in dict.fromkeys([*kind._kinds, *(key for row in rows for key in row or ())]):
+        name, declared, values = prefix + key, kind._kinds.get(key), [row.get(key) if row else None for row in rows]
+        inner = without_none(declared)
+        if is_row(inner) or (declared is None and any(isinstance(value, Mapping) for value in values)):
+            columns |= to_columns(inner or Row, values, f"{name}.")
+        elif key == "subjects" or key.endswith("pair"):
+            start, item = prefix if key == "subjects" else f"{name}.", (*typing.get_args(inner), None)[0]
+            for k, end in enumerate(("first", "second")):
+                cells = [value[k] if value and k < len(value) else None for value in values]
+                columns[start + end] = cells, item and item | None
+        elif typing.get_origin(inner) in (Rows, Mapping) or any(is_nested(value) for value in values):
+            continue
+        else:
+            # A missing value must not round integers.
+            is_integer = {type(value) for value in values} == {int, type(None)}
+            columns[name] = values, int | None if is_integer else declared | None if prefix and declared else declared
+    return columns
+
+
+def is_nested(value: object) -> bool:
+    """Whether a value is a list of objects or lists."""
+    return isinstance(value, list) and any(isinstance(one, (Mapping, list)) for one in value)
 
 
 def import_pyarrow() -> Any:
@@ -160,43 +206,39 @@ def import_pyarrow() -> Any:
     return pyarrow
 
 
-def to_arrow_column(values: Any) -> Any:
-    """Returns a column of Arrow; one of several types, or of integers above 64 bits, becomes text."""
-    pyarrow = import_pyarrow()
+def to_arrow_column(values: Any, kind: Any = None) -> Any:
+    """Returns a column of Arrow; one of several types, or of integers above 63 bits, becomes text."""
+    pyarrow, kind = import_pyarrow(), without_none(kind)
+    item = (typing.get_args(kind) or (kind,))[0]
+    dtype = getattr(pyarrow, DTYPES[item][2])() if item in DTYPES else None
     try:
-        return pyarrow.array(values)
+        if kind is not object:
+            return pyarrow.array(values, pyarrow.list_(dtype) if item is not kind else dtype)
     except (OverflowError, pyarrow.ArrowInvalid, pyarrow.ArrowTypeError):
-        return pyarrow.array([None if value is None else str(value) for value in values])
+        pass
+    return pyarrow.array([None if value is None else str(value) for value in values], pyarrow.string())
 
 
-def to_frame(columns: Any) -> pandas.DataFrame:
-    """Returns a data frame of pandas. Imports pandas."""
+def to_series(pandas: Any, values: Any, kind: Any = None) -> Any:
+    """Returns a column of pandas."""
+    inner = without_none(kind)
+    dtypes = DTYPES.get(inner, ("object", "object"))
     try:
-        import pandas
-    except ImportError:
-        raise ImportError("tables need pandas: pip install pandas") from None
-    exact = {name: pandas.Series(values, dtype=object) for name, values in columns.items() if is_rounded(values)}
-    return pandas.DataFrame({**columns, **exact})
+        return pandas.Series(values, dtype=None if kind is None else dtypes[inner is not kind])
+    except OverflowError:
+        return pandas.Series(values, dtype="object")
 
 
-def is_rounded(values: Any) -> bool:
-    """Whether pandas would round an integer of a list, because another value is None or a float."""
-    if not isinstance(values, list) or all(isinstance(value, int) for value in values):
-        return False
-    return any(isinstance(value, int) and abs(value) > 2**53 for value in values)
-
-
-def make_table(rows: Sequence[Mapping[str, Any]], max_rows: int = 10) -> str:
+def make_table(columns: Mapping[str, Column], count: int, max_rows: int = 10) -> str:
     """Returns the first rows as a table in HTML."""
-    if not rows:
+    if count == 0:
         return "<p>none</p>"
-    columns = list(dict.fromkeys(key for row in rows for key in row))
-    head = "".join(f"<th>{html.escape(str(column))}</th>" for column in columns)
+    head = "".join(f"<th>{html.escape(name)}</th>" for name in columns)
     body = "".join(
-        "<tr>" + "".join(f"<td>{html.escape(format_cell(row.get(key), str(key)))}</td>" for key in columns) + "</tr>"
-        for row in rows[:max_rows]
+        "<tr>" + "".join(f"<td>{html.escape(format_cell(cells[k], name))}</td>" for name, (cells, _) in columns.items())
+        for k in range(min(count, max_rows))
     )
-    more = f"<p>and {len(rows) - max_rows} more</p>" if len(rows) > max_rows else ""
+    more = f"<p>and {count - max_rows} more</p>" if count > max_rows else ""
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>{more}"
 
 

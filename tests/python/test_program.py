@@ -119,7 +119,8 @@ class Functions(Case):
     def test_compare(self) -> None:
         answer = tl.compare(short(), ["edge-tension", "laplacian"], runs=3, html=self.folder / "c.html")
         self.assertEqual(answer.laws.to_pandas()["name"].tolist(), ["edge-tension", "laplacian"])
-        self.assertEqual((answer.runs, answer["runs"]), (3, 3))
+        self.assertEqual((answer.runs, answer["runs"], answer.laws[1].violated.of), (3, 3, 3))
+        self.assertTrue(str(answer).startswith(answer.headline + "\n"), str(answer))
         self.assertTrue((self.folder / "c.html").exists())
         page = self.folder / "c.html"
         self.refuses(tl.Error, "exists", lambda: tl.compare(short(), ["laplacian"], runs=1, html=page))
@@ -128,13 +129,14 @@ class Functions(Case):
 
     def test_margin(self) -> None:
         found = tl.margin("pentagon", "time.duration_s", 2, 60, scan=2, halvings=1)
-        self.assertEqual(found.key, "time.duration_s")
+        self.assertEqual((found.key, found.turn and found.turn.holds_below), ("time.duration_s", False))
         self.assertFalse(found.probes[0].get("holds", False))
 
     def test_sweep(self) -> None:
         found = tl.sweep(short(), {"law.alpha": np.array([0.5, 1.0]), "law.delta_m": [1, 9]}, verdict="clear")
         self.assertEqual(found["grid"][1], {"key": "law.delta_m", "values": [1.0, 9.0]})
         self.assertEqual([point.refused for point in found.points], [0, 1, 0, 1])
+        self.assertEqual(found.points[3].values, [1.0, 9.0])
         self.assertTrue(found.is_good)
 
     def test_attack(self) -> None:

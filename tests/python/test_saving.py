@@ -5,6 +5,7 @@ import hashlib
 import multiprocessing
 import pickle
 import unittest
+import unittest.mock
 
 import joblib
 import numpy as np
@@ -229,6 +230,13 @@ class Flights(Case):
             pickle.loads(data)
             data[data.rindex(part) + 5] ^= 0x01
             self.refuses(tl.Error, "the bytes of the pickle are damaged", lambda data=data: pickle.loads(data))
+
+    def test_a_pickle_of_another_version_is_refused(self) -> None:
+        results = tl.fly(short()), tl.audit(*passing(), delta=1.5), tl.compare(short(), ["laplacian"], runs=1)
+        with unittest.mock.patch("tautline._pickles.VERSION", "another"):
+            pickles = [pickle.dumps(result) for result in results]
+        for data in pickles:
+            self.refuses(tl.Error, "of another version of tautline; make", lambda data=data: pickle.loads(data))
 
     def test_without_its_file_a_flight_keeps_its_scenario(self) -> None:
         file = self.folder / "s.toml"

@@ -334,7 +334,7 @@ class InFlights(Case):
         self.assertGreater(shielded.report["shield"]["changed_share"], 0.0)
         for shield, status in ((False, "violation"), (True, "clear")):
             flight = tl.fly(file, law=Dive(), shield=shield)
-            self.assertEqual(flight.report["audit"]["status"], status)
+            self.assertEqual(flight.status, status)
 
     def test_a_start_on_converging_paths_is_refused_before_a_law_without_a_command(self) -> None:
         def text(apart_m: float, speed_m_s: float, angle_rad: float, more: str = "") -> str:
@@ -369,7 +369,7 @@ class InFlights(Case):
                 file = text(near_m, speed_m_s, angle_rad)
                 self.refuses(tl.Error, "reserve segments nearer", lambda file=file: tl.Scenario(file))
         flight = tl.fly(text(1.01, 50.0, 0.99e-7), law=Nothing())
-        self.assertEqual((flight.report["audit"]["status"], flight.report["shield"]["exceeded"]), ("clear", None))
+        self.assertEqual((flight.status, flight.report["shield"]["exceeded"]), ("clear", None))
         aircraft = text(9.0, 1.0, 0.0, '[vehicle]\nmodel = "unicycle"')
         self.refuses(tl.Error, "no contract for unicycles", lambda: tl.fly(aircraft, law=Nothing()))
 

@@ -30,10 +30,34 @@ def through_arrow(table: tl.Table) -> pyarrow.Table:
 class Tables(Case):
     def test_integers_are_not_rounded_beside_unknown_values(self) -> None:
         big = 2**53 + 1
-        for values in ([big, None], [big, 0.5], [2**63 + 1, None]):
-            findings = tl.Findings([{"seed": value} for value in values])
-            self.assertEqual(findings.to_pandas().seed.tolist()[0], values[0])
-            self.assertEqual(int(findings.to_arrow()["seed"].to_pylist()[0]), values[0])
+        for values in ([big, None], [2**63 + 1, None], [2**63 + 1]):
+            rows = tl.Rows(tl.Row, [{"seed": value} for value in values])
+            self.assertEqual(rows.to_pandas().seed.tolist()[0], values[0])
+            self.assertEqual(int(rows.to_arrow()["seed"].to_pylist()[0]), values[0])
+
+    def test_a_table_has_its_columns_and_types_without_rows(self) -> None:
+        t, p = passing()
+        p[20:40, 3] = np.nan
+        full, clear = tl.audit(t, p, delta=1.5, limit={"speed": 0.1}), tl.audit(*passing(), delta=0.1)
+        proved = tl.audit(*passing(), delta=0.1, motion="bounded", max_accel=0.1)
+        for rows, none in (
+            (full.violations, clear.violations),
+            (full.closest, clear.undecided),
+            (full.closest, clear.obstacles),
+            (full.gaps, clear.gaps),
+            (full.limits, clear.limits),
+            (full.assumptions, proved.assumptions),
+            (tl.fly("pentagon-laplacian").reasons, tl.fly("pentagon").reasons),
+            (tl.fly("pentagon-laplacian").certificate.void, tl.fly("pentagon").certificate.void),
+            (tl.check("pentagon-collinear").warnings, tl.check("pentagon").warnings),
+        ):
+            with self.subTest(table=repr(rows)[:60]):
+                self.assertEqual((len(rows) > 0, len(none)), (True, 0))
+                self.assertEqual(through_arrow(rows).schema, through_arrow(none).schema)
+                self.assertEqual(rows.to_pandas().dtypes.to_dict(), none.to_pandas().dtypes.to_dict())
+                self.assertEqual(set(rows[0]), set(type(rows[0])._kinds))
+        dtypes = clear.violations.to_pandas().dtypes[["first", "lower", "first_index"]]
+        self.assertEqual([str(dtype) for dtype in dtypes], ["string", "float64", "Int64"])
 
     def test_every_table_is_flat_in_pandas_and_arrow(self) -> None:
         t, p = passing()
@@ -65,7 +89,7 @@ class Tables(Case):
                     kind = column.type
                     self.assertFalse(pyarrow.types.is_struct(kind) or pyarrow.types.is_map(kind), column)
                 for name in frame.columns:
-                    self.assertFalse(frame[name].map(lambda cell: isinstance(cell, dict)).any(), name)
+                    self.assertFalse(any(isinstance(cell, dict) for cell in frame[name]), name)
 
     def test_columns_hold_the_numbers(self) -> None:
         flight = tl.fly(short())
@@ -126,7 +150,8 @@ class Attributes(Case):
         names = ["w", "x", "y", "z"]
         audit = tl.audit(t, p, delta=1.5, names=names)
         for finding in audit.closest:
-            self.assertEqual(finding.pair, tuple(names[index] for index in finding.indices))
+            self.assertEqual(finding.subjects, tuple(names[index] for index in finding.indices))
+            self.assertEqual(finding.pair, finding.subjects)
         self.assertEqual(audit.violations[0].indices, (0, 1))
         self.assertEqual(audit.gaps[0].indices, (3,))
         frame = audit.violations.to_pandas()
@@ -137,7 +162,7 @@ class Attributes(Case):
         sim = tl.Simulation(short())
         sim.step(steps=10)
         first, second = sim.closest.indices
-        self.assertEqual(sim.closest.pair, (str(first + 1), str(second + 1)))
+        self.assertEqual(sim.closest.subjects, (str(first + 1), str(second + 1)))
 
 
 class ArrayTensor:

@@ -29,7 +29,7 @@ class Types(unittest.TestCase):
 
     def test_mypy_checks_code_that_uses_the_package(self) -> None:
         wrong = "import tautline as tl\ntl.audit('a.csv', delta='1.5')\n"
-        right = "import tautline as tl\nx: float | None = tl.audit('a.csv', delta=1.5).separation_m\n"
+        right = "import tautline as tl\nx: float | None = tl.audit('a.csv', delta=1.5).closest[0].lower\n"
         for code, text in ((1, wrong), (0, right)):
             ran = self.mypy("mypy", "--strict", "-c", text)
             self.assertEqual(ran.returncode, code, ran.stdout + ran.stderr)
@@ -48,8 +48,9 @@ class NoLaw:
             "tl.audit('a.csv', motion='linear', format='csv', fps=30).closest[0].indices",
             "tl.read('a.csv', duplicates='first', time_unit='ms').audit(delta=1.0, rules='none')",
             "tl.fly('pentagon', law=Mine()).audit(limit={'speed': 5.0})",
-            "tl.compare('pentagon', ['orca', Mine()], overwrite=True).laws",
-            "tl.margin('pentagon', 'time.duration_s', 1, 2, law=Mine(), verdict='clear')",
+            "tl.compare('pentagon', ['orca', Mine()], overwrite=True).laws[0].violated.count + 1",
+            "(tl.margin('pentagon', 'time.dt_s', 1, 2, law=Mine(), verdict='clear').turn or exit()).bracket[0] + 1.0",
+            "tl.fly('pentagon').reasons[0].data.get('deepest'), tl.campaign('c.toml').laws[0].clear.low / 2",
             "tl.export('a.csv', 'b.skyb', to='skyb', overwrite=True)",
             "tl.audit([0.0, 1.0], [[[0.0, 0.0]], [[1.0, 1.0]]], delta=1.0)",
             "tl.Simulation.load(tl.Simulation('pentagon', law=Mine()).save(), law=Mine()).step([[0.0] * 3] * 5)",
@@ -67,6 +68,11 @@ class NoLaw:
             "tl.margin('pentagon', 'time.duration_s', 1, 2, verdict='won')",
             "tl.export('a.csv', 'b.skyb', to='sky')",
             "tl.read('a.csv').audit(rules='nothing')",
+            "tl.audit('a.csv').closest[0].min_m",
+            "tl.audit('a.csv').limits[0].closest.lower",
+            "tl.compare('pentagon').laws[0].violated.shares",
+            "tl.margin('pentagon', 'time.duration_s', 1, 2).turn.bracket",
+            "tl.fly('pentagon').reasons[0].message",
         ]
         ran = self.mypy("mypy", "--strict", "-c", law + "\n".join(right))
         self.assertEqual(ran.returncode, 0, ran.stdout + ran.stderr)

@@ -11,7 +11,7 @@ from tautline import _arguments, _native, _words
 
 #: Options of commands that the package does not have: watches, pictures, films, replays, proofs.
 FOREIGN = {
-    "accel", "adapter", "bad", "brake", "expect", "film", "horizon", "identify", "json", "latency", "law", "max_age",
+    "accel", "adapter", "bad", "brake", "expect", "film", "horizon", "identify", "json", "latency", "max_age",
     "max_vehicles", "position_error", "proof", "run", "shard", "size", "velocity_error",
 }  # fmt: skip
 
