@@ -90,7 +90,7 @@ class Comparison(Answer):
 
 
 class Turn(Row):
-    """Turn of a verdict between two values, of which the first is smaller."""
+    """Turn of a verdict between a smaller and a larger value."""
 
     bracket: tuple[float, float]
     holds_below: bool

@@ -26,13 +26,14 @@ mod view;
 mod watch;
 
 use std::ffi::OsString;
+use std::fmt::{self, Formatter};
 use std::process::ExitCode;
-use std::sync::Once;
+use std::sync::{Once, PoisonError, RwLock};
 
 use clap::{Parser, Subcommand};
 
 use console::Exit;
-use tautline_core::option::{Opt, spell_with};
+use tautline_core::option::{FORMAT, FPS, Opt, spell_with};
 use tautline_recordings::read;
 use tautline_report::request::{Failure, command_line};
 
@@ -47,6 +48,7 @@ pub fn main() -> ExitCode {
 pub fn entry(arguments: &[OsString]) -> u8 {
     quiet_guarded_panics();
     spell_with(as_argument);
+    remember_command(arguments);
     if completions::answer(arguments) {
         return Exit::Good as u8;
     }
@@ -140,10 +142,29 @@ enum Command {
     Completions(completions::CompletionsArguments),
 }
 
+/// Remembers the command, by which options are named in messages.
+fn remember_command(arguments: &[OsString]) {
+    let command = arguments.get(1).map(|word| word.to_string_lossy().into_owned()).unwrap_or_default();
+    *COMMAND.write().unwrap_or_else(PoisonError::into_inner) = command;
+}
+
+/// Name of the command of this process, such as `audit`.
+static COMMAND: RwLock<String> = RwLock::new(String::new());
+
 /// Writes an option as on the command line, such as `--time-unit ms`.
-fn as_argument(option: Opt, value: Option<&str>, out: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-    out.write_str(&option.argument())?;
+fn as_argument(option: Opt, value: Option<&str>, out: &mut Formatter<'_>) -> fmt::Result {
+    let command = COMMAND.read().unwrap_or_else(PoisonError::into_inner);
+    write!(out, "--{}", name_of(option, &command))?;
     value.map_or(Ok(()), |value| write!(out, " {value}"))
+}
+
+/// Returns the name of an option in a command: options of readers have other names beside equal options of the output.
+fn name_of(option: Opt, command: &str) -> &'static str {
+    match (option, command) {
+        (FPS, "render") => "recording-fps",
+        (FORMAT, "export" | "render" | "view") => "input-format",
+        (option, _) => option.name,
+    }
 }
 
 /// Silences the panic hook for panics that become errors.
@@ -196,7 +217,7 @@ mod tests {
     use clap::CommandFactory as _;
     use tautline_core::option;
 
-    use super::Arguments;
+    use super::{Arguments, name_of};
 
     #[test]
     fn the_arguments_are_consistent() {
@@ -213,5 +234,17 @@ mod tests {
         add(&Arguments::command(), &mut names);
         let unknown: Vec<_> = option::ALL.iter().filter(|option| !names.contains(option.name)).collect();
         assert!(unknown.is_empty(), "{unknown:?}");
+    }
+
+    #[test]
+    fn options_of_readers_are_those_of_each_command_that_reads() {
+        let program = Arguments::command();
+        for name in ["audit", "export", "render", "view"] {
+            let Some(command) = program.find_subcommand(name) else { continue };
+            let names: BTreeSet<_> = command.get_arguments().filter_map(|argument| argument.get_long()).collect();
+            for option in [option::FPS, option::FORMAT, option::TIME_UNIT, option::COLUMN, option::SCALE] {
+                assert!(names.contains(name_of(option, name)), "{name}: {option:?}");
+            }
+        }
     }
 }

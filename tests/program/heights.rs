@@ -97,7 +97,7 @@ fn heights_beside_latitudes_are_assumed_in_metres_without_a_unit() {
     let folder = recordings();
     let bounded = ["--delta", "1", "--motion", "bounded", "--max-accel", "0.1"];
     for (column, is_assumed, verdict) in [
-        ("alt", true, "CLEAR if heights are in metres, accelerations of at most 0.1 m/s^2: "),
+        ("alt", true, "CLEAR if accelerations of at most 0.1 m/s^2, heights are in metres: "),
         ("alt_m", false, "PROVED CLEAR: "),
     ] {
         let rows: Vec<_> = (0..10).map(|t| format!("{t},a,47,8,400\n{t},b,47.001,8,400\n")).collect();

@@ -1,5 +1,5 @@
-//! docs/report.md lists exactly the keys of the JSON of `run`, `audit` and `check`, with units; docs/study-json.md
-//! those of studies.
+//! docs/report.md lists exactly the keys of the JSON of `run`, `audit` and `check`, with units, docs/codes.md their
+//! codes, and docs/study-json.md the keys of studies.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
@@ -9,6 +9,7 @@ use crate::program::{TAUTLINE, ran_by};
 use serde_json::Value;
 
 const PAGE: &str = include_str!("../../docs/report.md");
+const CODES: &str = include_str!("../../docs/codes.md");
 const ELLIPSOID: &str = "safety={shape=\"ellipsoid\", half_axes_m=[0.5, 0.5, 1.0]}";
 const STUDIES: &str = include_str!("../../docs/study-json.md");
 /// Objects that stand in many places of the JSON of studies, by their keys: share, estimate, quantiles, pairs of runs.
@@ -71,7 +72,7 @@ fn without_findings(value: Value) -> Value {
 
 /// Asserts that the row of a reason's code names every key of its data.
 fn assert_documented_reason(reason: &serde_json::Map<String, Value>) {
-    let text = section(PAGE, "\n## ", "Reasons against a pass");
+    let text = section(CODES, "\n## ", "Reasons against a pass");
     let code = reason["code"].as_str().expect("a code");
     let row = text.lines().find(|line| line.starts_with(&format!("| `{code}` |"))).unwrap_or_else(|| panic!("{code}"));
     for key in reason["data"].as_object().expect("an object").keys() {
@@ -206,7 +207,8 @@ fn every_key_of_the_report_is_on_its_page() {
     ];
     let heard = [&["run", "pentagon", "--force"], &quick[..], &radio].concat();
     let shielded = [&["run", "pentagon", "--force", "--set", "shield.enabled=true"], &quick[..]].concat();
-    let commands = [&hit, &passed_through, &mission, &among, &assigned, &tilting, &heard, &shielded].map(|of| &of[..]);
+    let commands =
+        [&hit, &passed_through, &mission, &among, &assigned, &tilting, &heard, &shielded].map(|command| &command[..]);
     assert_documented(&documented(PAGE, "report.json"), &printed(&commands, without_findings));
 }
 
@@ -311,6 +313,10 @@ fn every_key_of_a_campaign_is_on_its_page() {
 fn every_code_of_a_warning_is_on_its_page() {
     use tautline::preflight::Code;
     for code in Code::ALL {
-        assert!(PAGE.contains(&format!("`{}`", code.name())), "{}", code.name());
+        let refuses = if code.refuses() { "yes" } else { "no" };
+        let mut rows = section(CODES, "\n## ", "Warnings of a check").lines();
+        let is_row =
+            |row: &str| row.starts_with(&format!("| `{}` |", code.name())) && row.ends_with(&format!(" {refuses} |"));
+        assert!(rows.any(is_row), "{}", code.name());
     }
 }

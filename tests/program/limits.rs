@@ -51,6 +51,9 @@ fn limits_are_in_every_answer() {
     let junit = read("j.xml");
     assert!(junit.contains(r#"tests="3""#) && junit.contains(r#"failures="3""#), "{junit}");
     assert!(!junit.contains("separation"), "it was not asked how close two came");
+    let (ran, _) = audit(&["--fence", "venue.toml", "--json"]);
+    let report: serde_json::Value = serde_json::from_str(&ran.out).expect("JSON");
+    assert_eq!(report["question"]["limits"], serde_json::json!({ "fence_margin_m": 0.0 }));
     let page = read("p.html");
     assert!(page.contains("Each vehicle by itself") && page.contains("room to the fence"));
 }

@@ -317,6 +317,27 @@ fn a_run_that_ended_early_is_not_clear() {
 }
 
 #[test]
+fn an_early_end_leaves_every_part_undecided_and_names_those_that_were_before() {
+    let folder = tempfile::tempdir().expect("a folder");
+    // The mean velocity grows until positions have no resolution.
+    fly(folder.path(), "pentagon", &["swarm.a22_per_s=0.5", "time.duration_s=150"]);
+    let asked = ["flown", "--plan", "flown", "--plan-delay", "0", "--tube", "1", "--require-presence"];
+    let judged = audit(folder.path(), &[&asked[..], &["--json", "--junit", "cases.xml"]].concat());
+    let report = json(&judged.out);
+    assert_eq!((judged.exit, &report["plan"]["status"]), (Some(1), &"undecided".into()), "{judged:?}");
+    for name in ["separation", "plan", "presence"] {
+        assert_eq!(status(&report, name), "undecided", "{report}");
+    }
+    let cases = fs::read_to_string(folder.path().join("cases.xml")).expect("cases");
+    assert!(cases.contains("until then every vehicle is seen throughout"), "{cases}");
+    assert!(cases.contains("until then within "), "{cases}");
+    // Only the yaw rate was unknown before the end.
+    let judged = audit(folder.path(), &["flown", "--limit", "yaw-rate=1"]);
+    let said = "UNDECIDED: yaw rate unknown for 1 (limit 1.000 deg/s); the flight ended early";
+    assert!(judged.exit == Some(1) && judged.out.starts_with(said), "{judged:?}");
+}
+
+#[test]
 fn the_recording_of_an_undecided_run_is_undecided() {
     let folder = pentagon();
     rewritten(folder.path(), "open.mcap", |_| {}, |audit| audit.status = "undecided".to_owned());

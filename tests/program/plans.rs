@@ -131,7 +131,7 @@ fn an_assumption_of_the_plan_is_not_one_of_the_flight() {
     let assumed = "the clocks of all vehicles started together";
     for (flight, plan, said, subjects) in [
         ("known.csv", "boot.csv", format!("between its samples and in the plan {assumed}: "), [Some("the plan")]),
-        ("boot.csv", "known.csv", format!("CLEAR if {assumed}, straight between samples and the plan is "), [None]),
+        ("boot.csv", "known.csv", format!("CLEAR if straight between samples, {assumed} and the plan is "), [None]),
     ] {
         let asked = [flight, "--plan", plan, "--plan-delay", "0", "--tube", "1"];
         let ran = audit(folder.path(), &asked);

@@ -91,7 +91,7 @@ fn positions_by_interpolated_transforms_are_not_proved() {
     let exact = ran("robots_exact", &bounded);
     assert!(exact.exit == Some(0) && exact.out.starts_with("PROVED CLEAR"), "{exact:?}");
     let guessed = ran("robots", &bounded);
-    let if_so = "CLEAR if transforms uniform between their samples, accelerations of at most 1.0 m/s^2: ";
+    let if_so = "CLEAR if accelerations of at most 1.0 m/s^2, transforms uniform between their samples: ";
     assert!(guessed.exit == Some(0) && guessed.out.starts_with(if_so), "{guessed:?}");
     assert!(guessed.err.contains("10 by transforms at their time, 32 by interpolation"), "{guessed:?}");
     let json: serde_json::Value = serde_json::from_str(&ran("robots", &["--json"]).out).expect("a report");

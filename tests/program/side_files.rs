@@ -113,6 +113,11 @@ fn an_obstacle_that_stands_still_beyond_its_path_is_an_assumption() {
     let assumed = format!("the obstacle truck stands still {times}");
     assert!(ran.exit == Some(0) && ran.out.starts_with("CLEAR if ") && ran.out.contains(&assumed), "{ran:?}");
     assert_eq!(facts(folder.path(), &part, "obstacle-motion"), [("convention".to_owned(), format!("truck: {times}"))]);
+    let three = [0; 3].map(|_| path(moving)).concat();
+    fs::write(folder.path().join("three.toml"), three).expect("written");
+    let ran = audit(folder.path(), &["rest.csv", "--delta", "1", "--obstacles", "three.toml"]);
+    let expected = format!("CLEAR if straight between samples, {assumed} and 2 others outside the paths: ");
+    assert!(ran.exit == Some(0) && ran.out.starts_with(&expected), "{ran:?}");
     let whole = [&["rest.csv", "--delta", "1", "--obstacles", "whole.toml"], &bounded[..]].concat();
     let ran = audit(folder.path(), &whole);
     assert!(ran.exit == Some(0) && ran.out.starts_with("PROVED CLEAR: "), "{ran:?}");

@@ -11,8 +11,8 @@ from tautline import _arguments, _native, _words
 
 #: Options of commands that the package does not have: watches, pictures, films, replays, proofs.
 FOREIGN = {
-    "accel", "adapter", "bad", "brake", "expect", "film", "horizon", "identify", "json", "latency", "max_age",
-    "max_vehicles", "position_error", "proof", "run", "shard", "size", "velocity_error",
+    "accel", "adapter", "bad", "brake", "expect", "film", "film_fps", "horizon", "identify", "json", "latency",
+    "max_age", "max_vehicles", "position_error", "proof", "run", "shard", "size", "velocity_error",
 }  # fmt: skip
 
 

@@ -278,6 +278,7 @@ impl fmt::Display for Fact {
         let value = self.value.as_ref().map_or_else(String::new, ToString::to_string);
         let subject = self.subject.as_deref().unwrap_or_default();
         match self.kind {
+            FactKind::Motion if !subject.is_empty() => write!(out, "{subject} by straight lines between samples"),
             FactKind::Motion => out.write_str(match value.as_str() {
                 STRAIGHT => "straight between samples",
                 HELD => "held between samples, jumps swept",

@@ -141,6 +141,7 @@ options! {
     EXPORT_FORMAT = "format" "to" Word;
     FENCE = "fence" "fence" Number;
     FILM = "film" "film" Number;
+    FILM_FPS = "fps" "film_fps" Number;
     FLIGHTS = "flights" "flights" Number;
     FORCE = "force" "overwrite" Flag;
     FORMAT = "format" "format" Word;

@@ -3,7 +3,7 @@
 use std::borrow::Cow;
 
 use tautline_core::failure::Failure;
-use tautline_core::option::{ADAPTER, FPS, SIZE};
+use tautline_core::option::{ADAPTER, FILM_FPS, SIZE};
 use tautline_core::record::RecordError;
 
 /// Largest coordinate and radius that can be drawn \[m\]: more than twice the distance of the Moon. Pictures use single
@@ -128,7 +128,7 @@ impl RenderError {
                 format!("try a smaller picture, or another driver with {software}").into()
             }
             E::UnknownFilm(_) => "name the film something.mp4 or something.gif".into(),
-            E::FilmRate(_) => format!("give another rate with {FPS}").into(),
+            E::FilmRate(_) => format!("give another rate with {FILM_FPS}").into(),
             E::FilmSize(_) => format!("give another size with {SIZE}, or another format").into(),
             E::Write(_) => "free some space or write to another folder".into(),
             E::NoFfmpeg => "install ffmpeg, build tautline with --features film, or name a .gif film".into(),

@@ -227,9 +227,13 @@ impl Settings {
             Expected::Names(names) => names.len(),
         };
         if !(2..=self.max_vehicles).contains(&count) {
-            let option = if matches!(self.expected, Expected::Count(_)) { EXPECT } else { IDS };
             let problem = format!("must give 2 vehicles or more, and at most the number of {MAX_VEHICLES}");
-            return Err(SettingsError { option, problem, value: count.to_string() });
+            let (option, value) = match self.expected {
+                Expected::Heard => (MAX_VEHICLES, self.max_vehicles),
+                Expected::Count(_) => (EXPECT, count),
+                Expected::Names(_) => (IDS, count),
+            };
+            return Err(SettingsError { option, problem, value: value.to_string() });
         }
         Ok(())
     }

@@ -16,6 +16,7 @@ impl From<RecordedError> for Failure {
             RecordedError::OutOfRange { option, of: subject, range, .. } => {
                 let name = if subject.is_some() { "NAME=" } else { "" };
                 let help = match *option {
+                    ELLIPSOID => format!("give {} with three numbers above 0", ELLIPSOID.set("X,Y,Z")),
                     CYLINDER => format!("give {} with two numbers above 0, such as 2,4", CYLINDER.set("R,H")),
                     WELL_CLEAR => format!("give {}, or D,Z,T such as 1219.2,137.16,35", WELL_CLEAR.set("PRESET")),
                     _ => format!("give {}, where NUMBER is {range}", option.set(format!("{name}NUMBER"))),

@@ -111,6 +111,9 @@ pub struct Answer {
     pub part: Part,
     /// Status of the part; not clear if a flight ended early.
     pub status: Status,
+    /// Status over the time that was flown.
+    #[serde(skip)]
+    pub status_so_far: Status,
     /// Findings nearest to their limits, at most ten of vehicles and ten of obstacles, the nearest first of each.
     pub closest: Vec<Finding>,
     /// Times beyond a limit.
@@ -126,7 +129,8 @@ impl Answer {
     #[must_use]
     pub fn new(part: Part, status: Status) -> Self {
         let none = FindingList::new(Tally::all(0), Vec::new());
-        Self { part, status, closest: Vec::new(), violations: none.clone(), undecided: none, detectors: None }
+        let (closest, violations, undecided) = (Vec::new(), none.clone(), none);
+        Self { part, status, status_so_far: status, closest, violations, undecided, detectors: None }
     }
 }
 

@@ -699,7 +699,9 @@ impl Serialize for Report {
                 schema_version: SCHEMA_VERSION,
                 status,
                 pass: self.verdict.pass,
-                proved: status == Status::Clear && !self.facts.iter().any(Fact::is_assumption),
+                proved: status == Status::Clear
+                    && self.verdict.is_motion_of_the_law()
+                    && !self.facts.iter().any(Fact::is_assumption),
                 question: self.question.clone(),
                 answers: vec![self.answer()],
                 facts: self.facts.clone(),

@@ -228,6 +228,22 @@ impl Coded for Reason {
 }
 
 impl Verdict {
+    /// Returns whether the flown motion is that of law and vehicles. If it is not, a clear flight proves nothing about
+    /// them.
+    #[must_use]
+    pub fn is_motion_of_the_law(&self) -> bool {
+        !self.reasons.iter().any(|reason| {
+            matches!(
+                reason,
+                Reason::StepsTooLong { .. }
+                    | Reason::EnergyRose { .. }
+                    | Reason::CertificateBroken { .. }
+                    | Reason::ObstacleCertificateBroken { .. }
+                    | Reason::PassedThrough { .. }
+            )
+        })
+    }
+
     /// Returns whether a reason has this code.
     #[must_use]
     pub fn has(&self, code: &str) -> bool {
@@ -242,7 +258,8 @@ impl Verdict {
         let warnings: Vec<_> = result.preflight.refusing().into_iter().map(str::to_owned).collect();
         reasons.extend((!warnings.is_empty()).then_some(Reason::Refused { warnings }));
         reasons.extend(of_pairs(report, result));
-        reasons.extend(report.obstacles.iter().flat_map(of_obstacles));
+        let is_whole = result.flight.ending == Ending::Completed;
+        reasons.extend(report.obstacles.iter().flat_map(|found| of_obstacles(found, is_whole)));
         reasons.extend(of_hulls(report));
         reasons.extend(undecided(result));
         reasons.extend(broken_certificate(report));
@@ -351,7 +368,8 @@ pub(super) fn is_unresolved_by_step(status: Status, overlong_steps: u64, violati
     status == Status::Undecided && overlong_steps > 0 && violations > 0
 }
 
-fn of_obstacles(found: &Obstacles) -> Vec<Reason> {
+/// Returns the reasons of obstacles. An early end (not `is_whole`) has a reason of its own.
+fn of_obstacles(found: &Obstacles, is_whole: bool) -> Vec<Reason> {
     let &Obstacles { status, undecided, disagreements, .. } = found;
     let violations = found.violations.len();
     let deepest = found.deepest().cloned();
@@ -363,7 +381,8 @@ fn of_obstacles(found: &Obstacles) -> Vec<Reason> {
         })),
     }
     reasons.extend((disagreements > 0).then_some(Reason::ObstacleDetectorsDisagree { disagreements }));
-    if status == Status::Undecided && disagreements == 0 {
+    let is_open = is_whole || undecided > 0 || deepest.is_some();
+    if status == Status::Undecided && disagreements == 0 && is_open {
         reasons.push(deepest.map_or(Reason::ObstacleUndecided { undecided }, Reason::ObstacleUnresolvedByStep));
     }
     reasons

@@ -201,8 +201,8 @@ impl Display for Reason {
                         format!("at the end the largest edge error is {} m (limit {limit} m)", metres(value))
                     }
                     UnmetCriterion::MaxPositionErrorM => format!(
-                        "at the end every edge error is within its limit, but the shape, its attitude or its place is \
-                         another one: the largest position error is {} m (limit {limit} m)",
+                        "at the end every edge error is within its limit, but the shape, its attitude or its place \
+                         differs: the largest position error is {} m (limit {limit} m)",
                         metres(value)
                     ),
                     UnmetCriterion::Disagreement => format!(

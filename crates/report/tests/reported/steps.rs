@@ -5,6 +5,7 @@ use tautline_audit::Status;
 use tautline_core::record::Event;
 use tautline_core::swarm::Pair;
 use tautline_laws::law::{LaplacianKeys, LawError, LawSpec, VoidReason};
+use tautline_report::report::Report;
 use tautline_report::run;
 use tautline_sim::scenario::{Scenario, TimeSpec};
 use tautline_sim::sim::Ending;
@@ -128,6 +129,9 @@ fn clear_and_reached_flight_with_overlong_steps_does_not_pass() {
     assert!(whole.run.overlong_steps > 0 && !whole.verdict.pass, "{:?}", whole.verdict);
     assert!(whole.headline().starts_with("STEP TOO LONG: "), "{}", whole.headline());
     assert_eq!(whole.separation.certified_m, None);
+    // A clear motion that is not that of the law proves nothing about the law.
+    let proved = |report: &Report| report.to_json().expect("JSON").contains("\"proved\": true");
+    assert!(proved(&refined) && !proved(&whole));
 }
 
 #[test]

@@ -137,7 +137,9 @@ impl PlanReport {
         let is_open =
             |finding: &&Finding| finding.limit.is_some() && finding.largest_margin() > 0.0 && !is_beyond(finding);
         let beyond: Vec<_> = all.iter().filter(is_beyond).cloned().collect();
-        let open: Vec<_> = all.iter().filter(is_open).cloned().chain(unknown).collect();
+        let mut open: Vec<_> = all.iter().filter(is_open).cloned().chain(unknown).collect();
+        let start_s = |finding: &Finding| finding.from_s.or(finding.at_s).unwrap_or(f64::NEG_INFINITY);
+        open.sort_by(|a, b| start_s(a).total_cmp(&start_s(b)));
         let farthest = all.iter().max_by(|a, b| a.value.upper_bound().total_cmp(&b.value.upper_bound()));
         Answer {
             closest: farthest.cloned().into_iter().collect(),

@@ -108,8 +108,6 @@ pub struct RecordedReport {
     pub plan: Option<PlanReport>,
     /// Early end of the flight inside the judged window. The rest of the window is unknown.
     pub ended_early: Option<EarlyEnd>,
-    /// Whether everything was clear up to the early end.
-    pub(super) was_clear_until_end: bool,
     /// Time that is not judged because vehicles are on the ground.
     pub(super) exemption: Option<Exemption>,
     /// Whether the deepest violation is one of doubles only, whose decimals are exactly at the limit.
@@ -271,7 +269,7 @@ impl RecordedReport {
         let answers = of_pairs.into_iter().chain(of_limits).chain(of_well_clear).chain(of_presence).collect();
         Self {
             status: outcome.status,
-            question: Question::of(settings),
+            question: Question::of(settings, outcome),
             source,
             vehicles: outcome.vehicles.clone(),
             judged: outcome.presence.iter().flatten().count(),
@@ -285,7 +283,6 @@ impl RecordedReport {
             plan: None,
             ended_early: None,
             exemption: Exemption::new(outcome, settings),
-            was_clear_until_end: false,
             is_decimal_tie: false,
             run_objection: None,
             is_else_known: outcome.is_else_known,
@@ -309,8 +306,9 @@ impl RecordedReport {
     /// Returns the report with an early end: undecided at best.
     #[must_use]
     pub fn with_early_end(mut self, end: EarlyEnd) -> Self {
-        self.was_clear_until_end = self.status == Status::Clear;
-        for status in self.answers.iter_mut().map(|answer| &mut answer.status).chain([&mut self.status]) {
+        let of_plan = self.plan.iter_mut().map(|plan| &mut plan.status);
+        let of_parts = self.answers.iter_mut().map(|answer| &mut answer.status);
+        for status in of_parts.chain(of_plan).chain([&mut self.status]) {
             *status = status.and(Status::Undecided);
         }
         self.ended_early = Some(end);
@@ -429,7 +427,7 @@ fn on_well_clear(found: &WellClearOutcome, outcome: &Outcome) -> Answer {
 
 impl Question {
     /// Returns the question of complete settings.
-    fn of(settings: &Settings) -> Self {
+    fn of(settings: &Settings, outcome: &Outcome) -> Self {
         let scaled = settings.ellipsoid_m.is_some();
         Self {
             delta: settings
@@ -441,7 +439,12 @@ impl Question {
             ellipsoid_m: settings.ellipsoid_m.map(Into::into),
             cylinder_m: settings.cylinder.map(|cylinder| [cylinder.horizontal_m, cylinder.vertical_m]),
             obstacles: settings.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect(),
-            limits: settings.envelope.limits.iter().map(|limit| (limit.quantity.key(), limit.allowed)).collect(),
+            limits: outcome
+                .envelope
+                .limits
+                .iter()
+                .map(|found| (found.limit.quantity.key(), found.limit.allowed))
+                .collect(),
             well_clear: settings.well_clear.map(|limits| [limits.horizontal_m, limits.vertical_m, limits.tau_s]),
             require_presence: settings.require_presence,
             plan: None,

@@ -29,20 +29,23 @@ impl RecordedReport {
         one_line(&format!("{}: {}", self.verdict(), self.finding()))
     }
 
-    /// Returns the answer to a part in a few words; the headline for separations.
+    /// Returns the answer to a part in a few words; the headline for separations. An early end of a flight that makes
+    /// the answer undecided comes first.
     #[must_use]
     pub fn brief(&self, part: Part) -> String {
-        match part {
-            Part::Separation => self.headline(),
-            Part::Plan => self.plan.as_ref().map_or_else(String::new, |plan| plan.brief_as(plan.status)),
-            Part::Presence => {
-                let partly = counted(self.presence.partly as u64, "vehicle is", "vehicles are");
-                format!("{partly} not seen throughout")
-            }
-            part => {
-                let answer = self.answers.iter().find(|answer| answer.part == part);
-                answer.map_or_else(String::new, |answer| answer.brief_as(answer.status))
-            }
+        let Some(answer) = self.answers.iter().find(|answer| answer.part == part) else { return String::new() };
+        let so_far = match part {
+            Part::Separation => return self.headline(),
+            Part::Plan => self.plan.as_ref().map_or_else(String::new, |plan| plan.brief_as(answer.status_so_far)),
+            Part::Presence => match self.presence.partly as u64 {
+                0 => "every vehicle is seen throughout".to_owned(),
+                partly => format!("{} not seen throughout", counted(partly, "vehicle is", "vehicles are")),
+            },
+            _ => answer.brief_as(answer.status_so_far),
+        };
+        match &self.ended_early {
+            Some(end) if answer.status != answer.status_so_far => format!("{}; until then {so_far}", end.words()),
+            _ => so_far,
         }
     }
 
@@ -88,7 +91,7 @@ impl RecordedReport {
     /// Returns the motion between samples, with the assumptions on the samples and on obstacles.
     #[must_use]
     pub fn motion(&self) -> String {
-        let of_motion = |fact: &&Fact| fact.kind == FactKind::Motion || fact.is_assumption() && !is_of_part(fact);
+        let of_motion = |fact: &&Fact| !is_of_part(fact) && (fact.kind == FactKind::Motion || fact.is_assumption());
         self.clauses(of_motion).join(", ")
     }
 
@@ -106,24 +109,24 @@ impl RecordedReport {
         of_motion.into_iter().chain(of_parts).collect::<Vec<_>>().join(" and ")
     }
 
-    /// Returns the facts as clauses. Obstacles that stand still give two: the first one, and the number of the others.
+    /// Returns the facts as clauses, the motion first. Of the obstacles that stand still, the first is named.
     fn clauses(&self, is_told: impl Fn(&&Fact) -> bool) -> Vec<String> {
-        let mut clauses = Vec::new();
-        let mut resting = 0;
-        for fact in self.source.facts.iter().filter(is_told) {
-            resting += u64::from(fact.kind == FactKind::ObstacleMotion);
-            match fact.kind {
-                FactKind::ObstacleMotion if resting > 1 => {}
-                FactKind::Motion if fact.is_named(BOUNDED) => clauses.push(self.bounds()),
-                FactKind::RoundedCorners => clauses.push(self.corners_in_words(fact)),
-                _ if fact.subject.as_deref() == Some(THE_PLAN) => clauses.push(format!("in {THE_PLAN} {fact}")),
-                _ => clauses.push(fact.to_string()),
+        let mut facts: Vec<_> = self.source.facts.iter().filter(is_told).collect();
+        facts.sort_by_key(|fact| fact.kind != FactKind::Motion);
+        let is_resting = |fact: &&Fact| fact.kind == FactKind::ObstacleMotion;
+        let others = facts.iter().filter(|fact| is_resting(fact)).count().saturating_sub(1) as u64;
+        let first = facts.iter().position(|fact| is_resting(&fact));
+        let clause = |(k, fact): (usize, &&Fact)| match fact.kind {
+            FactKind::ObstacleMotion if first != Some(k) => None,
+            FactKind::ObstacleMotion if others > 0 => {
+                Some(format!("{fact} and {} outside the paths", counted(others, "other", "others")))
             }
-        }
-        if resting > 1 {
-            clauses.push(format!("{} outside the paths", counted(resting - 1, "other obstacle", "other obstacles")));
-        }
-        clauses
+            FactKind::Motion if fact.is_named(BOUNDED) => Some(self.bounds()),
+            FactKind::RoundedCorners => Some(self.corners_in_words(fact)),
+            _ if is_of_plan(fact) => Some(format!("in {THE_PLAN} {fact}")),
+            _ => Some(fact.to_string()),
+        };
+        facts.iter().enumerate().filter_map(clause).collect()
     }
 
     /// Returns the bounds on accelerations.
@@ -144,21 +147,28 @@ impl RecordedReport {
 
     /// Returns the headline without the verdict.
     fn finding(&self) -> String {
+        let so_far = self.status_so_far();
         match &self.ended_early {
-            None => self.finding_as(self.status),
-            Some(end) if self.was_clear_until_end => {
+            None => self.finding_as(so_far),
+            Some(end) if so_far == Status::Clear => {
                 let verdict = self.verdict_as(Status::Clear);
-                format!("{}; until then {verdict}: {}", end.words(), self.finding_as(Status::Clear))
+                format!("{}; until then {verdict}: {}", end.words(), self.finding_as(so_far))
             }
-            Some(end) => format!("{}; {}", self.finding_as(self.status), end.words()),
+            Some(end) => format!("{}; {}", self.finding_as(so_far), end.words()),
         }
     }
 
-    /// Returns the findings that decide the status, on pairs and on limits. Up to an early end of a clear flight all of
-    /// them are clear.
+    /// Returns the status over the time that was flown.
+    fn status_so_far(&self) -> Status {
+        if self.ended_early.is_none() {
+            return self.status;
+        }
+        self.answers.iter().fold(Status::Clear, |all, answer| all.and(answer.status_so_far))
+    }
+
+    /// Returns the findings that decide a status over the time that was flown, on pairs and on limits.
     fn finding_as(&self, status: Status) -> String {
-        let decides = |own: Status| own == status || self.was_clear_until_end;
-        let answers = self.answers.iter().filter(|answer| decides(answer.status));
+        let answers = self.answers.iter().filter(|answer| answer.status_so_far == status);
         let found = answers.filter_map(|answer| match answer.part {
             Part::Separation => Some(self.finding_of_pairs(answer, status)),
             Part::Plan => self.plan.as_ref().map(|plan| plan.brief_as(status)),
@@ -283,7 +293,7 @@ impl RecordedReport {
                 let apart = interval(finding.value.lower_bound(), finding.value.upper_bound(), limit);
                 [finding.names(), apart, fixed(finding.at_s.unwrap_or(f64::NAN), 3), exact(limit)]
             };
-            let columns = &["who", "smallest distance", "at [s]", "limit"];
+            let columns = &["pair", "smallest distance", "at [s]", "limit"];
             let rows = closest.filter(|finding| finding.is_of_obstacle() == is_of_obstacle).map(row);
             Section::table(heading, &caption, columns, rows)
         };
@@ -406,7 +416,21 @@ fn is_of_part(fact: &Fact) -> bool {
             | FactKind::PlanMotion
             | FactKind::PlanHeights
             | FactKind::PlanPlane
-    ) || fact.subject.as_deref() == Some(THE_PLAN)
+    ) || is_of_plan(fact)
+        || fact.kind == FactKind::Motion && fact.subject.is_some()
+}
+
+/// Returns whether a fact is about the samples of the plan.
+fn is_of_plan(fact: &Fact) -> bool {
+    let is_of_samples = matches!(
+        fact.kind,
+        FactKind::HeightUnit
+            | FactKind::CommonStart
+            | FactKind::GpsClocks
+            | FactKind::LogTimes
+            | FactKind::UniformTransforms
+    );
+    is_of_samples && fact.subject.as_deref() == Some(THE_PLAN)
 }
 
 impl Corners {

@@ -340,7 +340,8 @@ impl OwnRecording {
             };
             let unit = if self.ellipsoid_m.is_some() && found.obstacle == 0 { "half axes" } else { "m" };
             let who = [found.vehicle.to_string(), other];
-            RunObjection::RunFoundCloser { who, min: found.min_m, unit, at_s: found.min_at_s }
+            let min = if unit == "m" { found.min_m * self.scale } else { found.min_m };
+            RunObjection::RunFoundCloser { who, min, unit, at_s: found.min_at_s }
         })
     }
 

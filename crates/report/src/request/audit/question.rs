@@ -315,6 +315,9 @@ impl<'a> AuditRequest<'a> {
         settings_file: Option<&str>,
     ) -> Vec<Fact> {
         let mut facts = self.motion(curves, holds_every_step, is_by_run);
+        if is_by_run && (!outcome.envelope.limits.is_empty() || outcome.well_clear.is_some()) {
+            facts.push(Fact::name(FactKind::Motion, Source::Default, STRAIGHT).about("limits and well clear"));
+        }
         if !curves {
             facts.push(match self.settings.max_gap_s {
                 Some(gap_s) if gap_s.is_finite() => Fact::number(FactKind::LongestGap, Source::Declared, gap_s, "s"),
