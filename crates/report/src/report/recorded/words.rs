@@ -377,8 +377,17 @@ impl RecordedReport {
             Status::Violation => Tone::Bad,
             Status::Undecided => Tone::Neutral,
         };
-        let badge = Badge { tone, word: self.verdict() };
-        let mut page = Page::new("Audit of a recording", self.source.recording.clone(), badge, self.finding());
+        let word = match self.status {
+            Status::Clear if self.is_proved() => "PROVED CLEAR",
+            Status::Clear => "CLEAR",
+            Status::Violation => "VIOLATION",
+            Status::Undecided => "UNDECIDED",
+        };
+        let badge = Badge { tone, word: word.to_owned() };
+        // Conditions are as long as the user's names: they follow the badge.
+        let headline = self.headline();
+        let rest = headline.strip_prefix(word).unwrap_or(&headline).trim_start_matches([':', ' ']).to_owned();
+        let mut page = Page::new("Audit of a recording", self.source.recording.clone(), badge, rest);
         page.replay = Some(page::replay(&self.source.recording, replay, Start::AtOnce));
         page.add(
             "Figures",
