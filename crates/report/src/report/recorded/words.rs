@@ -115,7 +115,7 @@ impl RecordedReport {
         facts.sort_by_key(|fact| fact.kind != FactKind::Motion);
         let is_resting = |fact: &&Fact| fact.kind == FactKind::ObstacleMotion;
         let others = facts.iter().filter(|fact| is_resting(fact)).count().saturating_sub(1) as u64;
-        let first = facts.iter().position(|fact| is_resting(&fact));
+        let first = facts.iter().position(is_resting);
         let clause = |(k, fact): (usize, &&Fact)| match fact.kind {
             FactKind::ObstacleMotion if first != Some(k) => None,
             FactKind::ObstacleMotion if others > 0 => {
