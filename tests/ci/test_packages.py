@@ -90,6 +90,9 @@ class Crates(Copied):
         patches = "".join(f'{name} = {{ path = "{name}-{VERSION}" }}\n' for name in sorted(PUBLISHED))
         manifest = f'[workspace]\nresolver = "3"\nmembers = ["*"]\n\n[patch.crates-io]\n{patches}\n{profiles}'
         (unpacked / "Cargo.toml").write_text(manifest)
+        # Archives have one fixed time, so that cargo would take the files of an earlier archive for these.
+        for file in unpacked.rglob("*.rs"):
+            file.touch()
         shutil.copy2(self.folder / "Cargo.lock", unpacked)
         # The folder `target` already holds the dependencies.
         check = ["cargo", "check", "--offline", "--workspace", "--bins", "--lib", "--target-dir", ROOT / "target"]
