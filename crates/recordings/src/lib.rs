@@ -12,7 +12,6 @@
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
 pub mod export;
-mod failure;
 pub mod mcap;
 pub mod read;
 mod segments;

@@ -19,6 +19,7 @@ use std::io;
 
 use crate::read::{Channels, ReadError, Recording};
 use source::Source;
+use tautline_core::failure::Failure;
 use tautline_core::option::SAMPLE_HZ;
 
 /// Formats that can be written; the extension of a file is the name of its format.
@@ -157,5 +158,11 @@ impl ExportError {
             Self::Write(_) => true,
             _ => false,
         }
+    }
+}
+
+impl From<ExportError> for Failure {
+    fn from(error: ExportError) -> Self {
+        Self::new(error.code(), error.is_machine(), error.to_string()).with_help(error.help())
     }
 }

@@ -5,6 +5,7 @@ use std::path::Path;
 use std::{fmt, io};
 
 use super::readers::Format;
+use tautline_core::failure::Failure;
 use tautline_core::option::{ALLOW_UNFINISHED, COLUMN, FORMAT, FPS, Opt, SCALE, SKIP_INCOMPLETE, SORT, TIME_SCALE};
 
 /// Longest quoted value in a message \[characters\].
@@ -306,5 +307,11 @@ pub(super) fn list(names: &[String], shown: usize) -> String {
         0 => "none".to_owned(),
         count if count > shown => format!("{} and {} more", names[..shown].join(", "), count - shown),
         _ => names.join(", "),
+    }
+}
+
+impl From<ReadError> for Failure {
+    fn from(error: ReadError) -> Self {
+        Self::new(error.code(), error.is_machine(), error.to_string()).with_help(error.help())
     }
 }

@@ -14,7 +14,7 @@ use tautline_sim::metrics::Summary;
 use tautline_sim::sim::Ending;
 
 /// Verdict on a flight.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub struct Verdict {
     /// Whether the flight is clear, reached its formation, was flown to its end and was not refused by the check: there

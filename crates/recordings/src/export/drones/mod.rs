@@ -23,6 +23,7 @@ use self::fit::{FitError, Piece};
 use self::motion::{Arc, Deviation, Motion, deviation};
 use crate::read::ReadError;
 use crate::segments::Trajectory;
+use tautline_core::failure::Failure;
 use tautline_core::option::{COMPRESSED, FROM, SAMPLE_HZ, SKYB_VERSION, TOLERANCE, UNTIL};
 use tautline_core::track::{Item, Sample, Tracks};
 
@@ -542,5 +543,11 @@ impl DroneError {
     #[must_use]
     pub fn is_machine(&self) -> bool {
         matches!(self, Self::Write(_) | Self::Interrupted)
+    }
+}
+
+impl From<DroneError> for Failure {
+    fn from(error: DroneError) -> Self {
+        Self::new(error.code(), error.is_machine(), error.to_string()).with_help(error.help())
     }
 }

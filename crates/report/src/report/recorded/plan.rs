@@ -149,12 +149,6 @@ impl PlanReport {
         }
     }
 
-    /// Returns the findings with the status of the verdict in a clause.
-    #[must_use]
-    pub fn brief(&self) -> String {
-        self.brief_as(self.status)
-    }
-
     /// Returns the findings in the words of a status.
     pub(super) fn brief_as(&self, status: Status) -> String {
         let delay =
