@@ -1,8 +1,8 @@
 #!/bin/sh
 # Packs or publishes the crates: sh .github/crates.sh package|publish [ARGUMENT...]
 #
-# Arguments go to `cargo package` or `cargo publish`, for example --dry-run. REPOSITORY is the URL of the repository. It
-# is written into the manifests while the command runs.
+# Arguments go to `cargo package` or `cargo publish`, for example --dry-run. While the command runs, Cargo.toml has
+# REPOSITORY, the URL of the repository, in place of its placeholder, and the crates have copies of embedded files.
 #
 # `publish` publishes crate by crate in the order of their dependencies and skips versions that the registry already
 # has, so a failed run can be repeated. The registry accepts 5 new crates at once, then one every 10 minutes: after a
@@ -21,26 +21,21 @@ cd "$(dirname "$0")/.."
 manifests=$(echo Cargo.toml crates/*/Cargo.toml)
 
 work=$(mktemp -d)
-# Restores the manifests with their times, so that cargo does not rebuild the crates.
+# Restores the manifest with its time, so that cargo does not rebuild the crates.
 restore() {
-    for manifest in $manifests; do
-        if [ -f "$work/$manifest" ]; then cp -p "$work/$manifest" "$manifest"; fi
-    done
+    if [ -f "$work/Cargo.toml" ]; then cp -p "$work/Cargo.toml" Cargo.toml; fi
+    sh .github/embed.sh remove
     rm -rf "$work"
 }
 trap restore EXIT
 trap 'exit 130' HUP INT TERM
 
+sh .github/embed.sh copy
+set -- --allow-dirty "$@"
+
 if [ -n "${REPOSITORY:-}" ]; then
-    for manifest in $manifests; do
-        mkdir -p "$work/$(dirname "$manifest")"
-        cp -p "$manifest" "$work/$manifest"
-        awk -v line="repository = \"$REPOSITORY\"" '
-            { print }
-            $0 == "[package]" { print line }
-        ' "$work/$manifest" >"$manifest"
-    done
-    set -- --allow-dirty "$@"
+    cp -p Cargo.toml "$work/Cargo.toml"
+    sed "s|^repository = .*|repository = \"$REPOSITORY\"|" "$work/Cargo.toml" >Cargo.toml
 fi
 
 # The name in a manifest.

@@ -20,7 +20,8 @@ arguments=$#
 if [ "$long" ]; then
     case " $* " in *" -- "*) set -- "$@" --include-ignored ;; *) set -- "$@" -- --include-ignored ;; esac
 fi
-cargo test "$@"
+# The Python package and the fuzz targets have tests of their own.
+cargo test --workspace --exclude tautline-python --exclude tautline-fuzz "$@"
 if [ "$arguments" != 0 ]; then exit; fi
 if [ "$long" ]; then
     cargo test --release -p tautline-sim --test bits

@@ -46,7 +46,8 @@ class InFolder(unittest.TestCase):
     def pack(self):
         """Returns an archive of the program in the folder of the test. Packs it once for all tests."""
         if not list(PACKED.glob("*.tar.gz")):
-            done = run("sh", ROOT / ".github/package.sh", PROGRAM, TARGET, PACKED, folder=self.folder)
+            done = run("sh", ROOT / ".github/package.sh", PROGRAM, TARGET, PACKED, folder=self.folder,
+                       NOTICES=str(ROOT / "LICENSE-MIT"))
             self.assertEqual(done.returncode, 0, done.stderr)
         shutil.copytree(PACKED, self.folder / "dist", dirs_exist_ok=True)
         return self.folder / "dist" / f"tautline-{VERSION}-{TARGET}.tar.gz"

@@ -13,6 +13,7 @@ import sys
 import tarfile
 import tempfile
 import unittest
+import zipfile
 
 import yaml
 
@@ -24,12 +25,17 @@ PUBLISHED = {"tautline"} | {f"tautline-{folder.name}" for folder in (ROOT / "cra
 MINUTES = 1800
 
 
+def new_folder(test):
+    folder = pathlib.Path(tempfile.mkdtemp())
+    test.addCleanup(shutil.rmtree, folder)
+    return folder
+
+
 class Copied(unittest.TestCase):
     """A copy of the tracked files, which a test may change."""
 
     def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp())
-        self.addCleanup(shutil.rmtree, self.folder)
+        self.folder = new_folder(self)
         files = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, check=True).stdout
         for name in files.decode().split("\0"):
             source = ROOT / name
@@ -65,6 +71,16 @@ class Notes(Copied):
     def test_versions_agree(self):
         self.assertIn(f"\nversion: {VERSION}\n", (ROOT / "CITATION.cff").read_text())
 
+    def test_addresses_of_the_repository_agree(self):
+        [url] = re.findall(r'^repository = "(.*)"$', (ROOT / "Cargo.toml").read_text(), re.MULTILINE)
+        owner = url.removeprefix("https://github.com/").removesuffix("/tautline")
+        self.assertIn(f'repository-code: "{url}"', (ROOT / "CITATION.cff").read_text())
+        pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CITATION.cff", *(ROOT / "docs").glob("*.md")]
+        # The addresses of clones and images, and the names of the action.
+        named = {found for page in pages for found in re.findall(r"[\w.-]+/tautline(?=[@:])|https://\S+/tautline\b",
+                                                                 page.read_text())}
+        self.assertEqual(named, {url, f"{owner}/tautline"})
+
 
 class Crates(Copied):
     def crates(self, *words, **environment):
@@ -72,32 +88,62 @@ class Crates(Copied):
         return subprocess.run(["sh", script, *words], env=os.environ | environment, capture_output=True, text=True,
                               timeout=MINUTES, check=False)
 
-    def test_packages_contain_all_files_that_they_need(self):
-        """Checks the unpacked packages as members of another workspace, without the tree they came from."""
+    def test_packages_and_examples_build_without_the_tree(self):
+        """Checks the unpacked packages, and the examples against them, in a folder that holds nothing else."""
         packed = self.folder / "packed"
-        done = self.crates("package", "--offline", "--no-verify", "--allow-dirty", "--target-dir", str(packed))
+        done = self.crates("package", "--offline", "--no-verify", "--target-dir", str(packed))
         self.assertEqual(done.returncode, 0, done.stderr)
         archives = sorted((packed / "package").glob("*.crate"))
         names = {archive.name.removesuffix(f"-{VERSION}.crate") for archive in archives}
         self.assertEqual(names, PUBLISHED)
-        unpacked = self.folder / "unpacked"
+        alone = new_folder(self)
         for archive in archives:
             self.assertLess(archive.stat().st_size, 10 << 20, "the limit of the registry")
             with tarfile.open(archive) as files:
-                files.extractall(unpacked, filter="data")
+                files.extractall(alone, filter="data")
+            unpacked = {file.name for file in (alone / archive.stem).iterdir()}
+            self.assertLessEqual({"LICENSE-MIT", "LICENSE-APACHE"}, unpacked, archive.stem)
+        for example in (ROOT / "examples/crates").iterdir():
+            copy = alone / f"example-{example.name}"
+            shutil.copytree(example, copy)
+            manifest = (copy / "Cargo.toml").read_text()
+            manifest = re.sub(r'\{ path = "\.\./\.\./\.\./crates/\w+"', f'{{ version = "{VERSION}"', manifest)
+            self.assertNotIn("path =", manifest)
+            (copy / "Cargo.toml").write_text(manifest)
         whole = (self.folder / "Cargo.toml").read_text()
         profiles = whole[whole.index("[profile.dev]"):]
         patches = "".join(f'{name} = {{ path = "{name}-{VERSION}" }}\n' for name in sorted(PUBLISHED))
         manifest = f'[workspace]\nresolver = "3"\nmembers = ["*"]\n\n[patch.crates-io]\n{patches}\n{profiles}'
-        (unpacked / "Cargo.toml").write_text(manifest)
+        (alone / "Cargo.toml").write_text(manifest)
+        self.check(alone, "--workspace", "--bins", "--lib")
+
+    def check(self, folder, *words):
+        """Compiles an unpacked workspace with the dependencies that the folder `target` holds."""
         # Archives have one fixed time, so that cargo would take the files of an earlier archive for these.
-        for file in unpacked.rglob("*.rs"):
+        for file in folder.rglob("*.rs"):
             file.touch()
-        shutil.copy2(self.folder / "Cargo.lock", unpacked)
-        # The folder `target` already holds the dependencies.
-        check = ["cargo", "check", "--offline", "--workspace", "--bins", "--lib", "--target-dir", ROOT / "target"]
-        done = subprocess.run(check, cwd=unpacked, capture_output=True, text=True, timeout=MINUTES, check=False)
+        if not (folder / "Cargo.lock").exists():
+            shutil.copy2(self.folder / "Cargo.lock", folder)
+        check = ["cargo", "check", "--offline", *words, "--target-dir", ROOT / "target"]
+        done = subprocess.run(check, cwd=folder, capture_output=True, text=True, timeout=MINUTES, check=False)
         self.assertEqual(done.returncode, 0, done.stderr[-4000:])
+
+    def test_a_source_distribution_builds_without_the_tree(self):
+        run("sh", self.folder / ".github/embed.sh", "copy", folder=self.folder)
+        words = [MATURIN, "sdist", "--manifest-path", self.folder / "python/Cargo.toml", "--out", "dist"]
+        done = subprocess.run(words, cwd=self.folder, capture_output=True, text=True, timeout=MINUTES, check=False)
+        self.assertEqual(done.returncode, 0, done.stderr[-4000:])
+        [file] = (self.folder / "dist").iterdir()
+        # CONTRIBUTING.md downloads this name.
+        self.assertEqual(file.name, f"tautline-{VERSION}.tar.gz")
+        alone = new_folder(self)
+        with tarfile.open(file) as files:
+            files.extractall(alone, filter="data")
+        source = alone / f"tautline-{VERSION}"
+        manifests = {f"crates/{crate.removeprefix('tautline-')}/Cargo.toml" for crate in PUBLISHED - {"tautline"}}
+        for name in manifests | {"Cargo.lock", "pyproject.toml", "PKG-INFO"}:
+            self.assertTrue((source / name).is_file(), name)
+        self.check(source, "--package", "tautline-python")
 
     def test_the_repository_is_written_into_each_package_and_manifests_are_restored(self):
         manifests = [self.folder / "Cargo.toml", *self.folder.glob("crates/*/Cargo.toml")]
@@ -242,6 +288,13 @@ class SupplyChain(unittest.TestCase):
             words = [DENY, "--offline", "--config", file.name, "check", "--hide-inclusion-graph"]
             return run(*words, "bans", "licenses", "sources", folder=ROOT)
 
+    def test_notices_accept_the_same_licences(self):
+        def licences(text, key):
+            return re.findall(r'"(.*)"', text[text.index(f"\n{key} = ["):].split("]")[0])
+
+        accepted = licences((ROOT / ".github/about.toml").read_text(), "accepted")
+        self.assertEqual(accepted, licences((ROOT / "deny.toml").read_text(), "allow"))
+
     def test_licences_versions_and_sources_are_allowed(self):
         done = self.check((ROOT / "deny.toml").read_text())
         self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
@@ -259,12 +312,17 @@ class Installed(unittest.TestCase):
     """What a user installs, in a new folder."""
 
     def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp())
-        self.addCleanup(shutil.rmtree, self.folder)
+        self.folder = new_folder(self)
+        self.notices = self.folder / "notices.txt"
+        self.notices.write_text("licences of libraries\n")
+
+    def pack(self, program, *words):
+        return run("sh", ROOT / ".github/package.sh", program, TARGET, *words, folder=self.folder,
+                   NOTICES=str(self.notices))
 
     def test_an_archive_flies_the_ten_minute_tour(self):
         environment = {"RELEASES": self.folder.as_uri()}
-        done = run("sh", ROOT / ".github/package.sh", PROGRAM, TARGET, self.folder, folder=self.folder)
+        done = self.pack(PROGRAM, self.folder)
         self.assertEqual(done.returncode, 0, done.stderr)
         done = run("sh", ROOT / ".github/install.sh", VERSION, "bin", folder=self.folder, **environment)
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -276,11 +334,20 @@ class Installed(unittest.TestCase):
         self.assertIn("Ran 1 test", done.stderr)
 
     def test_an_archive_with_the_viewer_has_another_name(self):
-        done = run("sh", ROOT / ".github/package.sh", PROGRAM, TARGET, self.folder, "viewer", folder=self.folder)
+        done = self.pack(PROGRAM, self.folder, "viewer")
         self.assertEqual(pathlib.Path(done.stdout.strip()).name, f"tautline-{VERSION}-{TARGET}-viewer.tar.gz")
 
+    def test_an_archive_has_all_licences(self):
+        with tarfile.open(self.pack(PROGRAM, self.folder).stdout.strip()) as files:
+            names = {pathlib.Path(name).name for name in files.getnames()}
+        self.assertLessEqual({"LICENSE-MIT", "LICENSE-APACHE", "THIRD-PARTY.txt"}, names)
+        self.notices.unlink()
+        done = self.pack(PROGRAM, self.folder)
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("notices.txt: missing; sh .github/notices.sh Cargo.toml writes it", done.stderr)
+
     def test_the_smoke_test_starts_an_archive(self):
-        done = run("sh", ROOT / ".github/package.sh", PROGRAM, TARGET, "dist", folder=self.folder)
+        done = self.pack(PROGRAM, "dist")
         archive = self.folder / done.stdout.strip()
         done = run("sh", ROOT / ".github/smoke.sh", archive, folder=self.folder)
         self.assertEqual((done.returncode, done.stdout), (0, f"{archive}: started\n"), done.stderr)
@@ -292,29 +359,26 @@ class Installed(unittest.TestCase):
         program = self.folder / "tautline"
         program.write_text("#!/bin/sh\necho tautline 9.9.9\n")
         program.chmod(0o755)
-        done = run("sh", ROOT / ".github/package.sh", program, TARGET, "dist", folder=self.folder)
+        done = self.pack(program, "dist")
         done = run("sh", ROOT / ".github/smoke.sh", done.stdout.strip(), folder=self.folder)
         self.assertEqual(done.returncode, 1)
         self.assertIn(f'has the version "tautline 9.9.9", must be "tautline {VERSION}"', done.stderr)
 
-    def test_the_source_distribution_has_all_crates(self):
-        words = [MATURIN, "sdist", "--manifest-path", ROOT / "python/Cargo.toml", "--out", "dist"]
-        done = subprocess.run(words, cwd=self.folder, capture_output=True, text=True, timeout=MINUTES, check=False)
-        self.assertEqual(done.returncode, 0, done.stderr[-4000:])
-        [file] = (self.folder / "dist").iterdir()
-        # CONTRIBUTING.md downloads this name.
-        self.assertEqual(file.name, f"tautline-{VERSION}.tar.gz")
-        with tarfile.open(file) as files:
-            names = {name.removeprefix(f"tautline-{VERSION}/") for name in files.getnames()}
-        manifests = {f"crates/{crate.removeprefix('tautline-')}/Cargo.toml" for crate in PUBLISHED - {"tautline"}}
-        self.assertLessEqual(manifests | {"Cargo.lock", "pyproject.toml", "PKG-INFO"}, names)
-
     def test_a_wheel_works_in_a_clean_environment(self):
+        run("sh", ROOT / ".github/embed.sh", "copy", folder=ROOT)
+        self.addCleanup(run, "sh", ROOT / ".github/embed.sh", "remove", folder=ROOT)
         words = [MATURIN, "build", "--manifest-path", ROOT / "python/Cargo.toml", "--out", "dist"]
         done = subprocess.run(words, cwd=self.folder, capture_output=True, text=True, timeout=MINUTES, check=False)
         self.assertEqual(done.returncode, 0, done.stderr[-4000:])
         [wheel] = (self.folder / "dist").glob("*.whl")
         self.assertRegex(wheel.name, rf"^tautline-{re.escape(VERSION)}-cp310-abi3-")
+        with zipfile.ZipFile(wheel) as files:
+            [metadata] = [name for name in files.namelist() if name.endswith(".dist-info/METADATA")]
+            licences = [name for name in files.namelist() if "/licenses/" in name]
+            text = files.read(metadata).decode()
+        self.assertGreaterEqual({pathlib.Path(name).name for name in licences}, {"LICENSE-MIT", "LICENSE-APACHE"})
+        self.assertRegex(text, "(?m)^Author: The tautline developers$")
+        self.assertRegex(text, "(?m)^Project-URL: Source Code, https://github.com/OWNER/tautline$")
         done = run("sh", ROOT / ".github/smoke.sh", wheel, folder=self.folder, PYTHON=sys.executable)
         self.assertEqual(done.returncode, 0, done.stderr)
         subprocess.run([sys.executable, "-m", "venv", self.folder / "venv"], check=True)

@@ -129,11 +129,19 @@ def unread_within(page: Page) -> list[str]:
 
 
 def missing_targets(command: Command) -> list[str]:
+    """Returns the targets of cargo and the names of tests that the package of a command does not have."""
     found = []
+    package = re.search(r"(?:-p|--package) tautline-([\w-]+)", command.text)
+    root = ROOT / "crates" / package[1] if package else ROOT
     for option, name in re.findall(r"(--example|--bench|--test) ([\w-]+)", command.text):
-        folders = [root / CARGO_TARGETS[option] for root in (ROOT, *(ROOT / "crates").iterdir())]
-        if not any((folder / f"{name}.rs").exists() or (folder / name / "main.rs").exists() for folder in folders):
-            found.append(f"{command.place}: there is no {CARGO_TARGETS[option]}/{name}.rs, nor {name}/main.rs")
+        folder = root / CARGO_TARGETS[option]
+        if not ((folder / f"{name}.rs").exists() or (folder / name / "main.rs").exists()):
+            found.append(f"{command.place}: there is no {folder.relative_to(ROOT)}/{name}.rs, nor {name}/main.rs")
+    if test := re.search(r"cargo test .*(?:--lib|--test \w+) ([\w:]+)", command.text):
+        last = test[1].rstrip(":").split("::")[-1]
+        sources = (file for folder in ("src", "tests") for file in (root / folder).rglob("*.rs"))
+        if not any(re.search(rf"(fn|mod) \w*{last}", file.read_text()) for file in sources):
+            found.append(f"{command.place}: no test of {root.relative_to(ROOT)} is called {test[1]}")
     return found
 
 

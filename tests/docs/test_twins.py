@@ -60,6 +60,11 @@ FAULTS = {
     "a file with a wrong key": ("runs = 3", "rums = 3", "rums"),
     "a malformed file": ("runs = 3", "runs 3", "runs"),
     "an unlisted program": ("tautline list", "tautlime list", "`tautlime` is neither run nor excepted"),
+    "an unknown test": (
+        "cargo test --test docs_of_tautline",
+        "cargo test -p tautline-laws --lib no_such_test",
+        "no test of crates/laws is called no_such_test",
+    ),
     "an unknown option of a command that is not run": (
         "cargo test --test docs_of_tautline",
         "ssh node7 /shared/tautline campaign shard camp --shards 1",

@@ -22,6 +22,13 @@
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 
+/// Embeds a file of the folder `assets`. Takes parts of its name.
+macro_rules! embedded {
+    ($($name:literal),+) => {
+        include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/", env!("TAUTLINE_ASSETS"), "/", $($name),+))
+    };
+}
+
 pub mod continuous;
 pub mod link;
 pub mod metrics;

@@ -64,7 +64,12 @@ impl Pipelines {
             usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
             mapped_at_creation: false,
         });
-        let shaders = device.create_shader_module(wgpu::include_wgsl!("../../../../shaders/scene.wgsl"));
+        let shaders = device.create_shader_module(wgpu::include_wgsl!(concat!(
+            env!("CARGO_MANIFEST_DIR"),
+            "/",
+            env!("TAUTLINE_SHADERS"),
+            "/scene.wgsl"
+        )));
         let call = |corner, pixel, attributes: &[_], bytes: usize, writes_depth| {
             let pipeline = device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
                 label: Some(pixel),

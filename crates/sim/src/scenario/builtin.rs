@@ -13,77 +13,55 @@ pub struct Builtin {
     pub toml: &'static str,
 }
 
+/// Embeds the scenario with a name.
+macro_rules! builtin {
+    ($name:literal, $summary:literal) => {
+        Builtin { name: $name, summary: $summary, toml: embedded!($name, ".toml") }
+    };
+}
+
 const ALL: &[Builtin] = &[
-    Builtin {
-        name: "pentagon",
-        summary: "five vehicles from a line to the hourglass of the edge-tension paper: clear and reached",
-        toml: include_str!("../../../../assets/pentagon.toml"),
-    },
-    Builtin {
-        name: "hexagon",
-        summary: "six vehicles from two rows to a regular hexagon, with less than 1 g: clear and reached",
-        toml: include_str!("../../../../assets/hexagon.toml"),
-    },
-    Builtin {
-        name: "circle",
-        summary: "six vehicles from a line to a circle under the edge-tension law: clear and reached",
-        toml: include_str!("../../../../assets/circle.toml"),
-    },
-    Builtin {
-        name: "pentagon-laplacian",
-        summary: "the start of the pentagon under the Laplacian baseline, which avoids no collision: a violation",
-        toml: include_str!("../../../../assets/pentagon-laplacian.toml"),
-    },
-    Builtin {
-        name: "pentagon-collinear",
-        summary: "the pentagon from an exactly straight line, which the law cannot leave: clear but never reached",
-        toml: include_str!("../../../../assets/pentagon-collinear.toml"),
-    },
-    Builtin {
-        name: "pentagon-leader",
-        summary: "the pentagon around a leader that follows only its own reference, over a star: clear and reached",
-        toml: include_str!("../../../../assets/pentagon-leader.toml"),
-    },
-    Builtin {
-        name: "leader-lossy",
-        summary: "a moving leader over a radio that loses one message in ten, extrapolated: clear and reached",
-        toml: include_str!("../../../../assets/leader-lossy.toml"),
-    },
-    Builtin {
-        name: "swap",
-        summary: "twelve vehicles change places across a circle under the displacement law: clear and reached",
-        toml: include_str!("../../../../assets/swap.toml"),
-    },
-    Builtin {
-        name: "show",
-        summary: "a hundred vehicles write two words and end in rings, certified through all legs: clear and reached",
-        toml: include_str!("../../../../assets/show.toml"),
-    },
-    Builtin {
-        name: "obstacles",
-        summary: "eight vehicles past pillars, a house and a cable, in two legs: clear of all of them, reached",
-        toml: include_str!("../../../../assets/obstacles.toml"),
-    },
-    Builtin {
-        name: "crazyflies",
-        summary: "five quadrotors that tilt and lag, from a line to a pentagon of 0.6 m: clear, reached, not certified",
-        toml: include_str!("../../../../assets/crazyflies.toml"),
-    },
-    Builtin {
-        name: "shielded-crazyflies",
-        summary: "six quadrotors change places in wind, under a law that avoids nothing and a shield: clear, reached",
-        toml: include_str!("../../../../assets/shielded-crazyflies.toml"),
-    },
-    Builtin {
-        name: "gusts",
-        summary: "rings in a turbulent wind with gusts on some vehicles: a common wind changes no separation, reached",
-        toml: include_str!("../../../../assets/gusts.toml"),
-    },
-    Builtin {
-        name: "thousand",
-        summary: "a thousand vehicles gather in space: clear and reached",
-        toml: include_str!("../../../../assets/thousand.toml"),
-    },
+    builtin!("pentagon", "five vehicles from a line to the hourglass of the edge-tension paper: clear and reached"),
+    builtin!("hexagon", "six vehicles from two rows to a regular hexagon, with less than 1 g: clear and reached"),
+    builtin!("circle", "six vehicles from a line to a circle under the edge-tension law: clear and reached"),
+    builtin!(
+        "pentagon-laplacian",
+        "the start of the pentagon under the Laplacian baseline, which avoids no collision: a violation"
+    ),
+    builtin!(
+        "pentagon-collinear",
+        "the pentagon from an exactly straight line, which the law cannot leave: clear but never reached"
+    ),
+    builtin!(
+        "pentagon-leader",
+        "the pentagon around a leader that follows only its own reference, over a star: clear and reached"
+    ),
+    builtin!(
+        "leader-lossy",
+        "a moving leader over a radio that loses one message in ten, extrapolated: clear and reached"
+    ),
+    builtin!("swap", "twelve vehicles change places across a circle under the displacement law: clear and reached"),
+    builtin!(
+        "show",
+        "a hundred vehicles write two words and end in rings, certified through all legs: clear and reached"
+    ),
+    builtin!(
+        "obstacles",
+        "eight vehicles past pillars, a house and a cable, in two legs: clear of all of them, reached"
+    ),
+    builtin!(
+        "crazyflies",
+        "five quadrotors that tilt and lag, from a line to a pentagon of 0.6 m: clear, reached, not certified"
+    ),
+    builtin!(
+        "shielded-crazyflies",
+        "six quadrotors change places in wind, under a law that avoids nothing and a shield: clear, reached"
+    ),
+    builtin!(
+        "gusts",
+        "rings in a turbulent wind with gusts on some vehicles: a common wind changes no separation, reached"
+    ),
+    builtin!("thousand", "a thousand vehicles gather in space: clear and reached"),
 ];
 
 /// Returns all built-in scenarios, the default first.
@@ -103,7 +81,7 @@ pub fn find(name: &str) -> Option<&'static Builtin> {
 #[must_use]
 pub fn new_scenario(name: &str) -> Option<String> {
     let is_name = (1..=MAX_NAME_CHARS).contains(&name.len()) && name.chars().all(is_name_character);
-    is_name.then(|| include_str!("../../../../assets/new-scenario.toml").replace("NAME", name))
+    is_name.then(|| embedded!("new-scenario.toml").replace("NAME", name))
 }
 
 #[cfg(test)]

@@ -119,9 +119,9 @@ impl Model {
 
 /// Built-in models: names and texts of their files.
 pub const MODELS: [(&str, &str); 3] = [
-    ("crazyflie", include_str!("../../../../assets/vehicles/crazyflie.toml")),
-    ("crazyflie-brushless", include_str!("../../../../assets/vehicles/crazyflie-brushless.toml")),
-    ("hummingbird", include_str!("../../../../assets/vehicles/hummingbird.toml")),
+    ("crazyflie", embedded!("vehicles/crazyflie.toml")),
+    ("crazyflie-brushless", embedded!("vehicles/crazyflie-brushless.toml")),
+    ("hummingbird", embedded!("vehicles/hummingbird.toml")),
 ];
 
 /// Error in the text of a model, with its bytes.

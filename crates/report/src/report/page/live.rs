@@ -12,7 +12,7 @@ const LOG_STYLE: &str = "#log{list-style:none;padding:0;max-height:16rem;overflo
 /// Returns the page of a live watch. It reads positions and notices from the WebSocket `live` of its server.
 #[must_use]
 pub fn live_page() -> String {
-    let (script, hash) = replay::packed(include_str!("../../../../../assets/live.js"));
+    let (script, hash) = replay::packed(embedded!("TAUTLINE_ASSETS", "live.js"));
     let policy = format!("{POLICY}; {} {hash}; connect-src 'self'", replay::script_source());
     let page = html! {
         (DOCTYPE)

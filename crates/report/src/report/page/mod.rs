@@ -4,6 +4,13 @@
 //! browser to load anything. Pictures link to their files in full size. If it holds replays, a single script of this
 //! crate may run. The page follows the browser's light or dark theme and fits a phone. Equal parts give equal bytes.
 
+/// Embeds a file of the folder whose path a variable of the build holds.
+macro_rules! embedded {
+    ($folder:literal, $name:literal) => {
+        include_str!(concat!(env!("CARGO_MANIFEST_DIR"), "/", env!($folder), "/", $name))
+    };
+}
+
 mod live;
 mod replay;
 

@@ -14,9 +14,8 @@ use tautline_core::text::{counted, metres, up_to};
 pub(super) const STYLE: &str = include_str!("replay.css");
 
 /// Script and shaders of replays, without comments and indentation.
-static SCRIPT: LazyLock<String> = LazyLock::new(|| without_comments(include_str!("../../../../../assets/replay.js")));
-static SHADERS: LazyLock<String> =
-    LazyLock::new(|| without_comments(include_str!("../../../../../shaders/replay.glsl")));
+static SCRIPT: LazyLock<String> = LazyLock::new(|| without_comments(embedded!("TAUTLINE_ASSETS", "replay.js")));
+static SHADERS: LazyLock<String> = LazyLock::new(|| without_comments(embedded!("TAUTLINE_SHADERS", "replay.glsl")));
 
 /// Returns a script without comments and indentation, with its source expression.
 pub(super) fn packed(source: &str) -> (String, String) {

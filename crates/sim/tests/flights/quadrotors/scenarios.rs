@@ -62,7 +62,7 @@ fn a_custom_model_is_a_file_relative_to_the_scenario() {
 }
 
 fn builtin_text() -> &'static str {
-    include_str!("../../../../../assets/crazyflies.toml")
+    tautline_sim::scenario::builtin::find("crazyflies").expect("a built-in scenario").toml
 }
 
 #[test]
