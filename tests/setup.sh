@@ -1,5 +1,8 @@
 #!/bin/sh
-# Installs the missing requirements of builds and tests, except for the Rust toolchain. From anywhere: sh tests/setup.sh
+# Installs the missing requirements of builds and tests, except for the Rust toolchain.
+# From anywhere: sh tests/setup.sh [--long]
+#
+# --long adds those of `tests/run.sh --long`. Three of its tools are built from source.
 set -eu
 cd "$(dirname "$0")/.."
 
@@ -8,6 +11,13 @@ if ! command -v cc >/dev/null 2>&1 || ! command -v c++ >/dev/null 2>&1; then
     sudo=$([ "$(id -u)" = 0 ] || echo sudo)
     $sudo apt-get update
     $sudo apt-get install -y --no-install-recommends gcc g++ libc6-dev
+fi
+
+# The interpreter that runs the checker of proofs.
+if ! command -v python3 >/dev/null 2>&1; then
+    sudo=$([ "$(id -u)" = 0 ] || echo sudo)
+    $sudo apt-get update
+    $sudo apt-get install -y --no-install-recommends python3
 fi
 
 # The browser for tests/reports.
@@ -28,6 +38,23 @@ if ! target/typescript/node_modules/.bin/tsc --version >/dev/null 2>&1; then
     npm install --silent --no-audit --no-fund --prefix target/typescript 'typescript@5'
 fi
 
+# A software driver if there is no graphics driver, for tests/viewer.
+if ! ls /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1 && ! ls /etc/vulkan/icd.d/*.json >/dev/null 2>&1; then
+    sudo=$([ "$(id -u)" = 0 ] || echo sudo)
+    $sudo apt-get update
+    $sudo apt-get install -y --no-install-recommends mesa-vulkan-drivers libvulkan1
+fi
+
+# Virtual screen, virtual input and window libraries for tests/window.
+if ! command -v Xvfb >/dev/null 2>&1 || ! command -v xdotool >/dev/null 2>&1; then
+    sudo=$([ "$(id -u)" = 0 ] || echo sudo)
+    $sudo apt-get update
+    $sudo apt-get install -y --no-install-recommends xvfb xdotool libx11-6 libx11-xcb1 libxcursor1 libxi6 libxrandr2 \
+        libxkbcommon-x11-0
+fi
+
+if [ "${1:-}" != --long ]; then exit; fi
+
 # The builder of the book, which tests/docs runs.
 if ! target/mdbook/bin/mdbook --version >/dev/null 2>&1; then
     cargo install --quiet --locked --debug --no-default-features --features search --root target/mdbook \
@@ -46,21 +73,6 @@ if ! target/fuzz-tool/bin/cargo-fuzz --version >/dev/null 2>&1; then
     cargo install --quiet --locked --debug --root target/fuzz-tool --target-dir target/fuzz-tool/build \
         'cargo-fuzz@0.13.2'
     rm -rf target/fuzz-tool/build
-fi
-
-# A software driver if there is no graphics driver, for tests/viewer.
-if ! ls /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1 && ! ls /etc/vulkan/icd.d/*.json >/dev/null 2>&1; then
-    sudo=$([ "$(id -u)" = 0 ] || echo sudo)
-    $sudo apt-get update
-    $sudo apt-get install -y --no-install-recommends mesa-vulkan-drivers libvulkan1
-fi
-
-# Virtual screen, virtual input and window libraries for tests/window.
-if ! command -v Xvfb >/dev/null 2>&1 || ! command -v xdotool >/dev/null 2>&1; then
-    sudo=$([ "$(id -u)" = 0 ] || echo sudo)
-    $sudo apt-get update
-    $sudo apt-get install -y --no-install-recommends xvfb xdotool libx11-6 libx11-xcb1 libxcursor1 libxi6 libxrandr2 \
-        libxkbcommon-x11-0
 fi
 
 # Creates target/NAME with packages, unless it can import MODULES: environment NAME MODULES PACKAGE...
