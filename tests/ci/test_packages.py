@@ -75,7 +75,8 @@ class Notes(Copied):
         [url] = re.findall(r'^repository = "(.*)"$', (ROOT / "Cargo.toml").read_text(), re.MULTILINE)
         owner = url.removeprefix("https://github.com/").removesuffix("/tautline")
         self.assertIn(f'repository-code: "{url}"', (ROOT / "CITATION.cff").read_text())
-        pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CITATION.cff", *(ROOT / "docs").glob("*.md")]
+        pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CITATION.cff", ROOT / "python/pyproject.toml",
+                 *(ROOT / "docs").glob("*.md")]
         # The addresses of clones and images, and the names of the action.
         named = {found for page in pages for found in re.findall(r"[\w.-]+/tautline(?=[@:])|https://\S+/tautline\b",
                                                                  page.read_text())}
@@ -108,7 +109,7 @@ class Crates(Copied):
             shutil.copytree(example, copy)
             manifest = (copy / "Cargo.toml").read_text()
             manifest = re.sub(r'\{ path = "\.\./\.\./\.\./crates/\w+"', f'{{ version = "{VERSION}"', manifest)
-            self.assertNotIn("path =", manifest)
+            self.assertNotIn('"../', manifest)
             (copy / "Cargo.toml").write_text(manifest)
         whole = (self.folder / "Cargo.toml").read_text()
         profiles = whole[whole.index("[profile.dev]"):]
@@ -378,7 +379,7 @@ class Installed(unittest.TestCase):
             text = files.read(metadata).decode()
         self.assertGreaterEqual({pathlib.Path(name).name for name in licences}, {"LICENSE-MIT", "LICENSE-APACHE"})
         self.assertRegex(text, "(?m)^Author: The tautline developers$")
-        self.assertRegex(text, "(?m)^Project-URL: Source Code, https://github.com/OWNER/tautline$")
+        self.assertRegex(text, "(?m)^Project-URL: Repository, https://github.com/OWNER/tautline$")
         done = run("sh", ROOT / ".github/smoke.sh", wheel, folder=self.folder, PYTHON=sys.executable)
         self.assertEqual(done.returncode, 0, done.stderr)
         subprocess.run([sys.executable, "-m", "venv", self.folder / "venv"], check=True)
