@@ -130,7 +130,7 @@ class Crates(Copied):
         self.assertEqual(done.returncode, 0, done.stderr[-4000:])
 
     def test_a_source_distribution_builds_without_the_tree(self):
-        run("sh", self.folder / ".github/embed.sh", "copy", folder=self.folder)
+        run("sh", self.folder / ".github/embed.sh", "crates", folder=self.folder)
         words = [MATURIN, "sdist", "--manifest-path", self.folder / "python/Cargo.toml", "--out", "dist"]
         done = subprocess.run(words, cwd=self.folder, capture_output=True, text=True, timeout=MINUTES, check=False)
         self.assertEqual(done.returncode, 0, done.stderr[-4000:])
@@ -366,7 +366,7 @@ class Installed(unittest.TestCase):
         self.assertIn(f'has the version "tautline 9.9.9", must be "tautline {VERSION}"', done.stderr)
 
     def test_a_wheel_works_in_a_clean_environment(self):
-        run("sh", ROOT / ".github/embed.sh", "copy", folder=ROOT)
+        run("sh", ROOT / ".github/embed.sh", "wheel", folder=ROOT)
         self.addCleanup(run, "sh", ROOT / ".github/embed.sh", "remove", folder=ROOT)
         words = [MATURIN, "build", "--manifest-path", ROOT / "python/Cargo.toml", "--out", "dist"]
         done = subprocess.run(words, cwd=self.folder, capture_output=True, text=True, timeout=MINUTES, check=False)
