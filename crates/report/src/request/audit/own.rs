@@ -7,9 +7,9 @@ use nalgebra::Vector3;
 use super::super::{Failure, Monitor};
 use super::AuditRequest;
 use crate::report::recorded::{EarlyEnd, RunObjection};
-use crate::report::{ObstacleApproach, Report};
+use crate::report::{Finding, Objects, Report};
 use tautline_audit::recorded::{Approach, ObjectPair, Outcome, Settings, TOUCHING_ELLIPSOIDS, VehicleSettings};
-use tautline_audit::{LISTED, Obstacle, ParryEvidence, Status, Tally, Violation};
+use tautline_audit::{Obstacle, ParryEvidence, Status, Tally, Violation};
 use tautline_core::option::{DELTA, INDEPENDENT};
 use tautline_core::record::Event;
 use tautline_core::swarm::Pair;
@@ -63,43 +63,28 @@ pub(super) enum RunAnswer {
 /// Returns the audit that a run writes at the end of its recording.
 #[must_use]
 pub fn run_audit(scenario: &Scenario, report: &Report) -> RunAudit {
-    let scale = scenario.half_axes_m().map_or(1.0, |_| TOUCHING_ELLIPSOIDS / scenario.delta_m);
-    let limit_m = scenario.delta_m * scale;
-    let of_pair = |[first, second]: [usize; 2], [from_s, to_s]: [f64; 2], min_m: f64, min_at_s: f64| {
-        let (vehicle, other_vehicle, min_m) = (first as u64, second as u64, min_m * scale);
-        RunFinding { vehicle, other_vehicle, obstacle: 0, limit_m, from_s, to_s, min_m, min_at_s }
+    let scale = metric_scale(scenario);
+    let run_finding = |found: &Finding| {
+        let Objects::Pair(pair) = found.objects else { return None };
+        let (min_m, min_at_s, limit_m) = (found.value.upper?, found.at_s?, found.limit?);
+        let (from_s, to_s) = (found.from_s.unwrap_or(min_at_s), found.to_s.unwrap_or(min_at_s));
+        Some(numbered(&Violation { pair, from_s, to_s, min_m, min_at_s, limit_m }, scale))
     };
-    let of_obstacle = |found: &ObstacleApproach, [from_s, to_s]: [f64; 2]| {
-        let &ObstacleApproach { vehicle, ref obstacle, clearance_m, min_m, min_at_s } = found;
-        let (vehicle, limit_m) = (vehicle as u64, clearance_m);
-        let obstacle = 1 + scenario.obstacles.iter().take_while(|of| of.name != *obstacle).count() as u64;
-        RunFinding { vehicle, other_vehicle: 0, obstacle, limit_m, from_s, to_s, min_m, min_at_s }
-    };
-    let separation = &report.separation;
-    let closest = separation.min_pair.zip(separation.min_m).zip(separation.min_at_s);
-    let closest = closest.map(|((pair, min_m), at_s)| of_pair(pair, [at_s; 2], min_m, at_s));
-    let obstacles = report.obstacles.as_ref();
-    let approaches = obstacles.into_iter().flat_map(|of| &of.closest).map(|of| of_obstacle(of, [of.min_at_s; 2]));
-    let of_pairs = report.audit.violations.iter();
-    let of_pairs = of_pairs.map(|of| of_pair(of.pair.numbers(), [of.from_s, of.to_s], of.min_m, of.min_at_s));
-    let of_obstacles = obstacles.into_iter().flat_map(|of| &of.violations);
-    let of_obstacles = of_obstacles.map(|of| of_obstacle(&of.approach, [of.from_s, of.to_s]));
-    let mut violations: Vec<_> = of_pairs.chain(of_obstacles).collect();
-    let violations_count = violations.len() as u64;
+    let answer = &report.answer;
+    let mut violations: Vec<_> = answer.violations.listed.iter().filter_map(run_finding).collect();
     violations.sort_by(|a, b| (a.min_m - a.limit_m).total_cmp(&(b.min_m - b.limit_m)));
-    violations.truncate(LISTED);
     violations.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
     let time = &scenario.time;
     RunAudit {
-        status: report.audit.status.name().to_owned(),
+        status: answer.status.name().to_owned(),
         ended_early: report.run.early_end().unwrap_or_default(),
         holds_every_step: scenario.has_engine() && report.run.refined_steps == 0 && time.samples() > time.steps(),
-        limit_m,
+        limit_m: scenario.delta_m * scale,
         duration_s: report.run.duration_s,
-        steps: report.audit.steps,
-        pairs_checked: report.audit.pairs_checked,
-        violations_count,
-        closest: closest.into_iter().chain(approaches).collect(),
+        steps: answer.detectors.and_then(|detectors| detectors.steps).unwrap_or_default(),
+        pairs_checked: answer.detectors.map_or(0, |detectors| detectors.pairs_swept),
+        violations_count: answer.violations.count,
+        closest: answer.closest.iter().filter_map(run_finding).collect(),
         violations,
         sha256: String::new(),
     }
@@ -388,34 +373,40 @@ impl OwnRecording {
 
 /// Returns the violation or the approach of an event, in the lengths of [`run_audit`].
 fn run_finding(event: &Event, scenario: &Scenario) -> Option<RunFinding> {
-    let scale = scenario.half_axes_m().map_or(1.0, |_| TOUCHING_ELLIPSOIDS / scenario.delta_m);
-    let finding = |vehicle: usize, time_s: f64, limit_m: f64, min_m: f64| RunFinding {
-        vehicle: vehicle as u64 + 1,
-        limit_m,
-        from_s: time_s,
-        to_s: time_s,
-        min_m,
-        min_at_s: time_s,
-        ..RunFinding::default()
-    };
-    let of_pair = |pair: Pair, time_s: f64, min_m: f64| RunFinding {
-        other_vehicle: pair.second() as u64 + 1,
-        ..finding(pair.first(), time_s, scenario.delta_m * scale, min_m * scale)
-    };
-    let of_obstacle = |vehicle: usize, obstacle: usize, time_s: f64, min_m: Option<f64>| {
-        let limit_m = scenario.obstacles.get(obstacle)?.clearance_m;
-        let found = finding(vehicle, time_s, limit_m, min_m.unwrap_or(limit_m.next_down()));
-        Some(RunFinding { obstacle: obstacle as u64 + 1, ..found })
-    };
-    match *event {
-        Event::ViolationBegan { pair, time_s } => Some(of_pair(pair, time_s, scenario.delta_m.next_down())),
-        Event::Approach { pair, time_s, separation_m } => Some(of_pair(pair, time_s, separation_m)),
-        Event::ObstacleViolationBegan { vehicle, obstacle, time_s } => of_obstacle(vehicle, obstacle, time_s, None),
-        Event::ObstacleApproach { vehicle, obstacle, time_s, distance_m } => {
-            of_obstacle(vehicle, obstacle, time_s, Some(distance_m))
+    let (pair, time_s, min_m) = match *event {
+        Event::ViolationBegan { pair, time_s } => (pair.into(), time_s, None),
+        Event::Approach { pair, time_s, separation_m } => (pair.into(), time_s, Some(separation_m)),
+        Event::ObstacleViolationBegan { vehicle, obstacle, time_s } => {
+            (ObjectPair::Obstacle { vehicle, obstacle }, time_s, None)
         }
-        _ => None,
-    }
+        Event::ObstacleApproach { vehicle, obstacle, time_s, distance_m } => {
+            (ObjectPair::Obstacle { vehicle, obstacle }, time_s, Some(distance_m))
+        }
+        _ => return None,
+    };
+    let limit_m = match pair {
+        ObjectPair::Vehicles(_) => scenario.delta_m,
+        ObjectPair::Obstacle { obstacle, .. } => scenario.obstacles.get(obstacle)?.clearance_m,
+    };
+    let (from_s, to_s, min_at_s, min_m) = (time_s, time_s, time_s, min_m.unwrap_or(limit_m.next_down()));
+    Some(numbered(&Violation { pair, from_s, to_s, min_m, min_at_s, limit_m }, metric_scale(scenario)))
+}
+
+/// Returns the factor from separations of the scenario to those of its recording.
+fn metric_scale(scenario: &Scenario) -> f64 {
+    scenario.half_axes_m().map_or(1.0, |_| TOUCHING_ELLIPSOIDS / scenario.delta_m)
+}
+
+/// Returns a violation or an approach with numbers from 1, separations of vehicles multiplied by `scale`.
+fn numbered(found: &Violation<ObjectPair>, scale: f64) -> RunFinding {
+    let &Violation { pair, from_s, to_s, min_m, min_at_s, limit_m } = found;
+    let ([vehicle, other_vehicle, obstacle], scale) = match pair {
+        ObjectPair::Vehicles(pair) => ([pair.first() + 1, pair.second() + 1, 0], scale),
+        ObjectPair::Obstacle { vehicle, obstacle } => ([vehicle + 1, 0, obstacle + 1], 1.0),
+    };
+    let [vehicle, other_vehicle, obstacle] = [vehicle, other_vehicle, obstacle].map(|number| number as u64);
+    let (min_m, limit_m) = (min_m * scale, limit_m * scale);
+    RunFinding { vehicle, other_vehicle, obstacle, limit_m, from_s, to_s, min_m, min_at_s }
 }
 
 /// Leaves the answer of the samples undecided, for a reason of the run's audit.
