@@ -49,10 +49,10 @@ pub(super) fn flight(
     let scenario = ScenarioRequest::named(&path.to_string_lossy(), &[])?.read()?;
     let mut log = FlightLog::of(&scenario);
     let report = run(&scenario, &mut log)?;
-    if let Some(closest) = report.separation.closest() {
+    if let Some(closest) = report.closest_pair() {
         log.conclude(closest.separation_m, closest.time_s);
     }
-    Ok(Timeline::flown(&scenario, Arc::new(log)).judged(report.audit.status))
+    Ok(Timeline::flown(&scenario, Arc::new(log)).judged(report.answer.status))
 }
 
 /// Refuses options of recordings for a scenario.

@@ -46,9 +46,9 @@ fn a_large_swarm_sweeps_near_pairs_and_records_vehicles() {
             run_while(&scenario, &preflight, sink, &mut |_| ControlFlow::Continue(()))
         };
         let report = threads.install(fly).expect("a flight");
-        assert_eq!((report.audit.status, report.run.steps), (Status::Clear, 3), "{name}: whole steps, none in parts");
+        assert_eq!((report.answer.status, report.run.steps), (Status::Clear, 3), "{name}: whole steps, none in parts");
         // Four neighbours at 2 m, and four at 2.83 m.
-        let swept = report.audit.pairs_checked as f64 / (4 * MANY_VEHICLES) as f64;
+        let swept = report.answer.detectors.expect("detectors").pairs_swept as f64 / (4 * MANY_VEHICLES) as f64;
         assert!((2.0..=8.0).contains(&swept), "{name}: {swept} pairs a vehicle and step");
         recorder.finish().expect("written");
         let (bytes, numbers) = (std::fs::metadata(&path).expect("written").len(), preflight.recording_bytes);

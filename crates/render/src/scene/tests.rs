@@ -523,8 +523,8 @@ fn the_closest_approach_is_the_same_in_report_figure_replay_and_picture() {
     scenario.time.record_hz = 1.0;
     let mut log = FlightLog::of(&scenario);
     let report = run(&scenario, &mut log).expect("a flight");
-    let (min_m, at_s) = (report.separation.min_m.expect("a distance"), report.separation.min_at_s.expect("a time"));
-    let [first, second] = report.separation.min_pair.expect("a pair");
+    let closest = report.closest_pair().expect("a pair");
+    let (min_m, at_s, [first, second]) = (closest.separation_m, closest.time_s, closest.pair.numbers());
     log.conclude(min_m, at_s);
     let closest = log.closest().expect("an approach");
     assert_eq!((closest.separation_m, closest.time_s, closest.pair.numbers()), (min_m, at_s, [first, second]));
