@@ -330,3 +330,36 @@ fn summary(of: &Summary, monitor: &Monitor) -> String {
     }
     text
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::{Subject, sentence};
+    use crate::event::{Fault, Reason};
+    use crate::monitor::{Monitor, Pose};
+    use crate::notice::{Notice, Statement};
+    use crate::plan::Plan;
+    use crate::settings::Settings;
+
+    #[test]
+    fn sentences_have_names_numbers_and_sources_of_bounds() {
+        let mut monitor = Monitor::new(Settings::default(), Plan::default()).expect("settings");
+        for (id, x) in [("a", 0.0), ("b\n", 4.0)] {
+            let (position_m, velocity_m_s) = (Vector3::x() * x, Some(Vector3::zeros()));
+            monitor.take(&Pose { t_s: 0.0, id, position_m, velocity_m_s, accuracy_m: None }, 0.0);
+        }
+        let text = Notice::new(Statement::State(&monitor.assess(0.0)), &monitor).text;
+        let bounds = "if positions are within 0.05 m (default) and accelerations within 9.81 m/s^2 (default)";
+        assert!(text.starts_with("0.00 s: CLEAR until 0.5") && text.contains(bounds), "{text}");
+        assert!(text.ends_with("; closest a-b\u{fffd} 4.00 m, at least 3.89 m"), "{text}");
+        for (reason, expected) in [
+            (Reason::Stale(0, 1.5), "a not heard for 1.50 s"),
+            (Reason::Uncertain([0, 1], 0.999), "a-b\u{fffd} may be as near as 0.99 m (delta 1 m)"),
+            (Reason::Fault(Fault::Conflict, Some(0)), "a has two positions at one time"),
+            (Reason::Fault(Fault::Conflict, None), "a vehicle has two positions at one time in the last 1 s"),
+        ] {
+            assert_eq!(sentence(Subject::Reason(reason), &monitor), expected);
+        }
+    }
+}
