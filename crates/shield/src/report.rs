@@ -366,6 +366,7 @@ fn raise(share: &mut Option<f64>, other: Option<f64>) {
 mod tests {
     use super::*;
     use crate::Settings;
+    use tautline_core::fact::Coded as _;
 
     #[test]
     fn counters_add_and_name_the_assumption_that_failed() {

@@ -154,11 +154,10 @@ impl Settings {
     /// Returns the clocks of the stamps. Stamps as the time base need a common one.
     #[must_use]
     pub fn clock_scope(&self) -> ClockScope {
-        match (self.time_base, self.clocks) {
-            (TimeBase::Stamps, _) => ClockScope::Common,
-            (TimeBase::Arrival, Some(clocks)) => clocks,
-            (TimeBase::Arrival, None) if self.has_message_counts => ClockScope::PerVehicle,
-            (TimeBase::Arrival, None) => ClockScope::Common,
+        let by_default = if self.has_message_counts { ClockScope::PerVehicle } else { ClockScope::Common };
+        match self.time_base {
+            TimeBase::Arrival => self.clocks.unwrap_or(by_default),
+            TimeBase::Stamps => ClockScope::Common,
         }
     }
 

@@ -74,23 +74,23 @@ fn state(of: &Assessment, monitor: &Monitor) -> String {
         State::Undecided(why) => (format!("UNDECIDED: {}", reason(why, monitor)), false),
     };
     if let Some(near) = of.closest {
-        text += &format!("; closest {} {} m", pair(near.pair), at_least(near.nominal_m, 2));
+        text.extend([format!("; closest {} {} m", pair(near.pair), at_least(near.nominal_m, 2))]);
         if !is_violation {
-            text += &format!(", at least {} m", at_least(near.least_m.max(0.0), 2));
+            text.extend([format!(", at least {} m", at_least(near.least_m.max(0.0), 2))]);
         }
     }
     if let Some(first) = of.nominal_violation.filter(|_| !is_violation) {
-        text += &format!("; on course to violate: {} at {}", pair(first.pair), seconds(first.at_s));
+        text.extend([format!("; on course to violate: {} at {}", pair(first.pair), seconds(first.at_s))]);
     }
     if let Some(brake) = of.last_brake.filter(|_| !is_violation) {
-        text += &if brake.at_s > of.now_s {
+        text.extend([if brake.at_s > of.now_s {
             format!("; brake {} by {} s", pair(brake.pair), at_least(brake.at_s, 2))
         } else {
             format!("; the last moment to brake {} has passed", pair(brake.pair))
-        };
+        }]);
     }
     if of.signed_off > 0 {
-        text += &format!("; signed off: {} of {}", of.signed_off, of.heard);
+        text.extend([format!("; signed off: {} of {}", of.signed_off, of.heard)]);
     }
     text
 }
@@ -142,18 +142,13 @@ fn event(event: &Event, cause: Option<Subject<'_>>, monitor: &Monitor) -> String
         }
         Event::Plan { vehicle, .. } => format!("{} is within {} m of its plan again", name(vehicle), settings.tube_m),
         Event::Fault { fault, count, vehicle, .. } => {
-            let mut text = self::fault(fault, vehicle.map(name).as_deref());
-            if count > 1 {
-                text += &format!(" ({count} times)");
-            }
-            match cause {
-                Some(Subject::Reason(why)) => {
-                    text += &format!(": {}{}", reason(why, monitor), remedy_of_sign_off(why, monitor));
-                }
-                Some(Subject::Message(error)) => text += &format!(": {}", message(error)),
-                _ => {}
-            }
-            text
+            let times = if count > 1 { format!(" ({count} times)") } else { String::new() };
+            let cause = match cause {
+                Some(Subject::Reason(why)) => format!(": {}{}", reason(why, monitor), remedy_of_sign_off(why, monitor)),
+                Some(Subject::Message(error)) => format!(": {}", message(error)),
+                _ => String::new(),
+            };
+            format!("{}{times}{cause}", self::fault(fault, vehicle.map(name).as_deref()))
         }
     }
 }
@@ -320,13 +315,13 @@ fn summary(of: &Summary, monitor: &Monitor) -> String {
         of.violations
     );
     if of.returned > 0 {
-        text += &format!("; heard again after a sign-off: {}", of.returned);
+        text.extend([format!("; heard again after a sign-off: {}", of.returned)]);
     }
     if let Some((distance_m, pair)) = &of.closest {
-        text += &format!("; closest {} {} m", pair.join("-"), at_least(*distance_m, 2));
+        text.extend([format!("; closest {} {} m", pair.join("-"), at_least(*distance_m, 2))]);
     }
     if let Some(count) = of.compared {
-        text += &format!("; positions compared with the plan: {count}");
+        text.extend([format!("; positions compared with the plan: {count}")]);
     }
     text
 }

@@ -210,6 +210,7 @@ impl Certificate {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tautline_core::fact::Coded as _;
     use tautline_core::swarm::Pair;
 
     #[test]

@@ -126,7 +126,7 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::{LONGEST_LINE, input_of_line, lines};
-    use crate::event::Problem;
+    use crate::event::{MessageError, Problem};
     use crate::source::{Input, channel};
 
     #[test]
@@ -176,9 +176,8 @@ mod tests {
         let found: Vec<_> = inputs.receiver.iter().collect();
         let kinds: Vec<_> = found.iter().map(|input| matches!(input, Input::Pose(..))).collect();
         assert_eq!(kinds, [true, false, true, false, false]);
-        assert!(
-            matches!(&found[1], Input::Garbage(error, _) if error.problem == Problem::TooLong && error.place == "line 2")
-        );
+        let too_long = MessageError { place: "line 2".to_owned(), problem: Problem::TooLong };
+        assert!(matches!(&found[1], Input::Garbage(error, _) if *error == too_long));
         assert_eq!(found[4], Input::End);
     }
 }

@@ -43,8 +43,8 @@ impl Naming {
         self.options.topics.is_empty() || self.options.topics.iter().any(|of| of == topic)
     }
 
-    /// Returns the pose of a vehicle that arrived at a time \[s\], or the error of its message; `None` for a transform in
-    /// another frame.
+    /// Returns the pose of a vehicle that arrived at a time \[s\], or the error of its message; `None` for a transform
+    /// in another frame.
     ///
     /// A name in the message is the name of the vehicle. Otherwise the name is the topic without its last part, such
     /// as `cf1` of `/cf1/pose`.
