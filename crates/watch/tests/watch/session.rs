@@ -224,7 +224,7 @@ fn a_return_after_a_sign_off_makes_the_time_since_the_sign_off_not_known() {
         };
         let (summary, seen) = flight(true);
         assert!(!summary.passes() && summary.was_undecided && summary.returned == 1, "{summary:?} {:?}", seen.notices);
-        // NOT KNOWN from the sign-off to the return, and for the largest age from there.
+        // UNDECIDED from the sign-off to the return, and for the largest age from there.
         assert!((summary.clear_s - clear_s).abs() < 1e-9, "{summary:?}");
         assert!((summary.undecided_s - 2.98).abs() < 1e-9, "{summary:?}");
         let back = [("/event", json!("back")), ("/t_s", json!(3.1)), ("/signed_off_s", json!(1.02))];
