@@ -320,3 +320,31 @@ fn every_code_of_a_warning_is_on_its_page() {
         assert!(rows.any(is_row), "{}", code.name());
     }
 }
+
+#[test]
+fn every_code_has_a_row_and_every_row_a_code() {
+    use tautline::fact::{Coded, FactKind, Source};
+    use tautline::watch;
+    for (heading, codes) in [
+        ("Reasons against a pass", tautline::report::Reason::CODES),
+        ("Reasons of a void certificate", tautline::law::VoidReason::CODES),
+        ("Early ends", tautline::sim::Ending::CODES),
+        ("Exceeded bounds of a shield", tautline::shield::report::Exceeded::CODES),
+        ("Facts", FactKind::CODES),
+        ("Sources", Source::CODES),
+        ("Notices of a watch", watch::Statement::CODES),
+        ("Reasons of a watch", watch::Reason::CODES),
+        ("Faults of a watch", watch::Fault::CODES),
+        ("Messages that cannot be read", watch::Problem::CODES),
+        ("Lost sources of a watch", watch::Loss::CODES),
+    ] {
+        let lines = section(CODES, "\n## ", heading).lines().skip_while(|line| !line.starts_with("| ---"));
+        let cells = lines.filter_map(|line| line.strip_prefix("| `")?.split_once("` |"));
+        let mut rows: Vec<_> = cells.flat_map(|(cell, _)| cell.split("`, `")).collect();
+        // A completed flight has no early end.
+        let mut codes: Vec<_> = codes.iter().copied().filter(|code| *code != "completed").collect();
+        rows.sort_unstable();
+        codes.sort_unstable();
+        assert_eq!(rows, codes, "{heading}");
+    }
+}

@@ -68,6 +68,6 @@ pub use outcome::{
 };
 pub use recorded::TrackAuditor;
 pub use slices::{Slice, Slices};
-pub use sweep::swept_separation_m;
+pub use sweep::{Sweep, sweep, swept_separation_m};
 pub use tautline_core::{swarm, track};
 pub use well_clear::WellClear;

@@ -56,6 +56,27 @@ pub fn swept_separation_m(from: Vector3<f64>, to: Vector3<f64>) -> f64 {
     RelativeMotion::new(from, to).closest().separation_m()
 }
 
+/// Smallest separation over a straight relative motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sweep {
+    /// Smallest separation \[m\].
+    pub min_m: f64,
+    /// Time of the smallest separation, as a fraction of the motion.
+    pub at: f64,
+    /// Part of the motion below the limit, as fractions; `None` without one.
+    pub below: Option<[f64; 2]>,
+}
+
+/// Sweeps the relative position of two vehicles on a straight line from `from` to `to` \[m\], with a limit \[m\].
+#[must_use]
+pub fn sweep(from: Vector3<f64>, to: Vector3<f64>, limit_m: f64) -> Sweep {
+    let motion = RelativeMotion::new(from, to);
+    let closest = motion.closest();
+    let min_m = closest.separation_m();
+    let below = (min_m < limit_m).then(|| motion.below(limit_m, closest)).map(|Span { enter, exit }| [enter, exit]);
+    Sweep { min_m, at: closest.at, below }
+}
+
 /// Straight relative motion of a pair over a step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RelativeMotion {

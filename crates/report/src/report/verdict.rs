@@ -8,6 +8,7 @@ use super::hulls::PassedThrough;
 use super::legs::LegNumbers;
 use tautline_audit::{Disagreement, ObjectPair, Status};
 use tautline_core::fact::Coded;
+use tautline_core::impl_coded;
 use tautline_core::record::EnergyRise;
 use tautline_core::swarm::{Bounce, Pair};
 use tautline_sim::metrics::Summary;
@@ -216,35 +217,31 @@ fn serialize_approach<S: Serializer>(found: &Finding, serializer: S) -> Result<S
     data.serialize(serializer)
 }
 
-impl Coded for Reason {
-    fn code(&self) -> &'static str {
-        match self {
-            Self::Refused { .. } => "refused",
-            Self::Violation { .. } => "violation",
-            Self::UnresolvedByStep(_) => "unresolved-by-step",
-            Self::ObstacleViolation { .. } => "obstacle-violation",
-            Self::ObstacleCertificateBroken { .. } => "obstacle-certificate-broken",
-            Self::ObstacleDetectorsDisagree { .. } => "obstacle-detectors-disagree",
-            Self::ObstacleUnresolvedByStep(_) => "obstacle-unresolved-by-step",
-            Self::ObstacleUndecided { .. } => "obstacle-undecided",
-            Self::PassedThrough { .. } => "passed-through",
-            Self::HullsHit { .. } => "hulls-hit",
-            Self::DetectorsDisagree { .. } => "detectors-disagree",
-            Self::PathsBend { .. } => "paths-bend",
-            Self::NotJudged {} => "not-judged",
-            Self::CertificateBroken { .. } => "certificate-broken",
-            Self::ShieldBoundExceeded { .. } => "shield-bound-exceeded",
-            Self::LawFailed { .. } => "law-failed",
-            Self::StepsTooLong { .. } => "steps-too-long",
-            Self::EnergyRose { .. } => "energy-rose",
-            Self::EndedEarly { .. } => "ended-early",
-            Self::NotReached { .. } => "not-reached",
-            Self::LegNotReached { .. } => "leg-not-reached",
-            Self::LegNeverBegan { .. } => "leg-never-began",
-            Self::StartTooFlat { .. } => "start-too-flat",
-        }
-    }
-}
+impl_coded! { Reason {
+    Self::Refused { .. } => "refused",
+    Self::Violation { .. } => "violation",
+    Self::UnresolvedByStep(_) => "unresolved-by-step",
+    Self::ObstacleViolation { .. } => "obstacle-violation",
+    Self::ObstacleCertificateBroken { .. } => "obstacle-certificate-broken",
+    Self::ObstacleDetectorsDisagree { .. } => "obstacle-detectors-disagree",
+    Self::ObstacleUnresolvedByStep(_) => "obstacle-unresolved-by-step",
+    Self::ObstacleUndecided { .. } => "obstacle-undecided",
+    Self::PassedThrough { .. } => "passed-through",
+    Self::HullsHit { .. } => "hulls-hit",
+    Self::DetectorsDisagree { .. } => "detectors-disagree",
+    Self::PathsBend { .. } => "paths-bend",
+    Self::NotJudged {} => "not-judged",
+    Self::CertificateBroken { .. } => "certificate-broken",
+    Self::ShieldBoundExceeded { .. } => "shield-bound-exceeded",
+    Self::LawFailed { .. } => "law-failed",
+    Self::StepsTooLong { .. } => "steps-too-long",
+    Self::EnergyRose { .. } => "energy-rose",
+    Self::EndedEarly { .. } => "ended-early",
+    Self::NotReached { .. } => "not-reached",
+    Self::LegNotReached { .. } => "leg-not-reached",
+    Self::LegNeverBegan { .. } => "leg-never-began",
+    Self::StartTooFlat { .. } => "start-too-flat",
+} }
 
 impl Verdict {
     /// Returns whether the flown motion is that of law and vehicles. If it is not, a clear flight proves nothing about
