@@ -67,8 +67,8 @@ fn fill<'a>(mut request: AuditRequest<'a>, text: &str, path: &Path) -> Result<Co
     if file.ellipsoid_m.is_some() && !file.radius_m.is_empty() {
         return Err(wrong("ellipsoid_m and radius_m are both given".to_owned()));
     }
-    let is_bounded = request.options.motion.is_some() || file.motion == Some(Interpolation::Bounded);
-    if !file.max_accel_m_s2.is_empty() && !is_bounded {
+    let may_be_bounded = request.options.motion.is_some() || file.motion == Some(Interpolation::Bounded);
+    if !file.max_accel_m_s2.is_empty() && !may_be_bounded {
         return Err(wrong("max_accel_m_s2 has no effect without motion = \"bounded\"".to_owned()));
     }
     // Each key may change the verdict.
