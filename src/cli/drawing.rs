@@ -8,11 +8,10 @@ use std::sync::Arc;
 use clap::builder::TypedValueParser;
 
 use super::console::Console;
-use super::reading::one_of;
 use tautline_recordings::mcap::McapRecording;
 use tautline_recordings::read::{self, Fault, Format, ReadError, ReadOptions};
 use tautline_render::{Colouring, FARTHEST_M, FlightLog, RenderError, Theme, Timeline, TracksError};
-use tautline_report::request::{Failure, ScenarioRequest};
+use tautline_report::request::{Failure, ScenarioRequest, one_of};
 use tautline_report::run::run;
 use tautline_sim::scenario::builtin;
 

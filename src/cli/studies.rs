@@ -6,10 +6,9 @@ use clap::Args;
 use clap::builder::{PossibleValue, TypedValueParser};
 
 use super::console::{Console, Terminal};
-use super::reading::one_of;
 use super::run::{ScenarioArguments, pictures};
 use super::{Exit, completions};
-use tautline_report::request::Failure;
+use tautline_report::request::{Failure, one_of};
 use tautline_studies::attack::{Bound, FLIGHTS, SEEDS_OF_A_CANDIDATE};
 use tautline_studies::margin::Range;
 use tautline_studies::sweep::SweptKey;

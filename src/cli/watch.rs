@@ -9,11 +9,11 @@ use clap::Args;
 use clap::builder::PossibleValue;
 
 use super::console::{self, Console, Exit, Terminal};
-use super::reading::{one_of, origin};
+use super::reading::origin;
 use tautline_core::track::EarthOrigin;
 use tautline_recordings::read::{self, EarthFrame, ReadError, ReadOptions};
 use tautline_report::report::page::live_page;
-use tautline_report::request::{ExportRequest, Failure, Monitor as _, Silent, export_file};
+use tautline_report::request::{ExportRequest, Failure, Monitor as _, Silent, export_file, one_of};
 use tautline_watch::foxglove_server::FoxgloveServer;
 use tautline_watch::page::Page;
 use tautline_watch::source::{self, Feed, MavlinkFrame, NamingOptions, OwnedPose};

@@ -346,7 +346,7 @@ impl OwnRecording {
             && settings.only.is_none()
             && (settings.from_s, settings.to_s, settings.above_m) == (None, None, None)
             && settings.obstacles == self.obstacles
-            && (request.settings.motion, request.settings.max_gap_s) == (None, None)
+            && (request.options.motion, request.options.max_gap_s) == (None, None)
     }
 
     /// Returns whether the samples contradict the run's audit with a smaller distance. Distances between samples are
