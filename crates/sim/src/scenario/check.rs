@@ -7,8 +7,8 @@
 use std::borrow::Cow;
 use std::ops::Range;
 
-use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+use toml::{Spanned, Value};
 
 use super::error::ScenarioError;
 use super::error::suggest;
@@ -69,6 +69,40 @@ pub(super) fn check_value(key: &str, value: &mut Spanned<DeValue<'_>>, node: Nod
     Check { overridden_from: usize::MAX, file: node.whole_file() }.value(value, node, key, None)
 }
 
+/// Checks the bounds of a value of a scenario built in code, whose keys and types are those of the schema. Choices are
+/// nested as serde writes them.
+pub(super) fn check_bounds(value: &Value, node: Node, name: &str) -> Result<(), SchemaError> {
+    let alternatives = node.alternatives();
+    if let Value::Table(table) = value {
+        return table.iter().try_for_each(|(key, value)| {
+            let choice = value.as_table().and_then(|choice| {
+                let is_chosen = |tag: (&str, &str)| tag.0 == key && choice.contains_key(tag.1);
+                Some((alternatives.iter().find(|part| part.tag().is_some_and(is_chosen))?, choice))
+            });
+            if let Some((part, choice)) = choice {
+                return choice.values().try_for_each(|keys| check_bounds(keys, *part, name));
+            }
+            let of_choice = || alternatives.iter().find_map(|part| part.property(key));
+            node.property(key).or_else(of_choice).map_or(Ok(()), |part| {
+                check_bounds(value, part, key).map_err(|schema_error| schema_error.child(&**key))
+            })
+        });
+    }
+    let node = alternatives.into_iter().find(|part| admits(*part, value.type_str())).unwrap_or(node);
+    match *value {
+        Value::Array(ref list) => {
+            check_length(name, node, list.len(), 0..0)?;
+            let Some(node) = node.items() else { return Ok(()) };
+            list.iter().enumerate().try_for_each(|(entry, value)| {
+                check_bounds(value, node, name).map_err(|schema_error| schema_error.child((entry + 1).to_string()))
+            })
+        }
+        Value::Integer(number) => in_range(name, node, number as f64, || number.to_string(), 0..0),
+        Value::Float(number) => in_range(name, node, number, || shortest(number).to_lowercase(), 0..0),
+        _ => Ok(()),
+    }
+}
+
 struct Check {
     /// Part of the schema for the whole file.
     file: Node,
@@ -111,7 +145,7 @@ impl Check {
         }
         let alternatives = node.alternatives();
         if !alternatives.is_empty() {
-            let admitting: Vec<_> = alternatives.into_iter().filter(|part| admits(*part, value.get_ref())).collect();
+            let admitting: Vec<_> = alternatives.into_iter().filter(|part| admits(*part, value.get_ref().type_str())).collect();
             let part = match (&admitting[..], value.get_ref()) {
                 ([], _) => return Err(wrong_type(name, node, value.get_ref(), span)),
                 (parts @ [_, _, ..], DeValue::Table(table)) => self.named_by_key(name, parts, table, span)?,
@@ -119,25 +153,30 @@ impl Check {
             };
             return self.value(value, part, name, None);
         }
-        if !admits(node, value.get_ref()) {
+        if !admits(node, value.get_ref().type_str()) {
             return Err(wrong_type(name, node, value.get_ref(), span));
-        }
-        if let DeValue::Array(list) = value.get_ref() {
-            let of = |keyword: &str| node.keyword(keyword).as_u64();
-            let lengths = of("minItems").unwrap_or(0)..=of("maxItems").unwrap_or(u64::MAX);
-            if !lengths.contains(&(list.len() as u64)) {
-                return Err(wrong_type(name, node, value.get_ref(), span));
-            }
         }
         match value.get_mut() {
             DeValue::Array(list) => {
+                check_length(name, node, list.len(), span)?;
                 let Some(node) = node.items() else { return Ok(()) };
                 list.iter_mut().enumerate().try_for_each(|(entry, value)| {
                     self.value(value, node, name, None)
                         .map_err(|schema_error| schema_error.child((entry + 1).to_string()))
                 })
             }
-            number @ (DeValue::Integer(_) | DeValue::Float(_)) => in_range(name, node, number, span),
+            DeValue::Integer(written) => {
+                let Ok(whole) = i64::from_str_radix(written.as_str(), written.radix()) else {
+                    let most = if node.kind() == "integer" { i64::MAX.to_string() } else { format!("{LARGEST:e}") };
+                    return Err(out_of_range(name, node, &format!("at most {most} in magnitude"), written.as_str(), span));
+                };
+                in_range(name, node, whole as f64, || whole.to_string(), span)
+            }
+            DeValue::Float(written) => {
+                let number: f64 = written.as_str().parse().unwrap_or(f64::NAN);
+                let shown = || if number.is_finite() { shortest(number) } else { written.as_str().to_owned() };
+                in_range(name, node, number, shown, span)
+            }
             _ => Ok(()),
         }
     }
@@ -294,41 +333,38 @@ fn nest_choice(table: &mut DeTable<'_>, node: Node, chosen: Node, tag: &'static 
     table.insert(tag_key, Spanned::new(span, DeValue::Table(choice)));
 }
 
-/// Returns whether a value has the type of a part of the schema.
-fn admits(node: Node, value: &DeValue<'_>) -> bool {
-    match value {
-        DeValue::Table(_) => node.is_table(),
-        DeValue::Array(_) => node.kind() == "array",
-        DeValue::String(_) => node.kind() == "string" || !node.words().is_empty(),
-        DeValue::Boolean(_) => node.kind() == "boolean",
-        DeValue::Integer(_) => matches!(node.kind(), "integer" | "number"),
-        DeValue::Float(_) => node.kind() == "number",
-        DeValue::Datetime(_) => false,
+/// Returns whether a part of the schema has a type of TOML.
+fn admits(node: Node, type_name: &str) -> bool {
+    match type_name {
+        "table" => node.is_table(),
+        "string" => node.kind() == "string" || !node.words().is_empty(),
+        "integer" => matches!(node.kind(), "integer" | "number"),
+        "float" => node.kind() == "number",
+        other => node.kind() == other,
     }
 }
 
+/// Refuses a list that is shorter or longer than the schema allows.
+fn check_length(name: &str, node: Node, length: usize, span: Range<usize>) -> Result<(), SchemaError> {
+    let bound = |keyword: &str| node.keyword(keyword).as_u64();
+    let lengths = bound("minItems").unwrap_or(0)..=bound("maxItems").unwrap_or(u64::MAX);
+    if lengths.contains(&(length as u64)) {
+        return Ok(());
+    }
+    let message = format!("`{}` must be {}, got a list of {length}", short(name), expected(node));
+    Err(SchemaError::new("scenario/wrong-type", message, description(node), span))
+}
+
 /// Refuses a number that is not finite, outside the bounds of the schema, or outside [`SMALLEST`] to [`LARGEST`].
-fn in_range(name: &str, node: Node, number: &DeValue<'_>, span: Range<usize>) -> Result<(), SchemaError> {
-    let (written, number) = match number {
-        DeValue::Integer(written) => {
-            let Ok(whole) = i64::from_str_radix(written.as_str(), written.radix()) else {
-                let most = if node.kind() == "integer" { i64::MAX.to_string() } else { format!("{LARGEST:e}") };
-                let message = format!("`{name}` must be at most {most} in magnitude, got {}", written.as_str());
-                return Err(SchemaError::new("scenario/out-of-range", message, description(node), span));
-            };
-            (whole.to_string(), whole as f64)
-        }
-        DeValue::Float(written) => {
-            let number: f64 = written.as_str().parse().unwrap_or(f64::NAN);
-            (if number.is_finite() { shortest(number) } else { written.as_str().to_owned() }, number)
-        }
-        _ => return Ok(()),
-    };
+fn in_range(
+    name: &str,
+    node: Node,
+    number: f64,
+    shown: impl FnOnce() -> String,
+    span: Range<usize>,
+) -> Result<(), SchemaError> {
     let bound = |keyword: &str| node.keyword(keyword).as_f64();
-    let refuse = |must: String| {
-        let message = format!("`{name}` must be {must}, got {written}");
-        Err(SchemaError::new("scenario/out-of-range", message, description(node), span.clone()))
-    };
+    let refuse = |must: String| Err(out_of_range(name, node, &must, &shown(), span));
     if !number.is_finite() {
         return refuse("a finite number".to_owned());
     }
@@ -351,6 +387,11 @@ fn in_range(name: &str, node: Node, number: &DeValue<'_>, span: Range<usize>) ->
         return refuse(format!("at least {SMALLEST:e}"));
     }
     Ok(())
+}
+
+fn out_of_range(name: &str, node: Node, must: &str, number: &str, span: Range<usize>) -> SchemaError {
+    let message = format!("`{name}` must be {must}, got {number}");
+    SchemaError::new("scenario/out-of-range", message, description(node), span)
 }
 
 fn unknown_choice(name: &str, known: &[&str], span: Range<usize>) -> SchemaError {

@@ -2,8 +2,8 @@
 //!
 //! A [`Scenario`] is plain data that holds a whole flight; [`Scenario::validate`] lists its invariants.
 //! [`Scenario::read`] reads it from TOML, [`Scenario::new`] builds it in code. Data flow of a file: `source` -> `text`
-//! (TOML and overrides) -> `check` (schema) -> `document` (keys) -> `build` -> `validate`. [`Scenario::resolved_toml`]
-//! writes a scenario back as TOML with every default and random number written out.
+//! (TOML and overrides) -> `check` (schema) -> `document` (keys) -> `build` -> `validate`. [`Scenario::resolved`] writes
+//! a scenario back as TOML with every default and random number written out.
 
 mod build;
 pub mod builtin;
@@ -43,6 +43,7 @@ pub use limits::{
 };
 pub use obstacles::{OBSTACLE_HELP, ObstacleTable, Solid};
 pub use resolution::Drift;
+pub use resolved::Resolved;
 pub use schema::{TomlSchema, key_choices, key_paths, schema, takes_integers_only};
 pub use source::{MAX_FILE_BYTES, Source};
 pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Safety, Scenario, Space};

@@ -2,14 +2,15 @@
 
 use nalgebra::Vector3;
 
-use super::check::{SchemaError, check_schema};
+use super::check::{SchemaError, check_bounds};
+use super::document::Document;
 use super::error::ScenarioError;
 use super::limits::{
     CONTACT_PREDICTION_M, MAX_NAME_CHARS, MAX_STEPS, SLOT_MARGIN, check_count, check_lengths, check_memory,
     first_pair_within, is_name_character, require_finite,
 };
+use super::schema::Node;
 use super::spec::{Safety, Scenario, Space};
-use super::text::Text;
 use super::time::TimeSpec;
 use crate::sim::{self, SimError};
 use tautline_audit::ObstacleError;
@@ -44,7 +45,7 @@ impl Scenario {
     pub fn validate(&self) -> Result<(), ScenarioError> {
         self.check_noise()?;
         self.check_lengths()?;
-        self.check_written(&self.resolved_toml(), SchemaError::without_text)?;
+        check_bounds(&Document::from(self).value(), Node::root(), "scenario").map_err(SchemaError::without_text)?;
         self.check()
     }
 
@@ -52,13 +53,8 @@ impl Scenario {
     pub(super) fn check_built(&self) -> Result<(), ScenarioError> {
         self.check()?;
         // The reader of a recording checks these values. Points and edges have no other limits than the checked ones.
-        self.check_written(&self.resolved_toml_without_lists(), SchemaError::of_filled_value)
-    }
-
-    /// Checks the text of the scenario against the schema.
-    fn check_written(&self, written: &str, of_key: fn(SchemaError) -> ScenarioError) -> Result<(), ScenarioError> {
-        let mut tree = Text { name: &self.name, toml: written, overrides: &[] }.tree()?;
-        check_schema(&mut tree, written.len() + 1).map_err(of_key)
+        let filled = Document::from(self).without_lists().value();
+        check_bounds(&filled, Node::root(), "scenario").map_err(SchemaError::of_filled_value)
     }
 
     /// Checks conditions on several keys; the schema checks single keys.

@@ -71,7 +71,7 @@ fn a_scenario_with_every_imperfection_is_written_and_read_back() {
     ];
     let sets: Vec<_> = ALL.into_iter().chain(more).collect();
     let scenario = builtin("pentagon", &sets);
-    let again = read(&scenario.resolved_toml());
+    let again = read(&scenario.resolved().toml);
     assert_eq!(scenario, again);
     assert_eq!((again.network.failure.len(), again.failures.len(), again.time.control_hz), (2, 3, Some(60.0)));
     let (flight, log) = fly(&scenario);

@@ -129,7 +129,7 @@ fn a_default_that_follows_from_other_keys_survives_write_and_read() {
         (&["law.kind=laplacian", "swarm.a22_per_s=0", "vehicle.drag_per_s=3"], 0.0),
     ] {
         let scenario = read_builtin("pentagon", sets).expect("valid");
-        let written = scenario.resolved_toml();
+        let written = scenario.resolved().toml;
         assert!(written.contains(&format!("f2_per_s = {f2_per_s:?}\n")), "{written}");
         assert_eq!(read(&written), Ok(scenario), "{sets:?}");
     }
@@ -241,7 +241,7 @@ fn an_unknown_name_is_refused_with_the_known_names() {
 #[test]
 fn an_override_sets_existing_and_missing_keys() {
     let set = |sets: &[&str]| read_builtin("pentagon", sets).expect("right overrides");
-    let says = |sets: &[&str], line: &str| set(sets).resolved_toml().lines().any(|written| written.trim() == line);
+    let says = |sets: &[&str], line: &str| set(sets).resolved().toml.lines().any(|written| written.trim() == line);
     assert!(says(&["law.delta_m=1.5"], "delta_m = 1.5"));
     assert!(says(&["name=my-run"], "name = \"my-run\""));
     assert!(says(&[], "kind = \"rapier\"") && says(&["plant.kind=ideal"], "kind = \"ideal\""));
@@ -371,23 +371,23 @@ fn the_resolved_scenario_reads_back_to_the_same_bits_and_the_same_hash() {
     let changed = changed.iter().map(|&sets| ("pentagon", sets));
     for (name, sets) in builtin::all().iter().map(|builtin| (builtin.name, &[][..])).chain(changed) {
         let scenario = read_builtin(name, sets).expect(name);
-        let resolved = scenario.resolved_toml();
+        let resolved = scenario.resolved().toml;
         let again = read(&resolved).expect(&resolved);
         assert_eq!(again, scenario);
         let (a, b) = (&scenario.start.positions_m, &again.start.positions_m);
         assert!(a.iter().zip(b).all(|(a, b)| a.to_bits() == b.to_bits()));
-        assert_eq!(again.resolved_toml(), resolved);
-        assert_eq!(again.sha256_hex(), scenario.sha256_hex());
+        assert_eq!(again.resolved().toml, resolved);
+        assert_eq!(again.resolved().sha256, scenario.resolved().sha256);
     }
 }
 
 #[test]
 fn the_hash_changes_with_the_last_bit_of_a_start_position() {
     let mut scenario = read_builtin("pentagon", &[]).expect("a built-in");
-    let hash = scenario.sha256_hex();
+    let hash = scenario.resolved().sha256;
     assert_eq!(hash.len(), 64);
     scenario.start.positions_m[(0, 0)] = scenario.start.positions_m[(0, 0)].next_up();
-    assert_ne!(scenario.sha256_hex(), hash);
+    assert_ne!(scenario.resolved().sha256, hash);
 }
 
 #[test]
@@ -470,6 +470,6 @@ fn an_invalid_scenario_built_in_code_is_refused_without_panic() {
         break_it(&mut scenario);
         assert!(scenario.validate().is_err(), "break {number}");
         // The text must not make the reader panic either.
-        let _ = read(&scenario.resolved_toml());
+        let _ = read(&scenario.resolved().toml);
     }
 }

@@ -67,9 +67,9 @@ fn slots_must_not_be_spread_to_the_end_of_the_flight() {
 fn a_reference_without_a_kind_is_at_rest() {
     let resting = |keys: &str| read(&format!("{RIGHT}[reference]\n{keys}").replace("edge-tension", "displacement"));
     let (named, bare) = (resting("kind = \"rest\"\nleader = 2\n"), resting("leader = 2\n"));
-    let resolved = named.expect("right").resolved_toml();
+    let resolved = named.expect("right").resolved().toml;
     assert!(resolved.contains("leader = 2"));
-    assert_eq!(bare.expect("right").resolved_toml(), resolved);
+    assert_eq!(bare.expect("right").resolved().toml, resolved);
     let moving = resting("velocity_m_s = [1, 0]\n").expect_err("one at rest has no velocity");
     assert_eq!(moving.code(), "scenario/unknown-key", "{moving}");
 }

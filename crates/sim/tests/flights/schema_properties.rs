@@ -221,7 +221,7 @@ fn fault_of_refusal(error: &ScenarioError, paths: &[String]) -> Option<String> {
 
 /// Returns the fault of an accepted scenario: it cannot be written, read back, checked or flown.
 fn fault_of_accepted(scenario: &Scenario) -> Option<String> {
-    let written = scenario.resolved_toml();
+    let written = scenario.resolved().toml;
     match read(&written) {
         Err(error) => return Some(format!("its own text is refused: {error}")),
         Ok(again) if again != *scenario => return Some("its own text is another scenario".to_owned()),

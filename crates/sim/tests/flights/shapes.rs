@@ -61,7 +61,7 @@ fn every_shape_has_the_given_spacing_or_one_and_a_half_delta() {
             assert_eq!((scenario.count(), scenario.space), (50, space), "{shape}");
             let off = nearest_m(&scenario) / spacing_m - 1.0;
             assert!(off.abs() < SPACING_ROUNDING, "{shape}: {off:e}");
-            let resolved = scenario.resolved_toml();
+            let resolved = scenario.resolved().toml;
             assert!(resolved.contains("shape = \"points\""), "{resolved}");
             let again = Scenario::read(&Source::Text { name: "again".to_owned(), text: resolved }, &[]);
             assert_eq!(again.as_ref(), Ok(&scenario), "{shape}");

@@ -261,10 +261,10 @@ fn a_leader_blown_off_its_reference_voids_the_certificate() {
 #[test]
 fn a_scenario_with_wind_is_written_and_read_back_bit_for_bit() {
     let scenario = builtin("gusts", &[]);
-    let again = read(&scenario.resolved_toml());
+    let again = read(&scenario.resolved().toml);
     assert_eq!(again, scenario);
     assert_eq!(again.wind.gusts[0].fall_s(), 1.5, "the fall time defaults to the rise time");
-    let own = read(&builtin("gusts", &["wind.shared=false"]).resolved_toml());
+    let own = read(&builtin("gusts", &["wind.shared=false"]).resolved().toml);
     assert!(!own.wind.shared);
 }
 

@@ -218,7 +218,7 @@ impl Campaign {
     fn runs_are_equal(&self) -> bool {
         let hash = |run: u64| {
             let scenario = self.scenario(run, &self.laws[0]);
-            scenario.map_or_else(|error| error.to_string(), |scenario| scenario.flight_sha256_hex())
+            scenario.map_or_else(|error| error.to_string(), |scenario| scenario.flight_sha256())
         };
         let is_fixed = |variation: &Variation| *variation == Variation::Seed || variation.is_constant();
         self.variations.values().all(is_fixed) && (1..self.manifest.runs.min(3)).all(|run| hash(run) == hash(0))
@@ -260,7 +260,7 @@ impl Campaign {
     /// Returns for run 0 under each law the hash of the scenario, or the reason why the run cannot be flown.
     fn first(&self) -> Vec<String> {
         let first = self.laws.iter().map(|law| self.scenario(0, law));
-        first.map(|first| first.map_or_else(|error| error.message().to_owned(), |first| first.sha256_hex())).collect()
+        first.map(|first| first.map_or_else(|error| error.message().to_owned(), |first| first.resolved().sha256)).collect()
     }
 
     /// Returns the same campaign, whose number of runs was raised after flights had been flown.

@@ -307,7 +307,7 @@ fn fly_violated_flight(folder: &Folder, flight: FlightId<'_>, bad: usize, out: &
     };
     let scenario = flight.scenario(folder.campaign())?;
     std::fs::create_dir_all(out).map_err(file_failure("write", out))?;
-    let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
+    let header = Header::new(&scenario.name, &scenario.resolved().toml, scenario.count(), scenario.delta_m);
     let mut recording = McapRecorder::create(&out.join(RECORDING), &header)?;
     let mut state = StateHashAtStep::violation_of(violated);
     let flown = splitting::replay(&scenario, &violated.genealogy, &mut (&mut recording, &mut state));

@@ -84,7 +84,7 @@ fn conditions_of_a_measured_table_are_checked() {
     // An own assumption needs no table.
     assert!(builtin(SHIELDED, &["wind.mean_m_s=[1,0]", "shield.tracking_error_m=0.5"]).shield.is_some());
     let again = Scenario::read(
-        &scenario::Source::Text { name: "again".to_owned(), text: builtin(SHIELDED, &[]).resolved_toml() },
+        &scenario::Source::Text { name: "again".to_owned(), text: builtin(SHIELDED, &[]).resolved().toml },
         &[],
     );
     assert_eq!(again.expect("the same").shield_limits().expect("limits").expect("a shield").tube(), limits.tube());
