@@ -25,6 +25,6 @@ fuzz_target!(|bytes: &[u8]| {
             let again = Scenario::read(&source, &[]).expect("a resolved scenario is valid");
             assert_eq!(again.resolved().toml, resolved, "a resolved scenario changes when it is read");
         }
-        Err(error) => assert!(!error.message().is_empty(), "an error without a text"),
+        Err(error) => assert!(!error.message.is_empty(), "an error without a text"),
     }
 });

@@ -290,7 +290,7 @@ impl Experiment for Options {
             let scenario = base.with(&[runs.sets(run), sets(&self.keys, &points[point])].concat());
             let scenario = match scenario {
                 Ok(scenario) => scenario,
-                Err(error) => return Ok(Some(Err(error.message().to_owned()))),
+                Err(error) => return Ok(Some(Err(error.message))),
             };
             match batch.fly(&scenario, runs.seed(run)) {
                 Ok(flight) => Ok(flight.map(Ok)),

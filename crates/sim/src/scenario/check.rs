@@ -10,8 +10,7 @@ use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 use toml::{Spanned, Value};
 
-use super::error::ScenarioError;
-use super::error::suggest;
+use super::error::{ErrorKind, Field, ScenarioError, suggest};
 use super::limits::{LARGEST, SMALLEST};
 use super::schema::{Node, tables_with};
 use tautline_core::text::shortest;
@@ -28,8 +27,8 @@ pub(super) struct SchemaError {
 }
 
 impl SchemaError {
-    fn new(code: &'static str, message: impl AsRef<str>, help: impl AsRef<str>, span: Range<usize>) -> Self {
-        let error = ScenarioError::new(message).coded(code).with_help(help);
+    fn new(kind: ErrorKind, message: impl AsRef<str>, help: impl AsRef<str>, span: Range<usize>) -> Self {
+        let error = ScenarioError::new(message).with_kind(kind).with_help(help);
         Self { error, span, path: Vec::new() }
     }
 
@@ -41,10 +40,10 @@ impl SchemaError {
     /// Returns the error about a value that the scenario does not give, with its dotted path as its key.
     pub(super) fn of_filled_value(self) -> ScenarioError {
         let error = self.without_text();
-        let path = error.field().map_or_else(String::new, |field| field.to_string());
-        let message = format!("{path}, which follows from other keys: {}", error.message());
+        let path = error.fields.first().map_or_else(String::new, Field::to_string);
+        let message = format!("{path}, which follows from other keys: {}", error.message);
         ScenarioError::new(message)
-            .coded(error.code())
+            .with_kind(error.kind)
             .with_help(format!("give {path} another value, or change the keys that it follows from"))
             .at(path)
     }
@@ -145,7 +144,8 @@ impl Check {
         }
         let alternatives = node.alternatives();
         if !alternatives.is_empty() {
-            let admitting: Vec<_> = alternatives.into_iter().filter(|part| admits(*part, value.get_ref().type_str())).collect();
+            let admitting: Vec<_> =
+                alternatives.into_iter().filter(|part| admits(*part, value.get_ref().type_str())).collect();
             let part = match (&admitting[..], value.get_ref()) {
                 ([], _) => return Err(wrong_type(name, node, value.get_ref(), span)),
                 (parts @ [_, _, ..], DeValue::Table(table)) => self.named_by_key(name, parts, table, span)?,
@@ -168,7 +168,13 @@ impl Check {
             DeValue::Integer(written) => {
                 let Ok(whole) = i64::from_str_radix(written.as_str(), written.radix()) else {
                     let most = if node.kind() == "integer" { i64::MAX.to_string() } else { format!("{LARGEST:e}") };
-                    return Err(out_of_range(name, node, &format!("at most {most} in magnitude"), written.as_str(), span));
+                    return Err(out_of_range(
+                        name,
+                        node,
+                        &format!("at most {most} in magnitude"),
+                        written.as_str(),
+                        span,
+                    ));
                 };
                 in_range(name, node, whole as f64, || whole.to_string(), span)
             }
@@ -194,7 +200,7 @@ impl Check {
         let (Some(key), None) = (keys.next(), keys.next()) else {
             let message = format!("`{}` must have one key, got {}", short(name), table.len());
             let help = format!("give one of {}", names.join(", "));
-            return Err(SchemaError::new("scenario/wrong-type", message, help, span));
+            return Err(SchemaError::new(ErrorKind::WrongType, message, help, span));
         };
         let of_key = parts.iter().copied().find(|part| part.property(key.get_ref()).is_some());
         of_key.ok_or_else(|| self.unknown_key(key.get_ref(), names, key.span()))
@@ -207,7 +213,7 @@ impl Check {
             [] => suggest(name, &known),
             ref tables => format!("`{name}` belongs in {}; {}", tables.join(", or "), suggest(name, &known)),
         };
-        SchemaError::new("scenario/unknown-key", format!("unknown key `{}`", short(name)), help, span).child(name)
+        SchemaError::new(ErrorKind::UnknownKey, format!("unknown key `{}`", short(name)), help, span).child(name)
     }
 
     fn table(
@@ -242,7 +248,7 @@ impl Check {
         if let Some(missing) = required.into_iter().find(|key| !table.contains_key(*key)) {
             let help = format!("`{missing}` is {}", known(missing).map_or_else(String::new, expected));
             let schema_error =
-                SchemaError::new("scenario/missing-key", format!("missing key `{missing}`"), help, span.clone());
+                SchemaError::new(ErrorKind::MissingKey, format!("missing key `{missing}`"), help, span.clone());
             return Err(schema_error);
         }
         if let Some((chosen, (tag, _))) = chosen.and_then(|chosen| Some((chosen, chosen.tag()?))) {
@@ -268,7 +274,7 @@ impl Check {
                 let Some(name) = value.get_ref().as_str() else {
                     let message = format!("`{tag}` must be {}, got {}", listed(&names), found(value.get_ref()));
                     return Err(
-                        SchemaError::new("scenario/wrong-type", message, description(node), value.span()).child(tag)
+                        SchemaError::new(ErrorKind::WrongType, message, description(node), value.span()).child(tag)
                     );
                 };
                 (name.to_owned(), value.span())
@@ -280,7 +286,7 @@ impl Check {
             (None, None, None) => {
                 let help = format!("give one of {}", listed(&names));
                 return Err(SchemaError::new(
-                    "scenario/missing-key",
+                    ErrorKind::MissingKey,
                     format!("missing key `{tag}`"),
                     help,
                     span.clone(),
@@ -292,7 +298,7 @@ impl Check {
             if own_name.is_some() && !table.contains_key(tag) {
                 let help = format!(
                     "the name of a law is its kind unless the table [laws.NAME] has a `kind`: {}",
-                    schema_error.error.help().unwrap_or_default()
+                    schema_error.error.help.as_deref().unwrap_or_default()
                 );
                 schema_error.error = schema_error.error.with_help(help);
             }
@@ -352,7 +358,7 @@ fn check_length(name: &str, node: Node, length: usize, span: Range<usize>) -> Re
         return Ok(());
     }
     let message = format!("`{}` must be {}, got a list of {length}", short(name), expected(node));
-    Err(SchemaError::new("scenario/wrong-type", message, description(node), span))
+    Err(SchemaError::new(ErrorKind::WrongType, message, description(node), span))
 }
 
 /// Refuses a number that is not finite, outside the bounds of the schema, or outside [`SMALLEST`] to [`LARGEST`].
@@ -391,17 +397,17 @@ fn in_range(
 
 fn out_of_range(name: &str, node: Node, must: &str, number: &str, span: Range<usize>) -> SchemaError {
     let message = format!("`{name}` must be {must}, got {number}");
-    SchemaError::new("scenario/out-of-range", message, description(node), span)
+    SchemaError::new(ErrorKind::OutOfRange, message, description(node), span)
 }
 
 fn unknown_choice(name: &str, known: &[&str], span: Range<usize>) -> SchemaError {
     let message = format!("unknown choice `{}`", short(name));
-    SchemaError::new("scenario/unknown-choice", message, suggest(name, known), span)
+    SchemaError::new(ErrorKind::UnknownChoice, message, suggest(name, known), span)
 }
 
 fn wrong_type(name: &str, node: Node, value: &DeValue<'_>, span: Range<usize>) -> SchemaError {
     let message = format!("`{}` must be {}, got {}", short(name), expected(node), found(value));
-    SchemaError::new("scenario/wrong-type", message, description(node), span)
+    SchemaError::new(ErrorKind::WrongType, message, description(node), span)
 }
 
 /// Returns a value in words.

@@ -35,7 +35,7 @@ pub use crate::link::{
 };
 pub use crate::shield::ShieldSpec;
 pub use environment::IgnoredPart;
-pub use error::{Field, ScenarioError, edit_distance};
+pub use error::{ErrorKind, Field, ScenarioError, edit_distance};
 pub use external::ExternalLaw;
 pub use limits::{
     BYTES_PER_EDGE, BYTES_PER_VEHICLE, CONTACT_PREDICTION_M, LARGEST, MAX_HALVINGS, MAX_MEMORY_BYTES, MAX_NAME_CHARS,

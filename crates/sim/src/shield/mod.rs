@@ -32,7 +32,7 @@ use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::scenario::{MAX_MEMORY_BYTES, Scenario, ScenarioError, Space};
+use crate::scenario::{ErrorKind, MAX_MEMORY_BYTES, Scenario, ScenarioError, Space};
 use crate::sim::MAX_BEND;
 use tautline_core::swarm::row;
 use tautline_core::text::shortest;
@@ -152,7 +152,7 @@ impl Scenario {
         let Some(spec) = &self.shield_keys() else { return Ok(None) };
         let Some(control_hz) = self.time.control_hz else {
             return Err(ScenarioError::new("the shield holds commands over periods, but no rate of commands is given")
-                .coded("scenario/missing-key")
+                .with_kind(ErrorKind::MissingKey)
                 .with_help(format!("set time.control_hz, such as {SHIELD_CONTROL_HZ}"))
                 .at("shield"));
         };
@@ -386,7 +386,7 @@ impl Scenario {
             self.count(),
             bytes >> 30
         ))
-        .coded("scenario/memory")
+        .with_kind(ErrorKind::Memory)
         .with_help("use fewer vehicles or a shorter network.latency_s")
         .at_keys(["shield", "network.latency_s"]))
     }
@@ -412,9 +412,9 @@ fn is_whole(number: f64) -> bool {
 
 /// Returns an error about a value: `PROBLEM (VALUE)`.
 fn refused(problem: &str, value: f64) -> ScenarioError {
-    ScenarioError::new(format!("{problem} ({})", shortest(value))).coded("scenario/shield")
+    ScenarioError::new(format!("{problem} ({})", shortest(value))).with_kind(ErrorKind::Shield)
 }
 
 fn refused_with(problem: &str, help: &str) -> ScenarioError {
-    ScenarioError::new(problem).coded("scenario/shield").with_help(help)
+    ScenarioError::new(problem).with_kind(ErrorKind::Shield).with_help(help)
 }

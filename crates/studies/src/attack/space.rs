@@ -193,7 +193,7 @@ impl SearchSpace {
     /// The reason of a refusal: the candidate cannot be flown, or two vehicles start closer than `apart_m`.
     pub fn candidate(&self, values: &[f64]) -> Result<Vec<Scenario>, String> {
         let flight = |k: u64| {
-            let scenario = self.scenario(values, k).map_err(|error| error.message().to_owned())?;
+            let scenario = self.scenario(values, k).map_err(|error| error.message)?;
             scenario.law().map_err(|error| error.to_string())?;
             let near_m = self.options.apart_m.map(|apart_m| (apart_m, closest_start_m(&scenario)));
             match near_m {

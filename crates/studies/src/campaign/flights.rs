@@ -260,7 +260,7 @@ impl Campaign {
     /// Returns for run 0 under each law the hash of the scenario, or the reason why the run cannot be flown.
     fn first(&self) -> Vec<String> {
         let first = self.laws.iter().map(|law| self.scenario(0, law));
-        first.map(|first| first.map_or_else(|error| error.message().to_owned(), |first| first.resolved().sha256)).collect()
+        first.map(|first| first.map_or_else(|error| error.message, |first| first.resolved().sha256)).collect()
     }
 
     /// Returns the same campaign, whose number of runs was raised after flights had been flown.
@@ -366,7 +366,7 @@ impl Campaign {
             Ok(scenario) => scenario,
             Err(error) => {
                 batch.monitor().advance(self.own().time.steps());
-                row.not_flown = Some(error.message().to_owned());
+                row.not_flown = Some(error.message);
                 return Ok(Some(row));
             }
         };

@@ -113,7 +113,8 @@ impl Spec {
             let remedy = "a specification is `key = value` lines below `[table]` headers";
             failed("campaign/specification", &problem, Some(remedy), error.span().unwrap_or_default())
         };
-        let misfit = |code| move |(error, span): (ScenarioError, _)| failed(code, error.message(), error.help(), span);
+        let misfit =
+            |code| move |(error, span): (ScenarioError, _)| failed(code, &error.message, error.help.as_deref(), span);
         let table = DeTable::parse(text).map_err(not_toml)?.into_inner();
         let mut file = Spanned::new(0..0, DeValue::Table(table));
         SPEC.check("specification", &mut file).map_err(misfit("campaign/specification"))?;
@@ -185,7 +186,7 @@ impl Spec {
     /// Returns the error of a scenario that a key of the specification caused. The place is in the specification unless
     /// the error has a place in the scenario's own file. `situation` precedes the message if it is not empty.
     pub(super) fn scenario(&self, key: &str, situation: &str, error: ScenarioError) -> Failure {
-        let place = error.place().cloned();
+        let place = error.place.clone();
         let failure = Failure::from(error);
         let failure = if situation.is_empty() { failure } else { failure.under(situation) };
         match place {
