@@ -15,7 +15,7 @@ use std::str::FromStr;
 
 use nalgebra::Vector3;
 
-use super::error::{Fault, ReadError, quoted, refuse};
+use super::error::{ContentKind, Fault, ReadError, quoted, refuse};
 use super::heading;
 use super::options::{ColumnNames, ReadOptions};
 use super::order::Recording;
@@ -151,7 +151,7 @@ pub(super) fn turned(recording: Recording, options: &ReadOptions) -> Result<Reco
         let problem = format!("{AXES} maps its third axis to x or y, but it has none");
         let column = COLUMN.set("z=NAME");
         let remedy = format!("name the column of the third axis with {column}, or keep z in {AXES}");
-        return refuse("recording/contradicts-option", problem, remedy);
+        return refuse(ContentKind::ContradictsOption, problem, remedy);
     }
     let mut metadata = recording.metadata().clone();
     metadata.notes.push(options.turn().note());
@@ -164,7 +164,7 @@ pub(super) fn refuse_known(options: &ReadOptions, what: &str) -> Result<(), Faul
         return Ok(());
     }
     refuse(
-        "recording/contradicts-option",
+        ContentKind::ContradictsOption,
         format!("{what} gives the directions of its axes"),
         format!("omit {AXES} and the signs of {SCALE}"),
     )
@@ -179,7 +179,7 @@ pub(super) fn refuse_turned_height(options: &ReadOptions, column: &str) -> Resul
         format!("column {} is a height by its name, but {AXES} or {SCALE} change its direction", quoted(column));
     let named = COLUMN.set(format!("z={column}"));
     let remedy = format!("keep z in {AXES} and {SCALE}, or take the numbers as z with {named}");
-    refuse("recording/contradicts-option", problem, remedy)
+    refuse(ContentKind::ContradictsOption, problem, remedy)
 }
 
 struct MappedRecording {
@@ -204,7 +204,7 @@ impl Tracks for MappedRecording {
                     if sample.radius_m.is_some() && !self.axes.keeps_lengths() {
                         let problem = format!("{SCALE} has different factors for its axes, but vehicles have a radius");
                         let remedy = format!("give one factor in {SCALE}");
-                        return refuse("recording/contradicts-option", problem, remedy);
+                        return refuse(ContentKind::ContradictsOption, problem, remedy);
                     }
                     sample.position_m = self.axes.turn(sample.position_m);
                     sample.velocity_m_s = sample.velocity_m_s.map(|velocity| self.axes.turn(velocity));
@@ -303,7 +303,7 @@ impl Convention {
         };
         let Some(alt) = at("ref_alt") else {
             let problem = "its positions are relative to `ref_lat` and `ref_lon`, but there is no column `ref_alt`";
-            return refuse("recording/missing-column", problem, GLOBAL);
+            return refuse(ContentKind::MissingColumn, problem, GLOBAL);
         };
         let mut px4 = self.clone();
         for start in ["", "v"] {

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use tautline_core::fact::Source;
 
 use super::clock::TimeUnit;
-use super::error::{Fault, quoted, refuse};
+use super::error::{ContentKind, Fault, quoted, refuse};
 
 /// List of words, separated by blanks.
 #[derive(Clone, Copy)]
@@ -368,7 +368,7 @@ pub(super) fn with_units(header: &[String], below: &[&str]) -> Result<Vec<String
             quoted(&own_unit),
             quoted(unit)
         );
-        refuse("recording/unit-conflict", problem, "remove one of the two units")
+        refuse(ContentKind::UnitConflict, problem, "remove one of the two units")
     };
     let mut named = header.iter().zip(below).map(with_unit).collect::<Result<Vec<_>, _>>()?;
     named.extend(header.iter().skip(named.len()).cloned());

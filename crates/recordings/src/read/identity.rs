@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::Vector3;
 
-use super::error::{Fault, quoted, refuse};
+use super::error::{ContentKind, Fault, quoted, refuse};
 use super::heading;
 use super::heading::Heading;
 use tautline_core::option::{COLUMN, ONE_VEHICLE};
@@ -51,8 +51,8 @@ pub(super) fn spelling(name: &str) -> String {
 /// Returns the fault of two names with the same key.
 fn same_spelling_fault(first: &str, second: &str) -> Fault {
     let problem = format!("the vehicles {} and {} differ only in how they are spelled", quoted(first), quoted(second));
-    Fault::coded(
-        "recording/vehicle-twice",
+    Fault::content(
+        ContentKind::VehicleTwice,
         problem,
         "use one name per vehicle, and names that differ in more than spelling",
     )
@@ -317,7 +317,7 @@ impl SuspectColumn {
         );
         let column = COLUMN.set(format!("id={called}"));
         let remedy = format!("name the column of the vehicle with {column}; {otherwise}");
-        Some(Fault::coded("recording/several-vehicles", problem, remedy))
+        Some(Fault::content(ContentKind::SeveralVehicles, problem, remedy))
     }
 }
 
@@ -360,7 +360,7 @@ pub(super) fn examine(header: &[String], unused: &[usize], vehicles: &[String]) 
                 let problem = format!("column {called} gives the time of vehicle {vehicle} only");
                 let remedy =
                     "write one row for each vehicle and time, or remove the column if it repeats the time of the row";
-                return refuse("recording/several-clocks", problem, remedy);
+                return refuse(ContentKind::SeveralClocks, problem, remedy);
             }
             let Some(last) = rest.rsplit(['.', '/']).next().filter(|last| heading::is_id(last)) else { continue };
             quantities.entry(rest).or_default().push(column);
@@ -375,7 +375,7 @@ pub(super) fn examine(header: &[String], unused: &[usize], vehicles: &[String]) 
         let [column, vehicle] = [&header[first], &vehicles[vehicle]].map(|name| quoted(name));
         let problem = format!("column {column} may name a vehicle, but there is no such column for {vehicle}");
         return refuse(
-            "recording/ambiguous-vehicle",
+            ContentKind::AmbiguousVehicle,
             problem,
             "add such a column for each vehicle, or remove these columns",
         );
@@ -383,7 +383,7 @@ pub(super) fn examine(header: &[String], unused: &[usize], vehicles: &[String]) 
     if let Some([x, y]) = further(&others) {
         let problem = format!("the columns {} and {} may be the position of a further vehicle", quoted(x), quoted(y));
         let remedy = "rename these columns like those of the other vehicles, or remove them";
-        return refuse("recording/ambiguous-column", problem, remedy);
+        return refuse(ContentKind::AmbiguousColumn, problem, remedy);
     }
     let ids: Vec<_> = ids.collect();
     let is_watched = |columns: &Vec<usize>| columns.len() > 1 && !columns.iter().all(|column| ids.contains(column));
@@ -419,7 +419,7 @@ impl SwapMonitor {
                     "the values of column {called} and its counterparts are exchanged, as names of vehicles are"
                 );
                 let remedy = "name these columns like `a.id`, or remove them if their values are not names";
-                return refuse("recording/ambiguous-vehicle", problem, remedy);
+                return refuse(ContentKind::AmbiguousVehicle, problem, remedy);
             }
         }
         self.last = now;

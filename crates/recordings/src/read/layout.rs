@@ -11,7 +11,7 @@ use tautline_core::option::{COLUMN, ONE_VEHICLE, SCALE};
 use super::agreement::{Compared, SecondPosition};
 use super::axes::Convention;
 use super::clock::{SubunitColumn, TimeUnit};
-use super::error::{Fault, list, quoted, refuse};
+use super::error::{ContentKind, Fault, list, quoted, refuse};
 use super::heading::{
     DEPTH, EARTH, HEIGHT, Heading, Heights, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity,
 };
@@ -200,7 +200,7 @@ impl Layout {
                 let [directed, other] = [directed, other].map(|column| quoted(&header[column]));
                 let problem = format!("column {directed} gives the direction of its axis, column {other} does not");
                 refuse(
-                    "recording/several-frames",
+                    ContentKind::SeveralFrames,
                     problem,
                     "name the axes of all positions alike, as in `x_ned` or `north`",
                 )
@@ -214,7 +214,7 @@ impl Layout {
         let (convention, used) = (&self.convention, self.columns());
         if convention.reference.is_some() && options.metres() != 1.0 {
             let problem = format!("its positions are in metres, but {SCALE} is {}", options.metres());
-            return refuse("recording/contradicts-option", problem, format!("omit {SCALE}"));
+            return refuse(ContentKind::ContradictsOption, problem, format!("omit {SCALE}"));
         }
         let several = self
             .id
@@ -222,7 +222,7 @@ impl Layout {
             .or_else(|| (self.names.len() > 1).then(|| "its header".to_owned()));
         if let Some(namer) = several.filter(|_| options.one_vehicle && !options.is_joined) {
             let problem = format!("{namer} names the vehicles");
-            return refuse("recording/contradicts-option", problem, format!("omit {ONE_VEHICLE}"));
+            return refuse(ContentKind::ContradictsOption, problem, format!("omit {ONE_VEHICLE}"));
         }
         let is_one_vehicle = options.one_vehicle || options.is_joined;
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
@@ -245,7 +245,7 @@ impl Layout {
         if let Some((column, stem)) = unused.clone().find_map(|column| repeats(&column)) {
             let problem = format!("column {} repeats column {}", quoted(&header[column]), quoted(stem));
             return refuse(
-                "recording/ambiguous-column",
+                ContentKind::AmbiguousColumn,
                 problem,
                 "rename the columns of each vehicle, or remove these columns",
             );
@@ -254,9 +254,9 @@ impl Layout {
         let is_decided = is_one_vehicle || convention.is_one_vehicle;
         if self.id.is_none() && one && !is_decided && !unused.iter().all(|name| heading::is_not_vehicle_column(name)) {
             return Err(match missing(header, ID, "") {
-                Fault::Content { code, problem, remedy } => {
+                Fault::Content { kind, problem, remedy } => {
                     let remedy = format!("{remedy}; if all rows are of one vehicle, use {ONE_VEHICLE}");
-                    Fault::coded(code, problem, remedy)
+                    Fault::content(kind, problem, remedy)
                 }
                 fault => fault,
             });
@@ -405,8 +405,8 @@ fn two_frames(vehicle: &str, read: &str, on_earth: bool) -> Fault {
         quoted(vehicle),
         quoted(read)
     );
-    Fault::coded(
-        "recording/several-frames",
+    Fault::content(
+        ContentKind::SeveralFrames,
         problem,
         "give the positions of all vehicles in one frame, or remove the columns of the other frame",
     )
@@ -463,15 +463,15 @@ pub(super) fn missing(header: &[String], role: Role, of: &str) -> Fault {
     let problem = format!("no column gives {}{of}; its columns are {}", WORDS[role], list(header, 12));
     let column = COLUMN.set(format!("{}=NAME", ColumnNames::ROLES[role]));
     let remedy = format!("name the column with {column}, or rename it");
-    Fault::coded(code_of_missing(role), problem, remedy)
+    Fault::content(kind_of_missing(role), problem, remedy)
 }
 
-fn code_of_missing(role: Role) -> &'static str {
+fn kind_of_missing(role: Role) -> ContentKind {
     match role {
-        TIME => "recording/no-time-column",
-        ID => "recording/no-vehicle-column",
-        _ if is_velocity(role) || role == RADIUS => "recording/missing-column",
-        _ => "recording/no-position-column",
+        TIME => ContentKind::NoTimeColumn,
+        ID => ContentKind::NoVehicleColumn,
+        _ if is_velocity(role) || role == RADIUS => ContentKind::MissingColumn,
+        _ => ContentKind::NoPositionColumn,
     }
 }
 
@@ -519,7 +519,7 @@ impl<'a> Columns<'a> {
         let kind = if on_earth { "degrees" } else { "metres" };
         let given = COLUMN.set(format!("{}={}", ColumnNames::ROLES[role], self.header[column]));
         let problem = format!("{given} would be ignored, because the positions are read in {kind}");
-        refuse("recording/contradicts-option", problem, "name the columns of either x and y, or lat and lon")
+        refuse(ContentKind::ContradictsOption, problem, "name the columns of either x and y, or lat and lon")
     }
 
     pub(super) fn get(&self, vehicle: &str, role: Role) -> Option<usize> {
@@ -545,7 +545,7 @@ impl<'a> Columns<'a> {
                 SCALE.set("0.3048"),
                 SCALE.set("1")
             );
-            return refuse("recording/unknown-unit", problem, remedy);
+            return refuse(ContentKind::UnknownUnit, problem, remedy);
         }
         if self.place != EARTH {
             axes::refuse_turned_height(options, &self.header[first])?;
@@ -606,7 +606,7 @@ impl<'a> Columns<'a> {
         let (first, second) = (&self.header[first], &self.header[column]);
         let problem = format!("the columns `{first}` and `{second}` both give {}{of}", WORDS[heading.role]);
         let remedy = format!("name one of them with {COLUMN}, or remove the other");
-        refuse("recording/ambiguous-column", problem, remedy)
+        refuse(ContentKind::AmbiguousColumn, problem, remedy)
     }
 
     /// Finds the vehicles of a wide table; returns their names in order of appearance.
@@ -621,7 +621,7 @@ impl<'a> Columns<'a> {
         if let (Some((odd, _)), Some((word, _))) = (odd, words) {
             let [odd, word] = [*odd, *word].map(|column| quoted(&self.header[column]));
             let problem = format!("column {odd} may belong to a vehicle, like {word}, or be another quantity");
-            return refuse("recording/ambiguous-column", problem, "give the column a longer name, or remove it");
+            return refuse(ContentKind::AmbiguousColumn, problem, "give the column a longer name, or remove it");
         }
         let mut names: Vec<String> = Vec::new();
         // `cf1_v_x` is a velocity if there is a `cf1_x`.
@@ -675,7 +675,11 @@ impl<'a> Columns<'a> {
                 let unit = self.units.get(&column).map_or("deg", |unit| *unit);
                 metres[column] = heading::degrees(unit).ok_or_else(|| {
                     let problem = format!("column {name} has an unknown unit of angle, {}", quoted(unit));
-                    Fault::coded("recording/unknown-unit", problem, "write degrees, without a unit in the column name")
+                    Fault::content(
+                        ContentKind::UnknownUnit,
+                        problem,
+                        "write degrees, without a unit in the column name",
+                    )
                 })?;
                 continue;
             }
@@ -689,7 +693,7 @@ impl<'a> Columns<'a> {
                 let remedy = format!(
                     "use one of m, cm, mm, km, ft, in; or name the column with {COLUMN} and set its unit with {SCALE}"
                 );
-                Fault::coded("recording/unknown-unit", problem, remedy)
+                Fault::content(ContentKind::UnknownUnit, problem, remedy)
             })?;
             metres[column] = size;
             if size != 1.0 {
@@ -713,7 +717,7 @@ impl<'a> Columns<'a> {
         if let Some(silent) = silent {
             let problem = format!("column {other} has a unit in its name, but column {silent} has none");
             return refuse(
-                "recording/unit-conflict",
+                ContentKind::UnitConflict,
                 problem,
                 "put a unit into the name of each column, as in `x [mm]`",
             );
@@ -722,7 +726,7 @@ impl<'a> Columns<'a> {
             let given = SCALE.set(scale);
             let problem = format!("column {other} has a unit in its name, which contradicts {given}");
             let remedy = format!("omit {SCALE}, or remove the units from the header");
-            return refuse("recording/contradicts-option", problem, remedy);
+            return refuse(ContentKind::ContradictsOption, problem, remedy);
         }
         Ok(metres)
     }

@@ -7,7 +7,7 @@ use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::option::{COLUMN, DUPLICATES, SORT, TIME_UNIT};
 
 use super::clock::{Probe, Stamp, TimeUnit, Timing};
-use super::error::{Fault, Place, ReadError, quoted};
+use super::error::{ContentKind, Fault, Place, ReadError, quoted};
 use super::options::{Duplicates, ReadOptions};
 use super::source::Source as File;
 use tautline_core::track::{Item, Metadata, Sample, Tracks};
@@ -271,7 +271,7 @@ impl<R: Rows> Ordered<R> {
             DUPLICATES.set("last"),
             COLUMN.set("id=NAME")
         );
-        Fault::coded("recording/duplicate-row", problem, remedy)
+        Fault::content(ContentKind::DuplicateRow, problem, remedy)
     }
 
     #[cold]
@@ -284,7 +284,7 @@ impl<R: Rows> Ordered<R> {
             "leave latitude and longitude empty where the receiver had no fix, or correct the unit of the times with \
              {TIME_UNIT}"
         );
-        Fault::coded("recording/position-jump", problem, remedy)
+        Fault::content(ContentKind::PositionJump, problem, remedy)
     }
 
     #[cold]
@@ -292,7 +292,7 @@ impl<R: Rows> Ordered<R> {
         let (vehicle, first) = (self.name(row), self.rows.place(before.place));
         let which = if row.radius.is_some() { "a radius here, but none" } else { "no radius here, but one" };
         let remedy = "fill the empty cells, or leave all radii of the vehicle empty";
-        Fault::coded("recording/radius", format!("vehicle {vehicle} has {which} at {first}"), remedy)
+        Fault::content(ContentKind::Radius, format!("vehicle {vehicle} has {which} at {first}"), remedy)
     }
 
     /// Returns the next row without consuming it.
@@ -476,7 +476,7 @@ pub(super) fn refuse_steps_back(rows: &[Row], of: &impl Rows, timing: &Timing) -
                  if the rows are only out of order, use {SORT}",
                 COLUMN.set("id=NAME")
             );
-            return Err(Fault::coded("recording/time-backwards", problem, remedy).at(of.place(row.place)));
+            return Err(Fault::content(ContentKind::TimeBackwards, problem, remedy).at(of.place(row.place)));
         }
     }
     Ok(())

@@ -21,7 +21,7 @@ use tautline_core::option::TOPIC;
 use super::axes;
 use super::clock::{Stamp, TimeUnit};
 use super::earth::{LocalFrame, is_no_fix, no_fixes};
-use super::error::{Fault, Place, ReadError, quoted, refuse};
+use super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
 use super::readers::{FormatOption, Packing, Reader};
@@ -67,7 +67,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         [topic, ..] => {
             let problem = format!("{} is not a position topic", quoted(topic));
             return refuse(
-                "recording/unknown-topic",
+                ContentKind::UnknownTopic,
                 problem,
                 format!("use {} or {}", TOPIC.set(GLOBAL), TOPIC.set(LOCAL)),
             );
@@ -81,7 +81,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let Some(first) = fixes.first() else {
         let problem = format!("it has no {} with a known place on the Earth", topic_option.unwrap_or("position"));
         let remedy = "log vehicle_global_position, or give positions of a common frame as a table t,id,x,y,z";
-        return refuse("recording/no-fix", problem, remedy);
+        return refuse(ContentKind::NoFix, problem, remedy);
     };
     let local = LocalFrame::first(first.origin, options)?;
     let rows = log.rows(fixes, &local)?;
@@ -93,7 +93,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     };
     notes.push(clock.to_owned());
     notes.extend(no_fixes(if topic == GLOBAL { log.no_fixes } else { 0 }, ""));
-    let none = Fault::coded("recording/empty", "it holds no position", "record again");
+    let none = Fault::content(ContentKind::Empty, "it holds no position", "record again");
     let mut info = RecordingInfo::new(source, options, Some(TimeUnit::Microseconds), notes, none);
     info.metadata.earth_origin = Some(local.measured_from(options.origin));
     let of_clock = if log.boot_us.is_some() { fact::Source::Recorded } else { fact::Source::Default };
@@ -402,7 +402,7 @@ fn flags(body: &[u8]) -> Result<u64, Fault> {
     if needed[0] & !APPENDED != 0 || needed[1..].iter().any(|&byte| byte != 0) {
         let problem = "unknown version of ULog";
         return refuse(
-            "recording/unsupported-format",
+            ContentKind::UnsupportedFormat,
             problem,
             "convert its vehicle_global_position with `ulog2csv`, and give the result",
         );

@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::super::axes;
 use super::super::clock::{Stamp, TimeUnit};
-use super::super::error::{Fault, Place, ReadError};
+use super::super::error::{ContentKind, Fault, Place, ReadError};
 use super::super::identity::Names;
 use super::super::options::ReadOptions;
 use super::super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
@@ -56,7 +56,7 @@ pub(super) fn open_export(source: &Source, options: &ReadOptions) -> Result<Reco
     let mut exported = Exported { path: source.path.clone(), topics, instants };
     exported.next(&mut Vec::new())?;
     let is_planar = exported.instants.axes == Some(2);
-    let none = Fault::coded("recording/empty", "it holds no instant", "export again");
+    let none = Fault::content(ContentKind::Empty, "it holds no instant", "export again");
     let mut info = RecordingInfo::new(source, options, Some(TimeUnit::Seconds), notes, none);
     (info.epoch_ns, info.metadata.is_planar) = (exported.instants.epoch_ns, is_planar);
     exported.rewind()?;
@@ -226,7 +226,7 @@ pub(super) fn open_samples(source: &Source, options: &ReadOptions) -> Result<Rec
     let notes = options.accept_unfinished(recording.is_complete())?;
     let vehicles = recording.header().vehicles;
     let run = Run { recording, vehicles, names: Names::default(), samples: 0 };
-    let none = Fault::coded("recording/empty", "it holds no sample", "record again");
+    let none = Fault::content(ContentKind::Empty, "it holds no sample", "record again");
     let mut info = RecordingInfo::new(source, options, Some(TimeUnit::Seconds), notes, none);
     info.metadata.facts.push(Fact::name(FactKind::Identity, fact::Source::Recorded, "numbers of the simulation"));
     info.metadata.facts.push(Fact::name(FactKind::Clock, fact::Source::Recorded, "time of the simulation"));

@@ -8,7 +8,7 @@ use tautline_core::option::ORIGIN;
 
 use super::super::axes;
 use super::super::earth::LocalFrame;
-use super::super::error::{Fault, ReadError, quoted, refuse};
+use super::super::error::{ContentKind, Fault, ReadError, quoted, refuse};
 use super::super::options::{MessageClock, ReadOptions};
 use super::foreign::SplitFiles;
 use super::messages::{EARTH, PoseKind, VehicleKey};
@@ -68,7 +68,7 @@ impl ReadPlan {
             axes::refuse_known(options, "a recording with places on the Earth")?;
         }
         if options.origin.is_some() && first_fix.is_none() {
-            return refuse("recording/unused-option", "it has no place on the Earth", format!("omit {ORIGIN}"));
+            return refuse(ContentKind::UnusedOption, "it has no place on the Earth", format!("omit {ORIGIN}"));
         }
         plan.check()?;
         plan.find_bodies()?;
@@ -120,7 +120,7 @@ impl ReadPlan {
             let problem = format!("transforms describe {}, but topics of poses describe other vehicles", quoted(name));
             let known = self.outline.names().join(", ");
             let remedy = format!("{}; it has {known}", choose_topics());
-            return refuse("recording/ambiguous-topics", problem, remedy);
+            return refuse(ContentKind::AmbiguousTopics, problem, remedy);
         }
         if !covered.is_empty() {
             let covered = covered.join(", ");
@@ -263,8 +263,8 @@ impl ReadPlan {
         match &self.target_frame {
             Some(frame) => {
                 let problem = format!("no position is in the frame {}, nor can be transformed to it", quoted(frame));
-                Fault::coded(
-                    "recording/unusable-frame",
+                Fault::content(
+                    ContentKind::UnusableFrame,
                     problem,
                     "name another frame, or record /tf and /tf_static from before the first position",
                 )
@@ -272,10 +272,14 @@ impl ReadPlan {
             None if trees().any(|tree| tree.frames().any(|frame| tree.moves(frame))) => {
                 let frames: Vec<_> = trees().flat_map(Tree::frames).map(quoted).collect();
                 let problem = format!("its transforms describe no vehicle; its frames are {}", frames.join(", "));
-                Fault::coded("recording/no-positions", problem, "record the transforms of the vehicles' own frames too")
+                Fault::content(
+                    ContentKind::NoPositions,
+                    problem,
+                    "record the transforms of the vehicles' own frames too",
+                )
             }
-            None => Fault::coded(
-                "recording/no-positions",
+            None => Fault::content(
+                ContentKind::NoPositions,
                 "its topics with positions have no messages with one",
                 "record again",
             ),

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-use super::super::error::{Fault, UNSEEN, quoted, refuse};
+use super::super::error::{ContentKind, Fault, UNSEEN, quoted, refuse};
 use tautline_core::option::{FRAME, TOPIC};
 
 /// Largest depth of a frame.
@@ -100,7 +100,7 @@ impl Tree {
             return Ok(());
         }
         let problem = format!("frame {} has several constant poses, or moves as well", quoted(frame));
-        refuse("recording/transforms", problem, "record again, with one publisher of each transform")
+        refuse(ContentKind::Transforms, problem, "record again, with one publisher of each transform")
     }
 
     /// Returns the frames with constant poses.
@@ -125,11 +125,11 @@ impl Tree {
                     quoted(second_parent)
                 );
                 let remedy = format!("record robots in separate namespaces, or choose topics of poses with {TOPIC}");
-                return refuse("recording/transforms", problem, remedy);
+                return refuse(ContentKind::Transforms, problem, remedy);
             }
             if way.len() > DEEPEST {
                 let problem = format!("frame {} has more than {DEEPEST} ancestors", quoted(frame));
-                return refuse("recording/transforms", problem, "check the transforms for a cycle");
+                return refuse(ContentKind::Transforms, problem, "check the transforms for a cycle");
             }
             way.push(&edge.parent);
         }
@@ -193,7 +193,7 @@ impl Tree {
             edge.samples.dedup();
             if let Some([(time_ns, _), _]) = edge.samples.array_windows().find(|[a, b]| a.0 == b.0) {
                 let problem = format!("frame {} has two poses at {time_ns} ns", quoted(frame));
-                return refuse("recording/transforms", problem, "record again, with one publisher of each transform");
+                return refuse(ContentKind::Transforms, problem, "record again, with one publisher of each transform");
             }
         }
         Ok(())
@@ -275,7 +275,7 @@ impl FramePose {
         let quaternion = Quaternion::new(w, x, y, z);
         if (quaternion.norm() - 1.0).abs() > NORM {
             let problem = format!("the quaternion {x}, {y}, {z}, {w} is not normalized");
-            return refuse("recording/transforms", problem, format!("record again, or omit {FRAME}"));
+            return refuse(ContentKind::Transforms, problem, format!("record again, or omit {FRAME}"));
         }
         Ok(Isometry3::from_parts(Translation3::from(self.position), UnitQuaternion::new_normalize(quaternion)))
     }
