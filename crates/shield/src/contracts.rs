@@ -13,7 +13,7 @@ use crate::contract::{
 use crate::fleet::{PairRoom, closest_starts};
 use crate::plane::Segment;
 use crate::report::SharedStarts;
-use crate::settings::ShieldError;
+use crate::settings::{ShieldError, ShieldFault};
 use crate::start::{Start, hash_of_pair};
 #[cfg(test)]
 use crate::{contract::Side, plane::Divider};
@@ -52,7 +52,13 @@ impl Contracts {
         let count = starts.len();
         let (Some(own), Ok(number)) = (starts.get(index), u16::try_from(index)) else {
             let problem = format!("the number of the vehicle is not among {count} starts of at most 65536");
-            return Err(ShieldError::new("index", problem, index as f64, "count vehicles from 0"));
+            return Err(ShieldError::new(
+                ShieldFault::Mismatch,
+                "index",
+                problem,
+                index as f64,
+                "count vehicles from 0",
+            ));
         };
         let has_plane = |owner: &Start, follower: &Start| divider_of_starts(owner, follower).is_some();
         let (before, after) = (&starts[..index], &starts[index + 1..]);
@@ -66,7 +72,7 @@ impl Contracts {
         let others = (0..count).filter(|other| *other != index).map(apart);
         let worst = others.min_by(|a, b| a.room_m().total_cmp(&b.room_m())).or_else(|| closest_starts(&starts));
         Err(worst.map_or_else(
-            || ShieldError::new("start", "a vehicle has no pair".into(), 0.0, "give two starts"),
+            || ShieldError::new(ShieldFault::Mismatch, "start", "a vehicle has no pair".into(), 0.0, "give two starts"),
             |worst| worst.too_near(),
         ))
     }
@@ -106,7 +112,13 @@ impl Contracts {
         }
         if !fits {
             let problem = "the saved contracts do not fit the starts".into();
-            return Err(ShieldError::new("saved", problem, places.len() as f64, "give unaltered data"));
+            return Err(ShieldError::new(
+                ShieldFault::Altered,
+                "saved",
+                problem,
+                places.len() as f64,
+                "give unaltered data",
+            ));
         }
         contracts.places.copy_from_slice(places);
         contracts.followed.extend_from_slice(followed);

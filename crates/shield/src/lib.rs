@@ -120,7 +120,7 @@ pub use fleet::Fleet;
 pub use obstacle::{ConvexBody, Obstacle};
 pub use report::Counters;
 pub use saved::SavedShield;
-pub use settings::{Limits, Settings, ShieldError};
+pub use settings::{Limits, Settings, ShieldError, ShieldFault};
 pub use shield::Shield;
 pub use start::Start;
 pub use unicycle::UnicycleShield;

@@ -175,10 +175,17 @@ impl Settings {
         if drag >= self.accel_m_s2 {
             let (of, speed) = (shortest(self.accel_m_s2), shortest(self.max_speed_m_s));
             let problem = format!("drag takes {drag:.4} of `accel_m_s2` {of} at `max_speed_m_s` {speed}");
-            return Err(ShieldError::new("a22_per_s", problem, self.a22_per_s, "lower its magnitude or the speed"));
+            return Err(ShieldError::new(
+                ShieldFault::NoReserve,
+                "a22_per_s",
+                problem,
+                self.a22_per_s,
+                "lower its magnitude or the speed",
+            ));
         }
         if reference <= 0.0 {
             return Err(ShieldError::new(
+                ShieldFault::NoReserve,
                 "accel_m_s2",
                 format!("feedback takes up to {:.4} and drag {drag:.4}; nothing is left", tube.feedback_m_s2),
                 self.accel_m_s2,
@@ -188,6 +195,7 @@ impl Settings {
         let brake = self.brake_m_s2.unwrap_or((BRAKE_SHARE * self.accel_m_s2).min(reference));
         if brake > reference {
             return Err(ShieldError::new(
+                ShieldFault::NoReserve,
                 "brake_m_s2",
                 format!("must be at most {reference:.4}, which is what feedback and drag leave of `accel_m_s2`"),
                 brake,
@@ -215,7 +223,9 @@ impl Settings {
 
     /// Returns the largest coordinate that the margin for rounding covers \[m\].
     fn farthest_m(&self, envelope: &Envelope, tube: &Tube, margin_m: f64) -> Result<f64, ShieldError> {
-        let fails = |place, problem, value, remedy| Err(ShieldError::new(place, problem, value, remedy));
+        let fails = |place, problem, value, remedy| {
+            Err(ShieldError::new(ShieldFault::OutOfRange, place, problem, value, remedy))
+        };
         if margin_m > FARTHEST_M {
             let problem = format!("margins must be at most {FARTHEST_M} m, which the margin for rounding covers");
             let place = match (self.tracking_error_m, self.half_height_m) {
@@ -270,7 +280,9 @@ impl Settings {
             ("integration_error_m_s2", self.integration_error_m_s2),
             ("ease_m", self.ease_m.unwrap_or(0.0)),
         ];
-        let fails = |place, problem: &str, value, remedy| Err(ShieldError::new(place, problem.into(), value, remedy));
+        let fails = |place, problem: &str, value, remedy| {
+            Err(ShieldError::new(ShieldFault::OutOfRange, place, problem.into(), value, remedy))
+        };
         if let Some((place, value)) = positive.into_iter().find(|(_, value)| !(value.is_finite() && *value > 0.0)) {
             return fails(place, "must be above 0", value, "give a positive number");
         }
@@ -347,7 +359,7 @@ impl Settings {
                 format!("magnitude must be at most {} {of_period}", at_least(largest_per_s, 3))
             }
         };
-        ShieldError::new(place, problem, value, remedy)
+        ShieldError::new(ShieldFault::Tracker, place, problem, value, remedy)
     }
 }
 
@@ -440,7 +452,7 @@ impl Limits {
             ("delta_m", delta_m)
         };
         let problem = format!("vehicle {} has another value", vehicle + 1);
-        Err(ShieldError::new(place, problem, value, "give all vehicles the same"))
+        Err(ShieldError::new(ShieldFault::Mismatch, place, problem, value, "give all vehicles the same"))
     }
 
     /// Gap that two vehicles keep by choice \[m\].
@@ -499,7 +511,13 @@ impl Limits {
         let speed = state.velocity_m_s.norm();
         if speed > self.settings.max_speed_m_s {
             let problem = format!("starts faster than `max_speed_m_s` = {}", self.settings.max_speed_m_s);
-            return Err(ShieldError::new("start", problem, speed, "raise `max_speed_m_s` or start slower"));
+            return Err(ShieldError::new(
+                ShieldFault::TooFast,
+                "start",
+                problem,
+                speed,
+                "raise `max_speed_m_s` or start slower",
+            ));
         }
         Ok(start)
     }
@@ -521,6 +539,8 @@ impl Limits {
 /// Settings or starts that cannot be certified: `PLACE: PROBLEM (VALUE); REMEDY`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShieldError {
+    /// Kind of the problem.
+    pub fault: ShieldFault,
     /// Name of the setting, or `start`.
     pub place: &'static str,
     /// What is wrong.
@@ -531,9 +551,35 @@ pub struct ShieldError {
     pub remedy: &'static str,
 }
 
+/// Kind of a [`ShieldError`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ShieldFault {
+    /// A number is not finite or out of its range.
+    OutOfRange,
+    /// The tracker does not hold a vehicle near its reference.
+    Tracker,
+    /// Feedback and drag leave no acceleration to the reference or its brake.
+    NoReserve,
+    /// A vehicle starts faster than its largest speed.
+    TooFast,
+    /// A start is too near to another one or to an obstacle.
+    TooNear,
+    /// Vehicles differ in settings that must agree, or in their number.
+    Mismatch,
+    /// Saved or sent data were altered.
+    Altered,
+}
+
 impl ShieldError {
-    pub(crate) fn new(place: &'static str, problem: String, value: f64, remedy: &'static str) -> Self {
-        Self { place, problem, value, remedy }
+    pub(crate) fn new(
+        fault: ShieldFault,
+        place: &'static str,
+        problem: String,
+        value: f64,
+        remedy: &'static str,
+    ) -> Self {
+        Self { fault, place, problem, value, remedy }
     }
 }
 
