@@ -83,11 +83,11 @@ impl Vehicle {
     }
 
     /// Checks after the first sample that the vehicle can be judged.
-    pub(super) fn check(&self, settings: &Settings) -> Result<(), RecordedError> {
+    pub(super) fn check(&self, settings: &Settings, has_plan: bool) -> Result<(), RecordedError> {
         if self.motion == Some(Interpolation::Bounded) && self.max_accel_m_s2.is_nan() {
             return Err(RecordedError::NoBound { vehicle: self.name.clone() });
         }
-        if settings.has_separation_limit() && !self.has_limit(settings) {
+        if settings.has_separation_limit(has_plan) && !self.has_limit(settings) {
             return Err(RecordedError::NoLimit { vehicle: self.name.clone() });
         }
         Ok(())

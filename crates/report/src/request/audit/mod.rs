@@ -157,6 +157,12 @@ impl ConfiguredAudit<'_> {
         let called = request.subject.name();
         let Settled { settings, own, opening, side_files, notes: notes_on_question } = settled;
         let mut auditor = TrackAuditor::new(settings.clone())?.with_interruption(monitor.interruption().clone());
+        if request.plan.is_some() {
+            auditor = auditor.with_plan();
+        }
+        if request.is_silent() && request.obstacles.is_none() {
+            auditor = auditor.with_own_limit();
+        }
         if request.html.is_some() {
             auditor = auditor.with_smallest();
         }
@@ -353,7 +359,6 @@ impl<'a> RecordedLimits<'a> {
         let delta_m = own.map(|own| own.limit_m).filter(|_| is_open && ellipsoid_m.is_none());
         settings.delta_m = settings.delta_m.or(delta_m);
         settings.ellipsoid_m = settings.ellipsoid_m.or(ellipsoid_m);
-        settings.is_own_limit = is_silent && request.obstacles.is_none();
         // Every sample of a `tautline run` recording contains all vehicles, so no vehicle is absent between two
         // samples.
         settings.max_gap_s = settings.max_gap_s.or(own.filter(|own| own.is_unaltered()).map(|_| f64::INFINITY));

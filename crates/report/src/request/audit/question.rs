@@ -172,7 +172,6 @@ impl<'a> AuditRequest<'a> {
         }
         self.plan.as_ref().map_or(Ok(()), PlanQuestion::check)?;
         let mut settings = self.settings.clone();
-        settings.has_plan = self.plan.is_some();
         settings.obstacles.extend(self.obstacles.as_deref().map_or(Ok(Vec::new()), venue_file::read_obstacles)?);
         if let Some(fence) = self.fence.as_deref() {
             settings.envelope.fence = Some(venue_file::read_fence(fence)?);
@@ -213,7 +212,7 @@ impl<'a> AuditRequest<'a> {
         let asked =
             outcome.vehicles.iter().filter(|&name| settings.only.as_ref().is_none_or(|only| only.contains(name)));
         let asked = asked.count();
-        if asked < 2 && settings.obstacles.is_empty() && settings.envelope.is_empty() && !settings.has_plan {
+        if asked < 2 && settings.obstacles.is_empty() && settings.envelope.is_empty() && self.plan.is_none() {
             let message =
                 format!("{path}: {} to judge, but no second object", counted(asked as u64, "vehicle", "vehicles"));
             let help = format!(

@@ -346,7 +346,7 @@ impl Flight {
             *time_s -= from_s;
         }
         settings.max_gap_s = Some(f64::INFINITY);
-        (settings.from_s, settings.to_s, settings.is_own_limit) = (None, None, false);
+        (settings.from_s, settings.to_s) = (None, None);
         Ok(Self { vehicles, span_s: (from_s, until_s), settings, has_pair, audit: report, notes })
     }
 }
