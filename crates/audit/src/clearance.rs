@@ -214,8 +214,8 @@ mod tests {
 
     fn fly(auditor: &mut ClearanceAuditor, way: &[[f64; 3]]) -> (usize, usize) {
         let (mut began, mut ended) = (0, 0);
-        for (k, at) in way.iter().enumerate() {
-            let finding = auditor.step(k as f64, &Rows::from_row_slice(at)).unwrap();
+        for (k, point) in way.iter().enumerate() {
+            let finding = auditor.step(k as f64, &Rows::from_row_slice(point)).unwrap();
             began += finding.began.len();
             ended += finding.ended.len();
         }

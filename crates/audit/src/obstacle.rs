@@ -156,11 +156,11 @@ impl Obstacle {
     #[must_use]
     pub fn is_upright_through_ground(&self) -> bool {
         let holds_0 = |from: f64, to: f64| from.min(to) <= 0.0 && 0.0 <= from.max(to);
-        self.path.iter().all(|(_, at)| match self.shape {
-            Shape::Ball { .. } => at.z == 0.0,
-            Shape::Box { half_m, .. } => holds_0(at.z - half_m.z, at.z + half_m.z),
+        self.path.iter().all(|(_, point)| match self.shape {
+            Shape::Ball { .. } => point.z == 0.0,
+            Shape::Box { half_m, .. } => holds_0(point.z - half_m.z, point.z + half_m.z),
             Shape::Capsule { from_m, to_m, .. } => {
-                let (from, to) = (at.z + from_m.z, at.z + to_m.z);
+                let (from, to) = (point.z + from_m.z, point.z + to_m.z);
                 let (is_vertical, is_level) = (from_m.xy() == to_m.xy(), from == to);
                 (is_vertical || is_level) && holds_0(from, to)
             }
@@ -231,11 +231,11 @@ impl Shape {
             return if end < start { (end, 1.0) } else { (start, 0.0) };
         }
         let (from, to) = (self.in_box_frame(from), self.in_box_frame(to));
-        let at = |u: f64| if u >= 1.0 { to } else { from + (to - from) * u };
+        let position = |u: f64| if u >= 1.0 { to } else { from + (to - from) * u };
         let mut best = (f64::INFINITY, 0.0);
         let mut start = (0.0, self.offset_from_core(from));
         for u in self.feature_changes(from, to).into_iter().chain([1.0]) {
-            let end = (u, self.offset_from_core(at(u)));
+            let end = (u, self.offset_from_core(position(u)));
             let part = RelativeMotion::new(start.1, end.1).closest();
             if part.squared < best.0 {
                 best = (part.squared, start.0 + (end.0 - start.0) * part.at);

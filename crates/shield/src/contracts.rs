@@ -210,19 +210,19 @@ impl Contracts {
 
     /// Reads the newest messages, decides and proposes at an instant, in the order of the other vehicles. Adds the
     /// planes within reach.
-    pub(crate) fn renew(&mut self, at: &Instant<'_>, near: &mut Reach) -> Renewed {
+    pub(crate) fn renew(&mut self, instant: &Instant<'_>, near: &mut Reach) -> Renewed {
         let mut renewed = Renewed::default();
         for word in 0..self.agenda.words() {
-            let [fired, heard] = self.agenda.take(word, at.period);
+            let [fired, heard] = self.agenda.take(word, instant.period);
             let mut open = fired | heard;
             while open != 0 {
                 let other = 64 * word + open.trailing_zeros() as usize;
                 let bit = open & open.wrapping_neg();
                 open ^= bit;
-                self.look(other, [fired & bit != 0, heard & bit != 0], at, near, &mut renewed);
+                self.look(other, [fired & bit != 0, heard & bit != 0], instant, near, &mut renewed);
             }
         }
-        self.agenda.end(at.period);
+        self.agenda.end(instant.period);
         renewed
     }
 
@@ -232,36 +232,36 @@ impl Contracts {
         &mut self,
         other: usize,
         [has_come, has_news]: [bool; 2],
-        at: &Instant<'_>,
+        instant: &Instant<'_>,
         near: &mut Reach,
         renewed: &mut Renewed,
     ) {
         if self.places.get(other) == Some(&0)
-            && let Some(room) = self.room_at_start(other, at)
+            && let Some(room) = self.room_at_start(other, instant)
         {
-            self.agenda.schedule(other, at.period + at.horizons[0].periods(room));
+            self.agenda.schedule(other, instant.period + instant.horizons[0].periods(room));
             return;
         }
         let Some(place) = self.place(other) else { return };
         // A period noted before a message or a proposal set another one is passed over.
-        let is_due = |due: u64| has_come && due <= at.period;
+        let is_due = |due: u64| has_come && due <= instant.period;
         let (seen, due) = if other < self.index as usize {
             let contract = &mut self.followed[place];
             let is_due = is_due(contract.due);
             if !(is_due || has_news) {
                 return;
             }
-            (contract.look(at, [is_due, has_news], near, renewed), &mut contract.due)
+            (contract.look(instant, [is_due, has_news], near, renewed), &mut contract.due)
         } else {
             let contract = &mut self.owned[place];
             let is_due = is_due(contract.due);
             if !(is_due || has_news) {
                 return;
             }
-            (contract.look(at, is_due, near, renewed), &mut contract.due)
+            (contract.look(instant, is_due, near, renewed), &mut contract.due)
         };
-        let next = at.period + seen.sleeps;
-        if *due <= at.period || next < *due {
+        let next = instant.period + seen.sleeps;
+        if *due <= instant.period || next < *due {
             *due = next;
             self.agenda.schedule(other, next);
         }
@@ -271,19 +271,19 @@ impl Contracts {
     }
 
     /// Returns the room of the plane of the starts \[m\], if both vehicles are far from it.
-    fn room_at_start(&self, other: usize, at: &Instant<'_>) -> Option<f64> {
+    fn room_at_start(&self, other: usize, instant: &Instant<'_>) -> Option<f64> {
         let (held, is_far) = match other.cmp(&(self.index as usize)) {
             Ordering::Less => {
                 let contract = self.followed_at_start(other)?;
-                (contract.held, contract.held.room_m(&at.segment.position()) > contract.far_m)
+                (contract.held, contract.held.room_m(&instant.segment.position()) > contract.far_m)
             }
             Ordering::Greater => {
                 let contract = self.owned_at_start(other)?;
-                (contract.held, contract.is_far(at.segment))
+                (contract.held, contract.is_far(instant.segment))
             }
             Ordering::Equal => return None,
         };
-        is_far.then(|| held.room_m(&at.segment.position()))
+        is_far.then(|| held.room_m(&instant.segment.position()))
     }
 
     /// Takes the next part of the messages that are to be sent.

@@ -239,9 +239,9 @@ mod tests {
             let obstacle = random_body(&mut random, 2.0, 0.0);
             let segment = Segment::new(random.vector(4.0), random.vector(4.0));
             let margin = random.between(0.1, 0.5);
-            let at = |k: usize| segment.position() + (segment.stop() - segment.position()) * (k as f64 / 200.0);
+            let point_at = |k: usize| segment.position() + (segment.stop() - segment.position()) * (k as f64 / 200.0);
             let distance = |k: usize| {
-                let point = at(k);
+                let point = point_at(k);
                 obstacle.body.closest_point_m(&point).map_or(0.0, |closest| (closest - point).norm())
             };
             let nearest = (0..=200).map(distance).fold(f64::INFINITY, f64::min);

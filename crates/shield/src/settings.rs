@@ -173,8 +173,8 @@ impl Settings {
         let drag = self.a22_per_s.abs() * self.max_speed_m_s;
         let reference = self.accel_m_s2 - tube.feedback_m_s2 - drag;
         if drag >= self.accel_m_s2 {
-            let (of, speed) = (shortest(self.accel_m_s2), shortest(self.max_speed_m_s));
-            let problem = format!("drag takes {drag:.4} of `accel_m_s2` {of} at `max_speed_m_s` {speed}");
+            let (accel, speed) = (shortest(self.accel_m_s2), shortest(self.max_speed_m_s));
+            let problem = format!("drag takes {drag:.4} of `accel_m_s2` {accel} at `max_speed_m_s` {speed}");
             return Err(ShieldError::new(
                 ShieldFault::NoReserve,
                 "a22_per_s",
@@ -312,7 +312,7 @@ impl Settings {
             TubeError::LargeDrag => "a22_per_s",
             // Name the setting that leaves a tube when it is 0.
             TubeError::Unstable | TubeError::Slow => {
-                let holds = |of: TrackerLoop| of.tube().is_ok();
+                let holds = |tracker: TrackerLoop| tracker.tube().is_ok();
                 if has_lag && holds(TrackerLoop { actuator_lag_s: 0.0, ..*tracker }) {
                     "actuator_lag_s"
                 } else if self.a22_per_s != 0.0 && holds(TrackerLoop { a22_per_s: 0.0, ..*tracker }) {
@@ -468,19 +468,22 @@ impl Limits {
     /// tube is an assumption itself, and the words do not call the separation certified.
     #[must_use]
     pub fn certificate(&self) -> String {
-        let of = &self.settings;
-        let delay = match of.measurement_delay_periods {
+        let settings = &self.settings;
+        let delay = match settings.measurement_delay_periods {
             0 => String::new(),
             1 => "; measurements are a period old".to_owned(),
             periods => format!("; measurements are {periods} periods old"),
         };
-        let lag =
-            if of.actuator_lag_s > 0.0 { format!("; actuators lag by {} s", of.actuator_lag_s) } else { String::new() };
-        let (certified, tracking, tube) = match of.tracking_error_m {
+        let lag = if settings.actuator_lag_s > 0.0 {
+            format!("; actuators lag by {} s", settings.actuator_lag_s)
+        } else {
+            String::new()
+        };
+        let (certified, tracking, tube) = match settings.tracking_error_m {
             Some(error_m) => ("", format!("vehicles stay within {error_m} m of their references; "), "assumed tube"),
             None => ("certified ", String::new(), "tube"),
         };
-        let height = of.half_height_m.map_or_else(String::new, |half| {
+        let height = settings.half_height_m.map_or_else(String::new, |half| {
             let vertical = at_least(2.0 * half, 3);
             format!(" on a level and {vertical} m in the vertical, outside the ellipsoid of these half axes")
         });
@@ -488,11 +491,11 @@ impl Limits {
             "{certified}never closer than {} m{height} under any law and any loss of messages. Assumed: {tracking}\
              commands up to {} m/s^2 are carried out; position errors stay below {} m and velocity errors below {} \
              m/s; pushes stay below {} m/s^2{delay}{lag} ({tube} {} m)",
-            exact(of.delta_m),
-            of.accel_m_s2,
-            of.position_error_m,
-            of.velocity_error_m_s,
-            of.disturbance_m_s2,
+            exact(settings.delta_m),
+            settings.accel_m_s2,
+            settings.position_error_m,
+            settings.velocity_error_m_s,
+            settings.disturbance_m_s2,
             at_most(self.tube.error_m, 3)
         )
     }
@@ -659,9 +662,9 @@ mod tests {
         assert!(refused(|settings| settings.accel_m_s2 = 1e5).starts_with("accel_m_s2: must be at most 10000 m times"));
         // Starts and their stop points are within it.
         let limits = Settings { max_speed_m_s: 300.0, ..Settings::new(1.0, 0.05) }.limits().expect("fast");
-        let at = |x: f64, speed: f64| State { position_m: Vector3::x() * x, velocity_m_s: Vector3::x() * speed };
-        assert!(limits.start(at(25_000.0, 300.0)).is_ok() && limits.start(at(fast, 0.0)).is_ok());
-        for start in [at(fast + 1.0, 0.0), at(fast - 10_000.0, 300.0)] {
+        let state_at = |x: f64, speed: f64| State { position_m: Vector3::x() * x, velocity_m_s: Vector3::x() * speed };
+        assert!(limits.start(state_at(25_000.0, 300.0)).is_ok() && limits.start(state_at(fast, 0.0)).is_ok());
+        for start in [state_at(fast + 1.0, 0.0), state_at(fast - 10_000.0, 300.0)] {
             let error = limits.start(start).expect_err("far").to_string();
             assert!(error.contains("farther than 4") && error.ends_with("near the vehicles"), "{error}");
         }

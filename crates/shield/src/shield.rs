@@ -204,14 +204,14 @@ impl Shield {
         let (limits, reference) = (self.limits, self.reference);
         let reach = limits.envelope.reach_m(&reference, limits.choice);
         self.reach.clear();
-        let at = Instant {
+        let instant = Instant {
             period: self.period,
             segment: &self.segment,
             side: &limits.side(),
             reach_m: reach,
             horizons: [limits.horizon(reference.velocity_m_s.norm()), self.fastest],
         };
-        let renewed = self.contracts.renew(&at, &mut self.reach);
+        let renewed = self.contracts.renew(&instant, &mut self.reach);
         let (segment, is_level) = (self.segment, limits.settings().is_level);
         let planes = self.keep_outs.iter_mut().filter_map(|keep_out| keep_out.within(&segment, reach));
         let height_m = reference.position_m.z;

@@ -402,14 +402,14 @@ impl UnicycleShield {
         let reach = self.loiter.reach_m(self.reference.speed_m_s);
         self.near.clear();
         let segment = self.fallback.segment;
-        let at = Instant {
+        let instant = Instant {
             period: self.period,
             segment: &segment,
             side: &self.side,
             reach_m: reach,
             horizons: [self.horizon; 2],
         };
-        self.counters.renewed(self.contracts.renew(&at, &mut self.near));
+        self.counters.renewed(self.contracts.renew(&instant, &mut self.near));
         self.near.extend(self.keep_outs.iter_mut().filter_map(|keep_out| keep_out.within(&segment, reach)));
         if !(wanted.accel_m_s2.is_finite() && wanted.turn_rad_s.is_finite()) {
             self.counters.chosen(true, 1.0, 1.0);

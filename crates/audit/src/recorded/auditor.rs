@@ -79,7 +79,7 @@ impl TrackAuditor {
     pub fn new(settings: Settings) -> Result<Self, RecordedError> {
         settings.check()?;
         Ok(Self {
-            least_offset_s: settings.vehicles.values().map(|of| of.offset_s).fold(0.0, f64::min),
+            least_offset_s: settings.vehicles.values().map(|vehicle| vehicle.offset_s).fold(0.0, f64::min),
             windows: Windows::new(settings.limits(), &settings.obstacles, &settings.land_on),
             envelope: (!settings.envelope.is_empty())
                 .then(|| LimitMonitor::new(&settings.envelope, settings.window(), settings.accel_window_s)),

@@ -236,11 +236,12 @@ impl Settings {
         const POSITIVE: (f64, &str) = (MIN_LIMIT_M, "a finite number above 0");
         const NOT_NEGATIVE: (f64, &str) = (0.0, "a finite number of at least 0");
         const FINITE: (f64, &str) = (-LARGEST, "a finite number");
-        let check_of = |option, of: Option<&str>, value: Option<f64>, (least, range): (f64, &'static str)| match value {
+        let check_of = |option, name: Option<&str>, value: Option<f64>, (least, range): (f64, &'static str)| match value
+        {
             Some(value) if !(least..=LARGEST).contains(&value) => {
                 let is_of_range = value.is_finite() && value > 0.0 || value < -LARGEST;
                 let range = if is_of_range { "a number of a size between 1e-70 and 1e70" } else { range };
-                Err(RecordedError::OutOfRange { option, of: of.map(str::to_owned), range, value })
+                Err(RecordedError::OutOfRange { option, of: name.map(str::to_owned), range, value })
             }
             _ => Ok(()),
         };
@@ -373,7 +374,7 @@ impl Limits {
 #[non_exhaustive]
 pub enum RecordedError {
     /// A number of the settings is out of range.
-    #[error("{option}: must be {range}, got {}{value:?}", of.as_ref().map(|of| format!("{of}=")).unwrap_or_default())]
+    #[error("{option}: must be {range}, got {}{value:?}", of.as_ref().map(|subject| format!("{subject}=")).unwrap_or_default())]
     OutOfRange {
         /// The setting.
         option: Opt,

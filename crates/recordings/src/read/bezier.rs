@@ -81,18 +81,18 @@ fn append(curve: &mut Curve, file: &Source) -> Result<bool, ReadError> {
     let mut lines = Lines::new(file)?;
     let (mut columns, mut pieces) = (None, 0_u64);
     while lines.advance()? {
-        let at = Place::Line(lines.number());
-        let line = str::from_utf8(lines.line()).map_err(|_| Fault::NotUtf8.at(at.clone()))?.trim();
+        let place = Place::Line(lines.number());
+        let line = str::from_utf8(lines.line()).map_err(|_| Fault::NotUtf8.at(place.clone()))?.trim();
         let columns = match &mut columns {
             _ if line.is_empty() => continue,
             None => {
-                columns = Some(Columns::of(line).map_err(|fault| fault.at(at))?);
+                columns = Some(Columns::of(line).map_err(|fault| fault.at(place))?);
                 continue;
             }
             Some(_) if line.starts_with('#') => continue,
             Some(columns) => columns,
         };
-        columns.append(curve, line).map_err(|fault| fault.at(at))?;
+        columns.append(curve, line).map_err(|fault| fault.at(place))?;
         pieces += 1;
     }
     match columns {
@@ -173,7 +173,7 @@ impl Columns {
                 }
             });
         }
-        let point = |of: &[f64]| Vector3::new(of[0], of[1], of.get(2).copied().unwrap_or(0.0));
+        let point = |numbers: &[f64]| Vector3::new(numbers[0], numbers[1], numbers.get(2).copied().unwrap_or(0.0));
         let points: Vec<_> = values[1..].chunks_exact(axes).map(point).collect();
         curve.push(values[0], powers(&points, values[0]))
     }

@@ -70,11 +70,11 @@ fn by_subject(markers: Vec<(String, [usize; 3])>) -> Result<Vec<MarkerColumns>, 
             return refuse(ContentKind::VehicleTwice, problem, "give each marker its own name, and export again");
         }
         let subject = name.split(':').next().unwrap_or_default().to_owned();
-        let at = *known.entry(subject.clone()).or_insert(vehicles.len());
-        if at == vehicles.len() {
+        let index = *known.entry(subject.clone()).or_insert(vehicles.len());
+        if index == vehicles.len() {
             vehicles.push((subject, Vec::new()));
         }
-        vehicles[at].1.push(columns);
+        vehicles[index].1.push(columns);
     }
     Ok(vehicles)
 }
@@ -270,7 +270,11 @@ impl MotiveHead {
 
     /// Returns the value of a name in the first line.
     fn header_value(&self, what: &str) -> Option<&str> {
-        self.header.iter().position(|name| name == what).and_then(|at| self.header.get(at + 1)).map(String::as_str)
+        self.header
+            .iter()
+            .position(|name| name == what)
+            .and_then(|index| self.header.get(index + 1))
+            .map(String::as_str)
     }
 
     fn capture(&self) -> Result<Capture, Fault> {
@@ -318,11 +322,11 @@ impl MotiveHead {
 
     /// Returns the position columns of all items of a type.
     fn positions(&self, wanted: &str) -> Vec<(String, [usize; 3])> {
-        let is = |row: &[String], column: usize, what: &str| row.get(column).is_some_and(|cell| cell == what);
+        let holds = |row: &[String], column: usize, what: &str| row.get(column).is_some_and(|cell| cell == what);
         let starts = (2..self.axes.len()).filter(|&column| {
-            is(&self.types, column, wanted)
+            holds(&self.types, column, wanted)
                 && ["X", "Y", "Z"].iter().enumerate().all(|(axis, name)| {
-                    is(&self.measures, column + axis, "Position") && is(&self.axes, column + axis, name)
+                    holds(&self.measures, column + axis, "Position") && holds(&self.axes, column + axis, name)
                 })
         });
         let named =
@@ -456,7 +460,7 @@ impl ViconSection {
             );
         }
         if is_objects && vehicles.len() < parts {
-            let several = vehicles.iter().find(|(_, of)| of.len() > 1).map_or("", |(name, _)| name);
+            let several = vehicles.iter().find(|(_, columns)| columns.len() > 1).map_or("", |(name, _)| name);
             let problem = format!("{} has several segments", quoted(several));
             return refuse(
                 ContentKind::AmbiguousColumn,
@@ -474,8 +478,8 @@ impl ViconSection {
         let named: Vec<_> = (2..self.names.len()).filter(|&column| !self.names[column].is_empty()).collect();
         let ends = named.iter().skip(1).copied().chain([self.axes.len()]);
         let columns = |(&from, to): (&usize, usize)| {
-            let of = |axis: &str| (from..to.min(self.axes.len())).find(|&column| self.axes[column] == axis);
-            Some((self.names[from].clone(), [of(axes[0])?, of(axes[1])?, of(axes[2])?]))
+            let column_of = |axis: &str| (from..to.min(self.axes.len())).find(|&column| self.axes[column] == axis);
+            Some((self.names[from].clone(), [column_of(axes[0])?, column_of(axes[1])?, column_of(axes[2])?]))
         };
         named.iter().zip(ends).filter_map(columns).filter(|(name, _)| !name.starts_with('*')).collect()
     }

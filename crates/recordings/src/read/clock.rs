@@ -676,7 +676,7 @@ mod dates_tests {
 
     #[test]
     fn dates_are_read_to_the_nanosecond() {
-        let at = |text: &str| Date::parse(text).map(|date| (date.since_1970_ns, date.has_zone));
+        let parsed = |text: &str| Date::parse(text).map(|date| (date.since_1970_ns, date.has_zone));
         let start = 1_700_000_000_000_000_000;
         for (text, expected) in [
             ("2023-11-14T22:13:20Z", (start, true)),
@@ -687,7 +687,7 @@ mod dates_tests {
             (" 2023-11-14 22:13:20.000000001 ", (start + 1, false)),
             ("1969-12-31T23:59:59.999999999Z", (-1, true)),
         ] {
-            assert_eq!(at(text), Some(expected), "{text}");
+            assert_eq!(parsed(text), Some(expected), "{text}");
         }
     }
 

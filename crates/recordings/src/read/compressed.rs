@@ -154,20 +154,20 @@ fn start_of_blocks(bytes: &[u8]) -> Result<usize, ReadError> {
 }
 
 /// Returns the first block with a trajectory: the offset of its body, and the body.
-fn trajectory_block(bytes: &[u8], mut at: usize) -> Result<(usize, &[u8]), ReadError> {
-    while at < bytes.len() {
+fn trajectory_block(bytes: &[u8], mut offset: usize) -> Result<(usize, &[u8]), ReadError> {
+    while offset < bytes.len() {
         let block = || {
-            let &[kind, low, high] = bytes.get(at..at + 3)? else { return None };
-            let body = bytes.get(at + 3..at + 3 + usize::from(u16::from_le_bytes([low, high])))?;
+            let &[kind, low, high] = bytes.get(offset..offset + 3)? else { return None };
+            let body = bytes.get(offset + 3..offset + 3 + usize::from(u16::from_le_bytes([low, high])))?;
             Some((kind, body))
         };
         let Some((kind, body)) = block() else {
-            return Err(Fault::Truncated("a block is incomplete".to_owned()).at(Place::Byte(at as u64)));
+            return Err(Fault::Truncated("a block is incomplete".to_owned()).at(Place::Byte(offset as u64)));
         };
         if kind == skyb::TRAJECTORY {
-            return Ok((at + 3, body));
+            return Ok((offset + 3, body));
         }
-        at += 3 + body.len();
+        offset += 3 + body.len();
     }
     refuse(ContentKind::NoPositions, "it has no trajectory", "export the show with the paths of its drones")
 }

@@ -475,7 +475,7 @@ impl Fields {
             }
             Separator::Any(bytes) => {
                 let mut start = 0;
-                let ends = (0..line.len()).filter(|&at| bytes.contains(&line[at]));
+                let ends = (0..line.len()).filter(|&index| bytes.contains(&line[index]));
                 for end in ends.chain([line.len()]) {
                     if start < end {
                         self.ends.push((start, end));

@@ -145,10 +145,10 @@ pub(super) fn is_no_fix(place: &Geodetic) -> bool {
 }
 
 /// Returns the note on `count` omitted rows or messages without a fix; `of` names the vehicles.
-pub(super) fn no_fixes(count: u64, of: &str) -> Option<String> {
+pub(super) fn no_fixes(count: u64, what: &str) -> Option<String> {
     let positions = if count == 1 { "position" } else { "positions" };
     (count > 0)
-        .then(|| format!("{count} {positions}{of} omitted for lack of a fix: latitude and longitude are exactly 0"))
+        .then(|| format!("{count} {positions}{what} omitted for lack of a fix: latitude and longitude are exactly 0"))
 }
 
 /// Returns sine and cosine of latitude and of longitude.

@@ -215,8 +215,8 @@ impl Track {
     fn push(&mut self, time: f64, position: Vector3<f64>) -> Option<f64> {
         let [first, middle] = self.0;
         self.0 = [middle, Some((time, position))];
-        let ((from, start), (at, place)) = (first?, middle?);
-        let part = (at - from) / (time - from);
+        let ((from, start), (between, place)) = (first?, middle?);
+        let part = (between - from) / (time - from);
         part.is_finite().then(|| (place - start.lerp(&position, part)).norm())
     }
 }
@@ -263,12 +263,12 @@ impl SuspectColumn {
             self.last = Some(value.into());
         }
         let among_all = self.track.push(time, position);
-        let of = match self.values.get_mut(value) {
-            Some(of) => of,
+        let entry = match self.values.get_mut(value) {
+            Some(entry) => entry,
             None => self.values.entry(value.into()).or_default(),
         };
-        of.rows += 1;
-        let among_own = of.track.push(time, position);
+        entry.rows += 1;
+        let among_own = entry.track.push(time, position);
         if let (Some(all), Some(own)) = (among_all, among_own) {
             self.compared += 1;
             self.off[0] += own;
@@ -371,7 +371,9 @@ pub(super) fn examine(header: &[String], unused: &[usize], vehicles: &[String]) 
         }
     }
     let ids = names.values().map(|(_, column)| *column);
-    if let Some((first, vehicle)) = ids.clone().next().zip((0..vehicles.len()).find(|of| !names.contains_key(of))) {
+    if let Some((first, vehicle)) =
+        ids.clone().next().zip((0..vehicles.len()).find(|vehicle| !names.contains_key(vehicle)))
+    {
         let [column, vehicle] = [&header[first], &vehicles[vehicle]].map(|name| quoted(name));
         let problem = format!("column {column} may name a vehicle, but there is no such column for {vehicle}");
         return refuse(
@@ -450,12 +452,12 @@ fn of_vehicles<'a>(column: &'a str, vehicles: &[String]) -> Vec<(usize, &'a str)
     if !found.is_empty() {
         return found;
     }
-    let path_of_one = stem.match_indices(['.', '/']).find_map(|(at, _)| {
+    let path_of_one = stem.match_indices(['.', '/']).find_map(|(index, _)| {
         let is_below =
-            |vehicle: &&String| vehicle.strip_prefix(&stem[..at]).is_some_and(|rest| rest.starts_with(['.', '/']));
+            |vehicle: &&String| vehicle.strip_prefix(&stem[..index]).is_some_and(|rest| rest.starts_with(['.', '/']));
         let mut below = vehicles.iter().enumerate().filter(|(_, vehicle)| is_below(vehicle));
         let first = below.next()?;
-        below.next().is_none().then_some((first.0, &stem[at + 1..]))
+        below.next().is_none().then_some((first.0, &stem[index + 1..]))
     });
     path_of_one.into_iter().filter(|_| vehicles.len() > 1).collect()
 }
@@ -484,8 +486,8 @@ fn further<'a>(names: &[&'a str]) -> Option<[&'a str; 2]> {
     array.or_else(|| {
         known.iter().find_map(|(name, original)| {
             AXES.iter().find_map(|axes| {
-                name.match_indices(axes[0]).find_map(|(at, token)| {
-                    let (before, behind) = (&name[..at], &name[at + token.len()..]);
+                name.match_indices(axes[0]).find_map(|(index, token)| {
+                    let (before, behind) = (&name[..index], &name[index + token.len()..]);
                     let second = known.get(&format!("{before}{}{behind}", axes[1]))?;
                     is_position(&format!("{before}{behind}"), *axes).then_some([*original, *second])
                 })

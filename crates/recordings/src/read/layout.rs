@@ -153,8 +153,9 @@ impl Layout {
         layout.metres.iter_mut().zip(&convention.signs).for_each(|(metres, sign)| *metres *= sign);
         layout.notes.extend(convention.note.clone());
         if is_planar {
-            let of = if flat.len() < vehicles.len() { format!(" of {}", list(&flat, 12)) } else { String::new() };
-            layout.notes.push(format!("no column gives the height{of}: {PLANAR}"));
+            let of_vehicles =
+                if flat.len() < vehicles.len() { format!(" of {}", list(&flat, 12)) } else { String::new() };
+            layout.notes.push(format!("no column gives the height{of_vehicles}: {PLANAR}"));
         }
         layout.notes.extend(columns.heights_used(&layout, options)?);
         layout.facts = columns.facts(&layout, options);
@@ -188,10 +189,14 @@ impl Layout {
         if !convention.has_directions() || convention.reference.is_some() {
             return Ok(());
         }
-        let of_heights: BTreeSet<_> =
-            heights.among(self.bodies.iter().filter_map(|body| body.position[2])).iter().map(|of| of.0).collect();
-        let of = |body: &VehicleColumns| body.position.into_iter().chain(body.velocity.unwrap_or_default()).flatten();
-        let positions = self.bodies.iter().flat_map(of);
+        let of_heights: BTreeSet<_> = heights
+            .among(self.bodies.iter().filter_map(|body| body.position[2]))
+            .iter()
+            .map(|height| height.0)
+            .collect();
+        let columns_of =
+            |body: &VehicleColumns| body.position.into_iter().chain(body.velocity.unwrap_or_default()).flatten();
+        let positions = self.bodies.iter().flat_map(columns_of);
         let (directed, others): (Vec<_>, Vec<_>) = positions
             .filter(|column| !of_heights.contains(column))
             .partition(|column| convention.directed.contains(column));
@@ -239,8 +244,8 @@ impl Layout {
         let repeats = |&column: &usize| {
             let (stem, number) = header[column].rsplit_once('.')?;
             let is_number = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
-            let of = |read: usize| header[read] == stem && Heading::of(&convention.header[read]).is_some();
-            (is_number && used.iter().any(|&read| of(read))).then_some((column, stem))
+            let is_read = |read: usize| header[read] == stem && Heading::of(&convention.header[read]).is_some();
+            (is_number && used.iter().any(|&read| is_read(read))).then_some((column, stem))
         };
         if let Some((column, stem)) = unused.clone().find_map(|column| repeats(&column)) {
             let problem = format!("column {} repeats column {}", quoted(&header[column]), quoted(stem));
@@ -353,7 +358,7 @@ impl Layout {
 
     /// Returns the columns that are read, each once, in ascending order.
     pub(super) fn columns(&self) -> Vec<usize> {
-        let of = |body: &VehicleColumns| {
+        let columns_of = |body: &VehicleColumns| {
             let velocity = body.velocity.unwrap_or_default();
             body.position.into_iter().chain(velocity).chain([body.radius]).flatten()
         };
@@ -361,7 +366,7 @@ impl Layout {
         let columns: BTreeSet<_> = self
             .bodies
             .iter()
-            .flat_map(of)
+            .flat_map(columns_of)
             .chain(self.time_columns())
             .chain(self.id)
             .chain(others)
@@ -378,11 +383,11 @@ impl Layout {
 
 /// Returns the vehicles that have both horizontal coordinates of a frame. `first` is the role of the first coordinate.
 fn vehicles_of<'a>(first: Role, headings: &[(usize, Heading<'a>)]) -> BTreeSet<&'a str> {
-    let of = |role: Role| {
+    let column_of = |role: Role| {
         headings.iter().filter(move |(_, heading)| heading.role == role).map(|(_, heading)| heading.vehicle)
     };
-    let second: BTreeSet<_> = of(first + 1).collect();
-    of(first).filter(|vehicle| second.contains(vehicle)).collect()
+    let second: BTreeSet<_> = column_of(first + 1).collect();
+    column_of(first).filter(|vehicle| second.contains(vehicle)).collect()
 }
 
 /// Refuses vehicles whose positions are given in another frame only. `names` are the vehicles that are read.
@@ -459,8 +464,8 @@ const WORDS: [&str; 12] = [
 ];
 
 /// Returns the fault of a missing column for a role.
-pub(super) fn missing(header: &[String], role: Role, of: &str) -> Fault {
-    let problem = format!("no column gives {}{of}; its columns are {}", WORDS[role], list(header, 12));
+pub(super) fn missing(header: &[String], role: Role, suffix: &str) -> Fault {
+    let problem = format!("no column gives {}{suffix}; its columns are {}", WORDS[role], list(header, 12));
     let column = COLUMN.set(format!("{}=NAME", ColumnNames::ROLES[role]));
     let remedy = format!("name the column with {column}, or rename it");
     Fault::content(kind_of_missing(role), problem, remedy)
@@ -600,11 +605,11 @@ impl<'a> Columns<'a> {
     }
 
     pub(super) fn claim(&mut self, vehicle: &str, heading: &Heading<'a>, column: usize) -> Result<(), Fault> {
-        let of = if vehicle.is_empty() { String::new() } else { format!(" of `{vehicle}`") };
+        let of_vehicle = if vehicle.is_empty() { String::new() } else { format!(" of `{vehicle}`") };
         self.units.extend(heading.unit.map(|unit| (column, unit)));
         let Some(first) = self.found.insert((vehicle.to_owned(), heading.role), column) else { return Ok(()) };
         let (first, second) = (&self.header[first], &self.header[column]);
-        let problem = format!("the columns `{first}` and `{second}` both give {}{of}", WORDS[heading.role]);
+        let problem = format!("the columns `{first}` and `{second}` both give {}{of_vehicle}", WORDS[heading.role]);
         let remedy = format!("name one of them with {COLUMN}, or remove the other");
         refuse(ContentKind::AmbiguousColumn, problem, remedy)
     }
@@ -638,8 +643,8 @@ impl<'a> Columns<'a> {
             self.claim(heading.vehicle, heading, *column)?;
         }
         if names.is_empty() {
-            let of = " and none for its position (as `id`, `x`, `y`, or as `x1`, `y1`)";
-            return Err(missing(self.header, ID, of));
+            let hint = " and none for its position (as `id`, `x`, `y`, or as `x1`, `y1`)";
+            return Err(missing(self.header, ID, hint));
         }
         Ok(names)
     }
@@ -647,7 +652,7 @@ impl<'a> Columns<'a> {
     /// Returns the columns of a vehicle. Requires x and y of the position; a velocity must have the same axes as the
     /// position.
     pub(super) fn body(&self, vehicle: &str) -> Result<VehicleColumns, Fault> {
-        let of = if vehicle.is_empty() { String::new() } else { format!(" of vehicle `{vehicle}`") };
+        let of_vehicle = if vehicle.is_empty() { String::new() } else { format!(" of vehicle `{vehicle}`") };
         let axes = |role| [0, 1, 2].map(|axis| self.get(vehicle, role + axis));
         let (position, velocity) = (axes(self.place), axes(VELOCITY));
         let moves = velocity.iter().any(Option::is_some);
@@ -657,7 +662,7 @@ impl<'a> Columns<'a> {
                 (Some(_), None) if moves => VELOCITY,
                 _ => continue,
             };
-            return Err(missing(self.header, lacks + axis, &of));
+            return Err(missing(self.header, lacks + axis, &of_vehicle));
         }
         Ok(VehicleColumns { position, velocity: moves.then_some(velocity), radius: self.get(vehicle, RADIUS) })
     }

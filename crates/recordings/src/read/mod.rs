@@ -178,7 +178,8 @@ pub fn recording_name(paths: &[&Path]) -> String {
 /// [`ReadError`] if the file is a show that cannot be read.
 pub fn show_rules(path: &Path, options: &ReadOptions) -> Result<Option<ShowRules>, ReadError> {
     let mut source = Source::file(path);
-    let is_show = path.is_file() && recognise(&mut source, options.format).is_ok_and(|of| of == Format::SKYBRUSH);
+    let is_show =
+        path.is_file() && recognise(&mut source, options.format).is_ok_and(|format| format == Format::SKYBRUSH);
     if is_show { skybrush::rules(&source, options) } else { Ok(None) }
 }
 

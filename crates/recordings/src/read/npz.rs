@@ -262,10 +262,10 @@ impl Arrays {
     /// Returns an array of vectors with `times` instants.
     fn table(&mut self, name: &str, times: usize, known_axes: &[ArrayAxis]) -> Result<Table, ReadError> {
         let array = self.array(name)?;
-        let at = in_array(name);
+        let fail = in_array(name);
         let &[first, second, third] = array.shape.as_slice() else {
             let problem = format!("its shape is {:?}, expected three axes", array.shape);
-            return Err(at(Fault::content(
+            return Err(fail(Fault::content(
                 ContentKind::ArrayShape,
                 problem,
                 "save positions as T x N x 3 or N x T x 3",
@@ -273,11 +273,11 @@ impl Arrays {
         };
         if array.count() == 0 {
             let problem = format!("its shape is {:?}, which has no elements", array.shape);
-            return Err(at(Fault::content(ContentKind::Empty, problem, "save at least one instant of one vehicle")));
+            return Err(fail(Fault::content(ContentKind::Empty, problem, "save at least one instant of one vehicle")));
         }
         let shape = [first, second, third];
-        let layout = layout(shape, times, known_axes).map_err(&at)?;
-        Ok(Table { shape, layout, numbers: numbers(array, &layout).map_err(at)? })
+        let layout = layout(shape, times, known_axes).map_err(&fail)?;
+        Ok(Table { shape, layout, numbers: numbers(array, &layout).map_err(fail)? })
     }
 }
 
@@ -291,7 +291,7 @@ struct Table {
 
 impl Table {
     fn length(&self, axis: ArrayAxis) -> usize {
-        self.layout.into_iter().zip(self.shape).find(|(of, _)| *of == axis).map_or(1, |(_, length)| length)
+        self.layout.into_iter().zip(self.shape).find(|(own, _)| *own == axis).map_or(1, |(_, length)| length)
     }
 
     fn vehicles(&self) -> usize {
@@ -319,7 +319,7 @@ fn numbers(mut array: Array, order: &[ArrayAxis]) -> Result<Numbers, Fault> {
         inner.iter().product::<usize>()
     };
     let along = USUAL.map(|axis| {
-        let place = order.iter().position(|of| *of == axis);
+        let place = order.iter().position(|own| *own == axis);
         place.map_or((1, 0), |place| (shape[place], stride(place)))
     });
     let steps = |(length, stride): (usize, usize)| (0..length).map(move |k| k * stride);

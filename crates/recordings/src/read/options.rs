@@ -370,7 +370,7 @@ impl ReadOptions {
             (is_one_vehicle, FormatOption::OneVehicle, &ONE_VEHICLE, "names its vehicles"),
             (self.allow_unfinished, FormatOption::Unfinished, &ALLOW_UNFINISHED, "cannot be read before it is closed"),
         ];
-        match given.into_iter().find(|(is_given, of, ..)| *is_given && !format.supports.contains(of)) {
+        match given.into_iter().find(|(is_given, option, ..)| *is_given && !format.supports.contains(option)) {
             Some((.., option, why)) => {
                 refuse(ContentKind::UnusedOption, format!("{} {why}", format.title), format!("omit {option}"))
             }

@@ -457,26 +457,26 @@ pub(super) fn probe(rows: &[Row]) -> Option<Probe> {
 }
 
 /// Refuses rows of one vehicle whose time decreases in the order of the file.
-pub(super) fn refuse_steps_back(rows: &[Row], of: &impl Rows, timing: &Timing) -> Result<(), ReadError> {
+pub(super) fn refuse_steps_back(rows: &[Row], source: &impl Rows, timing: &Timing) -> Result<(), ReadError> {
     let mut last: Vec<Option<&Row>> = Vec::new();
     for row in rows {
         if row.vehicle >= last.len() {
             last.resize(row.vehicle + 1, None);
         }
         let Some(before) = last[row.vehicle].replace(row) else { continue };
-        if row.stamp.compare(before.stamp).is_lt() && of.file(row.place) == of.file(before.place) {
-            let name = quoted(of.vehicles().get(row.vehicle).map_or("", String::as_str));
+        if row.stamp.compare(before.stamp).is_lt() && source.file(row.place) == source.file(before.place) {
+            let name = quoted(source.vehicles().get(row.vehicle).map_or("", String::as_str));
             let (time_s, before_s) = (timing.seconds(row.stamp), timing.seconds(before.stamp));
             let problem = format!(
                 "vehicle {name} goes back in time: {time_s} s comes after {before_s} s at {}",
-                of.place(before.place)
+                source.place(before.place)
             );
             let remedy = format!(
                 "check whether its clock was set; if the rows belong to several vehicles, name their column with {}; \
                  if the rows are only out of order, use {SORT}",
                 COLUMN.set("id=NAME")
             );
-            return Err(Fault::content(ContentKind::TimeBackwards, problem, remedy).at(of.place(row.place)));
+            return Err(Fault::content(ContentKind::TimeBackwards, problem, remedy).at(source.place(row.place)));
         }
     }
     Ok(())

@@ -292,7 +292,7 @@ fn repeated(path: &Path, directory: u64) -> io::Result<Option<String>> {
     file.seek(SeekFrom::Start(directory))?;
     let (mut fixed, mut known) = ([0; FIXED_BYTES], BTreeSet::new());
     while file.read_exact(&mut fixed).is_ok() && fixed.starts_with(&BEGIN) {
-        let [name, extra, comment] = [28, 30, 32].map(|at| u16::from_le_bytes([fixed[at], fixed[at + 1]]));
+        let [name, extra, comment] = [28, 30, 32].map(|offset| u16::from_le_bytes([fixed[offset], fixed[offset + 1]]));
         let mut bytes = vec![0; usize::from(name)];
         file.read_exact(&mut bytes)?;
         file.seek_relative(i64::from(extra) + i64::from(comment))?;

@@ -443,9 +443,9 @@ impl<C: Cells> Rows for Table<C> {
     fn late_notes(&self) -> Vec<String> {
         const LISTED: usize = 12;
         let names = self.no_fixes.keys().filter_map(|&vehicle| self.names.all().get(vehicle));
-        let mut of: Vec<_> = names.take(LISTED).map(|name| quoted(name)).collect();
-        of.extend((self.no_fixes.len() > LISTED).then(|| "...".to_owned()));
-        let vehicles = format!(" of {}", of.join(", "));
+        let mut listed: Vec<_> = names.take(LISTED).map(|name| quoted(name)).collect();
+        listed.extend((self.no_fixes.len() > LISTED).then(|| "...".to_owned()));
+        let vehicles = format!(" of {}", listed.join(", "));
         let mut notes: Vec<_> = no_fixes(self.no_fixes.values().sum(), &vehicles).into_iter().collect();
         if self.incomplete > 0 {
             notes.push(format!("positions omitted because one of their coordinates is empty: {}", self.incomplete));

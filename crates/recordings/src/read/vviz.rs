@@ -122,11 +122,11 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
 
 /// Returns the samples of a drone, or the fault and the index of its step.
 fn items(agent: &Agent, vehicle: usize, show: &Show, scale: f64) -> Result<Vec<Item>, (Option<usize>, Fault)> {
-    let mut at = [agent.home_x, agent.home_y, agent.home_z];
+    let mut position = [agent.home_x, agent.home_y, agent.home_z];
     let mut time_s = show.time_offset_secs;
     let mut items = Vec::new();
-    let sample = |at: [f64; 3], time_s: f64| {
-        let position_m = Vector3::new(at[0], at[2], at[1]) * scale;
+    let sample = |point: [f64; 3], time_s: f64| {
+        let position_m = Vector3::new(point[0], point[2], point[1]) * scale;
         let finite = time_s.is_finite() && position_m.iter().all(|x| x.is_finite());
         let sample = Sample { vehicle, time_s, position_m, velocity_m_s: None, radius_m: None };
         if finite { Ok(Item::Sample(sample)) } else { Err(Fault::out_of_range()) }
@@ -135,7 +135,7 @@ fn items(agent: &Agent, vehicle: usize, show: &Show, scale: f64) -> Result<Vec<I
         let fail = |fault| (Some(number), fault);
         if number > 0 || step.dt.is_some() {
             if number == 0 {
-                items.push(sample(at, time_s).map_err(fail)?);
+                items.push(sample(position, time_s).map_err(fail)?);
             }
             let duration_s = duration(step, show).map_err(fail)?;
             let after_s = time_s + duration_s;
@@ -149,10 +149,10 @@ fn items(agent: &Agent, vehicle: usize, show: &Show, scale: f64) -> Result<Vec<I
             }
             time_s = after_s;
         }
-        for (at, by) in at.iter_mut().zip([step.dx, step.dy, step.dz]) {
-            *at += by;
+        for (coordinate, by) in position.iter_mut().zip([step.dx, step.dy, step.dz]) {
+            *coordinate += by;
         }
-        items.push(sample(at, time_s).map_err(fail)?);
+        items.push(sample(position, time_s).map_err(fail)?);
     }
     Ok(items)
 }

@@ -43,7 +43,7 @@ impl ImperfectionSpec for ActuationSpec {
             (self.max_accel_m_s2.is_some(), VoidReason::AccelerationLimited),
             (self.lag_s > 0.0, VoidReason::AccelerationLagged),
         ];
-        voids.into_iter().filter_map(|(is, void)| is.then_some(void)).collect()
+        voids.into_iter().filter_map(|(is_void, void)| is_void.then_some(void)).collect()
     }
 }
 

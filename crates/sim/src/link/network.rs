@@ -136,7 +136,7 @@ impl ImperfectionSpec for NetworkSpec {
     fn voids(&self) -> Vec<VoidReason> {
         let is_late = self.latency_s > 0.0 || self.rate_hz.is_some();
         let voids = [(is_late, VoidReason::MessagesDelayed), (self.loses(), VoidReason::MessagesLost)];
-        voids.into_iter().filter_map(|(is, void)| is.then_some(void)).collect()
+        voids.into_iter().filter_map(|(is_void, void)| is_void.then_some(void)).collect()
     }
 }
 

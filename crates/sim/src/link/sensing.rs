@@ -92,7 +92,7 @@ impl ImperfectionSpec for SensingSpec {
     fn voids(&self) -> Vec<VoidReason> {
         let is_late = self.latency_s > 0.0 || self.near_s() > 0.0 || self.rate_hz.is_some();
         let voids = [(is_late, VoidReason::SensingDelayed), (self.is_noisy(), VoidReason::SensingInexact)];
-        voids.into_iter().filter_map(|(is, void)| is.then_some(void)).collect()
+        voids.into_iter().filter_map(|(is_void, void)| is_void.then_some(void)).collect()
     }
 }
 

@@ -234,10 +234,10 @@ impl Check {
             let Some(node) = known(name) else {
                 // The key of the file may have a value of an override.
                 let is_of_override = |span: Range<usize>| span.start >= self.overridden_from;
-                let at =
+                let place =
                     if !is_of_override(key.span()) && is_of_override(value.span()) { value.span() } else { key.span() };
                 let known: Vec<_> = node.keys().chain(chosen.into_iter().flat_map(Node::keys)).collect();
-                return Err(self.unknown_key(name, known, at));
+                return Err(self.unknown_key(name, known, place));
             };
             // `chosen` has checked the tag.
             if node.keyword("const").is_null() {
@@ -269,7 +269,7 @@ impl Check {
     ) -> Result<Option<Node>, SchemaError> {
         let names: Vec<_> = alternatives.iter().filter_map(|part| part.tag()).map(|(_, name)| name).collect();
         let default = alternatives.iter().find(|part| !part.requires(tag)).and_then(|part| part.tag());
-        let (name, at) = match (table.get(tag), own_name, default) {
+        let (name, tag_span) = match (table.get(tag), own_name, default) {
             (Some(value), ..) => {
                 let Some(name) = value.get_ref().as_str() else {
                     let message = format!("`{tag}` must be {}, got {}", listed(&names), found(value.get_ref()));
@@ -279,7 +279,7 @@ impl Check {
                 };
                 (name.to_owned(), value.span())
             }
-            (None, Some((own, at)), _) => ((*own).to_owned(), at.clone()),
+            (None, Some((own, own_span)), _) => ((*own).to_owned(), own_span.clone()),
             (None, None, Some((_, default))) => (default.to_owned(), span.clone()),
             // Some tables, such as `[[leg]]`, need no tag.
             (None, None, None) if node.keyword("anyOf").is_array() => return Ok(None),
@@ -294,7 +294,7 @@ impl Check {
             }
         };
         let Some(&chosen) = alternatives.iter().find(|part| part.tag().is_some_and(|(_, known)| known == name)) else {
-            let mut schema_error = unknown_choice(&name, &names, at);
+            let mut schema_error = unknown_choice(&name, &names, tag_span);
             if own_name.is_some() && !table.contains_key(tag) {
                 let help = format!(
                     "the name of a law is its kind unless the table [laws.NAME] has a `kind`: {}",
@@ -304,7 +304,7 @@ impl Check {
             }
             return Err(schema_error.child(tag));
         };
-        if at.start >= self.overridden_from {
+        if tag_span.start >= self.overridden_from {
             let is_left = |key: &str, value: &Spanned<DeValue<'_>>| {
                 value.span().start < self.overridden_from
                     && node.property(key).is_none()
@@ -318,7 +318,7 @@ impl Check {
             }
         }
         let name = DeValue::String(Cow::Owned(name));
-        table.entry(Spanned::new(at.clone(), tag.into())).or_insert(Spanned::new(at, name));
+        table.entry(Spanned::new(tag_span.clone(), tag.into())).or_insert(Spanned::new(tag_span, name));
         Ok(Some(chosen))
     }
 }
@@ -438,18 +438,18 @@ fn expected(node: Node) -> String {
         "boolean" => "true or false".to_owned(),
         "string" => "text".to_owned(),
         "array" => {
-            let of = node.items().map_or_else(String::new, |items| match items.kind() {
+            let entries = node.items().map_or_else(String::new, |items| match items.kind() {
                 "number" => " numbers".to_owned(),
                 "integer" => " whole numbers".to_owned(),
                 "array" => " lists".to_owned(),
                 _ => " entries".to_owned(),
             });
             match (node.keyword("minItems").as_u64(), node.keyword("maxItems").as_u64()) {
-                (Some(least), Some(most)) if least == most => format!("a list of {least}{of}"),
-                (Some(least), Some(most)) => format!("a list of {least} to {most}{of}"),
+                (Some(least), Some(most)) if least == most => format!("a list of {least}{entries}"),
+                (Some(least), Some(most)) => format!("a list of {least} to {most}{entries}"),
                 (Some(1), None) => "a list with at least one entry".to_owned(),
-                (Some(least), None) => format!("a list of at least {least}{of}"),
-                _ => format!("a list of{of}"),
+                (Some(least), None) => format!("a list of at least {least}{entries}"),
+                _ => format!("a list of{entries}"),
             }
         }
         _ => {

@@ -230,9 +230,13 @@ impl Scenario {
                 set_row(&mut slots_m, i, slot_m);
             });
             if let Some((_, vehicle, number)) = self.too_near(&slots_m, SLOT_MARGIN * self.delta_m) {
-                let of = if leg == 0 { String::new() } else { format!(" of leg {}", leg + 1) };
+                let of_leg = if leg == 0 { String::new() } else { format!(" of leg {}", leg + 1) };
                 return Err(self
-                    .refuse(row(&slots_m, vehicle), number, format_args!("the slot of vehicle {}{of} is", vehicle + 1))
+                    .refuse(
+                        row(&slots_m, vehicle),
+                        number,
+                        format_args!("the slot of vehicle {}{of_leg} is", vehicle + 1),
+                    )
                     .at_leg_entry(leg, "formation.points_m", vehicle)
                     .at_entry("obstacle", number));
             }

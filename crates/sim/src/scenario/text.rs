@@ -143,12 +143,12 @@ fn laws<'t, 'a>(root: &'t Spanned<DeValue<'a>>) -> Option<&'t DeTable<'a>> {
 /// else of its table. An overridden part, with a span from `overridden` on, replaces the whole.
 fn find(root: &Spanned<DeValue<'_>>, field: &Field, overridden: usize) -> Range<usize> {
     let of_leg = field.leg.checked_sub(1).and_then(|leg| root.get_ref().get("leg")?.get_ref().get(leg));
-    let at = |path: &str| match (of_leg, path.strip_prefix("formation.")) {
+    let value_at = |path: &str| match (of_leg, path.strip_prefix("formation.")) {
         (Some(leg), Some(key)) => leg.get_ref().get(key),
         _ => path.split('.').try_fold(root, |value, key| value.get_ref().get(key)),
     };
     let origins = ORIGINS.iter().find(|(key, _)| *key == field.key).map_or(&[][..], |(_, origins)| origins);
-    let Some(value) = std::iter::once(&*field.key).chain(origins.iter().copied()).find_map(at) else {
+    let Some(value) = std::iter::once(&*field.key).chain(origins.iter().copied()).find_map(value_at) else {
         if let Some(leg) = of_leg {
             return leg.span();
         }

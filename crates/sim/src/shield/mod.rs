@@ -247,9 +247,9 @@ impl Scenario {
 
     /// Returns the shields of all vehicles at these starts, with planes before the obstacles.
     pub(crate) fn shield_fleet(&self, limits: &Limits, states: &[State]) -> Result<Fleet, ScenarioError> {
-        let keep_out = |of: &tautline_laws::space::Obstacle| {
-            let clearance_m = of.clearance_m;
-            Obstacle::new(Solid { shape: of.shape, place_m: of.place_m }, clearance_m)
+        let keep_out = |obstacle: &tautline_laws::space::Obstacle| {
+            let clearance_m = obstacle.clearance_m;
+            Obstacle::new(Solid { shape: obstacle.shape, place_m: obstacle.place_m }, clearance_m)
         };
         let obstacles: Vec<_> = self.obstacles.iter().map(keep_out).collect();
         let fleet = Fleet::new(&vec![*limits; self.count()], states);
@@ -307,14 +307,14 @@ impl Scenario {
                 spec.velocity_error_m_s,
             ),
         ];
-        for (key, of, noise, bound) in noises {
+        for (key, what, noise, bound) in noises {
             if noise > 0.0 && noise >= bound {
                 return Err(refused(
-                    &format!("{key} must be more than {of}, the standard deviation of an unbounded error"),
+                    &format!("{key} must be more than {what}, the standard deviation of an unbounded error"),
                     bound,
                 )
                 .with_help(format!("raise it to {}, six deviations", 6.0 * noise))
-                .at_keys([key, of]));
+                .at_keys([key, what]));
             }
         }
         let push_m_s2 = self.drag_per_s * self.fastest_wind_m_s();

@@ -114,8 +114,8 @@ impl Campaign {
     /// # Errors
     /// [`Failure`] if the campaign cannot be flown here, for example because a file of its scenario is missing or
     /// different, or because it has another law.
-    pub fn of(manifest: Manifest, at: &Path, external_law: Option<&ExternalLaw>) -> Result<Self, Failure> {
-        check_external_law(&manifest, at, external_law)?;
+    pub fn of(manifest: Manifest, path: &Path, external_law: Option<&ExternalLaw>) -> Result<Self, Failure> {
+        check_external_law(&manifest, path, external_law)?;
         let spec = Spec::read("the specification in the manifest", &manifest.spec)?;
         let campaign = Self::read(manifest, &spec, external_law)?;
         let first = campaign.first();
@@ -126,7 +126,7 @@ impl Campaign {
                 campaign.manifest.first.join(", ")
             );
             let remedy = "use the same files of the scenario on all machines";
-            return Err(other_campaign(at, problem, remedy));
+            return Err(other_campaign(path, problem, remedy));
         }
         Ok(campaign)
     }
@@ -423,7 +423,7 @@ impl Campaign {
 }
 
 /// Refuses an external law that is not the one that a manifest names.
-fn check_external_law(manifest: &Manifest, at: &Path, given: Option<&ExternalLaw>) -> Result<(), Failure> {
+fn check_external_law(manifest: &Manifest, path: &Path, given: Option<&ExternalLaw>) -> Result<(), Failure> {
     let (planned, given) = (manifest.external_law.as_deref(), given.map(ExternalLaw::name));
     if planned == given {
         return Ok(());
@@ -434,7 +434,7 @@ fn check_external_law(manifest: &Manifest, at: &Path, given: Option<&ExternalLaw
         Some(law) => format!("continue the campaign in Python: tautline.campaign(..., law={law}(...))"),
         None => "continue without an external law, or give another folder".to_owned(),
     };
-    Err(other_campaign(at, problem, remedy))
+    Err(other_campaign(path, problem, remedy))
 }
 
 fn written<'a>(drawn: &'a BTreeMap<&'a str, toml::Value>) -> impl Iterator<Item = String> + 'a {

@@ -430,14 +430,14 @@ mod tests {
         const KEYS: &str = "scenario = \"pentagon\"\nruns = 3\n[vary]\n\"start.jitter_m\" = \"run\"\n\
                             law.alpha = { list = [0, 1] }\n[vary.network]\n  loss = \"run\"\n[stop]\nwidth = 3\n";
         let spec = Spec::read("spec.toml", KEYS).expect("read");
-        let at = |key: &str| spec.refuse(key, "", "").place().map(|place| (place.line, place.column));
-        assert_eq!(at("runs"), Some((2, 1)));
-        assert_eq!(at("vary.start.jitter_m"), Some((4, 1)));
-        assert_eq!(at("vary.law.alpha.list"), Some((5, 15)));
-        assert_eq!(at("vary.law.alpha.list.2"), Some((5, 26)));
-        assert_eq!(at("vary.network.loss"), Some((7, 3)));
-        assert_eq!(at("stop.width"), Some((9, 1)));
-        assert_eq!(at("stop.decided"), Some((8, 2)), "its table");
-        assert_eq!((at("laws"), at("")), (None, None));
+        let place_of = |key: &str| spec.refuse(key, "", "").place().map(|place| (place.line, place.column));
+        assert_eq!(place_of("runs"), Some((2, 1)));
+        assert_eq!(place_of("vary.start.jitter_m"), Some((4, 1)));
+        assert_eq!(place_of("vary.law.alpha.list"), Some((5, 15)));
+        assert_eq!(place_of("vary.law.alpha.list.2"), Some((5, 26)));
+        assert_eq!(place_of("vary.network.loss"), Some((7, 3)));
+        assert_eq!(place_of("stop.width"), Some((9, 1)));
+        assert_eq!(place_of("stop.decided"), Some((8, 2)), "its table");
+        assert_eq!((place_of("laws"), place_of("")), (None, None));
     }
 }

@@ -72,9 +72,9 @@ impl Outline {
         splits.visit_all(|part| {
             let Part::Message(message) = part else { return Ok(()) };
             if planned::is_curve(&message.of.schema) {
-                let of = if outline.reads(message.of) { &mut outline.curves } else { &mut outline.unread };
-                if !of.contains(&message.of.topic) {
-                    of.insert(message.of.topic.clone());
+                let list = if outline.reads(message.of) { &mut outline.curves } else { &mut outline.unread };
+                if !list.contains(&message.of.topic) {
+                    list.insert(message.of.topic.clone());
                 }
                 return Ok(());
             }
@@ -189,7 +189,7 @@ impl Outline {
 
     /// Returns the transform tree for a topic, and its namespace: the innermost one that contains the topic.
     pub(super) fn tree_of(&self, topic: &str) -> Option<(&str, &Tree)> {
-        let around = topic.rmatch_indices('/').map(|(at, _)| &topic[..at]).take(DEEPEST).chain([""]);
+        let around = topic.rmatch_indices('/').map(|(index, _)| &topic[..index]).take(DEEPEST).chain([""]);
         let mut nearest = around.filter_map(|space| self.trees.get_key_value(space));
         nearest.next().map(|(space, tree)| (space.as_str(), tree))
     }

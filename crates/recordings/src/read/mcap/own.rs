@@ -116,8 +116,8 @@ fn take(instant: &Instant, axes: usize, vehicles: usize, (number, rows): (u64, &
         return Err(format!("the lengths of its arrays do not fit {count} vehicles"));
     }
     let vector = |numbers: &[f64], k: usize| {
-        let of = &numbers[axes * k..axes * (k + 1)];
-        Vector3::new(of[0], of[1], of.get(2).copied().unwrap_or(0.0))
+        let coordinates = &numbers[axes * k..axes * (k + 1)];
+        Vector3::new(coordinates[0], coordinates[1], coordinates.get(2).copied().unwrap_or(0.0))
     };
     for (k, &vehicle) in instant.vehicles.iter().enumerate() {
         let vehicle = usize::try_from(vehicle).ok().filter(|&vehicle| vehicle < vehicles);
@@ -203,10 +203,10 @@ impl Channels {
     fn read_instant(&mut self) -> Result<Vec<Read>, ReadError> {
         let mut found: Vec<Read> = Vec::new();
         while let Some(part) = self.topics.next()? {
-            let Part::Message(Message { of, bytes, .. }) = part else { continue };
-            match &*of.schema {
+            let Part::Message(Message { of: topic, bytes, .. }) = part else { continue };
+            match &*topic.schema {
                 CHANNEL_SCHEMA => {
-                    let fault = |reason| ReadFault::Message { topic: of.topic.clone(), reason };
+                    let fault = |reason| ReadFault::Message { topic: topic.topic.clone(), reason };
                     let read = decode::<Read>(bytes).map_err(fault);
                     let message = read.map_err(|fault| self.topics.fault(fault))?;
                     found.retain(|before| before.name != message.name);

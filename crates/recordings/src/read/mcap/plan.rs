@@ -73,10 +73,9 @@ impl ReadPlan {
         plan.check()?;
         plan.find_bodies()?;
         if plan.target_frame.is_none() {
-            let bodies = plan
-                .bodies
-                .iter()
-                .flat_map(|(space, of)| of.values().flatten().map(|body| (space.as_str(), body.carrier.as_str())));
+            let bodies = plan.bodies.iter().flat_map(|(space, bodies)| {
+                bodies.values().flatten().map(|body| (space.as_str(), body.carrier.as_str()))
+            });
             refuse_local_frames(plan.outline.given_in().chain(bodies))?;
         }
         let needed = plan.find_chains()?;
@@ -103,17 +102,17 @@ impl ReadPlan {
             let bodies = tree.bodies()?;
             if beside_poses {
                 for body in bodies {
-                    let of = if coverage.holds(space, tree, &body) { &mut covered } else { &mut uncovered };
-                    of.push(body.frame);
+                    let group = if coverage.holds(space, tree, &body) { &mut covered } else { &mut uncovered };
+                    group.push(body.frame);
                 }
                 continue;
             }
             let vehicles: BTreeSet<_> = bodies.iter().map(|body| body.frame.as_str()).collect();
             let others: Vec<_> = tree.frames().filter(|frame| tree.moves(frame) && !vehicles.contains(frame)).collect();
             self.notes.extend(note_of(&bodies, &others));
-            let of = self.bodies.entry(space.clone()).or_default();
+            let in_space = self.bodies.entry(space.clone()).or_default();
             for body in bodies {
-                of.entry(body.driver.clone()).or_default().push(body);
+                in_space.entry(body.driver.clone()).or_default().push(body);
             }
         }
         if let Some(name) = uncovered.first() {
@@ -321,7 +320,7 @@ impl ReadPlan {
             notes.push(format!("velocities of odometry are not used: {why}"));
         }
         let bodies: BTreeSet<_> =
-            self.bodies.values().flat_map(|of| of.values().flatten()).map(|body| &*body.frame).collect();
+            self.bodies.values().flat_map(|bodies| bodies.values().flatten()).map(|body| &*body.frame).collect();
         let fixed = self.outline.trees.values().flat_map(Tree::fixed_frames);
         let fixed: BTreeSet<_> = fixed.filter(|frame| !bodies.contains(frame)).collect();
         if !fixed.is_empty() {
@@ -348,7 +347,7 @@ impl ReadPlan {
             left_out.extend(unconnected.map(|frame| format!("{topic} in {frame}")));
         }
         for (space, body) in
-            self.bodies.iter().flat_map(|(space, of)| of.values().flatten().map(move |body| (space, body)))
+            self.bodies.iter().flat_map(|(space, bodies)| bodies.values().flatten().map(move |body| (space, body)))
         {
             if !self.chain(space, &body.frame).is_some_and(|chain| chain.contains_upward(&body.driver)) {
                 left_out.push(body.frame.clone());

@@ -83,13 +83,13 @@ pub(super) fn open(
             return Ok(());
         }
         number += 1;
-        let at = || Place::Part(format!("curve {number} on topic `{}`", message.of.topic));
+        let place = || Place::Part(format!("curve {number} on topic `{}`", message.of.topic));
         let read = match &*message.of.schema {
             MINCO => Plan::of_minco,
             POLYNOMIALS => Plan::of_polynomials,
             _ => Plan::of_b_spline,
         };
-        let (drone, plan) = read(&message.of.encoding, message.bytes).map_err(|fault| fault.at(at()))?;
+        let (drone, plan) = read(&message.of.encoding, message.bytes).map_err(|fault| fault.at(place()))?;
         let start_ns = plan.start_ns;
         match drones.entry(drone).or_default().insert(start_ns, plan.clone()) {
             None => Ok(()),
@@ -100,7 +100,7 @@ pub(super) fn open(
             Some(_) => {
                 let problem = format!("another curve of drone {drone} starts at {start_ns} ns");
                 let remedy = format!("record each planner on a topic of its own, and choose the topics with {TOPIC}");
-                Err(Fault::content(ContentKind::DuplicateRow, problem, remedy).at(at()))
+                Err(Fault::content(ContentKind::DuplicateRow, problem, remedy).at(place()))
             }
         }
     })?;
@@ -109,7 +109,7 @@ pub(super) fn open(
     let mut notes = splits.notes.clone();
     notes.push(format!(
         "{} of planners of {}: each is judged until the next one of its drone starts",
-        counted(drones.values().map(|of| of.len() as u64).sum(), "curve", "curves"),
+        counted(drones.values().map(|curves| curves.len() as u64).sum(), "curve", "curves"),
         counted(drones.len() as u64, "drone", "drones")
     ));
     if repeated > 0 {
@@ -257,7 +257,7 @@ impl Plan {
                 refuse_not_finite(&format!("{name}_{letter}"), &wide(numbers))?;
             }
         }
-        let state = |of: [[f32; 3]; 3]| of.map(|numbers| Vector3::from(numbers.map(f64::from)));
+        let state = |rows: [[f32; 3]; 3]| rows.map(|numbers| Vector3::from(numbers.map(f64::from)));
         let inner: Vec<_> = x.1.iter().zip(&y.1).zip(&z.1).map(|((x, y), z)| Vector3::new(*x, *y, *z)).collect();
         let parts = minimum_jerk(state(minco.start), &inner, state(minco.end), &durations);
         let start_ns = start_ns(minco.start_time)?;

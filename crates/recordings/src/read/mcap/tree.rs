@@ -160,10 +160,10 @@ impl Tree {
         };
         let vehicles = ways.iter().filter(|(frame, way)| is_vehicle(frame, way));
         let body = |(frame, way): (&&str, &Vec<&str>)| {
-            let at = way.iter().position(|frame| self.moves(frame))?;
-            let [driver, carrier] = [way[at], way[at + 1]].map(str::to_owned);
+            let index = way.iter().position(|frame| self.moves(frame))?;
+            let [driver, carrier] = [way[index], way[index + 1]].map(str::to_owned);
             let body = VehicleFrame { frame: (*frame).to_owned(), driver, carrier };
-            Some(way[..=at].iter().try_for_each(|frame| self.check(frame)).map(|()| body))
+            Some(way[..=index].iter().try_for_each(|frame| self.check(frame)).map(|()| body))
         };
         vehicles.filter_map(body).collect()
     }
@@ -171,7 +171,8 @@ impl Tree {
     /// Returns the transforms from a frame to another; `None` without a common ancestor.
     pub(super) fn chain(&self, from: &str, into: &str) -> Result<Option<Chain>, Fault> {
         let (up, down) = (self.ancestry(from)?, self.ancestry(into)?);
-        let meeting = up.iter().enumerate().find_map(|(k, frame)| Some((k, down.iter().position(|of| of == frame)?)));
+        let meeting =
+            up.iter().enumerate().find_map(|(k, frame)| Some((k, down.iter().position(|other| other == frame)?)));
         let Some((top, bottom)) = meeting else { return Ok(None) };
         let owned = |frames: &[&str]| frames.iter().map(|frame| (*frame).to_owned()).collect();
         Ok(Some(Chain { up: owned(&up[..top]), down: owned(&down[..bottom]) }))
@@ -382,11 +383,11 @@ mod tests {
         assert!(tree.transform_along(&chain, 0, None).is_err());
         tree.learn("a", "odom", STILL);
         assert!(tree.chain("a", "map").is_err() && tree.chain("b", "map").is_ok());
-        let at = |x| FramePose { position: Vector3::new(x, 0.0, 0.0), turn: NO_TURN };
-        tree.store("b", 5, &at(1.0)).expect("a rotation");
-        tree.store("b", 5, &at(1.0)).expect("a rotation");
+        let pose = |x| FramePose { position: Vector3::new(x, 0.0, 0.0), turn: NO_TURN };
+        tree.store("b", 5, &pose(1.0)).expect("a rotation");
+        tree.store("b", 5, &pose(1.0)).expect("a rotation");
         assert!(tree.settle().is_ok());
-        tree.store("b", 5, &at(2.0)).expect("a rotation");
+        tree.store("b", 5, &pose(2.0)).expect("a rotation");
         assert!(tree.settle().is_err());
     }
 }

@@ -368,8 +368,8 @@ impl Groups {
 
     /// Returns the cell of the current row in a column.
     fn cell(&self, number: usize) -> &Cell {
-        let at = self.columns.binary_search_by_key(&number, |column| column.number);
-        at.ok().and_then(|at| self.columns[at].cells.get(self.cursor.at)).unwrap_or(&Cell::Empty)
+        let index = self.columns.binary_search_by_key(&number, |column| column.number);
+        index.ok().and_then(|index| self.columns[index].cells.get(self.cursor.at)).unwrap_or(&Cell::Empty)
     }
 }
 
