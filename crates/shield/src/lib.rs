@@ -117,6 +117,7 @@ pub mod wire;
 pub use brake::State;
 pub use contract::{Body, Broadcast, Entry, Message};
 pub use fleet::Fleet;
+pub use nalgebra;
 pub use obstacle::{ConvexBody, Obstacle};
 pub use report::Counters;
 pub use saved::SavedShield;

@@ -109,8 +109,8 @@ impl TrackAuditor {
         Self { has_plan: true, ..self }
     }
 
-    /// Declares that delta or the ellipsoid comes from the recording itself. With limits on single vehicles, separations
-    /// are then judged only if the recording has a pair to judge.
+    /// Declares that delta or the ellipsoid comes from the recording itself. With limits on single vehicles,
+    /// separations are then judged only if the recording has a pair to judge.
     #[must_use]
     pub fn with_own_limit(self) -> Self {
         Self { has_own_limit: true, ..self }

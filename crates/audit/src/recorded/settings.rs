@@ -374,7 +374,10 @@ impl Limits {
 #[non_exhaustive]
 pub enum RecordedError {
     /// A number of the settings is out of range.
-    #[error("{option}: must be {range}, got {}{value:?}", of.as_ref().map(|subject| format!("{subject}=")).unwrap_or_default())]
+    #[error(
+        "{option}: must be {range}, got {}{value:?}",
+        of.as_ref().map(|name| format!("{name}=")).unwrap_or_default()
+    )]
     OutOfRange {
         /// The setting.
         option: Opt,

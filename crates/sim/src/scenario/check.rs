@@ -5,6 +5,7 @@
 //! `kind = { NAME = { keys } }`.
 
 use std::borrow::Cow;
+use std::fmt::Display;
 use std::ops::Range;
 
 use toml::de::{DeTable, DeValue};
@@ -22,19 +23,20 @@ const NAME_CHARS: usize = 40;
 pub(super) struct SchemaError {
     pub(super) error: ScenarioError,
     pub(super) span: Range<usize>,
-    /// Keys and entries that lead to the value, innermost first.
-    path: Vec<String>,
+    /// Dotted path of keys and entries that lead to the value.
+    path: Box<str>,
 }
 
 impl SchemaError {
     fn new(kind: ErrorKind, message: impl AsRef<str>, help: impl AsRef<str>, span: Range<usize>) -> Self {
         let error = ScenarioError::new(message).with_kind(kind).with_help(help);
-        Self { error, span, path: Vec::new() }
+        Self { error, span, path: "".into() }
     }
 
-    fn child(mut self, key: impl Into<String>) -> Self {
-        self.path.push(key.into());
-        self
+    /// Returns the error of the value below a key or entry.
+    fn child(self, key: impl Display) -> Self {
+        let path = if self.path.is_empty() { key.to_string() } else { format!("{key}.{}", self.path) };
+        Self { path: path.into(), ..self }
     }
 
     /// Returns the error about a value that the scenario does not give, with its dotted path as its key.
@@ -50,8 +52,7 @@ impl SchemaError {
 
     /// Returns the error with its dotted path as its key, for a scenario without a text.
     pub(super) fn without_text(self) -> ScenarioError {
-        let path: Vec<_> = self.path.into_iter().rev().collect();
-        self.error.at(path.join("."))
+        self.error.at(String::from(self.path))
     }
 }
 
@@ -82,9 +83,9 @@ pub(super) fn check_bounds(value: &Value, node: Node, name: &str) -> Result<(), 
                 return choice.values().try_for_each(|keys| check_bounds(keys, *part, name));
             }
             let of_choice = || alternatives.iter().find_map(|part| part.property(key));
-            node.property(key).or_else(of_choice).map_or(Ok(()), |part| {
-                check_bounds(value, part, key).map_err(|schema_error| schema_error.child(&**key))
-            })
+            node.property(key)
+                .or_else(of_choice)
+                .map_or(Ok(()), |part| check_bounds(value, part, key).map_err(|schema_error| schema_error.child(key)))
         });
     }
     let node = alternatives.into_iter().find(|part| admits(*part, value.type_str())).unwrap_or(node);
@@ -93,7 +94,7 @@ pub(super) fn check_bounds(value: &Value, node: Node, name: &str) -> Result<(), 
             check_length(name, node, list.len(), 0..0)?;
             let Some(node) = node.items() else { return Ok(()) };
             list.iter().enumerate().try_for_each(|(entry, value)| {
-                check_bounds(value, node, name).map_err(|schema_error| schema_error.child((entry + 1).to_string()))
+                check_bounds(value, node, name).map_err(|schema_error| schema_error.child(entry + 1))
             })
         }
         Value::Integer(number) => in_range(name, node, number as f64, || number.to_string(), 0..0),
@@ -161,8 +162,7 @@ impl Check {
                 check_length(name, node, list.len(), span)?;
                 let Some(node) = node.items() else { return Ok(()) };
                 list.iter_mut().enumerate().try_for_each(|(entry, value)| {
-                    self.value(value, node, name, None)
-                        .map_err(|schema_error| schema_error.child((entry + 1).to_string()))
+                    self.value(value, node, name, None).map_err(|schema_error| schema_error.child(entry + 1))
                 })
             }
             DeValue::Integer(written) => {
@@ -241,7 +241,7 @@ impl Check {
             };
             // `chosen` has checked the tag.
             if node.keyword("const").is_null() {
-                self.value(value, node, name, None).map_err(|schema_error| schema_error.child(&**name))?;
+                self.value(value, node, name, None).map_err(|schema_error| schema_error.child(name))?;
             }
         }
         let required = node.required().chain(chosen.into_iter().flat_map(Node::required));

@@ -2,8 +2,8 @@
 //!
 //! A [`Scenario`] is plain data that holds a whole flight; [`Scenario::validate`] lists its invariants.
 //! [`Scenario::read`] reads it from TOML, [`Scenario::new`] builds it in code. Data flow of a file: `source` -> `text`
-//! (TOML and overrides) -> `check` (schema) -> `document` (keys) -> `build` -> `validate`. [`Scenario::resolved`] writes
-//! a scenario back as TOML with every default and random number written out.
+//! (TOML and overrides) -> `check` (schema) -> `document` (keys) -> `build` -> `validate`. [`Scenario::resolved`]
+//! writes a scenario back as TOML with every default and random number written out.
 
 mod build;
 pub mod builtin;

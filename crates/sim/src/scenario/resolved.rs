@@ -20,7 +20,8 @@ use super::vehicle::VehicleTable;
 use tautline_core::swarm::Rows;
 use tautline_laws::target::{Leg, LegTrigger};
 
-/// Scenario as TOML with every default written out, and its hash. Reading the TOML gives an equal scenario, bit for bit.
+/// Scenario as TOML with every default written out, and its hash. Reading the TOML gives an equal scenario, bit for
+/// bit.
 ///
 /// Start and formations are lists of points, so the text does not depend on the generators of shapes and random
 /// numbers. Equal scenarios have equal texts.

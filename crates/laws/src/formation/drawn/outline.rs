@@ -143,7 +143,7 @@ fn curve(path: &usvg::tiny_skia_path::Path) -> BezPath {
             PathSegment::LineTo(to) => curve.line_to(coordinates(to)),
             PathSegment::QuadTo(control, to) => curve.quad_to(coordinates(control), coordinates(to)),
             PathSegment::CubicTo(first, second, to) => {
-                curve.curve_to(coordinates(first), coordinates(second), coordinates(to))
+                curve.curve_to(coordinates(first), coordinates(second), coordinates(to));
             }
             PathSegment::Close => curve.close_path(),
         }
