@@ -79,7 +79,7 @@ fn a_law_without_edge_data_needs_no_memory_for_a_complete_graph() {
     scenario.validate().expect("the same answer");
     let text = grid(40_000, "law = { kind = \"edge-tension\", delta_m = 1.0 }\n");
     let refused = Scenario::read(&Source::Text { name: "test".to_owned(), text }, &[]).expect_err("too much memory");
-    assert!(refused.message().contains("40000 vehicles with 799980000 edges would take"), "{refused}");
+    assert!(refused.message.contains("40000 vehicles with 799980000 edges would take"), "{refused}");
 }
 
 #[test]

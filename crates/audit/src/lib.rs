@@ -62,7 +62,8 @@ pub use clearance::{ClearanceAuditor, ClearanceFinding, ClearanceOutcome, swept_
 pub use cylinder::Cylinder;
 pub use decimals::are_decimals_apart;
 pub use findings::{LISTED, Tally};
-pub use obstacle::{Obstacle, ObstacleError, Shape};
+pub use nalgebra;
+pub use obstacle::{Obstacle, ObstacleError, ObstacleFault, Shape};
 pub use outcome::{
     Approach, AuditOutcome, Disagreement, ObjectPair, ParryEvidence, Status, StepFinding, Undecided, Violation,
 };

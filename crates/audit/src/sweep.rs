@@ -145,8 +145,8 @@ impl RelativeMotion {
         let mut closest = ClosestPoint { squared: self.from_squared, at: 0.0 };
         let start_rate = self.from.dot(&self.by);
         if start_rate < 0.0 && self.to.dot(&self.by) > 0.0 {
-            let at = (-start_rate / self.by.norm_squared()).min(1.0);
-            closest.improve((self.from + self.by * at).norm_squared(), at);
+            let fraction = (-start_rate / self.by.norm_squared()).min(1.0);
+            closest.improve((self.from + self.by * fraction).norm_squared(), fraction);
         }
         closest.improve(self.to_squared, 1.0);
         closest
@@ -173,9 +173,9 @@ impl RelativeMotion {
 
 impl ClosestPoint {
     #[inline]
-    fn improve(&mut self, squared: f64, at: f64) {
+    fn improve(&mut self, squared: f64, fraction: f64) {
         if squared < self.squared {
-            *self = Self { squared, at };
+            *self = Self { squared, at: fraction };
         }
     }
 
@@ -263,11 +263,11 @@ mod tests {
             let distance = closest.separation_m() + deep;
             let Span { enter, exit } = motion.below(distance, closest);
             prop_assert!(0.0 <= enter && enter <= closest.at && closest.at <= exit && exit <= 1.0);
-            let at = |s: f64| (motion.from + motion.by * s).norm();
-            if enter > 0.0 { prop_assert!((at(enter) - distance).abs() < TOLERANCE_M) }
-            if exit < 1.0 { prop_assert!((at(exit) - distance).abs() < TOLERANCE_M) }
-            prop_assert_eq!(enter <= 0.0, at(0.0) < distance);
-            prop_assert_eq!(exit >= 1.0, at(1.0) < distance);
+            let distance_at = |s: f64| (motion.from + motion.by * s).norm();
+            if enter > 0.0 { prop_assert!((distance_at(enter) - distance).abs() < TOLERANCE_M) }
+            if exit < 1.0 { prop_assert!((distance_at(exit) - distance).abs() < TOLERANCE_M) }
+            prop_assert_eq!(enter <= 0.0, distance_at(0.0) < distance);
+            prop_assert_eq!(exit >= 1.0, distance_at(1.0) < distance);
         }
     }
 

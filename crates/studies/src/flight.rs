@@ -105,7 +105,7 @@ pub fn fly(
     }
     let is_whole = !report.run.is_interrupted();
     let summary =
-        || FlightSummary { flight_sha256: scenario.flight_sha256_hex(), ..FlightSummary::new(report, seed, &effort) };
+        || FlightSummary { flight_sha256: scenario.flight_sha256(), ..FlightSummary::new(report, seed, &effort) };
     Ok(is_whole.then(summary))
 }
 

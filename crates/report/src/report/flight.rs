@@ -506,7 +506,10 @@ impl Report {
                 // A path leaves the chord of its step by less than a bound, which the audit adds.
                 Fact::name(FactKind::Motion, Source::Deduced, CHORDS)
             }],
-            scenario: ScenarioIdentity { name: scenario.name.clone(), sha256: scenario.sha256_hex() },
+            scenario: ScenarioIdentity {
+                name: scenario.name.clone(),
+                sha256: result.preflight.resolved.sha256.clone(),
+            },
             tool: Tool { name: tautline_core::PROGRAM.to_owned(), version: tautline_core::VERSION.to_owned() },
             verdict: Verdict { pass: false, reasons: Vec::new() },
             answer: result.answer(),

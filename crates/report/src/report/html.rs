@@ -160,7 +160,7 @@ impl Report {
                 "The same program gives the same motion to the last bit, on any number of threads: the hash of all \
                  recorded states is " (self.run.state_hash) "."
             }
-            (folded_scenario(&page.scenario.resolved_toml(), &self.scenario.sha256))
+            (folded_scenario(&page.preflight.resolved.toml, &self.scenario.sha256))
         }
     }
 }

@@ -153,7 +153,7 @@ fn fly(
     monitor: &dyn Monitor,
     log: &mut FlightLog,
 ) -> Result<Report, Failure> {
-    let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
+    let header = Header::new(&scenario.name, &preflight.resolved.toml, scenario.count(), scenario.delta_m);
     let mut recording = McapRecorder::create(&folder.file(RECORDING), &header)?;
     if let Some(topic) = pictures.topic(scenario) {
         recording = recording.with(topic)?;

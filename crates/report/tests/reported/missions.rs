@@ -326,7 +326,7 @@ fn stalled_interchangeable_vehicles_are_reassigned_and_spread_no_slots() {
     assert!(assignment.certified_m <= promised_m, "{assignment:?} {promised_m:?}");
 
     // The resolved scenario reads back as the same scenario.
-    assert_eq!(read(&scenario.resolved_toml()), scenario);
+    assert_eq!(read(&scenario.resolved().toml), scenario);
 
     // A simulation that was saved earlier continues to the same bits.
     let mut simulation = Simulation::new(&scenario).expect("a flight");

@@ -165,6 +165,12 @@ impl ConfiguredAudit<'_> {
         let called = request.subject.name();
         let Settled { settings, own, opening, side_files, notes: notes_on_question } = settled;
         let mut auditor = TrackAuditor::new(settings.clone())?.with_interruption(monitor.interruption().clone());
+        if request.plan.is_some() {
+            auditor = auditor.with_plan();
+        }
+        if request.is_silent() && request.obstacles.is_none() {
+            auditor = auditor.with_own_limit();
+        }
         if request.html.is_some() {
             auditor = auditor.with_smallest();
         }

@@ -119,7 +119,7 @@ impl<'a> AuditRequest<'a> {
         let asked =
             outcome.vehicles.iter().filter(|&name| settings.only.as_ref().is_none_or(|only| only.contains(name)));
         let asked = asked.count();
-        if asked < 2 && settings.obstacles.is_empty() && settings.envelope.is_empty() && !settings.has_plan {
+        if asked < 2 && settings.obstacles.is_empty() && settings.envelope.is_empty() && self.plan.is_none() {
             let message =
                 format!("{path}: {} to judge, but no second object", counted(asked as u64, "vehicle", "vehicles"));
             let help = format!(
