@@ -30,7 +30,7 @@ restore() {
 trap restore EXIT
 trap 'exit 130' HUP INT TERM
 
-sh .github/embed.sh copy
+sh .github/embed.sh crates
 set -- --allow-dirty "$@"
 
 if [ -n "${REPOSITORY:-}" ]; then

@@ -7,9 +7,7 @@ use std::path::PathBuf;
 
 fn main() {
     let package = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());
-    for (folder, variable) in [("shaders", "TAUTLINE_SHADERS")] {
-        let place = if package.join(folder).is_dir() { "" } else { "../../" };
-        println!("cargo::rustc-env={variable}={place}{folder}");
-    }
+    let place = if package.join("shaders").is_dir() { "" } else { "../../" };
+    println!("cargo::rustc-env=TAUTLINE_SHADERS={place}shaders");
     println!("cargo::rerun-if-changed=build.rs");
 }

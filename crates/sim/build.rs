@@ -7,9 +7,7 @@ use std::path::PathBuf;
 
 fn main() {
     let package = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());
-    for (folder, variable) in [("assets", "TAUTLINE_ASSETS")] {
-        let place = if package.join(folder).is_dir() { "" } else { "../../" };
-        println!("cargo::rustc-env={variable}={place}{folder}");
-    }
+    let place = if package.join("assets").is_dir() { "" } else { "../../" };
+    println!("cargo::rustc-env=TAUTLINE_ASSETS={place}assets");
     println!("cargo::rerun-if-changed=build.rs");
 }
