@@ -2,7 +2,7 @@
 //!
 //! Each imperfection is a file of this module. The file holds the table of the scenario, which implements
 //! [`ImperfectionSpec`], and its simulation in flight. [`of`] combines all of them into one [`Imperfections`].
-//! Without imperfections ([`NoImperfections`]), laws read the true state without a copy. docs/imperfections.md has the
+//! Without imperfections ([`NoImperfections`]), laws read the true state without a copy. docs/scenario.md has the
 //! equations.
 //!
 //! Sensors measure and vehicles send at fixed times, which need not be the ends of steps. [`Imperfections::settle`]
