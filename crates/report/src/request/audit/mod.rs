@@ -146,6 +146,7 @@ impl ConfiguredAudit<'_> {
     /// Completes the question: limits of the recording, rules, side files. Reads the first items.
     fn settle(&self, mut settings: Settings, monitor: &dyn Monitor) -> Result<Settled<'_>, Failure> {
         let request = &self.request;
+        let is_own_limit = is_silent(&settings) && request.options.obstacles.is_none();
         let (own, show) = request.subject.own(monitor)?;
         let own = if request.options.independent { own.map(OwnRecording::independent) } else { own };
         let mut notes = rules::fill(&mut settings, request, show.as_ref())?;
@@ -156,19 +157,19 @@ impl ConfiguredAudit<'_> {
         against_plan::refuse_changed_positions(request)?;
         let opening = Opening::read(&|| request.subject.open(), monitor)?;
         let side_files = opening.align(&mut settings, side_obstacles)?;
-        Ok(Settled { settings, own, opening, side_files, notes })
+        Ok(Settled { settings, is_own_limit, own, opening, side_files, notes })
     }
 
     /// Reads and judges all items, from the first ones on.
     fn judge_motion(&self, settled: Settled<'_>, monitor: &dyn Monitor) -> Result<JudgedRecording, Failure> {
         let request = &self.request;
         let called = request.subject.name();
-        let Settled { settings, own, opening, side_files, notes: notes_on_question } = settled;
+        let Settled { settings, is_own_limit, own, opening, side_files, notes: notes_on_question } = settled;
         let mut auditor = TrackAuditor::new(settings.clone())?.with_interruption(monitor.interruption().clone());
-        if request.plan.is_some() {
+        if request.options.plan.is_some() {
             auditor = auditor.with_plan();
         }
-        if request.is_silent() && request.obstacles.is_none() {
+        if is_own_limit {
             auditor = auditor.with_own_limit();
         }
         if request.html.is_some() {
@@ -299,9 +300,18 @@ fn tell(monitor: &dyn Monitor, notes: &[String]) {
     }
 }
 
+/// Returns whether the settings limit no distance of vehicles.
+fn is_silent(settings: &Settings) -> bool {
+    let has_radius = settings.radius_m.is_some() || settings.vehicles.values().any(|one| one.radius_m.is_some());
+    let has_shape = settings.ellipsoid_m.is_some() || settings.cylinder.is_some();
+    settings.delta_m.is_none() && !has_radius && !has_shape
+}
+
 /// A complete question, and the first items of the recording.
 struct Settled<'a> {
     settings: Settings,
+    /// Whether the limits on distances are those of the recording.
+    is_own_limit: bool,
     /// Limits, obstacles and audit of a flight of `tautline run`.
     own: Option<OwnRecording>,
     opening: Opening<'a>,

@@ -263,8 +263,6 @@ impl AuditOptions {
                 fence: self.fence.as_deref().map(venue_file::read_fence).transpose()?,
             },
             accel_window_s: self.accel_window_s,
-            has_plan: self.plan.is_some(),
-            is_own_limit: self.is_silent() && self.obstacles.is_none(),
         })
     }
 

@@ -119,7 +119,7 @@ impl<'a> AuditRequest<'a> {
         let asked =
             outcome.vehicles.iter().filter(|&name| settings.only.as_ref().is_none_or(|only| only.contains(name)));
         let asked = asked.count();
-        if asked < 2 && settings.obstacles.is_empty() && settings.envelope.is_empty() && self.plan.is_none() {
+        if asked < 2 && settings.obstacles.is_empty() && settings.envelope.is_empty() && self.options.plan.is_none() {
             let message =
                 format!("{path}: {} to judge, but no second object", counted(asked as u64, "vehicle", "vehicles"));
             let help = format!(
@@ -167,7 +167,7 @@ impl<'a> AuditRequest<'a> {
             (option, None) => option.to_string(),
         };
         let timed = self.for_drones.then(|| "an export for drones".to_owned()).into_iter();
-        let timed = timed.chain(settings.has_plan.then(|| PLAN.to_string()));
+        let timed = timed.chain(self.options.plan.as_ref().map(|_| PLAN.to_string()));
         timed.chain(settings.rests_on_seconds().into_iter().map(in_words)).collect()
     }
 

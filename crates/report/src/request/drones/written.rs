@@ -111,8 +111,6 @@ impl<'a> Written<'a> {
                     flown.radius_m.map(|radius_m| radius_m + evaluation_m);
             }
         }
-        settings.is_own_limit =
-            settings.delta_m.is_none() && settings.ellipsoid_m.is_none() && settings.vehicles.is_empty();
         let motions: &[_] = match options.dialect {
             // Setpoints are held. A vehicle that follows them smoothly is between two of them.
             Dialect::Px4Show => &[Some(Interpolation::Hold), Some(Interpolation::Linear)],
