@@ -1,9 +1,9 @@
 #!/bin/sh
 # Copies files of the repository into the packages that need them: sh .github/embed.sh crates|wheel|remove
 #
-# A package holds only files of its own folder. Crates embed files of `assets` and `shaders`; their build scripts find
-# the copies. Every crate has both licences. A wheel has them too, and those of its libraries if .github/notices.sh wrote
-# them.
+# A package holds only files of its own folder. Crates embed files of `assets` and `shaders`; their build scripts
+# find the copies. Every crate has both licences. A wheel has them too, and those of its libraries if
+# .github/notices.sh wrote them.
 set -eu
 cd "$(dirname "$0")/.."
 case ${1:-} in crates | wheel | remove) ;; *) echo "usage: embed.sh crates|wheel|remove" >&2; exit 2 ;; esac

@@ -1,9 +1,9 @@
 #!/bin/sh
 # Sets up and runs the tests of the Rust crates. From anywhere: sh tests/run.sh [--long] [arguments of cargo test]
 #
-# --long adds the rest: ignored tests, release bits, MP4 films, fuzz targets, three of tests/mutants, packages, clusters,
-# exported files, the Python package and the commands of the docs. TAUTLINE_LONG=1 adds random cases, an hour of fuzzing,
-# and the slowest commands of the docs. CONTRIBUTING.md has the time of each part.
+# --long adds the rest: ignored tests, release bits, MP4 films, fuzz targets, three of tests/mutants, packages,
+# clusters, exported files, the Python package and the commands of the docs. TAUTLINE_LONG=1 adds random cases, an hour
+# of fuzzing, and the slowest commands of the docs.
 set -eu
 cd "$(dirname "$0")/.."
 
