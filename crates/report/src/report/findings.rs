@@ -169,9 +169,8 @@ pub(super) fn closest_table(answer: &Answer, are_of_obstacles: bool) -> Section 
 }
 
 /// Returns the violations and the undecided times of some answers, a sentence each.
-pub(super) fn lists<'a>(answers: impl IntoIterator<Item = &'a Answer> + Clone) -> [Section; 2] {
+pub(super) fn lists<'a, I: Iterator<Item = &'a Answer>>(answers: impl Fn() -> I) -> [Section; 2] {
     [true, false].map(|are_violations| {
-        let answers = || answers.clone().into_iter();
         let list = |answer: &'a Answer| if are_violations { &answer.violations } else { &answer.undecided };
         let sentences = answers().flat_map(|answer| {
             list(answer).listed.iter().map(move |finding| finding.sentence(answer.part, are_violations))

@@ -89,7 +89,7 @@ impl Report {
         let caption = "after the first collision the motion is not governed by the law";
         let hits = self.hulls.bounces.iter().flatten().map(hit);
         let hits = Section::table("Hulls that hit", caption, &["Vehicles", "At", "Closing speed"], hits);
-        let [violations, _] = lists(std::slice::from_ref(&self.answer));
+        let [violations, _] = lists(|| std::iter::once(&self.answer));
         let sections = [violations, hits, closest_table(&self.answer, true)];
         sections.into_iter().filter(|section| !section.rows.is_empty()).collect()
     }

@@ -294,7 +294,7 @@ impl RecordedReport {
         let seen = format!("{} seen throughout, {} not", presence.throughout, presence.partly);
         // The plan has sections of its own.
         let answers = || self.answers.iter().filter(|answer| answer.part != Part::Plan);
-        let [violations, undecided] = lists(answers());
+        let [violations, undecided] = lists(answers);
         let closest = |is_of_obstacle| self.separation().map(|answer| closest_table(answer, is_of_obstacle));
         let sections = [
             Section::table("Each vehicle by itself", "limits, and the vehicles closest to them", columns, limits),
