@@ -75,15 +75,15 @@ const restart = places => {
   }
 };
 
-/** Shows a state beside and in the view. @param {string} text @param {string} state @param {number[]} who */
-const show = (text, state, who) => {
+/** Shows a state beside and in the view. @param {string} text @param {string} status @param {number[]} violated */
+const show = (text, status, violated) => {
   verdict.textContent = text;
-  verdict.dataset.state = state;
+  verdict.dataset.status = status;
   // Without a box the view has other vehicles than the roster.
-  if (box) root.player?.push(drawn, [-INSTANTS * PERIOD_S, state === "violation", text, who, null], near);
+  if (box) root.player?.push(drawn, [-INSTANTS * PERIOD_S, status === "violation", text, violated, null], near);
 };
 /** Shows that the state is old. @param {number} behind_s */
-const doubt = behind_s => show(`NOT KNOWN: the page is ${behind_s.toFixed(1)} s behind`, "not-known", []);
+const doubt = behind_s => show(`UNDECIDED: the page is ${behind_s.toFixed(1)} s behind`, "undecided", []);
 
 /** Returns the delay of a frame beyond the smallest delay [s]. @param {number} t_s */
 const delay = t_s => {
@@ -95,9 +95,12 @@ const delay = t_s => {
   return lag_s - least_s;
 };
 
+/** Returns the line of a notice, with its time. @param {any} notice */
+const line = notice => `${notice.t_s === null ? "" : notice.t_s.toFixed(2) + " s: "}${notice.text}`;
+
 /** Draws a frame. @param {any} frame */
 const draw = frame => {
-  const behind_s = delay(frame.t_s), isOld = behind_s > MOST_BEHIND_S;
+  const behind_s = delay(frame.state.t_s), isOld = behind_s > MOST_BEHIND_S;
   const places = frame.places.slice(0, names.length);
   const outside = places.some((/** @type {any} */ at) =>
     at && (!root.player || !box || [0, 1, 2].some(axis => Math.abs(at[axis] - box[0][axis]) > 2 * box[1][axis])));
@@ -107,16 +110,16 @@ const draw = frame => {
     return at ? [at[0] - from[0], at[1] - from[1], at[2] - from[2], at[3] ? 1 : 0] : [0, 0, 0, 0];
   });
   near = frame.near ?? [65535, 65535];
-  if (isOld) doubt(behind_s); else show(frame.text, frame.state, frame.who ?? []);
+  if (isOld) doubt(behind_s); else show(line(frame.state), frame.state.status, frame.violated ?? []);
   root.dataset.frames = `${+(root.dataset.frames ?? 0) + 1}`;
 };
 
 /** Adds a notice to the log. @param {any} notice */
 const note = notice => {
   if (notice.event === "state") return;
-  const line = document.createElement("li");
-  line.textContent = `${notice.t_s === null ? "" : notice.t_s.toFixed(2) + " s: "}${notice.text}`;
-  log.prepend(line);
+  const entry = document.createElement("li");
+  entry.textContent = line(notice);
+  log.prepend(entry);
   while (log.children.length > 200) log.lastChild?.remove();
 };
 
@@ -126,7 +129,7 @@ const connect = () => {
     waits = 500;
     const message = JSON.parse(event.data);
     if (message.op === "roster") {
-      names = message.names;
+      names = message.vehicles;
       delta = message.delta_m ?? delta;
       radius = Math.min(0.1, delta / 4);
       box = null;
@@ -135,7 +138,7 @@ const connect = () => {
   };
   socket.onclose = () => {
     last = null;
-    show("NOT KNOWN: the page lost its server and connects again", "not-known", []);
+    show("UNDECIDED: the page lost its server and connects again", "undecided", []);
     setTimeout(connect, waits);
     waits = Math.min(2 * waits, 5000);
   };

@@ -1,6 +1,8 @@
 """Generates docs/scenario.md from the schema of the program:
 
     tautline schema | python3 docs/scenario_reference.py > docs/scenario.md
+
+The text below the keys of a table NAME is docs/scenario/NAME.md, if that file exists.
 """
 
 from __future__ import annotations
@@ -8,9 +10,12 @@ from __future__ import annotations
 import json
 import sys
 import textwrap
+from pathlib import Path
 from typing import Any, Iterator
 
 Schema = dict[str, Any]
+
+NOTES = Path(__file__).resolve().parent / "scenario"
 
 HEAD = """\
 # Scenario reference
@@ -85,24 +90,30 @@ class Reference:
 
     def keys(self, path: str, table: Schema, level: int) -> Iterator[str]:
         keys: dict[str, Schema] = table.get("properties", {})
-        common = self.rows(keys, table.get("required", []))
         variants = self.variants(table)
-        if keys:
-            yield common + "\n"
-        if variants:
-            yield from self.varied(path, table, variants)
+        elsewhere = self.same(path, keys, variants)
+        own = {name: key for name, key in keys.items() if not elsewhere or name not in elsewhere[1]}
+        if own:
+            yield self.rows(own, table.get("required", [])) + "\n"
+        if elsewhere:
+            yield self.referred(*elsewhere, self.tag(variants[0]), bool(own))
+        elif variants:
+            yield from self.varied(variants)
+        if (notes := NOTES / f"{path}.md").exists():
+            yield notes.read_text(encoding="utf-8")
         for name, key in keys.items():
             if self.is_table(key):
                 yield from self.section(f"{path}.{name}", key, min(level + 1, 3))
 
-    def varied(self, path: str, table: Schema, variants: list[Schema]) -> Iterator[str]:
+    @staticmethod
+    def referred(section: str, common: list[str], tag: str, has_own: bool) -> str:
+        """Returns the sentence on the keys that another section has."""
+        names = listed([f"`{name}`" for name in [*common, tag]], "and")
+        also = "Also " if has_own else ""
+        return f"{also}{names} with the keys of that value, as in [`[{section}]`](#{section}).\n"
+
+    def varied(self, variants: list[Schema]) -> Iterator[str]:
         """Yields the keys that depend on the value of another key."""
-        said = next((name for name in ("formation", "law") if name != path and self.same(name, variants)), None)
-        if said:
-            tag = self.tag(variants[0])
-            also = "Also " if table.get("properties") else ""
-            yield f"{also}`{tag}` with the keys of that value, as in [`[{said}]`](#{said}).\n"
-            return
         tag = self.tag(variants[0])
         names = [variant["properties"][tag]["const"] for variant in variants]
         yield f"`{tag}` is {alternatives(names)}. Each value has the keys below it.\n"
@@ -175,9 +186,14 @@ class Reference:
         options = [one for one in options if not one.get("deprecated")]
         return options if options and all("properties" in one for one in options) else []
 
-    def same(self, name: str, variants: list[Schema]) -> bool:
-        there = self.variants(self.followed(self.schema["properties"][name]))
-        return [one["properties"] for one in there] == [one["properties"] for one in variants]
+    def same(self, path: str, keys: dict[str, Schema], variants: list[Schema]) -> tuple[str, list[str]] | None:
+        """Returns the section with the same variants, and the names of keys that it also has."""
+        for name in ("formation", "law"):
+            there = self.followed(self.schema["properties"][name])
+            others = [one["properties"] for one in self.variants(there)]
+            if name != path and variants and others == [one["properties"] for one in variants]:
+                return name, [key for key, value in keys.items() if there.get("properties", {}).get(key) == value]
+        return None
 
     @staticmethod
     def tag(variant: Schema) -> str:
@@ -222,8 +238,10 @@ def toml(value: Any) -> str:
 
 def wrapped(page: str) -> Iterator[str]:
     """Yields the lines of a page, with paragraphs wrapped at 120 characters."""
+    is_code = False
     for line in page.split("\n"):
-        is_kept = line.startswith("|") or len(line) <= 120
+        is_code ^= line.startswith("```")
+        is_kept = line.startswith("|") or len(line) <= 120 or is_code
         yield from [line] if is_kept else textwrap.wrap(line, 120, break_on_hyphens=False)
 
 

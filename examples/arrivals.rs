@@ -1,5 +1,5 @@
-//! Prints the table of arrivals of docs/shield.md: laws without and under the shield, and behind a radio that loses
-//! messages, from random starts of several kinds.
+//! Prints the table of arrivals, which docs/shield.md shows in part: laws without and under the shield, and behind a
+//! radio that loses messages, from random starts of several kinds.
 //!
 //! `cargo run --release --example arrivals [RUNS]`, 20 runs of each by default.
 

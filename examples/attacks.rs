@@ -1,4 +1,5 @@
-//! Prints the tables of docs/attack.md: CMA-ES and random search, or with `laws` the worst start of each law.
+//! Prints the table of tests/reports/attacks.md, CMA-ES and random search, or with `laws` that of docs/studies.md: the
+//! worst start of each law.
 //!
 //! `cargo run --release --example attacks [laws]`
 

@@ -1,4 +1,4 @@
-//! Prints the table of docs/margins.md: margins of points and Crazyflies for each imperfection.
+//! Prints the table of margins in docs/studies.md: margins of points and Crazyflies for each imperfection.
 //!
 //! `cargo run --release --example margins`
 

@@ -27,8 +27,9 @@ fn every_broken_variant_is_still_a_change_of_one_line_and_listed_on_the_page() {
             PAGE.lines().find(|line| line.contains(&format!("`{name}`"))).unwrap_or_else(|| panic!("{name}: no row"));
         assert!(row.contains(&what) && row.contains(test), "{name}: {row}");
         let survives = text.lines().any(|line| line == "survives: yes");
-        assert!(!survives || test == "golden", "{name}: {test}");
+        // The verdicts of a recording are in the golden table, those of a watch in the tests of its crate.
+        assert!(!survives || test == "golden" || field("test:").contains("--test watch"), "{name}: {test}");
         *(if survives { &mut surviving } else { &mut caught }) += 1;
     }
-    assert_eq!((caught, surviving), (10, 2));
+    assert_eq!((caught, surviving), (10, 3));
 }

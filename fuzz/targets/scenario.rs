@@ -20,11 +20,11 @@ fuzz_target!(|bytes: &[u8]| {
     match Scenario::read(&source, &[]) {
         Ok(scenario) => {
             // A resolved scenario states every key and describes the same flight.
-            let resolved = scenario.resolved_toml();
+            let resolved = scenario.resolved().toml;
             fs::write(&*PATH, &resolved).expect("the scratch file is writable");
             let again = Scenario::read(&source, &[]).expect("a resolved scenario is valid");
-            assert_eq!(again.resolved_toml(), resolved, "a resolved scenario changes when it is read");
+            assert_eq!(again.resolved().toml, resolved, "a resolved scenario changes when it is read");
         }
-        Err(error) => assert!(!error.message().is_empty(), "an error without a text"),
+        Err(error) => assert!(!error.message.is_empty(), "an error without a text"),
     }
 });

@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 
 use libfuzzer_sys::fuzz_target;
 use tautline_watch::source::{
-    Input, LineMessage, MavlinkFrame, MavlinkReader, Naming, NamingOptions, message_of_line, poses_of_message,
+    Input, MavlinkFrame, MavlinkReader, Naming, NamingOptions, input_of_line, inputs_of_message,
 };
 use tautline_watch::{ClockScope, Monitor, Plan, Settings, State};
 
@@ -20,18 +20,15 @@ fuzz_target!(|bytes: &[u8]| {
     let mut inputs = Vec::new();
     match SOURCE.as_str() {
         "watch-lines" => {
-            let messages = bytes.split(|&byte| byte == b'\n').filter_map(|line| message_of_line(line).ok());
-            inputs.extend(messages.map(|message| match message {
-                LineMessage::Pose(pose) => Input::Pose(pose, 0.0),
-                LineMessage::SignOff(id, t_s) => Input::SignOff(id, t_s, 0.0),
-            }));
+            let lines = bytes.split(|&byte| byte == b'\n');
+            inputs.extend(lines.filter_map(|line| input_of_line(line, 0.0).ok()));
         }
         "watch-mavlink" => MavlinkReader::new(MavlinkFrame::Local).take(bytes, 0.0, &mut inputs),
         "watch-rosbridge" => {
             let text = String::from_utf8_lossy(bytes);
             let mut naming = Naming::new(NamingOptions::default());
-            let poses = poses_of_message(&text, &mut naming).into_iter().flatten().flatten();
-            inputs.extend(poses.map(|pose| Input::Pose(pose, 0.0)));
+            // A message without a position adds none.
+            let _ = inputs_of_message(&text, &mut naming, 0.0, &mut inputs);
         }
         other => panic!("{other}: no such source"),
     }
@@ -40,7 +37,7 @@ fuzz_target!(|bytes: &[u8]| {
 
 /// Judges the inputs, which arrive 10 ms apart. Checks that no assessment is clear while two vehicles are too near.
 fn judge(inputs: &[Input]) {
-    let settings = Settings { clocks: ClockScope::PerVehicle, ..Settings::default() };
+    let settings = Settings { clocks: Some(ClockScope::PerVehicle), ..Settings::default() };
     let delta_m = settings.delta_m;
     let mut monitor = Monitor::new(settings, Plan::default()).expect("the default settings are valid");
     // Vehicles that signed off are no longer judged.

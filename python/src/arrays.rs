@@ -1,7 +1,7 @@
 //! A recording in borrowed arrays, read one instant after the other.
 
 use numpy::ndarray::{ArrayView1, ArrayView3};
-use tautline::read::{Fault, Place, ReadError};
+use tautline::read::{ContentKind, Fault, Place, ReadError};
 use tautline::track::{Item, Metadata, Sample, Tracks};
 
 /// Approximate number of items of a batch, small enough for the processor's cache.
@@ -9,7 +9,7 @@ const BATCH: usize = 4096;
 /// Largest number of vehicles that a note names.
 const MOST_NAMED: usize = 8;
 /// Error code of a number that is not finite.
-const NOT_FINITE: &str = "recording/not-finite";
+const NOT_FINITE: ContentKind = ContentKind::NotFinite;
 
 /// Positions and optional velocities of N vehicles at T instants.
 #[derive(Clone)]
@@ -43,10 +43,10 @@ impl<'a> Arrays<'a> {
     /// Appends the samples of the next instant to `items`.
     fn instant(&mut self, items: &mut Vec<Item>) -> Result<(), ReadError> {
         let (k, time_s) = (self.at, self.times_s[self.at]);
-        let wrong = |code, place: String, problem: String, remedy: &str| ReadError {
+        let wrong = |kind, place: String, problem: String, remedy: &str| ReadError {
             file: "arrays".to_owned(),
             place: Some(Place::Part(place)),
-            fault: Fault::Content { code, problem, remedy: remedy.to_owned() },
+            fault: Fault::Content { kind, problem, remedy: remedy.to_owned() },
         };
         if !time_s.is_finite() {
             let problem = format!("it is {time_s}");
@@ -56,7 +56,7 @@ impl<'a> Arrays<'a> {
             let how = if before_s == time_s { "is repeated" } else { "runs backwards" };
             let problem = format!("time {how}: {time_s} s comes after {before_s} s");
             let remedy = "sort the instants by time, and take repeated ones out";
-            return Err(wrong("recording/time-backwards", format!("t[{k}]"), problem, remedy));
+            return Err(wrong(ContentKind::TimeBackwards, format!("t[{k}]"), problem, remedy));
         }
         for vehicle in 0..self.positions_m.shape()[1] {
             let position = vector(&self.positions_m, k, vehicle);

@@ -11,7 +11,7 @@ use tautline::fact::Fact;
 use tautline::mcap::RunAudit;
 use tautline::report::recorded::RecordedReport;
 use tautline::request::audit::Open;
-use tautline::request::{self, Failure, Monitor as _, OwnRecording, Silent, Subject};
+use tautline::request::{self, AuditRequest, Failure, Monitor as _, OwnRecording, Silent, Subject};
 use tautline::scenario::Scenario;
 use tautline::track::Tracks as _;
 
@@ -126,7 +126,7 @@ pub(crate) fn audit_files(
 ) -> PyResult<AuditOutcome> {
     let subject = Subject::Files { paths, options: Box::new(options.0.clone()) };
     let monitor = Silent::default();
-    let request = question.request(subject, command, html);
+    let request = AuditRequest { command: command.to_owned(), html, ..AuditRequest::new(subject, question.0.clone()) };
     let audited = run_in_thread(py, monitor.interruption(), || request::audit_files(&request, &monitor))?;
     judged(&audited.map_err(Failure::into_exception)?.report)
 }
@@ -161,7 +161,8 @@ pub(crate) fn audit_arrays<'py>(
     let work = || {
         let open: &Open<'_> = &|| Ok(Box::new(arrays.clone()));
         let subject = Subject::InMemory { name: "arrays", own, open };
-        request::audit_files(&question.request(subject, command, html), &monitor)
+        let request = AuditRequest::new(subject, question.0.clone());
+        request::audit_files(&AuditRequest { command: command.to_owned(), html, ..request }, &monitor)
     };
     let audited = run_in_thread(py, monitor.interruption(), work)?;
     judged(&audited.map_err(Failure::into_exception)?.report)

@@ -148,7 +148,7 @@ pub(crate) fn fly(
             None => Components::of(scenario)?,
         };
         let recording = record.as_deref().map(|path| {
-            let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
+            let header = Header::new(&scenario.name, &preflight.resolved.toml, scenario.count(), scenario.delta_m);
             McapRecorder::create(path, &header)
         });
         let page = html.is_some().then(|| FlightLog::of(scenario));

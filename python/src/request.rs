@@ -1,14 +1,11 @@
 //! Converts keyword arguments of Python into parts of requests.
 
-use std::path::PathBuf;
-
 use pyo3::prelude::*;
-use tautline::audit::envelope::{Envelope, Limit, Quantity};
-use tautline::audit::recorded::{self, Interpolation, VehicleSettings};
+use pyo3::types::{PyDict, PyList};
+use tautline::audit::envelope::Quantity;
+use tautline::audit::recorded::Interpolation;
 use tautline::read::{self, ArrayAxis, ColumnNames, Dimensions, Duplicates, Format, MessageClock, TimeUnit};
-use tautline::request::audit::PlanQuestion;
-use tautline::request::audit::rules::{self, Rules};
-use tautline::request::{AuditRequest, ConfigFile, Subject};
+use tautline::request::audit;
 
 use crate::errors::{wrong_input, wrong_input_with_code};
 
@@ -111,123 +108,50 @@ impl ReadOptions {
 
 /// Options of an audit.
 #[pyclass(frozen, module = "tautline._native")]
-pub(crate) struct AuditOptions {
-    settings: recorded::Settings,
-    obstacles: Option<PathBuf>,
-    fence: Option<PathBuf>,
-    plan: Option<PlanQuestion>,
-    rules: Rules,
-    config: ConfigFile,
-    expect_vehicles: Option<usize>,
-    independent: bool,
-}
-
-/// Value of a quantity for all vehicles, and values by name.
-type PerVehicleValues = (Option<f64>, Vec<(String, f64)>);
+pub(crate) struct AuditOptions(pub(crate) audit::AuditOptions);
 
 #[pymethods]
 impl AuditOptions {
+    /// Reads the keyword arguments as `tautline.toml` is read; None is an argument that is not given.
     #[new]
-    #[expect(clippy::too_many_arguments, reason = "one for each keyword of Python")]
-    #[pyo3(signature = (*, delta, motion, max_accel, radius, ellipsoid, obstacles, limit, fence, plan, plan_delay, tube,
-                        accel_window, config, cylinder, well_clear, rules, has_config, from_s, to_s, above, land_on,
-                        ids, offset, expect_vehicles, max_gap, require_presence, independent))]
-    fn new(
-        delta: Option<f64>,
-        motion: Option<String>,
-        max_accel: PerVehicleValues,
-        radius: PerVehicleValues,
-        ellipsoid: Option<String>,
-        obstacles: Option<PathBuf>,
-        limit: Vec<(String, f64)>,
-        fence: Option<PathBuf>,
-        plan: Option<PathBuf>,
-        plan_delay: Option<f64>,
-        tube: Option<f64>,
-        accel_window: Option<f64>,
-        config: Option<PathBuf>,
-        cylinder: Option<String>,
-        well_clear: Option<String>,
-        rules: Option<String>,
-        has_config: bool,
-        from_s: Option<f64>,
-        to_s: Option<f64>,
-        above: Option<f64>,
-        land_on: Vec<String>,
-        ids: Option<Vec<String>>,
-        offset: Vec<(String, f64)>,
-        expect_vehicles: Option<usize>,
-        max_gap: Option<f64>,
-        require_presence: bool,
-        independent: bool,
-    ) -> PyResult<Self> {
-        let motions = Interpolation::ALL.map(|motion| (motion.name(), motion));
-        let mut settings = recorded::Settings {
-            delta_m: delta,
-            motion: choice("motion", motion, &motions)?,
-            max_accel_m_s2: max_accel.0,
-            radius_m: radius.0,
-            ellipsoid_m: parsed_by("ellipsoid", ellipsoid, rules::ellipsoid)?,
-            cylinder: parsed_by("cylinder", cylinder, rules::cylinder)?,
-            well_clear: parsed_by("well_clear", well_clear, rules::well_clear)?,
-            from_s,
-            to_s,
-            above_m: above,
-            land_on: land_on.into_iter().collect(),
-            max_gap_s: max_gap,
-            require_presence,
-            accel_window_s: accel_window,
-            only: ids.map(|names| names.into_iter().collect()),
-            ..recorded::Settings::default()
-        };
-        let mut of = |name: String, set: &dyn Fn(&mut VehicleSettings)| set(settings.vehicles.entry(name).or_default());
-        for (name, value) in max_accel.1 {
-            of(name, &|of| of.max_accel_m_s2 = Some(value));
+    #[pyo3(signature = (**options))]
+    fn new(options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
+        let mut given = toml::Table::new();
+        for (name, argument) in options.into_iter().flatten().filter(|(_, argument)| !argument.is_none()) {
+            given.insert(name.extract()?, value(&argument)?);
         }
-        for (name, value) in radius.1 {
-            of(name, &|of| of.radius_m = Some(value));
+        let motion = given.get("motion").and_then(toml::Value::as_str).map(str::to_owned);
+        choice("motion", motion, &Interpolation::ALL.map(|motion| (motion.name(), motion)))?;
+        if let Some(toml::Value::Table(limits)) = given.get_mut("limit") {
+            let keys = Quantity::NUMBERS.map(|quantity| (quantity.name(), quantity.key()));
+            let by_key = std::mem::take(limits).into_iter().map(|(name, allowed)| {
+                Ok((choice("limit", Some(name), &keys)?.unwrap_or_default().to_owned(), allowed))
+            });
+            *limits = by_key.collect::<PyResult<_>>()?;
         }
-        for (name, value) in offset {
-            of(name, &|of| of.offset_s = value);
-        }
-        let quantities = Quantity::NUMBERS.map(|quantity| (quantity.name(), quantity));
-        let mut limits = Vec::new();
-        for (name, allowed) in limit {
-            let quantity = choice("limit", Some(name), &quantities)?;
-            limits.extend(quantity.map(|quantity| Limit { quantity, allowed }));
-        }
-        settings.envelope = Envelope { limits, fence: None };
-        let config = match (config, has_config) {
-            (Some(path), _) => ConfigFile::File(path),
-            (None, true) => ConfigFile::Nearest,
-            (None, false) => ConfigFile::None,
-        };
-        let plan = plan.map(|path| PlanQuestion { path, delay_s: plan_delay, tube_m: tube });
-        let rules = parsed::<Rules>("rules", rules)?.unwrap_or_default();
-        Ok(Self { settings, obstacles, fence, plan, rules, config, expect_vehicles, independent })
+        let read = |given: toml::Table| given.try_into::<audit::AuditOptions>();
+        read(given.clone()).map(Self).map_err(|error| {
+            let is_wrong = |(name, argument)| read(toml::Table::from_iter([(name, argument)])).is_err();
+            let wrong = given.into_iter().find(|argument| is_wrong(argument.clone()));
+            wrong_input(format!("{}: {}", wrong.unwrap_or_else(|| (String::new(), false.into())).0, error.message()))
+        })
     }
 }
 
-/// Parses an argument with a function; the error names the argument.
-fn parsed_by<T>(name: &str, text: Option<String>, parse: fn(&str) -> Result<T, String>) -> PyResult<Option<T>> {
-    text.map(|text| parse(&text)).transpose().map_err(|error| wrong_input(format!("{name}: {error}")))
-}
-
-impl AuditOptions {
-    /// Returns the request for an audit. `command` is the call that repeats it.
-    pub(crate) fn request<'a>(&self, subject: Subject<'a>, command: &str, html: Option<PathBuf>) -> AuditRequest<'a> {
-        AuditRequest {
-            settings: self.settings.clone(),
-            obstacles: self.obstacles.clone(),
-            fence: self.fence.clone(),
-            plan: self.plan.clone(),
-            rules: self.rules,
-            expect_vehicles: self.expect_vehicles,
-            independent: self.independent,
-            config: self.config.clone(),
-            command: command.to_owned(),
-            html,
-            ..AuditRequest::new(subject)
-        }
+/// Returns the value of a keyword argument.
+fn value(argument: &Bound<'_, PyAny>) -> PyResult<toml::Value> {
+    if let Ok(by_name) = argument.cast::<PyDict>() {
+        let entries = by_name.iter().map(|(name, argument)| Ok((name.extract::<String>()?, value(&argument)?)));
+        entries.collect::<PyResult<toml::Table>>().map(toml::Value::from)
+    } else if let Ok(list) = argument.cast::<PyList>() {
+        list.iter().map(|argument| value(&argument)).collect::<PyResult<Vec<_>>>().map(toml::Value::from)
+    } else if let Ok(is_set) = argument.extract::<bool>() {
+        Ok(is_set.into())
+    } else if let Ok(count) = argument.extract::<i64>() {
+        Ok(count.into())
+    } else if let Ok(number) = argument.extract::<f64>() {
+        Ok(number.into())
+    } else {
+        argument.extract::<String>().map(toml::Value::from)
     }
 }

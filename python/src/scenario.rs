@@ -115,12 +115,12 @@ impl Scenario {
 
     #[getter]
     fn toml(&self) -> String {
-        self.scenario.resolved_toml()
+        self.scenario.resolved().toml
     }
 
     #[getter]
     fn sha256(&self) -> String {
-        self.scenario.sha256_hex()
+        self.scenario.resolved().sha256
     }
 
     /// Checks the scenario. Returns whether it may fly, a headline, a summary, and the check as JSON.

@@ -222,7 +222,7 @@ impl Simulation {
 
     /// Returns the simulation as bytes.
     fn save<'py>(&self, py: Python<'py>, scenario: &Scenario) -> PyResult<Bound<'py, PyBytes>> {
-        let (law, toml) = (self.python_law.as_deref(), scenario.scenario.resolved_toml());
+        let (law, toml) = (self.python_law.as_deref(), scenario.scenario.resolved().toml);
         let bytes = self.with_history(py, |state| state.history.save(&toml, law, state.simulation.state()))??;
         Ok(PyBytes::new(py, &bytes))
     }

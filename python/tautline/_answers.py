@@ -1,4 +1,5 @@
-"""Answers of checks, studies and exports, with the types of their keys. docs/study-json.md explains the keys."""
+"""Answers of checks, studies and exports, with the types of their keys. docs/studies.md and
+docs/campaigns.md explain the keys of studies."""
 
 from __future__ import annotations
 

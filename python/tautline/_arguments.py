@@ -180,16 +180,14 @@ def optional_count(value: object, what: str) -> int | None:
     return None if value is None else count(value, what)
 
 
-def number_or_by_name(value: object, what: str) -> tuple[float | None, list[tuple[str, float]]]:
-    """Returns the number of all vehicles, and numbers of vehicles by name."""
-    if isinstance(value, Mapping):
-        return None, numbers_by_name(value, what)
-    return optional_number(value, what), []
+def number_or_by_name(value: object, what: str) -> float | dict[str, float] | None:
+    """Returns the number of all vehicles, numbers of vehicles by name, or None."""
+    return numbers_by_name(value, what) if isinstance(value, Mapping) else optional_number(value, what)
 
 
-def numbers_by_name(value: object, what: str) -> list[tuple[str, float]]:
-    """Returns the items of a dictionary of numbers."""
-    return [(str(name), number(x, what)) for name, x in mapping(value, what).items()]
+def numbers_by_name(value: object, what: str) -> dict[str, float]:
+    """Returns a dictionary of numbers."""
+    return {str(name): number(x, what) for name, x in mapping(value, what).items()}
 
 
 def boolean(value: object, what: str) -> bool:

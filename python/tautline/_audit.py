@@ -309,8 +309,6 @@ def perform(given: Mapping[str, Any], findings: _native.FlightFindings | None = 
         raise TypeError("plan_delay, tube: only with a plan")
     if ids is not None and not ids:
         raise Error("ids: no vehicle is named; leave it out to audit all")
-    # Arrays have no folder that could hold a tautline.toml.
-    looks_for_config = config is None and positions is None
     question = _native.AuditOptions(
         delta=optional_number(given["delta"], "delta"),
         motion=optional_text(given["motion"], "motion"),
@@ -328,7 +326,7 @@ def perform(given: Mapping[str, Any], findings: _native.FlightFindings | None = 
         tube=optional_number(given["tube"], "tube"),
         accel_window=optional_number(given["accel_window"], "accel_window"),
         config=None if config is False else optional_path(config, "config"),
-        has_config=looks_for_config,
+        no_config=config is False,
         from_s=optional_number(given["from_s"], "from_s"),
         to_s=optional_number(given["to_s"], "to_s"),
         above=optional_number(given["above"], "above"),

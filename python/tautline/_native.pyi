@@ -292,7 +292,7 @@ class Columns:
 
 _AuditOutcome = tuple[str, str, str, str, list[bool]]
 _Answer = tuple[bool, str, str, str]
-_NumberOrByName = tuple[float | None, Sequence[tuple[str, float]]]
+_NumberOrByName = float | dict[str, float] | None
 
 @final
 class ReadOptions:
@@ -332,7 +332,7 @@ class AuditOptions:
         radius: _NumberOrByName,
         ellipsoid: str | None,
         obstacles: str | None,
-        limit: Sequence[tuple[str, float]],
+        limit: dict[str, float],
         fence: str | None,
         plan: str | None,
         plan_delay: float | None,
@@ -342,13 +342,13 @@ class AuditOptions:
         cylinder: str | None,
         well_clear: str | None,
         rules: str | None,
-        has_config: bool,
+        no_config: bool,
         from_s: float | None,
         to_s: float | None,
         above: float | None,
         land_on: Sequence[str],
         ids: Sequence[str] | None,
-        offset: Sequence[tuple[str, float]],
+        offset: dict[str, float],
         expect_vehicles: int | None,
         max_gap: float | None,
         require_presence: bool,

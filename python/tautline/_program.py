@@ -139,7 +139,7 @@ def compare(
     ``laws`` are kinds, names of tables ``[laws.NAME]``, and laws in Python, by default all that the scenario has. Laws
     in Python fly on the calling thread alone, and nothing is proved about them. ``shield`` flies each
     law twice, as ``NAME+bare`` and under the shield as ``NAME+shield``. ``overwrite``
-    replaces existing files. More in docs/compare.md.
+    replaces existing files. More in docs/studies.md.
     """
     return Comparison(
         *_native.compare(
@@ -176,7 +176,7 @@ def margin(
     """Searches between ``start`` and ``stop`` for the two values of a key between which a verdict turns.
 
     ``verdict`` is ``pass``, ``clear`` or ``reached``. A law in Python flies in place of the scenario's law, on the
-    calling thread alone. More in docs/margins.md.
+    calling thread alone. More in docs/studies.md.
     """
     return Margin(
         *_native.margin(
@@ -215,7 +215,7 @@ def sweep(
 
     ``answer.points.to_pandas()`` has a row for each point, with the share of runs that have the ``verdict``.
     ``verdict`` is ``pass``, ``clear`` or ``reached``. A law in Python flies in place of the scenario's law, on the
-    calling thread alone. More in docs/sweeps.md.
+    calling thread alone. More in docs/studies.md.
     """
     swept = []
     for key, values in mapping(keys, "keys").items():
@@ -262,7 +262,7 @@ def attack(
     * ``apart``: smallest separation of two start positions [m].
     * ``law``: law in Python, which flies in place of the scenario's law, on the calling thread alone.
 
-    A search without a violation proves nothing. More in docs/attack.md.
+    A search without a violation proves nothing. More in docs/studies.md.
     """
     varied = []
     for key, bounds in mapping(vary, "vary").items():

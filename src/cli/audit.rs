@@ -1,27 +1,19 @@
 //! `tautline audit`: arguments, and reports on one or several recordings.
 
-use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::{PossibleValue, TypedValueParser};
-use nalgebra::Vector3;
 use serde::Serialize;
 
 use super::console::{Console, Terminal};
-use super::reading::{ReadArguments, one_of};
+use super::reading::ReadArguments;
 use super::run::figure_formats;
 use super::{Exit, audit_formats, console, reading};
-use tautline_audit::envelope::{Envelope, Limit, Quantity};
-use tautline_audit::recorded::{Interpolation, Settings, VehicleSettings};
-use tautline_audit::{Cylinder, WellClear};
 use tautline_core::files::write_atomically;
 use tautline_recordings::read::Format;
 use tautline_report::report::recorded::RecordedReport;
-use tautline_report::request::audit::PlanQuestion;
-use tautline_report::request::audit::rules::{self, Rules};
 use tautline_report::request::outputs::NamedPath;
-use tautline_report::request::{AuditRequest, AuditedRecording, ConfigFile, Failure, Monitor as _, Subject};
+use tautline_report::request::{AuditOptions, AuditRequest, AuditedRecording, Failure, Monitor as _, Subject};
 
 /// A recording of the command, with its audit or the failure.
 pub(super) struct Answer {
@@ -44,11 +36,10 @@ pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, 
     }
     let mut asked = Vec::new();
     for paths in recordings {
-        let (request, settings) = arguments.request(paths, command);
+        let request = arguments.request(paths, command);
         // No output may replace an input of any recording, even if the settings of a recording are wrong.
         request.check_outputs(&arguments.outputs())?;
-        let configured = settings.and_then(|settings| AuditRequest { settings, ..request.clone() }.configured());
-        asked.push((request.subject.name(), configured));
+        asked.push((request.subject.name(), request.configured()));
     }
     let mut complete = asked.iter().filter_map(|(_, asked)| asked.as_ref().ok());
     complete.try_for_each(|asked| asked.check_outputs(&arguments.outputs()))?;
@@ -132,321 +123,84 @@ impl<'a> JsonAnswer<'a> {
 Exit codes: 0 clear, by proof or with the assumed motion between samples; 1 violation or undecided (0 for undecided \
 with --allow-undecided); 2 wrong input; 3 failure of the machine. A separation strictly below its limit is a \
 violation. The limit of two vehicles is max(delta, r1 + r2).")]
-#[expect(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 pub(super) struct AuditArguments {
     #[command(flatten)]
-    pub(super) reading: ReadArguments,
+    reading: ReadArguments,
     /// Format of the recording [default: detected from its content].
     #[arg(long, value_name = "FORMAT", value_parser = reading::format(), help_heading = "Reading")]
-    pub(super) format: Option<Format>,
+    format: Option<Format>,
 
-    /// Safety distance between two centres [m]; default: that of a tautline recording. With --ellipsoid, a scaled
-    /// distance; default: 2.
-    #[arg(long, value_name = "METRES", allow_negative_numbers = true, help_heading = "Judging")]
-    pub(super) delta: Option<f64>,
-    /// Motion between samples [default: linear for samples, polynomial for curves].
-    #[arg(long, value_name = "MOTION", value_parser = motion(), help_heading = "Judging")]
-    pub(super) motion: Option<Interpolation>,
-    /// Largest acceleration [m/s^2] of all vehicles, or of one, for --motion bounded; repeatable.
-    #[arg(long, value_name = "[NAME=]A", value_parser = named, allow_negative_numbers = true, help_heading = "Judging")]
-    pub(super) max_accel: Vec<Named>,
-    /// Radius [m] of all vehicles, or of one; repeatable.
-    #[arg(long, value_name = "[NAME=]R", value_parser = named, allow_negative_numbers = true, help_heading = "Judging")]
-    pub(super) radius: Vec<Named>,
-    /// Half axes [m] of an ellipsoid around each vehicle, such as its downwash, or a name (crazyswarm,
-    /// crazyflie-firmware); two touch at a scaled distance of 2.
-    #[arg(
-        long,
-        value_name = "AX,AY,AZ",
-        value_parser = rules::ellipsoid,
-        allow_hyphen_values = true,
-        conflicts_with_all = ["radius", "obstacles"],
-        help_heading = "Judging"
-    )]
-    pub(super) ellipsoid: Option<Vector3<f64>>,
-    /// Upright cylinder: a pair is too near if it is horizontally closer than R and vertically closer than H [m].
-    #[arg(long, value_name = "R,H", value_parser = rules::cylinder, help_heading = "Judging")]
-    #[arg(allow_hyphen_values = true)]
-    pub(super) cylinder: Option<Cylinder>,
-    /// Well clear of air traffic: do-365, f3442, or D,Z,T (horizontal and vertical distance [m], modified tau [s]).
-    #[arg(long, value_name = "PRESET", value_parser = rules::well_clear, help_heading = "Judging")]
-    #[arg(allow_hyphen_values = true)]
-    pub(super) well_clear: Option<WellClear>,
-    /// Origin of limits that no option sets: the recording (a Skybrush show), the defaults of skybrush, or none
-    /// [default: recording].
-    #[arg(long, value_name = "ORIGIN", help_heading = "Judging")]
-    pub(super) rules: Option<Rules>,
-    /// TOML file of obstacles: balls, boxes, capsules, half-spaces; static or moving.
-    #[arg(long, value_name = "FILE", help_heading = "Judging")]
-    pub(super) obstacles: Option<PathBuf>,
-    /// Limits of each vehicle: speed, horizontal, climb, descent [m/s], accel [m/s^2], height, floor,
-    /// navigation-floor [m], yaw-rate [deg/s].
-    #[arg(
-        long,
-        value_name = "LIMIT=VALUE,...",
-        value_parser = limit,
-        value_delimiter = ',',
-        allow_hyphen_values = true,
-        help_heading = "Judging"
-    )]
-    pub(super) limit: Vec<Limit>,
-    /// Check means of the acceleration over this time [s] against --limit accel; corners of curves count.
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Judging")]
-    pub(super) accel_window: Option<f64>,
-    /// TOML file of a fence that contains all vehicles.
-    #[arg(long, value_name = "FILE", help_heading = "Judging")]
-    pub(super) fence: Option<PathBuf>,
-    /// Plan of the flight, in any format that is read: its curves are compared with the flight, vehicle by vehicle.
-    #[arg(long, value_name = "FILE", help_heading = "Judging")]
-    pub(super) plan: Option<PathBuf>,
-    /// Time of the flight at which the plan has time 0 [s] [default: estimated within a minute].
-    #[arg(long, value_name = "SECONDS", requires = "plan", allow_negative_numbers = true, help_heading = "Judging")]
-    pub(super) plan_delay: Option<f64>,
-    /// Largest allowed distance from the plan [m].
-    #[arg(long, value_name = "METRES", requires = "plan", allow_negative_numbers = true, help_heading = "Judging")]
-    pub(super) tube: Option<f64>,
-    /// Start of the judged window [s].
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Judging")]
-    pub(super) from: Option<f64>,
-    /// End of the judged window [s].
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Judging")]
-    pub(super) to: Option<f64>,
-    /// Ignore pairs of vehicles while both are at or below this height [m].
-    #[arg(long, value_name = "Z", allow_negative_numbers = true, help_heading = "Judging")]
-    pub(super) above: Option<f64>,
-    /// Obstacles on which vehicles land: ignore these for a vehicle at or below --above; quote a name with a comma.
-    /// Repeatable.
-    #[arg(long, value_name = "NAME,...", value_parser = listed, help_heading = "Judging")]
-    pub(super) land_on: Vec<Listed>,
-    /// Judge only these vehicles; quote a name with a comma. Repeatable.
-    #[arg(long, value_name = "NAME,...", value_parser = listed, help_heading = "Judging")]
-    pub(super) ids: Vec<Listed>,
-    /// Add this to the times of a vehicle with a clock offset [s]; repeatable.
-    #[arg(long, value_name = "NAME=SECONDS", value_parser = offset, help_heading = "Judging")]
-    pub(super) offset: Vec<(String, f64)>,
-    /// Expected number of vehicles; another number is wrong input.
-    #[arg(long, value_name = "N", help_heading = "Judging")]
-    pub(super) expect_vehicles: Option<usize>,
-    /// Judge a tautline recording from its samples, without the run's audit of every step.
-    #[arg(long, help_heading = "Judging")]
-    pub(super) independent: bool,
-    /// Report undecided if a vehicle is absent in part of the window.
-    #[arg(long, help_heading = "Judging")]
-    pub(super) require_presence: bool,
-    /// Longest time between two samples that is not a gap [s] [default: 1.5 of the vehicle's usual interval].
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, help_heading = "Judging")]
-    pub(super) max_gap: Option<f64>,
-
-    /// Read settings from this file instead of the nearest tautline.toml, which is searched from the folder of the
-    /// recording up to the working folder.
-    #[arg(long, value_name = "FILE", help_heading = "Judging")]
-    pub(super) config: Option<PathBuf>,
-    /// Ignore all tautline.toml files.
-    #[arg(long, conflicts_with = "config", help_heading = "Judging")]
-    pub(super) no_config: bool,
+    #[command(flatten)]
+    options: AuditOptions,
 
     /// Print the report as JSON on standard output; all text goes to standard error.
     #[arg(long, help_heading = "Output")]
-    pub(super) json: bool,
+    json: bool,
     /// Print no summary and no progress.
     #[arg(long, help_heading = "Output")]
-    pub(super) quiet: bool,
+    quiet: bool,
     /// Write the verdict as a `JUnit` file.
     #[arg(long, value_name = "FILE", help_heading = "Output")]
-    pub(super) junit: Option<PathBuf>,
+    junit: Option<PathBuf>,
     /// Write violations, undecided times and gaps as CSV.
     #[arg(long, value_name = "FILE", help_heading = "Output")]
-    pub(super) events: Option<PathBuf>,
+    events: Option<PathBuf>,
     /// Write a report page with figures.
     #[arg(long, value_name = "FILE", help_heading = "Output")]
-    pub(super) html: Option<PathBuf>,
+    html: Option<PathBuf>,
     /// Write the figures of the page into the folder NAME-figures beside NAME.html, in these formats; PDF and PNG have
     /// the width of a paper's column, 85 mm.
     #[arg(long, value_name = "FORMAT,...", value_delimiter = ',', requires = "html", help_heading = "Output")]
     #[arg(value_parser = ["svg", "pdf", "png"])]
-    pub(super) figures: Vec<String>,
+    figures: Vec<String>,
     /// Write a proof of the verdict that `check_proof.py` checks in exact arithmetic without this program; only for a
     /// CSV table with --delta.
     #[arg(long, value_name = "FILE", help_heading = "Output")]
-    pub(super) proof: Option<PathBuf>,
+    proof: Option<PathBuf>,
     /// Write a summary in Markdown, for example for the page of a job.
     #[arg(long, value_name = "FILE", help_heading = "Output")]
-    pub(super) summary: Option<PathBuf>,
+    summary: Option<PathBuf>,
     /// Print an annotation for each recording, in the format of this CI system.
     #[arg(long, value_name = "SYSTEM", help_heading = "Output")]
-    pub(super) annotations: Option<Annotations>,
-    /// Exit with 0 for undecided recordings too.
-    #[arg(long, help_heading = "Output")]
-    pub(super) allow_undecided: bool,
-}
-
-fn motion() -> impl TypedValueParser<Value = Interpolation> {
-    let help = |motion| match motion {
-        Interpolation::Linear => "Straight lines",
-        Interpolation::Hold => "Constant positions, with a jump at each sample",
-        Interpolation::Polynomial => "The recording's own curves",
-        Interpolation::Bounded => "Any motion within the largest acceleration",
-    };
-    one_of(Interpolation::ALL.map(|motion| (PossibleValue::new(motion.name()).help(help(motion)), motion)).into())
+    annotations: Option<Annotations>,
 }
 
 /// CI system whose annotations are printed.
 #[derive(Clone, Copy, Debug, clap::ValueEnum)]
-pub(super) enum Annotations {
+enum Annotations {
     /// GitHub Actions
     Github,
 }
 
-/// Number, for one vehicle if it has a name.
-pub(super) type Named = (Option<String>, f64);
-
-/// Names of vehicles or obstacles.
-#[derive(Clone, Debug)]
-pub(super) struct Listed(Vec<String>);
-
-fn listed(text: &str) -> Result<Listed, String> {
-    let mut lines = csv::ReaderBuilder::new().has_headers(false).from_reader(text.as_bytes());
-    match lines.records().next() {
-        Some(Ok(names)) => Ok(Listed(names.iter().map(str::to_owned).collect())),
-        Some(Err(error)) => Err(error.to_string()),
-        None => Err("give at least one name".to_owned()),
-    }
-}
-
-fn number(text: &str) -> Result<f64, String> {
-    match text.trim().parse::<f64>() {
-        Ok(number) if number.is_finite() => Ok(number),
-        _ => Err(format!("`{text}` is not a number")),
-    }
-}
-
-fn named(text: &str) -> Result<Named, String> {
-    match text.rsplit_once('=') {
-        Some((name, value)) => Ok((Some(name.to_owned()), number(value)?)),
-        None => Ok((None, number(text)?)),
-    }
-}
-
-fn offset(text: &str) -> Result<(String, f64), String> {
-    let (name, value) = text.rsplit_once('=').ok_or("write NAME=SECONDS, such as cf3=-0.12")?;
-    Ok((name.to_owned(), number(value)?))
-}
-
-/// Parses a limit such as `speed=5`.
-fn limit(text: &str) -> Result<Limit, String> {
-    let names = || Quantity::NUMBERS.map(Quantity::name).join(", ");
-    let (name, value) = text.split_once('=').ok_or_else(|| format!("write LIMIT=VALUE with a limit of {}", names()))?;
-    let quantity = Quantity::NUMBERS.into_iter().find(|quantity| quantity.name() == name.trim());
-    let quantity = quantity.ok_or_else(|| format!("unknown limit `{name}`; the limits are {}", names()))?;
-    match value.trim().parse::<f64>() {
-        Ok(allowed) if allowed.is_finite() => Ok(Limit { quantity, allowed }),
-        _ => Err(format!("`{value}` is not a number")),
-    }
-}
-
 impl AuditArguments {
-    /// Returns the request for the recording in these files, and its settings. `command` repeats the request.
-    pub(super) fn request(
-        &self,
-        paths: Vec<PathBuf>,
-        command: &str,
-    ) -> (AuditRequest<'static>, Result<Settings, Failure>) {
-        let config = match (&self.config, self.no_config) {
-            (Some(path), _) => ConfigFile::File(path.clone()),
-            (None, true) => ConfigFile::None,
-            (None, false) => ConfigFile::Nearest,
-        };
-        let request = AuditRequest {
-            obstacles: self.obstacles.clone(),
-            fence: self.fence.clone(),
-            plan: self.plan.clone().map(|path| PlanQuestion { path, delay_s: self.plan_delay, tube_m: self.tube }),
-            rules: self.rules.unwrap_or_default(),
-            expect_vehicles: self.expect_vehicles,
-            independent: self.independent,
-            allow_undecided: self.allow_undecided,
-            config,
+    /// Returns the request for the recording in these files. `command` repeats the request.
+    fn request(&self, paths: Vec<PathBuf>, command: &str) -> AuditRequest<'static> {
+        let subject = Subject::Files { paths, options: Box::new(self.reading.options(self.format)) };
+        AuditRequest {
             command: command.to_owned(),
             html: self.html.clone(),
             formats: figure_formats(&self.figures),
             proof: self.proof.clone(),
-            ..AuditRequest::new(Subject::Files { paths, options: Box::new(self.reading.options(self.format)) })
-        };
-        (request, self.settings())
-    }
-
-    fn settings(&self) -> Result<Settings, Failure> {
-        refuse_repeated("--radius", self.radius.iter().map(|(name, _)| name.as_deref()))?;
-        refuse_repeated("--max-accel", self.max_accel.iter().map(|(name, _)| name.as_deref()))?;
-        refuse_repeated("--offset", self.offset.iter().map(|(name, _)| Some(name.as_str())))?;
-        let mut vehicles: BTreeMap<String, VehicleSettings> = BTreeMap::new();
-        let (mut radius_m, mut max_accel_m_s2) = (None, None);
-        for (name, value) in &self.radius {
-            match name {
-                Some(name) => vehicles.entry(name.clone()).or_default().radius_m = Some(*value),
-                None => radius_m = Some(*value),
-            }
+            ..AuditRequest::new(subject, self.options.clone())
         }
-        for (name, value) in &self.max_accel {
-            match name {
-                Some(name) => vehicles.entry(name.clone()).or_default().max_accel_m_s2 = Some(*value),
-                None => max_accel_m_s2 = Some(*value),
-            }
-        }
-        for (name, value) in &self.offset {
-            vehicles.entry(name.clone()).or_default().offset_s = *value;
-        }
-        let names = |lists: &[Listed]| -> BTreeSet<String> {
-            lists.iter().flat_map(|Listed(names)| names.iter().cloned()).collect()
-        };
-        let only = names(&self.ids);
-        Ok(Settings {
-            delta_m: self.delta,
-            motion: self.motion,
-            max_accel_m_s2,
-            radius_m,
-            ellipsoid_m: self.ellipsoid,
-            cylinder: self.cylinder,
-            well_clear: self.well_clear,
-            from_s: self.from,
-            to_s: self.to,
-            above_m: self.above,
-            land_on: names(&self.land_on),
-            max_gap_s: self.max_gap,
-            require_presence: self.require_presence,
-            accel_window_s: self.accel_window,
-            vehicles,
-            only: (!only.is_empty()).then_some(only),
-            envelope: Envelope { limits: self.limit.clone(), fence: None },
-            ..Settings::default()
-        })
     }
 
     /// Returns the output files that cover all recordings, with their options.
-    pub(super) fn outputs(&self) -> Vec<NamedPath<'_>> {
+    fn outputs(&self) -> Vec<NamedPath<'_>> {
         let outputs = [("--events", &self.events), ("--junit", &self.junit), ("--summary", &self.summary)];
         outputs.into_iter().filter_map(|(option, path)| Some((option.to_owned(), path.as_deref()?))).collect()
     }
 }
 
-/// Refuses an option that is given twice for one vehicle, or twice for all vehicles.
-fn refuse_repeated<'a>(option: &str, names: impl Iterator<Item = Option<&'a str>>) -> Result<(), Failure> {
-    let mut known = BTreeSet::new();
-    for name in names {
-        if !known.insert(name) {
-            let of = name.map_or("all vehicles".to_owned(), |name| format!("vehicle {name}"));
-            return Err(Failure::input("usage/twice", format!("{option}: two values for {of}"), "give one value"));
-        }
-    }
-    Ok(())
-}
-
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
     use std::path::Path;
 
     use clap::{CommandFactory as _, FromArgMatches as _, Parser};
 
     use super::*;
+    use tautline_audit::envelope::Quantity;
     use tautline_report::request::Silent;
 
     #[derive(Parser)]
@@ -485,9 +239,8 @@ mod tests {
         let words = ["audit".to_owned(), recording.clone()].into_iter().chain(arguments);
         let matches = Command::command().get_matches_from(words);
         let parsed = Command::from_arg_matches(&matches).expect("valid arguments").arguments;
-        let (request, settings) = parsed.request(vec![PathBuf::from(recording)], "");
-        let settings = settings.expect("valid settings");
-        let asked = AuditRequest { settings, ..request }.configured().and_then(|asked| asked.judge(&Silent::default()));
+        let request = parsed.request(vec![PathBuf::from(recording)], "");
+        let asked = request.configured().and_then(|asked| asked.judge(&Silent::default()));
         asked.map(drop).map_err(|failure| failure.code().to_owned())
     }
 
@@ -581,18 +334,5 @@ mod tests {
             let row = OPTIONS.iter().find(|(_, arguments, _)| arguments.iter().any(|of| of.contains(quantity.name())));
             assert_eq!(row.map(|(.., is_timed)| *is_timed), Some(quantity.rests_on_seconds()), "{}", quantity.name());
         }
-    }
-
-    #[test]
-    fn limits_are_read_by_their_names() {
-        let read = limit(" climb = 2.5").expect("a limit");
-        assert_eq!((read.quantity, read.allowed), (Quantity::Climb, 2.5));
-        assert_eq!(
-            limit("speed").unwrap_err(),
-            "write LIMIT=VALUE with a limit of speed, horizontal, climb, descent, accel, height, floor, \
-             navigation-floor, yaw-rate"
-        );
-        assert!(limit("spee=3").unwrap_err().starts_with("unknown limit `spee`"));
-        assert_eq!(limit("speed=NaN").unwrap_err(), "`NaN` is not a number");
     }
 }

@@ -28,14 +28,13 @@ pub(super) struct Console {
 }
 
 /// Words of verdicts with their colours. Of words with a common beginning the longest comes first.
-const VERDICTS: [(&str, AnsiColor); 20] = [
+const VERDICTS: [(&str, AnsiColor); 19] = [
     ("CERTIFICATE BROKEN", AnsiColor::Red),
     ("CLEAR", AnsiColor::Green),
     ("DEFECT", AnsiColor::Red),
     ("DOES NOT PASS", AnsiColor::Red),
     ("INTERRUPTED", AnsiColor::Yellow),
     ("NOT FIRM", AnsiColor::Yellow),
-    ("NOT KNOWN", AnsiColor::Yellow),
     ("NOT PASSED", AnsiColor::Red),
     ("NOT REACHED", AnsiColor::Yellow),
     ("NOT VALID", AnsiColor::Red),

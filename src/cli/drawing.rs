@@ -8,11 +8,10 @@ use std::sync::Arc;
 use clap::builder::TypedValueParser;
 
 use super::console::Console;
-use super::reading::one_of;
 use tautline_recordings::mcap::McapRecording;
 use tautline_recordings::read::{self, Fault, Format, ReadError, ReadOptions};
 use tautline_render::{Colouring, FARTHEST_M, FlightLog, RenderError, Theme, Timeline, TracksError};
-use tautline_report::request::{Failure, ScenarioRequest};
+use tautline_report::request::{Failure, ScenarioRequest, one_of};
 use tautline_report::run::run;
 use tautline_sim::scenario::builtin;
 
@@ -49,10 +48,10 @@ pub(super) fn flight(
     let scenario = ScenarioRequest::named(&path.to_string_lossy(), &[])?.read()?;
     let mut log = FlightLog::of(&scenario);
     let report = run(&scenario, &mut log)?;
-    if let Some(closest) = report.separation.closest() {
+    if let Some(closest) = report.closest_pair() {
         log.conclude(closest.separation_m, closest.time_s);
     }
-    Ok(Timeline::flown(&scenario, Arc::new(log)).judged(report.audit.status))
+    Ok(Timeline::flown(&scenario, Arc::new(log)).judged(report.answer.status))
 }
 
 /// Refuses options of recordings for a scenario.

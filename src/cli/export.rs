@@ -8,11 +8,11 @@ use nalgebra::Vector3;
 
 use super::Exit;
 use super::console::{self, Console, Terminal};
-use super::reading::{self, ReadArguments, one_of, three};
+use super::reading::{self, ReadArguments, three};
 use tautline_recordings::export::WRITTEN;
 use tautline_recordings::export::drones::Dialect;
 use tautline_recordings::read::Format;
-use tautline_report::request::{DroneChoices, ExportRequest, Failure, export_drones, export_file};
+use tautline_report::request::{DroneChoices, ExportRequest, Failure, export_drones, export_file, one_of};
 
 /// Arguments of `tautline export`.
 #[derive(Debug, Args)]

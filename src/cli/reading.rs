@@ -5,7 +5,7 @@ use std::path::Path;
 use std::path::PathBuf;
 
 use clap::Args;
-use clap::builder::{PathBufValueParser, PossibleValue, PossibleValuesParser, TypedValueParser};
+use clap::builder::{PathBufValueParser, PossibleValue, TypedValueParser};
 
 use tautline_recordings::read::{
     ArrayAxis, ArrayLayout, Axes, ColumnNames, Dimensions, Duplicates, Format, MessageClock, ReadOptions, Scale,
@@ -14,6 +14,7 @@ use tautline_recordings::read::{
 #[cfg(feature = "viewer")]
 use tautline_report::request::Failure;
 use tautline_report::request::audit::recording_in;
+use tautline_report::request::one_of;
 
 /// Options for reading a recording.
 #[derive(Clone, Debug, Args)]
@@ -187,17 +188,6 @@ pub(super) fn three(text: &str) -> Result<[f64; 3], String> {
         Ok(numbers) if numbers.iter().all(|x| x.is_finite()) => Ok(numbers),
         _ => Err(format!("`{text}` is not three numbers")),
     }
-}
-
-/// Returns a parser of names with their values.
-pub(super) fn one_of<T: Clone + Send + Sync + 'static>(
-    choices: Vec<(PossibleValue, T)>,
-) -> impl TypedValueParser<Value = T> {
-    let names = choices.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
-    PossibleValuesParser::new(names).try_map(move |given| {
-        let chosen = choices.iter().find(|(name, _)| name.get_name() == given);
-        chosen.map(|(_, value)| value.clone()).ok_or("not one of the possible values")
-    })
 }
 
 fn unit() -> impl TypedValueParser<Value = TimeUnit> {

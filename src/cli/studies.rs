@@ -6,10 +6,9 @@ use clap::Args;
 use clap::builder::{PossibleValue, TypedValueParser};
 
 use super::console::{Console, Terminal};
-use super::reading::one_of;
 use super::run::{ScenarioArguments, pictures};
 use super::{Exit, completions};
-use tautline_report::request::Failure;
+use tautline_report::request::{Failure, one_of};
 use tautline_studies::attack::{Bound, FLIGHTS, SEEDS_OF_A_CANDIDATE};
 use tautline_studies::margin::Range;
 use tautline_studies::sweep::SweptKey;
@@ -83,7 +82,7 @@ struct RunArguments {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Exit codes: 0 complete, for any result; 1 interrupted. The keys of a law are in [laws.NAME] of the scenario. NAME is \
-the kind of the law, or any name if the table has a `kind`. See docs/compare.md.")]
+the kind of the law, or any name if the table has a `kind`. See docs/studies.md.")]
 pub(super) struct CompareArguments {
     #[command(flatten)]
     study: StudyArguments,
@@ -123,7 +122,7 @@ impl CompareArguments {
 #[command(after_help = "\
 Exit codes: 0 the verdict turns or holds everywhere; 1 it holds nowhere, or the search was interrupted. A single run \
 (--runs 1) changes only the key. With more runs, run k has start.seed and noise.seed = S + k, and a scenario without \
-randomness gets a small jitter of the start. See docs/margins.md.")]
+randomness gets a small jitter of the start. See docs/studies.md.")]
 pub(super) struct MarginArguments {
     #[command(flatten)]
     study: StudyArguments,
@@ -179,7 +178,7 @@ impl MarginArguments {
 #[command(after_help = "\
 Exit codes: 0 complete, for any result; 1 interrupted. A single run (--runs 1) changes only the keys. With more runs, \
 run k has start.seed and noise.seed = S + k, and a scenario without randomness gets a small jitter of the start. \
-See docs/sweeps.md.")]
+See docs/studies.md.")]
 pub(super) struct SweepArguments {
     #[command(flatten)]
     study: StudyArguments,
@@ -214,7 +213,7 @@ impl SweepArguments {
 #[derive(Debug, Args)]
 #[command(after_help = "\
 Exit codes: 0 no violation found; 1 violation found, or interrupted. This is a search, not a proof: worse flights may \
-exist within the bounds. See docs/attack.md.")]
+exist within the bounds. See docs/studies.md.")]
 pub(super) struct AttackArguments {
     #[command(flatten)]
     study: StudyArguments,

@@ -9,11 +9,11 @@ use clap::Args;
 use clap::builder::PossibleValue;
 
 use super::console::{self, Console, Exit, Terminal};
-use super::reading::{one_of, origin};
+use super::reading::origin;
 use tautline_core::track::EarthOrigin;
 use tautline_recordings::read::{self, EarthFrame, ReadError, ReadOptions};
 use tautline_report::report::page::live_page;
-use tautline_report::request::{ExportRequest, Failure, Monitor as _, Silent, export_file};
+use tautline_report::request::{ExportRequest, Failure, Monitor as _, Silent, export_file, one_of};
 use tautline_watch::foxglove_server::FoxgloveServer;
 use tautline_watch::page::Page;
 use tautline_watch::source::{self, Feed, MavlinkFrame, NamingOptions, OwnedPose};
@@ -32,7 +32,7 @@ Sources:
   rosbridge:HOST:PORT   Topics of ROS, with --topic.
   foxglove:HOST:PORT    Topics with positions of a Foxglove server, all or those of --topic.
 
-A line comes each second and at every change of state: CLEAR, NOT KNOWN or VIOLATION. A watch ends with its input or
+A line comes each second and at every change of state: CLEAR, UNDECIDED or VIOLATION. A watch ends with its input or
 with Ctrl-C. Exit codes: 0 if it was CLEAR from start to end, 1 if not or if a vehicle left its plan.")]
 pub(super) struct WatchArguments {
     /// Source of positions; several sources are not joined.
@@ -147,8 +147,8 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<Exit, Failure> {
         let other = if page.port() == u16::MAX { page.port() - 1 } else { page.port() + 1 };
         return Err(Failure::input("watch/setting", message, format!("write --foxglove=127.0.0.1:{other}")));
     }
-    let plan = arguments.read_plan(&source)?;
-    let settings = arguments.settings(&source, &plan)?;
+    let mut settings = arguments.settings(&source)?;
+    let plan = arguments.read_plan(&mut settings)?;
     let monitor = Monitor::new(settings, plan).map_err(|error| {
         Failure::input("watch/setting", error.to_string(), "give a number in this range; tautline watch --help")
     })?;
@@ -181,8 +181,8 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<Exit, Failure> {
         .map_err(|error| Failure::machine("files/cannot-write", format!("cannot write the watch: {error}")));
     // The recording is complete even if another output failed.
     let recorded = outputs.recorder.map_or(Ok(true), |recorder| recorder.finish(console));
-    let is_good = watched?.is_good();
-    Ok(Exit::good_if(recorded? && is_good))
+    let passes = watched?.passes();
+    Ok(Exit::good_if(recorded? && passes))
 }
 
 /// Source of the command line.
@@ -225,16 +225,10 @@ impl WatchArguments {
         Ok(address)
     }
 
-    fn clock_scope(&self, source: &Address) -> ClockScope {
-        let is_mavlink = matches!(source, Address::Mavlink(_));
-        self.clocks.unwrap_or(if is_mavlink { ClockScope::PerVehicle } else { ClockScope::Common })
-    }
-
-    fn settings(&self, source: &Address, plan: &Plan) -> Result<Settings, Failure> {
+    fn settings(&self, source: &Address) -> Result<Settings, Failure> {
         let expected = match self.expect {
             Some(count) => Expected::Count(count),
             None if !self.ids.is_empty() => Expected::Names(self.ids.clone()),
-            None if self.plan.is_some() => Expected::Names(plan.names().map(str::to_owned).collect()),
             None => Expected::Heard,
         };
         if let Some(empty) = self.ids.iter().position(String::is_empty) {
@@ -262,12 +256,13 @@ impl WatchArguments {
             expected,
             max_vehicles: self.max_vehicles,
             time_base: self.time,
-            clocks: self.clock_scope(source),
+            clocks: self.clocks,
             has_message_counts: matches!(source, Address::Mavlink(_)),
         })
     }
 
-    fn read_plan(&self, source: &Address) -> Result<Plan, Failure> {
+    /// Reads the plan, whose vehicles are expected unless others are.
+    fn read_plan(&self, settings: &mut Settings) -> Result<Plan, Failure> {
         let Some(path) = &self.plan else { return Ok(Plan::default()) };
         if let Some(start_s) = self.plan_start.filter(|start_s| !start_s.is_finite()) {
             let message = format!("--plan-start: must be finite ({start_s})");
@@ -291,7 +286,7 @@ impl WatchArguments {
         if !items.is_empty() {
             recording = read::open_plan(path, origin.as_ref()).map_err(unread)?;
         }
-        let epoch_s = match self.clock_scope(source) {
+        let epoch_s = match settings.clock_scope() {
             // The reader counts times since 1970 from a whole second.
             ClockScope::Common => recording.clock().epoch_ns as f64 * 1e-9,
             ClockScope::PerVehicle => 0.0,
@@ -303,6 +298,9 @@ impl WatchArguments {
         let metadata = recording.metadata();
         if metadata.is_planar {
             return refused("it has no heights, so a deviation in height is not known", "add the heights to the plan");
+        }
+        if settings.expected == Expected::Heard {
+            settings.expected = Expected::Names(plan.names().map(str::to_owned).collect());
         }
         Ok(plan)
     }

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from commands import run, spoken, unknown_arguments
-from exceptions import AROUND
 from pages import ROOT, Block
 
 WRONG_INPUT = 2
@@ -54,8 +53,7 @@ def wrong_toml(block: Block, folder: Path, programs: Path) -> list[str]:
         (folder / "two.csv").write_text(TWO, encoding="utf-8")
         command = f"tautline audit two.csv --delta 0.5 {' '.join(AUDIT_FILES[key] for key in keys)} {file}"
     else:
-        sets = [*AROUND.get(block.page, []), *settings(keys)]
-        command = f"tautline check pentagon {' '.join(f'--set {shlex.quote(one)}' for one in sets)}"
+        command = f"tautline check pentagon {' '.join(f'--set {shlex.quote(one)}' for one in settings(keys))}"
     ran = run(command, folder, programs)
     wrong = ran.exit_code >= WRONG_INPUT
     return [f"{block.place}: {command}\n{ran.output.strip()}"] if wrong else []

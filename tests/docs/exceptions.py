@@ -26,24 +26,24 @@ NOT_RUN_HERE = {
     ("CONTRIBUTING.md", "cargo run --release -- schema"): "writes docs/scenario.md; test_book.py compares the two",
     ("docs/clusters.md", "cp target/release/tautline"): "copies into the shared folder of a cluster",
     ("docs/clusters.md", "/shared/tautline"): "the same",
-    ("docs/plan-to-flight.md", "tautline watch mavlink:"): "listens until Ctrl-C",
+    ("docs/export.md", "tautline watch mavlink:"): "listens until Ctrl-C",
     ("docs/watch.md", "tautline watch mavlink:"): "listens until Ctrl-C; crates/watch tests the source",
     ("docs/watch.md", "tautline watch rosbridge:"): "the same; tests/program/watch.rs runs it",
     ("docs/watch.md", "tautline watch foxglove:"): "the same",
-    ("docs/scale.md", "tautline run"): "ten thousand and a hundred thousand vehicles: minutes, and 0.4 GB of memory",
+    ("docs/benchmarks.md", "tautline run"): "ten thousand and a hundred thousand vehicles: minutes, 0.4 GB of memory",
 }
 
 # (page, beginning of the command): reason for a duration of more than 20 s. Runs with TAUTLINE_LONG, else is parsed.
 LONG = {
     ("README.md", "tautline campaign run examples/campaign.toml"): "a thousand flights",
-    ("docs/attack.md", "tautline attack pentagon"): "a thousand flights",
+    ("docs/studies.md", "tautline attack pentagon"): "a thousand flights",
     ("docs/campaigns.md", "tautline campaign run examples/campaign.toml"): "a thousand flights",
     ("docs/campaigns.md", "tautline campaign replay out/campaign"): "of the campaign above",
     ("docs/campaigns.md", "tautline campaign shard"): "a thousand flights",
     ("docs/campaigns.md", "tautline campaign missing"): "of the shards above",
     ("docs/campaigns.md", "tautline campaign merge"): "of the shards above",
     ("docs/shield.md", "tautline check shielded-crazyflies --set vehicle.model=hummingbird"): "a thousand flights",
-    ("docs/compare.md", "tautline compare"): "sixty flights",
+    ("docs/studies.md", "tautline compare"): "sixty flights",
     ("docs/viewer.md", "tautline render out/pentagon/run.mcap --film"): "six hundred pictures",
     ("docs/viewer.md", "tautline render pentagon-laplacian"): "two hundred pictures",
 }
@@ -52,14 +52,4 @@ LONG = {
 INSTEAD = {
     "cargo run --release --example own_law": "debug/examples/own_law",
     "cargo run --release --package example-shield": "debug/example-shield",
-}
-
-# (page, beginning of a text block): reason why it differs from the output of the command above.
-OTHER_OUTPUT = {
-    ("docs/audit.md", "PROVED CLEAR: never closer than 0.305304 m"): "an example, for a recording with curves",
-}
-
-# Overrides of `pentagon` that the parts of scenarios on a page need.
-AROUND = {
-    "docs/safety.md": ["swarm.hull_radius_m=0.1", "law={kind=\"displacement\", delta_m=0.25}", "swarm.dimensions=3"],
 }

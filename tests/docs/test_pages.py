@@ -29,7 +29,7 @@ class Walk:
                 last = block.section, self.carry_out(block)
             elif block.language == "text":
                 shown_below = last[0] == block.section and last[1]
-                if shown_below and not self.is_other_output(block):
+                if shown_below:
                     self.compare(block, shown_below)
                 last = "", None
             else:
@@ -54,10 +54,6 @@ class Walk:
     def compare(self, block: Block, ran: Ran) -> None:
         if (line := missing_lines(block.text, ran.output)) is not None:
             self.wrong.append(f"{block.place}: the command above does not print\n{line}\nbut\n{ran.output.strip()}")
-
-    @staticmethod
-    def is_other_output(block: Block) -> bool:
-        return any(page == block.page and block.text.startswith(begin) for page, begin in exceptions.OTHER_OUTPUT)
 
 
 fixtures: Fixtures
@@ -87,11 +83,8 @@ class Exceptions(unittest.TestCase):
     def test_each_is_of_a_page_as_it_is(self) -> None:
         blocks = [block for page in pages() for block in page.blocks]
         called = [command for block in blocks if block.language == "sh" for command in commands(block)]
-        shown = [block for block in blocks if block.language == "text"]
         for page, begin in [*exceptions.NOT_RUN_HERE, *exceptions.LONG]:
             self.assertTrue(any(one.page == page and one.text.startswith(begin) for one in called), (page, begin))
-        for page, begin in exceptions.OTHER_OUTPUT:
-            self.assertTrue(any(one.page == page and one.text.startswith(begin) for one in shown), (page, begin))
         for command in exceptions.INSTEAD:
             self.assertTrue(any(one.text == command for one in called), command)
         for program in [*exceptions.NOT_RUN, *exceptions.RUN]:

@@ -1,5 +1,5 @@
 //! docs/report.md lists exactly the keys of the JSON of `run`, `audit` and `check`, with units, docs/codes.md their
-//! codes, and docs/study-json.md the keys of studies.
+//! codes, docs/studies.md the keys of studies, and docs/campaigns.md those of campaigns.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::RangeInclusive;
@@ -11,7 +11,8 @@ use serde_json::Value;
 const PAGE: &str = include_str!("../../docs/report.md");
 const CODES: &str = include_str!("../../docs/codes.md");
 const ELLIPSOID: &str = "safety={shape=\"ellipsoid\", half_axes_m=[0.5, 0.5, 1.0]}";
-const STUDIES: &str = include_str!("../../docs/study-json.md");
+const STUDIES: &str = include_str!("../../docs/studies.md");
+const CAMPAIGNS: &str = include_str!("../../docs/campaigns.md");
 /// Objects that stand in many places of the JSON of studies, by their keys: share, estimate, quantiles, pairs of runs.
 const KINDS: [&[&str]; 4] = [
     &["count", "of", "share", "low", "high", "confidence"],
@@ -30,13 +31,21 @@ fn documented(page: &'static str, heading: &str) -> BTreeMap<&'static str, &'sta
     rows(section(page, "\n## ", heading))
 }
 
-/// Returns the keys of tables, each with its unit.
+/// Returns the keys of a study, with those of all studies.
+fn documented_study(heading: &str) -> BTreeMap<&'static str, &'static str> {
+    let mut keys = documented(STUDIES, "Keys of all studies");
+    keys.extend(documented(STUDIES, heading));
+    keys
+}
+
+/// Returns the keys of tables, each with its unit. The first cell of a row holds one key or several.
 fn rows(text: &'static str) -> BTreeMap<&'static str, &'static str> {
     let row = |line: &'static str| {
         let mut cells = line.trim_matches('|').split(" | ").map(str::trim);
-        Some((cells.next()?.strip_prefix('`')?.strip_suffix('`')?, cells.next()?))
+        let (keys, unit) = (cells.next()?.strip_prefix('`')?.strip_suffix('`')?, cells.next()?);
+        Some(keys.split("`, `").map(move |key| (key, unit)))
     };
-    text.lines().map(|line| line.replace("| |", "| - |")).map(|line| &*line.leak()).filter_map(row).collect()
+    text.lines().map(|line| line.replace("| |", "| - |")).map(|line| &*line.leak()).filter_map(row).flatten().collect()
 }
 
 /// Returns the keys of a finding, from the table whose first cells hold one key or several.
@@ -274,14 +283,14 @@ fn every_key_of_the_check_is_on_its_page() {
 #[test]
 fn every_key_of_a_comparison_is_on_its_page() {
     let quick = ["compare", "--laws", "edge-tension", "--runs", "1", "--json", "-", "--set", "time.duration_s=1.5"];
-    assert_eq!(plain(&documented(STUDIES, "compare --json")), printed(&[&quick], by_kind));
+    assert_eq!(plain(&documented_study("compare --json")), printed(&[&quick], by_kind));
 }
 
 #[test]
 fn every_key_of_an_attack_is_on_its_page() {
     let quick =
         ["attack", "--vary", "law.alpha=0.9..1.1", "--flights", "1", "--json", "-", "--set", "time.duration_s=1.5"];
-    assert_eq!(plain(&documented(STUDIES, "attack --json")), printed(&[&quick], by_kind));
+    assert_eq!(plain(&documented_study("attack --json")), printed(&[&quick], by_kind));
 }
 
 #[test]
@@ -306,7 +315,7 @@ fn every_key_of_a_campaign_is_on_its_page() {
     }
     // Null in one campaign, a table or a list in the other.
     let named: BTreeSet<_> = found.iter().map(|key| key.trim_end_matches("[]").to_owned()).collect();
-    assert_eq!(plain(&documented(STUDIES, "campaign.json")), whole(&named));
+    assert_eq!(plain(&documented(CAMPAIGNS, "campaign.json")), whole(&named));
 }
 
 #[test]
@@ -318,5 +327,33 @@ fn every_code_of_a_warning_is_on_its_page() {
         let is_row =
             |row: &str| row.starts_with(&format!("| `{}` |", code.name())) && row.ends_with(&format!(" {refuses} |"));
         assert!(rows.any(is_row), "{}", code.name());
+    }
+}
+
+#[test]
+fn every_code_has_a_row_and_every_row_a_code() {
+    use tautline::fact::{Coded, FactKind, Source};
+    use tautline::watch;
+    for (heading, codes) in [
+        ("Reasons against a pass", tautline::report::Reason::CODES),
+        ("Reasons of a void certificate", tautline::law::VoidReason::CODES),
+        ("Early ends", tautline::sim::Ending::CODES),
+        ("Exceeded bounds of a shield", tautline::shield::report::Exceeded::CODES),
+        ("Facts", FactKind::CODES),
+        ("Sources", Source::CODES),
+        ("Notices of a watch", watch::Statement::CODES),
+        ("Reasons of a watch", watch::Reason::CODES),
+        ("Faults of a watch", watch::Fault::CODES),
+        ("Messages that cannot be read", watch::Problem::CODES),
+        ("Lost sources of a watch", watch::Loss::CODES),
+    ] {
+        let lines = section(CODES, "\n## ", heading).lines().skip_while(|line| !line.starts_with("| ---"));
+        let cells = lines.filter_map(|line| line.strip_prefix("| `")?.split_once("` |"));
+        let mut rows: Vec<_> = cells.flat_map(|(cell, _)| cell.split("`, `")).collect();
+        // A completed flight has no early end.
+        let mut codes: Vec<_> = codes.iter().copied().filter(|code| *code != "completed").collect();
+        rows.sort_unstable();
+        codes.sort_unstable();
+        assert_eq!(rows, codes, "{heading}");
     }
 }

@@ -1,19 +1,22 @@
-//! Compares `docs/attack.md` with flights: one seed and one law by default, all tables with `TAUTLINE_LONG=1`.
+//! Compares `attacks.md` and the laws of `docs/studies.md` with flights: one seed by default, all tables with
+//! `TAUTLINE_LONG=1`.
 
 #[path = "../support/attacks.rs"]
 mod tables;
 
 use tables::{CASES, Case, SEEDS};
 
-const PAGE: &str = include_str!("../../docs/attack.md");
+const PAGE: &str = include_str!("../../docs/studies.md");
+const SEARCHES: &str = include_str!("attacks.md");
 /// Number of the twenty seeds for which CMA-ES must find a smaller separation.
 const MIN_BETTER: u64 = 18;
 
-/// Returns the table of a command on the page.
+/// Returns the table of a command on one of the pages.
 fn on_page(command: &str) -> &'static str {
     let [begin, end] =
         ["begin", "end"].map(|mark| format!("<!-- {mark}: cargo run --release --example {command} -->\n"));
-    PAGE.split_once(&begin).and_then(|(_, rest)| rest.split_once(&end)).expect("two marks").0
+    let table = |page: &'static str| page.split_once(&begin)?.1.split_once(&end);
+    table(PAGE).or_else(|| table(SEARCHES)).expect("two marks").0
 }
 
 /// Returns the results of a seed: CMA-ES and random search on each case \[m\].
@@ -34,6 +37,7 @@ fn cma_es_beats_random_search_with_the_same_number_of_flights() {
         let count = |less: &dyn Fn(u64) -> bool| (0..SEEDS).filter(|&seed| less(seed)).count() as u64;
         let better = count(&|seed| found_m(seed)[2 * case] < found_m(seed)[2 * case + 1]);
         assert!(better >= MIN_BETTER, "{name}: {better} of {SEEDS}");
+        assert!(PAGE.contains(&format!("{better} of {SEEDS}")), "docs/studies.md lacks {better} of {SEEDS} for {name}");
         let of_itself = count(&|seed| found_m(seed)[2 * case + 1] < found_m((seed + 1) % SEEDS)[2 * case + 1]);
         assert!(of_itself < MIN_BETTER, "{name}: {of_itself} of {SEEDS}");
     }
@@ -44,7 +48,7 @@ fn the_tables_of_the_page_match_flights() {
     if is_long() {
         for (command, flown) in [("attacks", tables::beside_random()), ("attacks laws", tables::worst_starts())] {
             let page = on_page(command);
-            assert!(page == flown, "docs/attack.md has\n{page}and flown was\n{flown}");
+            assert!(page == flown, "the page of {command} has\n{page}and flown was\n{flown}");
         }
         return;
     }

@@ -46,9 +46,9 @@ fn a_large_swarm_sweeps_near_pairs_and_records_vehicles() {
             run_while(&scenario, &preflight, sink, &mut |_| ControlFlow::Continue(()))
         };
         let report = threads.install(fly).expect("a flight");
-        assert_eq!((report.audit.status, report.run.steps), (Status::Clear, 3), "{name}: whole steps, none in parts");
+        assert_eq!((report.answer.status, report.run.steps), (Status::Clear, 3), "{name}: whole steps, none in parts");
         // Four neighbours at 2 m, and four at 2.83 m.
-        let swept = report.audit.pairs_checked as f64 / (4 * MANY_VEHICLES) as f64;
+        let swept = report.answer.detectors.expect("detectors").pairs_swept as f64 / (4 * MANY_VEHICLES) as f64;
         assert!((2.0..=8.0).contains(&swept), "{name}: {swept} pairs a vehicle and step");
         recorder.finish().expect("written");
         let (bytes, numbers) = (std::fs::metadata(&path).expect("written").len(), preflight.recording_bytes);
@@ -79,7 +79,7 @@ fn a_law_without_edge_data_needs_no_memory_for_a_complete_graph() {
     scenario.validate().expect("the same answer");
     let text = grid(40_000, "law = { kind = \"edge-tension\", delta_m = 1.0 }\n");
     let refused = Scenario::read(&Source::Text { name: "test".to_owned(), text }, &[]).expect_err("too much memory");
-    assert!(refused.message().contains("40000 vehicles with 799980000 edges would take"), "{refused}");
+    assert!(refused.message.contains("40000 vehicles with 799980000 edges would take"), "{refused}");
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! Table of docs/margins.md: how much of each imperfection five points and five Crazyflies survive.
+//! Table of margins in docs/studies.md: how much of each imperfection five points and five Crazyflies survive.
 
 use tautline::margin::{Margin, Options, Range};
 use tautline::request::{ScenarioRequest, Silent};

@@ -175,8 +175,8 @@ impl Auditor {
             && self.outcome.closest.is_none_or(|old| new.separation_m < old.separation_m)
         {
             self.outcome.closest = closest;
-            let of = [new.pair.first(), new.pair.second()];
-            self.closest_motion = Some(exact_motion([&self.positions_m, to], of, step));
+            let vehicles = [new.pair.first(), new.pair.second()];
+            self.closest_motion = Some(exact_motion([&self.positions_m, to], vehicles, step));
         }
         self.nearest_m = nearest_squared.sqrt();
         self.positions_m.copy_from(to);
@@ -188,7 +188,7 @@ impl Auditor {
 /// Returns the straight motion of a pair over a step.
 fn exact_motion([from, to]: [&Rows; 2], [i, j]: [usize; 2], interval: Interval) -> ExactMotion {
     let Interval { from_s, to_s } = interval;
-    let line = |of| Line { from_s, to_s, from: row(from, of), to: row(to, of) };
+    let line = |vehicle| Line { from_s, to_s, from: row(from, vehicle), to: row(to, vehicle) };
     ExactMotion { first: line(i), second: line(j), interval }
 }
 

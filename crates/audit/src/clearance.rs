@@ -4,7 +4,7 @@ use super::auditor::{AuditError, check_instant};
 use super::cross_check::KeepOut;
 use super::enclosure::Target;
 use super::ledger::{ClosestPairs, Lists, Results};
-use super::obstacle::{Obstacle, ObstacleError};
+use super::obstacle::{Obstacle, ObstacleError, ObstacleFault};
 use super::outcome::{Approach, ObjectPair, ParryEvidence, Status, Undecided, Violation};
 use super::pair_sweep::PairSweep;
 use super::segment::Segment;
@@ -82,12 +82,12 @@ impl ClearanceAuditor {
     pub fn new(vehicles: usize, obstacles: &[Obstacle]) -> Result<Self, ObstacleError> {
         let judged = obstacles.iter().map(|obstacle| {
             obstacle.check()?;
-            let wrong = |reason: &str| ObstacleError { name: obstacle.name.clone(), reason: reason.to_owned() };
+            let wrong = |fault| ObstacleError { name: obstacle.name.clone(), fault };
             let [(_, place_m)] = obstacle.path[..] else {
-                return Err(wrong("it moves; an obstacle of a flight must be at rest"));
+                return Err(wrong(ObstacleFault::Moves));
             };
             let limit_m = obstacle.clearance_m.filter(|&limit_m| limit_m >= MIN_LIMIT_M);
-            let limit_m = limit_m.ok_or_else(|| wrong("the clearance must be above 0 m"))?;
+            let limit_m = limit_m.ok_or_else(|| wrong(ObstacleFault::NoClearance))?;
             Ok(GuardedObstacle { obstacle: obstacle.clone(), place_m, keep_out: KeepOut::new(limit_m) })
         });
         Ok(Self {
@@ -214,8 +214,8 @@ mod tests {
 
     fn fly(auditor: &mut ClearanceAuditor, way: &[[f64; 3]]) -> (usize, usize) {
         let (mut began, mut ended) = (0, 0);
-        for (k, at) in way.iter().enumerate() {
-            let finding = auditor.step(k as f64, &Rows::from_row_slice(at)).unwrap();
+        for (k, point) in way.iter().enumerate() {
+            let finding = auditor.step(k as f64, &Rows::from_row_slice(point)).unwrap();
             began += finding.began.len();
             ended += finding.ended.len();
         }

@@ -48,11 +48,11 @@ fn along_chords(keep_out: &KeepOut, r: &[Vector3<f64>], found: &Minimum, roundin
     let wanted = (whole / (CHORD_OVER_LIMIT * limit)).sqrt().ceil();
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped to a small number")]
     let chords = wanted.clamp(1.0, f64::from(MAX_CHORDS)) as u32;
-    let at = |k: u32| value(r, f64::from(k) / f64::from(chords));
-    let mut from = at(0);
+    let value_at = |k: u32| value(r, f64::from(k) / f64::from(chords));
+    let mut from = value_at(0);
     let mut contact = None;
     for k in 0..chords {
-        let to = at(k + 1);
+        let to = value_at(k + 1);
         if let Some(fraction) = keep_out.cast(&RelativeMotion::new(from, to)) {
             contact = Some((f64::from(k) + fraction) / f64::from(chords));
             break;
@@ -77,8 +77,8 @@ fn curvature_deviation(r: &[Vector3<f64>]) -> f64 {
 fn from_shape(shape: &Shape, limit: f64, found: &Minimum, position: impl Fn(f64) -> Vector3<f64>) -> CrossCheck {
     let points = (0..=PARTS).map(|k| f64::from(k) / f64::from(PARTS));
     let measured = |u: f64| {
-        let at = position(u);
-        (distance(shape, at), ROUNDING * (at.norm() + shape.radius() + limit))
+        let point = position(u);
+        (distance(shape, point), ROUNDING * (point.norm() + shape.radius() + limit))
     };
     let (there, rounding) = measured(found.at);
     let same = (there - found.upper.max(0.0)).abs() <= rounding;
@@ -101,9 +101,9 @@ pub(super) fn from_cylinder(
 ) -> CrossCheck {
     let is_inside = |u: f64, scale: f64| {
         // The axis of parry's cylinder is y.
-        let at = vector(position(u).xzy());
+        let point = vector(position(u).xzy());
         scale > 0.0
-            && Cylinder::new(cylinder.vertical_m * scale, cylinder.horizontal_m * scale).contains_local_point(at)
+            && Cylinder::new(cylinder.vertical_m * scale, cylinder.horizontal_m * scale).contains_local_point(point)
     };
     let points = (0..=PARTS).map(|k| f64::from(k) / f64::from(PARTS));
     let tolerance = ROUNDING * (found.upper + limit) + rounding;
@@ -279,8 +279,8 @@ mod tests {
                 // Past the obstacle: nearest somewhere between the ends.
                 let across = Vector3::new(-far.y, far.x, 0.0).normalize();
                 let along = |u: f64| far + across * (6e6 * u - 2.9e6);
-                let (lower, at) = shape.closest(along(0.0), along(1.0));
-                let right = Minimum { lower, upper: lower, at };
+                let (lower, fraction) = shape.closest(along(0.0), along(1.0));
+                let right = Minimum { lower, upper: lower, at: fraction };
                 assert!(from_shape(&shape, 1.0, &right, along).agrees, "{shape:?} {far:?}");
                 // Inside, parry returns zero at every depth.
                 let wrong = Minimum { upper: lower + 0.1, ..right };
@@ -294,8 +294,8 @@ mod tests {
     fn a_wrong_minimum_is_a_disagreement() {
         let along = |u: f64| Vector3::new(6.0 * u - 3.0, 2.0, 0.0);
         for shape in one_of_each() {
-            let (lower, at) = shape.closest(along(0.0), along(1.0));
-            let right = Minimum { lower, upper: lower, at };
+            let (lower, fraction) = shape.closest(along(0.0), along(1.0));
+            let right = Minimum { lower, upper: lower, at: fraction };
             assert!(from_shape(&shape, 1.0, &right, along).agrees, "{shape:?}");
             for wrong in [Minimum { upper: lower + 0.1, ..right }, Minimum { lower: lower + 3.0, ..right }] {
                 assert!(!from_shape(&shape, 1.0, &wrong, along).agrees, "{shape:?} {wrong:?}");

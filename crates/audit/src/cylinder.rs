@@ -111,15 +111,15 @@ impl Cylinder {
         let q = -(rate + root.copysign(rate));
         let inner = [-f.dot(&b) / b.norm_squared(), -z / w, q / squared, excess / q];
         let inner = inner.into_iter().filter(|u| u.is_finite()).map(|u| u.clamp(0.0, 1.0));
-        let (mut least, mut at) = (f64::INFINITY, 0.0);
+        let (mut least, mut fraction) = (f64::INFINITY, 0.0);
         for u in [0.0].into_iter().chain(inner).chain([1.0]) {
             let r = if u >= 1.0 { motion.to } else { motion.from + motion.by * u };
             let distance = self.distance(r);
-            if distance < least || (distance == least && u < at) {
-                (least, at) = (distance, u);
+            if distance < least || (distance == least && u < fraction) {
+                (least, fraction) = (distance, u);
             }
         }
-        (least, at)
+        (least, fraction)
     }
 
     /// Returns a lower bound of the scaled distance along a straight motion.
@@ -130,14 +130,17 @@ impl Cylinder {
 
     /// Returns the part of a straight motion below a scaled distance, given that the motion falls below it.
     pub(super) fn below(&self, motion: &RelativeMotion, distance: f64) -> Span {
-        let (_, at) = self.closest(motion);
+        let (_, fraction) = self.closest(motion);
         let flat = |r: Vector3<f64>| Vector3::new(r.x, r.y, 0.0);
         let across = RelativeMotion::new(flat(motion.from), flat(motion.to));
         let (nearest, reach) = (across.closest(), self.horizontal_m * distance);
-        let sides =
-            if nearest.separation_m() < reach { across.below(reach, nearest) } else { Span { enter: at, exit: at } };
-        let (low, high) = fractions_within(motion, self.vertical_m * distance, 1.0).unwrap_or((at, at));
-        Span { enter: sides.enter.max(low).min(at), exit: sides.exit.min(high).max(at) }
+        let sides = if nearest.separation_m() < reach {
+            across.below(reach, nearest)
+        } else {
+            Span { enter: fraction, exit: fraction }
+        };
+        let (low, high) = fractions_within(motion, self.vertical_m * distance, 1.0).unwrap_or((fraction, fraction));
+        Span { enter: sides.enter.max(low).min(fraction), exit: sides.exit.min(high).max(fraction) }
     }
 }
 
@@ -157,14 +160,14 @@ fn fractions_within(motion: &RelativeMotion, reach: f64, slack: f64) -> Option<(
 fn smallest_across(motion: &RelativeMotion, (low, high): (f64, f64)) -> Option<f64> {
     let (from, by) = (motion.from.xy(), motion.by.xy());
     let squared = by.norm_squared();
-    let at = if squared > SMALLEST_SQUARED_M2 {
+    let fraction = if squared > SMALLEST_SQUARED_M2 {
         (-from.dot(&by) / squared).clamp(low, high)
     } else if by.amax() == 0.0 {
         low
     } else {
         return None;
     };
-    Some((from + by * at).norm())
+    Some((from + by * fraction).norm())
 }
 
 #[cfg(test)]

@@ -39,12 +39,12 @@ mod tests {
 
     #[test]
     fn decimals_are_compared_exactly() {
-        let at = Vector3::new;
-        assert!(are_decimals_apart(at(0.1, 0.0, 0.0), at(0.6, 0.0, 0.0), 0.5));
-        assert!(are_decimals_apart(at(0.1, 0.2, 0.3), at(0.4, 0.6, 0.3), 0.5), "3, 4 and 5 tenths");
-        assert!(are_decimals_apart(at(-1e3, 0.0, 0.0), at(-999.5, 0.0, 0.0), 0.5));
-        assert!(!are_decimals_apart(at(0.1, 0.0, 0.0), at(0.599_999_999_999, 0.0, 0.0), 0.5));
-        assert!(!are_decimals_apart(at(0.1, 0.0, 0.0), at(f64::NAN, 0.0, 0.0), 0.5));
-        assert!(are_decimals_apart(at(1e-300, 0.0, 0.0), at(3e-300, 0.0, 0.0), 2e-300));
+        let vector = Vector3::new;
+        assert!(are_decimals_apart(vector(0.1, 0.0, 0.0), vector(0.6, 0.0, 0.0), 0.5));
+        assert!(are_decimals_apart(vector(0.1, 0.2, 0.3), vector(0.4, 0.6, 0.3), 0.5), "3, 4 and 5 tenths");
+        assert!(are_decimals_apart(vector(-1e3, 0.0, 0.0), vector(-999.5, 0.0, 0.0), 0.5));
+        assert!(!are_decimals_apart(vector(0.1, 0.0, 0.0), vector(0.599_999_999_999, 0.0, 0.0), 0.5));
+        assert!(!are_decimals_apart(vector(0.1, 0.0, 0.0), vector(f64::NAN, 0.0, 0.0), 0.5));
+        assert!(are_decimals_apart(vector(1e-300, 0.0, 0.0), vector(3e-300, 0.0, 0.0), 2e-300));
     }
 }

@@ -177,8 +177,8 @@ mod tests {
         BigRational::from_float(number).expect("a finite number")
     }
 
-    fn value(of: DoubleDouble) -> BigRational {
-        exact(of.high) + exact(of.low)
+    fn value(number: DoubleDouble) -> BigRational {
+        exact(number.high) + exact(number.low)
     }
 
     fn number() -> impl Strategy<Value = f64> {

@@ -115,7 +115,7 @@ impl<'a> Search<'a> {
 
     /// Returns the smallest distance, in closed form or to within [`WIDTH_M`]; `None` if it is not below `cutoff`.
     pub(super) fn minimum(&mut self, cutoff: f64) -> Option<Minimum> {
-        let (lower, at) = match (self.straight(), self.target) {
+        let (lower, fraction) = match (self.straight(), self.target) {
             (Some(motion), Target::Origin) => {
                 let approach = motion.closest();
                 (approach.separation_m(), approach.at)
@@ -123,7 +123,7 @@ impl<'a> Search<'a> {
             (Some(motion), Target::Shape(shape)) => shape.closest(motion.from, motion.to),
             (None, _) | (_, Target::Cylinder(_)) => return self.minimum_within((0.0, 1.0), cutoff),
         };
-        (lower < cutoff).then_some(Minimum { lower, upper: lower, at })
+        (lower < cutoff).then_some(Minimum { lower, upper: lower, at: fraction })
     }
 
     /// Returns the smallest distance between two fractions of the segment, to within [`WIDTH_M`]; `None` if it is not
@@ -131,7 +131,7 @@ impl<'a> Search<'a> {
     pub(super) fn minimum_within(&mut self, (from, to): (f64, f64), cutoff: f64) -> Option<Minimum> {
         let (mut length, mut open) = (to - from, vec![(self.enclose(from, to - from).0, from)]);
         let (start, end) = (self.distance(from), self.distance(to));
-        let (mut upper, mut at) = if end < start { (end, to) } else { (start, from) };
+        let (mut upper, mut fraction) = if end < start { (end, to) } else { (start, from) };
         let mut lower = upper;
         loop {
             // A part that cannot improve the result is dropped; its lower bound is kept.
@@ -149,24 +149,24 @@ impl<'a> Search<'a> {
             for (low, start) in std::mem::take(&mut open) {
                 let middle = start + length;
                 let there = self.distance(middle);
-                if there < upper || (there == upper && middle < at) {
-                    (upper, at) = (there, middle);
+                if there < upper || (there == upper && middle < fraction) {
+                    (upper, fraction) = (there, middle);
                 }
                 open.extend([start, middle].map(|start| (self.enclose(start, length).0.max(low), start)));
             }
         }
         let lower = lower.min(upper);
-        (lower < cutoff).then_some(Minimum { lower, upper, at })
+        (lower < cutoff).then_some(Minimum { lower, upper, at: fraction })
     }
 
     /// Returns the largest distance to within [`WIDTH_M`]; the upper bound is not below `floor` if no larger distance
     /// is searched. A straight motion is farthest at one of its ends.
     pub(super) fn maximum(&mut self, floor: f64) -> Maximum {
         let (start, end) = (self.distance(0.0), self.distance(1.0));
-        let (mut lower, mut at) = if end > start { (end, 1.0) } else { (start, 0.0) };
+        let (mut lower, mut fraction) = if end > start { (end, 1.0) } else { (start, 0.0) };
         if self.straight().is_some() {
             let rounding = 4.0 * self.r.len() as f64 * f64::EPSILON * self.r.iter().map(Vector3::norm).sum::<f64>();
-            return Maximum { lower, upper: (lower + rounding).next_up(), at };
+            return Maximum { lower, upper: (lower + rounding).next_up(), at: fraction };
         }
         let (mut length, mut open) = (1.0, vec![(self.enclose(0.0, 1.0).1, 0.0)]);
         let mut upper = lower;
@@ -180,14 +180,14 @@ impl<'a> Search<'a> {
                 goes_on
             });
             if open.is_empty() {
-                return Maximum { lower, upper: upper.max(lower), at };
+                return Maximum { lower, upper: upper.max(lower), at: fraction };
             }
             length *= 0.5;
             for (high, start) in std::mem::take(&mut open) {
                 let middle = start + length;
                 let there = self.distance(middle);
-                if there > lower || (there == lower && middle < at) {
-                    (lower, at) = (there, middle);
+                if there > lower || (there == lower && middle < fraction) {
+                    (lower, fraction) = (there, middle);
                 }
                 open.extend([start, middle].map(|start| (self.enclose(start, length).1.min(high), start)));
             }
@@ -196,7 +196,7 @@ impl<'a> Search<'a> {
 
     /// Returns the parts of the segment below a distance, given that the distance at the fraction `at` is. Each part is
     /// exact to within [`SHORTEST_PART`], rather too long than too short.
-    pub(super) fn below(&mut self, distance: f64, at: f64) -> Vec<(f64, f64)> {
+    pub(super) fn below(&mut self, distance: f64, fraction: f64) -> Vec<(f64, f64)> {
         if let Some(motion) = self.exact() {
             let Span { enter, exit } = motion.below(distance, motion.closest());
             return vec![(enter, exit)];
@@ -211,10 +211,10 @@ impl<'a> Search<'a> {
         let spans = runs.filter_map(|run| {
             let (from, to) = (run.first()?.0, run.last()?.1);
             let has = |class| run.iter().any(|part| part.2 == Some(class));
-            (has(true) || !has(false) && from <= at && at <= to).then_some((from, to))
+            (has(true) || !has(false) && from <= fraction && fraction <= to).then_some((from, to))
         });
         let spans: Vec<_> = spans.collect();
-        if spans.is_empty() { vec![(at, at)] } else { spans }
+        if spans.is_empty() { vec![(fraction, fraction)] } else { spans }
     }
 
     /// Returns the distance at a fraction of the segment.

@@ -110,7 +110,7 @@ impl ExactMotion {
                 return RelativeEnd { r: difference(b, a), error: 0.0 };
             }
             let position = |line: &Line, place| match place {
-                EndPosition::Sample(at) => [0, 1, 2].map(|axis| DoubleDouble::from(at[axis])),
+                EndPosition::Sample(position) => [0, 1, 2].map(|axis| DoubleDouble::from(position[axis])),
                 EndPosition::Interpolated => line.position(time_s),
             };
             let (a, b) = (position(&self.first, first), position(&self.second, second));
@@ -297,16 +297,16 @@ impl IntegerMotion {
             Units::of(lines.iter().flat_map(|line| [line.from_s, line.to_s]).chain([interval.from_s, interval.to_s]));
         let coordinates = lines.iter().flat_map(|line| line.from.iter().chain(&line.to).copied());
         let units = Units::of(coordinates.chain([distance]));
-        let at = [(interval.from_s, false), (interval.to_s, true)];
+        let window_ends = [(interval.from_s, false), (interval.to_s, true)];
         let is_between =
-            |line: &Line| at.iter().any(|&(t, end)| matches!(line.place(t, end), EndPosition::Interpolated));
+            |line: &Line| window_ends.iter().any(|&(t, end)| matches!(line.place(t, end), EndPosition::Interpolated));
         let weights = lines.map(|line| {
             if is_between(line) { times.integer(line.to_s) - times.integer(line.from_s) } else { BigInt::from(1) }
         });
         let position = |k: usize, time_s: f64, is_end: bool| {
             let line = lines[k];
             [0, 1, 2].map(|axis| match line.place(time_s, is_end) {
-                EndPosition::Sample(at) => units.integer(at[axis]) * &weights[k],
+                EndPosition::Sample(position) => units.integer(position[axis]) * &weights[k],
                 EndPosition::Interpolated => {
                     let by = units.integer(line.to[axis]) - units.integer(line.from[axis]);
                     units.integer(line.from[axis]) * &weights[k]
@@ -314,7 +314,7 @@ impl IntegerMotion {
                 }
             })
         };
-        let ends = at.map(|(time_s, is_end)| {
+        let ends = window_ends.map(|(time_s, is_end)| {
             let (a, b) = (position(0, time_s, is_end), position(1, time_s, is_end));
             [0, 1, 2].map(|axis| &b[axis] * &weights[0] - &a[axis] * &weights[1])
         });
@@ -357,8 +357,8 @@ pub(super) fn compare_height(line: &Line, time_s: f64, height: f64) -> Ordering 
     let lengths = Units::of([line.from.z, line.to.z, height]);
     let above_start = lengths.integer(height) - lengths.integer(line.from.z);
     let climbs = lengths.integer(line.to.z) - lengths.integer(line.from.z);
-    let [from, to, at] = [line.from_s, line.to_s, time_s].map(|time_s| times.integer(time_s));
-    (climbs * (at - &from)).cmp(&(above_start * (to - from)))
+    let [from, to, instant] = [line.from_s, line.to_s, time_s].map(|time_s| times.integer(time_s));
+    (climbs * (instant - &from)).cmp(&(above_start * (to - from)))
 }
 
 /// Returns the double in the middle of all doubles between two.
@@ -407,8 +407,8 @@ mod tests {
     }
 
     fn motion() -> impl Strategy<Value = ExactMotion> {
-        let at = || prop::array::uniform3(coordinate()).prop_map(Vector3::from);
-        (prop::array::uniform4(time()), prop::array::uniform4(at()), any::<bool>()).prop_map(
+        let point = || prop::array::uniform3(coordinate()).prop_map(Vector3::from);
+        (prop::array::uniform4(time()), prop::array::uniform4(point()), any::<bool>()).prop_map(
             |(times, [a, b, c, d], is_together)| {
                 let [t, u, v, w] = times;
                 let (first, second) = ([t.min(u), t.max(u)], if is_together { [t, u] } else { [v, w] });

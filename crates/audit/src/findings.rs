@@ -132,9 +132,15 @@ impl<T: Finding> Shortlist<T> {
     /// Returns every kept finding once, ordered by start and then by subject.
     pub(super) fn into_list(self) -> Vec<T> {
         let both = self.worst.into_values().chain(self.firsts.into_values());
-        let key =
-            |of: &T| (TotalOrder(of.span_s()[0]), of.subject(), TotalOrder(of.span_s()[1]), TotalOrder(of.excess()));
-        both.map(|of| (key(&of), of)).collect::<BTreeMap<_, _>>().into_values().collect()
+        let key = |finding: &T| {
+            (
+                TotalOrder(finding.span_s()[0]),
+                finding.subject(),
+                TotalOrder(finding.span_s()[1]),
+                TotalOrder(finding.excess()),
+            )
+        };
+        both.map(|finding| (key(&finding), finding)).collect::<BTreeMap<_, _>>().into_values().collect()
     }
 }
 
@@ -220,8 +226,8 @@ impl<T: Finding> Episodes<T> {
 
     fn index(&mut self) {
         self.of_pair.clear();
-        for (index, of) in self.all.iter().enumerate() {
-            self.of_pair.entry(of.subject()).or_default().push(index);
+        for (index, finding) in self.all.iter().enumerate() {
+            self.of_pair.entry(finding.subject()).or_default().push(index);
         }
     }
 
@@ -245,16 +251,16 @@ impl<T: Finding> Episodes<T> {
         let Some(settled) = &mut self.settled else { return };
         let Interval { from_s, to_s } = settled.window;
         let (mut open, mut swept_from) = (Vec::new(), 0);
-        for (k, of) in self.all.drain(..).enumerate() {
+        for (k, finding) in self.all.drain(..).enumerate() {
             let is_swept = k >= settled.swept_from;
             // The next swept motion of a pair begins at the end of this window if the pair was swept, else at its
             // start.
-            if of.span_s()[1] < if is_swept { to_s } else { from_s } {
-                settled.list.offer(of);
+            if finding.span_s()[1] < if is_swept { to_s } else { from_s } {
+                settled.list.offer(finding);
                 settled.count += 1;
             } else {
                 swept_from += usize::from(!is_swept);
-                open.push(of);
+                open.push(finding);
             }
         }
         if open.len() > MAX_OPEN {
@@ -276,7 +282,8 @@ impl<T: Finding> Episodes<T> {
     /// Returns the findings ordered by start and then by pair, shortened if the list is long, and their number.
     pub(super) fn finish(self) -> (Vec<T>, Tally) {
         let is_bounded = self.settled.is_some();
-        let (mut list, settled) = self.settled.map_or((Vec::new(), 0), |of| (of.list.into_list(), of.count));
+        let (mut list, settled) =
+            self.settled.map_or((Vec::new(), 0), |settled| (settled.list.into_list(), settled.count));
         let count = settled + self.all.len() as u64;
         list.extend(self.all);
         // The first finding of each pair comes first.
@@ -332,14 +339,14 @@ mod tests {
     #[test]
     fn the_worst_and_first_findings_are_kept_in_any_order_of_pairs() {
         // Subject 0 at 0, 1 and 2 s; subject 1 at 0.5 and 1.5 s; subject 2 at 3 s.
-        let of = [
+        let findings = [
             vec![found(0, 0.0, 1.0), found(0, 1.0, 5.0), found(0, 2.0, 2.0)],
             vec![found(1, 0.5, 0.1), found(1, 1.5, 4.0)],
             vec![found(2, 3.0, 3.0)],
         ];
         let expected = [found(0, 0.0, 1.0), found(1, 0.5, 0.1), found(0, 1.0, 5.0), found(1, 1.5, 4.0)];
         for order in [[0, 1, 2], [2, 1, 0], [1, 2, 0]] {
-            assert_eq!(kept(&order.map(|k: usize| of[k].clone()).concat()), expected, "{order:?}");
+            assert_eq!(kept(&order.map(|k: usize| findings[k].clone()).concat()), expected, "{order:?}");
         }
     }
 
@@ -387,7 +394,7 @@ mod tests {
         }
         let (list, tally) = going_on.finish();
         assert_eq!((tally.count, tally.is_exact), (5000, true));
-        assert!(list.iter().all(|of| of.span_s == [0.0, 40.0]));
+        assert!(list.iter().all(|finding| finding.span_s == [0.0, 40.0]));
     }
 
     #[test]

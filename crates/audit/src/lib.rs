@@ -62,12 +62,13 @@ pub use clearance::{ClearanceAuditor, ClearanceFinding, ClearanceOutcome, swept_
 pub use cylinder::Cylinder;
 pub use decimals::are_decimals_apart;
 pub use findings::{LISTED, Tally};
-pub use obstacle::{Obstacle, ObstacleError, Shape};
+pub use nalgebra;
+pub use obstacle::{Obstacle, ObstacleError, ObstacleFault, Shape};
 pub use outcome::{
     Approach, AuditOutcome, Disagreement, ObjectPair, ParryEvidence, Status, StepFinding, Undecided, Violation,
 };
 pub use recorded::TrackAuditor;
 pub use slices::{Slice, Slices};
-pub use sweep::swept_separation_m;
+pub use sweep::{Sweep, sweep, swept_separation_m};
 pub use tautline_core::{swarm, track};
 pub use well_clear::WellClear;

@@ -60,12 +60,56 @@ pub enum Shape {
 
 /// Error in the definition of an obstacle.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("obstacle `{name}`: {reason}")]
+#[error("obstacle `{name}`: {fault}")]
 pub struct ObstacleError {
     /// Name of the obstacle.
     pub name: String,
-    /// Reason.
-    pub reason: String,
+    /// The fault.
+    pub fault: ObstacleFault,
+}
+
+/// Fault of an obstacle.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ObstacleFault {
+    /// The radius of a ball or capsule \[m\] is not above 0, or too large.
+    #[error("the radius must be above 0 m, got {0:?}")]
+    Radius(f64),
+    /// A length of a box is not above 0, or too large.
+    #[error("every length of the box must be above 0 m")]
+    BoxLength,
+    /// The yaw of a box \[rad\] is not finite.
+    #[error("the yaw must be a finite number, got {0:?}")]
+    Yaw(f64),
+    /// An end of a capsule is not finite, or too far away.
+    #[error("the ends of the capsule must be finite numbers")]
+    CapsuleEnd,
+    /// The normal of a half-space is zero, not finite or too long.
+    #[error("the normal must not be zero")]
+    Normal,
+    /// The clearance \[m\] is negative, not finite or too large.
+    #[error("the clearance must be at least 0 m, got {0:?}")]
+    Clearance(f64),
+    /// The clearance of an obstacle of a flight is missing or 0.
+    #[error("the clearance must be above 0 m")]
+    NoClearance,
+    /// The path has no point.
+    #[error("the path has no point")]
+    NoPath,
+    /// The point at a time \[s\] is not finite, or too far away.
+    #[error("the point at {0:?} s is not finite")]
+    Point(f64),
+    /// The time of a point \[s\] is not later than the time before it \[s\].
+    #[error("the time {time_s:?} s of a point is not later than {before_s:?} s before it")]
+    Order {
+        /// Time of the point \[s\].
+        time_s: f64,
+        /// Time of the point before it \[s\].
+        before_s: f64,
+    },
+    /// An obstacle of a flight moves.
+    #[error("it moves; an obstacle of a flight must be at rest")]
+    Moves,
 }
 
 impl Obstacle {
@@ -74,46 +118,35 @@ impl Obstacle {
     /// # Errors
     /// [`ObstacleError`] if a length, a position, a time or the clearance is out of range.
     pub fn check(&self) -> Result<(), ObstacleError> {
-        let wrong = |reason: String| Err(ObstacleError { name: self.name.clone(), reason });
+        let wrong = |fault| Err(ObstacleError { name: self.name.clone(), fault });
         let length = |x: f64| x > 0.0 && x <= MAX_LENGTH_M;
         let place = |v: &Vector3<f64>| v.iter().all(|x| x.abs() <= MAX_LENGTH_M);
         match &self.shape {
             Shape::Ball { radius_m } | Shape::Capsule { radius_m, .. } if !length(*radius_m) => {
-                return wrong(format!("the radius must be above 0 m, got {radius_m:?}"));
+                return wrong(ObstacleFault::Radius(*radius_m));
             }
-            Shape::Box { half_m, .. } if !half_m.iter().all(|x| length(*x)) => {
-                return wrong("every length of the box must be above 0 m".to_owned());
-            }
-            Shape::Box { yaw_rad, .. } if !yaw_rad.is_finite() => {
-                return wrong(format!("the yaw must be a finite number, got {yaw_rad:?}"));
-            }
+            Shape::Box { half_m, .. } if !half_m.iter().all(|x| length(*x)) => return wrong(ObstacleFault::BoxLength),
+            Shape::Box { yaw_rad, .. } if !yaw_rad.is_finite() => return wrong(ObstacleFault::Yaw(*yaw_rad)),
             Shape::Capsule { from_m, to_m, .. } if !(place(from_m) && place(to_m)) => {
-                return wrong("the ends of the capsule must be finite numbers".to_owned());
+                return wrong(ObstacleFault::CapsuleEnd);
             }
-            Shape::HalfSpace { normal } if !length(normal.norm()) => {
-                return wrong("the normal must not be zero".to_owned());
-            }
+            Shape::HalfSpace { normal } if !length(normal.norm()) => return wrong(ObstacleFault::Normal),
             _ => {}
         }
         if let Some(clearance_m) = self.clearance_m
             && !(0.0..=MAX_LENGTH_M).contains(&clearance_m)
         {
-            return wrong(format!("the clearance must be at least 0 m, got {clearance_m:?}"));
+            return wrong(ObstacleFault::Clearance(clearance_m));
         }
-        let Some((_, first)) = self.path.first() else { return wrong("the path has no point".to_owned()) };
+        let Some((_, first)) = self.path.first() else { return wrong(ObstacleFault::NoPath) };
         if self.path.len() == 1 && place(first) {
             return Ok(());
         }
-        for (time_s, at) in &self.path {
-            if !(time_s.is_finite() && place(at)) {
-                return wrong(format!("the point at {time_s:?} s is not finite"));
-            }
+        if let Some((time_s, _)) = self.path.iter().find(|(time_s, at_m)| !(time_s.is_finite() && place(at_m))) {
+            return wrong(ObstacleFault::Point(*time_s));
         }
         match self.path.windows(2).find(|points| points[1].0 <= points[0].0) {
-            Some(points) => wrong(format!(
-                "the time {:?} s of a point is not later than {:?} s before it",
-                points[1].0, points[0].0
-            )),
+            Some(points) => wrong(ObstacleFault::Order { time_s: points[1].0, before_s: points[0].0 }),
             None => Ok(()),
         }
     }
@@ -123,11 +156,11 @@ impl Obstacle {
     #[must_use]
     pub fn is_upright_through_ground(&self) -> bool {
         let holds_0 = |from: f64, to: f64| from.min(to) <= 0.0 && 0.0 <= from.max(to);
-        self.path.iter().all(|(_, at)| match self.shape {
-            Shape::Ball { .. } => at.z == 0.0,
-            Shape::Box { half_m, .. } => holds_0(at.z - half_m.z, at.z + half_m.z),
+        self.path.iter().all(|(_, point)| match self.shape {
+            Shape::Ball { .. } => point.z == 0.0,
+            Shape::Box { half_m, .. } => holds_0(point.z - half_m.z, point.z + half_m.z),
             Shape::Capsule { from_m, to_m, .. } => {
-                let (from, to) = (at.z + from_m.z, at.z + to_m.z);
+                let (from, to) = (point.z + from_m.z, point.z + to_m.z);
                 let (is_vertical, is_level) = (from_m.xy() == to_m.xy(), from == to);
                 (is_vertical || is_level) && holds_0(from, to)
             }
@@ -198,11 +231,11 @@ impl Shape {
             return if end < start { (end, 1.0) } else { (start, 0.0) };
         }
         let (from, to) = (self.in_box_frame(from), self.in_box_frame(to));
-        let at = |u: f64| if u >= 1.0 { to } else { from + (to - from) * u };
+        let position = |u: f64| if u >= 1.0 { to } else { from + (to - from) * u };
         let mut best = (f64::INFINITY, 0.0);
         let mut start = (0.0, self.offset_from_core(from));
         for u in self.feature_changes(from, to).into_iter().chain([1.0]) {
-            let end = (u, self.offset_from_core(at(u)));
+            let end = (u, self.offset_from_core(position(u)));
             let part = RelativeMotion::new(start.1, end.1).closest();
             if part.squared < best.0 {
                 best = (part.squared, start.0 + (end.0 - start.0) * part.at);

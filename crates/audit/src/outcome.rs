@@ -77,6 +77,12 @@ impl ObjectPair {
     }
 }
 
+impl From<Pair> for ObjectPair {
+    fn from(pair: Pair) -> Self {
+        Self::Vehicles(pair)
+    }
+}
+
 /// Closest approach of a pair.
 ///
 /// Distances are between two centres, or from a centre to an obstacle's surface \[m\]. With an ellipsoid they are

@@ -105,12 +105,12 @@ impl<'a> SmallestSeparation<'a> {
     fn finish(self) -> Option<(f64, f64)> {
         let mut found = None;
         let mut least = self.cutoff;
-        for (lower, at, overlap) in self.candidates {
+        for (lower, fraction, overlap) in self.candidates {
             if lower < least && lower <= self.upper {
                 let exact = overlap.exact();
                 if exact.is_below(least) {
                     least = exact.separation();
-                    found = Some((least, overlap.interval.at(at)));
+                    found = Some((least, overlap.interval.at(fraction)));
                 }
             }
         }
@@ -169,13 +169,13 @@ impl PairSweep<'_> {
     /// Returns whether an object is on the ground during all of `interval`. If this is a single instant, the height at
     /// this instant counts, because a segment that takes off begins on the ground.
     #[inline]
-    fn is_on_ground(&self, of: &Segment, interval: Interval) -> bool {
+    fn is_on_ground(&self, segment: &Segment, interval: Interval) -> bool {
         let starts_there = |above: f64| {
             interval.from_s >= interval.to_s
-                && !of.jumps()
-                && of.position(interval.from_s).z + of.deviation_at(interval.from_s) <= above
+                && !segment.jumps()
+                && segment.position(interval.from_s).z + segment.deviation_at(interval.from_s) <= above
         };
-        of.grounded == Some(true) || self.above.is_some_and(starts_there)
+        segment.grounded == Some(true) || self.above.is_some_and(starts_there)
     }
 
     fn offer(&self, lower_m: f64, upper_m: f64, time_s: f64, results: &mut Results) {
@@ -214,14 +214,14 @@ impl PairSweep<'_> {
         }
         let (pair, limit_m) = (self.pair, self.keep_out.delta_m);
         let is_below = cylinder.is_below(&motion, &exact, limit_m);
-        let (nearest_m, at) = cylinder.closest(&motion);
+        let (nearest_m, fraction) = cylinder.closest(&motion);
         let min_m = if is_below { cylinder.separation(&motion, &exact) } else { nearest_m };
-        let found = Minimum { lower: min_m, upper: min_m, at };
+        let found = Minimum { lower: min_m, upper: min_m, at: fraction };
         let rounding = motion.resolution_m() * cylinder.per_metre();
         let mut check = from_cylinder(cylinder, limit_m, &found, rounding, |u| motion.from + motion.by * u);
         check.agrees &= is_below || check.contact.is_none();
         let span = cylinder.below(&motion, limit_m);
-        let [from_s, to_s, min_at_s] = [span.enter, span.exit, at].map(|u| overlap.interval.at(u));
+        let [from_s, to_s, min_at_s] = [span.enter, span.exit, fraction].map(|u| overlap.interval.at(u));
         results.ledger.add_cross_check(pair, overlap.interval, min_m, is_below.then_some(span.enter), check);
         if is_below && !results.ledger.violations.is_from_earlier_window(to_s) {
             let from_start = exact.starts_within(cylinder, limit_m);
@@ -303,7 +303,9 @@ impl Overlap<'_> {
     /// Returns whether both vehicles stand still at the same positions as in another overlap.
     #[inline]
     fn is_same_rest(&self, other: &Self) -> bool {
-        let is_still = |of: &Segment, other: &Segment| of.from == of.to && of.from == other.from && of.to == other.to;
+        let is_still = |segment: &Segment, other: &Segment| {
+            segment.from == segment.to && segment.from == other.from && segment.to == other.to
+        };
         is_still(self.first, other.first) && is_still(self.second, other.second)
     }
 
@@ -325,13 +327,13 @@ impl Overlap<'_> {
     fn interpolated(&self) -> RelativeMotion {
         let (a, b) = (self.first.line(), self.second.line());
         let (start, by_a, by_b) = (b.from - a.from, a.to - a.from, b.to - b.from);
-        let at = |time_s: f64, end: bool| {
+        let position = |time_s: f64, end: bool| {
             let share =
                 |line: &Line| if line.to_s <= line.from_s { f64::from(u8::from(end)) } else { line.fraction(time_s) };
             start + (by_b * share(&b) - by_a * share(&a))
         };
         RelativeMotion::interpolated(
-            [at(self.interval.from_s, false), at(self.interval.to_s, true)],
+            [position(self.interval.from_s, false), position(self.interval.to_s, true)],
             start,
             [by_a, by_b],
         )

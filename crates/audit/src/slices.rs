@@ -154,9 +154,9 @@ mod tests {
         assert_eq!(slices.closest(), Some(slice(12_345).closest));
         for most in [4096, 1000, 3, 1] {
             let kept = slices.clone().finish(most);
-            assert!(kept.len() <= most && kept.iter().any(|of| of.closest == slice(12_345).closest));
+            assert!(kept.len() <= most && kept.iter().any(|part| part.closest == slice(12_345).closest));
             assert!(kept.windows(2).all(|two| two[0].to_s == two[1].from_s), "the slices touch");
-            let widest_s = kept.iter().map(|of| of.to_s - of.from_s).fold(0.0, f64::max);
+            let widest_s = kept.iter().map(|part| part.to_s - part.from_s).fold(0.0, f64::max);
             assert!(most < 4 || widest_s <= 4.0 * 100_000.0 / most as f64, "{most}: {widest_s}");
         }
     }
@@ -168,7 +168,7 @@ mod tests {
         let kept = slices.finish(1000);
         let gaps: Vec<_> = kept.windows(2).filter(|two| two[0].to_s < two[1].from_s).collect();
         assert!(gaps.len() == 1 && gaps[0][0].to_s == 30_000.0 && gaps[0][1].from_s == 30_400.0, "{gaps:?}");
-        assert!(kept.iter().all(|of| of.is_whole));
+        assert!(kept.iter().all(|part| part.is_whole));
     }
 
     #[test]
@@ -177,7 +177,7 @@ mod tests {
         (0..6000).for_each(|k| slices.take(slice(k)));
         slices.take(Slice { to_s: 2e8, ..slice(200_000_000) });
         let kept = slices.finish(2000);
-        let widest_s = kept.iter().map(|of| of.to_s - of.from_s).fold(0.0, f64::max);
+        let widest_s = kept.iter().map(|part| part.to_s - part.from_s).fold(0.0, f64::max);
         assert!(kept.len() > 1000 && widest_s <= 6.0, "{} of {widest_s} s", kept.len());
     }
 
@@ -186,12 +186,12 @@ mod tests {
         let mut slices = Slices::new(4096);
         (0..200).filter(|k| *k != 90).for_each(|k| slices.take(slice(k)));
         let kept = slices.finish(4);
-        let of_gap: Vec<_> = kept.iter().filter(|of| of.from_s < 90.0 && 91.0 < of.to_s).collect();
+        let of_gap: Vec<_> = kept.iter().filter(|part| part.from_s < 90.0 && 91.0 < part.to_s).collect();
         assert!(of_gap.len() == 1 && !of_gap[0].is_whole, "{kept:?}");
         assert_eq!(of_gap[0].known_s(), [of_gap[0].closest.time_s; 2]);
-        let others = kept.iter().filter(|of| !(of.from_s..of.to_s).contains(&90.0));
+        let others = kept.iter().filter(|part| !(part.from_s..part.to_s).contains(&90.0));
         assert!(
-            others.clone().count() > 1 && others.clone().all(|of| of.known_s() == [of.from_s, of.to_s]),
+            others.clone().count() > 1 && others.clone().all(|part| part.known_s() == [part.from_s, part.to_s]),
             "{kept:?}"
         );
     }
@@ -202,7 +202,7 @@ mod tests {
         (0..10_000).map(|k| 2 * k).for_each(|k| slices.take(slice(k)));
         assert!(slices.all.len() <= 100 && slices.finish(7).len() <= 7);
         let mut instants = Slices::new(100);
-        (0..10_000).map(slice).for_each(|of| instants.take(Slice { to_s: of.from_s, ..of }));
+        (0..10_000).map(slice).for_each(|part| instants.take(Slice { to_s: part.from_s, ..part }));
         assert!(instants.all.len() <= 100 && instants.finish(7).len() <= 7);
     }
 

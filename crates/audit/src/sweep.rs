@@ -56,6 +56,27 @@ pub fn swept_separation_m(from: Vector3<f64>, to: Vector3<f64>) -> f64 {
     RelativeMotion::new(from, to).closest().separation_m()
 }
 
+/// Smallest separation over a straight relative motion.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sweep {
+    /// Smallest separation \[m\].
+    pub min_m: f64,
+    /// Time of the smallest separation, as a fraction of the motion.
+    pub at: f64,
+    /// Part of the motion below the limit, as fractions; `None` without one.
+    pub below: Option<[f64; 2]>,
+}
+
+/// Sweeps the relative position of two vehicles on a straight line from `from` to `to` \[m\], with a limit \[m\].
+#[must_use]
+pub fn sweep(from: Vector3<f64>, to: Vector3<f64>, limit_m: f64) -> Sweep {
+    let motion = RelativeMotion::new(from, to);
+    let closest = motion.closest();
+    let min_m = closest.separation_m();
+    let below = (min_m < limit_m).then(|| motion.below(limit_m, closest)).map(|Span { enter, exit }| [enter, exit]);
+    Sweep { min_m, at: closest.at, below }
+}
+
 /// Straight relative motion of a pair over a step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RelativeMotion {
@@ -124,8 +145,8 @@ impl RelativeMotion {
         let mut closest = ClosestPoint { squared: self.from_squared, at: 0.0 };
         let start_rate = self.from.dot(&self.by);
         if start_rate < 0.0 && self.to.dot(&self.by) > 0.0 {
-            let at = (-start_rate / self.by.norm_squared()).min(1.0);
-            closest.improve((self.from + self.by * at).norm_squared(), at);
+            let fraction = (-start_rate / self.by.norm_squared()).min(1.0);
+            closest.improve((self.from + self.by * fraction).norm_squared(), fraction);
         }
         closest.improve(self.to_squared, 1.0);
         closest
@@ -152,9 +173,9 @@ impl RelativeMotion {
 
 impl ClosestPoint {
     #[inline]
-    fn improve(&mut self, squared: f64, at: f64) {
+    fn improve(&mut self, squared: f64, fraction: f64) {
         if squared < self.squared {
-            *self = Self { squared, at };
+            *self = Self { squared, at: fraction };
         }
     }
 
@@ -242,11 +263,11 @@ mod tests {
             let distance = closest.separation_m() + deep;
             let Span { enter, exit } = motion.below(distance, closest);
             prop_assert!(0.0 <= enter && enter <= closest.at && closest.at <= exit && exit <= 1.0);
-            let at = |s: f64| (motion.from + motion.by * s).norm();
-            if enter > 0.0 { prop_assert!((at(enter) - distance).abs() < TOLERANCE_M) }
-            if exit < 1.0 { prop_assert!((at(exit) - distance).abs() < TOLERANCE_M) }
-            prop_assert_eq!(enter <= 0.0, at(0.0) < distance);
-            prop_assert_eq!(exit >= 1.0, at(1.0) < distance);
+            let distance_at = |s: f64| (motion.from + motion.by * s).norm();
+            if enter > 0.0 { prop_assert!((distance_at(enter) - distance).abs() < TOLERANCE_M) }
+            if exit < 1.0 { prop_assert!((distance_at(exit) - distance).abs() < TOLERANCE_M) }
+            prop_assert_eq!(enter <= 0.0, distance_at(0.0) < distance);
+            prop_assert_eq!(exit >= 1.0, distance_at(1.0) < distance);
         }
     }
 

@@ -11,6 +11,9 @@ use serde::{Serialize, Serializer};
 
 /// Value with a stable code, which programs may compare.
 pub trait Coded {
+    /// Codes of all values.
+    const CODES: &'static [&'static str];
+
     /// Returns the code, in lower case with hyphens.
     fn code(&self) -> &'static str;
 }
@@ -30,7 +33,24 @@ pub fn serialize_coded<T: Coded + fmt::Display, S: Serializer>(values: &[T], ser
     serializer.collect_seq(values.iter().map(|value| Statement { code: value.code(), text: value.to_string() }))
 }
 
-/// Declares an enum without data and the code of each value.
+/// Implements [`Coded`] for an enum by a pattern and the code of each value.
+#[macro_export]
+macro_rules! impl_coded {
+    ($name:ty { $($value:pat => $code:literal,)* }) => {
+        impl $crate::fact::Coded for $name {
+            const CODES: &'static [&'static str] = &[$($code),*];
+
+            fn code(&self) -> &'static str {
+                match self {
+                    $($value => $code,)*
+                }
+            }
+        }
+    };
+}
+
+/// Declares an enum without data and the code of each value, which is also its JSON.
+#[macro_export]
 macro_rules! coded {
     ($(#[$of_type:meta])* $name:ident { $($(#[$of_value:meta])* $value:ident = $code:literal,)* }) => {
         $(#[$of_type])*
@@ -40,17 +60,16 @@ macro_rules! coded {
             $($(#[$of_value])* $value,)*
         }
 
-        impl Coded for $name {
-            fn code(&self) -> &'static str {
-                match self {
-                    $(Self::$value => $code,)*
-                }
-            }
+        impl $name {
+            /// All values.
+            pub const ALL: [Self; [$($code),*].len()] = [$(Self::$value),*];
         }
 
-        impl Serialize for $name {
-            fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-                serializer.serialize_str(self.code())
+        $crate::impl_coded! { $name { $(Self::$value => $code,)* } }
+
+        impl ::serde::Serialize for $name {
+            fn serialize<S: ::serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+                serializer.serialize_str($crate::fact::Coded::code(self))
             }
         }
     };
@@ -319,6 +338,8 @@ impl fmt::Display for Fact {
 }
 
 impl Coded for Fact {
+    const CODES: &'static [&'static str] = FactKind::CODES;
+
     fn code(&self) -> &'static str {
         self.kind.code()
     }

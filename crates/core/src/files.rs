@@ -149,24 +149,24 @@ mod tests {
         use std::os::unix::{fs::FileTypeExt as _, fs::symlink};
 
         let folder = tempfile::tempdir().expect("a folder");
-        let at = |name: &str| folder.path().join(name);
-        fs::create_dir(at("runs")).expect("a folder");
-        fs::write(at("runs/3.html"), b"old").expect("writes");
+        let file = |name: &str| folder.path().join(name);
+        fs::create_dir(file("runs")).expect("a folder");
+        fs::write(file("runs/3.html"), b"old").expect("writes");
         for target in ["runs/3.html", "runs/4.html"] {
-            let _ = fs::remove_file(at("latest.html"));
-            symlink(target, at("latest.html")).expect("a link");
-            write_atomically(&at("latest.html"), b"new").expect("writes");
-            assert_eq!(fs::read_link(at("latest.html")).expect("still a link"), Path::new(target));
-            assert_eq!(fs::read(at(target)).expect("reads"), b"new");
+            let _ = fs::remove_file(file("latest.html"));
+            symlink(target, file("latest.html")).expect("a link");
+            write_atomically(&file("latest.html"), b"new").expect("writes");
+            assert_eq!(fs::read_link(file("latest.html")).expect("still a link"), Path::new(target));
+            assert_eq!(fs::read(file(target)).expect("reads"), b"new");
         }
-        assert!(std::process::Command::new("mkfifo").arg(at("pipe")).status().expect("runs").success());
+        assert!(std::process::Command::new("mkfifo").arg(file("pipe")).status().expect("runs").success());
         // Opened for reading and writing, so that neither end blocks.
-        let mut pipe = File::options().read(true).write(true).open(at("pipe")).expect("a pipe");
-        write_atomically(&at("pipe"), b"through").expect("writes");
+        let mut pipe = File::options().read(true).write(true).open(file("pipe")).expect("a pipe");
+        write_atomically(&file("pipe"), b"through").expect("writes");
         let mut through = [0; 7];
         pipe.read_exact(&mut through).expect("reads");
         assert_eq!(&through, b"through");
-        assert!(fs::metadata(at("pipe")).expect("there").file_type().is_fifo());
+        assert!(fs::metadata(file("pipe")).expect("there").file_type().is_fifo());
         assert_eq!(names(folder.path()).len(), 3, "nothing else is left");
     }
 }

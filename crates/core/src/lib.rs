@@ -28,6 +28,8 @@ pub mod swarm;
 pub mod text;
 pub mod track;
 
+pub use nalgebra;
+
 /// Name of the program in its artefacts.
 pub const PROGRAM: &str = "tautline";
 

@@ -19,3 +19,5 @@ pub mod observation;
 pub mod space;
 pub mod target;
 pub mod wind;
+
+pub use nalgebra;

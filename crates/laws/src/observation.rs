@@ -171,17 +171,17 @@ mod tests {
 
     #[test]
     fn received_and_sensed_states_come_from_the_shared_table_or_from_each_vehicle() {
-        let at = |x: f64| Swarm::at_rest(Formation::line(2, x).slots_m);
-        let (own, graph, formation) = (at(1.0), Graph::complete(2), Formation::line(2, 1.0));
+        let swarm_at = |x: f64| Swarm::at_rest(Formation::line(2, x).slots_m);
+        let (own, graph, formation) = (swarm_at(1.0), Graph::complete(2), Formation::line(2, 1.0));
         let exact = Observation::exact(&own, &graph, &formation);
         assert_eq!(exact.shared(), Some(&own));
         assert_eq!(exact.received(0, 1), exact.sensed(0, 1));
         assert_eq!((exact.received(0, 1).position_m.x, exact.received(0, 1).age_s), (1.0, 0.0));
 
         let held = StateTables {
-            received: vec![at(2.0), at(3.0)],
+            received: vec![swarm_at(2.0), swarm_at(3.0)],
             ages_s: vec![vec![0.0, 0.5]; 2],
-            sensed: vec![at(4.0), at(5.0)],
+            sensed: vec![swarm_at(4.0), swarm_at(5.0)],
         };
         let late = Observation { others: OtherStates::PerVehicle(&held), ..exact };
         assert_eq!(late.shared(), None);

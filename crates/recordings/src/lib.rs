@@ -16,5 +16,6 @@ pub mod mcap;
 pub mod read;
 mod segments;
 
+pub use nalgebra;
 pub use read::{ReadError, ReadOptions, Recording, open, open_plan};
 pub use tautline_core::track;

@@ -86,11 +86,11 @@ impl Trajectory {
             }
         };
         let Some(first) = pieces.first() else { return Ok(Self::default()) };
-        let mut at = [0; AXES];
-        for (at, coordinate_m) in at.iter_mut().zip(&first.points[0]) {
-            *at = whole(*coordinate_m, 0)?;
+        let mut position = [0; AXES];
+        for (coordinate, coordinate_m) in position.iter_mut().zip(&first.points[0]) {
+            *coordinate = whole(*coordinate_m, 0)?;
         }
-        let mut trajectory = Self { start: at, segments: Vec::with_capacity(pieces.len()) };
+        let mut trajectory = Self { start: position, segments: Vec::with_capacity(pieces.len()) };
         for piece in pieces {
             let mut units = [[0.0; POINTS]; 3];
             for (axis, units) in units.iter_mut().enumerate() {
@@ -99,13 +99,13 @@ impl Trajectory {
                     *unit = point[axis] / unit_m;
                 }
             }
-            let kinds: Vec<_> = (0..3).map(|axis| lowest_kind(&units[axis], at[axis])).collect();
+            let kinds: Vec<_> = (0..3).map(|axis| lowest_kind(&units[axis], position[axis])).collect();
             let common = kinds.iter().copied().max().unwrap_or(0);
             let mut segment = Segment { duration_ms: piece.duration_ms, ..Segment::default() };
             for axis in 0..3 {
                 let kind = if is_uniform { common } else { kinds[axis] };
-                segment.points[axis] = of_kind(&units[axis], at[axis], kind);
-                at[axis] = segment.points[axis].last().copied().unwrap_or(at[axis]);
+                segment.points[axis] = of_kind(&units[axis], position[axis], kind);
+                position[axis] = segment.points[axis].last().copied().unwrap_or(position[axis]);
             }
             from_ms += u64::from(piece.duration_ms);
             trajectory.segments.push(segment);
@@ -120,7 +120,7 @@ impl Trajectory {
             let kind = |axis: usize| {
                 let count = segment.points[axis].len();
                 let mut kinds = (0_u8..).zip(POINTS_OF_KIND);
-                kinds.find(|(_, of)| *of == count).map_or(0, |(kind, _)| kind)
+                kinds.find(|(_, length)| *length == count).map_or(0, |(kind, _)| kind)
             };
             bytes.push((0..AXES).map(|axis| kind(axis) << (2 * axis)).sum());
             bytes.extend(segment.duration_ms.to_le_bytes());
@@ -134,18 +134,18 @@ impl Trajectory {
     /// # Errors
     /// [`Truncated`] if a segment is incomplete, or the segment at the end is missing.
     pub(crate) fn decode(bytes: &[u8], is_terminated: bool) -> Result<(Self, usize), Truncated> {
-        let number = |at: usize| Some(i16::from_le_bytes(bytes.get(at..at + 2)?.try_into().ok()?));
+        let number = |offset: usize| Some(i16::from_le_bytes(bytes.get(offset..offset + 2)?.try_into().ok()?));
         let mut trajectory = Self::default();
         for (axis, start) in trajectory.start.iter_mut().enumerate() {
             *start = number(2 * axis).ok_or(Truncated { byte: 0 })?;
         }
-        let mut at = START_BYTES;
-        while is_terminated || at < bytes.len() {
-            let byte = at;
+        let mut offset = START_BYTES;
+        while is_terminated || offset < bytes.len() {
+            let byte = offset;
             let read = || {
-                let &[kinds, low, high] = bytes.get(at..at + HEAD_BYTES)? else { return None };
+                let &[kinds, low, high] = bytes.get(offset..offset + HEAD_BYTES)? else { return None };
                 let mut segment = Segment { duration_ms: u16::from_le_bytes([low, high]), ..Segment::default() };
-                let mut next = at + HEAD_BYTES;
+                let mut next = offset + HEAD_BYTES;
                 if is_terminated && segment.duration_ms == 0 {
                     return Some((segment, next));
                 }
@@ -157,28 +157,28 @@ impl Trajectory {
                 Some((segment, next))
             };
             let (segment, next) = read().ok_or(Truncated { byte })?;
-            at = next;
+            offset = next;
             if is_terminated && segment.duration_ms == 0 {
                 break;
             }
             trajectory.segments.push(segment);
         }
-        Ok((trajectory, at))
+        Ok((trajectory, offset))
     }
 
     /// Returns the duration \[ms\] and the Bernstein coefficients of each segment \[m\], for a unit of length \[m\].
     pub(crate) fn curves(&self, unit_m: f64) -> impl Iterator<Item = (u16, Vec<Vector3<f64>>)> + '_ {
-        let mut at = self.start;
+        let mut position = self.start;
         self.segments.iter().map(move |segment| {
             let degree = segment.points[..3].iter().map(Vec::len).max().unwrap_or(0);
             let axes: Vec<Vec<f64>> = (0..3)
                 .map(|axis| {
-                    let points = std::iter::once(&at[axis]).chain(&segment.points[axis]);
+                    let points = std::iter::once(&position[axis]).chain(&segment.points[axis]);
                     raised(points.map(|number| f64::from(*number)).collect(), degree)
                 })
                 .collect();
-            for (at, points) in at.iter_mut().zip(&segment.points) {
-                *at = points.last().copied().unwrap_or(*at);
+            for (coordinate, points) in position.iter_mut().zip(&segment.points) {
+                *coordinate = points.last().copied().unwrap_or(*coordinate);
             }
             let point = |k: usize| Vector3::from_fn(|axis, _| axes[axis][k]) * unit_m;
             (segment.duration_ms, (0..=degree).map(point).collect())

@@ -327,7 +327,10 @@ mod tests {
         let entity = &update.entities[0];
         assert_eq!((entity.spheres.len(), entity.lines[0].points.len()), (10, 20));
         assert_eq!(entity.spheres[0].size.map(|size| size.x), Some(0.5));
-        assert_eq!(entity.spheres[0].pose.and_then(|pose| pose.position).map(|at| (at.x, at.y)), Some((3.0, -0.05)));
+        assert_eq!(
+            entity.spheres[0].pose.and_then(|pose| pose.position).map(|position| (position.x, position.y)),
+            Some((3.0, -0.05))
+        );
         assert_eq!(entity.spheres[5].size.map(|size| size.x), Some(2.0));
         let topic = scene.topic();
         assert_eq!(
@@ -371,15 +374,16 @@ mod tests {
         assert_eq!((tilted.spheres.len(), tilted.cylinders.len(), tilted.lines.len()), (4, 8, 3));
         assert!(bytes.len() < 2 * (1100 + 230) + 140 + 100, "{} bytes", bytes.len());
         let front = |entity: &SceneEntity| entity.cylinders[0].pose.expect("a pose");
-        let (at, turn) = (front(&tilted).position.expect("a place"), front(&tilted).orientation.expect("a turn"));
+        let (position, turn) = (front(&tilted).position.expect("a place"), front(&tilted).orientation.expect("a turn"));
         // A vehicle that flies ahead tilts its front down.
         let x = QuadrotorShape::within(0.25).rotors_m[0].x;
         assert!(
-            (at.x - place.x - x * 0.4_f64.cos()).abs() < 1e-12 && (at.z - place.z + x * 0.4_f64.sin()).abs() < 1e-12
+            (position.x - place.x - x * 0.4_f64.cos()).abs() < 1e-12
+                && (position.z - place.z + x * 0.4_f64.sin()).abs() < 1e-12
         );
         assert!((turn.y - 0.2_f64.sin()).abs() < 1e-12 && (turn.w - 0.2_f64.cos()).abs() < 1e-12);
         let (level, place, _) = entity(2, 0.0);
-        assert_eq!(front(&level).position.map(|at| at.z), Some(place.z));
+        assert_eq!(front(&level).position.map(|position| position.z), Some(place.z));
         let (many, ..) = entity(MAX_QUADROTORS + 1, 0.4);
         assert_eq!((many.spheres.len(), many.cylinders.len()), (2 * (MAX_QUADROTORS + 1), 0));
     }

@@ -39,6 +39,7 @@ pub use error::{FARTHEST_M, RenderError};
 pub use film::{Film, FilmFormat};
 pub use foxglove_scene::{FoxgloveScene, SCENE_HZ};
 pub use gpu::{AdapterChoice, Renderer, adapters};
+pub use nalgebra;
 pub use picture::{Picture, contact_sheet, data_uri};
 pub use run_pictures::{RunPictures, Snapshot, snapshot_names, snapshots_of_run};
 pub use scene::{Adjustment, CameraSpec, Colouring, Extent, Layers, Scene, Theme, View};

@@ -25,8 +25,8 @@ impl Picture {
         if x >= width || y >= height {
             return None;
         }
-        let at = (y as usize * width as usize + x as usize) * 4;
-        self.rgba.get(at..at + 4)?.try_into().ok()
+        let offset = (y as usize * width as usize + x as usize) * 4;
+        self.rgba.get(offset..offset + 4)?.try_into().ok()
     }
 
     /// Encodes the picture as PNG without opacity; all pictures are opaque.
@@ -104,8 +104,8 @@ pub fn contact_sheet(pictures: &[Picture], columns: u32) -> Result<Picture, Rend
     for (k, picture) in pictures.iter().enumerate() {
         let (left, top) = (k % columns as usize * width as usize * 4, k / columns as usize * height as usize);
         for (y, row) in picture.rgba.chunks_exact(width as usize * 4).enumerate() {
-            let at = (top + y) * row_bytes + left;
-            rgba[at..at + row.len()].copy_from_slice(row);
+            let offset = (top + y) * row_bytes + left;
+            rgba[offset..offset + row.len()].copy_from_slice(row);
         }
     }
     Ok(Picture { size_px, rgba })

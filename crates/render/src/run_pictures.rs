@@ -50,7 +50,7 @@ impl RunPictures {
         report: &Report,
         log: &Arc<FlightLog>,
     ) -> Result<Vec<Snapshot>, RenderError> {
-        let timeline = Timeline::flown(scenario, Arc::clone(log)).judged(report.audit.status);
+        let timeline = Timeline::flown(scenario, Arc::clone(log)).judged(report.answer.status);
         if log.keyframes().is_empty() {
             return Err(RenderError::Empty(timeline.name));
         }

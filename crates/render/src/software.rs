@@ -116,8 +116,8 @@ impl Software {
 
 impl Letters {
     /// Replaces the texture, or the part of it at a position.
-    fn update(&mut self, at: Option<[usize; 2]>, [width, height]: [usize; 2], pixels: &[Color32]) {
-        let Some([left, top]) = at else {
+    fn update(&mut self, origin: Option<[usize; 2]>, [width, height]: [usize; 2], pixels: &[Color32]) {
+        let Some([left, top]) = origin else {
             (self.size, self.pixels) = ([width, height], pixels.to_vec());
             return;
         };
@@ -131,12 +131,12 @@ impl Letters {
 
     /// Returns the nearest texel, from 0 to 1 per channel. Letters are drawn at whole pixels.
     fn texel(&self, u: f32, v: f32) -> [f32; 4] {
-        let at = |part: f32, side: usize| {
+        let index_at = |part: f32, side: usize| {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "the cast saturates")]
-            let at = (part * side as f32) as usize;
-            at.min(side.saturating_sub(1))
+            let index = (part * side as f32) as usize;
+            index.min(side.saturating_sub(1))
         };
-        let texel = self.pixels.get(at(v, self.size[1]) * self.size[0] + at(u, self.size[0]));
+        let texel = self.pixels.get(index_at(v, self.size[1]) * self.size[0] + index_at(u, self.size[0]));
         texel.map_or([1.0; 4], |texel| texel.to_array().map(|channel| f32::from(channel) / 255.0))
     }
 
@@ -165,13 +165,13 @@ impl Letters {
         let [width, height] = picture.size_px;
         for y in pixels(bounds.top(), bounds.bottom(), height) {
             for x in pixels(bounds.left(), bounds.right(), width) {
-                let at = Pos2::new(x as f32 + 0.5, y as f32 + 0.5);
-                let weights = edges.map(|[p, q]| cross(p, q, at));
-                if !clip.contains(at) || weights.iter().zip(owns).any(|(&w, owns)| w < 0.0 || w == 0.0 && !owns) {
+                let pixel = Pos2::new(x as f32 + 0.5, y as f32 + 0.5);
+                let weights = edges.map(|[p, q]| cross(p, q, pixel));
+                if !clip.contains(pixel) || weights.iter().zip(owns).any(|(&w, owns)| w < 0.0 || w == 0.0 && !owns) {
                     continue;
                 }
                 let [wa, wb, wc] = weights.map(|weight| weight / area);
-                let mix = |of: &dyn Fn(&Vertex) -> f32| wa * of(&a) + wb * of(&b) + wc * of(&c);
+                let mix = |value_of: &dyn Fn(&Vertex) -> f32| wa * value_of(&a) + wb * value_of(&b) + wc * value_of(&c);
                 let texel = self.texel(mix(&|v| v.uv.x), mix(&|v| v.uv.y));
                 let from = (y * width as usize + x) * 4;
                 let source = [0, 1, 2, 3].map(|k| mix(&|v| f32::from(v.color.to_array()[k])) * texel[k]);
@@ -252,9 +252,9 @@ impl ViewSpace {
     }
 
     /// Projects a point ahead of the camera \[pixels\].
-    fn project(&self, at: Vec3) -> Vector2<f32> {
-        let scale = if self.is_perspective { -1.0 / at.z } else { 1.0 };
-        let [x, y] = [at.x * scale / self.half[0], at.y * scale / self.half[1]];
+    fn project(&self, point: Vec3) -> Vector2<f32> {
+        let scale = if self.is_perspective { -1.0 / point.z } else { 1.0 };
+        let [x, y] = [point.x * scale / self.half[0], point.y * scale / self.half[1]];
         Vector2::new((1.0 + x) * self.size_px[0] / 2.0, (1.0 - y) * self.size_px[1] / 2.0)
     }
 
@@ -263,9 +263,9 @@ impl ViewSpace {
         let whole = [[0.0, 0.0], self.size_px];
         let depth_m = -centre.z;
         if !self.is_perspective {
-            let at = self.project(centre);
+            let centre_px = self.project(centre);
             let reach = radius_m / self.half[1] * self.size_px[1] / 2.0 + 1.0;
-            return Some([[at.x - reach, at.y - reach], [at.x + reach, at.y + reach]]);
+            return Some([[centre_px.x - reach, centre_px.y - reach], [centre_px.x + reach, centre_px.y + reach]]);
         }
         if depth_m <= -radius_m {
             return None;
@@ -273,14 +273,14 @@ impl ViewSpace {
         if depth_m <= 1.001 * radius_m {
             return Some(whole);
         }
-        let at = self.project(centre);
+        let centre_px = self.project(centre);
         // Bound of the ellipse as which a ball appears, from the tangent cone of its distance and direction.
         let sine = radius_m / centre.norm().max(depth_m);
         let stretch = 1.0 / (1.0 - (radius_m / depth_m).powi(2)).max(1e-4);
         let aside = centre.xy().norm() / depth_m;
         let tangent = sine / (1.0 - sine * sine).max(1e-4).sqrt() * (1.0 + aside * aside) * stretch;
         let reach = tangent / self.half[1] * self.size_px[1] / 2.0 + 1.0;
-        Some([[at.x - reach, at.y - reach], [at.x + reach, at.y + reach]])
+        Some([[centre_px.x - reach, centre_px.y - reach], [centre_px.x + reach, centre_px.y + reach]])
     }
 
     fn stroke(&self, line: &Line) -> Option<Stroke> {
@@ -324,9 +324,9 @@ impl ViewSpace {
         if reach < 0.0 {
             return None;
         }
-        let at = origin + direction * reach;
-        let normal = self.to_sphere(self.to_sphere(at - centre, ratio), ratio).normalize();
-        Some(Hit { normal, view: -direction.normalize(), depth_m: -at.z })
+        let point = origin + direction * reach;
+        let normal = self.to_sphere(self.to_sphere(point - centre, ratio), ratio).normalize();
+        Some(Hit { normal, view: -direction.normalize(), depth_m: -point.z })
     }
 }
 
@@ -410,9 +410,9 @@ impl<'a> Band<'a> {
         let [red, green, blue, opacity] = disc.colour.linear();
         self.visit(around, |band, sample, [x, y]| {
             let [origin, direction] = view.ray(x, y);
-            let at = origin + direction * ((centre - origin).dot(&normal) / direction.dot(&normal));
-            let out = (at - centre).norm() / disc.radius_m;
-            if out <= 1.0 && -at.z < band.depths_m[sample] && (!view.is_perspective || at.z < 0.0) {
+            let point = origin + direction * ((centre - origin).dot(&normal) / direction.dot(&normal));
+            let out = (point - centre).norm() / disc.radius_m;
+            if out <= 1.0 && -point.z < band.depths_m[sample] && (!view.is_perspective || point.z < 0.0) {
                 let rim = ((out - 0.86) / 0.14).clamp(0.0, 1.0);
                 let rim = rim * rim * (3.0 - 2.0 * rim);
                 band.blend(sample, [red, green, blue, opacity * (0.45 + 0.55 * rim)]);
@@ -436,9 +436,9 @@ impl<'a> Band<'a> {
             let mut columns = [low.x, high.x];
             if along.y.abs() > 1e-6 {
                 let half = (reach + 1.0) / along.y.abs();
-                let at = from.x + (y as f32 + 0.5 - from.y) * along.x / along.y;
+                let crossing_x = from.x + (y as f32 + 0.5 - from.y) * along.x / along.y;
                 let slack = half + (along.x / along.y).abs();
-                columns = [columns[0].max(at - slack), columns[1].min(at + slack)];
+                columns = [columns[0].max(crossing_x - slack), columns[1].min(crossing_x + slack)];
             }
             self.visit([[columns[0], y as f32], [columns[1], y as f32 + 1.0]], |band, sample, [x, y]| {
                 let offset = Vector2::new(x, y) - from;

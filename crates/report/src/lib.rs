@@ -19,4 +19,5 @@ pub mod request;
 pub mod run;
 mod simplify;
 
+pub use nalgebra;
 pub use tautline_sim::scenario;

@@ -87,15 +87,15 @@ pub fn verify(scenario: &Scenario, report: &Report) -> Result<Verification, SimE
     finer.time.dt_s *= 0.5;
     finer.time.max_rate_dt *= 0.5;
     let again = run(&finer, &mut ())?;
-    let same_distance = match (report.separation.min_m, again.separation.min_m) {
+    let same_distance = match (report.min_separation_m(), again.min_separation_m()) {
         (Some(before_m), Some(after_m)) => (before_m - after_m).abs() <= SAME * scenario.delta_m,
         (before_m, after_m) => before_m == after_m,
     };
-    let same_verdict = report.verdict.pass == again.verdict.pass && report.audit.status == again.audit.status;
+    let same_verdict = report.verdict.pass == again.verdict.pass && report.answer.status == again.answer.status;
     Ok(Verification {
         dt_s: finer.time.dt_s,
         pass: again.verdict.pass,
-        min_m: again.separation.min_m,
+        min_m: again.min_separation_m(),
         reached_at_s: again.formation.reached_at_s,
         firm: same_distance && same_verdict,
     })

@@ -406,23 +406,29 @@ impl Owned {
 
     /// Renews the plane at an instant, and adds the planes within reach.
     #[inline]
-    pub(crate) fn look(&mut self, at: &Instant<'_>, is_due: bool, near: &mut Reach, renewed: &mut Renewed) -> Seen {
-        let speaks = self.renew(at.segment, at.side, at.period, is_due);
-        let position = at.segment.position();
+    pub(crate) fn look(
+        &mut self,
+        instant: &Instant<'_>,
+        is_due: bool,
+        near: &mut Reach,
+        renewed: &mut Renewed,
+    ) -> Seen {
+        let speaks = self.renew(instant.segment, instant.side, instant.period, is_due);
+        let position = instant.segment.position();
         let mut room = self.held.room_m(&position);
-        if room <= at.reach_m {
-            renewed.oldest = renewed.oldest.max(self.age(at.period));
+        if room <= instant.reach_m {
+            renewed.oldest = renewed.oldest.max(self.age(instant.period));
             near.push(self.held);
         }
-        if let Some(pending) = self.pending(at.side) {
+        if let Some(pending) = self.pending(instant.side) {
             let beside = pending.room_m(&position);
-            if beside <= at.reach_m {
+            if beside <= instant.reach_m {
                 near.push(pending);
             }
             room = room.min(beside);
         }
         let followers_room = -self.held.room_m(&self.segment.position()) - (self.far_m[1] - self.far_m[0]);
-        let [own, fastest] = at.horizons;
+        let [own, fastest] = instant.horizons;
         Seen { speaks, sleeps: own.periods(room).min(fastest.periods(followers_room)) }
     }
 
@@ -520,18 +526,18 @@ impl Followed {
     #[inline]
     pub(crate) fn look(
         &mut self,
-        at: &Instant<'_>,
+        instant: &Instant<'_>,
         [is_due, has_news]: [bool; 2],
         near: &mut Reach,
         counted: &mut Renewed,
     ) -> Seen {
-        self.decide(at.segment, at.side, at.period, counted);
-        let room = self.held.room_m(&at.segment.position());
-        if room <= at.reach_m {
-            counted.oldest = counted.oldest.max(self.age(at.period));
+        self.decide(instant.segment, instant.side, instant.period, counted);
+        let room = self.held.room_m(&instant.segment.position());
+        if room <= instant.reach_m {
+            counted.oldest = counted.oldest.max(self.age(instant.period));
             near.push(self.held);
         }
-        Seen { speaks: has_news || (is_due && room <= self.far_m), sleeps: at.horizons[0].periods(room) }
+        Seen { speaks: has_news || (is_due && room <= self.far_m), sleeps: instant.horizons[0].periods(room) }
     }
 
     /// Returns the plane that both vehicles hold.

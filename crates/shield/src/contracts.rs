@@ -13,7 +13,7 @@ use crate::contract::{
 use crate::fleet::{PairRoom, closest_starts};
 use crate::plane::Segment;
 use crate::report::SharedStarts;
-use crate::settings::ShieldError;
+use crate::settings::{ShieldError, ShieldFault};
 use crate::start::{Start, hash_of_pair};
 #[cfg(test)]
 use crate::{contract::Side, plane::Divider};
@@ -52,7 +52,13 @@ impl Contracts {
         let count = starts.len();
         let (Some(own), Ok(number)) = (starts.get(index), u16::try_from(index)) else {
             let problem = format!("the number of the vehicle is not among {count} starts of at most 65536");
-            return Err(ShieldError::new("index", problem, index as f64, "count vehicles from 0"));
+            return Err(ShieldError::new(
+                ShieldFault::Mismatch,
+                "index",
+                problem,
+                index as f64,
+                "count vehicles from 0",
+            ));
         };
         let has_plane = |owner: &Start, follower: &Start| divider_of_starts(owner, follower).is_some();
         let (before, after) = (&starts[..index], &starts[index + 1..]);
@@ -66,7 +72,7 @@ impl Contracts {
         let others = (0..count).filter(|other| *other != index).map(apart);
         let worst = others.min_by(|a, b| a.room_m().total_cmp(&b.room_m())).or_else(|| closest_starts(&starts));
         Err(worst.map_or_else(
-            || ShieldError::new("start", "a vehicle has no pair".into(), 0.0, "give two starts"),
+            || ShieldError::new(ShieldFault::Mismatch, "start", "a vehicle has no pair".into(), 0.0, "give two starts"),
             |worst| worst.too_near(),
         ))
     }
@@ -106,7 +112,13 @@ impl Contracts {
         }
         if !fits {
             let problem = "the saved contracts do not fit the starts".into();
-            return Err(ShieldError::new("saved", problem, places.len() as f64, "give unaltered data"));
+            return Err(ShieldError::new(
+                ShieldFault::Altered,
+                "saved",
+                problem,
+                places.len() as f64,
+                "give unaltered data",
+            ));
         }
         contracts.places.copy_from_slice(places);
         contracts.followed.extend_from_slice(followed);
@@ -198,19 +210,19 @@ impl Contracts {
 
     /// Reads the newest messages, decides and proposes at an instant, in the order of the other vehicles. Adds the
     /// planes within reach.
-    pub(crate) fn renew(&mut self, at: &Instant<'_>, near: &mut Reach) -> Renewed {
+    pub(crate) fn renew(&mut self, instant: &Instant<'_>, near: &mut Reach) -> Renewed {
         let mut renewed = Renewed::default();
         for word in 0..self.agenda.words() {
-            let [fired, heard] = self.agenda.take(word, at.period);
+            let [fired, heard] = self.agenda.take(word, instant.period);
             let mut open = fired | heard;
             while open != 0 {
                 let other = 64 * word + open.trailing_zeros() as usize;
                 let bit = open & open.wrapping_neg();
                 open ^= bit;
-                self.look(other, [fired & bit != 0, heard & bit != 0], at, near, &mut renewed);
+                self.look(other, [fired & bit != 0, heard & bit != 0], instant, near, &mut renewed);
             }
         }
-        self.agenda.end(at.period);
+        self.agenda.end(instant.period);
         renewed
     }
 
@@ -220,36 +232,36 @@ impl Contracts {
         &mut self,
         other: usize,
         [has_come, has_news]: [bool; 2],
-        at: &Instant<'_>,
+        instant: &Instant<'_>,
         near: &mut Reach,
         renewed: &mut Renewed,
     ) {
         if self.places.get(other) == Some(&0)
-            && let Some(room) = self.room_at_start(other, at)
+            && let Some(room) = self.room_at_start(other, instant)
         {
-            self.agenda.schedule(other, at.period + at.horizons[0].periods(room));
+            self.agenda.schedule(other, instant.period + instant.horizons[0].periods(room));
             return;
         }
         let Some(place) = self.place(other) else { return };
         // A period noted before a message or a proposal set another one is passed over.
-        let is_due = |due: u64| has_come && due <= at.period;
+        let is_due = |due: u64| has_come && due <= instant.period;
         let (seen, due) = if other < self.index as usize {
             let contract = &mut self.followed[place];
             let is_due = is_due(contract.due);
             if !(is_due || has_news) {
                 return;
             }
-            (contract.look(at, [is_due, has_news], near, renewed), &mut contract.due)
+            (contract.look(instant, [is_due, has_news], near, renewed), &mut contract.due)
         } else {
             let contract = &mut self.owned[place];
             let is_due = is_due(contract.due);
             if !(is_due || has_news) {
                 return;
             }
-            (contract.look(at, is_due, near, renewed), &mut contract.due)
+            (contract.look(instant, is_due, near, renewed), &mut contract.due)
         };
-        let next = at.period + seen.sleeps;
-        if *due <= at.period || next < *due {
+        let next = instant.period + seen.sleeps;
+        if *due <= instant.period || next < *due {
             *due = next;
             self.agenda.schedule(other, next);
         }
@@ -259,19 +271,19 @@ impl Contracts {
     }
 
     /// Returns the room of the plane of the starts \[m\], if both vehicles are far from it.
-    fn room_at_start(&self, other: usize, at: &Instant<'_>) -> Option<f64> {
+    fn room_at_start(&self, other: usize, instant: &Instant<'_>) -> Option<f64> {
         let (held, is_far) = match other.cmp(&(self.index as usize)) {
             Ordering::Less => {
                 let contract = self.followed_at_start(other)?;
-                (contract.held, contract.held.room_m(&at.segment.position()) > contract.far_m)
+                (contract.held, contract.held.room_m(&instant.segment.position()) > contract.far_m)
             }
             Ordering::Greater => {
                 let contract = self.owned_at_start(other)?;
-                (contract.held, contract.is_far(at.segment))
+                (contract.held, contract.is_far(instant.segment))
             }
             Ordering::Equal => return None,
         };
-        is_far.then(|| held.room_m(&at.segment.position()))
+        is_far.then(|| held.room_m(&instant.segment.position()))
     }
 
     /// Takes the next part of the messages that are to be sent.

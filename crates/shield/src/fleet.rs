@@ -9,7 +9,7 @@ use crate::contract::{Broadcast, Message};
 use crate::obstacle::Obstacle;
 use crate::report::{Assumption, Counters, SharedStarts, assumptions};
 use crate::saved::SavedShield;
-use crate::settings::{Limits, ShieldError};
+use crate::settings::{Limits, ShieldError, ShieldFault};
 use crate::shield::Shield;
 use crate::start::Start;
 
@@ -47,7 +47,13 @@ impl PairRoom {
         let (i, j) = (self.pair.0 + 1, self.pair.1 + 1);
         let problem =
             format!("vehicles {i} and {j} reserve segments nearer than the {:.6} m of their margins", self.required_m);
-        ShieldError::new("start", problem, self.distance_m, "move them apart, start slower or lower the errors")
+        ShieldError::new(
+            ShieldFault::TooNear,
+            "start",
+            problem,
+            self.distance_m,
+            "move them apart, start slower or lower the errors",
+        )
     }
 }
 
@@ -102,7 +108,13 @@ impl Fleet {
     pub fn new(limits: &[Limits], starts: &[State]) -> Result<Self, ShieldError> {
         if limits.len() != starts.len() {
             let problem = format!("{} states for {} vehicles", starts.len(), limits.len());
-            return Err(ShieldError::new("start", problem, starts.len() as f64, "give one state per vehicle"));
+            return Err(ShieldError::new(
+                ShieldFault::Mismatch,
+                "start",
+                problem,
+                starts.len() as f64,
+                "give one state per vehicle",
+            ));
         }
         let starts: Vec<_> =
             limits.iter().zip(starts).map(|(limits, state)| limits.start(*state)).collect::<Result<_, _>>()?;
@@ -149,7 +161,13 @@ impl Fleet {
     pub fn load(saved: &[SavedShield]) -> Result<Self, ShieldError> {
         if saved.iter().any(|one| one.starts != saved[0].starts) {
             let problem = "the saved shields have different starts".into();
-            return Err(ShieldError::new("saved", problem, saved.len() as f64, "save them at one instant"));
+            return Err(ShieldError::new(
+                ShieldFault::Altered,
+                "saved",
+                problem,
+                saved.len() as f64,
+                "save them at one instant",
+            ));
         }
         Ok(Self { shields: saved.iter().map(SavedShield::load).collect::<Result<_, _>>()? })
     }

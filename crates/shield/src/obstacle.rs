@@ -21,7 +21,7 @@ use std::sync::Arc;
 use nalgebra::{Isometry3, Unit, Vector3};
 
 use crate::plane::{Plane, Segment};
-use crate::settings::{ROUNDING_M, ShieldError};
+use crate::settings::{ROUNDING_M, ShieldError, ShieldFault};
 
 /// Points of the segment at which a plane is tried.
 const TRIES: usize = 32;
@@ -160,7 +160,13 @@ impl KeepOut {
             let clearance_m = obstacle.clearance_m;
             if !(clearance_m.is_finite() && clearance_m >= 0.0) {
                 let problem = format!("the clearance of obstacle {number} must not be negative");
-                return Err(ShieldError::new("clearance_m", problem, clearance_m, "give 0 or a positive number"));
+                return Err(ShieldError::new(
+                    ShieldFault::OutOfRange,
+                    "clearance_m",
+                    problem,
+                    clearance_m,
+                    "give 0 or a positive number",
+                ));
             }
             let margin_m = clearance_m + around_m + ROUNDING_M / 2.0;
             match obstacle.plane_before(segment, margin_m) {
@@ -171,11 +177,11 @@ impl KeepOut {
                          its margin"
                     );
                     let remedy = "move it away, start slower or lower the errors";
-                    Err(ShieldError::new("start", problem, room_m + margin_m, remedy))
+                    Err(ShieldError::new(ShieldFault::TooNear, "start", problem, room_m + margin_m, remedy))
                 }
                 None => {
                     let problem = format!("vehicle {vehicle} reserves a segment that meets obstacle {number}");
-                    Err(ShieldError::new("start", problem, 0.0, "move it away or start slower"))
+                    Err(ShieldError::new(ShieldFault::TooNear, "start", problem, 0.0, "move it away or start slower"))
                 }
             }
         });
@@ -233,9 +239,9 @@ mod tests {
             let obstacle = random_body(&mut random, 2.0, 0.0);
             let segment = Segment::new(random.vector(4.0), random.vector(4.0));
             let margin = random.between(0.1, 0.5);
-            let at = |k: usize| segment.position() + (segment.stop() - segment.position()) * (k as f64 / 200.0);
+            let point_at = |k: usize| segment.position() + (segment.stop() - segment.position()) * (k as f64 / 200.0);
             let distance = |k: usize| {
-                let point = at(k);
+                let point = point_at(k);
                 obstacle.body.closest_point_m(&point).map_or(0.0, |closest| (closest - point).norm())
             };
             let nearest = (0..=200).map(distance).fold(f64::INFINITY, f64::min);

@@ -80,8 +80,8 @@ impl Metric {
     }
 
     #[inline]
-    fn segment(self, of: &Segment) -> Segment {
-        Segment::new(self.scaled(&of.position()), self.scaled(&of.stop()))
+    fn segment(self, segment: &Segment) -> Segment {
+        Segment::new(self.scaled(&segment.position()), self.scaled(&segment.stop()))
     }
 
     /// Returns the true plane of a plane in scaled lengths.
@@ -369,9 +369,12 @@ mod tests {
         for _ in 0..2_000 {
             let (own, other) = (segment(&mut random), segment(&mut random));
             let distance = own.distance_m(&other);
-            let at = |of: &Segment, k: usize| of.position() + (of.stop() - of.position()) * (k as f64 / 20.0);
+            let point_at = |segment: &Segment, k: usize| {
+                segment.position() + (segment.stop() - segment.position()) * (k as f64 / 20.0)
+            };
             let sampled = (0..=20).flat_map(|s| (0..=20).map(move |t| (s, t)));
-            let nearest = sampled.map(|(s, t)| (at(&own, s) - at(&other, t)).norm()).fold(f64::INFINITY, f64::min);
+            let nearest =
+                sampled.map(|(s, t)| (point_at(&own, s) - point_at(&other, t)).norm()).fold(f64::INFINITY, f64::min);
             assert!(distance <= nearest + 1e-12, "{own:?} {other:?}: {distance} {nearest}");
             // Samples are 1/20 of a segment apart.
             assert!(distance >= nearest - 0.16, "{own:?} {other:?}: {distance} {nearest}");

@@ -3,7 +3,8 @@
 use std::fmt;
 
 use serde::{Deserialize, Serialize};
-use tautline_core::fact::{Coded, Fact, FactKind, Source};
+use tautline_core::fact::{Fact, FactKind, Source};
+use tautline_core::impl_coded;
 
 use crate::contract::{Heard, Renewed};
 use crate::settings::Limits;
@@ -99,20 +100,16 @@ impl Exceeded {
     }
 }
 
-impl Coded for Exceeded {
-    fn code(&self) -> &'static str {
-        match self {
-            Self::OtherStarts(_) => "other-starts",
-            Self::UnknownSender => "unknown-sender",
-            Self::MissingMeasurement => "missing-measurement",
-            Self::Measurement(_) => "measurement",
-            Self::Tube(_) => "tube",
-            Self::Offset(_) => "offset",
-            Self::Command(_) => "command",
-            Self::Coordinate(_) => "coordinate",
-        }
-    }
-}
+impl_coded! { Exceeded {
+    Self::OtherStarts(_) => "other-starts",
+    Self::UnknownSender => "unknown-sender",
+    Self::MissingMeasurement => "missing-measurement",
+    Self::Measurement(_) => "measurement",
+    Self::Tube(_) => "tube",
+    Self::Offset(_) => "offset",
+    Self::Command(_) => "command",
+    Self::Coordinate(_) => "coordinate",
+} }
 
 impl fmt::Display for Exceeded {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -369,6 +366,7 @@ fn raise(share: &mut Option<f64>, other: Option<f64>) {
 mod tests {
     use super::*;
     use crate::Settings;
+    use tautline_core::fact::Coded as _;
 
     #[test]
     fn counters_add_and_name_the_assumption_that_failed() {

@@ -9,7 +9,7 @@ use crate::brake::State;
 use crate::contracts::SavedContracts;
 use crate::plane::Segment;
 use crate::report::Counters;
-use crate::settings::{Settings, ShieldError};
+use crate::settings::{Settings, ShieldError, ShieldFault};
 use crate::shield::Shield;
 use crate::start::Start;
 
@@ -49,7 +49,13 @@ impl SavedShield {
         let is_finite = states.clone().all(State::is_finite) && self.segment.is_finite();
         if !(is_finite && self.acceleration.iter().all(|value| value.is_finite()) && self.past.len() <= delay + 1) {
             let problem = "the saved state has a number that no shield saves".into();
-            return Err(ShieldError::new("saved", problem, self.past.len() as f64, "give unaltered data"));
+            return Err(ShieldError::new(
+                ShieldFault::Altered,
+                "saved",
+                problem,
+                self.past.len() as f64,
+                "give unaltered data",
+            ));
         }
         Shield::loaded(self, &limits, &starts)
     }

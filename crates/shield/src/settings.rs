@@ -173,12 +173,19 @@ impl Settings {
         let drag = self.a22_per_s.abs() * self.max_speed_m_s;
         let reference = self.accel_m_s2 - tube.feedback_m_s2 - drag;
         if drag >= self.accel_m_s2 {
-            let (of, speed) = (shortest(self.accel_m_s2), shortest(self.max_speed_m_s));
-            let problem = format!("drag takes {drag:.4} of `accel_m_s2` {of} at `max_speed_m_s` {speed}");
-            return Err(ShieldError::new("a22_per_s", problem, self.a22_per_s, "lower its magnitude or the speed"));
+            let (accel, speed) = (shortest(self.accel_m_s2), shortest(self.max_speed_m_s));
+            let problem = format!("drag takes {drag:.4} of `accel_m_s2` {accel} at `max_speed_m_s` {speed}");
+            return Err(ShieldError::new(
+                ShieldFault::NoReserve,
+                "a22_per_s",
+                problem,
+                self.a22_per_s,
+                "lower its magnitude or the speed",
+            ));
         }
         if reference <= 0.0 {
             return Err(ShieldError::new(
+                ShieldFault::NoReserve,
                 "accel_m_s2",
                 format!("feedback takes up to {:.4} and drag {drag:.4}; nothing is left", tube.feedback_m_s2),
                 self.accel_m_s2,
@@ -188,6 +195,7 @@ impl Settings {
         let brake = self.brake_m_s2.unwrap_or((BRAKE_SHARE * self.accel_m_s2).min(reference));
         if brake > reference {
             return Err(ShieldError::new(
+                ShieldFault::NoReserve,
                 "brake_m_s2",
                 format!("must be at most {reference:.4}, which is what feedback and drag leave of `accel_m_s2`"),
                 brake,
@@ -215,7 +223,9 @@ impl Settings {
 
     /// Returns the largest coordinate that the margin for rounding covers \[m\].
     fn farthest_m(&self, envelope: &Envelope, tube: &Tube, margin_m: f64) -> Result<f64, ShieldError> {
-        let fails = |place, problem, value, remedy| Err(ShieldError::new(place, problem, value, remedy));
+        let fails = |place, problem, value, remedy| {
+            Err(ShieldError::new(ShieldFault::OutOfRange, place, problem, value, remedy))
+        };
         if margin_m > FARTHEST_M {
             let problem = format!("margins must be at most {FARTHEST_M} m, which the margin for rounding covers");
             let place = match (self.tracking_error_m, self.half_height_m) {
@@ -270,7 +280,9 @@ impl Settings {
             ("integration_error_m_s2", self.integration_error_m_s2),
             ("ease_m", self.ease_m.unwrap_or(0.0)),
         ];
-        let fails = |place, problem: &str, value, remedy| Err(ShieldError::new(place, problem.into(), value, remedy));
+        let fails = |place, problem: &str, value, remedy| {
+            Err(ShieldError::new(ShieldFault::OutOfRange, place, problem.into(), value, remedy))
+        };
         if let Some((place, value)) = positive.into_iter().find(|(_, value)| !(value.is_finite() && *value > 0.0)) {
             return fails(place, "must be above 0", value, "give a positive number");
         }
@@ -300,7 +312,7 @@ impl Settings {
             TubeError::LargeDrag => "a22_per_s",
             // Name the setting that leaves a tube when it is 0.
             TubeError::Unstable | TubeError::Slow => {
-                let holds = |of: TrackerLoop| of.tube().is_ok();
+                let holds = |tracker: TrackerLoop| tracker.tube().is_ok();
                 if has_lag && holds(TrackerLoop { actuator_lag_s: 0.0, ..*tracker }) {
                     "actuator_lag_s"
                 } else if self.a22_per_s != 0.0 && holds(TrackerLoop { a22_per_s: 0.0, ..*tracker }) {
@@ -347,7 +359,7 @@ impl Settings {
                 format!("magnitude must be at most {} {of_period}", at_least(largest_per_s, 3))
             }
         };
-        ShieldError::new(place, problem, value, remedy)
+        ShieldError::new(ShieldFault::Tracker, place, problem, value, remedy)
     }
 }
 
@@ -440,7 +452,7 @@ impl Limits {
             ("delta_m", delta_m)
         };
         let problem = format!("vehicle {} has another value", vehicle + 1);
-        Err(ShieldError::new(place, problem, value, "give all vehicles the same"))
+        Err(ShieldError::new(ShieldFault::Mismatch, place, problem, value, "give all vehicles the same"))
     }
 
     /// Gap that two vehicles keep by choice \[m\].
@@ -456,19 +468,22 @@ impl Limits {
     /// tube is an assumption itself, and the words do not call the separation certified.
     #[must_use]
     pub fn certificate(&self) -> String {
-        let of = &self.settings;
-        let delay = match of.measurement_delay_periods {
+        let settings = &self.settings;
+        let delay = match settings.measurement_delay_periods {
             0 => String::new(),
             1 => "; measurements are a period old".to_owned(),
             periods => format!("; measurements are {periods} periods old"),
         };
-        let lag =
-            if of.actuator_lag_s > 0.0 { format!("; actuators lag by {} s", of.actuator_lag_s) } else { String::new() };
-        let (certified, tracking, tube) = match of.tracking_error_m {
+        let lag = if settings.actuator_lag_s > 0.0 {
+            format!("; actuators lag by {} s", settings.actuator_lag_s)
+        } else {
+            String::new()
+        };
+        let (certified, tracking, tube) = match settings.tracking_error_m {
             Some(error_m) => ("", format!("vehicles stay within {error_m} m of their references; "), "assumed tube"),
             None => ("certified ", String::new(), "tube"),
         };
-        let height = of.half_height_m.map_or_else(String::new, |half| {
+        let height = settings.half_height_m.map_or_else(String::new, |half| {
             let vertical = at_least(2.0 * half, 3);
             format!(" on a level and {vertical} m in the vertical, outside the ellipsoid of these half axes")
         });
@@ -476,11 +491,11 @@ impl Limits {
             "{certified}never closer than {} m{height} under any law and any loss of messages. Assumed: {tracking}\
              commands up to {} m/s^2 are carried out; position errors stay below {} m and velocity errors below {} \
              m/s; pushes stay below {} m/s^2{delay}{lag} ({tube} {} m)",
-            exact(of.delta_m),
-            of.accel_m_s2,
-            of.position_error_m,
-            of.velocity_error_m_s,
-            of.disturbance_m_s2,
+            exact(settings.delta_m),
+            settings.accel_m_s2,
+            settings.position_error_m,
+            settings.velocity_error_m_s,
+            settings.disturbance_m_s2,
             at_most(self.tube.error_m, 3)
         )
     }
@@ -499,7 +514,13 @@ impl Limits {
         let speed = state.velocity_m_s.norm();
         if speed > self.settings.max_speed_m_s {
             let problem = format!("starts faster than `max_speed_m_s` = {}", self.settings.max_speed_m_s);
-            return Err(ShieldError::new("start", problem, speed, "raise `max_speed_m_s` or start slower"));
+            return Err(ShieldError::new(
+                ShieldFault::TooFast,
+                "start",
+                problem,
+                speed,
+                "raise `max_speed_m_s` or start slower",
+            ));
         }
         Ok(start)
     }
@@ -521,6 +542,8 @@ impl Limits {
 /// Settings or starts that cannot be certified: `PLACE: PROBLEM (VALUE); REMEDY`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ShieldError {
+    /// Kind of the problem.
+    pub fault: ShieldFault,
     /// Name of the setting, or `start`.
     pub place: &'static str,
     /// What is wrong.
@@ -531,9 +554,35 @@ pub struct ShieldError {
     pub remedy: &'static str,
 }
 
+/// Kind of a [`ShieldError`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ShieldFault {
+    /// A number is not finite or out of its range.
+    OutOfRange,
+    /// The tracker does not hold a vehicle near its reference.
+    Tracker,
+    /// Feedback and drag leave no acceleration to the reference or its brake.
+    NoReserve,
+    /// A vehicle starts faster than its largest speed.
+    TooFast,
+    /// A start is too near to another one or to an obstacle.
+    TooNear,
+    /// Vehicles differ in settings that must agree, or in their number.
+    Mismatch,
+    /// Saved or sent data were altered.
+    Altered,
+}
+
 impl ShieldError {
-    pub(crate) fn new(place: &'static str, problem: String, value: f64, remedy: &'static str) -> Self {
-        Self { place, problem, value, remedy }
+    pub(crate) fn new(
+        fault: ShieldFault,
+        place: &'static str,
+        problem: String,
+        value: f64,
+        remedy: &'static str,
+    ) -> Self {
+        Self { fault, place, problem, value, remedy }
     }
 }
 
@@ -613,9 +662,9 @@ mod tests {
         assert!(refused(|settings| settings.accel_m_s2 = 1e5).starts_with("accel_m_s2: must be at most 10000 m times"));
         // Starts and their stop points are within it.
         let limits = Settings { max_speed_m_s: 300.0, ..Settings::new(1.0, 0.05) }.limits().expect("fast");
-        let at = |x: f64, speed: f64| State { position_m: Vector3::x() * x, velocity_m_s: Vector3::x() * speed };
-        assert!(limits.start(at(25_000.0, 300.0)).is_ok() && limits.start(at(fast, 0.0)).is_ok());
-        for start in [at(fast + 1.0, 0.0), at(fast - 10_000.0, 300.0)] {
+        let state_at = |x: f64, speed: f64| State { position_m: Vector3::x() * x, velocity_m_s: Vector3::x() * speed };
+        assert!(limits.start(state_at(25_000.0, 300.0)).is_ok() && limits.start(state_at(fast, 0.0)).is_ok());
+        for start in [state_at(fast + 1.0, 0.0), state_at(fast - 10_000.0, 300.0)] {
             let error = limits.start(start).expect_err("far").to_string();
             assert!(error.contains("farther than 4") && error.ends_with("near the vehicles"), "{error}");
         }

@@ -14,7 +14,7 @@ use crate::obstacle::{KeepOut, Obstacle};
 use crate::plane::Segment;
 use crate::report::{Assumption, Counters, SharedStarts, assumptions};
 use crate::saved::SavedShield;
-use crate::settings::{Limits, NORMAL_M, ShieldError, UNIT_ROUNDOFF};
+use crate::settings::{Limits, NORMAL_M, ShieldError, ShieldFault, UNIT_ROUNDOFF};
 use crate::start::Start;
 
 /// Number of planes within reach for which memory is reserved.
@@ -89,7 +89,13 @@ impl Shield {
             && limits.start(own.state)?.with_flight(own.flight) != *own
         {
             let problem = format!("the announced start of vehicle {} is not that of its own settings", index + 1);
-            return Err(ShieldError::new("start", problem, index as f64, "announce `Limits::start` of these settings"));
+            return Err(ShieldError::new(
+                ShieldFault::Mismatch,
+                "start",
+                problem,
+                index as f64,
+                "announce `Limits::start` of these settings",
+            ));
         }
         Self::of_checked(limits, index, &starts.into())
     }
@@ -198,14 +204,14 @@ impl Shield {
         let (limits, reference) = (self.limits, self.reference);
         let reach = limits.envelope.reach_m(&reference, limits.choice);
         self.reach.clear();
-        let at = Instant {
+        let instant = Instant {
             period: self.period,
             segment: &self.segment,
             side: &limits.side(),
             reach_m: reach,
             horizons: [limits.horizon(reference.velocity_m_s.norm()), self.fastest],
         };
-        let renewed = self.contracts.renew(&at, &mut self.reach);
+        let renewed = self.contracts.renew(&instant, &mut self.reach);
         let (segment, is_level) = (self.segment, limits.settings().is_level);
         let planes = self.keep_outs.iter_mut().filter_map(|keep_out| keep_out.within(&segment, reach));
         let height_m = reference.position_m.z;

@@ -27,7 +27,7 @@ use sha2::{Digest as _, Sha256};
 
 use crate::brake::State;
 use crate::plane::{Metric, Segment};
-use crate::settings::{FARTHEST_M, ROUNDING_M, ShieldError};
+use crate::settings::{FARTHEST_M, ROUNDING_M, ShieldError, ShieldFault};
 
 const MAGIC: [u8; 4] = *b"TLS1";
 /// Number of doubles of a start.
@@ -96,7 +96,13 @@ impl Start {
     /// If the bytes are not those of a start, were altered, or hold a number that no vehicle announces.
     pub fn from_bytes(bytes: &[u8]) -> Result<Self, ShieldError> {
         let fails = |problem: &str, value: f64| {
-            Err(ShieldError::new("start", problem.into(), value, "send the bytes of `Start::to_bytes` unaltered"))
+            Err(ShieldError::new(
+                ShieldFault::Altered,
+                "start",
+                problem.into(),
+                value,
+                "send the bytes of `Start::to_bytes` unaltered",
+            ))
         };
         let Some(bytes) = bytes.first_chunk::<{ Self::BYTES }>().filter(|_| bytes.len() == Self::BYTES) else {
             return fails(&format!("must have {} bytes", Self::BYTES), bytes.len() as f64);
@@ -139,7 +145,9 @@ impl Start {
     /// # Errors
     /// If a number is not finite or out of range, or a coordinate is beyond 1e6 m.
     pub(crate) fn check(&self) -> Result<(), ShieldError> {
-        let fails = |problem: &str, value: f64, remedy| Err(ShieldError::new("start", problem.into(), value, remedy));
+        let fails = |problem: &str, value: f64, remedy| {
+            Err(ShieldError::new(ShieldFault::OutOfRange, "start", problem.into(), value, remedy))
+        };
         if let Some(value) = self.numbers().into_iter().find(|value| !value.is_finite()) {
             return fails("must be finite", value, "give a position and a velocity");
         }
@@ -177,7 +185,13 @@ fn check_coordinates(point_m: &Vector3<f64>, farthest_m: f64) -> Result<(), Shie
         return Ok(());
     }
     let problem = format!("reserves space farther than {farthest_m} m from the origin along an axis");
-    Err(ShieldError::new("start", problem, coordinate, "use a local frame with its origin near the vehicles"))
+    Err(ShieldError::new(
+        ShieldFault::OutOfRange,
+        "start",
+        problem,
+        coordinate,
+        "use a local frame with its origin near the vehicles",
+    ))
 }
 
 /// Returns the hash of the starts of an owner and a follower, which each message of the pair carries.

@@ -244,12 +244,12 @@ struct Sampled {
 }
 
 impl Sampled {
-    fn new(of: &TrackerLoop) -> Result<Self, TubeError> {
+    fn new(tracker: &TrackerLoop) -> Result<Self, TubeError> {
         let mut dynamics = Continuous::zeros();
         dynamics[(POSITION, VELOCITY)] = 1.0;
-        dynamics[(VELOCITY, VELOCITY)] = of.a22_per_s;
-        if of.actuator_lag_s > 0.0 {
-            let rate = 1.0 / of.actuator_lag_s;
+        dynamics[(VELOCITY, VELOCITY)] = tracker.a22_per_s;
+        if tracker.actuator_lag_s > 0.0 {
+            let rate = 1.0 / tracker.actuator_lag_s;
             (dynamics[(VELOCITY, ACTUATOR)], dynamics[(VELOCITY, HELD)]) = (1.0, -1.0);
             dynamics[(ACTUATOR, ACTUATOR)] = -rate;
             (dynamics[(ACTUATOR, FEEDBACK)], dynamics[(ACTUATOR, HELD)]) = (rate, rate);
@@ -258,12 +258,12 @@ impl Sampled {
         }
         let magnitude = dynamics.map(f64::abs);
         let rate = magnitude.row_iter().map(|row| row.sum()).fold(0.0, f64::max);
-        let cells = (rate * of.period_s / CELL_RATE).ceil();
+        let cells = (rate * tracker.period_s / CELL_RATE).ceil();
         if cells > MAX_CELLS as f64 {
-            let has_lag = of.actuator_lag_s > 0.0;
-            return Err(if has_lag && of.actuator_lag_s < shortest_lag_s(of.period_s) {
+            let has_lag = tracker.actuator_lag_s > 0.0;
+            return Err(if has_lag && tracker.actuator_lag_s < shortest_lag_s(tracker.period_s) {
                 TubeError::ShortLag
-            } else if of.period_s > longest_period_s(has_lag) {
+            } else if tracker.period_s > longest_period_s(has_lag) {
                 TubeError::LongPeriod
             } else {
                 TubeError::LargeDrag
@@ -272,18 +272,18 @@ impl Sampled {
         // In 0..=MAX_CELLS.
         #[allow(clippy::cast_possible_truncation, clippy::cast_sign_loss)]
         let cells = (cells as usize).max(CELLS);
-        let cell_s = of.period_s / cells as f64;
+        let cell_s = tracker.period_s / cells as f64;
         let cell = exponential(&(dynamics * cell_s));
         let mut grid = vec![Continuous::identity()];
         for _ in 0..cells {
             grid.push(cell * grid[grid.len() - 1]);
         }
-        let largest = grid.iter().fold(Continuous::zeros(), |largest, at| largest.sup(&at.map(f64::abs)));
+        let largest = grid.iter().fold(Continuous::zeros(), |largest, value| largest.sup(&value.map(f64::abs)));
         let curvature = magnitude * magnitude * exponential(&(magnitude * cell_s)) * largest;
 
-        let delay = of.measurement_delay_periods;
+        let delay = tracker.measurement_delay_periods;
         let order = CARRIED + delay;
-        let gains = [of.tracker_per_s2, of.tracker_per_s];
+        let gains = [tracker.tracker_per_s2, tracker.tracker_per_s];
         let mut feedback = RowDVector::zeros(order);
         if delay == 0 {
             (feedback[POSITION], feedback[VELOCITY]) = (-gains[0], -gains[1]);
@@ -292,7 +292,7 @@ impl Sampled {
         }
         let mut lift = DMatrix::zeros(STATES, order);
         lift.view_mut((0, 0), (CARRIED, CARRIED)).fill_with_identity();
-        if of.actuator_lag_s <= 0.0 {
+        if tracker.actuator_lag_s <= 0.0 {
             // Without a lag the actuator has no state.
             lift[(ACTUATOR, ACTUATOR)] = 0.0;
         }
@@ -321,14 +321,14 @@ impl Sampled {
         let mut starts = DMatrix::zeros(order, 2);
         (starts[(POSITION, 0)], starts[(VELOCITY, 1)]) = (1.0, 1.0);
 
-        let noise = gains[0] * of.position_error_m + gains[1] * of.velocity_error_m_s;
-        let held = if of.actuator_lag_s > 0.0 { of.accel_m_s2 } else { 0.0 };
-        let weights = of.push_weights(cells, cell_s);
+        let noise = gains[0] * tracker.position_error_m + gains[1] * tracker.velocity_error_m_s;
+        let held = if tracker.actuator_lag_s > 0.0 { tracker.accel_m_s2 } else { 0.0 };
+        let weights = tracker.push_weights(cells, cell_s);
         let sum = weights.sum();
         let interpolation =
             std::array::from_fn(|component| cell_s * cell_s / 8.0 * curvature[(component, VELOCITY)] * sum);
         Ok(Self {
-            tracker: *of,
+            tracker: *tracker,
             cells,
             cell_s,
             grid,
@@ -420,44 +420,48 @@ struct Sums {
 
 impl Sums {
     /// Returns the bounds of the inputs in their own period.
-    fn own_period(of: &Sampled) -> Self {
+    fn own_period(sampled: &Sampled) -> Self {
         let noise_and_held = |continuous: &Continuous| {
-            of.bounds[0] * continuous[(POSITION, FEEDBACK)].abs() + of.bounds[1] * continuous[(POSITION, HELD)].abs()
+            sampled.bounds[0] * continuous[(POSITION, FEEDBACK)].abs()
+                + sampled.bounds[1] * continuous[(POSITION, HELD)].abs()
         };
         let push = |point: usize| {
-            let weights = of.tracker.push_weights(point, of.cell_s);
-            let between = of.cell_s * of.cell_s / 8.0 * of.curvature[(POSITION, VELOCITY)] * weights.sum();
-            let response = |k: usize| of.grid[point - k][(POSITION, VELOCITY)].abs();
+            let weights = sampled.tracker.push_weights(point, sampled.cell_s);
+            let between =
+                sampled.cell_s * sampled.cell_s / 8.0 * sampled.curvature[(POSITION, VELOCITY)] * weights.sum();
+            let response = |k: usize| sampled.grid[point - k][(POSITION, VELOCITY)].abs();
             weights.iter().enumerate().map(|(k, weight)| weight * response(k)).sum::<f64>() + between
         };
-        let positions = DVector::from_fn(of.cells + 1, |point, _| noise_and_held(&of.grid[point]) + push(point));
-        let held = [(FEEDBACK, of.bounds[0]), (HELD, of.bounds[1])];
-        let bend = of.bend((0..STATES).map(|k| held.iter().filter(|(at, _)| *at == k).map(|(_, bound)| bound).sum()));
-        Self { positions, bend, feedback: of.bounds[0] }
+        let positions =
+            DVector::from_fn(sampled.cells + 1, |point, _| noise_and_held(&sampled.grid[point]) + push(point));
+        let held = [(FEEDBACK, sampled.bounds[0]), (HELD, sampled.bounds[1])];
+        let bend = sampled
+            .bend((0..STATES).map(|k| held.iter().filter(|(state, _)| *state == k).map(|(_, bound)| bound).sum()));
+        Self { positions, bend, feedback: sampled.bounds[0] }
     }
 
     /// Returns the bounds of the start error whose unit states are the columns.
-    fn of_start(of: &Sampled, starts: &DMatrix<f64>) -> Self {
-        let errors = [of.tracker.position_error_m, of.tracker.velocity_error_m_s];
+    fn of_start(sampled: &Sampled, starts: &DMatrix<f64>) -> Self {
+        let errors = [sampled.tracker.position_error_m, sampled.tracker.velocity_error_m_s];
         let errors = DVector::from_column_slice(&errors);
-        let lifted = (&of.lift * starts).map(f64::abs) * &errors;
+        let lifted = (&sampled.lift * starts).map(f64::abs) * &errors;
         Self {
-            positions: (&of.positions * starts).map(f64::abs) * &errors,
-            bend: of.bend(lifted.iter().copied()),
-            feedback: ((&of.feedback * starts).map(f64::abs) * &errors)[0],
+            positions: (&sampled.positions * starts).map(f64::abs) * &errors,
+            bend: sampled.bend(lifted.iter().copied()),
+            feedback: ((&sampled.feedback * starts).map(f64::abs) * &errors)[0],
         }
     }
 
     /// Adds the bounds of the inputs of one earlier period, whose states are the columns.
-    fn add(&mut self, of: &Sampled, inputs: &DMatrix<f64>) {
-        let positions = &of.positions * inputs;
+    fn add(&mut self, sampled: &Sampled, inputs: &DMatrix<f64>) {
+        let positions = &sampled.positions * inputs;
         for (point, sum) in self.positions.iter_mut().enumerate() {
-            *sum += of.bound(|k| positions[(point, k)].abs());
+            *sum += sampled.bound(|k| positions[(point, k)].abs());
         }
-        let lifted = &of.lift * inputs;
-        self.bend += of.bound(|k| of.bend(lifted.column(k).iter().copied()));
-        let feedback = &of.feedback * inputs;
-        self.feedback += of.bound(|k| feedback[k].abs());
+        let lifted = &sampled.lift * inputs;
+        self.bend += sampled.bound(|k| sampled.bend(lifted.column(k).iter().copied()));
+        let feedback = &sampled.feedback * inputs;
+        self.feedback += sampled.bound(|k| feedback[k].abs());
     }
 
     fn error_m(&self, start: &Self) -> f64 {
@@ -466,18 +470,18 @@ impl Sums {
 }
 
 /// Returns the exponential of a matrix whose norm is at most [`CELL_RATE`].
-fn exponential(of: &Continuous) -> Continuous {
+fn exponential(matrix: &Continuous) -> Continuous {
     let (mut sum, mut term) = (Continuous::identity(), Continuous::identity());
     for k in 1..=TERMS {
-        term = term * of / f64::from(k);
+        term = term * matrix / f64::from(k);
         sum += term;
     }
     sum
 }
 
 /// Returns the norm of a matrix for the largest component: its largest sum of absolute values in a row.
-fn row_sum_norm<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(of: &Matrix<f64, R, C, S>) -> f64 {
-    of.row_iter().map(|row| row.iter().map(|value| value.abs()).sum()).fold(0.0, f64::max)
+fn row_sum_norm<R: Dim, C: Dim, S: RawStorage<f64, R, C>>(matrix: &Matrix<f64, R, C, S>) -> f64 {
+    matrix.row_iter().map(|row| row.iter().map(|value| value.abs()).sum()).fold(0.0, f64::max)
 }
 
 #[cfg(test)]

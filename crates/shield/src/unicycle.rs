@@ -44,7 +44,7 @@ use crate::contracts::Contracts;
 use crate::obstacle::{KeepOut, Obstacle};
 use crate::plane::{Metric, Segment};
 use crate::report::{Assumption, Counters, SharedStarts};
-use crate::settings::{FARTHEST_M, LEAD_PERIODS, NORMAL_M, ROUNDING_M, ShieldError, UNIT_ROUNDOFF};
+use crate::settings::{FARTHEST_M, LEAD_PERIODS, NORMAL_M, ROUNDING_M, ShieldError, ShieldFault, UNIT_ROUNDOFF};
 use crate::start::Start;
 
 /// Largest turn in a period \[rad\].
@@ -155,7 +155,9 @@ impl Loiter {
     /// If a setting is out of range, a number is not finite, or the speed is not within its limits. Also if the
     /// reserved segment reaches beyond 1e6 m along an axis.
     pub fn start(&self, pose: &Pose) -> Result<Start, ShieldError> {
-        let fails = |place, problem: &str, value, remedy| Err(ShieldError::new(place, problem.into(), value, remedy));
+        let fails = |place, problem: &str, value, remedy| {
+            Err(ShieldError::new(ShieldFault::OutOfRange, place, problem.into(), value, remedy))
+        };
         let positive = [
             ("delta_m", self.delta_m),
             ("period_s", self.period_s),
@@ -327,12 +329,24 @@ impl UnicycleShield {
         let contracts = Contracts::new(index, starts.into())?;
         if own.with_flight(contracts.own().flight) != *contracts.own() {
             let problem = "the announced start differs from this pose of the vehicle counted from 0".into();
-            return Err(ShieldError::new("start", problem, index as f64, "announce `Loiter::start` of this pose"));
+            return Err(ShieldError::new(
+                ShieldFault::Mismatch,
+                "start",
+                problem,
+                index as f64,
+                "announce `Loiter::start` of this pose",
+            ));
         }
         let differs = starts.iter().position(|start| start.delta_m != loiter.delta_m || start.metric != Metric::BALL);
         if let Some(vehicle) = differs {
             let problem = format!("vehicle {} has another value or an ellipsoid", vehicle + 1);
-            return Err(ShieldError::new("delta_m", problem, loiter.delta_m, "give all vehicles the same"));
+            return Err(ShieldError::new(
+                ShieldFault::Mismatch,
+                "delta_m",
+                problem,
+                loiter.delta_m,
+                "give all vehicles the same",
+            ));
         }
         Ok(Self {
             loiter: *loiter,
@@ -388,14 +402,14 @@ impl UnicycleShield {
         let reach = self.loiter.reach_m(self.reference.speed_m_s);
         self.near.clear();
         let segment = self.fallback.segment;
-        let at = Instant {
+        let instant = Instant {
             period: self.period,
             segment: &segment,
             side: &self.side,
             reach_m: reach,
             horizons: [self.horizon; 2],
         };
-        self.counters.renewed(self.contracts.renew(&at, &mut self.near));
+        self.counters.renewed(self.contracts.renew(&instant, &mut self.near));
         self.near.extend(self.keep_outs.iter_mut().filter_map(|keep_out| keep_out.within(&segment, reach)));
         if !(wanted.accel_m_s2.is_finite() && wanted.turn_rad_s.is_finite()) {
             self.counters.chosen(true, 1.0, 1.0);

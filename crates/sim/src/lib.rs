@@ -41,6 +41,7 @@ pub mod sim;
 pub mod vehicle;
 
 pub use link::Imperfections;
+pub use nalgebra;
 pub use plant::Plant;
 pub use scenario::Scenario;
 pub use sim::Simulation;

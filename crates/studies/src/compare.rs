@@ -366,21 +366,21 @@ impl LawRow {
     }
 
     fn notes(&self) -> Vec<String> {
-        let (name, of) = (&self.name, self.flights.len());
+        let (name, total) = (&self.name, self.flights.len());
         let refused = (self.refused > 0).then(|| {
             let mut codes: Vec<_> =
                 self.flights.iter().flat_map(|flight| &flight.refused).map(String::as_str).collect();
             codes.sort_unstable();
             codes.dedup();
             let (codes, refused) = (codes.join(", "), self.refused);
-            format!("{name}: {refused} of {of} flights are refused by `check` ({codes}) and flown anyway")
+            format!("{name}: {refused} of {total} flights are refused by `check` ({codes}) and flown anyway")
         });
         let early: Vec<_> = self.flights.iter().filter(|flight| flight.ended_early.is_some()).collect();
         let ended = early.first().map(|first| {
             let violated = early.iter().filter(|flight| flight.outcome == Outcome::Violated).count();
             let why = first.ended_early.as_deref().unwrap_or_default().trim_end_matches('.');
             format!(
-                "{name}: {} of {of} flights ended early, {violated} of them after a violation; the first has \
+                "{name}: {} of {total} flights ended early, {violated} of them after a violation; the first has \
                  start.seed {}: {why}",
                 early.len(),
                 first.seed
@@ -388,7 +388,7 @@ impl LawRow {
         });
         let reached = self.reached.count;
         let censored = (reached > 0 && reached < self.reached.of).then(|| {
-            format!("{name}: times to reach are over the {reached} of {of} flights that reached the formation")
+            format!("{name}: times to reach are over the {reached} of {total} flights that reached the formation")
         });
         let identical = FlightSample::new(&self.flights).note(&format!("under {name}"));
         [refused, ended, censored, identical].into_iter().flatten().collect()
@@ -408,17 +408,17 @@ impl Comparison {
             value,
             interval,
         };
-        let share = |name: &str, title: &str, of: fn(&LawRow) -> Proportion| {
+        let share = |name: &str, title: &str, pick: fn(&LawRow) -> Proportion| {
             let percent = |part: f64| 100.0 * part;
             let rows = self.laws.iter().map(|law| {
-                let share = of(law);
+                let share = pick(law);
                 row(law, share.share.map(percent), [share.low, share.high].map(percent).map(Some))
             });
             by_law(name, title, "share of the flights [%]", &rows.collect::<Vec<_>>(), Some([0.0, 100.0]), None)
         };
-        let measured = |name: &str, title: &str, label: &str, of: &dyn Fn(&LawRow) -> Estimate, limit| {
+        let measured = |name: &str, title: &str, label: &str, pick: &dyn Fn(&LawRow) -> Estimate, limit| {
             let rows = self.laws.iter().map(|law| {
-                let estimate = of(law);
+                let estimate = pick(law);
                 row(law, estimate.value, [estimate.low, estimate.high])
             });
             by_law(name, title, label, &rows.collect::<Vec<_>>(), None, limit)

@@ -105,7 +105,7 @@ pub fn fly(
     }
     let is_whole = !report.run.is_interrupted();
     let summary =
-        || FlightSummary { flight_sha256: scenario.flight_sha256_hex(), ..FlightSummary::new(report, seed, &effort) };
+        || FlightSummary { flight_sha256: scenario.flight_sha256(), ..FlightSummary::new(report, seed, &effort) };
     Ok(is_whole.then(summary))
 }
 
@@ -142,7 +142,7 @@ impl FlightSummary {
     }
 
     fn new(report: Report, seed: u64, effort: &Effort) -> Self {
-        let breaks_certificate = report.breaks_certificate();
+        let (closest, breaks_certificate) = (report.closest_pair(), report.breaks_certificate());
         let refused = report.verdict.reasons.iter().find_map(|reason| match reason {
             Reason::Refused { warnings } => Some(warnings.clone()),
             _ => None,
@@ -156,11 +156,11 @@ impl FlightSummary {
             refused,
             reached: report.formation.reached && report.legs.iter().all(|leg| leg.reached_at_s.is_some()),
             reached_at_s: report.formation.reached_at_s,
-            delta_m: report.separation.delta_m,
-            min_m: report.separation.min_m,
-            min_at_s: report.separation.min_at_s,
-            min_pair: report.separation.min_pair,
-            certified_m: report.separation.certified_m,
+            delta_m: report.delta_m(),
+            min_m: closest.map(|closest| closest.separation_m),
+            min_at_s: closest.map(|closest| closest.time_s),
+            min_pair: closest.map(|closest| closest.pair.numbers()),
+            certified_m: report.certificate.separation_m,
             breaks_certificate,
             path_length_m: effort.path_length_m(),
             peak_control_m_s2: report.control.peak_m_s2,
@@ -190,11 +190,11 @@ impl Outcome {
     }
 
     fn of(report: &Report) -> Self {
-        match report.audit.status {
+        match report.answer.status {
             Status::Violation => Self::Violated,
             _ if report.run.ended_early.is_some() => Self::EndedEarly,
-            Status::Clear if report.audit.parry.disagreements == 0 => Self::Clear,
-            Status::Clear | Status::Undecided => Self::Undecided,
+            Status::Clear => Self::Clear,
+            Status::Undecided => Self::Undecided,
         }
     }
 }

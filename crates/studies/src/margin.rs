@@ -467,11 +467,11 @@ fn search<E>(
 ) -> Result<Option<Bisection>, E> {
     // `part` is the share between neighbouring values.
     let between = |from: f64, to: f64, share: f64, part: f64| {
-        let at = |share: f64| {
+        let value_at = |share: f64| {
             if range.logarithmic { from * libm::pow(to / from, share) } else { from + (to - from) * share }
         };
-        let value = at(share);
-        let gap = (value - at(share - part)).abs().min((at(share + part) - value).abs());
+        let value = value_at(share);
+        let gap = (value - value_at(share - part)).abs().min((value_at(share + part) - value).abs());
         if integers { value.round() } else { shortened(value, ROUNDING * gap) }
     };
     let last = range.scan.max(2) - 1;

@@ -389,7 +389,7 @@ impl About {
     pub(crate) fn new(scenario: &Scenario) -> Self {
         Self {
             schema_version: SCHEMA_VERSION,
-            scenario: ScenarioIdentity { name: scenario.name.clone(), sha256: scenario.sha256_hex() },
+            scenario: ScenarioIdentity { name: scenario.name.clone(), sha256: scenario.resolved().sha256 },
             tool: Tool { name: tautline_core::PROGRAM.to_owned(), version: tautline_core::VERSION.to_owned() },
             delta_m: scenario.delta_m,
             external_law: scenario.external_law.as_ref().map(|law| law.name().to_owned()),

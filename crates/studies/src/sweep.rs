@@ -261,11 +261,11 @@ impl Experiment for Options {
                 ));
             }
         }
-        base.check_keys(self.keys.iter().map(|of| of.key.as_str()))?;
+        base.check_keys(self.keys.iter().map(|varied| varied.key.as_str()))?;
         let points = self.points();
         let scenario = |values: &Vec<f64>| base.with(&sets(&self.keys, values));
         let read = batch.run(points.len(), |number| {
-            Ok::<_, Failure>(Some(scenario(&points[number]).ok().map(|of| of.is_random_in_flight())))
+            Ok::<_, Failure>(Some(scenario(&points[number]).ok().map(|scenario| scenario.is_random_in_flight())))
         })?;
         if read.iter().any(Option::is_none) {
             return Ok(None);
@@ -279,7 +279,7 @@ impl Experiment for Options {
                 .err()
                 .unwrap_or_else(|| wrong_values(&format!("{SWEEP_KEY}: the grid is empty"))));
         };
-        let keys: Vec<_> = self.keys.iter().map(|of| &*of.key).collect();
+        let keys: Vec<_> = self.keys.iter().map(|varied| &*varied.key).collect();
         let runs = Runs::new(self.runs, self.seed, base, is_random || keys.contains(&JITTER_KEY));
         runs.check_seeds(&keys, base, is_random)?;
         let count = usize::try_from(self.runs).unwrap_or(usize::MAX);
@@ -290,7 +290,7 @@ impl Experiment for Options {
             let scenario = base.with(&[runs.sets(run), sets(&self.keys, &points[point])].concat());
             let scenario = match scenario {
                 Ok(scenario) => scenario,
-                Err(error) => return Ok(Some(Err(error.message().to_owned()))),
+                Err(error) => return Ok(Some(Err(error.message))),
             };
             match batch.fly(&scenario, runs.seed(run)) {
                 Ok(flight) => Ok(flight.map(Ok)),
@@ -403,9 +403,10 @@ impl Sweep {
             }
             [y, x] => {
                 let axes = [x, y].map(|SweptKey { key, values }| GridAxis { key, values });
-                let at = |y: f64, x: f64| self.points.iter().find(|point| point.values == [y, x]);
-                let map = |name: &str, label: &str, range, of: fn(&Point) -> Option<f64>| {
-                    let cells = y.values.iter().flat_map(|&y| x.values.iter().map(move |&x| at(y, x).and_then(of)));
+                let point_at = |y: f64, x: f64| self.points.iter().find(|point| point.values == [y, x]);
+                let map = |name: &str, label: &str, range, pick: fn(&Point) -> Option<f64>| {
+                    let cells =
+                        y.values.iter().flat_map(|&y| x.values.iter().map(move |&x| point_at(y, x).and_then(pick)));
                     heat_map(name, label, axes, &cells.collect::<Vec<_>>(), range)
                 };
                 vec![
@@ -424,7 +425,7 @@ impl Study for Sweep {
     }
 
     fn title(&self) -> String {
-        let keys: Vec<_> = self.keys.iter().map(|of| of.key.as_str()).collect();
+        let keys: Vec<_> = self.keys.iter().map(|varied| varied.key.as_str()).collect();
         format!("{}: {}", self.about.scenario.name, keys.join(" and "))
     }
 
@@ -462,7 +463,7 @@ impl Study for Sweep {
             let (runs, with) = (counted(runs, "run", "runs"), sets(&self.keys, &point.values).join(", "));
             format!("{runs} could not be flown and count in no share, the first with {with}: {why}")
         });
-        let inert = self.keys.iter().enumerate().filter(|&(place, of)| of.is_seed() && self.is_inert(place));
+        let inert = self.keys.iter().enumerate().filter(|&(place, varied)| varied.is_seed() && self.is_inert(place));
         let inert = inert.map(|(_, SweptKey { key, .. })| {
             format!(
                 "{key} changes no flight: the scenario draws no random number from this seed. Set {JITTER_KEY} for \

@@ -158,7 +158,7 @@ impl Column {
         match (share.share, self.title().1) {
             (None, _) => (UNKNOWN.to_owned(), None),
             (Some(value), "%") => {
-                (fixed(100.0 * value, decimals(value).into()), interval.map(|of| of.replace(" %", "")))
+                (fixed(100.0 * value, decimals(value).into()), interval.map(|interval| interval.replace(" %", "")))
             }
             (Some(_), _) if self.kind == Kind::OneFlight => {
                 (if share.count == 1 { "yes" } else { "no" }.to_owned(), None)
@@ -232,8 +232,8 @@ impl<R> Builder<'_, R> {
     #[must_use]
     pub fn column<C: Into<Cell>>(mut self, name: &str, heading: &str, kind: Kind, cell: impl Fn(&R) -> C) -> Self {
         self.table.columns.push(Column::new(name, heading, kind));
-        for (row, of) in self.table.rows.iter_mut().zip(self.of) {
-            row.push(cell(of).into());
+        for (row, item) in self.table.rows.iter_mut().zip(self.of) {
+            row.push(cell(item).into());
         }
         self
     }
@@ -255,8 +255,8 @@ impl Table {
     /// Returns a table with the columns whose index `is_kept` accepts, under another caption.
     #[must_use]
     pub fn part(&self, caption: &str, is_kept: impl Fn(usize) -> bool) -> Self {
-        fn kept<T: Clone>(of: &[T], is_kept: &impl Fn(usize) -> bool) -> Vec<T> {
-            of.iter().enumerate().filter(|(place, _)| is_kept(*place)).map(|(_, one)| one.clone()).collect()
+        fn kept<T: Clone>(list: &[T], is_kept: &impl Fn(usize) -> bool) -> Vec<T> {
+            list.iter().enumerate().filter(|(place, _)| is_kept(*place)).map(|(_, one)| one.clone()).collect()
         }
         Self {
             caption: caption.to_owned(),
@@ -320,7 +320,7 @@ impl Table {
                 self.shown(row).map(|(column, cell)| column.shown(cell)).unzip();
             out += &line(values.iter().map(|value| escaped(value)).collect());
             let small = |interval: Option<String>| {
-                interval.map_or_else(String::new, |of| format!("{{\\small {}}}", escaped(&of)))
+                interval.map_or_else(String::new, |interval| format!("{{\\small {}}}", escaped(&interval)))
             };
             out += &line(intervals.into_iter().map(small).collect());
         }

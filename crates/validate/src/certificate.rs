@@ -279,14 +279,14 @@ mod tests {
             "flipped"
         }
 
-        fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
-            self.1.positions_m.copy_from(&-&at.own.positions_m);
-            self.1.velocities_m_s.copy_from(&at.own.velocities_m_s);
-            self.0.command(&Observation { own: &self.1, ..*at }, command)
+        fn command(&mut self, observation: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+            self.1.positions_m.copy_from(&-&observation.own.positions_m);
+            self.1.velocities_m_s.copy_from(&observation.own.velocities_m_s);
+            self.0.command(&Observation { own: &self.1, ..*observation }, command)
         }
 
-        fn energy(&self, at: &Observation<'_>) -> Option<f64> {
-            self.0.energy(at)
+        fn energy(&self, observation: &Observation<'_>) -> Option<f64> {
+            self.0.energy(observation)
         }
     }
 

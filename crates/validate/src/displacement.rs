@@ -129,8 +129,9 @@ fn largest(deviations: &[Deviation], number: impl Fn(&Deviation) -> f64) -> f64 
 }
 
 fn flights(deviations: &[Deviation]) -> Result<[Claim; 2], MeasureError> {
-    let (energy, certified_m) = (largest(deviations, |of| of.energy), largest(deviations, |of| of.certified_m));
-    let closest_m = largest(deviations, |of| of.closest_m);
+    let (energy, certified_m) =
+        (largest(deviations, |deviation| deviation.energy), largest(deviations, |deviation| deviation.certified_m));
+    let closest_m = largest(deviations, |deviation| deviation.closest_m);
     let lengths = stated("displacement-flights")?.measured(
         format!(
             "E(0) off by {energy:.1e}, certified separation by {certified_m:.1e} m, closest approach by \
@@ -138,7 +139,7 @@ fn flights(deviations: &[Deviation]) -> Result<[Claim; 2], MeasureError> {
         ),
         [("energy_relative", energy), ("certified_m", certified_m), ("closest_m", closest_m)],
     );
-    let reached_s = largest(deviations, |of| of.reached_s);
+    let reached_s = largest(deviations, |deviation| deviation.reached_s);
     let arrival = stated("displacement-arrival")?
         .measured(format!("off by at most {reached_s:.4} s"), [("reached_s", reached_s)]);
     Ok([lengths.within_limit(), arrival.within_limit()])
@@ -182,10 +183,10 @@ impl Law for Flipped {
         "flipped"
     }
 
-    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
-        self.0.command(at, command)?;
+    fn command(&mut self, observation: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        self.0.command(observation, command)?;
         let mut alone = Rows::zeros(command.nrows());
-        self.0.command(&Observation { near: &[], ..*at }, &mut alone)?;
+        self.0.command(&Observation { near: &[], ..*observation }, &mut alone)?;
         *command = alone * 2.0 - &*command;
         Ok(())
     }

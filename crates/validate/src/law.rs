@@ -165,8 +165,9 @@ fn literal_baseline() -> Result<Claim, MeasureError> {
             set_row(&mut swarm.velocities_m_s, i, -row(&goal.slots_m, i));
         }
         let mut control = Rows::zeros(count);
-        let at = Observation::exact(&swarm, &links, &origin);
-        law.command(&at, &mut control).map(|()| (0..count).map(|i| row(&control, i).norm()).fold(0.0, f64::max))
+        let observation = Observation::exact(&swarm, &links, &origin);
+        law.command(&observation, &mut control)
+            .map(|()| (0..count).map(|i| row(&control, i).norm()).fold(0.0, f64::max))
     };
     let (at_goal, at_scaled) = (control_at(1.0)?, control_at(f2_per_s / f1_per_s2)?);
     let claim = stated("goal-as-printed")?;

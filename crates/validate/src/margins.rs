@@ -107,11 +107,11 @@ impl Sink for DisturbanceSink<'_> {
     fn sample(&mut self, sample: &Sample<'_>) -> Result<(), RecordError> {
         let errors_m = &sample.swarm.positions_m - &self.scenario.formation().slots_m;
         let (mean_m, mean_m_s) = (mean_row(&errors_m), mean_row(&sample.swarm.velocities_m_s));
-        let of = |i: usize| {
+        let value_of = |i: usize| {
             let common = if self.counts_common { nalgebra::Vector3::zeros() } else { mean_m_s };
             (row(&errors_m, i) - mean_m).norm_squared() + (row(&sample.swarm.velocities_m_s, i) - common).norm_squared()
         };
-        self.sizes.push((sample.time_s, (0..errors_m.nrows()).map(of).sum()));
+        self.sizes.push((sample.time_s, (0..errors_m.nrows()).map(value_of).sum()));
         Ok(())
     }
 

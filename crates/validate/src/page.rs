@@ -31,7 +31,7 @@ impl Validation {
     /// Returns a line for each claim: result, name and measurement.
     #[must_use]
     pub fn text(&self) -> String {
-        let width = |of: fn(&Claim) -> usize| self.claims().map(of).max().unwrap_or(0);
+        let width = |width_of: fn(&Claim) -> usize| self.claims().map(width_of).max().unwrap_or(0);
         let (outcomes, names) = (width(|claim| claim.outcome().len()), width(|claim| claim.id.len()));
         self.claims().fold(String::new(), |text, claim| {
             let finding = claim.finding.map(|finding| format!("[{finding}] ")).unwrap_or_default();
@@ -225,7 +225,7 @@ fn readable(list: &str) -> String {
         let words = name.replace("min", "smallest separation").replace("_10_s", "_10 s").replace('_', " ");
         Some(format!("{words} {number} {unit}"))
     };
-    list.split(", ").map(|of| entry(of).unwrap_or_else(|| of.to_owned())).collect::<Vec<_>>().join(", ")
+    list.split(", ").map(|name| entry(name).unwrap_or_else(|| name.to_owned())).collect::<Vec<_>>().join(", ")
 }
 
 fn row(claim: &Claim) -> [Markup; 3] {

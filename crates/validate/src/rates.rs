@@ -74,8 +74,8 @@ fn bent() -> Scenario {
 fn bent_hexagon() -> Result<Claim, MeasureError> {
     let scenario = bent();
     let solution = continuous(&scenario, &BEND_TIMES_S, Tolerances::default())?;
-    let at = |k: usize| solution.states.get(k).map_or(f64::NAN, |state| bend_m(&state.positions_m));
-    let (at_100_m, at_300_m, at_10000_m, at_30000_m) = (at(0), at(1), at(2), at(3));
+    let bend_at = |k: usize| solution.states.get(k).map_or(f64::NAN, |state| bend_m(&state.positions_m));
+    let (at_100_m, at_300_m, at_10000_m, at_30000_m) = (bend_at(0), bend_at(1), bend_at(2), bend_at(3));
     let exponent = (at_30000_m / at_10000_m).ln() / (BEND_TIMES_S[3] / BEND_TIMES_S[2]).ln();
     let words = format!(
         "bend {BEND_M} m, after 100 s {at_100_m:.2} m, after 300 s {at_300_m:.2} m, after 10000 s {at_10000_m:.3} m; \

@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 use mavlink_core::calculate_crc;
 use nalgebra::Vector3;
 use tautline_watch::source::{Feed, Input, MavlinkFrame, OwnedPose, channel, mavlink};
-use tautline_watch::{ClockScope, Monitor, Notice, Output, Plan, Settings, watch};
+use tautline_watch::{ClockScope, Monitor, Notice, Output, Plan, Settings, Status, watch};
 
 const VEHICLES: u32 = 250;
 const MESSAGES: u32 = 4;
@@ -53,7 +53,7 @@ fn give_others(feed: &Feed, round: u32) {
 
 impl Output for Alarms {
     fn notice(&mut self, notice: &Notice) -> io::Result<()> {
-        let is_alarm = notice.event == "violation" || notice.json["state"] == "violation";
+        let is_alarm = notice.status == Status::Violation;
         let sent_ns = if is_alarm { self.sent_ns.swap(0, Ordering::Relaxed) } else { 0 };
         if sent_ns > 0 {
             let now_ns = u64::try_from(self.start.elapsed().as_nanos()).unwrap_or(u64::MAX);
@@ -74,7 +74,7 @@ fn frame(system: u8, time_ms: u32, [north, east, down]: [f32; 3]) -> Vec<u8> {
 }
 
 fn main() -> Result<(), Box<dyn std::error::Error>> {
-    let settings = Settings { delta_m: 1.0, clocks: ClockScope::PerVehicle, ..Settings::default() };
+    let settings = Settings { delta_m: 1.0, clocks: Some(ClockScope::PerVehicle), ..Settings::default() };
     let monitor = Monitor::new(settings, Plan::default())?;
     let stop = Arc::new(AtomicBool::new(false));
     let (feed, inputs) = channel(Arc::clone(&stop));

@@ -1,23 +1,23 @@
 //! Times of a watch that count only if vehicles stay away: since sign-offs, and its end without a pair.
 //!
 //! A sign-off is worth nothing if the vehicle is heard again: the time in the state CLEAR since the sign-off is then
-//! NOT KNOWN, because the vehicle was not examined. The time in which fewer than two vehicles were present counts as
+//! UNDECIDED, because the vehicle was not examined. The time in which fewer than two vehicles were present counts as
 //! the end of the watch, unless a vehicle is heard again or another state follows.
 
 use crate::event::{Assessment, State};
 
-/// Vehicles that signed off, with the time that a return makes NOT KNOWN.
+/// Vehicles that signed off, with the time that a return makes UNDECIDED.
 #[derive(Debug, Default)]
 pub(crate) struct Absences {
     /// Time in the state CLEAR up to the last judgement \[s\].
     pub(crate) clear_s: f64,
     /// Time with fewer than two present vehicles up to the last judgement \[s\].
     pub(crate) end_s: f64,
-    /// Time in the state CLEAR that returns since the last judgement made NOT KNOWN \[s\].
+    /// Time in the state CLEAR that returns since the last judgement made UNDECIDED \[s\].
     pub(crate) unseen_s: f64,
     /// Whether a vehicle returned since the last judgement.
     pub(crate) has_return: bool,
-    /// For each vehicle that signed off, the value of `clear_s` from which the time is not yet NOT KNOWN \[s\].
+    /// For each vehicle that signed off, the value of `clear_s` from which the time is not yet UNDECIDED \[s\].
     since_s: Vec<Option<f64>>,
     /// Vehicles that returned since the last judgement.
     returned: Vec<usize>,

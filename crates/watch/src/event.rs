@@ -1,45 +1,57 @@
 //! Output of the monitor as plain data. Vehicles are indices into [`Monitor::names`](crate::Monitor::names).
 
+use tautline_audit::{Status, Violation};
+use tautline_core::{coded, impl_coded};
+
 /// Two vehicles, the lower index first.
 pub type Pair = [u32; 2];
 
-/// Reason why separation is not known.
+/// Reason why separation is undecided, or why a sign-off is refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reason {
     /// Fewer than two vehicles were heard: their number.
     TooFew(usize),
     /// Expected vehicles were not heard: number heard, number expected.
     Missing([usize; 2]),
-    /// An expected vehicle was not heard: its index into [`Expected::Names`](crate::Expected::Names).
-    MissingName(usize),
     /// Fewer than two vehicles are present, because others signed off: the number of present ones.
     SignedOff(usize),
     /// A vehicle is stale: its age \[s\].
     Stale(u32, f64),
     /// The velocity of a vehicle is not known yet.
-    SpeedUnknown(u32),
+    VelocityUnknown(u32),
     /// The error of the positions of a vehicle is not known: no bound is given, and the source reports none.
     ErrorUnknown(u32),
-    /// The messages of a vehicle are those of two vehicles with one name.
-    TwoStreams(u32),
-    /// The clock of a vehicle stepped, and no message has arrived since.
-    ClockStepped(u32),
-    /// A vehicle sent two positions with one stamp.
-    Conflict(u32),
-    /// An error event less than the largest age ago.
-    Doubt(Fault),
+    /// An error of the input less than the largest age ago, or one that lasts for a vehicle.
+    Fault(Fault, Option<u32>),
     /// The bounds allow a pair to be closer than delta: the smallest possible separation \[m\].
     Uncertain(Pair, f64),
+    /// A pair is in a measured violation. Only of a sign-off.
+    Violation(Pair),
+    /// The stamp of a sign-off is older than the newest position of its vehicle: both stamps \[s\].
+    Late([f64; 2]),
+    /// The vehicle of a sign-off has signed off: stamps of the sign-off and of the newest position \[s\].
+    Repeated([f64; 2]),
 }
+
+impl_coded! { Reason {
+    Self::TooFew(_) => "too-few",
+    Self::Missing(_) => "missing",
+    Self::SignedOff(_) => "signed-off",
+    Self::Stale(..) => "stale",
+    Self::VelocityUnknown(_) => "velocity-unknown",
+    Self::ErrorUnknown(_) => "error-unknown",
+    Self::Fault(..) => "fault",
+    Self::Uncertain(..) => "uncertain",
+    Self::Violation(_) => "violation",
+    Self::Late(_) => "late",
+    Self::Repeated(_) => "repeated",
+} }
 
 impl Reason {
     /// Returns whether the reason is normal before all vehicles are heard.
     #[must_use]
     pub fn is_of_start(&self) -> bool {
-        matches!(
-            self,
-            Self::TooFew(_) | Self::Missing(_) | Self::MissingName(_) | Self::SpeedUnknown(_) | Self::ErrorUnknown(_)
-        )
+        matches!(self, Self::TooFew(_) | Self::Missing(_) | Self::VelocityUnknown(_) | Self::ErrorUnknown(_))
     }
 
     /// Returns whether the reason is normal after all vehicles but one have signed off. It is normal only in the last
@@ -56,9 +68,26 @@ pub enum State {
     /// Every pair of the heard vehicles keeps delta at the present, by the bounds.
     Clear,
     /// Neither CLEAR nor VIOLATION is established.
-    NotKnown(Reason),
+    Undecided(Reason),
     /// A pair is closer than delta: the pair, and its distance \[m\].
     Violation(Pair, f64),
+}
+
+impl State {
+    /// Returns the status of the separation.
+    #[must_use]
+    pub fn status(self) -> Status {
+        match self {
+            Self::Clear => Status::Clear,
+            Self::Undecided(_) => Status::Undecided,
+            Self::Violation(..) => Status::Violation,
+        }
+    }
+
+    /// Returns the pair in violation.
+    pub(crate) fn violated(self) -> Option<Pair> {
+        if let Self::Violation(pair, _) = self { Some(pair) } else { None }
+    }
 }
 
 /// Separation of the closest pair at the present.
@@ -106,83 +135,43 @@ pub struct Assessment {
     pub deviation: Option<(u32, f64)>,
 }
 
-/// Error of the input.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Fault {
-    /// A message cannot be read.
-    Garbage,
-    /// A number of a message is not finite or beyond the largest that is read.
-    OutOfRange,
-    /// A message of a vehicle beyond the largest number of vehicles.
-    TooManyVehicles,
-    /// The clock of a source stepped, or its stamps run faster than they arrive.
-    ClockStep,
-    /// A vehicle has two positions at one time.
-    Conflict,
-    /// A vehicle moved farther than its bounds allow.
-    OutOfBounds,
-    /// The velocities that a vehicle sends contradict its positions.
-    VelocityDisagrees,
-    /// The bound on the error of positions is smaller than the accuracy that the source reports.
-    Inaccurate,
-    /// The messages of a vehicle are those of two vehicles with one name.
-    TwoStreams,
-    /// Messages came faster than they were read, and some were dropped.
-    Dropped,
-    /// A vehicle sent too many messages between two messages of another one. The past of this pair is not judged.
-    NotJudged,
-    /// The sign-off of a vehicle was refused or ignored, for the cause in a [`Refusal`].
-    SignOff,
-    /// A vehicle sent a pose after its sign-off, so its separation since the sign-off is not known.
-    Returned,
-    /// An ignored message that is older than the newest one of its vehicle.
-    Reordered,
-    /// An ignored message that is a repetition.
-    Duplicate,
+coded! {
+    /// Error of the input.
+    Fault {
+        /// A message cannot be read, for the reason in a [`MessageError`].
+        Garbage = "garbage",
+        /// A number of a message is not finite or beyond the largest that is read.
+        OutOfRange = "out-of-range",
+        /// A message of a vehicle beyond the largest number of vehicles.
+        TooManyVehicles = "too-many-vehicles",
+        /// The clock of a source stepped, or its stamps run faster than they arrive.
+        ClockStep = "clock-step",
+        /// A vehicle has two positions at one time.
+        Conflict = "conflict",
+        /// A vehicle moved farther than its bounds allow.
+        OutOfBounds = "out-of-bounds",
+        /// The velocities that a vehicle sends contradict its positions.
+        VelocityDisagrees = "velocity-disagrees",
+        /// The bound on the error of positions is smaller than the accuracy that the source reports.
+        Inaccurate = "inaccurate",
+        /// The messages of a vehicle are those of two vehicles with one name.
+        TwoStreams = "two-streams",
+        /// Messages came faster than they were read, and some were dropped.
+        Dropped = "dropped",
+        /// A vehicle sent too many messages between two messages of another one. The past of this pair is not judged.
+        NotJudged = "not-judged",
+        /// The sign-off of a vehicle was refused or ignored, for a [`Reason`].
+        SignOff = "sign-off-refused",
+        /// A vehicle sent a pose after its sign-off, so its separation since the sign-off is undecided.
+        Returned = "pose-after-sign-off",
+        /// An ignored message that is older than the newest one of its vehicle.
+        Reordered = "reordered",
+        /// An ignored message that is a repetition.
+        Duplicate = "duplicate",
+    }
 }
 
 impl Fault {
-    /// All faults.
-    pub const ALL: [Self; 15] = [
-        Self::Garbage,
-        Self::OutOfRange,
-        Self::TooManyVehicles,
-        Self::ClockStep,
-        Self::Conflict,
-        Self::OutOfBounds,
-        Self::VelocityDisagrees,
-        Self::Inaccurate,
-        Self::TwoStreams,
-        Self::Dropped,
-        Self::NotJudged,
-        Self::SignOff,
-        Self::Returned,
-        Self::Reordered,
-        Self::Duplicate,
-    ];
-
-    /// Returns the name in JSON.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Garbage => "garbage",
-            Self::OutOfRange => "out-of-range",
-            Self::TooManyVehicles => "too-many-vehicles",
-            Self::ClockStep => "clock-step",
-            Self::Conflict => "conflict",
-            Self::OutOfBounds => "out-of-bounds",
-            Self::VelocityDisagrees => "velocity-disagrees",
-            Self::Inaccurate => "inaccurate",
-            Self::TwoStreams => "two-streams",
-            Self::Dropped => "dropped",
-            Self::NotJudged => "not-judged",
-            Self::SignOff => "sign-off-refused",
-            Self::Returned => "pose-after-sign-off",
-            Self::Reordered => "reordered",
-            Self::Duplicate => "duplicate",
-        }
-    }
-
     /// Returns whether the state is not CLEAR for the largest age after this fault.
     #[must_use]
     pub fn gives_doubt(self) -> bool {
@@ -190,51 +179,105 @@ impl Fault {
     }
 }
 
-/// Cause for which a sign-off was refused or ignored.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Refusal {
-    /// Its stamp \[s\] is older than the newest one of the vehicle \[s\].
-    Late {
-        /// Stamp of the sign-off \[s\].
-        t_s: f64,
-        /// Stamp of the newest position \[s\].
-        newest_s: f64,
-    },
-    /// The vehicle has signed off, and its newest position has this stamp \[s\].
-    Repeated {
-        /// Stamp of the sign-off \[s\].
-        t_s: f64,
-        /// Stamp of the newest position \[s\].
-        newest_s: f64,
-    },
-    /// An error of the input gives doubt.
-    Doubt(Fault),
-    /// The vehicle is in a measured violation with another one.
-    Violation(Pair),
-    /// A vehicle is stale, or was not heard since the step of its clock.
-    Stale(u32),
-    /// The messages of a vehicle are those of two vehicles with one name.
-    TwoStreams(u32),
-    /// The velocity of a vehicle is not known, or it has two positions at one time.
-    NoPrediction(u32),
-    /// The bounds allow a pair to be closer than delta: the smallest possible separation \[m\].
-    Uncertain(Pair, f64),
+/// Message that cannot be read.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MessageError {
+    /// Place of the message, such as `line 7` or its topic.
+    pub place: String,
+    /// Reason.
+    pub problem: Problem,
 }
 
-/// Violation by measured positions, with straight motion between them.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Violation {
-    /// The pair.
-    pub pair: Pair,
-    /// Start \[s\].
-    pub from_s: f64,
-    /// End, or the time up to which it was judged \[s\].
-    pub to_s: f64,
-    /// Smallest distance \[m\].
-    pub min_m: f64,
-    /// Time of the smallest distance \[s\].
-    pub min_at_s: f64,
+/// Reason why a message cannot be read. Strings are parts of the message, or words of its decoder or sender.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Problem {
+    /// The line is longer than the largest number of bytes that is read.
+    TooLong,
+    /// The line is not a pose: words of the parser, and the line.
+    NotPose(String, String),
+    /// Some axes of the velocity are missing.
+    VelocityIncomplete,
+    /// The name of the vehicle is empty.
+    NoName,
+    /// A sign-off has a position.
+    SignOffWithPosition,
+    /// The event is unknown.
+    UnknownEvent(String),
+    /// The vehicle of a sign-off was not heard: its name.
+    NotHeard(String),
+    /// The bytes, the place on the Earth or the text cannot be decoded: words of the decoder.
+    NotDecoded(String),
+    /// The server reports an error.
+    ServerError(String),
+    /// The message has no stamp.
+    NoStamp,
+    /// The position is on the Earth, and no origin is given.
+    NoOrigin,
+    /// Transforms have several frames, and none is given.
+    NoFrame,
+    /// The position is in another frame than those before: both frames.
+    OtherFrame([String; 2]),
+    /// The vehicle has another topic: its name and this topic.
+    OtherTopic([String; 2]),
+    /// More topics than are read.
+    TooManyTopics,
+    /// The datagram ends within a frame of `MAVLink`.
+    CutFrame,
+    /// A frame of `MAVLink` 2 has unknown incompatible flags.
+    UnknownFlags(u8),
+    /// A frame of `MAVLink` does not begin with this byte.
+    NoFrameStart(u8),
+    /// The checksum of a message of a system is wrong: ids of both.
+    WrongChecksum([u32; 2]),
+    /// The message is not one of a topic.
+    NotOfTopic,
+    /// The message has no position that is read: its topic.
+    NoPosition(String),
+    /// The message has no subscription.
+    NoSubscription,
 }
+
+impl_coded! { Problem {
+    Self::TooLong => "too-long",
+    Self::NotPose(..) => "not-pose",
+    Self::VelocityIncomplete => "velocity-incomplete",
+    Self::NoName => "no-name",
+    Self::SignOffWithPosition => "sign-off-with-position",
+    Self::UnknownEvent(_) => "unknown-event",
+    Self::NotHeard(_) => "not-heard",
+    Self::NotDecoded(_) => "not-decoded",
+    Self::ServerError(_) => "server-error",
+    Self::NoStamp => "no-stamp",
+    Self::NoOrigin => "no-origin",
+    Self::NoFrame => "no-frame",
+    Self::OtherFrame(_) => "other-frame",
+    Self::OtherTopic(_) => "other-topic",
+    Self::TooManyTopics => "too-many-topics",
+    Self::CutFrame => "cut-frame",
+    Self::UnknownFlags(_) => "unknown-flags",
+    Self::NoFrameStart(_) => "no-frame-start",
+    Self::WrongChecksum(_) => "wrong-checksum",
+    Self::NotOfTopic => "not-of-topic",
+    Self::NoPosition(_) => "no-position",
+    Self::NoSubscription => "no-subscription",
+} }
+
+/// Loss of a source.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Loss {
+    /// The connection failed: words of the system.
+    Failed(String),
+    /// The server is silent.
+    Silent,
+    /// The server closed the connection.
+    Closed,
+}
+
+impl_coded! { Loss {
+    Self::Failed(_) => "failed",
+    Self::Silent => "silent",
+    Self::Closed => "closed",
+} }
 
 /// Event of the monitor.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -272,9 +315,9 @@ pub enum Event {
         at_s: f64,
     },
     /// A measured violation began.
-    Began(Violation),
+    Began(Violation<Pair>),
     /// A measured violation ended.
-    Ended(Violation),
+    Ended(Violation<Pair>),
     /// A vehicle left the tube around its plan, or returned.
     Plan {
         /// The vehicle.
@@ -294,8 +337,8 @@ pub enum Event {
         count: u64,
         /// Vehicle of the last error.
         vehicle: Option<u32>,
-        /// Cause of the last refused sign-off, with [`Fault::SignOff`].
-        refusal: Option<Refusal>,
+        /// Reason of the last refused sign-off, with [`Fault::SignOff`].
+        refusal: Option<Reason>,
         /// Time \[s\].
         at_s: f64,
     },

@@ -19,11 +19,11 @@ use ::foxglove::messages::{
     line_primitive, log,
 };
 use ::foxglove::{Channel, ChannelBuilder, Context, FoxgloveError, RawChannel, Schema, WebSocketServer, messages};
-use serde_json::{Value, json};
 
-use crate::event::{Assessment, Pair, State};
+use crate::event::{Assessment, Pair};
 use crate::monitor::Monitor;
-use crate::notice::Notice;
+use crate::notice::{Notice, Statement};
+use tautline_audit::Status;
 
 /// Time between two scenes of an unchanged state.
 const SCENE_PERIOD: Duration = Duration::from_millis(100);
@@ -39,7 +39,7 @@ const LINE_M: f64 = 0.05;
 /// Opacity of a sphere, whose radius is half of delta.
 const OPACITY: f64 = 0.6;
 const CLEAR: [f64; 3] = [0.2, 0.7, 0.4];
-const NOT_KNOWN: [f64; 3] = [0.9, 0.7, 0.2];
+const UNDECIDED: [f64; 3] = [0.9, 0.7, 0.2];
 const ALARM: [f64; 3] = [0.9, 0.15, 0.15];
 const AHEAD: [f64; 3] = [1.0, 0.5, 0.1];
 const STALE: [f64; 3] = [0.5, 0.5, 0.5];
@@ -56,8 +56,8 @@ pub struct FoxgloveServer {
     status: Arc<RawChannel>,
     /// Time of the last scene.
     shown: Option<Instant>,
-    /// State of the last scene, and of the last log message.
-    states: [Option<&'static str>; 2],
+    /// Status of the last scene, and of the last log message of a state.
+    statuses: [Option<Status>; 2],
     /// Keeps the channels open.
     _context: Arc<Context>,
 }
@@ -90,7 +90,7 @@ impl FoxgloveServer {
             log: channel("/watch/log").build(),
             status,
             shown: None,
-            states: [None; 2],
+            statuses: [None; 2],
             _context: context,
         })
     }
@@ -103,19 +103,13 @@ impl FoxgloveServer {
 
     /// Publishes a notice as a log message. A state is published when it changes.
     pub fn notice(&mut self, notice: &Notice) {
-        let text = |key: &str| notice.json[key].as_str().unwrap_or_default();
-        if notice.event == "state" {
-            let state = state_name(text("state"));
-            if self.states[1].replace(state) == Some(state) {
-                return;
-            }
+        if notice.event == "state" && self.statuses[1].replace(notice.status) == Some(notice.status) {
+            return;
         }
-        let level = match (notice.event, text("state")) {
-            ("violation" | "violation-end", _) | ("state", "violation") => log::Level::Error,
-            ("state", "not-known") | ("stale" | "fault" | "lost", _) => log::Level::Warning,
-            ("plan", _) if notice.json["outside"] == true => log::Level::Error,
-            ("summary", _) if notice.json["good"] == false => log::Level::Error,
-            _ => log::Level::Info,
+        let level = match notice.status {
+            Status::Violation => log::Level::Error,
+            Status::Undecided => log::Level::Warning,
+            Status::Clear => log::Level::Info,
         };
         self.log.log(&Log {
             timestamp: Some(Timestamp::now()),
@@ -128,21 +122,17 @@ impl FoxgloveServer {
 
     /// Publishes the scene and the status of a judgement, each 0.1 s and when the state changes.
     pub fn assessed(&mut self, of: &Assessment, monitor: &Monitor) {
-        let state = state_name(match of.state {
-            State::Clear => "clear",
-            State::NotKnown(_) => "not-known",
-            State::Violation(..) => "violation",
-        });
+        let status = of.state.status();
         let is_due = self.shown.is_none_or(|last| last.elapsed() >= SCENE_PERIOD);
-        if !is_due && self.states[0] == Some(state) {
+        if !is_due && self.statuses[0] == Some(status) {
             return;
         }
-        (self.shown, self.states[0]) = (Some(Instant::now()), Some(state));
+        (self.shown, self.statuses[0]) = (Some(Instant::now()), Some(status));
         if self.scene.has_sinks() {
             self.scene.log(&scene(of, monitor, &self.frame));
         }
         if self.status.has_sinks() {
-            self.status.log(status(of, monitor, state).to_string().as_bytes());
+            self.status.log(Notice::new(Statement::State(of), monitor).json.to_string().as_bytes());
         }
     }
 }
@@ -154,56 +144,15 @@ fn of_server(error: FoxgloveError) -> io::Error {
     }
 }
 
-fn state_name(state: &str) -> &'static str {
-    match state {
-        "clear" => "clear",
-        "violation" => "violation",
-        _ => "not-known",
-    }
-}
-
-/// Returns the status as JSON.
-fn status(of: &Assessment, monitor: &Monitor, state: &str) -> Value {
-    let names = |keep: &dyn Fn(usize) -> bool| -> Vec<&String> {
-        monitor.names().iter().enumerate().filter(|(k, _)| keep(*k)).map(|(_, name)| name).collect()
-    };
-    let pair = |pair: Pair| pair.map(|k| monitor.names().get(k as usize));
-    let notice = Notice::of_state(of, monitor);
-    json!({
-        "t_s": notice.json["t_s"],
-        "state": state,
-        "reason": notice.json["reason"],
-        "text": notice.text,
-        "facts": notice.json["facts"],
-        "separation_m": of.closest.map(|near| near.nominal_m),
-        "least_separation_m": of.closest.map(|near| near.least_m),
-        "closest_pair": of.closest.map(|near| pair(near.pair)),
-        "clear_until_s": of.clear_until.map(|until| until.at_s),
-        "violation_at_s": of.nominal_violation.map(|of| of.at_s),
-        "vehicles": of.heard,
-        "stale": names(&|k| is_stale(monitor, k)),
-        "signed_off": names(&|k| monitor.has_signed_off(k)),
-    })
-}
-
-fn is_stale(monitor: &Monitor, vehicle: usize) -> bool {
-    let most_s = monitor.settings().max_age_s.value;
-    !monitor.has_signed_off(vehicle) && monitor.newest(vehicle).is_some_and(|(.., age_s)| age_s > most_s)
-}
-
 /// Returns a sphere per present vehicle, and lines between pairs in violation and on course to violate.
 fn scene(of: &Assessment, monitor: &Monitor, frame: &str) -> SceneUpdate {
     let place = |k: u32| monitor.newest(k as usize).map(|(at, ..)| Point3 { x: at.x, y: at.y, z: at.z });
-    let violated = match of.state {
-        State::Violation(pair, _) => Some(pair),
-        _ => None,
-    };
-    let mut alarms: Vec<Pair> = monitor.open_violations().map(|of| of.pair).chain(violated).collect();
+    let mut alarms: Vec<Pair> = monitor.open_violations().map(|of| of.pair).chain(of.state.violated()).collect();
     alarms.sort_unstable();
     alarms.dedup();
     let mut in_alarm: Vec<u32> = alarms.iter().flatten().copied().collect();
     in_alarm.sort_unstable();
-    let own = if of.state == State::Clear { CLEAR } else { NOT_KNOWN };
+    let own = if of.state.status() == Status::Clear { CLEAR } else { UNDECIDED };
     let now = Timestamp::now();
     let entity = |id: String| SceneEntity {
         timestamp: Some(now),
@@ -219,7 +168,7 @@ fn scene(of: &Assessment, monitor: &Monitor, frame: &str) -> SceneUpdate {
             let at = place(k)?;
             let shown = match () {
                 () if in_alarm.binary_search(&k).is_ok() => ALARM,
-                () if is_stale(monitor, k as usize) => STALE,
+                () if monitor.is_stale(k as usize) => STALE,
                 () => own,
             };
             let sphere = SpherePrimitive {

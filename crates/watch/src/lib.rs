@@ -32,16 +32,18 @@ pub mod source;
 mod streams;
 mod velocity;
 mod violations;
+mod words;
 
 pub use clock::{DRIFT, STEP_S};
-pub use event::{Assessment, Event, Fault, Pair, PairTime, Reason, Refusal, Separation, State, Violation};
+pub use event::{Assessment, Event, Fault, Loss, MessageError, Pair, PairTime, Problem, Reason, Separation, State};
 pub use history::HISTORY;
 pub use monitor::{LONGEST_NAME, MOST_EVENTS, Monitor, Pose, Taken};
-pub use notice::Notice;
+pub use notice::{Notice, Statement};
 pub use plan::Plan;
 pub use record::Record;
 pub use session::{ASSESS_PERIOD_S, LINE_PERIOD_S, Output, Summary, watch};
 pub use settings::{
     Bound, ClockScope, DEFAULT_ACCEL_M_S2, Expected, REPORTED_DEVIATIONS, Settings, SettingsError, TimeBase,
 };
+pub use tautline_audit::{Status, Violation};
 pub use violations::MOST_OPEN;

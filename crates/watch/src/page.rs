@@ -19,9 +19,9 @@ use std::time::{Duration, Instant};
 use serde_json::{Value, json};
 use tungstenite::Message;
 
-use crate::event::{Assessment, State};
+use crate::event::Assessment;
 use crate::monitor::Monitor;
-use crate::notice::Notice;
+use crate::notice::{Notice, Statement};
 
 /// Time between two frames \[s\].
 pub const FRAME_PERIOD_S: f64 = 0.1;
@@ -127,7 +127,7 @@ impl Page {
             address,
             token,
             viewers: Mutex::default(),
-            roster: Mutex::new(Arc::from("{\"op\":\"roster\",\"names\":[]}")),
+            roster: Mutex::new(Arc::from("{\"op\":\"roster\",\"vehicles\":[]}")),
             connections: Mutex::default(),
         });
         let server = Arc::clone(&shared);
@@ -173,33 +173,23 @@ impl Page {
         self.framed_s = of.now_s;
         if monitor.names().len() != self.names {
             self.names = monitor.names().len();
-            let roster = json!({ "op": "roster", "names": monitor.names(), "delta_m": monitor.settings().delta_m });
+            let roster = json!({ "op": "roster", "vehicles": monitor.names(), "delta_m": monitor.settings().delta_m });
             *lock(&self.shared.roster) = Arc::from(roster.to_string());
             self.send(&roster);
         }
         if lock(&self.shared.viewers).is_empty() {
             return;
         }
-        let most_s = monitor.settings().max_age_s.value;
         let places: Vec<Value> = (0..self.names)
             .map(|k| match monitor.newest(k).filter(|_| !monitor.has_signed_off(k)) {
-                Some((at, _, age_s)) => json!([at.x, at.y, at.z, age_s <= most_s]),
+                Some((at, ..)) => json!([at.x, at.y, at.z, !monitor.is_stale(k)]),
                 None => Value::Null,
             })
             .collect();
-        let state = match of.state {
-            State::Clear => "clear",
-            State::NotKnown(_) => "not-known",
-            State::Violation(..) => "violation",
-        };
-        let who = match of.state {
-            State::Violation(pair, _) => Some(pair),
-            _ => None,
-        };
-        let text = Notice::of_state(of, monitor).text;
+        let state = Notice::new(Statement::State(of), monitor).json;
         let near = of.closest.map(|near| near.pair);
         self.send(&json!({
-            "op": "frame", "t_s": of.now_s, "state": state, "text": text, "near": near, "who": who, "places": places,
+            "op": "frame", "state": state, "near": near, "violated": of.state.violated(), "places": places,
         }));
     }
 
@@ -483,7 +473,7 @@ mod tests {
             monitor.take(&Pose { t_s: 0.0, id, position_m, velocity_m_s: None, accuracy_m: None }, 0.0);
         }
         page.assessed(&monitor.assess(0.0), &monitor);
-        assert_eq!(read()["names"], serde_json::json!(["a", "b"]));
+        assert_eq!(read()["vehicles"], serde_json::json!(["a", "b"]));
         let frame = read();
         assert_eq!(frame["op"], "frame");
         assert_eq!(frame["places"][1], serde_json::json!([0.5, 0.0, 0.0, true]));

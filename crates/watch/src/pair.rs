@@ -221,43 +221,11 @@ fn step_within(margin: f64, rate: f64, curve: f64) -> f64 {
     }
 }
 
-/// Smallest distance of two straight motions between two instants.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sweep {
-    /// Smallest distance \[m\].
-    pub min_m: f64,
-    /// Time of the smallest distance, as a share of the interval.
-    pub at: f64,
-    /// Part of the interval with a distance below the limit, as shares; `None` without one.
-    pub below: Option<[f64; 2]>,
-}
-
-/// Sweeps the relative position from `from_m` to `to_m` on a straight line.
-#[must_use]
-pub fn sweep(from_m: Vector3<f64>, to_m: Vector3<f64>, delta_m: f64) -> Sweep {
-    let change = to_m - from_m;
-    let (along, length2) = (from_m.dot(&change), change.norm_squared());
-    let at = if length2 > 0.0 { (-along / length2).clamp(0.0, 1.0) } else { 0.0 };
-    let min_m = (from_m + change * at).norm();
-    let below = (min_m < delta_m).then(|| {
-        let gap = from_m.norm_squared() - delta_m * delta_m;
-        let root = (along * along - length2 * gap).max(0.0).sqrt();
-        if length2 > 0.0 {
-            let [from, to] = [(-along - root) / length2, (-along + root) / length2];
-            // The closest point is inside, whatever the rounding of the roots.
-            [from.clamp(0.0, at), to.clamp(at, 1.0)]
-        } else {
-            [0.0, 1.0]
-        }
-    });
-    Sweep { min_m, at, below }
-}
-
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
 
-    use super::{Prediction, RelativeMotion, sweep};
+    use super::{Prediction, RelativeMotion};
 
     fn head_on(gap_m: f64, speed_m_s: f64, age_s: f64, accel_m_s2: f64) -> RelativeMotion {
         let at =
@@ -293,14 +261,5 @@ mod tests {
         assert!((brake_s - 2.0).abs() < 1e-3 && brake_s <= 2.0, "{brake_s}");
         assert_eq!(head_on(2.9, 2.0, 0.0, 0.0).last_brake_s(1.0, 2.0, 60.0), Some(0.0));
         assert_eq!(head_on(11.0, -2.0, 0.0, 0.0).last_brake_s(1.0, 2.0, 60.0), None);
-    }
-
-    #[test]
-    fn a_sweep_finds_what_its_ends_miss() {
-        let found = sweep(Vector3::new(-3.0, 0.6, 0.0), Vector3::new(3.0, 0.6, 0.0), 1.0);
-        assert!((found.min_m - 0.6).abs() < 1e-12 && (found.at - 0.5).abs() < 1e-12);
-        let [from, to] = found.below.expect("a violation");
-        assert!((from - (0.5 - 0.8 / 6.0)).abs() < 1e-12 && (to - (0.5 + 0.8 / 6.0)).abs() < 1e-12);
-        assert_eq!(sweep(Vector3::new(-3.0, 1.1, 0.0), Vector3::new(3.0, 1.1, 0.0), 1.0).below, None);
     }
 }

@@ -5,15 +5,14 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::{RecvTimeoutError, TryRecvError};
 use std::time::Duration;
 
-use serde_json::json;
-
 use crate::absences::Absences;
-use crate::event::{Assessment, Event, Fault, Reason, State};
+use crate::event::{Assessment, Event, Fault, MessageError, Problem, Reason, State};
 use crate::monitor::Monitor;
-use crate::notice::{Notice, bounds_text, down, fixed, name};
+use crate::notice::{Notice, Statement};
 use crate::settings::TimeBase;
 use crate::source::{Input, Inputs, OwnedPose};
-use tautline_core::fact::Fact;
+use crate::words::name;
+use tautline_audit::Status;
 
 /// Time between two judgements \[s\]; an alarm is at most this late.
 pub const ASSESS_PERIOD_S: f64 = 0.01;
@@ -57,12 +56,12 @@ pub struct Summary {
     pub has_started: bool,
     /// Time in the state CLEAR \[s\].
     pub clear_s: f64,
-    /// Time in the state NOT KNOWN after the start \[s\], and time since sign-offs after which the vehicle was heard.
-    pub not_known_s: f64,
+    /// Time in the state UNDECIDED after the start \[s\], and time since sign-offs after which the vehicle was heard.
+    pub undecided_s: f64,
     /// Time in the state VIOLATION \[s\].
     pub violation_s: f64,
-    /// Whether a judgement after the start was NOT KNOWN.
-    pub was_not_known: bool,
+    /// Whether a judgement after the start was UNDECIDED.
+    pub was_undecided: bool,
     /// Whether a judgement was VIOLATION, or a measured violation was found.
     pub was_violated: bool,
     /// Whether a vehicle left the tube around its plan.
@@ -82,58 +81,21 @@ pub struct Summary {
 }
 
 impl Summary {
-    /// Returns whether every judgement after the start was CLEAR, without a violation and within the plan. With a
-    /// plan, at least one position must have been compared.
+    /// Returns the status of the separation: clear if every judgement after the start was CLEAR. With a plan, at least
+    /// one position must have been compared.
     #[must_use]
-    pub fn is_good(&self) -> bool {
-        self.has_started && !self.was_not_known && !self.was_violated && !self.was_off_plan && self.compared != Some(0)
+    pub fn status(&self) -> Status {
+        match self {
+            _ if self.was_violated => Status::Violation,
+            _ if !self.has_started || self.was_undecided || self.compared == Some(0) => Status::Undecided,
+            _ => Status::Clear,
+        }
     }
 
-    /// Returns the last line, with the facts on which CLEAR rests.
-    fn notice(&self, at_s: f64, facts: &[Fact]) -> Notice {
-        let verdict = match self {
-            _ if self.was_violated => "VIOLATION",
-            _ if !self.has_started || self.was_not_known || self.compared == Some(0) => "NOT KNOWN",
-            _ if self.was_off_plan => "OFF PLAN",
-            _ => "CLEAR",
-        };
-        let is_clear = verdict == "CLEAR";
-        let bounds = if is_clear { bounds_text(facts) } else { String::new() };
-        let mut text = format!(
-            "{verdict}{bounds}: {} vehicles{}, {} s CLEAR, {} s NOT KNOWN, {} s VIOLATION, measured violations: {}",
-            self.vehicles,
-            if self.signed_off > 0 { format!(" ({} signed off)", self.signed_off) } else { String::new() },
-            fixed(self.clear_s),
-            fixed(self.not_known_s),
-            fixed(self.violation_s),
-            self.violations
-        );
-        if self.returned > 0 {
-            text.extend([format!("; heard again after a sign-off: {}", self.returned)]);
-        }
-        if let Some((distance_m, [a, b])) = &self.closest {
-            text.extend([format!("; closest {a}-{b} {} m", down(*distance_m))]);
-        }
-        if let Some(count) = self.compared {
-            text.extend([format!("; positions compared with the plan: {count}")]);
-        }
-        let closest = self.closest.as_ref().map(|(distance_m, pair)| json!({ "pair": pair, "distance_m": distance_m }));
-        let more = json!({
-            "good": self.is_good(),
-            "facts": is_clear.then_some(facts),
-            "started": self.has_started,
-            "vehicles": self.vehicles,
-            "signed_off": self.signed_off,
-            "returned": self.returned,
-            "clear_s": self.clear_s,
-            "not_known_s": self.not_known_s,
-            "violation_s": self.violation_s,
-            "violations": self.violations,
-            "off_plan": self.was_off_plan,
-            "compared_with_plan": self.compared,
-            "closest": closest,
-        });
-        Notice { text: text.clone(), ..Notice::new("summary", at_s, text, more) }
+    /// Returns whether the exit code is 0: the status is clear, and every vehicle kept to its plan.
+    #[must_use]
+    pub fn passes(&self) -> bool {
+        self.status() == Status::Clear && !self.was_off_plan
     }
 }
 
@@ -146,8 +108,8 @@ struct Session<'a> {
     absences: Absences,
     /// Time of the last line \[s\].
     line_s: f64,
-    /// Sentence of the last error of the input.
-    said: String,
+    /// Last message that cannot be read.
+    message_error: Option<MessageError>,
     /// Line of a judgement just before a stamp. The events of this stamp are older, so they come first.
     held: Option<Notice>,
     holds: bool,
@@ -166,7 +128,7 @@ pub fn watch(monitor: Monitor, inputs: &Inputs, output: &mut dyn Output) -> io::
         last: None,
         absences: Absences::default(),
         line_s: f64::NEG_INFINITY,
-        said: String::new(),
+        message_error: None,
         held: None,
         holds: false,
     };
@@ -187,8 +149,7 @@ pub fn watch(monitor: Monitor, inputs: &Inputs, output: &mut dyn Output) -> io::
         }
         let lost = inputs.dropped.load(Ordering::Relaxed);
         if lost > dropped {
-            session.said = format!("{} messages were dropped", lost - dropped);
-            session.monitor.fault(Fault::Dropped, None, now_s());
+            session.monitor.dropped(lost - dropped, now_s());
             dropped = lost;
         }
         if !uses_stamps && now_s() >= next_s {
@@ -206,17 +167,17 @@ impl Session<'_> {
         match input {
             Input::Pose(pose, arrival_s) => self.pose(&pose, arrival_s)?,
             Input::SignOff(id, t_s, arrival_s) => self.sign_off(&id, t_s, arrival_s)?,
-            Input::Fault(fault, arrival_s, said) => {
-                self.said = said;
-                self.monitor.fault(fault, None, arrival_s);
+            Input::Garbage(error, arrival_s) => {
+                self.message_error = Some(error);
+                self.monitor.fault(Fault::Garbage, None, arrival_s);
                 self.pass_events()?;
             }
             Input::TwoStreams(id, arrival_s) => {
                 self.monitor.two_streams(&id, arrival_s);
                 self.pass_events()?;
             }
-            Input::Connected(source) => self.source("connected", format!("connected to {source}"), &source)?,
-            Input::Lost(source, why) => self.source("lost", format!("lost {source}: {why}; trying again"), &source)?,
+            Input::Connected(source) => self.notice(Statement::Connected(&source))?,
+            Input::Lost(source, loss) => self.notice(Statement::Lost(&source, &loss))?,
             Input::End => return Ok(true),
         }
         Ok(false)
@@ -233,7 +194,8 @@ impl Session<'_> {
 
     fn sign_off(&mut self, id: &str, t_s: f64, arrival_s: f64) -> io::Result<()> {
         self.pass_until(t_s, arrival_s)?;
-        self.said = format!("{:?} signs off and was not heard", id.chars().take(60).collect::<String>());
+        let problem = Problem::NotHeard(id.chars().take(60).collect());
+        self.message_error = Some(MessageError { place: String::new(), problem });
         self.monitor.sign_off(id, t_s, arrival_s);
         self.pass_events()
     }
@@ -288,8 +250,8 @@ impl Session<'_> {
         Ok(())
     }
 
-    fn source(&mut self, event: &'static str, text: String, source: &str) -> io::Result<()> {
-        self.output.notice(&Notice::new(event, self.monitor.now_s(), text, json!({ "source": source })))
+    fn notice(&mut self, statement: Statement<'_>) -> io::Result<()> {
+        self.output.notice(&Notice::new(statement, &self.monitor))
     }
 
     fn assess(&mut self, arrival_s: f64) -> io::Result<()> {
@@ -313,30 +275,30 @@ impl Session<'_> {
                     self.absences.clear_s += passed_s;
                 }
                 State::Violation(..) => summary.violation_s += passed_s,
-                State::NotKnown(reason) if summary.has_started => {
+                State::Undecided(reason) if summary.has_started => {
                     if reason.is_of_end() {
                         self.absences.end_s += passed_s;
                     } else {
-                        summary.not_known_s += passed_s;
+                        summary.undecided_s += passed_s;
                     }
                 }
-                State::NotKnown(_) => {}
+                State::Undecided(_) => {}
             }
         }
         // A return of a vehicle, or another state, shows that the watch was not at its end.
         self.absences.settle();
         let unseen_s = std::mem::take(&mut self.absences.unseen_s);
         let has_return = std::mem::take(&mut self.absences.has_return);
-        let is_end = matches!(of.state, State::NotKnown(reason) if reason.is_of_end());
+        let is_end = matches!(of.state, State::Undecided(reason) if reason.is_of_end());
         let end_s = if is_end && !has_return { 0.0 } else { std::mem::take(&mut self.absences.end_s) };
         summary.clear_s = (summary.clear_s - unseen_s).max(0.0);
-        summary.not_known_s += unseen_s + end_s;
-        summary.was_not_known |= unseen_s + end_s > 0.0;
+        summary.undecided_s += unseen_s + end_s;
+        summary.was_undecided |= unseen_s + end_s > 0.0;
         summary.has_started |=
-            !matches!(of.state, State::NotKnown(reason) if reason.is_of_start() || reason.is_of_end());
+            !matches!(of.state, State::Undecided(reason) if reason.is_of_start() || reason.is_of_end());
         summary.was_violated |= matches!(of.state, State::Violation(..));
-        summary.was_not_known |=
-            summary.has_started && matches!(of.state, State::NotKnown(reason) if !reason.is_of_end());
+        summary.was_undecided |=
+            summary.has_started && matches!(of.state, State::Undecided(reason) if !reason.is_of_end());
         (summary.vehicles, summary.signed_off) = (of.heard, of.signed_off);
         if let Some(near) = of.closest {
             note_closest(summary, near.nominal_m, || near.pair.map(|k| name(&self.monitor, k)));
@@ -346,7 +308,7 @@ impl Session<'_> {
         let is_due = of.now_s >= self.line_s + LINE_PERIOD_S || of.now_s < self.line_s;
         if is_change || is_due {
             self.line_s = of.now_s;
-            let notice = Notice::of_state(&of, &self.monitor);
+            let notice = Notice::new(Statement::State(&of), &self.monitor);
             if self.holds {
                 self.held = Some(notice);
             } else {
@@ -366,7 +328,7 @@ impl Session<'_> {
                 Event::Back { vehicle, signed_off_s: Some(_), .. } => {
                     self.absences.end(vehicle);
                     self.summary.returned += 1;
-                    self.summary.was_not_known |= self.summary.has_started;
+                    self.summary.was_undecided |= self.summary.has_started;
                 }
                 Event::Ended(of) => {
                     note_closest(&mut self.summary, of.min_m, || of.pair.map(|k| name(&self.monitor, k)));
@@ -374,7 +336,8 @@ impl Session<'_> {
                 Event::Plan { is_outside: true, .. } => self.summary.was_off_plan = true,
                 _ => {}
             }
-            self.output.notice(&Notice::of_event(&event, &self.monitor, &self.said))?;
+            let statement = Statement::Event(&event, self.message_error.as_ref());
+            self.output.notice(&Notice::new(statement, &self.monitor))?;
         }
         Ok(())
     }
@@ -384,7 +347,7 @@ impl Session<'_> {
         self.judged(of)?;
         self.summary.violations = self.monitor.violations();
         self.summary.compared = self.monitor.compared();
-        self.output.notice(&self.summary.notice(self.monitor.now_s(), &self.monitor.facts()))?;
+        self.output.notice(&Notice::new(Statement::Summary(&self.summary), &self.monitor))?;
         Ok(self.summary)
     }
 }
@@ -396,11 +359,10 @@ fn note_closest(summary: &mut Summary, distance_m: f64, pair: impl FnOnce() -> [
 }
 
 /// Part of a state whose change gives a line at once.
-fn kind(state: State) -> (u8, Option<u32>) {
-    match state {
-        State::Clear => (0, None),
-        State::Violation([a, _], _) => (1, Some(a)),
-        State::NotKnown(Reason::Stale(vehicle, _)) => (2, Some(vehicle)),
-        State::NotKnown(_) => (2, None),
-    }
+fn kind(state: State) -> (Status, Option<u32>) {
+    let vehicle = match state {
+        State::Violation([vehicle, _], _) | State::Undecided(Reason::Stale(vehicle, _)) => Some(vehicle),
+        _ => None,
+    };
+    (state.status(), vehicle)
 }

@@ -47,10 +47,9 @@ pub enum TimeBase {
 }
 
 /// Clocks of the stamps.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ClockScope {
     /// All stamps come from one clock, or from synchronised clocks.
-    #[default]
     Common,
     /// Each vehicle has a clock of its own, such as the time since it started.
     PerVehicle,
@@ -111,9 +110,10 @@ pub struct Settings {
     pub max_vehicles: usize,
     /// Time base of ages.
     pub time_base: TimeBase,
-    /// Clocks of the stamps.
-    pub clocks: ClockScope,
-    /// Whether the source numbers the messages of each vehicle, as `MAVLink` does.
+    /// Clocks of the stamps. By default each vehicle has one if the source counts messages, whose stamps count from the
+    /// start of the vehicle; otherwise all vehicles have a common one.
+    pub clocks: Option<ClockScope>,
+    /// Whether the source counts the messages of each vehicle, as `MAVLink` does.
     pub has_message_counts: bool,
 }
 
@@ -132,7 +132,7 @@ impl Default for Settings {
             expected: Expected::Heard,
             max_vehicles: 2000,
             time_base: TimeBase::Arrival,
-            clocks: ClockScope::Common,
+            clocks: None,
             has_message_counts: false,
         }
     }
@@ -152,9 +152,11 @@ pub struct SettingsError {
 
 impl Settings {
     /// Returns the clocks of the stamps. Stamps as the time base need a common one.
-    pub(crate) fn clock_scope(&self) -> ClockScope {
+    #[must_use]
+    pub fn clock_scope(&self) -> ClockScope {
+        let by_default = if self.has_message_counts { ClockScope::PerVehicle } else { ClockScope::Common };
         match self.time_base {
-            TimeBase::Arrival => self.clocks,
+            TimeBase::Arrival => self.clocks.unwrap_or(by_default),
             TimeBase::Stamps => ClockScope::Common,
         }
     }
@@ -190,11 +192,23 @@ impl Settings {
                 reported_m.map(|error_m| Fact::number(FactKind::PositionError, Source::Recorded, error_m, "m"))
             }
         };
+        let clocks = match self.clock_scope() {
+            ClockScope::Common => "common",
+            ClockScope::PerVehicle => "own",
+        };
+        let source_of_clocks = match self.clocks {
+            Some(_) => Source::Declared,
+            None if self.has_message_counts => Source::Convention,
+            None => Source::Default,
+        };
         let others = [
             self.accel_m_s2.fact(FactKind::Acceleration, "m/s^2"),
             self.velocity_error_m_s.fact(FactKind::VelocityError, "m/s"),
             self.max_age_s.fact(FactKind::Age, "s"),
             self.latency_s.fact(FactKind::Latency, "s"),
+            Fact::name(FactKind::Clock, source_of_clocks, clocks),
+            Fact::name(FactKind::LengthUnit, Source::Convention, "m"),
+            Fact::name(FactKind::TimeUnit, Source::Convention, "s"),
         ];
         position_error.into_iter().chain(others).collect()
     }

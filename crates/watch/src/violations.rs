@@ -1,7 +1,7 @@
 //! Measured violations that are present, in bounded memory.
 
-use crate::event::{Event, Pair, Violation};
-use crate::pair::Sweep;
+use crate::event::{Event, Pair};
+use tautline_audit::{Sweep, Violation};
 
 /// Largest number of violations that are present at the same time and have a record each.
 pub const MOST_OPEN: usize = 4096;
@@ -18,7 +18,7 @@ pub(crate) struct OpenViolations {
 
 #[derive(Clone, Copy, Debug)]
 struct Record {
-    of: Violation,
+    of: Violation<Pair>,
     /// Number of the judgement that examined the pair last.
     judged: u64,
 }
@@ -33,7 +33,7 @@ impl OpenViolations {
     }
 
     /// Returns the present violation with the smallest distance.
-    pub(crate) fn worst(&self) -> Option<Violation> {
+    pub(crate) fn worst(&self) -> Option<Violation<Pair>> {
         self.open().min_by(|a, b| a.min_m.total_cmp(&b.min_m))
     }
 
@@ -49,12 +49,13 @@ impl OpenViolations {
         }
     }
 
-    /// Takes the sweep of a pair from `from_s` to `to_s`.
+    /// Takes the sweep of a pair from `from_s` to `to_s` with a limit \[m\].
     pub(crate) fn take(
         &mut self,
         pair: Pair,
         [from_s, to_s]: [f64; 2],
         sweep: &Sweep,
+        limit_m: f64,
         number: u64,
     ) -> [Option<Event>; 2] {
         let time_s = |share: f64| from_s + (to_s - from_s) * share;
@@ -83,6 +84,7 @@ impl OpenViolations {
                     to_s: time_s(leave),
                     min_m: sweep.min_m,
                     min_at_s: time_s(sweep.at),
+                    limit_m,
                 };
                 self.total += 1;
                 self.open.insert(k, Record { of, judged: number });
@@ -97,12 +99,12 @@ impl OpenViolations {
     }
 
     /// Returns the present violations.
-    pub(crate) fn open(&self) -> impl Iterator<Item = Violation> + '_ {
+    pub(crate) fn open(&self) -> impl Iterator<Item = Violation<Pair>> + '_ {
         self.open.iter().map(|record| record.of)
     }
 
     /// Removes and returns a violation whose pair fulfils a condition.
-    pub(crate) fn close(&mut self, is_over: impl Fn(Pair) -> bool) -> Option<Violation> {
+    pub(crate) fn close(&mut self, is_over: impl Fn(Pair) -> bool) -> Option<Violation<Pair>> {
         let k = self.open.iter().position(|record| is_over(record.of.pair))?;
         Some(self.open.remove(k).of)
     }
@@ -118,15 +120,15 @@ mod tests {
 
     use super::OpenViolations;
     use crate::event::Event;
-    use crate::pair::sweep;
+    use tautline_audit::sweep;
 
     #[test]
     fn a_violation_over_two_sweeps_is_one() {
         let mut open = OpenViolations::new();
         let at = |x| Vector3::new(x, 0.5, 0.0);
-        let first = open.take([0, 1], [0.0, 1.0], &sweep(at(-2.0), at(0.2), 1.0), 1);
+        let first = open.take([0, 1], [0.0, 1.0], &sweep(at(-2.0), at(0.2), 1.0), 1.0, 1);
         assert!(matches!(first, [Some(Event::Began(_)), None]), "{first:?}");
-        let second = open.take([0, 1], [1.0, 2.0], &sweep(at(0.2), at(2.4), 1.0), 2);
+        let second = open.take([0, 1], [1.0, 2.0], &sweep(at(0.2), at(2.4), 1.0), 1.0, 2);
         let [Some(Event::Ended(of)), None] = [second[1], second[0]] else { panic!("{second:?}") };
         let half_s = 0.75_f64.sqrt() / 2.2;
         assert!((of.from_s - (2.0 / 2.2 - half_s)).abs() < 1e-12, "{of:?}");

@@ -64,9 +64,9 @@ pub(super) fn largest(
         let mut part = c.to_vec();
         rescale(&mut part, start, length);
         let [at_start, at_end, upper] = evaluate(&part, &basis);
-        for (reached, at) in [(at_start, start), (at_end, start + length)] {
+        for (reached, offset) in [(at_start, start), (at_end, start + length)] {
             if reached > found.lower {
-                (found.lower, found.at) = (reached, at);
+                (found.lower, found.at) = (reached, offset);
             }
         }
         Part { upper, start, length }
@@ -183,11 +183,11 @@ fn between(
     let change = |k: usize| (end.get(k).unwrap_or(&zero) - start.get(k).unwrap_or(&zero)) / length_s;
     let change: Vec<_> = (0..start.len().max(end.len())).map(change).collect();
     let rounding = (first.rounding_m_s + last.rounding_m_s) / length_s;
-    let Enclosure { lower, upper, at } = largest_of(Quantity::Acceleration, &change, goal);
+    let Enclosure { lower, upper, at: fraction } = largest_of(Quantity::Acceleration, &change, goal);
     let over = Interval { from_s, to_s: to_s + length_s };
-    let middle_s = from_s + at * (to_s - from_s) + 0.5 * length_s;
-    let at = ((middle_s - over.from_s) / (over.to_s - over.from_s)).clamp(0.0, 1.0);
-    Some((over, Enclosure { lower: (lower - rounding).max(0.0), upper: (upper - rounding).max(0.0), at }))
+    let middle_s = from_s + fraction * (to_s - from_s) + 0.5 * length_s;
+    let fraction = ((middle_s - over.from_s) / (over.to_s - over.from_s)).clamp(0.0, 1.0);
+    Some((over, Enclosure { lower: (lower - rounding).max(0.0), upper: (upper - rounding).max(0.0), at: fraction }))
 }
 
 impl Velocity {
@@ -225,8 +225,8 @@ mod tests {
         for degree in 1..9_u32 {
             let c: Vec<_> = (0..=degree)
                 .map(|k| {
-                    let of = |a: u32| f64::from((k * 7919 + degree * 104_729 + a * 31) % 17) - 8.0;
-                    Vector3::new(of(1), of(2), of(3))
+                    let coefficient = |a: u32| f64::from((k * 7919 + degree * 104_729 + a * 31) % 17) - 8.0;
+                    Vector3::new(coefficient(1), coefficient(2), coefficient(3))
                 })
                 .collect();
             let sampled =
@@ -249,7 +249,7 @@ mod tests {
     fn largest(velocities: &[Velocity], length_s: f64) -> Option<f64> {
         let (mut mean, all) =
             (MeanAcceleration::default(), Interval { from_s: f64::NEG_INFINITY, to_s: f64::INFINITY });
-        let found = velocities.iter().flat_map(|of| mean.take(of.clone(), length_s, all, goal()));
+        let found = velocities.iter().flat_map(|velocity| mean.take(velocity.clone(), length_s, all, goal()));
         found.collect::<Vec<_>>().into_iter().map(|(_, found)| found.upper).reduce(f64::max)
     }
 

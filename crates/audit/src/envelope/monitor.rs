@@ -71,9 +71,9 @@ struct LastState {
 
 impl LimitMonitor {
     pub(crate) fn new(envelope: &Envelope, window: Interval, accel_window_s: Option<f64>) -> Self {
-        let of = envelope.all().into_iter().map(LimitRecord::new).collect();
+        let records = envelope.all().into_iter().map(LimitRecord::new).collect();
         let fence = envelope.fence.clone().map(|fence| MonitoredFence { fence, interruption: Interruption::default() });
-        Self { fence, window, of, vehicles: Vec::new(), accel_window_s, means: Vec::new() }
+        Self { fence, window, of: records, vehicles: Vec::new(), accel_window_s, means: Vec::new() }
     }
 
     pub(crate) fn set_interruption(&mut self, interruption: Interruption) {
@@ -132,14 +132,14 @@ impl LimitMonitor {
     /// Judges mean accelerations over windows that end in the interval of a velocity.
     fn judge_mean_accelerations(&mut self, vehicle: usize, velocity: &Velocity) {
         let Some(length_s) = self.accel_window_s else { return };
-        let accelerations = self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::Acceleration);
-        for of in accelerations {
-            let (known, bound, width) = (of.known(), of.limit.bound(), WIDTH * of.limit.allowance());
+        let accelerations = self.of.iter_mut().filter(|record| record.limit.quantity == Quantity::Acceleration);
+        for record in accelerations {
+            let (known, bound, width) = (record.known(), record.limit.bound(), WIDTH * record.limit.allowance());
             let goal = Precision { known, bound, width, coarse: 0.0 };
             for found in self.means[vehicle].take(velocity.clone(), length_s, self.window, goal) {
-                of.note(vehicle, Some(found));
+                record.note(vehicle, Some(found));
             }
-            of.assumes = Some(Fact::number(FactKind::MeanAcceleration, Source::Declared, length_s, "s"));
+            record.assumes = Some(Fact::number(FactKind::MeanAcceleration, Source::Declared, length_s, "s"));
         }
     }
 
@@ -168,9 +168,9 @@ impl LimitMonitor {
             let lower = if is_whole || bounded_by_m_s2.is_none() { needed } else { f64::NEG_INFINITY };
             let upper = bounded_by_m_s2.map_or(lower, |most| most.max(lower));
             let over = Interval { from_s: from_s.max(window.from_s), to_s: seen.time_s.min(window.to_s) };
-            let at =
+            let fraction =
                 if over.to_s > over.from_s { (before.time_s - over.from_s) / (over.to_s - over.from_s) } else { 0.0 };
-            (over.from_s < over.to_s).then_some((over, Enclosure { lower, upper, at }))
+            (over.from_s < over.to_s).then_some((over, Enclosure { lower, upper, at: fraction }))
         });
         if bounded_by_m_s2.is_none() {
             let limits = self.of.iter_mut().filter(|limit| limit.limit.quantity == Quantity::Acceleration);
@@ -212,14 +212,16 @@ impl LimitMonitor {
             let second = derivative(&first, clipped_s);
             let is_mean = self.accel_window_s.is_some();
             self.observe_navigation(vehicle, clip);
-            for of in self.of.iter_mut().filter(|of| !(is_mean && of.limit.quantity == Quantity::Acceleration)) {
+            for record in
+                self.of.iter_mut().filter(|record| !(is_mean && record.limit.quantity == Quantity::Acceleration))
+            {
                 let goal = Precision {
-                    known: of.known(),
-                    bound: of.limit.bound(),
-                    width: WIDTH * of.limit.allowance(),
+                    known: record.known(),
+                    bound: record.limit.bound(),
+                    width: WIDTH * record.limit.allowance(),
                     coarse: 0.0,
                 };
-                let found = match (of.limit.quantity, of.limit.quantity.derivative()) {
+                let found = match (record.limit.quantity, record.limit.quantity.derivative()) {
                     (Quantity::Fence, _) => {
                         self.fence.as_ref().map(|fence| outside(fence, &part, Precision { coarse: COARSE, ..goal }))
                     }
@@ -229,7 +231,7 @@ impl LimitMonitor {
                     (Quantity::YawRate, _) => None,
                     (quantity, order) => Some(largest_of(quantity, [&part, &first, &second][order], goal)),
                 };
-                of.note(vehicle, found.map(|found| (clip, found)));
+                record.note(vehicle, found.map(|found| (clip, found)));
             }
         }
         if self.accel_window_s.is_some() {
@@ -275,26 +277,27 @@ impl LimitMonitor {
             let coefficients = vec![(start - before.position_m) / apart_s];
             self.judge_mean_accelerations(vehicle, &Velocity { over, coefficients, rounding_m_s: 0.0 });
         } else if by_m_s > SMOOTH && !is_mean && is_in(self.window) {
-            let accelerations = self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::Acceleration);
-            accelerations.for_each(|of| of.note_corner(vehicle, from_s, by_m_s));
+            let accelerations = self.of.iter_mut().filter(|record| record.limit.quantity == Quantity::Acceleration);
+            accelerations.for_each(|record| record.note_corner(vehicle, from_s, by_m_s));
         }
     }
 
     /// Records that a vehicle is seen in the window, which decides the navigation floor if it never moves horizontally.
     fn observe_navigation(&mut self, vehicle: usize, over: Interval) {
         let is_in_window = over.from_s <= self.window.to_s && self.window.from_s <= over.to_s;
-        let floors = self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::NavigationFloor && is_in_window);
-        floors.for_each(|of| of.observe(vehicle));
+        let floors =
+            self.of.iter_mut().filter(|record| record.limit.quantity == Quantity::NavigationFloor && is_in_window);
+        floors.for_each(|record| record.observe(vehicle));
     }
 
     /// Judges the yaw rate of a vehicle by its setpoints of time \[s\] and yaw \[deg\].
     pub(crate) fn judge_yaw(&mut self, vehicle: usize, setpoints: &[[f64; 2]]) {
-        for of in self.of.iter_mut().filter(|of| of.limit.quantity == Quantity::YawRate) {
+        for record in self.of.iter_mut().filter(|record| record.limit.quantity == Quantity::YawRate) {
             let still = Enclosure { lower: 0.0, upper: 0.0, at: 0.0 };
             let at_s = setpoints.first().map_or(0.0, |[time_s, _]| *time_s);
-            of.note(vehicle, Some((Interval { from_s: at_s, to_s: at_s }, still)));
+            record.note(vehicle, Some((Interval { from_s: at_s, to_s: at_s }, still)));
             for found in yaw_rates(setpoints, self.window) {
-                of.note(vehicle, Some(found));
+                record.note(vehicle, Some(found));
             }
         }
     }
@@ -305,17 +308,17 @@ impl LimitMonitor {
         vehicle: usize,
         mut find: impl FnMut(Limit, Option<&MonitoredFence>, Interval, f64) -> Option<EnclosedValue>,
     ) {
-        let Self { fence, window, of, .. } = self;
-        for of in of {
-            let known = of.known();
-            of.note(vehicle, find(of.limit, fence.as_ref(), *window, known));
+        let Self { fence, window, of: records, .. } = self;
+        for record in records {
+            let known = record.known();
+            record.note(vehicle, find(record.limit, fence.as_ref(), *window, known));
         }
     }
 
     /// Returns the verdicts for the judged vehicles. `is_whole` states that no motion was missed and no assumption
     /// contradicted.
     pub(crate) fn finish(self, judged: &[bool], is_whole: bool) -> EnvelopeOutcome {
-        EnvelopeOutcome { limits: self.of.into_iter().map(|of| of.finish(judged, is_whole)).collect() }
+        EnvelopeOutcome { limits: self.of.into_iter().map(|record| record.finish(judged, is_whole)).collect() }
     }
 }
 
@@ -353,8 +356,8 @@ fn position_value_between(
     let is_seen = |time_s: f64| time_s == before.time_s || time_s == seen.time_s;
     let ends = [(over.from_s, first), (over.to_s, second)].into_iter().filter(|&(time_s, _)| is_seen(time_s));
     let lower = if deviation_m == 0.0 { drawn } else { ends.map(|(_, value)| value).fold(f64::NEG_INFINITY, f64::max) };
-    let at = if second > first { 1.0 } else { 0.0 };
-    (over.from_s <= over.to_s).then_some((over, Enclosure { lower, upper: drawn + deviation_m, at }))
+    let fraction = if second > first { 1.0 } else { 0.0 };
+    (over.from_s <= over.to_s).then_some((over, Enclosure { lower, upper: drawn + deviation_m, at: fraction }))
 }
 
 /// Encloses speeds between two samples from the mean velocity, the recorded velocities, and the bound on acceleration.
@@ -366,9 +369,9 @@ fn speed_between(
     bound_m_s2: f64,
 ) -> Option<EnclosedValue> {
     let over = Interval { from_s: before.time_s.max(window.from_s), to_s: seen.time_s.min(window.to_s) };
-    let recorded = |of: &Sample| {
-        let in_window = window.from_s <= of.time_s && of.time_s <= window.to_s;
-        of.velocity_m_s.filter(|_| in_window).map(|velocity| limit.quantity.of(velocity))
+    let recorded = |sample: &Sample| {
+        let in_window = window.from_s <= sample.time_s && sample.time_s <= window.to_s;
+        sample.velocity_m_s.filter(|_| in_window).map(|velocity| limit.quantity.of(velocity))
     };
     let (start, end) = (recorded(before), recorded(seen));
     let added = bound_m_s2 * (seen.time_s - before.time_s);
@@ -381,9 +384,9 @@ fn speed_between(
     let lower = of_mean.max(largest_recorded);
     let by_ends = start.zip(end).map_or(f64::INFINITY, |(start, end)| 0.5 * (start + end + added));
     let upper = if bound_m_s2 == 0.0 { lower } else { lower.max((drawn + 0.5 * added).min(by_ends)) };
-    let at = if end == Some(lower) { 1.0 } else { 0.0 };
+    let fraction = if end == Some(lower) { 1.0 } else { 0.0 };
     let is_observed = over.from_s < over.to_s || (over.from_s == over.to_s && largest_recorded.is_finite());
-    is_observed.then_some((over, Enclosure { lower, upper, at }))
+    is_observed.then_some((over, Enclosure { lower, upper, at: fraction }))
 }
 
 /// Returns a bound on the rounding of the positions of two samples \[m\].
@@ -437,9 +440,9 @@ impl LimitRecord {
     }
 
     pub(super) fn note(&mut self, vehicle: usize, found: Option<EnclosedValue>) {
-        let Some((over, Enclosure { lower, upper, at })) = found else { return };
+        let Some((over, Enclosure { lower, upper, at: fraction })) = found else { return };
         self.observe(vehicle);
-        let at_s = over.from_s + at * (over.to_s - over.from_s);
+        let at_s = over.from_s + fraction * (over.to_s - over.from_s);
         let found = Exceedance { vehicle, from_s: over.from_s, to_s: over.to_s, lower, upper, at_s };
         let bound = self.limit.bound();
         if lower > bound {
@@ -474,9 +477,13 @@ impl LimitRecord {
             .filter(|&(vehicle, &is_judged)| is_judged && !is_observed(vehicle))
             .map(|(k, _)| k)
             .collect();
-        let signed = |of: Exceedance| {
-            let (lower, upper) = if limit.quantity.is_least() { (-of.upper, -of.lower) } else { (of.lower, of.upper) };
-            Exceedance { lower, upper, ..of }
+        let signed = |exceedance: Exceedance| {
+            let (lower, upper) = if limit.quantity.is_least() {
+                (-exceedance.upper, -exceedance.lower)
+            } else {
+                (exceedance.lower, exceedance.upper)
+            };
+            Exceedance { lower, upper, ..exceedance }
         };
         let listed = |times: ExceedanceIntervals| {
             let (list, tally) = times.finish();
@@ -516,11 +523,11 @@ impl ExceedanceIntervals {
             self.open.resize(found.vehicle + 1, None);
         }
         let last = &mut self.open[found.vehicle];
-        if let Some(of) = last.as_mut().filter(|of| of.to_s >= found.from_s) {
-            of.to_s = of.to_s.max(found.to_s);
-            of.upper = of.upper.max(found.upper);
-            if found.lower > of.lower {
-                (of.lower, of.at_s) = (found.lower, found.at_s);
+        if let Some(previous) = last.as_mut().filter(|previous| previous.to_s >= found.from_s) {
+            previous.to_s = previous.to_s.max(found.to_s);
+            previous.upper = previous.upper.max(found.upper);
+            if found.lower > previous.lower {
+                (previous.lower, previous.at_s) = (found.lower, found.at_s);
             }
         } else {
             self.count += 1;

@@ -43,14 +43,14 @@ pub(super) fn lowness_between(
     if over.from_s >= over.to_s || (!is_moving && speed + 0.5 * bound_m_s2 * h <= LEVEL_MOTION_M_S) {
         return None;
     }
-    let at = if second < first { 1.0 } else { 0.0 };
+    let fraction = if second < first { 1.0 } else { 0.0 };
     let is_whole = over.from_s == before.time_s && over.to_s == seen.time_s;
     let lower = match bound_m_s2 > 0.0 {
         false => -lowest,
         true if is_moving && is_whole => -highest - deviation_m,
         true => f64::NEG_INFINITY,
     };
-    Some((over, Enclosure { lower, upper: deviation_m - lowest, at }))
+    Some((over, Enclosure { lower, upper: deviation_m - lowest, at: fraction }))
 }
 
 /// Encloses the negated least height of a curve where it moves horizontally. `place` and `velocity` are polynomials of

@@ -35,6 +35,8 @@ const NAMES_LISTED: usize = 12;
 #[derive(Clone, Debug)]
 pub struct TrackAuditor {
     settings: Settings,
+    has_plan: bool,
+    has_own_limit: bool,
     vehicles: Vec<Vehicle>,
     rates: Option<Rates>,
     windows: Windows,
@@ -77,13 +79,15 @@ impl TrackAuditor {
     pub fn new(settings: Settings) -> Result<Self, RecordedError> {
         settings.check()?;
         Ok(Self {
-            least_offset_s: settings.vehicles.values().map(|of| of.offset_s).fold(0.0, f64::min),
+            least_offset_s: settings.vehicles.values().map(|vehicle| vehicle.offset_s).fold(0.0, f64::min),
             windows: Windows::new(settings.limits(), &settings.obstacles, &settings.land_on),
             envelope: (!settings.envelope.is_empty())
                 .then(|| LimitMonitor::new(&settings.envelope, settings.window(), settings.accel_window_s)),
             well_clear: settings.well_clear.map(WellClearMonitor::new),
             exempt: settings.above_m.map(|_| ExemptTime::default()),
             settings,
+            has_plan: false,
+            has_own_limit: false,
             vehicles: Vec::new(),
             rates: None,
             results: Results::bounded(Interruption::default()),
@@ -96,6 +100,20 @@ impl TrackAuditor {
             segments: 0,
             refused: None,
         })
+    }
+
+    /// Declares that the recording is compared with a plan. Without limits, separations are then not judged. Call it
+    /// before the first [`push`](Self::push).
+    #[must_use]
+    pub fn with_plan(self) -> Self {
+        Self { has_plan: true, ..self }
+    }
+
+    /// Declares that delta or the ellipsoid comes from the recording itself. With limits on single vehicles,
+    /// separations are then judged only if the recording has a pair to judge.
+    #[must_use]
+    pub fn with_own_limit(self) -> Self {
+        Self { has_own_limit: true, ..self }
     }
 
     /// Also records the smallest distance over time: see [`Outcome::smallest`]. Call it before the first
@@ -175,7 +193,7 @@ impl TrackAuditor {
             }
             Err(error) => return Err(error),
         };
-        if unseen && let Err(refused) = vehicle.check(&self.settings) {
+        if unseen && let Err(refused) = vehicle.check(&self.settings, self.has_plan) {
             self.refused = Some(refused);
             return Ok(());
         }
@@ -249,16 +267,17 @@ impl TrackAuditor {
 
     /// Returns whether a limit on separations exists, from the settings or from the recording's radii.
     fn has_separation_limit(&self) -> bool {
-        self.settings.has_separation_limit() || self.vehicles.iter().any(|vehicle| vehicle.radius_m.is_some())
+        self.settings.has_separation_limit(self.has_plan)
+            || self.vehicles.iter().any(|vehicle| vehicle.radius_m.is_some())
     }
 
     /// Returns whether the verdict includes separations. It always does if the settings limit them. If the only limits
     /// are those of the recording, and the settings limit single vehicles, two conditions must hold. There are two
     /// vehicles, or one and an obstacle, and each vehicle has a limit.
     fn judges_separation(&self) -> bool {
-        let is_own = self.settings.is_own_limit || !self.settings.has_separation_limit();
+        let is_own = self.has_own_limit || !self.settings.has_separation_limit(self.has_plan);
         let mut judged = self.vehicles.iter().filter(|vehicle| vehicle.is_judged());
-        if !is_own || !self.settings.judges_single_vehicles() {
+        if !is_own || !self.settings.judges_single_vehicles(self.has_plan) {
             return true;
         }
         let is_a_pair_present = match judged.clone().count() {

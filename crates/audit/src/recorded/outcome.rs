@@ -89,12 +89,12 @@ pub(super) fn vehicles_without_others(presence: &[Option<Presence>]) -> Vec<usiz
     present.sort_by(|(a, _), (b, _)| a.from_s.total_cmp(&b.from_s));
     let mut last_s = f64::NEG_INFINITY;
     let mut alone = Vec::new();
-    for (place, &(of, vehicle)) in present.iter().enumerate() {
+    for (place, &(index, vehicle)) in present.iter().enumerate() {
         let next_s = present.get(place + 1).map_or(f64::INFINITY, |(next, _)| next.from_s);
-        if last_s < of.from_s && of.to_s < next_s {
+        if last_s < index.from_s && index.to_s < next_s {
             alone.push(vehicle);
         }
-        last_s = last_s.max(of.to_s);
+        last_s = last_s.max(index.to_s);
     }
     alone.sort_unstable();
     alone
@@ -224,7 +224,7 @@ impl Outcome {
         match pair {
             ObjectPair::Vehicles(pair) => [self.name(pair.first()), self.name(pair.second())],
             ObjectPair::Obstacle { vehicle, obstacle } => {
-                [self.name(vehicle), obstacles.get(obstacle).map_or(String::new(), |of| of.name.clone())]
+                [self.name(vehicle), obstacles.get(obstacle).map_or(String::new(), |obstacle| obstacle.name.clone())]
             }
         }
     }
@@ -252,7 +252,7 @@ pub(super) fn absences(vehicles: &[Vehicle], settings: &Settings, span_s: Option
     };
     let selected = vehicles.iter().enumerate().filter(|(_, vehicle)| vehicle.is_selected);
     let absent = selected.filter(|(_, vehicle)| !is_throughout(vehicle));
-    absent.map(|(vehicle, of)| Absence { vehicle, seen: of.presence }).collect()
+    absent.map(|(vehicle, state)| Absence { vehicle, seen: state.presence }).collect()
 }
 
 /// Largest number of gaps that are held before all but the longest and the first of each vehicle are dropped.

@@ -113,16 +113,19 @@ impl PlanFindings {
         let mut vehicles = BTreeMap::new();
         for deviation in &self.deviations {
             let name = names.get(deviation.vehicle)?;
-            let given = settings.vehicles.get(name).and_then(|of| of.radius_m).or(settings.radius_m).unwrap_or(0.0);
+            let given =
+                settings.vehicles.get(name).and_then(|vehicle| vehicle.radius_m).or(settings.radius_m).unwrap_or(0.0);
             let half = (0.5 * settings.delta_m.unwrap_or(0.0)).max(given);
             let apart = self.tube_m.unwrap_or(deviation.upper_m);
             let radius_m = Some((half + apart) * (1.0 + ROUNDING));
             vehicles.insert(name.clone(), VehicleSettings { radius_m, offset_s: shift_s, max_accel_m_s2: None });
         }
         let only = Some(vehicles.keys().cloned().collect());
-        let (from_s, to_s) = self.common_s.map_or((settings.from_s, settings.to_s), |of| (Some(of.0), Some(of.1)));
+        let (from_s, to_s) =
+            self.common_s.map_or((settings.from_s, settings.to_s), |span_s| (Some(span_s.0), Some(span_s.1)));
         // A flight above the ground is planned above it, less the largest distance.
-        let most_m = self.deviations.iter().map(|of| of.upper_m).fold(self.tube_m.unwrap_or(0.0), f64::max);
+        let most_m =
+            self.deviations.iter().map(|deviation| deviation.upper_m).fold(self.tube_m.unwrap_or(0.0), f64::max);
         let above_m = settings.above_m.map(|above_m| above_m - most_m * (1.0 + ROUNDING) - ROUNDING * above_m.abs());
         let max_gap_s = (!self.has_curves).then_some(f64::INFINITY);
         Some(Settings { from_s, to_s, above_m, max_gap_s, vehicles, only, ..Settings::default() })
@@ -213,14 +216,14 @@ impl PlanComparison {
             unknown.extend(unknown_times(index, &vehicle.segments, planned, shortest_s));
         }
         let common_s = if is_estimated { self.common_time(&plan, delay_s) } else { None }.filter(|common_s| {
-            let within: Vec<_> = unknown.iter().filter_map(|of| self.unknown_within(of, *common_s)).collect();
+            let within: Vec<_> = unknown.iter().filter_map(|unknown| self.unknown_within(unknown, *common_s)).collect();
             let is_limited = within != unknown;
             unknown = within;
             is_limited
         });
         let known = deviations.len() == self.flight.iter().filter(|vehicle| vehicle.is_selected).count();
-        let has_left = |of: &Deviation| tube_m.is_some_and(|tube_m| of.lower_m > tube_m);
-        let is_within = |of: &Deviation| tube_m.is_none_or(|tube_m| of.upper_m <= tube_m);
+        let has_left = |deviation: &Deviation| tube_m.is_some_and(|tube_m| deviation.lower_m > tube_m);
+        let is_within = |deviation: &Deviation| tube_m.is_none_or(|tube_m| deviation.upper_m <= tube_m);
         let is_decided = known && !deviations.is_empty() && unknown.is_empty() && deviations.iter().all(is_within);
         let searched_s = is_estimated.then_some((-MOST_DELAY_S, MOST_DELAY_S));
         let status = Status::new(deviations.iter().any(has_left), is_decided);
@@ -277,10 +280,11 @@ impl PlanComparison {
 
     /// Returns the part of an unknown time within the common time. At its ends, a planned time shorter than a sampling
     /// interval does not count, because the vehicles of a flight are rarely sampled at the same instants.
-    fn unknown_within(&self, of: &Unknown, (from_s, to_s): (f64, f64)) -> Option<Unknown> {
-        let part = Unknown { from_s: of.from_s.max(from_s), to_s: of.to_s.min(to_s), ..*of };
+    fn unknown_within(&self, unknown: &Unknown, (from_s, to_s): (f64, f64)) -> Option<Unknown> {
+        let part = Unknown { from_s: unknown.from_s.max(from_s), to_s: unknown.to_s.min(to_s), ..*unknown };
         let is_at_end = part.from_s == from_s || part.to_s == to_s;
-        let interval_s = if of.is_flown || !is_at_end { 0.0 } else { self.flight[of.vehicle].mean_interval_s() };
+        let interval_s =
+            if unknown.is_flown || !is_at_end { 0.0 } else { self.flight[unknown.vehicle].mean_interval_s() };
         let shortest_s = if is_at_end { interval_s.max(SHORTEST_UNKNOWN_S) } else { 0.0 };
         (part.to_s > part.from_s && part.to_s - part.from_s >= shortest_s).then_some(part)
     }
@@ -309,7 +313,9 @@ impl PlanComparison {
         let cost = |delay_s: f64| {
             positions
                 .iter()
-                .map(|(planned, time_s, at)| (position_at(planned, time_s - delay_s) - at).norm_squared())
+                .map(|(planned, time_s, position_m)| {
+                    (position_at(planned, time_s - delay_s) - position_m).norm_squared()
+                })
                 .sum()
         };
         Ok(best_delay(cost))
@@ -468,10 +474,10 @@ fn unknown_times(vehicle: usize, flown: &[Segment], planned: &[Segment], shortes
             None => found.push(Unknown { vehicle, from_s: pair[0], to_s: pair[1], is_flown }),
         }
     }
-    found.retain(|of| {
-        let is_at_end = Some(of.from_s) == first_s || Some(of.to_s) == last_s;
-        let allowed_s = if of.is_flown { SHORTEST_UNKNOWN_S } else { shortest_s };
-        !is_at_end || of.to_s - of.from_s >= allowed_s
+    found.retain(|finding| {
+        let is_at_end = Some(finding.from_s) == first_s || Some(finding.to_s) == last_s;
+        let allowed_s = if finding.is_flown { SHORTEST_UNKNOWN_S } else { shortest_s };
+        !is_at_end || finding.to_s - finding.from_s >= allowed_s
     });
     found
 }

@@ -65,8 +65,8 @@ impl PositionLookup {
                 let done = &mut self.done[index];
                 *done += self.times_s[*done..].partition_point(|&time_s| time_s < segment.from_s);
                 while let Some(&time_s) = self.times_s.get(*done).filter(|&&time_s| time_s <= segment.to_s) {
-                    let at = segment.position(time_s).component_mul(&self.scale);
-                    set_row(&mut self.positions_m[*done], index, at);
+                    let position = segment.position(time_s).component_mul(&self.scale);
+                    set_row(&mut self.positions_m[*done], index, position);
                     // The next segment begins where this one ends, and may use that time again.
                     if time_s == segment.to_s {
                         break;
@@ -173,8 +173,8 @@ impl PairSeries {
     /// [`RecordedError`] if an item is invalid.
     pub fn push(&mut self, items: &[Item]) -> Result<(), RecordedError> {
         for item in items {
-            let of = self.vehicles.iter_mut().find(|(index, _)| *index == item.vehicle());
-            if let Some((_, vehicle)) = of {
+            let found = self.vehicles.iter_mut().find(|(index, _)| *index == item.vehicle());
+            if let Some((_, vehicle)) = found {
                 vehicle.take(item)?;
             }
         }
@@ -211,7 +211,10 @@ impl PairSeries {
         self.known_s = known_s;
         let scale = self.scale;
         for sample in found {
-            self.keep(PairSample { positions_m: sample.positions_m.map(|at| at.component_mul(&scale)), ..sample });
+            self.keep(PairSample {
+                positions_m: sample.positions_m.map(|position_m| position_m.component_mul(&scale)),
+                ..sample
+            });
         }
         for (_, vehicle) in &mut self.vehicles {
             vehicle.discard_until(until_s);
@@ -249,7 +252,7 @@ impl PairSample {
 /// segments. Adds at least one sample.
 fn samples(overlap: &Overlap<'_>, target: Target<'_>, found: &mut Vec<PairSample>) {
     let Overlap { first, second, interval: Interval { from_s, to_s } } = *overlap;
-    let at = |time_s: f64| {
+    let sample_at = |time_s: f64| {
         let positions_m = [first.position(time_s), second.position(time_s)];
         let deviation_m = (first.deviation_at(time_s) + second.deviation_at(time_s)) * target.per_metre();
         let distance_m = target.distance(positions_m[1] - positions_m[0]);
@@ -268,7 +271,7 @@ fn samples(overlap: &Overlap<'_>, target: Target<'_>, found: &mut Vec<PairSample
     }
     times_s.sort_unstable_by(f64::total_cmp);
     times_s.dedup();
-    found.extend(times_s.into_iter().map(at));
+    found.extend(times_s.into_iter().map(sample_at));
 }
 
 #[cfg(test)]
@@ -296,12 +299,12 @@ mod tests {
         assert_eq!(gaps, [(0, 2.0, 6.0), (1, 2.25, 6.25)]);
         let (times_s, positions_m) = lookup.finish();
         assert_eq!(times_s, times_to_look_up);
-        let x = |vehicle: usize| positions_m.iter().map(|at| at[(vehicle, 0)]).collect::<Vec<_>>();
-        let is = |found: Vec<f64>, expected: [f64; 7]| {
+        let x = |vehicle: usize| positions_m.iter().map(|rows| rows[(vehicle, 0)]).collect::<Vec<_>>();
+        let check = |found: Vec<f64>, expected: [f64; 7]| {
             let same = |(a, b): (&f64, &f64)| (a - b).abs() < 1e-12 || (a.is_nan() && b.is_nan());
             assert!(found.iter().zip(&expected).all(same), "{found:?}");
         };
-        is(x(0), [0.0, 0.5, 2.0, f64::NAN, 6.5, 8.0, f64::NAN]);
-        is(x(1), [f64::NAN, 2.5, 17.5, f64::NAN, 62.5, 77.5, f64::NAN]);
+        check(x(0), [0.0, 0.5, 2.0, f64::NAN, 6.5, 8.0, f64::NAN]);
+        check(x(1), [f64::NAN, 2.5, 17.5, f64::NAN, 62.5, 77.5, f64::NAN]);
     }
 }

@@ -13,7 +13,7 @@ use crate::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
 use crate::well_clear::WellClear;
 use tautline_core::option::{
     ABOVE, ACCEL_WINDOW, CYLINDER, DELTA, ELLIPSOID, FROM, LAND_ON, LIMIT, MAX_ACCEL, MAX_GAP, MOTION, OBSTACLES,
-    OFFSET, Opt, PLAN, RADIUS, TO, WELL_CLEAR,
+    OFFSET, Opt, RADIUS, TO, WELL_CLEAR,
 };
 
 /// Largest accepted number: a length \[m\], a time \[s\] or an acceleration \[m/s^2\].
@@ -141,11 +141,6 @@ pub struct Settings {
     /// Length of the windows over which accelerations are averaged \[s\]: change of velocity over the window, divided
     /// by its length. `None` uses instantaneous accelerations, and does not compare corners of curves with a limit.
     pub accel_window_s: Option<f64>,
-    /// Whether the recording is compared with a plan. Without limits, separations are then not judged.
-    pub has_plan: bool,
-    /// Whether delta or the ellipsoid comes from the recording itself. With limits on single vehicles, separations are
-    /// then judged only if the recording has a pair to judge.
-    pub is_own_limit: bool,
 }
 
 impl Settings {
@@ -181,8 +176,6 @@ impl Settings {
             yaw: _,
             envelope,
             accel_window_s,
-            has_plan,
-            is_own_limit: _,
         } = self;
         let motion = motion.filter(|motion| motion.rests_on_seconds());
         let mut timed: Vec<_> = motion.map(|motion| TimedSetting::of(MOTION, motion.name())).into_iter().collect();
@@ -195,7 +188,6 @@ impl Settings {
         add(max_gap_s.is_some_and(f64::is_finite), MAX_GAP);
         add(max_accel_m_s2.is_some(), MAX_ACCEL);
         add(accel_window_s.is_some(), ACCEL_WINDOW);
-        add(*has_plan, PLAN);
         add(well_clear.is_some_and(WellClear::rests_on_seconds), WELL_CLEAR);
         for (name, VehicleSettings { radius_m: _, offset_s, max_accel_m_s2 }) in vehicles {
             timed.extend((*offset_s != 0.0).then(|| TimedSetting::of(OFFSET, name)));
@@ -214,18 +206,18 @@ impl Settings {
     }
 
     /// Returns whether the settings limit separations or distances from obstacles, apart from a recording's own radii.
-    pub(super) fn has_separation_limit(&self) -> bool {
+    pub(super) fn has_separation_limit(&self, has_plan: bool) -> bool {
         let is_given =
             [self.delta_m.is_some(), self.ellipsoid_m.is_some(), self.cylinder.is_some(), self.radius_m.is_some()];
         is_given.contains(&true)
             || !self.obstacles.is_empty()
-            || self.vehicles.values().any(|of| of.radius_m.is_some())
-            || !self.judges_single_vehicles()
+            || self.vehicles.values().any(|vehicle| vehicle.radius_m.is_some())
+            || !self.judges_single_vehicles(has_plan)
     }
 
     /// Returns whether something else than separations is judged: limits of vehicles, a plan, or well clear.
-    pub(super) fn judges_single_vehicles(&self) -> bool {
-        !self.envelope.is_empty() || self.has_plan || self.well_clear.is_some()
+    pub(super) fn judges_single_vehicles(&self, has_plan: bool) -> bool {
+        !self.envelope.is_empty() || has_plan || self.well_clear.is_some()
     }
 
     pub(super) fn limits(&self) -> Limits {
@@ -244,11 +236,12 @@ impl Settings {
         const POSITIVE: (f64, &str) = (MIN_LIMIT_M, "a finite number above 0");
         const NOT_NEGATIVE: (f64, &str) = (0.0, "a finite number of at least 0");
         const FINITE: (f64, &str) = (-LARGEST, "a finite number");
-        let check_of = |option, of: Option<&str>, value: Option<f64>, (least, range): (f64, &'static str)| match value {
+        let check_of = |option, name: Option<&str>, value: Option<f64>, (least, range): (f64, &'static str)| match value
+        {
             Some(value) if !(least..=LARGEST).contains(&value) => {
                 let is_of_range = value.is_finite() && value > 0.0 || value < -LARGEST;
                 let range = if is_of_range { "a number of a size between 1e-70 and 1e70" } else { range };
-                Err(RecordedError::OutOfRange { option, of: of.map(str::to_owned), range, value })
+                Err(RecordedError::OutOfRange { option, of: name.map(str::to_owned), range, value })
             }
             _ => Ok(()),
         };
@@ -381,7 +374,10 @@ impl Limits {
 #[non_exhaustive]
 pub enum RecordedError {
     /// A number of the settings is out of range.
-    #[error("{option}: must be {range}, got {}{value:?}", of.as_ref().map(|of| format!("{of}=")).unwrap_or_default())]
+    #[error(
+        "{option}: must be {range}, got {}{value:?}",
+        of.as_ref().map(|name| format!("{name}=")).unwrap_or_default()
+    )]
     OutOfRange {
         /// The setting.
         option: Opt,

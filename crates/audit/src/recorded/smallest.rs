@@ -45,7 +45,7 @@ impl SmallestDistances {
             let over = Interval { from_s: two[0], to_s: two[1] };
             let mut found = self.closest(vehicles, over);
             // Straight segments are judged whole. An approach outside the slice belongs to another slice.
-            if found.first().is_some_and(|of| of.time_s < over.from_s || over.to_s < of.time_s) {
+            if found.first().is_some_and(|approach| approach.time_s < over.from_s || over.to_s < approach.time_s) {
                 let parts = parts.get_or_insert_with(|| vehicles.to_vec());
                 for (part, vehicle) in parts.iter_mut().zip(vehicles) {
                     let of_slice = &vehicle.segments[within(&vehicle.segments, over)];
@@ -187,7 +187,7 @@ mod tests {
             Item::Sample(Sample { vehicle, time_s, position_m, velocity_m_s: None, radius_m: None })
         };
         let mut items: Vec<_> =
-            tracks.iter().enumerate().flat_map(|(k, track)| track.iter().map(move |at| sample(k, at))).collect();
+            tracks.iter().enumerate().flat_map(|(k, track)| track.iter().map(move |point| sample(k, point))).collect();
         items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
         let names: Vec<_> = (0..tracks.len()).map(|k| k.to_string()).collect();
         let mut auditor = TrackAuditor::new(settings).expect("settings").with_smallest();
@@ -227,23 +227,23 @@ mod tests {
             x.sort_by(f64::total_cmp);
             x.windows(2).map(|two| two[1] - two[0]).fold(f64::INFINITY, f64::min)
         };
-        for of in found {
-            let [from_s, to_s] = of.known_s();
+        for slice in found {
+            let [from_s, to_s] = slice.known_s();
             let between = changes.windows(2).map(|two| f64::midpoint(two[0].max(from_s), two[1].min(to_s)));
             for time_s in between.filter(|time_s| from_s < *time_s && *time_s < to_s) {
-                assert!(present_at(time_s).len() > 1, "fewer than two vehicles at {time_s} s: {of:?}");
-                assert!(of.closest.lower_m <= nearest(time_s), "{time_s} s: {of:?}");
+                assert!(present_at(time_s).len() > 1, "fewer than two vehicles at {time_s} s: {slice:?}");
+                assert!(slice.closest.lower_m <= nearest(time_s), "{time_s} s: {slice:?}");
             }
-            let [first, second] = of.closest.pair.vehicles().map_or([0; 2], |pair| [pair.first(), pair.second()]);
-            let present = present_at(of.closest.time_s);
-            assert!(present.contains(&first) && present.contains(&second), "{of:?}");
-            assert_eq!(of.closest.lower_m, tracks[second][0].1 - tracks[first][0].1, "{of:?}");
+            let [first, second] = slice.closest.pair.vehicles().map_or([0; 2], |pair| [pair.first(), pair.second()]);
+            let present = present_at(slice.closest.time_s);
+            assert!(present.contains(&first) && present.contains(&second), "{slice:?}");
+            assert_eq!(slice.closest.lower_m, tracks[second][0].1 - tracks[first][0].1, "{slice:?}");
         }
         assert!(found.windows(2).all(|two| two[0].to_s <= two[1].from_s), "{found:?}");
     }
 
     fn extents(found: &[Slice]) -> Vec<(f64, f64)> {
-        found.iter().map(|of| (of.from_s, of.to_s)).collect()
+        found.iter().map(|slice| (slice.from_s, slice.to_s)).collect()
     }
 
     #[test]
@@ -252,8 +252,11 @@ mod tests {
         let tracks =
             [times().map(|t| (t, 0.0)).collect(), times().map(|t| (t, if t == 20.0 { 0.25 } else { 20.0 })).collect()];
         let found = slices(Settings::delta(1.0), &tracks);
-        assert_eq!(found.iter().map(|of| of.to_s).collect::<Vec<_>>(), times().skip(1).collect::<Vec<_>>());
-        assert!(found[..19].iter().all(|of| of.closest.lower_m == 20.0 && of.closest.time_s <= of.to_s), "{found:?}");
+        assert_eq!(found.iter().map(|slice| slice.to_s).collect::<Vec<_>>(), times().skip(1).collect::<Vec<_>>());
+        assert!(
+            found[..19].iter().all(|slice| slice.closest.lower_m == 20.0 && slice.closest.time_s <= slice.to_s),
+            "{found:?}"
+        );
         assert_eq!((found[19].closest.lower_m, found[19].closest.time_s), (0.25, 20.0));
     }
 
@@ -264,7 +267,7 @@ mod tests {
             slices(Settings::delta(1.0), &[0.0, 2.0].map(|speed| times.map(|t| (t, speed * (t + 1.0))).to_vec()));
         let wide: Vec<_> = extents(&found).into_iter().filter(|(from_s, to_s)| from_s < to_s).collect();
         assert_eq!(wide, [(0.0, 1.0), (1.0, 2.0), (2.0, 3.0), (8.0, 9.0), (9.0, 10.0)]);
-        assert!(found.iter().all(|of| !(3.1..8.0).contains(&of.to_s)), "{found:?}");
+        assert!(found.iter().all(|slice| !(3.1..8.0).contains(&slice.to_s)), "{found:?}");
     }
 
     #[test]
@@ -273,10 +276,11 @@ mod tests {
             |x: [f64; 2]| [(0.0, x[0]), (2.0, x[0]), (4.0, x[0]), (50.0, x[1]), (52.0, x[1]), (54.0, x[1])].to_vec();
         let tracks = [of_two([0.0; 2]), of_two([5.0, 3.0]), at_rest(100.0, [0.0, 4.0], 0.125)];
         let found = slices(with_gaps(2.0), &tracks);
-        assert!(found.iter().all(|of| of.is_whole && (of.to_s <= 4.0 || of.from_s >= 50.0)), "{found:?}");
-        let first = found.iter().find(|of| of.closest.lower_m == 3.0).expect("the separation is 3 m after the gap");
+        assert!(found.iter().all(|slice| slice.is_whole && (slice.to_s <= 4.0 || slice.from_s >= 50.0)), "{found:?}");
+        let first =
+            found.iter().find(|slice| slice.closest.lower_m == 3.0).expect("the separation is 3 m after the gap");
         assert_eq!((first.from_s, first.to_s), (50.0, 50.0), "the instant at which both are present again");
-        assert_eq!(found.iter().map(|of| of.to_s).fold(0.0, f64::max), 54.0);
+        assert_eq!(found.iter().map(|slice| slice.to_s).fold(0.0, f64::max), 54.0);
     }
 
     #[test]
@@ -285,26 +289,26 @@ mod tests {
         let late = at_rest(50.0, [3600.0, 3610.0], 0.25);
         let found = slices(with_gaps(2.0), &[a, b, late]);
         assert_eq!((found[0].from_s, found[found.len() - 1].to_s), (0.0, 9.5));
-        assert!(found.iter().all(|of| of.to_s - of.from_s <= 0.5), "{found:?}");
+        assert!(found.iter().all(|slice| slice.to_s - slice.from_s <= 0.5), "{found:?}");
     }
 
     #[test]
     fn vehicles_on_the_ground_have_no_slice() {
-        let at = |vehicle: usize, time_s: f64, z: f64| {
+        let sample_at = |vehicle: usize, time_s: f64, z: f64| {
             let position_m = Vector3::new(5.0 * vehicle as f64, 0.0, z);
             Item::Sample(Sample { vehicle, time_s, position_m, velocity_m_s: None, radius_m: None })
         };
         let heights = [(0.0, 0.0), (10.0, 0.0), (20.0, 10.0), (30.0, 10.0)];
-        let mut items: Vec<_> = heights.iter().flat_map(|&(t, z)| [at(0, t, z), at(1, t, z)]).collect();
+        let mut items: Vec<_> = heights.iter().flat_map(|&(t, z)| [sample_at(0, t, z), sample_at(1, t, z)]).collect();
         // A third vehicle aside, with more samples at the beginning.
-        items.extend((1..=20).map(|k| at(2, 0.25 * f64::from(k), 0.0)));
+        items.extend((1..=20).map(|k| sample_at(2, 0.25 * f64::from(k), 0.0)));
         items.sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
         let settings = Settings { above_m: Some(2.0), motion: Some(Interpolation::Linear), ..with_gaps(10.0) };
         let mut auditor = TrackAuditor::new(settings).expect("settings").with_smallest();
         auditor.push(&["a", "b", "c"].map(str::to_owned), &items).expect("valid items");
         let found = auditor.finish().expect("judged").smallest;
-        assert!(found.iter().all(|of| of.from_s >= 12.0), "{found:?}");
-        assert_eq!(found.iter().map(|of| of.to_s - of.from_s).sum::<f64>(), 18.0);
+        assert!(found.iter().all(|slice| slice.from_s >= 12.0), "{found:?}");
+        assert_eq!(found.iter().map(|slice| slice.to_s - slice.from_s).sum::<f64>(), 18.0);
     }
 
     #[test]
@@ -319,7 +323,7 @@ mod tests {
         let found = slices(with_gaps(0.9), &tracks);
         check(&tracks, 0.9, &found);
         assert!(
-            found.len() < 600 && found.iter().any(|of| of.is_whole) && found.iter().any(|of| !of.is_whole),
+            found.len() < 600 && found.iter().any(|slice| slice.is_whole) && found.iter().any(|slice| !slice.is_whole),
             "{}",
             found.len()
         );
@@ -336,19 +340,19 @@ mod tests {
             ),
         ) {
             let tracks: Vec<Track> = (0..).zip(tracks).map(|(k, (from, steps)): (i32, _)| {
-                let later = steps.into_iter().scan(from, |at, step| { *at += step; Some(*at) });
+                let later = steps.into_iter().scan(from, |time_s, step| { *time_s += step; Some(*time_s) });
                 let times = std::iter::once(from).chain(later);
                 times.map(|eighths| (0.125 * f64::from(eighths), 3.0_f64.powi(k))).collect()
             }).collect();
             let found = slices(with_gaps(2.5), &tracks);
             check(&tracks, 2.5, &found);
-            prop_assert!(found.iter().all(|of| of.is_whole));
+            prop_assert!(found.iter().all(|slice| slice.is_whole));
             let all: Vec<_> = tracks.iter().flat_map(|track| stretches(track, 2.5)).collect();
             for (k, a) in all.iter().enumerate() {
                 for b in &all[k + 1..] {
                     let (from_s, to_s) = (a[0].max(b[0]), a[1].min(b[1]));
                     let at_s = f64::midpoint(from_s, to_s);
-                    let is_covered = found.iter().any(|of| of.from_s <= at_s && at_s <= of.to_s);
+                    let is_covered = found.iter().any(|slice| slice.from_s <= at_s && at_s <= slice.to_s);
                     prop_assert!(from_s >= to_s || is_covered, "{at_s} s");
                 }
             }

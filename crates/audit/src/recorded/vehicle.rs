@@ -83,11 +83,11 @@ impl Vehicle {
     }
 
     /// Checks after the first sample that the vehicle can be judged.
-    pub(super) fn check(&self, settings: &Settings) -> Result<(), RecordedError> {
+    pub(super) fn check(&self, settings: &Settings, has_plan: bool) -> Result<(), RecordedError> {
         if self.motion == Some(Interpolation::Bounded) && self.max_accel_m_s2.is_nan() {
             return Err(RecordedError::NoBound { vehicle: self.name.clone() });
         }
-        if settings.has_separation_limit() && !self.has_limit(settings) {
+        if settings.has_separation_limit(has_plan) && !self.has_limit(settings) {
             return Err(RecordedError::NoLimit { vehicle: self.name.clone() });
         }
         Ok(())
@@ -179,8 +179,8 @@ impl Vehicle {
             last => {
                 gap = last.map(|last| Gap::new(sample.vehicle, last.time_s, time_s));
                 self.last_interval = None;
-                let at = self.scaled(sample.position_m);
-                self.add_straight((time_s, time_s), at, at);
+                let position = self.scaled(sample.position_m);
+                self.add_straight((time_s, time_s), position, position);
             }
         }
         self.last = Some(seen);
@@ -380,7 +380,7 @@ fn split_at_height(segment: Segment, height: f64, into: &mut Vec<Segment>) {
 
 fn split_curve_at_height(segment: &Segment, height: f64, into: &mut Vec<Segment>) {
     let length_s = segment.to_s - segment.from_s;
-    let at = |u: f64| if u >= 1.0 { segment.to_s } else { segment.from_s + length_s * u };
+    let time_at = |u: f64| if u >= 1.0 { segment.to_s } else { segment.from_s + length_s * u };
     let on_ground = |start: f64, length: f64| {
         let [from_s, to_s] = [start, start + length].map(|u| segment.from_s + length_s * u);
         let mut above: Vec<f64> = segment.local(Interval { from_s, to_s }).iter().map(|c| c.z).collect();
@@ -394,7 +394,7 @@ fn split_curve_at_height(segment: &Segment, height: f64, into: &mut Vec<Segment>
         }
     };
     for (start, end, grounded) in classify_parts(0.0, MAX_PARTS, on_ground) {
-        let part = segment.clipped(Interval { from_s: at(start), to_s: at(end) });
+        let part = segment.clipped(Interval { from_s: time_at(start), to_s: time_at(end) });
         into.extend(part.map(|part| Segment { grounded, ..part }));
     }
 }

@@ -189,7 +189,7 @@ impl WellClearMonitor {
         reaches.sort_by(|a, b| a.low.x.total_cmp(&b.low.x).then(a.vehicle.cmp(&b.vehicle)));
         let is_in_air = |reach: &Reach| segments(reach.vehicle).iter().any(|part| part.grounded != Some(true));
         self.has_judged |= reaches.len() > 1 && reaches.iter().any(is_in_air);
-        let fastest_m_s = reaches.iter().map(|of| of.speed_m_s).fold(0.0, f64::max);
+        let fastest_m_s = reaches.iter().map(|reach| reach.speed_m_s).fold(0.0, f64::max);
         for (k, a) in reaches.iter().enumerate() {
             if self.interruption.is_set() {
                 return;
@@ -230,7 +230,7 @@ impl WellClearMonitor {
     /// Adds a loss. A short uncertain time that touches a certain loss of the pair is the rounding of its end.
     fn add(&mut self, new: WellClearLoss, is_certain: bool) {
         let touches = |last: &WellClearLoss| new.from_s <= last.to_s && last.from_s <= new.to_s;
-        let is_short = |of: &WellClearLoss| of.to_s - of.from_s < AT_AN_END_S;
+        let is_short = |loss: &WellClearLoss| loss.to_s - loss.from_s < AT_AN_END_S;
         if is_certain {
             if self.undecided.open.get(&new.pair).is_some_and(|last| touches(last) && is_short(last)) {
                 self.undecided.open.remove(&new.pair);

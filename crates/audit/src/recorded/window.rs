@@ -322,7 +322,8 @@ impl Chord {
         let (from, to) = (first.position(from_s.max(first.from_s)), last.position(to_s));
         let by = to - from;
         let per_s = if to_s > from_s { 1.0 / (to_s - from_s) } else { 0.0 };
-        let off = |time_s: f64, at: &Vector3<f64>| (at - (from + by * ((time_s - from_s) * per_s))).norm_squared();
+        let off =
+            |time_s: f64, point: &Vector3<f64>| (point - (from + by * ((time_s - from_s) * per_s))).norm_squared();
         let mut squared = 0.0;
         // End of the segment before, or the start of the motion: usually the start of the next segment.
         let (mut end_s, mut end) = (from_s, from);
@@ -370,9 +371,9 @@ pub(super) fn within(segments: &[Segment], Interval { from_s, to_s }: Interval) 
 impl Extent {
     /// Returns the extent of the segments of a vehicle that meet the window; `None` without such segments.
     #[inline]
-    fn of_window(vehicle: usize, of: &Vehicle, window: Interval) -> Option<Self> {
-        let segments = within(&of.segments, window);
-        let parts = &of.segments[segments.clone()];
+    fn of_window(vehicle: usize, state: &Vehicle, window: Interval) -> Option<Self> {
+        let segments = within(&state.segments, window);
+        let parts = &state.segments[segments.clone()];
         if parts.is_empty() {
             return None;
         }
@@ -382,7 +383,7 @@ impl Extent {
             low: chord.from.inf(&chord.to) - aside,
             high: chord.from.sup(&chord.to) + aside,
             chord,
-            radius: of.radius_m.unwrap_or(0.0),
+            radius: state.radius_m.unwrap_or(0.0),
             grounded: parts.iter().all(|part| part.grounded == Some(true)),
             vehicle,
             segments,
@@ -402,33 +403,33 @@ mod tests {
 
     #[test]
     fn the_deviation_of_a_vehicle_is_that_of_its_corners() {
-        let at = |x: f64, y: f64| Vector3::new(x, y, 0.0);
+        let point = |x: f64, y: f64| Vector3::new(x, y, 0.0);
         let parts = [
-            Segment::straight(0.0, 1.0, at(0.0, 0.0), at(1.0, 0.5)),
-            Segment::straight(1.0, 2.0, at(1.0, 0.5), at(2.0, 0.0)),
+            Segment::straight(0.0, 1.0, point(0.0, 0.0), point(1.0, 0.5)),
+            Segment::straight(1.0, 2.0, point(1.0, 0.5), point(2.0, 0.0)),
         ];
         let way = Chord::of_window(&parts, Interval { from_s: 0.0, to_s: 2.0 });
-        assert_eq!((way.from, way.to), (at(0.0, 0.0), at(2.0, 0.0)));
+        assert_eq!((way.from, way.to), (point(0.0, 0.0), point(2.0, 0.0)));
         assert!((way.motion_deviation - 0.5).abs() < 1e-12 && way.motion_deviation >= 0.5);
         // A vehicle that covers the chord at the wrong time deviates along it.
         let hurried = [
-            Segment::straight(0.0, 0.5, at(0.0, 0.0), at(1.5, 0.0)),
-            Segment::straight(0.5, 2.0, at(1.5, 0.0), at(2.0, 0.0)),
+            Segment::straight(0.0, 0.5, point(0.0, 0.0), point(1.5, 0.0)),
+            Segment::straight(0.5, 2.0, point(1.5, 0.0), point(2.0, 0.0)),
         ];
         assert!((Chord::of_window(&hurried, Interval { from_s: 0.0, to_s: 2.0 }).motion_deviation - 1.0).abs() < 1e-12);
         // A vehicle that appears late counts as at its first position before.
-        let late = [Segment::straight(1.0, 2.0, at(5.0, 0.0), at(5.0, 1.0))];
+        let late = [Segment::straight(1.0, 2.0, point(5.0, 0.0), point(5.0, 1.0))];
         let way = Chord::of_window(&late, Interval { from_s: 0.0, to_s: 2.0 });
-        assert_eq!(way.from, at(5.0, 0.0));
+        assert_eq!(way.from, point(5.0, 0.0));
         assert!((way.motion_deviation - 0.5).abs() < 1e-12);
         // A vehicle deviates where it appears again after a gap.
         let away = [
-            Segment::straight(0.0, 1.0, at(0.0, 0.0), at(1.0, 0.0)),
-            Segment::straight(3.0, 4.0, at(3.0, 2.0), at(4.0, 0.0)),
+            Segment::straight(0.0, 1.0, point(0.0, 0.0), point(1.0, 0.0)),
+            Segment::straight(3.0, 4.0, point(3.0, 2.0), point(4.0, 0.0)),
         ];
         assert!((Chord::of_window(&away, Interval { from_s: 0.0, to_s: 4.0 }).motion_deviation - 2.0).abs() < 1e-12);
         // In a window too short to divide by, a vehicle may be anywhere.
-        let instant = [Segment::straight(0.0, 3e-310, at(0.0, 0.0), at(1.0, 0.0))];
+        let instant = [Segment::straight(0.0, 3e-310, point(0.0, 0.0), point(1.0, 0.0))];
         assert_eq!(Chord::of_window(&instant, Interval { from_s: 0.0, to_s: 3e-310 }).motion_deviation, f64::INFINITY);
     }
 
@@ -446,12 +447,12 @@ mod tests {
     #[test]
     fn the_closest_pairs_are_the_same_without_limits() {
         // Forty vehicles that fly through each other, every third of them on a curve with a deviation.
-        let at = |k: u32, by: f64| {
+        let sample_at = |k: u32, by: f64| {
             Vector3::new(f64::from(k * k % 41) + by, f64::from(k * 17 % 37) * (1.0 - by), f64::from(k % 3))
         };
         let part = |k: u32, from_s: u32| {
             let (from_s, by) = (f64::from(from_s), f64::from(from_s) / 8.0);
-            let (from, to) = (at(k, by), at(k, by + 0.125));
+            let (from, to) = (sample_at(k, by), sample_at(k, by + 0.125));
             let deviation = Deviation { peak: 0.01, hermite: false };
             let curve = Curve { from_s, to_s: from_s + 1.0, coefficients: vec![from, to - from], deviation };
             if k.is_multiple_of(3) { Segment::curved(curve) } else { Segment::straight(from_s, from_s + 1.0, from, to) }

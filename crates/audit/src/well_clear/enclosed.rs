@@ -153,7 +153,7 @@ mod tests {
         #[test]
         fn every_operation_contains_the_exact_result(a in -1e3..1e3_f64, b in -1e3..1e3_f64) {
             let (x, y) = (Enclosed::exactly(a), Enclosed::exactly(b));
-            let holds = |of: Enclosed, result: BigRational| exact(of.low) <= result && result <= exact(of.high);
+            let holds = |x: Enclosed, result: BigRational| exact(x.low) <= result && result <= exact(x.high);
             prop_assert!(holds(x + y, exact(a) + exact(b)));
             prop_assert!(holds(x - y, exact(a) - exact(b)));
             prop_assert!(holds(Enclosed::difference(a, b), exact(a) - exact(b)));

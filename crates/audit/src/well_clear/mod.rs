@@ -120,15 +120,15 @@ impl WellClear {
             return None;
         }
         let is_certain = is_certain && from.high < to.low;
-        let at = |elapsed_s: f64| (interval.from_s + elapsed_s).clamp(interval.from_s, interval.to_s);
+        let time_at = |elapsed_s: f64| (interval.from_s + elapsed_s).clamp(interval.from_s, interval.to_s);
         let span_s = if is_certain {
             // An end of the interval is an end of the loss without rounding.
             [
-                if from == Enclosed::ZERO { interval.from_s } else { at(from.middle()) },
-                if to == duration { interval.to_s } else { at(to.middle()) },
+                if from == Enclosed::ZERO { interval.from_s } else { time_at(from.middle()) },
+                if to == duration { interval.to_s } else { time_at(to.middle()) },
             ]
         } else {
-            [at(from.low), at(to.high)]
+            [time_at(from.low), time_at(to.high)]
         };
         Some(Loss { span_s, is_certain })
     }
@@ -235,14 +235,14 @@ impl WellClear {
         let r = overlap.relative();
         let share = |time_s: f64| ((time_s - interval.from_s) / (interval.to_s - interval.from_s)).clamp(0.0, 1.0);
         let (from, to) = (share(from_s), share(to_s));
-        let mut at = vec![from, to];
+        let mut instants = vec![from, to];
         if let [start, by] = r[..] {
             let (s, v) = (start.xy(), by.xy());
-            at.extend([-s.dot(&v) / v.norm_squared(), -start.z / by.z].into_iter().filter(|u| u.is_finite()));
+            instants.extend([-s.dot(&v) / v.norm_squared(), -start.z / by.z].into_iter().filter(|u| u.is_finite()));
         } else {
-            at.extend((1..32).map(|k| from + (to - from) * f64::from(k) / 32.0));
+            instants.extend((1..32).map(|k| from + (to - from) * f64::from(k) / 32.0));
         }
-        let places = at.into_iter().map(|u| value(&r, u.clamp(from, to)));
+        let places = instants.into_iter().map(|u| value(&r, u.clamp(from, to)));
         places.fold([f64::INFINITY; 2], |[across, up], r| [across.min(r.xy().norm()), up.min(r.z.abs())])
     }
 
@@ -293,12 +293,12 @@ mod tests {
         Segment::straight(0.0, DURATION_S, from, from + v * DURATION_S)
     }
 
-    fn losses(of: WellClear, first: &Segment, second: &Segment) -> Vec<Loss> {
-        of.losses(&Overlap { first, second, interval: Interval { from_s: 0.0, to_s: DURATION_S } })
+    fn losses(definition: WellClear, first: &Segment, second: &Segment) -> Vec<Loss> {
+        definition.losses(&Overlap { first, second, interval: Interval { from_s: 0.0, to_s: DURATION_S } })
     }
 
-    fn span(of: WellClear, first: &Segment, second: &Segment) -> Option<[f64; 2]> {
-        match losses(of, first, second)[..] {
+    fn span(definition: WellClear, first: &Segment, second: &Segment) -> Option<[f64; 2]> {
+        match losses(definition, first, second)[..] {
             [] => None,
             [Loss { span_s, is_certain: true }] => Some(span_s),
             ref other => panic!("{other:?}"),
@@ -313,13 +313,14 @@ mod tests {
     }
 
     /// Definition of `WCV_TAUMOD`, evaluated at one instant.
-    fn is_lost(of: WellClear, s: Vector3<f64>, v: Vector3<f64>) -> bool {
+    fn is_lost(definition: WellClear, s: Vector3<f64>, v: Vector3<f64>) -> bool {
         let (across, rate) = (s.xy().norm(), s.xy().dot(&v.xy()));
         let cpa = (-rate / v.xy().norm_squared()).max(0.0);
         let miss = (s.xy() + v.xy() * cpa).norm();
-        let tau = (of.horizontal_m * of.horizontal_m - across * across) / rate;
-        let is_timely = of.tau_s > 0.0 && rate < 0.0 && miss < of.horizontal_m && tau < of.tau_s;
-        (across < of.horizontal_m || is_timely) && s.z.abs() < of.vertical_m
+        let tau = (definition.horizontal_m * definition.horizontal_m - across * across) / rate;
+        let is_timely =
+            definition.tau_s > 0.0 && rate < 0.0 && miss < definition.horizontal_m && tau < definition.tau_s;
+        (across < definition.horizontal_m || is_timely) && s.z.abs() < definition.vertical_m
     }
 
     #[test]
@@ -383,7 +384,7 @@ mod tests {
     fn rounding_alone_never_decides() {
         // Formation flight at exactly D: neither lost nor well clear.
         let (own, wing) = (flight([0.0; 3], [50.0, 1.0, 0.0]), flight([609.6, 0.0, 0.0], [50.0, 1.0, 0.0]));
-        assert_eq!(losses(WellClear::F3442, &own, &wing).iter().filter(|of| of.is_certain).count(), 0);
+        assert_eq!(losses(WellClear::F3442, &own, &wing).iter().filter(|loss| loss.is_certain).count(), 0);
         let near = flight([609.5, 0.0, 0.0], [50.0, 1.0, 0.0]);
         assert_eq!(losses(WellClear::F3442, &own, &near), [Loss { span_s: [0.0, DURATION_S], is_certain: true }]);
         let far = flight([609.7, 0.0, 0.0], [50.0, 1.0, 0.0]);
@@ -429,7 +430,8 @@ mod tests {
             );
             assert_span(span(DAIDALUS, &own, &intruder), expected, 5e-3);
             // The thresholds of the standard are 10 ft smaller.
-            let [wide, narrow] = [DAIDALUS, WellClear::DO_365].map(|of| span(of, &own, &intruder).expect("a loss"));
+            let [wide, narrow] =
+                [DAIDALUS, WellClear::DO_365].map(|definition| span(definition, &own, &intruder).expect("a loss"));
             assert!(wide[0] < narrow[0] && narrow[1] < wide[1] && narrow[0] - wide[0] < 0.1);
         }
         let [own, intruder] =

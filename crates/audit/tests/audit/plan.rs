@@ -3,7 +3,7 @@
 use nalgebra::{Vector3, vector};
 use proptest::prelude::*;
 use tautline_audit::Status;
-use tautline_audit::recorded::{Interpolation, PlanComparison, PlanFindings, Settings, audit};
+use tautline_audit::recorded::{Interpolation, Outcome, PlanComparison, PlanFindings, Settings, TrackAuditor, audit};
 use tautline_core::track::{Item, Piece, Sample};
 
 fn sample(vehicle: usize, time_s: f64, position_m: Vector3<f64>) -> Item {
@@ -18,9 +18,11 @@ fn names(count: usize) -> Vec<String> {
     (0..count).map(|k| format!("cf{k}")).collect()
 }
 
-/// Returns settings that judge nothing but the plan.
-fn plan_alone() -> Settings {
-    Settings { has_plan: true, ..Settings::default() }
+/// Audits a flight that is compared with a plan.
+fn audit_flight(names: &[String], items: &[Item], settings: &Settings) -> Outcome {
+    let mut auditor = TrackAuditor::new(settings.clone()).expect("settings").with_plan();
+    auditor.push(names, items).expect("judged");
+    auditor.finish().expect("judged")
 }
 
 fn in_order(mut items: Vec<Item>) -> Vec<Item> {
@@ -36,7 +38,7 @@ fn compare(
     tube_m: Option<f64>,
 ) -> PlanFindings {
     let count = flight.iter().map(Item::vehicle).max().map_or(0, |most| most + 1);
-    let outcome = audit(&names(count), flight, settings.clone()).expect("judged");
+    let outcome = audit_flight(&names(count), flight, settings);
     let mut comparison = PlanComparison::new(settings, &outcome);
     comparison.push_plan(&names(count), plan.to_vec());
     comparison.push_flight(flight).expect("valid items");
@@ -57,25 +59,25 @@ fn bump() -> (Vec<Item>, Vec<Item>) {
 #[test]
 fn a_displacement_between_agreeing_samples_is_found() {
     let (flight, plan) = bump();
-    let found = compare(&plan_alone(), &flight, &plan, Some(0.0), None);
+    let found = compare(&Settings::default(), &flight, &plan, Some(0.0), None);
     assert_eq!((found.status, found.has_curves, found.unknown.len()), (Status::Clear, true, 0));
     let [of] = &found.deviations[..] else { panic!("{found:?}") };
     assert!(of.lower_m <= 0.2 && 0.2 <= of.upper_m && of.upper_m - of.lower_m < 1e-8, "{of:?}");
     assert!((of.at_s - 2.5).abs() < 1e-3 && of.rms_m < 1e-12, "the samples agree: {of:?}");
     // Negative twin: the samples of the same flight hide it.
     let samples: Vec<_> = (0..5).map(f64::from).map(|t| sample(0, t, vector![t, 0.0, 1.0])).collect();
-    let hidden = compare(&plan_alone(), &samples, &plan, Some(0.0), None);
+    let hidden = compare(&Settings::default(), &samples, &plan, Some(0.0), None);
     assert!(hidden.deviations[0].upper_m < 1e-12, "{hidden:?}");
 }
 
 #[test]
 fn a_tube_is_kept_left_or_undecided() {
     let (flight, plan) = bump();
-    let status = |tube_m| compare(&plan_alone(), &flight, &plan, Some(0.0), Some(tube_m)).status;
+    let status = |tube_m| compare(&Settings::default(), &flight, &plan, Some(0.0), Some(tube_m)).status;
     assert_eq!((status(0.25), status(0.15)), (Status::Clear, Status::Violation));
     // Samples 1 s apart under 0.8 m/s^2: any path within 0.1 m of the line.
     let samples: Vec<_> = (0..5).map(f64::from).map(|t| sample(0, t, vector![t, 0.0, 1.0])).collect();
-    let bounded = Settings { motion: Some(Interpolation::Bounded), max_accel_m_s2: Some(0.8), ..plan_alone() };
+    let bounded = Settings { motion: Some(Interpolation::Bounded), max_accel_m_s2: Some(0.8), ..Settings::default() };
     let found = compare(&bounded, &samples, &plan, Some(0.0), Some(0.05));
     assert_eq!(found.status, Status::Undecided);
     let of = &found.deviations[0];
@@ -111,16 +113,16 @@ fn a_delay_is_estimated_and_a_wrong_one_is_found() {
     for delay_s in [-0.4, 0.0, 0.3172, 1.9] {
         let flight = late_flight(delay_s);
         let plan = [path_plan(0, Vector3::zeros())];
-        let found = compare(&plan_alone(), &flight, &plan, None, None);
+        let found = compare(&Settings::default(), &flight, &plan, None, None);
         assert!((found.delay_s - delay_s).abs() < 2e-3, "{} {delay_s}", found.delay_s);
         assert_eq!(found.searched_s, Some((-60.0, 60.0)));
         assert!(found.deviations[0].upper_m < 1e-2, "{:?}", found.deviations[0].upper_m);
         // Negative twin: half a second off is decimetres off.
-        let wrong = compare(&plan_alone(), &flight, &plan, Some(delay_s + 0.5), Some(0.1));
+        let wrong = compare(&Settings::default(), &flight, &plan, Some(delay_s + 0.5), Some(0.1));
         assert!(wrong.deviations[0].lower_m > 0.2 && wrong.status == Status::Violation, "{wrong:?}");
         assert_eq!(wrong.searched_s, None);
     }
-    let again = || compare(&plan_alone(), &late_flight(0.3), &[path_plan(0, Vector3::zeros())], None, None);
+    let again = || compare(&Settings::default(), &late_flight(0.3), &[path_plan(0, Vector3::zeros())], None, None);
     assert_eq!(again().delay_s.to_bits(), again().delay_s.to_bits());
 }
 
@@ -128,31 +130,31 @@ fn a_delay_is_estimated_and_a_wrong_one_is_found() {
 fn times_of_one_alone_are_unknown() {
     let flight: Vec<_> = (0..=100).map(|k| f64::from(k) * 0.1).map(|t| sample(0, t, path(t))).collect();
     let plan = [path_plan(0, Vector3::zeros())];
-    let found = compare(&plan_alone(), &flight, &plan, Some(0.0), Some(1.0));
+    let found = compare(&Settings::default(), &flight, &plan, Some(0.0), Some(1.0));
     assert_eq!(found.status, Status::Undecided);
     let [of] = found.unknown[..] else { panic!("{:?}", found.unknown) };
     assert_eq!((of.from_s, of.to_s, of.is_flown), (8.0, 10.0, true));
     // Within a window that both cover, everything is known. A flown end without a plan counts, however short.
     for (to_s, status) in [(8.0, Status::Clear), (8.05, Status::Undecided)] {
-        let window = Settings { to_s: Some(to_s), ..plan_alone() };
+        let window = Settings { to_s: Some(to_s), ..Settings::default() };
         assert_eq!(compare(&window, &flight, &plan, Some(0.0), Some(1.0)).status, status, "{to_s}");
     }
     // A planned end without samples does not count if it is shorter than an interval.
     for (last, status) in [(80, Status::Clear), (79, Status::Undecided)] {
-        let window = Settings { from_s: Some(0.05), ..plan_alone() };
+        let window = Settings { from_s: Some(0.05), ..Settings::default() };
         let found = compare(&window, &flight[..=last], &plan, Some(0.05), Some(1.0));
         assert_eq!(found.status, status, "{last} {:?}", found.unknown);
     }
     // A gap in the flight.
     let gappy: Vec<_> = flight.iter().filter(|item| !(2.05..3.95).contains(&item.time_s())).cloned().collect();
-    let window = Settings { to_s: Some(8.0), ..plan_alone() };
+    let window = Settings { to_s: Some(8.0), ..Settings::default() };
     let found = compare(&window, &gappy, &plan, Some(0.0), Some(1.0));
     let [of] = found.unknown[..] else { panic!("{:?}", found.unknown) };
     assert!(!of.is_flown && (of.from_s - 2.0).abs() < 1e-9 && (of.to_s - 4.0).abs() < 1e-9, "{of:?}");
     assert_eq!(found.status, Status::Undecided);
     assert!(found.deviations[0].series.iter().any(|point| point.1.is_nan()), "the line of the figure breaks");
     // A window without the plan.
-    let late = Settings { from_s: Some(9.0), ..plan_alone() };
+    let late = Settings { from_s: Some(9.0), ..Settings::default() };
     let found = compare(&late, &flight, &plan, Some(0.0), None);
     assert_eq!((found.status, found.deviations.len()), (Status::Undecided, 0));
 }
@@ -168,7 +170,8 @@ fn two_flights(delay_s: f64, spans_s: [(f64, f64); 2]) -> Vec<Item> {
 #[test]
 fn an_estimated_delay_hides_no_vehicle_that_vanishes() {
     let plan = [path_plan(0, Vector3::zeros()), path_plan(1, vector![0.0, 5.0, 0.0])];
-    let judged = |delay_s, spans_s| compare(&plan_alone(), &two_flights(delay_s, spans_s), &plan, None, Some(0.1));
+    let judged =
+        |delay_s, spans_s| compare(&Settings::default(), &two_flights(delay_s, spans_s), &plan, None, Some(0.1));
     let all = (0.0, 8.0);
     for (delay_s, spans_s, expected) in [
         // The delay alone moves the ends of the plan.
@@ -204,7 +207,7 @@ fn an_estimated_delay_hides_no_vehicle_that_vanishes() {
     for (until_s, status) in [(0.0, Status::Clear), (2.0, Status::Undecided)] {
         let stays = sample(0, 5.0 + until_s, vector![4.0, 0.0, 1.0]);
         let flight = in_order(early.iter().cloned().chain((until_s > 0.0).then_some(stays)).collect());
-        let settings = Settings { max_gap_s: Some(5.0), ..plan_alone() };
+        let settings = Settings { max_gap_s: Some(5.0), ..Settings::default() };
         let found = compare(&settings, &flight, &short, None, Some(0.1));
         assert_eq!(found.status, status, "{until_s} {:?} {:?}", found.common_s, found.unknown);
     }
@@ -224,7 +227,7 @@ fn parallel(apart: f64) -> (Vec<Item>, Vec<Item>) {
 fn a_plan_certifies_only_with_the_distances_of_both_vehicles() {
     let (flight, plan) = parallel(1.41);
     let status = |delta_m: f64, tube_m: Option<f64>| {
-        let settings = Settings { has_plan: true, ..Settings::delta(delta_m) };
+        let settings = Settings::delta(delta_m);
         let found = compare(&settings, &flight, &plan, Some(0.0), tube_m);
         let asked = found.settings_of_plan(&settings, &names(2), found.delay_s)?;
         Some(audit(&names(2), &plan, asked).expect("judged").status)
@@ -247,7 +250,7 @@ fn a_plan_certifies_only_with_the_distances_of_both_vehicles() {
 #[test]
 fn without_a_limit_only_the_plan_is_judged() {
     let (flight, _) = parallel(0.5);
-    let outcome = audit(&names(2), &flight, plan_alone()).expect("judged");
+    let outcome = audit_flight(&names(2), &flight, &Settings::default());
     assert_eq!((outcome.status, outcome.separation), (Status::Clear, None));
     assert!(audit(&names(2), &flight, Settings::default()).is_err(), "nothing is asked");
 }
@@ -269,7 +272,7 @@ proptest! {
         } else {
             times.into_iter().zip(&samples).map(|(t, at)| sample(0, t, (*at).into())).collect()
         };
-        let found = compare(&plan_alone(), &in_order(flight.clone()), &plan, Some(0.0), None);
+        let found = compare(&Settings::default(), &in_order(flight.clone()), &plan, Some(0.0), None);
         let value = |c: &[Vector3<f64>], t: f64| c.iter().rev().fold(Vector3::zeros(), |sum, c| sum * t + c);
         let planned = |t: f64| if t < 1.5 { value(&vectors[..4], t) } else { value(&vectors[4..10], t - 1.5) };
         let flown = |t: f64| {

@@ -93,8 +93,8 @@ impl<'a> Operator<'a> {
         let rows = block.transpose();
         let mut forms = DMatrix::zeros(width, width);
         let mut values = [0.0; SEARCHED];
-        let mut add = |of: &dyn Fn(usize) -> f64| {
-            values.iter_mut().take(width).enumerate().for_each(|(k, value)| *value = of(k));
+        let mut add = |value_of: &dyn Fn(usize) -> f64| {
+            values.iter_mut().take(width).enumerate().for_each(|(k, value)| *value = value_of(k));
             (0..width).for_each(|l| (l..width).for_each(|k| forms[(k, l)] += values[k] * values[l]));
         };
         for (i, j) in self.graph.edges() {
@@ -280,8 +280,8 @@ mod tests {
     fn ring_pinned_at_one(count: usize) -> f64 {
         let half = 0.5 * count as f64;
         let off = |q: f64| {
-            let (at, next) = (libm::cos(q * half), libm::cos(q * (half - 1.0)));
-            3.0 * at - 2.0 * next - (2.0 - 2.0 * libm::cos(q)) * at
+            let (current, next) = (libm::cos(q * half), libm::cos(q * (half - 1.0)));
+            3.0 * current - 2.0 * next - (2.0 - 2.0 * libm::cos(q)) * current
         };
         let (mut low, mut high) = (1e-9, std::f64::consts::PI / count as f64);
         for _ in 0..200 {

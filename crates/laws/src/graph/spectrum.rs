@@ -152,9 +152,9 @@ impl Graph {
     /// Returns the diagonal of M: the degree of each vehicle, plus one if it is pinned; without the entry of a leader.
     #[must_use]
     pub fn pinned_diagonal(&self, pinning: &Pinning) -> Vec<f64> {
-        let of = |(i, &degree): (usize, &usize)| degree as f64 + if pinning.pins(i) { 1.0 } else { 0.0 };
+        let degree_of = |(i, &degree): (usize, &usize)| degree as f64 + if pinning.pins(i) { 1.0 } else { 0.0 };
         let degrees = self.degrees();
-        degrees.iter().enumerate().filter(|&(i, _)| pinning.leader() != Some(i)).map(of).collect()
+        degrees.iter().enumerate().filter(|&(i, _)| pinning.leader() != Some(i)).map(degree_of).collect()
     }
 
     /// Returns an upper bound on the largest eigenvalue of M. Without pinning it is N for the complete graph. Otherwise

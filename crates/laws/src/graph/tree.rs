@@ -107,8 +107,8 @@ impl Neighbours {
             order[reached..].sort_by_cached_key(|i| std::cmp::Reverse(ahead(i)));
             let layer = reached..order.len();
             reached = order.len();
-            for at in layer {
-                let i = order[at];
+            for node in layer {
+                let i = order[node];
                 for &j in self.get(i) {
                     if parent[j] == usize::MAX {
                         parent[j] = i;
@@ -172,7 +172,7 @@ mod tests {
                 let above: Vec<usize> = up(i).collect();
                 let (k, l) = up(j)
                     .enumerate()
-                    .find_map(|(l, at)| Some((above.iter().position(|&of| of == at)?, l)))
+                    .find_map(|(l, node)| Some((above.iter().position(|&parent| parent == node)?, l)))
                     .expect("a root");
                 k + l
             });

@@ -119,19 +119,20 @@ impl CbfQpLaw {
     }
 
     /// Returns the acceleration of the nominal controller for vehicle i \[m/s^2\].
-    fn nominal_m_s2(&self, at: &Observation<'_>, i: usize) -> Vector3<f64> {
+    fn nominal_m_s2(&self, observation: &Observation<'_>, i: usize) -> Vector3<f64> {
         let CbfQpKeys { k_per_s2, c_per_s, max_speed_m_s, .. } = self.keys;
-        let reference = &at.target.reference;
-        let missing_m = row(&at.target.formation.slots_m, i) + reference.position_m - row(&at.own.positions_m, i);
+        let reference = &observation.target.reference;
+        let missing_m =
+            row(&observation.target.formation.slots_m, i) + reference.position_m - row(&observation.own.positions_m, i);
         let wanted_m_s = reference.velocity_m_s + (missing_m * (k_per_s2 / c_per_s)).cap_magnitude(max_speed_m_s);
-        let own_m_s = row(&at.own.velocities_m_s, i);
+        let own_m_s = row(&observation.own.velocities_m_s, i);
         self.reference_use.feed_forward_m_s2(reference) + c_per_s * (wanted_m_s - own_m_s) - self.a22_per_s * own_m_s
     }
 
     /// Returns the half-space of accelerations of vehicle i that vehicle j allows; `None` out of range.
-    fn half_space(&self, at: &Observation<'_>, i: usize, j: usize) -> Result<Option<HalfSpace>, LawError> {
-        let sensed = at.sensed(i, j);
-        let apart_m = row(&at.own.positions_m, i) - sensed.position_m;
+    fn half_space(&self, observation: &Observation<'_>, i: usize, j: usize) -> Result<Option<HalfSpace>, LawError> {
+        let sensed = observation.sensed(i, j);
+        let apart_m = row(&observation.own.positions_m, i) - sensed.position_m;
         let distance_m = apart_m.norm();
         if distance_m == 0.0 {
             return Err(LawError::Collision { pair: Pair::new(i, j), separation_m: 0.0, delta_m: self.delta_m });
@@ -140,7 +141,7 @@ impl CbfQpLaw {
             return Ok(None);
         }
         let normal = apart_m / distance_m;
-        let bound = self.bound_m_s2(normal, distance_m, row(&at.own.velocities_m_s, i) - sensed.velocity_m_s);
+        let bound = self.bound_m_s2(normal, distance_m, row(&observation.own.velocities_m_s, i) - sensed.velocity_m_s);
         Ok(Some(HalfSpace { normal, offset: -0.5 * bound }))
     }
 
@@ -176,17 +177,17 @@ impl Law for CbfQpLaw {
         "cbf-qp"
     }
 
-    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
-        check_observation(self.count, at, command)?;
-        self.near.update(self.count, at.near);
+    fn command(&mut self, observation: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        check_observation(self.count, observation, command)?;
+        self.near.update(self.count, observation.near);
         for i in 0..self.count {
             self.half_spaces.clear();
             for &j in self.near.of(i) {
-                if let Some(half_space) = self.half_space(at, i, j)? {
+                if let Some(half_space) = self.half_space(observation, i, j)? {
                     self.half_spaces.push(half_space);
                 }
             }
-            let nominal = self.nominal_m_s2(at, i);
+            let nominal = self.nominal_m_s2(observation, i);
             set_row(command, i, self.half_spaces.nearest(nominal, self.keys.max_accel_m_s2).point);
         }
         check_range(command)
@@ -207,10 +208,10 @@ impl Law for CbfQpLaw {
     /// A vehicle without neighbours follows x'' = -c x' - k x. With neighbours in range no bound is known: a corner of
     /// several half-spaces may move as fast as two of their planes close. The law controls absolute positions, and a22
     /// is compensated.
-    fn rates(&self, at: &RateQuery) -> Rates {
+    fn rates(&self, query: &RateQuery) -> Rates {
         let alone_per_s = self.keys.c_per_s.max(self.keys.k_per_s2.sqrt());
-        let is_alone = at.nearest_m.is_some_and(|nearest_m| nearest_m > self.range_m);
-        Rates { fastest_per_s: is_alone.then_some(alone_per_s), common_mode_per_s: 0.0, ..Rates::unknown(at) }
+        let is_alone = query.nearest_m.is_some_and(|nearest_m| nearest_m > self.range_m);
+        Rates { fastest_per_s: is_alone.then_some(alone_per_s), common_mode_per_s: 0.0, ..Rates::unknown(query) }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Certificates: the separation that a law guarantees before the first step, or the reasons why it guarantees none.
 
 use super::error::LawError;
-use tautline_core::fact::Coded;
+use tautline_core::impl_coded;
 
 /// Separation that a law guarantees from a given start, or the reasons why the certificate is void.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -130,39 +130,35 @@ pub enum VoidReason {
     StartRefused(LawError),
 }
 
-impl Coded for VoidReason {
-    fn code(&self) -> &'static str {
-        match self {
-            Self::NoBarrier => "no-barrier",
-            Self::GraphNotComplete => "graph-not-complete",
-            Self::VelocityUndamped => "velocity-undamped",
-            Self::CommandLimited => "command-limited",
-            Self::TargetChanges => "target-changes",
-            Self::InexactLink => "inexact-link",
-            Self::SensingDelayed => "sensing-delayed",
-            Self::SensingInexact => "sensing-inexact",
-            Self::MessagesDelayed => "messages-delayed",
-            Self::MessagesLost => "messages-lost",
-            Self::AccelerationLimited => "acceleration-limited",
-            Self::AccelerationLagged => "acceleration-lagged",
-            Self::VehicleFails => "vehicle-fails",
-            Self::ExternalCommands => "external-commands",
-            Self::CommandsHeld => "commands-held",
-            Self::WindNotCovered => "wind-not-covered",
-            Self::WindUnbounded => "wind-unbounded",
-            Self::LeaderInWind => "leader-in-wind",
-            Self::VehicleNotPoint => "vehicle-not-point",
-            Self::NoFeedForward => "no-feed-forward",
-            Self::ObstaclesNotAvoided => "obstacles-not-avoided",
-            Self::ReferenceAmongObstacles => "reference-among-obstacles",
-            Self::StepsTooLong => "steps-too-long",
-            Self::ShieldExceeded => "shield-exceeded",
-            Self::Unresolved => "unresolved",
-            Self::StartRefused(LawError::Collision { .. }) => "start-too-close",
-            Self::StartRefused(_) => "start-refused",
-        }
-    }
-}
+impl_coded! { VoidReason {
+    Self::NoBarrier => "no-barrier",
+    Self::GraphNotComplete => "graph-not-complete",
+    Self::VelocityUndamped => "velocity-undamped",
+    Self::CommandLimited => "command-limited",
+    Self::TargetChanges => "target-changes",
+    Self::InexactLink => "inexact-link",
+    Self::SensingDelayed => "sensing-delayed",
+    Self::SensingInexact => "sensing-inexact",
+    Self::MessagesDelayed => "messages-delayed",
+    Self::MessagesLost => "messages-lost",
+    Self::AccelerationLimited => "acceleration-limited",
+    Self::AccelerationLagged => "acceleration-lagged",
+    Self::VehicleFails => "vehicle-fails",
+    Self::ExternalCommands => "external-commands",
+    Self::CommandsHeld => "commands-held",
+    Self::WindNotCovered => "wind-not-covered",
+    Self::WindUnbounded => "wind-unbounded",
+    Self::LeaderInWind => "leader-in-wind",
+    Self::VehicleNotPoint => "vehicle-not-point",
+    Self::NoFeedForward => "no-feed-forward",
+    Self::ObstaclesNotAvoided => "obstacles-not-avoided",
+    Self::ReferenceAmongObstacles => "reference-among-obstacles",
+    Self::StepsTooLong => "steps-too-long",
+    Self::ShieldExceeded => "shield-exceeded",
+    Self::Unresolved => "unresolved",
+    Self::StartRefused(LawError::Collision { .. }) => "start-too-close",
+    Self::StartRefused(_) => "start-refused",
+} }
 
 impl Certificate {
     /// Returns a void certificate with one reason.
@@ -214,6 +210,7 @@ impl Certificate {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tautline_core::fact::Coded as _;
     use tautline_core::swarm::Pair;
 
     #[test]

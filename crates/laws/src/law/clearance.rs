@@ -26,8 +26,8 @@ impl ClearanceTension {
     }
 
     /// Adds the push of the obstacles to the row of each vehicle, and returns the sum of the tensions \[m^2/s^2\].
-    pub(super) fn add_pushes(&self, at: &Observation<'_>, sums: &mut Rows) -> Result<f64, LawError> {
-        self.sum_tensions(at.obstacles, &at.own.positions_m, |vehicle, push| {
+    pub(super) fn add_pushes(&self, observation: &Observation<'_>, sums: &mut Rows) -> Result<f64, LawError> {
+        self.sum_tensions(observation.obstacles, &observation.own.positions_m, |vehicle, push| {
             let sum = row(sums, vehicle) + push;
             set_row(sums, vehicle, sum);
         })

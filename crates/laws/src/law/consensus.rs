@@ -69,7 +69,7 @@ pub(super) fn of_table(rows: &Rows) -> [impl Fn(usize) -> f64; 3] {
 /// Returns the position errors `p_i - h_i` along each axis \[m\], for [`add_laplacian_product`].
 pub(super) fn of_errors_m(positions_m: &Rows, slots_m: &Rows) -> [impl Fn(usize) -> f64; 3] {
     let ([x, y, z], [slot_x, slot_y, slot_z]) = (columns(positions_m), columns(slots_m));
-    [(x, slot_x), (y, slot_y), (z, slot_z)].map(|(at, slot)| move |i: usize| at[i] - slot[i])
+    [(x, slot_x), (y, slot_y), (z, slot_z)].map(|(coordinate, slot)| move |i: usize| coordinate[i] - slot[i])
 }
 
 /// `1/2 sum |v_i - mean v|^2` \[m^2/s^2\].
@@ -96,16 +96,16 @@ pub(super) fn consensus_margin(count: usize, gain_per_s: f64, connectivity: f64,
 }
 
 /// Checks that an observation is of `count` vehicles and finite, and that the table of accelerations has `count` rows.
-pub(super) fn check_observation(count: usize, at: &Observation<'_>, command: &Rows) -> Result<(), LawError> {
-    check_state(count, at.own)?;
-    check_tables(count, at, command)
+pub(super) fn check_observation(count: usize, observation: &Observation<'_>, command: &Rows) -> Result<(), LawError> {
+    check_state(count, observation.own)?;
+    check_tables(count, observation, command)
 }
 
 /// Checks the sizes as [`check_observation`] does, but does not check a shared state for finite numbers.
-pub(super) fn check_tables(count: usize, at: &Observation<'_>, command: &Rows) -> Result<(), LawError> {
-    check_rows(count, at.own)?;
-    if let OtherStates::PerVehicle(held) = at.others {
-        check_state(count, at.own)?;
+pub(super) fn check_tables(count: usize, observation: &Observation<'_>, command: &Rows) -> Result<(), LawError> {
+    check_rows(count, observation.own)?;
+    if let OtherStates::PerVehicle(held) = observation.others {
+        check_state(count, observation.own)?;
         if !held.matches_count(count) {
             return Err(LawError::Pictures { count });
         }
@@ -117,18 +117,18 @@ pub(super) fn check_tables(count: usize, at: &Observation<'_>, command: &Rows) -
 /// Adds `term(i, own, j, received)` to row i of `sums` for each neighbour j of vehicle i: `own` is the state of i and
 /// `received` the state of j that i received.
 pub(super) fn add_received_terms(
-    at: &Observation<'_>,
+    observation: &Observation<'_>,
     sums: &mut Rows,
     term: impl Fn(usize, NeighbourState, usize, NeighbourState) -> Result<Vector3<f64>, LawError>,
 ) -> Result<(), LawError> {
     let own = |i: usize| NeighbourState {
-        position_m: row(&at.own.positions_m, i),
-        velocity_m_s: row(&at.own.velocities_m_s, i),
+        position_m: row(&observation.own.positions_m, i),
+        velocity_m_s: row(&observation.own.velocities_m_s, i),
         age_s: 0.0,
     };
-    for (a, b) in at.links.edges() {
+    for (a, b) in observation.links.edges() {
         for (i, j) in [(a, b), (b, a)] {
-            let sum = row(sums, i) + term(i, own(i), j, at.received(i, j))?;
+            let sum = row(sums, i) + term(i, own(i), j, observation.received(i, j))?;
             set_row(sums, i, sum);
         }
     }
@@ -139,14 +139,14 @@ pub(super) fn add_received_terms(
 /// potential of the pair for the position of i relative to j \[m\], or `None` out of range. It must be odd in
 /// `apart_m`. Returns the sum of the potentials over the near pairs if all vehicles share one state.
 pub(super) fn add_pushes(
-    at: &Observation<'_>,
+    observation: &Observation<'_>,
     sums: &mut Rows,
     push: impl Fn(usize, usize, Vector3<f64>) -> Result<Option<(Vector3<f64>, f64)>, LawError>,
 ) -> Result<Option<f64>, LawError> {
-    if let Some(swarm) = at.shared() {
+    if let Some(swarm) = observation.shared() {
         let mut potential = 0.0;
         // With shared states the two pushes of a pair are opposite and computed once.
-        for &(i, j) in at.near {
+        for &(i, j) in observation.near {
             let apart_m = row(&swarm.positions_m, i) - row(&swarm.positions_m, j);
             if let Some((pushed, of_pair)) = push(i, j, apart_m)? {
                 let (of_i, of_j) = (row(sums, i) + pushed, row(sums, j) - pushed);
@@ -157,9 +157,9 @@ pub(super) fn add_pushes(
         }
         return Ok(Some(potential));
     }
-    for &(a, b) in at.near {
+    for &(a, b) in observation.near {
         for (i, j) in [(a, b), (b, a)] {
-            let apart_m = row(&at.own.positions_m, i) - at.sensed(i, j).position_m;
+            let apart_m = row(&observation.own.positions_m, i) - observation.sensed(i, j).position_m;
             if let Some((pushed, _)) = push(i, j, apart_m)? {
                 let sum = row(sums, i) + pushed;
                 set_row(sums, i, sum);

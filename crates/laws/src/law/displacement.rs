@@ -243,39 +243,41 @@ impl DisplacementLaw {
         0.5 * self.scale() * self.keys.k_per_s2 * self.pulls.stretch_m2(error_m)
     }
 
-    fn try_energy(&self, at: &Observation<'_>) -> Result<f64, LawError> {
-        check_state(self.pulls.graph.count(), at.own)?;
-        let (positions_m, Target { formation, reference, .. }) = (&at.own.positions_m, at.target);
+    fn try_energy(&self, observation: &Observation<'_>) -> Result<f64, LawError> {
+        check_state(self.pulls.graph.count(), observation.own)?;
+        let (positions_m, Target { formation, reference, .. }) = (&observation.own.positions_m, observation.target);
         let stretch = self.consensus_energy(|i| error_m(positions_m, formation, reference.position_m, i));
-        let pushes = self.cache.of(positions_m).map_or_else(|| self.potential(positions_m, at.obstacles), Ok)?;
+        let pushes =
+            self.cache.of(positions_m).map_or_else(|| self.potential(positions_m, observation.obstacles), Ok)?;
         let is_absolute = self.clearance.is_some() && !self.is_guided();
         let kinetic = if is_absolute {
-            0.5 * at.own.velocities_m_s.norm_squared()
+            0.5 * observation.own.velocities_m_s.norm_squared()
         } else {
-            self.pulls.kinetic_energy(at.own, &reference)
+            self.pulls.kinetic_energy(observation.own, &reference)
         };
         let energy = kinetic + stretch + pushes;
         if energy.is_finite() { Ok(energy) } else { Err(LawError::OutOfRange) }
     }
 
-    fn try_command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+    fn try_command(&mut self, observation: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
         command.fill(0.0);
         let gains = Gains { position: self.keys.k_per_s2, velocity: self.damping_per_s() };
-        self.pulls.add_pulls(at, gains, -self.scale(), command)?;
-        let of_pairs = add_pushes(at, command, |i, j, apart_m| self.push(i, j, apart_m))?;
-        let of_obstacles = self.clearance.as_ref().map_or(Ok(0.0), |clearance| clearance.add_pushes(at, command))?;
+        self.pulls.add_pulls(observation, gains, -self.scale(), command)?;
+        let of_pairs = add_pushes(observation, command, |i, j, apart_m| self.push(i, j, apart_m))?;
+        let of_obstacles =
+            self.clearance.as_ref().map_or(Ok(0.0), |clearance| clearance.add_pushes(observation, command))?;
         if let Some(of_pairs) = of_pairs {
-            self.cache.store(&at.own.positions_m, of_pairs + of_obstacles);
+            self.cache.store(&observation.own.positions_m, of_pairs + of_obstacles);
         }
         if self.is_guided() {
             if self.has_feed_forward {
-                let fed = feed_forward_acceleration(&at.target.reference, self.a22_per_s);
+                let fed = feed_forward_acceleration(&observation.target.reference, self.a22_per_s);
                 (0..command.nrows()).for_each(|i| {
                     let sum = row(command, i) + fed;
                     set_row(command, i, sum);
                 });
             }
-            self.pulls.lead(at, gains, self.a22_per_s, command);
+            self.pulls.lead(observation, gains, self.a22_per_s, command);
         }
         check_range(command)
     }
@@ -339,11 +341,12 @@ impl Law for DisplacementLaw {
         "displacement"
     }
 
-    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+    fn command(&mut self, observation: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
         let count = self.pulls.graph.count();
-        check_tables(count, at, command)?;
+        check_tables(count, observation, command)?;
         // A shared state that is not finite never gives a finite command, so the state is checked only after an error.
-        self.try_command(at, command).map_err(|fault| check_state(count, at.own).err().unwrap_or(fault))
+        self.try_command(observation, command)
+            .map_err(|fault| check_state(count, observation.own).err().unwrap_or(fault))
     }
 
     fn follow(&mut self, target: &Target<'_>) -> Result<(), LawError> {
@@ -361,8 +364,8 @@ impl Law for DisplacementLaw {
         Ok(())
     }
 
-    fn energy(&self, at: &Observation<'_>) -> Option<f64> {
-        self.try_energy(at).ok()
+    fn energy(&self, observation: &Observation<'_>) -> Option<f64> {
+        self.try_energy(observation).ok()
     }
 
     /// The contact mode is given for the complete graph without a reference.
@@ -400,19 +403,19 @@ impl Law for DisplacementLaw {
         self.certificate_through(start, ahead)
     }
 
-    fn rates(&self, at: &RateQuery) -> Rates {
-        let of_graph = if self.is_guided() { 1.0 } else { at.connectivity / self.connectivity };
+    fn rates(&self, query: &RateQuery) -> Rates {
+        let of_graph = if self.is_guided() { 1.0 } else { query.connectivity / self.connectivity };
         let damping_per_s = self.damping_per_s() * of_graph;
         Rates {
-            fastest_per_s: at.nearest_m.map(|nearest_m| self.fastest_per_s(nearest_m)),
-            obstacles_per_s2: (self.clearance.zip(at.obstacle_margin_m))
+            fastest_per_s: query.nearest_m.map(|nearest_m| self.fastest_per_s(nearest_m)),
+            obstacles_per_s2: (self.clearance.zip(query.obstacle_margin_m))
                 .map_or(0.0, |(clearance, clearance_margin_m)| clearance.rate_squared(clearance_margin_m)),
             velocity_margin: Some(VelocityMargin {
-                per_s: damping_per_s - at.a22_per_s,
-                terms_per_s: damping_per_s + at.a22_per_s.abs(),
+                per_s: damping_per_s - query.a22_per_s,
+                terms_per_s: damping_per_s + query.a22_per_s.abs(),
                 remedy: "Raise law.zeta_per_s.",
             }),
-            common_mode_per_s: if self.is_guided() { at.a22_per_s - self.damping_per_s() } else { at.a22_per_s },
+            common_mode_per_s: if self.is_guided() { query.a22_per_s - self.damping_per_s() } else { query.a22_per_s },
         }
     }
 }
@@ -490,11 +493,11 @@ impl DisplacementLaw {
 /// - the wind's contribution has no bound, or the wind moves a leader.
 fn voids(context: &LawContext<'_>) -> Vec<VoidReason> {
     let &LawContext { guidance, obstacles, a22_per_s, exposure, .. } = context;
-    let is_unfed = |of: &Guidance| !of.feed_forward && !needs_no_feed_forward(&of.motion, a22_per_s);
-    let is_carried = guidance.is_some_and(|of| !of.motion.is_at_rest());
+    let is_unfed = |guidance: &Guidance| !guidance.feed_forward && !needs_no_feed_forward(&guidance.motion, a22_per_s);
+    let is_carried = guidance.is_some_and(|guidance| !guidance.motion.is_at_rest());
     let is_driven = guidance.is_none() && a22_per_s > 0.0;
     let is_turbulent = exposure.is_some_and(|exposure| exposure.wind.turbulence.is_some());
-    let is_led = guidance.is_some_and(|of| matches!(of.known_by, Pinning::Leader(_)));
+    let is_led = guidance.is_some_and(|guidance| matches!(guidance.known_by, Pinning::Leader(_)));
     let reasons = [
         (guidance.is_some_and(is_unfed), VoidReason::NoFeedForward),
         (!obstacles.is_empty() && is_carried, VoidReason::ReferenceAmongObstacles),

@@ -130,9 +130,9 @@ impl EdgeTensionLaw {
     }
 
     /// Adds `w_ij (p_i - p_j) / alpha` for the received states of all neighbours.
-    fn add_received_pulls(&self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+    fn add_received_pulls(&self, observation: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
         let Self { alpha, delta_m, .. } = *self;
-        add_received_terms(at, command, |i, own, j, received| {
+        add_received_terms(observation, command, |i, own, j, received| {
             let edge_m = own.position_m - received.position_m;
             let separation_m = edge_m.norm();
             if separation_m <= delta_m {
@@ -197,21 +197,21 @@ impl Law for EdgeTensionLaw {
         "edge-tension"
     }
 
-    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
-        check_observation(self.graph.count(), at, command)?;
+    fn command(&mut self, observation: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        check_observation(self.graph.count(), observation, command)?;
         command.fill(0.0);
-        let per_vehicle = -1.0 / at.own.count().max(1) as f64;
+        let per_vehicle = -1.0 / observation.own.count().max(1) as f64;
         let Self { alpha, a22_per_s, .. } = *self;
         let velocity_gain = (1.0 + a22_per_s) * per_vehicle;
-        if let Some(swarm) = at.shared() {
+        if let Some(swarm) = observation.shared() {
             let potential = self.kernel.add_pulls(&swarm.positions_m, command).map_err(|_| self.fault(swarm))?;
             self.cache.store(&swarm.positions_m, potential);
             *command *= alpha * per_vehicle;
             add_laplacian_product(&self.graph, &of_table(&swarm.velocities_m_s), velocity_gain, command);
         } else {
-            self.add_received_pulls(at, command)?;
+            self.add_received_pulls(observation, command)?;
             *command *= alpha * per_vehicle;
-            add_received_terms(at, command, |_, own, _, received| {
+            add_received_terms(observation, command, |_, own, _, received| {
                 Ok(velocity_gain * (own.velocity_m_s - received.velocity_m_s))
             })?;
         }
@@ -240,8 +240,8 @@ impl Law for EdgeTensionLaw {
         Ok(())
     }
 
-    fn energy(&self, at: &Observation<'_>) -> Option<f64> {
-        self.try_energy(at.own).ok()
+    fn energy(&self, observation: &Observation<'_>) -> Option<f64> {
+        self.try_energy(observation.own).ok()
     }
 
     /// Complete graph only. All relative velocities are damped at 1 + a22. The stiffnesses are the eigenvalues of 1/N
@@ -310,7 +310,7 @@ impl Law for EdgeTensionLaw {
                 .map(|((_, tightest), most)| tightest.push_side_root(count * most.energy)),
             certified_until_s: bounded.and_then(|bounded| bounded.until_s),
             energy_initial,
-            linked_m: links_alone.map(|(energy, of)| of.push_side_root(count * energy)),
+            linked_m: links_alone.map(|(energy, potential)| potential.push_side_root(count * energy)),
             void,
             ..Certificate::default()
         }
@@ -338,14 +338,14 @@ impl Law for EdgeTensionLaw {
     ///
     /// Hence the whole Hessian is at most (V''max/N) `L_G`, whose largest eigenvalue is at most V''max, so omega^2 <=
     /// V''max. On the complete graph relative velocities decay at 1/s. The fastest rate is max(omega, 1/s).
-    fn rates(&self, at: &RateQuery) -> Rates {
-        let fastest = |(of, nearest_m): (EdgeTension, f64)| of.second_derivative(nearest_m).sqrt().max(1.0);
+    fn rates(&self, query: &RateQuery) -> Rates {
+        let fastest = |(tension, nearest_m): (EdgeTension, f64)| tension.second_derivative(nearest_m).sqrt().max(1.0);
         let gain_per_s = 1.0 + self.a22_per_s;
-        let margin = consensus_margin(self.graph.count(), gain_per_s, at.connectivity, at.a22_per_s);
+        let margin = consensus_margin(self.graph.count(), gain_per_s, query.connectivity, query.a22_per_s);
         Rates {
-            fastest_per_s: self.tightest.zip(at.nearest_m).map(fastest),
+            fastest_per_s: self.tightest.zip(query.nearest_m).map(fastest),
             velocity_margin: Some(margin),
-            ..Rates::unknown(at)
+            ..Rates::unknown(query)
         }
     }
 }

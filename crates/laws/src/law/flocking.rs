@@ -120,11 +120,11 @@ impl FlockingLaw {
     }
 
     /// Returns the acceleration of vehicle i towards the objective, with a22 compensated.
-    fn objective_m_s2(&self, at: &Observation<'_>, centre_m: Vector3<f64>, i: usize) -> Vector3<f64> {
+    fn objective_m_s2(&self, observation: &Observation<'_>, centre_m: Vector3<f64>, i: usize) -> Vector3<f64> {
         let c1 = self.keys.c1_gamma_per_s2;
-        let reference = &at.target.reference;
-        let off_m = row(&at.own.positions_m, i) - centre_m - reference.position_m;
-        let own_m_s = row(&at.own.velocities_m_s, i);
+        let reference = &observation.target.reference;
+        let off_m = row(&observation.own.positions_m, i) - centre_m - reference.position_m;
+        let own_m_s = row(&observation.own.velocities_m_s, i);
         let off_m_s = own_m_s - reference.velocity_m_s;
         let drawn_m_s2 = off_m * (-c1 / (1.0 + off_m.norm_squared()).sqrt()) - off_m_s * (2.0 * c1.sqrt());
         self.reference_use.feed_forward_m_s2(reference) + drawn_m_s2 - own_m_s * self.a22_per_s
@@ -162,17 +162,17 @@ impl Law for FlockingLaw {
         "flocking"
     }
 
-    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
-        check_observation(self.count, at, command)?;
-        let centre_m = mean_row(&at.target.formation.slots_m);
+    fn command(&mut self, observation: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        check_observation(self.count, observation, command)?;
+        let centre_m = mean_row(&observation.target.formation.slots_m);
         for i in 0..self.count {
-            set_row(command, i, self.objective_m_s2(at, centre_m, i));
+            set_row(command, i, self.objective_m_s2(observation, centre_m, i));
         }
-        for &(a, b) in at.near {
+        for &(a, b) in observation.near {
             for (i, j) in [(a, b), (b, a)] {
-                let sensed = at.sensed(i, j);
-                let towards_m = sensed.position_m - row(&at.own.positions_m, i);
-                let pull = self.pull_m_s2(towards_m, sensed.velocity_m_s - row(&at.own.velocities_m_s, i));
+                let sensed = observation.sensed(i, j);
+                let towards_m = sensed.position_m - row(&observation.own.positions_m, i);
+                let pull = self.pull_m_s2(towards_m, sensed.velocity_m_s - row(&observation.own.velocities_m_s, i));
                 let sum = row(command, i) + pull;
                 set_row(command, i, sum);
             }
@@ -209,7 +209,7 @@ impl Law for FlockingLaw {
     /// the damping. The number of near vehicles is at most the number of balls of diameter `nearest_m` that fit around
     /// a vehicle. The eigenvalues of a sum over pairs are at most twice the sum at a vehicle. While velocities differ,
     /// velocity matching also varies with distance. The objective damps the mean velocity, and a22 is compensated.
-    fn rates(&self, at: &RateQuery) -> Rates {
+    fn rates(&self, query: &RateQuery) -> Rates {
         let (alpha, gamma) = (self.keys.c1_alpha_per_s2, self.keys.c1_gamma_per_s2);
         let fastest_per_s = |nearest_m: f64| {
             let range_m = self.range_m();
@@ -221,9 +221,9 @@ impl Law for FlockingLaw {
             half + (half * half + gamma + 2.0 * near * of_pair).sqrt()
         };
         Rates {
-            fastest_per_s: at.nearest_m.map(fastest_per_s),
+            fastest_per_s: query.nearest_m.map(fastest_per_s),
             common_mode_per_s: -2.0 * gamma.sqrt(),
-            ..Rates::unknown(at)
+            ..Rates::unknown(query)
         }
     }
 }

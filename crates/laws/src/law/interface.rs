@@ -31,7 +31,7 @@ pub trait Law: DynClone + Send {
     ///
     /// # Errors
     /// [`LawError`] where the law is not defined, such as a pair at or inside the safety distance of a barrier.
-    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError>;
+    fn command(&mut self, observation: &Observation<'_>, command: &mut Rows) -> Result<(), LawError>;
 
     /// Adopts a target whose slots have changed, before the next command.
     ///
@@ -63,8 +63,8 @@ pub trait Law: DynClone + Send {
     }
 
     /// Returns bounds on the rates of the closed loop.
-    fn rates(&self, at: &RateQuery) -> Rates {
-        Rates::unknown(at)
+    fn rates(&self, query: &RateQuery) -> Rates {
+        Rates::unknown(query)
     }
 
     /// Returns the linearized motion about the slots of a formation, if it is known.
@@ -179,8 +179,8 @@ pub struct Rates {
 impl Rates {
     /// Returns rates without bounds; the mean velocity of the swarm grows at rate a22.
     #[must_use]
-    pub fn unknown(at: &RateQuery) -> Self {
-        Self { fastest_per_s: None, obstacles_per_s2: 0.0, velocity_margin: None, common_mode_per_s: at.a22_per_s }
+    pub fn unknown(query: &RateQuery) -> Self {
+        Self { fastest_per_s: None, obstacles_per_s2: 0.0, velocity_margin: None, common_mode_per_s: query.a22_per_s }
     }
 }
 

@@ -99,16 +99,17 @@ impl Law for LaplacianLaw {
         "laplacian"
     }
 
-    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
-        check_observation(self.graph.count(), at, command)?;
+    fn command(&mut self, observation: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        check_observation(self.graph.count(), observation, command)?;
         command.fill(0.0);
-        let (per_vehicle, slots_m) = (-1.0 / at.own.count().max(1) as f64, &at.target.formation.slots_m);
+        let (per_vehicle, slots_m) =
+            (-1.0 / observation.own.count().max(1) as f64, &observation.target.formation.slots_m);
         let (f1, f2) = (self.f1_per_s2 * per_vehicle, self.f2_per_s * per_vehicle);
-        if let Some(swarm) = at.shared() {
+        if let Some(swarm) = observation.shared() {
             add_laplacian_product(&self.graph, &of_errors_m(&swarm.positions_m, slots_m), f1, command);
             add_laplacian_product(&self.graph, &of_table(&swarm.velocities_m_s), f2, command);
         } else {
-            add_received_terms(at, command, |i, own, j, received| {
+            add_received_terms(observation, command, |i, own, j, received| {
                 let errors_m = (own.position_m - row(slots_m, i)) - (received.position_m - row(slots_m, j));
                 Ok(f1 * errors_m + f2 * (own.velocity_m_s - received.velocity_m_s))
             })?;
@@ -116,13 +117,13 @@ impl Law for LaplacianLaw {
         check_range(command)
     }
 
-    fn energy(&self, at: &Observation<'_>) -> Option<f64> {
+    fn energy(&self, observation: &Observation<'_>) -> Option<f64> {
         if !self.graph.is_complete() || self.f1_per_s2 <= 0.0 {
             return None;
         }
-        let swarm = at.own;
+        let swarm = observation.own;
         check_state(self.graph.count(), swarm).ok()?;
-        let error_m = |i| row(&swarm.positions_m, i) - row(&at.target.formation.slots_m, i);
+        let error_m = |i| row(&swarm.positions_m, i) - row(&observation.target.formation.slots_m, i);
         let potential = 0.5 * self.f1_per_s2 * sum_of_squares_about_mean(swarm.count(), error_m);
         let energy = relative_kinetic_energy(swarm) + potential;
         energy.is_finite().then_some(energy)
@@ -144,12 +145,17 @@ impl Law for LaplacianLaw {
 
     /// The law is linear. With the eigenvalues 0 <= mu <= N of the graph's Laplacian, its modes are
     /// `x'' = -(f1 mu/N) x - (f2 mu/N - a22) x'`. Their rates are at most `max(sqrt(f1), |f2 - a22|, |a22|)`.
-    fn rates(&self, at: &RateQuery) -> Rates {
-        let fastest = self.f1_per_s2.sqrt().max((self.f2_per_s - at.a22_per_s).abs()).max(at.a22_per_s.abs());
+    fn rates(&self, query: &RateQuery) -> Rates {
+        let fastest = self.f1_per_s2.sqrt().max((self.f2_per_s - query.a22_per_s).abs()).max(query.a22_per_s.abs());
         Rates {
             fastest_per_s: Some(fastest),
-            velocity_margin: Some(consensus_margin(self.graph.count(), self.f2_per_s, at.connectivity, at.a22_per_s)),
-            ..Rates::unknown(at)
+            velocity_margin: Some(consensus_margin(
+                self.graph.count(),
+                self.f2_per_s,
+                query.connectivity,
+                query.a22_per_s,
+            )),
+            ..Rates::unknown(query)
         }
     }
 }

@@ -7,8 +7,8 @@
 //! s^2 - a22 s + (K + C s) e^(-s tau) = 0
 //! ```
 //!
-//! If only the received states are late, own and received terms separate: see [`ReceivedStateLoop`]. docs/margins.md
-//! has the derivations.
+//! If only the received states are late, own and received terms separate: see [`ReceivedStateLoop`]. docs/studies.md
+//! lists the modes of each law.
 
 use std::f64::consts::TAU;
 

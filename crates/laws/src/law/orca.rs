@@ -152,35 +152,36 @@ impl OrcaLaw {
     ///
     /// # Errors
     /// [`LawError`] if a state is not finite or two vehicles are at the same position.
-    pub fn velocities(&mut self, at: &Observation<'_>, velocities: &mut Rows) -> Result<(), LawError> {
-        check_observation(self.count, at, velocities)?;
-        self.near.update(self.count, at.near);
+    pub fn velocities(&mut self, observation: &Observation<'_>, velocities: &mut Rows) -> Result<(), LawError> {
+        check_observation(self.count, observation, velocities)?;
+        self.near.update(self.count, observation.near);
         for i in 0..self.count {
-            self.find_nearest(at, i);
+            self.find_nearest(observation, i);
             self.half_spaces.clear();
             for place in 0..self.nearest.len() {
-                let half_space = self.half_space(at, i, self.nearest[place].1)?;
+                let half_space = self.half_space(observation, i, self.nearest[place].1)?;
                 self.half_spaces.push(half_space);
             }
-            let preferred = self.preferred_m_s(at, i);
+            let preferred = self.preferred_m_s(observation, i);
             set_row(velocities, i, self.half_spaces.nearest(preferred, self.keys.max_speed_m_s).point);
         }
         check_range(velocities)
     }
 
     /// Returns the preferred velocity of vehicle i without neighbours \[m/s\].
-    fn preferred_m_s(&self, at: &Observation<'_>, i: usize) -> Vector3<f64> {
-        let reference = &at.target.reference;
-        let missing_m = row(&at.target.formation.slots_m, i) + reference.position_m - row(&at.own.positions_m, i);
+    fn preferred_m_s(&self, observation: &Observation<'_>, i: usize) -> Vector3<f64> {
+        let reference = &observation.target.reference;
+        let missing_m =
+            row(&observation.target.formation.slots_m, i) + reference.position_m - row(&observation.own.positions_m, i);
         reference.velocity_m_s + (self.keys.k_per_s * missing_m).cap_magnitude(self.keys.speed_m_s)
     }
 
     /// Finds the nearest vehicles that vehicle i senses within the range, in order of distance and then of index.
-    fn find_nearest(&mut self, at: &Observation<'_>, i: usize) {
+    fn find_nearest(&mut self, observation: &Observation<'_>, i: usize) {
         self.nearest.clear();
-        let own_m = row(&at.own.positions_m, i);
+        let own_m = row(&observation.own.positions_m, i);
         for &j in self.near.of(i) {
-            let apart = (at.sensed(i, j).position_m - own_m).norm_squared();
+            let apart = (observation.sensed(i, j).position_m - own_m).norm_squared();
             if apart > self.range_m * self.range_m {
                 continue;
             }
@@ -193,10 +194,10 @@ impl OrcaLaw {
     }
 
     /// Returns the half-space of velocities of vehicle i that vehicle j allows.
-    fn half_space(&self, at: &Observation<'_>, i: usize, j: usize) -> Result<HalfSpace, LawError> {
-        let sensed = at.sensed(i, j);
-        let own_m_s = row(&at.own.velocities_m_s, i);
-        let towards_m = sensed.position_m - row(&at.own.positions_m, i);
+    fn half_space(&self, observation: &Observation<'_>, i: usize, j: usize) -> Result<HalfSpace, LawError> {
+        let sensed = observation.sensed(i, j);
+        let own_m_s = row(&observation.own.velocities_m_s, i);
+        let towards_m = sensed.position_m - row(&observation.own.positions_m, i);
         if towards_m.norm_squared() == 0.0 {
             return Err(LawError::Collision { pair: Pair::new(i, j), separation_m: 0.0, delta_m: self.delta_m });
         }
@@ -212,11 +213,11 @@ impl Law for OrcaLaw {
         "orca"
     }
 
-    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
-        self.velocities(at, command)?;
-        let feed_forward_m_s2 = self.reference_use.feed_forward_m_s2(&at.target.reference);
+    fn command(&mut self, observation: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        self.velocities(observation, command)?;
+        let feed_forward_m_s2 = self.reference_use.feed_forward_m_s2(&observation.target.reference);
         for i in 0..self.count {
-            let own_m_s = row(&at.own.velocities_m_s, i);
+            let own_m_s = row(&observation.own.velocities_m_s, i);
             let tracked_m_s2 = (row(command, i) - own_m_s) * self.keys.tracking_per_s;
             let wanted = feed_forward_m_s2 + tracked_m_s2 - own_m_s * self.a22_per_s;
             set_row(command, i, wanted.cap_magnitude(self.keys.max_accel_m_s2));
@@ -238,11 +239,11 @@ impl Law for OrcaLaw {
 
     /// A vehicle without neighbours follows x'' = -tracking (x' + k x). With neighbours in range no bound is known: the
     /// chosen velocity may turn as fast as two vehicles pass. a22 is compensated, so the common mode does not grow.
-    fn rates(&self, at: &RateQuery) -> Rates {
+    fn rates(&self, query: &RateQuery) -> Rates {
         let OrcaKeys { tracking_per_s, k_per_s, .. } = self.keys;
         let alone_per_s = tracking_per_s.max((tracking_per_s * k_per_s).sqrt());
-        let is_alone = at.nearest_m.is_some_and(|nearest_m| nearest_m > self.range_m);
-        Rates { fastest_per_s: is_alone.then_some(alone_per_s), common_mode_per_s: 0.0, ..Rates::unknown(at) }
+        let is_alone = query.nearest_m.is_some_and(|nearest_m| nearest_m > self.range_m);
+        Rates { fastest_per_s: is_alone.then_some(alone_per_s), common_mode_per_s: 0.0, ..Rates::unknown(query) }
     }
 }
 

@@ -77,13 +77,13 @@ impl PinnedConsensus {
     /// `k (e_i - r) + c (v_i - r')` if i knows the reference.
     pub(super) fn add_pulls(
         &mut self,
-        at: &Observation<'_>,
+        observation: &Observation<'_>,
         gains: Gains,
         scale: f64,
         sums: &mut Rows,
     ) -> Result<(), LawError> {
-        let (slots_m, Gains { position: k, velocity: c }) = (&at.target.formation.slots_m, gains);
-        if let Some(swarm) = at.shared() {
+        let (slots_m, Gains { position: k, velocity: c }) = (&observation.target.formation.slots_m, gains);
+        if let Some(swarm) = observation.shared() {
             let (errors_m, velocities_m_s) = (of_errors_m(&swarm.positions_m, slots_m), columns(&swarm.velocities_m_s));
             let pull = |axis: usize| {
                 let (error_m, velocity_m_s) = (&errors_m[axis], velocities_m_s[axis]);
@@ -100,14 +100,14 @@ impl PinnedConsensus {
                 add_laplacian_product(&self.graph, &of_table(&self.pulls), scale, sums);
             }
         } else {
-            add_received_terms(at, sums, |i, own, j, received| {
+            add_received_terms(observation, sums, |i, own, j, received| {
                 let error_m = (own.position_m - row(slots_m, i)) - (received.position_m - row(slots_m, j));
                 Ok(scale * (k * error_m + c * (own.velocity_m_s - received.velocity_m_s)))
             })?;
         }
         if matches!(self.pinning, Pinning::All | Pinning::Listed(_)) {
             for i in (0..self.graph.count()).filter(|&i| self.pinning.pins(i)) {
-                let (error_m, velocity_m_s) = reference_errors(at, i);
+                let (error_m, velocity_m_s) = reference_errors(observation, i);
                 let sum = row(sums, i) + scale * (k * error_m + c * velocity_m_s);
                 set_row(sums, i, sum);
             }
@@ -116,11 +116,11 @@ impl PinnedConsensus {
     }
 
     /// Replaces the leader's row by its own tracking of the reference, independent of other vehicles.
-    pub(super) fn lead(&self, at: &Observation<'_>, gains: Gains, a22_per_s: f64, command: &mut Rows) {
+    pub(super) fn lead(&self, observation: &Observation<'_>, gains: Gains, a22_per_s: f64, command: &mut Rows) {
         if let Some(leader) = self.pinning.leader() {
-            let (error_m, velocity_m_s) = reference_errors(at, leader);
+            let (error_m, velocity_m_s) = reference_errors(observation, leader);
             let back = gains.position * error_m + gains.velocity * velocity_m_s;
-            set_row(command, leader, feed_forward_acceleration(&at.target.reference, a22_per_s) - back);
+            set_row(command, leader, feed_forward_acceleration(&observation.target.reference, a22_per_s) - back);
         }
     }
 
@@ -151,10 +151,10 @@ impl PinnedConsensus {
 }
 
 /// `p_i - h_i - r` \[m\] and `v_i - r'` \[m/s\].
-fn reference_errors(at: &Observation<'_>, i: usize) -> (Vector3<f64>, Vector3<f64>) {
-    let reference = &at.target.reference;
-    let error_m = error_m(&at.own.positions_m, at.target.formation, reference.position_m, i);
-    (error_m, row(&at.own.velocities_m_s, i) - reference.velocity_m_s)
+fn reference_errors(observation: &Observation<'_>, i: usize) -> (Vector3<f64>, Vector3<f64>) {
+    let reference = &observation.target.reference;
+    let error_m = error_m(&observation.own.positions_m, observation.target.formation, reference.position_m, i);
+    (error_m, row(&observation.own.velocities_m_s, i) - reference.velocity_m_s)
 }
 
 /// Returns `p_i - h_i - place` \[m\].

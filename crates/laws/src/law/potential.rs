@@ -139,14 +139,15 @@ impl PotentialLaw {
         Ok(sum)
     }
 
-    fn try_energy(&self, at: &Observation<'_>) -> Result<f64, LawError> {
-        check_state(self.graph.count(), at.own)?;
-        let (positions_m, slots_m) = (&at.own.positions_m, &at.target.formation.slots_m);
+    fn try_energy(&self, observation: &Observation<'_>) -> Result<f64, LawError> {
+        check_state(self.graph.count(), observation.own)?;
+        let (positions_m, slots_m) = (&observation.own.positions_m, &observation.target.formation.slots_m);
         let error_m = |i| row(positions_m, i) - row(slots_m, i);
         let attraction: f64 = self.graph.edges().map(|(i, j)| (error_m(i) - error_m(j)).norm_squared()).sum();
         let repulsion = self.cache.of(positions_m).map_or_else(|| self.repulsive_potential(positions_m), Ok)?;
-        let kinetic = 0.5 * at.own.velocities_m_s.norm_squared();
-        let energy = kinetic + 0.5 * self.keys.k_per_s2 / at.own.count().max(1) as f64 * attraction + repulsion;
+        let kinetic = 0.5 * observation.own.velocities_m_s.norm_squared();
+        let energy =
+            kinetic + 0.5 * self.keys.k_per_s2 / observation.own.count().max(1) as f64 * attraction + repulsion;
         if energy.is_finite() { Ok(energy) } else { Err(LawError::OutOfRange) }
     }
 }
@@ -183,21 +184,22 @@ impl Law for PotentialLaw {
         "potential"
     }
 
-    fn command(&mut self, at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
-        check_observation(self.graph.count(), at, command)?;
-        command.copy_from(&at.own.velocities_m_s);
+    fn command(&mut self, observation: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        check_observation(self.graph.count(), observation, command)?;
+        command.copy_from(&observation.own.velocities_m_s);
         *command *= -self.keys.c_per_s;
-        let (slots_m, gain) = (&at.target.formation.slots_m, -self.keys.k_per_s2 / at.own.count().max(1) as f64);
-        if let Some(swarm) = at.shared() {
+        let (slots_m, gain) =
+            (&observation.target.formation.slots_m, -self.keys.k_per_s2 / observation.own.count().max(1) as f64);
+        if let Some(swarm) = observation.shared() {
             add_laplacian_product(&self.graph, &of_errors_m(&swarm.positions_m, slots_m), gain, command);
         } else {
-            add_received_terms(at, command, |i, own, j, received| {
+            add_received_terms(observation, command, |i, own, j, received| {
                 Ok(gain * ((own.position_m - row(slots_m, i)) - (received.position_m - row(slots_m, j))))
             })?;
         }
-        let potential = add_pushes(at, command, |i, j, apart_m| self.repulsion(i, j, apart_m))?;
+        let potential = add_pushes(observation, command, |i, j, apart_m| self.repulsion(i, j, apart_m))?;
         if let Some(potential) = potential {
-            self.cache.store(&at.own.positions_m, potential);
+            self.cache.store(&observation.own.positions_m, potential);
         }
         if let Some(limit) = self.keys.max_accel_m_s2 {
             (0..command.nrows()).for_each(|i| set_row(command, i, row(command, i).cap_magnitude(limit)));
@@ -220,8 +222,8 @@ impl Law for PotentialLaw {
         Ok(())
     }
 
-    fn energy(&self, at: &Observation<'_>) -> Option<f64> {
-        self.try_energy(at).ok()
+    fn energy(&self, observation: &Observation<'_>) -> Option<f64> {
+        self.try_energy(observation).ok()
     }
 
     fn certificate(&self, start: &Observation<'_>, _ahead: &[&Formation]) -> Certificate {
@@ -255,17 +257,17 @@ impl Law for PotentialLaw {
         }
     }
 
-    fn rates(&self, at: &RateQuery) -> Rates {
-        let a22_per_s = at.a22_per_s;
+    fn rates(&self, query: &RateQuery) -> Rates {
+        let a22_per_s = query.a22_per_s;
         Rates {
-            fastest_per_s: at.nearest_m.and_then(|nearest_m| self.fastest_per_s(nearest_m, a22_per_s)),
+            fastest_per_s: query.nearest_m.and_then(|nearest_m| self.fastest_per_s(nearest_m, a22_per_s)),
             velocity_margin: Some(VelocityMargin {
                 per_s: self.keys.c_per_s - a22_per_s,
                 terms_per_s: self.keys.c_per_s + a22_per_s.abs(),
                 remedy: "Raise law.c_per_s, or reduce swarm.a22_per_s.",
             }),
             common_mode_per_s: a22_per_s - self.keys.c_per_s,
-            ..Rates::unknown(at)
+            ..Rates::unknown(query)
         }
     }
 }

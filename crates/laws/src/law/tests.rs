@@ -25,11 +25,11 @@ fn built(spec: &LawSpec, links: &Graph, formation: &Formation) -> Box<dyn Law> {
     spec.clone().complete(0.1).build(&context).expect("a law")
 }
 
-fn command(law: &mut dyn Law, at: &Observation<'_>) -> Rows {
+fn command(law: &mut dyn Law, observation: &Observation<'_>) -> Rows {
     let mut near = CellList::default();
-    near.update(&at.own.positions_m, law.capabilities().sensing_range_m.unwrap_or(0.0));
+    near.update(&observation.own.positions_m, law.capabilities().sensing_range_m.unwrap_or(0.0));
     let mut command = Rows::zeros(COUNT);
-    law.command(&Observation { near: near.pairs(), ..*at }, &mut command).expect("a command");
+    law.command(&Observation { near: near.pairs(), ..*observation }, &mut command).expect("a command");
     command
 }
 
@@ -76,11 +76,11 @@ fn a_command_depends_only_on_the_tables_of_its_vehicle() {
             let mut law = built(&spec, &links, &formation);
             let mut command_with = |vehicle: Option<usize>| {
                 let held = pictures(vehicle);
-                let at = Observation {
+                let observation = Observation {
                     others: OtherStates::PerVehicle(&held),
                     ..Observation::exact(&swarm, &links, &formation)
                 };
-                command(law.as_mut(), &at)
+                command(law.as_mut(), &observation)
             };
             let plain = command_with(None);
             let mut own = 0;
@@ -108,9 +108,9 @@ fn following_new_slots_equals_building_the_law_for_them() {
         let mut target = CurrentTarget::first_of(&[Leg::first(first.clone())]).expect("a leg");
         target.begin(1, &next);
         law.follow(&target.view()).expect("slots clear of delta");
-        let at = Observation { target: target.view(), ..Observation::exact(&swarm, &links, &next) };
-        let anew = command(built(&spec, &links, &next).as_mut(), &at);
-        assert_eq!(command(law.as_mut(), &at), anew, "{spec:?}");
+        let observation = Observation { target: target.view(), ..Observation::exact(&swarm, &links, &next) };
+        let anew = command(built(&spec, &links, &next).as_mut(), &observation);
+        assert_eq!(command(law.as_mut(), &observation), anew, "{spec:?}");
         assert_eq!(
             law.capabilities().sensing_range_m,
             built(&spec, &links, &next).capabilities().sensing_range_m,

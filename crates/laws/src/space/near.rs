@@ -77,11 +77,11 @@ impl CellList {
         found.clear();
         for (place, (&(cell, i), &point)) in cells.iter().zip(points.iter()).enumerate() {
             let mut compare = |from: usize, last_cell: u64| {
-                for (&(other, j), &at) in cells[from..].iter().zip(&points[from..]) {
+                for (&(other, j), &position) in cells[from..].iter().zip(&points[from..]) {
                     if other > last_cell {
                         break;
                     }
-                    let apart = (at - point).norm_squared();
+                    let apart = (position - point).norm_squared();
                     if apart <= squared && apart.sqrt() <= range_m {
                         found.push((i.min(j), i.max(j)));
                     }
@@ -211,9 +211,9 @@ impl NearLists {
         others.clear();
         others.resize(2 * pairs.len(), 0);
         for &(i, j) in pairs {
-            for (of, other) in [(i, j), (j, i)] {
-                others[ends[of]] = other;
-                ends[of] += 1;
+            for (vehicle, other) in [(i, j), (j, i)] {
+                others[ends[vehicle]] = other;
+                ends[vehicle] += 1;
             }
         }
     }

@@ -279,17 +279,17 @@ mod tests {
     use super::*;
 
     fn motions() -> Vec<ReferenceMotion> {
-        let at = |x: f64, y: f64, z: f64| Vector3::new(x, y, z);
+        let point = |x: f64, y: f64, z: f64| Vector3::new(x, y, z);
         let points = vec![
-            (0.0, at(0.0, 0.0, 0.0)),
-            (2.0, at(3.0, -1.0, 0.5)),
-            (5.0, at(-1.0, 2.0, 0.0)),
-            (9.0, at(1.0, 1.0, 1.0)),
+            (0.0, point(0.0, 0.0, 0.0)),
+            (2.0, point(3.0, -1.0, 0.5)),
+            (5.0, point(-1.0, 2.0, 0.0)),
+            (9.0, point(1.0, 1.0, 1.0)),
         ];
         vec![
-            ReferenceMotion::Rest { position_m: at(1.0, 2.0, 3.0) },
-            ReferenceMotion::Velocity { from_m: at(1.0, 0.0, 0.0), velocity_m_s: at(0.5, -0.25, 0.0) },
-            ReferenceMotion::Circle { centre_m: at(1.0, 1.0, 2.0), radius_m: 3.0, period_s: -7.0 },
+            ReferenceMotion::Rest { position_m: point(1.0, 2.0, 3.0) },
+            ReferenceMotion::Velocity { from_m: point(1.0, 0.0, 0.0), velocity_m_s: point(0.5, -0.25, 0.0) },
+            ReferenceMotion::Circle { centre_m: point(1.0, 1.0, 2.0), radius_m: 3.0, period_s: -7.0 },
             ReferenceMotion::WayPoints { points: points.clone() },
             ReferenceMotion::Table(Spline::through(&points).expect("a spline")),
         ]

@@ -171,13 +171,13 @@ mod tests {
     }
 
     /// Returns the leg at times 0, 0.5, 1, ... while the swarm is in the formation of leg `at(time)`.
-    fn flown(legs: &[Leg], at: impl Fn(f64) -> usize) -> Vec<usize> {
+    fn flown(legs: &[Leg], leg_at: impl Fn(f64) -> usize) -> Vec<usize> {
         let mut schedule = Schedule::new(legs, &Graph::complete(2), Arrival::default());
         let mut target = CurrentTarget::first_of(legs).expect("legs");
         (0..8)
             .map(|k| {
                 let time_s = 0.5 * f64::from(k);
-                let swarm = Swarm::at_rest(legs[at(time_s)].formation.slots_m.clone());
+                let swarm = Swarm::at_rest(legs[leg_at(time_s)].formation.slots_m.clone());
                 schedule.supervise(time_s, &swarm, &mut target);
                 target.view().leg
             })

@@ -52,7 +52,9 @@ mod tests {
         let count = 200_000_u32;
         let (mut one, mut other) = (Normals::new(7, 1), Normals::new(7, 2));
         let pairs: Vec<_> = (0..count).map(|_| (one.next(), other.next())).collect();
-        let mean = |of: &dyn Fn(f64, f64) -> f64| pairs.iter().map(|&(a, b)| of(a, b)).sum::<f64>() / f64::from(count);
+        let mean = |value_of: &dyn Fn(f64, f64) -> f64| {
+            pairs.iter().map(|&(a, b)| value_of(a, b)).sum::<f64>() / f64::from(count)
+        };
         // Four standard deviations of each mean.
         let near = |found: f64, expected: f64, variance: f64| {
             assert!((found - expected).abs() < 4.0 * (variance / f64::from(count)).sqrt(), "{found} for {expected}");

@@ -294,15 +294,15 @@ mod tests {
 
     #[test]
     fn a_gust_rises_holds_and_falls_as_one_minus_cosine() {
-        let at = |time_s: f64| gust().share(time_s);
+        let share_at = |time_s: f64| gust().share(time_s);
         for (time_s, share) in [(0.0, 0.0), (2.0, 0.0), (2.5, 0.5), (3.0, 1.0), (3.4, 1.0), (3.5, 1.0), (4.5, 0.5)] {
-            assert!((at(time_s) - share).abs() < 1e-15, "{time_s}");
+            assert!((share_at(time_s) - share).abs() < 1e-15, "{time_s}");
         }
-        assert_eq!((at(5.5), at(1e9)), (0.0, 0.0));
-        assert!((at(2.0 + 1.0 / 3.0) - 0.25).abs() < 1e-15, "1/2 (1 - cos 60 deg)");
+        assert_eq!((share_at(5.5), share_at(1e9)), (0.0, 0.0));
+        assert!((share_at(2.0 + 1.0 / 3.0) - 0.25).abs() < 1e-15, "1/2 (1 - cos 60 deg)");
         // Slopes begin and end flat, unlike those of a triangle of the same height.
         for corner_s in gust().corners_s() {
-            let bend = |h: f64| (at(corner_s + h) - at(corner_s - h)).abs() / h;
+            let bend = |h: f64| (share_at(corner_s + h) - share_at(corner_s - h)).abs() / h;
             assert!(bend(1e-4) < 1e-3, "{corner_s}");
         }
         let triangle = |time_s: f64| (time_s - 2.0).clamp(0.0, 1.0);

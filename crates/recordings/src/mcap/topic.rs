@@ -191,7 +191,7 @@ impl TopicReader {
                 Part::Topic(self.topics.entry(channel).insert_entry(declared).into_mut())
             }),
             op::MESSAGE => message(fields).map(|(channel, log_ns, bytes)| match self.topics.get(&channel) {
-                Some(of) => Part::Message(Message { offset, of, log_ns, bytes }),
+                Some(topic) => Part::Message(Message { offset, of: topic, log_ns, bytes }),
                 None => Part::Other,
             }),
             _ => Some(Part::Other),

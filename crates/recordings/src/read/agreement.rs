@@ -9,7 +9,7 @@ use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::option::COLUMN;
 
 use super::earth::{Geodetic, LocalFrame};
-use super::error::{Fault, list, quoted};
+use super::error::{ContentKind, Fault, list, quoted};
 
 /// Largest error of the difference of two fixes \[m\]: an uncorrected receiver is within 5 m (95 %).
 const LARGEST_ERROR_M: f64 = 10.0;
@@ -411,7 +411,7 @@ impl Compared {
             (chosen(&self.metric, ["x", "y", "z"]), chosen(&self.earth, ["lat", "lon", "alt"]))
         };
         let remedy = format!("choose the positions that have one origin for all vehicles, {metric}, or {earth}");
-        Fault::coded("recording/several-frames", problem, remedy)
+        Fault::content(ContentKind::SeveralFrames, problem, remedy)
     }
 }
 

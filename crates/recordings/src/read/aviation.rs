@@ -4,7 +4,7 @@
 //! per minute and speeds in knots. The state vectors of `OpenSky` are in metres. Their columns have no unit.
 
 use super::clock::Stamp;
-use super::error::{Fault, quoted};
+use super::error::{ContentKind, Fault, quoted};
 use super::heading;
 use super::heading::Words;
 use tautline_core::option::SCALE;
@@ -194,7 +194,7 @@ impl ClimbMonitor {
             SCALE.set("0.3048"),
             SCALE.set("1")
         );
-        Some(Fault::coded("recording/unit-conflict", problem, remedy))
+        Some(Fault::content(ContentKind::UnitConflict, problem, remedy))
     }
 }
 

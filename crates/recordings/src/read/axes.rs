@@ -15,7 +15,7 @@ use std::str::FromStr;
 
 use nalgebra::Vector3;
 
-use super::error::{Fault, ReadError, quoted, refuse};
+use super::error::{ContentKind, Fault, ReadError, quoted, refuse};
 use super::heading;
 use super::options::{ColumnNames, ReadOptions};
 use super::order::Recording;
@@ -151,7 +151,7 @@ pub(super) fn turned(recording: Recording, options: &ReadOptions) -> Result<Reco
         let problem = format!("{AXES} maps its third axis to x or y, but it has none");
         let column = COLUMN.set("z=NAME");
         let remedy = format!("name the column of the third axis with {column}, or keep z in {AXES}");
-        return refuse("recording/contradicts-option", problem, remedy);
+        return refuse(ContentKind::ContradictsOption, problem, remedy);
     }
     let mut metadata = recording.metadata().clone();
     metadata.notes.push(options.turn().note());
@@ -164,7 +164,7 @@ pub(super) fn refuse_known(options: &ReadOptions, what: &str) -> Result<(), Faul
         return Ok(());
     }
     refuse(
-        "recording/contradicts-option",
+        ContentKind::ContradictsOption,
         format!("{what} gives the directions of its axes"),
         format!("omit {AXES} and the signs of {SCALE}"),
     )
@@ -179,7 +179,7 @@ pub(super) fn refuse_turned_height(options: &ReadOptions, column: &str) -> Resul
         format!("column {} is a height by its name, but {AXES} or {SCALE} change its direction", quoted(column));
     let named = COLUMN.set(format!("z={column}"));
     let remedy = format!("keep z in {AXES} and {SCALE}, or take the numbers as z with {named}");
-    refuse("recording/contradicts-option", problem, remedy)
+    refuse(ContentKind::ContradictsOption, problem, remedy)
 }
 
 struct MappedRecording {
@@ -204,7 +204,7 @@ impl Tracks for MappedRecording {
                     if sample.radius_m.is_some() && !self.axes.keeps_lengths() {
                         let problem = format!("{SCALE} has different factors for its axes, but vehicles have a radius");
                         let remedy = format!("give one factor in {SCALE}");
-                        return refuse("recording/contradicts-option", problem, remedy);
+                        return refuse(ContentKind::ContradictsOption, problem, remedy);
                     }
                     sample.position_m = self.axes.turn(sample.position_m);
                     sample.velocity_m_s = sample.velocity_m_s.map(|velocity| self.axes.turn(velocity));
@@ -297,21 +297,23 @@ impl Convention {
     }
 
     fn of_px4(&self, lower: &[String]) -> Result<Option<Self>, Fault> {
-        let at = |name: &str| lower.iter().position(|known| known == name);
-        let (Some(_), Some(_), Some(lat), Some(lon)) = (at("x"), at("y"), at("ref_lat"), at("ref_lon")) else {
+        let index_of = |name: &str| lower.iter().position(|known| known == name);
+        let (Some(_), Some(_), Some(lat), Some(lon)) =
+            (index_of("x"), index_of("y"), index_of("ref_lat"), index_of("ref_lon"))
+        else {
             return Ok(None);
         };
-        let Some(alt) = at("ref_alt") else {
+        let Some(alt) = index_of("ref_alt") else {
             let problem = "its positions are relative to `ref_lat` and `ref_lon`, but there is no column `ref_alt`";
-            return refuse("recording/missing-column", problem, GLOBAL);
+            return refuse(ContentKind::MissingColumn, problem, GLOBAL);
         };
         let mut px4 = self.clone();
         for start in ["", "v"] {
             px4.turn_all(lower, start, &ned());
         }
         px4.reference = Some([lat, lon, alt]);
-        px4.valid = ["xy_valid", "z_valid"].into_iter().filter_map(at).collect();
-        px4.counts_from_boot = at("timestamp").is_some();
+        px4.valid = ["xy_valid", "z_valid"].into_iter().filter_map(index_of).collect();
+        px4.counts_from_boot = index_of("timestamp").is_some();
         px4.is_one_vehicle = true;
         let what = "positions are north, east and down of `ref_lat`, `ref_lon` and `ref_alt` (PX4)";
         let clock = "; times count from the start of the vehicle's computer";
@@ -355,7 +357,7 @@ impl Convention {
         for (column, name) in self.header.iter().enumerate() {
             let (stem, unit) = without_unit(name);
             let Some((rest, axes)) = without_frame(stem) else { continue };
-            let start = rest.rfind(SEPARATORS).map_or(0, |at| at + 1);
+            let start = rest.rfind(SEPARATORS).map_or(0, |index| index + 1);
             let word = rest[start..].to_lowercase();
             let axis = ["x", "y", "z"].iter().position(|axis| word.strip_prefix(['v', 'p']).unwrap_or(&word) == *axis);
             if let Some(axis) = axis {
@@ -366,18 +368,23 @@ impl Convention {
         let enu = Axes::default();
         let places: Vec<_> = lower.iter().filter_map(|name| Direction::of(without_unit(name).0)).collect();
         let across = |axis: usize, is_letter: bool| {
-            places.iter().any(|of| of.axis == axis && of.is_letter == is_letter && !of.is_velocity)
+            places.iter().any(|place| place.axis == axis && place.is_letter == is_letter && !place.is_velocity)
         };
         let has_words = across(0, false) && across(1, false);
         let has_letters = across(0, true) && across(1, true) && across(2, true);
         for (column, name) in self.header.iter().enumerate() {
             let (stem, unit) = without_unit(name);
-            let Some(of) = Direction::of(stem) else { continue };
-            let is_meant = if of.is_letter { has_letters || (has_words && of.is_velocity) } else { has_words };
+            let Some(direction) = Direction::of(stem) else { continue };
+            let is_meant =
+                if direction.is_letter { has_letters || (has_words && direction.is_velocity) } else { has_words };
             if is_meant {
-                let before = if of.is_velocity { format!("{}v", of.vehicle) } else { of.vehicle.to_owned() };
-                turned.turn(column, &enu, of.axis, [&before, unit]);
-                turned.signs[column] = of.sign;
+                let before = if direction.is_velocity {
+                    format!("{}v", direction.vehicle)
+                } else {
+                    direction.vehicle.to_owned()
+                };
+                turned.turn(column, &enu, direction.axis, [&before, unit]);
+                turned.signs[column] = direction.sign;
             }
         }
         if !turned.has_directions() {
@@ -407,10 +414,10 @@ fn without_frame(stem: &str) -> Option<(String, Axes)> {
     let lower = stem.to_lowercase();
     // A name whose length changes in lower case contains no known word.
     let words = lower.split(SEPARATORS).filter(|_| lower.len() == stem.len());
-    let (at, word, axes) = words
+    let (index, word, axes) = words
         .map(|word| (word.as_ptr() as usize - lower.as_ptr() as usize, word))
-        .find_map(|(at, word)| Some((at, word, Axes::from_name(word).filter(|_| FRAMES.contains(&word))?)))?;
-    let (before, behind) = (&stem[..at], &stem[at + word.len()..]);
+        .find_map(|(index, word)| Some((index, word, Axes::from_name(word).filter(|_| FRAMES.contains(&word))?)))?;
+    let (before, behind) = (&stem[..index], &stem[index + word.len()..]);
     // One of the two separators around the word is removed too.
     let rest = if behind.is_empty() {
         before.strip_suffix(SEPARATORS)?.to_owned()
@@ -443,7 +450,7 @@ impl<'a> Direction<'a> {
             (&["down"], 2, -1.0),
         ];
         const LETTERS: [(&str, usize, f64); 4] = [("e", 0, 1.0), ("n", 1, 1.0), ("u", 2, 1.0), ("d", 2, -1.0)];
-        let end = stem.rfind(SEPARATORS).map_or(0, |at| at + 1);
+        let end = stem.rfind(SEPARATORS).map_or(0, |index| index + 1);
         let word = stem[end..].to_lowercase();
         let mut before = &stem[..end];
         let by_word = WORDS.iter().find(|(words, ..)| words.contains(&&*word)).map(|&(_, axis, sign)| (axis, sign));
@@ -461,7 +468,7 @@ impl<'a> Direction<'a> {
         };
         // Quantity before the direction: `vel_n`, `position_east`.
         let quantity = before.trim_end_matches(SEPARATORS);
-        let start = quantity.rfind(SEPARATORS).map_or(0, |at| at + 1);
+        let start = quantity.rfind(SEPARATORS).map_or(0, |index| index + 1);
         match quantity[start..].to_lowercase().as_str() {
             "v" | "vel" | "velocity" => (is_velocity, before) = (true, &before[..start]),
             "p" | "pos" | "position" => before = &before[..start],

@@ -14,7 +14,7 @@ use nalgebra::Vector3;
 
 use super::crazyflie::{Curve, curves_of};
 use super::curves::{Curves, powers};
-use super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
+use super::error::{ContentKind, Fault, Place, ReadError, UNSEEN, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{FormatOption, Packing, Reader};
@@ -81,18 +81,18 @@ fn append(curve: &mut Curve, file: &Source) -> Result<bool, ReadError> {
     let mut lines = Lines::new(file)?;
     let (mut columns, mut pieces) = (None, 0_u64);
     while lines.advance()? {
-        let at = Place::Line(lines.number());
-        let line = str::from_utf8(lines.line()).map_err(|_| Fault::NotUtf8.at(at.clone()))?.trim();
+        let place = Place::Line(lines.number());
+        let line = str::from_utf8(lines.line()).map_err(|_| Fault::NotUtf8.at(place.clone()))?.trim();
         let columns = match &mut columns {
             _ if line.is_empty() => continue,
             None => {
-                columns = Some(Columns::of(line).map_err(|fault| fault.at(at))?);
+                columns = Some(Columns::of(line).map_err(|fault| fault.at(place))?);
                 continue;
             }
             Some(_) if line.starts_with('#') => continue,
             Some(columns) => columns,
         };
-        columns.append(curve, line).map_err(|fault| fault.at(at))?;
+        columns.append(curve, line).map_err(|fault| fault.at(place))?;
         pieces += 1;
     }
     match columns {
@@ -114,7 +114,7 @@ impl Columns {
     fn of(header: &str) -> Result<Self, Fault> {
         if !is_header(header.as_bytes()) {
             let problem = format!("{} is not a header of Bezier curves", quoted(header));
-            return refuse("recording/no-header", problem, HEADER);
+            return refuse(ContentKind::NoHeader, problem, HEADER);
         }
         let mut found: Vec<_> = names(header).collect();
         found.pop_if(|name| name.is_empty());
@@ -128,11 +128,11 @@ impl Columns {
         let expected = (0..).flat_map(|point| of_axes.iter().map(move |axis| format!("p{point}{axis}")));
         if let Some((odd, expected)) = found[1..].iter().zip(expected).find(|(a, b)| !a.eq_ignore_ascii_case(b)) {
             let problem = format!("a column has the name {}, expected `{expected}`", quoted(odd));
-            return refuse("recording/missing-column", problem, HEADER);
+            return refuse(ContentKind::MissingColumn, problem, HEADER);
         }
         if !is_short && (found.len() - 1) % of_axes.len() != 0 {
             let problem = format!("the last point has fewer than {} columns", of_axes.len());
-            return refuse("recording/missing-column", problem, HEADER);
+            return refuse(ContentKind::MissingColumn, problem, HEADER);
         }
         Ok(Self { axes, fields: (!is_short).then_some(found.len()) })
     }
@@ -143,24 +143,24 @@ impl Columns {
         let numbers = fields.len().saturating_sub(1);
         if let Some(expected) = self.fields.filter(|expected| *expected != fields.len()) {
             let problem = format!("it has {} fields, expected {expected}", fields.len());
-            return refuse("recording/field-count", problem, "every line needs one field per column");
+            return refuse(ContentKind::FieldCount, problem, "every line needs one field per column");
         }
         let axes = match self.axes {
             Some(axes) => axes,
             None => [2, 3].into_iter().find(|axes| axes * (USUAL_DEGREE + 1) == numbers).ok_or_else(|| {
                 let problem = format!("the header does not give the axes of {numbers} numbers");
-                Fault::coded("recording/ambiguous-layout", problem, HEADER)
+                Fault::content(ContentKind::AmbiguousLayout, problem, HEADER)
             })?,
         };
         self.axes = Some(axes);
         if numbers == 0 || !numbers.is_multiple_of(axes) {
             let problem = format!("it has {numbers} numbers after the duration, expected a multiple of {axes}");
-            return refuse("recording/field-count", problem, "every point needs all its axes");
+            return refuse(ContentKind::FieldCount, problem, "every point needs all its axes");
         }
         if numbers / axes > HIGHEST_DEGREE + 1 {
             let problem =
                 format!("the degree of the piece is {}, at most {HIGHEST_DEGREE} is supported", numbers / axes - 1);
-            return refuse("recording/degree", problem, "use fewer control points");
+            return refuse(ContentKind::Degree, problem, "use fewer control points");
         }
         let mut values = Vec::with_capacity(fields.len());
         for (index, field) in fields.iter().enumerate() {
@@ -169,11 +169,11 @@ impl Columns {
                 Ok(_) => return Err(Fault::not_finite(&(index + 1).to_string(), field, UNSEEN)),
                 Err(_) => {
                     let problem = format!("column `{}` holds {}, which is not a number", index + 1, quoted(field));
-                    return refuse("recording/not-a-number", problem, "write numbers with a decimal point");
+                    return refuse(ContentKind::NotANumber, problem, "write numbers with a decimal point");
                 }
             });
         }
-        let point = |of: &[f64]| Vector3::new(of[0], of[1], of.get(2).copied().unwrap_or(0.0));
+        let point = |numbers: &[f64]| Vector3::new(numbers[0], numbers[1], numbers.get(2).copied().unwrap_or(0.0));
         let points: Vec<_> = values[1..].chunks_exact(axes).map(point).collect();
         curve.push(values[0], powers(&points, values[0]))
     }

@@ -25,7 +25,7 @@ use std::str;
 use nalgebra::Vector3;
 
 use super::clock::{Stamp, TimeUnit};
-use super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
+use super::error::{ContentKind, Fault, Place, ReadError, UNSEEN, quoted, refuse};
 use super::heading;
 use super::options::ReadOptions;
 use super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
@@ -67,14 +67,14 @@ fn by_subject(markers: Vec<(String, [usize; 3])>) -> Result<Vec<MarkerColumns>, 
     for (name, columns) in markers {
         if !names.insert(name.clone()) {
             let problem = format!("two markers have the name {}", quoted(&name));
-            return refuse("recording/vehicle-twice", problem, "give each marker its own name, and export again");
+            return refuse(ContentKind::VehicleTwice, problem, "give each marker its own name, and export again");
         }
         let subject = name.split(':').next().unwrap_or_default().to_owned();
-        let at = *known.entry(subject.clone()).or_insert(vehicles.len());
-        if at == vehicles.len() {
+        let index = *known.entry(subject.clone()).or_insert(vehicles.len());
+        if index == vehicles.len() {
             vehicles.push((subject, Vec::new()));
         }
-        vehicles[at].1.push(columns);
+        vehicles[index].1.push(columns);
     }
     Ok(vehicles)
 }
@@ -101,7 +101,7 @@ fn note_of_markers(vehicles: &[MarkerColumns]) -> Option<String> {
 fn open(source: &Source, capture: Capture, options: &ReadOptions) -> Result<Recording, ReadError> {
     if options.metres() != 1.0 {
         let problem = format!("it has a unit of length, which contradicts {}", SCALE.set(options.metres()));
-        return refuse("recording/contradicts-option", problem, format!("omit {SCALE}"));
+        return refuse(ContentKind::ContradictsOption, problem, format!("omit {SCALE}"));
     }
     let names = capture.vehicles.iter().map(|(name, _)| name.clone()).collect();
     let (unit, notes) = (Some(TimeUnit::Seconds), capture.notes.clone());
@@ -139,7 +139,7 @@ impl Table {
             TimeSource::Frames(rate) => {
                 if let Some(part) = number(cells, 1)?.filter(|part| *part != 0.0) {
                     let problem = format!("it is subframe {part}");
-                    return refuse("recording/frame-rate", problem, "export trajectories at the camera rate");
+                    return refuse(ContentKind::FrameRate, problem, "export trajectories at the camera rate");
                 }
                 Ok(Stamp::Real(needed(0)? / rate))
             }
@@ -169,7 +169,7 @@ fn number(cells: &[&[u8]], column: usize) -> Result<Option<f64>, Fault> {
     let Some(cell) = cells.get(column) else {
         let problem = format!("it has {} fields, but field {} belongs to a vehicle", cells.len(), column + 1);
         return refuse(
-            "recording/field-count",
+            ContentKind::FieldCount,
             problem,
             "every line needs one field per column; the fields of a lost marker are empty",
         );
@@ -181,7 +181,7 @@ fn number(cells: &[&[u8]], column: usize) -> Result<Option<f64>, Fault> {
         Ok(_) => Err(Fault::not_finite(&(column + 1).to_string(), text, UNSEEN)),
         Err(_) => {
             let problem = format!("column `{}` holds {}, which is not a number", column + 1, quoted(text));
-            refuse("recording/not-a-number", problem, "export again, with decimal points")
+            refuse(ContentKind::NotANumber, problem, "export again, with decimal points")
         }
     }
 }
@@ -270,24 +270,28 @@ impl MotiveHead {
 
     /// Returns the value of a name in the first line.
     fn header_value(&self, what: &str) -> Option<&str> {
-        self.header.iter().position(|name| name == what).and_then(|at| self.header.get(at + 1)).map(String::as_str)
+        self.header
+            .iter()
+            .position(|name| name == what)
+            .and_then(|index| self.header.get(index + 1))
+            .map(String::as_str)
     }
 
     fn capture(&self) -> Result<Capture, Fault> {
         let unit = self.header_value("Length Units").unwrap_or_default();
         let metres = heading::size_of(unit, false).ok_or_else(|| {
-            Fault::coded(
-                "recording/unknown-unit",
+            Fault::content(
+                ContentKind::UnknownUnit,
                 format!("unknown unit of length {}", quoted(unit)),
                 "export it in metres",
             )
         })?;
         if let Some(space) = self.header_value("Coordinate Space").filter(|space| *space != "Global") {
             let problem = format!("its coordinate space is {}", quoted(space));
-            return refuse("recording/unusable-frame", problem, "export it in global coordinates");
+            return refuse(ContentKind::UnusableFrame, problem, "export it in global coordinates");
         }
         let time = self.axes.iter().position(|name| name.starts_with("Time"));
-        let time = time.ok_or_else(|| Fault::coded("recording/no-time-column", "no column gives the time", EXPORT))?;
+        let time = time.ok_or_else(|| Fault::content(ContentKind::NoTimeColumn, "no column gives the time", EXPORT))?;
         let bodies = self.positions("Rigid Body");
         let has_bodies = !bodies.is_empty();
         let vehicles = if has_bodies {
@@ -297,7 +301,7 @@ impl MotiveHead {
         };
         if vehicles.is_empty() {
             return refuse(
-                "recording/no-positions",
+                ContentKind::NoPositions,
                 "it has neither a rigid body nor a labelled marker with positions",
                 EXPORT,
             );
@@ -305,7 +309,7 @@ impl MotiveHead {
         let mut known = BTreeSet::new();
         if let Some((name, _)) = vehicles.iter().find(|(name, _)| !known.insert(name.as_str())) {
             let problem = format!("two rigid bodies have the name {}", quoted(name));
-            return refuse("recording/vehicle-twice", problem, "give each rigid body its own name, and export again");
+            return refuse(ContentKind::VehicleTwice, problem, "give each rigid body its own name, and export again");
         }
         let mut notes = vec!["Motive has y up: its x, -z and y are read as x, y and z".to_owned()];
         notes.extend(note_of_markers(&vehicles));
@@ -318,11 +322,11 @@ impl MotiveHead {
 
     /// Returns the position columns of all items of a type.
     fn positions(&self, wanted: &str) -> Vec<(String, [usize; 3])> {
-        let is = |row: &[String], column: usize, what: &str| row.get(column).is_some_and(|cell| cell == what);
+        let holds = |row: &[String], column: usize, what: &str| row.get(column).is_some_and(|cell| cell == what);
         let starts = (2..self.axes.len()).filter(|&column| {
-            is(&self.types, column, wanted)
+            holds(&self.types, column, wanted)
                 && ["X", "Y", "Z"].iter().enumerate().all(|(axis, name)| {
-                    is(&self.measures, column + axis, "Position") && is(&self.axes, column + axis, name)
+                    holds(&self.measures, column + axis, "Position") && holds(&self.axes, column + axis, name)
                 })
         });
         let named =
@@ -384,7 +388,7 @@ fn open_vicon(source: &Source, options: &ReadOptions) -> Result<Recording, ReadE
         let sections: Vec<_> = heads.iter().map(|head| head.section.as_str()).collect();
         let problem = format!("it has neither objects nor trajectories; its sections are {}", sections.join(", "));
         return refuse(
-            "recording/no-positions",
+            ContentKind::NoPositions,
             problem,
             "export the trajectories of markers, or the objects of Tracker",
         );
@@ -437,8 +441,8 @@ impl ViconSection {
         let rate = self.rate.parse().ok().filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
         let rate = rate.ok_or_else(|| {
             let problem = format!("the rate of {} must be a positive number, got {}", self.section, quoted(&self.rate));
-            Fault::coded(
-                "recording/frame-rate",
+            Fault::content(
+                ContentKind::FrameRate,
                 problem,
                 "export again: the second line of a section gives the number of frames per second",
             )
@@ -450,16 +454,16 @@ impl ViconSection {
         let vehicles = by_subject(markers)?;
         if vehicles.is_empty() {
             return refuse(
-                "recording/no-positions",
+                ContentKind::NoPositions,
                 "it has no named marker and no object",
                 "export again, with labelled trajectories",
             );
         }
         if is_objects && vehicles.len() < parts {
-            let several = vehicles.iter().find(|(_, of)| of.len() > 1).map_or("", |(name, _)| name);
+            let several = vehicles.iter().find(|(_, columns)| columns.len() > 1).map_or("", |(name, _)| name);
             let problem = format!("{} has several segments", quoted(several));
             return refuse(
-                "recording/ambiguous-column",
+                ContentKind::AmbiguousColumn,
                 problem,
                 "export objects with one segment each, or the trajectories of markers",
             );
@@ -474,8 +478,8 @@ impl ViconSection {
         let named: Vec<_> = (2..self.names.len()).filter(|&column| !self.names[column].is_empty()).collect();
         let ends = named.iter().skip(1).copied().chain([self.axes.len()]);
         let columns = |(&from, to): (&usize, usize)| {
-            let of = |axis: &str| (from..to.min(self.axes.len())).find(|&column| self.axes[column] == axis);
-            Some((self.names[from].clone(), [of(axes[0])?, of(axes[1])?, of(axes[2])?]))
+            let column_of = |axis: &str| (from..to.min(self.axes.len())).find(|&column| self.axes[column] == axis);
+            Some((self.names[from].clone(), [column_of(axes[0])?, column_of(axes[1])?, column_of(axes[2])?]))
         };
         named.iter().zip(ends).filter_map(columns).filter(|(name, _)| !name.starts_with('*')).collect()
     }
@@ -487,11 +491,11 @@ impl ViconSection {
         if let Some(other) = units.find(|unit| unit.map_or("", |unit| unit.as_str()) != first) {
             let problem =
                 format!("positions have different units: {} and {}", quoted(first), quoted(other.map_or("", |u| u)));
-            return refuse("recording/unit-conflict", problem, "export all positions in millimetres");
+            return refuse(ContentKind::UnitConflict, problem, "export all positions in millimetres");
         }
         heading::size_of(first, false).ok_or_else(|| {
-            Fault::coded(
-                "recording/unknown-unit",
+            Fault::content(
+                ContentKind::UnknownUnit,
                 format!("unknown unit of length {}", quoted(first)),
                 "export it in millimetres",
             )

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use chrono::{DateTime, NaiveDateTime};
 
-use super::error::{Fault, quoted, refuse};
+use super::error::{ContentKind, Fault, quoted, refuse};
 use super::heading;
 use super::options::ReadOptions;
 use tautline_core::option::{COLUMN, FPS, TIME_SCALE, TIME_UNIT};
@@ -384,7 +384,7 @@ impl SubunitColumn {
             (_, None) => format!("column {own} holds {}, which is not a whole number", rest.approximately()),
         };
         let remedy = format!("if one of the two is the whole time, name it with {}", COLUMN.set("t=NAME"));
-        refuse("recording/time-format", problem, remedy)
+        refuse(ContentKind::TimeFormat, problem, remedy)
     }
 }
 
@@ -423,7 +423,7 @@ pub(super) fn time_columns(
                 let (whole, own) = (quoted(&header[whole.column]), quoted(&header[rest.column]));
                 let problem = format!("times are split over the columns {whole} and {own}, whose units are known");
                 let remedy = format!("omit {TIME_UNIT}, {FPS} and {TIME_SCALE}");
-                return refuse("recording/contradicts-option", problem, remedy);
+                return refuse(ContentKind::ContradictsOption, problem, remedy);
             }
             Ok(Some((whole.column, Some(rest))))
         }
@@ -463,7 +463,7 @@ fn both(header: &[String], a: &Candidate, b: &Candidate) -> Fault {
     let (first, second) = (quoted(&header[a.column]), quoted(&header[b.column]));
     let problem = format!("the columns {first} and {second} both give the time");
     let remedy = format!("name one of them with {}, or remove the other", COLUMN.set("t=NAME"));
-    Fault::coded("recording/ambiguous-column", problem, remedy)
+    Fault::content(ContentKind::AmbiguousColumn, problem, remedy)
 }
 
 /// Relative rounding of a unit of time.
@@ -491,7 +491,7 @@ pub(super) fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<T
             Some((_, unit)) => {
                 let problem = format!("column {} is in {} by its name, but another unit is given", quoted(name), unit);
                 let remedy = "leave the unit to the name, or rename the column if its name is wrong";
-                Err(Fault::coded("recording/unit-conflict", problem, remedy))
+                Err(Fault::content(ContentKind::UnitConflict, problem, remedy))
             }
         };
     }
@@ -504,7 +504,7 @@ pub(super) fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<T
     TimeUnit::from_name(&unit).map(Some).ok_or_else(|| {
         let problem = format!("column {} has an unknown unit of time, {}", quoted(name), quoted(&unit));
         let remedy = format!("set its length in seconds with {TIME_SCALE}, such as 60 for minutes");
-        Fault::coded("recording/unknown-unit", problem, remedy)
+        Fault::content(ContentKind::UnknownUnit, problem, remedy)
     })
 }
 
@@ -676,7 +676,7 @@ mod dates_tests {
 
     #[test]
     fn dates_are_read_to_the_nanosecond() {
-        let at = |text: &str| Date::parse(text).map(|date| (date.since_1970_ns, date.has_zone));
+        let parsed = |text: &str| Date::parse(text).map(|date| (date.since_1970_ns, date.has_zone));
         let start = 1_700_000_000_000_000_000;
         for (text, expected) in [
             ("2023-11-14T22:13:20Z", (start, true)),
@@ -687,7 +687,7 @@ mod dates_tests {
             (" 2023-11-14 22:13:20.000000001 ", (start + 1, false)),
             ("1969-12-31T23:59:59.999999999Z", (-1, true)),
         ] {
-            assert_eq!(at(text), Some(expected), "{text}");
+            assert_eq!(parsed(text), Some(expected), "{text}");
         }
     }
 

@@ -6,7 +6,7 @@
 use std::io::Read as _;
 
 use super::curves::{Curves, piece, powers};
-use super::error::{Fault, Place, ReadError, refuse};
+use super::error::{ContentKind, Fault, Place, ReadError, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{Format, FormatOption, Packing, Reader};
@@ -98,7 +98,7 @@ fn crazyflie(bytes: &[u8]) -> Result<Decoded, ReadError> {
     let (trajectory, length) = Trajectory::decode(bytes, true).map_err(|fault| truncated(fault, 0))?;
     if length < bytes.len() {
         let problem = format!("{} bytes follow the segment without a duration, which ends it", bytes.len() - length);
-        let fault = Fault::coded("recording/damaged", problem, "write the trajectory again");
+        let fault = Fault::content(ContentKind::Damaged, problem, "write the trajectory again");
         return Err(fault.at(Place::Byte(length as u64)));
     }
     Ok((trajectory, skyb::unit_m(1)))
@@ -116,7 +116,7 @@ fn skybrush(bytes: &[u8]) -> Result<Decoded, ReadError> {
     let scale = u32::from(first & 0x7f);
     if scale == 0 {
         let fault =
-            Fault::coded("recording/no-positions", "the scale of its trajectory is 0", "compile the show again");
+            Fault::content(ContentKind::NoPositions, "the scale of its trajectory is 0", "compile the show again");
         return Err(fault.at(Place::Byte(start as u64)));
     }
     let (trajectory, _) = Trajectory::decode(segments, false).map_err(|fault| truncated(fault, start + 1))?;
@@ -128,7 +128,7 @@ fn start_of_blocks(bytes: &[u8]) -> Result<usize, ReadError> {
     let version_at = skyb::MAGIC.len();
     let again = "compile the show again, or give the .skyc show";
     let unsupported = |problem: String, byte: usize| {
-        Err(Fault::coded("recording/unsupported-format", problem, again).at(Place::Byte(byte as u64)))
+        Err(Fault::content(ContentKind::UnsupportedFormat, problem, again).at(Place::Byte(byte as u64)))
     };
     let missing = || Fault::Truncated("its header is incomplete".to_owned());
     match bytes.get(version_at).ok_or_else(missing)? {
@@ -154,22 +154,22 @@ fn start_of_blocks(bytes: &[u8]) -> Result<usize, ReadError> {
 }
 
 /// Returns the first block with a trajectory: the offset of its body, and the body.
-fn trajectory_block(bytes: &[u8], mut at: usize) -> Result<(usize, &[u8]), ReadError> {
-    while at < bytes.len() {
+fn trajectory_block(bytes: &[u8], mut offset: usize) -> Result<(usize, &[u8]), ReadError> {
+    while offset < bytes.len() {
         let block = || {
-            let &[kind, low, high] = bytes.get(at..at + 3)? else { return None };
-            let body = bytes.get(at + 3..at + 3 + usize::from(u16::from_le_bytes([low, high])))?;
+            let &[kind, low, high] = bytes.get(offset..offset + 3)? else { return None };
+            let body = bytes.get(offset + 3..offset + 3 + usize::from(u16::from_le_bytes([low, high])))?;
             Some((kind, body))
         };
         let Some((kind, body)) = block() else {
-            return Err(Fault::Truncated("a block is incomplete".to_owned()).at(Place::Byte(at as u64)));
+            return Err(Fault::Truncated("a block is incomplete".to_owned()).at(Place::Byte(offset as u64)));
         };
         if kind == skyb::TRAJECTORY {
-            return Ok((at + 3, body));
+            return Ok((offset + 3, body));
         }
-        at += 3 + body.len();
+        offset += 3 + body.len();
     }
-    refuse("recording/no-positions", "it has no trajectory", "export the show with the paths of its drones")
+    refuse(ContentKind::NoPositions, "it has no trajectory", "export the show with the paths of its drones")
 }
 
 /// Returns the items of a vehicle.

@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 
 use super::csv::TextTable;
 use super::curves::{Curves, VehicleItems, piece};
-use super::error::{Fault, ReadError, quoted, refuse};
+use super::error::{ContentKind, Fault, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{Format, FormatOption, Packing, Reader};
@@ -64,7 +64,7 @@ pub(super) fn curves_of(
     let mut curves = VehicleItems::new();
     if let Some(name) = options.starts.keys().find(|name| vehicles.iter().all(|(known, _)| known != *name)) {
         let problem = format!("{START} names the unknown vehicle {}", quoted(name));
-        return refuse("recording/unknown-vehicle", problem, "use the names of the files without their extension");
+        return refuse(ContentKind::UnknownVehicle, problem, "use the names of the files without their extension");
     }
     for (name, files) in vehicles {
         let mut curve = Curve { vehicle: curves.len(), time_s: 0.0, scale: options.metres(), items: Vec::new() };
@@ -107,7 +107,7 @@ impl Columns {
             let found = header.iter().position(|known| known.eq_ignore_ascii_case(name));
             found.ok_or_else(|| {
                 let remedy = "the header of a polynomial file is duration,x^0,...,x^7,y^0,...,z^0,...";
-                Fault::coded("recording/missing-column", format!("no column has the name `{name}`"), remedy)
+                Fault::content(ContentKind::MissingColumn, format!("no column has the name `{name}`"), remedy)
             })
         };
         let mut highest = 0;
@@ -115,7 +115,7 @@ impl Columns {
             let Some(("x" | "y" | "z" | "X" | "Y" | "Z", power)) = name.split_once('^') else { continue };
             let power = power.parse::<usize>().ok().filter(|&power| power <= HIGHEST_POWER).ok_or_else(|| {
                 let problem = format!("the power of column `{name}` is not a number up to {HIGHEST_POWER}");
-                Fault::coded("recording/degree", problem, "use pieces of degree 7, as Crazyflie trajectories have")
+                Fault::content(ContentKind::Degree, problem, "use pieces of degree 7, as Crazyflie trajectories have")
             })?;
             highest = highest.max(power);
         }
@@ -162,7 +162,7 @@ impl Curve {
         // A duration that is not a number compares false.
         if !(duration_s > 0.0 && to_s > self.time_s) {
             let problem = format!("the duration of the piece must be positive, got {duration_s} s");
-            return refuse("recording/duration", problem, "remove the piece");
+            return refuse(ContentKind::Duration, problem, "remove the piece");
         }
         let piece = piece(self.vehicle, self.time_s, to_s, coefficients, self.scale);
         self.items.push(Item::Piece(piece.ok_or_else(Fault::out_of_range)?));

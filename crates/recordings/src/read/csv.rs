@@ -10,7 +10,7 @@ use std::str;
 use csv_core::ReadRecordResult;
 
 use super::clock::{Stamp, TimeUnit};
-use super::error::{Fault, Place, ReadError, one_of, quoted, refuse};
+use super::error::{ContentKind, Fault, Place, ReadError, one_of, quoted, refuse};
 use super::layout::{Layout, VehicleColumns};
 use super::options::{Dimensions, ReadOptions};
 use super::order::Recording;
@@ -128,7 +128,7 @@ fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Record
                                numbers are whole";
                 let remedy =
                     format!("use {}, or {} for a time and a position", FORMAT.set("trajnet"), DIMENSIONS.set("3"));
-                return refuse("recording/ambiguous-layout", problem, remedy);
+                return refuse(ContentKind::AmbiguousLayout, problem, remedy);
             }
             TrajnetMatch::None => {}
         }
@@ -144,7 +144,7 @@ fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Record
         _ if !text.named => numbers(),
         _ if options.dimensions.is_some() => {
             let remedy = format!("omit {DIMENSIONS}");
-            refuse("recording/contradicts-option", "its header defines the numbers of a vehicle", remedy)
+            refuse(ContentKind::ContradictsOption, "its header defines the numbers of a vehicle", remedy)
         }
         // A line above numbers may be a comment instead of a header.
         Err(fault) if !first.is_empty() => numbers().map_err(|_| fault),
@@ -190,14 +190,14 @@ impl TextTable {
         if line.contains(&b'\r') {
             let remedy = "save it with the line ends of Unix or Windows";
             return refuse(
-                "recording/line-ends",
+                ContentKind::LineEnds,
                 "its lines end with carriage returns only, as on old Macintoshes",
                 remedy,
             );
         }
         if let Some(value) = decimal_comma(line) {
             let problem = format!("column `1` holds {}, a number with a decimal comma", quoted(&value));
-            return refuse("recording/decimal-comma", problem, "write numbers with a decimal point");
+            return refuse(ContentKind::DecimalComma, problem, "write numbers with a decimal point");
         }
         self.header = names(line, self.separator)?;
         let numeric = self.header.iter().filter(|name| !name.is_empty()).all(|name| name.parse::<f64>().is_ok());
@@ -212,7 +212,7 @@ impl TextTable {
             let problem = format!("its first line has {} fields that are not all numbers", self.header.len());
             let remedy =
                 format!("a TrajNet table has frame, vehicle, x and y in each line, and no header; omit {FORMAT}");
-            return refuse("recording/wrong-format", problem, remedy);
+            return refuse(ContentKind::WrongFormat, problem, remedy);
         }
         if numeric {
             self.first = self.header.iter().map(|number| number.parse()).collect::<Result<_, _>>().unwrap_or_default();
@@ -230,7 +230,7 @@ impl TextTable {
         } else {
             let remedy = "add a header: t,id,x,y,z for one row per vehicle and time, or t,x1,y1,z1,x2,... for one \
                           row per time";
-            return refuse("recording/no-header", "the first line holds numbers, not column names", remedy);
+            return refuse(ContentKind::NoHeader, "the first line holds numbers, not column names", remedy);
         }
         Ok(())
     }
@@ -287,7 +287,7 @@ impl TextTable {
         } else {
             "every line needs one field per column; leave cells empty if a vehicle was not seen"
         };
-        Fault::coded("recording/field-count", format!("it has {found} fields, expected {expected}"), remedy)
+        Fault::content(ContentKind::FieldCount, format!("it has {found} fields, expected {expected}"), remedy)
     }
 }
 
@@ -475,7 +475,7 @@ impl Fields {
             }
             Separator::Any(bytes) => {
                 let mut start = 0;
-                let ends = (0..line.len()).filter(|&at| bytes.contains(&line[at]));
+                let ends = (0..line.len()).filter(|&index| bytes.contains(&line[index]));
                 for end in ends.chain([line.len()]) {
                     if start < end {
                         self.ends.push((start, end));
@@ -498,7 +498,7 @@ impl Fields {
         let (result, read, _, count) = reader.read_record(&text, &mut unquoted, &mut ends);
         if result != ReadRecordResult::Record || read < text.len() {
             let remedy = "close the quotes on the line where they begin";
-            return refuse("recording/unclosed-quotes", "its quotes are not closed on the same line", remedy);
+            return refuse(ContentKind::UnclosedQuotes, "its quotes are not closed on the same line", remedy);
         }
         let starts = std::iter::once(0).chain(ends.iter().copied());
         self.ends.clear();
@@ -553,7 +553,7 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
             let ways: Vec<_> = known.iter().map(|dimensions| dimensions.name()).collect();
             let remedy =
                 format!("use {}: x and y, x, y and z, and +2 or +3 for their velocities", one_of(DIMENSIONS, &ways));
-            return refuse("recording/ambiguous-layout", problem, remedy);
+            return refuse(ContentKind::AmbiguousLayout, problem, remedy);
         }
         (None, []) if count == 12 => {
             if options.times_per_second.is_none() {
@@ -565,7 +565,7 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
             let each = given.map_or(3, |given| given.counts().1);
             let problem = format!("the line has {count} numbers, expected time and {each} for each vehicle");
             let remedy = format!("write t x y z x y z ..., one line per time, or set {DIMENSIONS}");
-            return refuse("recording/field-count", problem, remedy);
+            return refuse(ContentKind::FieldCount, problem, remedy);
         }
     };
     let (axes, each) = dimensions.counts();

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use nalgebra::Vector3;
 use serde::de::DeserializeOwned;
 
-use super::error::{Fault, Place, ReadError};
+use super::error::{ContentKind, Fault, Place, ReadError};
 use super::order::{BATCH, Recording};
 use tautline_core::track::{Item, Metadata, Piece, Tracks};
 
@@ -67,7 +67,7 @@ pub(super) fn from_json<T: DeserializeOwned>(bytes: &[u8], a_show: &str, remedy:
         let fault = if error.is_eof() {
             Fault::Truncated("the JSON ends before it is complete".to_owned())
         } else {
-            Fault::coded("recording/malformed", format!("it is not the JSON of {a_show}: {error}"), remedy)
+            Fault::content(ContentKind::Malformed, format!("it is not the JSON of {a_show}: {error}"), remedy)
         };
         fault.at(Place::Line(u64::try_from(error.line()).unwrap_or(0)))
     })

@@ -7,7 +7,7 @@ use nalgebra::{Matrix3, Vector3};
 
 use super::axes;
 use super::axes::GLOBAL;
-use super::error::{Fault, ReadError, quoted, refuse};
+use super::error::{ContentKind, Fault, ReadError, quoted, refuse};
 use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::Row;
@@ -64,7 +64,7 @@ impl LocalFrame {
         // Other files would have other first places.
         let problem = "several files need one origin for their places on the Earth";
         let remedy = format!("set it with {ORIGIN}, such as {}", ORIGIN.set(local.origin()));
-        refuse("recording/no-origin", problem, remedy)
+        refuse(ContentKind::NoOrigin, problem, remedy)
     }
 
     /// Converts a position relative to another origin \[m\] to this frame.
@@ -145,10 +145,10 @@ pub(super) fn is_no_fix(place: &Geodetic) -> bool {
 }
 
 /// Returns the note on `count` omitted rows or messages without a fix; `of` names the vehicles.
-pub(super) fn no_fixes(count: u64, of: &str) -> Option<String> {
+pub(super) fn no_fixes(count: u64, what: &str) -> Option<String> {
     let positions = if count == 1 { "position" } else { "positions" };
     (count > 0)
-        .then(|| format!("{count} {positions}{of} omitted for lack of a fix: latitude and longitude are exactly 0"))
+        .then(|| format!("{count} {positions}{what} omitted for lack of a fix: latitude and longitude are exactly 0"))
 }
 
 /// Returns sine and cosine of latitude and of longitude.
@@ -164,7 +164,7 @@ fn centred(place: Geodetic) -> Result<Vector3<f64>, Fault> {
         }
         let problem = format!("{what} {} is outside of +-{most} degrees", quoted(&format!("{value:?}")));
         let remedy = "write decimal degrees; divide integers of 1e-7 degrees by 1e7";
-        refuse("recording/not-on-earth", problem, remedy)
+        refuse(ContentKind::NotOnEarth, problem, remedy)
     };
     range("latitude", place.x, 90.0)?;
     range("longitude", place.y, 360.0)?;
@@ -183,8 +183,8 @@ pub(super) fn origin<C: Cells>(
 ) -> Result<Option<LocalFrame>, ReadError> {
     let reference = layout.convention.reference;
     if !layout.on_earth && reference.is_none() {
-        let needless = Fault::coded(
-            "recording/unused-option",
+        let needless = Fault::content(
+            ContentKind::UnusedOption,
             "it has no columns of latitude and longitude",
             format!("omit {ORIGIN}"),
         );
@@ -205,11 +205,11 @@ pub(super) fn origin<C: Cells>(
     }
     if reference.is_some() {
         let problem = "no row has the origin of its positions (`ref_lat`, `ref_lon`)";
-        return refuse("recording/no-fix", problem, GLOBAL);
+        return refuse(ContentKind::NoFix, problem, GLOBAL);
     }
     if unfixed {
         let problem = "no row has a fix: all latitudes and longitudes are exactly 0";
-        return refuse("recording/no-fix", problem, "record again with a fix, or give another file");
+        return refuse(ContentKind::NoFix, problem, "record again with a fix, or give another file");
     }
     Ok(None)
 }

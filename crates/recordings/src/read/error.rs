@@ -147,13 +147,205 @@ pub enum Fault {
     /// The content has the format, but is not valid motion.
     #[error("{problem}")]
     Content {
-        /// Stable code of the problem, such as `recording/time-backwards`.
-        code: &'static str,
+        /// Kind of the problem.
+        kind: ContentKind,
         /// The problem.
         problem: String,
         /// The remedy.
         remedy: String,
     },
+}
+
+/// Kind of a [`Fault::Content`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ContentKind {
+    /// Several columns may hold a quantity.
+    AmbiguousColumn,
+    /// The layout of the numbers is ambiguous.
+    AmbiguousLayout,
+    /// Several topics may hold the positions.
+    AmbiguousTopics,
+    /// Several columns may name the vehicle.
+    AmbiguousVehicle,
+    /// An entry of the archive is missing or duplicate.
+    ArchiveEntry,
+    /// An array has the wrong shape.
+    ArrayShape,
+    /// The index of a ROS 2 bag contradicts its files.
+    BagIndex,
+    /// An option contradicts the file.
+    ContradictsOption,
+    /// The content contradicts its format.
+    Damaged,
+    /// A number has a decimal comma.
+    DecimalComma,
+    /// The degree of a curve is out of range.
+    Degree,
+    /// A vehicle has two positions at one time.
+    DuplicateRow,
+    /// A piece of a curve has no valid duration.
+    Duration,
+    /// The elements have a type that is not read.
+    ElementType,
+    /// There are no samples.
+    Empty,
+    /// A cell without a value needs one.
+    EmptyCell,
+    /// A row has the wrong number of fields.
+    FieldCount,
+    /// The folder has no tables, or tables in several folders.
+    Folder,
+    /// The frame rate is invalid.
+    FrameRate,
+    /// Times count frames of unknown duration.
+    Frames,
+    /// The knots of a B-spline have the wrong order or number.
+    Knots,
+    /// The line ends are those of no table.
+    LineEnds,
+    /// A list has the wrong length.
+    ListLength,
+    /// The text has the wrong structure.
+    Malformed,
+    /// A column is missing.
+    MissingColumn,
+    /// No row has a fix.
+    NoFix,
+    /// The header is missing.
+    NoHeader,
+    /// The origin of places on the Earth is missing.
+    NoOrigin,
+    /// The column of positions is missing.
+    NoPositionColumn,
+    /// No part of the file has positions.
+    NoPositions,
+    /// The column of times is missing.
+    NoTimeColumn,
+    /// The column of vehicles is missing.
+    NoVehicleColumn,
+    /// A pipe or device cannot be read twice.
+    NotAFile,
+    /// A text is not a number.
+    NotANumber,
+    /// A number is not finite.
+    NotFinite,
+    /// A latitude or longitude is out of range.
+    NotOnEarth,
+    /// An option is out of range.
+    OptionOutOfRange,
+    /// A number is too large.
+    Overflow,
+    /// A position jumps between two fixes.
+    PositionJump,
+    /// A radius is out of range.
+    Radius,
+    /// Times are of several clocks.
+    SeveralClocks,
+    /// Positions are in several frames.
+    SeveralFrames,
+    /// Rows of one vehicle may be of several.
+    SeveralVehicles,
+    /// Time runs backwards.
+    TimeBackwards,
+    /// A time has an unknown format.
+    TimeFormat,
+    /// Transforms are no tree of rigid motions.
+    Transforms,
+    /// Two options give the unit of time.
+    TwoTimeUnits,
+    /// Quotes are not closed.
+    UnclosedQuotes,
+    /// Units contradict each other.
+    UnitConflict,
+    /// The content has no known format.
+    UnknownFormat,
+    /// A named topic does not exist.
+    UnknownTopic,
+    /// A unit is unknown.
+    UnknownUnit,
+    /// A named vehicle does not exist.
+    UnknownVehicle,
+    /// The compression is not supported.
+    UnsupportedCompression,
+    /// The format is not supported.
+    UnsupportedFormat,
+    /// A frame cannot be used.
+    UnusableFrame,
+    /// An option has no meaning for the format.
+    UnusedOption,
+    /// Two vehicles may be the same.
+    VehicleTwice,
+    /// The content does not have the requested format.
+    WrongFormat,
+}
+
+impl ContentKind {
+    /// Returns the stable code, such as `recording/time-backwards`.
+    #[must_use]
+    pub fn code(self) -> &'static str {
+        match self {
+            Self::AmbiguousColumn => "recording/ambiguous-column",
+            Self::AmbiguousLayout => "recording/ambiguous-layout",
+            Self::AmbiguousTopics => "recording/ambiguous-topics",
+            Self::AmbiguousVehicle => "recording/ambiguous-vehicle",
+            Self::ArchiveEntry => "recording/archive-entry",
+            Self::ArrayShape => "recording/array-shape",
+            Self::BagIndex => "recording/bag-index",
+            Self::ContradictsOption => "recording/contradicts-option",
+            Self::Damaged => "recording/damaged",
+            Self::DecimalComma => "recording/decimal-comma",
+            Self::Degree => "recording/degree",
+            Self::DuplicateRow => "recording/duplicate-row",
+            Self::Duration => "recording/duration",
+            Self::ElementType => "recording/element-type",
+            Self::Empty => "recording/empty",
+            Self::EmptyCell => "recording/empty-cell",
+            Self::FieldCount => "recording/field-count",
+            Self::Folder => "recording/folder",
+            Self::FrameRate => "recording/frame-rate",
+            Self::Frames => "recording/frames",
+            Self::Knots => "recording/knots",
+            Self::LineEnds => "recording/line-ends",
+            Self::ListLength => "recording/list-length",
+            Self::Malformed => "recording/malformed",
+            Self::MissingColumn => "recording/missing-column",
+            Self::NoFix => "recording/no-fix",
+            Self::NoHeader => "recording/no-header",
+            Self::NoOrigin => "recording/no-origin",
+            Self::NoPositionColumn => "recording/no-position-column",
+            Self::NoPositions => "recording/no-positions",
+            Self::NoTimeColumn => "recording/no-time-column",
+            Self::NoVehicleColumn => "recording/no-vehicle-column",
+            Self::NotAFile => "recording/not-a-file",
+            Self::NotANumber => "recording/not-a-number",
+            Self::NotFinite => "recording/not-finite",
+            Self::NotOnEarth => "recording/not-on-earth",
+            Self::OptionOutOfRange => "recording/option-out-of-range",
+            Self::Overflow => "recording/overflow",
+            Self::PositionJump => "recording/position-jump",
+            Self::Radius => "recording/radius",
+            Self::SeveralClocks => "recording/several-clocks",
+            Self::SeveralFrames => "recording/several-frames",
+            Self::SeveralVehicles => "recording/several-vehicles",
+            Self::TimeBackwards => "recording/time-backwards",
+            Self::TimeFormat => "recording/time-format",
+            Self::Transforms => "recording/transforms",
+            Self::TwoTimeUnits => "recording/two-time-units",
+            Self::UnclosedQuotes => "recording/unclosed-quotes",
+            Self::UnitConflict => "recording/unit-conflict",
+            Self::UnknownFormat => "recording/unknown-format",
+            Self::UnknownTopic => "recording/unknown-topic",
+            Self::UnknownUnit => "recording/unknown-unit",
+            Self::UnknownVehicle => "recording/unknown-vehicle",
+            Self::UnsupportedCompression => "recording/unsupported-compression",
+            Self::UnsupportedFormat => "recording/unsupported-format",
+            Self::UnusableFrame => "recording/unusable-frame",
+            Self::UnusedOption => "recording/unused-option",
+            Self::VehicleTwice => "recording/vehicle-twice",
+            Self::WrongFormat => "recording/wrong-format",
+        }
+    }
 }
 
 impl From<io::Error> for Fault {
@@ -174,8 +366,8 @@ impl Fault {
         ReadError { place: Some(place), ..self.into() }
     }
 
-    pub(super) fn coded(code: &'static str, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
-        Self::Content { code, problem: problem.into(), remedy: remedy.into() }
+    pub(super) fn content(kind: ContentKind, problem: impl Into<String>, remedy: impl Into<String>) -> Self {
+        Self::Content { kind, problem: problem.into(), remedy: remedy.into() }
     }
 
     pub(super) fn damaged(reason: impl fmt::Display) -> Self {
@@ -184,19 +376,19 @@ impl Fault {
 
     /// Returns the fault of a table without rows.
     pub(super) fn header_only() -> Self {
-        Self::coded("recording/empty", "it has a header and no rows", NOTHING_RECORDED)
+        Self::content(ContentKind::Empty, "it has a header and no rows", NOTHING_RECORDED)
     }
 
     /// Returns the fault of a number that is infinite or NaN.
     pub(super) fn not_finite(column: &str, value: &str, remedy: &str) -> Self {
         let problem = format!("column `{column}` holds {}, which is not finite", quoted(value));
-        Self::coded("recording/not-finite", problem, remedy)
+        Self::content(ContentKind::NotFinite, problem, remedy)
     }
 
     /// Returns the fault of an empty cell where a value is required.
     pub(super) fn empty_cell(column: &str) -> Self {
         let remedy = "fill it, or leave all cells of the position empty if the vehicle was not seen";
-        Self::coded("recording/empty-cell", format!("column `{column}` is empty"), remedy)
+        Self::content(ContentKind::EmptyCell, format!("column `{column}` is empty"), remedy)
     }
 
     /// Returns the fault of an empty cell beside other coordinates.
@@ -205,7 +397,7 @@ impl Fault {
             "fill it, leave all cells of the position empty if the vehicle was not seen, or read such rows as rows \
              without a position with {SKIP_INCOMPLETE}"
         );
-        Self::coded("recording/empty-cell", format!("column `{column}` is empty"), remedy)
+        Self::content(ContentKind::EmptyCell, format!("column `{column}` is empty"), remedy)
     }
 
     /// Returns the fault of decreasing time.
@@ -216,7 +408,7 @@ impl Fault {
              are only out of order, use {SORT}",
             COLUMN.set("id=NAME")
         );
-        Self::coded("recording/time-backwards", problem, remedy)
+        Self::content(ContentKind::TimeBackwards, problem, remedy)
     }
 
     /// Returns the fault of times that count frames of unknown duration.
@@ -225,13 +417,13 @@ impl Fault {
             "set the frame rate with {FPS}, such as {}, or the duration of a frame in seconds with {TIME_SCALE}",
             FPS.set("30")
         );
-        Self::coded("recording/frames", problem, remedy)
+        Self::content(ContentKind::Frames, problem, remedy)
     }
 
     /// Returns the fault of a value that overflows in metres or seconds.
     pub(super) fn out_of_range() -> Self {
         let remedy = format!("check {SCALE} and the values");
-        Self::coded("recording/overflow", "a value exceeds the range of numbers", remedy)
+        Self::content(ContentKind::Overflow, "a value exceeds the range of numbers", remedy)
     }
 
     fn code(&self) -> &'static str {
@@ -247,7 +439,7 @@ impl Fault {
             Self::Unfinished => "recording/unfinished",
             Self::Bomb(_) => "recording/grows-too-large",
             Self::Damaged(_) => "recording/damaged",
-            Self::Content { code, .. } => code,
+            Self::Content { kind, .. } => kind.code(),
         }
     }
 
@@ -276,11 +468,11 @@ impl Fault {
 
 /// Returns a fault of the content as an error.
 pub(super) fn refuse<T, E: From<Fault>>(
-    code: &'static str,
+    kind: ContentKind,
     problem: impl Into<String>,
     remedy: impl Into<String>,
 ) -> Result<T, E> {
-    Err(Fault::coded(code, problem, remedy).into())
+    Err(Fault::content(kind, problem, remedy).into())
 }
 
 /// Returns an option with its possible values, such as `--layout A or B`.

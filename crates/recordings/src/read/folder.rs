@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use super::error::{Fault, ReadError, quoted};
+use super::error::{ContentKind, Fault, ReadError, quoted};
 use super::identity::spelling;
 use super::order::Recording;
 use super::readers::is_prose;
@@ -101,7 +101,7 @@ impl Folder {
             Some(name) => format!("give {name} inside it"),
             None => remedy.to_owned(),
         };
-        Fault::coded("recording/folder", format!("there is no table in the {what}{holds}"), remedy)
+        Fault::content(ContentKind::Folder, format!("there is no table in the {what}{holds}"), remedy)
     }
 
     /// Returns the fault of tables in several folders, which would be several recordings.
@@ -121,8 +121,8 @@ impl Folder {
         };
         let part = if self.files.is_empty() { "" } else { "some of " };
         let problem = format!("{part}its tables are in folders: {}", listed(&folders));
-        Fault::coded(
-            "recording/folder",
+        Fault::content(
+            ContentKind::Folder,
             problem,
             format!("{remedy}; the tables of one recording must be in one folder, one per vehicle"),
         )
@@ -243,7 +243,7 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
         if let Some(first) = known.insert(spelling(name), path) {
             let problem = format!("the vehicle of {} has the same name {}", first.display(), quoted(name));
             let remedy = "rename one of the files: vehicles are named after their files";
-            return Err(ReadError::new(path, Fault::coded("recording/vehicle-twice", problem, remedy)));
+            return Err(ReadError::new(path, Fault::content(ContentKind::VehicleTwice, problem, remedy)));
         }
     }
     check_own_names(&recordings, &paths, &vehicles)?;
@@ -261,7 +261,7 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
             continue;
         };
         let remedy = format!("set the unit with {TIME_UNIT}, and record all files with one clock");
-        return Err(ReadError::new(path, Fault::coded("recording/several-clocks", problem, remedy)));
+        return Err(ReadError::new(path, Fault::content(ContentKind::SeveralClocks, problem, remedy)));
     }
     let clock = Clock {
         inferred: clocks.iter().any(|clock| clock.inferred),
@@ -329,12 +329,12 @@ fn check_own_names(recordings: &[Recording], paths: &[PathBuf], called: &[String
     if let Some((name, path, _)) = others.next().filter(|_| known.keys().eq(&files)) {
         let problem = format!("the rows name vehicle {}, but another file has this name", quoted(name));
         let remedy = "name each file after its vehicle, or remove the column with the name";
-        return Err(ReadError::new(path, Fault::coded("recording/vehicle-twice", problem, remedy)));
+        return Err(ReadError::new(path, Fault::content(ContentKind::VehicleTwice, problem, remedy)));
     }
     let Some((name, first, path)) = twice else { return Ok(()) };
     let problem = format!("its rows name the vehicle {}, as do those of {}", quoted(name), first.display());
     let remedy = "put all rows of a vehicle into one file, or remove the vehicle column";
-    Err(ReadError::new(path, Fault::coded("recording/vehicle-twice", problem, remedy)))
+    Err(ReadError::new(path, Fault::content(ContentKind::VehicleTwice, problem, remedy)))
 }
 
 /// Refuses files in different frames: Earth or metric coordinates, with or without directions of the axes.
@@ -355,7 +355,7 @@ fn check_frames(recordings: &[Recording], paths: &[PathBuf]) -> Result<(), ReadE
         let problem = format!("its positions {its}, but those of {} {those}", path.display());
         Err(ReadError::new(
             other,
-            Fault::coded("recording/several-frames", problem, "use one frame and the same column names in all files"),
+            Fault::content(ContentKind::SeveralFrames, problem, "use one frame and the same column names in all files"),
         ))
     })
 }
@@ -394,7 +394,7 @@ impl JoinedFile {
                 Item::Piece(_) => "it holds a curve, but the first file holds samples",
             };
             let remedy = "split it, or remove the vehicle column: joined files hold the samples of one vehicle each";
-            return Err(ReadError::new(&self.path, Fault::coded("recording/several-vehicles", problem, remedy)));
+            return Err(ReadError::new(&self.path, Fault::content(ContentKind::SeveralVehicles, problem, remedy)));
         }
         self.until_s = items.last().map_or(self.until_s, Item::time_s);
         self.waiting = items.into_iter().peekable();

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use tautline_core::fact::Source;
 
 use super::clock::TimeUnit;
-use super::error::{Fault, quoted, refuse};
+use super::error::{ContentKind, Fault, quoted, refuse};
 
 /// List of words, separated by blanks.
 #[derive(Clone, Copy)]
@@ -127,9 +127,9 @@ impl<'a> Heading<'a> {
             let role = quantity(&stem.strip_suffix(['_', '.']).unwrap_or(stem).to_lowercase())?;
             return Some(Self::new(&name[stem.len()..], role));
         }
-        let mut splits = name.char_indices().filter(|&(at, c)| at > 0 && matches!(c, '.' | '/' | '_'));
-        let (separator, heading) = splits.find_map(|(at, separator)| {
-            Some((separator, Self::new(&name[..at], quantity(&name[at + 1..].to_lowercase())?)))
+        let mut splits = name.char_indices().filter(|&(index, c)| index > 0 && matches!(c, '.' | '/' | '_'));
+        let (separator, heading) = splits.find_map(|(index, separator)| {
+            Some((separator, Self::new(&name[..index], quantity(&name[index + 1..].to_lowercase())?)))
         })?;
         let ambiguous = LETTERS.contains(&heading.vehicle) && separator == '_';
         (ambiguous || !is_quantity_name(heading.vehicle)).then_some(Self { ambiguous, ..heading })
@@ -205,11 +205,11 @@ pub(super) fn is_quantity_name(name: &str) -> bool {
 /// Returns whether an unused column holds attitudes, rates or sensor values, and therefore no vehicle names.
 pub(super) fn is_not_vehicle_column(name: &str) -> bool {
     let stem = bracketed(name).0.to_lowercase();
-    let is = |start: &str, ends: &[&str]| stem.strip_prefix(start).is_some_and(|end| ends.contains(&end));
+    let is_named = |start: &str, ends: &[&str]| stem.strip_prefix(start).is_some_and(|end| ends.contains(&end));
     let known = ["", "roll", "pitch", "yaw", "heading", "speed", "battery", "voltage", "thrust", "frame"];
     known.contains(&stem.as_str())
-        || is("q", &["x", "y", "z", "w", "0", "1", "2", "3"])
-        || ["a", "w", "yaw^"].iter().any(|start| is(start, &["x", "y", "z"]))
+        || is_named("q", &["x", "y", "z", "w", "0", "1", "2", "3"])
+        || ["a", "w", "yaw^"].iter().any(|start| is_named(start, &["x", "y", "z"]))
         || stem
             .rsplit_once(['.', '/', '_'])
             .is_some_and(|(start, _)| LETTERS.contains(&start) || is_quantity_name(start))
@@ -298,11 +298,11 @@ const VEHICLE_ENDS: [&str; 9] = ["id", "idx", "name", "number", "no", "nr", "num
 /// Returns whether a column names the vehicle of a row.
 pub(super) fn is_id(name: &str) -> bool {
     let name = joined(name);
-    let is = |stem: &str| VEHICLES.contains(stem);
+    let is_vehicle = |stem: &str| VEHICLES.contains(stem);
     let behind = VEHICLE_ENDS.iter().filter_map(|end| name.strip_suffix(end));
     matches!(name.as_str(), "id" | "name" | "uid" | "uuid" | "sysid" | "systemid")
-        || is(&name)
-        || behind.into_iter().any(is)
+        || is_vehicle(&name)
+        || behind.into_iter().any(is_vehicle)
 }
 
 /// Returns the rank of a column among the candidates for vehicle names; 0 is the best. The order is `id`, `track_id`,
@@ -368,7 +368,7 @@ pub(super) fn with_units(header: &[String], below: &[&str]) -> Result<Vec<String
             quoted(&own_unit),
             quoted(unit)
         );
-        refuse("recording/unit-conflict", problem, "remove one of the two units")
+        refuse(ContentKind::UnitConflict, problem, "remove one of the two units")
     };
     let mut named = header.iter().zip(below).map(with_unit).collect::<Result<Vec<_>, _>>()?;
     named.extend(header.iter().skip(named.len()).cloned());

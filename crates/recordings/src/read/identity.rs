@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, HashMap};
 
 use nalgebra::Vector3;
 
-use super::error::{Fault, quoted, refuse};
+use super::error::{ContentKind, Fault, quoted, refuse};
 use super::heading;
 use super::heading::Heading;
 use tautline_core::option::{COLUMN, ONE_VEHICLE};
@@ -51,8 +51,8 @@ pub(super) fn spelling(name: &str) -> String {
 /// Returns the fault of two names with the same key.
 fn same_spelling_fault(first: &str, second: &str) -> Fault {
     let problem = format!("the vehicles {} and {} differ only in how they are spelled", quoted(first), quoted(second));
-    Fault::coded(
-        "recording/vehicle-twice",
+    Fault::content(
+        ContentKind::VehicleTwice,
         problem,
         "use one name per vehicle, and names that differ in more than spelling",
     )
@@ -215,8 +215,8 @@ impl Track {
     fn push(&mut self, time: f64, position: Vector3<f64>) -> Option<f64> {
         let [first, middle] = self.0;
         self.0 = [middle, Some((time, position))];
-        let ((from, start), (at, place)) = (first?, middle?);
-        let part = (at - from) / (time - from);
+        let ((from, start), (between, place)) = (first?, middle?);
+        let part = (between - from) / (time - from);
         part.is_finite().then(|| (place - start.lerp(&position, part)).norm())
     }
 }
@@ -263,12 +263,12 @@ impl SuspectColumn {
             self.last = Some(value.into());
         }
         let among_all = self.track.push(time, position);
-        let of = match self.values.get_mut(value) {
-            Some(of) => of,
+        let entry = match self.values.get_mut(value) {
+            Some(entry) => entry,
             None => self.values.entry(value.into()).or_default(),
         };
-        of.rows += 1;
-        let among_own = of.track.push(time, position);
+        entry.rows += 1;
+        let among_own = entry.track.push(time, position);
         if let (Some(all), Some(own)) = (among_all, among_own) {
             self.compared += 1;
             self.off[0] += own;
@@ -317,7 +317,7 @@ impl SuspectColumn {
         );
         let column = COLUMN.set(format!("id={called}"));
         let remedy = format!("name the column of the vehicle with {column}; {otherwise}");
-        Some(Fault::coded("recording/several-vehicles", problem, remedy))
+        Some(Fault::content(ContentKind::SeveralVehicles, problem, remedy))
     }
 }
 
@@ -360,7 +360,7 @@ pub(super) fn examine(header: &[String], unused: &[usize], vehicles: &[String]) 
                 let problem = format!("column {called} gives the time of vehicle {vehicle} only");
                 let remedy =
                     "write one row for each vehicle and time, or remove the column if it repeats the time of the row";
-                return refuse("recording/several-clocks", problem, remedy);
+                return refuse(ContentKind::SeveralClocks, problem, remedy);
             }
             let Some(last) = rest.rsplit(['.', '/']).next().filter(|last| heading::is_id(last)) else { continue };
             quantities.entry(rest).or_default().push(column);
@@ -371,11 +371,13 @@ pub(super) fn examine(header: &[String], unused: &[usize], vehicles: &[String]) 
         }
     }
     let ids = names.values().map(|(_, column)| *column);
-    if let Some((first, vehicle)) = ids.clone().next().zip((0..vehicles.len()).find(|of| !names.contains_key(of))) {
+    if let Some((first, vehicle)) =
+        ids.clone().next().zip((0..vehicles.len()).find(|vehicle| !names.contains_key(vehicle)))
+    {
         let [column, vehicle] = [&header[first], &vehicles[vehicle]].map(|name| quoted(name));
         let problem = format!("column {column} may name a vehicle, but there is no such column for {vehicle}");
         return refuse(
-            "recording/ambiguous-vehicle",
+            ContentKind::AmbiguousVehicle,
             problem,
             "add such a column for each vehicle, or remove these columns",
         );
@@ -383,7 +385,7 @@ pub(super) fn examine(header: &[String], unused: &[usize], vehicles: &[String]) 
     if let Some([x, y]) = further(&others) {
         let problem = format!("the columns {} and {} may be the position of a further vehicle", quoted(x), quoted(y));
         let remedy = "rename these columns like those of the other vehicles, or remove them";
-        return refuse("recording/ambiguous-column", problem, remedy);
+        return refuse(ContentKind::AmbiguousColumn, problem, remedy);
     }
     let ids: Vec<_> = ids.collect();
     let is_watched = |columns: &Vec<usize>| columns.len() > 1 && !columns.iter().all(|column| ids.contains(column));
@@ -419,7 +421,7 @@ impl SwapMonitor {
                     "the values of column {called} and its counterparts are exchanged, as names of vehicles are"
                 );
                 let remedy = "name these columns like `a.id`, or remove them if their values are not names";
-                return refuse("recording/ambiguous-vehicle", problem, remedy);
+                return refuse(ContentKind::AmbiguousVehicle, problem, remedy);
             }
         }
         self.last = now;
@@ -450,12 +452,12 @@ fn of_vehicles<'a>(column: &'a str, vehicles: &[String]) -> Vec<(usize, &'a str)
     if !found.is_empty() {
         return found;
     }
-    let path_of_one = stem.match_indices(['.', '/']).find_map(|(at, _)| {
+    let path_of_one = stem.match_indices(['.', '/']).find_map(|(index, _)| {
         let is_below =
-            |vehicle: &&String| vehicle.strip_prefix(&stem[..at]).is_some_and(|rest| rest.starts_with(['.', '/']));
+            |vehicle: &&String| vehicle.strip_prefix(&stem[..index]).is_some_and(|rest| rest.starts_with(['.', '/']));
         let mut below = vehicles.iter().enumerate().filter(|(_, vehicle)| is_below(vehicle));
         let first = below.next()?;
-        below.next().is_none().then_some((first.0, &stem[at + 1..]))
+        below.next().is_none().then_some((first.0, &stem[index + 1..]))
     });
     path_of_one.into_iter().filter(|_| vehicles.len() > 1).collect()
 }
@@ -484,8 +486,8 @@ fn further<'a>(names: &[&'a str]) -> Option<[&'a str; 2]> {
     array.or_else(|| {
         known.iter().find_map(|(name, original)| {
             AXES.iter().find_map(|axes| {
-                name.match_indices(axes[0]).find_map(|(at, token)| {
-                    let (before, behind) = (&name[..at], &name[at + token.len()..]);
+                name.match_indices(axes[0]).find_map(|(index, token)| {
+                    let (before, behind) = (&name[..index], &name[index + token.len()..]);
                     let second = known.get(&format!("{before}{}{behind}", axes[1]))?;
                     is_position(&format!("{before}{behind}"), *axes).then_some([*original, *second])
                 })

@@ -11,7 +11,7 @@ use tautline_core::option::{COLUMN, ONE_VEHICLE, SCALE};
 use super::agreement::{Compared, SecondPosition};
 use super::axes::Convention;
 use super::clock::{SubunitColumn, TimeUnit};
-use super::error::{Fault, list, quoted, refuse};
+use super::error::{ContentKind, Fault, list, quoted, refuse};
 use super::heading::{
     DEPTH, EARTH, HEIGHT, Heading, Heights, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity,
 };
@@ -153,8 +153,9 @@ impl Layout {
         layout.metres.iter_mut().zip(&convention.signs).for_each(|(metres, sign)| *metres *= sign);
         layout.notes.extend(convention.note.clone());
         if is_planar {
-            let of = if flat.len() < vehicles.len() { format!(" of {}", list(&flat, 12)) } else { String::new() };
-            layout.notes.push(format!("no column gives the height{of}: {PLANAR}"));
+            let of_vehicles =
+                if flat.len() < vehicles.len() { format!(" of {}", list(&flat, 12)) } else { String::new() };
+            layout.notes.push(format!("no column gives the height{of_vehicles}: {PLANAR}"));
         }
         layout.notes.extend(columns.heights_used(&layout, options)?);
         layout.facts = columns.facts(&layout, options);
@@ -188,10 +189,14 @@ impl Layout {
         if !convention.has_directions() || convention.reference.is_some() {
             return Ok(());
         }
-        let of_heights: BTreeSet<_> =
-            heights.among(self.bodies.iter().filter_map(|body| body.position[2])).iter().map(|of| of.0).collect();
-        let of = |body: &VehicleColumns| body.position.into_iter().chain(body.velocity.unwrap_or_default()).flatten();
-        let positions = self.bodies.iter().flat_map(of);
+        let of_heights: BTreeSet<_> = heights
+            .among(self.bodies.iter().filter_map(|body| body.position[2]))
+            .iter()
+            .map(|height| height.0)
+            .collect();
+        let columns_of =
+            |body: &VehicleColumns| body.position.into_iter().chain(body.velocity.unwrap_or_default()).flatten();
+        let positions = self.bodies.iter().flat_map(columns_of);
         let (directed, others): (Vec<_>, Vec<_>) = positions
             .filter(|column| !of_heights.contains(column))
             .partition(|column| convention.directed.contains(column));
@@ -200,7 +205,7 @@ impl Layout {
                 let [directed, other] = [directed, other].map(|column| quoted(&header[column]));
                 let problem = format!("column {directed} gives the direction of its axis, column {other} does not");
                 refuse(
-                    "recording/several-frames",
+                    ContentKind::SeveralFrames,
                     problem,
                     "name the axes of all positions alike, as in `x_ned` or `north`",
                 )
@@ -214,7 +219,7 @@ impl Layout {
         let (convention, used) = (&self.convention, self.columns());
         if convention.reference.is_some() && options.metres() != 1.0 {
             let problem = format!("its positions are in metres, but {SCALE} is {}", options.metres());
-            return refuse("recording/contradicts-option", problem, format!("omit {SCALE}"));
+            return refuse(ContentKind::ContradictsOption, problem, format!("omit {SCALE}"));
         }
         let several = self
             .id
@@ -222,7 +227,7 @@ impl Layout {
             .or_else(|| (self.names.len() > 1).then(|| "its header".to_owned()));
         if let Some(namer) = several.filter(|_| options.one_vehicle && !options.is_joined) {
             let problem = format!("{namer} names the vehicles");
-            return refuse("recording/contradicts-option", problem, format!("omit {ONE_VEHICLE}"));
+            return refuse(ContentKind::ContradictsOption, problem, format!("omit {ONE_VEHICLE}"));
         }
         let is_one_vehicle = options.one_vehicle || options.is_joined;
         let unused = (0..header.len()).filter(|column| used.binary_search(column).is_err());
@@ -239,13 +244,13 @@ impl Layout {
         let repeats = |&column: &usize| {
             let (stem, number) = header[column].rsplit_once('.')?;
             let is_number = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
-            let of = |read: usize| header[read] == stem && Heading::of(&convention.header[read]).is_some();
-            (is_number && used.iter().any(|&read| of(read))).then_some((column, stem))
+            let is_read = |read: usize| header[read] == stem && Heading::of(&convention.header[read]).is_some();
+            (is_number && used.iter().any(|&read| is_read(read))).then_some((column, stem))
         };
         if let Some((column, stem)) = unused.clone().find_map(|column| repeats(&column)) {
             let problem = format!("column {} repeats column {}", quoted(&header[column]), quoted(stem));
             return refuse(
-                "recording/ambiguous-column",
+                ContentKind::AmbiguousColumn,
                 problem,
                 "rename the columns of each vehicle, or remove these columns",
             );
@@ -254,9 +259,9 @@ impl Layout {
         let is_decided = is_one_vehicle || convention.is_one_vehicle;
         if self.id.is_none() && one && !is_decided && !unused.iter().all(|name| heading::is_not_vehicle_column(name)) {
             return Err(match missing(header, ID, "") {
-                Fault::Content { code, problem, remedy } => {
+                Fault::Content { kind, problem, remedy } => {
                     let remedy = format!("{remedy}; if all rows are of one vehicle, use {ONE_VEHICLE}");
-                    Fault::coded(code, problem, remedy)
+                    Fault::content(kind, problem, remedy)
                 }
                 fault => fault,
             });
@@ -353,7 +358,7 @@ impl Layout {
 
     /// Returns the columns that are read, each once, in ascending order.
     pub(super) fn columns(&self) -> Vec<usize> {
-        let of = |body: &VehicleColumns| {
+        let columns_of = |body: &VehicleColumns| {
             let velocity = body.velocity.unwrap_or_default();
             body.position.into_iter().chain(velocity).chain([body.radius]).flatten()
         };
@@ -361,7 +366,7 @@ impl Layout {
         let columns: BTreeSet<_> = self
             .bodies
             .iter()
-            .flat_map(of)
+            .flat_map(columns_of)
             .chain(self.time_columns())
             .chain(self.id)
             .chain(others)
@@ -378,11 +383,11 @@ impl Layout {
 
 /// Returns the vehicles that have both horizontal coordinates of a frame. `first` is the role of the first coordinate.
 fn vehicles_of<'a>(first: Role, headings: &[(usize, Heading<'a>)]) -> BTreeSet<&'a str> {
-    let of = |role: Role| {
+    let column_of = |role: Role| {
         headings.iter().filter(move |(_, heading)| heading.role == role).map(|(_, heading)| heading.vehicle)
     };
-    let second: BTreeSet<_> = of(first + 1).collect();
-    of(first).filter(|vehicle| second.contains(vehicle)).collect()
+    let second: BTreeSet<_> = column_of(first + 1).collect();
+    column_of(first).filter(|vehicle| second.contains(vehicle)).collect()
 }
 
 /// Refuses vehicles whose positions are given in another frame only. `names` are the vehicles that are read.
@@ -405,8 +410,8 @@ fn two_frames(vehicle: &str, read: &str, on_earth: bool) -> Fault {
         quoted(vehicle),
         quoted(read)
     );
-    Fault::coded(
-        "recording/several-frames",
+    Fault::content(
+        ContentKind::SeveralFrames,
         problem,
         "give the positions of all vehicles in one frame, or remove the columns of the other frame",
     )
@@ -459,19 +464,19 @@ const WORDS: [&str; 12] = [
 ];
 
 /// Returns the fault of a missing column for a role.
-pub(super) fn missing(header: &[String], role: Role, of: &str) -> Fault {
-    let problem = format!("no column gives {}{of}; its columns are {}", WORDS[role], list(header, 12));
+pub(super) fn missing(header: &[String], role: Role, suffix: &str) -> Fault {
+    let problem = format!("no column gives {}{suffix}; its columns are {}", WORDS[role], list(header, 12));
     let column = COLUMN.set(format!("{}=NAME", ColumnNames::ROLES[role]));
     let remedy = format!("name the column with {column}, or rename it");
-    Fault::coded(code_of_missing(role), problem, remedy)
+    Fault::content(kind_of_missing(role), problem, remedy)
 }
 
-fn code_of_missing(role: Role) -> &'static str {
+fn kind_of_missing(role: Role) -> ContentKind {
     match role {
-        TIME => "recording/no-time-column",
-        ID => "recording/no-vehicle-column",
-        _ if is_velocity(role) || role == RADIUS => "recording/missing-column",
-        _ => "recording/no-position-column",
+        TIME => ContentKind::NoTimeColumn,
+        ID => ContentKind::NoVehicleColumn,
+        _ if is_velocity(role) || role == RADIUS => ContentKind::MissingColumn,
+        _ => ContentKind::NoPositionColumn,
     }
 }
 
@@ -519,7 +524,7 @@ impl<'a> Columns<'a> {
         let kind = if on_earth { "degrees" } else { "metres" };
         let given = COLUMN.set(format!("{}={}", ColumnNames::ROLES[role], self.header[column]));
         let problem = format!("{given} would be ignored, because the positions are read in {kind}");
-        refuse("recording/contradicts-option", problem, "name the columns of either x and y, or lat and lon")
+        refuse(ContentKind::ContradictsOption, problem, "name the columns of either x and y, or lat and lon")
     }
 
     pub(super) fn get(&self, vehicle: &str, role: Role) -> Option<usize> {
@@ -545,7 +550,7 @@ impl<'a> Columns<'a> {
                 SCALE.set("0.3048"),
                 SCALE.set("1")
             );
-            return refuse("recording/unknown-unit", problem, remedy);
+            return refuse(ContentKind::UnknownUnit, problem, remedy);
         }
         if self.place != EARTH {
             axes::refuse_turned_height(options, &self.header[first])?;
@@ -600,13 +605,13 @@ impl<'a> Columns<'a> {
     }
 
     pub(super) fn claim(&mut self, vehicle: &str, heading: &Heading<'a>, column: usize) -> Result<(), Fault> {
-        let of = if vehicle.is_empty() { String::new() } else { format!(" of `{vehicle}`") };
+        let of_vehicle = if vehicle.is_empty() { String::new() } else { format!(" of `{vehicle}`") };
         self.units.extend(heading.unit.map(|unit| (column, unit)));
         let Some(first) = self.found.insert((vehicle.to_owned(), heading.role), column) else { return Ok(()) };
         let (first, second) = (&self.header[first], &self.header[column]);
-        let problem = format!("the columns `{first}` and `{second}` both give {}{of}", WORDS[heading.role]);
+        let problem = format!("the columns `{first}` and `{second}` both give {}{of_vehicle}", WORDS[heading.role]);
         let remedy = format!("name one of them with {COLUMN}, or remove the other");
-        refuse("recording/ambiguous-column", problem, remedy)
+        refuse(ContentKind::AmbiguousColumn, problem, remedy)
     }
 
     /// Finds the vehicles of a wide table; returns their names in order of appearance.
@@ -621,7 +626,7 @@ impl<'a> Columns<'a> {
         if let (Some((odd, _)), Some((word, _))) = (odd, words) {
             let [odd, word] = [*odd, *word].map(|column| quoted(&self.header[column]));
             let problem = format!("column {odd} may belong to a vehicle, like {word}, or be another quantity");
-            return refuse("recording/ambiguous-column", problem, "give the column a longer name, or remove it");
+            return refuse(ContentKind::AmbiguousColumn, problem, "give the column a longer name, or remove it");
         }
         let mut names: Vec<String> = Vec::new();
         // `cf1_v_x` is a velocity if there is a `cf1_x`.
@@ -638,8 +643,8 @@ impl<'a> Columns<'a> {
             self.claim(heading.vehicle, heading, *column)?;
         }
         if names.is_empty() {
-            let of = " and none for its position (as `id`, `x`, `y`, or as `x1`, `y1`)";
-            return Err(missing(self.header, ID, of));
+            let hint = " and none for its position (as `id`, `x`, `y`, or as `x1`, `y1`)";
+            return Err(missing(self.header, ID, hint));
         }
         Ok(names)
     }
@@ -647,7 +652,7 @@ impl<'a> Columns<'a> {
     /// Returns the columns of a vehicle. Requires x and y of the position; a velocity must have the same axes as the
     /// position.
     pub(super) fn body(&self, vehicle: &str) -> Result<VehicleColumns, Fault> {
-        let of = if vehicle.is_empty() { String::new() } else { format!(" of vehicle `{vehicle}`") };
+        let of_vehicle = if vehicle.is_empty() { String::new() } else { format!(" of vehicle `{vehicle}`") };
         let axes = |role| [0, 1, 2].map(|axis| self.get(vehicle, role + axis));
         let (position, velocity) = (axes(self.place), axes(VELOCITY));
         let moves = velocity.iter().any(Option::is_some);
@@ -657,7 +662,7 @@ impl<'a> Columns<'a> {
                 (Some(_), None) if moves => VELOCITY,
                 _ => continue,
             };
-            return Err(missing(self.header, lacks + axis, &of));
+            return Err(missing(self.header, lacks + axis, &of_vehicle));
         }
         Ok(VehicleColumns { position, velocity: moves.then_some(velocity), radius: self.get(vehicle, RADIUS) })
     }
@@ -675,7 +680,11 @@ impl<'a> Columns<'a> {
                 let unit = self.units.get(&column).map_or("deg", |unit| *unit);
                 metres[column] = heading::degrees(unit).ok_or_else(|| {
                     let problem = format!("column {name} has an unknown unit of angle, {}", quoted(unit));
-                    Fault::coded("recording/unknown-unit", problem, "write degrees, without a unit in the column name")
+                    Fault::content(
+                        ContentKind::UnknownUnit,
+                        problem,
+                        "write degrees, without a unit in the column name",
+                    )
                 })?;
                 continue;
             }
@@ -689,7 +698,7 @@ impl<'a> Columns<'a> {
                 let remedy = format!(
                     "use one of m, cm, mm, km, ft, in; or name the column with {COLUMN} and set its unit with {SCALE}"
                 );
-                Fault::coded("recording/unknown-unit", problem, remedy)
+                Fault::content(ContentKind::UnknownUnit, problem, remedy)
             })?;
             metres[column] = size;
             if size != 1.0 {
@@ -713,7 +722,7 @@ impl<'a> Columns<'a> {
         if let Some(silent) = silent {
             let problem = format!("column {other} has a unit in its name, but column {silent} has none");
             return refuse(
-                "recording/unit-conflict",
+                ContentKind::UnitConflict,
                 problem,
                 "put a unit into the name of each column, as in `x [mm]`",
             );
@@ -722,7 +731,7 @@ impl<'a> Columns<'a> {
             let given = SCALE.set(scale);
             let problem = format!("column {other} has a unit in its name, which contradicts {given}");
             let remedy = format!("omit {SCALE}, or remove the units from the header");
-            return refuse("recording/contradicts-option", problem, remedy);
+            return refuse(ContentKind::ContradictsOption, problem, remedy);
         }
         Ok(metres)
     }

@@ -49,7 +49,7 @@ pub use self::parquet::is_guarded;
 pub use axes::Axes;
 pub use clock::TimeUnit;
 pub use earth::EarthFrame;
-pub use error::{Fault, Place, ReadError};
+pub use error::{ContentKind, Fault, Place, ReadError};
 pub use heading::is_read;
 pub use mcap::{Channels, LivePose, has_live_poses, live_poses};
 pub use options::{ArrayAxis, ArrayLayout, ColumnNames, Dimensions, Duplicates, MessageClock, ReadOptions, Scale};
@@ -97,8 +97,8 @@ pub fn open_plan(path: &Path, of_flight: Option<&EarthOrigin>) -> Result<Recordi
     let from_place = |place: [f64; 3]| open(path, &ReadOptions { origin: Some(place), ..ReadOptions::default() });
     let (problem, remedy) = match (open(path, &ReadOptions::default()), of_flight) {
         // Several files of places on the Earth need an origin.
-        (Err(error), Some(origin)) if error.code() == NO_ORIGIN => return from_place(origin.place),
-        (Err(error), _) if error.code() != NO_ORIGIN => return Err(error),
+        (Err(error), Some(origin)) if lacks_origin(&error) => return from_place(origin.place),
+        (Err(error), _) if !lacks_origin(&error) => return Err(error),
         (Ok(plan), _) => match (plan.earth_origin(), of_flight) {
             (Some(own), Some(origin)) if own.place != origin.place => return from_place(origin.place),
             (Some(_), None) => ON_EARTH,
@@ -110,11 +110,14 @@ pub fn open_plan(path: &Path, of_flight: Option<&EarthOrigin>) -> Result<Recordi
         },
         (Err(_), _) => ON_EARTH,
     };
-    Err(ReadError::new(path, Fault::coded("recording/several-frames", problem, remedy)))
+    Err(ReadError::new(path, Fault::content(ContentKind::SeveralFrames, problem, remedy)))
 }
 
-/// Code of several files with places on the Earth.
-const NO_ORIGIN: &str = "recording/no-origin";
+/// Returns whether several files have places on the Earth and no origin.
+fn lacks_origin(error: &ReadError) -> bool {
+    matches!(error.fault, Fault::Content { kind: ContentKind::NoOrigin, .. })
+}
+
 /// Problem and remedy of a plan on the Earth of a flight in metres.
 const ON_EARTH: (&str, &str) = (
     "the plan has places on the Earth, but the flight is in metres from an unknown origin",
@@ -175,7 +178,8 @@ pub fn recording_name(paths: &[&Path]) -> String {
 /// [`ReadError`] if the file is a show that cannot be read.
 pub fn show_rules(path: &Path, options: &ReadOptions) -> Result<Option<ShowRules>, ReadError> {
     let mut source = Source::file(path);
-    let is_show = path.is_file() && recognise(&mut source, options.format).is_ok_and(|of| of == Format::SKYBRUSH);
+    let is_show =
+        path.is_file() && recognise(&mut source, options.format).is_ok_and(|format| format == Format::SKYBRUSH);
     if is_show { skybrush::rules(&source, options) } else { Ok(None) }
 }
 
@@ -185,7 +189,7 @@ fn folder_of(path: &Path) -> Result<Option<Folder>, ReadError> {
     if data.is_dir() {
         if bag::is_bag(path) {
             let remedy = format!("open it without {JOIN}; its topics are the vehicles");
-            return refuse("recording/several-vehicles", "it is a ROS 2 bag, not a file with one vehicle", remedy);
+            return refuse(ContentKind::SeveralVehicles, "it is a ROS 2 bag, not a file with one vehicle", remedy);
         }
         let folder = Folder::open(path)?;
         let remedy =
@@ -194,7 +198,7 @@ fn folder_of(path: &Path) -> Result<Option<Folder>, ReadError> {
     }
     if !data.is_file() {
         let problem = "it is a pipe or a device, but a recording is read more than once";
-        return refuse("recording/not-a-file", problem, "save it to a file first");
+        return refuse(ContentKind::NotAFile, problem, "save it to a file first");
     }
     if !readers::is_archive(path)? {
         return Ok(None);

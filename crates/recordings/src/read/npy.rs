@@ -8,7 +8,7 @@ use std::io;
 use std::io::Read;
 
 use super::clock::{Stamp, TimeUnit};
-use super::error::Fault;
+use super::error::{ContentKind, Fault};
 
 /// First bytes of an array.
 const MAGIC: &[u8; 6] = b"\x93NUMPY";
@@ -79,7 +79,7 @@ impl Array {
         let descr = descr.trim_matches(['\'', '"']);
         let (kind, width, big_endian) = kind(descr).ok_or_else(|| {
             let remedy = "save times as one of float64, int64, datetime64, and positions as one of float32, float64";
-            Fault::coded("recording/element-type", format!("it holds elements of type `{descr}`"), remedy)
+            Fault::content(ContentKind::ElementType, format!("it holds elements of type `{descr}`"), remedy)
         })?;
         let fortran_order = value(&header, "fortran_order").ok_or_else(|| broken("order"))? == "True";
         let shape = value(&header, "shape").ok_or_else(|| broken("shape"))?;
@@ -164,8 +164,8 @@ impl Array {
 }
 
 fn not(what: &str, found: &str) -> Fault {
-    Fault::coded(
-        "recording/element-type",
+    Fault::content(
+        ContentKind::ElementType,
         format!("its elements are {found}, expected {what}"),
         "save float64, int64 or text",
     )

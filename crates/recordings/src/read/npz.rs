@@ -19,7 +19,7 @@ use std::collections::BTreeSet;
 use nalgebra::Vector3;
 
 use super::clock::{Stamp, TimeUnit};
-use super::error::{Fault, Place, ReadError, one_of, refuse};
+use super::error::{ContentKind, Fault, Place, ReadError, one_of, refuse};
 use super::identity::Names;
 use super::npy::Array;
 use super::options::{ArrayAxis, ArrayLayout, ReadOptions};
@@ -59,14 +59,14 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     };
     let time = time
         .filter(|name| arrays.holds(name))
-        .ok_or_else(|| arrays.missing("recording/no-time-column", "times", "t"))?;
+        .ok_or_else(|| arrays.missing(ContentKind::NoTimeColumn, "times", "t"))?;
     let positions = match options.columns.get("x") {
         Some(given) => Some(given.clone()),
         None => arrays.only_of(&POSITIONS, "x")?,
     };
     let positions = positions
         .filter(|name| arrays.holds(name))
-        .ok_or_else(|| arrays.missing("recording/no-position-column", "positions", "positions"))?;
+        .ok_or_else(|| arrays.missing(ContentKind::NoPositionColumn, "positions", "positions"))?;
 
     let mut stamps = arrays.array(&time)?;
     let unit = stamps.unit().or_else(|| time.rsplit_once('_').and_then(|(_, unit)| TimeUnit::from_name(unit)));
@@ -74,7 +74,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     for k in 0..stamps.count() {
         let stamp = stamps.next_stamp().and_then(|stamp| match stamp {
             Stamp::Real(time) if !time.is_finite() => refuse(
-                "recording/not-finite",
+                ContentKind::NotFinite,
                 format!("the time is {time}"),
                 "remove the instant: times must be finite",
             ),
@@ -101,7 +101,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     }
     let is_planar = table.axes() == 2;
     let rows = Instants { name: positions, times, at: 0, table, velocities, seen, radii, names };
-    let none = Fault::coded("recording/empty", "it holds no position", "save at least one instant of one vehicle");
+    let none = Fault::content(ContentKind::Empty, "it holds no position", "save at least one instant of one vehicle");
     let mut info = RecordingInfo::new(source, options, unit, notes, none);
     info.metadata.is_planar = is_planar;
     if let Some(Stamp::Whole(epoch)) = epoch_ns {
@@ -141,12 +141,12 @@ fn layout(shape: [usize; 3], times: usize, known_axes: &[ArrayAxis]) -> Result<A
                 "save T x N x 3 positions, with T the number of times, or name the axes with {LAYOUT}, such as {}",
                 LAYOUT.set("time,vehicle,axis")
             );
-            refuse("recording/array-shape", problem(""), remedy)
+            refuse(ContentKind::ArrayShape, problem(""), remedy)
         }
         _ => {
             let ways: Vec<_> = fitting.iter().map(|layout| ArrayAxis::layout_name(*layout)).collect();
             let remedy = format!("name its axes with {}", one_of(LAYOUT, &ways));
-            refuse("recording/ambiguous-layout", problem("; several layouts fit"), remedy)
+            refuse(ContentKind::AmbiguousLayout, problem("; several layouts fit"), remedy)
         }
     }
 }
@@ -177,7 +177,7 @@ impl Arrays {
             (Some(first), Some(second)) => {
                 let problem = format!("the arrays `{first}` and `{second}` both give the {}", names[1]);
                 refuse(
-                    "recording/ambiguous-column",
+                    ContentKind::AmbiguousColumn,
                     problem,
                     format!("name one of them with {}", COLUMN.set(format!("{option}=NAME"))),
                 )
@@ -186,14 +186,14 @@ impl Arrays {
         }
     }
 
-    fn missing(&self, code: &'static str, role: &str, usual: &str) -> Fault {
+    fn missing(&self, kind: ContentKind, role: &str, usual: &str) -> Fault {
         let names = self.archive.names();
         let names: Vec<_> =
             names.iter().filter_map(|name| name.strip_suffix(".npy")).map(super::error::quoted).collect();
         let option = if usual == "t" { "t" } else { "x" };
         let problem = format!("no array gives the {role}; its arrays are {}", names.join(", "));
         let remedy = format!("save it as `{usual}`, or name it with {}", COLUMN.set(format!("{option}=NAME")));
-        Fault::coded(code, problem, remedy)
+        Fault::content(kind, problem, remedy)
     }
 
     fn array(&mut self, name: &str) -> Result<Array, ReadError> {
@@ -226,8 +226,8 @@ impl Arrays {
         let (order, expected): (Vec<_>, Vec<_>) = axes.into_iter().unzip();
         if array.shape != expected {
             let problem = format!("its shape is {:?}, but the positions require {expected:?}", array.shape);
-            return Err(in_array(name)(Fault::coded(
-                "recording/array-shape",
+            return Err(in_array(name)(Fault::content(
+                ContentKind::ArrayShape,
                 problem,
                 "save arrays of one recording together",
             )));
@@ -239,15 +239,15 @@ impl Arrays {
     fn names(&mut self, vehicles: usize) -> Result<Vec<String>, ReadError> {
         let names = self.texts("names")?;
         let different: BTreeSet<_> = names.iter().collect();
-        let (code, problem) = match different.len() {
+        let (kind, problem) = match different.len() {
             _ if names.len() != vehicles => {
-                ("recording/array-shape", format!("it has {} elements for {vehicles} vehicles", names.len()))
+                (ContentKind::ArrayShape, format!("it has {} elements for {vehicles} vehicles", names.len()))
             }
-            count if count < vehicles => ("recording/vehicle-twice", "two vehicles have the same name".to_owned()),
+            count if count < vehicles => (ContentKind::VehicleTwice, "two vehicles have the same name".to_owned()),
             _ => return Ok(names),
         };
         let remedy = "save a distinct name for each vehicle, or omit `names`";
-        Err(in_array("names")(Fault::coded(code, problem, remedy)))
+        Err(in_array("names")(Fault::content(kind, problem, remedy)))
     }
 
     fn texts(&mut self, name: &str) -> Result<Vec<String>, ReadError> {
@@ -262,18 +262,22 @@ impl Arrays {
     /// Returns an array of vectors with `times` instants.
     fn table(&mut self, name: &str, times: usize, known_axes: &[ArrayAxis]) -> Result<Table, ReadError> {
         let array = self.array(name)?;
-        let at = in_array(name);
+        let fail = in_array(name);
         let &[first, second, third] = array.shape.as_slice() else {
             let problem = format!("its shape is {:?}, expected three axes", array.shape);
-            return Err(at(Fault::coded("recording/array-shape", problem, "save positions as T x N x 3 or N x T x 3")));
+            return Err(fail(Fault::content(
+                ContentKind::ArrayShape,
+                problem,
+                "save positions as T x N x 3 or N x T x 3",
+            )));
         };
         if array.count() == 0 {
             let problem = format!("its shape is {:?}, which has no elements", array.shape);
-            return Err(at(Fault::coded("recording/empty", problem, "save at least one instant of one vehicle")));
+            return Err(fail(Fault::content(ContentKind::Empty, problem, "save at least one instant of one vehicle")));
         }
         let shape = [first, second, third];
-        let layout = layout(shape, times, known_axes).map_err(&at)?;
-        Ok(Table { shape, layout, numbers: numbers(array, &layout).map_err(at)? })
+        let layout = layout(shape, times, known_axes).map_err(&fail)?;
+        Ok(Table { shape, layout, numbers: numbers(array, &layout).map_err(fail)? })
     }
 }
 
@@ -287,7 +291,7 @@ struct Table {
 
 impl Table {
     fn length(&self, axis: ArrayAxis) -> usize {
-        self.layout.into_iter().zip(self.shape).find(|(of, _)| *of == axis).map_or(1, |(_, length)| length)
+        self.layout.into_iter().zip(self.shape).find(|(own, _)| *own == axis).map_or(1, |(_, length)| length)
     }
 
     fn vehicles(&self) -> usize {
@@ -315,7 +319,7 @@ fn numbers(mut array: Array, order: &[ArrayAxis]) -> Result<Numbers, Fault> {
         inner.iter().product::<usize>()
     };
     let along = USUAL.map(|axis| {
-        let place = order.iter().position(|of| *of == axis);
+        let place = order.iter().position(|own| *own == axis);
         place.map_or((1, 0), |place| (shape[place], stride(place)))
     });
     let steps = |(length, stride): (usize, usize)| (0..length).map(move |k| k * stride);
@@ -345,7 +349,7 @@ fn next_radius(numbers: &mut Numbers) -> Result<Option<f64>, Fault> {
         return Ok(Some(radius).filter(|radius| !radius.is_nan()));
     }
     refuse(
-        "recording/radius",
+        ContentKind::Radius,
         format!("the radius is {radius}"),
         "radii must be finite and not negative, or NaN if unknown",
     )
@@ -377,13 +381,13 @@ impl Instants {
         }
         if let Some(odd) = position.iter().find(|x| !x.is_finite()) {
             let remedy = "save an array `seen` of T x N booleans that is false if a vehicle was not seen";
-            return refuse("recording/not-finite", format!("the position contains {odd}"), remedy);
+            return refuse(ContentKind::NotFinite, format!("the position contains {odd}"), remedy);
         }
         // NaN marks vehicles without a velocity.
         let velocity = velocity.filter(|velocity| !velocity.iter().all(|x| x.is_nan()));
         if velocity.is_some_and(|velocity| velocity.iter().any(|x| !x.is_finite())) {
             return refuse(
-                "recording/not-finite",
+                ContentKind::NotFinite,
                 "the velocity is not finite",
                 "velocities must be finite, or all NaN if unknown",
             );

@@ -10,7 +10,7 @@ use std::io::{BufReader, Bytes, Read};
 use serde::de::{DeserializeSeed, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
 use super::clock::Stamp;
-use super::error::{Fault, Place, ReadError, quoted, refuse};
+use super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
 use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::Recording;
@@ -64,7 +64,7 @@ fn open_objects<T: ObjectText + 'static>(source: &Source, options: &ReadOptions)
             quoted(list)
         );
         let remedy = "name each vehicle in its object, as in {\"id\": \"a\", \"x\": 1, ...}";
-        return Err(Fault::coded("recording/list-length", problem, remedy).at(T::place(*line)));
+        return Err(Fault::content(ContentKind::ListLength, problem, remedy).at(T::place(*line)));
     }
     table::open(source, objects, layout, None, 0, options)
 }
@@ -157,8 +157,8 @@ impl Elements {
     fn refuse(&self, byte: u8, expected: &str) -> ReadError {
         let problem =
             format!("it is not an array of JSON objects: {expected} is expected, got {}", byte.escape_ascii());
-        self.fault(Fault::coded(
-            "recording/malformed",
+        self.fault(Fault::content(
+            ContentKind::Malformed,
             problem,
             "write an array like [{\"t\": 0, \"id\": \"a\", ...}, ...]",
         ))
@@ -313,11 +313,11 @@ impl Scenes {
         let Some(stated) = &self.fps else { return Ok(()) };
         if let Some(other) = &self.other_fps {
             let problem = format!("its scenes state {stated} and {other} positions per second");
-            return refuse("recording/frames", problem, "write the scenes of each rate to a file of their own");
+            return refuse(ContentKind::Frames, problem, "write the scenes of each rate to a file of their own");
         }
         let Some(fps) = stated.parse().ok().filter(|&fps: &f64| fps > 0.0 && fps.is_finite()) else {
             let problem = format!("its scenes state {} positions per second", quoted(stated));
-            return refuse("recording/frames", problem, "correct `fps` of the scenes, or remove it");
+            return refuse(ContentKind::Frames, problem, "correct `fps` of the scenes, or remove it");
         };
         if self.is_uneven || self.step == 0 {
             return Ok(());
@@ -326,14 +326,14 @@ impl Scenes {
         let states = format!("its scenes state {fps} positions per second, and frames have steps of {}", self.step);
         let remedy = format!("give a rate of {rate} frames per second");
         let Some(given) = options.times_per_second.or(options.time_unit.map(|unit| unit.per_second() as f64)) else {
-            return refuse("recording/frames", format!("its times are the numbers of frames; {states}"), remedy);
+            return refuse(ContentKind::Frames, format!("its times are the numbers of frames; {states}"), remedy);
         };
         let equals = |other: f64| (given / other - 1.0).abs() <= ROUNDING;
         let parts = (rate / given).round();
         if equals(rate) || (parts > 1.0 && equals(rate / parts) && !equals(fps)) {
             return Ok(());
         }
-        refuse("recording/unit-conflict", format!("{states}, but {given} frames per second are given"), remedy)
+        refuse(ContentKind::UnitConflict, format!("{states}, but {given} frames per second are given"), remedy)
     }
 }
 
@@ -380,7 +380,7 @@ impl<T: ObjectText> Objects<T> {
                 let problem = format!("`{PREDICTION}` marks a predicted position beside measured positions");
                 let remedy =
                     "remove the lines of predictions, or judge each prediction as a file of its own, without this key";
-                let fault = Fault::coded("recording/ambiguous-layout", problem, remedy);
+                let fault = Fault::content(ContentKind::AmbiguousLayout, problem, remedy);
                 return Err(fault.at(T::place(objects.text.number())));
             }
             objects.scenes.observe(&objects.flat);
@@ -391,7 +391,7 @@ impl<T: ObjectText> Objects<T> {
                 if objects.header.len() == MOST_COLUMNS {
                     let problem = format!("its objects have more than {MOST_COLUMNS} different keys");
                     let remedy = "write one object per vehicle and time, with the same keys in all";
-                    let fault = Fault::coded("recording/field-count", problem, remedy);
+                    let fault = Fault::content(ContentKind::FieldCount, problem, remedy);
                     return Err(fault.at(T::place(objects.text.number())));
                 }
                 objects.columns.insert(key.clone(), objects.header.len());
@@ -438,8 +438,8 @@ impl<T: ObjectText> Objects<T> {
 
 fn take_apart(line: &[u8], flat: &mut Vec<(String, Cell)>, lists: &mut Vec<(String, usize)>) -> Result<(), Fault> {
     let refused = |what: String| {
-        Fault::coded(
-            "recording/malformed",
+        Fault::content(
+            ContentKind::Malformed,
             format!("it is not a JSON object: {what}"),
             "write one object like {\"t\": 0, \"id\": \"a\", ...} per line",
         )

@@ -6,7 +6,7 @@ use std::str::FromStr;
 
 use super::axes::Axes;
 use super::clock::TimeUnit;
-use super::error::{Fault, quoted, refuse};
+use super::error::{ContentKind, Fault, quoted, refuse};
 use super::readers::{Format, FormatOption};
 use tautline_core::option::{
     ALLOW_UNFINISHED, AXES, CLOCK, COLUMN, DIMENSIONS, DUPLICATES, FPS, FRAME, LAYOUT, ONE_VEHICLE, ORIGIN, SCALE,
@@ -307,7 +307,7 @@ impl ReadOptions {
         if !(metres.is_finite() && metres > 0.0) {
             let problem = format!("{SCALE} must be positive, got {metres}");
             return refuse(
-                "recording/option-out-of-range",
+                ContentKind::OptionOutOfRange,
                 problem,
                 "give a positive number of metres per unit of length",
             );
@@ -315,13 +315,13 @@ impl ReadOptions {
         if let Some(rate) = self.times_per_second.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
             let problem = format!("the number of time units per second must be positive, got {rate}");
             let remedy = format!("give a positive number with {FPS} or {TIME_SCALE}");
-            return refuse("recording/option-out-of-range", problem, remedy);
+            return refuse(ContentKind::OptionOutOfRange, problem, remedy);
         }
         if let Some(unit) = self.time_unit.filter(|_| self.times_per_second.is_some()) {
             let given = TIME_UNIT.set(unit.name());
             let problem = format!("the unit of time is given twice: {given}, and {FPS} or {TIME_SCALE}");
             let remedy = format!("omit {TIME_UNIT}, or {FPS} and {TIME_SCALE}");
-            return refuse("recording/two-time-units", problem, remedy);
+            return refuse(ContentKind::TwoTimeUnits, problem, remedy);
         }
         if let Some([latitude, longitude, height_m]) = self.origin {
             let is_on_earth = latitude.abs() <= 90.0 && longitude.abs() <= 360.0 && height_m.is_finite();
@@ -329,17 +329,17 @@ impl ReadOptions {
                 let given = ORIGIN.set(format!("{latitude},{longitude},{height_m}"));
                 let problem = format!("{given} is not on the Earth");
                 let remedy = "give a latitude within 90 degrees and a longitude within 360 degrees";
-                return refuse("recording/option-out-of-range", problem, remedy);
+                return refuse(ContentKind::OptionOutOfRange, problem, remedy);
             }
         }
         if let Some((name, _)) = self.starts.iter().find(|(_, start)| !start.iter().all(|x| x.is_finite())) {
             let problem = format!("the start of {} is not finite", quoted(name));
-            return refuse("recording/option-out-of-range", problem, "give three finite numbers in metres");
+            return refuse(ContentKind::OptionOutOfRange, problem, "give three finite numbers in metres");
         }
         if !self.turn().are_finite() {
             let problem = format!("a factor of {SCALE} is 0 or not finite");
             return refuse(
-                "recording/option-out-of-range",
+                ContentKind::OptionOutOfRange,
                 problem,
                 "give three finite numbers other than 0, such as 1,1,-1",
             );
@@ -370,9 +370,9 @@ impl ReadOptions {
             (is_one_vehicle, FormatOption::OneVehicle, &ONE_VEHICLE, "names its vehicles"),
             (self.allow_unfinished, FormatOption::Unfinished, &ALLOW_UNFINISHED, "cannot be read before it is closed"),
         ];
-        match given.into_iter().find(|(is_given, of, ..)| *is_given && !format.supports.contains(of)) {
+        match given.into_iter().find(|(is_given, option, ..)| *is_given && !format.supports.contains(option)) {
             Some((.., option, why)) => {
-                refuse("recording/unused-option", format!("{} {why}", format.title), format!("omit {option}"))
+                refuse(ContentKind::UnusedOption, format!("{} {why}", format.title), format!("omit {option}"))
             }
             None => Ok(()),
         }

@@ -7,7 +7,7 @@ use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::option::{COLUMN, DUPLICATES, SORT, TIME_UNIT};
 
 use super::clock::{Probe, Stamp, TimeUnit, Timing};
-use super::error::{Fault, Place, ReadError, quoted};
+use super::error::{ContentKind, Fault, Place, ReadError, quoted};
 use super::options::{Duplicates, ReadOptions};
 use super::source::Source as File;
 use tautline_core::track::{Item, Metadata, Sample, Tracks};
@@ -271,7 +271,7 @@ impl<R: Rows> Ordered<R> {
             DUPLICATES.set("last"),
             COLUMN.set("id=NAME")
         );
-        Fault::coded("recording/duplicate-row", problem, remedy)
+        Fault::content(ContentKind::DuplicateRow, problem, remedy)
     }
 
     #[cold]
@@ -284,7 +284,7 @@ impl<R: Rows> Ordered<R> {
             "leave latitude and longitude empty where the receiver had no fix, or correct the unit of the times with \
              {TIME_UNIT}"
         );
-        Fault::coded("recording/position-jump", problem, remedy)
+        Fault::content(ContentKind::PositionJump, problem, remedy)
     }
 
     #[cold]
@@ -292,7 +292,7 @@ impl<R: Rows> Ordered<R> {
         let (vehicle, first) = (self.name(row), self.rows.place(before.place));
         let which = if row.radius.is_some() { "a radius here, but none" } else { "no radius here, but one" };
         let remedy = "fill the empty cells, or leave all radii of the vehicle empty";
-        Fault::coded("recording/radius", format!("vehicle {vehicle} has {which} at {first}"), remedy)
+        Fault::content(ContentKind::Radius, format!("vehicle {vehicle} has {which} at {first}"), remedy)
     }
 
     /// Returns the next row without consuming it.
@@ -457,26 +457,26 @@ pub(super) fn probe(rows: &[Row]) -> Option<Probe> {
 }
 
 /// Refuses rows of one vehicle whose time decreases in the order of the file.
-pub(super) fn refuse_steps_back(rows: &[Row], of: &impl Rows, timing: &Timing) -> Result<(), ReadError> {
+pub(super) fn refuse_steps_back(rows: &[Row], source: &impl Rows, timing: &Timing) -> Result<(), ReadError> {
     let mut last: Vec<Option<&Row>> = Vec::new();
     for row in rows {
         if row.vehicle >= last.len() {
             last.resize(row.vehicle + 1, None);
         }
         let Some(before) = last[row.vehicle].replace(row) else { continue };
-        if row.stamp.compare(before.stamp).is_lt() && of.file(row.place) == of.file(before.place) {
-            let name = quoted(of.vehicles().get(row.vehicle).map_or("", String::as_str));
+        if row.stamp.compare(before.stamp).is_lt() && source.file(row.place) == source.file(before.place) {
+            let name = quoted(source.vehicles().get(row.vehicle).map_or("", String::as_str));
             let (time_s, before_s) = (timing.seconds(row.stamp), timing.seconds(before.stamp));
             let problem = format!(
                 "vehicle {name} goes back in time: {time_s} s comes after {before_s} s at {}",
-                of.place(before.place)
+                source.place(before.place)
             );
             let remedy = format!(
                 "check whether its clock was set; if the rows belong to several vehicles, name their column with {}; \
                  if the rows are only out of order, use {SORT}",
                 COLUMN.set("id=NAME")
             );
-            return Err(Fault::coded("recording/time-backwards", problem, remedy).at(of.place(row.place)));
+            return Err(Fault::content(ContentKind::TimeBackwards, problem, remedy).at(source.place(row.place)));
         }
     }
     Ok(())

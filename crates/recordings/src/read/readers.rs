@@ -5,7 +5,7 @@ use std::ops::Deref;
 use std::path::Path;
 use std::{fmt, str};
 
-use super::error::{Fault, ReadError, refuse};
+use super::error::{ContentKind, Fault, ReadError, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::skybrush::SHOW;
@@ -204,7 +204,7 @@ pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<F
     if (source.gzip || packed) && !unpacks {
         let (within, remedy) = if packed { ("an archive", "unzip") } else { ("gzip", "gunzip") };
         let problem = format!("it is {} inside {within}", format.title);
-        return refuse("recording/unsupported-compression", problem, format!("unpack it first, with {remedy}"));
+        return refuse(ContentKind::UnsupportedCompression, problem, format!("unpack it first, with {remedy}"));
     }
     Ok(format)
 }
@@ -288,7 +288,7 @@ fn unsupported_bytes(head: &[u8]) -> Option<Fault> {
     if head.starts_with(b"\x93NUMPY") {
         let remedy = "save positions together with their times: numpy.savez(\"flight.npz\", t=t, positions=positions)";
         let problem = "it is a single NumPy array, without times";
-        return Some(Fault::coded("recording/no-time-column", problem, remedy));
+        return Some(Fault::content(ContentKind::NoTimeColumn, problem, remedy));
     }
     if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
         return Some(Fault::NotUtf8);
@@ -297,22 +297,22 @@ fn unsupported_bytes(head: &[u8]) -> Option<Fault> {
     if matches!(head, [0, 4..=7, _, _, _, _, _, _, 0xfd | 0xfe, ..]) {
         let remedy = "write its positions with `mavlogdump.py --types GLOBAL_POSITION_INT --format csv`, and from \
                       that a table t,id,lat,lon,alt in degrees and metres";
-        return Some(Fault::coded(
-            "recording/unsupported-format",
+        return Some(Fault::content(
+            ContentKind::UnsupportedFormat,
             "it is a MAVLink telemetry log, which is not supported",
             remedy,
         ));
     }
     if head.get(257..262) == Some(b"ustar") {
-        return Some(Fault::coded(
-            "recording/unsupported-format",
+        return Some(Fault::content(
+            ContentKind::UnsupportedFormat,
             "it is a tar archive, which is not supported",
             UNPACK,
         ));
     }
     let known = UNSUPPORTED.iter().find(|(begin, ..)| head.starts_with(begin));
     known.map(|(_, what, remedy)| {
-        Fault::coded("recording/unsupported-format", format!("it is {what}, which is not supported"), *remedy)
+        Fault::content(ContentKind::UnsupportedFormat, format!("it is {what}, which is not supported"), *remedy)
     })
 }
 
@@ -327,5 +327,5 @@ fn unsupported_text(text: &[u8]) -> Option<Fault> {
         b'[' if !objects::is_array(text) => ("JSON, but neither a Skybrush show nor an array of objects", TABLE),
         _ => return None,
     };
-    Some(Fault::coded("recording/unsupported-format", format!("it is {what}, which is not supported"), remedy))
+    Some(Fault::content(ContentKind::UnsupportedFormat, format!("it is {what}, which is not supported"), remedy))
 }

@@ -260,7 +260,7 @@ mod tests {
         assert_eq!((rules.min_distance_m, rules.max_height_m), (Some(2.5), Some(100.0)));
         assert_eq!((rules.max_climb_m_s, rules.max_descent_m_s), (Some(2.0), Some(3.0)));
         assert_eq!((rules.max_accel_m_s2, rules.navigation_floor_m), (Some(4.0), Some(2.5)));
-        assert_eq!(rules.polygons.iter().map(|of| of.is_inclusion).collect::<Vec<_>>(), [true, false]);
+        assert_eq!(rules.polygons.iter().map(|polygon| polygon.is_inclusion).collect::<Vec<_>>(), [true, false]);
         assert_eq!(rules.polygons[0].corners_m[1], [9.0, 0.0]);
         assert!(rules.not_judged.is_empty(), "{:?}", rules.not_judged);
     }

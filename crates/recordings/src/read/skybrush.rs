@@ -15,7 +15,7 @@ use serde_json::value::RawValue;
 
 use super::axes::Axes;
 use super::curves::{Curves, distinct, from_json, piece, powers};
-use super::error::{Fault, Place, ReadError, refuse};
+use super::error::{ContentKind, Fault, Place, ReadError, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{FormatOption, Packing, Reader};
@@ -100,7 +100,7 @@ fn show(source: &Source) -> Result<(Show, Option<Archive>), ReadError> {
         Some(_) => {
             let problem = format!("it is an archive with neither `{SHOW}` nor NumPy arrays nor tables");
             return refuse(
-                "recording/unknown-format",
+                ContentKind::UnknownFormat,
                 problem,
                 "give a .skyc or .npz file, or pack one table per vehicle",
             );
@@ -146,7 +146,7 @@ fn value(text: Option<&RawValue>, what: &str) -> Result<Value, Fault> {
     let text = text.map_or("null", RawValue::get);
     if text.len() > RULES_LIMIT_BYTES {
         let problem = format!("{what} has {} bytes, at most {RULES_LIMIT_BYTES} are read", text.len());
-        return refuse("recording/malformed", problem, "export the show from Skybrush again");
+        return refuse(ContentKind::Malformed, problem, "export the show from Skybrush again");
     }
     serde_json::from_str(text).map_err(Fault::damaged)
 }
@@ -172,7 +172,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let (show, mut archive) = show(source)?;
     let Some(swarm) = show.swarm else {
         return refuse(
-            "recording/unsupported-format",
+            ContentKind::UnsupportedFormat,
             "it is JSON, but not a Skybrush show: it has no `swarm`",
             readers::TABLE,
         );
@@ -191,7 +191,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     stand_throughout(curves.iter_mut());
     if curves.iter().all(Vec::is_empty) {
         let remedy = "export the show with its trajectories";
-        return refuse("recording/no-positions", "the show has no drone with a trajectory", remedy);
+        return refuse(ContentKind::NoPositions, "the show has no drone with a trajectory", remedy);
     }
     Ok(Curves::recording(distinct(names).into_iter().zip(curves).collect(), Vec::new()))
 }
@@ -217,7 +217,7 @@ fn referenced<T: DeserializeOwned>(archive: Option<&mut Archive>, reference: &st
     let name = name.trim_start_matches("./");
     let Some(archive) = archive.filter(|archive| archive.holds(name)) else {
         let problem = format!("it refers to `{reference}`, which is missing");
-        return refuse("recording/archive-entry", problem, "give the .skyc file that holds all parts of the show");
+        return refuse(ContentKind::ArchiveEntry, problem, "give the .skyc file that holds all parts of the show");
     };
     parse(&archive.document(name)?, Some(name))
 }
@@ -238,7 +238,7 @@ fn items(trajectory: &Trajectory, vehicle: usize, scale: f64) -> Result<Vec<Item
         let problem = format!("the version of the trajectory is {version}, expected 1");
         return Err((
             None,
-            Fault::coded("recording/unsupported-format", problem, "export the show with trajectories of version 1"),
+            Fault::content(ContentKind::UnsupportedFormat, problem, "export the show with trajectories of version 1"),
         ));
     }
     let Some(Point(first_s, first, ..)) = &trajectory.points.first() else { return Ok(Vec::new()) };
@@ -266,16 +266,16 @@ fn items(trajectory: &Trajectory, vehicle: usize, scale: f64) -> Result<Vec<Item
 fn segment(before: &Point, point: &Point, [from_s, to_s]: [f64; 2]) -> Result<Vec<Vector3<f64>>, Fault> {
     if to_s == from_s {
         let problem = format!("two points are at the same time, {to_s} s");
-        return refuse("recording/duplicate-row", problem, "remove one of them: a drone is in one place at a time");
+        return refuse(ContentKind::DuplicateRow, problem, "remove one of them: a drone is in one place at a time");
     }
     if to_s < from_s {
         let problem = format!("time runs backwards: {to_s} s comes after {from_s} s");
-        return refuse("recording/time-backwards", problem, "check the order of the points, and export the show again");
+        return refuse(ContentKind::TimeBackwards, problem, "check the order of the points, and export the show again");
     }
     let degree = point.2.len() + 1;
     if degree > HIGHEST_DEGREE {
         let problem = format!("the degree of the segment is {degree}, at most {HIGHEST_DEGREE} is supported");
-        return refuse("recording/degree", problem, "use fewer control points");
+        return refuse(ContentKind::Degree, problem, "use fewer control points");
     }
     let points = std::iter::once(&before.1).chain(&point.2).chain([&point.1]);
     Ok(powers(&points.map(|&point| point.into()).collect::<Vec<_>>(), to_s - from_s))

@@ -13,7 +13,7 @@ use tempfile::TempPath;
 use zip::result::ZipError;
 use zip::{CompressionMethod, ZipArchive};
 
-use super::error::{Fault, Place, ReadError, quoted, refuse};
+use super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
 
 /// Longest accepted line \[bytes\]: an instant of a hundred thousand vehicles.
 pub(super) const LINE_LIMIT_BYTES: usize = 8 * 1024 * 1024;
@@ -186,7 +186,7 @@ impl Archive {
             && let Some(name) = repeated(path, zip.central_directory_start())?
         {
             let remedy = "unpack it, and make an archive with only one of the two";
-            return refuse("recording/archive-entry", format!("two entries have the name {}", quoted(&name)), remedy);
+            return refuse(ContentKind::ArchiveEntry, format!("two entries have the name {}", quoted(&name)), remedy);
         }
         Ok(Self { path: path.to_owned(), zip, document_bytes: 0 })
     }
@@ -213,7 +213,7 @@ impl Archive {
         let packed_bytes = entry.compressed_size();
         if entry.encrypted() {
             return refuse(
-                "recording/unsupported-compression",
+                ContentKind::UnsupportedCompression,
                 "it is encrypted",
                 "give an archive without a password",
             );
@@ -232,7 +232,7 @@ impl Archive {
             }
             other => {
                 let remedy = "make the archive with deflate or without compression, as numpy.savez does";
-                return refuse("recording/unsupported-compression", format!("it is packed by {other}"), remedy);
+                return refuse(ContentKind::UnsupportedCompression, format!("it is packed by {other}"), remedy);
             }
         })
     }
@@ -247,7 +247,7 @@ impl Archive {
         }
         ranges.sort_unstable();
         if ranges.windows(2).any(|pair| pair[0].1 > pair[1].0) {
-            return refuse("recording/archive-entry", "two entries share bytes", "make the archive again");
+            return refuse(ContentKind::ArchiveEntry, "two entries share bytes", "make the archive again");
         }
         Ok(())
     }
@@ -292,7 +292,7 @@ fn repeated(path: &Path, directory: u64) -> io::Result<Option<String>> {
     file.seek(SeekFrom::Start(directory))?;
     let (mut fixed, mut known) = ([0; FIXED_BYTES], BTreeSet::new());
     while file.read_exact(&mut fixed).is_ok() && fixed.starts_with(&BEGIN) {
-        let [name, extra, comment] = [28, 30, 32].map(|at| u16::from_le_bytes([fixed[at], fixed[at + 1]]));
+        let [name, extra, comment] = [28, 30, 32].map(|offset| u16::from_le_bytes([fixed[offset], fixed[offset + 1]]));
         let mut bytes = vec![0; usize::from(name)];
         file.read_exact(&mut bytes)?;
         file.seek_relative(i64::from(extra) + i64::from(comment))?;
@@ -307,10 +307,10 @@ fn zip_fault(error: ZipError) -> Fault {
     match error {
         ZipError::Io(error) => error.into(),
         ZipError::FileNotFound => {
-            Fault::coded("recording/archive-entry", "the entry is missing", "make the archive again")
+            Fault::content(ContentKind::ArchiveEntry, "the entry is missing", "make the archive again")
         }
-        ZipError::UnsupportedArchive(what) => Fault::coded(
-            "recording/unsupported-compression",
+        ZipError::UnsupportedArchive(what) => Fault::content(
+            ContentKind::UnsupportedCompression,
             format!("unsupported archive feature: {what}"),
             "make the archive with deflate or without compression",
         ),

@@ -33,10 +33,10 @@ pub(super) fn b_spline(degree: usize, knots: &[f64], points: &[Vector3<f64>]) ->
 fn blossom(degree: usize, knots: &[f64], points: &[Vector3<f64>], k: usize, at_end: usize) -> Vector3<f64> {
     let mut level = points[k - degree..=k].to_vec();
     for r in 1..=degree {
-        let at = if r <= at_end { knots[k + 1] } else { knots[k] };
+        let knot = if r <= at_end { knots[k + 1] } else { knots[k] };
         for i in (r..=degree).rev() {
             let (low, high) = (knots[i + k - degree], knots[i + 1 + k - r]);
-            let share = (at - low) / (high - low);
+            let share = (knot - low) / (high - low);
             level[i] = level[i - 1] * (1.0 - share) + level[i] * share;
         }
     }
@@ -79,7 +79,7 @@ fn nodes(start: State, inner: &[Vector3<f64>], end: State, durations: &[f64]) ->
         let before = Matrix2::new(168.0 * s2 * s, 24.0 * s2, -24.0 * s2, -3.0 * s);
         let after = Matrix2::new(168.0 * t2 * t, -24.0 * t2, 24.0 * t2, -3.0 * t);
         let by = [position(node) - position(node - 1), position(node + 1) - position(node)];
-        let row = |of: [f64; 2]| -> RowVector3<f64> { (by[0] * of[0] + by[1] * of[1]).transpose() };
+        let row = |values: [f64; 2]| -> RowVector3<f64> { (by[0] * values[0] + by[1] * values[1]).transpose() };
         let mut right =
             Matrix2x3::from_rows(&[row([360.0 * s2 * s2, 360.0 * t2 * t2]), row([-60.0 * s2 * s, 60.0 * t2 * t])]);
         match factors.last().zip(rights.last()) {
@@ -136,16 +136,16 @@ mod tests {
     }
 
     /// Evaluates a B-spline by the recursion of Cox and de Boor for the basis functions.
-    fn by_basis(degree: usize, knots: &[f64], points: &[Vector3<f64>], at: f64) -> Vector3<f64> {
-        fn basis(i: usize, p: usize, knots: &[f64], at: f64) -> f64 {
+    fn by_basis(degree: usize, knots: &[f64], points: &[Vector3<f64>], time: f64) -> Vector3<f64> {
+        fn basis(i: usize, p: usize, knots: &[f64], time: f64) -> f64 {
             if p == 0 {
-                return if knots[i] <= at && at < knots[i + 1] { 1.0 } else { 0.0 };
+                return if knots[i] <= time && time < knots[i + 1] { 1.0 } else { 0.0 };
             }
-            let part = |low: f64, high: f64, of: f64| if high > low { of / (high - low) } else { 0.0 };
-            part(knots[i], knots[i + p], at - knots[i]) * basis(i, p - 1, knots, at)
-                + part(knots[i + 1], knots[i + p + 1], knots[i + p + 1] - at) * basis(i + 1, p - 1, knots, at)
+            let part = |low: f64, high: f64, distance: f64| if high > low { distance / (high - low) } else { 0.0 };
+            part(knots[i], knots[i + p], time - knots[i]) * basis(i, p - 1, knots, time)
+                + part(knots[i + 1], knots[i + p + 1], knots[i + p + 1] - time) * basis(i + 1, p - 1, knots, time)
         }
-        points.iter().enumerate().map(|(i, point)| point * basis(i, degree, knots, at)).sum()
+        points.iter().enumerate().map(|(i, point)| point * basis(i, degree, knots, time)).sum()
     }
 
     /// Integral of the squared jerk.
@@ -176,9 +176,9 @@ mod tests {
             points in vectors(9),
             steps in prop::collection::vec(prop_oneof![1 => Just(0.0), 4 => 0.1..2.0], 15),
         ) {
-            let mut knots: Vec<f64> = steps[..=points.len() + degree].iter().scan(-1.0, |at, step| {
-                *at += step;
-                Some(*at)
+            let mut knots: Vec<f64> = steps[..=points.len() + degree].iter().scan(-1.0, |knot, step| {
+                *knot += step;
+                Some(*knot)
             }).collect();
             if is_clamped {
                 let [first, last] = [knots[degree], knots[points.len()]];

@@ -7,7 +7,7 @@ use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::option::{DISTINCT, TOPIC};
 use tautline_core::track::{Item, Metadata, Sample, Tracks};
 
-use super::error::{Fault, ReadError, quoted};
+use super::error::{ContentKind, Fault, ReadError, quoted};
 use super::options::ReadOptions;
 use super::order::Recording;
 
@@ -107,7 +107,7 @@ fn fault(names: &[String], first: usize, second: usize) -> Fault {
     let remedy = format!(
         "leave one of them out (for messages, choose topics with {TOPIC}), or confirm two vehicles with {DISTINCT}"
     );
-    Fault::coded("recording/vehicle-twice", problem, remedy)
+    Fault::content(ContentKind::VehicleTwice, problem, remedy)
 }
 
 /// Position of a vehicle at a time, as bits.

@@ -12,7 +12,7 @@ use super::aviation::ClimbMonitor;
 use super::axes::Axes;
 use super::clock::{Date, Probe, Stamp, TimeUnit};
 use super::earth::{LocalFrame, convert_to_local, is_no_fix, no_fixes, origin};
-use super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
+use super::error::{ContentKind, Fault, Place, ReadError, UNSEEN, quoted, refuse};
 use super::identity::{AlternativeId, Names, SuspectColumn, SwapMonitor};
 use super::layout::{Layout, VehicleColumns};
 use super::options::ReadOptions;
@@ -75,7 +75,7 @@ pub(super) fn open<C: Cells + 'static>(
         let problem =
             format!("it has a column of time stamps and a second time column {}", quoted(&cells.header()[rest.column]));
         let remedy = format!("name one of them with {}", COLUMN.set("t=NAME"));
-        return refuse("recording/ambiguous-column", problem, remedy);
+        return refuse(ContentKind::AmbiguousColumn, problem, remedy);
     }
     let dates = dates(&mut cells, &layout, options)?;
     let unit = if dates.is_some() { Some(TimeUnit::Nanoseconds) } else { unit.or(layout.unit) };
@@ -139,7 +139,7 @@ fn dates<C: Cells>(cells: &mut C, layout: &Layout, options: &ReadOptions) -> Res
     if first.is_some() && (options.time_unit.is_some() || options.times_per_second.is_some()) {
         let problem = format!("the times in column {} are dates", quoted(&cells.header()[column]));
         let remedy = format!("omit {TIME_UNIT}, {FPS} and {TIME_SCALE}");
-        return refuse("recording/contradicts-option", problem, remedy);
+        return refuse(ContentKind::ContradictsOption, problem, remedy);
     }
     Ok(first)
 }
@@ -174,7 +174,7 @@ impl<C: Cells> Table<C> {
             let what = if Date::parse(&of_day).is_some() { "a date after numbers" } else { "a time of day" };
             let problem = format!("column `{}` holds {}, {what}", self.cells.header()[column], quoted(of_day.trim()));
             return refuse(
-                "recording/time-format",
+                ContentKind::TimeFormat,
                 problem,
                 "write all times as numbers in one unit (s, ms, us, ns), or all as dates with a time like \
                  2023-11-14T22:13:20.5Z",
@@ -192,7 +192,7 @@ impl<C: Cells> Table<C> {
         }
         let holds = |what: &str, remedy: &str| {
             let problem = format!("column `{}` holds {}, {what}", self.cells.header()[column], quoted(text.trim()));
-            Fault::coded("recording/time-format", problem, remedy)
+            Fault::content(ContentKind::TimeFormat, problem, remedy)
         };
         match Date::parse(&text) {
             Some(date) if date.has_zone == first.has_zone => Ok(Stamp::Whole(date.since_1970_ns)),
@@ -325,8 +325,8 @@ impl<C: Cells> Table<C> {
         {
             let problem =
                 format!("column {} has a different value in each row and so names no vehicle", quoted(&header[column]));
-            return Some(Fault::coded(
-                "recording/ambiguous-vehicle",
+            return Some(Fault::content(
+                ContentKind::AmbiguousVehicle,
                 problem,
                 "remove such columns if their values are not names",
             ));
@@ -355,7 +355,7 @@ impl<C: Cells> Table<C> {
                 format!("column {} has a different value in each row and so names no vehicle{others}", called(id));
             let column = COLUMN.set("id=NAME");
             let remedy = format!("name the column of the vehicle with {column}, or remove this one");
-            return refuse("recording/ambiguous-vehicle", problem, remedy);
+            return refuse(ContentKind::AmbiguousVehicle, problem, remedy);
         }
         if let Some(alternative) = self.alternative_ids.iter().find(|alternative| alternative.is_one()) {
             let (first, other) = (called(id), called(alternative.column));
@@ -363,7 +363,7 @@ impl<C: Cells> Table<C> {
                 format!("the columns {first} and {other} could both name the vehicle, but contradict each other");
             let [first, other] = [id, alternative.column].map(|column| COLUMN.set(format!("id={}", header[column])));
             let remedy = format!("choose one with {first} or {other}");
-            return refuse("recording/ambiguous-vehicle", problem, remedy);
+            return refuse(ContentKind::AmbiguousVehicle, problem, remedy);
         }
         Ok(())
     }
@@ -405,7 +405,7 @@ fn row(
     };
     if let (Some(radius), Some(column)) = (radius.filter(|radius| *radius < 0.0), body.radius) {
         let problem = format!("column `{}` holds {radius}, a negative radius", cells.header()[column]);
-        return refuse("recording/radius", problem, "write 0 or a positive number");
+        return refuse(ContentKind::Radius, problem, "write 0 or a positive number");
     }
     Ok(Found::Row(Row { stamp, place: cells.row(), vehicle, position, velocity, radius }))
 }
@@ -443,9 +443,9 @@ impl<C: Cells> Rows for Table<C> {
     fn late_notes(&self) -> Vec<String> {
         const LISTED: usize = 12;
         let names = self.no_fixes.keys().filter_map(|&vehicle| self.names.all().get(vehicle));
-        let mut of: Vec<_> = names.take(LISTED).map(|name| quoted(name)).collect();
-        of.extend((self.no_fixes.len() > LISTED).then(|| "...".to_owned()));
-        let vehicles = format!(" of {}", of.join(", "));
+        let mut listed: Vec<_> = names.take(LISTED).map(|name| quoted(name)).collect();
+        listed.extend((self.no_fixes.len() > LISTED).then(|| "...".to_owned()));
+        let vehicles = format!(" of {}", listed.join(", "));
         let mut notes: Vec<_> = no_fixes(self.no_fixes.values().sum(), &vehicles).into_iter().collect();
         if self.incomplete > 0 {
             notes.push(format!("positions omitted because one of their coordinates is empty: {}", self.incomplete));
@@ -569,18 +569,18 @@ pub(super) fn number(cells: &impl Cells, column: usize) -> Result<Option<f64>, F
 pub(super) fn odd_number(cells: &impl Cells, column: usize, unseen: &str) -> Result<Option<f64>, Fault> {
     let (text, column) = (cells.text(column)?, &cells.header()[column]);
     let text = text.trim();
-    let holds = |code, what: &str, remedy| {
+    let holds = |kind, what: &str, remedy| {
         let problem = format!("column `{column}` holds {}, {what}", quoted(text));
-        refuse(code, problem, remedy)
+        refuse(kind, problem, remedy)
     };
     match text.parse::<f64>() {
         _ if text.is_empty() => Ok(None),
         Ok(number) if number.is_finite() => Ok(Some(number)),
         Ok(_) => Err(Fault::not_finite(column, text, unseen)),
         Err(_) if text.replacen(',', ".", 1).parse::<f64>().is_ok() => {
-            holds("recording/decimal-comma", "a number with a decimal comma", "write numbers with a decimal point")
+            holds(ContentKind::DecimalComma, "a number with a decimal comma", "write numbers with a decimal point")
         }
-        Err(_) => holds("recording/not-a-number", "which is not a number", "write a number with a decimal point"),
+        Err(_) => holds(ContentKind::NotANumber, "which is not a number", "write a number with a decimal point"),
     }
 }
 

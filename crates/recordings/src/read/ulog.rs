@@ -21,7 +21,7 @@ use tautline_core::option::TOPIC;
 use super::axes;
 use super::clock::{Stamp, TimeUnit};
 use super::earth::{LocalFrame, is_no_fix, no_fixes};
-use super::error::{Fault, Place, ReadError, quoted, refuse};
+use super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
 use super::readers::{FormatOption, Packing, Reader};
@@ -67,7 +67,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         [topic, ..] => {
             let problem = format!("{} is not a position topic", quoted(topic));
             return refuse(
-                "recording/unknown-topic",
+                ContentKind::UnknownTopic,
                 problem,
                 format!("use {} or {}", TOPIC.set(GLOBAL), TOPIC.set(LOCAL)),
             );
@@ -81,7 +81,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let Some(first) = fixes.first() else {
         let problem = format!("it has no {} with a known place on the Earth", topic_option.unwrap_or("position"));
         let remedy = "log vehicle_global_position, or give positions of a common frame as a table t,id,x,y,z";
-        return refuse("recording/no-fix", problem, remedy);
+        return refuse(ContentKind::NoFix, problem, remedy);
     };
     let local = LocalFrame::first(first.origin, options)?;
     let rows = log.rows(fixes, &local)?;
@@ -93,7 +93,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     };
     notes.push(clock.to_owned());
     notes.extend(no_fixes(if topic == GLOBAL { log.no_fixes } else { 0 }, ""));
-    let none = Fault::coded("recording/empty", "it holds no position", "record again");
+    let none = Fault::content(ContentKind::Empty, "it holds no position", "record again");
     let mut info = RecordingInfo::new(source, options, Some(TimeUnit::Microseconds), notes, none);
     info.metadata.earth_origin = Some(local.measured_from(options.origin));
     let of_clock = if log.boot_us.is_some() { fact::Source::Recorded } else { fact::Source::Default };
@@ -179,8 +179,8 @@ impl Log {
         if fill(&mut input, &mut header)? < HEADER_BYTES {
             return Ok(false);
         }
-        let (mut at, mut body, mut end) = (HEADER_BYTES as u64, Vec::new(), u64::MAX);
-        while at < end {
+        let (mut offset, mut body, mut end) = (HEADER_BYTES as u64, Vec::new(), u64::MAX);
+        while offset < end {
             let mut head = [0; 3];
             match fill(&mut input, &mut head)? {
                 0 => return Ok(true),
@@ -192,13 +192,13 @@ impl Log {
             if fill(&mut input, &mut body)? < body.len() {
                 return Ok(false);
             }
-            self.message(head[2], &body, at, &mut end).map_err(|fault| fault.at(Place::Byte(at)))?;
-            at += 3 + u64::from(size);
+            self.message(head[2], &body, offset, &mut end).map_err(|fault| fault.at(Place::Byte(offset)))?;
+            offset += 3 + u64::from(size);
         }
         Ok(true)
     }
 
-    fn message(&mut self, kind: u8, body: &[u8], at: u64, end: &mut u64) -> Result<(), Fault> {
+    fn message(&mut self, kind: u8, body: &[u8], offset: u64, end: &mut u64) -> Result<(), Fault> {
         match kind {
             b'B' => *end = flags(body)?,
             b'F' => {
@@ -210,7 +210,7 @@ impl Log {
                 let id: [u8; 2] = take(body, 0)?;
                 self.topics.remove(&u16::from_le_bytes(id));
             }
-            b'D' => self.data(body, at)?,
+            b'D' => self.data(body, offset)?,
             // Other message types, also of later versions.
             _ if kind.is_ascii_uppercase() => {}
             _ => return Err(Fault::damaged(format!("a message of kind {kind:#04x}"))),
@@ -264,7 +264,7 @@ impl Log {
         Ok(bytes)
     }
 
-    fn data(&mut self, body: &[u8], at: u64) -> Result<(), Fault> {
+    fn data(&mut self, body: &[u8], offset: u64) -> Result<(), Fault> {
         let id = u16::from_le_bytes(take(body, 0)?);
         let Some(topic) = self.topics.get(&id) else { return Ok(()) };
         let message = Message { topic, bytes: &body[2..] };
@@ -276,7 +276,7 @@ impl Log {
                 let numbers = Vector3::from(message.numbers(["lat", "lon", "alt"])?);
                 self.no_fixes += u64::from(valid && is_no_fix(&numbers));
                 if let Some(origin) = place.filter(|_| valid) {
-                    self.global.push(Fix { at, time_us, origin, position: Vector3::zeros() });
+                    self.global.push(Fix { at: offset, time_us, origin, position: Vector3::zeros() });
                 }
             }
             LOCAL => {
@@ -289,7 +289,7 @@ impl Log {
                 let [north, east, down] = message.numbers(["x", "y", "z"])?;
                 let position = Vector3::new(east, north, -down);
                 if let Some(origin) = origin.filter(|_| valid && position.iter().all(|x| x.is_finite())) {
-                    self.local.push(Fix { at, time_us, origin, position });
+                    self.local.push(Fix { at: offset, time_us, origin, position });
                 }
             }
             _ => {
@@ -339,7 +339,7 @@ impl Message<'_> {
 
     fn whole(&self, name: &str) -> Result<u64, Fault> {
         match self.field(name)? {
-            (at, Kind::U64) => Ok(u64::from_le_bytes(take(self.bytes, at)?)),
+            (offset, Kind::U64) => Ok(u64::from_le_bytes(take(self.bytes, offset)?)),
             _ => Err(Fault::damaged(format!("field `{name}` of `{}` is of another kind", self.topic.name))),
         }
     }
@@ -348,8 +348,8 @@ impl Message<'_> {
         let mut numbers = [0.0; 3];
         for (number, name) in numbers.iter_mut().zip(names) {
             *number = match self.field(name)? {
-                (at, Kind::Double) => f64::from_le_bytes(take(self.bytes, at)?),
-                (at, Kind::Float) => f64::from(f32::from_le_bytes(take(self.bytes, at)?)),
+                (offset, Kind::Double) => f64::from_le_bytes(take(self.bytes, offset)?),
+                (offset, Kind::Float) => f64::from(f32::from_le_bytes(take(self.bytes, offset)?)),
                 _ => return Err(Fault::damaged(format!("field `{name}` of `{}` is of another kind", self.topic.name))),
             };
         }
@@ -365,7 +365,7 @@ impl Message<'_> {
     /// Returns whether a flag is set or absent.
     fn is_set(&self, name: &str) -> Result<bool, Fault> {
         match self.topic.fields.get(name) {
-            Some(&(at, Kind::Byte)) => Ok(take::<1>(self.bytes, at)? != [0]),
+            Some(&(offset, Kind::Byte)) => Ok(take::<1>(self.bytes, offset)? != [0]),
             _ => Ok(true),
         }
     }
@@ -385,8 +385,8 @@ fn fill(input: &mut impl Read, bytes: &mut [u8]) -> Result<usize, ReadError> {
     Ok(filled)
 }
 
-fn take<const N: usize>(bytes: &[u8], at: usize) -> Result<[u8; N], Fault> {
-    let part = at.checked_add(N).and_then(|end| bytes.get(at..end)).and_then(|part| part.try_into().ok());
+fn take<const N: usize>(bytes: &[u8], offset: usize) -> Result<[u8; N], Fault> {
+    let part = offset.checked_add(N).and_then(|end| bytes.get(offset..end)).and_then(|part| part.try_into().ok());
     part.ok_or_else(|| Fault::damaged("a message is shorter than its format"))
 }
 
@@ -402,7 +402,7 @@ fn flags(body: &[u8]) -> Result<u64, Fault> {
     if needed[0] & !APPENDED != 0 || needed[1..].iter().any(|&byte| byte != 0) {
         let problem = "unknown version of ULog";
         return refuse(
-            "recording/unsupported-format",
+            ContentKind::UnsupportedFormat,
             problem,
             "convert its vehicle_global_position with `ulog2csv`, and give the result",
         );

@@ -12,7 +12,7 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 
 use super::curves::{Curves, from_json};
-use super::error::{Fault, Place, ReadError, quoted, refuse};
+use super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{FormatOption, Packing, Reader};
@@ -83,7 +83,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let show: Show = from_json(&bytes, "a VVIZ show", "export the show as VVIZ 1.0")?;
     if let Some(frame) = show.coordinate_frame.as_deref().filter(|frame| *frame != GRAPHICS) {
         let problem = format!("unknown axes {}", quoted(frame));
-        return refuse("recording/unusable-frame", problem, "export with the axes `ogl`: x right, y up, z forward");
+        return refuse(ContentKind::UnusableFrame, problem, "export with the axes `ogl`: x right, y up, z forward");
     }
     let (mut vehicles, mut names) = (Vec::new(), BTreeSet::new());
     for performance in &show.performances {
@@ -97,7 +97,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         };
         if !names.insert(name.clone()) {
             let fault =
-                Fault::coded("recording/vehicle-twice", "two drones have this id", "give each drone its own id");
+                Fault::content(ContentKind::VehicleTwice, "two drones have this id", "give each drone its own id");
             return Err(fault.at(place(None)));
         }
         let flown = items(&performance.agent_description, vehicles.len(), &show, options.metres());
@@ -106,7 +106,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     }
     if vehicles.iter().all(|(_, items)| items.is_empty()) {
         return refuse(
-            "recording/no-positions",
+            ContentKind::NoPositions,
             "it has no drone with samples",
             "export the show with the paths of its drones",
         );
@@ -122,11 +122,11 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
 
 /// Returns the samples of a drone, or the fault and the index of its step.
 fn items(agent: &Agent, vehicle: usize, show: &Show, scale: f64) -> Result<Vec<Item>, (Option<usize>, Fault)> {
-    let mut at = [agent.home_x, agent.home_y, agent.home_z];
+    let mut position = [agent.home_x, agent.home_y, agent.home_z];
     let mut time_s = show.time_offset_secs;
     let mut items = Vec::new();
-    let sample = |at: [f64; 3], time_s: f64| {
-        let position_m = Vector3::new(at[0], at[2], at[1]) * scale;
+    let sample = |point: [f64; 3], time_s: f64| {
+        let position_m = Vector3::new(point[0], point[2], point[1]) * scale;
         let finite = time_s.is_finite() && position_m.iter().all(|x| x.is_finite());
         let sample = Sample { vehicle, time_s, position_m, velocity_m_s: None, radius_m: None };
         if finite { Ok(Item::Sample(sample)) } else { Err(Fault::out_of_range()) }
@@ -135,24 +135,24 @@ fn items(agent: &Agent, vehicle: usize, show: &Show, scale: f64) -> Result<Vec<I
         let fail = |fault| (Some(number), fault);
         if number > 0 || step.dt.is_some() {
             if number == 0 {
-                items.push(sample(at, time_s).map_err(fail)?);
+                items.push(sample(position, time_s).map_err(fail)?);
             }
             let duration_s = duration(step, show).map_err(fail)?;
             let after_s = time_s + duration_s;
             if after_s <= time_s {
                 let problem = format!("it follows the previous sample after {duration_s:?} s");
-                return Err(fail(Fault::coded(
-                    "recording/duration",
+                return Err(fail(Fault::content(
+                    ContentKind::Duration,
                     problem,
                     "remove one of the samples: a drone is in one place at a time",
                 )));
             }
             time_s = after_s;
         }
-        for (at, by) in at.iter_mut().zip([step.dx, step.dy, step.dz]) {
-            *at += by;
+        for (coordinate, by) in position.iter_mut().zip([step.dx, step.dy, step.dz]) {
+            *coordinate += by;
         }
-        items.push(sample(at, time_s).map_err(fail)?);
+        items.push(sample(position, time_s).map_err(fail)?);
     }
     Ok(items)
 }
@@ -163,7 +163,7 @@ fn duration(step: &Step, show: &Show) -> Result<f64, Fault> {
         (Some(duration_s), _) => Ok(duration_s),
         (None, Some(rate)) if rate > 0.0 => Ok(rate.recip()),
         _ => refuse(
-            "recording/frame-rate",
+            ContentKind::FrameRate,
             "it has neither `dt` nor a positive `defaultPositionRate`",
             "export the show again",
         ),

@@ -66,8 +66,8 @@ impl Patch {
         let [low, high] = bounds.unwrap_or_default();
         let mut rgba = Vec::new();
         for y in low[1]..=high[1] {
-            for at in (low[0]..=high[0]).map(|x| 4 * (y * width + x)) {
-                let (new, old) = (&picture.rgba[at..at + 4], &mut shown[at..at + 4]);
+            for index in (low[0]..=high[0]).map(|x| 4 * (y * width + x)) {
+                let (new, old) = (&picture.rgba[index..index + 4], &mut shown[index..index + 4]);
                 if is_changed(new, old) {
                     old.copy_from_slice(new);
                     rgba.extend_from_slice(new);

@@ -34,8 +34,8 @@ fn a_gif_holds_only_changes_and_shows_every_picture() {
     let size_px = [20, 10];
     let plain = |colour: [u8; 4]| Picture { size_px, rgba: colour.repeat(200) };
     let mut dotted = plain([9, 9, 9, 255]);
-    let at = 4 * (5 * 20 + 7);
-    dotted.rgba[at..at + 8].copy_from_slice(&[200, 0, 0, 255, 0, 200, 0, 255]);
+    let index = 4 * (5 * 20 + 7);
+    dotted.rgba[index..index + 8].copy_from_slice(&[200, 0, 0, 255, 0, 200, 0, 255]);
     let same = dotted.clone();
     let bytes = film(FilmFormat::Gif, 10, &[plain([9, 9, 9, 255]), dotted.clone(), same]);
     let mut decoder = gif_decoder(&bytes);
@@ -158,9 +158,9 @@ fn an_mp4_has_the_right_duration() {
     for count in [1, 2, 5] {
         let bytes = film(FilmFormat::Mp4, 20, &pictures([64, 32], count));
         // The media header: version and flags, two dates, ticks per second, ticks.
-        let at = bytes.windows(4).position(|name| name == b"mdhd").expect("a header") + 4;
+        let offset = bytes.windows(4).position(|name| name == b"mdhd").expect("a header") + 4;
         let [ticks_per_second, ticks] =
-            [12, 16].map(|after| u32::from_be_bytes(bytes[at + after..][..4].try_into().expect("four bytes")));
+            [12, 16].map(|after| u32::from_be_bytes(bytes[offset + after..][..4].try_into().expect("four bytes")));
         let lasts_s = f64::from(ticks) / f64::from(ticks_per_second);
         assert!((lasts_s - f64::from(count) / 20.0).abs() < 1e-4, "{count} pictures last {lasts_s} s");
     }

@@ -73,15 +73,15 @@ impl Overlay {
 /// Draws annotations with the top left corner of their picture at `origin` \[points\].
 pub(crate) fn paint(painter: &egui::Painter, annotations: &[Annotation], origin: Vec2, pixels_per_point: f32) {
     let scale = 1.0 / pixels_per_point;
-    let at = |[x, y]: [f32; 2]| pos2(x * scale, y * scale) + origin;
-    let corners = |[low, high]: [[f32; 2]; 2]| Rect::from_min_max(at(low), at(high));
+    let to_screen = |[x, y]: [f32; 2]| pos2(x * scale, y * scale) + origin;
+    let corners = |[low, high]: [[f32; 2]; 2]| Rect::from_min_max(to_screen(low), to_screen(high));
     let stroke = |width_px: f32, colour| Stroke::new(width_px * scale, colour32(colour));
     for annotation in annotations {
         match annotation {
             Annotation::Words { at_px, anchor, size_px, colour, text } => {
                 let font = FontId::proportional(size_px * scale);
                 let galley = painter.layout_no_wrap(text.clone(), font, colour32(*colour));
-                let place = at(*at_px) - Vec2::new(anchor[0], anchor[1]) * galley.size();
+                let place = to_screen(*at_px) - Vec2::new(anchor[0], anchor[1]) * galley.size();
                 // Whole pixels keep letters sharp.
                 let place =
                     pos2((place.x * pixels_per_point).round() * scale, (place.y * pixels_per_point).round() * scale);
@@ -97,10 +97,10 @@ pub(crate) fn paint(painter: &egui::Painter, annotations: &[Annotation], origin:
                 painter.add(Shape::mesh(gradient(corners(*corners_px), colours)));
             }
             Annotation::Stroke { ends_px, colour, width_px } => {
-                painter.line_segment(ends_px.map(at), stroke(*width_px, *colour));
+                painter.line_segment(ends_px.map(to_screen), stroke(*width_px, *colour));
             }
             Annotation::Ring { at_px, radius_px, colour, width_px } => {
-                painter.circle_stroke(at(*at_px), radius_px * scale, stroke(*width_px, *colour));
+                painter.circle_stroke(to_screen(*at_px), radius_px * scale, stroke(*width_px, *colour));
             }
         }
     }

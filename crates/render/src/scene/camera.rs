@@ -343,8 +343,13 @@ mod tests {
                         centre + (axis * cosine + across * (1.0 - cosine * cosine).sqrt()) * radius
                     }
                 };
-                let at = camera.project(point).expect("ahead").at_px;
-                sides = [sides[0].min(at[0]), sides[1].max(at[0]), sides[2].min(at[1]), sides[3].max(at[1])];
+                let centre_px = camera.project(point).expect("ahead").at_px;
+                sides = [
+                    sides[0].min(centre_px[0]),
+                    sides[1].max(centre_px[0]),
+                    sides[2].min(centre_px[1]),
+                    sides[3].max(centre_px[1]),
+                ];
             }
         }
         sides

@@ -171,9 +171,9 @@ impl SceneBuilder<'_> {
         if began.is_empty()
             && let Some((found, [vehicle, obstacle])) = self.timeline.obstacle_violations_by(now_s).next()
         {
-            let at = format!("violated at {:.2} s", found.from_s);
+            let when = format!("violated at {:.2} s", found.from_s);
             let (vehicle, obstacle) = (&self.timeline.vehicles[vehicle], self.timeline.obstacle(obstacle));
-            let texts = vec![format!("{at} by {vehicle} near {obstacle}"), at, "violated".to_owned()];
+            let texts = vec![format!("{when} by {vehicle} near {obstacle}"), when, "violated".to_owned()];
             return (texts, theme.alarm());
         }
         match (began.first(), undecided_s) {
@@ -198,12 +198,12 @@ impl SceneBuilder<'_> {
                 (vec![since, "undecided".to_owned()], theme.soft_ink())
             }
             (Some(span), _) => {
-                let at = match began.len() {
+                let when = match began.len() {
                     1 => format!("violated at {:.2} s", span.from_s),
                     many => format!("{many} violations, the first at {:.2} s", span.from_s),
                 };
-                let [pair, short] = self.pair(span.pair).map(|pair| format!("{at} by {pair}"));
-                let mut texts = vec![pair, short, at, "violated".to_owned()];
+                let [pair, short] = self.pair(span.pair).map(|pair| format!("{when} by {pair}"));
+                let mut texts = vec![pair, short, when, "violated".to_owned()];
                 let hit = self.timeline.log.hits().0.first().filter(|hit| hit.time_s <= now_s);
                 if let Some(&Bounce { time_s: hit_s, pair, closing_m_s }) = hit {
                     let [pair, _] = self.pair(pair);
@@ -221,14 +221,14 @@ impl SceneBuilder<'_> {
         let shown_m = |delta_m| beside_limit(approach.separation_m, delta_m, 3);
         let separation = self.timeline.delta_m.map_or(metres(approach.separation_m), |delta_m| shown_m(delta_m) + " m");
         let [pair, short] = self.pair(approach.pair);
-        let at = format!("{:.2} s", approach.time_s);
+        let when = format!("{:.2} s", approach.time_s);
         let scaled = if self.timeline.log.metric().is_metres() { "" } else { ", scaled" };
         let delta = |delta_m| format!("  (delta {} m{scaled})", exact(delta_m));
         let delta = self.timeline.delta_m.map_or(String::new(), delta);
         let closest = if self.is_end() { "closest" } else { "closest so far" };
         vec![
-            format!("{closest} {separation}, vehicles {pair} at {at}{delta}"),
-            format!("{closest} {separation}, vehicles {pair} at {at}"),
+            format!("{closest} {separation}, vehicles {pair} at {when}{delta}"),
+            format!("{closest} {separation}, vehicles {pair} at {when}"),
             format!("{closest} {separation}, {short}"),
             format!("{closest} {separation}"),
         ]
@@ -328,10 +328,10 @@ impl SceneBuilder<'_> {
         } else {
             self.labelled_vehicles()
         };
-        for (k, at) in reserved {
+        for (k, place) in reserved {
             let least = f64::from(self.view.text_px(LEAST_ROOM));
-            let radius = (self.timeline.radius_m[k] * at.px_per_m).max(least);
-            let [x, y, radius] = pixels([at.at_px[0], at.at_px[1], radius]);
+            let radius = (self.timeline.radius_m[k] * place.px_per_m).max(least);
+            let [x, y, radius] = pixels([place.at_px[0], place.at_px[1], radius]);
             labels.reserve([[x - radius, y - radius], [x + radius, y + radius]]);
         }
     }
@@ -349,14 +349,14 @@ impl SceneBuilder<'_> {
             let is_closest = self.frame.so_far.is_none_or(|so_far| distance_m <= so_far.separation_m);
             let text = metres(distance_m) + if alarm || is_closest { "" } else { " now" };
             let distances_px = [1.1 * size_px, 1.8 * size_px, 3.0 * size_px];
-            let at = middle.and_then(|middle| labels.find(middle.at_px, &distances_px, size_px, &text));
-            let Some(at) = at else { continue };
+            let spot = middle.and_then(|middle| labels.find(middle.at_px, &distances_px, size_px, &text));
+            let Some(spot) = spot else { continue };
             let half = width(size_px, &text) / 2.0 + 0.25 * size_px;
-            let corners_px = [[at[0] - half, at[1] - 0.68 * size_px], [at[0] + half, at[1] + 0.68 * size_px]];
+            let corners_px = [[spot[0] - half, spot[1] - 0.68 * size_px], [spot[0] + half, spot[1] + 0.68 * size_px]];
             let (ground, ink) =
                 if alarm { (theme.alarm(), theme.on_alarm()) } else { (theme.background().at(0.82), theme.ink()) };
             labels.draw(Annotation::Box { corners_px, colour: ground, round_px: 0.3 * size_px });
-            labels.put(at, [0.5, 0.5], size_px, ink, &text);
+            labels.put(spot, [0.5, 0.5], size_px, ink, &text);
             labels.reserve(corners_px);
         }
     }
@@ -380,21 +380,22 @@ impl SceneBuilder<'_> {
     pub(super) fn names(&self, labels: &mut LabelLayout) {
         let (theme, size_px) = (self.view.theme, self.view.text_px(0.85));
         let labelled = self.labelled_vehicles();
-        let depths = || labelled.iter().map(|(_, at)| at.depth_m);
+        let depths = || labelled.iter().map(|(_, projection)| projection.depth_m);
         let [near, far] = [depths().fold(f64::INFINITY, f64::min), depths().fold(0.0, f64::max)];
-        for &(k, at) in &labelled {
+        for &(k, projection) in &labelled {
             #[expect(clippy::cast_possible_truncation, reason = "an opacity")]
-            let part = ((at.depth_m - near) / far.max(1e-9)).clamp(0.0, 1.0) as f32;
+            let part = ((projection.depth_m - near) / far.max(1e-9)).clamp(0.0, 1.0) as f32;
             let strength =
                 if self.alarmed[k] || self.view.picked == Some(k) { 1.0 } else { 1.0 - (1.0 - FAINT) * part };
             // A vehicle too close to another is often hidden by it, and is named anyway.
-            let is_hidden = self.is_hidden(k, at);
+            let is_hidden = self.is_hidden(k, projection);
             if is_hidden && !self.alarmed[k] {
                 continue;
             }
             let leads = self.timeline.plan.as_ref().and_then(Plan::leader) == Some(k);
             let name = shortened(&self.timeline.vehicles[k]) + if leads { " leads" } else { "" };
-            let [x, y, radius] = pixels([at.at_px[0], at.at_px[1], self.timeline.radius_m[k] * at.px_per_m]);
+            let [x, y, radius] =
+                pixels([projection.at_px[0], projection.at_px[1], self.timeline.radius_m[k] * projection.px_per_m]);
             let fitting = (1.5 * radius).min(1.7 * radius / width(1.0, &name).max(0.4)).min(size_px);
             if fitting >= 8.0 && !is_hidden {
                 let (at_px, anchor, colour) = ([x, y], [0.5, 0.5], theme.background());
@@ -406,8 +407,8 @@ impl SceneBuilder<'_> {
             // First free position of: above right, above left, below right, below left.
             for [left, above] in [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0], [1.0, 0.0]] {
                 let beside = [
-                    at.at_px[0] + offset * (1.0 - 2.0 * f64::from(left)),
-                    at.at_px[1] + offset * (1.0 - 2.0 * f64::from(above)),
+                    projection.at_px[0] + offset * (1.0 - 2.0 * f64::from(left)),
+                    projection.at_px[1] + offset * (1.0 - 2.0 * f64::from(above)),
                 ];
                 if labels.put_if_free(beside, [left, above], 0.85 * size_px, colour, &name) {
                     break;
@@ -422,23 +423,23 @@ impl SceneBuilder<'_> {
             return true;
         }
         let others = (0..self.timeline.count()).filter(|&other| other != k);
-        others.filter_map(|other| Some((other, self.projected(other)?))).any(|(other, at)| {
-            let apart = (at.at_px[0] - own.at_px[0]).hypot(at.at_px[1] - own.at_px[1]);
-            at.depth_m < own.depth_m && apart < self.timeline.radius_m[other] * at.px_per_m
+        others.filter_map(|other| Some((other, self.projected(other)?))).any(|(other, projection)| {
+            let apart = (projection.at_px[0] - own.at_px[0]).hypot(projection.at_px[1] - own.at_px[1]);
+            projection.depth_m < own.depth_m && apart < self.timeline.radius_m[other] * projection.px_per_m
         })
     }
 
     /// Returns whether a round obstacle is between the camera and a vehicle; only these are drawn solid.
     fn is_behind_obstacle(&self, k: usize) -> bool {
         let Some(place) = self.vehicle(k) else { return false };
-        let distance_m = self.camera.project(place).map_or(0.0, |at| at.depth_m);
+        let distance_m = self.camera.project(place).map_or(0.0, |projection| projection.depth_m);
         let towards = match self.camera.lens {
             Lens::Perspective(_) => self.camera.eye_m - place,
             Lens::Parallel(_) => self.camera.back * distance_m,
         };
         let is_round = |shape: &Shape| matches!(shape, Shape::Ball { .. } | Shape::Capsule { .. });
         let (from_m, obstacles) =
-            (place + self.extent.origin_m(), self.timeline.plan.iter().flat_map(|of| &of.obstacles));
+            (place + self.extent.origin_m(), self.timeline.plan.iter().flat_map(|plan| &plan.obstacles));
         obstacles
             .filter(|obstacle| is_round(&obstacle.shape))
             .any(|obstacle| is_between(&obstacle.shape, obstacle.place_m, from_m, from_m + towards))

@@ -171,10 +171,10 @@ impl Theme {
     /// Returns the colour of a quantity relative to its range, from 0 to 1.
     pub(crate) fn ramp(self, part: f32) -> Colour {
         let ramp = if self == Self::Dark { RAMP_ON_DARK } else { RAMP_ON_LIGHT };
-        let at = part.clamp(0.0, 1.0) * (ramp.len() - 1) as f32;
+        let position = part.clamp(0.0, 1.0) * (ramp.len() - 1) as f32;
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the ramp")]
-        let from = (at as usize).min(ramp.len() - 2);
-        Colour::hex(ramp[from]).towards(Colour::hex(ramp[from + 1]), at - from as f32)
+        let from = (position as usize).min(ramp.len() - 2);
+        Colour::hex(ramp[from]).towards(Colour::hex(ramp[from + 1]), position - from as f32)
     }
 }
 

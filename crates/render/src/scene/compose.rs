@@ -208,7 +208,7 @@ impl<'a> SceneBuilder<'a> {
         let mut alarmed = vec![false; timeline.count()];
         let now_s = frame.time_s;
         let too_close_to_obstacle = timeline.obstacle_violations_by(now_s).filter(|(found, _)| found.to_s >= now_s);
-        let too_close_to_obstacle: Vec<_> = too_close_to_obstacle.map(|(_, of)| of).collect();
+        let too_close_to_obstacle: Vec<_> = too_close_to_obstacle.map(|(_, vehicle)| vehicle).collect();
         for [vehicle, _] in &too_close_to_obstacle {
             alarmed[*vehicle] = true;
         }

@@ -152,9 +152,9 @@ impl Extent {
         let (low, high) = (low - origin_m, high - origin_m);
         let span = (high.x - low.x).max(high.y - low.y).max(2.0 * largest) + 2.0 * largest;
         let grid_m = round_step(span / GROUND_LINES);
-        let corner = |at: Vector3<f64>, round: fn(f64) -> f64| {
-            let at = ((at + origin_m) / grid_m).map(round) * grid_m - origin_m;
-            Vector3::new(at.x, at.y, z)
+        let corner = |point: Vector3<f64>, round: fn(f64) -> f64| {
+            let point = ((point + origin_m) / grid_m).map(round) * grid_m - origin_m;
+            Vector3::new(point.x, point.y, z)
         };
         let margin = Vector3::repeat(largest);
         let ground_m = [corner(low - margin, f64::floor), corner(high + margin, f64::ceil)];
@@ -242,7 +242,7 @@ impl Extent {
     fn framing(&self, direction: Direction, area: Area) -> Camera {
         let mut framed = self.framed.lock().unwrap_or_else(PoisonError::into_inner);
         match &*framed {
-            Some((known, of, camera)) if *known == direction && *of == area => *camera,
+            Some((known, own_area, camera)) if *known == direction && *own_area == area => *camera,
             _ => {
                 let camera = Camera::framing(direction, &self.balls, area);
                 *framed = Some((direction, area, camera));
@@ -345,12 +345,12 @@ mod tests {
 
     #[test]
     fn a_smoothed_box_contains_the_box_of_its_time() {
-        let at = |k: u32| SwarmBox {
+        let box_at = |k: u32| SwarmBox {
             time_s: f64::from(k),
             centre: Vector3::new(f64::from(k * k % 13), 0.0, f64::from(k)),
             half: Vector3::repeat(1.0 + f64::from(k % 3)),
         };
-        let swarm: Vec<_> = (0..100).map(at).collect();
+        let swarm: Vec<_> = (0..100).map(box_at).collect();
         for (around, smooth) in swarm.iter().zip(smoothed(&swarm)) {
             let beyond = (around.centre - smooth.centre).abs() + around.half - smooth.half;
             assert!(beyond.max() <= 1e-12, "{around:?} {smooth:?}");

@@ -46,7 +46,7 @@ pub(super) fn has_few_edges(plan: &Plan) -> bool {
 impl SceneBuilder<'_> {
     /// Returns the larger of a radius and the length of `least_px` pixels at a position \[m\].
     fn at_least(&self, place: Vector3<f64>, radius_m: f64, least_px: f32) -> f64 {
-        let px_per_m = self.camera.project(place).map_or(f64::INFINITY, |at| at.px_per_m);
+        let px_per_m = self.camera.project(place).map_or(f64::INFINITY, |projection| projection.px_per_m);
         radius_m.max(f64::from(least_px * self.view.unit_px()) / px_per_m)
     }
 
@@ -59,10 +59,10 @@ impl SceneBuilder<'_> {
     pub(super) fn covered_areas_px(&self) -> Vec<([f64; 2], f64)> {
         let cover = |k| {
             let place = self.vehicle(k)?;
-            let at = self.camera.project(place)?;
+            let projection = self.camera.project(place)?;
             let radius_m = self.at_least(place, self.timeline.radius_m[k], MIN_RADIUS_PX[0]);
             let shell_m = self.shell_m(k).map_or(0.0, |shell_m| self.timeline.log.metric().longest_m(shell_m));
-            Some((at.at_px, radius_m.max(shell_m) * at.px_per_m))
+            Some((projection.at_px, radius_m.max(shell_m) * projection.px_per_m))
         };
         (0..self.timeline.count()).filter_map(cover).collect()
     }
@@ -153,7 +153,7 @@ impl SceneBuilder<'_> {
         let by_clearance =
             self.view.colouring == Colouring::Clearance && corners.len() * count * count <= MAX_DISTANCES;
         let clearances: Vec<_> =
-            corners.iter().filter(|_| by_clearance).map(|(_, at)| self.clearance_parts(at)).collect();
+            corners.iter().filter(|_| by_clearance).map(|(_, corner)| self.clearance_parts(corner)).collect();
         lines.reserve(count * corners.len());
         for k in 0..count {
             for (n, pair) in corners.windows(2).enumerate() {
@@ -167,11 +167,12 @@ impl SceneBuilder<'_> {
                     _ => clearances.get(n + 1).map_or(self.colour(k), |parts| self.view.theme.ramp(parts[k])),
                 };
                 for ([from_s, to_s], is_violation) in cut([from_s, to_s], &self.violating_s[k]) {
-                    let at = |time_s: f64| single(start.lerp(&end, (time_s - pair[0].0) / (pair[1].0 - pair[0].0)));
+                    let point_at =
+                        |time_s: f64| single(start.lerp(&end, (time_s - pair[0].0) / (pair[1].0 - pair[0].0)));
                     let (colour, least) =
                         if is_violation { (self.view.theme.alarm(), VIOLATED) } else { (colour, 0.0) };
                     let colours = [from_s, to_s].map(|time_s| colour.at(opacity(time_s).max(least)));
-                    lines.push(Line { ends_m: [at(from_s), at(to_s)], colours, width_px });
+                    lines.push(Line { ends_m: [point_at(from_s), point_at(to_s)], colours, width_px });
                 }
             }
         }
@@ -297,8 +298,8 @@ impl SceneBuilder<'_> {
                     for side in 0..6 {
                         let (axis, sign) = (side / 2, if side % 2 == 0 { 1.0 } else { -1.0 });
                         let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
-                        let of = |k: usize, share: f64| turned * Vector3::ith(k, half_m[k] * share);
-                        self.hatched([RIM, HATCH], place + of(axis, sign), of(u, 1.0), of(v, 1.0), lines);
+                        let offset = |k: usize, share: f64| turned * Vector3::ith(k, half_m[k] * share);
+                        self.hatched([RIM, HATCH], place + offset(axis, sign), offset(u, 1.0), offset(v, 1.0), lines);
                     }
                 }
                 // The grid of the ground shows a level plane.
@@ -438,7 +439,7 @@ impl SceneBuilder<'_> {
     pub(super) fn arms(&self, lines: &mut Vec<Line>) {
         let unit_px = self.view.unit_px();
         for (quadrotor, colour) in self.quadrotors() {
-            let px_per_m = self.camera.project(quadrotor.place).map_or(0.0, |at| at.px_per_m);
+            let px_per_m = self.camera.project(quadrotor.place).map_or(0.0, |projection| projection.px_per_m);
             #[expect(clippy::cast_possible_truncation, reason = "pixels")]
             let width_px = (ARM * quadrotor.arm_m * px_per_m) as f32;
             let width_px = width_px.max(ARM_PX * unit_px);

@@ -108,9 +108,9 @@ impl SceneBuilder<'_> {
             let is_high = height(high[other]) > height(low[other]);
             // Only the last number that fits has the unit.
             let mut unit = " m";
-            for (at, number) in self.numbers(axis, is_high, size_px, &mut taken) {
+            for (place, number) in self.numbers(axis, is_high, size_px, &mut taken) {
                 let text = format!("{number}{unit}");
-                if !is_covered(at, &text) && labels.put_if_free(at, [0.5; 2], size_px, soft, &text) {
+                if !is_covered(place, &text) && labels.put_if_free(place, [0.5; 2], size_px, soft, &text) {
                     unit = "";
                 }
             }
@@ -142,23 +142,27 @@ impl SceneBuilder<'_> {
             let place = |n: u32| {
                 point[other] = from + (to - from) * f64::from(n) / f64::from(CROSSINGS);
                 let [x, y] = self.camera.project(point)?.at_px;
-                let at = [x, y + below_px];
+                let place_px = [x, y + below_px];
                 // Distances from the sides of the free area.
-                let free_px =
-                    [at[0] - half, width_px - half - at[0], at[1] - top - line, height_px - bottom.max(line) - at[1]];
+                let free_px = [
+                    place_px[0] - half,
+                    width_px - half - place_px[0],
+                    place_px[1] - top - line,
+                    height_px - bottom.max(line) - place_px[1],
+                ];
                 let side = (0..4).min_by(|&a, &b| free_px[a].total_cmp(&free_px[b])).filter(|_| n > 0);
-                free_px.iter().all(|&free_px| free_px >= 0.0).then_some((side, at))
+                free_px.iter().all(|&free_px| free_px >= 0.0).then_some((side, place_px))
             };
-            let (side, at) = (0..=CROSSINGS).find_map(place)?;
-            Some((side, at, text))
+            let (side, crossing) = (0..=CROSSINGS).find_map(place)?;
+            Some((side, crossing, text))
         };
         let numbers: Vec<_> = (0..=steps(high[axis] - low[axis], step)).rev().filter_map(number).collect();
         // Numbers at several sides of the picture would be taken for those of the other axis.
-        let count = |side| numbers.iter().filter(|(at, ..)| *at == side).count();
+        let count = |side| numbers.iter().filter(|(own_side, ..)| *own_side == side).count();
         let sides = numbers.iter().map(|(side, ..)| *side).filter(|side| side.is_none() || side != taken);
         let commonest = sides.max_by_key(|&side| count(side));
         let kept = numbers.iter().filter(|(side, ..)| Some(*side) == commonest);
-        let numbers = kept.map(|(_, at, text)| (*at, text.clone())).collect();
+        let numbers = kept.map(|(_, point, text)| (*point, text.clone())).collect();
         *taken = commonest.flatten();
         numbers
     }
@@ -180,7 +184,7 @@ impl SceneBuilder<'_> {
             let at_px = [middle[0] + x * arm * beyond, middle[1] + y * arm * beyond];
             labels.put(at_px, [0.5, 0.5], size_px, colour, ["x", "y", "z"][axis]);
         }
-        labels.reserve([middle.map(|at| at - 0.2 * arm), middle.map(|at| at + 0.2 * arm)]);
+        labels.reserve([middle.map(|value| value - 0.2 * arm), middle.map(|value| value + 0.2 * arm)]);
     }
 }
 
@@ -205,7 +209,8 @@ mod tests {
     #[test]
     fn the_scale_shows_round_numbers() {
         assert_eq!(
-            [(-0.0, 2.0), (4.000_000_1, 2.0), (0.3, 0.05), (-15.0, 5.0)].map(|(at, step)| format_multiple(at, step)),
+            [(-0.0, 2.0), (4.000_000_1, 2.0), (0.3, 0.05), (-15.0, 5.0)]
+                .map(|(number, step)| format_multiple(number, step)),
             ["0", "4", "0.30", "-15"]
         );
         assert_eq!(steps(f64::INFINITY, 1.0), MAX_LINES);

@@ -212,9 +212,12 @@ fn cameras_frame_all_vehicles_between_the_texts() {
         for time_s in [0.0, 5.0, 10.0] {
             let scene = scene(&timeline, time_s, &camera(text));
             for ball in &scene.balls {
-                let at = scene.camera.project(Vector3::from(ball.centre_m.map(f64::from))).expect("ahead").at_px;
+                let centre_px = scene.camera.project(Vector3::from(ball.centre_m.map(f64::from))).expect("ahead").at_px;
                 let [top, bottom] = [area.texts_px[0], 720.0 - area.texts_px[1]];
-                assert!((0.0..1280.0).contains(&at[0]) && (top..bottom).contains(&at[1]), "{text}, {time_s} s: {at:?}");
+                assert!(
+                    (0.0..1280.0).contains(&centre_px[0]) && (top..bottom).contains(&centre_px[1]),
+                    "{text}, {time_s} s: {centre_px:?}"
+                );
             }
         }
     }
@@ -349,7 +352,7 @@ fn any_picture_size_and_swarm_gives_a_finite_list() {
     let timeline = timeline();
     for size_px in [[1, 1], [64, 2000], [16_384, 16], [320, 180]] {
         let scene = scene(&timeline, 5.0, &View { size_px, ..View::default() });
-        let finite = |at: &[f32; 2]| at.iter().all(|x| x.is_finite());
+        let finite = |point: &[f32; 2]| point.iter().all(|x| x.is_finite());
         assert!(scene.annotations.iter().all(|annotation| if let Annotation::Words { at_px, .. } = annotation {
             finite(at_px)
         } else {
@@ -404,8 +407,8 @@ fn a_vehicle_too_small_to_see_is_a_dot() {
         timeline.take(&Sample::new(time_s, step as u64, &swarm, &control));
     }
     let scene = scene(&timeline, 0.0, &camera("top"));
-    let at = scene.camera.project(Vector3::zeros()).expect("ahead");
-    assert!(scene.balls.iter().all(|ball| f64::from(ball.radius_m) * at.px_per_m > 1.4), "{:?}", scene.balls);
+    let projection = scene.camera.project(Vector3::zeros()).expect("ahead");
+    assert!(scene.balls.iter().all(|ball| f64::from(ball.radius_m) * projection.px_per_m > 1.4), "{:?}", scene.balls);
 }
 
 #[test]
@@ -463,11 +466,11 @@ fn numbers_of_the_ground_do_not_cover_vehicles_or_shells() {
     let numbers = |view: &View| {
         let scene = scene(&timeline, 0.0, view);
         let number = |text: &str| text.trim_end_matches(" m").parse::<f64>().is_ok();
-        let at = |annotation: &Annotation| match annotation {
+        let place_of = |annotation: &Annotation| match annotation {
             Annotation::Words { at_px, text, .. } if number(text) => Some(*at_px),
             _ => None,
         };
-        (scene.camera, scene.annotations.iter().filter_map(at).collect::<Vec<_>>())
+        (scene.camera, scene.annotations.iter().filter_map(place_of).collect::<Vec<_>>())
     };
     let mut dropped = 0;
     let sides = (0..360).step_by(20).flat_map(|azimuth| [5, 30, 60, 80].map(|elevation| (azimuth, elevation)));
@@ -483,8 +486,8 @@ fn numbers_of_the_ground_do_not_cover_vehicles_or_shells() {
             let place =
                 Extent::of(&timeline).place(&timeline.log.at(0.0).expect("a frame").positions_m, k).expect("there");
             let Some(ball) = camera.project(place) else { continue };
-            let clear = |at: &[f32; 2]| {
-                let [x, y] = [0, 1].map(|axis| f64::from(at[axis]) - ball.at_px[axis]);
+            let clear = |point: &[f32; 2]| {
+                let [x, y] = [0, 1].map(|axis| f64::from(point[axis]) - ball.at_px[axis]);
                 x.hypot(y) > 1.0 * ball.px_per_m
             };
             assert!(with.iter().all(clear), "{azimuth}, {elevation} degrees");
@@ -523,8 +526,8 @@ fn the_closest_approach_is_the_same_in_report_figure_replay_and_picture() {
     scenario.time.record_hz = 1.0;
     let mut log = FlightLog::of(&scenario);
     let report = run(&scenario, &mut log).expect("a flight");
-    let (min_m, at_s) = (report.separation.min_m.expect("a distance"), report.separation.min_at_s.expect("a time"));
-    let [first, second] = report.separation.min_pair.expect("a pair");
+    let closest = report.closest_pair().expect("a pair");
+    let (min_m, at_s, [first, second]) = (closest.separation_m, closest.time_s, closest.pair.numbers());
     log.conclude(min_m, at_s);
     let closest = log.closest().expect("an approach");
     assert_eq!((closest.separation_m, closest.time_s, closest.pair.numbers()), (min_m, at_s, [first, second]));

@@ -99,7 +99,14 @@ fn the_closest_approach_at_different_sample_times_is_drawn() {
     let frame = timeline.log.at(closest.time_s).expect("a frame");
     let drawn_m = tautline_core::swarm::separation(&frame.positions_m, 0, 1);
     assert!((drawn_m - 0.5).abs() < 1e-9, "{drawn_m} m");
-    assert!(timeline.log.at(closest.time_s - 0.2).expect("a frame").so_far.is_some_and(|at| at.separation_m > 0.6));
+    assert!(
+        timeline
+            .log
+            .at(closest.time_s - 0.2)
+            .expect("a frame")
+            .so_far
+            .is_some_and(|approach| approach.separation_m > 0.6)
+    );
 }
 
 #[test]

@@ -168,7 +168,8 @@ fn common_times(tracks: &[VehicleTrack], moments_s: &[f64]) -> Vec<f64> {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "bounded by both")]
     let steps = wanted.ceil().clamp(1.0, max_times.max(2) as f64) as usize;
     let even = (0..=steps).map(|k| first + (last - first) * (k as f64 / steps as f64));
-    let mut times: Vec<f64> = even.chain(moments_s.iter().copied().filter(|at| (first..=last).contains(at))).collect();
+    let mut times: Vec<f64> =
+        even.chain(moments_s.iter().copied().filter(|moment_s| (first..=last).contains(moment_s))).collect();
     times.sort_unstable_by(f64::total_cmp);
     times.dedup();
     times

@@ -35,17 +35,18 @@ impl Viewport<'_> {
     /// Returns projection, position and radius of a vehicle in the picture \[pixels\].
     fn on_picture(&self, k: usize, player: &Player) -> Option<(Projected, Vec2, f32)> {
         let (frame, scene) = self.drawn?;
-        let at = scene.camera.project(self.extent.place(&frame.positions_m, k)?)?;
+        let centre_px = scene.camera.project(self.extent.place(&frame.positions_m, k)?)?;
         #[expect(clippy::cast_possible_truncation, reason = "pixels")]
-        let [x, y, radius] = [at.at_px[0], at.at_px[1], player.timeline.radius_m[k] * at.px_per_m].map(|v| v as f32);
-        Some((at, vec2(x, y), radius))
+        let [x, y, radius] = [centre_px.at_px[0], centre_px.at_px[1], player.timeline.radius_m[k] * centre_px.px_per_m]
+            .map(|v| v as f32);
+        Some((centre_px, vec2(x, y), radius))
     }
 
     /// Returns the nearest vehicle at a point of the picture, within its ball or a few pixels around its centre.
     fn pick(&self, point: Vec2, player: &Player) -> Option<usize> {
         let depth_m = |k: usize| {
-            let (at, place, radius) = self.on_picture(k, player)?;
-            ((place - point).length() <= radius.max(8.0)).then_some(at.depth_m)
+            let (centre_px, place, radius) = self.on_picture(k, player)?;
+            ((place - point).length() <= radius.max(8.0)).then_some(centre_px.depth_m)
         };
         let hit = (0..player.timeline.count()).filter_map(|k| Some((k, depth_m(k)?)));
         hit.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(k, _)| k)
@@ -69,9 +70,9 @@ fn picture(ui: &mut Ui, state: &mut WindowState, player: &Player, viewport: &Vie
     if let Some((_, scene)) = viewport.drawn {
         paint(&painter, &scene.annotations, area.min.to_vec2(), points);
     }
-    if let Some((_, at, radius)) = state.picked.and_then(|picked| viewport.on_picture(picked, player)) {
+    if let Some((_, centre_px, radius)) = state.picked.and_then(|picked| viewport.on_picture(picked, player)) {
         let stroke = Stroke::new(2.0, ui.visuals().strong_text_color());
-        painter.circle_stroke(area.min + at / points, (radius / points).max(6.0) + 4.0, stroke);
+        painter.circle_stroke(area.min + centre_px / points, (radius / points).max(6.0) + 4.0, stroke);
     }
     let drag = response.drag_delta();
     if response.dragged_by(PointerButton::Primary) && !ui.input(|input| input.modifiers.shift) {
@@ -88,9 +89,9 @@ fn picture(ui: &mut Ui, state: &mut WindowState, player: &Player, viewport: &Vie
         }
     }
     if response.clicked()
-        && let Some(at) = response.interact_pointer_pos()
+        && let Some(pointer) = response.interact_pointer_pos()
     {
-        state.picked = viewport.pick((at - area.min) * points, player);
+        state.picked = viewport.pick((pointer - area.min) * points, player);
     }
     if state.help {
         help(ui.ctx(), &mut state.help);
@@ -185,8 +186,8 @@ fn marks(ui: &Ui, slider: Rect, [first_s, last_s]: [f64; 2], player: &Player) {
         painter.rect_filled(bar, 0.0, ALARM);
     }
     if let Some(closest) = log.closest() {
-        let (at, top) = (x(closest.time_s), slider.top());
-        let corners = vec![pos2(at - 4.0, top - 1.0), pos2(at + 4.0, top - 1.0), pos2(at, top + 5.0)];
+        let (x_px, top) = (x(closest.time_s), slider.top());
+        let corners = vec![pos2(x_px - 4.0, top - 1.0), pos2(x_px + 4.0, top - 1.0), pos2(x_px, top + 5.0)];
         let colour = ui.visuals().strong_text_color();
         painter.add(egui::Shape::convex_polygon(corners, colour, Stroke::NONE));
     }
@@ -284,23 +285,29 @@ fn plot(ui: &mut Ui, player: &Player) {
         keyframes.iter().filter_map(|keyframe| Some([keyframe.time_s, keyframe.closest?.separation_m])).collect();
     // A point shows the smallest of its separations.
     let smallest =
-        |shared: &[[f64; 2]]| [shared[0][0], shared.iter().fold(f64::INFINITY, |least, at| least.min(at[1]))];
+        |shared: &[[f64; 2]]| [shared[0][0], shared.iter().fold(f64::INFINITY, |least, point| least.min(point[1]))];
     let points: Vec<_> = separations.chunks(keyframes.len().div_ceil(MAX_PLOT_POINTS).max(1)).map(smallest).collect();
     let values = || points.iter().map(|point| point[1]).chain(delta_m);
     let top = values().fold(0.0, f64::max) * 1.1;
     let bottom = (values().fold(f64::INFINITY, f64::min) * 0.9).min(top);
     #[expect(clippy::cast_possible_truncation, reason = "points of a plot")]
-    let at = |time_s: f64, separation_m: f64| {
+    let point_at = |time_s: f64, separation_m: f64| {
         let (x, y) = ((time_s - first_s) / span_s, (separation_m - bottom) / (top - bottom).max(1e-9));
         pos2(area.left() + x as f32 * area.width(), area.bottom() - y as f32 * area.height())
     };
     if let Some(delta_m) = delta_m {
         let stroke = Stroke::new(1.5, ALARM);
-        painter.line_segment([at(first_s, delta_m), at(last_s, delta_m)], stroke);
+        painter.line_segment([point_at(first_s, delta_m), point_at(last_s, delta_m)], stroke);
         let font = egui::FontId::proportional(11.0);
-        painter.text(at(last_s, delta_m), Align2::RIGHT_BOTTOM, format!("delta {delta_m} m "), font, stroke.color);
+        painter.text(
+            point_at(last_s, delta_m),
+            Align2::RIGHT_BOTTOM,
+            format!("delta {delta_m} m "),
+            font,
+            stroke.color,
+        );
     }
-    let curve = points.iter().map(|&[time_s, separation_m]| at(time_s, separation_m)).collect();
+    let curve = points.iter().map(|&[time_s, separation_m]| point_at(time_s, separation_m)).collect();
     painter.add(egui::Shape::line(curve, Stroke::new(1.5, visuals.hyperlink_color)));
     let ink = plot_ink(visuals);
     let number = |corner: egui::Pos2, anchor, text| {
@@ -309,7 +316,7 @@ fn plot(ui: &mut Ui, player: &Player) {
     number(area.left_top(), Align2::LEFT_TOP, format!(" {top:.1} m"));
     number(area.left_bottom(), Align2::LEFT_BOTTOM, format!(" {bottom:.1} m, {first_s:.0} s"));
     number(area.right_bottom(), Align2::RIGHT_BOTTOM, format!("{last_s:.0} s "));
-    let now = at(player.time_s, bottom).x;
+    let now = point_at(player.time_s, bottom).x;
     painter.vline(now, area.y_range(), Stroke::new(1.0, visuals.strong_text_color()));
     if let Some(pointer) = response.hover_pos() {
         let time_s = first_s + f64::from((pointer.x - area.left()) / area.width()) * span_s;

@@ -114,11 +114,11 @@ impl Player {
     pub(super) fn step(&mut self, samples: isize) {
         self.playing = false;
         let keyframes = self.timeline.log.keyframes();
-        let at = keyframes.partition_point(|keyframe| keyframe.time_s <= self.time_s).saturating_sub(1);
-        let between = keyframes.get(at).is_some_and(|keyframe| keyframe.time_s < self.time_s);
+        let index = keyframes.partition_point(|keyframe| keyframe.time_s <= self.time_s).saturating_sub(1);
+        let between = keyframes.get(index).is_some_and(|keyframe| keyframe.time_s < self.time_s);
         // A step back from between two samples goes to the sample before.
         let by = if samples < 0 && between { samples + 1 } else { samples };
-        let to = at.saturating_add_signed(by).min(keyframes.len().saturating_sub(1));
+        let to = index.saturating_add_signed(by).min(keyframes.len().saturating_sub(1));
         if let Some(keyframe) = keyframes.get(to) {
             self.time_s = keyframe.time_s;
         }
@@ -202,7 +202,7 @@ mod tests {
         };
         let visited = [true, true, true, false, false].map(&mut visit);
         let expected = [0.5, 1.3, 1.3, 0.5, 0.5];
-        assert!(visited.iter().zip(expected).all(|(at, expected)| (at - expected).abs() < 1e-9), "{visited:?}");
+        assert!(visited.iter().zip(expected).all(|(time_s, expected)| (time_s - expected).abs() < 1e-9), "{visited:?}");
     }
 
     #[test]

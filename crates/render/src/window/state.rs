@@ -211,6 +211,6 @@ impl WindowState {
 
 /// Returns the choice after this one; the first follows the last.
 fn next<T: Copy + PartialEq, const N: usize>(all: &[(&str, T); N], this: T) -> T {
-    let at = all.iter().position(|(_, choice)| *choice == this).unwrap_or(N - 1);
-    all[(at + 1) % N].1
+    let index = all.iter().position(|(_, choice)| *choice == this).unwrap_or(N - 1);
+    all[(index + 1) % N].1
 }

@@ -230,15 +230,15 @@ impl Finding {
     }
 
     /// Returns the violation of a pair. If `is_exact` is false, the smallest distance has only an upper bound.
-    pub(super) fn violation(
-        found: &Violation<ObjectPair>,
+    pub(super) fn violation<P: Copy + Into<ObjectPair>>(
+        found: &Violation<P>,
         names: [String; 2],
         unit: &'static str,
         is_exact: bool,
     ) -> Self {
         let lower = if is_exact { found.min_m } else { f64::NEG_INFINITY };
         let value = Enclosure::new(lower, found.min_m, unit);
-        let finding = Self::new(Objects::Pair(found.pair), names, value, Some(found.limit_m));
+        let finding = Self::new(Objects::Pair(found.pair.into()), names, value, Some(found.limit_m));
         finding.over(found.from_s, found.to_s).at(found.min_at_s)
     }
 

@@ -1,10 +1,11 @@
 //! Answers and their findings in words, and as moments of a replay.
 
-use super::answer::{Answer, Finding, Objects, Part};
+use super::answer::{Answer, Finding, FindingList, Objects, Part};
+use super::section::Section;
 use crate::replay::{Kind, LONGEST_NAME, Moment, Span, cut};
 use tautline_audit::envelope::{Limit, Quantity};
 use tautline_audit::recorded::WIDTH_M;
-use tautline_audit::{ObjectPair, Status, WellClear};
+use tautline_audit::{ObjectPair, Status, Tally, WellClear};
 use tautline_core::text::{at_least, at_most, beside_limit, exact, fixed, seconds};
 
 impl Answer {
@@ -97,16 +98,6 @@ impl Answer {
         ]
     }
 
-    /// Returns the violations, a sentence each.
-    pub(super) fn violations_in_words(&self) -> impl Iterator<Item = String> + '_ {
-        self.violations.listed.iter().map(|finding| finding.sentence(self.part, true))
-    }
-
-    /// Returns the undecided times, a sentence each.
-    pub(super) fn undecided_in_words(&self) -> impl Iterator<Item = String> + '_ {
-        self.undecided.listed.iter().map(|finding| finding.sentence(self.part, false))
-    }
-
     /// Returns the closest approach as a moment of a replay.
     fn closest_moment(&self) -> Option<Moment> {
         let finding = self.closest.first().filter(|_| self.part == Part::Separation)?.short();
@@ -161,6 +152,53 @@ pub(super) fn moments(answers: &[Answer]) -> impl Iterator<Item = Moment> + '_ {
     let violations = answers.clone().flat_map(Answer::violation_moments);
     let undecided = answers.clone().flat_map(Answer::undecided_moments);
     answers.filter_map(Answer::closest_moment).chain(violations).chain(undecided)
+}
+
+/// Returns the closest approaches of vehicles, or of vehicles and obstacles, as a table.
+pub(super) fn closest_table(answer: &Answer, are_of_obstacles: bool) -> Section {
+    let heading = if are_of_obstacles { "Closest to obstacles" } else { "Closest pairs" };
+    let closest = || answer.closest.iter().filter(|finding| finding.is_of_obstacle() == are_of_obstacles);
+    let unit = closest().next().map_or("", |finding| finding.value.unit);
+    let row = |finding: &Finding| {
+        let limit = finding.limit.unwrap_or_default();
+        let apart = interval(finding.value.lower_bound(), finding.value.upper_bound(), limit);
+        [finding.names(), apart, fixed(finding.at_s.unwrap_or(f64::NAN), 3), exact(limit)]
+    };
+    let columns = &["pair", "smallest distance", "at [s]", "limit"];
+    Section::table(heading, format!("smallest distances in {unit}"), columns, closest().map(row))
+}
+
+/// Returns the violations and the undecided times of some answers, a sentence each.
+pub(super) fn lists<'a, I: Iterator<Item = &'a Answer>>(answers: impl Fn() -> I) -> [Section; 2] {
+    [true, false].map(|are_violations| {
+        let list = |answer: &'a Answer| if are_violations { &answer.violations } else { &answer.undecided };
+        let sentences = answers().flat_map(|answer| {
+            list(answer).listed.iter().map(move |finding| finding.sentence(answer.part, are_violations))
+        });
+        let heading = if are_violations { "Violations" } else { "Undecided" };
+        Section::list(heading, shortened_in_words(sum(answers().map(list))), sentences.collect())
+    })
+}
+
+/// Adds the numbers of found and of listed findings.
+pub(super) fn sum<'a>(lists: impl IntoIterator<Item = &'a FindingList>) -> Tally {
+    lists.into_iter().fold(Tally::all(0), |all, list| Tally {
+        count: all.count + list.count,
+        listed: all.listed + list.listed.len(),
+        is_exact: all.is_exact && list.is_exact,
+    })
+}
+
+/// Returns the number of findings in words, such as `at least 12`.
+pub(super) fn tally_in_words(tally: Tally) -> String {
+    let least = if tally.is_exact { "" } else { "at least " };
+    format!("{least}{}", tally.count)
+}
+
+/// Returns the number of findings, and the number of the listed ones if the list is cut.
+pub(super) fn shortened_in_words(tally: Tally) -> String {
+    let count = tally_in_words(tally);
+    if tally.is_shortened() { format!("{count}, {} of them listed", tally.listed) } else { count }
 }
 
 impl Finding {

@@ -4,18 +4,19 @@ use std::path::Path;
 
 use serde::{Serialize, Serializer};
 
-use super::answer::{Answer, Detectors, Finding, FindingList, Judgement, Part, Question};
+use super::answer::{Answer, Detectors, Finding, FindingList, Judgement, Objects, Part, Question};
+use super::findings::moments;
 use super::hulls::Hulls;
 use super::legs::LegNumbers;
-use super::obstacles::{ObstacleApproach, ObstacleViolation, Obstacles};
 use super::shield::ShieldNumbers;
 use super::verdict::{Reason, UnmetCriterion, Verdict, at_rest, energy_rises};
 use super::words::early_end;
-use tautline_audit::{self as audit, Approach, ObjectPair, Status};
+use crate::replay::{JudgementContext, Moment};
+use tautline_audit::{Approach, ObjectPair, Status, Violation};
 use tautline_core::fact::{CHORDS, EVERY_STEP, Fact, FactKind, Source, serialize_coded};
 use tautline_core::files::{FileError, write_atomically};
 use tautline_core::record::{DeadlockRecovery, Reassignment};
-use tautline_core::swarm::{ClosestApproach, Pair};
+use tautline_core::swarm::ClosestApproach;
 use tautline_laws::law::{Certificate, VoidReason};
 use tautline_sim::link::Traffic;
 use tautline_sim::metrics::{LegSummary, QuadrotorPeaks, Summary};
@@ -27,7 +28,7 @@ use tautline_sim::sim::{Ending, Flight};
 pub const SCHEMA_VERSION: u32 = 3;
 
 /// Report on a flight, the content of `report.json`. In JSON the keys of a [`Judgement`] come first, then `reasons`,
-/// `certificate` and `ellipsoid`, then the fields from [`Self::scenario`] on.
+/// then the fields from [`Self::certificate`] on.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(remote = "Self")]
 #[non_exhaustive]
@@ -41,15 +42,15 @@ pub struct Report {
     /// Verdict on the flight.
     #[serde(skip)]
     pub verdict: Verdict,
-    /// Smallest separation and certificate.
+    /// Answer on separations and obstacles.
     #[serde(skip)]
-    pub separation: Separation,
-    /// Findings of the audit.
-    #[serde(skip)]
-    pub audit: Audit,
-    /// Findings on obstacles, if the scenario has any.
-    #[serde(skip)]
-    pub obstacles: Option<Obstacles>,
+    pub answer: Answer,
+    /// Certificate of the flight.
+    pub certificate: FlightCertificate,
+    /// Ellipsoid that must stay empty around each vehicle. The separations of answer and certificate are then scaled
+    /// lengths.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub ellipsoid: Option<Ellipsoid>,
     /// Scenario of the flight.
     pub scenario: ScenarioIdentity,
     /// Program that flew the scenario.
@@ -114,110 +115,19 @@ pub struct Tool {
     pub version: String,
 }
 
-/// Smallest separation of two vehicles, and the certificate.
-#[derive(Clone, Debug, PartialEq)]
+/// Certificate of a flight, before the first step or after slots were spread if that is smaller.
+#[derive(Clone, Debug, PartialEq, Serialize)]
 #[non_exhaustive]
-pub struct Separation {
-    /// Safety distance delta \[m\].
-    pub delta_m: f64,
-    /// Smallest separation of any pair over the flight \[m\].
-    pub min_m: Option<f64>,
-    /// Time of `min_m` \[s\].
-    pub min_at_s: Option<f64>,
-    /// The two vehicles, numbered from 1.
-    pub min_pair: Option<[usize; 2]>,
-    /// Separation that the law certified before the first step, or after slots were spread if that is smaller \[m\].
-    pub certified_m: Option<f64>,
-    /// Time up to which `certified_m` holds \[s\]; null if it has no end or nothing is certified.
-    pub certified_until_s: Option<f64>,
+pub struct FlightCertificate {
+    /// Certified separation \[m\]; null if nothing is certified.
+    pub separation_m: Option<f64>,
+    /// Certified distance beyond the clearance of every obstacle \[m\]; null without obstacles or certificate.
+    pub clearance_margin_m: Option<f64>,
+    /// Time up to which the certificate holds \[s\]; null if it has no end or nothing is certified.
+    pub until_s: Option<f64>,
     /// Reasons why nothing is certified, objects with `code` and `text`.
-    pub certificate_void: Vec<VoidReason>,
-    /// Ellipsoid that must stay empty around each vehicle. The distances above and in the audit are then scaled
-    /// lengths.
-    pub ellipsoid: Option<Ellipsoid>,
-}
-
-impl Separation {
-    /// Returns the closest approach of two vehicles over the flight.
-    #[must_use]
-    pub fn closest(&self) -> Option<ClosestApproach> {
-        let (separation_m, time_s, [first, second]) = (self.min_m?, self.min_at_s?, self.min_pair?);
-        let (first, second) = (first.checked_sub(1)?, second.checked_sub(1)?);
-        (first != second).then(|| ClosestApproach { pair: Pair::new(first, second), separation_m, time_s })
-    }
-
-    /// Returns whether the certificate covers the time of the closest approach.
-    pub(super) fn is_promised(&self) -> bool {
-        self.certified_until_s.zip(self.min_at_s).is_none_or(|(until_s, min_at_s)| min_at_s <= until_s)
-    }
-}
-
-/// Findings of the audit.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub struct Audit {
-    /// Status of separations and obstacles, the worse of the two. At best undecided if the flight ended early.
-    pub status: Status,
-    /// Intervals in which a pair was below delta.
-    pub violations: Vec<Violation>,
-    /// Number of undecided times of pairs, counted beside violations too.
-    pub undecided: u64,
-    /// Steps swept.
-    pub steps: u64,
-    /// Pairs swept, summed over all steps.
-    pub pairs_checked: u64,
-    /// Result of the closed-form sweep, which decides.
-    pub closed_form: ClosedForm,
-    /// Result of the shape cast, which must agree.
-    pub parry: Parry,
-    /// Contacts of the engine's own collision detection, which are evidence only.
-    pub rapier: Rapier,
-}
-
-/// An interval in which a pair was below delta.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Violation {
-    /// The two vehicles.
-    pub pair: Pair,
-    /// Start \[s\].
-    pub from_s: f64,
-    /// End, or the end of the run \[s\].
-    pub to_s: f64,
-    /// Smallest separation in the interval \[m\].
-    pub min_m: f64,
-    /// Time of `min_m` \[s\].
-    pub min_at_s: f64,
-}
-
-impl Violation {
-    /// Returns the violation of a pair that an audit found.
-    pub(super) fn new<P>(pair: Pair, found: &audit::Violation<P>) -> Self {
-        let &audit::Violation { from_s, to_s, min_m, min_at_s, .. } = found;
-        Self { pair, from_s, to_s, min_m, min_at_s }
-    }
-}
-
-/// Result of the closed-form sweep.
-#[derive(Clone, Debug, PartialEq)]
-pub struct ClosedForm {
-    /// Smallest separation \[m\].
-    pub min_m: Option<f64>,
-}
-
-/// Result of the shape cast.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Parry {
-    /// Time of the first contact of two keep-out balls \[s\]; null without a contact.
-    pub min_toi_s: Option<f64>,
-    /// Number of casts that contradict the closed form.
-    pub disagreements: u64,
-}
-
-/// Contacts of the engine's own collision detection.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Rapier {
-    /// Number of pairs whose keep-out balls overlapped at the end of a step; null for a plant without an engine.
-    pub contact_pairs: Option<u64>,
+    #[serde(serialize_with = "serialize_coded")]
+    pub void: Vec<VoidReason>,
 }
 
 /// Errors of the formation at the end, and its arrival.
@@ -479,47 +389,90 @@ impl FlightResult<'_> {
         }
     }
 
-    fn separation(&self) -> Separation {
-        let Certificate { certified_m, certified_until_s, void, .. } = &self.flight.certificate;
-        let closest = self.flight.audit.closest;
-        let in_metres = self.flight.in_metres.as_ref().and_then(|in_metres| in_metres.closest);
-        let [min_m, min_distance_m] = [closest, in_metres].map(|of| finite(of?.separation_m));
-        let [min_at_s, min_distance_at_s] = [closest, in_metres].map(|of| finite(of?.time_s));
-        let [min_pair, min_distance_pair] = [closest, in_metres].map(|of| of.map(|of| of.pair.numbers()));
-        let half_axes_m = self.scenario.half_axes_m();
-        Separation {
-            delta_m: self.scenario.delta_m,
-            min_m,
-            min_at_s,
-            min_pair,
-            certified_m: certified_m.and_then(finite),
-            certified_until_s: certified_until_s.and_then(finite),
-            certificate_void: void.clone(),
-            ellipsoid: half_axes_m.map(|half_axes_m| Ellipsoid {
-                half_axes_m,
-                min_distance_m,
-                min_distance_at_s,
-                min_distance_pair,
-            }),
+    fn unit(&self) -> &'static str {
+        if self.scenario.half_axes_m().is_some() { "m, scaled" } else { "m" }
+    }
+
+    /// Returns the names of a pair, and the unit of its distances.
+    fn names(&self, pair: ObjectPair) -> ([String; 2], &'static str) {
+        match pair {
+            ObjectPair::Vehicles(pair) => (pair.numbers().map(|number| number.to_string()), self.unit()),
+            ObjectPair::Obstacle { vehicle, obstacle } => {
+                let name = self.scenario.obstacles.get(obstacle).map(|obstacle| obstacle.name.clone());
+                ([(vehicle + 1).to_string(), name.unwrap_or_default()], "m")
+            }
         }
     }
 
-    fn audit(&self) -> Audit {
-        let (flight, audit) = (self.flight, &self.flight.audit);
-        let contact_pairs = self.scenario.has_engine().then_some(flight.engine_contacts.len() as u64);
-        Audit {
-            status: flight.status(),
-            violations: audit.violations.iter().map(|found| Violation::new(found.pair, found)).collect(),
-            undecided: audit.unresolved + audit.refused,
-            steps: audit.steps,
-            pairs_checked: audit.pairs_checked,
-            closed_form: ClosedForm { min_m: audit.closest.and_then(|closest| finite(closest.separation_m)) },
-            parry: Parry {
-                min_toi_s: audit.parry.min_toi_s.and_then(finite),
-                disagreements: audit.parry.disagreements,
-            },
-            rapier: Rapier { contact_pairs },
+    fn approach(&self, pair: ObjectPair, distance_m: f64, time_s: f64, limit_m: f64) -> Finding {
+        let (names, unit) = self.names(pair);
+        Finding::approach(&Approach { pair, lower_m: distance_m, upper_m: distance_m, time_s, limit_m }, names, unit)
+    }
+
+    fn violation<P: Copy + Into<ObjectPair>>(&self, found: &Violation<P>) -> Finding {
+        let (names, unit) = self.names(found.pair.into());
+        Finding::violation(found, names, unit, true)
+    }
+
+    /// Returns the deepest of some violations.
+    pub(super) fn deepest<P: Copy + Into<ObjectPair>>(&self, violations: &[Violation<P>]) -> Option<Finding> {
+        let depth = |found: &Violation<P>| [found.min_m - found.limit_m, found.min_m];
+        let order = |[a, b]: [f64; 2], [c, d]: [f64; 2]| a.total_cmp(&c).then(b.total_cmp(&d));
+        violations.iter().min_by(|a, b| order(depth(a), depth(b))).map(|found| self.violation(found))
+    }
+
+    /// Returns the answer on separations and obstacles. Of many violations the deepest are listed.
+    fn answer(&self) -> Answer {
+        let (flight, audit, clearance) = (self.flight, &self.flight.audit, self.flight.clearance.as_ref());
+        let delta_m = self.scenario.delta_m;
+        let closest = audit.closest.filter(|found| found.separation_m.is_finite() && found.time_s.is_finite());
+        let closest = closest.map(|found| self.approach(found.pair.into(), found.separation_m, found.time_s, delta_m));
+        let nearest = clearance.into_iter().flat_map(|outcome| &outcome.closest);
+        let nearest = nearest.map(|found| self.approach(found.pair, found.certain_m(), found.time_s, found.limit_m));
+        let of_pairs = audit.violations.iter().map(|found| self.violation(found));
+        let of_obstacles = clearance.into_iter().flat_map(|outcome| &outcome.violations);
+        let violations = of_pairs.chain(of_obstacles.map(|found| self.violation(found))).collect();
+        let undecided_by_obstacles =
+            clearance.map_or(0, |outcome| outcome.undecided.len() as u64 + outcome.unresolved + outcome.refused);
+        let undecided = audit.unresolved + audit.refused + undecided_by_obstacles;
+        Answer {
+            status_so_far: flight.status_so_far(),
+            closest: closest.into_iter().chain(nearest).collect(),
+            violations: FindingList::deepest(violations),
+            undecided: FindingList { count: undecided, is_exact: true, listed: Vec::new() },
+            detectors: Some(Detectors {
+                steps: Some(audit.steps),
+                segments: None,
+                pairs_swept: audit.pairs_checked,
+                parry_contact_s: audit.parry.min_toi_s.and_then(finite),
+                parry_disagreements: audit.parry.disagreements
+                    + clearance.map_or(0, |outcome| outcome.parry.disagreements),
+                rapier_contact_pairs: self.scenario.has_engine().then_some(flight.engine_contacts.len() as u64),
+            }),
+            ..Answer::new(Part::Separation, flight.status())
         }
+    }
+
+    fn certificate(&self) -> FlightCertificate {
+        let Certificate { certified_m, certified_clearance_margin_m, certified_until_s, void, .. } =
+            &self.flight.certificate;
+        let margin_m = self.flight.clearance.as_ref().and(*certified_clearance_margin_m);
+        FlightCertificate {
+            separation_m: certified_m.and_then(finite),
+            clearance_margin_m: margin_m.and_then(finite),
+            until_s: certified_until_s.and_then(finite),
+            void: void.clone(),
+        }
+    }
+
+    fn ellipsoid(&self) -> Option<Ellipsoid> {
+        let closest = self.flight.in_metres.as_ref().and_then(|in_metres| in_metres.closest);
+        Some(Ellipsoid {
+            half_axes_m: self.scenario.half_axes_m()?,
+            min_distance_m: closest.and_then(|closest| finite(closest.separation_m)),
+            min_distance_at_s: closest.and_then(|closest| finite(closest.time_s)),
+            min_distance_pair: closest.map(|closest| closest.pair.numbers()),
+        })
     }
 
     fn vehicle(&self) -> Option<VehicleNumbers> {
@@ -542,7 +495,7 @@ impl Report {
         let mut report = Self {
             question: Question {
                 delta: Some(scenario.delta_m),
-                unit: if scenario.half_axes_m().is_some() { "m, scaled" } else { "m" },
+                unit: result.unit(),
                 ellipsoid_m: scenario.half_axes_m(),
                 obstacles: scenario.obstacles.iter().map(|obstacle| obstacle.name.clone()).collect(),
                 ..Question::default()
@@ -553,16 +506,19 @@ impl Report {
                 // A path leaves the chord of its step by less than a bound, which the audit adds.
                 Fact::name(FactKind::Motion, Source::Deduced, CHORDS)
             }],
-            scenario: ScenarioIdentity { name: scenario.name.clone(), sha256: scenario.sha256_hex() },
+            scenario: ScenarioIdentity {
+                name: scenario.name.clone(),
+                sha256: result.preflight.resolved.sha256.clone(),
+            },
             tool: Tool { name: tautline_core::PROGRAM.to_owned(), version: tautline_core::VERSION.to_owned() },
             verdict: Verdict { pass: false, reasons: Vec::new() },
-            separation: result.separation(),
-            audit: result.audit(),
+            answer: result.answer(),
+            certificate: result.certificate(),
+            ellipsoid: result.ellipsoid(),
             vehicle: result.vehicle(),
             network: flight.traffic,
             shield: flight.shield.as_ref().map(ShieldNumbers::from),
             failures: failed.map(FailedVehicle::from).collect(),
-            obstacles: Obstacles::of(result),
             hulls: Hulls::of(result),
             formation: FormationNumbers {
                 reached: result.reached_at_s().is_some(),
@@ -600,58 +556,49 @@ impl Report {
         report
     }
 
-    /// Returns the answer on separations and obstacles. Of many violations the deepest are listed.
+    /// Returns the safety distance delta \[m\].
     #[must_use]
-    pub fn answer(&self) -> Answer {
-        let (limit_m, unit) = (self.separation.delta_m, self.question.unit);
-        let names = |pair: Pair| pair.numbers().map(|number| number.to_string());
-        let of_obstacle = |found: &ObstacleApproach| {
-            let named = self.question.obstacles.iter().position(|name| *name == found.obstacle);
-            let obstacle = named.unwrap_or(self.question.obstacles.len());
-            let names = [found.vehicle.to_string(), found.obstacle.clone()];
-            (ObjectPair::Obstacle { vehicle: found.vehicle - 1, obstacle }, names)
-        };
-        let approach =
-            |pair, min_m, time_s, limit_m| Approach { pair, lower_m: min_m, upper_m: min_m, time_s, limit_m };
-        let closest = self.separation.closest().map(|closest| {
-            let pair = ObjectPair::Vehicles(closest.pair);
-            Finding::approach(&approach(pair, closest.separation_m, closest.time_s, limit_m), names(closest.pair), unit)
-        });
-        let obstacles = || self.obstacles.iter();
-        let nearest = obstacles().flat_map(|judged| &judged.closest).map(|found| {
-            let (pair, names) = of_obstacle(found);
-            Finding::approach(&approach(pair, found.min_m, found.min_at_s, found.clearance_m), names, "m")
-        });
-        let of_pairs = self.audit.violations.iter().map(|found| {
-            let &Violation { pair, from_s, to_s, min_m, min_at_s } = found;
-            let numbers = names(pair);
-            let pair = ObjectPair::Vehicles(pair);
-            Finding::violation(&audit::Violation { pair, from_s, to_s, min_m, min_at_s, limit_m }, numbers, unit, true)
-        });
-        let of_obstacles =
-            obstacles().flat_map(|judged| &judged.violations).map(|ObstacleViolation { approach, from_s, to_s }| {
-                let (pair, names) = of_obstacle(approach);
-                let &ObstacleApproach { min_m, min_at_s, clearance_m: limit_m, .. } = approach;
-                let (from_s, to_s) = (*from_s, *to_s);
-                Finding::violation(&audit::Violation { pair, from_s, to_s, min_m, min_at_s, limit_m }, names, "m", true)
-            });
-        let violations: Vec<_> = of_pairs.chain(of_obstacles).collect();
-        let undecided = self.audit.undecided + obstacles().map(|judged| judged.undecided).sum::<u64>();
-        Answer {
-            closest: closest.into_iter().chain(nearest).collect(),
-            violations: FindingList::deepest(violations),
-            undecided: FindingList { count: undecided, is_exact: true, listed: Vec::new() },
-            detectors: Some(Detectors {
-                steps: Some(self.audit.steps),
-                segments: None,
-                pairs_swept: self.audit.pairs_checked,
-                parry_contact_s: self.audit.parry.min_toi_s,
-                parry_disagreements: self.audit.parry.disagreements
-                    + obstacles().map(|judged| judged.disagreements).sum::<u64>(),
-                rapier_contact_pairs: self.audit.rapier.contact_pairs,
-            }),
-            ..Answer::new(Part::Separation, self.audit.status)
-        }
+    pub fn delta_m(&self) -> f64 {
+        self.question.delta.unwrap_or_default()
+    }
+
+    /// Returns the closest approach of two vehicles over the flight.
+    #[must_use]
+    pub fn closest_pair(&self) -> Option<ClosestApproach> {
+        self.answer.closest.iter().find_map(|found| {
+            let Objects::Pair(ObjectPair::Vehicles(pair)) = found.objects else { return None };
+            Some(ClosestApproach { pair, separation_m: found.value.upper?, time_s: found.at_s? })
+        })
+    }
+
+    /// Returns the smallest separation of two vehicles over the flight \[m\].
+    #[must_use]
+    pub fn min_separation_m(&self) -> Option<f64> {
+        self.closest_pair().map(|closest| closest.separation_m)
+    }
+
+    /// Returns the closest approach of a vehicle to an obstacle, beside its clearance.
+    pub(super) fn closest_obstacle(&self) -> Option<&Finding> {
+        self.answer.closest.iter().find(|found| found.is_of_obstacle())
+    }
+
+    /// Returns the number of contradictions of the two detectors.
+    pub(super) fn disagreements(&self) -> u64 {
+        self.answer.detectors.map_or(0, |detectors| detectors.parry_disagreements)
+    }
+
+    /// Returns the closest approach and the violations, the gravest first. Distances and times are those of the audit.
+    #[must_use]
+    pub fn moments(&self) -> Vec<Moment> {
+        moments(std::slice::from_ref(&self.answer)).collect()
+    }
+
+    /// Returns the limit of separations, and whether the audit decided everything else.
+    #[must_use]
+    pub fn judgement(&self) -> JudgementContext {
+        let is_open = self.answer.undecided.count + self.disagreements() > 0;
+        let is_else_known = self.answer.status_so_far != Status::Undecided && !is_open;
+        JudgementContext { is_else_known, limit: self.question.delta, unit: self.question.unit }
     }
 
     /// Returns the report as indented JSON with a final line break.
@@ -686,14 +633,10 @@ impl Serialize for Report {
             #[serde(flatten)]
             judgement: Judgement,
             reasons: &'a [Reason],
-            certificate: FlightCertificate<'a>,
-            #[serde(skip_serializing_if = "Option::is_none")]
-            ellipsoid: Option<&'a Ellipsoid>,
             #[serde(flatten)]
             rest: Rest<'a>,
         }
-        let status = self.audit.status;
-        let separation = &self.separation;
+        let status = self.answer.status;
         let document = Document {
             judgement: Judgement {
                 schema_version: SCHEMA_VERSION,
@@ -703,37 +646,16 @@ impl Serialize for Report {
                     && self.verdict.is_motion_of_the_law()
                     && !self.facts.iter().any(Fact::is_assumption),
                 question: self.question.clone(),
-                answers: vec![self.answer()],
+                answers: vec![self.answer.clone()],
                 facts: self.facts.clone(),
                 window_s: Some((0.0, self.run.duration_s)),
                 vehicles: (1..=self.run.vehicles).map(|number| number.to_string()).collect(),
             },
             reasons: &self.verdict.reasons,
-            certificate: FlightCertificate {
-                separation_m: separation.certified_m,
-                clearance_margin_m: self.obstacles.as_ref().and_then(|judged| judged.certified_clearance_margin_m),
-                until_s: separation.certified_until_s,
-                void: &separation.certificate_void,
-            },
-            ellipsoid: separation.ellipsoid.as_ref(),
             rest: Rest(self),
         };
         document.serialize(serializer)
     }
-}
-
-/// Certificate of a flight, before the first step or after slots were spread if that is smaller.
-#[derive(Serialize)]
-struct FlightCertificate<'a> {
-    /// Certified separation \[m\]; null if nothing is certified.
-    separation_m: Option<f64>,
-    /// Certified distance beyond the clearance of every obstacle \[m\]; null without obstacles or certificate.
-    clearance_margin_m: Option<f64>,
-    /// Time up to which the certificate holds \[s\]; null if it has no end or nothing is certified.
-    until_s: Option<f64>,
-    /// Reasons why nothing is certified, objects with `code` and `text`.
-    #[serde(serialize_with = "serialize_coded")]
-    void: &'a [VoidReason],
 }
 
 /// Returns the number if it is finite.

@@ -2,14 +2,14 @@
 
 use maud::{Markup, html};
 
-use super::flight::{Report, Violation};
-use super::obstacles::Obstacles;
+use super::findings::{closest_table, lists};
+use super::flight::Report;
 use super::page::{self, Badge, Page, Picture, Start};
 use super::section::Section;
 use crate::figures::Figure;
 use crate::replay::{NoReplay, Replay};
 use tautline_core::swarm::Bounce;
-use tautline_core::text::{beside_limit, seconds, significant, up_to};
+use tautline_core::text::{seconds, significant, up_to};
 use tautline_laws::formation::Freedom;
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::{PlantSpec, Scenario};
@@ -83,34 +83,25 @@ impl Report {
 
     /// Returns the lists of findings of the page.
     fn sections(&self) -> Vec<Section> {
-        let violation = |violation: &Violation| {
-            let [from, to, at] = [violation.from_s, violation.to_s, violation.min_at_s].map(seconds);
-            let min = beside_limit(violation.min_m, self.separation.delta_m, 6);
-            [violation.pair.to_string(), from, to, format!("{min} m"), at]
-        };
-        let columns = &["Vehicles", "From", "To", "Smallest", "At"];
-        let caption = "intervals in which a pair was below delta";
-        let violations = Section::table("Violations", caption, columns, self.audit.violations.iter().map(violation));
         let hit = |bounce: &Bounce| {
             [bounce.pair.to_string(), seconds(bounce.time_s), format!("{} m/s", up_to(bounce.closing_m_s))]
         };
         let caption = "after the first collision the motion is not governed by the law";
         let hits = self.hulls.bounces.iter().flatten().map(hit);
         let hits = Section::table("Hulls that hit", caption, &["Vehicles", "At", "Closing speed"], hits);
-        let obstacles = self.obstacles.iter().flat_map(Obstacles::sections);
-        [violations, hits].into_iter().chain(obstacles).filter(|section| !section.rows.is_empty()).collect()
+        let [violations, _] = lists(|| std::iter::once(&self.answer));
+        let sections = [violations, hits, closest_table(&self.answer, true)];
+        sections.into_iter().filter(|section| !section.rows.is_empty()).collect()
     }
 
     fn assumptions(&self, scenario: &Scenario) -> Vec<String> {
-        let certificate = if let (Some(shield), Some(_)) = (&self.shield, self.separation.certified_m) {
+        let certificate = if let (Some(shield), Some(_)) = (&self.shield, self.certificate.separation_m) {
             format!("With the shield between law and vehicles: {}.", shield.certificate)
-        } else if self.separation.certified_m.is_some() {
+        } else if self.certificate.separation_m.is_some() {
             scenario.flown_law().map_or_else(|error| error.to_string(), |law| law.capabilities().assumptions.to_owned())
         } else {
-            {
-                let void: Vec<_> = self.separation.certificate_void.iter().map(ToString::to_string).collect();
-                format!("No distance is certified. {}", void.join(" "))
-            }
+            let void: Vec<_> = self.certificate.void.iter().map(ToString::to_string).collect();
+            format!("No distance is certified. {}", void.join(" "))
         };
         let moved = match scenario.flown_law().map(|law| law.capabilities().controls.freedom()) {
             Ok(Freedom::Fixed) => "where the reference has moved it",
@@ -119,7 +110,7 @@ impl Report {
         };
         let (time, judge) = (&scenario.time, &scenario.arrival);
         let (plant, command) = plant(scenario);
-        let lengths = self.separation.ellipsoid.as_ref().map(|ellipsoid| {
+        let lengths = self.ellipsoid.as_ref().map(|ellipsoid| {
             let [_, _, half_height_m] = ellipsoid.half_axes_m;
             format!(
                 "An ellipsoid around each vehicle must stay empty; it reaches {half_height_m} m above and below the \
@@ -169,7 +160,7 @@ impl Report {
                 "The same program gives the same motion to the last bit, on any number of threads: the hash of all \
                  recorded states is " (self.run.state_hash) "."
             }
-            (folded_scenario(&page.scenario.resolved_toml(), &self.scenario.sha256))
+            (folded_scenario(&page.preflight.resolved.toml, &self.scenario.sha256))
         }
     }
 }

@@ -10,8 +10,6 @@ mod flight;
 mod html;
 mod hulls;
 mod legs;
-mod moments;
-mod obstacles;
 pub mod page;
 pub mod recorded;
 mod section;
@@ -21,17 +19,15 @@ mod words;
 
 pub use answer::{Answer, Detectors, Enclosure, Finding, FindingList, Judgement, Objects, Part, Question};
 pub use flight::{
-    Audit, ClosedForm, Control, Ellipsoid, Energy, FailedVehicle, FlightResult, FormationNumbers, Parry, Performance,
-    Rapier, Report, Run, SCHEMA_VERSION, ScenarioIdentity, Separation, Tool, VehicleNumbers, Velocity, Verification,
-    Violation,
+    Control, Ellipsoid, Energy, FailedVehicle, FlightCertificate, FlightResult, FormationNumbers, Performance, Report,
+    Run, SCHEMA_VERSION, ScenarioIdentity, Tool, VehicleNumbers, Velocity, Verification,
 };
 pub use html::RunPage;
 pub use hulls::{Hulls, PassedThrough};
 pub use legs::LegNumbers;
-pub use obstacles::{ObstacleApproach, ObstacleViolation, Obstacles};
 pub use shield::ShieldNumbers;
 pub use tautline_audit::Status;
-pub use verdict::{PairApproach, Reason, UnmetCriterion, Verdict};
+pub use verdict::{Reason, UnmetCriterion, Verdict};
 
 #[cfg(test)]
 mod tests;

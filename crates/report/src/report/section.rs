@@ -18,12 +18,10 @@ pub(super) struct Section {
 /// Returns a sentence on the content of a section for the first reader of a page.
 fn about(heading: &str) -> &'static str {
     match heading {
-        "Violations" => "Two vehicles, or a vehicle and its limit, were closer than allowed in each of these times.",
-        "Violations of clearance" => "A vehicle was closer to an obstacle than its clearance in each of these times.",
+        "Violations" => "A distance or the value of a vehicle was beyond its limit in each of these times.",
         "Hulls that hit" => "Two vehicles touched; the law does not govern the motion after the first collision.",
-        "Obstacles" => "Smallest distance of a vehicle from the surface of an obstacle; below zero is inside.",
         "Closest pairs" => "The pairs of vehicles that came closest, the closest first.",
-        "Closest to obstacles" => "The vehicles that came closest to an obstacle, the closest first.",
+        "Closest to obstacles" => "The vehicles that came closest to an obstacle; a distance below zero is inside.",
         "Each vehicle by itself" => "Limits of single vehicles, such as speed, with the vehicle nearest to each.",
         "Presence" => "Vehicles that the recording does not contain from its start to its end.",
         "Undecided" => "Times in which the recording is too coarse to prove or refute a violation.",

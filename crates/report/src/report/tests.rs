@@ -345,7 +345,10 @@ fn clear_run_that_reached_its_formation_passes() {
     assert!(report.verdict.pass);
     assert_eq!(report.verdict.reasons, Vec::new());
     assert_eq!(report.headline(), "CLEAR: never closer than 2.460 m (delta 2.000 m), formation reached at 36.50 s");
-    assert_eq!((report.separation.min_pair, report.audit.status), (Some([1, 2]), Status::Clear));
+    assert_eq!(
+        (report.closest_pair().map(|of| of.pair.numbers()), report.answer.status),
+        (Some([1, 2]), Status::Clear)
+    );
 }
 
 #[test]
@@ -353,8 +356,8 @@ fn violation_names_pair_distance_and_time() {
     let case = Case { audit: passing(1.5327), certificate: Certificate::void(VoidReason::NoBarrier), ..Case::good() };
     assert_eq!(case.reason(), "Vehicles 1 and 2 came to 1.532 m at 0.50 s; the safety distance is 2.000 m.");
     assert_eq!(case.report().headline(), "VIOLATION: vehicles 1 and 2 came to 1.532 m (delta 2.000 m) at 0.50 s");
-    let violation = &case.report().audit.violations[0];
-    assert_eq!((violation.pair, violation.min_m), (Pair::new(0, 1), 1.5327));
+    let violation = &case.report().answer.violations.listed[0];
+    assert_eq!((violation.subjects.join(" "), violation.value.upper), ("1 2".to_owned(), Some(1.5327)));
 }
 
 #[test]
@@ -503,11 +506,11 @@ fn early_end_is_a_reason() {
 #[test]
 fn void_certificate_gives_its_reasons() {
     let report = Case::good().report();
-    assert_eq!((report.separation.certified_m, report.separation.certificate_void.len()), (Some(2.055_307), 0));
+    assert_eq!((report.certificate.separation_m, report.certificate.void.len()), (Some(2.055_307), 0));
     assert!(report.text().contains("certified 2.055307 m"));
     let report = Case { certificate: Certificate::void(VoidReason::NoBarrier), ..Case::good() }.report();
-    assert_eq!(report.separation.certified_m, None);
-    assert_eq!(report.separation.certificate_void, [VoidReason::NoBarrier]);
+    assert_eq!(report.certificate.separation_m, None);
+    assert_eq!(report.certificate.void, [VoidReason::NoBarrier]);
     assert!(report.text().contains("not certified"));
 }
 
@@ -637,7 +640,7 @@ fn violated_clearance_or_certificate_of_an_obstacle_does_not_pass() {
          certified 0.600 m beyond";
     assert!(broken.headline().starts_with(said), "{}", broken.headline());
     let violated = report(1.25, None);
-    assert_eq!((violated.audit.status, violated.audit.violations.len()), (Status::Violation, 0));
+    assert_eq!((violated.answer.status, violated.answer.violations.count), (Status::Violation, 1));
     let said = "VIOLATION: vehicle 1 came to 0.250 m from obstacle tower at 0.50 s (clearance 0.500 m)";
     assert_eq!(violated.headline(), said);
     assert!(report(0.25, None).headline().contains("0.750 m inside obstacle tower"));
@@ -649,7 +652,7 @@ fn undecided_times_count_beside_a_violation() {
         let (mut audit, mut clearance) = (passing(1.5), passing_a_ball(1.25));
         change(&mut audit, &mut clearance);
         let report = Case { audit, clearance: Some(clearance), ..Case::good() }.report();
-        assert_eq!(report.audit.status, Status::Violation);
+        assert_eq!(report.answer.status, Status::Violation);
         report.judgement().is_else_known
     };
     assert!(is_all_known(|_, _| {}));
@@ -664,13 +667,13 @@ fn ellipsoids_report_scaled_and_unscaled_distances() {
     let case = Case { in_metres: Some(passing(1.25)), ..Case::good() };
     let report = case.report();
     assert!(report.headline().starts_with("CLEAR: never closer than 2.460 m scaled to ellipsoids (delta 2.000 m)"));
-    let ellipsoid = report.separation.ellipsoid.as_ref().expect("an ellipsoid");
-    assert_eq!((report.separation.min_m, ellipsoid.min_distance_m), (Some(2.4607), Some(1.25)));
+    let ellipsoid = report.ellipsoid.as_ref().expect("an ellipsoid");
+    assert_eq!((report.min_separation_m(), ellipsoid.min_distance_m), (Some(2.4607), Some(1.25)));
     assert!(report.text().contains(
         "ellipsoids   half axes 1.000, 1.000, 3.000 m; unscaled, centres never closer than 1.250000 m at 0.50 s, \
          vehicles 1 and 2\n"
     ));
-    assert_eq!(Case::good().report().separation.ellipsoid, None);
+    assert_eq!(Case::good().report().ellipsoid, None);
 }
 
 fn early() -> Case {
@@ -680,7 +683,7 @@ fn early() -> Case {
 #[test]
 fn early_end_of_a_clear_flight_is_undecided() {
     let report = early().report();
-    assert_eq!((report.audit.status, report.audit.undecided), (Status::Undecided, 0));
+    assert_eq!((report.answer.status, report.answer.undecided.count), (Status::Undecided, 0));
     assert!(!report.verdict.pass);
     assert_eq!(
         report.headline(),
@@ -692,14 +695,14 @@ fn early_end_of_a_clear_flight_is_undecided() {
     // The same flight, flown to its end.
     let whole = Case { ending: Ending::Completed, ..early() }.report();
     assert_eq!(whole.formation.at_rest, Some(true));
-    assert_eq!(whole.audit.status, Status::Clear);
+    assert_eq!(whole.answer.status, Status::Clear);
     assert!(whole.headline().ends_with(" (clear: never closer than 2.460 m, delta 2.000 m)"), "{}", whole.headline());
 }
 
 #[test]
 fn early_end_keeps_violations_and_other_undecided_times() {
     let violated = Case { audit: passing(1.5), ..early() }.report();
-    assert_eq!(violated.audit.status, Status::Violation);
+    assert_eq!(violated.answer.status, Status::Violation);
     let headline = violated.headline();
     assert!(
         headline.starts_with("VIOLATION: ") && headline.ends_with("; the flight ended early at 120.00 s"),

@@ -1,13 +1,14 @@
 //! Verdict on a flight and its reasons, as data. [`super::words`] turns reasons into sentences.
 
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 
+use super::answer::{Finding, Objects};
 use super::flight::{FailedVehicle, FlightResult, Report};
 use super::hulls::PassedThrough;
 use super::legs::LegNumbers;
-use super::obstacles::{ObstacleApproach, Obstacles};
-use tautline_audit::{Disagreement, Status, Violation};
+use tautline_audit::{Disagreement, ObjectPair, Status};
 use tautline_core::fact::Coded;
+use tautline_core::impl_coded;
 use tautline_core::record::EnergyRise;
 use tautline_core::swarm::{Bounce, Pair};
 use tautline_sim::metrics::Summary;
@@ -24,20 +25,6 @@ pub struct Verdict {
     pub reasons: Vec<Reason>,
 }
 
-/// Closest approach of a pair of vehicles, beside its limit.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[non_exhaustive]
-pub struct PairApproach {
-    /// The two vehicles.
-    pub pair: Pair,
-    /// Smallest separation \[m\].
-    pub min_m: f64,
-    /// Time of `min_m` \[s\].
-    pub min_at_s: f64,
-    /// Separation that is required or certified \[m\].
-    pub limit_m: f64,
-}
-
 /// Reason against a pass. In JSON an object with `code`, `text` and `data`, the fields of the variant.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(remote = "Self", untagged)]
@@ -51,26 +38,26 @@ pub enum Reason {
     /// A pair came below delta.
     Violation {
         /// Deepest violation.
-        #[serde(flatten)]
-        deepest: PairApproach,
+        #[serde(flatten, serialize_with = "serialize_approach")]
+        deepest: Finding,
         /// Number of violations of pairs.
         violations: usize,
     },
     /// A pair came below delta in the flown motion, and integration may have caused it.
-    UnresolvedByStep(PairApproach),
+    UnresolvedByStep(#[serde(serialize_with = "serialize_approach")] Finding),
     /// A vehicle came below the clearance of an obstacle.
     ObstacleViolation {
         /// Deepest violation.
-        #[serde(flatten)]
-        deepest: ObstacleApproach,
+        #[serde(flatten, serialize_with = "serialize_approach")]
+        deepest: Finding,
         /// Number of violations of obstacles.
         violations: usize,
     },
     /// A vehicle came nearer to an obstacle than certified.
     ObstacleCertificateBroken {
         /// The approach.
-        #[serde(flatten)]
-        approach: ObstacleApproach,
+        #[serde(flatten, serialize_with = "serialize_approach")]
+        approach: Finding,
         /// Certified distance beyond every clearance \[m\].
         certified_clearance_margin_m: f64,
     },
@@ -80,7 +67,7 @@ pub enum Reason {
         disagreements: u64,
     },
     /// A vehicle came below a clearance in the flown motion, and integration may have caused it.
-    ObstacleUnresolvedByStep(ObstacleApproach),
+    ObstacleUnresolvedByStep(#[serde(serialize_with = "serialize_approach")] Finding),
     /// Not every distance from an obstacle is decided.
     ObstacleUndecided {
         /// Number of undecided times.
@@ -119,9 +106,9 @@ pub enum Reason {
     NotJudged {},
     /// A pair came closer than certified.
     CertificateBroken {
-        /// The approach, with the certified separation.
-        #[serde(flatten)]
-        approach: PairApproach,
+        /// The approach, with the certified separation as its limit.
+        #[serde(flatten, serialize_with = "serialize_approach")]
+        approach: Finding,
         /// Whether the shield certifies; otherwise the law does.
         by_shield: bool,
     },
@@ -197,35 +184,64 @@ pub enum Reason {
     },
 }
 
-impl Coded for Reason {
-    fn code(&self) -> &'static str {
-        match self {
-            Self::Refused { .. } => "refused",
-            Self::Violation { .. } => "violation",
-            Self::UnresolvedByStep(_) => "unresolved-by-step",
-            Self::ObstacleViolation { .. } => "obstacle-violation",
-            Self::ObstacleCertificateBroken { .. } => "obstacle-certificate-broken",
-            Self::ObstacleDetectorsDisagree { .. } => "obstacle-detectors-disagree",
-            Self::ObstacleUnresolvedByStep(_) => "obstacle-unresolved-by-step",
-            Self::ObstacleUndecided { .. } => "obstacle-undecided",
-            Self::PassedThrough { .. } => "passed-through",
-            Self::HullsHit { .. } => "hulls-hit",
-            Self::DetectorsDisagree { .. } => "detectors-disagree",
-            Self::PathsBend { .. } => "paths-bend",
-            Self::NotJudged {} => "not-judged",
-            Self::CertificateBroken { .. } => "certificate-broken",
-            Self::ShieldBoundExceeded { .. } => "shield-bound-exceeded",
-            Self::LawFailed { .. } => "law-failed",
-            Self::StepsTooLong { .. } => "steps-too-long",
-            Self::EnergyRose { .. } => "energy-rose",
-            Self::EndedEarly { .. } => "ended-early",
-            Self::NotReached { .. } => "not-reached",
-            Self::LegNotReached { .. } => "leg-not-reached",
-            Self::LegNeverBegan { .. } => "leg-never-began",
-            Self::StartTooFlat { .. } => "start-too-flat",
-        }
+/// Serialises a smallest distance as the data of a reason, with names of keys that differ for pairs and obstacles.
+fn serialize_approach<S: Serializer>(found: &Finding, serializer: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    #[serde(untagged)]
+    enum Data<'a> {
+        Pair {
+            pair: Pair,
+            min_m: Option<f64>,
+            min_at_s: Option<f64>,
+            limit_m: Option<f64>,
+        },
+        Obstacle {
+            vehicle: usize,
+            obstacle: &'a str,
+            clearance_m: Option<f64>,
+            min_m: Option<f64>,
+            min_at_s: Option<f64>,
+        },
+        Vehicle {},
     }
+    let &Finding { at_s: min_at_s, limit: limit_m, ref value, .. } = found;
+    let min_m = value.upper;
+    let data = match found.objects {
+        Objects::Pair(ObjectPair::Vehicles(pair)) => Data::Pair { pair, min_m, min_at_s, limit_m },
+        Objects::Pair(ObjectPair::Obstacle { vehicle, .. }) => {
+            let (vehicle, obstacle) = (vehicle + 1, found.subjects.last().map_or("", String::as_str));
+            Data::Obstacle { vehicle, obstacle, clearance_m: limit_m, min_m, min_at_s }
+        }
+        Objects::Vehicle(_) => Data::Vehicle {},
+    };
+    data.serialize(serializer)
 }
+
+impl_coded! { Reason {
+    Self::Refused { .. } => "refused",
+    Self::Violation { .. } => "violation",
+    Self::UnresolvedByStep(_) => "unresolved-by-step",
+    Self::ObstacleViolation { .. } => "obstacle-violation",
+    Self::ObstacleCertificateBroken { .. } => "obstacle-certificate-broken",
+    Self::ObstacleDetectorsDisagree { .. } => "obstacle-detectors-disagree",
+    Self::ObstacleUnresolvedByStep(_) => "obstacle-unresolved-by-step",
+    Self::ObstacleUndecided { .. } => "obstacle-undecided",
+    Self::PassedThrough { .. } => "passed-through",
+    Self::HullsHit { .. } => "hulls-hit",
+    Self::DetectorsDisagree { .. } => "detectors-disagree",
+    Self::PathsBend { .. } => "paths-bend",
+    Self::NotJudged {} => "not-judged",
+    Self::CertificateBroken { .. } => "certificate-broken",
+    Self::ShieldBoundExceeded { .. } => "shield-bound-exceeded",
+    Self::LawFailed { .. } => "law-failed",
+    Self::StepsTooLong { .. } => "steps-too-long",
+    Self::EnergyRose { .. } => "energy-rose",
+    Self::EndedEarly { .. } => "ended-early",
+    Self::NotReached { .. } => "not-reached",
+    Self::LegNotReached { .. } => "leg-not-reached",
+    Self::LegNeverBegan { .. } => "leg-never-began",
+    Self::StartTooFlat { .. } => "start-too-flat",
+} }
 
 impl Verdict {
     /// Returns whether the flown motion is that of law and vehicles. If it is not, a clear flight proves nothing about
@@ -257,9 +273,8 @@ impl Verdict {
         let mut reasons = Vec::new();
         let warnings: Vec<_> = result.preflight.refusing().into_iter().map(str::to_owned).collect();
         reasons.extend((!warnings.is_empty()).then_some(Reason::Refused { warnings }));
-        reasons.extend(of_pairs(report, result));
-        let is_whole = result.flight.ending == Ending::Completed;
-        reasons.extend(report.obstacles.iter().flat_map(|found| of_obstacles(found, is_whole)));
+        reasons.extend(of_pairs(result));
+        reasons.extend(of_obstacles(report, result));
         reasons.extend(of_hulls(report));
         reasons.extend(undecided(result));
         reasons.extend(broken_certificate(report));
@@ -272,7 +287,7 @@ impl Verdict {
         reasons.extend(of_legs(&report.legs));
         reasons.extend(too_flat(result));
         // A status without a reason never passes.
-        if reasons.is_empty() && report.audit.status != Status::Clear {
+        if reasons.is_empty() && report.answer.status != Status::Clear {
             reasons.push(Reason::NotJudged {});
         }
         Self { pass: reasons.is_empty(), reasons }
@@ -348,44 +363,41 @@ pub(super) fn at_rest(result: &FlightResult<'_>) -> Option<bool> {
 }
 
 /// Returns the violation of a pair, or the one that integration may have caused.
-fn of_pairs(report: &Report, result: &FlightResult<'_>) -> Option<Reason> {
+fn of_pairs(result: &FlightResult<'_>) -> Option<Reason> {
     let audit = &result.flight.audit;
-    let limit_m = report.separation.delta_m;
-    let deepest = audit.violations.iter().min_by(|a, b| a.min_m.total_cmp(&b.min_m));
-    let deepest =
-        deepest.map(|&Violation { pair, min_m, min_at_s, .. }| PairApproach { pair, min_m, min_at_s, limit_m })?;
-    let violations = audit.violations.len();
+    let deepest = result.deepest(&audit.violations)?;
     match audit.status {
-        Status::Violation => Some(Reason::Violation { deepest, violations }),
-        status => is_unresolved_by_step(status, result.flight.overlong_steps, violations)
-            .then_some(Reason::UnresolvedByStep(deepest)),
+        Status::Violation => Some(Reason::Violation { deepest, violations: audit.violations.len() }),
+        // A step was too long for the law before or within the first violation.
+        _ => (result.flight.overlong_steps > 0).then_some(Reason::UnresolvedByStep(deepest)),
     }
 }
 
-/// Returns whether integration may have caused all violations: a step was too long for the law before or within the
-/// first one.
-pub(super) fn is_unresolved_by_step(status: Status, overlong_steps: u64, violations: usize) -> bool {
-    status == Status::Undecided && overlong_steps > 0 && violations > 0
-}
-
-/// Returns the reasons of obstacles. An early end (not `is_whole`) has a reason of its own.
-fn of_obstacles(found: &Obstacles, is_whole: bool) -> Vec<Reason> {
-    let &Obstacles { status, undecided, disagreements, .. } = found;
-    let violations = found.violations.len();
-    let deepest = found.deepest().cloned();
+/// Returns the reasons of obstacles.
+fn of_obstacles(report: &Report, result: &FlightResult<'_>) -> Vec<Reason> {
+    let Some(outcome) = &result.flight.clearance else { return Vec::new() };
+    let (disagreements, violations) = (outcome.parry.disagreements, outcome.violations.len());
+    let deepest = result.deepest(&outcome.violations);
     let mut reasons = Vec::new();
-    match (status, deepest.clone()) {
+    match (outcome.status, deepest.clone()) {
         (Status::Violation, Some(deepest)) => reasons.push(Reason::ObstacleViolation { deepest, violations }),
-        _ => reasons.extend(found.broken_certificate().map(|(certified_clearance_margin_m, approach)| {
-            Reason::ObstacleCertificateBroken { approach: approach.clone(), certified_clearance_margin_m }
-        })),
+        _ => reasons.extend(broken_clearance(report)),
     }
     reasons.extend((disagreements > 0).then_some(Reason::ObstacleDetectorsDisagree { disagreements }));
-    let is_open = is_whole || undecided > 0 || deepest.is_some();
-    if status == Status::Undecided && disagreements == 0 && is_open {
+    if outcome.status == Status::Undecided && disagreements == 0 {
+        let undecided = outcome.undecided.len() as u64 + outcome.unresolved + outcome.refused;
         reasons.push(deepest.map_or(Reason::ObstacleUndecided { undecided }, Reason::ObstacleUnresolvedByStep));
     }
     reasons
+}
+
+/// Returns the reason of an approach to an obstacle below the certified distance, by more than the error of
+/// integration.
+fn broken_clearance(report: &Report) -> Option<Reason> {
+    let certified_clearance_margin_m = report.certificate.clearance_margin_m?;
+    let approach = report.closest_obstacle()?.clone();
+    let is_broken = approach.margin() < certified_clearance_margin_m * (1.0 - INTEGRATION);
+    is_broken.then_some(Reason::ObstacleCertificateBroken { approach, certified_clearance_margin_m })
 }
 
 fn of_hulls(report: &Report) -> impl Iterator<Item = Reason> {
@@ -452,8 +464,8 @@ pub(super) fn energy_rises(result: &FlightResult<'_>) -> bool {
 /// Returns the reason of a broken certificate. The proof is of continuous time: a separation below the certified one
 /// shows a step that is too long for the law's barrier, or loss of digits.
 fn broken_certificate(report: &Report) -> Option<Reason> {
-    let (limit_m, closest) = (report.separation.certified_m?, report.separation.closest()?);
-    let approach = PairApproach { pair: closest.pair, min_m: closest.separation_m, min_at_s: closest.time_s, limit_m };
+    let closest = report.answer.closest.iter().find(|found| !found.is_of_obstacle())?.clone();
+    let approach = Finding { limit: report.certificate.separation_m, ..closest };
     let by_shield = report.shield.is_some();
     report.breaks_certificate().then_some(Reason::CertificateBroken { approach, by_shield })
 }

@@ -5,11 +5,11 @@ use std::fmt::{self, Display, Formatter};
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
+use super::answer::Finding;
 use super::flight::{Ellipsoid, FailedVehicle, Performance, Report, VehicleNumbers, Verification};
 use super::hulls::{PassedThrough, vehicles};
-use super::obstacles::Obstacles;
 use super::shield::ShieldNumbers;
-use super::verdict::{PairApproach, Reason, UnmetCriterion, breaks_certificate, is_unresolved_by_step};
+use super::verdict::{Reason, UnmetCriterion, breaks_certificate};
 use tautline_audit::Status;
 use tautline_core::fact::Coded;
 use tautline_core::swarm::Bounce;
@@ -68,8 +68,26 @@ fn others(violations: usize) -> String {
     }
 }
 
-fn came_to(PairApproach { pair, min_m, min_at_s, limit_m }: &PairApproach) -> String {
-    format!("{} came to {} m at {}", vehicles(*pair), beside_limit(*min_m, *limit_m, 3), seconds(*min_at_s))
+/// Returns a smallest distance of two vehicles, with the words `limit` behind it, or of a vehicle from an obstacle.
+fn came_to(found: &Finding, limit: &str) -> String {
+    let (min_m, limit_m) = (found.value.upper_bound(), found.limit.unwrap_or_default());
+    let at = seconds(found.at_s.unwrap_or_default());
+    let near = beside_limit(min_m, limit_m, 3);
+    let (vehicle, obstacle) = match &found.subjects[..] {
+        [vehicle, obstacle] if found.is_of_obstacle() => (vehicle, obstacle),
+        _ => return format!("vehicles {} came to {near} m{limit} at {at}", found.names()),
+    };
+    let clearance = exact(limit_m);
+    if min_m < 0.0 {
+        let deep = up_to(-min_m);
+        return format!("vehicle {vehicle} was {deep} m inside obstacle {obstacle} at {at} (clearance {clearance} m)");
+    }
+    format!("vehicle {vehicle} came to {near} m from obstacle {obstacle} at {at} (clearance {clearance} m)")
+}
+
+/// Returns a smallest separation below a certified one, in metres each.
+fn below_certified(found: &Finding) -> [String; 2] {
+    below_bound(found.value.upper_bound(), found.limit.unwrap_or_default())
 }
 
 /// Writes the reason in sentences, with a remedy.
@@ -81,26 +99,26 @@ impl Display for Reason {
             Self::Violation { deepest, violations } => write!(
                 out,
                 "{}; the safety distance is {} m.{}",
-                capitalised(&came_to(deepest)),
-                exact(deepest.limit_m),
+                capitalised(&came_to(deepest, "")),
+                exact(deepest.limit.unwrap_or_default()),
                 others(*violations)
             ),
             Self::UnresolvedByStep(deepest) => write!(
                 out,
                 "The step cannot resolve whether the safety distance of {} m is kept. In the flown motion {}, but the \
                  integration error of steps that are too long for the law may be larger.",
-                exact(deepest.limit_m),
-                came_to(deepest)
+                exact(deepest.limit.unwrap_or_default()),
+                came_to(deepest, "")
             ),
             Self::ObstacleViolation { deepest, violations } => {
-                write!(out, "A vehicle came too near to an obstacle: {}.{}", deepest.brief(), others(*violations))
+                write!(out, "A vehicle came too near to an obstacle: {}.{}", came_to(deepest, ""), others(*violations))
             }
             Self::ObstacleCertificateBroken { approach, certified_clearance_margin_m } => write!(
                 out,
                 "The law certifies {} m beyond every clearance in continuous time, and {}: the flown motion is not \
                  the one that the proof covers. Shorten time.dt_s.",
                 separation(*certified_clearance_margin_m),
-                approach.brief()
+                came_to(approach, "")
             ),
             Self::ObstacleDetectorsDisagree { disagreements } => write!(
                 out,
@@ -111,7 +129,7 @@ impl Display for Reason {
                 out,
                 "The step cannot resolve whether the clearance of obstacles is kept. In the flown motion {}, but the \
                  integration error of steps that are too long for the law may be larger.",
-                deepest.brief()
+                came_to(deepest, "")
             ),
             Self::ObstacleUndecided { .. } => {
                 out.write_str("The audit cannot decide whether every vehicle kept its clearance from the obstacles.")
@@ -149,9 +167,9 @@ impl Display for Reason {
                 out.write_str("The audit could not judge every pair and step, so it does not exclude a violation.")
             }
             Self::CertificateBroken { approach, by_shield } => {
-                let [min, certified] = below_bound(approach.min_m, approach.limit_m);
-                let pair = vehicles(approach.pair);
-                let broken = format!("{pair} came to {min} m: the flown motion is not the one that the proof covers");
+                let ([min, certified], pair) = (below_certified(approach), approach.names());
+                let broken =
+                    format!("vehicles {pair} came to {min} m: the flown motion is not the one that the proof covers");
                 if *by_shield {
                     return write!(out, "The assumptions of the shield held and imply {certified} m, but {broken}.");
                 }
@@ -265,7 +283,7 @@ impl Reason {
             Self::Refused { warnings } => format!("refused by check: {}", warnings.join(", ")),
             Self::ObstacleCertificateBroken { approach, certified_clearance_margin_m } => format!(
                 "certificate broken: {}, certified {} m beyond it",
-                approach.brief(),
+                came_to(approach, ""),
                 separation(*certified_clearance_margin_m)
             ),
             Self::PassedThrough { through, are_points } => format!(
@@ -275,9 +293,9 @@ impl Reason {
             ),
             Self::HullsHit { first, collisions } => hits(first, *collisions),
             Self::CertificateBroken { approach, .. } => {
-                let [min, certified] = below_bound(approach.min_m, approach.limit_m);
-                let (pair, time) = (vehicles(approach.pair), seconds(approach.min_at_s));
-                format!("certificate broken: {pair} came to {min} m at {time}, certified {certified} m")
+                let ([min, certified], pair) = (below_certified(approach), approach.names());
+                let time = seconds(approach.at_s.unwrap_or_default());
+                format!("certificate broken: vehicles {pair} came to {min} m at {time}, certified {certified} m")
             }
             Self::ShieldBoundExceeded { exceeded } => format!("bound of the shield exceeded: {exceeded}"),
             Self::LawFailed { instants } => format!("law failed: at {}", counted(*instants, "instant", "instants")),
@@ -362,8 +380,8 @@ impl Report {
     /// - `UNDECIDED: the flight ended early at 3.20 s; until then never closer than 2.435 m (delta 2.000 m)`
     #[must_use]
     pub fn headline(&self) -> String {
-        let (failures, is_clear) = (self.failures(), self.audit.status == Status::Clear);
-        let findings = match self.audit.status {
+        let (failures, is_clear) = (self.failures(), self.answer.status == Status::Clear);
+        let findings = match self.answer.status {
             Status::Clear if self.verdict.pass => {
                 vec![format!("CLEAR: {}, {}", self.clearance([" (", ")"]), self.arrival())]
             }
@@ -386,7 +404,7 @@ impl Report {
 
     /// Returns the failures beside the status of the audit, as `label: detail`.
     fn failures(&self) -> Vec<String> {
-        let is_violation = self.audit.status == Status::Violation;
+        let is_violation = self.answer.status == Status::Violation;
         let is_in_lead = self.is_clear_until_its_early_end();
         let is_told = |reason: &&Reason| match reason {
             Reason::EndedEarly { .. } => !is_in_lead,
@@ -409,7 +427,7 @@ impl Report {
 
     /// Returns the words that mark a scaled length.
     fn scaled(&self) -> &'static str {
-        if self.separation.ellipsoid.is_some() { " scaled to ellipsoids" } else { "" }
+        if self.ellipsoid.is_some() { " scaled to ellipsoids" } else { "" }
     }
 
     /// Returns how often slots were spread and vehicles were assigned anew; `None` if never.
@@ -426,11 +444,14 @@ impl Report {
     /// Returns whether a pair came closer than certified by more than the error of integration.
     #[must_use]
     pub fn breaks_certificate(&self) -> bool {
-        let both = self.separation.min_m.zip(self.separation.certified_m);
-        let breaks = |(min_m, certified_m)| breaks_certificate(min_m, certified_m, self.separation.delta_m);
+        let (Some(closest), Some(certified_m)) = (self.closest_pair(), self.certificate.separation_m) else {
+            return false;
+        };
         // The shield certifies only while its bounds hold.
         let holds = self.shield.as_ref().is_none_or(|shield| shield.exceeded.is_none());
-        holds && both.is_some_and(breaks) && self.separation.is_promised()
+        holds
+            && breaks_certificate(closest.separation_m, certified_m, self.delta_m())
+            && self.certificate.until_s.is_none_or(|until_s| closest.time_s <= until_s)
     }
 
     /// Returns why the audit is undecided, and the arrival if the formation was reached.
@@ -439,45 +460,31 @@ impl Report {
             let at = seconds(self.run.duration_s);
             return format!("the flight ended early at {at}; until then {}", self.clearance([" (", ")"]));
         }
-        let delta = exact(self.separation.delta_m);
-        let why = if self.audit.parry.disagreements > 0 {
+        let (delta, deepest) = (exact(self.delta_m()), self.deepest_in_words());
+        let why = if self.disagreements() > 0 {
             format!("the two detectors disagree (delta {delta} m)")
-        } else if self.is_unresolved_by_step() {
-            format!("the step cannot resolve this, as flown {}", self.deepest_in_words())
-        } else {
+        } else if deepest.is_empty() {
             format!("not everything could be judged (delta {delta} m)")
+        } else {
+            format!("the step cannot resolve this, as flown {deepest}")
         };
         if self.formation.reached { format!("{why}, {}", self.arrival()) } else { why }
     }
 
     /// Returns whether the flight ended early and was clear up to its end.
-    pub(super) fn is_clear_until_its_early_end(&self) -> bool {
-        let audit = &self.audit;
-        let of_obstacles = self.obstacles.as_ref().map_or(0, |of| of.undecided + of.disagreements);
-        let is_open = audit.undecided + audit.parry.disagreements + of_obstacles > 0;
-        let is_judged = self.run.vehicles < 2 || self.separation.min_m.is_some();
-        self.run.ended_early.is_some()
-            && audit.status == Status::Undecided
-            && is_judged
-            && !is_open
-            && !self.is_unresolved_by_step()
+    fn is_clear_until_its_early_end(&self) -> bool {
+        (self.answer.status, self.answer.status_so_far) == (Status::Undecided, Status::Clear)
     }
 
     /// Returns the smallest separation, delta between two brackets, and the distance beyond obstacles.
     fn clearance(&self, [open, close]: [&str; 2]) -> String {
-        let delta_m = self.separation.delta_m;
-        let closest = self.separation.min_m.map(|min_m| beside_limit(min_m, delta_m, 3));
+        let delta_m = self.delta_m();
+        let closest = self.min_separation_m().map(|min_m| beside_limit(min_m, delta_m, 3));
         let closest = closest.map_or("no two vehicles".to_owned(), |min| format!("never closer than {min} m"));
-        let room = self.obstacles.as_ref().and_then(Obstacles::room);
-        let room = room.map(|room| format!(", {room}")).unwrap_or_default();
-        format!("{closest}{}{open}delta {} m{close}{room}", self.scaled(), exact(delta_m))
-    }
-
-    /// Returns whether integration may have caused all violations.
-    fn is_unresolved_by_step(&self) -> bool {
-        let past_obstacles = self.obstacles.as_ref().map_or(0, |obstacles| obstacles.violations.len());
-        let violations = self.audit.violations.len() + past_obstacles;
-        is_unresolved_by_step(self.audit.status, self.run.overlong_steps, violations)
+        let margin = self.closest_obstacle().map_or(String::new(), |found| {
+            format!(", {} m beyond every obstacle's clearance", at_least(found.margin(), 3))
+        });
+        format!("{closest}{}{open}delta {} m{close}{margin}", self.scaled(), exact(delta_m))
     }
 
     /// Returns the arrival in words.
@@ -486,28 +493,17 @@ impl Report {
         format!("formation reached{}", at.unwrap_or_default())
     }
 
+    /// Returns the deepest violation of two vehicles and of an obstacle, also those that integration may have caused.
     fn deepest_in_words(&self) -> String {
-        let of_obstacles = self.obstacles.as_ref().and_then(Obstacles::brief);
-        if let Some(of_obstacles) = of_obstacles {
-            let is_alone = self.audit.violations.is_empty();
-            return if is_alone { of_obstacles } else { format!("{}; {of_obstacles}", self.deepest_pair_in_words()) };
-        }
-        self.deepest_pair_in_words()
-    }
-
-    fn deepest_pair_in_words(&self) -> String {
-        let Self { separation, .. } = self;
-        let delta_m = separation.delta_m;
-        let (Some([first, second]), Some(min_m)) = (separation.min_pair, separation.min_m) else {
-            return format!("two vehicles came closer than {} m", exact(delta_m));
-        };
-        let at = separation.min_at_s.map(|at_s| format!(" at {}", seconds(at_s))).unwrap_or_default();
-        format!(
-            "vehicles {first} and {second} came to {} m{} (delta {} m){at}",
-            beside_limit(min_m, delta_m, 3),
-            self.scaled(),
-            exact(delta_m)
-        )
+        let limit = format!("{} (delta {} m)", self.scaled(), exact(self.delta_m()));
+        let deepest = self.verdict.reasons.iter().filter_map(|reason| match reason {
+            Reason::Violation { deepest, .. }
+            | Reason::UnresolvedByStep(deepest)
+            | Reason::ObstacleViolation { deepest, .. }
+            | Reason::ObstacleUnresolvedByStep(deepest) => Some(came_to(deepest, &limit)),
+            _ => None,
+        });
+        deepest.collect::<Vec<_>>().join("; ")
     }
 
     /// Returns the findings as a short table, a line each, with a final line break.
@@ -526,8 +522,8 @@ impl Report {
         let first = [
             ("separation", Some(self.separation_line())),
             ("audit", Some(self.audit_line())),
-            ("ellipsoids", self.separation.ellipsoid.as_ref().map(Ellipsoid::line)),
-            ("obstacles", self.obstacles.as_ref().map(Obstacles::line)),
+            ("ellipsoids", self.ellipsoid.as_ref().map(Ellipsoid::line)),
+            ("obstacles", self.closest_obstacle().map(|found| self.obstacle_line(found))),
             ("network", self.network.as_ref().map(network_line)),
             ("shield", self.shield.as_ref().map(ShieldNumbers::line)),
             ("failed", failed),
@@ -547,45 +543,57 @@ impl Report {
     }
 
     fn separation_line(&self) -> String {
-        let separation = &self.separation;
-        let delta_m = separation.delta_m;
-        let pair = separation.min_pair.map(|[first, second]| format!(", vehicles {first} and {second}"));
-        let at = separation.min_at_s.map(|at_s| format!(" at {}", seconds(at_s)));
-        let certified = match separation.certified_m {
+        let (delta_m, closest) = (self.delta_m(), self.closest_pair());
+        let pair = closest.map(|closest| format!(" at {}, {}", seconds(closest.time_s), vehicles(closest.pair)));
+        let certified = match self.certificate.separation_m {
             Some(certified_m) => {
-                let until = separation.certified_until_s.map(|until_s| format!(" until {}", seconds(until_s)));
+                let until = self.certificate.until_s.map(|until_s| format!(" until {}", seconds(until_s)));
                 format!("certified {} m{}", beside_limit(certified_m, delta_m, 6), until.unwrap_or_default())
             }
             None => "not certified".to_owned(),
         };
         format!(
-            "{} m{}{}{} (delta {} m, {certified})",
-            separation.min_m.map_or("-".to_owned(), |min_m| beside_limit(min_m, delta_m, 6)),
+            "{} m{}{} (delta {} m, {certified})",
+            closest.map_or("-".to_owned(), |closest| beside_limit(closest.separation_m, delta_m, 6)),
             self.scaled(),
-            at.unwrap_or_default(),
             pair.unwrap_or_default(),
             exact(delta_m),
         )
     }
 
+    fn obstacle_line(&self, found: &Finding) -> String {
+        let (min_m, clearance_m) = (found.value.upper_bound(), found.limit.unwrap_or_default());
+        let near = if min_m < 0.0 { separation(min_m) } else { beside_limit(min_m, clearance_m, 6) };
+        let certified = match self.certificate.clearance_margin_m {
+            Some(margin_m) => format!("certified {} m beyond it", at_least(margin_m, 6)),
+            None => "not certified".to_owned(),
+        };
+        format!(
+            "{near} m at {}, vehicle {} (clearance {} m, {certified})",
+            seconds(found.at_s.unwrap_or_default()),
+            found.subjects.join(" from obstacle "),
+            exact(clearance_m)
+        )
+    }
+
     fn audit_line(&self) -> String {
-        let audit = &self.audit;
-        let detectors = match audit.parry.disagreements {
+        let detectors = match self.disagreements() {
             0 => "both detectors agree".to_owned(),
             n => format!("{} of the two detectors", counted(n, "disagreement", "disagreements")),
         };
-        let contacts = audit
-            .rapier
-            .contact_pairs
-            .map(|pairs| counted(pairs, "contact pair of keep-out shells", "contact pairs of keep-out shells"))
-            .map(|pairs| format!(", {pairs} seen by the engine"));
-        format!(
-            "{} in {}, {} swept; {detectors}{}",
-            counted(audit.violations.len() as u64, "violation", "violations"),
-            counted(audit.steps, "step", "steps"),
-            counted(audit.pairs_checked, "pair", "pairs"),
-            contacts.unwrap_or_default()
-        )
+        let swept = self.answer.detectors.map_or(String::new(), |swept| {
+            let contacts = swept
+                .rapier_contact_pairs
+                .map(|pairs| counted(pairs, "contact pair of keep-out shells", "contact pairs of keep-out shells"))
+                .map(|pairs| format!(", {pairs} seen by the engine"));
+            format!(
+                " in {}, {} swept; {detectors}{}",
+                counted(swept.steps.unwrap_or_default(), "step", "steps"),
+                counted(swept.pairs_swept, "pair", "pairs"),
+                contacts.unwrap_or_default()
+            )
+        });
+        counted(self.answer.violations.count, "violation", "violations") + &swept
     }
 
     fn formation_line(&self) -> String {

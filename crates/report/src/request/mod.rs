@@ -12,6 +12,8 @@
 //! | [`DroneExportRequest`] | [`export_drones`] | trajectories of drones, judged after their encoding |
 //! | [`ScenarioRequest`] | [`identify`] | a measured tracking error, and a model file |
 
+#[cfg(feature = "cli")]
+mod arguments;
 pub mod audit;
 mod drones;
 mod export;
@@ -21,7 +23,9 @@ mod pictures;
 mod run;
 mod scenario;
 
-pub use audit::{AuditRequest, AuditedRecording, ConfigFile, OwnRecording, Subject, audit_files, run_audit};
+#[cfg(feature = "cli")]
+pub use arguments::one_of;
+pub use audit::{AuditOptions, AuditRequest, AuditedRecording, OwnRecording, Subject, audit_files, run_audit};
 pub use drones::{DroneChoices, DroneExport, DroneExportRequest, export_drones};
 pub use export::{ExportRequest, export_file};
 pub use identify::{IdentifiedModel, identify};

@@ -108,7 +108,7 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
     let _lock = folder.open(request.force)?;
     let mut log = FlightLog::of(scenario);
     let mut report = within(&threads, scenario, || fly(scenario, &preflight, &folder, pictures, monitor, &mut log))?;
-    if let Some(closest) = report.separation.closest() {
+    if let Some(closest) = report.closest_pair() {
         log.conclude(closest.separation_m, closest.time_s);
     }
     let log = Arc::new(log);
@@ -153,7 +153,7 @@ fn fly(
     monitor: &dyn Monitor,
     log: &mut FlightLog,
 ) -> Result<Report, Failure> {
-    let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
+    let header = Header::new(&scenario.name, &preflight.resolved.toml, scenario.count(), scenario.delta_m);
     let mut recording = McapRecorder::create(&folder.file(RECORDING), &header)?;
     if let Some(topic) = pictures.topic(scenario) {
         recording = recording.with(topic)?;
@@ -209,7 +209,7 @@ fn figures(scenario: &Scenario, log: &FlightLog, report: &Report) -> Vec<Figure>
     let obstacles: Vec<_> = scenario.obstacles.iter().map(sim::audit_obstacle).collect();
     let criteria = Criteria {
         delta_m: scenario.delta_m,
-        certified_m: report.separation.certified_m,
+        certified_m: report.certificate.separation_m,
         shape: Some((&scenario.legs, &scenario.graph)),
         edge_error_m: Some(scenario.arrival.edge_error_m),
         disagreement_m_s: Some(scenario.arrival.disagreement_m_s),
@@ -228,7 +228,7 @@ pub fn flight_page(
     report: &Report,
     command: &str,
 ) -> String {
-    if let Some(closest) = report.separation.closest() {
+    if let Some(closest) = report.closest_pair() {
         log.conclude(closest.separation_m, closest.time_s);
     }
     let figures = figures(scenario, &log, report);

@@ -137,7 +137,7 @@ fn mission_reaches_every_leg_and_reports_each() {
     assert!(reached_s.is_sorted() && report.legs[2].from_s == Some(40.0));
     let certified_m: Vec<_> = report.legs.iter().map(|leg| leg.certified_m.expect("a promise")).collect();
     assert!(certified_m.windows(2).all(|pair| pair[1] <= pair[0]));
-    assert!(report.separation.min_m > report.separation.certified_m);
+    assert!(report.min_separation_m() > report.certificate.separation_m);
     assert!(report.headline().contains("3 of 3 legs reached"), "{}", report.headline());
 
     // Counter-example: no time for the second leg.
@@ -234,7 +234,7 @@ fn reference_removes_the_drift_of_feed_forward() {
 fn a_stalled_swarm_arrives_only_with_deadlock_recovery() {
     let stuck = |mode: &str| read(&CROWD.replace("MODE", mode));
     let held = run(&stuck("off"), &mut ()).expect("a report");
-    assert!(!held.formation.reached && held.audit.status == Status::Clear, "{}", held.headline());
+    assert!(!held.formation.reached && held.answer.status == Status::Clear, "{}", held.headline());
     let report = run(&stuck("auto"), &mut ()).expect("a report");
     assert!(report.verdict.pass, "{:?}", report.verdict.reasons);
     assert!(
@@ -242,10 +242,10 @@ fn a_stalled_swarm_arrives_only_with_deadlock_recovery() {
         "{}",
         report.headline()
     );
-    assert!(report.separation.min_m > report.separation.certified_m);
+    assert!(report.min_separation_m() > report.certificate.separation_m);
     let first = &report.deadlock_recoveries[0];
     assert!(
-        first.scale == 2.0 && report.separation.certified_m <= first.certified_m,
+        first.scale == 2.0 && report.certificate.separation_m <= first.certified_m,
         "{:?}",
         report.deadlock_recoveries
     );
@@ -258,7 +258,7 @@ fn the_certificate_includes_slots_spread_from_the_start() {
     let scenario = read(&weak);
     let promised_m = tautline_sim::preflight::Preflight::of(&scenario).expect("a law").certified_m.expect("a promise");
     let report = run(&scenario, &mut ()).expect("a report");
-    let closest_m = report.separation.min_m.expect("a pair");
+    let closest_m = report.min_separation_m().expect("a pair");
     assert!(promised_m <= closest_m && closest_m < 1.1, "{promised_m} {closest_m}");
     // Negative twin: the certificate without spreading is larger than the separation.
     let still = read(&WEAK_STAR.replace("MODE", "off"));
@@ -298,8 +298,8 @@ fn spreading_slots_renews_the_certificates_of_legs() {
     let recovery = report.deadlock_recoveries.first().expect("a deadlock recovery");
     assert_eq!(report.legs[1].certified_m, recovery.certified_m);
     assert!(report.legs[0].certified_m >= report.legs[1].certified_m, "{:?}", report.legs);
-    assert!(report.legs[1].certified_m <= report.separation.certified_m, "{:?}", report.legs);
-    assert!(report.separation.min_m > report.separation.certified_m);
+    assert!(report.legs[1].certified_m <= report.certificate.separation_m, "{:?}", report.legs);
+    assert!(report.min_separation_m() > report.certificate.separation_m);
 }
 
 /// Blocked interchangeable vehicles exchange slots and keep them on the next leg; no slots are spread.
@@ -318,15 +318,15 @@ fn stalled_interchangeable_vehicles_are_reassigned_and_spread_no_slots() {
     assert!(report.headline().contains("2 of 2 legs reached; 1 new assignment"), "{}", report.headline());
     assert!(report.legs[0].certified_m >= report.legs[1].certified_m, "{:?}", report.legs);
     assert_eq!(
-        (report.legs[1].certified_m, report.separation.certified_m),
+        (report.legs[1].certified_m, report.certificate.separation_m),
         (assignment.certified_m, assignment.certified_m)
     );
-    assert!(report.separation.min_m > report.separation.certified_m);
+    assert!(report.min_separation_m() > report.certificate.separation_m);
     let promised_m = tautline_sim::preflight::Preflight::of(&scenario).expect("a law").certified_m;
     assert!(assignment.certified_m <= promised_m, "{assignment:?} {promised_m:?}");
 
     // The resolved scenario reads back as the same scenario.
-    assert_eq!(read(&scenario.resolved_toml()), scenario);
+    assert_eq!(read(&scenario.resolved().toml), scenario);
 
     // A simulation that was saved earlier continues to the same bits.
     let mut simulation = Simulation::new(&scenario).expect("a flight");

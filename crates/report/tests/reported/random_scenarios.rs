@@ -142,7 +142,7 @@ fn judge(seed: u64, tally: &mut Tally) {
     }
     let firm = verify(&scenario, &engine.report).expect("a flight").firm;
     tally.firm += u32::from(firm);
-    let verdicts = [&engine, &ideal].map(|flown| (flown.report.verdict.pass, flown.report.audit.status));
+    let verdicts = [&engine, &ideal].map(|flown| (flown.report.verdict.pass, flown.report.answer.status));
     if firm && verdicts[0] != verdicts[1] {
         tally.failures.push(format!("seed {seed}: a firm verdict is another in continuous time: {verdicts:?}"));
     }
@@ -177,7 +177,7 @@ fn flight_with_an_energy_rise_does_not_pass() {
         ],
     );
     let honest = run(&scenario, &mut ()).expect("a report");
-    assert!(!honest.verdict.pass && honest.audit.status == Status::Clear, "{:?}", honest.verdict);
+    assert!(!honest.verdict.pass && honest.answer.status == Status::Clear, "{:?}", honest.verdict);
     assert_eq!(faults(&honest).count(), 0, "{:?}", honest.verdict);
     // Without halving, the same steps gain energy, and the flight fails.
     (scenario.time.max_rate_dt, scenario.time.max_halvings) = (1e9, 0);

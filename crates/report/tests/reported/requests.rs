@@ -6,12 +6,12 @@ use std::sync::atomic::Ordering;
 
 use nalgebra::Vector3;
 use tautline_audit::envelope::{Limit, Quantity};
-use tautline_audit::recorded::{Interpolation, Settings};
+use tautline_audit::recorded::Interpolation;
 use tautline_core::track::{Item, Metadata, Sample, Tracks};
 use tautline_recordings::read::{ReadError, ReadOptions};
 use tautline_report::request::audit::Open;
 use tautline_report::request::{
-    AuditRequest, ConfigFile, ExportRequest, RECORDING, RunRequest, ScenarioRequest, Silent, Subject, audit_files,
+    AuditOptions, AuditRequest, ExportRequest, RECORDING, RunRequest, ScenarioRequest, Silent, Subject, audit_files,
     export_file, run_into,
 };
 
@@ -70,8 +70,8 @@ fn file(folder: &Path) -> Subject<'static> {
     Subject::Files { paths: vec![path], options: Box::default() }
 }
 
-fn audit_request(subject: Subject<'_>, settings: Settings) -> AuditRequest<'_> {
-    AuditRequest { settings, ..AuditRequest::new(subject) }
+fn delta(delta_m: f64) -> AuditOptions {
+    AuditOptions { delta_m: Some(delta_m), ..AuditOptions::default() }
 }
 
 #[test]
@@ -82,11 +82,10 @@ fn motion_in_memory_is_judged_like_its_recording() {
     let request = AuditRequest {
         command: "audit(...)".to_owned(),
         html: Some(page.clone()),
-        ..audit_request(subject, Settings::delta(2.0))
+        ..AuditRequest::new(subject, delta(2.0))
     };
     let ours = audit_files(&request, &Silent::default()).expect("judged");
-    let theirs =
-        audit_files(&audit_request(file(folder.path()), Settings::delta(2.0)), &Silent::default()).expect("judged");
+    let theirs = audit_files(&AuditRequest::new(file(folder.path()), delta(2.0)), &Silent::default()).expect("judged");
     assert!(!ours.is_good());
     let (ours, theirs) = (ours.report, theirs.report);
     assert_eq!(ours.verdict(), "VIOLATION");
@@ -98,44 +97,49 @@ fn motion_in_memory_is_judged_like_its_recording() {
 #[test]
 fn wrong_requests_have_error_codes() {
     let folder = tempfile::tempdir().expect("a folder");
-    let code = |settings: Settings, change: &dyn Fn(&mut AuditRequest<'static>)| {
-        let mut request = AuditRequest { config: ConfigFile::None, ..audit_request(file(folder.path()), settings) };
+    let code = |options: AuditOptions, change: &dyn Fn(&mut AuditRequest<'static>)| {
+        let mut request =
+            AuditRequest::new(file(folder.path()), AuditOptions { no_config: options.config.is_none(), ..options });
         change(&mut request);
         let failure = audit_files(&request, &Silent::default()).expect_err("refused");
         assert!(!failure.is_machine() && failure.help().is_some(), "{failure}");
         failure.code()
     };
-    let (delta, same) = (Settings::delta(1.0), &|_: &mut AuditRequest<'static>| ());
+    let (one, same) = (delta(1.0), &|_: &mut AuditRequest<'static>| ());
     let limit = Limit { quantity: Quantity::Speed, allowed: 5.0 };
-    let mut twice = delta.clone();
-    twice.envelope.limits = vec![limit, limit];
-    assert_eq!(code(Settings::default(), same), "audit/no-limit");
-    assert_eq!(code(Settings::delta(f64::NAN), same), "audit/out-of-range");
+    let mut twice = one.clone();
+    twice.limits = vec![limit, limit];
+    assert_eq!(code(AuditOptions::default(), same), "audit/no-limit");
+    assert_eq!(code(delta(f64::NAN), same), "audit/out-of-range");
     assert_eq!(code(twice, same), "audit/limit-twice");
-    let unused = Settings { max_accel_m_s2: Some(2.0), ..delta.clone() };
+    let unused = AuditOptions { max_accel_m_s2: vec![(None, 2.0)], ..one.clone() };
     assert_eq!(code(unused, same), "audit/unused-acceleration");
-    let unbound = Settings { motion: Some(Interpolation::Bounded), ..delta.clone() };
+    let unbound = AuditOptions { motion: Some(Interpolation::Bounded), ..one.clone() };
     assert_eq!(code(unbound, same), "audit/no-acceleration-bound");
-    let empty = Settings { from_s: Some(1.0), to_s: Some(0.5), ..delta.clone() };
+    let empty = AuditOptions { from_s: Some(1.0), to_s: Some(0.5), ..one.clone() };
     assert_eq!(code(empty, same), "audit/empty-window");
-    let ghost = Settings { only: Some(["ghost".to_owned()].into()), ..delta.clone() };
+    let ghost = AuditOptions { ids: vec!["ghost".to_owned().into()], ..one.clone() };
     assert_eq!(code(ghost, same), "audit/unknown-vehicle");
-    assert_eq!(code(delta.clone(), &|of| of.expect_vehicles = Some(3)), "audit/vehicle-count");
+    assert_eq!(code(one.clone(), &|of| of.options.expect_vehicles = Some(3)), "audit/vehicle-count");
     let none = |name: &str| folder.path().join(name);
-    assert_eq!(code(delta.clone(), &|of| of.obstacles = Some(none("none.toml"))), "files/cannot-read");
-    assert_eq!(code(delta.clone(), &|of| of.config = ConfigFile::File(none("none.toml"))), "files/cannot-read");
-    assert_eq!(code(delta.clone(), &|of| of.html = Some(none("passing.csv"))), "files/overwrites-input");
+    assert_eq!(code(one.clone(), &|of| of.options.obstacles = Some(none("none.toml"))), "files/cannot-read");
+    assert_eq!(code(AuditOptions { config: Some(none("none.toml")), ..one.clone() }, same), "files/cannot-read");
+    assert_eq!(code(one.clone(), &|of| of.html = Some(none("passing.csv"))), "files/overwrites-input");
     let missing = |of: &mut AuditRequest<'static>| {
         of.subject = Subject::Files { paths: vec![none("none.csv")], options: Box::default() };
     };
-    assert_eq!(code(delta, &missing), "recording/not-found");
+    assert_eq!(code(one, &missing), "recording/not-found");
 }
 
 #[test]
 fn rejects_a_radius_beside_an_ellipsoid() {
     let folder = tempfile::tempdir().expect("a folder");
-    let both = Settings { radius_m: Some(0.1), ellipsoid_m: Some(Vector3::new(1.0, 1.0, 2.0)), ..Settings::default() };
-    let failure = audit_files(&audit_request(file(folder.path()), both), &Silent::default()).expect_err("refused");
+    let both = AuditOptions {
+        radius_m: vec![(None, 0.1)],
+        ellipsoid_m: Some(Vector3::new(1.0, 1.0, 2.0)),
+        ..AuditOptions::default()
+    };
+    let failure = audit_files(&AuditRequest::new(file(folder.path()), both), &Silent::default()).expect_err("refused");
     assert_eq!(failure.code(), "audit/radius-and-ellipsoid");
 }
 
@@ -144,7 +148,7 @@ fn monitor_ends_the_work() {
     let folder = tempfile::tempdir().expect("a folder");
     let monitor = Silent::default();
     monitor.interruption.store(true, Ordering::Relaxed);
-    let failure = audit_files(&audit_request(file(folder.path()), Settings::delta(2.0)), &monitor).expect_err("ended");
+    let failure = audit_files(&AuditRequest::new(file(folder.path()), delta(2.0)), &monitor).expect_err("ended");
     assert_eq!((failure.code(), failure.is_machine()), ("interrupted", true));
     let request = ExportRequest {
         paths: vec![folder.path().join("passing.csv")],

@@ -270,7 +270,7 @@ fn slot_laws_follow_a_reference_and_lag_without_feed_forward() {
         assert!(report.verdict.pass, "{law}: {:?}", report.verdict.reasons);
         assert!(report.legs.iter().all(|leg| leg.reached_at_s.is_some()), "{law}: {:?}", report.legs);
         let late = run(&carried(law, false), &mut ()).expect("a report");
-        assert!(late.audit.status == Status::Clear && !late.formation.reached, "{law}: {}", late.headline());
+        assert!(late.answer.status == Status::Clear && !late.formation.reached, "{law}: {}", late.headline());
     }
 }
 

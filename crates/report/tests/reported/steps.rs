@@ -128,7 +128,7 @@ fn clear_and_reached_flight_with_overlong_steps_does_not_pass() {
     assert_eq!((refined.run.overlong_steps, refined.verdict.pass), (0, true));
     assert!(whole.run.overlong_steps > 0 && !whole.verdict.pass, "{:?}", whole.verdict);
     assert!(whole.headline().starts_with("STEP TOO LONG: "), "{}", whole.headline());
-    assert_eq!(whole.separation.certified_m, None);
+    assert_eq!(whole.certificate.separation_m, None);
     // A clear motion that is not that of the law proves nothing about the law.
     let proved = |report: &Report| report.to_json().expect("JSON").contains("\"proved\": true");
     assert!(proved(&refined) && !proved(&whole));

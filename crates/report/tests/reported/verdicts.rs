@@ -82,7 +82,7 @@ fn slow_meeting_beside_a_far_vehicle_is_a_violation() {
         time.duration_s = 4000
         "#,
     );
-    assert_eq!(report.audit.status, Status::Violation, "{}", report.headline());
+    assert_eq!(report.answer.status, Status::Violation, "{}", report.headline());
 }
 
 /// Returns a scenario of three vehicles with slots 2 m apart and the gain `k_per_s2`.

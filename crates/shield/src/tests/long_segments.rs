@@ -152,7 +152,7 @@ fn the_starts_that_flew_too_near_are_refused_and_ones_with_room_are_not() {
 #[test]
 fn unicycles_that_slow_down_over_kilometres_at_small_angles_keep_the_safety_distance() {
     let mut random = Random::new(82);
-    let of = FAST_LOITER;
+    let loiter = FAST_LOITER;
     // Both loiter beside each other with the discs 2 r + delta apart.
     let length_m = (240.0_f64 * 240.0 - 25.0) / 2.0;
     let (mut accepted, mut refused) = (0, 0);
@@ -160,14 +160,14 @@ fn unicycles_that_slow_down_over_kilometres_at_small_angles_keep_the_safety_dist
         let pair = Pair { is_crossing: false, ..Pair::random(&mut random, length_m) };
         let [first, second] = pair.places();
         let (sin, cos) = pair.heading_rad.sin_cos();
-        let aside = Vector3::new(-sin, cos, 0.0) * (2.0 * of.radius_m());
+        let aside = Vector3::new(-sin, cos, 0.0) * (2.0 * loiter.radius_m());
         let poses = [first, (second.0 + aside, second.1)].map(|(position_m, heading_rad)| Pose {
             position_m,
             heading_rad,
             speed_m_s: 239.999,
         });
-        let starts = poses.map(|pose| of.start(&pose).expect("valid"));
-        let shields = [0, 1].map(|i| UnicycleShield::new(&of, i, &poses[i], &starts));
+        let starts = poses.map(|pose| loiter.start(&pose).expect("valid"));
+        let shields = [0, 1].map(|i| UnicycleShield::new(&loiter, i, &poses[i], &starts));
         assert_eq!(shields[0].is_ok(), shields[1].is_ok(), "{pair:?}");
         let [Ok(mut one), Ok(mut other)] = shields else {
             assert!(pair.room_m < LOST_M, "{pair:?}");
@@ -194,7 +194,7 @@ fn unicycles_that_slow_down_over_kilometres_at_small_angles_keep_the_safety_dist
 fn a_unicycle_loiters_at_its_rest_point_for_ever() {
     let mut random = Random::new(83);
     for _ in 0..20 {
-        let of = Loiter {
+        let loiter = Loiter {
             delta_m: DELTA_M,
             period_s: 0.5,
             min_speed_m_s: 20.0,
@@ -205,18 +205,18 @@ fn a_unicycle_loiters_at_its_rest_point_for_ever() {
             is_left: random.chance(0.5),
         };
         // A speed that whole periods reach up to rounding.
-        let speed_m_s = 20.0 + of.accel_m_s2 * 0.5 * random.index(30) as f64 * (1.0 + 0.9e-9 * random.unit());
+        let speed_m_s = 20.0 + loiter.accel_m_s2 * 0.5 * random.index(30) as f64 * (1.0 + 0.9e-9 * random.unit());
         let position_m = Vector3::new(random.between(-9e5, 9e5), random.between(-9e5, 9e5), 0.0);
         let pose = Pose { position_m, heading_rad: random.between(-3.0, 3.0), speed_m_s: speed_m_s.clamp(20.0, 60.0) };
-        let start = of.start(&pose).expect("valid");
-        let mut shield = UnicycleShield::new(&of, 0, &pose, &[start]).expect("alone");
+        let start = loiter.start(&pose).expect("valid");
+        let mut shield = UnicycleShield::new(&loiter, 0, &pose, &[start]).expect("alone");
         let centre_m = start.segment.stop();
         for period in 0..20_000 {
             shield.loiter();
             assert_eq!(shield.segment().stop(), centre_m);
             if period > 40 {
                 let from_m = (shield.next_reference().position_m - centre_m).norm();
-                assert!((from_m - of.radius_m()).abs() < 1e-9, "{of:?}: {from_m}");
+                assert!((from_m - loiter.radius_m()).abs() < 1e-9, "{loiter:?}: {from_m}");
             }
         }
     }
@@ -224,19 +224,20 @@ fn a_unicycle_loiters_at_its_rest_point_for_ever() {
 
 #[test]
 fn starts_of_unicycles_are_limited_like_those_of_points() {
-    let of = FAST_LOITER;
-    let at = |x: f64| Pose { position_m: Vector3::x() * x, heading_rad: 0.0, speed_m_s: 240.0 };
-    assert!(of.start(&at(900_000.0)).is_ok());
+    let loiter = FAST_LOITER;
+    let pose_at = |x: f64| Pose { position_m: Vector3::x() * x, heading_rad: 0.0, speed_m_s: 240.0 };
+    assert!(loiter.start(&pose_at(900_000.0)).is_ok());
     // The place, and the end of 28.8 km.
     for x in [1e6 + 1.0, 980_000.0] {
-        let error = of.start(&at(x)).expect_err("far").to_string();
+        let error = loiter.start(&pose_at(x)).expect_err("far").to_string();
         assert!(error.contains("farther than 1000000 m") && error.ends_with("its origin near the vehicles"), "{error}");
     }
-    let refused = |of: Loiter| of.start(&at(0.0)).expect_err("refused").to_string();
+    let refused = |loiter: Loiter| loiter.start(&pose_at(0.0)).expect_err("refused").to_string();
     assert!(
-        refused(Loiter { period_s: 0.5, ..of }).starts_with("max_speed_m_s: must move by at most 100 m in a period")
+        refused(Loiter { period_s: 0.5, ..loiter })
+            .starts_with("max_speed_m_s: must move by at most 100 m in a period")
     );
-    assert!(refused(Loiter { delta_m: 3e6, ..of }).starts_with("delta_m: margins must be at most 1000000 m"));
+    assert!(refused(Loiter { delta_m: 3e6, ..loiter }).starts_with("delta_m: margins must be at most 1000000 m"));
 }
 
 #[test]

@@ -32,7 +32,7 @@ pub(super) fn with_settings(flight: &mut Flight, change: impl Fn(&mut Settings))
         change(&mut settings);
         // Vehicles with equal settings have equal limits.
         let found = last
-            .filter(|(of, _)| *of == settings)
+            .filter(|(known, _)| *known == settings)
             .unwrap_or_else(|| (settings, settings.limits().expect("settings are valid")));
         (*limits, last) = (found.1, Some(found));
     }

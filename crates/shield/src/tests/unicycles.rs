@@ -26,11 +26,11 @@ fn loiter(random: &mut Random) -> Loiter {
     }
 }
 
-fn pose(random: &mut Random, of: &Loiter, half_m: f64) -> Pose {
+fn pose(random: &mut Random, loiter: &Loiter, half_m: f64) -> Pose {
     Pose {
         position_m: Vector3::new(random.between(-half_m, half_m), random.between(-half_m, half_m), 0.0),
         heading_rad: random.between(-3.2, 3.2),
-        speed_m_s: random.between(of.min_speed_m_s, of.max_speed_m_s),
+        speed_m_s: random.between(loiter.min_speed_m_s, loiter.max_speed_m_s),
     }
 }
 
@@ -38,8 +38,8 @@ fn pose(random: &mut Random, of: &Loiter, half_m: f64) -> Pose {
 fn a_pose_after_a_period_is_that_of_many_short_steps() {
     let mut random = Random::new(41);
     for round in 0..300 {
-        let of = loiter(&mut random);
-        let start = pose(&mut random, &of, 2.0);
+        let own_loiter = loiter(&mut random);
+        let start = pose(&mut random, &own_loiter, 2.0);
         let turn_rad_s = random.between(-3.0, 3.0) * [1.0, 1e-5, 0.0][round % 3];
         let command = Steering { accel_m_s2: random.between(-3.0, 3.0), turn_rad_s };
         let (steps, end) = (2_000, start.after(command, 0.5));
@@ -60,21 +60,21 @@ fn a_pose_after_a_period_is_that_of_many_short_steps() {
 fn the_pivot_stays_in_the_triangle_of_its_period() {
     let mut random = Random::new(42);
     for _ in 0..50_000 {
-        let of = loiter(&mut random);
-        let start = pose(&mut random, &of, 2.0);
+        let own_loiter = loiter(&mut random);
+        let start = pose(&mut random, &own_loiter, 2.0);
         let most = |speed: f64| (speed - start.speed_m_s) / PERIOD_S;
-        let accel_m_s2 = random.between(most(of.min_speed_m_s), most(of.max_speed_m_s));
-        let turn_rad_s = of.turn_rad_s * [random.between(-1.0, 1.0), 1.0, -1.0, 0.0][random.index(4)];
+        let accel_m_s2 = random.between(most(own_loiter.min_speed_m_s), most(own_loiter.max_speed_m_s));
+        let turn_rad_s = own_loiter.turn_rad_s * [random.between(-1.0, 1.0), 1.0, -1.0, 0.0][random.index(4)];
         let command = Steering { accel_m_s2, turn_rad_s };
         let end = start.after(command, PERIOD_S);
-        let corners = [of.pivot_m(&start), of.corner_m(&start, &end), of.pivot_m(&end)];
+        let corners = [own_loiter.pivot_m(&start), own_loiter.corner_m(&start, &end), own_loiter.pivot_m(&end)];
         let within = start.after(command, PERIOD_S * random.unit());
-        let pivot = of.pivot_m(&within);
-        assert!(((pivot - within.position_m).norm() - of.radius_m()).abs() < 1e-12);
+        let pivot = own_loiter.pivot_m(&within);
+        assert!(((pivot - within.position_m).norm() - own_loiter.radius_m()).abs() < 1e-12);
         for _ in 0..10 {
             let normal = random.direction();
             let largest = corners.iter().map(|corner| normal.dot(corner)).fold(f64::NEG_INFINITY, f64::max);
-            assert!(normal.dot(&pivot) <= largest + 1e-8, "{of:?} {start:?} {command:?}");
+            assert!(normal.dot(&pivot) <= largest + 1e-8, "{own_loiter:?} {start:?} {command:?}");
         }
     }
 }
@@ -83,20 +83,20 @@ fn the_pivot_stays_in_the_triangle_of_its_period() {
 fn the_fallback_runs_to_the_centre_of_its_circle_and_stays() {
     let mut random = Random::new(43);
     for _ in 0..300 {
-        let of = loiter(&mut random);
-        let start = pose(&mut random, &of, 2.0);
-        let announced = of.start(&start).expect("valid");
-        let mut shield = UnicycleShield::new(&of, 0, &start, &[announced]).expect("alone");
+        let own_loiter = loiter(&mut random);
+        let start = pose(&mut random, &own_loiter, 2.0);
+        let announced = own_loiter.start(&start).expect("valid");
+        let mut shield = UnicycleShield::new(&own_loiter, 0, &start, &[announced]).expect("alone");
         let centre = announced.segment.stop();
         let mut last = (centre - announced.segment.position()).norm();
         for _ in 0..300 {
             shield.loiter();
-            let left = centre - of.pivot_m(&shield.next_reference());
-            assert!(left.norm() <= last + 1e-9, "{of:?} {start:?}: {left}");
+            let left = centre - own_loiter.pivot_m(&shield.next_reference());
+            assert!(left.norm() <= last + 1e-9, "{own_loiter:?} {start:?}: {left}");
             last = left.norm();
         }
-        assert!(last < 1e-9, "{of:?} {start:?}: {last}");
-        assert!((shield.next_reference().speed_m_s - of.min_speed_m_s).abs() < 1e-9);
+        assert!(last < 1e-9, "{own_loiter:?} {start:?}: {last}");
+        assert!((shield.next_reference().speed_m_s - own_loiter.min_speed_m_s).abs() < 1e-9);
     }
 }
 
@@ -153,9 +153,9 @@ fn dive(seed: u64, has_defect: bool) -> f64 {
     let loiters: Vec<_> = (0..count).map(|_| loiter(&mut random)).collect();
     let is_point: Vec<_> = (0..count).map(|_| random.chance(0.2)).collect();
     let (poses, starts) = loop {
-        let poses: Vec<_> = loiters.iter().map(|of| pose(&mut random, of, 8.0)).collect();
-        let starts = poses.iter().zip(&loiters).zip(&is_point).map(|((pose, of), is_point)| {
-            if *is_point { point.slot(pose.position_m) } else { of.start(pose).expect("valid") }
+        let poses: Vec<_> = loiters.iter().map(|loiter| pose(&mut random, loiter, 8.0)).collect();
+        let starts = poses.iter().zip(&loiters).zip(&is_point).map(|((pose, loiter), is_point)| {
+            if *is_point { point.slot(pose.position_m) } else { loiter.start(pose).expect("valid") }
         });
         let starts: Vec<_> = starts.collect();
         if closest_starts(&starts).is_some_and(|worst| worst.room_m() >= 0.0) {
@@ -191,16 +191,17 @@ fn dive(seed: u64, has_defect: bool) -> f64 {
                 flying.push((period + random.index(latency + 1), message));
             }
         }
-        let (now, later) = flying.into_iter().partition(|(at, _)| *at <= period);
+        let (now, later) = flying.into_iter().partition(|(due, _)| *due <= period);
         let now: Vec<(usize, Message)> = now;
         flying = later;
         for (_, message) in &now {
             vehicles[message.to as usize].hear(message);
         }
         for k in 0..SAMPLES {
-            let at: Vec<_> = vehicles.iter().map(|vehicle| vehicle.at(PERIOD_S * k as f64 / SAMPLES as f64)).collect();
+            let poses: Vec<_> =
+                vehicles.iter().map(|vehicle| vehicle.at(PERIOD_S * k as f64 / SAMPLES as f64)).collect();
             let pairs = (0..count).flat_map(|i| (i + 1..count).map(move |j| (i, j)));
-            closest = pairs.map(|(i, j)| (at[i] - at[j]).norm()).fold(closest, f64::min);
+            closest = pairs.map(|(i, j)| (poses[i] - poses[j]).norm()).fold(closest, f64::min);
         }
     }
     closest
@@ -226,11 +227,11 @@ fn a_unicycle_that_flies_at_a_wall_keeps_its_clearance() {
     let mut closest = f64::INFINITY;
     for seed in 0..60 {
         let mut random = Random::new(seed);
-        let of = loiter(&mut random);
-        let mut start = pose(&mut random, &of, 2.0);
+        let own_loiter = loiter(&mut random);
+        let mut start = pose(&mut random, &own_loiter, 2.0);
         start.position_m.x += 8.0;
-        let announced = of.start(&start).expect("valid");
-        let alone = || UnicycleShield::new(&of, 0, &start, &[announced]).expect("alone");
+        let announced = own_loiter.start(&start).expect("valid");
+        let alone = || UnicycleShield::new(&own_loiter, 0, &start, &[announced]).expect("alone");
         let mut shield = alone().with_obstacles(&[Obstacle::new(wall, 0.5)]).expect("far");
         let error = alone().with_obstacles(&[Obstacle::new(wall, 20.0)]).expect_err("near").to_string();
         assert!(error.starts_with("start: vehicle 1 reserves a segment"), "{error}");
@@ -249,27 +250,36 @@ fn a_unicycle_that_flies_at_a_wall_keeps_its_clearance() {
 #[test]
 fn invalid_unicycles_are_refused_and_a_wish_that_is_not_finite_falls_back() {
     let mut random = Random::new(44);
-    let of = loiter(&mut random);
-    let start = pose(&mut random, &of, 1.0);
-    let refused = |of: Loiter, pose: Pose| of.start(&pose).expect_err("refused").to_string();
-    assert!(refused(Loiter { min_speed_m_s: 0.0, ..of }, start).starts_with("min_speed_m_s: must be above 0 (0)"));
-    assert!(refused(Loiter { turn_rad_s: 20.0, ..of }, start).starts_with("turn_rad_s: must turn by at most 1.5 rad"));
+    let own_loiter = loiter(&mut random);
+    let start = pose(&mut random, &own_loiter, 1.0);
+    let refused = |loiter: Loiter, pose: Pose| loiter.start(&pose).expect_err("refused").to_string();
     assert!(
-        refused(Loiter { accel_m_s2: 1e-9, ..of }, start).starts_with("accel_m_s2: slowing down must take at most")
+        refused(Loiter { min_speed_m_s: 0.0, ..own_loiter }, start).starts_with("min_speed_m_s: must be above 0 (0)")
     );
-    assert!(refused(Loiter { tracking_error_m: -1.0, ..of }, start).starts_with("tracking_error_m: must not be neg"));
-    assert!(refused(of, Pose { speed_m_s: 9.0, ..start }).starts_with("start: the speed must be from"));
-    assert!(refused(of, Pose { heading_rad: f64::NAN, ..start }).starts_with("start: must be finite"));
-    let announced = of.start(&start).expect("valid");
+    assert!(
+        refused(Loiter { turn_rad_s: 20.0, ..own_loiter }, start)
+            .starts_with("turn_rad_s: must turn by at most 1.5 rad")
+    );
+    assert!(
+        refused(Loiter { accel_m_s2: 1e-9, ..own_loiter }, start)
+            .starts_with("accel_m_s2: slowing down must take at most")
+    );
+    assert!(
+        refused(Loiter { tracking_error_m: -1.0, ..own_loiter }, start)
+            .starts_with("tracking_error_m: must not be neg")
+    );
+    assert!(refused(own_loiter, Pose { speed_m_s: 9.0, ..start }).starts_with("start: the speed must be from"));
+    assert!(refused(own_loiter, Pose { heading_rad: f64::NAN, ..start }).starts_with("start: must be finite"));
+    let announced = own_loiter.start(&start).expect("valid");
     let slot =
         Settings { delta_m: 2.0, ..Settings::new(1.0, PERIOD_S) }.limits().expect("valid").slot(Vector3::x() * 99.0);
-    let error = UnicycleShield::new(&of, 0, &start, &[announced, slot]).expect_err("another delta").to_string();
+    let error = UnicycleShield::new(&own_loiter, 0, &start, &[announced, slot]).expect_err("another delta").to_string();
     assert!(error.starts_with("delta_m: vehicle 2 has another value"), "{error}");
-    let other = Pose { speed_m_s: of.min_speed_m_s, ..start };
-    let error = UnicycleShield::new(&of, 0, &other, &[announced]).expect_err("another start").to_string();
+    let other = Pose { speed_m_s: own_loiter.min_speed_m_s, ..start };
+    let error = UnicycleShield::new(&own_loiter, 0, &other, &[announced]).expect_err("another start").to_string();
     assert!(error.starts_with("start: the announced start differs"), "{error}");
-    assert!(UnicycleShield::new(&of, 3, &start, &[announced]).is_err());
-    let mut shield = UnicycleShield::new(&of, 0, &start, &[announced]).expect("alone");
+    assert!(UnicycleShield::new(&own_loiter, 3, &start, &[announced]).is_err());
+    let mut shield = UnicycleShield::new(&own_loiter, 0, &start, &[announced]).expect("alone");
     let command = shield.filter(Steering { accel_m_s2: f64::NAN, turn_rad_s: 0.0 });
     assert!(command.accel_m_s2 < 0.0 && command.turn_rad_s == 0.0, "{command:?}");
     assert_eq!(shield.counters().brakes, 1);

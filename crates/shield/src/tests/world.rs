@@ -136,17 +136,17 @@ pub(super) struct World {
 }
 
 impl World {
-    pub(super) fn new(of: &Flight) -> Self {
-        let mut random = Random::new(of.seed);
-        let fleet = Fleet::new(&of.limits, &of.starts).expect("starts are apart");
-        let fleet = fleet.with_obstacles(&of.obstacles).expect("starts are before obstacles");
-        let count = of.starts.len();
+    pub(super) fn new(flight: &Flight) -> Self {
+        let mut random = Random::new(flight.seed);
+        let fleet = Fleet::new(&flight.limits, &flight.starts).expect("starts are apart");
+        let fleet = fleet.with_obstacles(&flight.obstacles).expect("starts are before obstacles");
+        let count = flight.starts.len();
         // True states may err like a measurement.
-        let states = of.starts.iter().zip(&of.limits).map(|(start, limits)| {
+        let states = flight.starts.iter().zip(&flight.limits).map(|(start, limits)| {
             let settings = limits.settings();
             State {
-                position_m: start.position_m + flat(random.vector(settings.position_error_m), of.planar),
-                velocity_m_s: start.velocity_m_s + flat(random.vector(settings.velocity_error_m_s), of.planar),
+                position_m: start.position_m + flat(random.vector(settings.position_error_m), flight.planar),
+                velocity_m_s: start.velocity_m_s + flat(random.vector(settings.velocity_error_m_s), flight.planar),
             }
         });
         let segments: Vec<_> = fleet.shields().iter().map(|shield| (0, shield.segment())).collect();
@@ -163,7 +163,7 @@ impl World {
             lost: vec![false; count * count],
             random,
             step: 0,
-            step_s: of.period_s / STEPS as f64,
+            step_s: flight.period_s / STEPS as f64,
             closest_m: f64::INFINITY,
             closest_s: 0.0,
             obstacle_room_m: f64::INFINITY,
@@ -179,16 +179,16 @@ impl World {
     }
 
     /// Makes one step of the plant, with the instants at its start.
-    pub(super) fn step(&mut self, of: &Flight) {
-        self.deliver(of);
+    pub(super) fn step(&mut self, flight: &Flight) {
+        self.deliver(flight);
         for i in 0..self.states.len() {
-            if self.step.is_multiple_of(of.instants[i]) {
-                self.instant(i, of);
+            if self.step.is_multiple_of(flight.instants[i]) {
+                self.instant(i, flight);
             }
         }
-        self.push(of);
-        self.judge(of);
-        self.judge_obstacles(of);
+        self.push(flight);
+        self.judge(flight);
+        self.judge_obstacles(flight);
         for i in 0..self.states.len() {
             self.states[i] = self.states[i].after(self.accelerations[i], self.step_s);
             self.since_s[i] += self.step_s;
@@ -198,7 +198,7 @@ impl World {
         self.step += 1;
     }
 
-    fn deliver(&mut self, of: &Flight) {
+    fn deliver(&mut self, flight: &Flight) {
         let now = self.time_s() + 1e-12;
         let mut place = 0;
         while place < self.flying.len() {
@@ -207,7 +207,7 @@ impl World {
                 continue;
             }
             let (_, mut message, segment) = self.flying.swap_remove(place);
-            if of.defect == Defect::OwnerDropsOldPlane {
+            if flight.defect == Defect::OwnerDropsOldPlane {
                 let owner = &self.fleet.shields()[message.to as usize];
                 if let Some(number) = owner.pending_number(message.from) {
                     let decision = Some(Decision { number, accepted: true });
@@ -222,68 +222,68 @@ impl World {
         }
     }
 
-    fn instant(&mut self, i: usize, of: &Flight) {
-        let settings = *of.limits[i].settings();
+    fn instant(&mut self, i: usize, flight: &Flight) {
+        let settings = *flight.limits[i].settings();
         self.past[i].push(self.states[i]);
         let late = self.past[i].len().saturating_sub(1 + settings.measurement_delay_periods);
         let truth = self.past[i][late];
-        let towards = self.nearest(i, of);
+        let towards = self.nearest(i, flight);
         let errors = [settings.position_error_m, settings.velocity_error_m_s].map(|bound| {
             // A vehicle that believes to be farther from the nearest one than it is flies towards it.
-            let error = if of.adversarial { -towards * bound } else { self.random.vector(bound) };
-            flat(error, of.planar)
+            let error = if flight.adversarial { -towards * bound } else { self.random.vector(bound) };
+            flat(error, flight.planar)
         });
         let measured = State { position_m: truth.position_m + errors[0], velocity_m_s: truth.velocity_m_s + errors[1] };
-        let wanted = flat(self.wanted(i, &measured, of), of.planar);
+        let wanted = flat(self.wanted(i, &measured, flight), flight.planar);
         let shield = &mut self.fleet.shields_mut()[i];
         shield.observe_measurement(&measured, &truth);
         let heard: Vec<_> = self.heard[i].iter().map(|(_, segment)| *segment).collect();
-        let brakes = of.defect == Defect::PlanesAsHeard && !shield.hold_heard(&heard);
+        let brakes = flight.defect == Defect::PlanesAsHeard && !shield.hold_heard(&heard);
         self.commands[i] = if brakes { shield.brake(measured) } else { shield.filter(measured, wanted) };
         self.since_s[i] = 0.0;
-        self.send(i, of);
+        self.send(i, flight);
     }
 
-    fn send(&mut self, i: usize, of: &Flight) {
+    fn send(&mut self, i: usize, flight: &Flight) {
         let (now, count) = (self.time_s(), self.states.len());
-        let broadcast_is_lost = of.radio.every_third && (self.step / of.instants[i] + i).is_multiple_of(3);
+        let broadcast_is_lost = flight.radio.every_third && (self.step / flight.instants[i] + i).is_multiple_of(3);
         let messages: Vec<_> = self.fleet.shields_mut()[i].messages().collect();
         let segment = self.fleet.shields()[i].segment();
         for message in messages {
-            let burst = of.radio.burst.max(1.0);
+            let burst = flight.radio.burst.max(1.0);
             let lost = &mut self.lost[i * count + message.to as usize];
             *lost = if *lost {
                 !self.random.chance(1.0 / burst)
             } else {
-                of.radio.loss > 0.0 && self.random.chance(of.radio.loss / ((1.0 - of.radio.loss) * burst))
+                flight.radio.loss > 0.0 && self.random.chance(flight.radio.loss / ((1.0 - flight.radio.loss) * burst))
             };
             if *lost || broadcast_is_lost {
                 continue;
             }
-            let copies = 1 + usize::from(self.random.chance(of.radio.duplicates));
+            let copies = 1 + usize::from(self.random.chance(flight.radio.duplicates));
             for _ in 0..copies {
-                self.flying.push((now + 1e-6 + of.radio.latency_s * self.random.unit(), message, segment));
+                self.flying.push((now + 1e-6 + flight.radio.latency_s * self.random.unit(), message, segment));
             }
         }
     }
 
     /// Returns the direction to the nearest vehicle or obstacle.
-    fn nearest(&self, i: usize, of: &Flight) -> Vector3<f64> {
+    fn nearest(&self, i: usize, flight: &Flight) -> Vector3<f64> {
         let own = self.states[i].position_m;
         let others = (0..self.states.len()).filter(|j| *j != i).map(|j| self.states[j].position_m);
-        let bodies = of.obstacles.iter().filter_map(|obstacle| obstacle.body.closest_point_m(&own));
+        let bodies = flight.obstacles.iter().filter_map(|obstacle| obstacle.body.closest_point_m(&own));
         others
             .chain(bodies)
             .map(|other| other - own)
-            .min_by(|a, b| of.scaled(a).norm_squared().total_cmp(&of.scaled(b).norm_squared()))
+            .min_by(|a, b| flight.scaled(a).norm_squared().total_cmp(&flight.scaled(b).norm_squared()))
             .map_or_else(Vector3::zeros, |to| to.normalize())
     }
 
-    fn wanted(&mut self, i: usize, measured: &State, of: &Flight) -> Vector3<f64> {
-        let largest = of.limits[i].settings().accel_m_s2;
-        match of.law {
-            Law::Slot => -(measured.position_m - of.slots[i]) - measured.velocity_m_s * 2.0,
-            Law::DiveAtNearest => self.nearest(i, of) * largest,
+    fn wanted(&mut self, i: usize, measured: &State, flight: &Flight) -> Vector3<f64> {
+        let largest = flight.limits[i].settings().accel_m_s2;
+        match flight.law {
+            Law::Slot => -(measured.position_m - flight.slots[i]) - measured.velocity_m_s * 2.0,
+            Law::DiveAtNearest => self.nearest(i, flight) * largest,
             Law::DiveAtCentre if self.random.chance(0.1) => self.random.direction() * largest,
             Law::DiveAtCentre => measured.position_m * -10.0,
             Law::Random => {
@@ -296,33 +296,35 @@ impl World {
         }
     }
 
-    fn push(&mut self, of: &Flight) {
+    fn push(&mut self, flight: &Flight) {
         for i in 0..self.states.len() {
-            let settings = of.limits[i].settings();
+            let settings = flight.limits[i].settings();
             let bound = settings.disturbance_m_s2;
-            let push = if of.adversarial { self.nearest(i, of) * bound } else { self.random.vector(bound) };
-            let command = self.commands[i].cap_magnitude(of.plant_m_s2);
-            self.accelerations[i] = command + flat(push, of.planar) + self.states[i].velocity_m_s * settings.a22_per_s;
+            let push = if flight.adversarial { self.nearest(i, flight) * bound } else { self.random.vector(bound) };
+            let command = self.commands[i].cap_magnitude(flight.plant_m_s2);
+            self.accelerations[i] =
+                command + flat(push, flight.planar) + self.states[i].velocity_m_s * settings.a22_per_s;
         }
     }
 
     /// Finds the least distance from obstacles over a step to 1e-9 m. Halves an interval of time while the path within
     /// it may come closer than found so far. Its distance is at least that of both ends from the plane before the body
     /// at its middle, less the bend of the path.
-    fn judge_obstacles(&mut self, of: &Flight) {
+    fn judge_obstacles(&mut self, flight: &Flight) {
         for (state, acceleration) in self.states.iter().zip(&self.accelerations) {
-            let at = |seconds: f64| state.after(*acceleration, seconds).position_m;
-            for obstacle in &of.obstacles {
+            let position_at = |seconds: f64| state.after(*acceleration, seconds).position_m;
+            for obstacle in &flight.obstacles {
                 let mut open = vec![(0.0, self.step_s)];
                 while let Some((from, to)) = open.pop() {
                     let middle = f64::midpoint(from, to);
-                    let Some(closest) = obstacle.body.closest_point_m(&at(middle)) else {
+                    let Some(closest) = obstacle.body.closest_point_m(&position_at(middle)) else {
                         self.obstacle_room_m = self.obstacle_room_m.min(-obstacle.clearance_m);
                         continue;
                     };
-                    let (outward, distance) = ((at(middle) - closest).normalize(), (at(middle) - closest).norm());
+                    let (outward, distance) =
+                        ((position_at(middle) - closest).normalize(), (position_at(middle) - closest).norm());
                     self.obstacle_room_m = self.obstacle_room_m.min(distance - obstacle.clearance_m);
-                    let ends = [from, to].map(|end| outward.dot(&(at(end) - closest)));
+                    let ends = [from, to].map(|end| outward.dot(&(position_at(end) - closest)));
                     let bend = acceleration.norm() * (to - from) * (to - from) / 8.0;
                     let least = (ends[0].min(ends[1]) - bend).max(0.0) - obstacle.clearance_m;
                     if least < self.obstacle_room_m - 1e-9 {
@@ -333,17 +335,17 @@ impl World {
         }
     }
 
-    fn judge(&mut self, of: &Flight) {
+    fn judge(&mut self, flight: &Flight) {
         for i in 0..self.states.len() {
             for j in i + 1..self.states.len() {
-                let apart = of.scaled(&(self.states[i].position_m - self.states[j].position_m));
-                let closing = of.scaled(&(self.states[i].velocity_m_s - self.states[j].velocity_m_s));
-                let bend = of.scaled(&(self.accelerations[i] - self.accelerations[j]));
+                let apart = flight.scaled(&(self.states[i].position_m - self.states[j].position_m));
+                let closing = flight.scaled(&(self.states[i].velocity_m_s - self.states[j].velocity_m_s));
+                let bend = flight.scaled(&(self.accelerations[i] - self.accelerations[j]));
                 let moved = closing.norm() * self.step_s + bend.norm() * self.step_s * self.step_s / 2.0;
                 if apart.norm() - moved < self.closest_m {
-                    let (separation, at) = least_separation(&apart, &closing, &bend, self.step_s);
+                    let (separation, time_s) = least_separation(&apart, &closing, &bend, self.step_s);
                     if separation < self.closest_m {
-                        (self.closest_m, self.closest_s) = (separation, self.time_s() + at);
+                        (self.closest_m, self.closest_s) = (separation, self.time_s() + time_s);
                     }
                 }
             }
@@ -361,7 +363,7 @@ pub(super) fn flat(vector: Vector3<f64>, planar: bool) -> Vector3<f64> {
 /// The derivative of the square is a cubic. Between its extrema it is monotone, so each change of sign from minus to
 /// plus has one minimum, found by bisection.
 pub(super) fn least_separation(r: &Vector3<f64>, v: &Vector3<f64>, a: &Vector3<f64>, step_s: f64) -> (f64, f64) {
-    let at = |t: f64| (r + v * t + a * (t * t / 2.0)).norm();
+    let distance_at = |t: f64| (r + v * t + a * (t * t / 2.0)).norm();
     let slope = |t: f64| {
         let (point, speed) = (r + v * t + a * (t * t / 2.0), v + a * t);
         point.dot(&speed)
@@ -374,7 +376,8 @@ pub(super) fn least_separation(r: &Vector3<f64>, v: &Vector3<f64>, a: &Vector3<f
         ends[1] = ((-b - root) / (2.0 * q)).clamp(0.0, step_s);
         ends[2] = ((-b + root) / (2.0 * q)).clamp(0.0, step_s);
     }
-    let mut best = if at(0.0) <= at(step_s) { (at(0.0), 0.0) } else { (at(step_s), step_s) };
+    let mut best =
+        if distance_at(0.0) <= distance_at(step_s) { (distance_at(0.0), 0.0) } else { (distance_at(step_s), step_s) };
     for piece in ends.windows(2) {
         let (mut low, mut high) = (piece[0], piece[1]);
         if slope(low) < 0.0 && slope(high) > 0.0 {
@@ -382,8 +385,8 @@ pub(super) fn least_separation(r: &Vector3<f64>, v: &Vector3<f64>, a: &Vector3<f
                 let middle = 0.5 * (low + high);
                 if slope(middle) < 0.0 { low = middle } else { high = middle }
             }
-            if at(low) < best.0 {
-                best = (at(low), low);
+            if distance_at(low) < best.0 {
+                best = (distance_at(low), low);
             }
         }
     }
@@ -395,12 +398,12 @@ fn the_least_separation_is_no_larger_than_any_sample() {
     let mut random = Random::new(8);
     for _ in 0..2_000 {
         let (r, v, a) = (random.vector(2.0), random.vector(5.0), random.vector(20.0));
-        let (separation, at) = least_separation(&r, &v, &a, 0.5);
+        let (separation, time_s) = least_separation(&r, &v, &a, 0.5);
         let samples = (0..=1_000).map(|k| f64::from(k) * 5e-4).map(|t| (r + v * t + a * (t * t / 2.0)).norm());
         let sampled = samples.fold(f64::INFINITY, f64::min);
         assert!(
             separation <= sampled + 1e-12 && separation > sampled - 0.01,
-            "{r} {v} {a}: {separation} {sampled} {at}"
+            "{r} {v} {a}: {separation} {sampled} {time_s}"
         );
     }
 }

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::sensing::SAME_S;
 use super::{ImperfectionSpec, is_off};
-use crate::scenario::{Scenario, ScenarioError};
+use crate::scenario::{ErrorKind, Scenario, ScenarioError};
 use tautline_core::swarm::{Rows, row, set_row};
 use tautline_laws::law::VoidReason;
 
@@ -33,7 +33,7 @@ impl ImperfectionSpec for ActuationSpec {
             return Ok(());
         }
         Err(ScenarioError::new("the ideal plant supports no lag")
-            .coded("scenario/unsupported-by-plant")
+            .with_kind(ErrorKind::UnsupportedByPlant)
             .with_help("leave out actuation.lag_s, or set plant.kind to \"rapier\"")
             .at_keys(["actuation.lag_s", "plant.kind"]))
     }
@@ -43,7 +43,7 @@ impl ImperfectionSpec for ActuationSpec {
             (self.max_accel_m_s2.is_some(), VoidReason::AccelerationLimited),
             (self.lag_s > 0.0, VoidReason::AccelerationLagged),
         ];
-        voids.into_iter().filter_map(|(is, void)| is.then_some(void)).collect()
+        voids.into_iter().filter_map(|(is_void, void)| is_void.then_some(void)).collect()
     }
 }
 

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::ImperfectionSpec;
 use super::sensing::SAME_S;
-use crate::scenario::{Scenario, ScenarioError};
+use crate::scenario::{ErrorKind, Scenario, ScenarioError};
 use crate::vehicle::RotorFailure;
 use tautline_core::swarm::{Rows, row, set_row};
 use tautline_laws::law::VoidReason;
@@ -75,7 +75,7 @@ impl ImperfectionSpec for Vec<Failure> {
                     "the vehicle must be from 1 to {}, got {vehicle}",
                     scenario.count()
                 ))
-                .coded("scenario/unknown-vehicle")
+                .with_kind(ErrorKind::UnknownVehicle)
                 .with_help("vehicles are counted from 1")
                 .at_entry("failure", entry));
             }
@@ -84,7 +84,7 @@ impl ImperfectionSpec for Vec<Failure> {
                     "at_s must be from 0 s to less than {} s, got {at_s} s",
                     scenario.time.duration_s
                 ))
-                .coded("scenario/outside-flight")
+                .with_kind(ErrorKind::OutsideFlight)
                 .with_help("give a time within the flight")
                 .at_entry("failure", entry)
                 .at("time.duration_s"));
@@ -108,22 +108,22 @@ impl ImperfectionSpec for Vec<Failure> {
 
 impl Scenario {
     fn check_rotor(&self, entry: usize, share: f64) -> Result<(), ScenarioError> {
-        let (code, said, help) = if self.airframe.quadrotor().is_none() {
+        let (kind, said, help) = if self.airframe.quadrotor().is_none() {
             (
-                "scenario/unsupported-by-vehicle",
+                ErrorKind::UnsupportedByVehicle,
                 "points have no rotors that can fail".to_owned(),
                 "set vehicle.model to a quadrotor, or kind to \"dead\"",
             )
         } else if !(0.0..1.0).contains(&share) {
             (
-                "scenario/out-of-range",
+                ErrorKind::OutOfRange,
                 format!("share must be from 0 to less than 1, got {share}"),
                 "share is the part of its thrust that the rotor still gives",
             )
         } else {
             return Ok(());
         };
-        Err(ScenarioError::new(said).coded(code).with_help(help).at_entry("failure", entry))
+        Err(ScenarioError::new(said).with_kind(kind).with_help(help).at_entry("failure", entry))
     }
 
     fn check_frozen(&self, entry: usize) -> Result<(), ScenarioError> {
@@ -131,7 +131,7 @@ impl Scenario {
             return Ok(());
         }
         Err(ScenarioError::new("vehicles of the ideal plant hold no command in continuous time")
-            .coded("scenario/unsupported-by-plant")
+            .with_kind(ErrorKind::UnsupportedByPlant)
             .with_help("set time.control_hz, or plant.kind to \"rapier\"")
             .at_entry("failure", entry)
             .at("plant.kind"))
@@ -142,7 +142,7 @@ impl Scenario {
             return Ok(());
         }
         Err(ScenarioError::new("a vehicle cannot fall silent without a rate of messages")
-            .coded("scenario/missing-key")
+            .with_kind(ErrorKind::MissingKey)
             .with_help("set network.rate_hz, such as 50")
             .at_entry("failure", entry))
     }

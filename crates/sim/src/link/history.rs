@@ -55,7 +55,7 @@ impl History {
     /// Writes the state at a time \[s\]; before the first state that state, after the last state that one.
     pub fn at(&self, time_s: f64, swarm: &mut Swarm) {
         let later = self.states.partition_point(|(state_s, _)| *state_s <= time_s);
-        let (before, after) = (later.checked_sub(1).and_then(|at| self.states.get(at)), self.states.get(later));
+        let (before, after) = (later.checked_sub(1).and_then(|index| self.states.get(index)), self.states.get(later));
         match (before, after) {
             (Some((from_s, from)), Some((to_s, to))) => {
                 interpolate(from, to, to_s - from_s, (time_s - from_s) / (to_s - from_s), swarm);
@@ -96,17 +96,17 @@ mod tests {
         for t in [0.0, 0.3, 0.5, 1.0] {
             history.push(t, &cubic(t));
         }
-        let mut at = cubic(0.0);
+        let mut point = cubic(0.0);
         for t in [0.0, 0.1, 0.3, 0.42, 0.77, 1.0] {
-            history.at(t, &mut at);
+            history.at(t, &mut point);
             let exact = cubic(t);
-            assert!((&at.positions_m - &exact.positions_m).amax() < 1e-14, "{t}");
-            assert!((&at.velocities_m_s - &exact.velocities_m_s).amax() < 1e-13, "{t}");
+            assert!((&point.positions_m - &exact.positions_m).amax() < 1e-14, "{t}");
+            assert!((&point.velocities_m_s - &exact.velocities_m_s).amax() < 1e-13, "{t}");
         }
-        history.at(7.0, &mut at);
-        assert_eq!(at, cubic(1.0));
-        history.at(-7.0, &mut at);
-        assert_eq!(at, cubic(0.0));
+        history.at(7.0, &mut point);
+        assert_eq!(point, cubic(1.0));
+        history.at(-7.0, &mut point);
+        assert_eq!(point, cubic(0.0));
     }
 
     #[test]
@@ -119,8 +119,8 @@ mod tests {
         history.forget_after(1.6);
         history.push(1.6, &cubic(0.0));
         history.push(1.6, &cubic(3.0));
-        let mut at = cubic(1.0);
-        history.at(1.6, &mut at);
-        assert_eq!((at, history.states.len()), (cubic(3.0), 2));
+        let mut point = cubic(1.0);
+        history.at(1.6, &mut point);
+        assert_eq!((point, history.states.len()), (cubic(3.0), 2));
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Each imperfection is a file of this module. The file holds the table of the scenario, which implements
 //! [`ImperfectionSpec`], and its simulation in flight. [`of`] combines all of them into one [`Imperfections`].
-//! Without imperfections ([`NoImperfections`]), laws read the true state without a copy. docs/imperfections.md has the
+//! Without imperfections ([`NoImperfections`]), laws read the true state without a copy. docs/scenario.md has the
 //! equations.
 //!
 //! Sensors measure and vehicles send at fixed times, which need not be the ends of steps. [`Imperfections::settle`]
@@ -32,7 +32,7 @@ use network::Network;
 use sensing::{RelativeSensor, StateSensor};
 use serde::{Deserialize, Serialize};
 
-use crate::scenario::{Scenario, ScenarioError};
+use crate::scenario::{ErrorKind, Scenario, ScenarioError};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::law::VoidReason;
@@ -84,7 +84,7 @@ impl Scenario {
         Err(ScenarioError::new(format!(
             "{key} samples the state, but the ideal plant evaluates the law in continuous time"
         ))
-        .coded("scenario/unsupported-by-plant")
+        .with_kind(ErrorKind::UnsupportedByPlant)
         .with_help("set time.control_hz, the rate of held commands, or set plant.kind to \"rapier\"")
         .at_keys([key, "plant.kind"]))
     }
@@ -188,20 +188,20 @@ fn latency(key: &'static str, what: &str, latency_s: f64, duration_s: f64) -> Re
     if latency_s == 0.0 || (SHORTEST_S..=duration_s).contains(&latency_s) {
         return Ok(latency_s);
     }
-    let (code, said, help) = if latency_s < SHORTEST_S {
+    let (kind, said, help) = if latency_s < SHORTEST_S {
         (
-            "scenario/out-of-range",
+            ErrorKind::OutOfRange,
             format!("{what} must be 0 or at least {SHORTEST_S} s, got {latency_s} s"),
             "give 0 for no latency",
         )
     } else {
         (
-            "scenario/outside-flight",
+            ErrorKind::OutsideFlight,
             format!("{what} must be at most the {duration_s} s of the flight, got {latency_s} s"),
             "reduce the latency, or increase time.duration_s",
         )
     };
-    Err(ScenarioError::new(said).coded(code).with_help(help).at(key).at("time.duration_s"))
+    Err(ScenarioError::new(said).with_kind(kind).with_help(help).at(key).at("time.duration_s"))
 }
 
 /// Returns whether a number is 0, which turns its imperfection off.

@@ -8,7 +8,7 @@ use super::history::History;
 use super::messages::Messages;
 use super::sensing::StateSensor;
 use super::{ImperfectionSpec, Traffic, is_default, is_off, latency};
-use crate::scenario::{MAX_MEMORY_BYTES, Scenario, ScenarioError};
+use crate::scenario::{ErrorKind, MAX_MEMORY_BYTES, Scenario, ScenarioError};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::law::VoidReason;
@@ -136,7 +136,7 @@ impl ImperfectionSpec for NetworkSpec {
     fn voids(&self) -> Vec<VoidReason> {
         let is_late = self.latency_s > 0.0 || self.rate_hz.is_some();
         let voids = [(is_late, VoidReason::MessagesDelayed), (self.loses(), VoidReason::MessagesLost)];
-        voids.into_iter().filter_map(|(is, void)| is.then_some(void)).collect()
+        voids.into_iter().filter_map(|(is_void, void)| is_void.then_some(void)).collect()
     }
 }
 
@@ -160,15 +160,15 @@ impl Scenario {
             return Ok(());
         }
         Err(ScenarioError::new(format!("{key} needs a rate of messages"))
-            .coded("scenario/missing-key")
+            .with_kind(ErrorKind::MissingKey)
             .with_help("set network.rate_hz, such as 50")
             .at(key))
     }
 
     fn check_link(&self, entry: usize, failure: &LinkFailure) -> Result<(), ScenarioError> {
         let &LinkFailure { link: [a, b], from_s, to_s } = failure;
-        let refuse = |code, said: String, help: &str| {
-            Err(ScenarioError::new(said).coded(code).with_help(help).at_entry("network.failure", entry))
+        let refuse = |kind, said: String, help: &str| {
+            Err(ScenarioError::new(said).with_kind(kind).with_help(help).at_entry("network.failure", entry))
         };
         let index = |number: u64| usize::try_from(number).unwrap_or(usize::MAX).checked_sub(1);
         let is_link = match (index(a), index(b)) {
@@ -179,7 +179,7 @@ impl Scenario {
         };
         if !is_link {
             return refuse(
-                "scenario/edge",
+                ErrorKind::Edge,
                 format!("the graph has no link between vehicles {a} and {b}"),
                 "name the two ends of an edge of [graph], counted from 1",
             );
@@ -189,7 +189,7 @@ impl Scenario {
             return Ok(());
         }
         refuse(
-            "scenario/outside-flight",
+            ErrorKind::OutsideFlight,
             format!("the link of vehicles {a} and {b} must be down within the flight, got {from_s} s to {until_s} s"),
             "give from_s from 0 s to less than the end of the flight, and to_s more than from_s",
         )
@@ -205,7 +205,7 @@ impl Scenario {
                 "{rate_hz} messages a second are more than {MESSAGES_A_STEP} messages in a step of {} s",
                 self.time.dt_s
             ))
-            .coded("scenario/step-too-long")
+            .with_kind(ErrorKind::StepTooLong)
             .with_help(format!("send at most {} a second, or reduce time.dt_s", MESSAGES_A_STEP / self.time.dt_s))
             .at_keys(["network.rate_hz", "sensing.rate_hz"]));
         }
@@ -224,7 +224,7 @@ impl Scenario {
             "messages over {received} links need {} GiB of memory, more than the limit of {gib} GiB",
             bytes >> 30
         ))
-        .coded("scenario/memory")
+        .with_kind(ErrorKind::Memory)
         .with_help("choose a graph of fewer edges, such as [graph] kind = \"ring\", or send less often")
         .at_keys(["network.rate_hz", "graph.kind"]))
     }

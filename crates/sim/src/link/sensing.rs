@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::history::History;
 use super::noise::{Noise, NoiseSource};
 use super::{ImperfectionSpec, is_off, latency};
-use crate::scenario::{Scenario, ScenarioError, Space};
+use crate::scenario::{ErrorKind, Scenario, ScenarioError, Space};
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_laws::law::VoidReason;
 use tautline_laws::observation::NeighbourState;
@@ -76,7 +76,7 @@ impl ImperfectionSpec for SensingSpec {
         for (key, what, noise) in noises {
             if noise > 0.0 && rate_hz.is_none() {
                 return Err(ScenarioError::new(format!("{what} needs a rate of measurements"))
-                    .coded("scenario/missing-key")
+                    .with_kind(ErrorKind::MissingKey)
                     .with_help("set sensing.rate_hz, such as 100")
                     .at(key));
             }
@@ -92,7 +92,7 @@ impl ImperfectionSpec for SensingSpec {
     fn voids(&self) -> Vec<VoidReason> {
         let is_late = self.latency_s > 0.0 || self.near_s() > 0.0 || self.rate_hz.is_some();
         let voids = [(is_late, VoidReason::SensingDelayed), (self.is_noisy(), VoidReason::SensingInexact)];
-        voids.into_iter().filter_map(|(is, void)| is.then_some(void)).collect()
+        voids.into_iter().filter_map(|(is_void, void)| is_void.then_some(void)).collect()
     }
 }
 

@@ -290,16 +290,16 @@ mod tests {
 
     #[test]
     fn a_path_holds_the_instants_of_its_step_and_the_largest_bend() {
-        let at = |x: f64| Rows::from_element(2, x);
+        let rows_at = |x: f64| Rows::from_element(2, x);
         let mut path = StepPath::default();
-        path.add_instant(0.1, &at(1.0));
-        path.add_instant(0.2, &at(2.0));
+        path.add_instant(0.1, &rows_at(1.0));
+        path.add_instant(0.2, &rows_at(2.0));
         path.raise_bend(0.5);
         path.raise_bend(0.25);
         assert_eq!(path.bend_m(), 0.5);
         path.begin();
-        path.add_instant(0.3, &at(3.0));
-        assert_eq!(path.instants().collect::<Vec<_>>(), [(0.3, &at(3.0))]);
+        path.add_instant(0.3, &rows_at(3.0));
+        assert_eq!(path.instants().collect::<Vec<_>>(), [(0.3, &rows_at(3.0))]);
         assert_eq!(path.bend_m(), 0.0);
     }
 }

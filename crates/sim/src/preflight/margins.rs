@@ -159,7 +159,7 @@ fn is_damped(mode: Mode, model: &Model, drag_per_s: f64) -> bool {
 
 /// Returns the margins in one line.
 pub(super) fn line(margins: &[PredictedMargin]) -> Option<String> {
-    let of = |key: &str| {
+    let margin_of = |key: &str| {
         let mut parts = margins.iter().filter(|margin| margin.key == key).map(|margin| {
             let state = if margin.state == ContactState::Free { "" } else { " in contact" };
             let bound = if margin.bound == Bound::AtMost { "up to" } else { "from" };
@@ -168,6 +168,6 @@ pub(super) fn line(margins: &[PredictedMargin]) -> Option<String> {
         let first = parts.next()?;
         Some(parts.fold(format!("{key} {first}"), |line, part| format!("{line}, {part}")))
     };
-    let lines: Vec<_> = [SENSING_LATENCY, NETWORK_LATENCY, CONTROL_RATE].into_iter().filter_map(of).collect();
+    let lines: Vec<_> = [SENSING_LATENCY, NETWORK_LATENCY, CONTROL_RATE].into_iter().filter_map(margin_of).collect();
     (!lines.is_empty()).then(|| lines.join("; ") + " (each without other imperfections)")
 }

@@ -12,7 +12,7 @@ mod warning;
 
 use serde::Serialize;
 
-use crate::scenario::{MAX_HALVINGS, PlantSpec, Scenario, TimeSpec};
+use crate::scenario::{MAX_HALVINGS, PlantSpec, Resolved, Scenario, TimeSpec};
 use crate::sim::{Breakdown, Ending, Simulation};
 use crate::vehicle::Quadrotor;
 use tautline_core::fact::serialize_coded;
@@ -45,6 +45,9 @@ pub enum Connectivity {
 pub struct Preflight {
     /// Name of the scenario.
     pub scenario: String,
+    /// The scenario with every default.
+    #[serde(skip)]
+    pub resolved: Resolved,
     /// Number of vehicles N.
     pub vehicles: usize,
     /// Number of dimensions: 2 for the plane z = 0, 3 for space.
@@ -208,6 +211,7 @@ impl Preflight {
         let margin = |rows: &Rows| scaled(rows).map(|(_, distance_m)| distance_m - scenario.delta_m);
         let mut found = Self {
             scenario: scenario.name.clone(),
+            resolved: scenario.resolved(),
             vehicles: scenario.count(),
             dimensions: scenario.space.dimensions(),
             delta_m: scenario.delta_m,

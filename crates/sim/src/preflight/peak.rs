@@ -32,13 +32,13 @@ pub(super) fn start_peak_m_s2(scenario: &Scenario, law: &mut dyn Law) -> Option<
         if let Some(range_m) = law.capabilities().sensing_range_m {
             near.update(&swarm.positions_m, range_m);
         }
-        let at = Observation {
+        let observation = Observation {
             target: target.view(),
             near: near.pairs(),
             obstacles: &scenario.obstacles,
             ..Observation::exact(&swarm, &scenario.graph, &of_leg.formation)
         };
-        law.command(&at, &mut command).ok()?;
+        law.command(&observation, &mut command).ok()?;
         peak_m_s2 = (0..command.nrows()).map(|i| row(&command, i).norm()).fold(peak_m_s2, f64::max);
     }
     let peak_m_s2 = scenario.actuation.max_accel_m_s2.map_or(peak_m_s2, |most_m_s2| peak_m_s2.min(most_m_s2));

@@ -46,7 +46,7 @@ impl ShieldCheck {
     pub(super) fn of(scenario: &Scenario) -> Option<Self> {
         let limits = scenario.shield_limits().ok()??;
         let ((start, slot), basis) = (scenario.shield_rooms()?, scenario.tracking_basis()?);
-        let numbers = |of: &PairRoom| [of.pair.0 + 1, of.pair.1 + 1];
+        let numbers = |room: &PairRoom| [room.pair.0 + 1, room.pair.1 + 1];
         Some(Self {
             certificate: basis.certificate(&limits),
             facts: basis.facts(limits.tube().error_m),

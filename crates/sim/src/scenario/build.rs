@@ -5,7 +5,7 @@
 
 use super::document::{Document, StartShape, StartTable};
 use super::document::{PerVehicle, Point, rows};
-use super::error::ScenarioError;
+use super::error::{ErrorKind, ScenarioError};
 use super::formation::is_flat;
 use super::formation::{check_slots, legs, listed_slots};
 use super::graph::{edge_count, graph};
@@ -105,7 +105,7 @@ fn delta_m(given_m: Option<f64>, safety: Safety) -> Result<f64, ScenarioError> {
         (Some(delta_m), _) => Ok(delta_m),
         (None, Safety::Ellipsoid { half_axes_m: [a_m, ..] }) => Ok(2.0 * a_m),
         (None, Safety::Ball) => Err(ScenarioError::new("missing key `delta_m`")
-            .coded("scenario/missing-key")
+            .with_kind(ErrorKind::MissingKey)
             .with_help("give the safety distance")
             .at("law")),
     }
@@ -115,12 +115,12 @@ fn delta_m(given_m: Option<f64>, safety: Safety) -> Result<f64, ScenarioError> {
 fn count(document: &Document) -> Result<usize, ScenarioError> {
     if let Some(count) = document.swarm.count {
         return usize::try_from(count)
-            .map_err(|_| ScenarioError::new("too many vehicles").coded("scenario/out-of-range").at("swarm.count"));
+            .map_err(|_| ScenarioError::new("too many vehicles").with_kind(ErrorKind::OutOfRange).at("swarm.count"));
     }
     let listed = document.start.positions_m.as_ref().map(Vec::len);
     listed.or(listed_slots(&document.formation.shape)).ok_or_else(|| {
         ScenarioError::new("the number of vehicles is missing")
-            .coded("scenario/missing-key")
+            .with_kind(ErrorKind::MissingKey)
             .with_help("add `count` to [swarm], for example count = 6")
             .at("swarm.count")
     })
@@ -158,7 +158,7 @@ fn space(document: &Document) -> Result<Space, ScenarioError> {
         Some(2) => Ok(Space::Plane),
         Some(3) => Ok(Space::Volume),
         Some(other) => Err(ScenarioError::new(format!("`dimensions` must be 2 or 3, got {other}"))
-            .coded("scenario/out-of-range")
+            .with_kind(ErrorKind::OutOfRange)
             .with_help("2 is the plane z = 0, 3 is space")
             .at("swarm.dimensions")),
         None => {
@@ -178,13 +178,13 @@ fn start(table: &StartTable, count: usize, space: Space, delta_m: f64) -> Result
         (None, Some(shape)) => start::positions(shape, count, space, delta_m, &mut random)?,
         (Some(_), Some(_)) => {
             return Err(ScenarioError::new("both `positions_m` and a `shape` are given")
-                .coded("scenario/exclusive-keys")
+                .with_kind(ErrorKind::ExclusiveKeys)
                 .with_help("keep one of them")
                 .at_keys(["start.shape", "start.positions_m"]));
         }
         (None, None) => {
             return Err(ScenarioError::new("no start positions are given")
-                .coded("scenario/missing-key")
+                .with_kind(ErrorKind::MissingKey)
                 .with_help("add positions_m = [[x, y], ...] or a shape, for example shape = \"line\", spacing_m = 3.0")
                 .at("start"));
         }

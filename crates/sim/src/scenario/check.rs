@@ -5,13 +5,13 @@
 //! `kind = { NAME = { keys } }`.
 
 use std::borrow::Cow;
+use std::fmt::Display;
 use std::ops::Range;
 
-use toml::Spanned;
 use toml::de::{DeTable, DeValue};
+use toml::{Spanned, Value};
 
-use super::error::ScenarioError;
-use super::error::suggest;
+use super::error::{ErrorKind, Field, ScenarioError, suggest};
 use super::limits::{LARGEST, SMALLEST};
 use super::schema::{Node, tables_with};
 use tautline_core::text::shortest;
@@ -23,36 +23,36 @@ const NAME_CHARS: usize = 40;
 pub(super) struct SchemaError {
     pub(super) error: ScenarioError,
     pub(super) span: Range<usize>,
-    /// Keys and entries that lead to the value, innermost first.
-    path: Vec<String>,
+    /// Dotted path of keys and entries that lead to the value.
+    path: Box<str>,
 }
 
 impl SchemaError {
-    fn new(code: &'static str, message: impl AsRef<str>, help: impl AsRef<str>, span: Range<usize>) -> Self {
-        let error = ScenarioError::new(message).coded(code).with_help(help);
-        Self { error, span, path: Vec::new() }
+    fn new(kind: ErrorKind, message: impl AsRef<str>, help: impl AsRef<str>, span: Range<usize>) -> Self {
+        let error = ScenarioError::new(message).with_kind(kind).with_help(help);
+        Self { error, span, path: "".into() }
     }
 
-    fn child(mut self, key: impl Into<String>) -> Self {
-        self.path.push(key.into());
-        self
+    /// Returns the error of the value below a key or entry.
+    fn child(self, key: impl Display) -> Self {
+        let path = if self.path.is_empty() { key.to_string() } else { format!("{key}.{}", self.path) };
+        Self { path: path.into(), ..self }
     }
 
     /// Returns the error about a value that the scenario does not give, with its dotted path as its key.
     pub(super) fn of_filled_value(self) -> ScenarioError {
         let error = self.without_text();
-        let path = error.field().map_or_else(String::new, |field| field.to_string());
-        let message = format!("{path}, which follows from other keys: {}", error.message());
+        let path = error.fields.first().map_or_else(String::new, Field::to_string);
+        let message = format!("{path}, which follows from other keys: {}", error.message);
         ScenarioError::new(message)
-            .coded(error.code())
+            .with_kind(error.kind)
             .with_help(format!("give {path} another value, or change the keys that it follows from"))
             .at(path)
     }
 
     /// Returns the error with its dotted path as its key, for a scenario without a text.
     pub(super) fn without_text(self) -> ScenarioError {
-        let path: Vec<_> = self.path.into_iter().rev().collect();
-        self.error.at(path.join("."))
+        self.error.at(String::from(self.path))
     }
 }
 
@@ -67,6 +67,40 @@ pub(super) fn check_schema(file: &mut Spanned<DeValue<'_>>, overridden_from: usi
 /// Checks a value of a file without overrides against a part of its schema. `key` names the value.
 pub(super) fn check_value(key: &str, value: &mut Spanned<DeValue<'_>>, node: Node) -> Result<(), SchemaError> {
     Check { overridden_from: usize::MAX, file: node.whole_file() }.value(value, node, key, None)
+}
+
+/// Checks the bounds of a value of a scenario built in code, whose keys and types are those of the schema. Choices are
+/// nested as serde writes them.
+pub(super) fn check_bounds(value: &Value, node: Node, name: &str) -> Result<(), SchemaError> {
+    let alternatives = node.alternatives();
+    if let Value::Table(table) = value {
+        return table.iter().try_for_each(|(key, value)| {
+            let choice = value.as_table().and_then(|choice| {
+                let is_chosen = |tag: (&str, &str)| tag.0 == key && choice.contains_key(tag.1);
+                Some((alternatives.iter().find(|part| part.tag().is_some_and(is_chosen))?, choice))
+            });
+            if let Some((part, choice)) = choice {
+                return choice.values().try_for_each(|keys| check_bounds(keys, *part, name));
+            }
+            let of_choice = || alternatives.iter().find_map(|part| part.property(key));
+            node.property(key)
+                .or_else(of_choice)
+                .map_or(Ok(()), |part| check_bounds(value, part, key).map_err(|schema_error| schema_error.child(key)))
+        });
+    }
+    let node = alternatives.into_iter().find(|part| admits(*part, value.type_str())).unwrap_or(node);
+    match *value {
+        Value::Array(ref list) => {
+            check_length(name, node, list.len(), 0..0)?;
+            let Some(node) = node.items() else { return Ok(()) };
+            list.iter().enumerate().try_for_each(|(entry, value)| {
+                check_bounds(value, node, name).map_err(|schema_error| schema_error.child(entry + 1))
+            })
+        }
+        Value::Integer(number) => in_range(name, node, number as f64, || number.to_string(), 0..0),
+        Value::Float(number) => in_range(name, node, number, || shortest(number).to_lowercase(), 0..0),
+        _ => Ok(()),
+    }
 }
 
 struct Check {
@@ -111,7 +145,8 @@ impl Check {
         }
         let alternatives = node.alternatives();
         if !alternatives.is_empty() {
-            let admitting: Vec<_> = alternatives.into_iter().filter(|part| admits(*part, value.get_ref())).collect();
+            let admitting: Vec<_> =
+                alternatives.into_iter().filter(|part| admits(*part, value.get_ref().type_str())).collect();
             let part = match (&admitting[..], value.get_ref()) {
                 ([], _) => return Err(wrong_type(name, node, value.get_ref(), span)),
                 (parts @ [_, _, ..], DeValue::Table(table)) => self.named_by_key(name, parts, table, span)?,
@@ -119,25 +154,35 @@ impl Check {
             };
             return self.value(value, part, name, None);
         }
-        if !admits(node, value.get_ref()) {
+        if !admits(node, value.get_ref().type_str()) {
             return Err(wrong_type(name, node, value.get_ref(), span));
-        }
-        if let DeValue::Array(list) = value.get_ref() {
-            let of = |keyword: &str| node.keyword(keyword).as_u64();
-            let lengths = of("minItems").unwrap_or(0)..=of("maxItems").unwrap_or(u64::MAX);
-            if !lengths.contains(&(list.len() as u64)) {
-                return Err(wrong_type(name, node, value.get_ref(), span));
-            }
         }
         match value.get_mut() {
             DeValue::Array(list) => {
+                check_length(name, node, list.len(), span)?;
                 let Some(node) = node.items() else { return Ok(()) };
                 list.iter_mut().enumerate().try_for_each(|(entry, value)| {
-                    self.value(value, node, name, None)
-                        .map_err(|schema_error| schema_error.child((entry + 1).to_string()))
+                    self.value(value, node, name, None).map_err(|schema_error| schema_error.child(entry + 1))
                 })
             }
-            number @ (DeValue::Integer(_) | DeValue::Float(_)) => in_range(name, node, number, span),
+            DeValue::Integer(written) => {
+                let Ok(whole) = i64::from_str_radix(written.as_str(), written.radix()) else {
+                    let most = if node.kind() == "integer" { i64::MAX.to_string() } else { format!("{LARGEST:e}") };
+                    return Err(out_of_range(
+                        name,
+                        node,
+                        &format!("at most {most} in magnitude"),
+                        written.as_str(),
+                        span,
+                    ));
+                };
+                in_range(name, node, whole as f64, || whole.to_string(), span)
+            }
+            DeValue::Float(written) => {
+                let number: f64 = written.as_str().parse().unwrap_or(f64::NAN);
+                let shown = || if number.is_finite() { shortest(number) } else { written.as_str().to_owned() };
+                in_range(name, node, number, shown, span)
+            }
             _ => Ok(()),
         }
     }
@@ -155,7 +200,7 @@ impl Check {
         let (Some(key), None) = (keys.next(), keys.next()) else {
             let message = format!("`{}` must have one key, got {}", short(name), table.len());
             let help = format!("give one of {}", names.join(", "));
-            return Err(SchemaError::new("scenario/wrong-type", message, help, span));
+            return Err(SchemaError::new(ErrorKind::WrongType, message, help, span));
         };
         let of_key = parts.iter().copied().find(|part| part.property(key.get_ref()).is_some());
         of_key.ok_or_else(|| self.unknown_key(key.get_ref(), names, key.span()))
@@ -168,7 +213,7 @@ impl Check {
             [] => suggest(name, &known),
             ref tables => format!("`{name}` belongs in {}; {}", tables.join(", or "), suggest(name, &known)),
         };
-        SchemaError::new("scenario/unknown-key", format!("unknown key `{}`", short(name)), help, span).child(name)
+        SchemaError::new(ErrorKind::UnknownKey, format!("unknown key `{}`", short(name)), help, span).child(name)
     }
 
     fn table(
@@ -189,21 +234,21 @@ impl Check {
             let Some(node) = known(name) else {
                 // The key of the file may have a value of an override.
                 let is_of_override = |span: Range<usize>| span.start >= self.overridden_from;
-                let at =
+                let place =
                     if !is_of_override(key.span()) && is_of_override(value.span()) { value.span() } else { key.span() };
                 let known: Vec<_> = node.keys().chain(chosen.into_iter().flat_map(Node::keys)).collect();
-                return Err(self.unknown_key(name, known, at));
+                return Err(self.unknown_key(name, known, place));
             };
             // `chosen` has checked the tag.
             if node.keyword("const").is_null() {
-                self.value(value, node, name, None).map_err(|schema_error| schema_error.child(&**name))?;
+                self.value(value, node, name, None).map_err(|schema_error| schema_error.child(name))?;
             }
         }
         let required = node.required().chain(chosen.into_iter().flat_map(Node::required));
         if let Some(missing) = required.into_iter().find(|key| !table.contains_key(*key)) {
             let help = format!("`{missing}` is {}", known(missing).map_or_else(String::new, expected));
             let schema_error =
-                SchemaError::new("scenario/missing-key", format!("missing key `{missing}`"), help, span.clone());
+                SchemaError::new(ErrorKind::MissingKey, format!("missing key `{missing}`"), help, span.clone());
             return Err(schema_error);
         }
         if let Some((chosen, (tag, _))) = chosen.and_then(|chosen| Some((chosen, chosen.tag()?))) {
@@ -224,24 +269,24 @@ impl Check {
     ) -> Result<Option<Node>, SchemaError> {
         let names: Vec<_> = alternatives.iter().filter_map(|part| part.tag()).map(|(_, name)| name).collect();
         let default = alternatives.iter().find(|part| !part.requires(tag)).and_then(|part| part.tag());
-        let (name, at) = match (table.get(tag), own_name, default) {
+        let (name, tag_span) = match (table.get(tag), own_name, default) {
             (Some(value), ..) => {
                 let Some(name) = value.get_ref().as_str() else {
                     let message = format!("`{tag}` must be {}, got {}", listed(&names), found(value.get_ref()));
                     return Err(
-                        SchemaError::new("scenario/wrong-type", message, description(node), value.span()).child(tag)
+                        SchemaError::new(ErrorKind::WrongType, message, description(node), value.span()).child(tag)
                     );
                 };
                 (name.to_owned(), value.span())
             }
-            (None, Some((own, at)), _) => ((*own).to_owned(), at.clone()),
+            (None, Some((own, own_span)), _) => ((*own).to_owned(), own_span.clone()),
             (None, None, Some((_, default))) => (default.to_owned(), span.clone()),
             // Some tables, such as `[[leg]]`, need no tag.
             (None, None, None) if node.keyword("anyOf").is_array() => return Ok(None),
             (None, None, None) => {
                 let help = format!("give one of {}", listed(&names));
                 return Err(SchemaError::new(
-                    "scenario/missing-key",
+                    ErrorKind::MissingKey,
                     format!("missing key `{tag}`"),
                     help,
                     span.clone(),
@@ -249,17 +294,17 @@ impl Check {
             }
         };
         let Some(&chosen) = alternatives.iter().find(|part| part.tag().is_some_and(|(_, known)| known == name)) else {
-            let mut schema_error = unknown_choice(&name, &names, at);
+            let mut schema_error = unknown_choice(&name, &names, tag_span);
             if own_name.is_some() && !table.contains_key(tag) {
                 let help = format!(
                     "the name of a law is its kind unless the table [laws.NAME] has a `kind`: {}",
-                    schema_error.error.help().unwrap_or_default()
+                    schema_error.error.help.as_deref().unwrap_or_default()
                 );
                 schema_error.error = schema_error.error.with_help(help);
             }
             return Err(schema_error.child(tag));
         };
-        if at.start >= self.overridden_from {
+        if tag_span.start >= self.overridden_from {
             let is_left = |key: &str, value: &Spanned<DeValue<'_>>| {
                 value.span().start < self.overridden_from
                     && node.property(key).is_none()
@@ -273,7 +318,7 @@ impl Check {
             }
         }
         let name = DeValue::String(Cow::Owned(name));
-        table.entry(Spanned::new(at.clone(), tag.into())).or_insert(Spanned::new(at, name));
+        table.entry(Spanned::new(tag_span.clone(), tag.into())).or_insert(Spanned::new(tag_span, name));
         Ok(Some(chosen))
     }
 }
@@ -294,41 +339,38 @@ fn nest_choice(table: &mut DeTable<'_>, node: Node, chosen: Node, tag: &'static 
     table.insert(tag_key, Spanned::new(span, DeValue::Table(choice)));
 }
 
-/// Returns whether a value has the type of a part of the schema.
-fn admits(node: Node, value: &DeValue<'_>) -> bool {
-    match value {
-        DeValue::Table(_) => node.is_table(),
-        DeValue::Array(_) => node.kind() == "array",
-        DeValue::String(_) => node.kind() == "string" || !node.words().is_empty(),
-        DeValue::Boolean(_) => node.kind() == "boolean",
-        DeValue::Integer(_) => matches!(node.kind(), "integer" | "number"),
-        DeValue::Float(_) => node.kind() == "number",
-        DeValue::Datetime(_) => false,
+/// Returns whether a part of the schema has a type of TOML.
+fn admits(node: Node, type_name: &str) -> bool {
+    match type_name {
+        "table" => node.is_table(),
+        "string" => node.kind() == "string" || !node.words().is_empty(),
+        "integer" => matches!(node.kind(), "integer" | "number"),
+        "float" => node.kind() == "number",
+        other => node.kind() == other,
     }
 }
 
+/// Refuses a list that is shorter or longer than the schema allows.
+fn check_length(name: &str, node: Node, length: usize, span: Range<usize>) -> Result<(), SchemaError> {
+    let bound = |keyword: &str| node.keyword(keyword).as_u64();
+    let lengths = bound("minItems").unwrap_or(0)..=bound("maxItems").unwrap_or(u64::MAX);
+    if lengths.contains(&(length as u64)) {
+        return Ok(());
+    }
+    let message = format!("`{}` must be {}, got a list of {length}", short(name), expected(node));
+    Err(SchemaError::new(ErrorKind::WrongType, message, description(node), span))
+}
+
 /// Refuses a number that is not finite, outside the bounds of the schema, or outside [`SMALLEST`] to [`LARGEST`].
-fn in_range(name: &str, node: Node, number: &DeValue<'_>, span: Range<usize>) -> Result<(), SchemaError> {
-    let (written, number) = match number {
-        DeValue::Integer(written) => {
-            let Ok(whole) = i64::from_str_radix(written.as_str(), written.radix()) else {
-                let most = if node.kind() == "integer" { i64::MAX.to_string() } else { format!("{LARGEST:e}") };
-                let message = format!("`{name}` must be at most {most} in magnitude, got {}", written.as_str());
-                return Err(SchemaError::new("scenario/out-of-range", message, description(node), span));
-            };
-            (whole.to_string(), whole as f64)
-        }
-        DeValue::Float(written) => {
-            let number: f64 = written.as_str().parse().unwrap_or(f64::NAN);
-            (if number.is_finite() { shortest(number) } else { written.as_str().to_owned() }, number)
-        }
-        _ => return Ok(()),
-    };
+fn in_range(
+    name: &str,
+    node: Node,
+    number: f64,
+    shown: impl FnOnce() -> String,
+    span: Range<usize>,
+) -> Result<(), SchemaError> {
     let bound = |keyword: &str| node.keyword(keyword).as_f64();
-    let refuse = |must: String| {
-        let message = format!("`{name}` must be {must}, got {written}");
-        Err(SchemaError::new("scenario/out-of-range", message, description(node), span.clone()))
-    };
+    let refuse = |must: String| Err(out_of_range(name, node, &must, &shown(), span));
     if !number.is_finite() {
         return refuse("a finite number".to_owned());
     }
@@ -353,14 +395,19 @@ fn in_range(name: &str, node: Node, number: &DeValue<'_>, span: Range<usize>) ->
     Ok(())
 }
 
+fn out_of_range(name: &str, node: Node, must: &str, number: &str, span: Range<usize>) -> SchemaError {
+    let message = format!("`{name}` must be {must}, got {number}");
+    SchemaError::new(ErrorKind::OutOfRange, message, description(node), span)
+}
+
 fn unknown_choice(name: &str, known: &[&str], span: Range<usize>) -> SchemaError {
     let message = format!("unknown choice `{}`", short(name));
-    SchemaError::new("scenario/unknown-choice", message, suggest(name, known), span)
+    SchemaError::new(ErrorKind::UnknownChoice, message, suggest(name, known), span)
 }
 
 fn wrong_type(name: &str, node: Node, value: &DeValue<'_>, span: Range<usize>) -> SchemaError {
     let message = format!("`{}` must be {}, got {}", short(name), expected(node), found(value));
-    SchemaError::new("scenario/wrong-type", message, description(node), span)
+    SchemaError::new(ErrorKind::WrongType, message, description(node), span)
 }
 
 /// Returns a value in words.
@@ -391,18 +438,18 @@ fn expected(node: Node) -> String {
         "boolean" => "true or false".to_owned(),
         "string" => "text".to_owned(),
         "array" => {
-            let of = node.items().map_or_else(String::new, |items| match items.kind() {
+            let entries = node.items().map_or_else(String::new, |items| match items.kind() {
                 "number" => " numbers".to_owned(),
                 "integer" => " whole numbers".to_owned(),
                 "array" => " lists".to_owned(),
                 _ => " entries".to_owned(),
             });
             match (node.keyword("minItems").as_u64(), node.keyword("maxItems").as_u64()) {
-                (Some(least), Some(most)) if least == most => format!("a list of {least}{of}"),
-                (Some(least), Some(most)) => format!("a list of {least} to {most}{of}"),
+                (Some(least), Some(most)) if least == most => format!("a list of {least}{entries}"),
+                (Some(least), Some(most)) => format!("a list of {least} to {most}{entries}"),
                 (Some(1), None) => "a list with at least one entry".to_owned(),
-                (Some(least), None) => format!("a list of at least {least}{of}"),
-                _ => format!("a list of{of}"),
+                (Some(least), None) => format!("a list of at least {least}{entries}"),
+                _ => format!("a list of{entries}"),
             }
         }
         _ => {

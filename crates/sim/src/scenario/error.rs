@@ -6,16 +6,148 @@ use std::fmt;
 use tautline_core::failure::{Failure, LONGEST_LINE, Place};
 use tautline_core::text::with_short_numbers;
 
-/// Error of a scenario.
+/// Error of a scenario: kind, keys, problem and remedy.
 ///
-/// [`fmt::Display`] writes place, message and remedy. The accessors serve programs that show the text around the place.
+/// [`fmt::Display`] writes place, problem and remedy.
 #[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
 pub struct ScenarioError {
-    code: &'static str,
-    message: Box<str>,
-    help: Option<Box<str>>,
-    fields: Vec<Field>,
-    place: Option<Box<Place>>,
+    /// Kind of the problem.
+    pub kind: ErrorKind,
+    /// The problem with its value, one sentence.
+    pub message: String,
+    /// The remedy.
+    pub help: Option<String>,
+    /// Keys that are part of the problem. The error is placed at the first one, unless an override set another one.
+    pub fields: Vec<Field>,
+    /// Place in the text; `None` for a scenario built in code, and for a file that could not be read.
+    pub place: Option<Box<Place>>,
+}
+
+/// Kind of a [`ScenarioError`].
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum ErrorKind {
+    /// The source cannot be read.
+    CannotRead,
+    /// A list has another length than the number of vehicles.
+    CountMismatch,
+    /// The graph is not connected.
+    Disconnected,
+    /// An edge of the graph does not join two vehicles.
+    Edge,
+    /// The text has no keys.
+    Empty,
+    /// Two keys exclude each other.
+    ExclusiveKeys,
+    /// A file that the scenario names cannot be used.
+    File,
+    /// Two hulls do not fit within the safety distance.
+    HullsTouch,
+    /// Keys contradict each other.
+    Inconsistent,
+    /// The law cannot be built with its parameters.
+    LawParameter,
+    /// The flight needs too much memory.
+    Memory,
+    /// A required key is missing.
+    MissingKey,
+    /// A name has other characters than letters, digits, `-` and `_`.
+    Name,
+    /// A vehicle or a slot is within the clearance of an obstacle.
+    NearObstacle,
+    /// The vehicles do not fit into the space of the start.
+    NoRoom,
+    /// The file or the built-in scenario does not exist.
+    NotFound,
+    /// The text is not UTF-8.
+    NotUtf8,
+    /// An obstacle cannot be judged.
+    Obstacle,
+    /// A number is out of its range.
+    OutOfRange,
+    /// A time or a duration is outside the flight.
+    OutsideFlight,
+    /// An override cannot be applied.
+    Override,
+    /// A vector leaves the plane of the swarm.
+    Plane,
+    /// The reference cannot be followed.
+    Reference,
+    /// A shape gives no formation.
+    Shape,
+    /// The shield has no certificate.
+    Shield,
+    /// The step is too long for a rate or a duration.
+    StepTooLong,
+    /// The text is not TOML.
+    Syntax,
+    /// The file is too large.
+    TooLarge,
+    /// The flight has too many steps.
+    TooManySteps,
+    /// A word is none of the choices.
+    UnknownChoice,
+    /// The key does not exist.
+    UnknownKey,
+    /// The vehicle does not exist.
+    UnknownVehicle,
+    /// The law does not support a setting.
+    UnsupportedByLaw,
+    /// The plant does not support a setting.
+    UnsupportedByPlant,
+    /// The vehicle does not support a setting.
+    UnsupportedByVehicle,
+    /// Two starts or two slots are within the safety distance.
+    WithinDelta,
+    /// A value has the wrong type.
+    WrongType,
+}
+
+impl ErrorKind {
+    /// Returns the stable code, such as `scenario/out-of-range`.
+    #[must_use]
+    pub fn code(self) -> &'static str {
+        match self {
+            Self::CannotRead => "scenario/cannot-read",
+            Self::CountMismatch => "scenario/count-mismatch",
+            Self::Disconnected => "scenario/disconnected",
+            Self::Edge => "scenario/edge",
+            Self::Empty => "scenario/empty",
+            Self::ExclusiveKeys => "scenario/exclusive-keys",
+            Self::File => "scenario/file",
+            Self::HullsTouch => "scenario/hulls-touch",
+            Self::Inconsistent => "scenario/inconsistent",
+            Self::LawParameter => "law/parameter",
+            Self::Memory => "scenario/memory",
+            Self::MissingKey => "scenario/missing-key",
+            Self::Name => "scenario/name",
+            Self::NearObstacle => "scenario/near-obstacle",
+            Self::NoRoom => "scenario/no-room",
+            Self::NotFound => "scenario/not-found",
+            Self::NotUtf8 => "scenario/not-utf8",
+            Self::Obstacle => "scenario/obstacle",
+            Self::OutOfRange => "scenario/out-of-range",
+            Self::OutsideFlight => "scenario/outside-flight",
+            Self::Override => "scenario/override",
+            Self::Plane => "scenario/plane",
+            Self::Reference => "scenario/reference",
+            Self::Shape => "scenario/shape",
+            Self::Shield => "scenario/shield",
+            Self::StepTooLong => "scenario/step-too-long",
+            Self::Syntax => "scenario/syntax",
+            Self::TooLarge => "scenario/too-large",
+            Self::TooManySteps => "scenario/too-many-steps",
+            Self::UnknownChoice => "scenario/unknown-choice",
+            Self::UnknownKey => "scenario/unknown-key",
+            Self::UnknownVehicle => "scenario/unknown-vehicle",
+            Self::UnsupportedByLaw => "scenario/unsupported-by-law",
+            Self::UnsupportedByPlant => "scenario/unsupported-by-plant",
+            Self::UnsupportedByVehicle => "scenario/unsupported-by-vehicle",
+            Self::WithinDelta => "scenario/within-delta",
+            Self::WrongType => "scenario/wrong-type",
+        }
+    }
 }
 
 /// Key of the scenario file, or an entry of the list that it holds. Displayed as an override names it:
@@ -32,24 +164,22 @@ pub struct Field {
 
 impl ScenarioError {
     pub(crate) fn new(message: impl AsRef<str>) -> Self {
-        let message = printable(message.as_ref()).into();
-        Self { code: "scenario/inconsistent", message, help: None, fields: Vec::new(), place: None }
+        let message = printable(message.as_ref());
+        Self { kind: ErrorKind::Inconsistent, message, help: None, fields: Vec::new(), place: None }
     }
 
     /// Returns an error about a value out of its range.
     pub(crate) fn out_of_range(message: impl AsRef<str>) -> Self {
-        Self::new(message).coded("scenario/out-of-range")
+        Self::new(message).with_kind(ErrorKind::OutOfRange)
     }
 
-    /// Replaces the default code `scenario/inconsistent`.
-    pub(crate) fn coded(mut self, code: &'static str) -> Self {
-        self.code = code;
-        self
+    /// Replaces the default kind [`ErrorKind::Inconsistent`].
+    pub(crate) fn with_kind(self, kind: ErrorKind) -> Self {
+        Self { kind, ..self }
     }
 
-    pub(crate) fn with_help(mut self, help: impl AsRef<str>) -> Self {
-        self.help = Some(printable(help.as_ref()).into());
-        self
+    pub(crate) fn with_help(self, help: impl AsRef<str>) -> Self {
+        Self { help: Some(printable(help.as_ref())), ..self }
     }
 
     /// Adds a key that is part of the problem. The error is placed at the first key, unless an override set another
@@ -91,11 +221,11 @@ impl ScenarioError {
     /// Adds `start.jitter_m` to the causes of two starts within delta, if the jitter moved the starts.
     pub(super) fn with_jitter(mut self, jitter_m: f64) -> Self {
         let is_of_starts = self.fields.first().is_some_and(|field| field.key == "start.positions_m");
-        if jitter_m == 0.0 || self.code != "scenario/within-delta" || !is_of_starts {
+        if jitter_m == 0.0 || self.kind != ErrorKind::WithinDelta || !is_of_starts {
             return self;
         }
-        self.message = format!("{}; start.jitter_m moved each coordinate by up to {jitter_m} m", self.message).into();
-        self.help = Some("reduce start.jitter_m, move one of the vehicles away, or reduce law.delta_m".into());
+        self.message = format!("{}; start.jitter_m moved each coordinate by up to {jitter_m} m", self.message);
+        self.help = Some("reduce start.jitter_m, move one of the vehicles away, or reduce law.delta_m".to_owned());
         self.fields.insert(0, Field { key: "start.jitter_m".into(), entry: None, leg: 0 });
         self
     }
@@ -108,36 +238,7 @@ impl ScenarioError {
     /// Returns the stable code of the problem, such as `scenario/out-of-range`.
     #[must_use]
     pub fn code(&self) -> &'static str {
-        self.code
-    }
-
-    /// Returns the message, one sentence.
-    #[must_use]
-    pub fn message(&self) -> &str {
-        &self.message
-    }
-
-    /// Returns the remedy.
-    #[must_use]
-    pub fn help(&self) -> Option<&str> {
-        self.help.as_deref()
-    }
-
-    /// Returns the key at which the error is placed, for a scenario that was read but is inconsistent.
-    #[must_use]
-    pub fn field(&self) -> Option<Field> {
-        self.fields.first().cloned()
-    }
-
-    /// Returns all keys that are part of the problem.
-    pub(super) fn fields(&self) -> &[Field] {
-        &self.fields
-    }
-
-    /// Returns the place in the text; `None` for a scenario built in code, and for a file that could not be read.
-    #[must_use]
-    pub fn place(&self) -> Option<&Place> {
-        self.place.as_deref()
+        self.kind.code()
     }
 }
 
@@ -145,7 +246,7 @@ impl std::error::Error for ScenarioError {}
 
 impl fmt::Display for ScenarioError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match (&self.place, self.field()) {
+        match (&self.place, self.fields.first()) {
             (Some(place), _) => {
                 write!(f, "{}:{}:{}: {}", printable(&place.source), place.line, place.column, self.message)?;
             }
@@ -212,16 +313,16 @@ pub fn edit_distance(a: &str, b: &str) -> usize {
 impl From<ScenarioError> for Failure {
     fn from(error: ScenarioError) -> Self {
         // The message of the error shows a part of a line of any length.
-        if error.place().is_some_and(|place| place.text.lines().any(|line| line.len() > LONGEST_LINE)) {
+        if error.place.as_ref().is_some_and(|place| place.text.lines().any(|line| line.len() > LONGEST_LINE)) {
             return Self::new(error.code(), false, error.to_string());
         }
-        let message = match error.field().filter(|_| error.place().is_none()) {
-            Some(field) => format!("{field}: {}", error.message()),
-            None => error.message().to_owned(),
+        let message = match error.fields.first().filter(|_| error.place.is_none()) {
+            Some(field) => format!("{field}: {}", error.message),
+            None => error.message.clone(),
         };
         let failure = Self::new(error.code(), false, message);
-        let failure = error.help().into_iter().fold(failure, Failure::with_help);
-        error.place().into_iter().fold(failure, Self::at)
+        let failure = error.help.iter().fold(failure, Self::with_help);
+        error.place.iter().fold(failure, |failure, place| failure.at(place))
     }
 }
 

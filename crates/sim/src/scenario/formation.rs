@@ -8,7 +8,7 @@ use super::document::{
     Assignment, DrawingSize, FormationShape, FormationTable, HelixKeys, ImageKeys, LegStart, LegTable, Placement,
     Point, SvgKeys, TextKeys, rows,
 };
-use super::error::ScenarioError;
+use super::error::{ErrorKind, ScenarioError};
 use super::files;
 use super::limits::{DEFAULT_SPACING, SLOT_MARGIN, rounded_up};
 use super::spec::Scenario;
@@ -60,7 +60,7 @@ fn freedom(scenario: &Scenario) -> Result<Option<Freedom>, ScenarioError> {
             "an assignment needs at most {most} vehicles, got {}",
             scenario.count()
         ))
-        .coded("scenario/out-of-range")
+        .with_kind(ErrorKind::OutOfRange)
         .with_help("set assignment to \"given\", or reduce swarm.count")
         .at_keys(["formation.assignment", "swarm.count"]));
     }
@@ -83,7 +83,7 @@ fn interchangeable(scenario: &Scenario, leg: usize, assignment: Assignment) -> R
         return Ok(false);
     }
     Err(ScenarioError::new(why)
-        .coded("scenario/unsupported-by-law")
+        .with_kind(ErrorKind::UnsupportedByLaw)
         .with_help(
             "set assignment to \"given\" or \"optimal\", or law.kind to \"displacement\" and deadlock.mode to \"auto\"",
         )
@@ -149,7 +149,7 @@ pub(super) fn check_slots(legs: &[LegTable], count: usize) -> Result<(), Scenari
     for (number, slots) in listed.enumerate() {
         if let Some(slots) = slots.filter(|&slots| slots != count) {
             return Err(ScenarioError::new(format!("leg {} has {slots} slots for {count} vehicles", number + 2))
-                .coded("scenario/count-mismatch")
+                .with_kind(ErrorKind::CountMismatch)
                 .with_help("every leg needs a slot for each vehicle")
                 .at_leg(number + 1, "formation.points_m")
                 .at("swarm.count"));
@@ -216,7 +216,7 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
     if let Some(turns) = keys.turns {
         if keys.spacing_m.is_some() {
             return Err(ScenarioError::new("both `spacing_m` and `turns` are given")
-                .coded("scenario/exclusive-keys")
+                .with_kind(ErrorKind::ExclusiveKeys)
                 .with_help("keep one of them")
                 .at_keys(["formation.turns", "formation.spacing_m"]));
         }
@@ -226,7 +226,7 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
     let spacing_m = spacing(keys.spacing_m, delta_m);
     let Some(step_rad) = Formation::helix_step_rad(radius_m, pitch_m, spacing_m) else {
         return Err(ScenarioError::new(format!("slots {spacing_m} m apart do not fit a helix of radius {radius_m} m"))
-            .coded("scenario/shape")
+            .with_kind(ErrorKind::Shape)
             .with_help(format!("enlarge formation.radius_m to at least {}", 0.5 * spacing_m))
             .at_keys(["formation.radius_m", "formation.spacing_m"]));
     };
@@ -245,7 +245,7 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
         return Err(ScenarioError::new(format!(
             "turns {pitch_m} m above each other do not keep a spacing of {spacing_m} m"
         ))
-        .coded("scenario/shape")
+        .with_kind(ErrorKind::Shape)
         .with_help(format!("enlarge formation.pitch_m to {}, or reduce formation.spacing_m", rounded_up(enough_m)))
         .at_keys(["formation.pitch_m", "formation.spacing_m"]));
     }
@@ -287,7 +287,7 @@ impl DrawingSize {
             (height_m, width_m, spacing_m) => {
                 let given = [(HEIGHT.key, height_m), (WIDTH.key, width_m), (SPACING, spacing_m)];
                 let error = ScenarioError::new("more than one of `height_m`, `width_m` and `spacing_m` are given")
-                    .coded("scenario/exclusive-keys")
+                    .with_kind(ErrorKind::ExclusiveKeys)
                     .with_help("keep one of them: each sets the size of the drawing");
                 Err(given.into_iter().filter(|(_, given)| given.is_some()).fold(error, |error, (key, _)| error.at(key)))
             }
@@ -312,13 +312,13 @@ pub(super) fn svg(keys: &SvgKeys, count: usize, delta_m: f64) -> Result<Formatio
             (Drawing::svg(&bytes, keys.filled).map_err(|error| refused(&error, files::KEY, Some(file)))?, files::KEY)
         }
         (given, _) => {
-            let (code, said) = if given.is_some() {
-                ("scenario/exclusive-keys", "both `path` and `file` are given")
+            let (kind, said) = if given.is_some() {
+                (ErrorKind::ExclusiveKeys, "both `path` and `file` are given")
             } else {
-                ("scenario/missing-key", "neither `path` nor `file` is given")
+                (ErrorKind::MissingKey, "neither `path` nor `file` is given")
             };
             return Err(ScenarioError::new(said)
-                .coded(code)
+                .with_kind(kind)
                 .with_help("give path = \"M 0 0 L ...\", or file = \"drawing.svg\"")
                 .at_keys([PATH, files::KEY]));
         }
@@ -346,7 +346,7 @@ fn sized(
     let (pair, nearest) = formation.min_distance().unwrap_or((Pair::new(0, 1), f64::INFINITY));
     if nearest == 0.0 {
         return Err(ScenarioError::new(format!("slots {pair} of the drawing are the same point"))
-            .coded("scenario/within-delta")
+            .with_kind(ErrorKind::WithinDelta)
             .with_help("draw longer lines or larger areas, or fly fewer vehicles")
             .at_keys([key, "swarm.count"]));
     }
@@ -375,7 +375,7 @@ impl Dimension {
             return Err(ScenarioError::new(format!(
                 "the drawing is a straight line, which cannot be {asked_m} m {name}"
             ))
-            .coded("scenario/shape")
+            .with_kind(ErrorKind::Shape)
             .with_help("give its other dimension, or spacing_m")
             .at(key));
         }
@@ -389,7 +389,7 @@ impl Dimension {
             "in a drawing {asked_m} m {name}, {count} vehicles come as near as {} m, not more than delta = {delta_m} m",
             beside_limit(nearest_m, delta_m, 3)
         ))
-        .coded("scenario/within-delta")
+        .with_kind(ErrorKind::WithinDelta)
         .with_help(format!(
             "set {key} to at least {enough_m} for {count} vehicles at this delta, reduce law.delta_m, or fly fewer \
              vehicles"
@@ -421,7 +421,7 @@ fn refused(error: &DrawingError, key: &'static str, file: Option<&Path>) -> Scen
         DrawingError::Slots(_) => format!("fly at most {MAX_DRAWN_SLOTS} vehicles"),
     };
     let shown = file.map_or_else(String::new, |file| format!("{}: ", file.display()));
-    let refused = ScenarioError::new(format!("{shown}{error}")).coded("scenario/shape").with_help(help).at(key);
+    let refused = ScenarioError::new(format!("{shown}{error}")).with_kind(ErrorKind::Shape).with_help(help).at(key);
     if matches!(error, DrawingError::Letters { .. } | DrawingError::Slots(_)) {
         refused.at("swarm.count")
     } else {

@@ -4,7 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::document::Edge;
-use super::error::ScenarioError;
+use super::error::{ErrorKind, ScenarioError};
 use super::limits::pair_count;
 use tautline_laws::graph::{Graph, GraphError};
 
@@ -102,7 +102,7 @@ fn index(number: u64) -> Option<usize> {
 fn star(hub: u64, count: usize) -> Result<Graph, ScenarioError> {
     index(hub).filter(|&hub| hub < count).map(|hub| Graph::star_about(count, hub)).ok_or_else(|| {
         ScenarioError::new(format!("the hub must be a vehicle from 1 to {count}, got {hub}"))
-            .coded("scenario/unknown-vehicle")
+            .with_kind(ErrorKind::UnknownVehicle)
             .with_help("vehicles are counted from 1")
             .at("graph.hub")
     })
@@ -113,7 +113,7 @@ fn drawn(degree: Option<u64>, seed: u64, count: usize) -> Result<Graph, Scenario
     let degree = degree.unwrap_or(DEFAULT_DEGREE.min(most));
     if !(1..=most).contains(&degree) {
         return Err(ScenarioError::new(format!("the mean number of links must be from 1 to {most}, got {degree}"))
-            .coded("scenario/out-of-range")
+            .with_kind(ErrorKind::OutOfRange)
             .with_help("a connected graph has a mean degree of about 2 or more")
             .at("graph.degree"));
     }
@@ -126,7 +126,7 @@ fn listed(edges: &[Edge], count: usize) -> Result<Graph, ScenarioError> {
     let indices = edges.iter().enumerate().map(|(entry, Edge([a, b]))| {
         index(*a).zip(index(*b)).ok_or_else(|| {
             ScenarioError::new(format!("edge {} names vehicle 0", entry + 1))
-                .coded("scenario/edge")
+                .with_kind(ErrorKind::Edge)
                 .with_help("vehicles are counted from 1")
                 .at_entry("graph.edges", entry)
         })
@@ -137,7 +137,7 @@ fn listed(edges: &[Edge], count: usize) -> Result<Graph, ScenarioError> {
         | GraphError::OutOfRange { edge, .. }
         | GraphError::Duplicate { edge, .. }) = error;
         ScenarioError::new(error.to_string())
-            .coded("scenario/edge")
+            .with_kind(ErrorKind::Edge)
             .with_help("list each pair of different vehicles once, in either order")
             .at_entry("graph.edges", edge)
     })

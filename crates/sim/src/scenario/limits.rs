@@ -2,7 +2,7 @@
 
 use std::fmt::Display;
 
-use super::error::ScenarioError;
+use super::error::{ErrorKind, ScenarioError};
 use tautline_core::swarm::{Pair, Rows, row};
 use tautline_laws::space::SpacedPoints;
 
@@ -69,7 +69,7 @@ pub(super) fn check_lengths<const N: usize>(
 ) -> Result<(), ScenarioError> {
     match lists.into_iter().find(|&(.., length)| length.is_some_and(|length| length != count)) {
         Some((key, what, Some(length))) => Err(ScenarioError::new(format!("{length} {what} for {count} vehicles"))
-            .coded("scenario/count-mismatch")
+            .with_kind(ErrorKind::CountMismatch)
             .with_help("the number of vehicles is swarm.count if given, or else the number of start positions")
             .at_keys([key, "swarm.count"])),
         _ => Ok(()),
@@ -88,7 +88,7 @@ pub(super) fn check_memory(count: usize, edges: u128) -> Result<(), ScenarioErro
         bytes as f64 / GIB,
         MAX_MEMORY_BYTES >> 30
     ))
-    .coded("scenario/memory")
+    .with_kind(ErrorKind::Memory)
     .with_help("fly fewer vehicles, or choose a graph of fewer edges, such as [graph] kind = \"ring\"")
     .at_keys(["swarm.count", "graph.kind"]))
 }

@@ -2,7 +2,7 @@
 //!
 //! A [`Scenario`] is plain data that holds a whole flight; [`Scenario::validate`] lists its invariants.
 //! [`Scenario::read`] reads it from TOML, [`Scenario::new`] builds it in code. Data flow of a file: `source` -> `text`
-//! (TOML and overrides) -> `check` (schema) -> `document` (keys) -> `build` -> `validate`. [`Scenario::resolved_toml`]
+//! (TOML and overrides) -> `check` (schema) -> `document` (keys) -> `build` -> `validate`. [`Scenario::resolved`]
 //! writes a scenario back as TOML with every default and random number written out.
 
 mod build;
@@ -35,7 +35,7 @@ pub use crate::link::{
 };
 pub use crate::shield::ShieldSpec;
 pub use environment::IgnoredPart;
-pub use error::{Field, ScenarioError, edit_distance};
+pub use error::{ErrorKind, Field, ScenarioError, edit_distance};
 pub use external::ExternalLaw;
 pub use limits::{
     BYTES_PER_EDGE, BYTES_PER_VEHICLE, CONTACT_PREDICTION_M, LARGEST, MAX_HALVINGS, MAX_MEMORY_BYTES, MAX_NAME_CHARS,
@@ -43,6 +43,7 @@ pub use limits::{
 };
 pub use obstacles::{OBSTACLE_HELP, ObstacleTable, Solid};
 pub use resolution::Drift;
+pub use resolved::Resolved;
 pub use schema::{TomlSchema, key_choices, key_paths, schema, takes_integers_only};
 pub use source::{MAX_FILE_BYTES, Source};
 pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Safety, Scenario, Space};

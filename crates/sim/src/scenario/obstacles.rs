@@ -25,7 +25,7 @@ use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::error::ScenarioError;
+use super::error::{ErrorKind, ScenarioError};
 use super::limits::{CONTACT_PREDICTION_M, SLOT_MARGIN, SMALLEST};
 use super::spec::Scenario;
 use tautline_core::option::OBSTACLES;
@@ -159,7 +159,7 @@ impl ObstacleTable {
 
     /// Returns the obstacle at rest, with a default clearance \[m\].
     pub(super) fn obstacle(&self, number: usize, clearance_m: f64) -> Result<Obstacle, ScenarioError> {
-        let wrong = |said: String| ScenarioError::new(said).coded("scenario/obstacle").at_entry("obstacle", number);
+        let wrong = |said: String| ScenarioError::new(said).with_kind(ErrorKind::Obstacle).at_entry("obstacle", number);
         let Solid { shape, path, clearance_m: own_m } =
             self.clone().solid().map_err(|said| wrong(said).with_help(OBSTACLE_HELP))?;
         let [(_, place_m)] = path[..] else {
@@ -203,7 +203,7 @@ impl Scenario {
             check_solid(obstacle).map_err(|error| error.at_entry("obstacle", number))?;
             if self.obstacles[..number].iter().any(|before| before.name == obstacle.name) {
                 return Err(ScenarioError::new(format!("two obstacles have the name `{}`", obstacle.name))
-                    .coded("scenario/name")
+                    .with_kind(ErrorKind::Name)
                     .with_help("give each obstacle its own name")
                     .at_entry("obstacle", number));
             }
@@ -230,9 +230,13 @@ impl Scenario {
                 set_row(&mut slots_m, i, slot_m);
             });
             if let Some((_, vehicle, number)) = self.too_near(&slots_m, SLOT_MARGIN * self.delta_m) {
-                let of = if leg == 0 { String::new() } else { format!(" of leg {}", leg + 1) };
+                let of_leg = if leg == 0 { String::new() } else { format!(" of leg {}", leg + 1) };
                 return Err(self
-                    .refuse(row(&slots_m, vehicle), number, format_args!("the slot of vehicle {}{of} is", vehicle + 1))
+                    .refuse(
+                        row(&slots_m, vehicle),
+                        number,
+                        format_args!("the slot of vehicle {}{of_leg} is", vehicle + 1),
+                    )
                     .at_leg_entry(leg, "formation.points_m", vehicle)
                     .at_entry("obstacle", number));
             }
@@ -257,7 +261,7 @@ impl Scenario {
             format!("{subject} {distance} m from obstacle `{name}`, not more than its clearance of {clearance_m} m")
         };
         ScenarioError::new(said)
-            .coded("scenario/near-obstacle")
+            .with_kind(ErrorKind::NearObstacle)
             .with_help("move one of them away, or reduce the clearance_m of the obstacle")
     }
 
@@ -274,7 +278,7 @@ impl Scenario {
             obstacle.name,
             obstacle.clearance_m
         ))
-        .coded("scenario/hulls-touch")
+        .with_kind(ErrorKind::HullsTouch)
         .with_help("enlarge the clearance_m of the obstacle, or reduce swarm.hull_radius_m")
         .at_entry("obstacle", number)
         .at_entry("swarm.hull_radius_m", vehicle))
@@ -286,18 +290,18 @@ fn check_solid(obstacle: &Obstacle) -> Result<(), ScenarioError> {
     let Obstacle { name, shape, .. } = obstacle;
     if name.trim().is_empty() {
         return Err(ScenarioError::new("the name of an obstacle is empty")
-            .coded("scenario/name")
+            .with_kind(ErrorKind::Name)
             .with_help("name the obstacle"));
     }
     if name.trim().parse::<u64>().is_ok() {
         return Err(ScenarioError::new(format!("the name of an obstacle must not be a number, got `{name}`"))
-            .coded("scenario/name")
+            .with_kind(ErrorKind::Name)
             .with_help("add a letter: numbers are names of vehicles"));
     }
     match shape {
         Shape::HalfSpace { normal } if normal.norm() < SMALLEST => {
             Err(ScenarioError::new(format!("the normal of obstacle `{name}` has the length {}", normal.norm()))
-                .coded("scenario/out-of-range")
+                .with_kind(ErrorKind::OutOfRange)
                 .with_help("give the direction that points out of the half-space, such as [0, 0, 1]"))
         }
         _ => Ok(()),

@@ -7,7 +7,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use super::document::{All, Point, Vehicles};
-use super::error::ScenarioError;
+use super::error::{ErrorKind, ScenarioError};
 use super::limits::SMALLEST;
 use tautline_laws::graph::Pinning;
 use tautline_laws::target::{Guidance, ReferenceMotion, Spline};
@@ -136,14 +136,14 @@ impl ReferenceTable {
             let index = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
             index.filter(|&index| index < count).ok_or_else(|| {
                 ScenarioError::new(format!("the vehicle must be from 1 to {count}, got {number}"))
-                    .coded("scenario/unknown-vehicle")
+                    .with_kind(ErrorKind::UnknownVehicle)
                     .with_help("vehicles are counted from 1")
                     .at(key)
             })
         };
         match (&self.known_by, self.leader) {
             (Some(_), Some(_)) => Err(ScenarioError::new("both `known_by` and `leader` are given")
-                .coded("scenario/exclusive-keys")
+                .with_kind(ErrorKind::ExclusiveKeys)
                 .with_help("keep one of them: only the leader knows its reference")
                 .at_keys(["reference.leader", "reference.known_by"])),
             (None, Some(leader)) => Ok(Pinning::Leader(index(leader, "reference.leader")?)),
@@ -181,7 +181,7 @@ impl ReferenceKind {
                 if period_s.abs() < SMALLEST {
                     let message = format!("the period must be at least {SMALLEST:e} s in magnitude, got {period_s} s");
                     return Err(ScenarioError::new(message)
-                        .coded("scenario/out-of-range")
+                        .with_kind(ErrorKind::OutOfRange)
                         .with_help("give a longer period; a negative one turns clockwise")
                         .at("reference.period_s"));
                 }
@@ -198,7 +198,7 @@ impl ReferenceKind {
                     (None, Some(speed_m_s)) => timed(&points_m, *speed_m_s),
                     _ => {
                         return Err(ScenarioError::new("way points need either `times_s` or `speed_m_s`")
-                            .coded("scenario/missing-key")
+                            .with_kind(ErrorKind::MissingKey)
                             .with_help("give the time at each point, or the largest speed between them")
                             .at_keys(["reference.times_s", "reference.speed_m_s", "reference.points_m"]));
                     }
@@ -211,7 +211,7 @@ impl ReferenceKind {
                 check_steady(&points)?;
                 let spline = Spline::through(&points).ok_or_else(|| {
                     ScenarioError::new("no curve goes through the points")
-                        .coded("scenario/reference")
+                        .with_kind(ErrorKind::Reference)
                         .at("reference.points_m")
                 })?;
                 ReferenceMotion::Table(spline)
@@ -224,7 +224,7 @@ impl ReferenceKind {
 fn places(points_m: &[Point]) -> Result<Vec<Vector3<f64>>, ScenarioError> {
     if points_m.is_empty() {
         return Err(ScenarioError::new("the reference has no points")
-            .coded("scenario/missing-key")
+            .with_kind(ErrorKind::MissingKey)
             .with_help("give points_m = [[x, y], ...]")
             .at("reference.points_m"));
     }
@@ -247,7 +247,7 @@ fn timed(points_m: &[Vector3<f64>], speed_m_s: f64) -> Vec<f64> {
 fn in_time(points_m: &[Vector3<f64>], times_s: &[f64]) -> Result<Vec<(f64, Vector3<f64>)>, ScenarioError> {
     if points_m.len() != times_s.len() {
         return Err(ScenarioError::new(format!("{} points and {} times", points_m.len(), times_s.len()))
-            .coded("scenario/count-mismatch")
+            .with_kind(ErrorKind::CountMismatch)
             .with_help("give a time for each point")
             .at_keys(["reference.times_s", "reference.points_m"]));
     }
@@ -260,7 +260,7 @@ fn in_time(points_m: &[Vector3<f64>], times_s: &[f64]) -> Result<Vec<(f64, Vecto
                 format!("time {} of the reference must be more than {before_s} s, got {time_s} s", k + 1)
             };
             return Err(ScenarioError::new(said)
-                .coded("scenario/reference")
+                .with_kind(ErrorKind::Reference)
                 .with_help("times must increase; for a jump of the formation use a [[leg]]")
                 .at_entry("reference.times_s", k));
         }
@@ -276,7 +276,7 @@ fn check_span(points: &[(f64, Vector3<f64>)], duration_s: f64) -> Result<(), Sce
             "the reference must cover the flight from 0 to {duration_s} s, got {} to {} s",
             first.0, last.0
         ))
-        .coded("scenario/outside-flight")
+        .with_kind(ErrorKind::OutsideFlight)
         .with_help("give points from time 0 to the end of the flight, or shorten time.duration_s")
         .at_keys(["reference.times_s", "time.duration_s"]));
     }
@@ -300,7 +300,7 @@ fn check_steady(points: &[(f64, Vector3<f64>)]) -> Result<(), ScenarioError> {
         points[k + 1].0,
         speeds_m_s[k]
     ))
-    .coded("scenario/reference")
+    .with_kind(ErrorKind::Reference)
     .with_help("add points in between, or set reference.kind to \"way-points\", which rests at each point")
     .at_entry("reference.points_m", k + 1))
 }

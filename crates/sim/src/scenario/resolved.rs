@@ -20,45 +20,39 @@ use super::vehicle::VehicleTable;
 use tautline_core::swarm::Rows;
 use tautline_laws::target::{Leg, LegTrigger};
 
+/// Scenario as TOML with every default written out, and its hash. Reading the TOML gives an equal scenario, bit for
+/// bit.
+///
+/// Start and formations are lists of points, so the text does not depend on the generators of shapes and random
+/// numbers. Equal scenarios have equal texts.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Resolved {
+    /// The TOML.
+    pub toml: String,
+    /// SHA-256 of the TOML in hexadecimal, 64 characters: the identity of a flight.
+    pub sha256: String,
+}
+
 impl Scenario {
-    /// Returns the scenario as TOML with every default written out. Reading it gives an equal scenario, bit for bit.
-    ///
-    /// Start and formations are lists of points, so the text does not depend on the generators of shapes and random
-    /// numbers. Equal scenarios have equal texts.
+    /// Writes the scenario with every default.
     #[must_use]
-    pub fn resolved_toml(&self) -> String {
-        written(&Document::from(self))
-    }
-
-    /// Returns [`Scenario::resolved_toml`] without the lists of points and edges.
-    pub(super) fn resolved_toml_without_lists(&self) -> String {
-        let mut document = Document::from(self);
-        let no_points = || FormationShape::Points { points_m: Vec::new() };
-        document.start.positions_m = None;
-        document.start.velocities_m_s = None;
-        document.formation.shape = no_points();
-        document.leg.iter_mut().for_each(|leg| leg.shape = Some(no_points()));
-        document.graph.kind = GraphKind::Complete {};
-        written(&document)
-    }
-
-    /// Returns the SHA-256 of [`Scenario::resolved_toml`] in hexadecimal, 64 characters: the identity of a flight.
-    #[must_use]
-    pub fn sha256_hex(&self) -> String {
-        Sha256::digest(self.resolved_toml()).iter().fold(String::with_capacity(64), |mut hex, byte| {
+    pub fn resolved(&self) -> Resolved {
+        let toml = written(&Document::from(self));
+        let sha256 = Sha256::digest(&toml).iter().fold(String::with_capacity(64), |mut hex, byte| {
             let _ = write!(hex, "{byte:02x}");
             hex
-        })
+        });
+        Resolved { toml, sha256 }
     }
 
-    /// Returns the hash of the settings that determine the flight. It is [`Scenario::sha256_hex`], but without the seed
-    /// of the noise if nothing in flight is random. Scenarios with equal hashes have the same flight.
+    /// Returns the hash of the settings that determine the flight. It is [`Resolved::sha256`], but without the seed of
+    /// the noise if nothing in flight is random. Scenarios with equal hashes have the same flight.
     #[must_use]
-    pub fn flight_sha256_hex(&self) -> String {
+    pub fn flight_sha256(&self) -> String {
         if self.is_random_in_flight() || self.noise_seed == 0 {
-            return self.sha256_hex();
+            return self.resolved().sha256;
         }
-        Self { noise_seed: 0, ..self.clone() }.sha256_hex()
+        Self { noise_seed: 0, ..self.clone() }.resolved().sha256
     }
 
     fn leg_table(&self, leg: &Leg) -> LegTable {
@@ -79,6 +73,25 @@ impl Scenario {
                 Space::Volume => Point::Space([row[0], row[1], row[2]]),
             })
             .collect()
+    }
+}
+
+impl Document {
+    /// Returns the document as a value of TOML.
+    pub(super) fn value(&self) -> Value {
+        // Every key of the document can be written as TOML.
+        Value::try_from(self).unwrap_or(Value::Table(Table::new()))
+    }
+
+    /// Returns the document without its lists of points and edges.
+    pub(super) fn without_lists(mut self) -> Self {
+        let no_points = || FormationShape::Points { points_m: Vec::new() };
+        self.start.positions_m = None;
+        self.start.velocities_m_s = None;
+        self.formation.shape = no_points();
+        self.leg.iter_mut().for_each(|leg| leg.shape = Some(no_points()));
+        self.graph.kind = GraphKind::Complete {};
+        self
     }
 }
 
@@ -153,11 +166,11 @@ fn per_vehicle(numbers: &[f64]) -> PerVehicle {
 
 /// Returns a document as TOML.
 fn written(document: &Document) -> String {
-    // Every key of the document can be written as TOML.
-    let tables = Table::try_from(document).unwrap_or_default();
     let mut out = String::new();
-    // Writing to a string cannot fail.
-    let _ = write_document(&mut out, &tables);
+    if let Value::Table(tables) = document.value() {
+        // Writing to a string cannot fail.
+        let _ = write_document(&mut out, &tables);
+    }
     out
 }
 

@@ -129,8 +129,8 @@ impl Node {
         let description = schema["description"].as_str();
         let definition = schema["$ref"].as_str().and_then(|path| self.file.pointer(path.trim_start_matches('#')));
         definition.map_or(Self { schema, description, ..self }, |definition| {
-            let of = self.resolve(definition);
-            Self { description: description.or(of.description), ..of }
+            let resolved = self.resolve(definition);
+            Self { description: description.or(resolved.description), ..resolved }
         })
     }
 
@@ -190,7 +190,7 @@ impl Node {
 
     /// Returns the alternatives, nested ones included; exactly one applies to a value.
     pub(super) fn alternatives(self) -> Vec<Self> {
-        let listed = ["oneOf", "anyOf"].into_iter().filter_map(|of| self.schema[of].as_array()).flatten();
+        let listed = ["oneOf", "anyOf"].into_iter().filter_map(|keyword| self.schema[keyword].as_array()).flatten();
         let parts = listed.filter(|part| part.as_object().is_some_and(|part| !part.is_empty()));
         let parts = parts.map(|part| self.part(part));
         let is_nested = |part: &Self| part.schema["oneOf"].is_array() && part.words().is_empty();
@@ -242,18 +242,18 @@ impl Node {
 pub fn takes_integers_only(source: &Source, overrides: &[Override], key: &str) -> bool {
     let Ok((name, toml)) = source.text() else { return false };
     let Ok(tree) = (Text { name: &name, toml: &toml, overrides }).tree() else { return false };
-    let mut at = (Some(Node::root()), Some(&tree));
+    let mut current = (Some(Node::root()), Some(&tree));
     for part in key.split('.') {
-        let (node, value) = at;
+        let (node, value) = current;
         let node = node.and_then(|node| node.child(value, part));
         let entry = || part.parse::<usize>().ok()?.checked_sub(1);
         let value = value.and_then(|value| match value.get_ref() {
             DeValue::Array(list) => list.get(entry()?),
             table => table.get(part),
         });
-        at = (node, value);
+        current = (node, value);
     }
-    at.0.is_some_and(|node| node.kind() == "integer")
+    current.0.is_some_and(|node| node.kind() == "integer")
 }
 
 /// Returns the paths of all keys of the scenario file, such as `law.delta_m`. Entries of lists of tables have the

@@ -5,8 +5,8 @@ use std::io::Read;
 use std::path::{Path, PathBuf};
 
 use super::document::Document;
-use super::error::ScenarioError;
 use super::error::suggest;
+use super::error::{ErrorKind, ScenarioError};
 use super::limits::{MAX_NAME_CHARS, is_name_character};
 use super::spec::Scenario;
 use super::text::Override;
@@ -144,7 +144,7 @@ fn unknown_builtin(name: &str) -> ScenarioError {
     let file = format!("{name}.toml");
     let is_file = Path::new(&file).is_file();
     ScenarioError::new(format!("`{name}` is neither a built-in scenario nor a file"))
-        .coded("scenario/not-found")
+        .with_kind(ErrorKind::NotFound)
         .with_help(if is_file { format!("did you mean the file `{file}`?") } else { suggest(name, &names) })
 }
 
@@ -158,7 +158,7 @@ fn read_file(path: &Path) -> Result<String, ScenarioError> {
     let shown = path.display().to_string();
     if path.is_dir() {
         return Err(ScenarioError::new(format!("{shown} is a directory"))
-            .coded("scenario/cannot-read")
+            .with_kind(ErrorKind::CannotRead)
             .with_help("give the path of a scenario file within it"));
     }
     read(&shown, File::open(path).map_err(|error| unreadable(&shown, &error))?)
@@ -167,7 +167,7 @@ fn read_file(path: &Path) -> Result<String, ScenarioError> {
 fn unreadable(shown: &str, error: &std::io::Error) -> ScenarioError {
     let is_missing = error.kind() == std::io::ErrorKind::NotFound;
     ScenarioError::new(format!("cannot read {shown}: {error}"))
-        .coded(if is_missing { "scenario/not-found" } else { "scenario/cannot-read" })
+        .with_kind(if is_missing { ErrorKind::NotFound } else { ErrorKind::CannotRead })
         .with_help("give the path of a scenario file, or the name of a built-in scenario such as `pentagon`")
 }
 
@@ -178,7 +178,7 @@ fn read(shown: &str, source: impl Read) -> Result<String, ScenarioError> {
     source.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(|error| unreadable(shown, &error))?;
     if bytes.len() as u64 > MAX_FILE_BYTES {
         return Err(ScenarioError::new(format!("{shown} has more than {} MiB", MAX_FILE_BYTES >> 20))
-            .coded("scenario/too-large")
+            .with_kind(ErrorKind::TooLarge)
             .with_help("name a smaller file"));
     }
     String::from_utf8(bytes).map_err(|error| {
@@ -186,7 +186,7 @@ fn read(shown: &str, source: impl Read) -> Result<String, ScenarioError> {
         let bytes = error.into_bytes();
         let text = String::from_utf8_lossy(&bytes[..bytes.len().min(valid + 64)]);
         ScenarioError::new(format!("byte {valid} (from 0) is not UTF-8"))
-            .coded("scenario/not-utf8")
+            .with_kind(ErrorKind::NotUtf8)
             .with_help("save the file as UTF-8 text")
             .with_place(Place::new(shown, &text, valid..valid + '\u{fffd}'.len_utf8()))
     })

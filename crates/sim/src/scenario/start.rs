@@ -5,7 +5,7 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 
 use super::document::StartShape;
-use super::error::ScenarioError;
+use super::error::{ErrorKind, ScenarioError};
 use super::spec::Space;
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_laws::formation::Formation;
@@ -36,7 +36,7 @@ pub(super) fn positions(
                 return Err(ScenarioError::new(format!(
                     "the smallest separation must be more than delta = {delta_m} m, got {min_separation_m} m"
                 ))
-                .coded("scenario/within-delta")
+                .with_kind(ErrorKind::WithinDelta)
                 .with_help("enlarge start.min_separation_m or reduce law.delta_m")
                 .at_keys(["start.min_separation_m", "law.delta_m"]));
             }
@@ -88,7 +88,7 @@ pub fn scatter(
                  {min_separation_m} m of another",
                 i + 1
             ))
-            .coded("scenario/no-room")
+            .with_kind(ErrorKind::NoRoom)
             .with_help("enlarge start.half_extent_m, reduce start.min_separation_m or fly fewer vehicles")
             .at_keys(["start.half_extent_m", "start.min_separation_m", "swarm.count"]));
         };

@@ -8,8 +8,8 @@ use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
 use super::document::{Assignment, Document, StartShape, StartTable};
-use super::error::ScenarioError;
 use super::error::suggest;
+use super::error::{ErrorKind, ScenarioError};
 use super::external::ExternalLaw;
 use super::limits::{MAX_NAME_CHARS, is_name_character};
 use super::source::{Source, decoded, finish};
@@ -172,7 +172,7 @@ impl Template {
             } else {
                 format!("no law has the name `{name}`")
             };
-            return Err(ScenarioError::new(problem).coded("scenario/unknown-choice").with_help(help));
+            return Err(ScenarioError::new(problem).with_kind(ErrorKind::UnknownChoice).with_help(help));
         };
         let law = law.complete(self.own.velocity_coefficient_per_s());
         Ok(NamedLaw { name: name.to_owned(), law, shield: None })
@@ -244,7 +244,7 @@ pub(super) fn check_laws(laws: &Laws) -> Result<(), (&str, ScenarioError)> {
         let kind = kind(law);
         if *name != kind && kinds.contains(name) {
             let error = ScenarioError::new(format!("the law {name} has the name of a kind, but is of the kind {kind}"))
-                .coded("scenario/name")
+                .with_kind(ErrorKind::Name)
                 .with_help("give it a name that is not a kind of law")
                 .at("law.kind");
             return Err((name, error));
@@ -261,5 +261,5 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
         None if name.len() > MAX_NAME_CHARS => format!("the name of a law has {} characters", name.len()),
         None => return Ok(()),
     };
-    Err(ScenarioError::new(said).coded("scenario/name").with_help(help))
+    Err(ScenarioError::new(said).with_kind(ErrorKind::Name).with_help(help))
 }

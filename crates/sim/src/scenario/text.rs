@@ -12,7 +12,7 @@ use toml::{Spanned, map::Map};
 
 use super::check::check_schema;
 use super::document::{Document, TimeKeys};
-use super::error::{Field, ScenarioError};
+use super::error::{ErrorKind, Field, ScenarioError};
 use tautline_core::failure::Place;
 use tautline_core::option::SET;
 
@@ -55,7 +55,7 @@ impl<'a> Text<'a> {
         let mut root = self.tree()?;
         if root.get_ref().as_table().is_some_and(Map::is_empty) {
             return Err(ScenarioError::new("the scenario is empty")
-                .coded("scenario/empty")
+                .with_kind(ErrorKind::Empty)
                 .with_help("start from a built-in scenario, such as `pentagon`")
                 .with_place(Place::new(self.name, self.toml, 0..0)));
         }
@@ -68,7 +68,7 @@ impl<'a> Text<'a> {
         // `check_schema` accepts only what serde reads. An error of serde is a defect of the schema.
         let document = Document::deserialize(ValueDeserializer::from(root)).map_err(|error| {
             ScenarioError::new(error.message())
-                .coded("scenario/wrong-type")
+                .with_kind(ErrorKind::WrongType)
                 .with_help("`tautline schema` describes every key")
                 .with_place(self.locate(error.span().unwrap_or(0..0)))
         })?;
@@ -77,8 +77,8 @@ impl<'a> Text<'a> {
 
     /// Adds the place in the text to an error about keys: the first key that an override sets, or else the first key.
     pub(super) fn place(&self, error: ScenarioError) -> ScenarioError {
-        let (None, Ok(root)) = (error.place(), self.tree()) else { return error };
-        let spans = error.fields().iter().map(|field| find(&root, field, self.toml.len() + 1));
+        let (None, Ok(root)) = (&error.place, self.tree()) else { return error };
+        let spans = error.fields.iter().map(|field| find(&root, field, self.toml.len() + 1));
         let overridden = spans.clone().find(|span| span.start > self.toml.len());
         // A key that is not in the text has no span.
         let written = || spans.clone().find(|span| !span.is_empty());
@@ -95,7 +95,7 @@ impl<'a> Text<'a> {
     pub(super) fn place_in_law(&self, law: &str, error: ScenarioError) -> ScenarioError {
         let Ok(root) = self.tree() else { return error };
         let Some((name, keys)) = laws(&root).and_then(|laws| laws.get_key_value(law)) else { return error };
-        let field = error.fields().first();
+        let field = error.fields.first();
         let key = field.map_or("", |field| field.key.trim_start_matches("law."));
         let span = keys.get_ref().get(key).map_or_else(|| name.span(), Spanned::span);
         error.with_place(self.locate(span))
@@ -105,7 +105,7 @@ impl<'a> Text<'a> {
     pub(super) fn tree(&self) -> Result<Spanned<DeValue<'a>>, ScenarioError> {
         let parsed = DeTable::parse(self.toml).map_err(|error| {
             ScenarioError::new(format!("the text is not TOML: {}", error.message()))
-                .coded("scenario/syntax")
+                .with_kind(ErrorKind::Syntax)
                 .with_help("a scenario is `key = value` lines below `[table]` headers")
                 .with_place(self.locate(error.span().unwrap_or(0..0)))
         })?;
@@ -143,12 +143,12 @@ fn laws<'t, 'a>(root: &'t Spanned<DeValue<'a>>) -> Option<&'t DeTable<'a>> {
 /// else of its table. An overridden part, with a span from `overridden` on, replaces the whole.
 fn find(root: &Spanned<DeValue<'_>>, field: &Field, overridden: usize) -> Range<usize> {
     let of_leg = field.leg.checked_sub(1).and_then(|leg| root.get_ref().get("leg")?.get_ref().get(leg));
-    let at = |path: &str| match (of_leg, path.strip_prefix("formation.")) {
+    let value_at = |path: &str| match (of_leg, path.strip_prefix("formation.")) {
         (Some(leg), Some(key)) => leg.get_ref().get(key),
         _ => path.split('.').try_fold(root, |value, key| value.get_ref().get(key)),
     };
     let origins = ORIGINS.iter().find(|(key, _)| *key == field.key).map_or(&[][..], |(_, origins)| origins);
-    let Some(value) = std::iter::once(&*field.key).chain(origins.iter().copied()).find_map(at) else {
+    let Some(value) = std::iter::once(&*field.key).chain(origins.iter().copied()).find_map(value_at) else {
         if let Some(leg) = of_leg {
             return leg.span();
         }
@@ -195,7 +195,7 @@ impl Override {
         let place = |span: Range<usize>| Place::new(&SET.to_string(), text, span);
         let Some(equals) = text.find('=') else {
             return Err(ScenarioError::new("an override has no `=`")
-                .coded("scenario/override")
+                .with_kind(ErrorKind::Override)
                 .with_help("write it as key.path=value, for example time.dt_s=0.001")
                 .with_place(place(0..text.len())));
         };
@@ -205,7 +205,7 @@ impl Override {
             let key = trimmed(text, start..start + part.len());
             if key.is_empty() || !text[key.clone()].chars().all(is_word) {
                 return Err(ScenarioError::new(format!("`{part}` is not a key of an override"))
-                    .coded("scenario/override")
+                    .with_kind(ErrorKind::Override)
                     .with_help("a path is keys and entry numbers with dots between them, such as start.positions_m.2.x")
                     .with_place(place(start..start + part.len())));
             }
@@ -214,7 +214,7 @@ impl Override {
         }
         if path.len() > MAX_DEPTH {
             return Err(ScenarioError::new(format!("a path must have at most {MAX_DEPTH} parts, got {}", path.len()))
-                .coded("scenario/override")
+                .with_kind(ErrorKind::Override)
                 .with_help("`tautline schema` lists the keys of a scenario")
                 .with_place(place(0..equals)));
         }
@@ -226,7 +226,7 @@ impl Override {
                 let base = parsed.value.start;
                 let span = error.span().map_or(parsed.value.clone(), |span| base + span.start..base + span.end);
                 Err(ScenarioError::new(format!("the value is not TOML: {}", error.message()))
-                    .coded("scenario/override")
+                    .with_kind(ErrorKind::Override)
                     .with_help("numbers, true, false, [lists], {tables} and \"strings\" are; a bare word is a string")
                     .with_place(place(span)))
             }
@@ -297,7 +297,7 @@ impl Override {
 
     fn refuse(&self, span: &Range<usize>, message: &str) -> ScenarioError {
         ScenarioError::new(message)
-            .coded("scenario/override")
+            .with_kind(ErrorKind::Override)
             .with_help("entries of lists are counted from 1, as vehicles are; x, y, z name the axes of a point")
             .with_place(self.place(span.clone()))
     }

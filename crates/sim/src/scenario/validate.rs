@@ -2,14 +2,15 @@
 
 use nalgebra::Vector3;
 
-use super::check::{SchemaError, check_schema};
-use super::error::ScenarioError;
+use super::check::{SchemaError, check_bounds};
+use super::document::Document;
+use super::error::{ErrorKind, ScenarioError};
 use super::limits::{
     CONTACT_PREDICTION_M, MAX_NAME_CHARS, MAX_STEPS, SLOT_MARGIN, check_count, check_lengths, check_memory,
     first_pair_within, is_name_character, require_finite,
 };
+use super::schema::Node;
 use super::spec::{Safety, Scenario, Space};
-use super::text::Text;
 use super::time::TimeSpec;
 use crate::sim::{self, SimError};
 use tautline_audit::ObstacleError;
@@ -44,7 +45,7 @@ impl Scenario {
     pub fn validate(&self) -> Result<(), ScenarioError> {
         self.check_noise()?;
         self.check_lengths()?;
-        self.check_written(&self.resolved_toml(), SchemaError::without_text)?;
+        check_bounds(&Document::from(self).value(), Node::root(), "scenario").map_err(SchemaError::without_text)?;
         self.check()
     }
 
@@ -52,13 +53,8 @@ impl Scenario {
     pub(super) fn check_built(&self) -> Result<(), ScenarioError> {
         self.check()?;
         // The reader of a recording checks these values. Points and edges have no other limits than the checked ones.
-        self.check_written(&self.resolved_toml_without_lists(), SchemaError::of_filled_value)
-    }
-
-    /// Checks the text of the scenario against the schema.
-    fn check_written(&self, written: &str, of_key: fn(SchemaError) -> ScenarioError) -> Result<(), ScenarioError> {
-        let mut tree = Text { name: &self.name, toml: written, overrides: &[] }.tree()?;
-        check_schema(&mut tree, written.len() + 1).map_err(of_key)
+        let filled = Document::from(self).without_lists().value();
+        check_bounds(&filled, Node::root(), "scenario").map_err(SchemaError::of_filled_value)
     }
 
     /// Checks conditions on several keys; the schema checks single keys.
@@ -97,7 +93,7 @@ impl Scenario {
         match error {
             SimError::Obstacle(ObstacleError { name, .. }) => {
                 let found = ScenarioError::new(error.to_string())
-                    .coded("scenario/obstacle")
+                    .with_kind(ErrorKind::Obstacle)
                     .with_help("correct the shape, the position or the clearance_m of the obstacle");
                 match self.obstacles.iter().position(|obstacle| obstacle.name == *name) {
                     Some(number) => found.at_entry("obstacle", number),
@@ -115,7 +111,7 @@ impl Scenario {
             return Ok(());
         }
         Err(ScenarioError::new(format!("noise.seed is too large for a scenario file, got {}", self.noise_seed))
-            .coded("scenario/out-of-range")
+            .with_kind(ErrorKind::OutOfRange)
             .with_help(format!("give a seed of at most {}", i64::MAX))
             .at("noise.seed"))
     }
@@ -127,7 +123,7 @@ impl Scenario {
                 "the formation must be held for {} s, longer than the flight of {} s",
                 arrival.hold_s, time.duration_s
             ))
-            .coded("scenario/outside-flight")
+            .with_kind(ErrorKind::OutsideFlight)
             .with_help("enlarge time.duration_s or reduce arrival.hold_s")
             .at_keys(["arrival.hold_s", "time.duration_s"]));
         }
@@ -137,7 +133,7 @@ impl Scenario {
     fn check_legs(&self) -> Result<(), ScenarioError> {
         if self.legs.is_empty() {
             return Err(ScenarioError::new("the scenario has no formation")
-                .coded("scenario/missing-key")
+                .with_kind(ErrorKind::MissingKey)
                 .with_help("give one")
                 .at("formation"));
         }
@@ -150,14 +146,14 @@ impl Scenario {
                     number + 1,
                     self.count()
                 ))
-                .coded("scenario/count-mismatch")
+                .with_kind(ErrorKind::CountMismatch)
                 .with_help("every leg needs a slot for each vehicle")
                 .at_leg(number, "formation.points_m"));
             }
             let LegTrigger::At(start_s) = leg.begins else { continue };
             if !(start_s >= from_s && start_s < self.time.duration_s) {
                 return Err(ScenarioError::new(format!("leg {} begins at {start_s} s", number + 1))
-                    .coded("scenario/outside-flight")
+                    .with_kind(ErrorKind::OutsideFlight)
                     .with_help(format!(
                         "legs must begin in order, at {from_s} s or later and before the end of the flight at {} s",
                         self.time.duration_s
@@ -182,13 +178,13 @@ impl Scenario {
                 guidance.motion.shortest_s(),
                 self.time.dt_s
             ))
-            .coded("scenario/step-too-long")
+            .with_kind(ErrorKind::StepTooLong)
             .with_help(format!("give each of its ways or turns at least {shortest_s} s, or reduce time.dt_s"))
             .at_keys(["reference.kind", "time.dt_s"]));
         }
         if self.space == Space::Plane && !guidance.motion.is_level() {
             return Err(ScenarioError::new("the reference leaves the plane z = 0 of the swarm")
-                .coded("scenario/plane")
+                .with_kind(ErrorKind::Plane)
                 .with_help("set its z to 0, or swarm.dimensions to 3")
                 .at_keys(["reference.kind", "swarm.dimensions"]));
         }
@@ -210,7 +206,7 @@ impl Scenario {
             metres(off_m),
             metres(off_m_s.norm())
         ))
-        .coded("scenario/reference")
+        .with_kind(ErrorKind::Reference)
         .with_help("leave out its start velocity: the default is that of the reference")
         .at_entry("start.velocities_m_s", leader)
         .at("reference.leader"))
@@ -219,7 +215,7 @@ impl Scenario {
     /// Checks that the law follows a reference that these vehicles know.
     fn check_followed(&self, guidance: &Guidance) -> Result<(), ScenarioError> {
         let refuse = |said: String, help: &str, key: &'static str| {
-            Err(ScenarioError::new(said).coded("scenario/unsupported-by-law").with_help(help).at(key).at("law.kind"))
+            Err(ScenarioError::new(said).with_kind(ErrorKind::UnsupportedByLaw).with_help(help).at(key).at("law.kind"))
         };
         match self.law() {
             Ok(law) if law.capabilities().controls != Controls::Places => {
@@ -282,7 +278,7 @@ impl Scenario {
                         "z of {what} of vehicle {} must be 0 in the plane, got {z}",
                         i + 1
                     ))
-                    .coded("scenario/plane")
+                    .with_kind(ErrorKind::Plane)
                     .with_help("set z to 0, or swarm.dimensions to 3")
                     .at_leg_entry(leg, key, i)
                     .at("swarm.dimensions"));
@@ -296,7 +292,7 @@ impl Scenario {
         let delta_m = self.delta_m;
         let refuse = |said: String, help: &str, (leg, key): (usize, &'static str), pair: Pair| {
             Err(ScenarioError::new(said)
-                .coded("scenario/within-delta")
+                .with_kind(ErrorKind::WithinDelta)
                 .with_help(help)
                 .at_leg_entry(leg, key, pair.second())
                 .at_leg_entry(leg, key, pair.first())
@@ -351,7 +347,7 @@ impl Scenario {
             exact(touching_m),
             self.delta_m
         ))
-        .coded("scenario/hulls-touch")
+        .with_kind(ErrorKind::HullsTouch)
         .with_help(match 0.5 * (least_m - CONTACT_PREDICTION_M) {
             _ if self.airframe.quadrotor().is_some() => {
                 format!(
@@ -375,7 +371,7 @@ impl Scenario {
             return Err(ScenarioError::new(format!(
                 "one step of {dt_s} s is longer than the flight of {duration_s} s"
             ))
-            .coded("scenario/step-too-long")
+            .with_kind(ErrorKind::StepTooLong)
             .with_help("enlarge time.duration_s or reduce time.dt_s")
             .at("time.duration_s"));
         }
@@ -384,7 +380,7 @@ impl Scenario {
             return Err(ScenarioError::new(format!(
                 "a flight has at most {MAX_STEPS:e} steps, got {steps:.2e} ({duration_s} s in steps of {dt_s} s)"
             ))
-            .coded("scenario/too-many-steps")
+            .with_kind(ErrorKind::TooManySteps)
             .with_help(format!("at this step a flight may last {} s", (MAX_STEPS * dt_s).floor()))
             .at_keys(["time.duration_s", "time.dt_s"]));
         }
@@ -393,7 +389,7 @@ impl Scenario {
                 "one step of {dt_s} s is longer than the time 1/|a22| = {} s in which velocities change by themselves",
                 1.0 / self.a22_per_s.abs()
             ))
-            .coded("scenario/step-too-long")
+            .with_kind(ErrorKind::StepTooLong)
             .with_help("reduce time.dt_s or swarm.a22_per_s")
             .at_keys(["swarm.a22_per_s", "time.dt_s"]));
         }
@@ -403,7 +399,7 @@ impl Scenario {
             return Err(ScenarioError::new(format!(
                 "a control rate of {control_hz} Hz evaluates the law more than once in a step of {dt_s} s"
             ))
-            .coded("scenario/step-too-long")
+            .with_kind(ErrorKind::StepTooLong)
             .with_help(format!("reduce time.control_hz to at most {}, or reduce time.dt_s", 1.0 / dt_s))
             .at_keys(["time.control_hz", "time.dt_s"]));
         }
@@ -413,7 +409,7 @@ impl Scenario {
 
 /// Returns an error of the parameters of a law at its key.
 fn of_law(error: &ParameterError) -> ScenarioError {
-    let found = ScenarioError::new(format!("no law has these parameters: {error}")).coded("law/parameter");
+    let found = ScenarioError::new(format!("no law has these parameters: {error}")).with_kind(ErrorKind::LawParameter);
     match *error {
         ParameterError::Tension { pair, .. } => found
             .with_help("enlarge the formation, or change law.delta_m")
@@ -451,7 +447,7 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
         return Ok(());
     };
     Err(ScenarioError::new(said)
-        .coded("scenario/name")
+        .with_kind(ErrorKind::Name)
         .with_help("it names a folder: use letters, digits, `-` and `_`")
         .at("name"))
 }
@@ -468,7 +464,7 @@ fn check_connected(graph: &Graph) -> Result<(), ScenarioError> {
         "the graph is not connected: no path joins vehicle 1 to {}{more}",
         named.join(", ")
     ))
-    .coded("scenario/disconnected")
+    .with_kind(ErrorKind::Disconnected)
     .with_help("add edges until every vehicle can be reached from every other")
     .at("graph.edges"))
 }
@@ -481,7 +477,7 @@ impl Scenario {
             return Err(ScenarioError::new(format!(
                 "spread slots must be held for less than the flight of {duration_s} s, got {hold_s} s"
             ))
-            .coded("scenario/outside-flight")
+            .with_kind(ErrorKind::OutsideFlight)
             .with_help("reduce deadlock.hold_s or increase time.duration_s: the slots must come together again")
             .at_keys(["deadlock.hold_s", "time.duration_s"]));
         }
@@ -490,7 +486,7 @@ impl Scenario {
             && law.capabilities().settling.is_none()
         {
             return Err(ScenarioError::new(format!("the law `{}` does not support deadlock recovery", law.name()))
-                .coded("scenario/unsupported-by-law")
+                .with_kind(ErrorKind::UnsupportedByLaw)
                 .with_help("leave out deadlock.mode, or set law.kind to \"displacement\"")
                 .at_keys(["deadlock.mode", "law.kind"]));
         }
@@ -525,7 +521,7 @@ impl Scenario {
             return Ok(());
         }
         Err(ScenarioError::new(format!("the law `{}` does not support ellipsoids", law.name()))
-            .coded("scenario/unsupported-by-law")
+            .with_kind(ErrorKind::UnsupportedByLaw)
             .with_help("set law.kind to \"displacement\", or safety.shape to \"ball\"")
             .at_keys(["safety.shape", "law.kind"]))
     }
@@ -544,19 +540,19 @@ impl Scenario {
                 self.time.dt_s,
                 1.0 / drag_per_s
             ))
-            .coded("scenario/step-too-long")
+            .with_kind(ErrorKind::StepTooLong)
             .with_help("reduce time.dt_s or vehicle.drag_per_s")
             .at_keys(["vehicle.drag_per_s", "time.dt_s"]));
         }
         if self.airframe.quadrotor().is_some() && drag_per_s != 0.0 {
             return Err(ScenarioError::new(format!("only points have vehicle.drag_per_s, got {drag_per_s} 1/s"))
-                .coded("scenario/unsupported-by-vehicle")
+                .with_kind(ErrorKind::UnsupportedByVehicle)
                 .with_help("leave it out: the drag of a quadrotor is part of its model")
                 .at_keys(["vehicle.drag_per_s", "vehicle.model"]));
         }
         if self.airframe.quadrotor().is_none() && !self.wind.is_still() && drag_per_s == 0.0 {
             return Err(ScenarioError::new("the wind has no effect on points without drag")
-                .coded("scenario/unsupported-by-vehicle")
+                .with_kind(ErrorKind::UnsupportedByVehicle)
                 .with_help("set vehicle.drag_per_s, for example to 0.3")
                 .at_keys(["wind", "vehicle.drag_per_s"]));
         }
@@ -571,7 +567,7 @@ impl Scenario {
                 "{what} blows at {} m/s along z, out of the plane z = 0",
                 air_m_s.z
             ))
-            .coded("scenario/plane")
+            .with_kind(ErrorKind::Plane)
             .with_help("set its z to 0, or swarm.dimensions to 3")
             .at_keys([key, "swarm.dimensions"]));
         }
@@ -588,7 +584,7 @@ impl Scenario {
                     "{what} takes {slope_s} s, too short for steps of {} s",
                     self.time.dt_s
                 ))
-                .coded("scenario/step-too-long")
+                .with_kind(ErrorKind::StepTooLong)
                 .with_help(format!("give it at least {shortest_s} s, or reduce time.dt_s"))
                 .at_keys(["wind.gust", "time.dt_s"]));
             }
@@ -598,7 +594,7 @@ impl Scenario {
                 "a gust must begin within the flight of {} s, got {at_s} s",
                 self.time.duration_s
             ))
-            .coded("scenario/outside-flight")
+            .with_kind(ErrorKind::OutsideFlight)
             .with_help("let it begin earlier, or enlarge time.duration_s")
             .at_keys(["wind.gust", "time.duration_s"]));
         }
@@ -610,7 +606,7 @@ impl Scenario {
                 Some(vehicle) => {
                     let problem = format!("a gust acts on vehicle {}, but the swarm has {}", vehicle + 1, self.count());
                     Err(ScenarioError::new(problem)
-                        .coded("scenario/unknown-vehicle")
+                        .with_kind(ErrorKind::UnknownVehicle)
                         .with_help(format!("give numbers from 1 to {}", self.count()))
                         .at("wind.gust"))
                 }

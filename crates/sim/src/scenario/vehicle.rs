@@ -5,8 +5,8 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::error::ScenarioError;
 use super::error::suggest;
+use super::error::{ErrorKind, ScenarioError};
 use super::files;
 use super::spec::{PlantSpec, Scenario, Space};
 use crate::vehicle::{
@@ -147,7 +147,7 @@ impl VehicleTable {
                     let known: Vec<_> = [POINT, UNICYCLE].into_iter().chain(known).collect();
                     let help = format!("{}; for another model give the path of a TOML file", suggest(name, &known));
                     ScenarioError::new(format!("no model has the name `{name}`"))
-                        .coded("scenario/unknown-choice")
+                        .with_kind(ErrorKind::UnknownChoice)
                         .with_help(help)
                         .at(MODEL)
                 })?
@@ -200,7 +200,7 @@ fn refuse_given<const N: usize>(
 ) -> Result<(), ScenarioError> {
     let Some((key, _)) = keys.into_iter().find(|(_, is_given)| *is_given) else { return Ok(()) };
     Err(ScenarioError::new(said)
-        .coded("scenario/unsupported-by-vehicle")
+        .with_kind(ErrorKind::UnsupportedByVehicle)
         .with_help(format!("leave this key out, or set vehicle.model to {other_model}"))
         .at_keys([key, MODEL]))
 }
@@ -255,12 +255,15 @@ fn read(path: &Path) -> Result<Model, ScenarioError> {
     let shown = path.display().to_string();
     let text = String::from_utf8(files::bytes(path, MODEL)?).map_err(|_| {
         ScenarioError::new(format!("{shown} is not UTF-8"))
-            .coded("scenario/file")
+            .with_kind(ErrorKind::File)
             .with_help("save the file as UTF-8 text")
             .at(MODEL)
     })?;
     vehicle::read(&text).map_err(|ModelParseError { message, help, span }| {
-        ScenarioError::new(message).coded("scenario/file").with_help(help).with_place(Place::new(&shown, &text, span))
+        ScenarioError::new(message)
+            .with_kind(ErrorKind::File)
+            .with_help(help)
+            .with_place(Place::new(&shown, &text, span))
     })
 }
 
@@ -319,7 +322,7 @@ impl Scenario {
                 "an attitude loop of {attitude_hz} Hz runs more than once in a step of {} s",
                 self.time.dt_s
             ))
-            .coded("scenario/step-too-long")
+            .with_kind(ErrorKind::StepTooLong)
             .with_help(format!(
                 "reduce vehicle.attitude_hz to at most {}, or time.dt_s to at most {}",
                 1.0 / self.time.dt_s,
@@ -348,26 +351,26 @@ impl Scenario {
         }
         if self.space != Space::Plane {
             return Err(ScenarioError::new("unicycles need the plane z = 0, but the swarm has three dimensions")
-                .coded("scenario/plane")
+                .with_kind(ErrorKind::Plane)
                 .with_help("set every z to 0 and swarm.dimensions to 2, or fly another vehicle.model")
                 .at_keys(["vehicle.model", "swarm.dimensions"]));
         }
         if !matches!(self.plant, PlantSpec::Rapier) {
             return Err(ScenarioError::new("the ideal plant does not support unicycles")
-                .coded("scenario/unsupported-by-plant")
+                .with_kind(ErrorKind::UnsupportedByPlant)
                 .with_help("leave out plant.kind: the motion of a unicycle is solved in closed form")
                 .at_keys(["plant.kind", "vehicle.model"]));
         }
         if self.a22_per_s != 0.0 {
             return Err(ScenarioError::new("a unicycle has no velocity coefficient a22")
-                .coded("scenario/unsupported-by-vehicle")
+                .with_kind(ErrorKind::UnsupportedByVehicle)
                 .with_help("leave out swarm.a22_per_s")
                 .at_keys(["swarm.a22_per_s", "vehicle.model"]));
         }
         if self.drag_per_s != 0.0 || !self.wind.is_still() {
             let key = if self.drag_per_s == 0.0 { "wind" } else { "vehicle.drag_per_s" };
             return Err(ScenarioError::new("wind and drag do not act on unicycles")
-                .coded("scenario/unsupported-by-vehicle")
+                .with_kind(ErrorKind::UnsupportedByVehicle)
                 .with_help("leave out [wind] and vehicle.drag_per_s, or fly another vehicle.model")
                 .at_keys([key, "vehicle.model"]));
         }
@@ -379,7 +382,7 @@ impl Scenario {
                     "the start speed of vehicle {} must be {min_speed_m_s} to {max_speed_m_s} m/s, got {speed_m_s} m/s",
                     i + 1
                 ))
-                .coded("scenario/out-of-range")
+                .with_kind(ErrorKind::OutOfRange)
                 .with_help("give start.velocities_m_s, a velocity for each vehicle, or change the limits of its speed")
                 .at_entry("start.velocities_m_s", i)
                 .at_keys(["vehicle.min_speed_m_s", "vehicle.model"]));

@@ -262,14 +262,14 @@ impl Scenario {
 
 /// Returns the push for which the shield leaves a share of its commands to the tracker \[m/s^2\].
 fn push_for(alone: &Scenario, spec: ShieldSpec, share: f64) -> Result<f64, ScenarioError> {
-    let at = |push_m_s2: f64| -> Result<_, ScenarioError> {
+    let error_at = |push_m_s2: f64| -> Result<_, ScenarioError> {
         let spec = ShieldSpec { disturbance_m_s2: Some(push_m_s2), ..spec };
         let limits = Scenario { shield: Some(spec), ..alone.clone() }.limits_alone()?;
         Ok((limits.tube().feedback_m_s2, limits.reference_m_s2()))
     };
     // The bound on the feedback is affine in the push.
-    let (least_m_s2, left_m_s2) = at(0.0)?;
-    let slope = (at(TRIAL_M_S2)?.0 - least_m_s2) / TRIAL_M_S2;
+    let (least_m_s2, left_m_s2) = error_at(0.0)?;
+    let slope = (error_at(TRIAL_M_S2)?.0 - least_m_s2) / TRIAL_M_S2;
     Ok(rounded_up(((least_m_s2 + left_m_s2) * share - least_m_s2).max(0.0) / slope))
 }
 
@@ -615,7 +615,7 @@ fn largest_thrust_n(channels: &[Channel]) -> f64 {
 
 impl fmt::Display for Identification {
     fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let of = &self.tracking;
+        let tracking = &self.tracking;
         let number = |value: f64| significant(value, 3);
         writeln!(
             out,
@@ -630,7 +630,7 @@ impl fmt::Display for Identification {
             "commands     up to {} m/s^2 of {}, feedback up to {}, reference up to {}; rotor thrust up to {} % of \
              the maximum",
             number(self.largest_command_m_s2),
-            of.accel_m_s2,
+            tracking.accel_m_s2,
             number(self.largest_feedback_m_s2),
             number(self.reference_m_s2),
             (100.0 * self.thrust_share).round()
@@ -639,7 +639,7 @@ impl fmt::Display for Identification {
             out,
             "recommended  tracking_error_m = {}, {} times the largest error. This bound is measured; each flight \
              checks it at each step.",
-            of.error_m, self.factor
+            tracking.error_m, self.factor
         )
     }
 }

@@ -32,7 +32,7 @@ use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::scenario::{MAX_MEMORY_BYTES, Scenario, ScenarioError, Space};
+use crate::scenario::{ErrorKind, MAX_MEMORY_BYTES, Scenario, ScenarioError, Space};
 use crate::sim::MAX_BEND;
 use tautline_core::swarm::row;
 use tautline_core::text::shortest;
@@ -152,7 +152,7 @@ impl Scenario {
         let Some(spec) = &self.shield_keys() else { return Ok(None) };
         let Some(control_hz) = self.time.control_hz else {
             return Err(ScenarioError::new("the shield holds commands over periods, but no rate of commands is given")
-                .coded("scenario/missing-key")
+                .with_kind(ErrorKind::MissingKey)
                 .with_help(format!("set time.control_hz, such as {SHIELD_CONTROL_HZ}"))
                 .at("shield"));
         };
@@ -247,9 +247,9 @@ impl Scenario {
 
     /// Returns the shields of all vehicles at these starts, with planes before the obstacles.
     pub(crate) fn shield_fleet(&self, limits: &Limits, states: &[State]) -> Result<Fleet, ScenarioError> {
-        let keep_out = |of: &tautline_laws::space::Obstacle| {
-            let clearance_m = of.clearance_m;
-            Obstacle::new(Solid { shape: of.shape, place_m: of.place_m }, clearance_m)
+        let keep_out = |obstacle: &tautline_laws::space::Obstacle| {
+            let clearance_m = obstacle.clearance_m;
+            Obstacle::new(Solid { shape: obstacle.shape, place_m: obstacle.place_m }, clearance_m)
         };
         let obstacles: Vec<_> = self.obstacles.iter().map(keep_out).collect();
         let fleet = Fleet::new(&vec![*limits; self.count()], states);
@@ -307,14 +307,14 @@ impl Scenario {
                 spec.velocity_error_m_s,
             ),
         ];
-        for (key, of, noise, bound) in noises {
+        for (key, what, noise, bound) in noises {
             if noise > 0.0 && noise >= bound {
                 return Err(refused(
-                    &format!("{key} must be more than {of}, the standard deviation of an unbounded error"),
+                    &format!("{key} must be more than {what}, the standard deviation of an unbounded error"),
                     bound,
                 )
                 .with_help(format!("raise it to {}, six deviations", 6.0 * noise))
-                .at_keys([key, of]));
+                .at_keys([key, what]));
             }
         }
         let push_m_s2 = self.drag_per_s * self.fastest_wind_m_s();
@@ -386,7 +386,7 @@ impl Scenario {
             self.count(),
             bytes >> 30
         ))
-        .coded("scenario/memory")
+        .with_kind(ErrorKind::Memory)
         .with_help("use fewer vehicles or a shorter network.latency_s")
         .at_keys(["shield", "network.latency_s"]))
     }
@@ -412,9 +412,9 @@ fn is_whole(number: f64) -> bool {
 
 /// Returns an error about a value: `PROBLEM (VALUE)`.
 fn refused(problem: &str, value: f64) -> ScenarioError {
-    ScenarioError::new(format!("{problem} ({})", shortest(value))).coded("scenario/shield")
+    ScenarioError::new(format!("{problem} ({})", shortest(value))).with_kind(ErrorKind::Shield)
 }
 
 fn refused_with(problem: &str, help: &str) -> ScenarioError {
-    ScenarioError::new(problem).coded("scenario/shield").with_help(help)
+    ScenarioError::new(problem).with_kind(ErrorKind::Shield).with_help(help)
 }

@@ -311,14 +311,14 @@ fn each(
     shields: &mut [Shield],
     commands: &mut [Vector3<f64>],
     broadcasts: &mut [Broadcast],
-    of: impl Fn(usize, &mut Shield, &mut Vector3<f64>, &mut Broadcast) + Sync,
+    work: impl Fn(usize, &mut Shield, &mut Vector3<f64>, &mut Broadcast) + Sync,
 ) {
     if shields.len() < CONCURRENT_FROM {
         let all = shields.iter_mut().zip(commands).zip(broadcasts).enumerate();
-        all.for_each(|(i, ((shield, command), broadcast))| of(i, shield, command, broadcast));
+        all.for_each(|(i, ((shield, command), broadcast))| work(i, shield, command, broadcast));
     } else {
         let all = shields.par_iter_mut().zip(commands).zip(broadcasts).enumerate();
-        all.for_each(|(i, ((shield, command), broadcast))| of(i, shield, command, broadcast));
+        all.for_each(|(i, ((shield, command), broadcast))| work(i, shield, command, broadcast));
     }
 }
 

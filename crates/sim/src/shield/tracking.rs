@@ -130,27 +130,27 @@ impl Scenario {
     }
 
     /// Returns the key and the text of the first condition of the measured table that the scenario does not meet.
-    fn beyond_tracking(&self, spec: &ShieldSpec, of: &Tracking) -> Option<(&'static str, String)> {
+    fn beyond_tracking(&self, spec: &ShieldSpec, tracking: &Tracking) -> Option<(&'static str, String)> {
         let quadrotor = self.airframe.quadrotor()?;
         let given = |key: Option<f64>| key.unwrap_or(f64::NAN);
         let same = [
-            ("shield.tracker_per_s2", given(spec.tracker_per_s2), of.tracker_per_s2),
-            ("shield.tracker_per_s", given(spec.tracker_per_s), of.tracker_per_s),
-            ("time.control_hz", given(self.time.control_hz), of.control_hz),
-            ("vehicle.attitude_hz", quadrotor.attitude_hz, of.attitude_hz),
+            ("shield.tracker_per_s2", given(spec.tracker_per_s2), tracking.tracker_per_s2),
+            ("shield.tracker_per_s", given(spec.tracker_per_s), tracking.tracker_per_s),
+            ("time.control_hz", given(self.time.control_hz), tracking.control_hz),
+            ("vehicle.attitude_hz", quadrotor.attitude_hz, tracking.attitude_hz),
             ("sensing.latency_s", self.sensing.latency_s, 0.0),
             ("actuation.lag_s", self.actuation.lag_s, 0.0),
         ];
         let at_most = [
-            ("shield.accel_m_s2", given(spec.accel_m_s2), of.accel_m_s2),
-            ("shield.max_speed_m_s", given(spec.max_speed_m_s), of.max_speed_m_s),
-            ("shield.position_error_m", spec.position_error_m, of.position_error_m),
-            ("shield.velocity_error_m_s", spec.velocity_error_m_s, of.velocity_error_m_s),
-            ("time.dt_s", self.time.dt_s, of.dt_s),
-            (WIND, self.fastest_wind_m_s(), of.wind_m_s),
+            ("shield.accel_m_s2", given(spec.accel_m_s2), tracking.accel_m_s2),
+            ("shield.max_speed_m_s", given(spec.max_speed_m_s), tracking.max_speed_m_s),
+            ("shield.position_error_m", spec.position_error_m, tracking.position_error_m),
+            ("shield.velocity_error_m_s", spec.velocity_error_m_s, tracking.velocity_error_m_s),
+            ("time.dt_s", self.time.dt_s, tracking.dt_s),
+            (WIND, self.fastest_wind_m_s(), tracking.wind_m_s),
         ];
         // A smaller push leaves more acceleration to the reference.
-        let at_least = [("shield.disturbance_m_s2", given(spec.disturbance_m_s2), of.disturbance_m_s2)];
+        let at_least = [("shield.disturbance_m_s2", given(spec.disturbance_m_s2), tracking.disturbance_m_s2)];
         // Limits of 0 need a floor that is small against a step of 0.002 s.
         let rounding = |limit: f64| SAME * limit.abs().max(1e-3);
         let lists = [
@@ -184,7 +184,7 @@ impl Scenario {
         if spec.tracking_error_m.is_some() {
             return Ok(());
         }
-        let beyond = model.tracking.as_ref().and_then(|of| self.beyond_tracking(spec, of));
+        let beyond = model.tracking.as_ref().and_then(|tracking| self.beyond_tracking(spec, tracking));
         let other_loop = self.other_attitude_loop().map(|(key, measured, value)| {
             (key, format!("{key} must be {}, got {}", shortest(measured), shortest(value)))
         });

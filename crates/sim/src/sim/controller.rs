@@ -76,7 +76,7 @@ impl Controller {
             let (positions_m, slack_m) = from.unwrap_or((&sensed.own.positions_m, 0.0));
             self.near.update(positions_m, range_m + slack_m);
         }
-        let at = Observation {
+        let observation = Observation {
             time_s,
             own: sensed.own,
             others: sensed.others,
@@ -85,7 +85,7 @@ impl Controller {
             near: self.near.pairs(),
             obstacles: &self.obstacles,
         };
-        let mut commanded = self.law.command(&at, &mut self.commanded);
+        let mut commanded = self.law.command(&observation, &mut self.commanded);
         if let Some(shield) = &mut self.shield {
             shield.note_undefined(std::mem::replace(&mut commanded, Ok(())), &mut self.commanded);
             shield.filter(time_s, truth, sensed.own, &mut self.commanded);

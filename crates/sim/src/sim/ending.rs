@@ -6,8 +6,8 @@ use crate::link::Traffic;
 use crate::scenario::ScenarioError;
 use crate::shield::ShieldReport;
 use tautline_audit::{AuditError, AuditOutcome, ClearanceOutcome, ObstacleError, Status};
-use tautline_core::fact::Coded;
 use tautline_core::failure::Failure;
+use tautline_core::impl_coded;
 use tautline_core::record::{DeadlockRecovery, EnergyRise, Reassignment, RecordError};
 use tautline_core::swarm::{Bounce, Pair, Swarm};
 use tautline_laws::law::{Certificate, LawError, ParameterError};
@@ -264,22 +264,18 @@ pub enum SimError {
     },
 }
 
-impl Coded for Ending {
-    fn code(&self) -> &'static str {
-        match self {
-            Self::Completed => "completed",
-            Self::Interrupted => "interrupted",
-            Self::LawUndefined(_) => "law-undefined",
-            Self::BrokeDown(Breakdown::CommandNotFinite { .. }) => "command-not-finite",
-            Self::BrokeDown(Breakdown::CommandOutOfRange { .. }) => "command-out-of-range",
-            Self::BrokeDown(Breakdown::StateNotFinite { .. }) => "state-not-finite",
-            Self::BrokeDown(Breakdown::Unresolved { .. }) => "positions-unresolved",
-            Self::BrokeDown(Breakdown::Stalled { .. }) => "solver-stalled",
-            Self::BrokeDown(Breakdown::Bent { .. }) => "path-bends",
-            Self::BrokeDown(Breakdown::Audit { .. }) => "audit-refused",
-        }
-    }
-}
+impl_coded! { Ending {
+    Self::Completed => "completed",
+    Self::Interrupted => "interrupted",
+    Self::LawUndefined(_) => "law-undefined",
+    Self::BrokeDown(Breakdown::CommandNotFinite { .. }) => "command-not-finite",
+    Self::BrokeDown(Breakdown::CommandOutOfRange { .. }) => "command-out-of-range",
+    Self::BrokeDown(Breakdown::StateNotFinite { .. }) => "state-not-finite",
+    Self::BrokeDown(Breakdown::Unresolved { .. }) => "positions-unresolved",
+    Self::BrokeDown(Breakdown::Stalled { .. }) => "solver-stalled",
+    Self::BrokeDown(Breakdown::Bent { .. }) => "path-bends",
+    Self::BrokeDown(Breakdown::Audit { .. }) => "audit-refused",
+} }
 
 impl From<SimError> for Failure {
     fn from(error: SimError) -> Self {

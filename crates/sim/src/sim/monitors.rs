@@ -175,7 +175,7 @@ impl EnergyMonitor {
     pub(super) fn add(&mut self, revision: u64, energy: Option<f64>) {
         let Some(energy) = energy else { return };
         let from = match self.since {
-            Some((of, from)) if of == revision => from,
+            Some((own_revision, from)) if own_revision == revision => from,
             _ => {
                 self.since = Some((revision, energy));
                 energy
@@ -243,8 +243,8 @@ mod tests {
         let mut state = Swarm::at_rest(rows(at_m));
         state.velocities_m_s.column_mut(1).fill(speed_m_s);
         let is_exceeded = |step: &u64| match resolution.add_step(&state, dt_s, *step) {
-            Err(Breakdown::Unresolved { step: at, rounding_m, required_m }) => {
-                assert!(at == *step && rounding_m > required_m && required_m == 0.01);
+            Err(Breakdown::Unresolved { step: at_step, rounding_m, required_m }) => {
+                assert!(at_step == *step && rounding_m > required_m && required_m == 0.01);
                 true
             }
             other => {

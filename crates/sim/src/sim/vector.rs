@@ -412,8 +412,8 @@ impl VectorSimulation {
         let are_within = |some: &[f64]| some.iter().fold(true, |all, x| all & (x.abs() <= MAX_COMMAND_M_S2));
         for (world, some) in commands.chunks_exact(width.max(1)).enumerate() {
             if !are_within(some) && self.world(world).ending().is_none() {
-                let at = some.iter().position(|x| !are_within(&[*x])).unwrap_or_default();
-                return Err(VectorError::Command { world, vehicle: at / 3, axis: at % 3, value: some[at] });
+                let index = some.iter().position(|x| !are_within(&[*x])).unwrap_or_default();
+                return Err(VectorError::Command { world, vehicle: index / 3, axis: index % 3, value: some[index] });
             }
         }
         Ok(())

@@ -142,7 +142,7 @@ pub struct ModelParseError {
 pub fn read(text: &str) -> Result<Model, ModelParseError> {
     let model: Model = toml::from_str(text).map_err(|error| ModelParseError {
         message: error.message().to_owned(),
-        help: "a model has the keys of the built-in ones, which docs/vehicles.md lists".to_owned(),
+        help: "a model has the keys of the built-in ones, which docs/scenario.md lists".to_owned(),
         span: error.span().unwrap_or(0..0),
     })?;
     model.check().map_err(|ModelError { key, message, help }| {

@@ -43,24 +43,24 @@ impl Unicycle {
     /// Returns the steering for a commanded acceleration u \[m/s^2\]: a = u . e and omega = u . n/s within the limits.
     /// Unit vector e is along the heading, n to its left. The speed stays within its limits over `dt_s` seconds.
     #[must_use]
-    pub fn steering(&self, of: Heading, command_m_s2: Vector3<f64>, dt_s: f64) -> Steering {
-        let (sin, cos) = libm::sincos(of.psi_rad);
+    pub fn steering(&self, heading: Heading, command_m_s2: Vector3<f64>, dt_s: f64) -> Steering {
+        let (sin, cos) = libm::sincos(heading.psi_rad);
         let along = command_m_s2.x * cos + command_m_s2.y * sin;
         let across = command_m_s2.y * cos - command_m_s2.x * sin;
-        let brakes = (self.min_speed_m_s - of.speed_m_s) / dt_s;
-        let gains = (self.max_speed_m_s - of.speed_m_s) / dt_s;
+        let brakes = (self.min_speed_m_s - heading.speed_m_s) / dt_s;
+        let gains = (self.max_speed_m_s - heading.speed_m_s) / dt_s;
         Steering {
             accel_m_s2: along.clamp(-self.max_accel_m_s2, self.max_accel_m_s2).max(brakes).min(gains),
-            turn_rad_s: (across / of.speed_m_s).clamp(-self.max_turn_rad_s, self.max_turn_rad_s),
+            turn_rad_s: (across / heading.speed_m_s).clamp(-self.max_turn_rad_s, self.max_turn_rad_s),
         }
     }
 
     /// Returns heading and speed after `dt_s` seconds, within the limits.
     #[must_use]
-    pub fn after(&self, of: Heading, by: Steering, dt_s: f64) -> Heading {
-        let speed_m_s = of.speed_m_s + by.accel_m_s2 * dt_s;
+    pub fn after(&self, heading: Heading, by: Steering, dt_s: f64) -> Heading {
+        let speed_m_s = heading.speed_m_s + by.accel_m_s2 * dt_s;
         Heading {
-            psi_rad: of.psi_rad + by.turn_rad_s * dt_s,
+            psi_rad: heading.psi_rad + by.turn_rad_s * dt_s,
             speed_m_s: speed_m_s.clamp(self.min_speed_m_s, self.max_speed_m_s),
         }
     }
@@ -114,11 +114,11 @@ mod tests {
         let unicycle = Unicycle::default();
         let ahead = SLOW.velocity_m_s() / SLOW.speed_m_s;
         let left = Vector3::new(-ahead.y, ahead.x, 0.0);
-        let of = |u: Vector3<f64>| unicycle.steering(SLOW, u, 0.01);
-        let both = of(0.3 * ahead + 0.4 * left);
+        let steering_of = |u: Vector3<f64>| unicycle.steering(SLOW, u, 0.01);
+        let both = steering_of(0.3 * ahead + 0.4 * left);
         assert!((both.accel_m_s2 - 0.3).abs() < 1e-15 && (both.turn_rad_s - 0.8).abs() < 1e-15, "{both:?}");
-        assert_eq!(of(99.0 * ahead).accel_m_s2, 2.0);
-        assert_eq!(of(-99.0 * left).turn_rad_s, -2.0);
+        assert_eq!(steering_of(99.0 * ahead).accel_m_s2, 2.0);
+        assert_eq!(steering_of(-99.0 * left).turn_rad_s, -2.0);
         let (mut heading, dt_s) = (SLOW, 0.01);
         for _ in 0..1000 {
             heading = unicycle.after(heading, unicycle.steering(heading, -ahead, dt_s), dt_s);

@@ -71,7 +71,7 @@ fn a_scenario_with_every_imperfection_is_written_and_read_back() {
     ];
     let sets: Vec<_> = ALL.into_iter().chain(more).collect();
     let scenario = builtin("pentagon", &sets);
-    let again = read(&scenario.resolved_toml());
+    let again = read(&scenario.resolved().toml);
     assert_eq!(scenario, again);
     assert_eq!((again.network.failure.len(), again.failures.len(), again.time.control_hz), (2, 3, Some(60.0)));
     let (flight, log) = fly(&scenario);
@@ -346,7 +346,7 @@ fn a_wrong_imperfection_is_refused_at_its_place() {
         let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect(set)).collect();
         let error = Scenario::read(&Source::Builtin("pentagon".to_owned()), &overrides).expect_err(code);
         assert_eq!(error.code(), code, "{sets:?}: {error}");
-        assert!(error.help().is_some(), "{sets:?}: {error}");
-        assert!(error.place().is_some_and(|place| place.source == "set"), "{sets:?}: {error}");
+        assert!(error.help.is_some(), "{sets:?}: {error}");
+        assert!(error.place.as_ref().is_some_and(|place| place.source == "set"), "{sets:?}: {error}");
     }
 }

@@ -98,9 +98,9 @@ fn an_ellipsoid_is_written_back_and_its_width_is_delta() {
     let scenario = above_each_other("[safety]\nshape = \"ellipsoid\"\nhalf_axes_m = [0.125, 0.125, 0.375]");
     assert_eq!((scenario.delta_m, scenario.metric().ratio()), (0.25, 3.0));
     assert_eq!(scenario.half_axes_m(), Some([0.125, 0.125, 0.375]));
-    assert_eq!(read(&scenario.resolved_toml()), scenario);
+    assert_eq!(read(&scenario.resolved().toml), scenario);
     let ball = above_each_other("delta_m = 0.4");
-    assert!(ball.metric().is_metres() && !ball.resolved_toml().contains("[safety]"));
+    assert!(ball.metric().is_metres() && !ball.resolved().toml.contains("[safety]"));
 }
 
 #[test]
@@ -110,7 +110,7 @@ fn wrong_ellipsoids_are_refused_with_a_remedy() {
         let refused: Result<Scenario, ScenarioError> =
             Scenario::read(&Source::Builtin("obstacles".to_owned()), &overrides);
         let error = refused.expect_err(sets[0]);
-        assert!(error.help().is_some_and(|help| !help.is_empty()), "{error}");
+        assert!(error.help.as_deref().is_some_and(|help| !help.is_empty()), "{error}");
         error
     };
     let axes = "safety.half_axes_m=[0.5, 0.5, 1.0]";

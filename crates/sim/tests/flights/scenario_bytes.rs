@@ -30,7 +30,7 @@ proptest! {
         }
         let text: String = text.into_iter().collect();
         match read(&text) {
-            Ok(scenario) => prop_assert_eq!(read(&scenario.resolved_toml()), Ok(scenario)),
+            Ok(scenario) => prop_assert_eq!(read(&scenario.resolved().toml), Ok(scenario)),
             Err(error) => prop_assert!(!error.to_string().is_empty()),
         }
     }

@@ -52,7 +52,7 @@ fn a_wrong_key_is_refused_at_its_place() {
         assert!(MISSION.contains(name), "{name}");
         let error = refusal(&MISSION.replace(name, other));
         assert_eq!(error.code(), code, "{error}");
-        assert_eq!(error.place().map(|place| (place.line, place.column)), Some(at), "{error}");
+        assert_eq!(error.place.as_ref().map(|place| (place.line, place.column)), Some(at), "{error}");
     }
 }
 
@@ -67,9 +67,9 @@ fn slots_must_not_be_spread_to_the_end_of_the_flight() {
 fn a_reference_without_a_kind_is_at_rest() {
     let resting = |keys: &str| read(&format!("{RIGHT}[reference]\n{keys}").replace("edge-tension", "displacement"));
     let (named, bare) = (resting("kind = \"rest\"\nleader = 2\n"), resting("leader = 2\n"));
-    let resolved = named.expect("right").resolved_toml();
+    let resolved = named.expect("right").resolved().toml;
     assert!(resolved.contains("leader = 2"));
-    assert_eq!(bare.expect("right").resolved_toml(), resolved);
+    assert_eq!(bare.expect("right").resolved().toml, resolved);
     let moving = resting("velocity_m_s = [1, 0]\n").expect_err("one at rest has no velocity");
     assert_eq!(moving.code(), "scenario/unknown-key", "{moving}");
 }
@@ -84,7 +84,7 @@ fn a_star_has_the_given_hub() {
     for (hub, code) in [(0, "scenario/out-of-range"), (6, "scenario/unknown-vehicle")] {
         let wrong = graph(&[&format!("graph={{kind=\"star\", hub={hub}}}")]).expect_err("no such vehicle");
         assert_eq!(wrong.code(), code, "{wrong}");
-        assert_eq!(wrong.place().map(|place| place.column), Some(25));
+        assert_eq!(wrong.place.as_ref().map(|place| place.column), Some(25));
     }
 }
 
@@ -172,7 +172,7 @@ fn a_flight_shorter_than_hold_s_is_refused_at_the_override() {
     let sets = [Override::parse("time.duration_s=0.5").expect("an override")];
     let error = Scenario::read(&Source::Builtin("thousand".to_owned()), &sets).expect_err("too short");
     assert_eq!(error.code(), "scenario/outside-flight", "{error}");
-    assert!(error.place().is_some_and(|place| place.source == "set" && place.text.contains("0.5")), "{error}");
+    assert!(error.place.as_ref().is_some_and(|place| place.source == "set" && place.text.contains("0.5")), "{error}");
 }
 
 #[test]

@@ -59,8 +59,8 @@ fn a_number_beyond_a_bound_of_the_schema_is_refused_at_its_key() {
         let source = Source::Text { name: "f".to_owned(), text: RIGHT.to_owned() };
         let error = Scenario::read(&source, &overrides).expect_err(&set);
         assert_eq!(error.code(), "scenario/out-of-range", "{set}: {error}");
-        assert!(error.message().contains(" must be "), "{error}");
-        assert_eq!(error.place().map(|place| place.source.as_str()), Some("set"), "{error}");
+        assert!(error.message.contains(" must be "), "{error}");
+        assert_eq!(error.place.as_ref().map(|place| place.source.as_str()), Some("set"), "{error}");
     }
     let schema = scenario::schema();
     assert_eq!(schema["$defs"]["PerVehicle"]["anyOf"][0]["exclusiveMinimum"], 0);

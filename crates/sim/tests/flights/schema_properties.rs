@@ -200,28 +200,28 @@ fn fault_of_refusal(error: &ScenarioError, paths: &[String]) -> Option<String> {
         let table = [format!("{key}."), format!("{key}.1.")];
         paths.iter().any(|path| path == key || table.iter().any(|table| path.starts_with(table)))
     };
-    let unknown = error.field().filter(|field| {
+    let unknown = error.fields.first().filter(|field| {
         // The first formation is a table, the later ones are a list.
         let is_of_leg = |key: &str| field.leg > 0 && is_key(&format!("leg.1{key}"));
         !is_key(&field.key) && !field.key.strip_prefix("formation").is_some_and(is_of_leg)
     });
-    if error.place().is_none() {
+    if error.place.is_none() {
         return Some(format!("without a place: {shown}"));
     }
     if let Some(field) = unknown {
         return Some(format!("the key {field} does not exist: {shown}"));
     }
-    if error.help().is_none_or(str::is_empty) {
+    if error.help.as_deref().is_none_or(str::is_empty) {
         return Some(format!("without a remedy: {shown}"));
     }
     let is_long =
-        error.message().chars().count() > LONGEST_MESSAGE || shown.split_whitespace().any(|word| word.len() > 60);
+        error.message.chars().count() > LONGEST_MESSAGE || shown.split_whitespace().any(|word| word.len() > 60);
     is_long.then(|| format!("a long message: {shown}"))
 }
 
 /// Returns the fault of an accepted scenario: it cannot be written, read back, checked or flown.
 fn fault_of_accepted(scenario: &Scenario) -> Option<String> {
-    let written = scenario.resolved_toml();
+    let written = scenario.resolved().toml;
     match read(&written) {
         Err(error) => return Some(format!("its own text is refused: {error}")),
         Ok(again) if again != *scenario => return Some("its own text is another scenario".to_owned()),

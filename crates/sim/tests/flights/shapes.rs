@@ -61,7 +61,7 @@ fn every_shape_has_the_given_spacing_or_one_and_a_half_delta() {
             assert_eq!((scenario.count(), scenario.space), (50, space), "{shape}");
             let off = nearest_m(&scenario) / spacing_m - 1.0;
             assert!(off.abs() < SPACING_ROUNDING, "{shape}: {off:e}");
-            let resolved = scenario.resolved_toml();
+            let resolved = scenario.resolved().toml;
             assert!(resolved.contains("shape = \"points\""), "{resolved}");
             let again = Scenario::read(&Source::Text { name: "again".to_owned(), text: resolved }, &[]);
             assert_eq!(again.as_ref(), Ok(&scenario), "{shape}");
@@ -86,9 +86,9 @@ fn a_drawing_has_the_given_height_or_width() {
 fn the_least_height_of_a_refusal_is_sufficient_and_tight() {
     let of = |height_m: f64| read(&format!("shape = \"text\"\ntext = \"HELLO\"\nheight_m = {height_m}"));
     let error = of(3.0).expect_err("too small");
-    assert!(error.message().starts_with("in a drawing 3 m high, 50 vehicles come as near as 0."), "{error}");
-    assert_eq!(error.place().map(|place| place.line), Some(LINE + 2));
-    let help = error.help().expect("a remedy");
+    assert!(error.message.starts_with("in a drawing 3 m high, 50 vehicles come as near as 0."), "{error}");
+    assert_eq!(error.place.as_ref().map(|place| place.line), Some(LINE + 2));
+    let help = error.help.as_deref().expect("a remedy");
     let named = help.strip_prefix("set formation.height_m to at least ").and_then(|rest| rest.split(' ').next());
     let least_m: f64 = named.expect(help).parse().expect(help);
     assert!((2.0..2.01).contains(&nearest_m(&of(least_m).expect("enough"))), "{help}");
@@ -124,8 +124,8 @@ fn files_are_relative_to_the_scenario() {
         .expect("a ring");
     assert!((nearest_m(&set) - 7.0).abs() < SPACING_ROUNDING);
     let elsewhere = read("shape = \"file\"\nfile = \"../points.csv\"", &[]).expect_err("it is below");
-    assert!(elsewhere.code() == "scenario/file" && elsewhere.help().is_some(), "{elsewhere}");
-    assert_eq!(elsewhere.place().map(|place| (place.line, place.column)), Some((LINE + 1, 8)));
+    assert!(elsewhere.code() == "scenario/file" && elsewhere.help.is_some(), "{elsewhere}");
+    assert_eq!(elsewhere.place.as_ref().map(|place| (place.line, place.column)), Some((LINE + 1, 8)));
     let absolute = format!("shape = \"file\"\nfile = '{}'", below.join("points.csv").display());
     assert_eq!(self::read(&absolute).expect("points").legs, high.legs);
 }
@@ -162,7 +162,7 @@ fn a_file_of_points_may_name_its_columns_and_gives_the_number_of_vehicles() {
     ] {
         let error = read(wrong).expect_err(wrong);
         assert_eq!(error.code(), code, "{error}");
-        assert!(error.help().is_some(), "{wrong:?}: {error}");
+        assert!(error.help.is_some(), "{wrong:?}: {error}");
         assert!(error.to_string().contains(&format!("test.toml:{}:8", LINE + 1)), "{error}");
     }
 }
@@ -194,19 +194,19 @@ fn a_wrong_shape_is_refused_at_its_key() {
     ] {
         let error = read(formation).expect_err(formation);
         assert_eq!(error.code(), code, "{error}");
-        assert!(error.help().is_some(), "{formation}: {error}");
-        assert_eq!(error.place().map(|place| (place.line, place.column)), Some(place), "{error}");
+        assert!(error.help.is_some(), "{formation}: {error}");
+        assert_eq!(error.place.as_ref().map(|place| (place.line, place.column)), Some(place), "{error}");
     }
     let few = FRAME.replace("count = 50", "count = 4") + "shape = \"text\"\ntext = \"HELLO\"";
     let error = Scenario::read(&Source::Text { name: "few".to_owned(), text: few }, &[]).expect_err("five letters");
-    assert_eq!(error.message(), "4 slots for 5 letters");
+    assert_eq!(error.message, "4 slots for 5 letters");
 }
 
 #[test]
 fn the_pitch_of_a_refusal_is_sufficient() {
     let of = |pitch: &str| read(&format!("shape = \"helix\"\nradius_m = 9\npitch_m = {pitch}"));
     for flat in ["1", "1e-9", "2.5"] {
-        let help = of(flat).expect_err("too flat").help().expect("a remedy").to_owned();
+        let help = of(flat).expect_err("too flat").help.expect("a remedy");
         let named = help.strip_prefix("enlarge formation.pitch_m to ").and_then(|rest| rest.split(',').next());
         let enough = of(named.expect(&help)).expect(&help);
         assert!((nearest_m(&enough) - 3.0).abs() < SPACING_ROUNDING, "{help}");

@@ -176,7 +176,7 @@ fn keys_that_unicycles_do_not_support_are_refused_with_a_remedy() {
         }
     }
     let scenario = read(FLIGHT);
-    let source = Source::Text { name: "again".to_owned(), text: scenario.resolved_toml() };
+    let source = Source::Text { name: "again".to_owned(), text: scenario.resolved().toml };
     assert_eq!(Scenario::read(&source, &[]).expect("its own text"), scenario);
     assert!(plant::of(&scenario).holds_commands());
 }

@@ -261,10 +261,10 @@ fn a_leader_blown_off_its_reference_voids_the_certificate() {
 #[test]
 fn a_scenario_with_wind_is_written_and_read_back_bit_for_bit() {
     let scenario = builtin("gusts", &[]);
-    let again = read(&scenario.resolved_toml());
+    let again = read(&scenario.resolved().toml);
     assert_eq!(again, scenario);
     assert_eq!(again.wind.gusts[0].fall_s(), 1.5, "the fall time defaults to the rise time");
-    let own = read(&builtin("gusts", &["wind.shared=false"]).resolved_toml());
+    let own = read(&builtin("gusts", &["wind.shared=false"]).resolved().toml);
     assert!(!own.wind.shared);
 }
 
@@ -288,7 +288,7 @@ fn a_wrong_wind_is_refused_at_its_place_with_a_remedy() {
         let sets = [&["vehicle.drag_per_s=0.3", "time.duration_s=10"], sets].concat();
         let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect(set)).collect();
         let error = Scenario::read(&Source::Builtin("pentagon".to_owned()), &overrides).expect_err(sets[2]);
-        assert!(error.help().is_some() && (error.place().is_some() || error.field().is_some()), "{error}");
+        assert!(error.help.is_some() && (error.place.is_some() || !error.fields.is_empty()), "{error}");
         error
     };
     let gust = |keys: &str| format!("wind.gust=[{{at_s = 1.0, rise_s = 1.0, velocity_m_s = [1.0, 0.0], {keys}}}]");

@@ -165,7 +165,7 @@ impl Experiment for Options {
     }
 
     fn fly(&self, base: &BaseScenario, batch: &Batch<'_>) -> Result<Option<Attack>, Failure> {
-        base.check_keys(self.vary.iter().map(|of| of.key.as_str()))?;
+        base.check_keys(self.vary.iter().map(|bound| bound.key.as_str()))?;
         let space = SearchSpace::new(base, self)?;
         batch
             .monitor()
@@ -384,9 +384,9 @@ impl Attack {
         let FlightSummary { min_m, min_at_s, min_pair, .. } = &worst.flown;
         let Some(min_m) = *min_m else { return "no two vehicles".to_owned() };
         let shown = beside_limit(min_m, self.about.delta_m, 3);
-        let at = min_at_s.map_or_else(String::new, |at_s| format!(" at {}", seconds(at_s)));
+        let when = min_at_s.map_or_else(String::new, |at_s| format!(" at {}", seconds(at_s)));
         let pair = min_pair.map_or_else(String::new, |[a, b]| format!(", vehicles {a} and {b}"));
-        format!("{shown} m{at}{pair}")
+        format!("{shown} m{when}{pair}")
     }
 }
 
@@ -415,7 +415,7 @@ impl Study for Attack {
         let flights = |count: u64| counted(count, "flight", "flights");
         let flown = format!("{} of {} flights were flown", self.flights, self.flights_asked);
         let mut notes = Vec::new();
-        let mut note = |is: bool, text: String| notes.extend(is.then_some(text));
+        let mut note = |is_noted: bool, text: String| notes.extend(is_noted.then_some(text));
         note(
             self.certificates_broken > 0,
             format!(
@@ -430,7 +430,9 @@ impl Study for Attack {
         );
         let worst = self.worst().map(|worst| &worst.flown);
         note(
-            worst.is_some_and(|of| of.outcome == Outcome::Violated && of.clearance_m().is_some_and(|of| of >= 0.0)),
+            worst.is_some_and(|worst| {
+                worst.outcome == Outcome::Violated && worst.clearance_m().is_some_and(|clearance_m| clearance_m >= 0.0)
+            }),
             "the violation is of an obstacle's clearance; the search minimises separations of vehicles only".to_owned(),
         );
         note(self.about.external_law.is_some(), self.about.note().unwrap_or_default());
@@ -443,7 +445,7 @@ impl Study for Attack {
         let candidates = counted(self.refused, "candidate", "candidates");
         note(self.refused > 0, format!("{candidates} could not be flown and cost no flight{first}"));
         note(
-            worst.is_some_and(|of| of.min_at_s == Some(0.0)),
+            worst.is_some_and(|worst| worst.min_at_s == Some(0.0)),
             format!("the smallest separation is that of two starts; {APART} keeps starts farther apart"),
         );
         note(
@@ -459,15 +461,15 @@ impl Study for Attack {
 
     fn records(&self) -> Table {
         let table = Table::of("Candidates that were worse than all before", &self.progress)
-            .column("flight", "Flight", Kind::Count, |of| of.flight)
-            .column("noise_seed", "", Kind::Integer, |of| of.flown.seed)
-            .column("outcome", "Verdict", Kind::Text, |of| of.flown.outcome.name())
-            .column("min", "Separation [m]", Kind::AtLeast, |of| of.flown.min_m)
-            .column("min_at", "At [s]", Kind::Exact, |of| of.flown.min_at_s)
-            .column("certified", "Certified [m]", Kind::AtLeast, |of| of.flown.certified_m);
+            .column("flight", "Flight", Kind::Count, |row| row.flight)
+            .column("noise_seed", "", Kind::Integer, |row| row.flown.seed)
+            .column("outcome", "Verdict", Kind::Text, |row| row.flown.outcome.name())
+            .column("min", "Separation [m]", Kind::AtLeast, |row| row.flown.min_m)
+            .column("min_at", "At [s]", Kind::Exact, |row| row.flown.min_at_s)
+            .column("certified", "Certified [m]", Kind::AtLeast, |row| row.flown.certified_m);
         let keys = self.bounds.iter().enumerate();
         keys.fold(table, |table, (k, bound)| {
-            table.column(&bound.key, &bound.key, Kind::Exact, |of| of.values.get(k).copied())
+            table.column(&bound.key, &bound.key, Kind::Exact, |row| row.values.get(k).copied())
         })
         .build()
     }

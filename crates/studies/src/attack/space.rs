@@ -193,7 +193,7 @@ impl SearchSpace {
     /// The reason of a refusal: the candidate cannot be flown, or two vehicles start closer than `apart_m`.
     pub fn candidate(&self, values: &[f64]) -> Result<Vec<Scenario>, String> {
         let flight = |k: u64| {
-            let scenario = self.scenario(values, k).map_err(|error| error.message().to_owned())?;
+            let scenario = self.scenario(values, k).map_err(|error| error.message)?;
             scenario.law().map_err(|error| error.to_string())?;
             let near_m = self.options.apart_m.map(|apart_m| (apart_m, closest_start_m(&scenario)));
             match near_m {
@@ -279,7 +279,7 @@ impl SearchSpace {
 
     /// Returns the bounds that `--start` and `--velocity` give each coordinate, positions before velocities.
     fn start_bounds(&self) -> Vec<Bound> {
-        let of = |list: &str, rows: &Rows, by: Option<f64>| {
+        let bounds_of = |list: &str, rows: &Rows, by: Option<f64>| {
             let Some(by) = by else { return Vec::new() };
             let numbers =
                 (0..rows.nrows()).flat_map(|i| (0..self.base.own().space.dimensions()).map(move |axis| (i, axis)));
@@ -292,8 +292,8 @@ impl SearchSpace {
             numbers.map(bound).collect()
         };
         let start = &self.base.own().start;
-        let mut bounds = of("positions_m", &start.positions_m, self.options.start_m);
-        bounds.extend(of("velocities_m_s", &start.velocities_m_s, self.options.velocity_m_s));
+        let mut bounds = bounds_of("positions_m", &start.positions_m, self.options.start_m);
+        bounds.extend(bounds_of("velocities_m_s", &start.velocities_m_s, self.options.velocity_m_s));
         bounds
     }
 

@@ -43,12 +43,12 @@ impl LawSummary {
         if let Some(splitting) = &self.splitting {
             return rare_event_sentence(splitting);
         }
-        let Proportion { count, of, confidence, .. } = self.violated;
-        if of == 0 {
+        let Proportion { count, of: total, confidence, .. } = self.violated;
+        if total == 0 {
             return "no flight was flown".to_owned();
         }
         let refused = if self.is_mostly_refused() {
-            let runs = separated(self.not_flown + of);
+            let runs = separated(self.not_flown + total);
             format!("MOST DRAWS REFUSED, {} of {runs} could not be flown: ", separated(self.not_flown))
         } else {
             String::new()
@@ -64,12 +64,12 @@ impl LawSummary {
             format!("{link}below {below} with {confidence:.0} % confidence ({kind})")
         });
         let bound = if confidence == 1.0 { Some(": all points of the grid, no sample".to_owned()) } else { bound };
-        let flights = if of == 1 { "flight" } else { "flights" };
+        let flights = if total == 1 { "flight" } else { "flights" };
         let broken = match self.certificates_broken {
             0 => String::new(),
             count => format!("CERTIFICATE BROKEN in {}: ", counted(count, "flight", "flights")),
         };
-        let counts = outcomes(count, self.unknown, self.clear.count, &format!("{} {flights}", separated(of)));
+        let counts = outcomes(count, self.unknown, self.clear.count, &format!("{} {flights}", separated(total)));
         let bound = bound.unwrap_or_default();
         format!("{refused}{broken}{counts}{bound}")
     }
@@ -165,18 +165,19 @@ impl Summary {
         let rows: Vec<_> = self.laws.iter().filter_map(|law| Some((&law.name, law.splitting.as_ref()?))).collect();
         Table::of("By adaptive multilevel splitting, with 95 % intervals", &rows)
             .column("law", "Law", Kind::Text, |(law, _)| (*law).clone())
-            .column("estimates", "Estimates", Kind::Count, |(_, of)| of.repetitions)
-            .column("probability", "Probability of a violation", Kind::Rare, |(_, of)| of.probability)
-            .column("extinct", "Estimates of 0", Kind::Count, |(_, of)| of.extinct.count)
-            .column("steps", "Steps flown", Kind::Count, |(_, of)| of.steps)
+            .column("estimates", "Estimates", Kind::Count, |(_, estimate)| estimate.repetitions)
+            .column("probability", "Probability of a violation", Kind::Rare, |(_, estimate)| estimate.probability)
+            .column("extinct", "Estimates of 0", Kind::Count, |(_, estimate)| estimate.extinct.count)
+            .column("steps", "Steps flown", Kind::Count, |(_, estimate)| estimate.steps)
             .build()
     }
 
     fn histograms(&self) -> Vec<Figure> {
-        let of = |pick: fn(&LawSummary) -> &Option<Histogram>| {
+        let column_of = |pick: fn(&LawSummary) -> &Option<Histogram>| {
             self.laws.iter().filter_map(|law| Some((law.name.clone(), pick(law).clone()?))).collect::<Vec<_>>()
         };
-        let (clearance, reached) = (of(|law| &law.clearance_histogram_m), of(|law| &law.reached_histogram_s));
+        let (clearance, reached) =
+            (column_of(|law| &law.clearance_histogram_m), column_of(|law| &law.reached_histogram_s));
         let limit = Some((0.0, "delta"));
         let drawn = (!clearance.is_empty())
             .then(|| histograms("clearance", "Smallest separation less delta", "clearance [m]", &clearance, limit));
@@ -188,8 +189,8 @@ impl Summary {
     /// Returns the section with the shares over a varied key.
     fn varied_section(&self, varied: &Varied) -> Section {
         let share = |bin: &Bin, law: usize, pick: fn(&BinShares) -> Proportion| bin.laws.get(law).map(pick);
-        let violated: fn(&BinShares) -> Proportion = |of| of.violated;
-        let reached: fn(&BinShares) -> Proportion = |of| of.reached;
+        let violated: fn(&BinShares) -> Proportion = |bin| bin.violated;
+        let reached: fn(&BinShares) -> Proportion = |bin| bin.reached;
         let names = self.laws.iter().map(|law| law.name.as_str()).enumerate();
         let key = Table::of("Shares with two-sided 95 % intervals", &varied.bins).column(
             "",
@@ -208,9 +209,9 @@ impl Summary {
         let figure = |name: &str, pick: fn(&BinShares) -> Proportion| {
             let of_law = |law: usize| {
                 let point = |bin: &Bin| {
-                    let of = share(bin, law, pick)?;
+                    let proportion = share(bin, law, pick)?;
                     let value = f64::midpoint(bin.low?, bin.high?);
-                    Some(Point { value, share: of.share?, interval: Some([of.low, of.high]) })
+                    Some(Point { value, share: proportion.share?, interval: Some([proportion.low, proportion.high]) })
                 };
                 varied.bins.iter().filter_map(point).collect::<Vec<_>>()
             };
@@ -266,7 +267,7 @@ impl Study for Summary {
     fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         for law in &self.laws {
-            let advice = law.splitting.iter().flat_map(|of| &of.advice);
+            let advice = law.splitting.iter().flat_map(|splitting| &splitting.advice);
             notes.extend(advice.map(|advice| format!("{}: {advice}", law.name)));
         }
         notes.extend(self.stopped_early.then(|| {

@@ -114,8 +114,8 @@ impl Campaign {
     /// # Errors
     /// [`Failure`] if the campaign cannot be flown here, for example because a file of its scenario is missing or
     /// different, or because it has another law.
-    pub fn of(manifest: Manifest, at: &Path, external_law: Option<&ExternalLaw>) -> Result<Self, Failure> {
-        check_external_law(&manifest, at, external_law)?;
+    pub fn of(manifest: Manifest, path: &Path, external_law: Option<&ExternalLaw>) -> Result<Self, Failure> {
+        check_external_law(&manifest, path, external_law)?;
         let spec = Spec::read("the specification in the manifest", &manifest.spec)?;
         let campaign = Self::read(manifest, &spec, external_law)?;
         let first = campaign.first();
@@ -126,7 +126,7 @@ impl Campaign {
                 campaign.manifest.first.join(", ")
             );
             let remedy = "use the same files of the scenario on all machines";
-            return Err(other_campaign(at, problem, remedy));
+            return Err(other_campaign(path, problem, remedy));
         }
         Ok(campaign)
     }
@@ -218,7 +218,7 @@ impl Campaign {
     fn runs_are_equal(&self) -> bool {
         let hash = |run: u64| {
             let scenario = self.scenario(run, &self.laws[0]);
-            scenario.map_or_else(|error| error.to_string(), |scenario| scenario.flight_sha256_hex())
+            scenario.map_or_else(|error| error.to_string(), |scenario| scenario.flight_sha256())
         };
         let is_fixed = |variation: &Variation| *variation == Variation::Seed || variation.is_constant();
         self.variations.values().all(is_fixed) && (1..self.manifest.runs.min(3)).all(|run| hash(run) == hash(0))
@@ -260,7 +260,7 @@ impl Campaign {
     /// Returns for run 0 under each law the hash of the scenario, or the reason why the run cannot be flown.
     fn first(&self) -> Vec<String> {
         let first = self.laws.iter().map(|law| self.scenario(0, law));
-        first.map(|first| first.map_or_else(|error| error.message().to_owned(), |first| first.sha256_hex())).collect()
+        first.map(|first| first.map_or_else(|error| error.message, |first| first.resolved().sha256)).collect()
     }
 
     /// Returns the same campaign, whose number of runs was raised after flights had been flown.
@@ -366,7 +366,7 @@ impl Campaign {
             Ok(scenario) => scenario,
             Err(error) => {
                 batch.monitor().advance(self.own().time.steps());
-                row.not_flown = Some(error.message().to_owned());
+                row.not_flown = Some(error.message);
                 return Ok(Some(row));
             }
         };
@@ -423,7 +423,7 @@ impl Campaign {
 }
 
 /// Refuses an external law that is not the one that a manifest names.
-fn check_external_law(manifest: &Manifest, at: &Path, given: Option<&ExternalLaw>) -> Result<(), Failure> {
+fn check_external_law(manifest: &Manifest, path: &Path, given: Option<&ExternalLaw>) -> Result<(), Failure> {
     let (planned, given) = (manifest.external_law.as_deref(), given.map(ExternalLaw::name));
     if planned == given {
         return Ok(());
@@ -434,7 +434,7 @@ fn check_external_law(manifest: &Manifest, at: &Path, given: Option<&ExternalLaw
         Some(law) => format!("continue the campaign in Python: tautline.campaign(..., law={law}(...))"),
         None => "continue without an external law, or give another folder".to_owned(),
     };
-    Err(other_campaign(at, problem, remedy))
+    Err(other_campaign(path, problem, remedy))
 }
 
 fn written<'a>(drawn: &'a BTreeMap<&'a str, toml::Value>) -> impl Iterator<Item = String> + 'a {

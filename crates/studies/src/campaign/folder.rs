@@ -227,11 +227,11 @@ impl Folder {
         let damages = damaged.iter().fold(String::new(), |text, damage| text + "; " + damage);
         let are = if missing.len() == 1 { "is" } else { "are" };
         let what = if damaged.is_empty() { "missing" } else { "missing or damaged" };
-        let of = counted(shards, "shard", "shards");
+        let total = counted(shards, "shard", "shards");
         let path = self.path.display().to_string();
         Failure::input(
             "campaign/missing-shards",
-            format!("{} of {of} {are} {what}: {list}{damages}", missing.len()),
+            format!("{} of {total} {are} {what}: {list}{damages}", missing.len()),
             command_line(["campaign", "shard", &path, &SHARD.argument(), &list].into_iter()),
         )
     }
@@ -482,8 +482,8 @@ impl Manifest {
     pub fn range(&self, shard: u64) -> std::ops::Range<u64> {
         let shards = self.shards.max(1);
         // Equal to `shard * runs / shards`, without overflow.
-        let at = |shard: u64| self.runs / shards * shard + self.runs % shards * shard / shards;
-        at(shard)..at(shard + 1)
+        let first_run = |shard: u64| self.runs / shards * shard + self.runs % shards * shard / shards;
+        first_run(shard)..first_run(shard + 1)
     }
 
     /// Reads a manifest.

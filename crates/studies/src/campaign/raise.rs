@@ -67,7 +67,7 @@ impl Folder {
                 else {
                     continue;
                 };
-                if open.as_ref().is_none_or(|(of, _)| *of != shard) {
+                if open.as_ref().is_none_or(|(open_shard, _)| *open_shard != shard) {
                     open.take().map_or(Ok(()), |(_, journal)| journal.sync())?;
                     open = Some((shard, Journal::create(new.unique_path(shard, JOURNAL), manifest)?));
                 }

@@ -215,7 +215,7 @@ pub(super) fn fly_worst_again(
     let laws = || std::iter::zip(campaign.laws(), &summary.laws);
     let mut flights = Vec::new();
     // A campaign has worst flights or violated flights of estimates, never both.
-    let mut bad: Vec<_> = laws().flat_map(|(law, of)| of.bad.iter().map(move |bad| (law, bad))).collect();
+    let mut bad: Vec<_> = laws().flat_map(|(law, summary)| summary.bad.iter().map(move |bad| (law, bad))).collect();
     bad.sort_by(|(_, a), (_, b)| a.clearance_m.total_cmp(&b.clearance_m));
     for (law, bad) in bad.into_iter().take(most) {
         if monitor.is_interrupted() {
@@ -223,7 +223,8 @@ pub(super) fn fly_worst_again(
         }
         flights.push(repeat_violated_flight(folder, law, bad)?);
     }
-    let mut worst: Vec<_> = laws().flat_map(|(law, of)| of.worst.iter().map(move |worst| (law, worst))).collect();
+    let mut worst: Vec<_> =
+        laws().flat_map(|(law, summary)| summary.worst.iter().map(move |worst| (law, worst))).collect();
     let rank = |worst: &Worst| worst.outcome != Outcome::Violated;
     worst.sort_by(|(_, a), (_, b)| rank(a).cmp(&rank(b)).then(a.clearance_m.total_cmp(&b.clearance_m)));
     for (law, worst) in worst.into_iter().take(most) {
@@ -248,9 +249,9 @@ pub(super) fn fly_worst_again(
 pub(super) fn remove_former_worst(folder: &Folder, summary: &Summary) -> Result<(), Failure> {
     let root = folder.file(WORST_FLIGHTS);
     let names: Vec<_> = std::iter::zip(folder.campaign().laws(), &summary.laws)
-        .flat_map(|(law, of)| {
-            let worst = of.worst.iter().map(move |worst| FlightId { law, run: worst.run, bad: None });
-            worst.chain(of.bad.iter().map(move |bad| FlightId { law, run: bad.run, bad: Some(bad.bad) }))
+        .flat_map(|(law, summary)| {
+            let worst = summary.worst.iter().map(move |worst| FlightId { law, run: worst.run, bad: None });
+            worst.chain(summary.bad.iter().map(move |bad| FlightId { law, run: bad.run, bad: Some(bad.bad) }))
         })
         .map(|flight| root.join(flight.name()))
         .collect();
@@ -307,7 +308,7 @@ fn fly_violated_flight(folder: &Folder, flight: FlightId<'_>, bad: usize, out: &
     };
     let scenario = flight.scenario(folder.campaign())?;
     std::fs::create_dir_all(out).map_err(file_failure("write", out))?;
-    let header = Header::new(&scenario.name, &scenario.resolved_toml(), scenario.count(), scenario.delta_m);
+    let header = Header::new(&scenario.name, &scenario.resolved().toml, scenario.count(), scenario.delta_m);
     let mut recording = McapRecorder::create(&out.join(RECORDING), &header)?;
     let mut state = StateHashAtStep::violation_of(violated);
     let flown = splitting::replay(&scenario, &violated.genealogy, &mut (&mut recording, &mut state));
@@ -328,11 +329,11 @@ fn check(flight: FlightId<'_>, left: &RunFiles, state_hash: &str) -> Result<(), 
 /// Returns one of the worst flights with its description and picture.
 fn shown(flight: FlightId<'_>, campaign: &Campaign, worst: &Worst, left: &RunFiles) -> WorstFlight {
     let pair = worst.min_pair.map_or_else(String::new, |[a, b]| format!("vehicles {a} and {b} came to "));
-    let at = worst.min_at_s.map_or_else(String::new, |at_s| format!(" at {at_s:.2} s"));
+    let when = worst.min_at_s.map_or_else(String::new, |at_s| format!(" at {at_s:.2} s"));
     let reached = if worst.reached { "reached its formation" } else { "did not reach its formation" };
     let by_obstacle = worst.outcome == Outcome::Violated && worst.clearance_m >= 0.0;
     let description = format!(
-        "Run {} under {}: {}{pair}{} m{at}, {} m {} delta; it {reached}.",
+        "Run {} under {}: {}{pair}{} m{when}, {} m {} delta; it {reached}.",
         flight.run,
         flight.law.name,
         if by_obstacle { "a vehicle came nearer to an obstacle than its clearance; " } else { "" },

@@ -377,14 +377,14 @@ fn of_estimate<'a, C: Into<Cell>>(name: &str, kind: Kind, cell: impl Fn(&Splitti
 fn drawn<'a>(place: usize, key: &str, samples: &[toml::Value]) -> Field<'a> {
     // The fixed columns have no dots in their names.
     let name = if key.contains('.') { key.to_owned() } else { format!("vary.{key}") };
-    let at = move |row: &Row| row.drawn.get(place).cloned();
+    let drawn_value = move |row: &Row| row.drawn.get(place).cloned();
     if samples.iter().all(toml::Value::is_integer) {
-        field(&name, Kind::Integer, move |row| at(row).and_then(|value| value.as_i64()))
+        field(&name, Kind::Integer, move |row| drawn_value(row).and_then(|value| value.as_i64()))
     } else if samples.iter().all(|value| value.is_float() || value.is_integer()) {
-        field(&name, Kind::Exact, move |row| at(row).and_then(|value| value.as_f64()))
+        field(&name, Kind::Exact, move |row| drawn_value(row).and_then(|value| value.as_f64()))
     } else {
         let text = |value: Value| value.as_str().map_or_else(|| value.to_string(), str::to_owned);
-        field(&name, Kind::Text, move |row| at(row).map(text))
+        field(&name, Kind::Text, move |row| drawn_value(row).map(text))
     }
 }
 
@@ -397,40 +397,40 @@ pub(super) fn fields(campaign: &Campaign) -> Vec<Field<'_>> {
     let not_flown = field("not_flown_because", Kind::Text, |row| row.not_flown.clone());
     if campaign.splitting().is_some() {
         fields.extend([
-            of_estimate("probability", Kind::Exact, |of| of.probability),
-            of_estimate("iterations", Kind::Count, |of| of.iterations),
-            of_estimate("extinct", Kind::Flag, |of| of.extinct),
-            of_estimate("steps", Kind::Count, |of| of.steps),
+            of_estimate("probability", Kind::Exact, |estimate| estimate.probability),
+            of_estimate("iterations", Kind::Count, |estimate| estimate.iterations),
+            of_estimate("extinct", Kind::Flag, |estimate| estimate.extinct),
+            of_estimate("steps", Kind::Count, |estimate| estimate.steps),
             not_flown,
         ]);
         return fields;
     }
     let outcome = |row: &Row| row.flight.as_ref().map_or("not_flown", |flight| flight.outcome.name());
-    let refused = |of: &FlightSummary| Some(of.refused.join(" ")).filter(|codes| !codes.is_empty());
+    let refused = |flight: &FlightSummary| Some(flight.refused.join(" ")).filter(|codes| !codes.is_empty());
     fields.extend([
         field("outcome", Kind::Text, outcome),
-        of_flight("pass", Kind::Flag, |of| of.pass),
+        of_flight("pass", Kind::Flag, |flight| flight.pass),
         of_flight("refused", Kind::Text, refused),
-        of_flight("ended_early", Kind::Text, |of| of.ended_early.clone()),
+        of_flight("ended_early", Kind::Text, |flight| flight.ended_early.clone()),
         not_flown,
-        of_flight("delta_m", Kind::Exact, |of| of.delta_m),
-        of_flight("min_m", Kind::Exact, |of| of.min_m),
-        of_flight("min_at_s", Kind::Exact, |of| of.min_at_s),
-        of_flight("min_vehicle_a", Kind::Integer, |of| of.min_pair.map(|pair| pair[0])),
-        of_flight("min_vehicle_b", Kind::Integer, |of| of.min_pair.map(|pair| pair[1])),
-        of_flight("certified_m", Kind::Exact, |of| of.certified_m),
-        of_flight("breaks_certificate", Kind::Flag, |of| of.breaks_certificate),
-        of_flight("reached", Kind::Flag, |of| of.reached),
-        of_flight("reached_at_s", Kind::Exact, |of| of.reached_at_s),
-        of_flight("peak_control_m_s2", Kind::Exact, |of| of.peak_control_m_s2),
-        of_flight("total_control_m_s", Kind::Exact, |of| of.total_control_m_s),
-        of_flight("path_length_m", Kind::Exact, |of| of.path_length_m),
-        of_flight("energy_max_over_initial", Kind::Exact, |of| of.energy_max_over_initial),
-        of_flight("steps", Kind::Count, |of| of.steps),
-        of_flight("refined_steps", Kind::Count, |of| of.refined_steps),
-        of_flight("overlong_steps", Kind::Count, |of| of.overlong_steps),
-        of_flight("scenario_sha256", Kind::Text, |of| of.scenario_sha256.clone()),
-        of_flight("state_hash", Kind::Text, |of| of.state_hash.clone()),
+        of_flight("delta_m", Kind::Exact, |flight| flight.delta_m),
+        of_flight("min_m", Kind::Exact, |flight| flight.min_m),
+        of_flight("min_at_s", Kind::Exact, |flight| flight.min_at_s),
+        of_flight("min_vehicle_a", Kind::Integer, |flight| flight.min_pair.map(|pair| pair[0])),
+        of_flight("min_vehicle_b", Kind::Integer, |flight| flight.min_pair.map(|pair| pair[1])),
+        of_flight("certified_m", Kind::Exact, |flight| flight.certified_m),
+        of_flight("breaks_certificate", Kind::Flag, |flight| flight.breaks_certificate),
+        of_flight("reached", Kind::Flag, |flight| flight.reached),
+        of_flight("reached_at_s", Kind::Exact, |flight| flight.reached_at_s),
+        of_flight("peak_control_m_s2", Kind::Exact, |flight| flight.peak_control_m_s2),
+        of_flight("total_control_m_s", Kind::Exact, |flight| flight.total_control_m_s),
+        of_flight("path_length_m", Kind::Exact, |flight| flight.path_length_m),
+        of_flight("energy_max_over_initial", Kind::Exact, |flight| flight.energy_max_over_initial),
+        of_flight("steps", Kind::Count, |flight| flight.steps),
+        of_flight("refined_steps", Kind::Count, |flight| flight.refined_steps),
+        of_flight("overlong_steps", Kind::Count, |flight| flight.overlong_steps),
+        of_flight("scenario_sha256", Kind::Text, |flight| flight.scenario_sha256.clone()),
+        of_flight("state_hash", Kind::Text, |flight| flight.state_hash.clone()),
     ]);
     fields
 }

@@ -113,7 +113,8 @@ impl Spec {
             let remedy = "a specification is `key = value` lines below `[table]` headers";
             failed("campaign/specification", &problem, Some(remedy), error.span().unwrap_or_default())
         };
-        let misfit = |code| move |(error, span): (ScenarioError, _)| failed(code, error.message(), error.help(), span);
+        let misfit =
+            |code| move |(error, span): (ScenarioError, _)| failed(code, &error.message, error.help.as_deref(), span);
         let table = DeTable::parse(text).map_err(not_toml)?.into_inner();
         let mut file = Spanned::new(0..0, DeValue::Table(table));
         SPEC.check("specification", &mut file).map_err(misfit("campaign/specification"))?;
@@ -185,7 +186,7 @@ impl Spec {
     /// Returns the error of a scenario that a key of the specification caused. The place is in the specification unless
     /// the error has a place in the scenario's own file. `situation` precedes the message if it is not empty.
     pub(super) fn scenario(&self, key: &str, situation: &str, error: ScenarioError) -> Failure {
-        let place = error.place().cloned();
+        let place = error.place.clone();
         let failure = Failure::from(error);
         let failure = if situation.is_empty() { failure } else { failure.under(situation) };
         match place {
@@ -429,14 +430,14 @@ mod tests {
         const KEYS: &str = "scenario = \"pentagon\"\nruns = 3\n[vary]\n\"start.jitter_m\" = \"run\"\n\
                             law.alpha = { list = [0, 1] }\n[vary.network]\n  loss = \"run\"\n[stop]\nwidth = 3\n";
         let spec = Spec::read("spec.toml", KEYS).expect("read");
-        let at = |key: &str| spec.refuse(key, "", "").place().map(|place| (place.line, place.column));
-        assert_eq!(at("runs"), Some((2, 1)));
-        assert_eq!(at("vary.start.jitter_m"), Some((4, 1)));
-        assert_eq!(at("vary.law.alpha.list"), Some((5, 15)));
-        assert_eq!(at("vary.law.alpha.list.2"), Some((5, 26)));
-        assert_eq!(at("vary.network.loss"), Some((7, 3)));
-        assert_eq!(at("stop.width"), Some((9, 1)));
-        assert_eq!(at("stop.decided"), Some((8, 2)), "its table");
-        assert_eq!((at("laws"), at("")), (None, None));
+        let place_of = |key: &str| spec.refuse(key, "", "").place().map(|place| (place.line, place.column));
+        assert_eq!(place_of("runs"), Some((2, 1)));
+        assert_eq!(place_of("vary.start.jitter_m"), Some((4, 1)));
+        assert_eq!(place_of("vary.law.alpha.list"), Some((5, 15)));
+        assert_eq!(place_of("vary.law.alpha.list.2"), Some((5, 26)));
+        assert_eq!(place_of("vary.network.loss"), Some((7, 3)));
+        assert_eq!(place_of("stop.width"), Some((9, 1)));
+        assert_eq!(place_of("stop.decided"), Some((8, 2)), "its table");
+        assert_eq!((place_of("laws"), place_of("")), (None, None));
     }
 }

@@ -27,24 +27,24 @@ pub enum Intervals {
 impl Intervals {
     /// Returns the share of `count` in `of`. `unknown` more count only at the upper end of the interval.
     #[must_use]
-    pub fn share(self, count: u64, unknown: u64, of: u64) -> Proportion {
-        let at = |count: u64| match self {
-            Self::ClopperPearson => Proportion::new(count, of),
-            Self::ConfidenceSequence => anytime(count, of),
-            Self::Exact => Proportion::exact(count, of),
+    pub fn share(self, count: u64, unknown: u64, total: u64) -> Proportion {
+        let proportion_of = |count: u64| match self {
+            Self::ClopperPearson => Proportion::new(count, total),
+            Self::ConfidenceSequence => anytime(count, total),
+            Self::Exact => Proportion::exact(count, total),
         };
-        let high = at(count.saturating_add(unknown).min(of)).high;
-        Proportion { high, ..at(count) }
+        let high = proportion_of(count.saturating_add(unknown).min(total)).high;
+        Proportion { high, ..proportion_of(count) }
     }
 
     /// Returns the upper bound of the share of `count` plus `unknown` in `of`; `None` for grids and for `of` = 0.
     #[must_use]
-    pub fn upper_bound(self, count: u64, unknown: u64, of: u64) -> Option<UpperBound> {
-        let count = count.saturating_add(unknown).min(of);
+    pub fn upper_bound(self, count: u64, unknown: u64, total: u64) -> Option<UpperBound> {
+        let count = count.saturating_add(unknown).min(total);
         let (share, kind) = match self {
-            _ if of == 0 => return None,
-            Self::ClopperPearson => (Proportion::upper_bound(count, of), BoundKind::OneSided),
-            Self::ConfidenceSequence => (anytime(count, of).high, BoundKind::ConfidenceSequence),
+            _ if total == 0 => return None,
+            Self::ClopperPearson => (Proportion::upper_bound(count, total), BoundKind::OneSided),
+            Self::ConfidenceSequence => (anytime(count, total).high, BoundKind::ConfidenceSequence),
             Self::Exact => return None,
         };
         Some(UpperBound { share, confidence: CONFIDENCE, kind })
@@ -171,7 +171,7 @@ impl Tally {
         self.counts.iter().all(|counts| {
             let share = counts.share(stop.of, Intervals::ConfidenceSequence);
             let is_narrow = stop.width.is_none_or(|width| share.high - share.low <= width);
-            let is_decided = stop.decided.is_none_or(|at| share.low > at || share.high < at);
+            let is_decided = stop.decided.is_none_or(|limit| share.low > limit || share.high < limit);
             is_narrow && is_decided
         })
     }
@@ -354,14 +354,14 @@ impl KeyColumn {
 
     fn bin(&self, said: String, low: Option<f64>, high: Option<f64>, members: &[&Flight], intervals: Intervals) -> Bin {
         let shares = |law: usize| {
-            let of = members.iter().filter(|flight| flight.law == law).count() as u64;
-            let count = |is: &dyn Fn(&Flight) -> bool| {
-                members.iter().filter(|flight| flight.law == law && is(flight)).count() as u64
+            let total = members.iter().filter(|flight| flight.law == law).count() as u64;
+            let count = |is_counted: &dyn Fn(&Flight) -> bool| {
+                members.iter().filter(|flight| flight.law == law && is_counted(flight)).count() as u64
             };
             let unknown = count(&|flight| flight.known == SeparationVerdict::Unknown);
             BinShares {
-                violated: intervals.share(count(&|flight| flight.known == SeparationVerdict::Violated), unknown, of),
-                reached: intervals.share(count(&|flight| flight.reached), 0, of),
+                violated: intervals.share(count(&|flight| flight.known == SeparationVerdict::Violated), unknown, total),
+                reached: intervals.share(count(&|flight| flight.reached), 0, total),
             }
         };
         Bin { said, low, high, laws: (0..self.laws).map(shares).collect() }

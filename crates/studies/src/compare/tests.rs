@@ -71,13 +71,13 @@ start_s = START_S
 
 #[test]
 fn times_to_reach_exclude_flights_that_did_not_reach() {
-    let of = |start_s: &str| {
+    let compared = |start_s: &str| {
         let text = CUT_SHORT.replace("START_S", start_s);
         let base = base(Source::Text { name: "t".to_owned(), text }, &[]);
         let flown = batch(1, &mut |batch| options(&["displacement"], 1).fly(&base, batch));
         flown.expect("no failure").expect("a comparison").laws.remove(0)
     };
-    let [cut, whole] = [of("1"), of("\"reached\"")];
+    let [cut, whole] = [compared("1"), compared("\"reached\"")];
     assert!(!cut.flights[0].reached && cut.flights[0].reached_at_s.is_some(), "its last leg was");
     assert_eq!((cut.reached_median_s.value, cut.reached_p95_s.value), (None, None));
     assert!(whole.flights[0].reached);

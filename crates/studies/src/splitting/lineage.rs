@@ -129,12 +129,12 @@ impl<S> Lineage<S> {
     pub(super) fn branch<P: RandomProcess<Saved = S>>(
         &self,
         path: &mut P,
-        at: &Crossing<S>,
+        crossing: &Crossing<S>,
         noise_seed: u64,
         target: f64,
         watch: &mut StepCounter<'_>,
     ) -> ControlFlow<(), Self> {
-        let &Crossing { step, score, ref saved } = at;
+        let &Crossing { step, score, ref saved } = crossing;
         path.restore(saved, Some(noise_seed));
         let lineage = Self {
             genealogy: self.genealogy.branched(Branch { step, noise_seed }),

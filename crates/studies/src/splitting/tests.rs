@@ -128,8 +128,8 @@ fn a_violated_flight_is_replayed_with_the_same_bits() {
         assert!(bad.iter().any(|bad| bad.genealogy.branches.len() > 1));
         for bad in &bad {
             let flight = seen(&scenario, &bad.genealogy);
-            let at = usize::try_from(bad.violated_at_step).expect("few");
-            assert_eq!(flight.after[at], bad.state_hash, "{bad:?}");
+            let step = usize::try_from(bad.violated_at_step).expect("few");
+            assert_eq!(flight.after[step], bad.state_hash, "{bad:?}");
             assert!(flight.violated && bad.clearance_m < 0.0);
             let again = seen(&scenario, &bad.genealogy);
             assert_eq!((again.all.finish(), again.after.len()), (flight.all.finish(), flight.after.len()));

@@ -27,7 +27,7 @@ impl Estimate {
         }
         let mean = values.iter().sum::<f64>() / count;
         let squares = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
-        let times = StudentsT::new(0.0, 1.0, count - 1.0).map(|of| of.inverse_cdf(1.0 - TAIL)).ok();
+        let times = StudentsT::new(0.0, 1.0, count - 1.0).map(|distribution| distribution.inverse_cdf(1.0 - TAIL)).ok();
         let half = times.map(|times| times * (squares / (count - 1.0) / count).sqrt());
         Self { value: Some(mean), low: half.map(|half| mean - half), high: half.map(|half| mean + half) }
     }
@@ -47,13 +47,14 @@ impl Estimate {
     pub fn quantile(values: &[f64], p: f64) -> Self {
         let mut sorted = values.to_vec();
         sorted.sort_by(f64::total_cmp);
-        let at = |rank: u64| usize::try_from(rank).ok()?.checked_sub(1).and_then(|index| sorted.get(index)).copied();
+        let value_at =
+            |rank: u64| usize::try_from(rank).ok()?.checked_sub(1).and_then(|index| sorted.get(index)).copied();
         let count = sorted.len() as u64;
         let Ok(below) = Binomial::new(p, count) else { return Self::default() };
         Self {
             value: middle(&sorted, p),
-            low: at(below.inverse_cdf(TAIL)),
-            high: at(below.inverse_cdf(1.0 - TAIL).saturating_add(1)),
+            low: value_at(below.inverse_cdf(TAIL)),
+            high: value_at(below.inverse_cdf(1.0 - TAIL).saturating_add(1)),
         }
     }
 }
@@ -64,8 +65,8 @@ fn middle(sorted: &[f64], p: f64) -> Option<f64> {
     const ROUNDING: f64 = 1e-9;
     let rank = p * sorted.len() as f64;
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a part of a length")]
-    let at = |rank: f64| sorted.get((rank.max(1.0) as usize - 1).min(sorted.len().saturating_sub(1))).copied();
-    let (lower, upper) = (at((rank - ROUNDING).ceil())?, at((rank + ROUNDING).floor() + 1.0)?);
+    let value_at = |rank: f64| sorted.get((rank.max(1.0) as usize - 1).min(sorted.len().saturating_sub(1))).copied();
+    let (lower, upper) = (value_at((rank - ROUNDING).ceil())?, value_at((rank + ROUNDING).floor() + 1.0)?);
     Some(if lower == upper { lower } else { f64::midpoint(lower, upper) })
 }
 

@@ -27,16 +27,16 @@ impl Proportion {
     /// one-sided binomial test rejects. It never covers less than [`CONFIDENCE`], also for counts of 0 and `of`. A
     /// count above `of` is reduced to `of`.
     #[must_use]
-    pub fn new(count: u64, of: u64) -> Self {
-        Self::between(count, of, clopper_pearson(count, of, TAIL))
+    pub fn new(count: u64, total: u64) -> Self {
+        Self::between(count, total, clopper_pearson(count, total, TAIL))
     }
 
     /// Returns `count` of `of` of flights that are no sample, such as all points of a grid. Both ends of the interval
     /// are the share, with a confidence of 1. A count above `of` is reduced to `of`.
     #[must_use]
-    pub fn exact(count: u64, of: u64) -> Self {
-        let share = (of > 0).then(|| count.min(of) as f64 / of as f64);
-        Self { confidence: 1.0, ..Self::between(count, of, [share.unwrap_or(0.0), share.unwrap_or(1.0)]) }
+    pub fn exact(count: u64, total: u64) -> Self {
+        let share = (total > 0).then(|| count.min(total) as f64 / total as f64);
+        Self { confidence: 1.0, ..Self::between(count, total, [share.unwrap_or(0.0), share.unwrap_or(1.0)]) }
     }
 
     /// Returns the one-sided upper bound of Clopper and Pearson: the largest share with which `count` or fewer of `of`
@@ -44,26 +44,26 @@ impl Proportion {
     /// half of it on either side. For a count of 0 the bound is `1 - (1 - CONFIDENCE)^(1 / of)`. A count above `of` is
     /// reduced to `of`.
     #[must_use]
-    pub fn upper_bound(count: u64, of: u64) -> f64 {
-        let [_, high] = clopper_pearson(count, of, 1.0 - CONFIDENCE);
+    pub fn upper_bound(count: u64, total: u64) -> f64 {
+        let [_, high] = clopper_pearson(count, total, 1.0 - CONFIDENCE);
         high
     }
 
     /// Returns `count` of `of` with the bounds of another interval. A count above `of` is reduced to `of`.
-    pub(super) fn between(count: u64, of: u64, [low, high]: [f64; 2]) -> Self {
-        let count = count.min(of);
-        let share = (of > 0).then(|| count as f64 / of as f64);
-        Self { count, of, share, low, high, confidence: CONFIDENCE }
+    pub(super) fn between(count: u64, total: u64, [low, high]: [f64; 2]) -> Self {
+        let count = count.min(total);
+        let share = (total > 0).then(|| count as f64 / total as f64);
+        Self { count, of: total, share, low, high, confidence: CONFIDENCE }
     }
 }
 
 /// Returns the bounds of Clopper and Pearson with an error probability of `tail` on either side. A count above `of` is
 /// reduced to `of`.
-pub(super) fn clopper_pearson(count: u64, of: u64, tail: f64) -> [f64; 2] {
-    let count = count.min(of);
-    let (hits, misses) = (count as f64, (of - count) as f64);
+pub(super) fn clopper_pearson(count: u64, total: u64, tail: f64) -> [f64; 2] {
+    let count = count.min(total);
+    let (hits, misses) = (count as f64, (total - count) as f64);
     let low = if count == 0 { None } else { beta_quantile(hits, misses + 1.0, tail) };
-    let high = if count == of { None } else { beta_quantile(hits + 1.0, misses, 1.0 - tail) };
+    let high = if count == total { None } else { beta_quantile(hits + 1.0, misses, 1.0 - tail) };
     [low.unwrap_or(0.0), high.unwrap_or(1.0)]
 }
 
@@ -107,19 +107,19 @@ impl Paired {
     /// together with a probability of at least 1 - alpha (Bonferroni). The bounds are the smallest and the largest
     /// product within them.
     #[must_use]
-    pub fn new(only_first: u64, only_second: u64, of: u64) -> Self {
+    pub fn new(only_first: u64, only_second: u64, total: u64) -> Self {
         let discordant = only_first.saturating_add(only_second);
-        let of = of.max(discordant);
-        let [psi_low, psi_high] = clopper_pearson(discordant, of, 0.5 * TAIL);
+        let total = total.max(discordant);
+        let [psi_low, psi_high] = clopper_pearson(discordant, total, 0.5 * TAIL);
         let [theta_low, theta_high] = clopper_pearson(only_first, discordant, 0.5 * TAIL);
         let [from, to] = [theta_low, theta_high].map(|theta| 2.0 * theta - 1.0);
         Self {
             only_first,
             only_second,
-            of,
+            of: total,
             p_value: p_value(only_first.min(only_second), discordant),
             first_of_discordant: Proportion::new(only_first, discordant),
-            difference: (of > 0).then(|| (only_first as f64 - only_second as f64) / of as f64),
+            difference: (total > 0).then(|| (only_first as f64 - only_second as f64) / total as f64),
             low: (from * psi_low).min(from * psi_high),
             high: (to * psi_low).max(to * psi_high),
             confidence: CONFIDENCE,
@@ -128,11 +128,11 @@ impl Paired {
 }
 
 /// Returns twice the probability of at most `fewer` of `of` for two equally likely kinds, at most 1.
-fn p_value(fewer: u64, of: u64) -> f64 {
-    if of == 0 {
+fn p_value(fewer: u64, total: u64) -> f64 {
+    if total == 0 {
         return 1.0;
     }
-    Binomial::new(0.5, of).map_or(1.0, |even| (2.0 * even.cdf(fewer)).min(1.0))
+    Binomial::new(0.5, total).map_or(1.0, |even| (2.0 * even.cdf(fewer)).min(1.0))
 }
 
 #[cfg(test)]
@@ -142,10 +142,10 @@ mod tests {
 
     #[test]
     fn a_share_has_the_interval_of_clopper_and_pearson() {
-        for (count, of, low, high) in
+        for (count, total, low, high) in
             [(26, 60, 0.306, 0.568), (100, 100, 0.9637, 1.0), (0, 500, 0.0, 0.00735), (20, 20, 0.8316, 1.0)]
         {
-            let share = Proportion::new(count, of);
+            let share = Proportion::new(count, total);
             near(share.low, low, 5e-4);
             near(share.high, high, 5e-4);
         }
@@ -156,28 +156,28 @@ mod tests {
 
     #[test]
     fn a_one_sided_bound_has_an_error_probability_of_5_percent() {
-        for of in [1_u64, 20, 200, 1000, 10_000] {
-            near(Proportion::upper_bound(0, of), 1.0 - 0.05_f64.powf(1.0 / of as f64), 1e-9);
+        for total in [1_u64, 20, 200, 1000, 10_000] {
+            near(Proportion::upper_bound(0, total), 1.0 - 0.05_f64.powf(1.0 / total as f64), 1e-9);
         }
         near(Proportion::upper_bound(0, 200), 0.014_867, 1e-6);
-        for (count, of) in [(1, 7), (3, 60), (299, 300)] {
-            let bound = Proportion::upper_bound(count, of);
-            near(binomial_up_to(count, of, bound), 1.0 - CONFIDENCE, 1e-9);
-            assert!(bound < Proportion::new(count, of).high, "below the upper end of the two-sided interval");
+        for (count, total) in [(1, 7), (3, 60), (299, 300)] {
+            let bound = Proportion::upper_bound(count, total);
+            near(binomial_up_to(count, total, bound), 1.0 - CONFIDENCE, 1e-9);
+            assert!(bound < Proportion::new(count, total).high, "below the upper end of the two-sided interval");
         }
         assert_eq!([Proportion::upper_bound(7, 7), Proportion::upper_bound(0, 0)], [1.0, 1.0]);
     }
 
     #[test]
     fn bounds_are_where_the_one_sided_tests_turn() {
-        for of in [1_u64, 2, 7, 20, 60, 300] {
-            for count in 0..=of {
-                let Proportion { low, high, .. } = Proportion::new(count, of);
+        for total in [1_u64, 2, 7, 20, 60, 300] {
+            for count in 0..=total {
+                let Proportion { low, high, .. } = Proportion::new(count, total);
                 if count > 0 {
-                    near(1.0 - binomial_up_to(count - 1, of, low), TAIL, 1e-9);
+                    near(1.0 - binomial_up_to(count - 1, total, low), TAIL, 1e-9);
                 }
-                if count < of {
-                    near(binomial_up_to(count, of, high), TAIL, 1e-9);
+                if count < total {
+                    near(binomial_up_to(count, total, high), TAIL, 1e-9);
                 }
             }
         }
@@ -190,10 +190,10 @@ mod tests {
         {
             near(Paired::new(first, second, 50).p_value, expected, 1e-12);
         }
-        for of in 1..60 {
-            for first in 0..=of {
-                let expected = (2.0 * binomial_up_to(first.min(of - first), of, 0.5)).min(1.0);
-                near(Paired::new(first, of - first, 100).p_value, expected, 1e-10);
+        for total in 1..60 {
+            for first in 0..=total {
+                let expected = (2.0 * binomial_up_to(first.min(total - first), total, 0.5)).min(1.0);
+                near(Paired::new(first, total - first, 100).p_value, expected, 1e-10);
             }
         }
     }
@@ -201,22 +201,22 @@ mod tests {
     /// Under the null hypothesis a p-value is at most alpha with a probability of at most alpha.
     #[test]
     fn equal_laws_are_rejected_at_most_at_the_stated_rate() {
-        let law = |count: u64, of: u64| {
-            binomial_up_to(count, of, 0.5) - if count == 0 { 0.0 } else { binomial_up_to(count - 1, of, 0.5) }
+        let law = |count: u64, total: u64| {
+            binomial_up_to(count, total, 0.5) - if count == 0 { 0.0 } else { binomial_up_to(count - 1, total, 0.5) }
         };
-        for of in 1..80 {
+        for total in 1..80 {
             for alpha in [0.01, 0.05, 0.2] {
-                let rejected = (0..=of).filter(|&first| Paired::new(first, of - first, of).p_value <= alpha);
-                let size: f64 = rejected.map(|first| law(first, of)).sum();
-                assert!(size <= alpha + 1e-12, "{size} of {of}");
+                let rejected = (0..=total).filter(|&first| Paired::new(first, total - first, total).p_value <= alpha);
+                let size: f64 = rejected.map(|first| law(first, total)).sum();
+                assert!(size <= alpha + 1e-12, "{size} of {total}");
             }
         }
     }
 
     #[test]
     fn the_difference_is_antisymmetric_and_within_its_bounds() {
-        for (first, second, of) in [(10, 0, 100), (3, 8, 40), (0, 0, 20), (7, 7, 14), (500, 100, 10_000)] {
-            let (one, other) = (Paired::new(first, second, of), Paired::new(second, first, of));
+        for (first, second, total) in [(10, 0, 100), (3, 8, 40), (0, 0, 20), (7, 7, 14), (500, 100, 10_000)] {
+            let (one, other) = (Paired::new(first, second, total), Paired::new(second, first, total));
             near(one.low, -other.high, 1e-12);
             near(one.high, -other.low, 1e-12);
             assert!(

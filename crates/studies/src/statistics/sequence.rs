@@ -25,16 +25,16 @@ const FIRST_LOOK: u64 = 100;
 /// probability of at most alpha. The bounds are the first numbers outside the set. A count above `of` is reduced to
 /// `of`.
 #[must_use]
-pub fn anytime(count: u64, of: u64) -> Proportion {
-    let count = count.min(of);
-    let low = if count == 0 { 0.0 } else { bound(count, of, 0.0) };
-    let high = if count == of { 1.0 } else { bound(count, of, 1.0) };
-    Proportion::between(count, of, [low, high])
+pub fn anytime(count: u64, total: u64) -> Proportion {
+    let count = count.min(total);
+    let low = if count == 0 { 0.0 } else { bound(count, total, 0.0) };
+    let high = if count == total { 1.0 } else { bound(count, total, 1.0) };
+    Proportion::between(count, total, [low, high])
 }
 
 /// Returns the first number outside the interval, by bisection between the share and `out`, which is outside.
-fn bound(count: u64, of: u64, mut out: f64) -> f64 {
-    let (hits, misses) = (count as f64, (of - count) as f64);
+fn bound(count: u64, total: u64, mut out: f64) -> f64 {
+    let (hits, misses) = (count as f64, (total - count) as f64);
     let mixture = ln_beta(PRIOR + hits, PRIOR + misses) - ln_beta(PRIOR, PRIOR);
     let limit = -libm::log(1.0 - CONFIDENCE);
     let times = |number: f64, logarithm: f64| if number > 0.0 { number * logarithm } else { 0.0 };
@@ -82,13 +82,13 @@ impl ConfidenceSequence {
     ///
     /// An empty intersection means that one of the intervals misses the true share. The sequence then restarts with
     /// this look.
-    pub fn look(&mut self, count: u64, of: u64) -> Proportion {
-        let now = anytime(count, of);
+    pub fn look(&mut self, count: u64, total: u64) -> Proportion {
+        let now = anytime(count, total);
         let [low, high] = self.bounds.unwrap_or([0.0, 1.0]);
         let common = [low.max(now.low), high.min(now.high)];
         let bounds = if common[0] <= common[1] { common } else { [now.low, now.high] };
         self.bounds = Some(bounds);
-        Proportion::between(count, of, bounds)
+        Proportion::between(count, total, bounds)
     }
 }
 
@@ -98,20 +98,20 @@ mod tests {
     use super::*;
 
     /// Returns the ratio by its product over the runs, all hits first.
-    fn ratio(count: u64, of: u64, p: f64) -> f64 {
+    fn ratio(count: u64, total: u64, p: f64) -> f64 {
         let hit = |k: u64| (PRIOR + k as f64) / (2.0 * PRIOR + k as f64) / p;
         let miss = |k: u64| (PRIOR + k as f64) / (2.0 * PRIOR + (count + k) as f64) / (1.0 - p);
-        (0..count).map(hit).product::<f64>() * (0..of - count).map(miss).product::<f64>()
+        (0..count).map(hit).product::<f64>() * (0..total - count).map(miss).product::<f64>()
     }
 
     #[test]
     fn bounds_are_where_the_ratio_reaches_20() {
-        for of in [1, 7, 100, 400] {
-            for count in (0..=of).step_by(usize::try_from(of).expect("few").div_ceil(20)) {
-                let Proportion { low, high, share, .. } = anytime(count, of);
+        for total in [1, 7, 100, 400] {
+            for count in (0..=total).step_by(usize::try_from(total).expect("few").div_ceil(20)) {
+                let Proportion { low, high, share, .. } = anytime(count, total);
                 assert!(0.0 <= low && share.is_some_and(|share| low <= share && share <= high) && high <= 1.0);
                 for bound in [low, high].into_iter().filter(|bound| (0.0..1.0).contains(bound) && *bound > 0.0) {
-                    near(ratio(count, of, bound), 20.0, 1e-9);
+                    near(ratio(count, total, bound), 20.0, 1e-9);
                 }
             }
         }
@@ -121,14 +121,14 @@ mod tests {
 
     #[test]
     fn the_interval_is_monotone_symmetric_and_wider_than_for_a_fixed_number() {
-        for of in [1, 10, 100, 5_000] {
-            let all: Vec<_> = (0..=of).map(|count| anytime(count, of)).collect();
-            assert!(all.windows(2).all(|next| next[0].low < next[1].low && next[0].high < next[1].high), "{of}");
+        for total in [1, 10, 100, 5_000] {
+            let all: Vec<_> = (0..=total).map(|count| anytime(count, total)).collect();
+            assert!(all.windows(2).all(|next| next[0].low < next[1].low && next[0].high < next[1].high), "{total}");
             for (one, count) in all.iter().zip(0..) {
-                let fixed = Proportion::new(count, of);
+                let fixed = Proportion::new(count, total);
                 // For one run both intervals have the same bounds.
-                assert!(one.low <= fixed.low + 1e-12 && fixed.high <= one.high + 1e-12, "{count} of {of}");
-                near(one.low, 1.0 - anytime(of - count, of).high, 1e-14);
+                assert!(one.low <= fixed.low + 1e-12 && fixed.high <= one.high + 1e-12, "{count} of {total}");
+                near(one.low, 1.0 - anytime(total - count, total).high, 1e-14);
             }
         }
     }
@@ -136,7 +136,7 @@ mod tests {
     /// Bounds with 1 as the prior, where the ratio has a closed form, justify the choice of the prior.
     #[test]
     fn jeffreys_prior_gives_a_third_lower_bound_for_a_count_of_zero() {
-        let uniform = |of: f64| -libm::expm1(-libm::log(20.0 * (of + 1.0)) / of);
+        let uniform = |total: f64| -libm::expm1(-libm::log(20.0 * (total + 1.0)) / total);
         near(anytime(0, 10_000).high, 0.000_817, 1e-6);
         near(uniform(10_000.0), 0.001_220, 1e-6);
         assert!(anytime(0, 1_000_000).high < 0.64 * uniform(1e6));

@@ -81,13 +81,13 @@ fn held(n: u64, p: f64, interval: impl Fn(u64, u64) -> [f64; 2]) -> Vec<bool> {
     (0..=n).map(holds).collect()
 }
 
-fn fixed(count: u64, of: u64) -> [f64; 2] {
-    let Proportion { low, high, .. } = Proportion::new(count, of);
+fn fixed(count: u64, total: u64) -> [f64; 2] {
+    let Proportion { low, high, .. } = Proportion::new(count, total);
     [low, high]
 }
 
-fn at_any_time(count: u64, of: u64) -> [f64; 2] {
-    let Proportion { low, high, .. } = anytime(count, of);
+fn at_any_time(count: u64, total: u64) -> [f64; 2] {
+    let Proportion { low, high, .. } = anytime(count, total);
     [low, high]
 }
 
@@ -127,9 +127,9 @@ fn a_share_is_covered() {
 /// The same check rejects the textbook interval: normal, with the standard error of the observed share.
 #[test]
 fn walds_interval_does_not_cover_a_small_share() {
-    let wald = |count: u64, of: u64| {
-        let share = count as f64 / of as f64;
-        let half = 1.96 * (share * (1.0 - share) / of as f64).sqrt();
+    let wald = |count: u64, total: u64| {
+        let share = count as f64 / total as f64;
+        let half = 1.96 * (share * (1.0 - share) / total as f64).sqrt();
         [share - half, share + half]
     };
     let covered = of_counts(100, 0.01, wald);
@@ -220,9 +220,9 @@ fn the_intersection_of_looks_is_covered() {
     let mut narrower = 0_u32;
     let covered = Draws::new(8).share(&mut |draws| {
         let (mut sequence, mut count, mut held) = (ConfidenceSequence::new(), 0, true);
-        for (&of, more) in all.iter().zip(&stages) {
+        for (&total, more) in all.iter().zip(&stages) {
             count += more.draw(draws);
-            let Proportion { low, high, .. } = sequence.look(count, of);
+            let Proportion { low, high, .. } = sequence.look(count, total);
             held &= low <= 0.1 && 0.1 <= high;
         }
         let (last, kept) = (anytime(count, 800), sequence.look(count, 800));

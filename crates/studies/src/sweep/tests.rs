@@ -79,9 +79,9 @@ fn every_point_has_its_flights_and_a_curve() {
 #[test]
 fn two_keys_make_a_heat_map_and_refused_points_are_shown_with_their_reason() {
     let sweep = swept(&options(&["start.positions_m.2.x=1,3,5", "law.alpha=0.5,1"], 1));
-    let at: Vec<_> = sweep.points.iter().map(|point| (point.values.clone(), point.refused)).collect();
+    let points: Vec<_> = sweep.points.iter().map(|point| (point.values.clone(), point.refused)).collect();
     assert_eq!(
-        at[..3],
+        points[..3],
         [(vec![1.0, 0.5], 1), (vec![1.0, 1.0], 1), (vec![3.0, 0.5], 0)],
         "the last key changes fastest"
     );

@@ -30,6 +30,15 @@ impl Monitor {
         self.fault_at(fault, vehicle, at_s.max(self.now_s));
     }
 
+    /// Counts messages that were dropped up to an arrival time \[s\].
+    pub(crate) fn dropped(&mut self, messages: u64, arrival_s: f64) {
+        let count = &mut self.faults[Fault::Dropped as usize];
+        // `fault` counts the last one.
+        count.total += messages - 1;
+        count.waiting += messages - 1;
+        self.fault(Fault::Dropped, None, arrival_s);
+    }
+
     pub(super) fn fault_at(&mut self, fault: Fault, vehicle: Option<u32>, at_s: f64) {
         let count = &mut self.faults[fault as usize];
         count.total += 1;

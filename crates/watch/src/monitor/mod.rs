@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 
 use crate::ahead;
 use crate::clock::SourceClock;
-use crate::event::{Event, Fault, Refusal, Violation};
+use crate::event::{Event, Fault, Pair, Reason};
 use crate::history::History;
 use crate::plan::Plan;
 use crate::settings::{Expected, Settings, SettingsError};
@@ -19,6 +19,7 @@ use crate::velocity::VelocityEnclosure;
 use crate::violations::OpenViolations;
 use faults::FaultCount;
 use past::SweptBox;
+use tautline_audit::Violation;
 use tautline_core::fact::{Fact, FactKind, Source};
 
 /// Largest number of events that wait for [`Monitor::drain_events`]; further ones are counted.
@@ -101,8 +102,8 @@ pub struct Monitor {
     faults: [FaultCount; Fault::ALL.len()],
     /// Last fault that gives doubt, with its time \[s\].
     doubt: Option<(Fault, f64)>,
-    /// Cause of the last refused sign-off.
-    refusal: Option<Refusal>,
+    /// Reason of the last refused sign-off.
+    refusal: Option<Reason>,
     events: Vec<Event>,
     suppressed: u64,
     violations: OpenViolations,
@@ -240,8 +241,15 @@ impl Monitor {
         self.vehicles.get(vehicle).is_some_and(|of| of.signed_off_s.is_some())
     }
 
+    /// Returns whether a vehicle is present and was not heard for the largest age.
+    #[must_use]
+    pub fn is_stale(&self, vehicle: usize) -> bool {
+        let most_s = self.settings.max_age_s.value;
+        !self.has_signed_off(vehicle) && self.newest(vehicle).is_some_and(|(.., age_s)| age_s > most_s)
+    }
+
     /// Returns the measured violations that are present.
-    pub fn open_violations(&self) -> impl Iterator<Item = Violation> + '_ {
+    pub fn open_violations(&self) -> impl Iterator<Item = Violation<Pair>> + '_ {
         self.violations.open()
     }
 

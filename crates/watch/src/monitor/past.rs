@@ -6,7 +6,7 @@ use super::Monitor;
 use crate::ahead;
 use crate::event::{Event, Fault, Pair};
 use crate::history::Fix;
-use crate::pair::sweep;
+use tautline_audit::sweep;
 
 /// Box around the motion of a vehicle since the last judgement \[m\].
 #[derive(Clone, Copy)]
@@ -20,7 +20,7 @@ impl Monitor {
     /// Judges all pairs over the time between the last judgement and the newest positions.
     ///
     /// The motion between two positions of a vehicle is straight. A gap longer than the largest age is not judged,
-    /// because the vehicle was stale or had signed off within the gap. Both make the time of the gap NOT KNOWN.
+    /// because the vehicle was stale or had signed off within the gap. Both make the time of the gap UNDECIDED.
     pub(super) fn judge_past(&mut self) {
         // Time until which every vehicle with a new position was judged.
         let mut floor_s = f64::INFINITY;
@@ -147,10 +147,10 @@ impl Monitor {
                     };
                     place(0) - place(1)
                 };
-                let found = sweep(apart(time_s), apart(end_s), self.settings.delta_m);
-                for event in self.violations.take(pair, [time_s, end_s], &found, number).into_iter().flatten() {
-                    self.emit(event);
-                }
+                let limit_m = self.settings.delta_m;
+                let found = sweep(apart(time_s), apart(end_s), limit_m);
+                let events = self.violations.take(pair, [time_s, end_s], &found, limit_m, number);
+                events.into_iter().flatten().for_each(|event| self.emit(event));
             }
             time_s = end_s;
         }

@@ -1,8 +1,8 @@
-//! Judgement of the present: CLEAR, NOT KNOWN or VIOLATION, with its reason.
+//! Judgement of the present: CLEAR, UNDECIDED or VIOLATION, with its reason.
 
 use super::{Monitor, Vehicle};
 use crate::clock::FALL_RATE;
-use crate::event::{Assessment, Event, Pair, PairTime, Reason, State};
+use crate::event::{Assessment, Event, Fault, Pair, PairTime, Reason, State};
 use crate::pair::Prediction;
 use crate::settings::{Expected, TimeBase};
 use crate::velocity::Ball;
@@ -19,25 +19,20 @@ impl Monitor {
         let present = self.vehicles.iter().filter(|of| of.signed_off_s.is_none()).count();
         let mut reason = None;
         let mut note = |of: Reason| reason = reason.or(Some(of));
-        if let Expected::Names(_) = self.settings.expected
-            && !self.missing.is_empty()
-        {
-            note(Reason::MissingName(0));
-        }
-        match self.settings.expected {
-            Expected::Count(count) if self.names.len() < count => note(Reason::Missing([self.names.len(), count])),
+        match &self.settings.expected {
+            Expected::Count(count) if self.names.len() < *count => note(Reason::Missing([self.names.len(), *count])),
+            Expected::Names(names) if !self.missing.is_empty() => {
+                note(Reason::Missing([names.len() - self.missing.len(), names.len()]));
+            }
             _ if self.names.len() < 2 => note(Reason::TooFew(self.names.len())),
             _ => {}
         }
-        if let Some(k) =
-            self.vehicles.iter().position(|vehicle| vehicle.has_two_streams && vehicle.signed_off_s.is_none())
-        {
-            note(Reason::TwoStreams(u32::try_from(k).unwrap_or(u32::MAX)));
+        let mut of_two = self.vehicles.iter().zip(0_u32..).filter(|(of, _)| of.has_two_streams);
+        if let Some((_, vehicle)) = of_two.find(|(of, _)| of.signed_off_s.is_none()) {
+            note(Reason::Fault(Fault::TwoStreams, Some(vehicle)));
         }
-        if let Some((fault, at_s)) = self.doubt
-            && now_s - at_s < self.settings.max_age_s.value
-        {
-            note(Reason::Doubt(fault));
+        if let Some(doubt) = self.recent_fault() {
+            note(doubt);
         }
         if present < 2 && present < self.vehicles.len() {
             note(Reason::SignedOff(present));
@@ -49,26 +44,18 @@ impl Monitor {
             if of.signed_off_s.is_some() {
                 continue;
             }
-            let Some(age_s) = self.age_s(of) else {
-                note(Reason::ClockStepped(vehicle));
-                continue;
-            };
-            let (was_stale, is_stale) = (of.is_stale, age_s > self.settings.max_age_s.value);
-            let ready = match self.prediction(of, age_s) {
-                _ if is_stale => Err(Reason::Stale(vehicle, age_s)),
-                Some(prediction) => {
+            let was_stale = of.is_stale;
+            match self.fresh_prediction(vehicle) {
+                Ok(prediction) => {
                     if of.has_conflict {
-                        note(Reason::Conflict(vehicle));
+                        note(Reason::Fault(Fault::Conflict, Some(vehicle)));
                     }
-                    Ok(prediction)
+                    self.ahead.push(vehicle, prediction);
                 }
-                None if of.position_error_m.is_none() => Err(Reason::ErrorUnknown(vehicle)),
-                None => Err(Reason::SpeedUnknown(vehicle)),
-            };
-            match ready {
-                Ok(prediction) => self.ahead.push(vehicle, prediction),
-                Err(of) => note(of),
+                Err(reason) => note(reason),
             }
+            let Some(age_s) = self.age_s(of) else { continue };
+            let is_stale = age_s > self.settings.max_age_s.value;
             self.vehicles[k].is_stale = is_stale;
             match (was_stale, is_stale) {
                 (false, true) => self.emit(Event::Stale { vehicle, age_s, at_s: now_s }),
@@ -83,8 +70,8 @@ impl Monitor {
         let state = match (nearest, measured, reason, found.uncertain) {
             (Some(near), ..) => State::Violation(near.pair, near.nominal_m),
             (None, Some(of), ..) => State::Violation(of.pair, of.min_m),
-            (None, None, Some(reason), _) => State::NotKnown(reason),
-            (None, None, None, Some((pair, least_m))) => State::NotKnown(Reason::Uncertain(pair, least_m)),
+            (None, None, Some(reason), _) => State::Undecided(reason),
+            (None, None, None, Some((pair, least_m))) => State::Undecided(Reason::Uncertain(pair, least_m)),
             (None, None, None, None) => State::Clear,
         };
         let time = |(pair, in_s): (Pair, f64)| PairTime { pair, at_s: now_s + in_s };
@@ -119,12 +106,30 @@ impl Monitor {
         last
     }
 
+    /// Returns the last error of the input, if it is less than the largest age ago.
+    pub(super) fn recent_fault(&self) -> Option<Reason> {
+        let doubt = self.doubt.filter(|(_, at_s)| self.now_s - at_s < self.settings.max_age_s.value);
+        doubt.map(|(fault, _)| Reason::Fault(fault, None))
+    }
+
+    /// Returns the prediction of a vehicle, unless it is stale, or its clock or velocity is unknown.
+    pub(super) fn fresh_prediction(&self, vehicle: u32) -> Result<Prediction, Reason> {
+        let of = &self.vehicles[vehicle as usize];
+        let age_s = self.age_s(of).ok_or(Reason::Fault(Fault::ClockStep, Some(vehicle)))?;
+        if age_s > self.settings.max_age_s.value {
+            return Err(Reason::Stale(vehicle, age_s));
+        }
+        let is_bounded = of.position_error_m.is_some();
+        let unknown = if is_bounded { Reason::VelocityUnknown } else { Reason::ErrorUnknown };
+        self.prediction(of, age_s).ok_or(unknown(vehicle))
+    }
+
     /// Returns the prediction of a vehicle with an age \[s\]; `None` if its velocity is not known.
     ///
     /// With [`TimeBase::Arrival`] stamps may run faster than arrivals by the rate r = [`FALL_RATE`]. During the age a
     /// the vehicle then moves for up to (1 + r) a, so its distance from `p + v a` is at most
     /// `eps + (e (1 + r) + |v| r) a + A (1 + r)^2 a^2 / 2`. The same holds for the time ahead.
-    pub(super) fn prediction(&self, of: &Vehicle, age_s: f64) -> Option<Prediction> {
+    fn prediction(&self, of: &Vehicle, age_s: f64) -> Option<Prediction> {
         let Ball { centre: velocity, radius: error_m_s } = of.velocity.velocity()?;
         let (fix, eps) = of.history.newest().zip(of.position_error_m)?;
         let accel = self.settings.accel_m_s2.value;

@@ -6,12 +6,12 @@
 //! to a sign-off are judged as all others.
 //!
 //! A pose after a sign-off shows that the vehicle had not left. Its motion since the sign-off was not judged, so this
-//! pose is [`Fault::Returned`], and the time since the sign-off is NOT KNOWN.
+//! pose is [`Fault::Returned`], and the time since the sign-off is UNDECIDED.
 
 use super::{Monitor, Vehicle, kept};
 use crate::clock::STEP_S;
-use crate::event::{Event, Fault, Refusal};
-use crate::pair::{Prediction, RelativeMotion};
+use crate::event::{Event, Fault, Reason};
+use crate::pair::RelativeMotion;
 use crate::settings::{LARGEST_TIME_S, TimeBase};
 
 impl Monitor {
@@ -19,7 +19,7 @@ impl Monitor {
     /// clock \[s\]. Returns whether the sign-off is accepted. A later pose ends it and is [`Fault::Returned`].
     ///
     /// A sign-off of a vehicle that was not heard is [`Fault::Garbage`]. One that is older than the newest position,
-    /// repeated or without a proof of delta is [`Fault::SignOff`] with its [`Refusal`]. A stamp with which a pose would
+    /// repeated or without a proof of delta is [`Fault::SignOff`] with its [`Reason`]. A stamp with which a pose would
     /// be a step of the clock, or too fast, is [`Fault::ClockStep`]; the clock stays as it is.
     pub fn sign_off(&mut self, id: &str, t_s: f64, arrival_s: f64) -> bool {
         if t_s.is_nan() || t_s.abs() > LARGEST_TIME_S {
@@ -43,13 +43,13 @@ impl Monitor {
         }
         let newest_s = of.history.newest().map(|fix| fix.t_s);
         let refusal = match (of.signed_off_s, newest_s, self.clock_of(of)) {
-            (Some(_), Some(newest_s), _) => Some(Refusal::Repeated { t_s, newest_s }),
-            (_, Some(newest_s), Some(_)) if t_s < newest_s => Some(Refusal::Late { t_s, newest_s }),
+            (Some(_), Some(newest_s), _) => Some(Reason::Repeated([t_s, newest_s])),
+            (_, Some(newest_s), Some(_)) if t_s < newest_s => Some(Reason::Late([t_s, newest_s])),
             (_, Some(_), Some(_)) => {
                 self.judge_past();
                 self.unproved(vehicle)
             }
-            _ => Some(Refusal::Stale(vehicle)),
+            _ => Some(Reason::Fault(Fault::ClockStep, Some(vehicle))),
         };
         if refusal.is_some() {
             self.refusal = refusal;
@@ -72,37 +72,34 @@ impl Monitor {
 
     /// Returns why the bounds do not prove that a vehicle keeps delta from all present vehicles at the present; `None`
     /// if they do.
-    fn unproved(&self, vehicle: u32) -> Option<Refusal> {
-        let doubt = self.doubt.filter(|(_, at_s)| self.now_s - at_s < self.settings.max_age_s.value);
-        if let Some((fault, _)) = doubt {
-            return Some(Refusal::Doubt(fault));
+    fn unproved(&self, vehicle: u32) -> Option<Reason> {
+        if let Some(doubt) = self.recent_fault() {
+            return Some(doubt);
         }
         if let Some(of) = self.open_violations().find(|of| of.pair.contains(&vehicle)) {
-            return Some(Refusal::Violation(of.pair));
+            return Some(Reason::Violation(of.pair));
         }
-        let own = match self.fresh_prediction(vehicle) {
+        let certain = |k: u32| {
+            let of = &self.vehicles[k as usize];
+            let fault = |fault| Err(Reason::Fault(fault, Some(k)));
+            match () {
+                () if of.has_two_streams => fault(Fault::TwoStreams),
+                () if of.has_conflict => fault(Fault::Conflict),
+                () => self.fresh_prediction(k),
+            }
+        };
+        let own = match certain(vehicle) {
             Ok(own) => own,
-            Err(refusal) => return Some(refusal),
+            Err(reason) => return Some(reason),
         };
         let others = self.vehicles.iter().zip(0_u32..).filter(|(of, k)| *k != vehicle && of.signed_off_s.is_none());
-        others.into_iter().find_map(|(_, k)| match self.fresh_prediction(k) {
-            Err(refusal) => Some(refusal),
+        others.into_iter().find_map(|(_, k)| match certain(k) {
+            Err(reason) => Some(reason),
             Ok(other) => {
                 let least_m = RelativeMotion::new(&own, &other).least_m();
                 let keeps_delta = least_m >= self.settings.delta_m;
-                (!keeps_delta).then(|| Refusal::Uncertain([vehicle.min(k), vehicle.max(k)], least_m))
+                (!keeps_delta).then(|| Reason::Uncertain([vehicle.min(k), vehicle.max(k)], least_m))
             }
         })
-    }
-
-    /// Returns the prediction of a vehicle, unless it is stale, has a conflict, or its clock or velocity is unknown.
-    fn fresh_prediction(&self, vehicle: u32) -> Result<Prediction, Refusal> {
-        let of = &self.vehicles[vehicle as usize];
-        if of.has_two_streams {
-            return Err(Refusal::TwoStreams(vehicle));
-        }
-        let age_s =
-            self.age_s(of).filter(|&age_s| age_s <= self.settings.max_age_s.value).ok_or(Refusal::Stale(vehicle))?;
-        self.prediction(of, age_s).filter(|_| !of.has_conflict).ok_or(Refusal::NoPrediction(vehicle))
     }
 }

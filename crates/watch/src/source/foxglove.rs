@@ -10,7 +10,7 @@ use serde_json::{Value, json};
 
 use super::websocket::{Incoming, Protocol, websocket};
 use super::{Feed, Input, Naming, NamingOptions};
-use crate::event::Fault;
+use crate::event::{MessageError, Problem};
 use tautline_recordings::read::{has_live_poses, live_poses};
 
 /// First byte of a message of a subscription, which has 12 more bytes before its data: subscription and time.
@@ -51,30 +51,28 @@ impl Protocol for Client {
     }
 
     fn take(&mut self, message: Incoming<'_>, arrival_s: f64, inputs: &mut Vec<Input>) -> Vec<String> {
-        let mut garbage = |why: String| inputs.push(Input::Fault(Fault::Garbage, arrival_s, why));
+        let garbage =
+            |place: &str, problem| Input::Garbage(MessageError { place: place.to_owned(), problem }, arrival_s);
         match message {
             Incoming::Text(text) => match serde_json::from_str::<Value>(text) {
                 Ok(of) => return self.answer(&of),
-                Err(error) => garbage(format!("foxglove: not JSON: {error}")),
+                Err(error) => inputs.push(garbage("foxglove", Problem::NotDecoded(error.to_string()))),
             },
             Incoming::Binary([MESSAGE_DATA, rest @ ..]) => {
                 let found = rest.split_first_chunk::<4>().zip(rest.get(12..));
                 let channel = found
                     .and_then(|((id, _), data)| Some((self.channels.get(&u32::from_le_bytes(*id))?.clone(), data)));
                 let Some((channel, data)) = channel else {
-                    garbage("foxglove: a message has no subscription".to_owned());
+                    inputs.push(garbage("foxglove", Problem::NoSubscription));
                     return Vec::new();
                 };
                 match live_poses(&channel.schema_name, &channel.encoding, data) {
                     Ok(poses) => {
-                        for pose in poses {
-                            match self.naming.pose(&channel.topic, pose) {
-                                Ok(pose) => inputs.extend(pose.map(|pose| Input::Pose(pose, arrival_s))),
-                                Err(why) => inputs.push(Input::Fault(Fault::Garbage, arrival_s, why)),
-                            }
-                        }
+                        inputs.extend(
+                            poses.into_iter().filter_map(|of| self.naming.input(&channel.topic, of, arrival_s)),
+                        );
                     }
-                    Err(why) => garbage(format!("{}: {why}", channel.topic)),
+                    Err(why) => inputs.push(garbage(&channel.topic, Problem::NotDecoded(why))),
                 }
             }
             // Times and answers of services.
@@ -138,7 +136,7 @@ mod tests {
         for wrong in [&[1_u8][..], &[1, 9, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0], &data[..data.len() - 1]] {
             inputs.clear();
             client.take(Incoming::Binary(wrong), 9.0, &mut inputs);
-            assert!(matches!(inputs[..], [Input::Fault(..)]), "{wrong:?}");
+            assert!(matches!(inputs[..], [Input::Garbage(..)]), "{wrong:?}");
         }
     }
 }

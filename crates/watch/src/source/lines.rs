@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 
 use super::{Feed, Input, OwnedPose};
-use crate::event::Fault;
+use crate::event::{MessageError, Problem};
 
 /// Largest number of bytes of a line. A longer line is an error of the input.
 pub const LONGEST_LINE: usize = 1 << 16;
@@ -35,15 +35,6 @@ enum Name {
     Number(i64),
 }
 
-/// Message of a line.
-#[derive(Clone, Debug, PartialEq)]
-pub enum LineMessage {
-    /// A pose.
-    Pose(OwnedPose),
-    /// The sign-off of a vehicle: its name, and its stamp \[s\].
-    SignOff(String, f64),
-}
-
 /// Reads lines until the end of `from`.
 pub fn lines(mut from: impl BufRead, feed: &Feed) {
     let mut line = Vec::new();
@@ -54,24 +45,20 @@ pub fn lines(mut from: impl BufRead, feed: &Feed) {
         let read = (&mut from).take(LONGEST_LINE as u64).read_until(b'\n', &mut line);
         number += 1;
         let arrival_s = feed.now_s();
-        let garbage = |why: String| Input::Fault(Fault::Garbage, arrival_s, format!("line {number}: {why}"));
+        let garbage = |problem| Input::Garbage(MessageError { place: format!("line {number}"), problem }, arrival_s);
         let input = match read {
             Ok(0) => break,
             Ok(_) if line.len() == LONGEST_LINE && line.last() != Some(&b'\n') => {
                 if skip_line(&mut from).is_err() {
                     break;
                 }
-                garbage(format!("longer than {LONGEST_LINE} bytes; write one pose per line"))
+                garbage(Problem::TooLong)
             }
             Ok(_) if matches!(line.trim_ascii().first(), None | Some(b'#')) => continue,
-            Ok(_) => match message_of_line(&line) {
-                Ok(LineMessage::Pose(pose)) => Input::Pose(pose, arrival_s),
-                Ok(LineMessage::SignOff(id, t_s)) => Input::SignOff(id, t_s, arrival_s),
-                Err(why) => garbage(why),
-            },
+            Ok(_) => input_of_line(&line, arrival_s).unwrap_or_else(garbage),
             Err(error) => {
                 is_error = true;
-                garbage(format!("cannot be read: {error}"))
+                garbage(Problem::NotDecoded(error.to_string()))
             }
         };
         if !feed.send(input) || is_error || feed.is_over() {
@@ -81,40 +68,37 @@ pub fn lines(mut from: impl BufRead, feed: &Feed) {
     let _ = feed.send(Input::End);
 }
 
-/// Returns the message of a line.
+/// Returns the pose or the sign-off of a line that arrived at a time \[s\].
 ///
 /// # Errors
-/// A sentence without a full stop if the line is neither a pose nor a sign-off.
-pub fn message_of_line(line: &[u8]) -> Result<LineMessage, String> {
-    let refused = |problem: &str| {
-        let shown: String = String::from_utf8_lossy(line.trim_ascii()).chars().take(60).collect();
-        let remedy = r#"write {"t":0,"id":"a","x":0,"y":0,"z":0}"#;
-        format!("not a pose: {problem} ({shown:?}); {remedy}")
-    };
-    let of: Line = serde_json::from_slice(line).map_err(|error| refused(&error.to_string()))?;
+/// If the line is neither.
+pub fn input_of_line(line: &[u8], arrival_s: f64) -> Result<Input, Problem> {
+    let refused =
+        |why: String| Problem::NotPose(why, String::from_utf8_lossy(line.trim_ascii()).chars().take(60).collect());
+    let of: Line = serde_json::from_slice(line).map_err(|error| refused(error.to_string()))?;
     let velocity_m_s = match (of.vx, of.vy, of.vz) {
         (Some(x), Some(y), Some(z)) => Some(Vector3::new(x, y, z)),
         (None, None, None) => None,
-        _ => return Err("a part of the velocity is missing; write vx, vy and vz, or none of them".to_owned()),
+        _ => return Err(Problem::VelocityIncomplete),
     };
     let id = match of.id {
         Name::Text(text) => text,
         Name::Number(number) => number.to_string(),
     };
     if id.is_empty() {
-        return Err("the id is empty; write the name of the vehicle".to_owned());
+        return Err(Problem::NoName);
     }
     match (of.event.as_deref(), [of.x, of.y, of.z]) {
-        (Some("off"), [None, None, None]) => Ok(LineMessage::SignOff(id, of.t)),
-        (Some("off"), _) => Err("a sign-off with a position; write the last pose in a line before it".to_owned()),
+        (Some("off"), [None, None, None]) => Ok(Input::SignOff(id, of.t, arrival_s)),
+        (Some("off"), _) => Err(Problem::SignOffWithPosition),
         (_, [Some(x), Some(y), Some(z)]) => {
             let position_m = Vector3::new(x, y, z);
-            Ok(LineMessage::Pose(OwnedPose { t_s: of.t, id, position_m, velocity_m_s, accuracy_m: None }))
+            Ok(Input::Pose(OwnedPose { t_s: of.t, id, position_m, velocity_m_s, accuracy_m: None }, arrival_s))
         }
-        (Some(event), [None, None, None]) => Err(format!("unknown event ({event:?}); write \"off\" for a sign-off")),
+        (Some(event), [None, None, None]) => Err(Problem::UnknownEvent(event.to_owned())),
         (_, place) => {
             let missing = ["x", "y", "z"].into_iter().zip(place).find(|(_, of)| of.is_none());
-            Err(refused(&format!("missing field `{}`", missing.map_or("x", |(name, _)| name))))
+            Err(refused(format!("missing field `{}`", missing.map_or("x", |(name, _)| name))))
         }
     }
 }
@@ -141,14 +125,14 @@ mod tests {
 
     use nalgebra::Vector3;
 
-    use super::{LONGEST_LINE, LineMessage, lines, message_of_line};
-    use crate::event::Fault;
+    use super::{LONGEST_LINE, input_of_line, lines};
+    use crate::event::{MessageError, Problem};
     use crate::source::{Input, channel};
 
     #[test]
     fn a_line_is_a_pose_with_or_without_velocity() {
-        let pose_of = |line: &[u8]| match message_of_line(line) {
-            Ok(LineMessage::Pose(pose)) => pose,
+        let pose_of = |line: &[u8]| match input_of_line(line, 0.0) {
+            Ok(Input::Pose(pose, _)) => pose,
             other => panic!("{other:?}"),
         };
         let pose = pose_of(br#"{"t":1.5,"id":7,"x":1,"y":2,"z":3e0,"more":[],"event":"landing"}"#);
@@ -172,14 +156,14 @@ mod tests {
             r#"{"t":0,"id":"a","event":"off","z":3}"#,
             "\u{0}",
         ] {
-            assert!(message_of_line(wrong.as_bytes()).is_err(), "{wrong}");
+            assert!(input_of_line(wrong.as_bytes(), 0.0).is_err(), "{wrong}");
         }
     }
 
     #[test]
     fn a_line_with_the_event_off_is_a_sign_off() {
-        let found = message_of_line(br#"{"t":9.5,"id":"a","event":"off"}"#);
-        assert_eq!(found, Ok(LineMessage::SignOff("a".to_owned(), 9.5)));
+        let found = input_of_line(br#"{"t":9.5,"id":"a","event":"off"}"#, 7.0);
+        assert_eq!(found, Ok(Input::SignOff("a".to_owned(), 9.5, 7.0)));
     }
 
     #[test]
@@ -192,7 +176,8 @@ mod tests {
         let found: Vec<_> = inputs.receiver.iter().collect();
         let kinds: Vec<_> = found.iter().map(|input| matches!(input, Input::Pose(..))).collect();
         assert_eq!(kinds, [true, false, true, false, false]);
-        assert!(matches!(&found[1], Input::Fault(Fault::Garbage, _, said) if said.starts_with("line 2: longer")));
+        let too_long = MessageError { place: "line 2".to_owned(), problem: Problem::TooLong };
+        assert!(matches!(&found[1], Input::Garbage(error, _) if *error == too_long));
         assert_eq!(found[4], Input::End);
     }
 }

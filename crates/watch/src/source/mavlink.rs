@@ -21,7 +21,7 @@ use socket2::SockRef;
 
 use super::drops::KernelDrops;
 use super::{Feed, Input, OwnedPose};
-use crate::event::Fault;
+use crate::event::{Loss, MessageError, Problem};
 use crate::streams::SequenceOrder;
 use tautline_recordings::read::EarthFrame;
 
@@ -35,8 +35,6 @@ const RECEIVER: (u32, usize, u8) = (24, 30, 24);
 const FIX_IN_SPACE: u8 = 3;
 /// Time for which an accuracy is used \[s\].
 const ACCURACY_S: f64 = 5.0;
-/// First bytes of `MAVLink` 1 and 2.
-const STARTS: [u8; 2] = [0xFE, 0xFD];
 /// Largest number of bytes of a datagram.
 const LARGEST_DATAGRAM: usize = 65_536;
 /// Receive buffer of the socket, as far as the system gives it \[bytes\].
@@ -68,7 +66,7 @@ pub fn mavlink(address: SocketAddr, frame: MavlinkFrame, feed: Feed) -> io::Resu
         feed.reconnect(&format!("mavlink:{bound}"), |connected| {
             let socket = match first.take().map_or_else(|| bind(bound), Ok) {
                 Ok(socket) => socket,
-                Err(error) => return error.to_string(),
+                Err(error) => return Loss::Failed(error.to_string()),
             };
             connected();
             // A system keeps its count while the socket is lost.
@@ -87,8 +85,8 @@ fn bind(address: SocketAddr) -> io::Result<UdpSocket> {
     Ok(socket)
 }
 
-/// Reads datagrams until the socket fails; returns the reason.
-fn listen(socket: &UdpSocket, reader: &mut MavlinkReader, feed: &Feed) -> String {
+/// Reads datagrams until the socket fails or the watch ends.
+fn listen(socket: &UdpSocket, reader: &mut MavlinkReader, feed: &Feed) -> Loss {
     let mut bytes = vec![0; LARGEST_DATAGRAM];
     let mut inputs = Vec::new();
     let mut drops = KernelDrops::of(socket);
@@ -104,10 +102,10 @@ fn listen(socket: &UdpSocket, reader: &mut MavlinkReader, feed: &Feed) -> String
             }
             Err(error) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {}
             Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-            Err(error) => return error.to_string(),
+            Err(error) => return Loss::Failed(error.to_string()),
         }
     }
-    "the watch has ended".to_owned()
+    Loss::Closed
 }
 
 /// Sender of the positions of a system.
@@ -154,15 +152,15 @@ impl MavlinkReader {
             });
             match length {
                 Ok(length) => bytes = &bytes[length..],
-                Err(why) => {
-                    inputs.push(Input::Fault(Fault::Garbage, arrival_s, format!("datagram: {why}")));
+                Err(problem) => {
+                    inputs.push(Input::Garbage(MessageError { place: "datagram".to_owned(), problem }, arrival_s));
                     return;
                 }
             }
         }
     }
 
-    fn take_frame(&mut self, frame: &Frame, arrival_s: f64, inputs: &mut Vec<Input>) -> Result<(), String> {
+    fn take_frame(&mut self, frame: &Frame, arrival_s: f64, inputs: &mut Vec<Input>) -> Result<(), Problem> {
         let Frame { system, component, number, checksum, ref payload, .. } = *frame;
         let reading = match (frame.message, &self.frame) {
             (id, MavlinkFrame::Local) if id == LOCAL.0 => Some(local(payload)),
@@ -202,14 +200,13 @@ impl MavlinkReader {
 }
 
 /// Returns the first frame of bytes.
-fn first_frame(bytes: &[u8]) -> Result<Frame, String> {
-    let cut = || "ends within a frame of MAVLink".to_owned();
-    let payload = usize::from(*bytes.get(1).ok_or_else(cut)?);
+fn first_frame(bytes: &[u8]) -> Result<Frame, Problem> {
+    let payload = usize::from(*bytes.get(1).ok_or(Problem::CutFrame)?);
     let (frame, is_whole) = match bytes[0] {
         0xFE => {
             let mut raw = MAVLinkV1MessageRaw::new();
             let length = 8 + payload;
-            raw.as_mut_slice()[..length].copy_from_slice(bytes.get(..length).ok_or_else(cut)?);
+            raw.as_mut_slice()[..length].copy_from_slice(bytes.get(..length).ok_or(Problem::CutFrame)?);
             let message = u32::from(raw.message_id());
             let frame = Frame {
                 message,
@@ -223,13 +220,13 @@ fn first_frame(bytes: &[u8]) -> Result<Frame, String> {
             (frame, extra_of(message).is_none_or(|extra| raw.has_valid_crc_with_extra_crc(extra)))
         }
         0xFD => {
-            let flags = *bytes.get(2).ok_or_else(cut)?;
+            let flags = *bytes.get(2).ok_or(Problem::CutFrame)?;
             if flags & !SIGNED != 0 {
-                return Err(format!("a frame of MAVLink 2 has unknown incompatible flags ({flags:#04x})"));
+                return Err(Problem::UnknownFlags(flags));
             }
             let length = 12 + payload + if flags & SIGNED != 0 { 13 } else { 0 };
             let mut raw = MAVLinkV2MessageRaw::new();
-            raw.as_mut_slice()[..length].copy_from_slice(bytes.get(..length).ok_or_else(cut)?);
+            raw.as_mut_slice()[..length].copy_from_slice(bytes.get(..length).ok_or(Problem::CutFrame)?);
             let message = raw.message_id();
             let frame = Frame {
                 message,
@@ -242,11 +239,10 @@ fn first_frame(bytes: &[u8]) -> Result<Frame, String> {
             };
             (frame, extra_of(message).is_none_or(|extra| raw.has_valid_crc_with_extra_crc(extra)))
         }
-        other => return Err(format!("a frame of MAVLink must begin with one of {STARTS:02x?}, got {other:02x}")),
+        other => return Err(Problem::NoFrameStart(other)),
     };
     if !is_whole {
-        let Frame { message, system, .. } = frame;
-        return Err(format!("the checksum of message {message} of system {system} is wrong"));
+        return Err(Problem::WrongChecksum([frame.message, frame.system]));
     }
     Ok(frame)
 }
@@ -274,7 +270,7 @@ fn local(payload: &[u8]) -> Reading {
 }
 
 /// Returns the reading of `GLOBAL_POSITION_INT`, `None` without a fix: latitude and longitude are 0.
-fn global(payload: &[u8], earth: &EarthFrame) -> Result<Option<Reading>, String> {
+fn global(payload: &[u8], earth: &EarthFrame) -> Result<Option<Reading>, Problem> {
     let number = |k: usize| f64::from(i32::from_le_bytes(word(payload, 4 * k)));
     let speed = |k: usize| f64::from(i16::from_le_bytes(half(payload, 20 + 2 * k))) * 0.01;
     let place = [number(1) * 1e-7, number(2) * 1e-7, number(3) * 1e-3];
@@ -282,8 +278,8 @@ fn global(payload: &[u8], earth: &EarthFrame) -> Result<Option<Reading>, String>
         return Ok(None);
     }
     let velocity = Vector3::new(speed(1), speed(0), -speed(2));
-    let at = earth.position_m(place)?;
-    Ok(Some((stamp(payload), at, earth.direction_at(place, velocity)?)))
+    let at = earth.position_m(place).map_err(Problem::NotDecoded)?;
+    Ok(Some((stamp(payload), at, earth.direction_at(place, velocity).map_err(Problem::NotDecoded)?)))
 }
 
 fn stamp(payload: &[u8]) -> f64 {
@@ -400,7 +396,7 @@ mod tests {
             bad[k] ^= 0x10;
             let poses = read(&bad, &MavlinkFrame::Local).iter().filter(|of| matches!(of, Input::Pose(..))).count();
             assert_eq!(poses, 0, "byte {k}");
-            assert!(matches!(&read(&good[..k], &MavlinkFrame::Local)[..], [] | [Input::Fault(..)]));
+            assert!(matches!(&read(&good[..k], &MavlinkFrame::Local)[..], [] | [Input::Garbage(..)]));
         }
         assert_eq!(read(&framed((0, 9, 50), 1, &[0; 9], true), &MavlinkFrame::Local), []);
     }

@@ -15,14 +15,14 @@ use std::time::{Duration, Instant};
 
 use nalgebra::Vector3;
 
-use crate::event::Fault;
+use crate::event::{Loss, MessageError};
 use crate::monitor::Pose;
 
 pub use foxglove::foxglove;
-pub use lines::{LONGEST_LINE, LineMessage, lines, message_of_line};
+pub use lines::{LONGEST_LINE, input_of_line, lines};
 pub use mavlink::{MavlinkFrame, MavlinkReader, mavlink};
 pub use naming::{Naming, NamingOptions};
-pub use rosbridge::{poses_of_message, rosbridge};
+pub use rosbridge::{inputs_of_message, rosbridge};
 
 /// Number of inputs that wait to be read. Inputs of the network beyond it are dropped and counted.
 pub const MOST_WAITING: usize = 1 << 16;
@@ -60,14 +60,14 @@ pub enum Input {
     Pose(OwnedPose, f64),
     /// The sign-off of a vehicle: its name, its stamp \[s\] and its arrival \[s\].
     SignOff(String, f64, f64),
-    /// An error of the input, with its arrival \[s\] and a sentence.
-    Fault(Fault, f64, String),
+    /// A message that cannot be read, and its arrival \[s\].
+    Garbage(MessageError, f64),
     /// The messages of a name are those of two vehicles: the name, and the arrival \[s\].
     TwoStreams(String, f64),
     /// A source is connected.
     Connected(String),
-    /// A source is lost, with the reason; it connects again.
-    Lost(String, String),
+    /// A source is lost; it connects again.
+    Lost(String, Loss),
     /// The source has ended.
     End,
 }
@@ -139,12 +139,12 @@ impl Feed {
     }
 
     /// Connects and reads again after each loss, with pauses that double. `session` connects, calls its argument when
-    /// it is connected, and reads; its error is the reason of the loss.
-    fn reconnect(&self, name: &str, mut session: impl FnMut(&mut dyn FnMut()) -> String) {
+    /// it is connected, and reads until the loss.
+    fn reconnect(&self, name: &str, mut session: impl FnMut(&mut dyn FnMut()) -> Loss) {
         let mut pause = PAUSES[0];
         while !self.is_over() {
             let mut is_connected = false;
-            let why = session(&mut || {
+            let loss = session(&mut || {
                 is_connected = true;
                 // At the end of the watch the session notices it, too.
                 let _ = self.send(Input::Connected(name.to_owned()));
@@ -152,7 +152,7 @@ impl Feed {
             if is_connected {
                 pause = PAUSES[0];
             }
-            if self.is_over() || !self.send(Input::Lost(name.to_owned(), why)) {
+            if self.is_over() || !self.send(Input::Lost(name.to_owned(), loss)) {
                 return;
             }
             let until = Instant::now() + pause;

@@ -2,8 +2,8 @@
 
 use std::collections::BTreeMap;
 
-use super::OwnedPose;
-use tautline_core::option::{FRAME, ORIGIN, TOPIC};
+use super::{Input, OwnedPose};
+use crate::event::{MessageError, Problem};
 use tautline_recordings::read::{EarthFrame, LivePose};
 
 /// Options for poses of topics.
@@ -43,36 +43,33 @@ impl Naming {
         self.options.topics.is_empty() || self.options.topics.iter().any(|of| of == topic)
     }
 
-    /// Returns the pose of a vehicle; `None` for a transform in another frame.
+    /// Returns the pose of a vehicle that arrived at a time \[s\], or the error of its message; `None` for a transform
+    /// in another frame.
     ///
     /// A name in the message is the name of the vehicle. Otherwise the name is the topic without its last part, such
     /// as `cf1` of `/cf1/pose`.
-    ///
-    /// # Errors
-    /// A sentence if the pose has no stamp, is in another frame, or its vehicle has another topic, too.
-    pub fn pose(&mut self, topic: &str, of: LivePose) -> Result<Option<OwnedPose>, String> {
+    pub fn input(&mut self, topic: &str, of: LivePose, arrival_s: f64) -> Option<Input> {
+        match self.pose(topic, of) {
+            Ok(pose) => Some(Input::Pose(pose?, arrival_s)),
+            Err(problem) => Some(Input::Garbage(MessageError { place: topic.to_owned(), problem }, arrival_s)),
+        }
+    }
+
+    fn pose(&mut self, topic: &str, of: LivePose) -> Result<Option<OwnedPose>, Problem> {
         if of.stamp_ns == 0 {
-            return Err(format!("{topic}: the message has no stamp, so its age is unknown; set header.stamp"));
+            return Err(Problem::NoStamp);
         }
         let position_m = if of.is_on_earth {
-            let Some(earth) = &self.options.earth else {
-                let origin = ORIGIN.set("LAT,LON,HEIGHT");
-                return Err(format!("{topic}: the positions are on the Earth; set {origin}"));
-            };
-            earth.position_m(of.position.into())?
+            let earth = self.options.earth.as_ref().ok_or(Problem::NoOrigin)?;
+            earth.position_m(of.position.into()).map_err(Problem::NotDecoded)?
         } else {
             if of.is_transform && self.options.frame.is_none() {
-                let example = FRAME.set("world");
-                return Err(format!("{topic}: transforms have several frames; set {FRAME}, such as {example}"));
+                return Err(Problem::NoFrame);
             }
             let frame = self.frame.get_or_insert_with(|| of.frame.clone());
             if *frame != of.frame {
-                let problem = || format!("{topic}: the position is in frame {:?}, others in {frame:?}", of.frame);
-                return if of.is_transform {
-                    Ok(None)
-                } else {
-                    Err(format!("{}; give the topics of one frame with {TOPIC}", problem()))
-                };
+                let others = frame.clone();
+                return if of.is_transform { Ok(None) } else { Err(Problem::OtherFrame([of.frame, others])) };
             }
             of.position
         };
@@ -89,13 +86,11 @@ impl Naming {
         Ok(Some(OwnedPose { t_s, id, position_m, velocity_m_s: None, accuracy_m: of.accuracy_m }))
     }
 
-    fn check_topic(&mut self, base: &str, topic: &str) -> Result<(), String> {
+    fn check_topic(&mut self, base: &str, topic: &str) -> Result<(), Problem> {
         match self.topics.get(base) {
             Some(own) if own == topic => Ok(()),
-            Some(own) => {
-                Err(format!("{topic}: vehicle {base:?} has the topic {own}, too; give one of them with {TOPIC}"))
-            }
-            None if self.topics.len() >= MOST_TOPICS => Err(format!("{topic}: more than {MOST_TOPICS} topics")),
+            Some(own) => Err(Problem::OtherTopic([base.to_owned(), own.clone()])),
+            None if self.topics.len() >= MOST_TOPICS => Err(Problem::TooManyTopics),
             None => {
                 self.topics.insert(base.to_owned(), topic.to_owned());
                 Ok(())
@@ -108,7 +103,7 @@ impl Naming {
 mod tests {
     use nalgebra::Vector3;
 
-    use super::{Naming, NamingOptions};
+    use super::{Input, Naming, NamingOptions};
     use tautline_recordings::read::LivePose;
 
     fn pose(frame: &str, name: Option<&str>, is_transform: bool) -> LivePose {
@@ -127,7 +122,9 @@ mod tests {
     #[test]
     fn a_topic_names_one_vehicle_in_one_frame() {
         let mut naming = Naming::new(NamingOptions::default());
-        let found = naming.pose("/cf1/pose", pose("world", None, false)).expect("a pose").expect("a vehicle");
+        let Some(Input::Pose(found, 7.0)) = naming.input("/cf1/pose", pose("world", None, false), 7.0) else {
+            panic!("a pose")
+        };
         assert_eq!((found.id.as_str(), found.t_s), ("cf1", 1.5));
         for (topic, of) in [
             ("/cf1/odom", pose("world", None, false)),
@@ -136,7 +133,7 @@ mod tests {
             ("/cf1/pose", LivePose { stamp_ns: 0, ..pose("world", None, false) }),
             ("/cf4/fix", LivePose { is_on_earth: true, ..pose("WGS 84", None, false) }),
         ] {
-            assert!(naming.pose(topic, of.clone()).is_err(), "{topic} {of:?}");
+            assert!(matches!(naming.input(topic, of.clone(), 7.0), Some(Input::Garbage(..))), "{topic} {of:?}");
         }
     }
 

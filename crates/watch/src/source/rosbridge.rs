@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::websocket::{Incoming, Protocol, websocket};
 use super::{Feed, Input, Naming, NamingOptions};
-use crate::event::Fault;
+use crate::event::{MessageError, Problem};
 use tautline_core::option::TOPIC;
 use tautline_recordings::read::LivePose;
 
@@ -41,39 +41,38 @@ impl Protocol for Rosbridge {
     }
 
     fn take(&mut self, message: Incoming<'_>, arrival_s: f64, inputs: &mut Vec<Input>) -> Vec<String> {
-        let poses = match message {
-            Incoming::Text(text) => poses_of_message(text, &mut self.naming),
-            Incoming::Binary(_) => Err("rosbridge: a binary message is not read".to_owned()),
+        let read = match message {
+            Incoming::Text(text) => inputs_of_message(text, &mut self.naming, arrival_s, inputs),
+            Incoming::Binary(_) => Err(Problem::NotOfTopic),
         };
-        match poses {
-            Ok(poses) => inputs.extend(poses.into_iter().map(|pose| match pose {
-                Ok(pose) => Input::Pose(pose, arrival_s),
-                Err(why) => Input::Fault(Fault::Garbage, arrival_s, why),
-            })),
-            Err(why) => inputs.push(Input::Fault(Fault::Garbage, arrival_s, why)),
-        }
+        let place = "rosbridge".to_owned();
+        inputs.extend(read.err().map(|problem| Input::Garbage(MessageError { place, problem }, arrival_s)));
         Vec::new()
     }
 }
 
-/// Poses of a message, and a sentence for each that cannot be used.
-type Poses = Vec<Result<super::OwnedPose, String>>;
-
-/// Returns the poses of a message of the server.
+/// Appends the poses of a message of the server that arrived at a time \[s\], and the errors of those that cannot be
+/// used.
 ///
 /// # Errors
-/// A sentence if the message is none of rosbridge, reports an error, or has no positions.
-pub fn poses_of_message(text: &str, naming: &mut Naming) -> Result<Poses, String> {
-    let of: Value = serde_json::from_str(text).map_err(|error| format!("rosbridge: not JSON: {error}"))?;
+/// If the message is none of rosbridge, reports an error, or has no positions.
+pub fn inputs_of_message(
+    text: &str,
+    naming: &mut Naming,
+    arrival_s: f64,
+    inputs: &mut Vec<Input>,
+) -> Result<(), Problem> {
+    let of: Value = serde_json::from_str(text).map_err(|error| Problem::NotDecoded(error.to_string()))?;
     let topic = of["topic"].as_str().unwrap_or_default();
     match of["op"].as_str() {
         Some("publish") if !topic.is_empty() => {}
-        Some("status") if of["level"] == "error" => return Err(format!("rosbridge: {}", of["msg"])),
-        Some("status") => return Ok(Vec::new()),
-        _ => return Err("rosbridge: not a message of a topic".to_owned()),
+        Some("status") if of["level"] == "error" => return Err(Problem::ServerError(of["msg"].to_string())),
+        Some("status") => return Ok(()),
+        _ => return Err(Problem::NotOfTopic),
     }
-    let poses = live_poses(&of["msg"]).ok_or_else(|| format!("{topic}: the message has no position that is read"))?;
-    Ok(poses.into_iter().filter_map(|pose| naming.pose(topic, pose).transpose()).collect())
+    let poses = live_poses(&of["msg"]).ok_or_else(|| Problem::NoPosition(topic.to_owned()))?;
+    inputs.extend(poses.into_iter().filter_map(|pose| naming.input(topic, pose, arrival_s)));
+    Ok(())
 }
 
 /// Returns the positions of a message of ROS by its fields, as rosbridge does not send its type.
@@ -143,17 +142,24 @@ fn pose(header: &Value, place: &Value, name: Option<String>, number: Option<usiz
 mod tests {
     use nalgebra::Vector3;
 
-    use super::poses_of_message;
-    use crate::source::{Naming, NamingOptions};
+    use super::inputs_of_message;
+    use crate::source::{Input, Naming, NamingOptions, OwnedPose};
     use tautline_recordings::read::EarthFrame;
 
     const HEADER: &str = r#""header":{"stamp":{"sec":3,"nanosec":500000000},"frame_id":"world"}"#;
 
+    /// Returns the poses of a message without an error.
+    fn poses_of(text: &str, naming: &mut Naming) -> Vec<OwnedPose> {
+        let mut inputs = Vec::new();
+        inputs_of_message(text, naming, 0.0, &mut inputs).expect(text);
+        let pose = |input| if let Input::Pose(pose, _) = input { pose } else { panic!("{input:?}") };
+        inputs.into_iter().map(pose).collect()
+    }
+
     fn read(topic: &str, body: &str) -> Vec<(String, f64, Vector3<f64>)> {
         let mut naming = Naming::new(NamingOptions { frame: Some("world".to_owned()), ..NamingOptions::default() });
         let text = format!(r#"{{"op":"publish","topic":"{topic}","msg":{{{body}}}}}"#);
-        let poses = poses_of_message(&text, &mut naming).expect(&text);
-        poses.into_iter().map(|of| of.expect("a pose")).map(|of| (of.id, of.t_s, of.position_m)).collect()
+        poses_of(&text, &mut naming).into_iter().map(|of| (of.id, of.t_s, of.position_m)).collect()
     }
 
     #[test]
@@ -182,9 +188,7 @@ mod tests {
             let place = r#""latitude":47.0,"longitude":8.0,"altitude":401.0"#;
             let covariance = format!(r#""position_covariance":[1,0,0,0,4,0,0,0,4],"position_covariance_type":{kind}"#);
             let text = format!(r#"{{"op":"publish","topic":"/a/fix","msg":{{{HEADER},{place},{covariance}}}}}"#);
-            let poses = poses_of_message(&text, &mut naming).expect("a message");
-            let [Ok(pose)] = &poses[..] else { panic!("{poses:?}") };
-            pose.accuracy_m
+            poses_of(&text, &mut naming)[0].accuracy_m
         };
         assert_eq!((accuracy_m(2), accuracy_m(0)), (Some(3.0), None));
     }
@@ -200,7 +204,7 @@ mod tests {
             r#"{"op":"publish","topic":"/a/b","msg":{"pose":{"position":{"x":1,"y":2,"z":3}}}}"#,
             r#"{"op":"status","level":"error","msg":"no such topic"}"#,
         ] {
-            assert!(poses_of_message(text, &mut naming).is_err(), "{text}");
+            assert!(inputs_of_message(text, &mut naming, 0.0, &mut Vec::new()).is_err(), "{text}");
         }
     }
 }

@@ -9,6 +9,7 @@ use tungstenite::http::Uri;
 use tungstenite::{ClientRequestBuilder, Error, Message, WebSocket};
 
 use super::{Feed, Input};
+use crate::event::Loss;
 
 /// Time limit of a connection and of its handshake.
 const PATIENCE: Duration = Duration::from_secs(5);
@@ -51,9 +52,9 @@ pub(super) fn websocket(url: &str, feed: Feed, mut protocol: impl Protocol) -> R
         feed.reconnect(&name, |connected| match connect(&uri, &protocol) {
             Ok(mut socket) => {
                 connected();
-                converse(&mut socket, &mut protocol, &read).unwrap_or_else(|error| error.to_string())
+                converse(&mut socket, &mut protocol, &read).unwrap_or_else(|error| Loss::Failed(error.to_string()))
             }
-            Err(why) => why,
+            Err(why) => Loss::Failed(why),
         });
     });
     Ok(())
@@ -90,8 +91,8 @@ fn connect(uri: &Uri, protocol: &impl Protocol) -> Result<WebSocket<TcpStream>, 
     Err(why)
 }
 
-/// Reads until the end of the watch or of the connection; returns the reason.
-fn converse(socket: &mut WebSocket<TcpStream>, protocol: &mut impl Protocol, feed: &Feed) -> Result<String, Error> {
+/// Reads until the end of the watch or of the connection.
+fn converse(socket: &mut WebSocket<TcpStream>, protocol: &mut impl Protocol, feed: &Feed) -> Result<Loss, Error> {
     for text in protocol.start() {
         socket.send(Message::text(text))?;
     }
@@ -102,7 +103,7 @@ fn converse(socket: &mut WebSocket<TcpStream>, protocol: &mut impl Protocol, fee
             Ok(message) => message,
             Err(Error::Io(error)) if matches!(error.kind(), io::ErrorKind::WouldBlock | io::ErrorKind::TimedOut) => {
                 if heard.elapsed() > 3 * SILENCE {
-                    return Ok("the server is silent".to_owned());
+                    return Ok(Loss::Silent);
                 }
                 if heard.elapsed() > SILENCE && !asked {
                     asked = true;
@@ -116,7 +117,7 @@ fn converse(socket: &mut WebSocket<TcpStream>, protocol: &mut impl Protocol, fee
         let replies = match &message {
             Message::Text(text) => protocol.take(Incoming::Text(text), feed.now_s(), &mut inputs),
             Message::Binary(bytes) => protocol.take(Incoming::Binary(bytes), feed.now_s(), &mut inputs),
-            Message::Close(_) => return Ok("the server closed the connection".to_owned()),
+            Message::Close(_) => return Ok(Loss::Closed),
             _ => Vec::new(),
         };
         for text in replies {
@@ -127,5 +128,5 @@ fn converse(socket: &mut WebSocket<TcpStream>, protocol: &mut impl Protocol, fee
         }
     }
     let _ = socket.close(None);
-    Ok("the watch has ended".to_owned())
+    Ok(Loss::Closed)
 }

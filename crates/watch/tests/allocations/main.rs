@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use nalgebra::Vector3;
 use stats_alloc::{INSTRUMENTED_SYSTEM, Region, StatsAlloc};
 use tautline_watch::source::{Input, OwnedPose, channel};
-use tautline_watch::{Bound, Monitor, Notice, Output, Plan, Pose, Settings, TimeBase, watch};
+use tautline_watch::{Bound, MessageError, Monitor, Notice, Output, Plan, Pose, Problem, Settings, TimeBase, watch};
 
 #[global_allocator]
 static ALLOCATOR: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
@@ -83,6 +83,7 @@ fn memory_of_a_watch_does_not_grow() {
     let taken = Arc::clone(&poses);
     let sender = std::thread::spawn(move || {
         let ids: Vec<_> = (0..20).map(|k| k.to_string()).collect();
+        let wrong = MessageError { place: "line 1".to_owned(), problem: Problem::NoName };
         let (mut sent, mut held) = (0_u64, Vec::new());
         for second in 0..seconds {
             for tick in 0..50 {
@@ -102,7 +103,7 @@ fn memory_of_a_watch_does_not_grow() {
                 }
             }
             let end_s = f64::from(second) + 0.99;
-            assert!(feed.send(Input::Fault(tautline_watch::Fault::Garbage, end_s, "wrong".to_owned())));
+            assert!(feed.send(Input::Garbage(wrong.clone(), end_s)));
             assert!(feed.send(Input::SignOff("19".to_owned(), end_s, end_s)));
             // Nothing waits at the measurement but the last two inputs.
             if second % 60 == 59 {

@@ -222,7 +222,7 @@ fn the_search_of_all_pairs_equals_the_pairs_one_by_one() {
         match of.state {
             State::Clear => assert!((clear_for_s(&of).expect("clear") - clear_s).abs() < 1e-6),
             State::Violation(..) => assert!(nearest_m < 1.0),
-            State::NotKnown(_) => assert_eq!(clear_s, 0.0),
+            State::Undecided(_) => assert_eq!(clear_s, 0.0),
         }
     }
 }

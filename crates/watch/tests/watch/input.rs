@@ -17,9 +17,9 @@ fn both(monitor: &mut Monitor, t_s: f64, arrival_s: f64) -> State {
 #[test]
 fn nothing_is_clear_before_two_vehicles_are_heard() {
     let mut monitor = monitor(settings());
-    assert_eq!(monitor.assess(0.0).state, State::NotKnown(Reason::TooFew(0)));
+    assert_eq!(monitor.assess(0.0).state, State::Undecided(Reason::TooFew(0)));
     rest(&mut monitor, "a", 0.0, 0.0, 1.0);
-    assert_eq!(monitor.assess(1.0).state, State::NotKnown(Reason::TooFew(1)));
+    assert_eq!(monitor.assess(1.0).state, State::Undecided(Reason::TooFew(1)));
     rest(&mut monitor, "b", 0.0, 6.0, 1.0);
     assert_eq!(monitor.assess(1.0).state, State::Clear);
 }
@@ -31,21 +31,21 @@ fn time_passes_from_the_first_pose_on_after_a_long_wait() {
         monitor.assess(0.1 * f64::from(k));
     }
     monitor.fault(Fault::Garbage, None, 4.9);
-    assert_eq!(both(&mut monitor, 0.0, 5.0), State::NotKnown(Reason::Doubt(Fault::Garbage)));
+    assert_eq!(both(&mut monitor, 0.0, 5.0), State::Undecided(Reason::Fault(Fault::Garbage, None)));
     let of = monitor.assess(6.01);
     assert!((of.now_s - 1.01).abs() < 1e-9, "{}", of.now_s);
-    assert!(matches!(of.state, State::NotKnown(Reason::Stale(..))), "{of:?}");
+    assert!(matches!(of.state, State::Undecided(Reason::Stale(..))), "{of:?}");
 }
 
 #[test]
 fn expected_vehicles_must_be_heard() {
     let mut counted = monitor(Settings { expected: Expected::Count(3), ..settings() });
-    assert_eq!(both(&mut counted, 0.0, 0.0), State::NotKnown(Reason::Missing([2, 3])));
+    assert_eq!(both(&mut counted, 0.0, 0.0), State::Undecided(Reason::Missing([2, 3])));
     rest(&mut counted, "c", 0.0, 12.0, 0.0);
     assert_eq!(counted.assess(0.0).state, State::Clear);
     let names = ["b", "c", "a"].map(str::to_owned).to_vec();
     let mut named = monitor(Settings { expected: Expected::Names(names), ..settings() });
-    assert_eq!(both(&mut named, 0.0, 0.0), State::NotKnown(Reason::MissingName(0)));
+    assert_eq!(both(&mut named, 0.0, 0.0), State::Undecided(Reason::Missing([2, 3])));
     assert_eq!(named.missing(), ["c"]);
 }
 
@@ -55,7 +55,7 @@ fn a_stale_vehicle_ends_clear_until_it_is_heard_again() {
     assert_eq!(both(&mut monitor, 0.0, 10.0), State::Clear);
     rest(&mut monitor, "a", 1.2, 0.0, 11.2);
     let state = monitor.assess(11.2).state;
-    let State::NotKnown(Reason::Stale(1, age_s)) = state else { panic!("{state:?}") };
+    let State::Undecided(Reason::Stale(1, age_s)) = state else { panic!("{state:?}") };
     assert!((age_s - 1.2).abs() < 1e-9);
     rest(&mut monitor, "b", 1.2, 6.0, 11.3);
     assert_eq!(monitor.assess(11.3).state, State::Clear);
@@ -83,7 +83,7 @@ fn two_positions_at_one_time_are_a_conflict() {
     let mut monitor = monitor(settings());
     both(&mut monitor, 0.0, 0.0);
     rest(&mut monitor, "b", 0.0, 9.0, 0.1);
-    assert!(matches!(monitor.assess(0.1).state, State::NotKnown(_)));
+    assert!(matches!(monitor.assess(0.1).state, State::Undecided(_)));
     assert_eq!(monitor.faults(Fault::Conflict), 1);
 }
 
@@ -96,10 +96,13 @@ fn a_step_of_the_common_clock_makes_all_vehicles_unknown_until_heard_again() {
         rest(&mut monitor, "a", 1000.6 + step_s, 0.0, 0.6);
         assert_eq!(monitor.faults(Fault::ClockStep), 1, "{step_s}");
         let state = monitor.assess(0.6).state;
-        assert!(matches!(state, State::NotKnown(_)), "{state:?}");
+        assert!(matches!(state, State::Undecided(_)), "{state:?}");
         rest(&mut monitor, "b", 1000.6 + step_s, 6.0, 0.6);
         // The doubt lasts for the largest age.
-        assert!(matches!(both(&mut monitor, 1000.7 + step_s, 0.7), State::NotKnown(Reason::Doubt(Fault::ClockStep))));
+        assert!(matches!(
+            both(&mut monitor, 1000.7 + step_s, 0.7),
+            State::Undecided(Reason::Fault(Fault::ClockStep, None))
+        ));
         for k in 0..20 {
             let t_s = 0.8 + 0.1 * f64::from(k);
             both(&mut monitor, 1000.0 + t_s + step_s, t_s);
@@ -129,7 +132,7 @@ fn a_vehicle_that_breaks_its_bounds_is_not_clear() {
     rest(&mut monitor, "b", 0.1, 6.034, 0.1);
     assert_eq!(monitor.assess(0.1).state, State::Clear);
     rest(&mut monitor, "b", 0.2, 6.134, 0.2);
-    assert_eq!(monitor.assess(0.2).state, State::NotKnown(Reason::Doubt(Fault::VelocityDisagrees)));
+    assert_eq!(monitor.assess(0.2).state, State::Undecided(Reason::Fault(Fault::VelocityDisagrees, None)));
     // A change of the velocity by 2 * 0.02 + 5 * 0.1 = 0.54 m/s, and by more.
     for (speed, fault) in [(0.53, 0), (0.55, 1)] {
         let mut monitor = crate::monitor(settings());
@@ -143,7 +146,7 @@ fn a_vehicle_that_breaks_its_bounds_is_not_clear() {
 
 #[test]
 fn clocks_of_vehicles_may_differ_if_each_has_its_own() {
-    let mut monitor = monitor(Settings { clocks: ClockScope::PerVehicle, ..settings() });
+    let mut monitor = monitor(Settings { clocks: Some(ClockScope::PerVehicle), ..settings() });
     for k in 0..20 {
         let now_s = 50.0 + 0.1 * f64::from(k);
         rest(&mut monitor, "a", now_s + 900.0, 0.0, now_s);
@@ -162,7 +165,7 @@ fn too_many_vehicles_are_not_clear() {
     let mut monitor = monitor(Settings { max_vehicles: 2, ..settings() });
     both(&mut monitor, 0.0, 0.0);
     rest(&mut monitor, "c", 0.0, 20.0, 0.0);
-    assert_eq!(monitor.assess(0.0).state, State::NotKnown(Reason::Doubt(Fault::TooManyVehicles)));
+    assert_eq!(monitor.assess(0.0).state, State::Undecided(Reason::Fault(Fault::TooManyVehicles, None)));
     assert_eq!(monitor.names().len(), 2);
 }
 
@@ -173,7 +176,7 @@ fn a_flood_gives_one_event_a_second_and_no_growth() {
     for t_s in repeat_n(f64::NAN, 100_000) {
         rest(&mut monitor, "a", t_s, 0.0, 0.1);
     }
-    assert!(matches!(monitor.assess(0.1).state, State::NotKnown(Reason::Doubt(Fault::OutOfRange))));
+    assert!(matches!(monitor.assess(0.1).state, State::Undecided(Reason::Fault(Fault::OutOfRange, None))));
     assert!(monitor.drain_events().count() <= 4);
     monitor.assess(1.2);
     let events: Vec<_> = monitor.drain_events().collect();
@@ -247,7 +250,7 @@ proptest! {
     ) {
         let mut monitor = monitor(Settings {
             time_base: if stamps { TimeBase::Stamps } else { TimeBase::Arrival },
-            clocks: if own_clocks { ClockScope::PerVehicle } else { ClockScope::Common },
+            clocks: own_clocks.then_some(ClockScope::PerVehicle),
             ..settings()
         });
         let mut arrival_s = 0.0;

@@ -3,9 +3,9 @@
 use nalgebra::Vector3;
 
 use crate::{monitor, settings};
-use tautline_watch::{Bound, Event, Monitor, Pose, Settings, State, TimeBase, Violation};
+use tautline_watch::{Bound, Event, Monitor, Pair, Pose, Settings, State, TimeBase, Violation};
 
-fn replay(monitor: &mut Monitor, poses: &[(f64, &str, f64, f64)]) -> Vec<Violation> {
+fn replay(monitor: &mut Monitor, poses: &[(f64, &str, f64, f64)]) -> Vec<Violation<Pair>> {
     let mut ended = Vec::new();
     let mut note = |monitor: &mut Monitor| {
         ended.extend(monitor.drain_events().filter_map(|event| match event {
@@ -70,6 +70,6 @@ fn a_gap_beyond_the_largest_age_is_not_judged_and_not_clear() {
         monitor.take(&Pose { t_s, id, position_m: Vector3::new(x, y, 0.0), velocity_m_s: None, accuracy_m: None }, t_s);
         states.push(monitor.assess(t_s).state);
     }
-    assert!(states[..3].iter().all(|state| matches!(state, State::NotKnown(_))), "{states:?}");
+    assert!(states[..3].iter().all(|state| matches!(state, State::Undecided(_))), "{states:?}");
     assert_eq!(monitor.violations(), 0);
 }

@@ -4,26 +4,48 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
+use serde_json::{Value, json};
+
 use crate::{monitor, settings};
 use tautline_watch::source::{OwnedPose, channel, lines};
 use tautline_watch::{Notice, Output, Settings, Summary, TimeBase, watch};
 
 #[derive(Default)]
 struct Collected {
-    texts: Vec<String>,
+    notices: Vec<Value>,
     rows: Vec<f64>,
 }
 
 impl Output for Collected {
     fn notice(&mut self, notice: &Notice) -> io::Result<()> {
         assert_eq!(notice.json["event"], notice.event);
-        self.texts.push(notice.text.clone());
+        assert!(!notice.text.contains(char::is_control), "{}", notice.text);
+        self.notices.push(notice.json.clone());
         Ok(())
     }
 
     fn pose(&mut self, time_s: f64, _pose: &OwnedPose) -> io::Result<()> {
         self.rows.push(time_s);
         Ok(())
+    }
+}
+
+impl Collected {
+    /// Returns the place of the first notice with these values at their paths.
+    fn place(&self, values: &[(&str, Value)]) -> Option<usize> {
+        self.notices.iter().position(|of| values.iter().all(|(path, value)| of.pointer(path) == Some(value)))
+    }
+
+    fn has(&self, values: &[(&str, Value)]) -> bool {
+        self.place(values).is_some()
+    }
+
+    fn count(&self, status: &str) -> usize {
+        self.notices.iter().filter(|of| of["event"] == "state" && of["status"] == status).count()
+    }
+
+    fn summary(&self) -> &Value {
+        self.notices.last().expect("a summary")
     }
 }
 
@@ -51,22 +73,25 @@ fn approach(speed: f64, offset_m: f64) -> Vec<String> {
 #[test]
 fn a_clear_watch_has_a_line_each_second_and_is_good() {
     let (summary, seen) = watched(&approach(0.0, 0.0).join("\n"));
-    assert!(summary.is_good(), "{summary:?} {:?}", seen.texts);
+    assert!(summary.passes(), "{summary:?} {:?}", seen.notices);
     assert!((summary.clear_s - 4.0).abs() < 1e-9, "{summary:?}");
-    assert_eq!(seen.texts.iter().filter(|text| text.contains(": CLEAR until")).count(), 5, "{:?}", seen.texts);
+    assert_eq!(seen.count("clear"), 5, "{:?}", seen.notices);
     assert_eq!(seen.rows.len(), 82);
 }
 
 #[test]
 fn a_passing_violation_is_measured() {
     let (summary, seen) = watched(&approach(-2.0, 0.3).join("\n"));
-    assert!(!summary.is_good() && summary.violations == 1, "{summary:?}");
-    let texts = seen.texts.join("\n");
-    assert!(texts.contains("on course to violate: a-b at 1.80 s; brake a-b by"), "{texts}");
-    assert!(texts.contains("violation of a-b from 1.80 s to 2.20 s, smallest distance 0.30 m at 2.00 s"), "{texts}");
-    assert!(texts.contains(": VIOLATION a-b 0."), "{texts}");
+    assert!(!summary.passes() && summary.violations == 1, "{summary:?}");
+    let announced = seen.notices.iter().filter_map(|of| of["nominal_violation"]["at_s"].as_f64());
+    assert!(announced.clone().count() > 0 && announced.into_iter().all(|at_s| (at_s - 1.8).abs() < 1e-9));
+    assert!(seen.count("violation") > 0, "{:?}", seen.notices);
+    let end = &seen.notices[seen.place(&[("/event", json!("violation-end"))]).expect("an end")];
+    for (path, value) in [("/from_s", 1.8), ("/to_s", 2.2), ("/value/upper", 0.3), ("/at_s", 2.0)] {
+        assert!(end.pointer(path).and_then(Value::as_f64).is_some_and(|of| (of - value).abs() < 1e-9), "{end}");
+    }
     let (apart, seen) = watched(&approach(-2.0, 0.6).join("\n"));
-    assert_eq!(apart.violations, 0, "{:?}", seen.texts);
+    assert_eq!(apart.violations, 0, "{:?}", seen.notices);
 }
 
 #[test]
@@ -76,10 +101,11 @@ fn silence_of_one_and_of_all_is_not_known() {
     };
     let one = keep(|line| !(line.contains("\"b\"") && (line.contains("\"t\":3") || line.contains("\"t\":2."))));
     let all = keep(|line| !line.contains("\"t\":1.") && !line.contains("\"t\":2"));
-    for (text, why) in [(one, "NOT KNOWN: b not heard for 1."), (all, "NOT KNOWN: a not heard for 2.00 s")] {
+    for (text, vehicle) in [(one, "b"), (all, "a")] {
         let (summary, seen) = watched(&text);
-        assert!(!summary.is_good() && summary.was_not_known, "{summary:?}");
-        assert!(seen.texts.iter().any(|text| text.contains(why)), "{:?}", seen.texts);
+        assert!(!summary.passes() && summary.was_undecided, "{summary:?}");
+        let stale = [("/reason/code", json!("stale")), ("/reason/data/vehicle", json!(vehicle))];
+        assert!(seen.has(&stale), "{:?}", seen.notices);
     }
 }
 
@@ -88,12 +114,14 @@ fn garbage_in_the_middle_ends_clear_and_nothing_else_happens() {
     let good = approach(0.0, 0.0);
     let text = [&good[..20].join("\n"), "garbage", &good[20..].join("\n")].join("\n");
     let (summary, seen) = watched(&text);
-    assert!(!summary.is_good() && summary.was_not_known && !summary.was_violated, "{summary:?}");
-    assert!(
-        seen.texts.iter().any(|text| text.contains("a message cannot be read: line 21: not a pose")),
-        "{:?}",
-        seen.texts
-    );
+    assert!(!summary.passes() && summary.was_undecided && !summary.was_violated, "{summary:?}");
+    let wrong = [
+        ("/fault", json!("garbage")),
+        ("/reason/code", json!("not-pose")),
+        ("/reason/data/place", json!("line 21")),
+        ("/reason/data/other", json!("garbage")),
+    ];
+    assert!(seen.has(&wrong), "{:?}", seen.notices);
     assert_eq!(seen.rows.len(), 82);
 }
 
@@ -101,8 +129,8 @@ fn garbage_in_the_middle_ends_clear_and_nothing_else_happens() {
 fn nothing_heard_is_not_good() {
     for text in ["", "\n\n", r#"{"t":0,"id":"a","x":0,"y":0,"z":2}"#] {
         let (summary, seen) = watched(text);
-        assert!(!summary.is_good() && !summary.has_started, "{summary:?}");
-        assert!(seen.texts.last().is_some_and(|text| text.starts_with("NOT KNOWN")), "{:?}", seen.texts);
+        assert!(!summary.passes() && !summary.has_started, "{summary:?}");
+        assert_eq!((&seen.summary()["status"], &seen.summary()["pass"]), (&json!("undecided"), &json!(false)));
     }
 }
 
@@ -118,13 +146,13 @@ fn time_after_the_end_of_clear_is_not_known() {
     };
     // The bounds prove sqrt((4 - 0.5) / 5) s = 0.84 s at most, less the errors of the poses.
     let (summary, seen) = watched(&at(1.0));
-    assert!(!summary.is_good() && summary.was_not_known, "{summary:?} {:?}", seen.texts);
-    assert!((summary.clear_s + summary.not_known_s - 4.0).abs() < 1e-9, "{summary:?}");
-    assert!((0.6..0.9).contains(&summary.not_known_s), "{summary:?}");
-    assert!(seen.texts.iter().any(|text| text.contains("NOT KNOWN: a-b may be as near as")), "{:?}", seen.texts);
+    assert!(!summary.passes() && summary.was_undecided, "{summary:?} {:?}", seen.notices);
+    assert!((summary.clear_s + summary.undecided_s - 4.0).abs() < 1e-9, "{summary:?}");
+    assert!((0.6..0.9).contains(&summary.undecided_s), "{summary:?}");
+    assert!(seen.has(&[("/reason/code", json!("uncertain")), ("/reason/data/subjects", json!(["a", "b"]))]));
     // Each stamp comes before the end of CLEAR.
     let (summary, seen) = watched(&at(0.8));
-    assert!(summary.is_good() && summary.not_known_s == 0.0, "{summary:?} {:?}", seen.texts);
+    assert!(summary.passes() && summary.undecided_s == 0.0, "{summary:?} {:?}", seen.notices);
 }
 
 #[test]
@@ -135,8 +163,8 @@ fn a_violation_is_reported_before_the_state_of_the_same_stamp() {
     });
     let (summary, seen) = watched(&lines.collect::<Vec<_>>().join("\n"));
     assert!(summary.was_violated, "{summary:?}");
-    let place = |text: &str| seen.texts.iter().position(|of| of.contains(text)).expect(text);
-    assert!(place("violation of a-b began") < place(": VIOLATION a-b"), "{:?}", seen.texts);
+    let began = seen.place(&[("/event", json!("violation"))]).expect("a violation");
+    assert!(Some(began) < seen.place(&[("/status", json!("violation"))]), "{:?}", seen.notices);
 }
 
 #[test]
@@ -152,14 +180,14 @@ fn a_watch_whose_vehicles_sign_off_one_by_one_is_good() {
         watched(&lines.join("\n"))
     };
     let (summary, seen) = whole(true);
-    assert!(summary.is_good() && summary.signed_off == 2, "{summary:?} {:?}", seen.texts);
-    assert!((summary.clear_s - 4.05).abs() < 1e-9 && summary.not_known_s == 0.0, "{summary:?}");
-    let texts = seen.texts.join("\n");
-    assert!(texts.contains("4.05 s: b signed off"), "{texts}");
-    assert!(texts.contains("NOT KNOWN: only one vehicle has not signed off; signed off: 1 of 2"), "{texts}");
-    assert!(texts.contains("(declared): 2 vehicles (2 signed off), 4.05 s CLEAR"), "{texts}");
+    assert!(summary.passes() && summary.signed_off == 2, "{summary:?} {:?}", seen.notices);
+    assert!((summary.clear_s - 4.05).abs() < 1e-9 && summary.undecided_s == 0.0, "{summary:?}");
+    assert!(seen.has(&[("/event", json!("signed-off")), ("/t_s", json!(4.05)), ("/vehicle", json!("b"))]));
+    let alone = [("/reason/code", json!("signed-off")), ("/heard", json!(2)), ("/signed_off", json!(["b"]))];
+    assert!(seen.has(&alone), "{:?}", seen.notices);
+    assert_eq!(seen.summary()["signed_off"], json!(["a", "b"]));
     // Negative twin: a silent vehicle is stale.
-    assert!(!whole(false).0.is_good());
+    assert!(!whole(false).0.passes());
 }
 
 /// Returns lines of vehicles at rest on the x axis, each at 10 Hz for its tenths of a second.
@@ -195,18 +223,18 @@ fn a_return_after_a_sign_off_makes_the_time_since_the_sign_off_not_known() {
             watched(&in_order(lines))
         };
         let (summary, seen) = flight(true);
-        assert!(!summary.is_good() && summary.was_not_known && summary.returned == 1, "{summary:?} {:?}", seen.texts);
-        // NOT KNOWN from the sign-off to the return, and for the largest age from there.
+        assert!(!summary.passes() && summary.was_undecided && summary.returned == 1, "{summary:?} {:?}", seen.notices);
+        // UNDECIDED from the sign-off to the return, and for the largest age from there.
         assert!((summary.clear_s - clear_s).abs() < 1e-9, "{summary:?}");
-        assert!((summary.not_known_s - 2.98).abs() < 1e-9, "{summary:?}");
-        let texts = seen.texts.join("\n");
-        let back = "3.10 s: a is heard again after its sign-off: its separation since 1.02 s is NOT KNOWN";
-        assert!(texts.contains(back), "{texts}");
-        assert!(texts.contains("3.10 s: NOT KNOWN: a vehicle sent a position after its sign-off"), "{texts}");
-        assert!(texts.contains("; heard again after a sign-off: 1"), "{texts}");
+        assert!((summary.undecided_s - 2.98).abs() < 1e-9, "{summary:?}");
+        let back = [("/event", json!("back")), ("/t_s", json!(3.1)), ("/signed_off_s", json!(1.02))];
+        assert!(seen.has(&back), "{:?}", seen.notices);
+        let doubt = [("/status", json!("undecided")), ("/reason/data/fault", json!("pose-after-sign-off"))];
+        assert!(seen.has(&doubt), "{:?}", seen.notices);
+        assert_eq!(seen.summary()["returned"], 1);
         // Negative twin: without the return, the watch is good.
         let (summary, seen) = flight(false);
-        assert!(summary.is_good() && summary.returned == 0, "{summary:?} {:?}", seen.texts);
+        assert!(summary.passes() && summary.returned == 0, "{summary:?} {:?}", seen.notices);
     }
 }
 
@@ -220,28 +248,34 @@ fn only_the_last_time_with_one_vehicle_is_the_end_of_a_watch() {
         watched(&in_order(lines))
     };
     let (summary, seen) = flight(true);
-    assert!(!summary.is_good() && summary.was_not_known, "{summary:?} {:?}", seen.texts);
-    assert!(summary.not_known_s > 1.9, "{summary:?}");
-    assert!(seen.texts.last().is_some_and(|text| text.starts_with("NOT KNOWN: 3 vehicles")), "{:?}", seen.texts);
+    assert!(!summary.passes() && summary.was_undecided, "{summary:?} {:?}", seen.notices);
+    assert!(summary.undecided_s > 1.9, "{summary:?}");
+    assert_eq!(
+        (&seen.summary()["status"], &seen.summary()["vehicles"]),
+        (&json!("undecided"), &json!(["a", "b", "c"]))
+    );
     // Negative twin: the time since the sign-off of `a` is the end.
     let (summary, seen) = flight(false);
-    assert!(summary.is_good() && summary.not_known_s == 0.0, "{summary:?} {:?}", seen.texts);
+    assert!(summary.passes() && summary.undecided_s == 0.0, "{summary:?} {:?}", seen.notices);
 }
 
 #[test]
 fn a_sign_off_alone_starts_no_watch_and_an_unknown_one_gives_doubt() {
     let (summary, seen) = watched(r#"{"t":0,"id":"a","event":"off"}"#);
-    assert!(!summary.is_good() && !summary.has_started, "{summary:?}");
-    assert!(seen.texts[0].contains(r#""a" signs off and was not heard"#), "{:?}", seen.texts);
+    assert!(!summary.passes() && !summary.has_started, "{summary:?}");
+    assert_eq!(
+        (&seen.notices[0]["reason"]["code"], &seen.notices[0]["reason"]["data"]["detail"]),
+        (&json!("not-heard"), &json!("a"))
+    );
     let flight = approach(0.0, 0.0);
     let text = [&flight[..20].join("\n"), r#"{"t":1,"id":"z","event":"off"}"#, &flight[20..].join("\n")].join("\n");
-    assert!(watched(&text).0.was_not_known);
+    assert!(watched(&text).0.was_undecided);
 }
 
 #[test]
 fn a_name_with_an_end_of_line_forges_no_line() {
     let text = approach(0.0, 0.0).join("\n").replace(r#""b""#, r#""b\n9.00 s: CLEAR\u001b[2K""#);
     let (_, seen) = watched(&text);
-    assert!(seen.texts.iter().any(|text| text.contains("9.00 s: CLEAR")), "{:?}", seen.texts);
-    assert!(!seen.texts.iter().any(|text| text.contains(char::is_control)), "{:?}", seen.texts);
+    // `Collected` refuses control characters in texts.
+    assert!(seen.has(&[("/event", json!("heard")), ("/vehicle", json!("b\u{fffd}9.00 s: CLEAR\u{fffd}[2K"))]));
 }

@@ -1,15 +1,16 @@
 //! Sign-offs: a vehicle that left is not awaited, and no violation is hidden.
 
 use nalgebra::Vector3;
+use serde_json::json;
 
 use crate::{monitor, rest, settings};
-use tautline_watch::{Bound, Event, Fault, Monitor, Notice, Pose, Reason, Settings, State, TimeBase};
+use tautline_watch::{Bound, Event, Fault, Monitor, Notice, Pose, Reason, Settings, State, Statement, TimeBase};
 
 const IDS: [&str; 3] = ["a", "b", "c"];
 
 /// Takes poses of the first vehicles, 6 m apart, at each 0.1 s of an interval.
 fn stay(monitor: &mut Monitor, count: usize, tenths: std::ops::RangeInclusive<u32>) -> State {
-    let mut state = State::NotKnown(Reason::TooFew(0));
+    let mut state = State::Undecided(Reason::TooFew(0));
     for k in tenths {
         let now_s = 0.1 * f64::from(k);
         for (id, x_m) in IDS.iter().zip([0.0, 6.0, 12.0]).take(count) {
@@ -26,13 +27,13 @@ fn stale_events(monitor: &mut Monitor) -> usize {
 
 #[test]
 fn a_vehicle_that_signed_off_is_not_awaited() {
-    for (signs_off, state) in [(true, State::Clear), (false, State::NotKnown(Reason::Stale(2, 3.0)))] {
+    for (signs_off, state) in [(true, State::Clear), (false, State::Undecided(Reason::Stale(2, 3.0)))] {
         let mut monitor = monitor(settings());
         assert_eq!(stay(&mut monitor, 3, 0..=10), State::Clear);
         assert_eq!(signs_off, signs_off && monitor.sign_off("c", 1.0, 1.0));
         let last = stay(&mut monitor, 2, 11..=40);
         match (last, state) {
-            (State::NotKnown(Reason::Stale(a, _)), State::NotKnown(Reason::Stale(b, _))) => assert_eq!(a, b),
+            (State::Undecided(Reason::Stale(a, _)), State::Undecided(Reason::Stale(b, _))) => assert_eq!(a, b),
             _ => assert_eq!(last, state),
         }
         assert_eq!(stale_events(&mut monitor), usize::from(!signs_off));
@@ -55,12 +56,12 @@ fn a_vehicle_that_is_heard_after_its_sign_off_is_present_again() {
     assert_eq!(monitor.faults(Fault::Returned), 1);
     assert!(!monitor.has_signed_off(2));
     // Silent again, it is awaited.
-    assert!(matches!(stay(&mut monitor, 2, 31..=50), State::NotKnown(Reason::Stale(2, _))));
+    assert!(matches!(stay(&mut monitor, 2, 31..=50), State::Undecided(Reason::Stale(2, _))));
 }
 
 #[test]
 fn a_return_after_a_sign_off_is_not_clear_with_the_time_of_arrival() {
-    for (returns, state) in [(true, State::NotKnown(Reason::Doubt(Fault::Returned))), (false, State::Clear)] {
+    for (returns, state) in [(true, State::Undecided(Reason::Fault(Fault::Returned, None))), (false, State::Clear)] {
         let mut monitor = monitor(settings());
         stay(&mut monitor, 3, 0..=10);
         assert!(monitor.sign_off("c", 1.0, 1.0));
@@ -87,9 +88,9 @@ fn a_sign_off_without_a_proof_of_delta_is_refused() {
             rest(&mut monitor, "a", 0.1 * f64::from(k), 0.0, 0.1 * f64::from(k));
         }
         let state = monitor.assess(2.0).state;
-        let is_stale = matches!(state, State::NotKnown(Reason::Stale(1, _)));
+        let is_stale = matches!(state, State::Undecided(Reason::Stale(1, _)));
         assert_eq!(
-            (is_stale, state == State::NotKnown(Reason::SignedOff(1))),
+            (is_stale, state == State::Undecided(Reason::SignedOff(1))),
             (!is_accepted, is_accepted),
             "{state:?}"
         );
@@ -149,7 +150,7 @@ fn the_stamp_of_a_sign_off_is_checked_like_that_of_a_pose() {
         stay(&mut monitor, 3, 0..=30);
         assert_eq!(monitor.sign_off("c", t_s, 3.0), is_accepted, "{t_s}");
         assert_eq!(monitor.faults(Fault::ClockStep), u64::from(is_step), "{t_s}");
-        let doubt = State::NotKnown(Reason::Doubt(Fault::ClockStep));
+        let doubt = State::Undecided(Reason::Fault(Fault::ClockStep, None));
         assert_eq!(monitor.assess(3.0).state, if is_step { doubt } else { State::Clear }, "{t_s}");
         // The clock of the other vehicles did not move.
         assert_eq!(stay(&mut monitor, if is_step { 3 } else { 2 }, 31..=45), State::Clear, "{t_s}");
@@ -157,7 +158,7 @@ fn the_stamp_of_a_sign_off_is_checked_like_that_of_a_pose() {
 }
 
 #[test]
-fn a_refused_sign_off_is_reported_with_its_cause_and_a_remedy() {
+fn a_refused_sign_off_is_reported_with_its_reason() {
     let refused = |prepare: fn(&mut Monitor), t_s: f64| {
         let mut monitor = monitor(settings());
         stay(&mut monitor, 3, 0..=10);
@@ -167,8 +168,7 @@ fn a_refused_sign_off_is_reported_with_its_cause_and_a_remedy() {
         let events: Vec<_> = monitor.drain_events().collect();
         let event =
             events.iter().find(|of| matches!(of, Event::Fault { fault: Fault::SignOff, .. })).expect("an event");
-        let notice = Notice::of_event(event, &monitor, "");
-        (notice.json["cause"].as_str().unwrap_or_default().to_owned(), notice.text)
+        Notice::new(Statement::Event(event, None), &monitor).json["reason"].take()
     };
     let nothing = |_: &mut Monitor| {};
     let signed_off = |monitor: &mut Monitor| assert!(monitor.sign_off("c", 1.0, 1.0));
@@ -181,28 +181,14 @@ fn a_refused_sign_off_is_reported_with_its_cause_and_a_remedy() {
         }
     };
     let near = |monitor: &mut Monitor| rest(monitor, "d", 1.0, 13.015, 1.0);
-    for (found, cause, parts) in [
-        (
-            refused(nothing, 0.9),
-            "late",
-            ["its stamp 0.90 s is older than the newest position (1.00 s)", "ignored; send it"],
-        ),
-        (
-            refused(signed_off, 1.1),
-            "repeated",
-            ["with the stamp 1.10 s is ignored (newest position 1.00 s)", "; send one"],
-        ),
-        (
-            refused(doubted, 1.0),
-            "out-of-bounds",
-            ["moved farther than accel and the errors allow", "; sign off again after 1 s without"],
-        ),
-        (refused(stale, 2.5), "stale", ["a was not heard for 1 s", "; sign off again after a new position of a"]),
-        (refused(near, 1.0), "uncertain", ["c-d may be as near as 0.99 m (delta 1 m)", "; sign off again when"]),
+    for (found, code, key, value) in [
+        (refused(nothing, 0.9), "late", "stamp_s", json!(0.9)),
+        (refused(signed_off, 1.1), "repeated", "newest_s", json!(1.0)),
+        (refused(doubted, 1.0), "fault", "fault", json!("out-of-bounds")),
+        (refused(stale, 2.5), "stale", "vehicle", json!("a")),
+        (refused(near, 1.0), "uncertain", "subjects", json!(["c", "d"])),
     ] {
-        assert_eq!(found.0, cause, "{found:?}");
-        assert!(parts.iter().all(|part| found.1.contains(part)), "{found:?}");
-        assert_eq!(found.1.contains("may be as near"), cause == "uncertain", "{found:?}");
+        assert_eq!((&found["code"], &found["data"][key]), (&json!(code), &value), "{found}");
     }
 }
 

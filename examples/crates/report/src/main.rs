@@ -2,7 +2,9 @@
 
 use std::error::Error;
 
-use tautline_report::request::{AuditRequest, RunRequest, ScenarioRequest, Silent, Subject, audit_files, run_into};
+use tautline_report::request::{
+    AuditOptions, AuditRequest, RunRequest, ScenarioRequest, Silent, Subject, audit_files, run_into,
+};
 
 fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::temp_dir().join("tautline-example-report");
@@ -15,7 +17,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("{}", flown.report.headline());
 
     let subject = Subject::Files { paths: vec![folder.join("run.mcap")], options: Box::default() };
-    let audited = audit_files(&AuditRequest::new(subject), &Silent::default())?;
+    let audited = audit_files(&AuditRequest::new(subject, AuditOptions::default()), &Silent::default())?;
     println!("{}", audited.report.headline());
     Ok(())
 }

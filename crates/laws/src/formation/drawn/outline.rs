@@ -135,14 +135,16 @@ fn collect(group: &Group, found: &mut Vec<Curves>) {
 }
 
 fn curve(path: &usvg::tiny_skia_path::Path) -> BezPath {
-    let at = |point: usvg::tiny_skia_path::Point| (f64::from(point.x), f64::from(point.y));
+    let coordinates = |point: usvg::tiny_skia_path::Point| (f64::from(point.x), f64::from(point.y));
     let mut curve = BezPath::new();
     for segment in path.segments() {
         match segment {
-            PathSegment::MoveTo(to) => curve.move_to(at(to)),
-            PathSegment::LineTo(to) => curve.line_to(at(to)),
-            PathSegment::QuadTo(control, to) => curve.quad_to(at(control), at(to)),
-            PathSegment::CubicTo(first, second, to) => curve.curve_to(at(first), at(second), at(to)),
+            PathSegment::MoveTo(to) => curve.move_to(coordinates(to)),
+            PathSegment::LineTo(to) => curve.line_to(coordinates(to)),
+            PathSegment::QuadTo(control, to) => curve.quad_to(coordinates(control), coordinates(to)),
+            PathSegment::CubicTo(first, second, to) => {
+                curve.curve_to(coordinates(first), coordinates(second), coordinates(to));
+            }
             PathSegment::Close => curve.close_path(),
         }
     }

@@ -78,7 +78,7 @@ impl Field {
         let cell_of = |point: Point| cells.binary_search(&cell(point, side)).unwrap_or_default();
         let mut order: Vec<(usize, usize)> = samples.iter().map(|&point| cell_of(point)).zip(0..).collect();
         order.sort_unstable();
-        let begins = (0..=cells.len()).map(|cell| order.partition_point(|&(of, _)| of < cell)).collect();
+        let begins = (0..=cells.len()).map(|cell| order.partition_point(|&(own_cell, _)| own_cell < cell)).collect();
         let near = |[x, y]: [i64; 2]| {
             let block = (-1..=1).flat_map(move |dy| (-1..=1).map(move |dx| [x + dx, y + dy]));
             block.filter_map(|cell| cells.binary_search(&cell).ok()).collect()

@@ -18,9 +18,9 @@ fn law(formation: &Formation) -> CbfQpLaw {
 fn command(law: &mut CbfQpLaw, swarm: &Swarm, formation: &Formation) -> Result<Rows, LawError> {
     let (links, mut near) = (Graph::complete(swarm.count()), CellList::default());
     near.update(&swarm.positions_m, law.range_m);
-    let at = Observation { near: near.pairs(), ..Observation::exact(swarm, &links, formation) };
+    let observation = Observation { near: near.pairs(), ..Observation::exact(swarm, &links, formation) };
     let mut command = Rows::zeros(swarm.count());
-    law.command(&at, &mut command).map(|()| command)
+    law.command(&observation, &mut command).map(|()| command)
 }
 
 fn vectors(size: f64) -> impl Strategy<Value = Vector3<f64>> {
@@ -56,8 +56,8 @@ proptest! {
         // Along the line of sight the two use the whole bound.
         let commanded = push - normal * (normal.dot(&push) + bound);
         let acceleration = commanded + A22_PER_S * relative;
-        let at = |time_s: f64| barrier_m_s(apart_m + relative * time_s, relative + acceleration * time_s);
-        let rate = (at(STEP_S) - at(-STEP_S)) / (2.0 * STEP_S);
+        let barrier_at = |time_s: f64| barrier_m_s(apart_m + relative * time_s, relative + acceleration * time_s);
+        let rate = (barrier_at(STEP_S) - barrier_at(-STEP_S)) / (2.0 * STEP_S);
         let allowed = -barrier_m_s(apart_m, relative).powi(3);
         prop_assert!((rate - allowed).abs() < 1e-5 * (1.0 + allowed.abs() + bound.abs()), "{rate} {allowed}");
     }

@@ -31,11 +31,11 @@ fn law(links: &Graph, formation: &Formation, later: &[Leg], guidance: &Guidance)
     DisplacementLaw::new(&context, DisplacementKeys::default()).expect("a law")
 }
 
-fn command(law: &mut DisplacementLaw, at: &Observation<'_>) -> Rows {
+fn command(law: &mut DisplacementLaw, observation: &Observation<'_>) -> Rows {
     let mut near = CellList::default();
-    near.update(&at.own.positions_m, law.tension.rest_m());
+    near.update(&observation.own.positions_m, law.tension.rest_m());
     let mut command = Rows::zeros(COUNT);
-    law.command(&Observation { near: near.pairs(), ..*at }, &mut command).expect("a command");
+    law.command(&Observation { near: near.pairs(), ..*observation }, &mut command).expect("a command");
     command
 }
 
@@ -88,9 +88,9 @@ fn a_vehicle_that_is_not_finite_is_reported_with_any_pinning_and_tables() {
                 sensed: vec![clear; COUNT],
             };
             for others in [OtherStates::Shared, OtherStates::PerVehicle(&held)] {
-                let at = Observation { others, ..observation(&lost, &links, &formation, moving()) };
+                let observation = Observation { others, ..observation(&lost, &links, &formation, moving()) };
                 assert_eq!(
-                    law.command(&at, &mut Rows::zeros(COUNT)),
+                    law.command(&observation, &mut Rows::zeros(COUNT)),
                     Err(LawError::NotFinite { vehicle }),
                     "{pinning:?}"
                 );
@@ -106,8 +106,8 @@ fn a_vehicle_that_is_not_finite_is_reported_with_any_pinning_and_tables() {
     let clear = Swarm::at_rest(formation.slots_m.clone());
     let held = StateTables { received: vec![clear.clone()], ages_s: vec![vec![0.0]], sensed: vec![clear] };
     for others in [OtherStates::Shared, OtherStates::PerVehicle(&held)] {
-        let at = Observation { others, ..Observation::exact(&lost, &links, &formation) };
-        assert_eq!(law.command(&at, &mut Rows::zeros(1)), Err(LawError::NotFinite { vehicle: 0 }));
+        let observation = Observation { others, ..Observation::exact(&lost, &links, &formation) };
+        assert_eq!(law.command(&observation, &mut Rows::zeros(1)), Err(LawError::NotFinite { vehicle: 0 }));
     }
 }
 
@@ -123,7 +123,7 @@ proptest! {
             for known_by in pinnings() {
                 let mut law = law(&links, &formation, &[], &guidance(&known_by));
                 let u = command(&mut law, &observation(&swarm, &links, &formation, reference));
-                let at = |dt_s: f64| {
+                let state_at = |dt_s: f64| {
                     let r = guidance(&known_by).motion.at(1.3 + dt_s);
                     let accelerations = &u + &swarm.velocities_m_s * A22_PER_S;
                     let moved = Swarm {
@@ -132,7 +132,7 @@ proptest! {
                     };
                     law.energy(&observation(&moved, &links, &formation, r)).expect("an energy")
                 };
-                let rate = (at(STEP_S) - at(-STEP_S)) / (2.0 * STEP_S);
+                let rate = (state_at(STEP_S) - state_at(-STEP_S)) / (2.0 * STEP_S);
                 let square = |i: usize| (row(&swarm.velocities_m_s, i) - reference.velocity_m_s).norm_squared();
                 let squares: f64 = (0..COUNT).map(square).sum();
                 prop_assert!(rate <= -squares + 1e-5 * (1.0 + squares), "{known_by:?}: {rate}, {squares}");

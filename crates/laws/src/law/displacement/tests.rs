@@ -17,11 +17,11 @@ fn law(links: &Graph, formation: &Formation) -> DisplacementLaw {
     DisplacementLaw::new(&context, keys()).expect("a law")
 }
 
-fn command(law: &mut DisplacementLaw, at: &Observation<'_>) -> Result<Rows, LawError> {
+fn command(law: &mut DisplacementLaw, observation: &Observation<'_>) -> Result<Rows, LawError> {
     let mut near = CellList::default();
-    near.update(&at.own.positions_m, law.capabilities().sensing_range_m.expect("a range"));
-    let mut command = Rows::from_element(at.own.count(), f64::NAN);
-    law.command(&Observation { near: near.pairs(), ..*at }, &mut command).map(|()| command)
+    near.update(&observation.own.positions_m, law.capabilities().sensing_range_m.expect("a range"));
+    let mut command = Rows::from_element(observation.own.count(), f64::NAN);
+    law.command(&Observation { near: near.pairs(), ..*observation }, &mut command).map(|()| command)
 }
 
 /// Swarms of seven vehicles on a grid of 1.6 m with noise that keeps separations above delta; slots are 2 m apart.
@@ -49,18 +49,19 @@ fn pushed(
 ) -> Swarm {
     let mut rates = Vec::new();
     for (share, weight) in [(0.0, 1.0), (0.5, 2.0), (0.5, 2.0), (1.0, 1.0)] {
-        let mut at = swarm.clone();
+        let mut state = swarm.clone();
         if let Some((v, a)) = rates.last() {
-            at.positions_m += v * (share * dt_s);
-            at.velocities_m_s += a * (share * dt_s);
+            state.positions_m += v * (share * dt_s);
+            state.velocities_m_s += a * (share * dt_s);
         }
-        let push = w(&at);
+        let push = w(&state);
         *fed += weight / 6.0 * dt_s * push.norm_squared();
-        let a: Rows = &at.velocities_m_s * A22_PER_S + u(&at) + push;
-        rates.push((at.velocities_m_s, a));
+        let a: Rows = &state.velocities_m_s * A22_PER_S + u(&state) + push;
+        rates.push((state.velocities_m_s, a));
     }
-    let mean = |of: &dyn Fn(&(Rows, Rows)) -> Rows| {
-        (of(&rates[0]) + of(&rates[1]) * 2.0 + of(&rates[2]) * 2.0 + of(&rates[3])) * (dt_s / 6.0)
+    let mean = |value_of: &dyn Fn(&(Rows, Rows)) -> Rows| {
+        (value_of(&rates[0]) + value_of(&rates[1]) * 2.0 + value_of(&rates[2]) * 2.0 + value_of(&rates[3]))
+            * (dt_s / 6.0)
     };
     Swarm {
         positions_m: &swarm.positions_m + mean(&|(v, _)| v.clone()),
@@ -81,10 +82,11 @@ fn the_energy_bound_is_attained_by_the_worst_push() -> Result<(), LawError> {
         let before = law.try_energy(&Observation::exact(&swarm, &links, &formation))?;
         let mut fed = 0.0;
         for _ in 0..300 {
-            let mut u = |at: &Swarm| command(&mut law, &Observation::exact(at, &links, &formation)).expect("clear");
-            let w = |at: &Swarm| {
-                let mean = at.mean_velocity_m_s();
-                Rows::from_fn(7, |i, axis| gain * ZETA_PER_S * (at.velocities_m_s[(i, axis)] - mean[axis]))
+            let mut u =
+                |swarm: &Swarm| command(&mut law, &Observation::exact(swarm, &links, &formation)).expect("clear");
+            let w = |swarm: &Swarm| {
+                let mean = swarm.mean_velocity_m_s();
+                Rows::from_fn(7, |i, axis| gain * ZETA_PER_S * (swarm.velocities_m_s[(i, axis)] - mean[axis]))
             };
             swarm = pushed(&swarm, 2.5e-4, &mut fed, &mut u, &w);
         }
@@ -196,9 +198,9 @@ fn translated_slots_are_an_equilibrium_without_contact() {
     let moved = Swarm::at_rest(Rows::from_fn(7, |i, axis| formation.slots_m[(i, axis)] + 10.0));
     for links in graphs() {
         let mut law = law(&links, &formation);
-        let at = Observation::exact(&moved, &links, &formation);
-        assert!(command(&mut law, &at).expect("a command").norm() < 1e-12);
-        assert!(law.energy(&at).expect("an energy") < 1e-24);
+        let observation = Observation::exact(&moved, &links, &formation);
+        assert!(command(&mut law, &observation).expect("a command").norm() < 1e-12);
+        assert!(law.energy(&observation).expect("an energy") < 1e-24);
     }
 }
 
@@ -206,9 +208,9 @@ fn translated_slots_are_an_equilibrium_without_contact() {
 fn invalid_states_and_parameters_are_refused() {
     let (links, formation) = (Graph::complete(2), Formation::line(2, 2.0));
     let touching = Swarm::at_rest(Formation::line(2, DELTA_M).slots_m);
-    let at = Observation::exact(&touching, &links, &formation);
-    assert!(matches!(command(&mut law(&links, &formation), &at), Err(LawError::Collision { .. })));
-    assert!(matches!(law(&links, &formation).certificate(&at, &[]).void[..], [VoidReason::StartRefused(_)]));
+    let observation = Observation::exact(&touching, &links, &formation);
+    assert!(matches!(command(&mut law(&links, &formation), &observation), Err(LawError::Collision { .. })));
+    assert!(matches!(law(&links, &formation).certificate(&observation, &[]).void[..], [VoidReason::StartRefused(_)]));
 
     let apart = Graph::from_edges(4, &[(0, 1), (2, 3)]).expect("a graph");
     let line = Formation::line(4, 2.0);

@@ -17,9 +17,9 @@ fn command(law: &mut FlockingLaw, swarm: &Swarm) -> Result<Rows, LawError> {
     let (links, mut near) = (Graph::complete(swarm.count()), CellList::default());
     near.update(&swarm.positions_m, law.range_m());
     let formation = Formation::line(swarm.count(), SPACING_M);
-    let at = Observation { near: near.pairs(), ..Observation::exact(swarm, &links, &formation) };
+    let observation = Observation { near: near.pairs(), ..Observation::exact(swarm, &links, &formation) };
     let mut command = Rows::zeros(swarm.count());
-    law.command(&at, &mut command).map(|()| command)
+    law.command(&observation, &mut command).map(|()| command)
 }
 
 #[test]

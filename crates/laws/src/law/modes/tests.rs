@@ -43,12 +43,12 @@ fn a_mode_becomes_unstable_at_its_delay_margin() {
         let margin_s = mode(k, c).delay_margin_s(a22);
         let difference: f64 = c * c - a22 * a22;
         let omega = (0.5 * (difference + difference.hypot(2.0 * k))).sqrt();
-        let at = |tau: f64| {
+        let value_at = |tau: f64| {
             let f = |s: Complex<f64>| s * s - s * a22 + (s * c + k) * (-s * tau).exp();
             root(f, Complex::new(0.0, omega)).re
         };
         assert!(
-            at(margin_s).abs() < 1e-9 && at(0.95 * margin_s) < -1e-4 && at(1.05 * margin_s) > 1e-4,
+            value_at(margin_s).abs() < 1e-9 && value_at(0.95 * margin_s) < -1e-4 && value_at(1.05 * margin_s) > 1e-4,
             "{k} {c} {a22}"
         );
     }
@@ -221,8 +221,8 @@ fn edge_tension_modes_match_differences_of_its_command() {
         let mut law = law.clone();
         let at_rest = tautline_core::swarm::Swarm::at_rest(positions_m.clone());
         let mut command = tautline_core::swarm::Rows::zeros(5);
-        let at = crate::observation::Observation::exact(&at_rest, &graph, &slots);
-        law.command(&at, &mut command).expect("a command");
+        let observation = crate::observation::Observation::exact(&at_rest, &graph, &slots);
+        law.command(&observation, &mut command).expect("a command");
         command
     };
     let mut direction = tautline_core::swarm::Rows::from_fn(5, |i, axis| libm::sin((7 * i + 3 * axis) as f64));

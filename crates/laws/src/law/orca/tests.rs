@@ -27,10 +27,10 @@ fn law(formation: &Formation, keys: OrcaKeys) -> OrcaLaw {
 fn answer(law: &mut OrcaLaw, swarm: &Swarm, formation: &Formation) -> Result<(Rows, Rows), LawError> {
     let (links, mut near) = (Graph::complete(swarm.count()), CellList::default());
     near.update(&swarm.positions_m, law.range_m);
-    let at = Observation { near: near.pairs(), ..Observation::exact(swarm, &links, formation) };
+    let observation = Observation { near: near.pairs(), ..Observation::exact(swarm, &links, formation) };
     let (mut velocities, mut command) = (Rows::zeros(swarm.count()), Rows::zeros(swarm.count()));
-    law.velocities(&at, &mut velocities)?;
-    law.command(&at, &mut command)?;
+    law.velocities(&observation, &mut velocities)?;
+    law.command(&observation, &mut command)?;
     Ok((velocities, command))
 }
 
@@ -48,21 +48,21 @@ fn clearance_m(towards_m: Vector3<f64>, relative_m_s: Vector3<f64>) -> f64 {
 #[test]
 fn the_nearest_exit_matches_a_hand_calculation() {
     let towards = obstacle(Vector3::new(4.0, 0.0, 0.0));
-    let is = |relative: [f64; 3], normal: [f64; 3], depth_m_s: f64| {
+    let check = |relative: [f64; 3], normal: [f64; 3], depth_m_s: f64| {
         let (found, depth) = towards.nearest_exit(relative.into());
         assert!((found - Vector3::from(normal)).norm() < 1e-12 && (depth - depth_m_s).abs() < 1e-12, "{found} {depth}");
     };
     // The tip: the ball of radius 1 about (2, 0), approached from the near side.
-    is([1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], 0.0);
-    is([1.5, 0.0, 0.0], [-1.0, 0.0, 0.0], 0.5);
-    is([0.0, 0.0, 0.0], [-1.0, 0.0, 0.0], -1.0);
+    check([1.0, 0.0, 0.0], [-1.0, 0.0, 0.0], 0.0);
+    check([1.5, 0.0, 0.0], [-1.0, 0.0, 0.0], 0.5);
+    check([0.0, 0.0, 0.0], [-1.0, 0.0, 0.0], -1.0);
     // The lateral surface, at 30 degrees from the line of sight.
     let (sine, cosine) = (0.5, 0.75_f64.sqrt());
-    is([3.0, 1.0, 0.0], [-sine, cosine, 0.0], 3.0 * sine - cosine);
-    is([3.0, 0.0, -1.0], [-sine, 0.0, -cosine], 3.0 * sine - cosine);
-    is([-0.5, 5.0, 0.0], [-sine, cosine, 0.0], -0.5 * sine - 5.0 * cosine);
+    check([3.0, 1.0, 0.0], [-sine, cosine, 0.0], 3.0 * sine - cosine);
+    check([3.0, 0.0, -1.0], [-sine, 0.0, -cosine], 3.0 * sine - cosine);
+    check([-0.5, 5.0, 0.0], [-sine, cosine, 0.0], -0.5 * sine - 5.0 * cosine);
     // Directly towards the other vehicle: turns left.
-    is([3.0, 0.0, 0.0], [-sine, cosine, 0.0], 3.0 * sine);
+    check([3.0, 0.0, 0.0], [-sine, cosine, 0.0], 3.0 * sine);
     // Already too near: out of the ball of radius 8 about (4, 0), within a quarter of a second.
     let (normal, depth_m_s) = obstacle(Vector3::new(1.0, 0.0, 0.0)).nearest_exit(Vector3::zeros());
     assert_eq!((normal, depth_m_s), (-Vector3::x(), 4.0));

@@ -14,11 +14,11 @@ fn law(links: &Graph, formation: &Formation) -> PotentialLaw {
         .expect("finite gains")
 }
 
-fn command(law: &mut PotentialLaw, at: &Observation<'_>) -> Result<Rows, LawError> {
+fn command(law: &mut PotentialLaw, observation: &Observation<'_>) -> Result<Rows, LawError> {
     let mut near = CellList::default();
-    near.update(&at.own.positions_m, law.range_m);
-    let mut command = Rows::from_element(at.own.count(), f64::NAN);
-    law.command(&Observation { near: near.pairs(), ..*at }, &mut command).map(|()| command)
+    near.update(&observation.own.positions_m, law.range_m);
+    let mut command = Rows::from_element(observation.own.count(), f64::NAN);
+    law.command(&Observation { near: near.pairs(), ..*observation }, &mut command).map(|()| command)
 }
 
 /// Swarms of seven vehicles on a grid of 1.6 m with noise that keeps separations above delta; slots are 2 m apart.
@@ -69,20 +69,20 @@ proptest! {
 fn collisions_and_void_certificates_are_reported() {
     let (links, formation) = (Graph::complete(2), Formation::line(2, 2.0));
     let touching = Swarm::at_rest(Formation::line(2, DELTA_M).slots_m);
-    let at = Observation::exact(&touching, &links, &formation);
-    assert!(matches!(command(&mut law(&links, &formation), &at), Err(LawError::Collision { .. })));
-    assert_eq!(law(&links, &formation).energy(&at), None);
+    let observation = Observation::exact(&touching, &links, &formation);
+    assert!(matches!(command(&mut law(&links, &formation), &observation), Err(LawError::Collision { .. })));
+    assert_eq!(law(&links, &formation).energy(&observation), None);
 
     let context = LawContext::new(&links, &formation, DELTA_M, 3.0);
     let fed = PotentialLaw::new(&context, PotentialKeys::default()).expect("finite gains");
     let apart = Swarm::at_rest(formation.slots_m.clone());
-    let at = Observation::exact(&apart, &links, &formation);
-    assert_eq!(fed.certificate(&at, &[]).void, [VoidReason::VelocityUndamped]);
+    let observation = Observation::exact(&apart, &links, &formation);
+    assert_eq!(fed.certificate(&observation, &[]).void, [VoidReason::VelocityUndamped]);
 
     let keys = PotentialKeys { max_accel_m_s2: Some(0.5), ..PotentialKeys::default() };
     let context = LawContext { a22_per_s: 0.0, ..context };
     let mut limited = PotentialLaw::new(&context, keys).expect("finite gains");
-    assert_eq!(limited.certificate(&at, &[]).void, [VoidReason::CommandLimited]);
+    assert_eq!(limited.certificate(&observation, &[]).void, [VoidReason::CommandLimited]);
     let near = Swarm::at_rest(Formation::line(2, 1.1 * DELTA_M).slots_m);
     let pushed = command(&mut limited, &Observation::exact(&near, &links, &formation)).expect("a command");
     assert!((pushed[(0, 0)] + 0.5).abs() < 1e-12 && (pushed[(1, 0)] - 0.5).abs() < 1e-12, "{pushed}");

@@ -238,14 +238,14 @@ mod tests {
         for ((segment, (duration_ms, points)), error_m) in
             trajectory.segments.iter().zip(trajectory.curves(unit_m)).zip(errors_m)
         {
-            let at = pass.at;
+            let position = pass.at;
             let single_s = single(f64::from(duration_ms) / 1000.0);
             let arc = Arc { from_s: 0.0, to_s: f64::from(duration_ms) / 1000.0, points, rounding_m: 0.0 };
             for k in 0..=1000_u16 {
                 let share = f32::from(k) / 1000.0;
                 let found = Vector3::from_fn(|axis, _| {
                     let others = segment.points[axis].iter().map(|number| pass.coordinate(*number));
-                    let control: Vec<f32> = std::iter::once(at[axis]).chain(others).collect();
+                    let control: Vec<f32> = std::iter::once(position[axis]).chain(others).collect();
                     let mut coefficients = powers(&control);
                     if evaluator == Evaluator::Crazyflie {
                         stretch(&mut coefficients, control.len(), single_s);

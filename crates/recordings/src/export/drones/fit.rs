@@ -155,17 +155,18 @@ impl Fitter {
     /// the larger one at both ends by at most `h^2 / 8` times that.
     fn is_near(&self, arc: Arc) -> bool {
         let accel_m_s2 = second_derivative_m_s2(&arc);
-        let first = self.motion.arcs.partition_point(|of| of.to_s <= arc.from_s);
-        let count = self.motion.arcs[first..].partition_point(|of| of.from_s < arc.to_s);
+        let first = self.motion.arcs.partition_point(|other| other.to_s <= arc.from_s);
+        let count = self.motion.arcs[first..].partition_point(|other| other.from_s < arc.to_s);
         let flown = &self.motion.arcs[first..first + count];
         let powers = arc.powers();
-        let at = |time_s: f64| powers.iter().rev().fold(Vector3::zeros(), |sum, c| sum * (time_s - arc.from_s) + c);
-        let bound_m = |of: &Arc| {
-            let (from_s, to_s) = (of.from_s.max(arc.from_s), of.to_s.min(arc.to_s));
-            let ends_m = [from_s, to_s].map(|time_s| (at(time_s) - of.position_m(time_s)).norm());
+        let position_at =
+            |time_s: f64| powers.iter().rev().fold(Vector3::zeros(), |sum, c| sum * (time_s - arc.from_s) + c);
+        let bound_m = |other: &Arc| {
+            let (from_s, to_s) = (other.from_s.max(arc.from_s), other.to_s.min(arc.to_s));
+            let ends_m = [from_s, to_s].map(|time_s| (position_at(time_s) - other.position_m(time_s)).norm());
             ends_m[0].max(ends_m[1]) + (to_s - from_s).powi(2) / 8.0 * accel_m_s2
         };
-        let is_open = |of: &&Arc| of.points.len() > 2 || bound_m(of) > self.tolerance_m;
+        let is_open = |other: &&Arc| other.points.len() > 2 || bound_m(other) > self.tolerance_m;
         let open: Vec<Arc> = flown.iter().filter(is_open).cloned().collect();
         open.is_empty() || is_within(&Motion { arcs: vec![arc] }, &Motion { arcs: open }, self.tolerance_m)
     }
@@ -189,20 +190,20 @@ impl Fitter {
             1
         };
         let ratio = next_s / duration_s;
-        let known = self.squares.iter().position(|of| of.given == given && of.ratio == ratio);
+        let known = self.squares.iter().position(|square| square.given == given && square.ratio == ratio);
         let index = if let Some(index) = known {
             index
         } else {
             // Only the ratio 1 occurs often.
-            self.squares.retain(|of| of.ratio == 1.0);
+            self.squares.retain(|square| square.ratio == 1.0);
             self.squares.push(LeastSquares::new(given, ratio)?);
             self.squares.len() - 1
         };
         let from_s = seconds(from_ms);
         let squares = &self.squares[index];
-        let place = |of: usize, k: usize| {
+        let place = |row: usize, k: usize| {
             let u = instant(k);
-            let time_s = if of == 0 { from_s + u * duration_s } else { from_s + duration_s + u * next_s };
+            let time_s = if row == 0 { from_s + u * duration_s } else { from_s + duration_s + u * next_s };
             self.motion.position_m(time_s)
         };
         let solved = squares.solve(&points, place);
@@ -214,7 +215,7 @@ impl Fitter {
 /// Returns a bound on the second derivative of an arc of degree 7 \[m/s^2\].
 fn second_derivative_m_s2(arc: &Arc) -> f64 {
     let degree = (arc.points.len() - 1) as f64;
-    let bends = arc.points.windows(3).map(|of| (of[0] - of[1] * 2.0 + of[2]).norm());
+    let bends = arc.points.windows(3).map(|triple| (triple[0] - triple[1] * 2.0 + triple[2]).norm());
     bends.fold(0.0, f64::max) * degree * (degree - 1.0) / (arc.to_s - arc.from_s).powi(2)
 }
 

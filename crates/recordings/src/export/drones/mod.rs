@@ -348,8 +348,8 @@ impl Work<'_> {
 /// Returns the deviation of two motions from 0 s on. Each rests after its end.
 #[must_use]
 pub fn deviation_with_rests(flight: &Motion, curve: &Motion) -> Deviation {
-    let end_s = [flight, curve].iter().filter_map(|of| of.span_s()).map(|span| span.1).fold(0.0, f64::max);
-    let [flight, curve] = [flight, curve].map(|of| of.clone().resting_until(end_s));
+    let end_s = [flight, curve].iter().filter_map(|motion| motion.span_s()).map(|span| span.1).fold(0.0, f64::max);
+    let [flight, curve] = [flight, curve].map(|motion| motion.clone().resting_until(end_s));
     let unknown = Deviation { bound_m: f64::INFINITY, found_m: f64::INFINITY, time_s: 0.0 };
     deviation(&flight, &curve).unwrap_or(unknown)
 }

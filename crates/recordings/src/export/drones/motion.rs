@@ -153,8 +153,8 @@ impl Motion {
         if let Some(last) = self.arcs.last()
             && last.to_s < to_s
         {
-            let (from_s, at, rounding_m) = (last.to_s, last.points[last.points.len() - 1], last.rounding_m);
-            self.arcs.push(Arc { rounding_m, ..Arc::straight(from_s, to_s, at, at) });
+            let (from_s, position, rounding_m) = (last.to_s, last.points[last.points.len() - 1], last.rounding_m);
+            self.arcs.push(Arc { rounding_m, ..Arc::straight(from_s, to_s, position, position) });
         }
         self
     }
@@ -252,9 +252,9 @@ impl Part {
 
     fn note(&self, found: &mut Deviation) {
         let last = self.difference[self.difference.len() - 1];
-        for (at, time_s) in [(self.difference[0], self.from_s), (last, self.to_s)] {
-            if at.norm() > found.found_m {
-                (found.found_m, found.time_s) = (at.norm(), time_s);
+        for (position, time_s) in [(self.difference[0], self.from_s), (last, self.to_s)] {
+            if position.norm() > found.found_m {
+                (found.found_m, found.time_s) = (position.norm(), time_s);
             }
         }
     }
@@ -275,12 +275,12 @@ impl Part {
 
 /// Returns the parts of the common time of two motions in which each has one arc.
 fn parts<'a>(first: &'a Motion, second: &'a Motion) -> impl Iterator<Item = Part> + 'a {
-    let (mut at, mut other) = (0, 0);
+    let (mut index, mut other) = (0, 0);
     std::iter::from_fn(move || {
-        while let (Some(one), Some(two)) = (first.arcs.get(at), second.arcs.get(other)) {
+        while let (Some(one), Some(two)) = (first.arcs.get(index), second.arcs.get(other)) {
             let (from_s, to_s) = (one.from_s.max(two.from_s), one.to_s.min(two.to_s));
             if one.to_s <= two.to_s {
-                at += 1;
+                index += 1;
             } else {
                 other += 1;
             }
@@ -334,9 +334,9 @@ mod tests {
     }
 
     fn chords(count: usize) -> Motion {
-        let at = |k: usize| 2.0 * k as f64 / count as f64;
+        let time_at = |k: usize| 2.0 * k as f64 / count as f64;
         let place = |t: f64| vector![t * t, 0.0, 0.0];
-        let arc = |k| Arc::straight(at(k), at(k + 1), place(at(k)), place(at(k + 1)));
+        let arc = |k| Arc::straight(time_at(k), time_at(k + 1), place(time_at(k)), place(time_at(k + 1)));
         Motion { arcs: (0..count).map(arc).collect() }
     }
 

@@ -39,9 +39,9 @@ pub(super) fn px4_show(
     work.check(name, motion, &times_s, &places, true)?;
     let mut text = "idx,t,px,py,pz,vx,vy,vz,ax,ay,az,yaw,mode,ledr,ledg,ledb\n".to_owned();
     for (row, (time_s, place)) in times_s.iter().zip(&places).enumerate() {
-        let at = |shift: f64| motion.position_m(time_s + shift * interval_s);
-        let velocity = (at(0.5) - at(-0.5)) / interval_s;
-        let acceleration = (at(1.0) - at(0.0) * 2.0 + at(-1.0)) / (interval_s * interval_s);
+        let position_at = |shift: f64| motion.position_m(time_s + shift * interval_s);
+        let velocity = (position_at(0.5) - position_at(-0.5)) / interval_s;
+        let acceleration = (position_at(1.0) - position_at(0.0) * 2.0 + position_at(-1.0)) / (interval_s * interval_s);
         // Writing to a string cannot fail.
         let _ = write!(text, "{row},{time_s:.6}");
         for vector in [*place, velocity, acceleration] {
@@ -130,7 +130,7 @@ impl Work<'_> {
     ) -> Result<(), DroneError> {
         let Some(tolerance_m) = self.options.tolerance_m else { return Ok(()) };
         let arcs = times_s.windows(2).zip(places.windows(2));
-        let arcs = arcs.map(|(t, at)| Arc::straight(t[0], t[1], at[0], if holds { at[0] } else { at[1] }));
+        let arcs = arcs.map(|(t, ends)| Arc::straight(t[0], t[1], ends[0], if holds { ends[0] } else { ends[1] }));
         let found = deviation_with_rests(motion, &Motion { arcs: arcs.collect() });
         if found.bound_m <= tolerance_m {
             return Ok(());
@@ -183,10 +183,11 @@ mod tests {
 
     #[test]
     fn held_setpoints_are_refused_beyond_a_tolerance() {
-        let at = |tolerance_m| DroneOptions { tolerance_m: Some(tolerance_m), ..DroneOptions::new(Dialect::Px4Show) };
+        let options_of =
+            |tolerance_m| DroneOptions { tolerance_m: Some(tolerance_m), ..DroneOptions::new(Dialect::Px4Show) };
         // 1.118 m/s for 50 ms.
-        assert!(encode(&flight(), &at(0.057), &|| false).is_ok());
-        let refused = encode(&flight(), &at(0.055), &|| false).expect_err("refused");
+        assert!(encode(&flight(), &options_of(0.057), &|| false).is_ok());
+        let refused = encode(&flight(), &options_of(0.055), &|| false).expect_err("refused");
         assert!(
             matches!(refused, DroneError::TooCoarse { .. }) && refused.help().contains("sample_hz or tolerance"),
             "{refused}"

@@ -199,9 +199,9 @@ fn reach_m(trajectory: &Trajectory, scale: u32) -> f64 {
 
 /// Returns the JSON of a drone with keyed points `[t, [x, y, z], [control points]]`.
 fn drone(label: &str, trajectory: &Trajectory, scale: u32) -> Value {
-    let mut at: [i16; 3] = [trajectory.start[0], trajectory.start[1], trajectory.start[2]];
-    let place = |at: [i16; 3]| at.map(|number| coordinate_m(number, scale));
-    let home = place(at);
+    let mut position: [i16; 3] = [trajectory.start[0], trajectory.start[1], trajectory.start[2]];
+    let place = |point: [i16; 3]| point.map(|number| coordinate_m(number, scale));
+    let home = place(position);
     let (mut points, mut time_ms) = (vec![json!([0.0, home, []])], 0);
     for segment in &trajectory.segments {
         time_ms += u64::from(segment.duration_ms);
@@ -209,16 +209,16 @@ fn drone(label: &str, trajectory: &Trajectory, scale: u32) -> Value {
         let point = |k: usize| place([0, 1, 2].map(|axis| segment.points[axis][k]));
         let control: Vec<_> = (0..count.saturating_sub(1)).map(point).collect();
         if count > 0 {
-            at = [0, 1, 2].map(|axis| segment.points[axis][count - 1]);
+            position = [0, 1, 2].map(|axis| segment.points[axis][count - 1]);
         }
-        points.push(json!([seconds(time_ms), place(at), control]));
+        points.push(json!([seconds(time_ms), place(position), control]));
     }
     json!({
         "type": "generic",
         "settings": {
             "name": label,
             "home": home,
-            "landAt": place(at),
+            "landAt": place(position),
             "trajectory": {"version": 1, "takeoffTime": 0, "points": points},
         },
     })

@@ -8,7 +8,7 @@ use std::path::{Component, Path, PathBuf};
 
 use serde::Deserialize;
 
-use super::super::error::{Fault, Place, ReadError, quoted, refuse};
+use super::super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
 use super::super::options::ReadOptions;
 use super::super::order::Recording;
 use super::super::readers::BAG;
@@ -58,7 +58,7 @@ pub(in crate::read) fn open(folder: &Path, options: &ReadOptions) -> Result<Reco
         let mut source = Source::file(path);
         if path.exists() && !path.is_file() {
             let fault =
-                Fault::coded("recording/bag-index", "the bag lists this file, but it is not a regular file", REINDEX);
+                Fault::content(ContentKind::BagIndex, "the bag lists this file, but it is not a regular file", REINDEX);
             return Err(ReadError::new(path, fault));
         }
         let (mut begin, mut bytes) =
@@ -79,7 +79,7 @@ fn bytes_of(path: &Path) -> Result<Vec<u8>, Fault> {
     let mut bytes = Vec::new();
     File::open(path)?.take(METADATA_LIMIT_BYTES + 1).read_to_end(&mut bytes)?;
     if bytes.len() as u64 > METADATA_LIMIT_BYTES {
-        return refuse("recording/bag-index", format!("it is longer than {METADATA_LIMIT_BYTES} bytes"), REINDEX);
+        return refuse(ContentKind::BagIndex, format!("it is longer than {METADATA_LIMIT_BYTES} bytes"), REINDEX);
     }
     Ok(bytes)
 }
@@ -91,14 +91,14 @@ fn read(path: &Path) -> Result<Bag, ReadError> {
         let place = error.location().map(|location| Place::Line(location.line()));
         let message = error.to_string();
         let problem = format!("it is not the index of a ROS 2 bag: {}", message.lines().next().unwrap_or_default());
-        ReadError { place, ..Fault::coded("recording/bag-index", problem, REINDEX).into() }
+        ReadError { place, ..Fault::content(ContentKind::BagIndex, problem, REINDEX).into() }
     })?;
     Ok(metadata.bag)
 }
 
 fn missing(error: std::io::Error) -> Fault {
     if error.kind() == std::io::ErrorKind::NotFound {
-        return Fault::coded("recording/bag-index", "the bag lists this file, but it is missing", REINDEX);
+        return Fault::content(ContentKind::BagIndex, "the bag lists this file, but it is missing", REINDEX);
     }
     error.into()
 }
@@ -107,7 +107,7 @@ fn missing(error: std::io::Error) -> Fault {
 fn files_of(bag: &Bag, folder: &Path) -> Result<Vec<PathBuf>, Fault> {
     if bag.storage_identifier != "mcap" {
         let problem = format!("the storage of the bag is {}, which is not supported", quoted(&bag.storage_identifier));
-        return refuse("recording/unsupported-format", problem, BAG);
+        return refuse(ContentKind::UnsupportedFormat, problem, BAG);
     }
     let mode = bag.compression_mode.as_deref().unwrap_or_default().to_uppercase();
     let format = bag.compression_format.as_deref().unwrap_or_default();
@@ -115,13 +115,13 @@ fn files_of(bag: &Bag, folder: &Path) -> Result<Vec<PathBuf>, Fault> {
         let problem =
             format!("the bag is packed by {} in mode {}, which is not supported", quoted(format), quoted(&mode));
         return refuse(
-            "recording/unsupported-compression",
+            ContentKind::UnsupportedCompression,
             problem,
             "rewrite it with `ros2 bag convert`, uncompressed or with compression mode `file`",
         );
     }
     if bag.relative_file_paths.is_empty() {
-        return refuse("recording/bag-index", "the bag lists no files", REINDEX);
+        return refuse(ContentKind::BagIndex, "the bag lists no files", REINDEX);
     }
     let (mut files, mut known) = (Vec::new(), BTreeSet::new());
     for listed in &bag.relative_file_paths {
@@ -131,11 +131,11 @@ fn files_of(bag: &Bag, folder: &Path) -> Result<Vec<PathBuf>, Fault> {
         let name = path.file_name().filter(|_| !path.components().any(odd));
         let Some(name) = name else {
             let problem = format!("the bag lists {}, which is not a file in its folder", quoted(listed));
-            return refuse("recording/bag-index", problem, REINDEX);
+            return refuse(ContentKind::BagIndex, problem, REINDEX);
         };
         let file = folder.join(name);
         if !known.insert(file.clone()) {
-            return refuse("recording/bag-index", format!("the bag lists {} twice", quoted(listed)), REINDEX);
+            return refuse(ContentKind::BagIndex, format!("the bag lists {} twice", quoted(listed)), REINDEX);
         }
         files.push(file);
     }
@@ -160,7 +160,7 @@ fn refuse_others(folder: &Path, files: &[PathBuf]) -> Result<(), ReadError> {
             let problem = format!("{other} is in the folder of the bag, but the bag does not list it");
             let remedy =
                 "remove the file if it does not belong to the bag, else rewrite metadata.yaml with `ros2 bag reindex`";
-            refuse("recording/bag-index", problem, remedy)
+            refuse(ContentKind::BagIndex, problem, remedy)
         }
     }
 }

@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use super::super::error::{Fault, quoted};
+use super::super::error::{ContentKind, Fault, quoted};
 use super::super::options::MessageClock;
 use tautline_core::option::CLOCK;
 
@@ -222,5 +222,5 @@ fn several_clocks(problem: String) -> Fault {
         CLOCK.set("log"),
         CLOCK.set("stamp")
     );
-    Fault::coded("recording/several-clocks", problem, remedy)
+    Fault::content(ContentKind::SeveralClocks, problem, remedy)
 }

@@ -6,7 +6,7 @@ use tautline_core::option::{FRAME, TOPIC};
 
 use super::super::clock::{Stamp, TimeUnit};
 use super::super::earth::{is_no_fix, no_fixes};
-use super::super::error::{Fault, Place, ReadError, UNSEEN, quoted, refuse};
+use super::super::error::{ContentKind, Fault, Place, ReadError, UNSEEN, quoted, refuse};
 use super::super::identity::Names;
 use super::super::options::{Duplicates, MessageClock, ReadOptions};
 use super::super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
@@ -196,7 +196,7 @@ impl SplitFiles {
             let problem =
                 format!("its files have {messages} messages, but metadata.yaml counts {}", self.least_messages);
             if self.notes.is_empty() {
-                return refuse("recording/bag-index", problem, "copy the whole folder again");
+                return refuse(ContentKind::BagIndex, problem, "copy the whole folder again");
             }
             self.note(problem);
         }
@@ -288,7 +288,7 @@ impl Poses {
         if target_frame == EARTH {
             let problem = format!("{EARTH} is not a metric frame: its positions are latitudes and longitudes");
             let remedy = format!("omit {FRAME}, or name a frame of poses; choose topics with {TOPIC}");
-            return refuse("recording/unusable-frame", problem, remedy);
+            return refuse(ContentKind::UnusableFrame, problem, remedy);
         }
         if *target_frame == observation.frame {
             return Ok(Some(observation.position));
@@ -350,7 +350,7 @@ impl Poses {
                     format!("positions are in the frame {known} on topic {first}, but in the frame {frame} here");
                 let remedy =
                     format!("name the frame to which all are transformed, or the only one to read, with {FRAME}");
-                return refuse("recording/several-frames", problem, remedy);
+                return refuse(ContentKind::SeveralFrames, problem, remedy);
             }
         }
         Ok(())

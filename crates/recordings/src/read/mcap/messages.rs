@@ -85,20 +85,20 @@ pub fn has_live_poses(schema: &str, encoding: &str) -> bool {
 pub fn live_poses(schema: &str, encoding: &str, bytes: &[u8]) -> Result<Vec<LivePose>, String> {
     let reader = reader_of(schema).ok_or_else(|| format!("messages of {schema} are not read"))?;
     let accuracy_m = if schema == FIXES { fix_accuracy_m(encoding, bytes) } else { None };
-    let live = |of: Observation| {
-        let (name, number) = match of.vehicle {
+    let live = |observation: Observation| {
+        let (name, number) = match observation.vehicle {
             VehicleKey::Topic => (None, None),
             VehicleKey::Listed(number) => (None, Some(number)),
             VehicleKey::Named(name) => (Some(name), None),
         };
-        let is_on_earth = of.frame == EARTH;
-        let is_transform = matches!(of.kind, PoseKind::Transform(_));
+        let is_on_earth = observation.frame == EARTH;
+        let is_transform = matches!(observation.kind, PoseKind::Transform(_));
         LivePose {
             name,
             number,
-            frame: of.frame,
-            stamp_ns: of.stamp_ns,
-            position: of.position,
+            frame: observation.frame,
+            stamp_ns: observation.stamp_ns,
+            position: observation.position,
             accuracy_m,
             is_on_earth,
             is_transform,

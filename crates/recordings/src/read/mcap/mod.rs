@@ -29,7 +29,7 @@ pub use own::Channels;
 
 use std::path::Path;
 
-use super::error::{Fault, Place, ReadError, refuse};
+use super::error::{ContentKind, Fault, Place, ReadError, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
 use super::readers::{Format, FormatOption, Packing, Reader};
@@ -98,7 +98,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let origin = origin(&mut topics)?;
     if options.clock.is_some() && matches!(origin, Some(Origin::Run | Origin::Export)) {
         let problem = "it is a recording of tautline, which has one clock";
-        return refuse("recording/unused-option", problem, format!("omit {CLOCK}"));
+        return refuse(ContentKind::UnusedOption, problem, format!("omit {CLOCK}"));
     }
     match origin {
         Some(Origin::Run) => return own::open_samples(source, options),
@@ -113,7 +113,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
                   geometry_msgs/msg/PoseStamped, geometry_msgs/msg/PoseArray, nav_msgs/msg/Odometry, \
                   sensor_msgs/msg/NavSatFix, motion_capture_tracking_interfaces/msg/NamedPoseArray, \
                   tf2_msgs/msg/TFMessage, traj_utils/msg/Bspline, traj_utils/msg/MINCOTraj or traj_utils/msg/PolyTraj";
-    refuse("recording/no-positions", "it has no topic with positions", remedy)
+    refuse(ContentKind::NoPositions, "it has no topic with positions", remedy)
 }
 
 impl From<RecordError> for ReadError {

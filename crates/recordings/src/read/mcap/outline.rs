@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::Vector3;
 
 use super::super::earth::is_no_fix;
-use super::super::error::{Fault, Place, ReadError, quoted, refuse};
+use super::super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
 use super::super::heading::Words;
 use super::clocks::Clocks;
 use super::foreign::SplitFiles;
@@ -72,9 +72,9 @@ impl Outline {
         splits.visit_all(|part| {
             let Part::Message(message) = part else { return Ok(()) };
             if planned::is_curve(&message.of.schema) {
-                let of = if outline.reads(message.of) { &mut outline.curves } else { &mut outline.unread };
-                if !of.contains(&message.of.topic) {
-                    of.insert(message.of.topic.clone());
+                let list = if outline.reads(message.of) { &mut outline.curves } else { &mut outline.unread };
+                if !list.contains(&message.of.topic) {
+                    list.insert(message.of.topic.clone());
                 }
                 return Ok(());
             }
@@ -144,7 +144,7 @@ impl Outline {
                 "record a pose of every vehicle in every list, or messages with names; if the list contains no \
                  vehicles, choose other topics with {TOPIC}"
             );
-            return refuse("recording/list-length", problem, remedy);
+            return refuse(ContentKind::ListLength, problem, remedy);
         }
         described.listed = listed;
         Ok(())
@@ -162,7 +162,7 @@ impl Outline {
         }
         if observation.frame == EARTH && message.of.schema != FIXES {
             let problem = format!("its frame has the reserved name {}", quoted(EARTH));
-            return refuse("recording/unusable-frame", problem, "rename the frame");
+            return refuse(ContentKind::UnusableFrame, problem, "rename the frame");
         }
         let described = self.topics.entry(topic.clone()).or_default();
         described.schema.clone_from(&message.of.schema);
@@ -181,7 +181,7 @@ impl Outline {
         if let Some(known) = described.child.as_ref().filter(|known| **known != child) {
             let problem =
                 format!("it is the odometry of {}, but earlier messages of {}", quoted(&child), quoted(known));
-            return refuse("recording/several-vehicles", problem, "record each robot on its own topic");
+            return refuse(ContentKind::SeveralVehicles, problem, "record each robot on its own topic");
         }
         described.child = Some(child);
         Ok(())
@@ -189,7 +189,7 @@ impl Outline {
 
     /// Returns the transform tree for a topic, and its namespace: the innermost one that contains the topic.
     pub(super) fn tree_of(&self, topic: &str) -> Option<(&str, &Tree)> {
-        let around = topic.rmatch_indices('/').map(|(at, _)| &topic[..at]).take(DEEPEST).chain([""]);
+        let around = topic.rmatch_indices('/').map(|(index, _)| &topic[..index]).take(DEEPEST).chain([""]);
         let mut nearest = around.filter_map(|space| self.trees.get_key_value(space));
         nearest.next().map(|(space, tree)| (space.as_str(), tree))
     }
@@ -209,7 +209,7 @@ impl Outline {
         let known = self.names();
         let Some(name) = self.named.iter().find(|topic| !known.contains(topic)) else { return Ok(()) };
         let problem = format!("it has no topic {} with positions; such topics are {}", quoted(name), known.join(", "));
-        refuse("recording/unknown-topic", problem, format!("choose one of these with {TOPIC}"))
+        refuse(ContentKind::UnknownTopic, problem, format!("choose one of these with {TOPIC}"))
     }
 
     /// Returns whether a topic named by the user has transforms of a namespace.
@@ -224,7 +224,7 @@ impl Outline {
         let twice = |first: &str, second: &str, vehicle: &str| {
             let problem = format!("topics {} and {} both describe {vehicle}", quoted(first), quoted(second));
             let remedy = if is_chosen { format!("name only one of the two with {TOPIC}") } else { choose_topics() };
-            Fault::coded("recording/ambiguous-topics", problem, remedy)
+            Fault::content(ContentKind::AmbiguousTopics, problem, remedy)
         };
         let called = |space: &str| if space.is_empty() { "the same robot".to_owned() } else { quoted(space) };
         let (mut named, mut robots) = (BTreeMap::new(), BTreeMap::new());
@@ -278,7 +278,7 @@ impl Outline {
         let Some((setpoint, other)) = self.setpoints().next().zip(others.next()) else { return Ok(()) };
         let (setpoint, other) = (quoted(setpoint), quoted(other));
         let problem = format!("topic {setpoint} has the name of a setpoint, but {other} beside it does not");
-        refuse("recording/ambiguous-topics", problem, choose_topics())
+        refuse(ContentKind::AmbiguousTopics, problem, choose_topics())
     }
 
     /// Returns the topics with names of setpoints, unless the user names the topics.
@@ -345,7 +345,7 @@ pub(super) fn refuse_local_frames<'a>(given: impl Iterator<Item = (&'a str, &'a 
         );
         let common = FRAME.set(frame);
         let remedy = format!("confirm a common frame with {common}, or name a frame that transforms lead to");
-        return refuse("recording/several-frames", problem, remedy);
+        return refuse(ContentKind::SeveralFrames, problem, remedy);
     }
     Ok(())
 }

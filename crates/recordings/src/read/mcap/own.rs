@@ -15,7 +15,7 @@ use serde::{Deserialize, Serialize};
 
 use super::super::axes;
 use super::super::clock::{Stamp, TimeUnit};
-use super::super::error::{Fault, Place, ReadError};
+use super::super::error::{ContentKind, Fault, Place, ReadError};
 use super::super::identity::Names;
 use super::super::options::ReadOptions;
 use super::super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
@@ -56,7 +56,7 @@ pub(super) fn open_export(source: &Source, options: &ReadOptions) -> Result<Reco
     let mut exported = Exported { path: source.path.clone(), topics, instants };
     exported.next(&mut Vec::new())?;
     let is_planar = exported.instants.axes == Some(2);
-    let none = Fault::coded("recording/empty", "it holds no instant", "export again");
+    let none = Fault::content(ContentKind::Empty, "it holds no instant", "export again");
     let mut info = RecordingInfo::new(source, options, Some(TimeUnit::Seconds), notes, none);
     (info.epoch_ns, info.metadata.is_planar) = (exported.instants.epoch_ns, is_planar);
     exported.rewind()?;
@@ -116,8 +116,8 @@ fn take(instant: &Instant, axes: usize, vehicles: usize, (number, rows): (u64, &
         return Err(format!("the lengths of its arrays do not fit {count} vehicles"));
     }
     let vector = |numbers: &[f64], k: usize| {
-        let of = &numbers[axes * k..axes * (k + 1)];
-        Vector3::new(of[0], of[1], of.get(2).copied().unwrap_or(0.0))
+        let coordinates = &numbers[axes * k..axes * (k + 1)];
+        Vector3::new(coordinates[0], coordinates[1], coordinates.get(2).copied().unwrap_or(0.0))
     };
     for (k, &vehicle) in instant.vehicles.iter().enumerate() {
         let vehicle = usize::try_from(vehicle).ok().filter(|&vehicle| vehicle < vehicles);
@@ -203,10 +203,10 @@ impl Channels {
     fn read_instant(&mut self) -> Result<Vec<Read>, ReadError> {
         let mut found: Vec<Read> = Vec::new();
         while let Some(part) = self.topics.next()? {
-            let Part::Message(Message { of, bytes, .. }) = part else { continue };
-            match &*of.schema {
+            let Part::Message(Message { of: topic, bytes, .. }) = part else { continue };
+            match &*topic.schema {
                 CHANNEL_SCHEMA => {
-                    let fault = |reason| ReadFault::Message { topic: of.topic.clone(), reason };
+                    let fault = |reason| ReadFault::Message { topic: topic.topic.clone(), reason };
                     let read = decode::<Read>(bytes).map_err(fault);
                     let message = read.map_err(|fault| self.topics.fault(fault))?;
                     found.retain(|before| before.name != message.name);
@@ -226,7 +226,7 @@ pub(super) fn open_samples(source: &Source, options: &ReadOptions) -> Result<Rec
     let notes = options.accept_unfinished(recording.is_complete())?;
     let vehicles = recording.header().vehicles;
     let run = Run { recording, vehicles, names: Names::default(), samples: 0 };
-    let none = Fault::coded("recording/empty", "it holds no sample", "record again");
+    let none = Fault::content(ContentKind::Empty, "it holds no sample", "record again");
     let mut info = RecordingInfo::new(source, options, Some(TimeUnit::Seconds), notes, none);
     info.metadata.facts.push(Fact::name(FactKind::Identity, fact::Source::Recorded, "numbers of the simulation"));
     info.metadata.facts.push(Fact::name(FactKind::Clock, fact::Source::Recorded, "time of the simulation"));

@@ -8,7 +8,7 @@ use tautline_core::option::ORIGIN;
 
 use super::super::axes;
 use super::super::earth::LocalFrame;
-use super::super::error::{Fault, ReadError, quoted, refuse};
+use super::super::error::{ContentKind, Fault, ReadError, quoted, refuse};
 use super::super::options::{MessageClock, ReadOptions};
 use super::foreign::SplitFiles;
 use super::messages::{EARTH, PoseKind, VehicleKey};
@@ -68,15 +68,14 @@ impl ReadPlan {
             axes::refuse_known(options, "a recording with places on the Earth")?;
         }
         if options.origin.is_some() && first_fix.is_none() {
-            return refuse("recording/unused-option", "it has no place on the Earth", format!("omit {ORIGIN}"));
+            return refuse(ContentKind::UnusedOption, "it has no place on the Earth", format!("omit {ORIGIN}"));
         }
         plan.check()?;
         plan.find_bodies()?;
         if plan.target_frame.is_none() {
-            let bodies = plan
-                .bodies
-                .iter()
-                .flat_map(|(space, of)| of.values().flatten().map(|body| (space.as_str(), body.carrier.as_str())));
+            let bodies = plan.bodies.iter().flat_map(|(space, bodies)| {
+                bodies.values().flatten().map(|body| (space.as_str(), body.carrier.as_str()))
+            });
             refuse_local_frames(plan.outline.given_in().chain(bodies))?;
         }
         let needed = plan.find_chains()?;
@@ -103,24 +102,24 @@ impl ReadPlan {
             let bodies = tree.bodies()?;
             if beside_poses {
                 for body in bodies {
-                    let of = if coverage.holds(space, tree, &body) { &mut covered } else { &mut uncovered };
-                    of.push(body.frame);
+                    let group = if coverage.holds(space, tree, &body) { &mut covered } else { &mut uncovered };
+                    group.push(body.frame);
                 }
                 continue;
             }
             let vehicles: BTreeSet<_> = bodies.iter().map(|body| body.frame.as_str()).collect();
             let others: Vec<_> = tree.frames().filter(|frame| tree.moves(frame) && !vehicles.contains(frame)).collect();
             self.notes.extend(note_of(&bodies, &others));
-            let of = self.bodies.entry(space.clone()).or_default();
+            let in_space = self.bodies.entry(space.clone()).or_default();
             for body in bodies {
-                of.entry(body.driver.clone()).or_default().push(body);
+                in_space.entry(body.driver.clone()).or_default().push(body);
             }
         }
         if let Some(name) = uncovered.first() {
             let problem = format!("transforms describe {}, but topics of poses describe other vehicles", quoted(name));
             let known = self.outline.names().join(", ");
             let remedy = format!("{}; it has {known}", choose_topics());
-            return refuse("recording/ambiguous-topics", problem, remedy);
+            return refuse(ContentKind::AmbiguousTopics, problem, remedy);
         }
         if !covered.is_empty() {
             let covered = covered.join(", ");
@@ -263,8 +262,8 @@ impl ReadPlan {
         match &self.target_frame {
             Some(frame) => {
                 let problem = format!("no position is in the frame {}, nor can be transformed to it", quoted(frame));
-                Fault::coded(
-                    "recording/unusable-frame",
+                Fault::content(
+                    ContentKind::UnusableFrame,
                     problem,
                     "name another frame, or record /tf and /tf_static from before the first position",
                 )
@@ -272,10 +271,14 @@ impl ReadPlan {
             None if trees().any(|tree| tree.frames().any(|frame| tree.moves(frame))) => {
                 let frames: Vec<_> = trees().flat_map(Tree::frames).map(quoted).collect();
                 let problem = format!("its transforms describe no vehicle; its frames are {}", frames.join(", "));
-                Fault::coded("recording/no-positions", problem, "record the transforms of the vehicles' own frames too")
+                Fault::content(
+                    ContentKind::NoPositions,
+                    problem,
+                    "record the transforms of the vehicles' own frames too",
+                )
             }
-            None => Fault::coded(
-                "recording/no-positions",
+            None => Fault::content(
+                ContentKind::NoPositions,
                 "its topics with positions have no messages with one",
                 "record again",
             ),
@@ -317,7 +320,7 @@ impl ReadPlan {
             notes.push(format!("velocities of odometry are not used: {why}"));
         }
         let bodies: BTreeSet<_> =
-            self.bodies.values().flat_map(|of| of.values().flatten()).map(|body| &*body.frame).collect();
+            self.bodies.values().flat_map(|bodies| bodies.values().flatten()).map(|body| &*body.frame).collect();
         let fixed = self.outline.trees.values().flat_map(Tree::fixed_frames);
         let fixed: BTreeSet<_> = fixed.filter(|frame| !bodies.contains(frame)).collect();
         if !fixed.is_empty() {
@@ -344,7 +347,7 @@ impl ReadPlan {
             left_out.extend(unconnected.map(|frame| format!("{topic} in {frame}")));
         }
         for (space, body) in
-            self.bodies.iter().flat_map(|(space, of)| of.values().flatten().map(move |body| (space, body)))
+            self.bodies.iter().flat_map(|(space, bodies)| bodies.values().flatten().map(move |body| (space, body)))
         {
             if !self.chain(space, &body.frame).is_some_and(|chain| chain.contains_upward(&body.driver)) {
                 left_out.push(body.frame.clone());

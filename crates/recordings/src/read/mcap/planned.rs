@@ -16,7 +16,7 @@ use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
 use super::super::curves::{Curves, VehicleItems, piece};
-use super::super::error::{Fault, Place, ReadError, quoted, refuse};
+use super::super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
 use super::super::options::ReadOptions;
 use super::super::order::Recording;
 use super::super::spline::{Part, b_spline, minimum_jerk};
@@ -63,7 +63,7 @@ pub(super) fn open(
     {
         let problem = format!("topic {} holds curves of a planner, but {} positions", quoted(topic), quoted(other));
         let remedy = format!("choose the topics of one kind with {TOPIC}");
-        return refuse("recording/ambiguous-topics", problem, remedy);
+        return refuse(ContentKind::AmbiguousTopics, problem, remedy);
     }
     let unused = [
         (options.frame.is_some(), FRAME, "curves of planners name no frame"),
@@ -73,7 +73,7 @@ pub(super) fn open(
         (options.duplicates.is_some(), DUPLICATES, "curves of planners are no rows"),
     ];
     if let Some((_, option, why)) = unused.into_iter().find(|(is_given, ..)| *is_given) {
-        return refuse("recording/unused-option", why, format!("omit {option}"));
+        return refuse(ContentKind::UnusedOption, why, format!("omit {option}"));
     }
     let (mut drones, mut number) = (BTreeMap::<i32, BTreeMap<i64, Plan>>::new(), 0);
     let mut repeated = 0;
@@ -83,13 +83,13 @@ pub(super) fn open(
             return Ok(());
         }
         number += 1;
-        let at = || Place::Part(format!("curve {number} on topic `{}`", message.of.topic));
+        let place = || Place::Part(format!("curve {number} on topic `{}`", message.of.topic));
         let read = match &*message.of.schema {
             MINCO => Plan::of_minco,
             POLYNOMIALS => Plan::of_polynomials,
             _ => Plan::of_b_spline,
         };
-        let (drone, plan) = read(&message.of.encoding, message.bytes).map_err(|fault| fault.at(at()))?;
+        let (drone, plan) = read(&message.of.encoding, message.bytes).map_err(|fault| fault.at(place()))?;
         let start_ns = plan.start_ns;
         match drones.entry(drone).or_default().insert(start_ns, plan.clone()) {
             None => Ok(()),
@@ -100,7 +100,7 @@ pub(super) fn open(
             Some(_) => {
                 let problem = format!("another curve of drone {drone} starts at {start_ns} ns");
                 let remedy = format!("record each planner on a topic of its own, and choose the topics with {TOPIC}");
-                Err(Fault::coded("recording/duplicate-row", problem, remedy).at(at()))
+                Err(Fault::content(ContentKind::DuplicateRow, problem, remedy).at(place()))
             }
         }
     })?;
@@ -109,7 +109,7 @@ pub(super) fn open(
     let mut notes = splits.notes.clone();
     notes.push(format!(
         "{} of planners of {}: each is judged until the next one of its drone starts",
-        counted(drones.values().map(|of| of.len() as u64).sum(), "curve", "curves"),
+        counted(drones.values().map(|curves| curves.len() as u64).sum(), "curve", "curves"),
         counted(drones.len() as u64, "drone", "drones")
     ));
     if repeated > 0 {
@@ -206,7 +206,7 @@ impl Plan {
         let Bspline { drone, degree, start, knots, points, .. } = decoded(encoding, bytes)?;
         if !(1..=HIGHEST_DEGREE).contains(&degree) {
             let problem = format!("order: must be 1 to {HIGHEST_DEGREE}, got {degree}");
-            return refuse("recording/degree", problem, replan());
+            return refuse(ContentKind::Degree, problem, replan());
         }
         let degree = degree.unsigned_abs() as usize;
         refuse_not_finite("knots", &knots)?;
@@ -214,23 +214,23 @@ impl Plan {
         if points.len() <= degree {
             let least = counted(degree as u64, "point", "points");
             let problem = format!("pos_pts: a curve of order {degree} needs more than {least}, got {}", points.len());
-            return refuse("recording/knots", problem, replan());
+            return refuse(ContentKind::Knots, problem, replan());
         }
         let expected = points.len() + degree + 1;
         if knots.len() != expected {
             let problem =
                 format!("knots: {} points of order {degree} need {expected} knots, got {}", points.len(), knots.len());
-            return refuse("recording/knots", problem, replan());
+            return refuse(ContentKind::Knots, problem, replan());
         }
         if let Some(k) = (1..knots.len()).find(|&k| knots[k] < knots[k - 1]) {
             let problem =
                 format!("knots[{k}]: must not be below the knot before it, {}, got {}", knots[k - 1], knots[k]);
-            return refuse("recording/knots", problem, replan());
+            return refuse(ContentKind::Knots, problem, replan());
         }
         let (first, last) = (knots[degree], knots[points.len()]);
         if first >= last {
             let problem = format!("knots: the curve must end after it starts, got {first} and {last}");
-            return refuse("recording/duration", problem, replan());
+            return refuse(ContentKind::Duration, problem, replan());
         }
         let points: Vec<_> = points.into_iter().map(Vector3::from).collect();
         let parts = b_spline(degree, &knots, &points);
@@ -249,7 +249,7 @@ impl Plan {
             refuse_not_finite(name, numbers)?;
             if numbers.len() + 1 != pieces {
                 let problem = format!("{name}: {} one number less, got {}", need(pieces), numbers.len());
-                return refuse("recording/field-count", problem, replan());
+                return refuse(ContentKind::FieldCount, problem, replan());
             }
         }
         for (name, states) in [("start", &minco.start), ("end", &minco.end)] {
@@ -257,7 +257,7 @@ impl Plan {
                 refuse_not_finite(&format!("{name}_{letter}"), &wide(numbers))?;
             }
         }
-        let state = |of: [[f32; 3]; 3]| of.map(|numbers| Vector3::from(numbers.map(f64::from)));
+        let state = |rows: [[f32; 3]; 3]| rows.map(|numbers| Vector3::from(numbers.map(f64::from)));
         let inner: Vec<_> = x.1.iter().zip(&y.1).zip(&z.1).map(|((x, y), z)| Vector3::new(*x, *y, *z)).collect();
         let parts = minimum_jerk(state(minco.start), &inner, state(minco.end), &durations);
         let start_ns = start_ns(minco.start_time)?;
@@ -276,7 +276,7 @@ impl Plan {
             if numbers.len() != terms * pieces {
                 let needed = need(pieces);
                 let problem = format!("{name}: {needed} {} numbers, got {}", terms * pieces, numbers.len());
-                return refuse("recording/field-count", problem, replan());
+                return refuse(ContentKind::FieldCount, problem, replan());
             }
         }
         let (mut parts, mut from_s) = (Vec::with_capacity(pieces), 0.0);
@@ -297,7 +297,7 @@ fn start_ns((sec, nanosec): (i32, u32)) -> Result<i64, Fault> {
         return Ok(nanoseconds(sec.into(), nanosec.into()));
     }
     let problem = format!("start_time.nanosec: must be below {NS_PER_S}, got {nanosec}");
-    refuse("recording/time-format", problem, replan())
+    refuse(ContentKind::TimeFormat, problem, replan())
 }
 
 fn wide(numbers: &[f32]) -> Vec<f64> {
@@ -313,7 +313,7 @@ fn refuse_degree(order: u8) -> Result<(), Fault> {
     if order == DEGREE {
         return Ok(());
     }
-    refuse("recording/degree", format!("order: must be {DEGREE}, got {order}"), replan())
+    refuse(ContentKind::Degree, format!("order: must be {DEGREE}, got {order}"), replan())
 }
 
 /// Returns the durations of the pieces \[s\], at least one.
@@ -321,12 +321,12 @@ fn durations(lengths: &[f32]) -> Result<Vec<f64>, Fault> {
     let durations = wide(lengths);
     refuse_not_finite("duration", &durations)?;
     if durations.is_empty() {
-        return refuse("recording/field-count", "duration: a curve needs at least one piece, got none", replan());
+        return refuse(ContentKind::FieldCount, "duration: a curve needs at least one piece, got none", replan());
     }
     match durations.iter().position(|duration_s| *duration_s <= 0.0) {
         Some(k) => {
             let problem = format!("duration[{k}]: must be positive, got {} s", durations[k]);
-            refuse("recording/duration", problem, replan())
+            refuse(ContentKind::Duration, problem, replan())
         }
         None => Ok(durations),
     }
@@ -343,7 +343,7 @@ fn refuse_not_finite(name: &str, numbers: &[f64]) -> Result<(), Fault> {
     match numbers.iter().position(|number| !number.is_finite()) {
         Some(k) => {
             let problem = format!("{name}[{k}]: must be a finite number, got {}", numbers[k]);
-            refuse("recording/not-finite", problem, replan())
+            refuse(ContentKind::NotFinite, problem, replan())
         }
         None => Ok(()),
     }

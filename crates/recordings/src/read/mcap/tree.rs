@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
 
-use super::super::error::{Fault, UNSEEN, quoted, refuse};
+use super::super::error::{ContentKind, Fault, UNSEEN, quoted, refuse};
 use tautline_core::option::{FRAME, TOPIC};
 
 /// Largest depth of a frame.
@@ -100,7 +100,7 @@ impl Tree {
             return Ok(());
         }
         let problem = format!("frame {} has several constant poses, or moves as well", quoted(frame));
-        refuse("recording/transforms", problem, "record again, with one publisher of each transform")
+        refuse(ContentKind::Transforms, problem, "record again, with one publisher of each transform")
     }
 
     /// Returns the frames with constant poses.
@@ -125,11 +125,11 @@ impl Tree {
                     quoted(second_parent)
                 );
                 let remedy = format!("record robots in separate namespaces, or choose topics of poses with {TOPIC}");
-                return refuse("recording/transforms", problem, remedy);
+                return refuse(ContentKind::Transforms, problem, remedy);
             }
             if way.len() > DEEPEST {
                 let problem = format!("frame {} has more than {DEEPEST} ancestors", quoted(frame));
-                return refuse("recording/transforms", problem, "check the transforms for a cycle");
+                return refuse(ContentKind::Transforms, problem, "check the transforms for a cycle");
             }
             way.push(&edge.parent);
         }
@@ -160,10 +160,10 @@ impl Tree {
         };
         let vehicles = ways.iter().filter(|(frame, way)| is_vehicle(frame, way));
         let body = |(frame, way): (&&str, &Vec<&str>)| {
-            let at = way.iter().position(|frame| self.moves(frame))?;
-            let [driver, carrier] = [way[at], way[at + 1]].map(str::to_owned);
+            let index = way.iter().position(|frame| self.moves(frame))?;
+            let [driver, carrier] = [way[index], way[index + 1]].map(str::to_owned);
             let body = VehicleFrame { frame: (*frame).to_owned(), driver, carrier };
-            Some(way[..=at].iter().try_for_each(|frame| self.check(frame)).map(|()| body))
+            Some(way[..=index].iter().try_for_each(|frame| self.check(frame)).map(|()| body))
         };
         vehicles.filter_map(body).collect()
     }
@@ -171,7 +171,8 @@ impl Tree {
     /// Returns the transforms from a frame to another; `None` without a common ancestor.
     pub(super) fn chain(&self, from: &str, into: &str) -> Result<Option<Chain>, Fault> {
         let (up, down) = (self.ancestry(from)?, self.ancestry(into)?);
-        let meeting = up.iter().enumerate().find_map(|(k, frame)| Some((k, down.iter().position(|of| of == frame)?)));
+        let meeting =
+            up.iter().enumerate().find_map(|(k, frame)| Some((k, down.iter().position(|other| other == frame)?)));
         let Some((top, bottom)) = meeting else { return Ok(None) };
         let owned = |frames: &[&str]| frames.iter().map(|frame| (*frame).to_owned()).collect();
         Ok(Some(Chain { up: owned(&up[..top]), down: owned(&down[..bottom]) }))
@@ -193,7 +194,7 @@ impl Tree {
             edge.samples.dedup();
             if let Some([(time_ns, _), _]) = edge.samples.array_windows().find(|[a, b]| a.0 == b.0) {
                 let problem = format!("frame {} has two poses at {time_ns} ns", quoted(frame));
-                return refuse("recording/transforms", problem, "record again, with one publisher of each transform");
+                return refuse(ContentKind::Transforms, problem, "record again, with one publisher of each transform");
             }
         }
         Ok(())
@@ -275,7 +276,7 @@ impl FramePose {
         let quaternion = Quaternion::new(w, x, y, z);
         if (quaternion.norm() - 1.0).abs() > NORM {
             let problem = format!("the quaternion {x}, {y}, {z}, {w} is not normalized");
-            return refuse("recording/transforms", problem, format!("record again, or omit {FRAME}"));
+            return refuse(ContentKind::Transforms, problem, format!("record again, or omit {FRAME}"));
         }
         Ok(Isometry3::from_parts(Translation3::from(self.position), UnitQuaternion::new_normalize(quaternion)))
     }
@@ -382,11 +383,11 @@ mod tests {
         assert!(tree.transform_along(&chain, 0, None).is_err());
         tree.learn("a", "odom", STILL);
         assert!(tree.chain("a", "map").is_err() && tree.chain("b", "map").is_ok());
-        let at = |x| FramePose { position: Vector3::new(x, 0.0, 0.0), turn: NO_TURN };
-        tree.store("b", 5, &at(1.0)).expect("a rotation");
-        tree.store("b", 5, &at(1.0)).expect("a rotation");
+        let pose = |x| FramePose { position: Vector3::new(x, 0.0, 0.0), turn: NO_TURN };
+        tree.store("b", 5, &pose(1.0)).expect("a rotation");
+        tree.store("b", 5, &pose(1.0)).expect("a rotation");
         assert!(tree.settle().is_ok());
-        tree.store("b", 5, &at(2.0)).expect("a rotation");
+        tree.store("b", 5, &pose(2.0)).expect("a rotation");
         assert!(tree.settle().is_err());
     }
 }

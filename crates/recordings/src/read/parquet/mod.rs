@@ -21,7 +21,7 @@ use parquet::schema::types::ColumnDescriptor;
 
 use self::pages::{Pages, delta_text};
 use crate::read::clock::{Stamp, TimeUnit};
-use crate::read::error::{Fault, Place, ReadError, refuse};
+use crate::read::error::{ContentKind, Fault, Place, ReadError, refuse};
 use crate::read::layout::Layout;
 use crate::read::options::ReadOptions;
 use crate::read::order::{BATCH, Recording};
@@ -94,8 +94,8 @@ pub(in crate::read) fn open(source: &Source, options: &ReadOptions) -> Result<Re
     }
     let unit = layout.time.and_then(|time| unit_of(&schema.column(time)));
     for &column in &layout.columns() {
-        if let Some((code, what, remedy)) = unreadable(&reader, column) {
-            return refuse(code, format!("column `{}` {what}", header[column]), remedy);
+        if let Some((kind, what, remedy)) = unreadable(&reader, column) {
+            return refuse(kind, format!("column `{}` {what}", header[column]), remedy);
         }
     }
     check_rows(&reader, layout.columns().len(), file_bytes)?;
@@ -169,13 +169,10 @@ fn unit_of(column: &ColumnDescriptor) -> Option<TimeUnit> {
     }
 }
 
-/// Returns code, problem and remedy of a column that cannot be read as numbers or text.
-fn unreadable(
-    reader: &SerializedFileReader<File>,
-    column: usize,
-) -> Option<(&'static str, &'static str, &'static str)> {
-    const ELEMENT_TYPE: &str = "recording/element-type";
-    const PACKED: &str = "recording/unsupported-compression";
+/// Returns kind, problem and remedy of a column that cannot be read as numbers or text.
+fn unreadable(reader: &SerializedFileReader<File>, column: usize) -> Option<(ContentKind, &'static str, &'static str)> {
+    const ELEMENT_TYPE: ContentKind = ContentKind::ElementType;
+    const PACKED: ContentKind = ContentKind::UnsupportedCompression;
     let metadata = reader.metadata();
     let descriptor = metadata.file_metadata().schema_descr().column(column);
     if descriptor.max_rep_level() > 0 {
@@ -241,7 +238,7 @@ fn read_cells(column: &mut Column, name: &str, count: usize) -> Result<Vec<Cell>
         }),
         ColumnReader::ByteArrayColumnReader(reader) => cells(reader, present, count, Cell::Text),
         _ => refuse(
-            "recording/element-type",
+            ContentKind::ElementType,
             format!("column `{name}` holds neither numbers (float, double, int32, int64) nor text"),
             "save numbers as double, time as one of double, int64, timestamp, and vehicles as one of text, int64",
         ),
@@ -371,8 +368,8 @@ impl Groups {
 
     /// Returns the cell of the current row in a column.
     fn cell(&self, number: usize) -> &Cell {
-        let at = self.columns.binary_search_by_key(&number, |column| column.number);
-        at.ok().and_then(|at| self.columns[at].cells.get(self.cursor.at)).unwrap_or(&Cell::Empty)
+        let index = self.columns.binary_search_by_key(&number, |column| column.number);
+        index.ok().and_then(|index| self.columns[index].cells.get(self.cursor.at)).unwrap_or(&Cell::Empty)
     }
 }
 
@@ -433,7 +430,7 @@ impl Cells for Groups {
     fn name(&self, column: usize) -> Result<Cow<'_, str>, Fault> {
         if let Cell::Real(_) = self.cell(column) {
             let problem = format!("column `{}` holds numbers with decimals", self.header[column]);
-            return refuse("recording/element-type", problem, "save vehicles as text or as integers");
+            return refuse(ContentKind::ElementType, problem, "save vehicles as text or as integers");
         }
         self.text(column)
     }

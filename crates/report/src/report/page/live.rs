@@ -27,7 +27,7 @@ pub fn live_page() -> String {
                     (theme_choice())
                     p.kind { "Live watch" }
                     h1 { "tautline watch" }
-                    p #verdict role="status" { "NOT KNOWN: the page is not connected" }
+                    p #verdict role="status" { "UNDECIDED: the page is not connected" }
                 }
                 main {
                     section {

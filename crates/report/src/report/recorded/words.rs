@@ -4,12 +4,12 @@ use super::plan::PlanReport;
 use super::report::{Corners, EarlyEnd, Exemption, PresenceSpan, RecordedReport, RunObjection, VehicleFinding};
 use crate::figures::Figure;
 use crate::replay::{NoReplay, Replay};
-use crate::report::answer::{Answer, Finding, FindingList, Part};
-use crate::report::findings::{interval, span};
+use crate::report::answer::{Answer, Finding, Part};
+use crate::report::findings::{closest_table, lists, shortened_in_words, span, sum, tally_in_words};
 use crate::report::page::{self, Badge, Page, Start, Tone};
 use crate::report::section::Section;
 use tautline_audit::recorded::Gap;
-use tautline_audit::{LISTED, Status, Tally};
+use tautline_audit::{LISTED, Status};
 use tautline_core::fact::{BOUNDED, CURVES, Coded, EVERY_STEP, Fact, FactKind, RUN_AUDIT};
 use tautline_core::option::{ABOVE, ACCEL_WINDOW, MAX_GAP, REQUIRE_PRESENCE};
 use tautline_core::text::{at_least, at_most, beside_limit, counted, exact, fixed, in_order, seconds};
@@ -204,7 +204,7 @@ impl RecordedReport {
                 let listed = answer.violations.listed.iter();
                 let deepest = listed.min_by(|a, b| a.largest_margin().total_cmp(&b.largest_margin()));
                 let tie = if self.is_decimal_tie { ", with decimals exactly at the limit" } else { "" };
-                let others = match counted_in_words(&answer.violations) {
+                let others = match tally_in_words(sum([&answer.violations])) {
                     _ if answer.violations.count <= 1 => String::new(),
                     count => format!("; {count} violations in all"),
                 };
@@ -285,18 +285,6 @@ impl RecordedReport {
 
     /// Returns the sections of the text and of the page.
     fn sections(&self) -> Vec<Section> {
-        let caption = format!("smallest distances in {}", self.unit());
-        let closest = |heading: &'static str, is_of_obstacle: bool| {
-            let closest = self.separation().into_iter().flat_map(|answer| &answer.closest);
-            let row = |finding: &Finding| {
-                let limit = finding.limit.unwrap_or_default();
-                let apart = interval(finding.value.lower_bound(), finding.value.upper_bound(), limit);
-                [finding.names(), apart, fixed(finding.at_s.unwrap_or(f64::NAN), 3), exact(limit)]
-            };
-            let columns = &["pair", "smallest distance", "at [s]", "limit"];
-            let rows = closest.filter(|finding| finding.is_of_obstacle() == is_of_obstacle).map(row);
-            Section::table(heading, &caption, columns, rows)
-        };
         let columns = &["what", "worst", "vehicle", "at [s]", "limit", "verdict"];
         let limits = self.answers.iter().filter_map(|answer| match answer.part {
             Part::Limit(limit) => Some(answer.row(limit)),
@@ -306,14 +294,9 @@ impl RecordedReport {
         let seen = format!("{} seen throughout, {} not", presence.throughout, presence.partly);
         // The plan has sections of its own.
         let answers = || self.answers.iter().filter(|answer| answer.part != Part::Plan);
-        let violations = sum(answers().map(|answer| &answer.violations));
-        let undecided = sum(answers().map(|answer| &answer.undecided));
-        let list = |heading: &'static str, tally: Tally, lines: Vec<String>| {
-            Section::list(heading, shortened_in_words(tally), lines)
-        };
+        let [violations, undecided] = lists(answers);
+        let closest = |is_of_obstacle| self.separation().map(|answer| closest_table(answer, is_of_obstacle));
         let sections = [
-            closest("Closest pairs", false),
-            closest("Closest to obstacles", true),
             Section::table("Each vehicle by itself", "limits, and the vehicles closest to them", columns, limits),
             Section::list(
                 "Presence",
@@ -321,12 +304,17 @@ impl RecordedReport {
                 presence.listed.iter().map(VehicleFinding::<PresenceSpan>::words).collect(),
             )
             .of_all(presence.partly),
-            list("Violations", violations, answers().flat_map(Answer::violations_in_words).collect()),
-            list("Undecided", undecided, answers().flat_map(Answer::undecided_in_words).collect()),
-            list("Gaps", self.gaps_tally, self.gaps.iter().map(VehicleFinding::<Gap>::words).collect()),
+            violations,
+            undecided,
+            Section::list(
+                "Gaps",
+                shortened_in_words(self.gaps_tally),
+                self.gaps.iter().map(VehicleFinding::<Gap>::words).collect(),
+            ),
         ];
         let against_plan = self.plan.iter().flat_map(PlanReport::sections);
-        sections.into_iter().chain(against_plan).filter(|section| !section.rows.is_empty()).collect()
+        let closest = [closest(false), closest(true)].into_iter().flatten();
+        closest.chain(sections).chain(against_plan).filter(|section| !section.rows.is_empty()).collect()
     }
 
     /// Returns the lists that are cut, a sentence each.
@@ -471,31 +459,6 @@ impl RunObjection {
 /// Puts text with foreign names on one line, without control characters that change the direction of reading.
 fn one_line(words: &str) -> String {
     in_order(words).chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
-}
-
-/// Adds the numbers of found and of listed findings.
-fn sum<'a>(lists: impl IntoIterator<Item = &'a FindingList>) -> Tally {
-    lists.into_iter().fold(Tally::all(0), |all, list| Tally {
-        count: all.count + list.count,
-        listed: all.listed + list.listed.len(),
-        is_exact: all.is_exact && list.is_exact,
-    })
-}
-
-/// Returns the number of findings in words, such as `at least 12`.
-fn counted_in_words(list: &FindingList) -> String {
-    tally_in_words(sum([list]))
-}
-
-fn tally_in_words(tally: Tally) -> String {
-    let least = if tally.is_exact { "" } else { "at least " };
-    format!("{least}{}", tally.count)
-}
-
-/// Returns the number of findings, and the number of the listed ones if the list is cut.
-fn shortened_in_words(tally: Tally) -> String {
-    let count = tally_in_words(tally);
-    if tally.is_shortened() { format!("{count}, {} of them listed", tally.listed) } else { count }
 }
 
 impl Exemption {

@@ -1,58 +1,30 @@
 //! Comparison of a recording with its plan, for `--plan`.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use super::super::{Failure, Monitor};
 use super::side_files::ItemSpan;
-use super::{AuditRequest, Open, Subject, recording_in};
+use super::{AuditOptions, AuditRequest, Open, Subject, recording_in};
 use crate::figures::{self, Figure};
 use crate::report::recorded::{PlanReport, RecordedReport, THE_PLAN};
 use tautline_audit::recorded::{Outcome, PlanComparison, PlanFindings, Settings, audit};
 use tautline_core::fact::{Fact, FactKind, Source};
-use tautline_core::option::{IDS, PLAN_DELAY, TUBE};
+use tautline_core::option::{IDS, PLAN_DELAY};
 use tautline_core::text::seconds;
 use tautline_core::track::Item;
 use tautline_recordings::open_plan;
 
 /// Largest number of names in a message.
 const NAMES_LISTED: usize = 12;
-/// Largest delay that may be given \[s\]: a century.
-const MOST_DELAY_S: f64 = 3.2e9;
-
-/// Options of a comparison with a plan.
-#[derive(Clone, Debug, PartialEq)]
-pub struct PlanQuestion {
-    /// File or folder of the plan, in any format that is read.
-    pub path: PathBuf,
-    /// Delay of the flight after the plan \[s\]; estimated if absent.
-    pub delay_s: Option<f64>,
-    /// Largest allowed distance from the plan \[m\].
-    pub tube_m: Option<f64>,
-}
-
-impl PlanQuestion {
-    /// Refuses numbers out of range.
-    pub(super) fn check(&self) -> Result<(), Failure> {
-        if let Some(tube_m) = self.tube_m.filter(|tube_m| !(tube_m.is_finite() && *tube_m > 0.0)) {
-            let message = format!("{TUBE}: must be a finite number above 0, got {tube_m:?}");
-            return Err(Failure::input("audit/out-of-range", message, "give the largest allowed distance in metres"));
-        }
-        if let Some(delay_s) = self.delay_s.filter(|delay_s| delay_s.is_nan() || delay_s.abs() > MOST_DELAY_S) {
-            let message = format!("{PLAN_DELAY}: must be a finite number of at most {MOST_DELAY_S} s, got {delay_s:?}");
-            return Err(Failure::input("audit/out-of-range", message, "give the delay in seconds"));
-        }
-        Ok(())
-    }
-}
 
 /// Refuses options that turn or scale the positions of the flight alone.
 pub(super) fn refuse_changed_positions(request: &AuditRequest<'_>) -> Result<(), Failure> {
-    let (Some(plan), Subject::Files { options, .. }) = (&request.plan, &request.subject) else { return Ok(()) };
+    let (Some(plan), Subject::Files { options, .. }) = (&request.options.plan, &request.subject) else { return Ok(()) };
     if !options.changes_positions() {
         return Ok(());
     }
     let message =
-        format!("{}: other axes or another scale would change only the positions of the flight", plan.path.display());
+        format!("{}: other axes or another scale would change only the positions of the flight", plan.display());
     let help = "export flight and plan with these options, and compare the exported files";
     Err(Failure::input("audit/plan-frame", message, help))
 }
@@ -76,13 +48,13 @@ pub(super) struct ComparedPlan {
     figure: Figure,
 }
 
-/// Compares a flight with its plan.
+/// Compares a flight with the plan of the options, if they have one.
 pub(super) fn compare(
-    question: &PlanQuestion,
+    options: &AuditOptions,
     flight: &AuditedFlight<'_>,
     monitor: &dyn Monitor,
-) -> Result<ComparedPlan, Failure> {
-    let path = recording_in(&question.path);
+) -> Result<Option<ComparedPlan>, Failure> {
+    let Some(path) = options.plan.as_deref().map(recording_in) else { return Ok(None) };
     let flown = (flight.open)()?;
     let origin = flown.earth_origin().copied();
     let mut plan = open_plan(&path, origin.as_ref())?;
@@ -124,7 +96,7 @@ pub(super) fn compare(
     }
     let shift = EpochShift::new(plan.clock().epoch_ns, flight.epoch_ns);
     let shift_s = shift.seconds();
-    let found = comparison.finish(shift_s, question.delay_s, question.tube_m).map_err(wrong)?;
+    let found = comparison.finish(shift_s, options.plan_delay_s, options.tube_m).map_err(wrong)?;
     check_common_time(&found, &items, shift_s, flight, &path)?;
     let asked = found.settings_of_plan(flight.settings, &flight.outcome.vehicles, shift_s + found.delay_s);
     let asked = asked.filter(|_| found.deviations.len() > 1);
@@ -133,7 +105,7 @@ pub(super) fn compare(
     report.planar = is_planar;
     let notes = plan.notes().iter().map(|note| format!("{}: {note}", path.display())).collect();
     let axes = if is_planar { "x and y" } else { "x, y and z" };
-    let clock = match (shift, question.delay_s) {
+    let clock = match (shift, options.plan_delay_s) {
         (EpochShift::Known(_), _) => Fact::name(FactKind::SideFileClock, Source::Deduced, "plan by its epoch"),
         (EpochShift::Unknown, Some(s)) => Fact::number(FactKind::SideFileClock, Source::Declared, s, "s"),
         (EpochShift::Unknown, None) => Fact::number(FactKind::SideFileClock, Source::Inferred, found.delay_s, "s"),
@@ -152,7 +124,7 @@ pub(super) fn compare(
     facts.extend((is_planar && !flight.is_planar).then(|| assumed(FactKind::PlanPlane)));
     facts.extend((!is_planar && are_heights_assumed).then(|| assumed(FactKind::PlanHeights)));
     let figure = figure(&found, flight.outcome);
-    Ok(ComparedPlan { report, notes, facts, figure })
+    Ok(Some(ComparedPlan { report, notes, facts, figure }))
 }
 
 /// Refuses heights of different references. Returns whether only one of both is known, so that one is assumed.
@@ -282,19 +254,6 @@ fn figure(found: &PlanFindings, outcome: &Outcome) -> Figure {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn numbers_out_of_range_are_refused() {
-        let question = |delay_s, tube_m| PlanQuestion { path: PathBuf::new(), delay_s, tube_m }.check();
-        assert!(question(Some(-3.0), Some(0.15)).is_ok() && question(None, None).is_ok());
-        for tube_m in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            let failure = question(None, Some(tube_m)).expect_err("refused");
-            assert!(failure.message().contains(&format!("got {tube_m:?}")), "{}", failure.message());
-        }
-        for delay_s in [f64::NAN, f64::NEG_INFINITY, 1e300] {
-            assert!(question(Some(delay_s), None).is_err(), "{delay_s}");
-        }
-    }
 
     #[test]
     fn clocks_are_joined_by_their_epochs() {

@@ -2,6 +2,7 @@
 
 mod against_plan;
 mod config;
+mod options;
 mod own;
 mod places;
 mod proof;
@@ -17,9 +18,9 @@ use std::path::{Path, PathBuf};
 
 use nalgebra::Vector3;
 
-pub use against_plan::PlanQuestion;
+pub use options::{AuditOptions, Entry, Names};
 pub use own::{OwnRecording, run_audit};
-pub use question::{AuditRequest, ConfigFile};
+pub use question::AuditRequest;
 pub use rules::Rules;
 pub use subject::{Open, Subject, open, own_recording, recording_in};
 
@@ -81,15 +82,14 @@ pub struct ConfiguredAudit<'a> {
 ///
 /// ```
 /// # use std::fs;
-/// use tautline_audit::recorded::Settings;
-/// use tautline_report::request::{AuditRequest, Silent, Subject, audit_files};
+/// use tautline_report::request::{AuditOptions, AuditRequest, Silent, Subject, audit_files};
 ///
 /// # let folder = std::env::temp_dir().join(format!("tautline-audit-files-{}", std::process::id()));
 /// # fs::create_dir_all(&folder)?;
 /// # let path = folder.join("two.csv");
 /// fs::write(&path, "t,id,x,y,z\n0,a,0,0,0\n0,b,3,0,0\n1,a,0,1,0\n1,b,3,1,0\n")?;
 /// let subject = Subject::Files { paths: vec![path], options: Box::default() };
-/// let request = AuditRequest { settings: Settings::delta(2.0), ..AuditRequest::new(subject) };
+/// let request = AuditRequest::new(subject, AuditOptions { delta_m: Some(2.0), ..AuditOptions::default() });
 /// assert!(audit_files(&request, &Silent::default())?.is_good());
 /// # fs::remove_dir_all(&folder)?;
 /// # Ok::<(), Box<dyn std::error::Error>>(())
@@ -125,21 +125,30 @@ impl ConfiguredAudit<'_> {
     /// # Errors
     /// As [`audit_files`].
     pub fn judge(&self, monitor: &dyn Monitor) -> Result<AuditedRecording, Failure> {
-        let settled = self.settle(monitor)?;
+        self.judge_with(self.request.options.settings()?, monitor)
+    }
+
+    /// Judges the recording with settings in the place of those of the options.
+    pub(super) fn judge_with(&self, settings: Settings, monitor: &dyn Monitor) -> Result<AuditedRecording, Failure> {
+        let settled = self.settle(settings, monitor)?;
         let mut judged = self.judge_motion(settled, monitor)?;
         let (report, plan_figure) = self.answer(&mut judged, monitor)?;
         // Print the verdict before writing files, so that a write error does not hide it.
         monitor.say(&format!("{}\n{}", report.headline(), report.text()));
         self.write(judged, &report, plan_figure, monitor)?;
-        Ok(AuditedRecording { report, allows_undecided: self.request.allow_undecided, asked_by: self.asked_by.clone() })
+        Ok(AuditedRecording {
+            report,
+            allows_undecided: self.request.options.allow_undecided,
+            asked_by: self.asked_by.clone(),
+        })
     }
 
     /// Completes the question: limits of the recording, rules, side files. Reads the first items.
-    fn settle(&self, monitor: &dyn Monitor) -> Result<Settled<'_>, Failure> {
+    fn settle(&self, mut settings: Settings, monitor: &dyn Monitor) -> Result<Settled<'_>, Failure> {
         let request = &self.request;
-        let mut settings = request.complete_settings()?;
+        let is_own_limit = is_silent(&settings) && request.options.obstacles.is_none();
         let (own, show) = request.subject.own(monitor)?;
-        let own = if request.independent { own.map(OwnRecording::independent) } else { own };
+        let own = if request.options.independent { own.map(OwnRecording::independent) } else { own };
         let mut notes = rules::fill(&mut settings, request, show.as_ref())?;
         let side_obstacles = settings.obstacles.len();
         let taken = RecordedLimits::fill(&mut settings, request, own.as_ref());
@@ -148,15 +157,21 @@ impl ConfiguredAudit<'_> {
         against_plan::refuse_changed_positions(request)?;
         let opening = Opening::read(&|| request.subject.open(), monitor)?;
         let side_files = opening.align(&mut settings, side_obstacles)?;
-        Ok(Settled { settings, own, opening, side_files, notes })
+        Ok(Settled { settings, is_own_limit, own, opening, side_files, notes })
     }
 
     /// Reads and judges all items, from the first ones on.
     fn judge_motion(&self, settled: Settled<'_>, monitor: &dyn Monitor) -> Result<JudgedRecording, Failure> {
         let request = &self.request;
         let called = request.subject.name();
-        let Settled { settings, own, opening, side_files, notes: notes_on_question } = settled;
+        let Settled { settings, is_own_limit, own, opening, side_files, notes: notes_on_question } = settled;
         let mut auditor = TrackAuditor::new(settings.clone())?.with_interruption(monitor.interruption().clone());
+        if request.options.plan.is_some() {
+            auditor = auditor.with_plan();
+        }
+        if is_own_limit {
+            auditor = auditor.with_own_limit();
+        }
         if request.html.is_some() {
             auditor = auditor.with_smallest();
         }
@@ -218,7 +233,7 @@ impl ConfiguredAudit<'_> {
         tell(monitor, &source.notes);
         let is_unaltered = own.is_some_and(OwnRecording::is_unaltered);
         let motion = [*curves, holds_every_step, is_by_run, is_unaltered];
-        source.facts.extend(request.facts(motion, outcome, self.asked_by()));
+        source.facts.extend(request.facts(settings, motion, outcome, self.asked_by()));
         let flight = AuditedFlight {
             open,
             name: request.subject.name(),
@@ -228,7 +243,7 @@ impl ConfiguredAudit<'_> {
             is_planar: source.planar,
         };
         let tie = decimal_tie(open, settings, outcome, monitor)?;
-        let compared = request.plan.as_ref().map(|plan| against_plan::compare(plan, &flight, monitor)).transpose()?;
+        let compared = against_plan::compare(&request.options, &flight, monitor)?;
         let report = RecordedReport::new(outcome, settings, source.clone());
         let (mut report, plan_figure) = against_plan::attach(report, compared, is_by_run, monitor);
         if let Some(RunAnswer::Undecided(why)) = answer {
@@ -285,9 +300,18 @@ fn tell(monitor: &dyn Monitor, notes: &[String]) {
     }
 }
 
+/// Returns whether the settings limit no distance of vehicles.
+fn is_silent(settings: &Settings) -> bool {
+    let has_radius = settings.radius_m.is_some() || settings.vehicles.values().any(|one| one.radius_m.is_some());
+    let has_shape = settings.ellipsoid_m.is_some() || settings.cylinder.is_some();
+    settings.delta_m.is_none() && !has_radius && !has_shape
+}
+
 /// A complete question, and the first items of the recording.
 struct Settled<'a> {
     settings: Settings,
+    /// Whether the limits on distances are those of the recording.
+    is_own_limit: bool,
     /// Limits, obstacles and audit of a flight of `tautline run`.
     own: Option<OwnRecording>,
     opening: Opening<'a>,
@@ -347,18 +371,16 @@ struct RecordedLimits<'a> {
 impl<'a> RecordedLimits<'a> {
     /// Fills the settings with the limits and obstacles of the recording.
     fn fill(settings: &mut Settings, request: &AuditRequest<'_>, own: Option<&'a OwnRecording>) -> Self {
-        let is_silent = request.is_silent();
-        let is_open = is_silent && settings.delta_m.is_none();
+        let is_open = request.options.is_silent() && settings.delta_m.is_none();
         let ellipsoid_m = own.and_then(|own| own.ellipsoid_m).filter(|_| is_open);
         let delta_m = own.map(|own| own.limit_m).filter(|_| is_open && ellipsoid_m.is_none());
         settings.delta_m = settings.delta_m.or(delta_m);
         settings.ellipsoid_m = settings.ellipsoid_m.or(ellipsoid_m);
-        settings.is_own_limit = is_silent && request.obstacles.is_none();
         // Every sample of a `tautline run` recording contains all vehicles, so no vehicle is absent between two
         // samples.
         settings.max_gap_s = settings.max_gap_s.or(own.filter(|own| own.is_unaltered()).map(|_| f64::INFINITY));
         let is_scaled = settings.ellipsoid_m.is_some() || settings.cylinder.is_some();
-        let is_asked = request.obstacles.is_none() && !is_scaled;
+        let is_asked = request.options.obstacles.is_none() && !is_scaled;
         let obstacles = own.map(|own| &own.obstacles[..]).filter(|own| is_asked && !own.is_empty());
         settings.obstacles.extend_from_slice(obstacles.unwrap_or_default());
         Self { delta_m, ellipsoid_m, obstacles }
@@ -373,7 +395,7 @@ impl<'a> RecordedLimits<'a> {
             format!("the ellipsoid is the recording's own, with half axes of {x:?}, {y:?} and {z:?} m")
         }));
         if self.obstacles.is_none() && own.is_some_and(|own| !own.obstacles.is_empty()) {
-            let why = if request.obstacles.is_some() {
+            let why = if request.options.obstacles.is_some() {
                 format!("{OBSTACLES} names others")
             } else {
                 "obstacles are not judged with ellipsoids or cylinders".to_owned()

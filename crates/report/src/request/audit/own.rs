@@ -7,9 +7,9 @@ use nalgebra::Vector3;
 use super::super::{Failure, Monitor};
 use super::AuditRequest;
 use crate::report::recorded::{EarlyEnd, RunObjection};
-use crate::report::{ObstacleApproach, Report};
+use crate::report::{Finding, Objects, Report};
 use tautline_audit::recorded::{Approach, ObjectPair, Outcome, Settings, TOUCHING_ELLIPSOIDS, VehicleSettings};
-use tautline_audit::{LISTED, Obstacle, ParryEvidence, Status, Tally, Violation};
+use tautline_audit::{Obstacle, ParryEvidence, Status, Tally, Violation};
 use tautline_core::option::{DELTA, INDEPENDENT};
 use tautline_core::record::Event;
 use tautline_core::swarm::Pair;
@@ -36,7 +36,7 @@ pub struct OwnRecording {
     pub(super) early_end: Option<EarlyEnd>,
     audit: StoredAudit,
     /// Violations and approaches of the events of the run.
-    run_findings: Vec<RunFinding>,
+    run_findings: Vec<Violation<ObjectPair>>,
     /// Whether the audit ignores the run's audit.
     is_independent: bool,
     /// Whether positions and times are read unchanged.
@@ -63,43 +63,33 @@ pub(super) enum RunAnswer {
 /// Returns the audit that a run writes at the end of its recording.
 #[must_use]
 pub fn run_audit(scenario: &Scenario, report: &Report) -> RunAudit {
-    let scale = scenario.half_axes_m().map_or(1.0, |_| TOUCHING_ELLIPSOIDS / scenario.delta_m);
-    let limit_m = scenario.delta_m * scale;
-    let of_pair = |[first, second]: [usize; 2], [from_s, to_s]: [f64; 2], min_m: f64, min_at_s: f64| {
-        let (vehicle, other_vehicle, min_m) = (first as u64, second as u64, min_m * scale);
-        RunFinding { vehicle, other_vehicle, obstacle: 0, limit_m, from_s, to_s, min_m, min_at_s }
+    let scale = metric_scale(scenario);
+    let run_finding = |found: &Finding| {
+        let ([vehicle, other_vehicle, obstacle], scale) = match found.objects {
+            Objects::Pair(ObjectPair::Vehicles(pair)) => ([pair.first() + 1, pair.second() + 1, 0], scale),
+            Objects::Pair(ObjectPair::Obstacle { vehicle, obstacle }) => ([vehicle + 1, 0, obstacle + 1], 1.0),
+            Objects::Vehicle(_) => return None,
+        };
+        let [vehicle, other_vehicle, obstacle] = [vehicle, other_vehicle, obstacle].map(|number| number as u64);
+        let (min_m, min_at_s, limit_m) = (found.value.upper? * scale, found.at_s?, found.limit? * scale);
+        let (from_s, to_s) = (found.from_s.unwrap_or(min_at_s), found.to_s.unwrap_or(min_at_s));
+        Some(RunFinding { vehicle, other_vehicle, obstacle, limit_m, from_s, to_s, min_m, min_at_s })
     };
-    let of_obstacle = |found: &ObstacleApproach, [from_s, to_s]: [f64; 2]| {
-        let &ObstacleApproach { vehicle, ref obstacle, clearance_m, min_m, min_at_s } = found;
-        let (vehicle, limit_m) = (vehicle as u64, clearance_m);
-        let obstacle = 1 + scenario.obstacles.iter().take_while(|of| of.name != *obstacle).count() as u64;
-        RunFinding { vehicle, other_vehicle: 0, obstacle, limit_m, from_s, to_s, min_m, min_at_s }
-    };
-    let separation = &report.separation;
-    let closest = separation.min_pair.zip(separation.min_m).zip(separation.min_at_s);
-    let closest = closest.map(|((pair, min_m), at_s)| of_pair(pair, [at_s; 2], min_m, at_s));
-    let obstacles = report.obstacles.as_ref();
-    let approaches = obstacles.into_iter().flat_map(|of| &of.closest).map(|of| of_obstacle(of, [of.min_at_s; 2]));
-    let of_pairs = report.audit.violations.iter();
-    let of_pairs = of_pairs.map(|of| of_pair(of.pair.numbers(), [of.from_s, of.to_s], of.min_m, of.min_at_s));
-    let of_obstacles = obstacles.into_iter().flat_map(|of| &of.violations);
-    let of_obstacles = of_obstacles.map(|of| of_obstacle(&of.approach, [of.from_s, of.to_s]));
-    let mut violations: Vec<_> = of_pairs.chain(of_obstacles).collect();
-    let violations_count = violations.len() as u64;
+    let answer = &report.answer;
+    let mut violations: Vec<_> = answer.violations.listed.iter().filter_map(run_finding).collect();
     violations.sort_by(|a, b| (a.min_m - a.limit_m).total_cmp(&(b.min_m - b.limit_m)));
-    violations.truncate(LISTED);
     violations.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
     let time = &scenario.time;
     RunAudit {
-        status: report.audit.status.name().to_owned(),
+        status: answer.status.name().to_owned(),
         ended_early: report.run.early_end().unwrap_or_default(),
         holds_every_step: scenario.has_engine() && report.run.refined_steps == 0 && time.samples() > time.steps(),
-        limit_m,
+        limit_m: scenario.delta_m * scale,
         duration_s: report.run.duration_s,
-        steps: report.audit.steps,
-        pairs_checked: report.audit.pairs_checked,
-        violations_count,
-        closest: closest.into_iter().chain(approaches).collect(),
+        steps: answer.detectors.and_then(|detectors| detectors.steps).unwrap_or_default(),
+        pairs_checked: answer.detectors.map_or(0, |detectors| detectors.pairs_swept),
+        violations_count: answer.violations.count,
+        closest: answer.closest.iter().filter_map(run_finding).collect(),
         violations,
         sha256: String::new(),
     }
@@ -236,11 +226,11 @@ impl OwnRecording {
                         counted(count, "finding", "findings")
                     ),
                 });
-                return self.of_samples(outcome, settings, &[&self.run_findings]);
+                return self.of_samples(outcome, settings, None);
             }
             StoredAudit::Altered => {
                 note("the recording was changed after the run, so the run's audit may refer to other samples");
-                return self.of_samples(outcome, settings, &[&self.run_findings]);
+                return self.of_samples(outcome, settings, None);
             }
             StoredAudit::AsWritten(audit) => audit,
         };
@@ -260,7 +250,7 @@ impl OwnRecording {
             note(&format!(
                 "the run's audit of every step answers another question ({verdict}: all vehicles, limit {limit})"
             ));
-            return self.of_samples(outcome, settings, &[&audit.violations, &audit.closest, &self.run_findings]);
+            return self.of_samples(outcome, settings, Some(audit));
         }
         if self.is_contradicted(outcome, audit, status) {
             note("they show vehicles closer than the run's audit");
@@ -285,8 +275,8 @@ impl OwnRecording {
     }
 
     /// Leaves the answer to the samples, unless the run objects.
-    fn of_samples(&self, outcome: &mut Outcome, settings: &Settings, findings: &[&[RunFinding]]) -> RunAnswer {
-        match self.objection(outcome, settings, findings) {
+    fn of_samples(&self, outcome: &mut Outcome, settings: &Settings, audit: Option<&RunAudit>) -> RunAnswer {
+        match self.objection(outcome, settings, audit) {
             Some(why) => undecided(outcome, why),
             None => RunAnswer::Samples,
         }
@@ -295,7 +285,7 @@ impl OwnRecording {
     /// Returns the reason why a clear answer of the samples is not certain: between samples the run found a pair closer
     /// than the request allows. Distances of another metric are compared by an upper bound. Motion that `--offset`
     /// shifts in time is not that of the run.
-    fn objection(&self, outcome: &Outcome, settings: &Settings, findings: &[&[RunFinding]]) -> Option<RunObjection> {
+    fn objection(&self, outcome: &Outcome, settings: &Settings, audit: Option<&RunAudit>) -> Option<RunObjection> {
         if outcome.separation != Some(Status::Clear) {
             return None;
         }
@@ -310,39 +300,38 @@ impl OwnRecording {
         let factor = if is_same_metric { 1.0 } else { metres * asked };
         let is_judged =
             |vehicle: usize| settings.only.as_ref().is_none_or(|only| only.contains(&(vehicle + 1).to_string()));
-        let in_window = |found: &RunFinding| {
+        let in_window = |found: &Violation<ObjectPair>| {
             !self.is_read_as_written
                 || (settings.from_s.is_none_or(|from_s| found.to_s >= from_s)
                     && settings.to_s.is_none_or(|to_s| found.from_s <= to_s))
         };
-        let is_closer = |found: &&RunFinding| match object_pair(found) {
-            Some(ObjectPair::Vehicles(pair)) => {
+        let is_closer = |found: &Violation<ObjectPair>| match found.pair {
+            ObjectPair::Vehicles(pair) => {
                 is_judged(pair.first())
                     && is_judged(pair.second())
                     && offset_s(pair.first()) == offset_s(pair.second())
                     && found.min_m * factor < limit
                     && in_window(found)
             }
-            Some(ObjectPair::Obstacle { vehicle, obstacle }) => {
+            ObjectPair::Obstacle { vehicle, obstacle } => {
                 self.obstacles.get(obstacle).is_some_and(|of| settings.obstacles.contains(of))
                     && is_judged(vehicle)
                     && found.min_m < found.limit_m
                     && in_window(found)
             }
-            None => false,
         };
-        let found = findings.iter().copied().flatten().filter(is_closer);
-        let deepest = found.min_by(|a, b| (a.min_m - a.limit_m).total_cmp(&(b.min_m - b.limit_m)));
-        deepest.map(|found| {
-            let other = match found.obstacle {
-                0 => found.other_vehicle.to_string(),
-                obstacle => format!("obstacle {obstacle}"),
-            };
-            let unit = if self.ellipsoid_m.is_some() && found.obstacle == 0 { "half axes" } else { "m" };
-            let who = [found.vehicle.to_string(), other];
-            let min = if unit == "m" { found.min_m * self.scale } else { found.min_m };
-            RunObjection::RunFoundCloser { who, min, unit, at_s: found.min_at_s }
-        })
+        let stored = audit.into_iter().flat_map(|audit| audit.violations.iter().chain(&audit.closest));
+        let found = stored.filter_map(decoded).chain(self.run_findings.iter().copied()).filter(is_closer);
+        let deepest = found.min_by(|a, b| (a.min_m - a.limit_m).total_cmp(&(b.min_m - b.limit_m)))?;
+        let who = match deepest.pair {
+            ObjectPair::Vehicles(pair) => pair.numbers().map(|number| number.to_string()),
+            ObjectPair::Obstacle { vehicle, obstacle } => {
+                [(vehicle + 1).to_string(), format!("obstacle {}", obstacle + 1)]
+            }
+        };
+        let is_scaled = self.ellipsoid_m.is_some() && deepest.pair.vehicles().is_some();
+        let (min, unit) = if is_scaled { (deepest.min_m, "half axes") } else { (deepest.min_m * self.scale, "m") };
+        Some(RunObjection::RunFoundCloser { who, min, unit, at_s: deepest.min_at_s })
     }
 
     /// Returns whether the run's audit answers a question. The question must have the limit and obstacles of the run,
@@ -357,7 +346,7 @@ impl OwnRecording {
             && settings.only.is_none()
             && (settings.from_s, settings.to_s, settings.above_m) == (None, None, None)
             && settings.obstacles == self.obstacles
-            && (request.settings.motion, request.settings.max_gap_s) == (None, None)
+            && (request.options.motion, request.options.max_gap_s) == (None, None)
     }
 
     /// Returns whether the samples contradict the run's audit with a smaller distance. Distances between samples are
@@ -370,7 +359,7 @@ impl OwnRecording {
         };
         let smallest_m = audit.closest.iter().filter(|of| of.obstacle == 0).map(|of| of.min_m).reduce(f64::min);
         let of_obstacle =
-            |pair: ObjectPair| audit.closest.iter().find(|of| object_pair(of) == Some(pair)).map(|of| of.min_m);
+            |pair: ObjectPair| audit.closest.iter().filter_map(decoded).find(|of| of.pair == pair).map(|of| of.min_m);
         let is_closer = |of: &Approach, least_m: Option<f64>| {
             least_m.is_some_and(|least_m| of.upper_m < least_m - SAME * (1.0 + least_m.abs()))
                 && has_sample(of.time_s, of.time_s)
@@ -387,35 +376,29 @@ impl OwnRecording {
 }
 
 /// Returns the violation or the approach of an event, in the lengths of [`run_audit`].
-fn run_finding(event: &Event, scenario: &Scenario) -> Option<RunFinding> {
-    let scale = scenario.half_axes_m().map_or(1.0, |_| TOUCHING_ELLIPSOIDS / scenario.delta_m);
-    let finding = |vehicle: usize, time_s: f64, limit_m: f64, min_m: f64| RunFinding {
-        vehicle: vehicle as u64 + 1,
-        limit_m,
-        from_s: time_s,
-        to_s: time_s,
-        min_m,
-        min_at_s: time_s,
-        ..RunFinding::default()
-    };
-    let of_pair = |pair: Pair, time_s: f64, min_m: f64| RunFinding {
-        other_vehicle: pair.second() as u64 + 1,
-        ..finding(pair.first(), time_s, scenario.delta_m * scale, min_m * scale)
-    };
-    let of_obstacle = |vehicle: usize, obstacle: usize, time_s: f64, min_m: Option<f64>| {
-        let limit_m = scenario.obstacles.get(obstacle)?.clearance_m;
-        let found = finding(vehicle, time_s, limit_m, min_m.unwrap_or(limit_m.next_down()));
-        Some(RunFinding { obstacle: obstacle as u64 + 1, ..found })
-    };
-    match *event {
-        Event::ViolationBegan { pair, time_s } => Some(of_pair(pair, time_s, scenario.delta_m.next_down())),
-        Event::Approach { pair, time_s, separation_m } => Some(of_pair(pair, time_s, separation_m)),
-        Event::ObstacleViolationBegan { vehicle, obstacle, time_s } => of_obstacle(vehicle, obstacle, time_s, None),
-        Event::ObstacleApproach { vehicle, obstacle, time_s, distance_m } => {
-            of_obstacle(vehicle, obstacle, time_s, Some(distance_m))
+fn run_finding(event: &Event, scenario: &Scenario) -> Option<Violation<ObjectPair>> {
+    let (pair, time_s, min_m) = match *event {
+        Event::ViolationBegan { pair, time_s } => (pair.into(), time_s, None),
+        Event::Approach { pair, time_s, separation_m } => (pair.into(), time_s, Some(separation_m)),
+        Event::ObstacleViolationBegan { vehicle, obstacle, time_s } => {
+            (ObjectPair::Obstacle { vehicle, obstacle }, time_s, None)
         }
-        _ => None,
-    }
+        Event::ObstacleApproach { vehicle, obstacle, time_s, distance_m } => {
+            (ObjectPair::Obstacle { vehicle, obstacle }, time_s, Some(distance_m))
+        }
+        _ => return None,
+    };
+    let (limit_m, scale) = match pair {
+        ObjectPair::Vehicles(_) => (scenario.delta_m, metric_scale(scenario)),
+        ObjectPair::Obstacle { obstacle, .. } => (scenario.obstacles.get(obstacle)?.clearance_m, 1.0),
+    };
+    let (min_m, limit_m) = (min_m.unwrap_or(limit_m.next_down()) * scale, limit_m * scale);
+    Some(Violation { pair, from_s: time_s, to_s: time_s, min_m, min_at_s: time_s, limit_m })
+}
+
+/// Returns the factor from separations of the scenario to those of its recording.
+fn metric_scale(scenario: &Scenario) -> f64 {
+    scenario.half_axes_m().map_or(1.0, |_| TOUCHING_ELLIPSOIDS / scenario.delta_m)
 }
 
 /// Leaves the answer of the samples undecided, for a reason of the run's audit.
@@ -428,29 +411,27 @@ fn undecided(outcome: &mut Outcome, why: RunObjection) -> RunAnswer {
 const UNDECIDED_RUN: &str =
     "the run itself is UNDECIDED: the recorded motion may differ from that of the law (see report.json)";
 
-/// Returns the pair of a finding; `None` if its numbers name no pair.
-fn object_pair(found: &RunFinding) -> Option<ObjectPair> {
+/// Returns the violation or the approach of a finding; `None` if its numbers name no pair.
+fn decoded(found: &RunFinding) -> Option<Violation<ObjectPair>> {
+    let &RunFinding { limit_m, from_s, to_s, min_m, min_at_s, .. } = found;
     let index = |number: u64| usize::try_from(number).ok()?.checked_sub(1);
     let vehicle = index(found.vehicle)?;
-    match (index(found.other_vehicle), index(found.obstacle)) {
-        (Some(other), None) if other != vehicle => Some(ObjectPair::Vehicles(Pair::new(vehicle, other))),
-        (None, Some(obstacle)) => Some(ObjectPair::Obstacle { vehicle, obstacle }),
-        _ => None,
-    }
+    let pair = match (index(found.other_vehicle), index(found.obstacle)) {
+        (Some(other), None) if other != vehicle => Pair::new(vehicle, other).into(),
+        (None, Some(obstacle)) => ObjectPair::Obstacle { vehicle, obstacle },
+        _ => return None,
+    };
+    Some(Violation { pair, from_s, to_s, min_m, min_at_s, limit_m })
 }
 
 /// Replaces the findings of the samples by those of the run's audit.
 fn repeat(audit: &RunAudit, status: Status, outcome: &mut Outcome) {
-    let closest = audit.closest.iter().filter_map(|found| {
-        let &RunFinding { limit_m, min_m, min_at_s, .. } = found;
-        Some(Approach { pair: object_pair(found)?, lower_m: min_m, upper_m: min_m, time_s: min_at_s, limit_m })
+    let closest = audit.closest.iter().filter_map(decoded).map(|found| {
+        let Violation { pair, limit_m, min_m, min_at_s, .. } = found;
+        Approach { pair, lower_m: min_m, upper_m: min_m, time_s: min_at_s, limit_m }
     });
     let (of_pairs, of_obstacles): (Vec<_>, Vec<_>) = closest.partition(|of| of.pair.vehicles().is_some());
-    let violations = audit.violations.iter().filter_map(|found| {
-        let &RunFinding { limit_m, from_s, to_s, min_m, min_at_s, .. } = found;
-        Some(Violation { pair: object_pair(found)?, from_s, to_s, min_m, min_at_s, limit_m })
-    });
-    outcome.violations = violations.collect();
+    outcome.violations = audit.violations.iter().filter_map(decoded).collect();
     let listed = outcome.violations.len();
     outcome.tallies.violations = Tally { count: audit.violations_count, listed, is_exact: true };
     outcome.undecided.clear();

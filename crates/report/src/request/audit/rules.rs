@@ -124,13 +124,13 @@ pub(super) fn fill(
     let mut notes = Vec::new();
     show.map_or(Ok(()), |show| check(settings, request, show))?;
     settings.yaw = show.map(|show| show.yaw.clone()).unwrap_or_default();
-    let (numbers, origin) = match request.rules {
+    let (numbers, origin) = match request.options.rules.unwrap_or_default() {
         Rules::None => return Ok(notes),
         Rules::Recording => (show.cloned().unwrap_or_default(), "the show file"),
         Rules::Skybrush => (skybrush(), "Skybrush Studio"),
     };
     let mut taken = Vec::new();
-    if let Some(delta_m) = numbers.min_distance_m.filter(|_| request.is_silent()) {
+    if let Some(delta_m) = numbers.min_distance_m.filter(|_| request.options.is_silent()) {
         settings.delta_m = Some(delta_m);
         taken.push(format!("distance {delta_m:?} m"));
     }
@@ -173,9 +173,10 @@ pub(super) fn fill(
 /// Rejects rules of a show that cannot be read, unless an option replaces them or no limit needs them.
 fn check(settings: &Settings, request: &AuditRequest<'_>, show: &ShowRules) -> Result<(), Failure> {
     let is_limited = |quantity: Quantity| settings.envelope.limits.iter().any(|limit| limit.quantity == quantity);
+    let rules = request.options.rules.unwrap_or_default();
     for (key, problem) in &show.unreadable {
         let is_of_validation = key.starts_with("validation");
-        if request.rules == Rules::None || (is_of_validation && request.rules == Rules::Skybrush) {
+        if rules == Rules::None || (is_of_validation && rules == Rules::Skybrush) {
             continue;
         }
         let quantities: &[Quantity] = match key.strip_prefix("validation.") {
@@ -192,7 +193,7 @@ fn check(settings: &Settings, request: &AuditRequest<'_>, show: &ShowRules) -> R
         };
         let named = quantities.iter().map(|quantity| LIMIT.set(format!("{}=NUMBER", quantity.name())).to_string());
         let (is_replaced, option) = match &**key {
-            "validation.minDistance" => (!request.is_silent(), Some(DELTA.to_string())),
+            "validation.minDistance" => (!request.options.is_silent(), Some(DELTA.to_string())),
             "geofence" => (settings.envelope.fence.is_some(), Some(FENCE.to_string())),
             _ if quantities.is_empty() => (false, None),
             _ => (quantities.iter().all(|of| is_limited(*of)), Some(named.collect::<Vec<_>>().join(" and "))),
@@ -201,7 +202,7 @@ fn check(settings: &Settings, request: &AuditRequest<'_>, show: &ShowRules) -> R
             return Err(unreadable(request, problem, option));
         }
     }
-    let is_yaw_limited_by_rules = match request.rules {
+    let is_yaw_limited_by_rules = match rules {
         Rules::None => false,
         Rules::Recording => show.max_yaw_rate_deg_s.is_some(),
         Rules::Skybrush => true,

@@ -13,7 +13,7 @@ use nalgebra::Vector3;
 
 pub use self::answer::DroneExport;
 use self::written::Written;
-use super::audit::{AuditRequest, ConfigFile, Subject, recording_in};
+use super::audit::{AuditOptions, AuditRequest, Subject, recording_in};
 use super::{ExportRequest, Failure, Monitor, Quiet, outputs};
 use crate::report::Status;
 use crate::report::recorded::RecordedReport;
@@ -181,15 +181,16 @@ impl DroneExportRequest {
     /// Returns the request for the audit of the flight.
     fn audit(&self) -> AuditRequest<'static> {
         let subject = Subject::Files { paths: self.paths.clone(), options: Box::new(self.options.clone()) };
-        let settings = Settings {
+        let options = AuditOptions {
             delta_m: self.delta_m,
             ellipsoid_m: self.ellipsoid_m,
+            obstacles: self.obstacles.clone(),
             from_s: self.from_s,
             to_s: self.until_s,
-            ..Settings::default()
+            no_config: true,
+            ..AuditOptions::default()
         };
-        let obstacles = self.obstacles.clone();
-        AuditRequest { settings, obstacles, for_drones: true, config: ConfigFile::None, ..AuditRequest::new(subject) }
+        AuditRequest { for_drones: true, ..AuditRequest::new(subject, options) }
     }
 
     /// Checks the window before anything is read.
@@ -314,7 +315,7 @@ impl Flight {
         };
         let has_pair = vehicles.len() > 1 || !settings.obstacles.is_empty();
         if !has_pair {
-            audit.settings.envelope.limits = vec![Limit { quantity: Quantity::Speed, allowed: BEYOND_M_S }];
+            audit.options.limits = vec![Limit { quantity: Quantity::Speed, allowed: BEYOND_M_S }];
         }
         let judged = audit.configured()?.judge(&quiet).map_err(|error| request.in_own_terms(error, &vehicles))?;
         let report = judged.report;
@@ -346,7 +347,7 @@ impl Flight {
             *time_s -= from_s;
         }
         settings.max_gap_s = Some(f64::INFINITY);
-        (settings.from_s, settings.to_s, settings.is_own_limit) = (None, None, false);
+        (settings.from_s, settings.to_s) = (None, None);
         Ok(Self { vehicles, span_s: (from_s, until_s), settings, has_pair, audit: report, notes })
     }
 }

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 
 use rayon::prelude::*;
 
-use super::super::audit::{AuditRequest, ConfigFile, Subject};
+use super::super::audit::{AuditOptions, AuditRequest, Subject};
 use super::super::{Failure, Monitor, Quiet};
 use super::{DroneExport, Flight};
 use tautline_audit::recorded::{Interpolation, Settings};
@@ -121,8 +121,8 @@ impl<'a> Written<'a> {
         for motion in motions {
             let subject = Subject::InMemory { name: &name, own: None, open: &|| self.open(options) };
             let settings = Settings { motion: *motion, ..settings.clone() };
-            let request = AuditRequest { settings, config: ConfigFile::None, ..AuditRequest::new(subject) };
-            let report = request.configured()?.judge(&Quiet::new(monitor))?.report;
+            let audit = AuditRequest::new(subject, AuditOptions::default()).configured()?;
+            let report = audit.judge_with(settings, &Quiet::new(monitor))?.report;
             answer.add(report, start_s);
         }
         Ok(answer)

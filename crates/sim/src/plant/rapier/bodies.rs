@@ -51,8 +51,8 @@ impl Bodies {
         let origin_m = mean_row(&scenario.start.positions_m);
         let insert = |i| insert_vehicle(&mut world, scenario, origin_m, i);
         let handles: Vec<_> = (0..scenario.count()).map(insert).collect();
-        let each = |of: &dyn Fn(&RigidBody) -> Vector| -> Vec<_> {
-            handles.iter().map(|&handle| of(&world.bodies[handle])).collect()
+        let each = |value_of: &dyn Fn(&RigidBody) -> Vector| -> Vec<_> {
+            handles.iter().map(|&handle| value_of(&world.bodies[handle])).collect()
         };
         let positions = each(&|body| body.translation());
         let velocities = each(&|body| body.linvel());

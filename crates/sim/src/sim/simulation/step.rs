@@ -175,23 +175,23 @@ impl Simulation {
             overruled,
             ..
         } = self;
-        let (of, moves) = ((law.as_ref(), &*links), (&*state, &*path, &*next));
+        let (inputs, moves) = ((law.as_ref(), &*links), (&*state, &*path, &*next));
         let Some(barrier_m) = law.capabilities().barrier_m.filter(|_| !*overruled && shield.is_none()) else {
             return (false, at_start_per_s);
         };
         let moved_m = longest_move_m(state, path, next);
         if !plant.holds_commands() {
-            return (judge.is_step_too_long(of, moves, moved_m), at_start_per_s);
+            return (judge.is_step_too_long(inputs, moves, moved_m), at_start_per_s);
         }
         let (clearance_margin_m, most) =
             (judge.clearance_margin_m - moved_m, TimeSpec::DEFAULT_MAX_RATE_DT.min(scenario.time.max_rate_dt));
         let rate = |nearest_m: f64| rate_per_s(law.as_ref(), scenario, (nearest_m, clearance_margin_m));
         let enough = |nearest_m: f64| nearest_m > barrier_m && rate(nearest_m) * length_s <= most;
         let may_leap = link.is_exact() && judge.nearest_m > barrier_m;
-        let nearest_m = judge.smallest_separation_of_move(of, moves, moved_m, enough);
+        let nearest_m = judge.smallest_separation_of_move(inputs, moves, moved_m, enough);
         let on_the_way_per_s = rate(nearest_m);
         let is_too_fast = on_the_way_per_s * length_s > MAX_RATE_DT_ON_THE_WAY.max(scenario.time.max_rate_dt);
-        let is_refused = is_too_fast || judge.is_step_too_long(of, moves, moved_m);
+        let is_refused = is_too_fast || judge.is_step_too_long(inputs, moves, moved_m);
         // A law may have no rate at or inside its barrier; no substep is short enough there.
         let leaps = may_leap && nearest_m <= barrier_m;
         (is_refused, if leaps { f64::INFINITY } else { on_the_way_per_s })

@@ -32,8 +32,8 @@ fn wrong_vehicles_are_refused_at_their_place_with_a_remedy() {
     ] {
         let error = refused(sets);
         assert_eq!(error.code(), code, "{sets:?}: {error}");
-        assert!(error.help().is_some_and(|help| help.contains(remedy)), "{sets:?}: {error}");
-        assert!(error.place().is_some_and(|place| place.source == "set"), "{sets:?}: {error}");
+        assert!(error.help.as_deref().is_some_and(|help| help.contains(remedy)), "{sets:?}: {error}");
+        assert!(error.place.as_ref().is_some_and(|place| place.source == "set"), "{sets:?}: {error}");
     }
 }
 
@@ -49,7 +49,7 @@ fn a_custom_model_is_a_file_relative_to_the_scenario() {
     let own = read().unwrap_or_else(|error| panic!("{error}"));
     assert_eq!(own.mass_kg, [0.03; 5]);
     // The scenario contains the model and no longer needs the file.
-    let again = Source::Text { name: "again".to_owned(), text: own.resolved_toml() };
+    let again = Source::Text { name: "again".to_owned(), text: own.resolved().toml };
     fs::remove_file(folder.path().join("mine.toml")).expect("removed");
     assert_eq!(Scenario::read(&again, &[]).unwrap_or_else(|error| panic!("{error}")), own);
     let missing = read().expect_err("no file");
@@ -71,7 +71,7 @@ fn a_scenario_of_quadrotors_is_written_and_read_back_bit_for_bit() {
         [&[][..], &["vehicle.attitude_rad_s=5.5", "vehicle.downwash=true"], &["time.control_hz=250", "time.dt_s=0.001"]]
     {
         let scenario = builtin("crazyflies", sets);
-        assert_eq!(read(&scenario.resolved_toml()), Scenario { name: scenario.name.clone(), ..scenario });
+        assert_eq!(read(&scenario.resolved().toml), Scenario { name: scenario.name.clone(), ..scenario });
     }
 }
 
@@ -84,5 +84,5 @@ fn rates_mass_hull_and_drag_depend_on_the_model() {
     let points = builtin("crazyflies", &[&sets[..], &["vehicle.model=point"]].concat());
     assert_eq!((points.mass_kg[0], points.hull_radius_m[0], points.a22_per_s), (7.0, 0.15, 0.1));
     assert_eq!((points.time.dt_s, points.time.control_hz), (1.0 / 240.0, None));
-    assert!(!points.resolved_toml().contains("[vehicle]"), "a scenario of points is written as ever");
+    assert!(!points.resolved().toml.contains("[vehicle]"), "a scenario of points is written as ever");
 }

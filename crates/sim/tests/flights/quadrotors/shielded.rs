@@ -76,7 +76,7 @@ fn conditions_of_a_measured_table_are_checked() {
         ("vehicle.attitude_damping=0.8", "vehicle.attitude_damping must be"),
     ] {
         let error = refused(&[set]);
-        let help = error.help().unwrap_or_default();
+        let help = error.help.as_deref().unwrap_or_default();
         assert!(error.to_string().contains(says) && help.contains("--identify"), "{set}: {error}");
     }
     let error = refused(&["shield.accel_m_s2=9"]);
@@ -84,7 +84,7 @@ fn conditions_of_a_measured_table_are_checked() {
     // An own assumption needs no table.
     assert!(builtin(SHIELDED, &["wind.mean_m_s=[1,0]", "shield.tracking_error_m=0.5"]).shield.is_some());
     let again = Scenario::read(
-        &scenario::Source::Text { name: "again".to_owned(), text: builtin(SHIELDED, &[]).resolved_toml() },
+        &scenario::Source::Text { name: "again".to_owned(), text: builtin(SHIELDED, &[]).resolved().toml },
         &[],
     );
     assert_eq!(again.expect("the same").shield_limits().expect("limits").expect("a shield").tube(), limits.tube());
