@@ -75,7 +75,7 @@ pub struct FlightSummary {
     pub overlong_steps: u64,
     /// SHA-256 of the resolved scenario.
     pub scenario_sha256: String,
-    /// Hash of the settings that determine the flight ([`Scenario::flight_sha256_hex`]).
+    /// Hash of the settings that determine the flight ([`Scenario::flight_sha256`]).
     #[serde(skip)]
     pub flight_sha256: String,
     /// Hash over the bits of every recorded state.
