@@ -12,8 +12,6 @@
 //! | [`DroneExportRequest`] | [`export_drones`] | trajectories of drones, judged after their encoding |
 //! | [`ScenarioRequest`] | [`identify`] | a measured tracking error, and a model file |
 
-#[cfg(feature = "cli")]
-mod arguments;
 pub mod audit;
 mod drones;
 mod export;
@@ -23,8 +21,6 @@ mod pictures;
 mod run;
 mod scenario;
 
-#[cfg(feature = "cli")]
-pub use arguments::one_of;
 pub use audit::{AuditOptions, AuditRequest, AuditedRecording, OwnRecording, Subject, audit_files, run_audit};
 pub use drones::{DroneChoices, DroneExport, DroneExportRequest, export_drones};
 pub use export::{ExportRequest, export_file};
@@ -38,3 +34,17 @@ pub use scenario::{ScenarioRequest, command_line};
 pub use tautline_core::failure::{Failure, blanked, in_range};
 pub use tautline_core::monitor::{Monitor, Quiet, Silent};
 pub use tautline_recordings::read::ReadOptions;
+
+/// Returns a parser of arguments that have names as values.
+#[cfg(feature = "cli")]
+#[must_use]
+pub fn one_of<T: Clone + Send + Sync + 'static>(
+    choices: Vec<(clap::builder::PossibleValue, T)>,
+) -> impl clap::builder::TypedValueParser<Value = T> {
+    use clap::builder::TypedValueParser as _;
+    let names = choices.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
+    clap::builder::PossibleValuesParser::new(names).try_map(move |given| {
+        let chosen = choices.iter().find(|(name, _)| name.get_name() == given);
+        chosen.map(|(_, value)| value.clone()).ok_or("not one of the possible values")
+    })
+}
