@@ -1,13 +1,15 @@
-//! Finds the embedded files: in this package, or at the top of the repository. The packaging script copies them.
+//! Finds the embedded files: in this package, or at the top of the repository. `.github/embed.sh` copies them.
 //!
-//! The variables hold paths relative to the package, so that the folder of the build can be shared and moved.
+//! The variable holds a path relative to the package, so that the folder of the build can be shared and moved. Cargo
+//! runs this again if the folder that it found is missing or has changed.
 
 use std::env;
 use std::path::PathBuf;
 
 fn main() {
     let package = PathBuf::from(env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default());
-    let place = if package.join("shaders").is_dir() { "" } else { "../../" };
-    println!("cargo::rustc-env=TAUTLINE_SHADERS={place}shaders");
+    let folder = if package.join("shaders").is_dir() { "shaders" } else { "../../shaders" };
+    println!("cargo::rustc-env=TAUTLINE_SHADERS={folder}");
+    println!("cargo::rerun-if-changed={folder}");
     println!("cargo::rerun-if-changed=build.rs");
 }
