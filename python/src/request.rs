@@ -1,5 +1,8 @@
 //! Converts keyword arguments of Python into parts of requests.
 
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use tautline::audit::envelope::Quantity;
@@ -117,8 +120,15 @@ impl AuditOptions {
     #[pyo3(signature = (**options))]
     fn new(options: Option<&Bound<'_, PyDict>>) -> PyResult<Self> {
         let mut given = toml::Table::new();
+        let mut files: BTreeMap<String, PathBuf> = BTreeMap::new();
         for (name, argument) in options.into_iter().flatten().filter(|(_, argument)| !argument.is_none()) {
-            given.insert(name.extract()?, value(&argument)?);
+            let name: String = name.extract()?;
+            // A path need not be text.
+            if ["obstacles", "fence", "plan", "config"].contains(&name.as_str()) {
+                files.insert(name, argument.extract()?);
+            } else {
+                given.insert(name, value(&argument)?);
+            }
         }
         let motion = given.get("motion").and_then(toml::Value::as_str).map(str::to_owned);
         choice("motion", motion, &Interpolation::ALL.map(|motion| (motion.name(), motion)))?;
@@ -130,7 +140,12 @@ impl AuditOptions {
             *limits = by_key.collect::<PyResult<_>>()?;
         }
         let read = |given: toml::Table| given.try_into::<audit::AuditOptions>();
-        read(given.clone()).map(Self).map_err(|error| {
+        let with_files = |options| {
+            let [obstacles, fence, plan, config] =
+                ["obstacles", "fence", "plan", "config"].map(|name| files.get(name).cloned());
+            Self(audit::AuditOptions { obstacles, fence, plan, config, ..options })
+        };
+        read(given.clone()).map(with_files).map_err(|error| {
             let is_wrong = |(name, argument)| read(toml::Table::from_iter([(name, argument)])).is_err();
             let wrong = given.into_iter().find(|argument| is_wrong(argument.clone()));
             wrong_input(format!("{}: {}", wrong.unwrap_or_else(|| (String::new(), false.into())).0, error.message()))

@@ -87,6 +87,69 @@ fn a_tautline_recording_has_a_default_delta() {
 }
 
 #[test]
+fn a_violation_at_an_obstacle_beside_ellipsoids_is_not_clear_in_an_audit() {
+    let folder = folder(&[("ell.toml", ELLIPSOIDS)]);
+    for record_hz in ["60", "240"] {
+        let record = format!("time.record_hz={record_hz}");
+        let words = ["run", "ell.toml", "--out", "out", "--force", "--no-figures", "--set", &record];
+        let ran = ran_by(TAUTLINE, folder.path(), &words);
+        assert!(ran.out.contains("from obstacle post"), "{ran:?}");
+        let ran = audit(folder.path(), &["out", "--json"]);
+        let json: Value = serde_json::from_str(&ran.out).expect("JSON alone");
+        assert_eq!((ran.exit, &json["status"]), (Some(1), &"undecided".into()), "{ran:?}");
+    }
+}
+
+/// Vehicle 1 flies through the clearance of an obstacle, far from all others.
+const ELLIPSOIDS: &str = r#"
+name = "ell"
+[swarm]
+count = 4
+dimensions = 3
+hull_radius_m = 0.05
+[safety]
+shape = "ellipsoid"
+half_axes_m = [0.25, 0.25, 0.75]
+[start]
+positions_m = [[-3, 0, 0], [6, 6, 0.3], [9, -9, 0.6], [9, 9, -0.2]]
+[formation]
+shape = "points"
+points_m = [[3, 0, 0], [9, 6, 0], [12, -9, 0], [12, 9, 0]]
+[reference]
+kind = "rest"
+[sensing]
+latency_s = 0.15
+[[obstacle]]
+name = "post"
+at_m = [0, 0, 0]
+ball = { radius_m = 0.2 }
+clearance_m = 0.3
+[law]
+kind = "displacement"
+delta_m = 0.5
+[time]
+duration_s = 20
+"#;
+
+#[test]
+fn of_equal_minima_all_outputs_name_one_pair() {
+    let folder = folder(&[]);
+    let start = "start={positions_m=[[-5.7,0],[5.7,0],[-2.7,10],[2.7,10]]}";
+    let formation = "formation={shape=\"points\",points_m=[[5.7,0],[-5.7,0],[2.7,10],[-2.7,10]]}";
+    let sets = [start, formation, "time.duration_s=4", "swarm.a22_per_s=0", "swarm.hull_radius_m=0.001"];
+    let sets: Vec<_> = sets.iter().flat_map(|set| ["--set", set]).collect();
+    let words = ["run", "pentagon-laplacian", "--plant", "ideal", "--out", "out", "--no-figures"];
+    let ran = ran_by(TAUTLINE, folder.path(), &[&words[..], &sets].concat());
+    let audited = audit(folder.path(), &["out"]);
+    for out in [&ran.out, &audited.out] {
+        let (headline, closest) = out.split_once('\n').expect("lines");
+        let closest = closest.lines().find(|line| line.contains("1 and 2") || line.contains("3 and 4")).expect(out);
+        let pair = if closest.contains("1 and 2") { "1 and 2" } else { "3 and 4" };
+        assert!(headline.contains("VIOLATION") && headline.contains(pair), "{out}");
+    }
+}
+
+#[test]
 fn json_goes_to_standard_output_with_the_keys_of_a_report() {
     let folder = folder(&[("pass.csv", PASS)]);
     let ran = audit(folder.path(), &["pass.csv", "--delta", "2", "--json"]);

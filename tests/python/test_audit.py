@@ -1,5 +1,6 @@
 """Tests of audits of arrays and files: they have the verdicts of the command line, for any memory order."""
 
+import os
 
 import numpy as np
 import tautline as tl
@@ -229,6 +230,13 @@ class Files(Case):
         self.assertTrue(tl.audit(self.folder / "p.npz", delta=0.1).is_clear)
         message = "neither delta nor its radius is given"
         self.refuses(tl.Error, message, lambda: tl.audit(self.folder / "p.npz", config=False))
+
+    def test_a_path_of_a_fence_need_not_be_text(self) -> None:
+        t, p = passing()
+        fence = os.fsdecode(os.fsencode(self.folder) + b"/f\xe9.toml")
+        with open(fence, "w") as file:
+            file.write("[fence]\npolygon_m = [[-1, -1], [1, -1], [1, 1], [-1, 1]]\n")
+        self.assertEqual(tl.audit(t, p, delta=0.1, fence=fence).status, "violation")
 
     def test_join_reads_files_with_one_vehicle_each(self) -> None:
         for name, x in (("a", 0.0), ("b", 1.0)):

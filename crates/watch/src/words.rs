@@ -8,7 +8,7 @@ use crate::settings::REPORTED_DEVIATIONS;
 use tautline_audit::Status;
 use tautline_core::fact::{Coded as _, Fact, FactKind, FactValue, Source};
 use tautline_core::option::{ACCEL, FRAME, MAX_VEHICLES, ORIGIN, POSITION_ERROR, TOPIC};
-use tautline_core::text::{at_least, at_most, seconds};
+use tautline_core::text::{at_least, at_most, in_order, seconds};
 
 /// Subject of a sentence.
 #[derive(Clone, Copy, Debug)]
@@ -49,10 +49,10 @@ pub(crate) fn name(monitor: &Monitor, vehicle: u32) -> String {
     monitor.names().get(vehicle as usize).map(|name| on_one_line(name)).unwrap_or_default()
 }
 
-/// Replaces control characters, and the other characters that begin a line.
+/// Replaces control characters, also those of direction, and the other characters that begin a line.
 fn on_one_line(text: &str) -> String {
     let is_wrong = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}');
-    text.replace(is_wrong, "\u{fffd}")
+    in_order(text).replace(is_wrong, "\u{fffd}")
 }
 
 fn joined(pair: Pair, monitor: &Monitor) -> String {

@@ -260,7 +260,7 @@ impl Finding {
     fn sentence(&self, part: Part, is_violation: bool) -> String {
         let names = self.names();
         let over = span(self.from_s.unwrap_or(f64::NAN), self.to_s.unwrap_or(f64::NAN));
-        let allowed = self.limit.unwrap_or_default();
+        let (allowed, unit) = (self.limit.unwrap_or_default(), self.value.unit);
         match part {
             Part::Limit(limit) if self.from_s.is_none() => {
                 format!("{names}: its {} is not known", quantity(limit.quantity))
@@ -275,7 +275,7 @@ impl Finding {
             ),
             Part::WellClear(_) => self.loss(if is_violation { "are not" } else { "may not be" }),
             _ if is_violation => format!(
-                "{names}: {} at {} s, below {} from {over}",
+                "{names}: {} {unit} at {} s, below {} {unit} from {over}",
                 beside_limit(self.value.upper_bound(), allowed, 3),
                 fixed(self.at_s.unwrap_or(f64::NAN), 3),
                 exact(allowed)
@@ -284,9 +284,9 @@ impl Finding {
                 let rate = self.rate_hz.map_or(String::new(), |hz| format!("; {} Hz would decide", at_most(hz, 1)));
                 let apart = match self.value.upper {
                     Some(upper) => interval(self.value.lower_bound(), upper, allowed),
-                    None => "not known".to_owned(),
+                    None => "an unknown distance in".to_owned(),
                 };
-                format!("{names}: {apart} from {over}, limit {}{rate}", exact(allowed))
+                format!("{names}: {apart} {unit} from {over}, limit {} {unit}{rate}", exact(allowed))
             }
         }
     }

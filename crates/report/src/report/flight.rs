@@ -414,11 +414,14 @@ impl FlightResult<'_> {
         Finding::violation(found, names, unit, true)
     }
 
-    /// Returns the deepest of some violations.
+    /// Returns the deepest of some violations. Of equal ones it is that of the closest pair.
     pub(super) fn deepest<P: Copy + Into<ObjectPair>>(&self, violations: &[Violation<P>]) -> Option<Finding> {
+        let closest = self.flight.audit.closest.map(|found| ObjectPair::from(found.pair));
+        let is_other = |found: &Violation<P>| Some(found.pair.into()) != closest;
         let depth = |found: &Violation<P>| [found.min_m - found.limit_m, found.min_m];
         let order = |[a, b]: [f64; 2], [c, d]: [f64; 2]| a.total_cmp(&c).then(b.total_cmp(&d));
-        violations.iter().min_by(|a, b| order(depth(a), depth(b))).map(|found| self.violation(found))
+        let deepest = violations.iter().min_by(|a, b| order(depth(a), depth(b)).then(is_other(a).cmp(&is_other(b))));
+        deepest.map(|found| self.violation(found))
     }
 
     /// Returns the answer on separations and obstacles. Of many violations the deepest are listed.

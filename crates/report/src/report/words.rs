@@ -85,6 +85,11 @@ fn came_to(found: &Finding, limit: &str) -> String {
     format!("vehicle {vehicle} came to {near} m from obstacle {obstacle} at {at} (clearance {clearance} m)")
 }
 
+/// Returns the words behind a distance that is scaled by an ellipsoid.
+fn scaled(found: &Finding) -> &'static str {
+    if found.value.unit == "m" { "" } else { " scaled to ellipsoids" }
+}
+
 /// Returns a smallest separation below a certified one, in metres each.
 fn below_certified(found: &Finding) -> [String; 2] {
     below_bound(found.value.upper_bound(), found.limit.unwrap_or_default())
@@ -99,7 +104,7 @@ impl Display for Reason {
             Self::Violation { deepest, violations } => write!(
                 out,
                 "{}; the safety distance is {} m.{}",
-                capitalised(&came_to(deepest, "")),
+                capitalised(&came_to(deepest, scaled(deepest))),
                 exact(deepest.limit.unwrap_or_default()),
                 others(*violations)
             ),
@@ -108,7 +113,7 @@ impl Display for Reason {
                 "The step cannot resolve whether the safety distance of {} m is kept. In the flown motion {}, but the \
                  integration error of steps that are too long for the law may be larger.",
                 exact(deepest.limit.unwrap_or_default()),
-                came_to(deepest, "")
+                came_to(deepest, scaled(deepest))
             ),
             Self::ObstacleViolation { deepest, violations } => {
                 write!(out, "A vehicle came too near to an obstacle: {}.{}", came_to(deepest, ""), others(*violations))

@@ -186,15 +186,24 @@ impl RecordedReport {
 
     fn finding_of_pairs(&self, answer: &Answer, status: Status) -> String {
         let unit = format!(" {}", self.unit());
-        let lower = |finding: &Finding| finding.value.lower_bound();
         let time = |finding: &Finding| seconds(finding.at_s.unwrap_or(f64::NAN));
         let delta = self.question.delta.map_or("by radii".to_owned(), |m| format!("delta {}{unit}", exact(m)));
         match status {
             Status::Clear => {
-                let lowest = answer.closest.iter().min_by(|a, b| lower(a).total_cmp(&lower(b)));
-                let closest = lowest.map_or(String::new(), |finding| {
-                    let least = beside_limit(lower(finding), finding.limit.unwrap_or_default(), 6);
-                    format!("never closer than {least}{unit}, {} at {} ", finding.names(), time(finding))
+                // Vehicles and obstacles have different limits.
+                let lower = |finding: &Finding| finding.value.lower_bound();
+                let nearest = answer
+                    .closest
+                    .iter()
+                    .min_by(|a, b| a.margin().total_cmp(&b.margin()).then(lower(a).total_cmp(&lower(b))));
+                let closest = nearest.map_or(String::new(), |finding| {
+                    let limit = finding.limit.unwrap_or_default();
+                    let least = beside_limit(finding.value.lower_bound(), limit, 6);
+                    let beside = match self.question.delta {
+                        Some(delta) if delta != limit => format!(", limit {}{unit}", exact(limit)),
+                        _ => String::new(),
+                    };
+                    format!("never closer than {least}{unit}, {} at {}{beside} ", finding.names(), time(finding))
                 });
                 let is_in_verdict = self.is_by_run() || self.source.facts.iter().any(Fact::is_assumption);
                 let motion = if is_in_verdict { String::new() } else { format!(", {}", self.motion()) };
@@ -202,7 +211,12 @@ impl RecordedReport {
             }
             Status::Violation => {
                 let listed = answer.violations.listed.iter();
-                let deepest = listed.min_by(|a, b| a.largest_margin().total_cmp(&b.largest_margin()));
+                // Of equal ones the closest pair.
+                let closest = answer.closest.first().map(|finding| finding.objects);
+                let is_other = |finding: &Finding| Some(finding.objects) != closest;
+                let deepest = listed.min_by(|a, b| {
+                    a.largest_margin().total_cmp(&b.largest_margin()).then(is_other(a).cmp(&is_other(b)))
+                });
                 let tie = if self.is_decimal_tie { ", with decimals exactly at the limit" } else { "" };
                 let others = match tally_in_words(sum([&answer.violations])) {
                     _ if answer.violations.count <= 1 => String::new(),

@@ -7,9 +7,10 @@ use toml::Spanned;
 use toml::de::DeTable;
 
 use super::super::Failure;
-use super::options::FILE_KEYS;
+use super::options::{FILE_KEYS, unknown_limit};
 use super::toml_file::TomlFile;
 use super::{AuditOptions, AuditRequest, ConfiguredAudit};
+use tautline_audit::envelope::Quantity;
 use tautline_audit::recorded::Interpolation;
 use tautline_core::option::NO_CONFIG;
 
@@ -81,16 +82,31 @@ fn fill<'a>(mut request: AuditRequest<'a>, text: &str, path: &Path) -> Result<Co
 fn parse(text: &str, path: &Path) -> Result<(AuditOptions, String), Failure> {
     let wrong = |start: usize, message: String| Err(FILE.wrong(text, path, start, &message));
     let table = DeTable::parse(text).map(Spanned::into_inner).unwrap_or_default();
-    let given = table.get("audit").and_then(|audit| audit.get_ref().as_table());
+    let audit = table.get("audit");
+    let given = audit.and_then(|audit| audit.get_ref().as_table());
+    if let (Some(audit), None) = (audit, given) {
+        return wrong(audit.span().start, "audit must be a table".to_owned());
+    }
     let entries: Vec<_> = given.into_iter().flatten().collect();
-    for (key, value) in &entries {
-        if FILE_KEYS.split(' ').all(|known| known != key.get_ref()) {
-            let keys = FILE_KEYS.replace(' ', "`, `");
-            return wrong(key.span().start, format!("unknown field `{}`, expected one of `{keys}`", key.get_ref()));
+    // Keys with their values, also of tables such as `limits`.
+    let tables = entries.iter().filter_map(|(key, value)| Some((key.get_ref(), value.get_ref().as_table()?)));
+    let inner = tables.flat_map(|(table, entries)| entries.iter().map(move |(key, value)| (Some(table), key, value)));
+    let keyed: Vec<_> = entries.iter().map(|(key, value)| (None, *key, *value)).chain(inner).collect();
+    for (table, key, value) in &keyed {
+        let is_limit = |key: &str| Quantity::NUMBERS.into_iter().any(|quantity| quantity.key() == key);
+        if table.is_some_and(|table| table == "limits") && !is_limit(key.get_ref()) {
+            return wrong(key.span().start, unknown_limit(key.get_ref()));
         }
         let number = value.get_ref().as_float().and_then(|number| number.as_str().parse::<f64>().ok());
         if number.is_some_and(|number| !number.is_finite()) {
-            return wrong(value.span().start, format!("{} must be a finite number", key.get_ref()));
+            let place = table.map_or(String::new(), |table| format!("{table}."));
+            return wrong(value.span().start, format!("{place}{} must be a finite number", key.get_ref()));
+        }
+    }
+    for (key, _) in &entries {
+        if FILE_KEYS.split(' ').all(|known| known != key.get_ref()) {
+            let keys = FILE_KEYS.replace(' ', "`, `");
+            return wrong(key.span().start, format!("unknown field `{}`, expected one of `{keys}`", key.get_ref()));
         }
     }
     match toml::from_str(text) {
@@ -100,8 +116,12 @@ fn parse(text: &str, path: &Path) -> Result<(AuditOptions, String), Failure> {
         }
         Err(error) => {
             let start = error.span().map_or(0, |span| span.start);
-            let entry = entries.iter().find(|(_, value)| value.span().contains(&start));
-            wrong(start, entry.map_or(String::new(), |(key, _)| format!("{}: ", key.get_ref())) + error.message())
+            // The innermost value with the error.
+            let place = keyed.iter().rfind(|(_, _, value)| value.span().contains(&start));
+            let place = place.map_or(String::new(), |(table, key, _)| {
+                table.map_or(String::new(), |table| format!("{table}.")) + key.get_ref() + ": "
+            });
+            wrong(start, place + error.message())
         }
     }
 }
@@ -110,7 +130,7 @@ fn parse(text: &str, path: &Path) -> Result<(AuditOptions, String), Failure> {
 mod tests {
     use super::*;
     use crate::request::Subject;
-    use tautline_audit::envelope::{Limit, Quantity};
+    use tautline_audit::envelope::Limit;
 
     fn request() -> AuditRequest<'static> {
         let paths = vec![PathBuf::from("show/a.csv")];
@@ -141,13 +161,52 @@ mod tests {
     }
 
     #[test]
+    fn every_key_of_the_file_has_an_effect() {
+        let values = [
+            ("delta_m", "1.0"),
+            ("radius_m", "1.0"),
+            ("ellipsoid_m", "[1.0, 1.0, 2.0]"),
+            ("cylinder_m", "[1.0, 2.0]"),
+            ("well_clear", "\"do-365\""),
+            ("rules", "\"skybrush\""),
+            ("motion", "\"hold\""),
+            ("max_accel_m_s2", "1.0\nmotion = \"bounded\""),
+            ("obstacles", "\"venue.toml\""),
+            ("fence", "\"fence.toml\""),
+            ("above_m", "1.0"),
+            ("land_on", "[\"roof\"]"),
+            ("max_gap_s", "1.0"),
+            ("expect_vehicles", "2"),
+            ("layout", "\"vehicle,time,axis\""),
+            ("allow_undecided", "true"),
+            ("axes", "\"ned\""),
+            ("scale", "2.0"),
+            ("require_presence", "true"),
+            ("accel_window_s", "1.0"),
+            ("limits", "{ speed_m_s = 1.0 }"),
+        ];
+        assert_eq!(values.map(|(key, _)| key).join(" "), FILE_KEYS);
+        let text = |key: &str, value: &str| format!("[audit]\n{key} = {value}");
+        let shown = |text: &str| format!("{:?}", filled(request(), text).expect(text).request.options);
+        let bounded = shown(&text("motion", "\"bounded\""));
+        for (key, value) in values {
+            let options = shown(&text(key, value));
+            assert!(options != shown("[audit]") && options != bounded, "{key}: {options}");
+        }
+    }
+
+    #[test]
     fn errors_name_their_line() {
         for (text, expected) in [
             ("", "line 1: missing field `audit`"),
             ("[audit]\ndelta = 1.5", "show/tautline.toml, line 2: unknown field `delta`"),
             ("[audit]\nmotion = \"spline\"", "line 2: motion: unknown variant `spline`"),
             ("[audit]\nids = [\"a\"]", "line 2: unknown field `ids`, expected one of `delta_m`, "),
-            ("[audit.limits]\nspeed = 5.0", "`speed` is not a limit: the limits are speed_m_s,"),
+            ("[audit]\n[audit.limits]\nheight_m = 9\nspeed = 5.0", "line 4: `speed` is not a limit: the limits are "),
+            ("[audit]\nlimits = 5", "line 2: limits: numbers by the names of limits are needed"),
+            ("[audit.radius_m]\na = 1\nb = \"x\"", "line 3: radius_m.b: invalid type"),
+            ("[audit]\nradius_m = { a = nan }", "line 2: radius_m.a must be a finite number"),
+            ("audit = [1.0]", "line 1: audit must be a table"),
             ("[audit]\nmax_accel_m_s2 = 2.0", "has no effect without motion = \"bounded\""),
             ("[audit]\naxes = \"nes\"", "`nes` is not three directions"),
             ("[audit]\nscale = [1, 0, 1]", "a scale must not be 0"),

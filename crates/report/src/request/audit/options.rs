@@ -1,6 +1,6 @@
 //! Options of an audit, each once: for the command line, `tautline.toml`, keyword arguments of Python and programs.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -19,7 +19,7 @@ use super::venue_file;
 use tautline_audit::envelope::{Envelope, Limit, Quantity};
 use tautline_audit::recorded::{Interpolation, RecordedError, Settings, VehicleSettings};
 use tautline_audit::{Cylinder, WellClear};
-use tautline_core::option::{ELLIPSOID, LIMIT, MAX_ACCEL, MOTION, OFFSET, Opt, PLAN_DELAY, RADIUS, TUBE};
+use tautline_core::option::{ELLIPSOID, IDS, LIMIT, MAX_ACCEL, MOTION, OFFSET, Opt, PLAN_DELAY, RADIUS, TUBE};
 use tautline_recordings::read::{ArrayAxis, ArrayLayout, Axes, Scale};
 
 /// Largest delay of a plan that may be given \[s\]: a century.
@@ -135,9 +135,9 @@ pub struct AuditOptions {
     #[cfg_attr(feature = "cli", arg(long, value_name = "NAME,...", value_parser = names))]
     pub ids: Vec<Names>,
     /// Add this to the times of a vehicle with a clock offset [s]; repeatable.
-    #[serde(deserialize_with = "entries")]
+    #[serde(deserialize_with = "offsets")]
     #[cfg_attr(feature = "cli", arg(long, value_name = "NAME=SECONDS", value_parser = offset))]
-    pub offset: Vec<Entry>,
+    pub offset: Vec<(String, f64)>,
     /// Expected number of vehicles; another number is wrong input.
     #[cfg_attr(feature = "cli", arg(long, value_name = "N"))]
     pub expect_vehicles: Option<usize>,
@@ -232,19 +232,21 @@ impl AuditOptions {
     pub fn settings(&self) -> Result<Settings, Failure> {
         self.check()?;
         let mut vehicles: BTreeMap<String, VehicleSettings> = BTreeMap::new();
-        let radius_m = fill(RADIUS, &self.radius_m, |name, radius_m| {
+        for (name, radius_m) in once_each(RADIUS, named(&self.radius_m))? {
             vehicles.entry(name.clone()).or_default().radius_m = Some(radius_m);
-        })?;
-        let max_accel_m_s2 = fill(MAX_ACCEL, &self.max_accel_m_s2, |name, max_accel_m_s2| {
+        }
+        for (name, max_accel_m_s2) in once_each(MAX_ACCEL, named(&self.max_accel_m_s2))? {
             vehicles.entry(name.clone()).or_default().max_accel_m_s2 = Some(max_accel_m_s2);
-        })?;
-        fill(OFFSET, &self.offset, |name, offset_s| vehicles.entry(name.clone()).or_default().offset_s = offset_s)?;
+        }
+        for (name, offset_s) in once_each(OFFSET, self.offset.iter().map(|(name, offset_s)| (name, *offset_s)))? {
+            vehicles.entry(name.clone()).or_default().offset_s = offset_s;
+        }
         let names = |lists: &[Names]| lists.iter().flat_map(|Names(names)| names.iter().cloned()).collect();
         Ok(Settings {
             delta_m: self.delta_m,
             motion: self.motion,
-            max_accel_m_s2,
-            radius_m,
+            max_accel_m_s2: of_all(MAX_ACCEL, &self.max_accel_m_s2)?,
+            radius_m: of_all(RADIUS, &self.radius_m)?,
             ellipsoid_m: self.ellipsoid_m,
             cylinder: self.cylinder_m,
             well_clear: self.well_clear,
@@ -283,7 +285,11 @@ impl AuditOptions {
                 "an ellipsoid has its own size: leave one of them out",
             ));
         }
-        let jumps = self.motion.filter(|of| matches!(of, Interpolation::Hold | Interpolation::Bounded));
+        if !self.ids.is_empty() && self.ids.iter().all(|Names(names)| names.is_empty()) {
+            let help = format!("name at least one vehicle, or leave {IDS} out to judge all");
+            return Err(Failure::input("audit/nothing-to-judge", format!("{IDS} names no vehicle"), help));
+        }
+        let jumps = self.motion.filter(|motion| matches!(motion, Interpolation::Hold | Interpolation::Bounded));
         if let Some(motion) = jumps.filter(|_| self.well_clear.is_some()) {
             return Err(RecordedError::WellClearMotion { motion: motion.name() }.into());
         }
@@ -305,20 +311,36 @@ impl AuditOptions {
     }
 }
 
-/// Returns the value of all vehicles, and passes those of single vehicles to `set`. Refuses two values for the same.
-fn fill(option: Opt, entries: &[Entry], mut set: impl FnMut(&String, f64)) -> Result<Option<f64>, Failure> {
-    let mut known = BTreeSet::new();
+/// Returns the entries of single vehicles.
+fn named(entries: &[Entry]) -> impl Iterator<Item = (&String, f64)> {
+    entries.iter().filter_map(|(name, value)| Some((name.as_ref()?, *value)))
+}
+
+/// Returns the entries of an option. Refuses two values for one vehicle.
+fn once_each<'a>(
+    option: Opt,
+    entries: impl Iterator<Item = (&'a String, f64)>,
+) -> Result<BTreeMap<&'a String, f64>, Failure> {
+    let mut known = BTreeMap::new();
     for (name, value) in entries {
-        if !known.insert(name) {
-            let vehicles = name.as_ref().map_or("all vehicles".to_owned(), |name| format!("vehicle {name}"));
-            let message = format!("{option}: two values for {vehicles}");
-            return Err(Failure::input("usage/twice", message, "give one value"));
-        }
-        if let Some(name) = name {
-            set(name, *value);
+        if known.insert(name, value).is_some() {
+            return Err(twice(option, &format!("vehicle {name}")));
         }
     }
-    Ok(entries.iter().find(|(name, _)| name.is_none()).map(|(_, value)| *value))
+    Ok(known)
+}
+
+/// Returns the value of all vehicles. Refuses two.
+fn of_all(option: Opt, entries: &[Entry]) -> Result<Option<f64>, Failure> {
+    let mut values = entries.iter().filter(|(name, _)| name.is_none()).map(|(_, value)| *value);
+    match (values.next(), values.next()) {
+        (_, Some(_)) => Err(twice(option, "all vehicles")),
+        (value, None) => Ok(value),
+    }
+}
+
+fn twice(option: Opt, vehicles: &str) -> Failure {
+    Failure::input("usage/twice", format!("{option}: two values for {vehicles}"), "give one value")
 }
 
 /// Text, a number, or several numbers, which stand for the text with commas between them.
@@ -335,11 +357,11 @@ fn parsed_by<'de, D: Deserializer<'de>, T>(
     given: D,
     parse: fn(&str) -> Result<T, String>,
 ) -> Result<Option<T>, D::Error> {
-    let numbers = |of: &[f64]| of.iter().map(|number| format!("{number:?}")).collect::<Vec<_>>().join(",");
+    let numbers = |list: &[f64]| list.iter().map(|number| format!("{number:?}")).collect::<Vec<_>>().join(",");
     let text = match Words::deserialize(given)? {
         Words::Text(text) => text,
         Words::Number(number) => numbers(&[number]),
-        Words::Numbers(of) => numbers(&of),
+        Words::Numbers(list) => numbers(&list),
     };
     parse(&text).map(Some).map_err(D::Error::custom)
 }
@@ -366,15 +388,26 @@ fn layout<'de, D: Deserializer<'de>>(given: D) -> Result<Option<ArrayLayout>, D:
 
 /// Reads limits by the keys of their quantities, such as `speed_m_s`.
 fn limits<'de, D: Deserializer<'de>>(given: D) -> Result<Vec<Limit>, D::Error> {
-    let limits = entries(given)?.into_iter().map(|(key, allowed)| {
-        let key = key.unwrap_or_default();
+    let limits = by_name(given, "limits")?.into_iter().map(|(key, allowed)| {
         let quantity = Quantity::NUMBERS.into_iter().find(|quantity| quantity.key() == key);
-        quantity.map(|quantity| Limit { quantity, allowed }).ok_or_else(|| {
-            let keys = Quantity::NUMBERS.map(Quantity::key).join(", ");
-            D::Error::custom(format!("`{key}` is not a limit: the limits are {keys}"))
-        })
+        quantity.map(|quantity| Limit { quantity, allowed }).ok_or_else(|| D::Error::custom(unknown_limit(&key)))
     });
     limits.collect()
+}
+
+/// Returns the error for a key that is no limit.
+pub(super) fn unknown_limit(key: &str) -> String {
+    format!("`{key}` is not a limit: the limits are {}", Quantity::NUMBERS.map(Quantity::key).join(", "))
+}
+
+/// Reads clock offsets by the names of vehicles.
+fn offsets<'de, D: Deserializer<'de>>(given: D) -> Result<Vec<(String, f64)>, D::Error> {
+    by_name(given, "vehicles")
+}
+
+fn by_name<'de, D: Deserializer<'de>>(given: D, names: &str) -> Result<Vec<(String, f64)>, D::Error> {
+    let wrong = || D::Error::custom(format!("numbers by the names of {names} are needed"));
+    entries(given)?.into_iter().map(|(name, number)| Ok((name.ok_or_else(wrong)?, number))).collect()
 }
 
 /// Reads the number of all vehicles, or numbers by the names of vehicles.
@@ -446,9 +479,9 @@ fn entry(text: &str) -> Result<Entry, String> {
 }
 
 #[cfg(feature = "cli")]
-fn offset(text: &str) -> Result<Entry, String> {
+fn offset(text: &str) -> Result<(String, f64), String> {
     let (name, value) = text.rsplit_once('=').ok_or("write NAME=SECONDS, such as cf3=-0.12")?;
-    Ok((Some(name.to_owned()), number(value)?))
+    Ok((name.to_owned(), number(value)?))
 }
 
 /// Parses a limit such as `speed=5`.
@@ -464,6 +497,14 @@ fn limit(text: &str) -> Result<Limit, String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_list_of_vehicles_without_a_name_is_refused() {
+        let judged = |ids| AuditOptions { ids, ..AuditOptions::default() }.settings().map(|settings| settings.only);
+        assert_eq!(judged(vec![]).expect("all vehicles"), None);
+        let refused = judged(vec![Names(vec![])]).expect_err("no vehicle");
+        assert_eq!(refused.code(), "audit/nothing-to-judge");
+    }
 
     #[test]
     fn numbers_of_a_plan_out_of_range_are_refused() {

@@ -226,11 +226,11 @@ impl OwnRecording {
                         counted(count, "finding", "findings")
                     ),
                 });
-                return self.of_samples(outcome, settings, None);
+                return self.of_samples(outcome, settings, None, |_| true);
             }
             StoredAudit::Altered => {
                 note("the recording was changed after the run, so the run's audit may refer to other samples");
-                return self.of_samples(outcome, settings, None);
+                return self.of_samples(outcome, settings, None, |_| true);
             }
             StoredAudit::AsWritten(audit) => audit,
         };
@@ -242,7 +242,12 @@ impl OwnRecording {
             if status == Status::Undecided && outcome.status == Status::Violation {
                 notes.push(UNDECIDED_RUN.to_owned());
             }
-            return RunAnswer::Samples;
+            if self.ellipsoid_m.is_none() {
+                return RunAnswer::Samples;
+            }
+            // Beside ellipsoids the samples are not judged against obstacles.
+            let of_obstacles = |pair: ObjectPair| matches!(pair, ObjectPair::Obstacle { .. });
+            return self.of_samples(outcome, settings, Some(audit), of_obstacles);
         }
         if !self.is_same_question(settings, request) || !outcome.absences.is_empty() {
             let limit = exact(self.limit_m);
@@ -250,7 +255,7 @@ impl OwnRecording {
             note(&format!(
                 "the run's audit of every step answers another question ({verdict}: all vehicles, limit {limit})"
             ));
-            return self.of_samples(outcome, settings, Some(audit));
+            return self.of_samples(outcome, settings, Some(audit), |_| true);
         }
         if self.is_contradicted(outcome, audit, status) {
             note("they show vehicles closer than the run's audit");
@@ -274,9 +279,15 @@ impl OwnRecording {
         }
     }
 
-    /// Leaves the answer to the samples, unless the run objects.
-    fn of_samples(&self, outcome: &mut Outcome, settings: &Settings, audit: Option<&RunAudit>) -> RunAnswer {
-        match self.objection(outcome, settings, audit) {
+    /// Leaves the answer to the samples, unless the run objects by a finding on a pair that counts.
+    fn of_samples(
+        &self,
+        outcome: &mut Outcome,
+        settings: &Settings,
+        audit: Option<&RunAudit>,
+        counts: fn(ObjectPair) -> bool,
+    ) -> RunAnswer {
+        match self.objection(outcome, settings, audit, counts) {
             Some(why) => undecided(outcome, why),
             None => RunAnswer::Samples,
         }
@@ -285,7 +296,13 @@ impl OwnRecording {
     /// Returns the reason why a clear answer of the samples is not certain: between samples the run found a pair closer
     /// than the request allows. Distances of another metric are compared by an upper bound. Motion that `--offset`
     /// shifts in time is not that of the run.
-    fn objection(&self, outcome: &Outcome, settings: &Settings, audit: Option<&RunAudit>) -> Option<RunObjection> {
+    fn objection(
+        &self,
+        outcome: &Outcome,
+        settings: &Settings,
+        audit: Option<&RunAudit>,
+        counts: fn(ObjectPair) -> bool,
+    ) -> Option<RunObjection> {
         if outcome.separation != Some(Status::Clear) {
             return None;
         }
@@ -314,14 +331,14 @@ impl OwnRecording {
                     && in_window(found)
             }
             ObjectPair::Obstacle { vehicle, obstacle } => {
-                self.obstacles.get(obstacle).is_some_and(|of| settings.obstacles.contains(of))
-                    && is_judged(vehicle)
-                    && found.min_m < found.limit_m
-                    && in_window(found)
+                // The run judged obstacles beside its ellipsoids, a question on recordings does not.
+                let is_asked = self.obstacles.get(obstacle).is_some_and(|of| settings.obstacles.contains(of));
+                (is_asked || is_same_metric) && is_judged(vehicle) && found.min_m < found.limit_m && in_window(found)
             }
         };
         let stored = audit.into_iter().flat_map(|audit| audit.violations.iter().chain(&audit.closest));
-        let found = stored.filter_map(decoded).chain(self.run_findings.iter().copied()).filter(is_closer);
+        let found = stored.filter_map(decoded).chain(self.run_findings.iter().copied());
+        let found = found.filter(|found| counts(found.pair)).filter(is_closer);
         let deepest = found.min_by(|a, b| (a.min_m - a.limit_m).total_cmp(&(b.min_m - b.limit_m)))?;
         let who = match deepest.pair {
             ObjectPair::Vehicles(pair) => pair.numbers().map(|number| number.to_string()),
