@@ -2,7 +2,9 @@
 
 use std::path::PathBuf;
 
+use pyo3::conversion::FromPyObjectOwned;
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use tautline::attack::Bound as Bounds;
 use tautline::campaign::CampaignRequest;
 use tautline::export::WRITTEN;
@@ -10,7 +12,8 @@ use tautline::export::drones::Dialect;
 use tautline::margin::Range;
 use tautline::report::recorded::RecordedReport;
 use tautline::request::{
-    DroneChoices, ExportRequest, Failure, Monitor, ScenarioRequest, Silent, export_drones, export_file,
+    DroneExportOptions, DroneExportRequest, ExportRequest, Failure, Monitor, ScenarioRequest, Silent, export_drones,
+    export_file,
 };
 use tautline::scenario::{ExternalLaw, builtin};
 use tautline::statistics::Proportion;
@@ -60,40 +63,23 @@ pub(crate) fn scenarios() -> Vec<&'static str> {
     builtin::all().iter().map(|builtin| builtin.name).collect()
 }
 
-/// Options of an export for drones.
-#[derive(FromPyObject)]
-pub(crate) struct DroneKeywords {
-    #[pyo3(item)]
-    tolerance: Option<f64>,
-    #[pyo3(item)]
-    delta: Option<f64>,
-    #[pyo3(item)]
-    ellipsoid: Option<[f64; 3]>,
-    #[pyo3(item)]
-    obstacles: Option<PathBuf>,
-    #[pyo3(item)]
-    from_s: Option<f64>,
-    #[pyo3(item)]
-    until_s: Option<f64>,
-    #[pyo3(item)]
-    compressed: bool,
-    #[pyo3(item)]
-    skyb_version: u8,
+/// Returns the value of a keyword argument.
+fn keyword<'py, T: FromPyObjectOwned<'py>>(keywords: &Bound<'py, PyDict>, name: &str) -> PyResult<T> {
+    keywords.as_any().get_item(name)?.extract().map_err(Into::into)
 }
 
-impl From<DroneKeywords> for DroneChoices {
-    fn from(keywords: DroneKeywords) -> Self {
-        Self {
-            tolerance_m: keywords.tolerance,
-            delta_m: keywords.delta,
-            ellipsoid_m: keywords.ellipsoid.map(Into::into),
-            obstacles: keywords.obstacles,
-            from_s: keywords.from_s,
-            until_s: keywords.until_s,
-            is_compressed: keywords.compressed,
-            skyb_version: keywords.skyb_version,
-        }
-    }
+/// Returns the options of an export for drones.
+fn drone_options(keywords: &Bound<'_, PyDict>) -> PyResult<DroneExportOptions> {
+    Ok(DroneExportOptions {
+        tolerance_m: keyword(keywords, "tolerance")?,
+        delta_m: keyword(keywords, "delta")?,
+        ellipsoid_m: keyword::<Option<[f64; 3]>>(keywords, "ellipsoid")?.map(Into::into),
+        obstacles: keyword(keywords, "obstacles")?,
+        from_s: keyword(keywords, "from_s")?,
+        until_s: keyword(keywords, "until_s")?,
+        is_compressed: keyword(keywords, "compressed")?,
+        skyb_version: Some(keyword(keywords, "skyb_version")?),
+    })
 }
 
 /// Writes a recording in another format, or for drones. Returns the answer of an export for drones.
@@ -107,17 +93,17 @@ pub(crate) fn export(
     to: Option<String>,
     sample_hz: Option<f64>,
     force: bool,
-    drones: DroneKeywords,
+    drones: &Bound<'_, PyDict>,
 ) -> PyResult<Option<Answer>> {
     let options = options.0.clone();
     let lossless = WRITTEN.iter().map(|format| (format.name, (Some(*format), None)));
     let of_drones = Dialect::ALL.map(|dialect| (dialect.name(), (None, Some(dialect))));
     let (format, dialect) = choice("to", to, &lossless.chain(of_drones).collect::<Vec<_>>())?.unwrap_or_default();
-    let request = ExportRequest { paths, options, output, format, sample_hz, force };
+    let file = ExportRequest { paths, options, output, format, sample_hz, force };
     let Some(dialect) = dialect else {
-        return answered(py, false, |monitor| export_file(&request, monitor)).map(|()| None);
+        return answered(py, false, |monitor| export_file(&file, monitor)).map(|()| None);
     };
-    let request = request.for_drones(dialect, drones.into());
+    let request = DroneExportRequest { file, dialect, options: drone_options(drones)? };
     let exported = answered(py, false, |monitor| export_drones(&request, monitor))?;
     let refusal = exported.refusal.as_ref().map(Failure::in_words);
     let headline = refusal.or_else(|| exported.audit.as_ref().map(RecordedReport::headline));

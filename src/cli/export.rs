@@ -4,15 +4,16 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::TypedValueParser;
-use nalgebra::Vector3;
 
 use super::Exit;
 use super::console::{self, Console, Terminal};
-use super::reading::{self, ReadArguments, three};
+use super::reading::{self, ReadArguments};
 use tautline_recordings::export::WRITTEN;
 use tautline_recordings::export::drones::Dialect;
 use tautline_recordings::read::Format;
-use tautline_report::request::{DroneChoices, ExportRequest, Failure, export_drones, export_file, one_of};
+use tautline_report::request::{
+    DroneExportOptions, DroneExportRequest, ExportRequest, Failure, export_drones, export_file, one_of,
+};
 
 /// Arguments of `tautline export`.
 #[derive(Debug, Args)]
@@ -33,62 +34,17 @@ pub(super) struct ExportArguments {
     /// Print no text.
     #[arg(long, short)]
     quiet: bool,
+    /// Format that drones fly. The written motion is judged; nothing is written if it is not clear.
+    #[arg(long, value_name = "FORMAT", value_parser = dialect(), help_heading = "For drones")]
+    to: Option<Dialect>,
     #[command(flatten)]
-    drones: DroneArguments,
+    drones: DroneExportOptions,
     // Last, because its help heading also applies to all later arguments.
     #[command(flatten)]
     reading: ReadArguments,
     /// Format of the recording [default: detected from its content].
     #[arg(long, value_name = "FORMAT", value_parser = reading::format())]
     input_format: Option<Format>,
-}
-
-/// Arguments of an export for drones.
-#[derive(Debug, Args)]
-#[command(next_help_heading = "For drones")]
-struct DroneArguments {
-    /// Format that drones fly. The written motion is judged; nothing is written if it is not clear.
-    #[arg(long, value_name = "FORMAT", value_parser = dialect())]
-    to: Option<Dialect>,
-    /// Largest distance of the written motion from the flight [m] [default: 0.01; none for px4-show and vviz].
-    #[arg(long, value_name = "METRES", requires = "to", allow_negative_numbers = true)]
-    tolerance: Option<f64>,
-    /// Safety distance between two centres [m] [default: that of the recording].
-    #[arg(long, value_name = "METRES", requires = "to", allow_negative_numbers = true)]
-    delta: Option<f64>,
-    /// Half axes [m] of an ellipsoid around each vehicle [default: those of the recording].
-    #[arg(long, value_name = "X,Y,Z", requires = "to", value_parser = ellipsoid)]
-    ellipsoid: Option<Vector3<f64>>,
-    /// TOML file of obstacles [default: those of the recording].
-    #[arg(long, value_name = "FILE", requires = "to")]
-    obstacles: Option<PathBuf>,
-    /// Start of the exported part of the flight [s].
-    #[arg(long, value_name = "SECONDS", requires = "to", allow_negative_numbers = true)]
-    from: Option<f64>,
-    /// End of the exported part of the flight [s].
-    #[arg(long, value_name = "SECONDS", requires = "to", allow_negative_numbers = true)]
-    until: Option<f64>,
-    /// Write the compressed form of a Crazyflie, whose coordinates reach 32.767 m.
-    #[arg(long, requires = "to")]
-    compressed: bool,
-    /// Version of .skyb files: 1, or 2 with a checksum.
-    #[arg(long, value_name = "VERSION", requires = "to", default_value_t = 2, hide_default_value = true)]
-    skyb_version: u8,
-}
-
-impl DroneArguments {
-    fn choices(&self) -> DroneChoices {
-        DroneChoices {
-            tolerance_m: self.tolerance,
-            delta_m: self.delta,
-            ellipsoid_m: self.ellipsoid,
-            obstacles: self.obstacles.clone(),
-            from_s: self.from,
-            until_s: self.until,
-            is_compressed: self.compressed,
-            skyb_version: self.skyb_version,
-        }
-    }
 }
 
 pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
@@ -98,15 +54,20 @@ pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
         return Err(Failure::input("usage/several-recordings", message, help));
     };
     let terminal = Terminal::new(Console { data_on_stdout: false, quiet: arguments.quiet })?;
-    let (paths, options) = (paths.clone(), arguments.reading.options(arguments.input_format));
-    let ExportArguments { output, format, sample_hz, force, drones, .. } = arguments;
-    let (output, sample_hz, force) = (output.clone(), *sample_hz, *force);
-    let request = ExportRequest { paths, options, output, format: *format, sample_hz, force };
-    let Some(dialect) = drones.to else {
-        export_file(&request, &terminal)?;
+    let ExportArguments { output, format, sample_hz, force, to, drones, .. } = arguments;
+    let file = ExportRequest {
+        paths: paths.clone(),
+        options: arguments.reading.options(arguments.input_format),
+        output: output.clone(),
+        format: *format,
+        sample_hz: *sample_hz,
+        force: *force,
+    };
+    let Some(dialect) = *to else {
+        export_file(&file, &terminal)?;
         return Ok(Exit::Good);
     };
-    let request = request.for_drones(dialect, drones.choices());
+    let request = DroneExportRequest { file, dialect, options: drones.clone() };
     match export_drones(&request, &terminal)?.refusal {
         None => Ok(Exit::Good),
         Some(refusal) => {
@@ -124,8 +85,4 @@ fn written_format() -> impl TypedValueParser<Value = Format> {
 /// Returns a parser of formats of drones.
 fn dialect() -> impl TypedValueParser<Value = Dialect> {
     one_of(Dialect::ALL.map(|dialect| (dialect.name().into(), dialect)).into())
-}
-
-fn ellipsoid(text: &str) -> Result<Vector3<f64>, String> {
-    three(text).map(Vector3::from)
 }

@@ -22,7 +22,7 @@ mod run;
 mod scenario;
 
 pub use audit::{AuditOptions, AuditRequest, AuditedRecording, OwnRecording, Subject, audit_files, run_audit};
-pub use drones::{DroneChoices, DroneExport, DroneExportRequest, export_drones};
+pub use drones::{DroneExport, DroneExportOptions, DroneExportRequest, export_drones};
 pub use export::{ExportRequest, export_file};
 pub use identify::{IdentifiedModel, identify};
 pub use outputs::{OutFolder, try_to_write_in};

@@ -141,7 +141,7 @@ impl DroneExport {
                  s{of_flight}"
             );
         }
-        let dialect = request.drones.dialect;
+        let dialect = request.dialect;
         let [one, many] = if dialect.is_sampled() { ["sample", "samples"] } else { ["piece", "pieces"] };
         let parts = || self.vehicles.iter().map(|of| of.parts);
         let (fewest, most) = (parts().min().unwrap_or(0), parts().max().unwrap_or(0));
@@ -154,7 +154,7 @@ impl DroneExport {
         let shift =
             if from_s == 0.0 { String::new() } else { format!("; {from_s:?} s of the flight are 0 s of the files") };
         let _ = writeln!(text, "flight       {} s to {} s{shift}", fixed(from_s, 3), fixed(until_s, 3));
-        let _ = write!(text, "wrote {}: {}, {} bytes", request.output.display(), dialect.title(), self.bytes);
+        let _ = write!(text, "wrote {}: {}, {} bytes", request.file.output.display(), dialect.title(), self.bytes);
         text
     }
 }

@@ -13,6 +13,8 @@ use nalgebra::Vector3;
 
 pub use self::answer::DroneExport;
 use self::written::Written;
+#[cfg(feature = "cli")]
+use super::audit::rules;
 use super::audit::{AuditOptions, AuditRequest, Subject, recording_in};
 use super::{ExportRequest, Failure, Monitor, Quiet, outputs};
 use crate::report::Status;
@@ -23,72 +25,61 @@ use tautline_core::option::{
     COLUMN, COMPRESSED, DELTA, DRONE_FORMAT, ELLIPSOID, FORCE, FROM, OBSTACLES, OUTPUT, SAMPLE_HZ, SKYB_VERSION, UNTIL,
 };
 use tautline_recordings::export::drones::{self, Dialect, DroneOptions, FlownVehicle};
-use tautline_recordings::read::ReadOptions;
 
 /// Largest speed of a limit that no vehicle reaches \[m/s\]: a lone vehicle is read under it for its gaps.
 const BEYOND_M_S: f64 = 1e9;
+
+/// Newest version of `.skyb` files.
+const NEWEST_SKYB: u8 = 2;
+
+/// Options that only an export for drones has; an option that is not given has its default value.
+///
+/// With the feature `cli` this struct is a part of the arguments of `tautline export`, and its comments are the help.
+#[derive(Clone, Debug, Default)]
+#[cfg_attr(feature = "cli", derive(clap::Args), command(next_help_heading = "For drones"))]
+#[allow(rustdoc::broken_intra_doc_links, reason = "units are in brackets, as in the help")]
+pub struct DroneExportOptions {
+    /// Largest distance of the written motion from the flight [m] [default: 0.01; none for px4-show and vviz].
+    #[cfg_attr(feature = "cli", arg(long = "tolerance", value_name = "METRES", requires = "to"))]
+    #[cfg_attr(feature = "cli", arg(allow_negative_numbers = true))]
+    pub tolerance_m: Option<f64>,
+    /// Safety distance between two centres [m] [default: that of the recording].
+    #[cfg_attr(feature = "cli", arg(long = "delta", value_name = "METRES", requires = "to"))]
+    #[cfg_attr(feature = "cli", arg(allow_negative_numbers = true))]
+    pub delta_m: Option<f64>,
+    /// Half axes [m] of an ellipsoid around each vehicle, or a name (crazyswarm, crazyflie-firmware) [default: those of
+    /// the recording].
+    #[cfg_attr(feature = "cli", arg(long = "ellipsoid", value_name = "AX,AY,AZ", requires = "to"))]
+    #[cfg_attr(feature = "cli", arg(value_parser = rules::ellipsoid, allow_hyphen_values = true))]
+    pub ellipsoid_m: Option<Vector3<f64>>,
+    /// TOML file of obstacles [default: those of the recording].
+    #[cfg_attr(feature = "cli", arg(long, value_name = "FILE", requires = "to"))]
+    pub obstacles: Option<PathBuf>,
+    /// Start of the exported part of the flight [s].
+    #[cfg_attr(feature = "cli", arg(long = "from", value_name = "SECONDS", requires = "to"))]
+    #[cfg_attr(feature = "cli", arg(allow_negative_numbers = true))]
+    pub from_s: Option<f64>,
+    /// End of the exported part of the flight [s].
+    #[cfg_attr(feature = "cli", arg(long = "until", value_name = "SECONDS", requires = "to"))]
+    #[cfg_attr(feature = "cli", arg(allow_negative_numbers = true))]
+    pub until_s: Option<f64>,
+    /// Write the compressed form of a Crazyflie, whose coordinates reach 32.767 m.
+    #[cfg_attr(feature = "cli", arg(long = "compressed", requires = "to"))]
+    pub is_compressed: bool,
+    /// Version of .skyb files: 1, or 2 with a checksum [default: 2].
+    #[cfg_attr(feature = "cli", arg(long, value_name = "VERSION", requires = "to"))]
+    pub skyb_version: Option<u8>,
+}
+
 /// A recording and the files to write for drones.
 #[derive(Clone, Debug)]
 pub struct DroneExportRequest {
-    /// Files or folders. Several paths are one recording, each with a vehicle of its own.
-    pub paths: Vec<PathBuf>,
-    /// Options of the readers.
-    pub options: ReadOptions,
-    /// Path of the output: a folder or a file, as the format demands.
-    pub output: PathBuf,
-    /// Format, tolerance and rate. The safety distance is set from the limits.
-    pub drones: DroneOptions,
-    /// Safety distance \[m\]; by default that of the recording.
-    pub delta_m: Option<f64>,
-    /// Half axes of the ellipsoid around each vehicle \[m\]; by default that of the recording.
-    pub ellipsoid_m: Option<Vector3<f64>>,
-    /// TOML file of obstacles; by default those of the recording.
-    pub obstacles: Option<PathBuf>,
-    /// Start of the exported part of the flight \[s\].
-    pub from_s: Option<f64>,
-    /// End of the exported part of the flight \[s\].
-    pub until_s: Option<f64>,
-    /// Whether an existing output is overwritten.
-    pub force: bool,
-}
-
-/// Options that only an export for drones has, each in its default state if the caller leaves it out.
-#[derive(Clone, Debug)]
-pub struct DroneChoices {
-    /// Largest distance from the flight \[m\]; by default that of the format.
-    pub tolerance_m: Option<f64>,
-    /// Safety distance \[m\]; by default that of the recording.
-    pub delta_m: Option<f64>,
-    /// Half axes of the ellipsoid around each vehicle \[m\]; by default that of the recording.
-    pub ellipsoid_m: Option<Vector3<f64>>,
-    /// TOML file of obstacles; by default those of the recording.
-    pub obstacles: Option<PathBuf>,
-    /// Start of the exported part of the flight \[s\].
-    pub from_s: Option<f64>,
-    /// End of the exported part of the flight \[s\].
-    pub until_s: Option<f64>,
-    /// Whether Crazyflie trajectories are compressed.
-    pub is_compressed: bool,
-    /// Version of `.skyb` files: 1, or 2 with a checksum.
-    pub skyb_version: u8,
-}
-
-impl ExportRequest {
-    /// Returns the request for drones with these files and this sampling rate.
-    #[must_use]
-    pub fn for_drones(self, dialect: Dialect, choices: DroneChoices) -> DroneExportRequest {
-        let Self { paths, options, output, format: _, sample_hz, force } = self;
-        let usual = DroneOptions::new(dialect);
-        let drones = DroneOptions {
-            tolerance_m: choices.tolerance_m.or(usual.tolerance_m),
-            is_compressed: choices.is_compressed,
-            skyb_version: choices.skyb_version,
-            sample_hz,
-            ..usual
-        };
-        let DroneChoices { delta_m, ellipsoid_m, obstacles, from_s, until_s, .. } = choices;
-        DroneExportRequest { paths, options, output, drones, delta_m, ellipsoid_m, obstacles, from_s, until_s, force }
-    }
+    /// Recording, output, and sampling rate. The output is a folder or a file, as the format demands.
+    pub file: ExportRequest,
+    /// Format that drones fly.
+    pub dialect: Dialect,
+    /// Tolerance, limits and part of the flight.
+    pub options: DroneExportOptions,
 }
 
 /// Writes a flight for drones, judges the written files, and removes them if they are not clear.
@@ -97,9 +88,12 @@ impl ExportRequest {
 /// [`Failure`] if the request or the recording is wrong, if the format cannot hold the flight, or if no file can be
 /// written. A violation is no error: see [`DroneExport::refusal`].
 pub fn export_drones(request: &DroneExportRequest, monitor: &dyn Monitor) -> Result<DroneExport, Failure> {
-    let paths = request.paths.iter().map(|path| recording_in(path)).collect();
-    let request = &DroneExportRequest { paths, ..request.clone() };
+    let mut request = request.clone();
+    for path in &mut request.file.paths {
+        *path = recording_in(path);
+    }
     request.check()?;
+    let request = &request;
     let flight = Flight::read(request, monitor)?;
     for note in &flight.notes {
         monitor.warn(&format!("note: {note}"));
@@ -111,17 +105,16 @@ pub fn export_drones(request: &DroneExportRequest, monitor: &dyn Monitor) -> Res
         let refusal = Some(Failure::input("export/violation", message, help));
         return Ok(DroneExport { span_s: flight.span_s, refusal, ..DroneExport::empty() });
     }
-    let mut options = request.drones;
-    options.delta_m = flight.settings.delta_m.filter(|_| flight.settings.ellipsoid_m.is_none());
+    let options = request.encoding(&flight.settings);
     let motions: Vec<_> = flight.vehicles.iter().map(|of| (of.name.clone(), of.motion.clone())).collect();
     monitor.begin("fit", None);
     let encoded = drones::encode(&motions, &options, &|| monitor.is_interrupted());
     monitor.finish();
     let encoded = encoded.map_err(|error| error.later(flight.span_s.0))?;
-    let written = Written::new(&request.output, &options, &encoded)?;
+    let written = Written::new(&request.file.output, &options, &encoded)?;
     let mut answer = written.judged(&flight, &options, encoded, monitor)?;
     if answer.refusal.is_none() {
-        written.keep(request.force)?;
+        written.keep(request.file.force)?;
         monitor.say(&answer.text(request, &flight));
     }
     answer.bytes = written.bytes;
@@ -131,30 +124,30 @@ pub fn export_drones(request: &DroneExportRequest, monitor: &dyn Monitor) -> Res
 impl DroneExportRequest {
     /// Checks the options and the output.
     fn check(&self) -> Result<(), Failure> {
-        let Self { drones, output, .. } = self;
-        let dialect = drones.dialect;
+        let Self { file: ExportRequest { paths, output, sample_hz, force, .. }, dialect, options } = self;
+        let has_old_version = options.skyb_version.is_some_and(|version| version != NEWEST_SKYB);
         let unused = [
-            (drones.is_compressed && dialect != Dialect::Crazyflie, COMPRESSED, "crazyflie", ""),
-            (drones.skyb_version != 2 && dialect != Dialect::Skyb, SKYB_VERSION, "skyb", ""),
-            (drones.sample_hz.is_some() && !dialect.is_sampled(), SAMPLE_HZ, "px4-show", " or vviz"),
+            (options.is_compressed && *dialect != Dialect::Crazyflie, COMPRESSED, "crazyflie", ""),
+            (has_old_version && *dialect != Dialect::Skyb, SKYB_VERSION, "skyb", ""),
+            (sample_hz.is_some() && !dialect.is_sampled(), SAMPLE_HZ, "px4-show", " or vviz"),
         ];
         if let Some((_, option, format, others)) = unused.into_iter().find(|(is_unused, ..)| *is_unused) {
             let message = format!("{option}: has no effect with {}", DRONE_FORMAT.set(dialect.name()));
             let help = format!("leave it out, or give {}{others}", DRONE_FORMAT.set(format));
             return Err(Failure::input("export/unused-option", message, help));
         }
-        if self.ellipsoid_m.is_some() && self.obstacles.is_some() {
+        if options.ellipsoid_m.is_some() && options.obstacles.is_some() {
             let message = format!("{ELLIPSOID} and {OBSTACLES}: must not both be given");
             return Err(Failure::input("export/unused-option", message, "leave one of them out"));
         }
         let replaceable = match fs::read_dir(output) {
-            Ok(mut entries) => dialect.is_folder() && (entries.next().is_none() || (self.force && is_export(output))),
-            Err(_) => !output.exists() || (!dialect.is_folder() && self.force),
+            Ok(mut entries) => dialect.is_folder() && (entries.next().is_none() || (*force && is_export(output))),
+            Err(_) => !output.exists() || (!dialect.is_folder() && *force),
         };
         if !replaceable {
             let help = if output.is_dir() != dialect.is_folder() {
                 format!("give a {} that does not exist", if dialect.is_folder() { "folder" } else { "file" })
-            } else if self.force {
+            } else if *force {
                 "give another folder: it holds other files than an export".to_owned()
             } else {
                 format!("overwrite it with {FORCE}, or give another path")
@@ -166,8 +159,8 @@ impl DroneExportRequest {
             let message = format!("{OUTPUT}: there is no folder {}", parent.display());
             return Err(Failure::input("files/no-folder", message, "make this folder, or give another path"));
         }
-        let mut inputs: Vec<_> = self.paths.iter().map(|path| ("the recording".to_owned(), path.as_path())).collect();
-        inputs.extend(self.obstacles.as_deref().map(|path| ("the file of obstacles".to_owned(), path)));
+        let mut inputs: Vec<_> = paths.iter().map(|path| ("the recording".to_owned(), path.as_path())).collect();
+        inputs.extend(options.obstacles.as_deref().map(|path| ("the file of obstacles".to_owned(), path)));
         let replaced = fs::canonicalize(output).ok();
         let is_within =
             |path: &Path| fs::canonicalize(path).ok().zip(replaced.as_ref()).is_some_and(|(a, b)| a.starts_with(b));
@@ -178,15 +171,30 @@ impl DroneExportRequest {
         outputs::check(&inputs, &[(OUTPUT.to_string(), output)])
     }
 
+    /// Returns the options of the encoder. A show states the safety distance of the flight.
+    fn encoding(&self, limits: &Settings) -> DroneOptions {
+        let usual = DroneOptions::new(self.dialect);
+        DroneOptions {
+            tolerance_m: self.options.tolerance_m.or(usual.tolerance_m),
+            is_compressed: self.options.is_compressed,
+            skyb_version: self.options.skyb_version.unwrap_or(NEWEST_SKYB),
+            sample_hz: self.file.sample_hz,
+            delta_m: limits.delta_m.filter(|_| limits.ellipsoid_m.is_none()),
+            ..usual
+        }
+    }
+
     /// Returns the request for the audit of the flight.
     fn audit(&self) -> AuditRequest<'static> {
-        let subject = Subject::Files { paths: self.paths.clone(), options: Box::new(self.options.clone()) };
+        let ExportRequest { paths, options, .. } = &self.file;
+        let subject = Subject::Files { paths: paths.clone(), options: Box::new(options.clone()) };
+        let DroneExportOptions { delta_m, ellipsoid_m, obstacles, from_s, until_s, .. } = self.options.clone();
         let options = AuditOptions {
-            delta_m: self.delta_m,
-            ellipsoid_m: self.ellipsoid_m,
-            obstacles: self.obstacles.clone(),
-            from_s: self.from_s,
-            to_s: self.until_s,
+            delta_m,
+            ellipsoid_m,
+            obstacles,
+            from_s,
+            to_s: until_s,
             no_config: true,
             ..AuditOptions::default()
         };
@@ -195,13 +203,13 @@ impl DroneExportRequest {
 
     /// Checks the window before anything is read.
     fn check_window(&self) -> Result<(), Failure> {
-        for (option, given) in [(FROM, self.from_s), (UNTIL, self.until_s)] {
+        for (option, given) in [(FROM, self.options.from_s), (UNTIL, self.options.until_s)] {
             if let Some(given) = given.filter(|given| !given.is_finite()) {
                 let message = format!("{option}: must be a finite number of seconds, got {given:?}");
                 return Err(Failure::input("export/window", message, format!("give {option} a time such as 2.5")));
             }
         }
-        match (self.from_s, self.until_s) {
+        match (self.options.from_s, self.options.until_s) {
             (Some(from_s), Some(until_s)) if until_s <= from_s => {
                 let message = format!("{UNTIL}: must be after {FROM}, got {until_s:?} s and {from_s:?} s");
                 Err(Failure::input("export/window", message, format!("give a larger {UNTIL} or a smaller {FROM}")))
@@ -212,7 +220,7 @@ impl DroneExportRequest {
 
     /// Refuses a vehicle that is absent for a part of the window, or whose motion has a gap.
     fn check_presence(&self, report: &RecordedReport) -> Result<(), Failure> {
-        let is_window = self.from_s.is_some() || self.until_s.is_some();
+        let is_window = self.options.from_s.is_some() || self.options.until_s.is_some();
         if let Some(absent) = report.presence.listed.first() {
             let spans = report.presence.listed.iter();
             let is_seen = spans.clone().all(|of| of.finding.from_s.is_some());
@@ -222,7 +230,9 @@ impl DroneExportRequest {
                 (Some(first_s), Some(last_s)) => {
                     format!("is absent for a part of the flight (seen {first_s:?} s to {last_s:?} s)")
                 }
-                _ if self.from_s.is_none() && self.until_s.is_none() => "is not seen at any time".to_owned(),
+                _ if self.options.from_s.is_none() && self.options.until_s.is_none() => {
+                    "is not seen at any time".to_owned()
+                }
                 _ => "is not seen in the exported part".to_owned(),
             };
             let message = format!("vehicle {}: it {seen}", absent.vehicle);
@@ -252,7 +262,7 @@ impl DroneExportRequest {
                 let spans = || vehicles.iter().filter_map(|of| of.motion.span_s());
                 let first_s = spans().map(|span| span.0).fold(f64::INFINITY, f64::min);
                 let last_s = spans().map(|span| span.1).fold(f64::NEG_INFINITY, f64::max);
-                let (option, given) = match (self.from_s, self.until_s) {
+                let (option, given) = match (self.options.from_s, self.options.until_s) {
                     (Some(from_s), until_s) if until_s.is_none() || from_s > last_s => (FROM, from_s),
                     (_, until_s) => (UNTIL, until_s.unwrap_or(last_s)),
                 };
@@ -328,8 +338,9 @@ impl Flight {
             })
         };
         let spans = vehicles.iter().map(span).collect::<Result<Vec<_>, _>>()?;
-        let from_s = spans.iter().map(|span| span.0).fold(request.from_s.unwrap_or(f64::NEG_INFINITY), f64::max);
-        let until_s = spans.iter().map(|span| span.1).fold(request.until_s.unwrap_or(f64::INFINITY), f64::min);
+        let from_s =
+            spans.iter().map(|span| span.0).fold(request.options.from_s.unwrap_or(f64::NEG_INFINITY), f64::max);
+        let until_s = spans.iter().map(|span| span.1).fold(request.options.until_s.unwrap_or(f64::INFINITY), f64::min);
         if until_s <= from_s {
             let message = format!("the exported part from {from_s:?} s to {until_s:?} s is empty");
             let help = format!("give {FROM} and {UNTIL} within the recording");
