@@ -220,6 +220,11 @@ def name_list(value: object, what: str) -> list[str]:
     return [str(name) for name in value]
 
 
+def optional_names(value: object, what: str) -> list[str] | None:
+    """Returns names or None."""
+    return None if value is None else name_list(value, what)
+
+
 def path(value: object, what: str) -> str:
     """Returns a path as text. A leading `-` gets `./` in front: it stands for a file, not for standard output."""
     if not isinstance(value, (str, os.PathLike)) or not isinstance(os.fspath(value), str):

@@ -21,6 +21,7 @@ from ._arguments import (
     number_or_by_name,
     numbers_by_name,
     optional_count,
+    optional_names,
     optional_number,
     optional_path,
     optional_text,
@@ -43,13 +44,37 @@ if TYPE_CHECKING:
 #: Verdict, headline, summary, the report as JSON, and whether each of its facts is an assumption.
 Outcome = tuple[str, str, str, str, list[bool]]
 
-#: Arguments of `audit`, in the order of the call that a page shows.
-SHOWN = (
-    "delta", "motion", "max_accel", "radius", "ellipsoid", "cylinder", "well_clear", "rules", "obstacles", "limit",
-    "fence", "plan", "plan_delay", "tube", "accel_window", "config", "from_s", "to_s", "above", "land_on", "ids",
-    "offset", "expect_vehicles", "max_gap",
-    "require_presence", "independent",
-)  # fmt: skip
+#: Check of each option of an audit, in the order of the call that a page shows.
+CHECKS: dict[str, Callable[[object, str], object]] = {
+    "delta": optional_number,
+    "motion": optional_text,
+    "max_accel": number_or_by_name,
+    "radius": number_or_by_name,
+    "ellipsoid": name_or_numbers,
+    "cylinder": name_or_numbers,
+    "well_clear": name_or_numbers,
+    "rules": optional_text,
+    "obstacles": optional_path,
+    "limit": numbers_by_name,
+    "fence": optional_path,
+    "plan": optional_path,
+    "plan_delay": optional_number,
+    "tube": optional_number,
+    "accel_window": optional_number,
+    "config": lambda value, what: False if value is False else optional_path(value, what),
+    "from_s": optional_number,
+    "to_s": optional_number,
+    "above": optional_number,
+    "land_on": optional_names,
+    "ids": optional_names,
+    "offset": numbers_by_name,
+    "expect_vehicles": optional_count,
+    "max_gap": optional_number,
+    "require_presence": boolean,
+    "independent": boolean,
+}
+#: Options that are files.
+FILES = ("obstacles", "fence", "plan", "config")
 
 
 class ViolationError(Error):
@@ -200,39 +225,14 @@ class AuditOptions(TypedDict, total=False):
     independent: bool
 
 
+class AuditArguments(AuditOptions, ReadOptions, total=False):
+    """Keyword arguments of :func:`audit`: its checks, and the options of reading."""
+
+
 def audit(
     t: ArrayLike | PathLike | Sequence[PathLike],
     positions: ArrayLike | None = None,
-    *,
-    delta: float | None = None,
-    velocities: ArrayLike | None = None,
-    names: Sequence[str] | None = None,
-    motion: Motion | None = None,
-    max_accel: float | Mapping[str, float] | None = None,
-    radius: float | Mapping[str, float] | None = None,
-    ellipsoid: Sequence[float] | str | None = None,
-    cylinder: Sequence[float] | None = None,
-    well_clear: Sequence[float] | str | None = None,
-    rules: Rules | None = None,
-    obstacles: PathLike | None = None,
-    limit: Mapping[str, float] | None = None,
-    fence: PathLike | None = None,
-    plan: PathLike | None = None,
-    plan_delay: float | None = None,
-    tube: float | None = None,
-    accel_window: float | None = None,
-    config: PathLike | Literal[False] | None = None,
-    from_s: float | None = None,
-    to_s: float | None = None,
-    above: float | None = None,
-    land_on: Iterable[str] | None = None,
-    ids: Iterable[str] | None = None,
-    offset: Mapping[str, float] | None = None,
-    expect_vehicles: int | None = None,
-    max_gap: float | None = None,
-    require_presence: bool = False,
-    independent: bool = False,
-    **read_as: Unpack[ReadOptions],
+    **options: Unpack[AuditArguments],
 ) -> Audit:
     """Audits positions over time, in arrays or in a recording of any format.
 
@@ -282,85 +282,64 @@ def audit(
     Raises ``TypeError`` for numbers that are no float64, ``FileNotFoundError`` for a missing file and :class:`Error`
     for other wrong input. docs/audit.md explains the verdicts.
     """
-    return perform(locals())
+    return perform(t, positions, options)
 
 
-def audit_with(findings: _native.FlightFindings, t: Any, positions: Any, options: AuditOptions) -> Audit:
-    """Audits the arrays of a flight with the findings of its run."""
-    try:
-        bound = inspect.signature(audit).bind(t, positions, **options)
-    except TypeError as wrong:
-        raise TypeError(f"audit() {wrong}") from None
-    bound.apply_defaults()
-    return perform(bound.arguments, findings)
+def signature() -> inspect.Signature:
+    """Returns the signature of :func:`audit` with all keyword arguments of an audit and of arrays."""
+    keyword, no = inspect.Parameter.KEYWORD_ONLY, ("require_presence", "independent")
+    named = [
+        inspect.Parameter(name, keyword, default=False if name in no else None, annotation=kind.__forward_arg__)
+        for name, kind in AuditOptions.__annotations__.items()
+    ]
+    given = inspect.signature(audit).parameters
+    read_as = given["options"].replace(name="read_as", annotation="Unpack[ReadOptions]")
+    return inspect.Signature([given["t"], given["positions"], *named, read_as], return_annotation="Audit")
 
 
-def perform(given: Mapping[str, Any], findings: _native.FlightFindings | None = None) -> Audit:
-    """Audits with the arguments of :func:`audit`."""
-    read_as = dict(given["read_as"])
-    t, positions, velocities, names = given["t"], given["positions"], given["velocities"], given["names"]
-    obstacles, fence, plan, config = given["obstacles"], given["fence"], given["plan"], given["config"]
-    ids = None if given["ids"] is None else name_list(given["ids"], "ids")
-    land_on = None if given["land_on"] is None else name_list(given["land_on"], "land_on")
-    options = given_arguments({**given, "ids": ids, "land_on": land_on}) | read_as
-    if unknown := [word for word in read_as if word not in inspect.signature(read_options).parameters]:
+audit.__signature__ = signature()  # type: ignore[attr-defined]
+
+
+def perform(
+    t: object,
+    positions: object,
+    arguments: Mapping[str, Any],
+    findings: _native.FlightFindings | None = None,
+) -> Audit:
+    """Audits with the arguments of :func:`audit`, those of a flight with the findings of its run."""
+    options = {name: check(arguments[name], name) for name, check in CHECKS.items() if name in arguments}
+    names, velocities = arguments.get("names"), arguments.get("velocities")
+    read_as = {name: arguments[name] for name in arguments if name not in AuditOptions.__annotations__}
+    if unknown := [word for word in read_as if word not in ReadOptions.__annotations__]:
         raise TypeError(f"audit() got an unexpected keyword argument '{unknown[0]}'")
-    if plan is None and (given["plan_delay"] is not None or given["tube"] is not None):
+    given = {name: value for name, value in options.items() if value is not None}
+    given = {name: value for name, value in given.items() if value is not False or name == "config"}
+    if "plan" not in given and ("plan_delay" in given or "tube" in given):
         raise TypeError("plan_delay, tube: only with a plan")
-    if ids is not None and not ids:
+    if given.get("ids") == []:
         raise Error("ids: no vehicle is named; leave it out to audit all")
+    has_no_config = given.get("config") is False
     question = _native.AuditOptions(
-        delta=optional_number(given["delta"], "delta"),
-        motion=optional_text(given["motion"], "motion"),
-        max_accel=number_or_by_name(given["max_accel"], "max_accel"),
-        radius=number_or_by_name(given["radius"], "radius"),
-        ellipsoid=name_or_numbers(given["ellipsoid"], "ellipsoid"),
-        cylinder=name_or_numbers(given["cylinder"], "cylinder"),
-        well_clear=name_or_numbers(given["well_clear"], "well_clear"),
-        rules=optional_text(given["rules"], "rules"),
-        obstacles=optional_path(obstacles, "obstacles"),
-        limit=numbers_by_name(given["limit"], "limit"),
-        fence=optional_path(fence, "fence"),
-        plan=optional_path(plan, "plan"),
-        plan_delay=optional_number(given["plan_delay"], "plan_delay"),
-        tube=optional_number(given["tube"], "tube"),
-        accel_window=optional_number(given["accel_window"], "accel_window"),
-        config=None if config is False else optional_path(config, "config"),
-        no_config=config is False,
-        from_s=optional_number(given["from_s"], "from_s"),
-        to_s=optional_number(given["to_s"], "to_s"),
-        above=optional_number(given["above"], "above"),
-        land_on=land_on or [],
-        ids=ids,
-        offset=numbers_by_name(given["offset"], "offset"),
-        expect_vehicles=optional_count(given["expect_vehicles"], "expect_vehicles"),
-        max_gap=optional_number(given["max_gap"], "max_gap"),
-        require_presence=boolean(given["require_presence"], "require_presence"),
-        independent=boolean(given["independent"], "independent"),
+        **{name: value for name, value in given.items() if value is not False}, no_config=has_no_config
     )
-    more_files = (obstacles, fence, plan, None if config is False else config)
-    files = [os.fspath(file) for file in more_files if file is not None]
+    files = [str(given[name]) for name in FILES if given.get(name)]
+    # An iterator of names is exhausted.
+    shown = {name: value if isinstance(value, list) else arguments[name] for name, value in given.items()} | read_as
     if positions is None:
         has_arrays = velocities is not None or names is not None
-        return audit_files(question, call_text(repr(t), options), t, read_as, files, has_arrays)
+        return audit_files(question, call_text(repr(t), shown), t, read_as, files, has_arrays)
     if isinstance(t, (str, os.PathLike)):
         raise TypeError("t: times are needed beside positions, or a path alone")
-    times, positions = exact_array(t, "t"), exact_array(positions, "positions")
-    velocities = None if velocities is None else exact_array(velocities, "velocities")
+    times, places = exact_array(t, "t"), exact_array(positions, "positions")
+    speeds = None if velocities is None else exact_array(velocities, "velocities")
     layout = read_as.pop("layout", None)
     if layout is not None:
-        positions = transposed(positions, layout)
-        velocities = None if velocities is None else transposed(velocities, layout)
+        places = transposed(places, layout)
+        speeds = None if speeds is None else transposed(speeds, layout)
     if read_as:
         raise TypeError(f"{', '.join(read_as)}: only for files, but arrays are given")
-    command = call_text("t, positions", options)
-    return with_files(files, lambda: audit_arrays(question, command, times, positions, velocities, names, findings))
-
-
-def given_arguments(arguments: Mapping[str, Any]) -> dict[str, Any]:
-    """Returns the arguments of `SHOWN` that differ from their defaults."""
-    given = {name: arguments[name] for name in SHOWN if arguments[name] is not None}
-    return {name: value for name, value in given.items() if value is not False or name == "config"}
+    command = call_text("t, positions", shown)
+    return with_files(files, lambda: audit_arrays(question, command, times, places, speeds, names, findings))
 
 
 def call_text(first: str, options: Mapping[str, Any]) -> str:

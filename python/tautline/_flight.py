@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from . import _display, _native
 from ._arguments import PathLike, boolean, path
-from ._audit import Audit, AuditOptions, audit_with
+from ._audit import Audit, AuditOptions, perform
 from ._judgement import Judgement, Statement
 from ._law import ControlLaw, check_law
 from ._native import Error
@@ -128,7 +128,7 @@ class Flight(Judgement, Table):
         audit. Other options are evaluated on the recorded instants. A flight that ended early is ``UNDECIDED`` unless
         a violation was found, or ``to_s`` ends the window earlier.
         """
-        return audit_with(self._audited, self.t, self.positions, options)
+        return perform(self.t, self.positions, options, self._audited)
 
     def plot(self) -> Figure:
         """Draws the paths from above, and the smallest separation over time with delta. Imports matplotlib."""

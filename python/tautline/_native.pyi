@@ -292,7 +292,6 @@ class Columns:
 
 _AuditOutcome = tuple[str, str, str, str, list[bool]]
 _Answer = tuple[bool, str, str, str]
-_NumberOrByName = float | dict[str, float] | None
 
 @final
 class ReadOptions:
@@ -323,37 +322,7 @@ class ReadOptions:
 
 @final
 class AuditOptions:
-    def __new__(
-        cls,
-        *,
-        delta: float | None,
-        motion: str | None,
-        max_accel: _NumberOrByName,
-        radius: _NumberOrByName,
-        ellipsoid: str | None,
-        obstacles: str | None,
-        limit: dict[str, float],
-        fence: str | None,
-        plan: str | None,
-        plan_delay: float | None,
-        tube: float | None,
-        accel_window: float | None,
-        config: str | None,
-        cylinder: str | None,
-        well_clear: str | None,
-        rules: str | None,
-        no_config: bool,
-        from_s: float | None,
-        to_s: float | None,
-        above: float | None,
-        land_on: Sequence[str],
-        ids: Sequence[str] | None,
-        offset: dict[str, float],
-        expect_vehicles: int | None,
-        max_gap: float | None,
-        require_presence: bool,
-        independent: bool,
-    ) -> AuditOptions: ...
+    def __new__(cls, **options: object) -> AuditOptions: ...
 
 def attack(
     scenario: Scenario,

@@ -8,7 +8,7 @@ use crate::settings::REPORTED_DEVIATIONS;
 use tautline_audit::Status;
 use tautline_core::fact::{Coded as _, Fact, FactKind, FactValue, Source};
 use tautline_core::option::{ACCEL, FRAME, MAX_VEHICLES, ORIGIN, POSITION_ERROR, TOPIC};
-use tautline_core::text::{at_least, at_most, in_order, seconds};
+use tautline_core::text::{at_least, at_most, counted, in_order, seconds};
 
 /// Subject of a sentence.
 #[derive(Clone, Copy, Debug)]
@@ -260,7 +260,9 @@ fn message(MessageError { place, problem }: &MessageError) -> String {
             "a sign-off with a position; write the last pose in a line before it".to_owned()
         }
         Problem::UnknownEvent(event) => format!("unknown event ({event:?}); write \"off\" for a sign-off"),
-        Problem::NotHeard(id) => format!("{id:?} signs off and was not heard"),
+        Problem::NotHeard(id) => {
+            format!("the sign-off of {id:?} is ignored: the vehicle was not heard; send its position first")
+        }
         Problem::NotDecoded(why) => format!("cannot be decoded: {why}"),
         Problem::ServerError(why) => format!("the server reports an error: {why}"),
         Problem::NoStamp => "the message has no stamp, so its age is unknown; set header.stamp".to_owned(),
@@ -307,8 +309,8 @@ fn summary(of: &Summary, monitor: &Monitor) -> String {
     };
     let signed_off = if of.signed_off > 0 { format!(" ({} signed off)", of.signed_off) } else { String::new() };
     let mut text = format!(
-        "{verdict}: {} vehicles{signed_off}, {} CLEAR, {} UNDECIDED, {} VIOLATION, measured violations: {}",
-        of.vehicles,
+        "{verdict}: {}{signed_off}, {} CLEAR, {} UNDECIDED, {} VIOLATION, measured violations: {}",
+        counted(of.vehicles as u64, "vehicle", "vehicles"),
         seconds(of.clear_s),
         seconds(of.undecided_s),
         seconds(of.violation_s),
