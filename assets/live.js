@@ -8,20 +8,26 @@ const INSTANTS = 200, PERIOD_S = 0.1;
 // Delay from which the shown state is not known [s], and largest relative rate of the clocks of server and browser.
 const MOST_BEHIND_S = 1, DRIFT = 1e-4;
 const root = /** @type {any} */ (document.querySelector(".replay"));
-const verdict = /** @type {HTMLElement} */ (document.querySelector("#verdict"));
-const log = /** @type {HTMLElement} */ (document.querySelector("#log"));
+const part = (/** @type {string} */ id) => /** @type {HTMLElement} */ (document.getElementById(id));
+const [band, icon, word, verdict, brake, sound, absent, pairs, facts, log] =
+  ["band", "icon", "word", "verdict", "brake", "sound", "absent", "pairs", "facts", "log"].map(part);
+const ICONS = { clear: "\u2713", warning: "\u26a0", undecided: "?", violation: "\u2716" };
 const start = root.querySelector(".replay-start").onclick;
 /** @type {string[]} */
 let names = [];
 let delta = 1, radius = 0.1;
 /** Middle and half sizes of the drawn box [m]. @type {number[][] | null} */
 let box = null;
+/** Places of the last instants, the oldest first. @type {(number[] | null)[][]} */
+let past = [];
 let waits = 500;
 /** Places and closest pair that are drawn. */
 let drawn = [0], near = [65535, 65535];
 /** Time of the last frame on the clocks of the browser and the server, and smallest difference of both [s].
  * @type {{ arrival_s: number, t_s: number, least_s: number } | null} */
 let last = null;
+/** Whether the watch has ended, so that its result is shown. */
+let hasEnded = false;
 
 /** Packs numbers as base64. @param {ArrayBufferView} numbers */
 const packed = numbers => {
@@ -31,9 +37,9 @@ const packed = numbers => {
   return btoa(text);
 };
 
-/** Starts the view around these positions. @param {(number[] | null)[]} places */
-const restart = places => {
-  const there = places.filter(at => at);
+/** Starts the view around the last positions, with the trails behind them. */
+const restart = () => {
+  const there = past.at(-1)?.filter(at => at) ?? [];
   const ends = [0, 1, 2].map(axis => {
     const all = there.map(at => at?.[axis] ?? 0);
     return [Math.min(...all), Math.max(...all)];
@@ -41,13 +47,32 @@ const restart = places => {
   const middle = ends.map(([low, high]) => (low + high) / 2);
   const half = ends.map(([low, high]) => Math.max(high - low, 4 * delta, 1));
   box = [middle, half];
-  const cell = 1e-3, count = names.length;
+  const count = names.length;
+  // Steps between instants are whole cells of at most 16 bits.
+  let most_m = 0;
+  for (let row = 1; row < past.length; row++)
+    for (let k = 0; k < count; k++)
+      for (let axis = 0; axis < 3; axis++) {
+        const [from, to] = [past[row - 1][k], past[row][k]];
+        if (from && to) most_m = Math.max(most_m, Math.abs(to[axis] - from[axis]));
+      }
+  const cell = Math.max(1e-3, most_m / 30000);
   const starts = new Int32Array(3 * count), steps = new Int16Array(3 * count * INSTANTS);
-  places.forEach((at, k) => {
-    for (let axis = 0; axis < 3; axis++)
-      starts[3 * k + axis] = Math.round(((at?.[axis] ?? middle[axis]) - middle[axis]) / cell);
-    if (!at) for (let row = 0; row < INSTANTS; row++) steps[3 * (row * count + k)] = -32768;
-  });
+  const cells = new Int32Array(3 * count);
+  for (let k = 0; k < count; k++) {
+    // The trail begins behind the last instant without the vehicle.
+    let oldest = past.length;
+    while (oldest > 0 && past[oldest - 1][k]) oldest--;
+    for (let row = 0; row < INSTANTS; row++) {
+      const instant = past.length - INSTANTS + row, at = instant < oldest ? null : past[instant][k];
+      if (!at) steps[3 * (row * count + k)] = -32768;
+      for (let axis = 0; at && axis < 3; axis++) {
+        const next = Math.round((at[axis] - middle[axis]) / cell), place = 3 * k + axis;
+        if (instant === oldest) starts[place] = next; else steps[3 * (row * count + k) + axis] = next - cells[place];
+        cells[place] = next;
+      }
+    }
+  }
   const reach = Math.max(half[0], half[1]), square = 10 ** Math.round(Math.log10(reach / 5));
   const lines = [], most = Math.ceil(reach / square) * square, low = Math.min(0, ends[2][0]) - middle[2];
   for (let at = -most; at <= most + square / 2; at += square)
@@ -75,15 +100,60 @@ const restart = places => {
   }
 };
 
-/** Shows a state beside and in the view. @param {string} text @param {string} status @param {number[]} violated */
-const show = (text, status, violated) => {
-  verdict.textContent = text;
-  verdict.dataset.status = status;
+/** Plays a tone. @type {((hertz: number, from_s: number) => void) | null} */
+let tone = null;
+sound.onclick = () => {
+  if (tone) tone = null;
+  else {
+    const context = new AudioContext();
+    tone = (hertz, from_s) => {
+      const [source, gain] = [context.createOscillator(), context.createGain()];
+      const begin_s = context.currentTime + from_s;
+      source.frequency.value = hertz;
+      gain.gain.setValueAtTime(0.2, begin_s);
+      gain.gain.linearRampToValueAtTime(0, begin_s + 0.15);
+      source.connect(gain).connect(context.destination);
+      source.start(begin_s);
+      source.stop(begin_s + 0.15);
+    };
+    tone(660, 0);
+  }
+  sound.textContent = `Sound: ${tone ? "on" : "off"}`;
+  sound.setAttribute("aria-pressed", `${!!tone}`);
+};
+/** Tones of a level: frequencies [Hz], and the time after which they sound again [s]. @type {Object<string, number[]>} */
+const TONES = { violation: [880, 880, 880], warning: [660, 660], undecided: [330], clear: [] };
+const REPEATS_S = 2;
+let level = "undecided", sounded_s = 0;
+/** Sounds the tones of a new level, and again while a violation or a warning lasts. @param {string} next */
+const ring = next => {
+  const now_s = performance.now() / 1000, isAlarm = next === "violation" || next === "warning";
+  if (next !== level || (isAlarm && now_s - sounded_s >= REPEATS_S)) {
+    TONES[next].forEach((hertz, k) => tone?.(hertz, 0.25 * k));
+    sounded_s = now_s;
+  }
+  level = next;
+};
+
+/** Shows a state in the band, in the tab and in the view.
+ * @param {string} said @param {string} status
+ * @param {{ violated?: number[], warning?: string, brake?: string, name?: string }} more */
+const show = (said, status, { violated = [], warning = "", brake: by = "", name = status.toUpperCase() } = {}) => {
+  const next = status === "clear" && warning ? "warning" : status;
+  ring(next);
+  const text = name + (warning ? `, ${warning}` : "");
+  band.dataset.level = verdict.dataset.status = next;
+  icon.textContent = ICONS[/** @type {keyof typeof ICONS} */ (next)];
+  if (word.textContent !== text) word.textContent = text;
+  verdict.textContent = said;
+  brake.textContent = by;
+  document.title = `${icon.textContent} ${by || text} - tautline watch`;
   // Without a box the view has other vehicles than the roster.
-  if (box) root.player?.push(drawn, [-INSTANTS * PERIOD_S, status === "violation", text, violated, null], near);
+  const inView = `${text}: ${said}`;
+  if (box) root.player?.push(drawn, [-INSTANTS * PERIOD_S, next === "violation", inView, violated, null], near);
 };
 /** Shows that the state is old. @param {number} behind_s */
-const doubt = behind_s => show(`UNDECIDED: the page is ${behind_s.toFixed(1)} s behind`, "undecided", []);
+const doubt = behind_s => show(`the page is ${behind_s.toFixed(1)} s behind`, "undecided");
 
 /** Returns the delay of a frame beyond the smallest delay [s]. @param {number} t_s */
 const delay = t_s => {
@@ -98,25 +168,78 @@ const delay = t_s => {
 /** Returns the line of a notice, with its time. @param {any} notice */
 const line = notice => `${notice.t_s === null ? "" : notice.t_s.toFixed(2) + " s: "}${notice.text}`;
 
+/** Returns a sentence without its first word, which the band shows. @param {string} text */
+const rest = text => text.replace(/^[A-Z ]+:? /, "");
+
+/** Replaces the items of a list. @param {HTMLElement} list @param {string[]} items */
+const fill = (list, items) => list.replaceChildren(...items.map(item => {
+  const entry = document.createElement("li");
+  entry.textContent = item;
+  return entry;
+}));
+
+/** Shows the closest pairs, the bounds, and which vehicles are not drawn. @param {any} frame */
+const list = frame => {
+  pairs.replaceChildren(...(frame.pairs ?? []).map((/** @type {number[]} */ [a, b, nominal, least]) => {
+    const row = document.createElement("tr");
+    const cells = [`${names[a]} and ${names[b]}`, nominal.toFixed(2), Math.max(least, 0).toFixed(2)];
+    row.append(...cells.map((text, k) => {
+      const cell = document.createElement("td");
+      cell.textContent = text;
+      if (k) Object.assign(cell, { className: "number" }).dataset.label = ["", "expected [m]", "at least [m]"][k];
+      return cell;
+    }));
+    if (nominal < delta) row.className = "reasons";
+    return row;
+  }));
+  fill(facts, [`delta ${delta} m`, ...frame.facts ?? []]);
+  const { heard, stale, signed_off: off } = frame.state, shown = drawn.filter((_, k) => k % 4 === 3 && drawn[k]).length;
+  const named = (/** @type {string} */ what, /** @type {string[]} */ of) => of.length ? ` ${what}: ${of.join(", ")}.` : "";
+  absent.textContent = `${shown} of ${heard} vehicles are drawn.`
+    + named("Stale", stale) + named("Signed off", off);
+  absent.className = stale.length ? "reasons" : "";
+};
+
 /** Draws a frame. @param {any} frame */
 const draw = frame => {
+  hasEnded = false;
   const behind_s = delay(frame.state.t_s), isOld = behind_s > MOST_BEHIND_S;
   const places = frame.places.slice(0, names.length);
+  past = [...past, places.map((/** @type {any} */ at) => at?.[3] ? at : null)].slice(-INSTANTS);
   const outside = places.some((/** @type {any} */ at) =>
-    at && (!root.player || !box || [0, 1, 2].some(axis => Math.abs(at[axis] - box[0][axis]) > 2 * box[1][axis])));
-  if (outside) restart(places);
+    at && (!root.player || !box || [0, 1, 2].some(axis => Math.abs(at[axis] - box[0][axis]) > box[1][axis])));
+  if (outside) restart();
   drawn = places.flatMap((/** @type {any} */ at) => {
     const from = box?.[0] ?? [0, 0, 0];
     return at ? [at[0] - from[0], at[1] - from[1], at[2] - from[2], at[3] ? 1 : 0] : [0, 0, 0, 0];
   });
   near = frame.near ?? [65535, 65535];
-  if (isOld) doubt(behind_s); else show(line(frame.state), frame.state.status, frame.violated ?? []);
+  if (isOld) doubt(behind_s); else {
+    const { t_s, status, text, last_brake: by, nominal_violation: ahead } = frame.state;
+    const left_s = by && by.at_s - t_s, pair = by?.subjects.join("-");
+    show(`${t_s.toFixed(2)} s: ${rest(text)}`, status, {
+      violated: frame.violated ?? [],
+      warning: status !== "violation" && ahead ? "on course to violate" : "",
+      brake: status === "violation" || !by ? "" : left_s > 0 ? `brake ${pair} by ${left_s.toFixed(1)} s` : `brake ${pair} now`,
+    });
+  }
+  list(frame);
   root.dataset.frames = `${+(root.dataset.frames ?? 0) + 1}`;
+};
+
+/** Shows the result of the watch. @param {any} result */
+const conclude = result => {
+  hasEnded = true;
+  last = null;
+  const isOff = result.status === "clear" && !result.pass;
+  const [status, name] = isOff ? ["violation", "OFF PLAN"] : [result.status, result.status.toUpperCase()];
+  show(`the watch has ended: ${rest(result.text)}`, status, { name });
 };
 
 /** Adds a notice to the log. @param {any} notice */
 const note = notice => {
   if (notice.event === "state") return;
+  if (notice.event === "summary") conclude(notice);
   const entry = document.createElement("li");
   entry.textContent = line(notice);
   log.prepend(entry);
@@ -125,6 +248,7 @@ const note = notice => {
 
 const connect = () => {
   const socket = new WebSocket(`ws://${location.host}/live${location.search}`);
+  past = [];
   socket.onmessage = event => {
     waits = 500;
     const message = JSON.parse(event.data);
@@ -138,7 +262,7 @@ const connect = () => {
   };
   socket.onclose = () => {
     last = null;
-    show("UNDECIDED: the page lost its server and connects again", "undecided", []);
+    if (!hasEnded) show("the page lost its server and connects again", "undecided");
     setTimeout(connect, waits);
     waits = Math.min(2 * waits, 5000);
   };

@@ -179,6 +179,9 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<Exit, Failure> {
     arguments.start(source, feed, console)?;
     let watched = watch_inputs(monitor, &inputs, &mut outputs)
         .map_err(|error| Failure::machine("files/cannot-write", format!("cannot write the watch: {error}")));
+    if let Some(page) = outputs.page {
+        page.finish();
+    }
     // The recording is complete even if another output failed.
     let recorded = outputs.recorder.map_or(Ok(true), |recorder| recorder.finish(console));
     let passes = watched?.passes();

@@ -10,6 +10,7 @@ mod report;
 mod attacks;
 mod channels;
 mod figures;
+mod live;
 mod margins;
 mod opened;
 mod page;

@@ -3,8 +3,10 @@
 //! Needs `chromium` (or the program that `CHROMIUM` names); `tests/run.sh` installs it.
 
 use std::fs;
+use std::io::{BufRead as _, BufReader, Read as _, Write as _};
+use std::net::TcpStream;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 /// Time limit of a browser; a page loads in a second or two.
@@ -60,6 +62,83 @@ frame.addEventListener("load", () => {
   });
 });
 "#;
+
+/// Page in a running browser, for pages that change with time.
+pub(crate) struct LivePage {
+    browser: Child,
+    socket: tungstenite::WebSocket<tungstenite::stream::MaybeTlsStream<TcpStream>>,
+    calls: u64,
+}
+
+impl LivePage {
+    /// Opens an address in a new browser.
+    pub(crate) fn open(folder: &Path, url: &str) -> Self {
+        let mut browser = Command::new(self::browser())
+            .args(["--headless", "--no-sandbox", "--no-first-run", "--remote-debugging-port=0"])
+            .args(["--disable-background-networking", "--disable-component-update", "--disable-dev-shm-usage"])
+            .arg(format!("--user-data-dir={}", folder.join("live-browser").display()))
+            .arg(url)
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped())
+            .spawn()
+            .expect("the browser starts");
+        let mut lines = BufReader::new(browser.stderr.take().expect("a pipe")).lines();
+        let address = lines.find_map(|line| {
+            let line = line.expect("a line");
+            let (_, rest) = line.split_once("DevTools listening on ws://")?;
+            rest.split('/').next().map(str::to_owned)
+        });
+        let address = address.expect("the browser prints its address");
+        // The browser must not wait for a reader of its messages.
+        std::thread::spawn(move || lines.for_each(drop));
+        let until = Instant::now() + PATIENCE;
+        let page = loop {
+            let mut stream = TcpStream::connect(&address).expect("connects");
+            write!(stream, "GET /json/list HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n").expect("sent");
+            let mut text = String::new();
+            let _ = stream.read_to_string(&mut text);
+            let found = text.split("\"webSocketDebuggerUrl\": \"").skip(1).filter_map(|rest| rest.split('"').next());
+            if let Some(page) = found.map(str::to_owned).find(|page| page.contains("/page/")) {
+                break page;
+            }
+            assert!(Instant::now() < until, "the browser shows no page: {text}");
+        };
+        let (socket, _) = tungstenite::connect(page).expect("connects");
+        Self { browser, socket, calls: 0 }
+    }
+
+    /// Returns the value of an expression in the page.
+    pub(crate) fn evaluate(&mut self, expression: &str) -> serde_json::Value {
+        self.calls += 1;
+        let parameters = serde_json::json!({ "expression": expression, "returnByValue": true });
+        let call = serde_json::json!({ "id": self.calls, "method": "Runtime.evaluate", "params": parameters });
+        self.socket.send(tungstenite::Message::text(call.to_string())).expect("sent");
+        loop {
+            let text = self.socket.read().expect("an answer").into_text().expect("text");
+            let mut answer: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+            if answer["id"] == self.calls {
+                return answer["result"]["result"]["value"].take();
+            }
+        }
+    }
+
+    /// Waits until an expression is true in the page.
+    pub(crate) fn wait_for(&mut self, condition: &str) {
+        let until = Instant::now() + PATIENCE;
+        while self.evaluate(condition) != true {
+            let text = self.evaluate("document.body.innerText");
+            assert!(Instant::now() < until, "not true within {PATIENCE:?}: {condition}\n{text}");
+            std::thread::sleep(Duration::from_millis(20));
+        }
+    }
+}
+
+impl Drop for LivePage {
+    fn drop(&mut self) {
+        let _ = self.browser.kill();
+        let _ = self.browser.wait();
+    }
+}
 
 fn browser() -> String {
     std::env::var("CHROMIUM").unwrap_or_else(|_| "chromium".to_owned())

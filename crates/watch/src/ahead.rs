@@ -104,6 +104,28 @@ impl Scratch {
         }
         found
     }
+
+    /// Returns the `count` closest pairs at the present, the closest one first. Call after [`Scratch::search`], which
+    /// sorts the vehicles.
+    pub(crate) fn closest_pairs(&self, count: usize) -> Vec<Separation> {
+        let axis = widest_axis(self.of.iter().map(|(_, of)| of.position_m));
+        let mut closest: Vec<Separation> = Vec::with_capacity(count + 1);
+        for (a, (first, motion)) in self.of.iter().enumerate() {
+            for (second, other) in &self.of[a + 1..] {
+                let farthest_m = closest.get(count.wrapping_sub(1)).map_or(f64::INFINITY, |of| of.nominal_m);
+                if other.position_m[axis] - motion.position_m[axis] > farthest_m {
+                    break;
+                }
+                let relative = RelativeMotion::new(motion, other);
+                let pair = [*first.min(second), *first.max(second)];
+                let near = Separation { pair, nominal_m: relative.nominal_m(), least_m: relative.least_m() };
+                let place = closest.partition_point(|of| (of.nominal_m, of.pair) < (near.nominal_m, near.pair));
+                closest.insert(place, near);
+                closest.truncate(count);
+            }
+        }
+        closest
+    }
 }
 
 /// Replaces the best time by an earlier one. Of equal times, the time of the lower pair is kept.

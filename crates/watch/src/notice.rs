@@ -160,8 +160,8 @@ impl Notice {
     }
 }
 
-/// Returns the names of vehicles.
-fn names(monitor: &Monitor, keep: impl Fn(usize) -> bool) -> Vec<String> {
+/// Returns the names of vehicles for lines of text.
+pub(crate) fn names(monitor: &Monitor, keep: impl Fn(usize) -> bool) -> Vec<String> {
     (0..monitor.names().len()).zip(0..).filter(|(k, _)| keep(*k)).map(|(_, vehicle)| name(monitor, vehicle)).collect()
 }
 

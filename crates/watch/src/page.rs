@@ -21,10 +21,15 @@ use tungstenite::Message;
 
 use crate::event::Assessment;
 use crate::monitor::Monitor;
-use crate::notice::{Notice, Statement};
+use crate::notice::{Notice, Statement, names};
+use tautline_core::fact::Fact;
 
 /// Time between two frames \[s\].
 pub const FRAME_PERIOD_S: f64 = 0.1;
+/// Number of pairs in the table of the page.
+const LISTED_PAIRS: usize = 8;
+/// Longest time in which the last messages are sent at the end of a watch.
+const FAREWELL: Duration = Duration::from_secs(1);
 /// Largest number of viewers.
 pub const MOST_VIEWERS: usize = 16;
 /// Largest number of connections with a valid request, viewers included.
@@ -173,7 +178,8 @@ impl Page {
         self.framed_s = of.now_s;
         if monitor.names().len() != self.names {
             self.names = monitor.names().len();
-            let roster = json!({ "op": "roster", "vehicles": monitor.names(), "delta_m": monitor.settings().delta_m });
+            let roster =
+                json!({ "op": "roster", "vehicles": names(monitor, |_| true), "delta_m": monitor.settings().delta_m });
             *lock(&self.shared.roster) = Arc::from(roster.to_string());
             self.send(&roster);
         }
@@ -188,9 +194,25 @@ impl Page {
             .collect();
         let state = Notice::new(Statement::State(of), monitor).json;
         let near = of.closest.map(|near| near.pair);
+        let pairs: Vec<Value> = monitor
+            .closest_pairs(LISTED_PAIRS)
+            .iter()
+            .map(|of| json!([of.pair[0], of.pair[1], of.nominal_m, of.least_m]))
+            .collect();
+        let facts: Vec<String> = monitor.facts().iter().map(Fact::to_string).collect();
         self.send(&json!({
             "op": "frame", "state": state, "near": near, "violated": of.state.violated(), "places": places,
+            "pairs": pairs, "facts": facts,
         }));
+    }
+
+    /// Ends the connections of the viewers after all messages are sent, at most a second later.
+    pub fn finish(self) {
+        lock(&self.shared.viewers).clear();
+        let until = Instant::now() + FAREWELL;
+        while lock(&self.shared.connections).admitted > 0 && Instant::now() < until {
+            std::thread::sleep(Duration::from_millis(5));
+        }
     }
 
     fn send(&self, message: &Value) {
@@ -262,9 +284,12 @@ fn answer_valid(mut stream: TcpStream, request: &Request, head: usize, shared: &
 fn view(socket: &mut tungstenite::WebSocket<TcpStream>, receiver: &Receiver<Arc<str>>) {
     while let Ok(text) = receiver.recv() {
         if socket.send(Message::text(&*text)).is_err() {
-            break;
+            return;
         }
     }
+    // A viewer that has left is no error.
+    let _ = socket.close(None);
+    let _ = socket.flush();
 }
 
 /// Returns the head of a request without taking it from the stream.

@@ -10,7 +10,7 @@ use nalgebra::Vector3;
 
 use crate::ahead;
 use crate::clock::SourceClock;
-use crate::event::{Event, Fault, Pair, Reason};
+use crate::event::{Event, Fault, Pair, Reason, Separation};
 use crate::history::History;
 use crate::plan::Plan;
 use crate::settings::{Expected, Settings, SettingsError};
@@ -259,6 +259,13 @@ impl Monitor {
         let of = self.vehicles.get(vehicle)?;
         let fix = of.history.newest()?;
         Some((fix.position_m, of.velocity.velocity().map(|ball| ball.centre), self.age_s(of).unwrap_or(f64::INFINITY)))
+    }
+
+    /// Returns the closest pairs of the last judgement, at most `count`, the closest one first. Stale vehicles and
+    /// vehicles without a known velocity have no pair.
+    #[must_use]
+    pub fn closest_pairs(&self, count: usize) -> Vec<Separation> {
+        self.ahead.closest_pairs(count)
     }
 
     /// Returns the index of a vehicle, and adds a vehicle that is not known; `None` beyond the largest number.

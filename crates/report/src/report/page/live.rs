@@ -4,10 +4,8 @@ use maud::{DOCTYPE, PreEscaped, html};
 
 use super::{POLICY, STYLE, metadata, replay, theme_choice};
 
-/// Rules of the log of notices.
-const LOG_STYLE: &str = "#log{list-style:none;padding:0;max-height:16rem;overflow:auto;\
-                         font-variant-numeric:tabular-nums}\
-                         #verdict{font-size:1.2rem;font-weight:700}";
+/// Rules of the band with the state, and of the lists.
+const LIVE_STYLE: &str = include_str!("live.css");
 
 /// Returns the page of a live watch. It reads positions and notices from the WebSocket `live` of its server.
 #[must_use]
@@ -20,20 +18,49 @@ pub fn live_page() -> String {
             head {
                 (metadata(&policy))
                 title { "Live watch" }
-                style { (PreEscaped(STYLE)) (PreEscaped(replay::STYLE)) (PreEscaped(LOG_STYLE)) }
+                style { (PreEscaped(STYLE)) (PreEscaped(replay::STYLE)) (PreEscaped(LIVE_STYLE)) }
             }
             body {
                 header {
                     (theme_choice())
                     p.kind { "Live watch" }
                     h1 { "tautline watch" }
-                    p #verdict role="status" { "UNDECIDED: the page is not connected" }
+                    div.band #band data-level="undecided" {
+                        span.band-icon #icon aria-hidden="true" { "?" }
+                        div.band-text {
+                            p #word role="alert" { "UNDECIDED" }
+                            p #verdict { "the page is not connected" }
+                        }
+                        p #brake {}
+                        button type="button" #sound aria-pressed="false" { "Sound: off" }
+                    }
                 }
                 main {
                     section {
                         h2 { "Positions" }
-                        p.about { "The newest positions of the last seconds. A vehicle that is not drawn is stale." }
+                        p.about { "The newest positions, with trails of the last 20 s." }
+                        p #absent { "No vehicle is heard." }
                         div.replay data-label="the watch" data-start="later" { script type="application/json" {} }
+                    }
+                    section {
+                        h2 { "Closest pairs" }
+                        p.about {
+                            "Expected: by constant velocity since the newest message. At least: the smallest separation \
+                             that the bounds below allow."
+                        }
+                        div.scroll {
+                            table {
+                                thead {
+                                    tr {
+                                        th scope="col" { "pair" }
+                                        th.number scope="col" { "expected [m]" }
+                                        th.number scope="col" { "at least [m]" }
+                                    }
+                                }
+                                tbody #pairs {}
+                            }
+                        }
+                        ul #facts {}
                     }
                     section { h2 { "Notices" } ul #log {} }
                 }
