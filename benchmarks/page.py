@@ -16,13 +16,13 @@ END = "<!-- benchmarks: end -->"
 
 SPEED = (
     "Both sides run on one core, in turns. The least time of the rounds counts. A ratio above 1 means that tautline is "
-    "faster. A ratio in bold is a loss of tautline. Parentheses contain the smallest and the largest ratio of a round. "
-    "A tilde replaces a ratio if 1 is within this spread."
+    "faster; one in bold is a loss of tautline. Parentheses contain the smallest and the largest ratio of a round. A "
+    "tilde replaces a ratio if 1 is within this spread."
 )
 GRAPH = (
-    "Times of the complete graph have two parts: the law and the rest of a step. The rest is energy check, engine and "
-    "audit in tautline, and engine alone in a peer. The law in Numba is code of this project, compiled with fastmath, "
-    "and evaluates each pair once."
+    "Parentheses contain the time of the law. The rest of a step is energy check, engine and audit in tautline, and "
+    "engine alone in a peer. The law in Numba is code of this project, compiled with fastmath, and evaluates each pair "
+    "once."
 )
 QUADROTORS = (
     "The two sides fly Crazyflies with different models and controllers. A lattice contracts from a spacing of 0.8 m "
@@ -33,20 +33,29 @@ WORLDS = (
     "`python/bench/worlds.py` measures many worlds in tautline (`tl.VectorSimulation`)."
 )
 MISSIONS = (
-    "Scenes are rebuilt from the published parameters below; random ones are other draws of the same "
-    "distribution. Vehicles are points. Commands have a limit, so no law has a certificate without the shield. "
-    "Only the displacement law and the shield avoid blocks. The displacement law has no limit on speed; its gains "
-    "keep a lone vehicle below the limit. The shield holds commands for 0.05 s. This hold is too long for the "
-    "displacement law on the complete graph of 40 vehicles or more in LSC. *Succeeded* flights are clear "
-    "throughout, with each vehicle at its goal to the end. A flight has *hidden* collisions if no sample at the "
-    "source's rate shows a collision. *Least* is the smallest separation as a share of the limit, rounded down. A "
-    "flight under the displacement law ends when it reaches the limit, so its smallest separation is just below the "
-    "limit. Time is the median of the successful flights. The last column is the processing time of a flight."
+    "Scenes are rebuilt from the published parameters below; random ones are other draws of the same distribution. "
+    "Vehicles are points. Commands have a limit, so no law has a certificate without the shield. Cells give the values "
+    "without and under the shield; `-` means no value."
+)
+COLUMNS = (
+    ("succeeded", "flights that are clear throughout, with each vehicle at its goal to the end"),
+    ("collided", "flights with a collision; *hidden* if no sample at the source's rate shows it"),
+    ("reached", "flights with each vehicle at its goal to the end"),
+    ("least", "smallest separation as a share of the limit, rounded down"),
+    ("time", "median of the successful flights"),
+    ("processing", "processing time of a flight"),
+)
+LAWS = (
+    "A flight under the displacement law ends when it reaches the limit, so its smallest separation is just below the "
+    "limit. This law has no limit on speed; its gains keep a lone vehicle below the limit. The shield holds commands "
+    "for 0.05 s, which is too long for this law on the complete graph of 40 vehicles or more in LSC. Only the "
+    "displacement law and the shield avoid blocks. RVO2 has no limit on acceleration. Its own method may succeed where "
+    "`orca` collides."
 )
 SAMPLING = (
-    "Columns show the separation of the whole motion, at its samples, and on straight lines between the samples. "
-    "*Hidden* is the separation at samples less that of the whole motion. Separations are rounded down. The verdict is "
-    "that of the whole motion. A violation that no sample shows is bold."
+    "Cells give the separation at samples and, in parentheses, on straight lines between the samples [m], rounded "
+    "down. Samples hide the difference from the separation of the whole motion, which decides the verdict. A cell in "
+    "bold does not show a violation."
 )
 
 
@@ -134,10 +143,10 @@ def rounds(rows: Sequence[Row]) -> str:
 
 
 def times(side: Row, unit: str) -> str:
-    """Returns the time of a side, with its parts if they are known."""
+    """Returns the time of a side, with that of the law if it is known."""
     text = time(side["time"], unit)
     if "parts" in side:
-        text += f" (law {time(side['parts']['law'], unit)}, rest {time(side['parts']['rest'], unit)})"
+        text += f" (law {time(side['parts']['law'], unit)})"
     return text
 
 
@@ -156,25 +165,40 @@ def kind(row: Row) -> str:
 
 
 def missions(rows: Sequence[Row]) -> list[str]:
+    shown = [row for row in rows if row["status"] == "measured"]
+    uses: dict[tuple[str, str], dict[bool, Row]] = {}
+    for row in shown:
+        uses.setdefault((row["mission"], row["law"]), {})[row["shield"]] = row
     lines = []
-    for row in rows:
-        if row["status"] == "measured":
-            median = "-" if row["median_s"] is None else f"{row['median_s']:.1f} s"
-            collided = f"{row['collided']}" + (f" ({row['hidden']} hidden)" if row["hidden"] else "")
-            law = row["law"] + (", shield" if row["shield"] else "")
-            flights = row["flights"]
-            least = math.floor(1e4 * row["least_m"] / row["delta_m"]) / 100
-            lines.append((row["mission"], law, f"{row['succeeded']} of {flights}", collided, f"{row['reached']}",
-                          f"{least:.2f} %", median, time(row["wall_s"], "s")))
+    for (mission, law), use in uses.items():
+        sides = [cells(use[shield]) if shield in use else ["-"] * 6 for shield in (False, True)]
+        flights = next(iter(use.values()))["flights"]
+        lines.append((mission, law, f"{flights}", *("/".join(pair) for pair in zip(*sides, strict=True))))
     sources = dict.fromkeys(
         f"- {row['mission'].split(',')[0]}: {row['source']}. Success: {row['success']}. Changes: {row['changes']}."
-        for row in rows if row["status"] == "measured"
+        for row in shown
     )
+    names = ("succeeded", "collided", "reached", "least [%]", "time [s]", "processing [s]")
     return [
         "## Missions of other projects",
-        wrapped([MISSIONS + totals(rows)]),
-        table(("mission", "law", "succeeded", "collided", "reached", "least", "time", "processing"), lines),
+        wrapped([MISSIONS]),
+        table(("column", "meaning"), COLUMNS),
+        wrapped([LAWS + totals(rows)]),
+        table(("mission", "law", "flights", *names), lines),
         wrapped(sources),
+    ]
+
+
+def cells(row: Row) -> list[str]:
+    """Returns the counts, the smallest separation [%] and the times [s] of the flights of a row."""
+    least = math.floor(1e4 * row["least_m"] / row["delta_m"]) / 100
+    return [
+        f"{row['succeeded']}",
+        f"{row['collided']}" + (f" ({row['hidden']} hidden)" if row["hidden"] else ""),
+        f"{row['reached']}",
+        f"{least:.2f}",
+        "-" if row["median_s"] is None else f"{row['median_s']:.1f}",
+        f"{row['wall_s']:.3g}",
     ]
 
 
@@ -193,23 +217,36 @@ def totals(rows: Sequence[Row]) -> str:
 
 
 def sampling(rows: Sequence[Row]) -> list[str]:
+    shown = [row for row in rows if row["status"] == "measured"]
+    rates = sorted({row["rate_hz"] for row in shown})
+    motions: dict[str, dict[float, Row]] = {}
+    for row in shown:
+        motions.setdefault(row["motion"], {})[row["rate_hz"]] = row
     lines = []
-    for row in rows:
-        if row["status"] == "measured":
-            verdict = "clear"
-            if row["violated"]:
-                verdict = "violation" if row["seen_at_samples"] else "**violation, hidden**"
-            lengths = [f"{math.floor(1000 * row[key]) / 1000:.3f} m" for key in ("true_m", "samples_m", "straight_m")]
-            lengths.append(f"{row['hidden_m']:.3f} m")
-            lines.append((row["motion"], f"{row['rate_hz']:g} Hz", *lengths, f"{row['delta_m']:g} m", verdict))
+    for motion, by_rate in motions.items():
+        whole = next(iter(by_rate.values()))
+        verdict = "violation" if whole["violated"] else "clear"
+        found = [sampled(by_rate[rate]) if rate in by_rate else "-" for rate in rates]
+        lines.append((motion, f"{whole['delta_m']:g} m", f"{metres(whole['true_m'])} m", verdict, *found))
     return [
         "## What sampling hides",
         wrapped([SAMPLING]),
-        table(("motion", "rate", "whole motion", "at samples", "straight lines", "hidden", "limit", "verdict"), lines),
+        table(("motion", "limit", "whole motion", "verdict", *(f"{rate:g} Hz" for rate in rates)), lines),
         *origins(rows),
         "Checks of other tools that see positions at samples only, each read in its source:",
         table(("tool", "check", "rate", "source"), TOOLS),
     ]
+
+
+def sampled(row: Row) -> str:
+    """Returns the separations at samples and between them, in bold if they belong to a violation without a sample."""
+    text = f"{metres(row['samples_m'])} ({metres(row['straight_m'])})"
+    return f"**{text}**" if row["violated"] and not row["seen_at_samples"] else text
+
+
+def metres(length: float) -> str:
+    """Returns a length rounded down to millimetres."""
+    return f"{math.floor(1000 * length) / 1000:.3f}"
 
 
 def origins(rows: Sequence[Row]) -> list[str]:
@@ -219,10 +256,11 @@ def origins(rows: Sequence[Row]) -> list[str]:
 
 
 def left_out(rows: Iterable[Row]) -> list[str]:
-    reasons: dict[tuple[str, str], list[str]] = {}
+    reasons: dict[tuple[str, str], dict[str, None]] = {}
     for row in rows:
         if row["status"] != "measured":
-            reasons.setdefault((row["status"], row["why"]), []).append(row["name"])
+            scene, _, rest = row["name"].partition("/")
+            reasons.setdefault((row["status"], row["why"]), {})[f"{scene.split(',')[0]}/{rest}"] = None
     if not reasons:
         return []
     lines = [f"- {'; '.join(names)}: {status}, {why}." for (status, why), names in reasons.items()]

@@ -32,9 +32,8 @@ schema completes and checks keys as you type.
 
 | column | meaning |
 | --- | --- |
-| unit | unit in the name of the key |
+| type | type and range of the values; further conditions are checked and refused with a remedy |
 | default | value without the key; `needed`: the key is required; `-`: no value, or as in the last column |
-| range | valid values; further conditions are checked and refused with a remedy |
 """
 
 # Order of the tables on the page; other tables of the schema come last.
@@ -51,7 +50,9 @@ UNITS = {
 }  # fmt: skip
 UNNAMED = {"alpha": "m^2/s^2"}
 
-COLUMNS = "| key | type | unit | default | range | meaning |\n| --- | --- | --- | --- | --- | --- |"
+COLUMNS = "| key | type | default | meaning |\n| --- | --- | --- | --- |"
+# Meanings of more words are given once in a table.
+LONG = 8
 
 
 class Reference:
@@ -82,7 +83,9 @@ class Reference:
         table, both = self.one_of_several(table)
         yield f"{'#' * level} {self.heading(path, several)}\n"
         used, own = sentence(use.get("description", "")), sentence(table.get("description", ""))
-        yield max(used, own, key=len) + (" Give a `[[table]]` for each, or a list." if both else "") + "\n"
+        # A key that is also text has its description in the table of keys.
+        about = own if own and not self.is_subtable(use) else max(used, own, key=len)
+        yield about + (" Give a `[[table]]` for each, or a list." if both else "") + "\n"
         values = table.get("additionalProperties")
         if isinstance(values, dict):
             table = self.followed(values)
@@ -92,7 +95,11 @@ class Reference:
         keys: dict[str, Schema] = table.get("properties", {})
         variants = self.variants(table)
         elsewhere = self.same(path, keys, variants)
-        own = {name: key for name, key in keys.items() if not elsewhere or name not in elsewhere[1]}
+        own = {
+            name: key
+            for name, key in keys.items()
+            if not self.is_subtable(key) and not (elsewhere and name in elsewhere[1])
+        }
         if own:
             yield self.rows(own, table.get("required", [])) + "\n"
         if elsewhere:
@@ -118,11 +125,16 @@ class Reference:
         names = [variant["properties"][tag]["const"] for variant in variants]
         yield f"`{tag}` is {alternatives(names)}. Each value has the keys below it.\n"
         rows = [COLUMNS]
+        first: dict[str, str] = {}
         for name, variant in zip(names, variants):
             default = "" if tag in variant.get("required", []) else f" This is the default."
-            rows.append(f"| **`{tag} = \"{name}\"`** | | | | | {cell(variant['description'])}{default} |")
+            rows.append(f"| **`{tag} = \"{name}\"`** | | | {cell(variant['description'])}{default} |")
             own = {key: value for key, value in variant["properties"].items() if key != tag}
-            rows += [self.row(key, value, key in variant.get("required", [])) for key, value in own.items()]
+            for key, value in own.items():
+                row = self.row(key, value, key in variant.get("required", []))
+                there = first.setdefault(row, name)
+                is_repeated = there != name and len(row.rsplit(" | ", 1)[1].split()) > LONG
+                rows.append(f"| `{key}` | | | as under `{there}` |" if is_repeated else row)
         yield "\n".join(rows) + "\n"
 
     def rows(self, keys: dict[str, Schema], required: list[str]) -> str:
@@ -133,8 +145,11 @@ class Reference:
         default = "needed" if needed else f"`{toml(key['default'])}`" if "default" in key else "-"
         words = [cell(key.get("description") or kind.get("description", ""))]
         words += [f"`{one['const']}`: {cell(one['description'])}" for one in self.words(kind)]
-        range_ = self.range_of(kind)
-        return f"| `{name}` | {self.type_of(key)} | {unit(name, kind)} | {default} | {range_} | {'<br>'.join(words)} |"
+        range_ = "" if self.words(kind) else self.range_of(kind)
+        type_ = ", ".join(part for part in (self.type_of(key), range_) if part)
+        if (said := unit(name)) and f" in {said}" not in words[0]:
+            type_ += f" \\[{said}\\]"
+        return f"| `{name}` | {type_} | {default} | {'<br>'.join(words)} |"
 
     def type_of(self, key: Schema) -> str:
         kind = self.followed(key)
@@ -203,6 +218,10 @@ class Reference:
         options = [one for one in kind.get("oneOf", []) if not one.get("deprecated")]
         return options if all("const" in one for one in options) else []
 
+    def is_subtable(self, key: Schema) -> bool:
+        """Returns whether the values of a key are tables only, which have a section."""
+        return self.is_table(key) and self.type_of(key) in ("table", "list of tables")
+
     def is_table(self, key: Schema) -> bool:
         kind = self.followed(key)
         if kind.get("type") == "array":
@@ -215,7 +234,7 @@ class Reference:
         return self.definitions[key["$ref"].rsplit("/", 1)[1]] if "$ref" in key else key
 
 
-def unit(name: str, kind: Schema) -> str:
+def unit(name: str) -> str:
     return UNNAMED.get(name) or next((said for end, said in UNITS.items() if name.endswith(end)), "")
 
 
