@@ -121,8 +121,9 @@ sound.onclick = () => {
   sound.textContent = `Sound: ${tone ? "on" : "off"}`;
   sound.setAttribute("aria-pressed", `${!!tone}`);
 };
-/** Tones of a level: frequencies [Hz], and the time after which they sound again [s]. @type {Object<string, number[]>} */
+/** Frequencies of the tones of a level [Hz]. @type {Object<string, number[]>} */
 const TONES = { violation: [880, 880, 880], warning: [660, 660], undecided: [330], clear: [] };
+// Time after which the tones of an alarm sound again [s].
 const REPEATS_S = 2;
 let level = "undecided", sounded_s = 0;
 /** Sounds the tones of a new level, and again while a violation or a warning lasts. @param {string} next */
@@ -194,7 +195,8 @@ const list = frame => {
   }));
   fill(facts, [`delta ${delta} m`, ...frame.facts ?? []]);
   const { heard, stale, signed_off: off } = frame.state, shown = drawn.filter((_, k) => k % 4 === 3 && drawn[k]).length;
-  const named = (/** @type {string} */ what, /** @type {string[]} */ of) => of.length ? ` ${what}: ${of.join(", ")}.` : "";
+  const named = (/** @type {string} */ what, /** @type {string[]} */ of) =>
+    of.length ? ` ${what}: ${of.join(", ")}.` : "";
   absent.textContent = `${shown} of ${heard} vehicles are drawn.`
     + named("Stale", stale) + named("Signed off", off);
   absent.className = stale.length ? "reasons" : "";
@@ -216,11 +218,11 @@ const draw = frame => {
   near = frame.near ?? [65535, 65535];
   if (isOld) doubt(behind_s); else {
     const { t_s, status, text, last_brake: by, nominal_violation: ahead } = frame.state;
-    const left_s = by && by.at_s - t_s, pair = by?.subjects.join("-");
+    const left_s = by && by.at_s - t_s, when = left_s > 0 ? `by ${left_s.toFixed(1)} s` : "now";
     show(`${t_s.toFixed(2)} s: ${rest(text)}`, status, {
       violated: frame.violated ?? [],
       warning: status !== "violation" && ahead ? "on course to violate" : "",
-      brake: status === "violation" || !by ? "" : left_s > 0 ? `brake ${pair} by ${left_s.toFixed(1)} s` : `brake ${pair} now`,
+      brake: status === "violation" || !by ? "" : `brake ${by.subjects.join("-")} ${when}`,
     });
   }
   list(frame);

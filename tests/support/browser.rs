@@ -71,10 +71,11 @@ pub(crate) struct LivePage {
 }
 
 impl LivePage {
-    /// Opens an address in a new browser.
+    /// Opens an address in a new browser without WebGL.
     pub(crate) fn open(folder: &Path, url: &str) -> Self {
         let mut browser = Command::new(self::browser())
             .args(["--headless", "--no-sandbox", "--no-first-run", "--remote-debugging-port=0"])
+            .args(WITHOUT_WEBGL)
             .args(["--disable-background-networking", "--disable-component-update", "--disable-dev-shm-usage"])
             .arg(format!("--user-data-dir={}", folder.join("live-browser").display()))
             .arg(url)
@@ -95,8 +96,11 @@ impl LivePage {
         let page = loop {
             let mut stream = TcpStream::connect(&address).expect("connects");
             write!(stream, "GET /json/list HTTP/1.1\r\nHost: {address}\r\nConnection: close\r\n\r\n").expect("sent");
-            let mut text = String::new();
-            let _ = stream.read_to_string(&mut text);
+            // The browser keeps the connection open.
+            stream.set_read_timeout(Some(Duration::from_millis(500))).expect("a limit");
+            let mut bytes = Vec::new();
+            let _ = stream.read_to_end(&mut bytes);
+            let text = String::from_utf8_lossy(&bytes);
             let found = text.split("\"webSocketDebuggerUrl\": \"").skip(1).filter_map(|rest| rest.split('"').next());
             if let Some(page) = found.map(str::to_owned).find(|page| page.contains("/page/")) {
                 break page;

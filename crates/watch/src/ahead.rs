@@ -108,11 +108,14 @@ impl Scratch {
     /// Returns the `count` closest pairs at the present, the closest one first. Call after [`Scratch::search`], which
     /// sorts the vehicles.
     pub(crate) fn closest_pairs(&self, count: usize) -> Vec<Separation> {
+        let mut closest: Vec<Separation> = Vec::new();
+        if count == 0 {
+            return closest;
+        }
         let axis = widest_axis(self.of.iter().map(|(_, of)| of.position_m));
-        let mut closest: Vec<Separation> = Vec::with_capacity(count + 1);
         for (a, (first, motion)) in self.of.iter().enumerate() {
             for (second, other) in &self.of[a + 1..] {
-                let farthest_m = closest.get(count.wrapping_sub(1)).map_or(f64::INFINITY, |of| of.nominal_m);
+                let farthest_m = closest.get(count - 1).map_or(f64::INFINITY, |of| of.nominal_m);
                 if other.position_m[axis] - motion.position_m[axis] > farthest_m {
                     break;
                 }
@@ -140,4 +143,33 @@ pub(crate) fn widest_axis(positions_m: impl Iterator<Item = Vector3<f64>>) -> us
     let start = (Vector3::repeat(f64::INFINITY), Vector3::repeat(f64::NEG_INFINITY));
     let (low, high) = positions_m.fold(start, |(low, high), at| (low.inf(&at), high.sup(&at)));
     (high - low).imax()
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::Scratch;
+    use crate::pair::{Prediction, RelativeMotion};
+    use crate::settings::Settings;
+
+    #[test]
+    fn closest_pairs_are_those_of_all_pairs() {
+        // A low-discrepancy sequence: golden ratio of three dimensions.
+        let place = |k: u32| Vector3::new(0.819_172_513, 0.671_043_607, 0.549_700_478) * f64::from(k);
+        let motion = |k: u32| Prediction::new(place(k).map(f64::fract) * 50.0, Vector3::x(), 0.1, 0.05, 0.1, 1.0);
+        for vehicles in [0, 1, 2, 5, 60] {
+            let mut scratch = Scratch::default();
+            (0..vehicles).for_each(|k| scratch.push(k, motion(k)));
+            scratch.search(&Settings::default());
+            let pairs = (0..vehicles).flat_map(|a| (a + 1..vehicles).map(move |b| [a, b]));
+            let nominal_m = |[a, b]: [u32; 2]| RelativeMotion::new(&motion(a), &motion(b)).nominal_m();
+            let mut all: Vec<_> = pairs.map(|pair| (nominal_m(pair), pair)).collect();
+            all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+            for count in [0, 1, 8, 5000] {
+                let found: Vec<_> = scratch.closest_pairs(count).iter().map(|of| (of.nominal_m, of.pair)).collect();
+                assert_eq!(found, all[..count.min(all.len())], "{vehicles} vehicles, {count} pairs");
+            }
+        }
+    }
 }

@@ -45,8 +45,8 @@ pub fn live_page() -> String {
                     section {
                         h2 { "Closest pairs" }
                         p.about {
-                            "Expected: by constant velocity since the newest message. At least: the smallest separation \
-                             that the bounds below allow."
+                            "Expected: by constant velocity since the newest message. At least: the smallest \
+                             separation that the bounds below allow."
                         }
                         div.scroll {
                             table {
