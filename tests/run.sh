@@ -1,53 +1,107 @@
 #!/bin/sh
-# Sets up and runs the tests of the Rust crates. From anywhere: sh tests/run.sh [--long] [arguments of cargo test]
+# Sets up and runs tests. From anywhere:
 #
-# --long adds the rest: ignored tests, release bits, MP4 films, fuzz targets, three of tests/mutants, packages,
-# clusters, exported files, the Python package and the commands of the docs. TAUTLINE_LONG=1 adds random cases, an hour
-# of fuzzing, and the slowest commands of the docs.
+#   sh tests/run.sh [arguments of cargo test]   the tests of the crates and of the program
+#   sh tests/run.sh --long                      all phases
+#   sh tests/run.sh --only PHASE...             some phases
+#
+# CONTRIBUTING.md lists the phases. TAUTLINE_LONG=1 adds random cases, an hour of fuzzing, and the slowest commands of
+# the docs.
 set -eu
 cd "$(dirname "$0")/.."
 
-long=
-if [ "${1:-}" = --long ]; then
-    long=yes
-    shift
-fi
-
-if [ "$long" ]; then
-    echo "tests: set-up, build and all tests, some 50 minutes on two cores"
-else
-    echo "tests: set-up, build and tests of the crates, some 20 minutes on two cores"
-fi
-sh tests/setup.sh ${long:+--long}
-
-# The debug build flies the golden scenarios; with --long the release build must have the same hashes.
-arguments=$#
-if [ "$long" ]; then
-    case " $* " in *" -- "*) set -- "$@" --include-ignored ;; *) set -- "$@" -- --include-ignored ;; esac
-fi
+all="crates ignored bits film fuzz mutants ci cluster docs readers python"
 # The Python package and the fuzz targets have tests of their own.
-case " $* " in
-    *" -p "* | *" --package "*) cargo test "$@" ;;
-    *) cargo test --workspace --exclude tautline-python --exclude tautline-fuzz "$@" ;;
-esac
-if [ "$arguments" != 0 ] || [ ! "$long" ]; then exit; fi
+rust="--workspace --exclude tautline-python --exclude tautline-fuzz"
 
-cargo test --release -p tautline-sim --test bits
+# The debug build flies the golden scenarios.
+crates() {
+    # Clippy compiles the examples; here each of them would be linked with the whole tree.
+    cargo test $rust --lib --bins --tests
+    cargo test $rust --doc
+}
+
+ignored() { cargo test $rust --lib --bins --tests -- --ignored; }
+
+# The release build must have the hashes of the debug build.
+bits() { cargo test --release -p tautline-sim --test bits; }
+
 # The H.264 encoder, which is not a default feature.
-cargo test -p tautline-render --features mp4 film
-# A minute for all fuzz targets, with the same inputs in each run; TAUTLINE_LONG=1 takes an hour, with others.
-sh fuzz/run.sh "${TAUTLINE_LONG:+170}"
-# A mutant of the law and one of the audit, and one that empties sentences, on which no verdict may depend.
-sh tests/mutants.sh 03-a22 07-sweep-off 11-reasons-without-text
+film() { cargo test -p tautline-render --features mp4 film; }
 
-# With the debug build: the GitHub action, hook and archives, clusters, every command of the docs.
-for tests in tests/ci tests/cluster tests/docs; do
-    target/cluster/bin/python -m unittest discover --verbose --start-directory "$tests"
-done
+# A minute for all fuzz targets, with the same inputs in each run; TAUTLINE_LONG=1 takes an hour, with others.
+fuzz() { sh fuzz/run.sh "${TAUTLINE_LONG:+170}"; }
+
+# A mutant of the law and one of the audit, and one that empties sentences, on which no verdict may depend.
+mutants() { sh tests/mutants.sh 03-a22 07-sweep-off 11-reasons-without-text; }
+
+# The Python tests below start the debug build of the program.
+with_program() {
+    cargo build --quiet
+    "target/$1/bin/python" -m unittest discover --verbose --start-directory "$2"
+}
+
+# The GitHub action, hook and archives, and packages.
+ci() { with_program cluster tests/ci; }
+
+cluster() { with_program cluster tests/cluster; }
+
+# Every command of the docs.
+docs() { with_program cluster tests/docs; }
 
 # Exported files with the libraries of their formats.
-target/readers/bin/python -m unittest discover --verbose --start-directory tests/readers
+readers() { with_program readers tests/readers; }
 
 # The Python package, in a debug build, with its notebooks.
-VIRTUAL_ENV="$PWD/target/python" target/python/bin/maturin develop --manifest-path python/Cargo.toml
-TAUTLINE_NOTEBOOKS=yes target/python/bin/python -m unittest discover --verbose --start-directory tests/python
+python() {
+    VIRTUAL_ENV="$PWD/target/python" target/python/bin/maturin develop --manifest-path python/Cargo.toml
+    TAUTLINE_NOTEBOOKS=yes target/python/bin/python -m unittest discover --verbose --start-directory tests/python
+}
+
+# Runs a phase and prints its processor time.
+phase() {
+    printf '\n== %s\n' "$1"
+    "$1"
+    times >"$scratch/times"
+    # User and system time of ended children, each as MINUTESmSECONDSs.
+    cpu_s=$(awk 'NR == 2 { gsub("s", ""); split($1, user, "m"); split($2, kernel, "m")
+        printf "%d", 60 * (user[1] + kernel[1]) + user[2] + kernel[2] }' "$scratch/times")
+    echo "$1: $((cpu_s - before_s)) CPU s" | tee -a "$scratch/phases"
+    before_s=$cpu_s
+}
+
+phases=crates
+case ${1:-} in
+    --long)
+        echo "tests: set-up, build and all tests, some 50 minutes on two cores"
+        phases=$all
+        shift
+        [ $# = 0 ] || { echo "--long: takes no arguments, got $*" >&2 && exit 2; }
+        ;;
+    --only)
+        shift
+        phases=$*
+        for name in $phases; do
+            case " $all " in *" $name "*) ;; *) echo "$name: no such phase; give some of: $all" >&2 && exit 2 ;; esac
+        done
+        set --
+        echo "tests: set-up, build and $phases"
+        ;;
+    *) echo "tests: set-up, build and tests of the crates, some 15 minutes on two cores" ;;
+esac
+if [ $# != 0 ]; then
+    sh tests/setup.sh crates
+    case " $* " in
+        *" -p "* | *" --package "*) exec cargo test "$@" ;;
+        *) exec cargo test $rust "$@" ;;
+    esac
+fi
+
+scratch=$(mktemp -d)
+trap 'rm -rf "$scratch"' EXIT
+before_s=0
+set_up() { sh tests/setup.sh $phases; }
+phase set_up
+for name in $phases; do phase "$name"; done
+printf '\n'
+cat "$scratch/phases"

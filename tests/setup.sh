@@ -1,78 +1,80 @@
 #!/bin/sh
 # Installs the missing requirements of builds and tests, except for the Rust toolchain.
-# From anywhere: sh tests/setup.sh [--long]
+# From anywhere: sh tests/setup.sh [--long | PHASE...]
 #
-# --long adds those of `tests/run.sh --long`. Three of its tools are built from source.
+# --long installs those of all phases of tests/run.sh. Without arguments: those of the phase `crates`. One tool of each
+# of the phases `ci`, `docs` and `fuzz` is built from source. `lint` needs a compiler and Python only.
 set -eu
 cd "$(dirname "$0")/.."
+phases=${*:-crates}
+
+# Returns whether one of these phases is to be set up.
+needed_by() {
+    for phase; do
+        case " $phases " in *" $phase "* | *" --long "*) return 0 ;; esac
+    done
+    return 1
+}
+
+has() { command -v "$1" >/dev/null 2>&1; }
+
+# Installs packages of Debian.
+debian() {
+    sudo=$([ "$(id -u)" = 0 ] || echo sudo)
+    $sudo apt-get update
+    $sudo apt-get install -y --no-install-recommends "$@"
+}
 
 # The C and C++ toolchain, for linking and for the H.264 encoder.
-if ! command -v cc >/dev/null 2>&1 || ! command -v c++ >/dev/null 2>&1; then
-    sudo=$([ "$(id -u)" = 0 ] || echo sudo)
-    $sudo apt-get update
-    $sudo apt-get install -y --no-install-recommends gcc g++ libc6-dev
-fi
+has cc && has c++ || debian gcc g++ libc6-dev
 
-# The interpreter that runs the checker of proofs.
-if ! command -v python3 >/dev/null 2>&1; then
-    sudo=$([ "$(id -u)" = 0 ] || echo sudo)
-    $sudo apt-get update
-    $sudo apt-get install -y --no-install-recommends python3
-fi
+# The interpreter that runs the checkers of proofs and prose.
+has python3 || debian python3
 
-# The browser for tests/reports.
-if ! command -v chromium >/dev/null 2>&1; then
-    sudo=$([ "$(id -u)" = 0 ] || echo sudo)
-    $sudo apt-get update
-    $sudo apt-get install -y --no-install-recommends chromium fonts-dejavu-core
-fi
+if needed_by crates ignored film; then
+    # The browser for tests/reports.
+    has chromium || debian chromium fonts-dejavu-core
 
-# The compiler that checks the types of assets/replay.js.
-if ! target/typescript/node_modules/.bin/tsc --version >/dev/null 2>&1; then
-    if ! command -v npm >/dev/null 2>&1; then
-        sudo=$([ "$(id -u)" = 0 ] || echo sudo)
-        $sudo apt-get update
-        $sudo apt-get install -y --no-install-recommends nodejs npm
+    # The compiler that checks the types of assets/replay.js.
+    if ! target/typescript/node_modules/.bin/tsc --version >/dev/null 2>&1; then
+        has npm || debian nodejs npm
+        mkdir -p target/typescript
+        npm install --silent --no-audit --no-fund --prefix target/typescript 'typescript@5'
     fi
-    mkdir -p target/typescript
-    npm install --silent --no-audit --no-fund --prefix target/typescript 'typescript@5'
+
+    # A software driver if there is no graphics driver, for tests/viewer.
+    ls /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1 || ls /etc/vulkan/icd.d/*.json >/dev/null 2>&1 ||
+        debian mesa-vulkan-drivers libvulkan1
+
+    # Virtual screen, virtual input and window libraries for tests/window.
+    has Xvfb && has xdotool ||
+        debian xvfb xdotool libx11-6 libx11-xcb1 libxcursor1 libxi6 libxrandr2 libxkbcommon-x11-0
 fi
 
-# A software driver if there is no graphics driver, for tests/viewer.
-if ! ls /usr/share/vulkan/icd.d/*.json >/dev/null 2>&1 && ! ls /etc/vulkan/icd.d/*.json >/dev/null 2>&1; then
-    sudo=$([ "$(id -u)" = 0 ] || echo sudo)
-    $sudo apt-get update
-    $sudo apt-get install -y --no-install-recommends mesa-vulkan-drivers libvulkan1
-fi
-
-# Virtual screen, virtual input and window libraries for tests/window.
-if ! command -v Xvfb >/dev/null 2>&1 || ! command -v xdotool >/dev/null 2>&1; then
-    sudo=$([ "$(id -u)" = 0 ] || echo sudo)
-    $sudo apt-get update
-    $sudo apt-get install -y --no-install-recommends xvfb xdotool libx11-6 libx11-xcb1 libxcursor1 libxi6 libxrandr2 \
-        libxkbcommon-x11-0
-fi
-
-if [ "${1:-}" != --long ]; then exit; fi
+# Builds a program from source, unless target/FOLDER/bin has it: tool FOLDER PROGRAM [arguments of cargo install]
+tool() {
+    folder=target/$1
+    program=$2
+    shift 2
+    if ! "$folder/bin/$program" --version >/dev/null 2>&1; then
+        cargo install --quiet --locked --debug --root "$folder" --target-dir "$folder/build" "$@"
+        rm -rf "$folder/build"
+    fi
+}
 
 # The builder of the book, which tests/docs runs.
-if ! target/mdbook/bin/mdbook --version >/dev/null 2>&1; then
-    cargo install --quiet --locked --debug --no-default-features --features search --root target/mdbook \
-        --target-dir target/mdbook/build 'mdbook@0.5.4'
-    rm -rf target/mdbook/build
+if needed_by docs; then
+    tool mdbook mdbook --no-default-features --features search 'mdbook@0.5.4'
 fi
 
-# The checker of licences and versions, which reads the sources of all systems, and the fuzzer.
-cargo fetch --quiet --locked
-if ! target/deny/bin/cargo-deny --version >/dev/null 2>&1; then
-    cargo install --quiet --locked --debug --no-default-features --root target/deny --target-dir target/deny/build \
-        'cargo-deny@0.20.2'
-    rm -rf target/deny/build
+# The checker of licences and versions, which reads the sources of all systems.
+if needed_by ci; then
+    cargo fetch --quiet --locked
+    tool deny cargo-deny --no-default-features 'cargo-deny@0.20.2'
 fi
-if ! target/fuzz-tool/bin/cargo-fuzz --version >/dev/null 2>&1; then
-    cargo install --quiet --locked --debug --root target/fuzz-tool --target-dir target/fuzz-tool/build \
-        'cargo-fuzz@0.13.2'
-    rm -rf target/fuzz-tool/build
+
+if needed_by fuzz; then
+    tool fuzz-tool cargo-fuzz 'cargo-fuzz@0.13.2'
 fi
 
 # Creates target/NAME with packages, unless it can import MODULES: environment NAME MODULES PACKAGE...
@@ -81,11 +83,7 @@ environment() {
     modules=$2
     shift 2
     if "$folder/bin/python" -c "import $modules" 2>/dev/null; then return; fi
-    if ! python3 -c 'import ensurepip, venv' 2>/dev/null; then
-        sudo=$([ "$(id -u)" = 0 ] || echo sudo)
-        $sudo apt-get update
-        $sudo apt-get install -y --no-install-recommends python3 python3-venv
-    fi
+    python3 -c 'import ensurepip, venv' 2>/dev/null || debian python3 python3-venv
     rm -rf "$folder"
     mkdir -p target
     python3 -m venv "$folder"
@@ -96,22 +94,26 @@ environment() {
 }
 
 # Ray for tests/cluster, pre-commit and YAML for tests/ci.
-environment cluster 'pre_commit, ray, yaml' 'ray>=2.40,<3' pre-commit pyyaml
+if needed_by ci cluster docs; then
+    environment cluster 'pre_commit, ray, yaml' 'ray>=2.40,<3' pre-commit pyyaml
+fi
 
 # The library that uploads Crazyflie trajectories, for tests/readers. Its other dependencies are not needed.
-environment readers cflib.crazyflie.mem.trajectory_memory \
-    --no-deps cflib==0.1.34 importlib_resources libusb-package 'numpy>=2.2,<3' packaging pyusb
+if needed_by readers; then
+    environment readers cflib.crazyflie.mem.trajectory_memory \
+        --no-deps cflib==0.1.34 importlib_resources libusb-package 'numpy>=2.2,<3' packaging pyusb
+fi
 
 # Build tool of the Python package, and packages for tests/python.
-environment python \
-    'cma, gymnasium, ipykernel, joblib, matplotlib, maturin, mypy, nbclient, numpy, pandas, pettingzoo, pyarrow' \
-    'cma>=4,<5' gymnasium ipykernel joblib 'matplotlib>=3.5' 'maturin>=1.9.4,<2' mypy nbclient 'numpy>=1.23' \
-    'pandas>=1.5' pettingzoo pyarrow
+if needed_by ci python; then
+    environment python \
+        'cma, gymnasium, ipykernel, joblib, matplotlib, maturin, mypy, nbclient, numpy, pandas, pettingzoo, pyarrow' \
+        'cma>=4,<5' gymnasium ipykernel joblib 'matplotlib>=3.5' 'maturin>=1.9.4,<2' mypy nbclient 'numpy>=1.23' \
+        'pandas>=1.5' pettingzoo pyarrow
+fi
 
 # Slurm for tests/cluster, which starts a node.
-if ! (PATH="$PATH:/usr/sbin" && command -v munged && command -v slurmctld && command -v slurmd && command -v sbatch) \
-    >/dev/null; then
-    sudo=$([ "$(id -u)" = 0 ] || echo sudo)
-    $sudo apt-get update
-    $sudo apt-get install -y --no-install-recommends munge slurmctld slurmd slurm-client
+if needed_by cluster; then
+    (PATH="$PATH:/usr/sbin" && has munged && has slurmctld && has slurmd && has sbatch) ||
+        debian munge slurmctld slurmd slurm-client
 fi

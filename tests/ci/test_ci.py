@@ -203,6 +203,36 @@ class Workflows(unittest.TestCase):
             for called in re.findall(r"(?:sh |run: )((?:source/)?\.\w+/\S+)", file.read_text()):
                 self.assertTrue((ROOT / called.removeprefix("source/")).is_file(), f"{file.name} calls {called}")
 
+    def phases(self):
+        """Returns the phases of tests/run.sh."""
+        return re.search(r'^all="(.*)"$', (ROOT / "tests/run.sh").read_text(), re.MULTILINE).group(1).split()
+
+    def test_every_phase_of_the_tests_is_a_job_and_a_row_of_the_page(self):
+        jobs = yaml.safe_load((ROOT / ".github/workflows/check.yml").read_text())["jobs"]
+        listed = [name for names in jobs["tests"]["strategy"]["matrix"]["phases"] for name in names.split()]
+        self.assertCountEqual(listed, self.phases())
+        page = (ROOT / "CONTRIBUTING.md").read_text()
+        rows = re.findall(r"^\| `(\w+)` \| .* \| (?:\d+|–) \|$", page, re.MULTILINE)
+        self.assertEqual(rows, ["set_up", *self.phases()])
+
+    def test_an_unknown_phase_is_refused(self):
+        done = run("sh", ROOT / "tests/run.sh", "--only", "bits", "bots", folder=ROOT)
+        self.assertEqual((done.returncode, done.stdout), (2, ""))
+        self.assertIn("bots: no such phase; give some of: crates ", done.stderr)
+
+    def test_other_systems_test_every_crate(self):
+        jobs = yaml.safe_load((ROOT / ".github/workflows/check.yml").read_text())["jobs"]
+        [tests] = [step["run"] for step in jobs["systems"]["steps"] if "cargo test" in step.get("run", "")]
+        crates = [f"tautline-{folder.name}" for folder in (ROOT / "crates").iterdir()]
+        self.assertCountEqual(re.findall(r"--package (\S+)", tests), crates)
+
+    def test_the_oldest_compiler_is_that_of_the_manifest(self):
+        jobs = yaml.safe_load((ROOT / ".github/workflows/check.yml").read_text())["jobs"]
+        script = jobs["oldest-rust"]["steps"][-1]["run"]
+        found = run("sh", "-c", script.splitlines()[0] + '; echo "$version"', folder=ROOT)
+        self.assertIn(f'rust-version = "{found.stdout.strip()}"', (ROOT / "Cargo.toml").read_text())
+        self.assertRegex(found.stdout, r"^\d+\.\d+\n$")
+
     def test_released_and_installed_targets_are_the_same(self):
         release = yaml.safe_load((ROOT / ".github/workflows/release.yml").read_text())
         targets = {of["target"] for of in release["jobs"]["program"]["strategy"]["matrix"]["include"]}

@@ -3,11 +3,11 @@
 use std::fs;
 use std::path::PathBuf;
 use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use crate::program::{Ran, TAUTLINE, ran_by};
+use crate::program::{PATIENCE, Ran, TAUTLINE, ran_by};
 
 /// Five vehicles from random starts, under two laws, for 1 s.
 const SPEC: &str = r#"
@@ -50,6 +50,12 @@ impl Place {
 
     fn left(&self, out: &str) -> [Vec<u8>; 2] {
         ["results.parquet", "campaign.json"].map(|name| fs::read(self.path(out).join(name)).expect("left"))
+    }
+
+    /// Returns the size of all rows and journals of a folder.
+    fn bytes(&self, out: &str) -> u64 {
+        let entries = fs::read_dir(self.path(out).join("parts")).into_iter().flatten().flatten();
+        entries.filter_map(|entry| entry.metadata().ok()).map(|file| file.len()).sum()
     }
 
     fn parts(&self, out: &str) -> Vec<PathBuf> {
@@ -95,6 +101,7 @@ fn the_answer_is_the_same_for_any_shards_threads_and_order() {
 fn a_campaign_killed_repeatedly_has_the_same_answer() {
     let place = Place::of(SPEC);
     let whole = place.run("whole", &[]);
+    let bytes = place.bytes("whole");
     let kills = if std::env::var_os("TAUTLINE_LONG").is_some() { 20 } else { 5 };
     for kill in 0..kills {
         let mut child = Command::new(TAUTLINE)
@@ -104,7 +111,14 @@ fn a_campaign_killed_repeatedly_has_the_same_answer() {
             .stderr(Stdio::null())
             .spawn()
             .expect("it starts");
-        std::thread::sleep(Duration::from_millis(150 + 97 * kill % 700));
+        // Each process adds about the same number of flights.
+        let enough = bytes * kill / kills;
+        let began = Instant::now();
+        while place.bytes("killed") <= enough && child.try_wait().expect("it is ours").is_none() {
+            let flown = place.bytes("killed");
+            assert!(began.elapsed() < PATIENCE, "process {kill} has flown {flown} of {enough} bytes");
+            std::thread::sleep(Duration::from_millis(2));
+        }
         child.kill().expect("it can be killed");
         child.wait().expect("it ends");
     }
@@ -401,7 +415,9 @@ fn journals_of_other_campaigns_and_changed_rows_are_ignored() {
             entries.into_iter().find(|path| path.extension().is_some_and(|kind| kind == "journal"))
         };
         let has_rows = || journal().is_some_and(|path| fs::read(path).is_ok_and(|bytes| bytes.len() > 4000));
+        let began = Instant::now();
         while !has_rows() && child.try_wait().expect("it is ours").is_none() {
+            assert!(began.elapsed() < PATIENCE, "the journal of {out} does not grow");
             std::thread::sleep(Duration::from_millis(5));
         }
         child.kill().expect("it can be killed");

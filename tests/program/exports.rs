@@ -3,9 +3,9 @@
 use std::fs;
 use std::path::Path;
 use std::process::{Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use crate::program::{Ran, TAUTLINE, ran_by};
+use crate::program::{PATIENCE, Ran, TAUTLINE, ran_by};
 use crate::report::{at, least, motion};
 
 const LONG: &str = "t,id,x,y,z\n0,1,1,2,3\n0,2,4,5,6\n0.5,1,1,2,3.5\n0.5,2,4,5,6\n";
@@ -129,8 +129,10 @@ fn an_export_that_is_interrupted_leaves_no_file() {
         .stderr(Stdio::piped())
         .spawn()
         .expect("started");
+    let began = Instant::now();
     while !names().iter().any(|name| name.ends_with(".partial")) {
         assert!(child.try_wait().expect("a child").is_none(), "it ended before it could be interrupted");
+        assert!(began.elapsed() < PATIENCE, "the export does not begin to write: {:?}", names());
         std::thread::sleep(Duration::from_millis(2));
     }
     assert!(Command::new("kill").args(["-s", "INT", &child.id().to_string()]).status().expect("kill").success());

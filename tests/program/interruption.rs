@@ -240,9 +240,22 @@ fn an_interrupted_film_leaves_no_file_and_names_the_kept_pictures() {
     assert_eq!(names(), ["start.png"]);
 }
 
-/// Starts a command that does not end, interrupts it after `after`, and returns its result.
-fn interrupted(folder: &Path, arguments: &[&str], after: Duration) -> Output {
-    let child = Command::new(TAUTLINE)
+/// Processor time that a command has used when it is interrupted, in whole seconds as `ps` rounds them down. A command
+/// is then beyond its start.
+const USED_S: u32 = 1;
+
+/// Returns the processor time of a process in whole seconds.
+fn used_s(child: &Child) -> u32 {
+    let ps = Command::new("ps").args(["-o", "time=", "-p", &child.id().to_string()]).output().expect("ps");
+    // [days-][hours:]minutes:seconds[.fraction]
+    let text = String::from_utf8(ps.stdout).expect("text");
+    let fields = text.trim().split(['-', ':']).map(|field| field.split('.').next().unwrap_or_default());
+    fields.filter_map(|field| field.parse::<u32>().ok()).fold(0, |total, field| 60 * total + field)
+}
+
+/// Starts a command that does not end, interrupts it after it has used some processor time, and returns its result.
+fn interrupted(folder: &Path, arguments: &[&str]) -> Output {
+    let mut child = Command::new(TAUTLINE)
         .args(arguments)
         .current_dir(folder)
         .env("XDG_RUNTIME_DIR", folder)
@@ -251,7 +264,12 @@ fn interrupted(folder: &Path, arguments: &[&str], after: Duration) -> Output {
         .stderr(Stdio::piped())
         .spawn()
         .expect("the program");
-    std::thread::sleep(after);
+    let began = Instant::now();
+    while used_s(&child) < USED_S {
+        assert!(child.try_wait().expect("it is ours").is_none(), "{arguments:?} ended before it was interrupted");
+        assert!(began.elapsed() < PATIENCE, "{arguments:?} has not used {USED_S} s of processor time");
+        std::thread::sleep(Duration::from_millis(20));
+    }
     let sent = Command::new("kill").args(["-s", "INT", &child.id().to_string()]).status();
     assert!(sent.expect("kill").success());
     child.wait_with_output().expect("an end")
@@ -281,8 +299,7 @@ fn an_interrupted_command_says_what_is_kept_and_how_to_continue() {
         (&["audit", "long.csv", "--delta", "1"], 130, "interrupted: the audit is incomplete; give the command again"),
     ] {
         // An audit of six million rows takes some seconds.
-        let after = Duration::from_secs(if arguments[0] == "audit" { 1 } else { 3 });
-        let ended = interrupted(folder.path(), arguments, after);
+        let ended = interrupted(folder.path(), arguments);
         let err = String::from_utf8_lossy(&ended.stderr);
         assert_eq!(ended.status.code(), Some(exit), "{arguments:?}: {err}");
         assert!(err.contains(says), "{arguments:?}: {err}");

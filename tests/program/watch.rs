@@ -11,7 +11,7 @@ use assert_cmd::Command as Checked;
 use serde_json::Value;
 use tempfile::tempdir;
 
-use crate::program::{Ran, TAUTLINE, ran_by};
+use crate::program::{PATIENCE, Ran, TAUTLINE, ran_by};
 use crate::report::{number, violations};
 
 fn watched(folder: &Path, arguments: &[&str], input: &str) -> Ran {
@@ -548,17 +548,18 @@ fn a_source_that_is_lost_connects_again_and_nothing_is_clear_meanwhile() {
     let listener = TcpListener::bind("127.0.0.1:0").expect("a port");
     let source = format!("rosbridge:{}", listener.local_addr().expect("an address"));
     let (mut child, mut out) = start(&[&source, "--topic", "/a/pose", "--topic", "/b/pose"]);
+    let (resume, is_stale) = std::sync::mpsc::channel();
     let server = std::thread::spawn(move || {
-        for _ in 0..2 {
-            let (stream, _) = listener.accept().expect("a client");
-            serve_ros(stream, 100);
-            std::thread::sleep(std::time::Duration::from_secs(1));
-        }
+        let serve = || serve_ros(listener.accept().expect("a client").0, 100);
+        serve();
+        is_stale.recv_timeout(PATIENCE).expect("the watch reports a stale vehicle");
+        serve();
     });
     until(&mut out, |of| of["event"] == "connected");
     until(&mut out, |of| of["status"] == "clear" && of["event"] == "state");
     until(&mut out, |of| of["event"] == "lost");
     until(&mut out, |of| of["reason"]["code"] == "stale");
+    resume.send(()).expect("the server waits");
     until(&mut out, |of| of["event"] == "connected");
     // The stamps begin again: the clock of the source stepped.
     until(&mut out, |of| of["fault"] == "clock-step");

@@ -285,7 +285,9 @@ class Threads(Case):
         refused, ticks = [], 0
         worker = threading.Thread(target=lambda: sim.step(steps=40_000))
         worker.start()
+        until = time.monotonic() + 300
         while worker.is_alive():
+            self.assertLess(time.monotonic(), until, "the worker has not made its steps")
             ticks += 1
             try:
                 sim.reset(np.zeros(50, dtype=bool))
@@ -297,11 +299,21 @@ class Threads(Case):
 
     def test_ctrl_c_stops_all_worlds_at_the_same_step(self) -> None:
         sim = tl.VectorSimulation("pentagon", 50, set={"time.duration_s": 10**5})
-        timer = threading.Timer(0.3, lambda: os.kill(os.getpid(), signal.SIGINT))
-        timer.start()
+        begin_s = time.process_time()
+
+        def interrupt() -> None:
+            # Only steps take this much processor time.
+            until = time.monotonic() + 60
+            while time.process_time() - begin_s < 0.3 and time.monotonic() < until:
+                time.sleep(0.001)
+            os.kill(os.getpid(), signal.SIGINT)
+
+        interrupter = threading.Thread(target=interrupt)
+        interrupter.start()
         with self.assertRaises(KeyboardInterrupt):
             sim.step(np.zeros((50, 5, 3)), steps=10**7)
-        timer.join()
+        interrupter.join()
+        self.assertGreater(sim.steps.max(), 0, "the worlds were stepped before the signal")
         self.assertEqual(len(set(sim.steps.tolist())), 1)
         sim.step(np.zeros((50, 5, 3)))
 

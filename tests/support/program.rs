@@ -6,7 +6,7 @@ use std::time::Duration;
 use assert_cmd::Command;
 
 /// Time limit of a command, generous for slow machines.
-const PATIENCE: Duration = Duration::from_mins(5);
+pub(crate) const PATIENCE: Duration = Duration::from_mins(5);
 
 /// Path of the program under test.
 pub(crate) const TAUTLINE: &str = env!("CARGO_BIN_EXE_tautline");

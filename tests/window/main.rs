@@ -52,7 +52,13 @@ impl Screen {
         String::from_utf8_lossy(&done.stdout).trim().to_owned()
     }
 
+    /// Returns the content of the whole screen.
+    fn content(&self) -> Vec<u8> {
+        std::fs::read(self.memory.path().join("Xvfb_screen0")).expect("the memory of the screen")
+    }
+
     fn open(&self, folder: &Path, arguments: &[&str]) -> (Child, String) {
+        let empty = self.content();
         let program = Command::new(env!("CARGO_BIN_EXE_tautline"))
             .arg("view")
             .args(arguments)
@@ -68,7 +74,7 @@ impl Screen {
             found.lines().next().map(str::to_owned)
         });
         // Keys reach the window once it has been drawn and has the focus.
-        std::thread::sleep(Duration::from_secs(2));
+        wait_for("the first picture of the window", || (self.content() != empty).then_some(()));
         self.xdotool(&["windowfocus", "--sync", &window]);
         (program, window)
     }
@@ -96,16 +102,28 @@ impl<'a> OpenWindow<'a> {
         self.screen.xdotool(&["key", "--window", &self.window, key]);
     }
 
-    /// Moves the mouse to a position in the window, with further actions.
-    fn mouse(&self, x: u32, y: u32, more: &[&str]) {
-        let [x, y] = [x, y].map(|at| at.to_string());
-        self.screen.xdotool(&[&["mousemove", "--window", &self.window, &x, &y][..], more].concat());
+    /// Moves the mouse to a position in the window.
+    fn move_mouse(&self, x: u32, y: u32) {
+        self.screen.xdotool(&["mousemove", "--window", &self.window, &x.to_string(), &y.to_string()]);
     }
 
-    /// Returns size and bytes of the current picture, as the window saves it.
+    /// Moves the mouse to a position in the window and acts there, each action in a frame of its own.
+    fn mouse(&self, x: u32, y: u32, actions: &[&[&str]]) {
+        self.move_mouse(x, y);
+        for action in actions {
+            self.picture();
+            self.screen.xdotool(action);
+        }
+    }
+
+    /// Returns size and bytes of the picture after all earlier inputs, as the window saves it.
     fn picture(&self) -> ([u32; 2], Vec<u8>) {
-        // Wait until earlier inputs are drawn.
-        std::thread::sleep(Duration::from_millis(500));
+        // The first picture may precede an input of the same frame. The second one is of a later frame.
+        self.saved_picture();
+        self.saved_picture()
+    }
+
+    fn saved_picture(&self) -> ([u32; 2], Vec<u8>) {
         self.key("p");
         let bytes = wait_for("a picture", || {
             let path = std::fs::read_dir(self.folder).ok()?.flatten().map(|entry| entry.path());
@@ -117,11 +135,21 @@ impl<'a> OpenWindow<'a> {
         ([16, 20].map(|at| u32::from_be_bytes(bytes[at..at + 4].try_into().expect("four bytes"))), bytes)
     }
 
-    /// Returns the content of the whole screen, with panels.
+    /// Returns the content of the whole screen, with panels, when it has been the same for longer than any animation.
     fn screenshot(&self) -> Vec<u8> {
-        // Longer than any animation.
-        std::thread::sleep(Duration::from_secs(1));
-        std::fs::read(self.screen.memory.path().join("Xvfb_screen0")).expect("the memory of the screen")
+        let (mut content, mut since) = (self.screen.content(), Instant::now());
+        wait_for("the end of all animations", || {
+            let next = self.screen.content();
+            if next != content {
+                (content, since) = (next, Instant::now());
+            }
+            (since.elapsed() > Duration::from_secs(1)).then(|| content.clone())
+        })
+    }
+
+    /// Waits until the whole screen, with panels, fulfils a condition.
+    fn wait_for_screen(&self, what: &str, is_reached: impl Fn(&[u8]) -> bool) {
+        wait_for(what, || is_reached(&self.screen.content()).then_some(()));
     }
 }
 
@@ -178,7 +206,6 @@ fn the_window_plays_reacts_to_keys_and_closes() {
     // Pause, closest approach, picture, next sample, picture.
     for key in ["space", "n", "p"] {
         screen.xdotool(&["key", "--window", &window, key]);
-        std::thread::sleep(Duration::from_millis(300));
     }
     wait_for("a picture", || (pictures(folder.path()).len() == 1).then_some(()));
     let closest_s = pictures(folder.path())[0];
@@ -243,17 +270,14 @@ fn keys_and_camera_movements_change_the_picture_reversibly() {
         window.key("2");
         assert!(window.picture() == whole, "framed after {what}");
     }
-    let drags: [(&str, &[&str]); 4] = [
-        ("drag", &["mousedown", "1", "sleep", "0.3", "mousemove_relative", "80", "30", "sleep", "0.3", "mouseup", "1"]),
-        (
-            "right drag",
-            &["mousedown", "3", "sleep", "0.3", "mousemove_relative", "80", "30", "sleep", "0.3", "mouseup", "3"],
-        ),
-        ("wheel up", &["click", "4"]),
-        ("wheel down", &["click", "5"]),
+    let drags: [(&str, &[&[&str]]); 4] = [
+        ("drag", &[&["mousedown", "1"], &["mousemove_relative", "80", "30"], &["mouseup", "1"]]),
+        ("right drag", &[&["mousedown", "3"], &["mousemove_relative", "80", "30"], &["mouseup", "3"]]),
+        ("wheel up", &[&["click", "4"]]),
+        ("wheel down", &[&["click", "5"]]),
     ];
-    for (what, act) in drags {
-        window.mouse(400, 300, act);
+    for (what, actions) in drags {
+        window.mouse(400, 300, actions);
         assert!(window.picture() != whole, "{what}");
         window.key("2");
         assert!(window.picture() == whole, "framed after {what}");
@@ -289,7 +313,7 @@ fn help_and_picked_vehicles_are_shown_and_hidden() {
     let (folder, screen) = (tempfile::tempdir().expect("a folder"), Screen::new());
     let (program, window) = OpenWindow::at_the_end(&screen, folder.path());
     // A pointer here changes nothing.
-    window.mouse(5, 5, &[]);
+    window.move_mouse(5, 5);
     window.picture();
     let (size_px, _) = window.picture();
     // The next key clears the message about saved pictures.
@@ -297,9 +321,9 @@ fn help_and_picked_vehicles_are_shown_and_hidden() {
     let plain = window.screenshot();
     assert!(window.screenshot() == plain, "without input the screen is the same");
     window.key("h");
-    assert!(window.screenshot() != plain, "help");
+    window.wait_for_screen("help", |screen| screen != plain);
     window.key("h");
-    assert!(window.screenshot() == plain, "no help");
+    window.wait_for_screen("a screen without help", |screen| screen == plain);
     window.key("v");
     let first = window.screenshot();
     assert!(first != plain, "the first vehicle is picked");
@@ -309,13 +333,17 @@ fn help_and_picked_vehicles_are_shown_and_hidden() {
     for _ in 0..4 {
         window.key("v");
     }
-    assert!(window.screenshot() == plain, "no vehicle is picked");
+    window.wait_for_screen("a screen without a picked vehicle", |screen| screen == plain);
     let [x, y] = first_vehicle(&folder.path().join("out/run.mcap"), size_px);
-    window.mouse(x, y, &["sleep", "0.3", "click", "1", "sleep", "0.3"]);
-    window.mouse(5, 5, &[]);
-    assert!(window.screenshot() == first, "the first vehicle is picked by a click at {x}, {y}");
-    window.mouse(5, 5, &["click", "1"]);
-    assert!(window.screenshot() == plain, "a click on the background picks no vehicle");
+    window.mouse(x, y, &[&["click", "1"]]);
+    window.picture();
+    window.move_mouse(5, 5);
+    window.key("End");
+    window.wait_for_screen(&format!("a vehicle picked by a click at {x}, {y}"), |screen| screen == first);
+    window.mouse(5, 5, &[&["click", "1"]]);
+    window.picture();
+    window.key("End");
+    window.wait_for_screen("a click on the background that picks no vehicle", |screen| screen == plain);
     window.key("q");
     assert_ends_well(program);
 }

@@ -5,6 +5,7 @@ use std::io;
 use std::net::TcpStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
 
 use foxglove::Decode as _;
 use foxglove::messages::{Log, SceneUpdate, log::Level};
@@ -18,6 +19,9 @@ use crate::{monitor, settings};
 use tautline_watch::foxglove_server::FoxgloveServer;
 use tautline_watch::source::{Input, OwnedPose, channel};
 use tautline_watch::{Assessment, Bound, Monitor, Notice, Output, Settings, Status, watch};
+
+/// Longest wait on a slow machine.
+const PATIENCE: Duration = Duration::from_mins(1);
 
 struct Published(FoxgloveServer);
 
@@ -122,7 +126,7 @@ fn watched(gap_m: f64) -> (SceneUpdate, Vec<Log>, Value) {
                     return;
                 }
             }
-            std::thread::sleep(std::time::Duration::from_millis(20));
+            std::thread::sleep(Duration::from_millis(20));
         }
     });
     let (mut scene, mut logs, mut status, mut count) = (SceneUpdate::default(), Vec::new(), Value::Null, 0);
@@ -200,9 +204,11 @@ fn a_client_that_does_not_read_blocks_nothing_and_loses_the_oldest_messages() {
         while !matches!(client.next(), Received::Status(_)) {}
         client
     });
+    let began = Instant::now();
     while !subscribed.is_finished() {
+        assert!(began.elapsed() < PATIENCE, "the client receives no status");
         server.assessed(&of, &monitor);
-        std::thread::sleep(std::time::Duration::from_millis(20));
+        std::thread::sleep(Duration::from_millis(20));
     }
     let mut client = subscribed.join().expect("a client");
     // 200 MB are more than the queue and the buffers of the connection hold.
