@@ -181,6 +181,8 @@ const LONG_STEP: f64 = 2.0;
 pub(super) struct Probe {
     first: Stamp,
     last: Stamp,
+    /// Last time \[units\].
+    last_time: f64,
     /// Smallest step between two different times \[units\].
     step: f64,
     /// Last time of each vehicle \[units\].
@@ -202,6 +204,7 @@ impl Probe {
         Self {
             first,
             last: first,
+            last_time: first.since(0),
             step: f64::INFINITY,
             last_of: Vec::new(),
             steps: 0,
@@ -217,11 +220,14 @@ impl Probe {
         if vehicle >= self.last_of.len() {
             self.last_of.resize(vehicle + 1, None);
         }
-        let time = stamp.since(0);
+        let time = if stamp == self.last { self.last_time } else { stamp.since(0) };
         if let Some(before) = self.last_of[vehicle].replace(time).filter(|before| *before != time) {
             self.steps += 1;
-            for (counts, unit) in self.long_steps.iter_mut().zip(TimeUnit::ALL) {
-                let step_s = (time - before).abs() / unit.per_second() as f64;
+            let step = (time - before).abs();
+            // A step that is short in seconds is short in every unit.
+            let units = TimeUnit::ALL.into_iter().filter(|_| step >= LONG_STEP);
+            for (counts, unit) in self.long_steps.iter_mut().zip(units) {
+                let step_s = step / unit.per_second() as f64;
                 for (count, least_s) in counts.iter_mut().zip([LONG_STEP, LONGEST_STEP_S]) {
                     *count += u64::from(step_s >= least_s);
                 }
@@ -234,11 +240,11 @@ impl Probe {
         self.in_order &= order == Ordering::Less;
         self.whole &= matches!(stamp, Stamp::Whole(_));
         self.integral &= stamp.whole().is_some();
-        self.step = self.step.min((time - self.last.since(0)).abs());
+        self.step = self.step.min((time - self.last_time).abs());
         if self.first.compare(stamp) == Ordering::Greater {
             self.first = stamp;
         }
-        self.last = stamp;
+        (self.last, self.last_time) = (stamp, time);
     }
 
     /// Returns the most likely unit for times of this size and step, the reason, and the other unit that fits as well.
