@@ -9,62 +9,37 @@ use std::str;
 
 use csv_core::ReadRecordResult;
 
-use super::clock::{Stamp, TimeUnit};
+use super::cells::Cells;
+use super::clock::Stamp;
 use super::error::{ContentKind, Fault, Place, ReadError, one_of, quoted, refuse};
+use super::format::Format;
 use super::layout::{Layout, VehicleColumns};
 use super::options::{Dimensions, ReadOptions};
 use super::order::Recording;
-use super::readers::{Format, FormatOption, Packing, Reader};
+use super::reader::Reader;
 use super::source::{Lines, Source};
-use super::table::Cells;
+use super::time_unit::TimeUnit;
 use super::{clock, heading, table};
 
 /// CSV table; also a text file that has no line besides comments.
 pub(super) const CSV: Reader = Reader {
-    name: "csv",
-    title: "a table in CSV",
-    extensions: &["csv", "txt"],
-    docs: "Table in text with a header, long (`t,id,x,y,z`) or wide (`t,x1,y1,z1,x2,...`)",
-    magic: &[],
+    format: Format::CSV,
     sniff: |head| head.text.is_some() && head.line.is_none_or(has_separators),
     open: |source, options| open(source, Format::CSV, options),
-    supports: FormatOption::TABLE,
-    packing: Packing::Any,
 };
 
 /// Numbers separated by blanks; accepts any other text.
 pub(super) const TEXT: Reader = Reader {
-    name: "text",
-    title: "a table in plain text",
-    extensions: &["txt"],
-    docs: "Numbers between blanks: `t x y z x y z ...`",
-    magic: &[],
+    format: Format::TEXT,
     sniff: |head| head.text.is_some(),
     open: |source, options| open(source, Format::TEXT, options),
-    supports: &[
-        FormatOption::TimeUnit,
-        FormatOption::Rows,
-        FormatOption::Dimensions,
-        FormatOption::Columns,
-        FormatOption::Origin,
-        FormatOption::Axes,
-        FormatOption::OneVehicle,
-        FormatOption::Incomplete,
-    ],
-    packing: Packing::Any,
 };
 
 /// `TrajNet` table; never recognised by its first bytes, but by [`trajnet`] in a [`TEXT`] file.
 pub(super) const TRAJNET: Reader = Reader {
-    name: "trajnet",
-    title: "a table of TrajNet",
-    extensions: &["txt"],
-    docs: "Numbers between blanks: frame, vehicle, x and y",
-    magic: &[],
+    format: Format::TRAJNET,
     sniff: |_| false,
     open: |source, options| open(source, Format::TRAJNET, options),
-    supports: FormatOption::TABLE,
-    packing: Packing::Any,
 };
 use tautline_core::option::{DIMENSIONS, FORMAT};
 
