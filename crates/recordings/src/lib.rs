@@ -8,10 +8,21 @@
 //!
 //! Memory grows with the bytes read, not with the lengths in file headers. Ambiguous input is an error that names the
 //! option to set.
+//!
+//! | feature, default | holds |
+//! | --- | --- |
+//! | `arrow` | reader and exporter of Parquet |
+//! | `mcap` | module [`mcap`], reader and exporter of MCAP, ROS 2 bags |
+//! | `shows` | readers of Skybrush and VVIZ shows and of compressed trajectories |
+//!
+//! A build without a feature refuses its files with an error that names the feature.
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
+// Helpers of several readers are unused in a build without these readers.
+#![cfg_attr(not(all(feature = "arrow", feature = "mcap", feature = "shows")), allow(dead_code))]
 
 pub mod export;
+#[cfg(feature = "mcap")]
 pub mod mcap;
 pub mod read;
 mod segments;

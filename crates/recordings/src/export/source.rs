@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 
-use super::ExportError;
+use super::error::ExportError;
 use crate::read::{Channels, ReadError, Recording, is_read};
 use tautline_core::record::Channel;
 use tautline_core::track::{Clock, Item, Piece, Sample, Tracks};

@@ -15,22 +15,17 @@ use nalgebra::Vector3;
 use super::crazyflie::{Curve, curves_of};
 use super::curves::{Curves, powers};
 use super::error::{ContentKind, Fault, Place, ReadError, UNSEEN, quoted, refuse};
+use super::format::Format;
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::readers::{FormatOption, Packing, Reader};
+use super::reader::Reader;
 use super::source::{Lines, Source};
 use tautline_core::track::{Item, Metadata};
 
 pub(super) const READER: Reader = Reader {
-    name: "bezier",
-    title: "a table of Bezier curves",
-    extensions: &["csv"],
-    docs: "Pieces of Bezier curves, a CSV for each vehicle in a folder",
-    magic: &[],
+    format: Format::BEZIER,
     sniff: |head| head.is_text(|text| is_header(text.split(|&byte| byte == b'\n').next().unwrap_or_default())),
     open: |source, options| open(vec![(source.stem(), vec![source.clone()])], None, options),
-    supports: &[FormatOption::Starts, FormatOption::Axes],
-    packing: Packing::Archive,
 };
 
 /// Highest supported degree.

@@ -24,13 +24,15 @@ use std::str;
 
 use nalgebra::Vector3;
 
-use super::clock::{Stamp, TimeUnit};
+use super::clock::Stamp;
 use super::error::{ContentKind, Fault, Place, ReadError, UNSEEN, quoted, refuse};
+use super::format::Format;
 use super::heading;
 use super::options::ReadOptions;
 use super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
-use super::readers::{FormatOption, Packing, Reader};
+use super::reader::Reader;
 use super::source::{Lines, Source};
+use super::time_unit::TimeUnit;
 use tautline_core::option::SCALE;
 
 /// Source of the time of a row.
@@ -211,15 +213,9 @@ impl Rows for Table {
 }
 
 pub(super) const MOTIVE: Reader = Reader {
-    name: "motive",
-    title: "a take of OptiTrack Motive",
-    extensions: &["csv"],
-    docs: "Take of OptiTrack Motive as CSV",
-    magic: &[],
+    format: Format::MOTIVE,
     sniff: |head| head.is_text(|text| text.starts_with(b"Format Version,")),
     open: open_motive,
-    supports: &[FormatOption::Rows],
-    packing: Packing::Any,
 };
 
 /// Number of lines in which the column names must occur.
@@ -335,17 +331,8 @@ impl MotiveHead {
     }
 }
 
-pub(super) const VICON: Reader = Reader {
-    name: "vicon",
-    title: "an export of Vicon",
-    extensions: &["csv"],
-    docs: "Export of Vicon Nexus or Tracker as CSV",
-    magic: &[],
-    sniff: |head| head.is_text(is_export),
-    open: open_vicon,
-    supports: &[FormatOption::Rows, FormatOption::Axes],
-    packing: Packing::Any,
-};
+pub(super) const VICON: Reader =
+    Reader { format: Format::VICON, sniff: |head| head.is_text(is_export), open: open_vicon };
 
 /// Names of the first section of an export.
 const SECTIONS: [&str; 9] =

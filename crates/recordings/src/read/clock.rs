@@ -8,6 +8,7 @@ use chrono::{DateTime, NaiveDateTime};
 use super::error::{ContentKind, Fault, quoted, refuse};
 use super::heading;
 use super::options::ReadOptions;
+use super::time_unit::TimeUnit;
 use tautline_core::option::{COLUMN, FPS, TIME_SCALE, TIME_UNIT};
 use tautline_core::track::Clock;
 
@@ -28,58 +29,6 @@ const TOP: f64 = 9.3e18;
 
 /// Number of decimals of a [`Stamp::Fixed`].
 const DECIMALS: usize = 18;
-
-/// Unit of time.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TimeUnit {
-    /// s.
-    Seconds,
-    /// ms.
-    Milliseconds,
-    /// us.
-    Microseconds,
-    /// ns.
-    Nanoseconds,
-}
-
-impl TimeUnit {
-    /// All units, the longest first.
-    pub const ALL: [Self; 4] = [Self::Seconds, Self::Milliseconds, Self::Microseconds, Self::Nanoseconds];
-
-    /// Returns the names, the usual one first, and the number of units per second.
-    const fn names(self) -> (&'static [&'static str], i64) {
-        match self {
-            Self::Seconds => (&["s", "sec", "secs", "second", "seconds"], 1),
-            Self::Milliseconds => {
-                (&["ms", "msec", "msecs", "millis", "millisec", "millisecs", "millisecond", "milliseconds"], 1_000)
-            }
-            Self::Microseconds => (
-                &["us", "µs", "μs", "usec", "usecs", "micros", "microsec", "microsecs", "microsecond", "microseconds"],
-                1_000_000,
-            ),
-            Self::Nanoseconds => {
-                (&["ns", "nsec", "nsecs", "nanos", "nanosec", "nanosecs", "nanosecond", "nanoseconds"], 1_000_000_000)
-            }
-        }
-    }
-
-    /// Returns `s`, `ms`, `us` or `ns`.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        self.names().0[0]
-    }
-
-    /// Returns the unit with this name.
-    #[must_use]
-    pub fn from_name(name: &str) -> Option<Self> {
-        Self::ALL.into_iter().find(|unit| unit.names().0.contains(&name))
-    }
-
-    /// Returns the number of units per second.
-    pub(super) fn per_second(self) -> i64 {
-        self.names().1
-    }
-}
 
 /// Exact time in the unit of the recording.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -181,6 +130,8 @@ const LONG_STEP: f64 = 2.0;
 pub(super) struct Probe {
     first: Stamp,
     last: Stamp,
+    /// Last time \[units\].
+    last_time: f64,
     /// Smallest step between two different times \[units\].
     step: f64,
     /// Last time of each vehicle \[units\].
@@ -202,6 +153,7 @@ impl Probe {
         Self {
             first,
             last: first,
+            last_time: first.since(0),
             step: f64::INFINITY,
             last_of: Vec::new(),
             steps: 0,
@@ -217,11 +169,14 @@ impl Probe {
         if vehicle >= self.last_of.len() {
             self.last_of.resize(vehicle + 1, None);
         }
-        let time = stamp.since(0);
+        let time = if stamp == self.last { self.last_time } else { stamp.since(0) };
         if let Some(before) = self.last_of[vehicle].replace(time).filter(|before| *before != time) {
             self.steps += 1;
-            for (counts, unit) in self.long_steps.iter_mut().zip(TimeUnit::ALL) {
-                let step_s = (time - before).abs() / unit.per_second() as f64;
+            let step = (time - before).abs();
+            // A step that is short in seconds is short in every unit.
+            let units = TimeUnit::ALL.into_iter().filter(|_| step >= LONG_STEP);
+            for (counts, unit) in self.long_steps.iter_mut().zip(units) {
+                let step_s = step / unit.per_second() as f64;
                 for (count, least_s) in counts.iter_mut().zip([LONG_STEP, LONGEST_STEP_S]) {
                     *count += u64::from(step_s >= least_s);
                 }
@@ -234,11 +189,11 @@ impl Probe {
         self.in_order &= order == Ordering::Less;
         self.whole &= matches!(stamp, Stamp::Whole(_));
         self.integral &= stamp.whole().is_some();
-        self.step = self.step.min((time - self.last.since(0)).abs());
+        self.step = self.step.min((time - self.last_time).abs());
         if self.first.compare(stamp) == Ordering::Greater {
             self.first = stamp;
         }
-        self.last = stamp;
+        (self.last, self.last_time) = (stamp, time);
     }
 
     /// Returns the most likely unit for times of this size and step, the reason, and the other unit that fits as well.

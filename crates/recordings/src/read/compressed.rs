@@ -7,9 +7,9 @@ use std::io::Read as _;
 
 use super::curves::{Curves, piece, powers};
 use super::error::{ContentKind, Fault, Place, ReadError, refuse};
+use super::format::Format;
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::readers::{Format, FormatOption, Packing, Reader};
 use super::skybrush::stand_throughout;
 use super::source::Source;
 use crate::export::drones::fit::seconds;
@@ -17,41 +17,11 @@ use crate::export::drones::skybrush as skyb;
 use crate::segments::{Trajectory, Truncated};
 use tautline_core::track::{Item, Sample};
 
-/// Reader of compiled Skybrush trajectories.
-pub(super) const SKYB: Reader = Reader {
-    name: "skyb",
-    title: "a compiled Skybrush trajectory",
-    extensions: &["skyb"],
-    docs: "Compiled Skybrush trajectory, a file for each drone in a folder",
-    magic: &[skyb::MAGIC],
-    sniff: |head| head.begins_with_any(&[skyb::MAGIC]),
-    open: open_skyb,
-    supports: &[FormatOption::Axes],
-    packing: Packing::Archive,
-};
-
-/// Reader of compressed Crazyflie trajectories.
-pub(super) const CRAZYFLIE: Reader = Reader {
-    name: "crazyflie-compressed",
-    title: "a compressed Crazyflie trajectory",
-    extensions: &["traj"],
-    docs: "Compressed Crazyflie trajectory, a file for each vehicle in a folder",
-    magic: &[],
-    // A file without magic bytes: its segments must end with the last byte.
-    sniff: |head| match Trajectory::decode(head.bytes, true) {
-        Ok((trajectory, length)) => length == head.bytes.len() && !trajectory.segments.is_empty(),
-        Err(_) => false,
-    },
-    open: open_crazyflie,
-    supports: &[FormatOption::Axes],
-    packing: Packing::Archive,
-};
-
-fn open_crazyflie(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+pub(super) fn open_crazyflie(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     open(std::slice::from_ref(source), crazyflie, None, options)
 }
 
-fn open_skyb(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+pub(super) fn open_skyb(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     open(std::slice::from_ref(source), skybrush, None, options)
 }
 

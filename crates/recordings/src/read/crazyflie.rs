@@ -10,31 +10,26 @@
 
 use nalgebra::Vector3;
 
+use super::cells::{Cells as _, number};
 use super::csv::TextTable;
 use super::curves::{Curves, VehicleItems, piece};
 use super::error::{ContentKind, Fault, ReadError, quoted, refuse};
+use super::format::Format;
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::readers::{Format, FormatOption, Packing, Reader};
+use super::reader::Reader;
 use super::source::Source;
-use super::table::{Cells as _, number};
 use tautline_core::option::START;
 use tautline_core::track::Item;
 
 pub(super) const READER: Reader = Reader {
-    name: "crazyflie",
-    title: "a folder of Crazyflie polynomials",
-    extensions: &["csv"],
-    docs: "Crazyflie polynomials, a CSV for each vehicle in a folder",
-    magic: &[],
+    format: Format::CRAZYFLIE,
     sniff: |head| {
         let begin = b"duration,";
         let begins = |line: &[u8]| line.get(..begin.len()).is_some_and(|start| start.eq_ignore_ascii_case(begin));
         head.line.is_some_and(begins)
     },
     open: |source, options| open(vec![(source.stem(), vec![source.clone()])], None, options),
-    supports: &[FormatOption::Starts, FormatOption::Axes],
-    packing: Packing::Archive,
 };
 
 /// Highest supported power.

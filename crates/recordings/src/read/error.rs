@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::path::Path;
 use std::{fmt, io};
 
-use super::readers::Format;
+use super::format::Format;
 use tautline_core::failure::Failure;
 use tautline_core::option::{ALLOW_UNFINISHED, COLUMN, FORMAT, FPS, Opt, SCALE, SKIP_INCOMPLETE, SORT, TIME_SCALE};
 
@@ -372,6 +372,14 @@ impl Fault {
 
     pub(super) fn damaged(reason: impl fmt::Display) -> Self {
         Self::Damaged(reason.to_string())
+    }
+
+    /// Returns the fault of a format whose reader is a feature that this build lacks.
+    #[cfg(not(all(feature = "arrow", feature = "mcap", feature = "shows")))]
+    pub(crate) fn without_feature(feature: &str) -> Self {
+        let problem = format!("its format needs the feature `{feature}`, which this build lacks");
+        let remedy = format!("build tautline-recordings with the feature `{feature}`");
+        Self::content(ContentKind::UnsupportedFormat, problem, remedy)
     }
 
     /// Returns the fault of a table without rows.

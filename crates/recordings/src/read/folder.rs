@@ -4,11 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::str;
 
 use super::error::{ContentKind, Fault, ReadError, quoted};
+use super::heading;
 use super::identity::spelling;
 use super::order::Recording;
-use super::readers::is_prose;
+use super::reader::head_of;
 use super::source::{Archive, Source};
 use tautline_core::fact::{self, Fact, FactKind};
 use tautline_core::option::TIME_UNIT;
@@ -432,6 +434,24 @@ impl Tracks for Joined {
     fn metadata(&self) -> &Metadata {
         &self.metadata
     }
+}
+
+/// Returns whether a file is text without a row of numbers or a time column, such as a note beside tables.
+fn is_prose(source: &Source) -> bool {
+    let Ok(head) = head_of(source) else { return false };
+    // The examined bytes may end inside a character.
+    let text = match str::from_utf8(&head) {
+        Ok(text) => text,
+        Err(error) if error.error_len().is_none() => str::from_utf8(&head[..error.valid_up_to()]).unwrap_or_default(),
+        Err(_) => return false,
+    };
+    let between = |c: char| c.is_whitespace() || matches!(c, ',' | ';' | '(' | ')' | '#');
+    let is_of_a_table = |line: &str| {
+        let words: Vec<_> = line.split(between).filter(|word| !word.is_empty()).collect();
+        let numbers = words.iter().filter(|word| word.parse::<f64>().is_ok()).count();
+        (numbers > 1 && 2 * numbers > words.len()) || words.iter().any(|word| heading::is_clock(word))
+    };
+    !text.contains('\0') && !text.lines().any(is_of_a_table)
 }
 
 #[cfg(test)]

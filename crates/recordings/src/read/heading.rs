@@ -4,8 +4,8 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use tautline_core::fact::Source;
 
-use super::clock::TimeUnit;
 use super::error::{ContentKind, Fault, quoted, refuse};
+use super::time_unit::TimeUnit;
 
 /// List of words, separated by blanks.
 #[derive(Clone, Copy)]

@@ -9,8 +9,8 @@ use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::option::{COLUMN, ONE_VEHICLE, SCALE};
 
 use super::agreement::{Compared, SecondPosition};
-use super::axes::Convention;
-use super::clock::{SubunitColumn, TimeUnit};
+use super::clock::SubunitColumn;
+use super::convention::Convention;
 use super::error::{ContentKind, Fault, list, quoted, refuse};
 use super::heading::{
     DEPTH, EARTH, HEIGHT, Heading, Heights, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity,
@@ -18,7 +18,8 @@ use super::heading::{
 use super::identity::Slots;
 use super::options::{ColumnNames, ReadOptions};
 use super::order::PLANAR;
-use super::{aviation, axes, clock, heading, identity};
+use super::time_unit::TimeUnit;
+use super::{aviation, clock, convention, heading, identity};
 
 /// Names of places that are not vehicles.
 const PLACES: [&str; 7] = ["home", "origin", "base", "datum", "ref", "reference", "launch"];
@@ -75,7 +76,7 @@ impl Layout {
     pub(super) fn of(header: &[String], options: &ReadOptions, alone: &str) -> Result<Self, Fault> {
         let convention = Convention::of(header, options)?;
         if convention.has_directions() {
-            axes::refuse_known(options, "its header")?;
+            convention::refuse_known(options, "its header")?;
         }
         let mut columns = Columns::given(header, options)?;
         let found = match columns.get("", TIME) {
@@ -553,7 +554,7 @@ impl<'a> Columns<'a> {
             return refuse(ContentKind::UnknownUnit, problem, remedy);
         }
         if self.place != EARTH {
-            axes::refuse_turned_height(options, &self.header[first])?;
+            convention::refuse_turned_height(options, &self.header[first])?;
         }
         let names: Vec<_> = used.iter().map(|(column, _)| self.header[*column].clone()).collect();
         let turned = if is_turned { ", with opposite sign" } else { "" };

@@ -17,52 +17,73 @@ mod aviation;
 mod axes;
 mod bezier;
 mod capture;
+mod cells;
 mod clock;
+#[cfg(feature = "shows")]
 mod compressed;
+mod convention;
 mod crazyflie;
 mod csv;
 pub(crate) mod curves;
 mod earth;
-mod error;
+pub(crate) mod error;
 mod folder;
+mod format;
 mod heading;
 mod identity;
 mod layout;
+mod local_origin;
+#[cfg(feature = "mcap")]
 pub(crate) mod mcap;
 mod npy;
 mod npz;
 mod objects;
+mod optional;
 mod options;
 mod order;
+#[cfg(feature = "arrow")]
 pub(crate) mod parquet;
+mod reader;
 mod readers;
+#[cfg(feature = "shows")]
 mod show_rules;
+#[cfg(feature = "shows")]
 mod skybrush;
 mod source;
+#[cfg(feature = "mcap")]
 mod spline;
 mod stated;
 mod table;
+mod time_unit;
 mod ulog;
+#[cfg(feature = "shows")]
 mod vviz;
 
+#[cfg(feature = "arrow")]
 pub use self::parquet::is_guarded;
 pub use axes::Axes;
-pub use clock::TimeUnit;
 pub use earth::EarthFrame;
 pub use error::{ContentKind, Fault, Place, ReadError};
+pub use format::{Format, FormatInfo};
 pub use heading::is_read;
+#[cfg(feature = "mcap")]
 pub use mcap::{Channels, LivePose, has_live_poses, live_poses};
+#[cfg(not(feature = "mcap"))]
+pub use optional::Channels;
 pub use options::{ArrayAxis, ArrayLayout, ColumnNames, Dimensions, Duplicates, MessageClock, ReadOptions, Scale};
 pub use order::Recording;
-pub use readers::{Format, READERS, Reader};
+#[cfg(feature = "shows")]
 pub use show_rules::{ShowPolygon, ShowRules};
+pub use time_unit::TimeUnit;
 
 use std::fs;
 use std::path::Path;
 
+#[cfg(feature = "mcap")]
 use crate::mcap::McapRecording;
 use error::refuse;
 use folder::{ARCHIVE, Folder};
+#[cfg(feature = "mcap")]
 use mcap::bag;
 use readers::recognise;
 use source::Source;
@@ -75,13 +96,13 @@ use tautline_core::track::EarthOrigin;
 /// [`ReadError`] if the file cannot be read, has an unknown format, or its beginning is invalid.
 pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
     let opened = match folder_of(path) {
-        _ if bag::is_bag(path) => open_bag(path, options),
+        _ if reader::is_bag(path) => open_bag(path, options),
         Ok(Some(folder)) => open_folder(folder, options),
         Ok(None) => open_one(Source::file(path), options),
         Err(error) => Err(error),
     };
     opened
-        .and_then(|recording| axes::turned(recording, options))
+        .and_then(|recording| convention::turned(recording, options))
         .map(|recording| stated::stated(recording, options, path))
         .map_err(|error| error.of(path))
 }
@@ -143,7 +164,7 @@ pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, 
     }
     let (opened, name) = (open_folder(all, options), recording_name(paths));
     opened
-        .and_then(|recording| axes::turned(recording, options))
+        .and_then(|recording| convention::turned(recording, options))
         .map(|recording| stated::stated(recording, options, Path::new(&name)))
         .map_err(|error| error.of(Path::new(&name)))
 }
@@ -152,12 +173,14 @@ pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, 
 ///
 /// # Errors
 /// [`ReadError`] if the recording is damaged before its first instant.
+#[cfg(feature = "mcap")]
 pub fn open_channels(path: &Path) -> Result<Option<Channels>, ReadError> {
     let is_mcap = || recognise(&mut Source::file(path), None).is_ok_and(|format| format == Format::MCAP);
     if path.is_file() && is_mcap() { Channels::open(path).map_err(|error| error.of(path)) } else { Ok(None) }
 }
 
 /// Opens a recording of `tautline run` with all its data; `None` for any other file.
+#[cfg(feature = "mcap")]
 #[must_use]
 pub fn open_run(path: &Path) -> Option<McapRecording> {
     if path.is_file() { mcap::open_run(path) } else { None }
@@ -176,6 +199,7 @@ pub fn recording_name(paths: &[&Path]) -> String {
 ///
 /// # Errors
 /// [`ReadError`] if the file is a show that cannot be read.
+#[cfg(feature = "shows")]
 pub fn show_rules(path: &Path, options: &ReadOptions) -> Result<Option<ShowRules>, ReadError> {
     let mut source = Source::file(path);
     let is_show =
@@ -187,7 +211,7 @@ pub fn show_rules(path: &Path, options: &ReadOptions) -> Result<Option<ShowRules
 fn folder_of(path: &Path) -> Result<Option<Folder>, ReadError> {
     let data = fs::metadata(path)?;
     if data.is_dir() {
-        if bag::is_bag(path) {
+        if reader::is_bag(path) {
             let remedy = format!("open it without {JOIN}; its topics are the vehicles");
             return refuse(ContentKind::SeveralVehicles, "it is a ROS 2 bag, not a file with one vehicle", remedy);
         }
@@ -219,6 +243,7 @@ fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, R
         folder.first().map(|first| recognise(first, options.format).map_err(|e| with_file(e, &first.display_path())));
     let left_out = folder.note();
     let format = format.transpose()?;
+    #[cfg(feature = "shows")]
     if let Some(format) = format.filter(|format| compressed::is_compressed(*format) && !folder.files.is_empty()) {
         options.refuse_unsupported_options(format)?;
         return compressed::open_folder(format, &folder.files, left_out, options);
@@ -246,12 +271,19 @@ fn open_bag(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> 
         return Err(Fault::WrongFormat(format).into());
     }
     options.refuse_unsupported_options(Format::MCAP)?;
-    bag::open(path, options)
+    #[cfg(feature = "mcap")]
+    {
+        bag::open(path, options)
+    }
+    #[cfg(not(feature = "mcap"))]
+    {
+        Err(ReadError::new(path, Fault::without_feature("mcap")))
+    }
 }
 
 fn open_one(mut source: Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     options.check()?;
     let format = recognise(&mut source, options.format)?;
     options.refuse_unsupported_options(format)?;
-    (format.open)(&source, options)
+    readers::open(format, &source, options)
 }

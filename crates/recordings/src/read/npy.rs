@@ -7,8 +7,9 @@
 use std::io;
 use std::io::Read;
 
-use super::clock::{Stamp, TimeUnit};
+use super::clock::Stamp;
 use super::error::{ContentKind, Fault};
+use super::time_unit::TimeUnit;
 
 /// First bytes of an array.
 const MAGIC: &[u8; 6] = b"\x93NUMPY";

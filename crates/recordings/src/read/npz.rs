@@ -18,32 +18,21 @@ use std::collections::BTreeSet;
 
 use nalgebra::Vector3;
 
-use super::clock::{Stamp, TimeUnit};
+use super::clock::Stamp;
 use super::error::{ContentKind, Fault, Place, ReadError, one_of, refuse};
+use super::format::Format;
 use super::identity::Names;
 use super::npy::Array;
 use super::options::{ArrayAxis, ArrayLayout, ReadOptions};
 use super::order::{BATCH, Ordered, PLANAR, Recording, RecordingInfo, Row, Rows};
-use super::readers::{FormatOption, Packing, Reader};
+use super::reader::Reader;
 use super::source::{Archive, Source};
+use super::time_unit::TimeUnit;
 
 pub(super) const READER: Reader = Reader {
-    name: "npz",
-    title: "an NPZ archive",
-    extensions: &["npz"],
-    docs: "NumPy arrays `t` and `positions`, as `numpy.savez` writes them",
-    magic: &[b"PK\x03\x04", b"PK\x05\x06"],
-    sniff: |head| head.begins_with_any(READER.magic) && memchr::memmem::find(head.bytes, b".npy").is_some(),
+    format: Format::NPZ,
+    sniff: |head| head.begins_with_any(Format::NPZ.magic) && memchr::memmem::find(head.bytes, b".npy").is_some(),
     open: |source, options| open(&source.clone().seekable()?, options),
-    supports: &[
-        FormatOption::TimeUnit,
-        FormatOption::Rows,
-        FormatOption::Columns,
-        FormatOption::Layout,
-        FormatOption::Axes,
-        FormatOption::OneVehicle,
-    ],
-    packing: Packing::Any,
 };
 use tautline_core::option::{COLUMN, LAYOUT};
 

@@ -9,27 +9,19 @@ use std::io::{BufReader, Bytes, Read};
 
 use serde::de::{DeserializeSeed, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
+use super::cells::Cells;
 use super::clock::Stamp;
 use super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
+use super::format::Format;
 use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::readers::{FormatOption, Packing, Reader};
+use super::reader::Reader;
 use super::source::{BLOCK_BYTES, LINE_LIMIT_BYTES, Lines, Source};
 use super::table;
-use super::table::Cells;
 
-pub(super) const READER: Reader = Reader {
-    name: "jsonl",
-    title: "a table of JSON objects",
-    extensions: &["jsonl", "ndjson", "json"],
-    docs: "Table with an object of JSON in each line, or a JSON array of objects",
-    magic: &[],
-    sniff: |head| head.is_text(|text| are_in(text) || is_array(text)),
-    open,
-    supports: FormatOption::TABLE,
-    packing: Packing::Any,
-};
+pub(super) const READER: Reader =
+    Reader { format: Format::OBJECTS, sniff: |head| head.is_text(|text| are_in(text) || is_array(text)), open };
 
 /// Largest number of columns; more indicate lists of changing length.
 const MOST_COLUMNS: usize = 100_000;

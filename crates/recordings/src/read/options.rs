@@ -5,9 +5,9 @@ use std::fmt::Display;
 use std::str::FromStr;
 
 use super::axes::Axes;
-use super::clock::TimeUnit;
 use super::error::{ContentKind, Fault, quoted, refuse};
-use super::readers::{Format, FormatOption};
+use super::format::{Format, FormatOption};
+use super::time_unit::TimeUnit;
 use tautline_core::option::{
     ALLOW_UNFINISHED, AXES, CLOCK, COLUMN, DIMENSIONS, DUPLICATES, FPS, FRAME, LAYOUT, ONE_VEHICLE, ORIGIN, SCALE,
     SKIP_INCOMPLETE, SORT, START, TIME_SCALE, TIME_UNIT, TOPIC,

@@ -6,10 +6,11 @@ use nalgebra::Vector3;
 use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::option::{COLUMN, DUPLICATES, SORT, TIME_UNIT};
 
-use super::clock::{Probe, Stamp, TimeUnit, Timing};
+use super::clock::{Probe, Stamp, Timing};
 use super::error::{ContentKind, Fault, Place, ReadError, quoted};
 use super::options::{Duplicates, ReadOptions};
 use super::source::Source as File;
+use super::time_unit::TimeUnit;
 use tautline_core::track::{Item, Metadata, Sample, Tracks};
 
 /// Longest step between two positions on the Earth that is accepted at any speed \[m\].

@@ -1,48 +1,27 @@
 //! Table of the readers, one row per format, and recognition of the format of a file by its content.
 
-use std::io::Read;
-use std::ops::Deref;
 use std::path::Path;
-use std::{fmt, str};
+use std::str;
 
 use super::error::{ContentKind, Fault, ReadError, refuse};
+use super::format::{Format, Packing};
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::skybrush::SHOW;
+use super::reader::{BAG, Head, Reader, SHOW, TABLE, head_of};
 use super::source::{Archive, GZIP_MAGIC, Source};
-use super::{bezier, capture, compressed, crazyflie, csv, heading, mcap, npz, objects, parquet, skybrush, ulog, vviz};
-
-/// Reader of a format: a row of [`READERS`].
-pub struct Reader {
-    /// Name for `--format`.
-    pub name: &'static str,
-    /// Name in sentences, with its article.
-    pub title: &'static str,
-    /// Usual extensions. Recognition uses only the content.
-    pub extensions: &'static [&'static str],
-    /// Description for `--help` and docs/recordings.md.
-    pub docs: &'static str,
-    /// First bytes of every file of the format; empty without such bytes.
-    pub(super) magic: &'static [&'static [u8]],
-    /// Whether a file is of this format, by its first bytes. The first row of [`READERS`] that accepts a file reads it.
-    pub(super) sniff: fn(&Head<'_>) -> bool,
-    pub(super) open: fn(&Source, &ReadOptions) -> Result<Recording, ReadError>,
-    /// Options of [`FormatOption`] that this format supports.
-    pub(super) supports: &'static [FormatOption],
-    pub(super) packing: Packing,
-}
+use super::{bezier, capture, crazyflie, csv, npz, objects, optional, ulog};
 
 /// All readers, in the order of recognition.
-pub static READERS: &[Reader] = &[
+static READERS: &[Reader] = &[
     ulog::READER,
-    parquet::READER,
-    mcap::READER,
+    optional::PARQUET,
+    optional::MCAP,
     npz::READER,
-    compressed::SKYB,
+    optional::SKYB,
     objects::READER,
-    vviz::READER,
-    skybrush::READER,
-    compressed::CRAZYFLIE,
+    optional::VVIZ,
+    optional::SKYBRUSH,
+    optional::CRAZYFLIE_COMPRESSED,
     capture::MOTIVE,
     capture::VICON,
     bezier::READER,
@@ -51,134 +30,6 @@ pub static READERS: &[Reader] = &[
     csv::TRAJNET,
     csv::TEXT,
 ];
-
-/// Options that only some formats support.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum FormatOption {
-    TimeUnit,
-    Rows,
-    Dimensions,
-    Starts,
-    Columns,
-    Layout,
-    Origin,
-    Frame,
-    Topics,
-    Axes,
-    OneVehicle,
-    Incomplete,
-    Clock,
-    Unfinished,
-}
-
-impl FormatOption {
-    /// Options of tables with named columns.
-    pub(super) const TABLE: &'static [Self] =
-        &[Self::TimeUnit, Self::Rows, Self::Columns, Self::Origin, Self::Axes, Self::OneVehicle, Self::Incomplete];
-}
-
-/// Packing in which a file of a format is read.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Packing {
-    /// With gzip and in an archive.
-    Any,
-    /// In an archive.
-    Archive,
-    None,
-}
-
-/// First bytes of a file.
-pub(super) struct Head<'a> {
-    pub(super) bytes: &'a [u8],
-    /// The bytes from the first non-blank on, if the bytes contain no NUL.
-    pub(super) text: Option<&'a [u8]>,
-    /// The first line that is neither empty nor a comment.
-    pub(super) line: Option<&'a [u8]>,
-}
-
-impl<'a> Head<'a> {
-    pub(super) fn new(bytes: &'a [u8]) -> Self {
-        let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes).trim_ascii_start();
-        let text = Some(text).filter(|text| memchr::memchr(0, text).is_none());
-        let lines = text.unwrap_or_default().split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii);
-        let line = lines.into_iter().find(|line| !line.is_empty() && !line.starts_with(b"#"));
-        Self { bytes, text, line }
-    }
-
-    pub(super) fn begins_with_any(&self, magic: &[&[u8]]) -> bool {
-        magic.iter().any(|magic| self.bytes.starts_with(magic))
-    }
-
-    /// Returns whether the bytes are text and the text satisfies `has`.
-    pub(super) fn is_text(&self, has: impl FnOnce(&[u8]) -> bool) -> bool {
-        self.text.is_some_and(has)
-    }
-}
-
-/// A format of recordings: a row of [`READERS`].
-#[derive(Clone, Copy)]
-pub struct Format(&'static Reader);
-
-impl Format {
-    /// A table in CSV.
-    pub const CSV: Self = Self(&csv::CSV);
-    /// Numbers separated by blanks.
-    pub const TEXT: Self = Self(&csv::TEXT);
-    /// A table of `TrajNet`.
-    pub const TRAJNET: Self = Self(&csv::TRAJNET);
-    /// A table in Parquet.
-    pub const PARQUET: Self = Self(&parquet::READER);
-    /// `NumPy` arrays.
-    pub const NPZ: Self = Self(&npz::READER);
-    /// MCAP.
-    pub const MCAP: Self = Self(&mcap::READER);
-    /// Pieces of Bezier curves.
-    pub const BEZIER: Self = Self(&bezier::READER);
-    /// Crazyflie polynomials.
-    pub const CRAZYFLIE: Self = Self(&crazyflie::READER);
-    /// Compressed Crazyflie trajectories.
-    pub const CRAZYFLIE_COMPRESSED: Self = Self(&compressed::CRAZYFLIE);
-    /// Compiled Skybrush trajectories.
-    pub const SKYB: Self = Self(&compressed::SKYB);
-    /// A Skybrush show.
-    pub const SKYBRUSH: Self = Self(&skybrush::READER);
-
-    /// Returns all formats.
-    pub fn all() -> impl Iterator<Item = Self> {
-        READERS.iter().map(Self)
-    }
-
-    /// Returns the names of all formats, for messages.
-    #[must_use]
-    pub fn names() -> String {
-        READERS.iter().map(|reader| reader.name).collect::<Vec<_>>().join(", ")
-    }
-}
-
-impl Deref for Format {
-    type Target = Reader;
-
-    fn deref(&self) -> &Reader {
-        self.0
-    }
-}
-
-impl PartialEq for Format {
-    fn eq(&self, other: &Self) -> bool {
-        self.name == other.name
-    }
-}
-
-impl Eq for Format {}
-
-impl fmt::Debug for Format {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name)
-    }
-}
-
-/// Number of bytes examined.
-const HEAD_BYTES: u64 = 64 * 1024;
 
 /// Recognises the format of a file, and whether it is packed by gzip.
 pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<Format, ReadError> {
@@ -209,6 +60,12 @@ pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<F
     Ok(format)
 }
 
+/// Opens a file of this format.
+pub(super) fn open(format: Format, source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+    let reader = READERS.iter().find(|reader| reader.format == format).ok_or(Fault::UnknownFormat)?;
+    (reader.open)(source, options)
+}
+
 /// Returns whether a file is a zip archive that contains neither `NumPy` arrays nor a show.
 pub(super) fn is_archive(path: &Path) -> Result<bool, ReadError> {
     let head = head_of(&Source::file(path))?;
@@ -216,33 +73,8 @@ pub(super) fn is_archive(path: &Path) -> Result<bool, ReadError> {
         && !Archive::open(path)?.names().iter().any(|name| is_recording(name)))
 }
 
-/// Returns whether a file is text without a row of numbers or a time column, such as a note beside tables.
-pub(super) fn is_prose(source: &Source) -> bool {
-    let Ok(head) = head_of(source) else { return false };
-    // The examined bytes may end inside a character.
-    let text = match str::from_utf8(&head) {
-        Ok(text) => text,
-        Err(error) if error.error_len().is_none() => str::from_utf8(&head[..error.valid_up_to()]).unwrap_or_default(),
-        Err(_) => return false,
-    };
-    let between = |c: char| c.is_whitespace() || matches!(c, ',' | ';' | '(' | ')' | '#');
-    let is_of_a_table = |line: &str| {
-        let words: Vec<_> = line.split(between).filter(|word| !word.is_empty()).collect();
-        let numbers = words.iter().filter(|word| word.parse::<f64>().is_ok()).count();
-        (numbers > 1 && 2 * numbers > words.len()) || words.iter().any(|word| heading::is_clock(word))
-    };
-    !text.contains('\0') && !text.lines().any(is_of_a_table)
-}
-
 fn is_recording(entry: &str) -> bool {
     entry == SHOW || entry.rsplit('.').next() == Some("npy")
-}
-
-/// Returns the first bytes, unpacked.
-fn head_of(source: &Source) -> Result<Vec<u8>, ReadError> {
-    let mut head = Vec::new();
-    source.bytes()?.take(HEAD_BYTES).read_to_end(&mut head)?;
-    if head.is_empty() { Err(Fault::Empty.into()) } else { Ok(head) }
 }
 
 fn format_of(bytes: &[u8]) -> Result<Format, Fault> {
@@ -253,7 +85,8 @@ fn format_of(bytes: &[u8]) -> Result<Format, Fault> {
     if let Some(fault) = head.text.and_then(unsupported_text) {
         return Err(fault);
     }
-    Format::all().find(|format| (format.sniff)(&head)).ok_or(Fault::UnknownFormat)
+    let reader = READERS.iter().find(|reader| (reader.sniff)(&head)).ok_or(Fault::UnknownFormat)?;
+    Ok(reader.format)
 }
 
 /// Unsupported formats: first bytes, description and remedy.
@@ -275,12 +108,9 @@ const UNSUPPORTED: [(&[u8], &str, &str); 11] = [
     (b"Rar!\x1a\x07", "a RAR archive", UNPACK),
 ];
 
-pub(super) const BAG: &str = "convert it with `rosbags-convert --src BAG --dst flight --dst-storage mcap` (from `pip \
-                              install rosbags`), and give the folder `flight`";
 const DATAFLASH: &str = "write its POS messages with `mavlogdump.py --types POS --format csv`, and from that a table \
                          t,id,lat,lon,alt in degrees and metres";
 const UNPACK: &str = "unpack it, and give the folder";
-pub(super) const TABLE: &str = "give positions over time, such as a table t,id,x,y,z, or one JSON object per line";
 const EARTH: &str = "write it as a table t,id,lat,lon,alt: time, vehicle, degrees and metres";
 
 /// Returns the fault of a known but unsupported format.

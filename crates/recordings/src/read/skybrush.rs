@@ -18,29 +18,13 @@ use super::curves::{Curves, distinct, from_json, piece, powers};
 use super::error::{ContentKind, Fault, Place, ReadError, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::readers::{FormatOption, Packing, Reader};
+use super::reader::{SHOW, TABLE};
 use super::show_rules::ShowRules;
 use super::source::{Archive, Source};
-use super::{npz, readers};
 use tautline_core::track::{Item, Piece, Sample};
-
-pub(super) const READER: Reader = Reader {
-    name: "skybrush",
-    title: "a Skybrush show",
-    extensions: &["skyc", "json"],
-    docs: "Skybrush show, or its JSON",
-    magic: &[],
-    sniff: |head| head.begins_with_any(npz::READER.magic) || head.is_text(|text| text.starts_with(b"{")),
-    open,
-    supports: &[FormatOption::Axes],
-    packing: Packing::None,
-};
 
 /// Highest supported degree of a Bezier segment.
 const HIGHEST_DEGREE: usize = 15;
-
-/// Name of the archive entry with the show.
-pub(super) const SHOW: &str = "show.json";
 
 #[derive(Deserialize)]
 struct Show {
@@ -171,11 +155,7 @@ fn resolved(index: usize, drone: Drone, mut archive: Option<&mut Archive>) -> Re
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let (show, mut archive) = show(source)?;
     let Some(swarm) = show.swarm else {
-        return refuse(
-            ContentKind::UnsupportedFormat,
-            "it is JSON, but not a Skybrush show: it has no `swarm`",
-            readers::TABLE,
-        );
+        return refuse(ContentKind::UnsupportedFormat, "it is JSON, but not a Skybrush show: it has no `swarm`", TABLE);
     };
     let mut names = Vec::new();
     let mut curves = Vec::new();

@@ -3,7 +3,8 @@
 use std::collections::BTreeSet;
 use std::fs::File;
 use std::io;
-use std::io::{BufRead as _, BufReader, Read, Seek as _, SeekFrom};
+use std::io::{BufReader, Read, Seek as _, SeekFrom};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -99,24 +100,28 @@ impl Source {
     }
 }
 
-/// Lines of a text, with one line in memory.
+/// Lines of a text. The current line is a slice of the block that was read last.
 pub(super) struct Lines {
-    input: BufReader<Box<dyn Read>>,
-    /// Current line with its line end.
-    buffer: Vec<u8>,
+    input: Box<dyn Read>,
+    /// Bytes in memory: `filled` of them were read, those from `next` on follow the current line.
+    block: Vec<u8>,
+    filled: usize,
+    next: usize,
+    /// Current line without its line end.
+    line: Range<usize>,
     number: u64,
 }
 
 impl Lines {
     pub(super) fn new(source: &Source) -> Result<Self, ReadError> {
-        Ok(Self { input: BufReader::with_capacity(BLOCK_BYTES, source.bytes()?), buffer: Vec::new(), number: 0 })
+        let input = source.bytes()?;
+        Ok(Self { input, block: vec![0; BLOCK_BYTES], filled: 0, next: 0, line: 0..0, number: 0 })
     }
 
     /// Returns the current line without its line end.
     #[inline]
     pub(super) fn line(&self) -> &[u8] {
-        let line = self.buffer.strip_suffix(b"\n").unwrap_or(&self.buffer);
-        line.strip_suffix(b"\r").unwrap_or(line)
+        &self.block[self.line.clone()]
     }
 
     /// Returns its number, from 1.
@@ -127,17 +132,58 @@ impl Lines {
     /// Moves to the next line; returns `false` after the last one.
     #[inline]
     pub(super) fn advance(&mut self) -> Result<bool, ReadError> {
-        self.buffer.clear();
         self.number += 1;
-        let read = (&mut self.input).take(LINE_LIMIT_BYTES as u64 + 1).read_until(b'\n', &mut self.buffer);
-        let bytes = read.map_err(|error| Fault::from(error).at(Place::Line(self.number)))?;
-        if self.buffer.len() > LINE_LIMIT_BYTES {
-            return Err(Fault::LineTooLong(LINE_LIMIT_BYTES).at(Place::Line(self.number)));
+        match memchr::memchr(b'\n', &self.block[self.next..self.filled]) {
+            Some(length) => self.enter(length, 1).map(|()| true),
+            None => self.fill(),
         }
-        if self.number == 1 && self.buffer.starts_with(b"\xef\xbb\xbf") {
-            self.buffer.drain(..3);
+    }
+
+    /// Moves to the line of `length` bytes that begins at `next`, and over the bytes of its line end.
+    #[inline]
+    fn enter(&mut self, length: usize, line_end: usize) -> Result<(), ReadError> {
+        if length + line_end > LINE_LIMIT_BYTES {
+            return Err(self.too_long());
         }
-        Ok(bytes > 0)
+        let (start, end) = (self.next, self.next + length);
+        self.next = end + line_end;
+        let line = &self.block[start..end];
+        self.line = start..end - usize::from(line.ends_with(b"\r"));
+        if self.number == 1 && line.starts_with(b"\xef\xbb\xbf") {
+            self.line.start += 3;
+        }
+        Ok(())
+    }
+
+    /// Reads blocks up to the end of the next line, and moves to it.
+    #[cold]
+    fn fill(&mut self) -> Result<bool, ReadError> {
+        self.block.copy_within(self.next..self.filled, 0);
+        self.filled -= self.next;
+        (self.next, self.line) = (0, 0..0);
+        loop {
+            if self.filled > LINE_LIMIT_BYTES {
+                return Err(self.too_long());
+            }
+            if self.filled == self.block.len() {
+                self.block.resize(2 * self.filled, 0);
+            }
+            let before = self.filled;
+            match self.input.read(&mut self.block[before..]) {
+                Ok(0) => return self.enter(before, 0).map(|()| before > 0),
+                Ok(bytes) => self.filled += bytes,
+                Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
+                Err(error) => return Err(Fault::from(error).at(Place::Line(self.number))),
+            }
+            if let Some(length) = memchr::memchr(b'\n', &self.block[before..self.filled]) {
+                return self.enter(before + length, 1).map(|()| true);
+            }
+        }
+    }
+
+    #[cold]
+    fn too_long(&self) -> ReadError {
+        Fault::LineTooLong(LINE_LIMIT_BYTES).at(Place::Line(self.number))
     }
 }
 

@@ -18,32 +18,19 @@ use nalgebra::Vector3;
 use tautline_core::fact::{self, Fact, FactKind};
 use tautline_core::option::TOPIC;
 
-use super::axes;
-use super::clock::{Stamp, TimeUnit};
+use super::clock::Stamp;
+use super::convention;
 use super::earth::{LocalFrame, is_no_fix, no_fixes};
 use super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
+use super::format::Format;
 use super::options::ReadOptions;
 use super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
-use super::readers::{FormatOption, Packing, Reader};
+use super::reader::Reader;
 use super::source::Source;
+use super::time_unit::TimeUnit;
 
-pub(super) const READER: Reader = Reader {
-    name: "ulog",
-    title: "a ULog of PX4",
-    extensions: &["ulg"],
-    docs: "Log of PX4",
-    magic: &[b"ULog\x01\x12\x35"],
-    sniff: |head| head.begins_with_any(READER.magic),
-    open,
-    supports: &[
-        FormatOption::Rows,
-        FormatOption::Origin,
-        FormatOption::Topics,
-        FormatOption::Axes,
-        FormatOption::Unfinished,
-    ],
-    packing: Packing::Any,
-};
+pub(super) const READER: Reader =
+    Reader { format: Format::ULOG, sniff: |head| head.begins_with_any(Format::ULOG.magic), open };
 
 const GLOBAL: &str = "vehicle_global_position";
 const LOCAL: &str = "vehicle_local_position";
@@ -60,7 +47,7 @@ const EARLIEST_UTC_US: u64 = 1_000_000_000_000_000;
 
 /// Opens a log.
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    axes::refuse_known(options, "a log of PX4")?;
+    convention::refuse_known(options, "a log of PX4")?;
     let topic_option = match &options.topics[..] {
         [] => None,
         [topic] if topic == GLOBAL || topic == LOCAL => Some(topic.as_str()),

@@ -15,27 +15,8 @@ use super::curves::{Curves, from_json};
 use super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::readers::{FormatOption, Packing, Reader};
 use super::source::Source;
 use tautline_core::track::{Item, Sample};
-
-/// Keys before the long arrays of a show.
-const KEYS: [&[u8]; 2] = [b"\"defaultPositionRate\"", b"\"agentTraversal\""];
-
-pub(super) const READER: Reader = Reader {
-    name: "vviz",
-    title: "a VVIZ show",
-    extensions: &["vviz"],
-    docs: "VVIZ show of Verge Aero or Finale 3D",
-    magic: &[],
-    sniff: |head| {
-        let holds = |text: &[u8]| KEYS.iter().any(|key| memchr::memmem::find(text, key).is_some());
-        head.is_text(|text| text.starts_with(b"{") && holds(text))
-    },
-    open,
-    supports: &[FormatOption::Rows],
-    packing: Packing::Any,
-};
 
 /// The only supported axes, also the default.
 const GRAPHICS: &str = "ogl";

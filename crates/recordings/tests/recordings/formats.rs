@@ -5,7 +5,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use tautline_core::track::Item;
-use tautline_recordings::read::{Dimensions, READERS, ReadOptions, Reader, TimeUnit};
+use tautline_recordings::read::{Dimensions, Format, FormatInfo, ReadOptions, TimeUnit};
 use tempfile::TempDir;
 
 use crate::recording::Whole;
@@ -169,20 +169,20 @@ fn rows_across_batches_are_complete_and_ordered() {
 fn docs_list_every_reader() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/recordings.md");
     let docs = fs::read_to_string(path).expect("the page");
-    let row = |Reader { name, extensions, docs, .. }: &Reader| {
+    let row = |FormatInfo { name, extensions, docs, .. }: &FormatInfo| {
         let extensions = extensions.iter().map(|extension| format!("`.{extension}`")).collect::<Vec<_>>().join(", ");
         format!("| `{name}` | {extensions} | {docs} |\n")
     };
     let head = "| `--format` | usual extensions | format |\n| --- | --- | --- |\n".to_owned();
-    let table = READERS.iter().map(row).fold(head, |table, row| table + &row) + "\n";
+    let table = Format::all().map(|format| row(&format)).fold(head, |table, row| table + &row) + "\n";
     assert!(docs.contains(&table), "docs/recordings.md must hold this table:\n{table}");
     let details = docs.lines().filter_map(|line| line.split(" | ").nth(1)?.strip_prefix('`')?.strip_suffix('`'));
     let described: BTreeSet<_> = details.collect();
-    assert!(READERS.iter().all(|reader| described.contains(reader.name)), "{described:?}");
+    assert!(Format::all().all(|reader| described.contains(reader.name)), "{described:?}");
 }
 
 #[test]
 fn reader_names_are_distinct() {
-    let names: BTreeSet<_> = READERS.iter().map(|reader| reader.name).collect();
-    assert_eq!(names.len(), READERS.len());
+    let names: BTreeSet<_> = Format::all().map(|reader| reader.name).collect();
+    assert_eq!(names.len(), Format::all().count());
 }

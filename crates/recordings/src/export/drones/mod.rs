@@ -21,7 +21,7 @@ use rayon::prelude::*;
 
 use self::fit::{FitError, Piece};
 use self::motion::{Arc, Deviation, Motion, deviation};
-use crate::read::ReadError;
+use crate::read::error::ReadError;
 use crate::segments::Trajectory;
 use tautline_core::failure::Failure;
 use tautline_core::option::{COMPRESSED, FROM, SAMPLE_HZ, SKYB_VERSION, TOLERANCE, UNTIL};

@@ -11,15 +11,10 @@ use serde::Deserialize;
 use super::super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
 use super::super::options::ReadOptions;
 use super::super::order::Recording;
-use super::super::readers::BAG;
+use super::super::reader::{BAG, BAG_INDEX, BAG_INDEX_LIMIT_BYTES};
 use super::super::source::{Source, ZSTD_MAGIC};
-use super::foreign::{self, SplitFiles};
-
-/// File name of the index of a bag.
-const METADATA: &str = "metadata.yaml";
-
-/// Largest accepted index \[bytes\]: ten times the size for a thousand topics.
-const METADATA_LIMIT_BYTES: u64 = 4 * 1024 * 1024;
+use super::foreign;
+use super::split::SplitFiles;
 
 const REINDEX: &str = "copy the whole folder again, or rewrite metadata.yaml with `ros2 bag reindex`";
 
@@ -41,16 +36,9 @@ struct Bag {
     compression_format: Option<String>,
 }
 
-/// Returns whether a folder is a bag.
-pub(in crate::read) fn is_bag(folder: &Path) -> bool {
-    let path = folder.join(METADATA);
-    path.is_file()
-        && bytes_of(&path).is_ok_and(|bytes| memchr::memmem::find(&bytes, b"rosbag2_bagfile_information").is_some())
-}
-
 /// Opens a bag.
 pub(in crate::read) fn open(folder: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let metadata = folder.join(METADATA);
+    let metadata = folder.join(BAG_INDEX);
     let bag = read(&metadata).map_err(|error| error.of(&metadata))?;
     let files = files_of(&bag, folder).map_err(|fault| ReadError::new(&metadata, fault))?;
     refuse_others(folder, &files)?;
@@ -77,9 +65,9 @@ pub(in crate::read) fn open(folder: &Path, options: &ReadOptions) -> Result<Reco
 
 fn bytes_of(path: &Path) -> Result<Vec<u8>, Fault> {
     let mut bytes = Vec::new();
-    File::open(path)?.take(METADATA_LIMIT_BYTES + 1).read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > METADATA_LIMIT_BYTES {
-        return refuse(ContentKind::BagIndex, format!("it is longer than {METADATA_LIMIT_BYTES} bytes"), REINDEX);
+    File::open(path)?.take(BAG_INDEX_LIMIT_BYTES + 1).read_to_end(&mut bytes)?;
+    if bytes.len() as u64 > BAG_INDEX_LIMIT_BYTES {
+        return refuse(ContentKind::BagIndex, format!("it is longer than {BAG_INDEX_LIMIT_BYTES} bytes"), REINDEX);
     }
     Ok(bytes)
 }

@@ -22,6 +22,7 @@ mod outline;
 pub(crate) mod own;
 mod plan;
 mod planned;
+mod split;
 mod tree;
 
 pub use messages::{LivePose, has_live_poses, live_poses};
@@ -30,35 +31,15 @@ pub use own::Channels;
 use std::path::Path;
 
 use super::error::{ContentKind, Fault, Place, ReadError, refuse};
+use super::format::Format;
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::readers::{Format, FormatOption, Packing, Reader};
 use super::source::Source;
 use crate::mcap::topic::{Part, TopicReader};
 use crate::mcap::{McapRecording, SWARM_SCHEMA};
-use foreign::SplitFiles;
+use split::SplitFiles;
 use tautline_core::option::CLOCK;
 use tautline_core::record::{ReadFault, RecordError};
-
-pub(in crate::read) const READER: Reader = Reader {
-    name: "mcap",
-    title: "an MCAP file",
-    extensions: &["mcap"],
-    docs: "MCAP: recordings of tautline, messages of Foxglove or ROS 2",
-    magic: &[b"\x89MCAP0\r\n"],
-    sniff: |head| head.begins_with_any(READER.magic),
-    open,
-    supports: &[
-        FormatOption::Rows,
-        FormatOption::Origin,
-        FormatOption::Frame,
-        FormatOption::Topics,
-        FormatOption::Clock,
-        FormatOption::Axes,
-        FormatOption::Unfinished,
-    ],
-    packing: Packing::None,
-};
 
 /// Program that wrote the positions of a file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -76,7 +57,7 @@ fn origin(topics: &mut TopicReader) -> Result<Option<Origin>, ReadError> {
         let origin = match name {
             SWARM_SCHEMA => Some(Origin::Run),
             _ if is_export => Some(Origin::Export),
-            _ if planned::is_curve(name) => Some(Origin::Foreign),
+            _ if messages::is_curve(name) => Some(Origin::Foreign),
             _ => messages::reader_of(name).map(|_| Origin::Foreign),
         };
         if origin.is_some() {

@@ -13,13 +13,14 @@ use std::path::{Path, PathBuf};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
-use super::super::axes;
-use super::super::clock::{Stamp, TimeUnit};
+use super::super::clock::Stamp;
+use super::super::convention;
 use super::super::error::{ContentKind, Fault, Place, ReadError};
 use super::super::identity::Names;
 use super::super::options::ReadOptions;
 use super::super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
 use super::super::source::Source;
+use super::super::time_unit::TimeUnit;
 use crate::mcap::topic::{Message, Part, Topic, TopicReader, decode};
 use crate::mcap::{CHANNEL_SCHEMA, ChannelMessage, Entry, McapRecording, SWARM_SCHEMA};
 use tautline_core::fact::{self, Fact, FactKind};
@@ -222,7 +223,7 @@ impl Channels {
 
 pub(super) fn open_samples(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let recording = McapRecording::open(&source.path)?;
-    axes::refuse_known(options, "a recording of tautline")?;
+    convention::refuse_known(options, "a recording of tautline")?;
     let notes = options.accept_unfinished(recording.is_complete())?;
     let vehicles = recording.header().vehicles;
     let run = Run { recording, vehicles, names: Names::default(), samples: 0 };

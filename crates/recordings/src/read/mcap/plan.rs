@@ -6,13 +6,13 @@ use nalgebra::{Isometry3, Vector3};
 use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::option::ORIGIN;
 
-use super::super::axes;
+use super::super::convention;
 use super::super::earth::LocalFrame;
 use super::super::error::{ContentKind, Fault, ReadError, quoted, refuse};
 use super::super::options::{MessageClock, ReadOptions};
-use super::foreign::SplitFiles;
 use super::messages::{EARTH, PoseKind, VehicleKey};
 use super::outline::{Outline, choose_topics, is_static, place, refuse_local_frames, space};
+use super::split::SplitFiles;
 use super::tree::{Chain, FramePose, TransformAt, Tree, VehicleFrame};
 use crate::mcap::topic::Part;
 
@@ -65,7 +65,7 @@ impl ReadPlan {
             outline,
         };
         if first_fix.is_some() {
-            axes::refuse_known(options, "a recording with places on the Earth")?;
+            convention::refuse_known(options, "a recording with places on the Earth")?;
         }
         if options.origin.is_some() && first_fix.is_none() {
             return refuse(ContentKind::UnusedOption, "it has no place on the Earth", format!("omit {ORIGIN}"));

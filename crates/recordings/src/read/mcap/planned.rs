@@ -20,18 +20,14 @@ use super::super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
 use super::super::options::ReadOptions;
 use super::super::order::Recording;
 use super::super::spline::{Part, b_spline, minimum_jerk};
-use super::foreign::SplitFiles;
-use super::messages::nanoseconds;
+use super::messages::{MINCO, POLYNOMIALS, is_curve, nanoseconds};
 use super::outline::Outline;
+use super::split::SplitFiles;
 use crate::mcap::topic::{CDR, Part as FilePart, decode};
 use tautline_core::fact::{self, Fact, FactKind};
 use tautline_core::option::{CLOCK, DUPLICATES, FRAME, ORIGIN, SORT, TOPIC};
 use tautline_core::text::counted;
 use tautline_core::track::{Clock, Item, Metadata};
-
-const B_SPLINE: &str = "traj_utils/msg/Bspline";
-const MINCO: &str = "traj_utils/msg/MINCOTraj";
-const POLYNOMIALS: &str = "traj_utils/msg/PolyTraj";
 
 /// Degree of the curves of EGO-Planner v2.
 const DEGREE: u8 = 5;
@@ -44,11 +40,6 @@ const NS_PER_S: i64 = 1_000_000_000;
 /// Returns the remedy for a curve that contradicts itself.
 fn replan() -> String {
     format!("check the planner and its version, and record again; or choose other topics with {TOPIC}")
-}
-
-/// Returns whether the messages of a schema are curves of a planner.
-pub(super) fn is_curve(schema: &str) -> bool {
-    matches!(schema, B_SPLINE | MINCO | POLYNOMIALS)
 }
 
 /// Opens the curves of planners; `None` if the recording has none, or the user names other topics.

@@ -20,27 +20,15 @@ use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
 use self::pages::{Pages, delta_text};
-use crate::read::clock::{Stamp, TimeUnit};
+use crate::read::cells::Cells;
+use crate::read::clock::Stamp;
 use crate::read::error::{ContentKind, Fault, Place, ReadError, refuse};
 use crate::read::layout::Layout;
 use crate::read::options::ReadOptions;
 use crate::read::order::{BATCH, Recording};
-use crate::read::readers::{FormatOption, Packing, Reader};
 use crate::read::source::Source;
 use crate::read::table;
-use crate::read::table::Cells;
-
-pub(in crate::read) const READER: Reader = Reader {
-    name: "parquet",
-    title: "a Parquet file",
-    extensions: &["parquet"],
-    docs: "Table in Parquet, long or wide",
-    magic: &[b"PAR1"],
-    sniff: |head| head.begins_with_any(READER.magic),
-    open: |source, options| open(&source.clone().seekable()?, options),
-    supports: FormatOption::TABLE,
-    packing: Packing::Any,
-};
+use crate::read::time_unit::TimeUnit;
 
 /// Metadata key of the epoch \[ns\].
 pub(crate) const EPOCH_KEY: &str = "epoch_ns";
@@ -56,6 +44,7 @@ const CELLS_PER_BYTE: u64 = 25;
 
 /// Opens a table.
 pub(in crate::read) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+    let source = &source.clone().seekable()?;
     let mut file = File::open(&source.path)?;
     let file_bytes = file.metadata()?.len();
     if file_bytes < 12 {

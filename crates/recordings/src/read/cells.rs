@@ -1,0 +1,98 @@
+//! Access to the cells of a table, as numbers, times and names.
+
+use std::borrow::Cow;
+
+use nalgebra::Vector3;
+
+use super::clock::Stamp;
+use super::error::{ContentKind, Fault, Place, ReadError, UNSEEN, quoted, refuse};
+
+/// Access to the cells of the current row of a table.
+pub(super) trait Cells {
+    /// Returns the names of the columns.
+    fn header(&self) -> &[String];
+
+    /// Moves before the first row. Only these columns are requested afterwards, in ascending order. Unless `all`
+    /// required columns are among them, other cells are not checked.
+    fn restart(&mut self, columns: &[usize], all: bool) -> Result<(), ReadError>;
+
+    /// Moves to the next row; returns `false` after the last one.
+    fn advance(&mut self) -> Result<bool, ReadError>;
+
+    /// Returns the number of the current row.
+    fn row(&self) -> u64;
+
+    /// Returns the place of the row with this number.
+    fn place(row: u64) -> Place;
+
+    /// Returns a cell as written; an empty string for an empty cell.
+    fn text(&self, column: usize) -> Result<Cow<'_, str>, Fault>;
+
+    /// Returns the number in a cell of plain numeric form.
+    fn number(&self, column: usize) -> Option<f64>;
+
+    /// Returns the time in a cell of plain numeric form.
+    fn stamp(&mut self, column: usize) -> Option<Stamp>;
+
+    /// Returns a cell as the name of a vehicle; an empty string for an empty cell.
+    fn name(&self, column: usize) -> Result<Cow<'_, str>, Fault> {
+        self.text(column)
+    }
+}
+
+/// Returns the fault of an empty cell.
+pub(super) fn empty(cells: &impl Cells, column: usize) -> Fault {
+    Fault::empty_cell(&cells.header()[column])
+}
+
+/// Returns the finite number in a cell; `None` for an empty cell.
+#[inline]
+pub(super) fn number(cells: &impl Cells, column: usize) -> Result<Option<f64>, Fault> {
+    match cells.number(column) {
+        Some(number) if number.is_finite() => Ok(Some(number)),
+        _ => odd_number(cells, column, UNSEEN),
+    }
+}
+
+/// Parses a cell without a plain finite number; `unseen` is the remedy for a number that is not finite.
+#[cold]
+pub(super) fn odd_number(cells: &impl Cells, column: usize, unseen: &str) -> Result<Option<f64>, Fault> {
+    let (text, column) = (cells.text(column)?, &cells.header()[column]);
+    let text = text.trim();
+    let holds = |kind, what: &str, remedy| {
+        let problem = format!("column `{column}` holds {}, {what}", quoted(text));
+        refuse(kind, problem, remedy)
+    };
+    match text.parse::<f64>() {
+        _ if text.is_empty() => Ok(None),
+        Ok(number) if number.is_finite() => Ok(Some(number)),
+        Ok(_) => Err(Fault::not_finite(column, text, unseen)),
+        Err(_) if text.replacen(',', ".", 1).parse::<f64>().is_ok() => {
+            holds(ContentKind::DecimalComma, "a number with a decimal comma", "write numbers with a decimal point")
+        }
+        Err(_) => holds(ContentKind::NotANumber, "which is not a number", "write a number with a decimal point"),
+    }
+}
+
+/// Returns three numbers; `None` if all cells are empty.
+#[inline]
+pub(super) fn vector(
+    cells: &impl Cells,
+    columns: &[Option<usize>; 3],
+    metres: &[f64],
+) -> Result<Option<Vector3<f64>>, Fault> {
+    let mut vector = Vector3::zeros();
+    let (mut filled, mut missing) = (false, None);
+    for (axis, column) in columns.iter().enumerate() {
+        let Some(column) = *column else { continue };
+        match number(cells, column)? {
+            Some(x) => (vector[axis], filled) = (x * metres[column], true),
+            None => missing = missing.or(Some(column)),
+        }
+    }
+    match missing {
+        None => Ok(Some(vector)),
+        Some(_) if !filled => Ok(None),
+        Some(column) => Err(Fault::empty_coordinate(&cells.header()[column])),
+    }
+}
