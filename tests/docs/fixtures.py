@@ -15,7 +15,6 @@ FLIGHT = "tautline run pentagon --set time.duration_s=10 --out out/short --quiet
 
 # Page: files that it needs.
 NEEDED_BY = {
-    "README.md": ["flight.csv"],
     "docs/ci.md": ["flights"],
     "docs/viewer.md": ["out/pentagon", "flight.csv"],
 }
