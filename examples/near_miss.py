@@ -1,9 +1,9 @@
-"""Writes near-miss.csv: four vehicles at 5 Hz, of which two pass each other between two samples.
+"""Writes a recording of four vehicles at 5 Hz. Two of them pass each other between two samples.
 
-    python examples/near_miss.py > examples/near-miss.csv
+Usage: ``python examples/near_miss.py > examples/near-miss.csv``.
 
-`a` and `b` fly through the origin at right angles, 12 cm apart in height. The samples show them at least 0.58 m apart;
-half-way between two samples they are 0.12 m apart.
+``a`` and ``b`` fly through the origin at right angles, 12 cm apart in height. All samples show them at least 0.57 m
+apart. Between two samples they are 0.12 m apart.
 """
 
 SPEED_M_S = 4.0

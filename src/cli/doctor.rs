@@ -98,7 +98,7 @@ fn adapters() -> Finding {
     };
     #[cfg(not(feature = "viewer"))]
     let (found, remedy) = (None, "build without `--no-default-features`");
-    Finding::new("pictures", found, "no graphics adapter: runs have no snapshots; figures and replay need none", remedy)
+    Finding::new("pictures", found, "no graphics adapter: the processor draws pictures, and there is no window", remedy)
 }
 
 /// Returns the display of a window.

@@ -184,8 +184,8 @@ pub(super) struct SweepArguments {
     study: StudyArguments,
     #[command(flatten)]
     runs: RunArguments,
-    /// Key with evenly spaced or listed values: `network.loss=0:0.5:11` or `law.alpha=0.5,1,2`; give it twice for a
-    /// grid.
+    /// Key with evenly spaced or listed values: `sensing.latency_s=0:0.1:11` or `law.alpha=0.5,1,2`; give it twice for
+    /// a grid.
     #[arg(
         long = "key",
         value_name = "KEY=FROM:TO:COUNT|KEY=V1,V2,...",
@@ -217,7 +217,7 @@ exist within the bounds. See docs/studies.md.")]
 pub(super) struct AttackArguments {
     #[command(flatten)]
     study: StudyArguments,
-    /// Numeric key with its bounds, such as `network.loss=0..0.3`; repeatable.
+    /// Numeric key with its bounds, such as `sensing.latency_s=0..0.1`; repeatable.
     #[arg(long, value_name = "KEY=LOW..HIGH", add = completions::key("="))]
     vary: Vec<String>,
     /// Move each start by up to R metres along each axis.

@@ -103,6 +103,24 @@ fn a_wrong_override_is_refused_at_its_place() {
 }
 
 #[test]
+fn an_error_that_an_override_causes_is_placed_in_the_override() {
+    let folder = folder();
+    fs::write(folder.path().join("wrong.toml"), RIGHT.replacen("delta_m", "delta_n", 1)).expect("a file");
+    for (scenario, set, place) in [
+        ("pentagon", "formation.shape=svg", "--set:1:"),
+        ("pentagon", "swarm.count=1", "--set:1:"),
+        ("pentagon", "law.kind=nothing", "--set:1:"),
+        ("swap", "formation.shape=text", "--set:1:"),
+        // Negative twin: the error is in the file without the override, too.
+        ("wrong.toml", "time.duration_s=7", "wrong.toml:"),
+    ] {
+        let harmless = ["--set", "time.max_rate_dt=0.1", "--set", set, "--set", "start.seed=3"];
+        let (_, message) = refused(folder.path(), scenario, &harmless);
+        assert!(message.contains(&format!("[{place}")), "{scenario} {set}: {message}");
+    }
+}
+
+#[test]
 fn control_characters_of_a_file_are_escaped() {
     let folder = folder();
     fs::write(folder.path().join("wrong.toml"), RIGHT.replacen("\"pair\"", "\"\\u001b[2J\u{1b}[2J\"", 1))

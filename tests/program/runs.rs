@@ -149,7 +149,8 @@ fn the_verdict_comes_first_and_the_paths_of_files_last() {
 #[test]
 fn the_readme_shows_what_the_program_prints() {
     let readme = include_str!("../../README.md");
-    let shown = readme.split("```text\n").nth(1).and_then(|rest| rest.split("```").next()).expect("a transcript");
+    let of_run = readme.split("tautline run pentagon").nth(1).expect("the command");
+    let shown = of_run.split("```text\n").nth(1).and_then(|rest| rest.split("```").next()).expect("a transcript");
     let printed = run(folder().path(), &[]).out;
     assert!(printed.starts_with(shown), "the README shows\n{shown}\nand the program prints\n{printed}");
 }

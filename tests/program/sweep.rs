@@ -45,7 +45,8 @@ fn files_are_the_same_for_any_number_of_threads() {
         let [csv, html, latex] = files.each_ref().map(String::as_str);
         let grid = ["--key", "law.alpha=0.5,1", "--key", "law.delta_m=1:9:3", "--quiet", "--threads", threads];
         let ran = ran(folder.path(), &[&grid[..], &["--csv", csv, "--html", html, "--latex", latex]].concat());
-        assert_eq!((ran.exit, ran.out.as_str()), (Some(0), ""), "{}", ran.err);
+        // Most of the points cannot be flown.
+        assert_eq!((ran.exit, ran.out.as_str()), (Some(1), ""), "{}", ran.err);
         files.map(|file| std::fs::read_to_string(folder.path().join(file)).expect("written"))
     };
     let [csv, html, latex] = files("one", "1");
@@ -84,4 +85,24 @@ fn wrong_input_is_refused_with_its_remedy() {
         assert_eq!((ran.exit, ran.code()), (Some(2), code), "{arguments:?}: {}", ran.err);
     }
     assert_eq!(std::fs::read_dir(folder.path()).expect("a folder").count(), 0, "nothing is written");
+}
+
+#[test]
+fn the_examples_of_the_help_fly() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let mut flown = 0;
+    for (study, option) in [("sweep", "--key"), ("attack", "--vary")] {
+        let help = ran_by(TAUTLINE, folder.path(), &[study, "--help"]).out;
+        for example in help.split('`').skip(1).step_by(2).filter(|text| text.contains('.') && text.contains('=')) {
+            let flights: &[&str] = if study == "attack" { &["--flights", "3"] } else { &[] };
+            let arguments = [&[study], &SHORT[..], flights, &[option, example, "--json", "-"]].concat();
+            let ran = ran_by(TAUTLINE, folder.path(), &arguments);
+            let found: Value = serde_json::from_str(&ran.out).unwrap_or_else(|error| panic!("{error}: {ran:?}"));
+            let points = found["points"].as_array().into_iter().flatten().chain([&found]);
+            let refused: u64 = points.filter_map(|point| point["refused"].as_u64()).sum();
+            assert_eq!(refused, 0, "{example}: {found}");
+            flown += 1;
+        }
+    }
+    assert!(flown >= 3, "{flown} examples");
 }

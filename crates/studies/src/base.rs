@@ -17,8 +17,8 @@ pub const JITTER: f64 = 0.05;
 /// Key of the jitter.
 pub(crate) const JITTER_KEY: &str = "start.jitter_m";
 /// Keys of the seeds of start and flight.
-const START_SEED: &str = "start.seed";
-const NOISE_SEED: &str = "noise.seed";
+pub(crate) const START_SEED: &str = "start.seed";
+pub(crate) const NOISE_SEED: &str = "noise.seed";
 
 /// A scenario that a study reads many times, each time with other overrides.
 #[derive(Clone, Debug)]
@@ -191,6 +191,14 @@ pub(crate) fn overlap(one: &str, other: &str) -> bool {
 pub(crate) fn check_runs(runs: u64, seed: u64) -> Result<(), Failure> {
     in_range(RUNS, &runs, &(1..=MOST_RUNS))?;
     in_range(SEED, &seed, &SEEDS)
+}
+
+/// Returns why a scenario cannot be flown, with its remedy, in a line.
+pub(crate) fn refusal(error: ScenarioError) -> String {
+    match error.help {
+        Some(help) => format!("{}; {help}", error.message),
+        None => error.message,
+    }
 }
 
 /// Returns the note on the jitter of a start without randomness.

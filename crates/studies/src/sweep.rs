@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use crate::attack::{Bound, FLIGHTS};
-use crate::base::{BaseScenario, Criterion, JITTER_KEY, Runs, check_runs, jitter_note, overlap};
+use crate::base::{BaseScenario, Criterion, JITTER_KEY, Runs, check_runs, jitter_note, overlap, refusal};
 use crate::batch::Batch;
 use crate::flight::{FlightSample, FlightSummary, Outcome};
 use crate::statistics::{CONFIDENCE, Estimate, Proportion};
@@ -290,7 +290,7 @@ impl Experiment for Options {
             let scenario = base.with(&[runs.sets(run), sets(&self.keys, &points[point])].concat());
             let scenario = match scenario {
                 Ok(scenario) => scenario,
-                Err(error) => return Ok(Some(Err(error.message))),
+                Err(error) => return Ok(Some(Err(refusal(error)))),
             };
             match batch.fly(&scenario, runs.seed(run)) {
                 Ok(flight) => Ok(flight.map(Ok)),
@@ -530,7 +530,9 @@ impl Study for Sweep {
     }
 
     fn is_good(&self) -> bool {
-        !self.interrupted
+        let refused: u64 = self.points.iter().map(|point| point.refused).sum();
+        let flown: u64 = self.points.iter().map(|point| point.flights.len() as u64).sum();
+        !self.interrupted && refused <= flown
     }
 
     fn repeats(&self, scenario: &ScenarioRequest) -> Vec<(String, String)> {

@@ -9,7 +9,7 @@ mod hash;
 
 pub use beside::record_in_thread;
 pub use error::{ReadFault, RecordError};
-pub use hash::{MessageHash, StateHash, sha256_hex};
+pub use hash::{MessageHash, StateHash, hex, sha256_hex};
 
 use std::sync::Arc;
 

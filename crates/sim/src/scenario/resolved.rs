@@ -3,7 +3,6 @@
 
 use std::fmt::{self, Write as _};
 
-use sha2::{Digest, Sha256};
 use toml::{Table, Value};
 
 use super::document::{
@@ -17,6 +16,7 @@ use super::reference::ReferenceTable;
 use super::spec::{Scenario, Space};
 use super::template::Laws;
 use super::vehicle::VehicleTable;
+use tautline_core::record::sha256_hex;
 use tautline_core::swarm::Rows;
 use tautline_laws::target::{Leg, LegTrigger};
 
@@ -38,10 +38,7 @@ impl Scenario {
     #[must_use]
     pub fn resolved(&self) -> Resolved {
         let toml = written(&Document::from(self));
-        let sha256 = Sha256::digest(&toml).iter().fold(String::with_capacity(64), |mut hex, byte| {
-            let _ = write!(hex, "{byte:02x}");
-            hex
-        });
+        let sha256 = sha256_hex(&toml);
         Resolved { toml, sha256 }
     }
 

@@ -101,8 +101,7 @@ impl Scenario {
     /// TOML; a key is unknown, missing or of the wrong type; the scenario is invalid (see [`Scenario::validate`]).
     pub fn read(source: &Source, overrides: &[Override]) -> Result<Self, ScenarioError> {
         let (name, text) = source.text()?;
-        let text = Text { name: &name, toml: &text, overrides };
-        finish(decoded(&text, source.folder())?, &text)
+        Text { name: &name, toml: &text, overrides }.read(|text| finish(decoded(text, source.folder())?, text))
     }
 }
 

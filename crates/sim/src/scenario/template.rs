@@ -81,14 +81,14 @@ impl Template {
     /// As [`Scenario::read`].
     pub fn read(source: &Source, overrides: &[Override]) -> Result<Self, ScenarioError> {
         let (name, toml) = source.text()?;
-        let text = Text { name: &name, toml: &toml, overrides };
-        let document = decoded(&text, source.folder())?;
-        let a22_per_s = document.velocity_coefficient_per_s();
-        let named = document.laws.iter().map(|(name, other)| (name.clone(), other.kind.clone().complete(a22_per_s)));
-        let laws = named.collect();
-        let start_is_random = is_random(&document);
-        let assignment = document.formation.placement.assignment;
-        let own = finish(document, &text)?;
+        let (own, start_is_random, assignment, laws) = Text { name: &name, toml: &toml, overrides }.read(|text| {
+            let document = decoded(text, source.folder())?;
+            let a22_per_s = document.velocity_coefficient_per_s();
+            let named = document.laws.iter();
+            let laws = named.map(|(name, other)| (name.clone(), other.kind.clone().complete(a22_per_s))).collect();
+            let (start_is_random, assignment) = (is_random(&document), document.formation.placement.assignment);
+            Ok((finish(document, text)?, start_is_random, assignment, laws))
+        })?;
         let folder = source.folder().to_owned();
         Ok(Self { own, start_is_random, assignment, laws, overrides: overrides.to_vec(), folder, name, toml })
     }

@@ -43,6 +43,7 @@ const ORIGINS: [(&str, &[&str]); 7] = [
 ];
 
 /// Named text with overrides.
+#[derive(Clone, Copy)]
 pub(super) struct Text<'a> {
     pub(super) name: &'a str,
     pub(super) toml: &'a str,
@@ -50,6 +51,25 @@ pub(super) struct Text<'a> {
 }
 
 impl<'a> Text<'a> {
+    /// Makes something of the text. An error in the text that does not appear without an override is placed in the
+    /// first override with which it appears.
+    pub(super) fn read<T>(self, make: impl Fn(&Self) -> Result<T, ScenarioError>) -> Result<T, ScenarioError> {
+        make(&self).map_err(|error| {
+            if error.place.as_ref().is_some_and(|place| place.source != self.name) {
+                return error;
+            }
+            let appears = |&count: &usize| {
+                let earlier = make(&Self { overrides: &self.overrides[..count], ..self }).err();
+                earlier.is_some_and(|earlier| earlier.kind == error.kind && earlier.message == error.message)
+            };
+            let first = (0..self.overrides.len()).find(appears).unwrap_or(self.overrides.len());
+            match first.checked_sub(1).and_then(|last| self.overrides.get(last)) {
+                Some(set) => error.with_place(set.place(set.value.clone())),
+                None => error,
+            }
+        })
+    }
+
     /// Reads the keys of the scenario. Drops keys of a choice that an override has replaced.
     pub(super) fn decode(&self) -> Result<Document, ScenarioError> {
         let mut root = self.tree()?;

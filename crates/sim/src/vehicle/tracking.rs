@@ -130,7 +130,7 @@ impl Model {
         if let Some(search) = keys.tracking.as_mut().and_then(|tracking| tracking.search.as_mut()) {
             search.model.clear();
         }
-        let mut digits = sha256_hex(&toml::to_string(&keys).unwrap_or_default());
+        let mut digits = sha256_hex(toml::to_string(&keys).unwrap_or_default());
         digits.truncate(FINGERPRINT_DIGITS);
         digits
     }

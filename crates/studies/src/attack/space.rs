@@ -5,7 +5,7 @@ use std::fmt;
 use serde::Serialize;
 
 use super::Options;
-use crate::base::{BaseScenario, overlap};
+use crate::base::{BaseScenario, overlap, refusal};
 use tautline_core::failure::Failure;
 use tautline_core::option::{APART, FLIGHTS, SEEDS, START, VARY, VELOCITY};
 use tautline_core::swarm::{Rows, separation};
@@ -88,7 +88,7 @@ impl Bound {
 
 /// Returns the failure of an argument of `--vary`.
 fn wrong(text: &str, why: &str) -> Failure {
-    let example = VARY.set("network.loss=0..0.3");
+    let example = VARY.set("sensing.latency_s=0..0.1");
     let help = format!("write a numeric key and two finite numbers in increasing order, such as {example}");
     Failure::input("attack/variation", format!("{}: {why}", VARY.set(text)), help)
 }
@@ -137,7 +137,7 @@ impl SearchSpace {
         space.check_apart()?;
         space.bounds.extend(space.start_bounds());
         if space.bounds.is_empty() {
-            let (start, key) = (START.set(1), VARY.set("network.loss=0..0.3"));
+            let (start, key) = (START.set(1), VARY.set("sensing.latency_s=0..0.1"));
             return Err(Failure::input(
                 "attack/nothing-varied",
                 "nothing is varied",
@@ -193,7 +193,7 @@ impl SearchSpace {
     /// The reason of a refusal: the candidate cannot be flown, or two vehicles start closer than `apart_m`.
     pub fn candidate(&self, values: &[f64]) -> Result<Vec<Scenario>, String> {
         let flight = |k: u64| {
-            let scenario = self.scenario(values, k).map_err(|error| error.message)?;
+            let scenario = self.scenario(values, k).map_err(refusal)?;
             scenario.law().map_err(|error| error.to_string())?;
             let near_m = self.options.apart_m.map(|apart_m| (apart_m, closest_start_m(&scenario)));
             match near_m {

@@ -11,7 +11,7 @@ use super::spec::{Method, Spec, Stop, refused};
 use super::summary::{Summary, SummaryAccumulator};
 use super::vary::Variation;
 use crate::SCHEMA_VERSION;
-use crate::base::BaseScenario;
+use crate::base::{BaseScenario, NOISE_SEED, START_SEED};
 use crate::batch::Batch;
 use crate::splitting::{self, SplittingSettings};
 use tautline_core::failure::Failure;
@@ -28,9 +28,6 @@ const MOST_TRIED: usize = 1000;
 const FIRST_TRIED: u64 = 100;
 /// Code of a value outside the bounds of its key.
 const OUT_OF_RANGE: &str = "scenario/out-of-range";
-/// Seeds that each run draws unless the specification sets them.
-const START_SEED: &str = "start.seed";
-const NOISE_SEED: &str = "noise.seed";
 /// Tables whose keys can make a flight random.
 const FLIGHT: [&str; 4] = ["wind.", "sensing.", "network.", "actuation."];
 

@@ -19,6 +19,7 @@ use crate::table::{Cell, ParquetTable};
 use tautline_core::failure::Failure;
 use tautline_core::files::{write_atomically, write_atomically_with};
 use tautline_core::option::{OUT, SHARD, SHARDS};
+use tautline_core::record::{hex, sha256_hex};
 use tautline_core::text::counted;
 use tautline_report::request::command_line;
 
@@ -270,7 +271,7 @@ impl Folder {
         let json = summary.to_json().map_err(|error| file_failure("write", &answer)(error.into()))?;
         write_atomically(&answer, json.as_bytes())?;
         let bytes = fs::read(&path).map_err(file_failure("read", &path))?;
-        Ok(Merged { summary, sha256: base16(&Sha256::digest(&bytes)) })
+        Ok(Merged { summary, sha256: sha256_hex(&bytes) })
     }
 
     /// Returns the answer of all flown rows without writing it.
@@ -439,7 +440,7 @@ impl Program {
         let path = HOLDER.get().cloned().map_or_else(std::env::current_exe, Ok);
         let path = path.map_err(file_failure("read", Path::new("the program")))?;
         let program = fs::read(&path).map_err(file_failure("read", &path))?;
-        Ok(Self { name, version, sha256: base16(&Sha256::digest(program)) })
+        Ok(Self { name, version, sha256: sha256_hex(program) })
     }
 }
 
@@ -474,7 +475,7 @@ impl Manifest {
             hash.update((text.len() as u64).to_le_bytes());
             hash.update(text);
         }
-        base16(&hash.finalize())
+        hex(&hash.finalize())
     }
 
     /// Returns the runs of a shard, from 0. The sizes of two shards differ by at most one run.
@@ -552,14 +553,12 @@ pub(super) fn file_failure(what: &'static str, path: &Path) -> impl FnOnce(std::
     }
 }
 
-/// Returns bytes as hexadecimal digits.
-pub(super) fn base16(bytes: &[u8]) -> String {
-    use std::fmt::Write as _;
-    bytes.iter().fold(String::new(), |mut text, byte| {
-        // Writing to a string does not fail.
-        let _ = write!(text, "{byte:02x}");
-        text
-    })
+/// Removes a file, unless it does not exist.
+pub(super) fn remove_if_present(path: &Path) -> Result<(), Failure> {
+    match fs::remove_file(path) {
+        Err(error) if error.kind() != std::io::ErrorKind::NotFound => Err(file_failure("remove", path)(error)),
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]

@@ -1,11 +1,9 @@
 //! More runs of a campaign in the same folder. Flights that were flown are kept.
 
-use std::fs;
-use std::io;
 use std::path::Path;
 
 use super::flights::Campaign;
-use super::folder::{Folder, JOURNAL, Manifest, file_failure, other_campaign};
+use super::folder::{Folder, JOURNAL, Manifest, other_campaign, remove_if_present};
 use super::shard::{Journal, PartState};
 use super::spec::Spec;
 use tautline_core::failure::Failure;
@@ -77,12 +75,7 @@ impl Folder {
         open.map_or(Ok(()), |(_, journal)| journal.sync())?;
         for shard in 0..old.campaign().manifest().shards {
             for part in [old.part_path(shard), old.times_path(shard)] {
-                match fs::remove_file(&part) {
-                    Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                        return Err(file_failure("remove", &part)(error));
-                    }
-                    _ => {}
-                }
+                remove_if_present(&part)?;
             }
         }
         manifest.write(&path.join("manifest.json"))?;

@@ -17,7 +17,7 @@ use serde_json::Value;
 use sha2::{Digest as _, Sha256};
 
 use super::flights::Campaign;
-use super::folder::{Folder, JOURNAL, Manifest, base16, different_results, file_failure, other_campaign};
+use super::folder::{Folder, JOURNAL, Manifest, different_results, file_failure, other_campaign, remove_if_present};
 use crate::SCHEMA_VERSION;
 use crate::batch::Batch;
 use crate::flight::{FlightSummary, Outcome};
@@ -25,6 +25,7 @@ use crate::splitting::Splitting;
 use crate::table::{Cell, Column, Kind};
 use tautline_core::failure::Failure;
 use tautline_core::files::write_beside;
+use tautline_core::record::{hex, sha256_hex};
 
 /// Flights of a finished shard.
 #[derive(Clone, Debug, PartialEq)]
@@ -130,12 +131,7 @@ impl Folder {
     /// Removes the journals of a finished shard.
     fn remove_journals(&self, shard: u64) -> Result<(), Failure> {
         for path in self.leftovers(shard, JOURNAL)? {
-            match fs::remove_file(&path) {
-                Err(error) if error.kind() != io::ErrorKind::NotFound => {
-                    return Err(file_failure("write", &path)(error));
-                }
-                _ => {}
-            }
+            remove_if_present(&path)?;
         }
         Ok(())
     }
@@ -185,7 +181,7 @@ pub(super) fn encode(manifest: &Manifest, shard: u64, rows: &[Row]) -> Result<Ve
     for row in rows {
         bytes.extend(line(row)?);
     }
-    let seal = PartTrailer { rows: rows.len(), sha256: base16(&Sha256::digest(&bytes)) };
+    let seal = PartTrailer { rows: rows.len(), sha256: sha256_hex(&bytes) };
     bytes.extend(line(&seal)?);
     Ok(bytes)
 }
@@ -218,7 +214,7 @@ fn decode(bytes: &[u8], manifest: &Manifest, shard: u64, laws: usize, path: &Pat
     let Some(end) = body.iter().rposition(|&byte| byte == b'\n') else { return Ok(PartState::Damaged(TRUNCATED)) };
     let (sealed, seal) = (&bytes[..=end], &body[end + 1..]);
     let Ok(seal) = serde_json::from_slice::<PartTrailer>(seal) else { return Ok(PartState::Damaged(TRUNCATED)) };
-    if seal.sha256 != base16(&Sha256::digest(sealed)) {
+    if seal.sha256 != sha256_hex(sealed) {
         return Ok(PartState::Damaged(ALTERED));
     }
     let mut lines = sealed.split_inclusive(|&byte| byte == b'\n');
@@ -293,7 +289,7 @@ impl Journal {
 
 /// Returns the hash over a campaign and the line of a row.
 fn seal_of(campaign: &str, row: &[u8]) -> String {
-    base16(&Sha256::new().chain_update(campaign).chain_update(row).finalize())
+    hex(&Sha256::new().chain_update(campaign).chain_update(row).finalize())
 }
 
 /// Result of a run under a law.

@@ -3,13 +3,11 @@
 //! The file holds the verdict and the facts that the table does not contain. The checker derives everything else.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::fs;
 use std::fs::File;
 use std::path::Path;
 
 use serde::Serialize;
-use sha2::{Digest as _, Sha256};
 
 use super::super::Failure;
 use super::AuditRequest;
@@ -20,6 +18,7 @@ use tautline_core::files::write_atomically;
 use tautline_core::option::{
     ABOVE, CYLINDER, DELTA, ELLIPSOID, FENCE, FROM, IDS, LIMIT, MAX_GAP, OFFSET, PROOF, RADIUS, TO, WELL_CLEAR,
 };
+use tautline_core::record::sha256_hex;
 use tautline_recordings::read::{ColumnNames, ReadOptions, TimeUnit};
 
 /// Names of the time column that the checker accepts, and the unit that a name gives.
@@ -196,10 +195,7 @@ pub(super) fn write(
     let bytes = fs::read(path).map_err(|error| {
         Failure::machine("recording/cannot-read", format!("cannot read {}: {error}", path.display()))
     })?;
-    let sha256 = Sha256::digest(&bytes).iter().fold(String::new(), |mut text, byte| {
-        let _ = write!(text, "{byte:02x}");
-        text
-    });
+    let sha256 = sha256_hex(&bytes);
     let names = outcome.vehicles.iter().map(String::as_str);
     let offsets_s = settings.vehicles.iter().filter(|(_, own)| own.offset_s != 0.0);
     let content = ProofFile {
