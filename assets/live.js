@@ -170,7 +170,7 @@ const delay = t_s => {
 const line = notice => `${notice.t_s === null ? "" : notice.t_s.toFixed(2) + " s: "}${notice.text}`;
 
 /** Returns a sentence without its first word, which the band shows. @param {string} text */
-const rest = text => text.replace(/^[A-Z ]+:? /, "");
+const rest = text => text.replace(/^(CLEAR|UNDECIDED|VIOLATION|OFF PLAN):? /, "");
 
 /** Replaces the items of a list. @param {HTMLElement} list @param {string[]} items */
 const fill = (list, items) => list.replaceChildren(...items.map(item => {
@@ -221,7 +221,8 @@ const draw = frame => {
     const left_s = by && by.at_s - t_s, when = left_s > 0 ? `by ${left_s.toFixed(1)} s` : "now";
     show(`${t_s.toFixed(2)} s: ${rest(text)}`, status, {
       violated: frame.violated ?? [],
-      warning: status !== "violation" && ahead ? "on course to violate" : "",
+      warning: [status !== "violation" && ahead && "on course to violate", frame.off_plan && "OFF PLAN"]
+        .filter(Boolean).join(", "),
       brake: status === "violation" || !by ? "" : `brake ${by.subjects.join("-")} ${when}`,
     });
   }
@@ -233,9 +234,12 @@ const draw = frame => {
 const conclude = result => {
   hasEnded = true;
   last = null;
-  const isOff = result.status === "clear" && !result.pass;
-  const [status, name] = isOff ? ["violation", "OFF PLAN"] : [result.status, result.status.toUpperCase()];
-  show(`the watch has ended: ${rest(result.text)}`, status, { name });
+  const words = result.status === "clear" && result.off_plan ? [] : [result.status.toUpperCase()];
+  if (result.off_plan) words.push("OFF PLAN");
+  const name = `ENDED: ${words.join(", ")}`;
+  show(`the watch has ended: ${rest(result.text)}`, result.off_plan ? "violation" : result.status, { name });
+  pairs.replaceChildren();
+  absent.textContent = "The watch has ended: the view shows its last positions.";
 };
 
 /** Adds a notice to the log. @param {any} notice */

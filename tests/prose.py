@@ -69,7 +69,8 @@ def findings():
                 for found in PHRASES.finditer(sentence):
                     yield f"{path}:{number}", "phrases", f"{found[0]}: {sentence}"
     tags = run("git", "tag", "--sort=-creatordate", "--merged").split()
-    for line in run("git", "log", "-200", "--format=%h %s", *(f"{tag}..HEAD" for tag in tags[:1])).splitlines():
+    since = [f"{tag}..HEAD" for tag in tags[:1]]
+    for line in run("git", "log", "-200", "--no-merges", "--format=%h %s", *since).splitlines():
         if len(line.split(" ", 1)[1]) > 72:
             yield f"commit {line.split()[0]}", "subjects", line
 

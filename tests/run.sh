@@ -47,7 +47,11 @@ ci() { with_program cluster tests/ci; }
 cluster() { with_program cluster tests/cluster; }
 
 # Every command of the docs.
-docs() { with_program cluster tests/docs; }
+docs() {
+    cargo build --quiet --package tautline --example own_law
+    cargo build --quiet --package example-shield
+    with_program cluster tests/docs
+}
 
 # Exported files with the libraries of their formats.
 readers() { with_program readers tests/readers; }
@@ -81,6 +85,7 @@ case ${1:-} in
     --only)
         shift
         phases=$*
+        [ "$phases" ] || { echo "--only: give some of: $all" >&2 && exit 2; }
         for name in $phases; do
             case " $all " in *" $name "*) ;; *) echo "$name: no such phase; give some of: $all" >&2 && exit 2 ;; esac
         done
@@ -98,10 +103,9 @@ if [ $# != 0 ]; then
 fi
 
 scratch=$(mktemp -d)
-trap 'rm -rf "$scratch"' EXIT
+trap 'cat "$scratch/phases" 2>/dev/null; rm -rf "$scratch"' EXIT
 before_s=0
 set_up() { sh tests/setup.sh $phases; }
 phase set_up
 for name in $phases; do phase "$name"; done
 printf '\n'
-cat "$scratch/phases"

@@ -106,6 +106,9 @@ fn a_wrong_override_is_refused_at_its_place() {
 fn an_error_that_an_override_causes_is_placed_in_the_override() {
     let folder = folder();
     fs::write(folder.path().join("wrong.toml"), RIGHT.replacen("delta_m", "delta_n", 1)).expect("a file");
+    let two = include_str!("../../assets/pentagon.toml").replacen("duration_s = ", "duration_s = -", 1);
+    let two = two.replacen("delta_m = ", "delta_m = -", 1);
+    fs::write(folder.path().join("two.toml"), two).expect("a file");
     for (scenario, set, place) in [
         ("pentagon", "formation.shape=svg", "--set:1:"),
         ("pentagon", "swarm.count=1", "--set:1:"),
@@ -113,6 +116,8 @@ fn an_error_that_an_override_causes_is_placed_in_the_override() {
         ("swap", "formation.shape=text", "--set:1:"),
         // Negative twin: the error is in the file without the override, too.
         ("wrong.toml", "time.duration_s=7", "wrong.toml:"),
+        // The override repairs the first of two errors; the second one is in the file.
+        ("two.toml", "law.delta_m=1.5", "two.toml:"),
     ] {
         let harmless = ["--set", "time.max_rate_dt=0.1", "--set", set, "--set", "start.seed=3"];
         let (_, message) = refused(folder.path(), scenario, &harmless);

@@ -74,5 +74,5 @@ fn the_page_of_a_watch_shows_its_states_and_its_result() {
     // The page tries to connect again, and still shows the result.
     std::thread::sleep(Duration::from_secs(2));
     assert_eq!(page.evaluate(&level("violation")), true);
-    assert_eq!(page.evaluate("document.querySelector('#word').textContent"), "VIOLATION");
+    assert_eq!(page.evaluate("document.querySelector('#word').textContent"), "ENDED: VIOLATION");
 }

@@ -115,14 +115,15 @@ impl Scratch {
         let axis = widest_axis(self.of.iter().map(|(_, of)| of.position_m));
         for (a, (first, motion)) in self.of.iter().enumerate() {
             for (second, other) in &self.of[a + 1..] {
-                let farthest_m = closest.get(count - 1).map_or(f64::INFINITY, |of| of.nominal_m);
+                let farthest_m = closest.get(count - 1).map_or(f64::INFINITY, |near| near.nominal_m);
                 if other.position_m[axis] - motion.position_m[axis] > farthest_m {
                     break;
                 }
                 let relative = RelativeMotion::new(motion, other);
                 let pair = [*first.min(second), *first.max(second)];
                 let near = Separation { pair, nominal_m: relative.nominal_m(), least_m: relative.least_m() };
-                let place = closest.partition_point(|of| (of.nominal_m, of.pair) < (near.nominal_m, near.pair));
+                let place =
+                    closest.partition_point(|other| (other.nominal_m, other.pair) < (near.nominal_m, near.pair));
                 closest.insert(place, near);
                 closest.truncate(count);
             }
@@ -167,7 +168,8 @@ mod tests {
             let mut all: Vec<_> = pairs.map(|pair| (nominal_m(pair), pair)).collect();
             all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
             for count in [0, 1, 8, 5000] {
-                let found: Vec<_> = scratch.closest_pairs(count).iter().map(|of| (of.nominal_m, of.pair)).collect();
+                let found: Vec<_> =
+                    scratch.closest_pairs(count).iter().map(|near| (near.nominal_m, near.pair)).collect();
                 assert_eq!(found, all[..count.min(all.len())], "{vehicles} vehicles, {count} pairs");
             }
         }

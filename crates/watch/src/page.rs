@@ -197,12 +197,13 @@ impl Page {
         let pairs: Vec<Value> = monitor
             .closest_pairs(LISTED_PAIRS)
             .iter()
-            .map(|of| json!([of.pair[0], of.pair[1], of.nominal_m, of.least_m]))
+            .map(|near| json!([near.pair[0], near.pair[1], near.nominal_m, near.least_m]))
             .collect();
+        let off_plan = of.deviation.is_some_and(|(_, deviation_m)| deviation_m > monitor.settings().tube_m);
         let facts: Vec<String> = monitor.facts().iter().map(Fact::to_string).collect();
         self.send(&json!({
             "op": "frame", "state": state, "near": near, "violated": of.state.violated(), "places": places,
-            "pairs": pairs, "facts": facts,
+            "pairs": pairs, "facts": facts, "off_plan": off_plan,
         }));
     }
 

@@ -325,6 +325,9 @@ fn summary(of: &Summary, monitor: &Monitor) -> String {
     if let Some(count) = of.compared {
         text.extend([format!("; positions compared with the plan: {count}")]);
     }
+    if of.was_off_plan && of.status() != Status::Clear {
+        text.push_str("; OFF PLAN");
+    }
     text
 }
 

@@ -51,22 +51,24 @@ pub(super) struct Text<'a> {
 }
 
 impl<'a> Text<'a> {
-    /// Makes something of the text. An error in the text that does not appear without an override is placed in the
-    /// first override with which it appears.
+    /// Makes something of the text. An error in the text is placed in an override if the text can be read with
+    /// the overrides before it, and not with the override.
     pub(super) fn read<T>(self, make: impl Fn(&Self) -> Result<T, ScenarioError>) -> Result<T, ScenarioError> {
         make(&self).map_err(|error| {
             if error.place.as_ref().is_some_and(|place| place.source != self.name) {
                 return error;
             }
-            let appears = |&count: &usize| {
-                let earlier = make(&Self { overrides: &self.overrides[..count], ..self }).err();
-                earlier.is_some_and(|earlier| earlier.kind == error.kind && earlier.message == error.message)
+            // Without a text that can be read, an error need not come from the override with which it first appears.
+            let fault = |count: usize| make(&Self { overrides: &self.overrides[..count], ..self }).err();
+            let Some(readable) = (0..self.overrides.len()).rev().find(|&count| fault(count).is_none()) else {
+                return error;
             };
-            let first = (0..self.overrides.len()).find(appears).unwrap_or(self.overrides.len());
-            match first.checked_sub(1).and_then(|last| self.overrides.get(last)) {
-                Some(set) => error.with_place(set.place(set.value.clone())),
-                None => error,
+            let is_same = |other: ScenarioError| other.kind == error.kind && other.message == error.message;
+            if !fault(readable + 1).is_some_and(is_same) {
+                return error;
             }
+            let set = &self.overrides[readable];
+            error.with_place(set.place(set.value.clone()))
         })
     }
 
