@@ -24,7 +24,7 @@ let waits = 500;
 /** Places and closest pair that are drawn. */
 let drawn = [0], near = [65535, 65535];
 /** Time of the last frame on the clocks of the browser and the server, and smallest difference of both [s].
- * @type {{ arrival_s: number, t_s: number, least_s: number } | null} */
+ * @type {{ arrival_s: number, sent_s: number, least_s: number } | null} */
 let last = null;
 /** Whether the watch has ended, so that its result is shown. */
 let hasEnded = false;
@@ -140,7 +140,7 @@ const ring = next => {
  * @param {string} said @param {string} status
  * @param {{ violated?: number[], warning?: string, brake?: string, name?: string }} more */
 const show = (said, status, { violated = [], warning = "", brake: by = "", name = status.toUpperCase() } = {}) => {
-  const next = status === "clear" && warning ? "warning" : status;
+  const next = status !== "violation" && warning ? "warning" : status;
   ring(next);
   const text = name + (warning ? `, ${warning}` : "");
   band.dataset.level = verdict.dataset.status = next;
@@ -156,13 +156,13 @@ const show = (said, status, { violated = [], warning = "", brake: by = "", name 
 /** Shows that the state is old. @param {number} behind_s */
 const doubt = behind_s => show(`the page is ${behind_s.toFixed(1)} s behind`, "undecided");
 
-/** Returns the delay of a frame beyond the smallest delay [s]. @param {number} t_s */
-const delay = t_s => {
-  const arrival_s = performance.now() / 1000, lag_s = arrival_s - t_s;
+/** Returns the delay of a frame beyond the smallest delay [s]. @param {number} sent_s */
+const delay = sent_s => {
+  const arrival_s = performance.now() / 1000, lag_s = arrival_s - sent_s;
   // A clock that goes back is that of another watch.
-  const before = last && t_s >= last.t_s ? last : null;
+  const before = last && sent_s >= last.sent_s ? last : null;
   const least_s = before ? Math.min(before.least_s + DRIFT * (arrival_s - before.arrival_s), lag_s) : lag_s;
-  last = { arrival_s, t_s, least_s };
+  last = { arrival_s, sent_s, least_s };
   return lag_s - least_s;
 };
 
@@ -205,7 +205,7 @@ const list = frame => {
 /** Draws a frame. @param {any} frame */
 const draw = frame => {
   hasEnded = false;
-  const behind_s = delay(frame.state.t_s), isOld = behind_s > MOST_BEHIND_S;
+  const behind_s = delay(frame.sent_s), isOld = behind_s > MOST_BEHIND_S;
   const places = frame.places.slice(0, names.length);
   past = [...past, places.map((/** @type {any} */ at) => at?.[3] ? at : null)].slice(-INSTANTS);
   const outside = places.some((/** @type {any} */ at) =>
@@ -277,7 +277,7 @@ connect();
 // A server that stalls sends no frame.
 setInterval(() => {
   if (!last) return;
-  const behind_s = performance.now() / 1000 - last.t_s - last.least_s;
+  const behind_s = performance.now() / 1000 - last.sent_s - last.least_s;
   if (performance.now() / 1000 - last.arrival_s > MOST_BEHIND_S) doubt(behind_s);
 }, 250);
 })();

@@ -308,6 +308,11 @@ fn deviations_from_the_plan_are_reported() {
     let left = events(&off).into_iter().find(|of| of["event"] == "plan").expect("a deviation");
     assert!(left["vehicle"] == "b" && left["outside"] == true, "{left}");
     assert!((number(&left, "/deviation_m") - 0.32).abs() < 1e-9, "{left}");
+    // Beside an undecided part the last line names the deviation, too.
+    let doubtful = approach(0.2, 0.0).replacen("{\"t\":3,", "nonsense\n{\"t\":3,", 1);
+    let doubtful = events(&run(&doubtful)).pop().expect("a summary");
+    assert_eq!((&doubtful["status"], &doubtful["off_plan"]), (&"undecided".into(), &true.into()), "{doubtful}");
+    assert!(doubtful["text"].as_str().is_some_and(|text| text.ends_with("; OFF PLAN")), "{doubtful}");
     // A plan of other times is not kept, and a guessed unit is refused.
     let late = watched(
         folder.path(),

@@ -9,7 +9,9 @@ use tautline_core::failure::{Failure, in_range};
 use tautline_core::option::{RUNS, SEED};
 use tautline_core::text::metres;
 use tautline_report::request::ScenarioRequest;
-use tautline_sim::scenario::{ExternalLaw, Override, Scenario, ScenarioError, Source, Template, takes_integers_only};
+use tautline_sim::scenario::{
+    ErrorKind, ExternalLaw, Override, Scenario, ScenarioError, Source, Template, takes_integers_only,
+};
 
 /// Jitter of a start without randomness along each axis, as a part of delta.
 pub const JITTER: f64 = 0.05;
@@ -193,11 +195,12 @@ pub(crate) fn check_runs(runs: u64, seed: u64) -> Result<(), Failure> {
     in_range(SEED, &seed, &SEEDS)
 }
 
-/// Returns why a scenario cannot be flown, with its remedy, in a line.
+/// Returns why a scenario cannot be flown, with its remedy, in a line. The message of a number out of range names the
+/// bound, and its help describes the key.
 pub(crate) fn refusal(error: ScenarioError) -> String {
     match error.help {
-        Some(help) => format!("{}; {help}", error.message),
-        None => error.message,
+        Some(help) if error.kind != ErrorKind::OutOfRange => format!("{}; {help}", error.message),
+        _ => error.message,
     }
 }
 

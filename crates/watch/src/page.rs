@@ -49,6 +49,8 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// Server of the live page. It ends with the process.
 pub struct Page {
     shared: Arc<Shared>,
+    /// Start of the server, from which the times of sent frames count.
+    began: Instant,
     /// Time of the last frame \[s\].
     framed_s: f64,
     names: usize,
@@ -152,7 +154,7 @@ impl Page {
                 });
             }
         });
-        Ok(Self { shared, framed_s: f64::NEG_INFINITY, names: 0 })
+        Ok(Self { shared, began: Instant::now(), framed_s: f64::NEG_INFINITY, names: 0 })
     }
 
     /// Returns the address of the page, with its token.
@@ -203,7 +205,7 @@ impl Page {
         let facts: Vec<String> = monitor.facts().iter().map(Fact::to_string).collect();
         self.send(&json!({
             "op": "frame", "state": state, "near": near, "violated": of.state.violated(), "places": places,
-            "pairs": pairs, "facts": facts, "off_plan": off_plan,
+            "pairs": pairs, "facts": facts, "off_plan": off_plan, "sent_s": self.began.elapsed().as_secs_f64(),
         }));
     }
 

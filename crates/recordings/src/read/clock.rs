@@ -174,11 +174,12 @@ impl Probe {
             self.steps += 1;
             let step = (time - before).abs();
             // A step that is short in seconds is short in every unit.
-            let units = TimeUnit::ALL.into_iter().filter(|_| step >= LONG_STEP);
-            for (counts, unit) in self.long_steps.iter_mut().zip(units) {
-                let step_s = step / unit.per_second() as f64;
-                for (count, least_s) in counts.iter_mut().zip([LONG_STEP, LONGEST_STEP_S]) {
-                    *count += u64::from(step_s >= least_s);
+            if step >= LONG_STEP {
+                for (counts, unit) in self.long_steps.iter_mut().zip(TimeUnit::ALL) {
+                    let step_s = step / unit.per_second() as f64;
+                    for (count, least_s) in counts.iter_mut().zip([LONG_STEP, LONGEST_STEP_S]) {
+                        *count += u64::from(step_s >= least_s);
+                    }
                 }
             }
         }

@@ -349,6 +349,28 @@ fn an_error_caused_by_an_override_is_placed_in_the_override() {
 }
 
 #[test]
+fn an_error_that_an_override_causes_elsewhere_is_placed_in_the_override() {
+    // The built-in scenario, its overrides, the one that causes the error, and the code of the error.
+    let cases: &[(&str, &[&str], usize, &str)] = &[
+        ("obstacles", &["obstacle.1.clearance_m=9"], 0, "scenario/near-obstacle"),
+        ("obstacles", &["time.dt_s=0.01", "obstacle.1.clearance_m=9"], 1, "scenario/near-obstacle"),
+        ("pentagon", &["formation.shape=text"], 0, "scenario/missing-key"),
+        ("pentagon", &["formation.shape=svg"], 0, "scenario/missing-key"),
+        ("pentagon", &["formation.shape=svg", "formation.path=\"M 0 0\"", "time.dt_s=0.01"], 1, "scenario/shape"),
+        ("pentagon", &["formation.scale=0.01", "time.dt_s=0.01"], 0, "scenario/within-delta"),
+        ("pentagon", &["swarm.dimensions=3", "formation={shape=\"text\", text=\"\"}"], 1, "scenario/shape"),
+    ];
+    for &(name, sets, cause, code) in cases {
+        let error = read_builtin(name, sets).expect_err("refused");
+        assert_eq!(error.code(), code, "{sets:?}: {error}");
+        assert!(
+            error.place.as_ref().is_some_and(|place| place.source == "set" && place.text == sets[cause]),
+            "{sets:?}: {error}"
+        );
+    }
+}
+
+#[test]
 fn an_error_of_the_file_is_placed_in_the_file_with_any_override() {
     let source = Source::Text { name: "f".to_owned(), text: RIGHT.replace("spacing_m = 3.0", "spacing_m = 1.0") };
     let overrides = [Override::parse("time.dt_s=0.1").expect("an override")];
