@@ -22,7 +22,7 @@ use tungstenite::Message;
 use crate::event::Assessment;
 use crate::monitor::Monitor;
 use crate::notice::{Notice, Statement, names};
-use tautline_core::fact::Fact;
+use tautline_core::fact::Coded as _;
 
 /// Time between two frames \[s\].
 pub const FRAME_PERIOD_S: f64 = 0.1;
@@ -202,7 +202,8 @@ impl Page {
             .map(|near| json!([near.pair[0], near.pair[1], near.nominal_m, near.least_m]))
             .collect();
         let off_plan = of.deviation.is_some_and(|(_, deviation_m)| deviation_m > monitor.settings().tube_m);
-        let facts: Vec<String> = monitor.facts().iter().map(Fact::to_string).collect();
+        let facts = monitor.facts();
+        let facts: Vec<String> = facts.iter().map(|fact| format!("{fact} ({})", fact.source.code())).collect();
         self.send(&json!({
             "op": "frame", "state": state, "near": near, "violated": of.state.violated(), "places": places,
             "pairs": pairs, "facts": facts, "off_plan": off_plan, "sent_s": self.began.elapsed().as_secs_f64(),
@@ -505,6 +506,11 @@ mod tests {
         let frame = read();
         assert_eq!(frame["op"], "frame");
         assert_eq!(frame["places"][1], serde_json::json!([0.5, 0.0, 0.0, true]));
+        assert_eq!(frame["off_plan"], false);
+        assert!(
+            frame["facts"].as_array().expect("a list").contains(&"position-error: 0.05 m (default)".into()),
+            "{frame}"
+        );
     }
 
     #[test]
