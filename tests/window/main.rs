@@ -118,9 +118,16 @@ impl<'a> OpenWindow<'a> {
 
     /// Returns size and bytes of the picture after all earlier inputs, as the window saves it.
     fn picture(&self) -> ([u32; 2], Vec<u8>) {
-        // The first picture may precede an input of the same frame. The second one is of a later frame.
+        // The first picture may precede an input of the same frame. The wheel moves the camera for several frames.
         self.saved_picture();
-        self.saved_picture()
+        let mut picture = self.saved_picture();
+        loop {
+            let next = self.saved_picture();
+            if next == picture {
+                return picture;
+            }
+            picture = next;
+        }
     }
 
     fn saved_picture(&self) -> ([u32; 2], Vec<u8>) {
