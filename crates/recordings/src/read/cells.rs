@@ -38,6 +38,11 @@ pub(super) trait Cells {
     fn name(&self, column: usize) -> Result<Cow<'_, str>, Fault> {
         self.text(column)
     }
+
+    /// Returns whether a cell is written exactly as this name; `false` if that is not known without parsing it.
+    fn has_name(&self, _column: usize, _name: &str) -> bool {
+        false
+    }
 }
 
 /// Returns the fault of an empty cell.
@@ -81,6 +86,12 @@ pub(super) fn vector(
     columns: &[Option<usize>; 3],
     metres: &[f64],
 ) -> Result<Option<Vector3<f64>>, Fault> {
+    if let [Some(x), Some(y), Some(z)] = *columns
+        && let [Some(along_x), Some(along_y), Some(along_z)] = [x, y, z].map(|column| cells.number(column))
+        && (along_x + along_y + along_z).is_finite()
+    {
+        return Ok(Some(Vector3::new(along_x * metres[x], along_y * metres[y], along_z * metres[z])));
+    }
     let mut vector = Vector3::zeros();
     let (mut filled, mut missing) = (false, None);
     for (axis, column) in columns.iter().enumerate() {

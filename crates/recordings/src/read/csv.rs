@@ -313,6 +313,11 @@ impl Cells for TextTable {
     }
 
     #[inline]
+    fn has_name(&self, column: usize, name: &str) -> bool {
+        self.fields.bytes(self.lines.line(), column) == name.as_bytes()
+    }
+
+    #[inline]
     fn stamp(&mut self, column: usize) -> Option<Stamp> {
         let bytes = self.fields.bytes(self.lines.line(), column);
         if bytes.is_empty() || bytes != self.time.0 {
@@ -394,15 +399,19 @@ fn decimal(text: &[u8]) -> Option<f64> {
     if !(2..=POWERS.len()).contains(&unsigned.len()) {
         return None;
     }
-    let (mut digits, mut point) = (0_u64, None);
-    for (index, &byte) in unsigned.iter().enumerate() {
-        match byte.wrapping_sub(b'0') {
-            digit @ 0..=9 => digits = 10 * digits + u64::from(digit),
-            _ if byte == b'.' && point.is_none() => point = Some(index),
-            _ => return None,
+    let digits_of = |bytes: &[u8], mut digits: u64| {
+        for (index, byte) in bytes.iter().enumerate() {
+            match byte.wrapping_sub(b'0') {
+                digit @ 0..=9 => digits = 10 * digits + u64::from(digit),
+                _ => return (digits, Some(index)),
+            }
         }
-    }
-    let number = digits as f64 / POWERS[unsigned.len() - 1 - point?];
+        (digits, None)
+    };
+    let (whole, end) = digits_of(unsigned, 0);
+    let decimals = unsigned[end?..].strip_prefix(b".")?;
+    let (digits, None) = digits_of(decimals, whole) else { return None };
+    let number = digits as f64 / POWERS[decimals.len()];
     Some(if unsigned.len() < text.len() { -number } else { number })
 }
 
@@ -427,6 +436,14 @@ fn decimal_comma(line: &[u8]) -> Option<String> {
     let number = |word: &&str| word.replacen(',', ".", 1).parse::<f64>().is_ok();
     let comma = words.iter().find(|word| word.contains(','))?;
     (words.len() > 1 && words.iter().all(number)).then(|| (*comma).to_owned())
+}
+
+/// Returns a word whose highest bit of each byte, from the lowest on, is set where `bytes` has this byte.
+#[inline]
+fn matches(bytes: [u8; 8], byte: u8) -> u64 {
+    const LOW_BITS: u64 = 0x7f7f_7f7f_7f7f_7f7f;
+    let zero_where_equal = u64::from_le_bytes(bytes) ^ u64::from_le_bytes([byte; 8]);
+    !(((zero_where_equal & LOW_BITS) + LOW_BITS) | zero_where_equal | LOW_BITS)
 }
 
 /// Fields of a line.
@@ -456,22 +473,7 @@ impl Fields {
         self.ends.clear();
         self.unquoted = None;
         match separator {
-            Separator::Byte(byte) => {
-                let mut start = 0;
-                // Fields are a few bytes long, so that a byte loop is faster than a search.
-                for (end, &found) in line.iter().enumerate() {
-                    if found == byte {
-                        self.ends.push((start, end));
-                        if self.ends.len() == limit {
-                            return Ok(());
-                        }
-                        start = end + 1;
-                    } else if found == b'"' {
-                        return self.split_quoted(line, byte);
-                    }
-                }
-                self.ends.push((start, line.len()));
-            }
+            Separator::Byte(byte) => return self.split_at(line, byte, limit),
             Separator::Any(bytes) => {
                 let mut start = 0;
                 let ends = (0..line.len()).filter(|&index| bytes.contains(&line[index]));
@@ -483,6 +485,41 @@ impl Fields {
                 }
             }
         }
+        Ok(())
+    }
+
+    /// Splits a line at a byte into its first `limit` fields.
+    #[inline]
+    fn split_at(&mut self, line: &[u8], separator: u8, limit: usize) -> Result<(), Fault> {
+        let (mut start, mut from) = (0, 0);
+        while from < line.len() {
+            // Fields are a few bytes long: eight bytes at once are faster than a search for each separator.
+            let bytes = line[from..].first_chunk().copied().unwrap_or_else(|| {
+                let mut bytes = [0; 8];
+                bytes.iter_mut().zip(&line[from..]).for_each(|(to, byte)| *to = *byte);
+                bytes
+            });
+            let (separators, quotes) = (matches(bytes, separator), matches(bytes, b'"'));
+            let mut left = separators;
+            while left != 0 {
+                let end = from + left.trailing_zeros() as usize / 8;
+                // A quote before the end of the last field that is needed.
+                if quotes & (left ^ (left - 1)) != 0 {
+                    return self.split_quoted(line, separator);
+                }
+                self.ends.push((start, end));
+                if self.ends.len() == limit {
+                    return Ok(());
+                }
+                start = end + 1;
+                left &= left - 1;
+            }
+            if quotes != 0 {
+                return self.split_quoted(line, separator);
+            }
+            from += 8;
+        }
+        self.ends.push((start, line.len()));
         Ok(())
     }
 
@@ -583,7 +620,7 @@ pub(super) fn layout(first: &[f64], options: &ReadOptions, alone: &str) -> Resul
 mod tests {
     use proptest::prelude::*;
 
-    use super::decimal;
+    use super::{Fields, Separator, decimal};
 
     #[test]
     fn short_decimals_are_read_and_other_texts_are_left() {
@@ -599,6 +636,15 @@ mod tests {
     }
 
     proptest! {
+        #[test]
+        fn lines_are_split_as_at_single_bytes(line in "[a,;\u{ac}\u{1ac}]{0,40}", limit in 1..9_usize) {
+            let mut fields = Fields::default();
+            prop_assert!(fields.split(line.as_bytes(), Separator::Byte(b','), limit).is_ok());
+            let expected: Vec<_> = line.split(',').take(limit).collect();
+            let found: Vec<_> = (0..fields.ends.len()).map(|at| fields.text(line.as_bytes(), at).expect("UTF-8")).collect();
+            prop_assert_eq!(found, expected);
+        }
+
         #[test]
         fn decimals_have_the_bits_of_the_standard_library(text in "-?[0-9]{0,8}[.]?[0-9]{0,9}[.e]?") {
             if let Some(number) = decimal(text.as_bytes()) {

@@ -108,17 +108,19 @@ impl Names {
         &self.in_order
     }
 
-    /// Returns the index of a name, adding a new one. Tries first the vehicle after `before`, cyclically: most files
-    /// list vehicles in turn.
+    /// Returns index and name of the vehicle after this one, cyclically; an empty name if there are no vehicles.
+    #[inline]
+    pub(super) fn after(&self, vehicle: usize) -> (usize, &str) {
+        let next = if vehicle + 1 < self.in_order.len() { vehicle + 1 } else { 0 };
+        (next, self.in_order.get(next).map_or("", String::as_str))
+    }
+
+    /// Returns the index of a name, adding a new one.
     ///
     /// # Errors
     /// If a new name differs from another only in spelling.
     #[inline]
-    pub(super) fn index(&mut self, name: &str, before: usize) -> Result<usize, Fault> {
-        let next = if before + 1 < self.in_order.len() { before + 1 } else { 0 };
-        if self.in_order.get(next).is_some_and(|known| known == name) {
-            return Ok(next);
-        }
+    pub(super) fn index(&mut self, name: &str) -> Result<usize, Fault> {
         if let Some(&index) = self.indices.get(name) {
             return Ok(index);
         }

@@ -107,6 +107,9 @@ pub(super) struct Lines {
     block: Vec<u8>,
     filled: usize,
     next: usize,
+    /// Places of the line ends in the block, and the number of those that lie before `next`.
+    line_ends: Vec<usize>,
+    passed: usize,
     /// Current line without its line end.
     line: Range<usize>,
     number: u64,
@@ -115,7 +118,16 @@ pub(super) struct Lines {
 impl Lines {
     pub(super) fn new(source: &Source) -> Result<Self, ReadError> {
         let input = source.bytes()?;
-        Ok(Self { input, block: vec![0; BLOCK_BYTES], filled: 0, next: 0, line: 0..0, number: 0 })
+        Ok(Self {
+            input,
+            block: vec![0; BLOCK_BYTES],
+            filled: 0,
+            next: 0,
+            line_ends: Vec::new(),
+            passed: 0,
+            line: 0..0,
+            number: 0,
+        })
     }
 
     /// Returns the current line without its line end.
@@ -133,20 +145,21 @@ impl Lines {
     #[inline]
     pub(super) fn advance(&mut self) -> Result<bool, ReadError> {
         self.number += 1;
-        match memchr::memchr(b'\n', &self.block[self.next..self.filled]) {
-            Some(length) => self.enter(length, 1).map(|()| true),
+        match self.line_ends.get(self.passed) {
+            Some(&end) => self.enter(end, 1).map(|()| true),
             None => self.fill(),
         }
     }
 
-    /// Moves to the line of `length` bytes that begins at `next`, and over the bytes of its line end.
+    /// Moves to the line from `next` to `end`, and over the bytes of its line end.
     #[inline]
-    fn enter(&mut self, length: usize, line_end: usize) -> Result<(), ReadError> {
-        if length + line_end > LINE_LIMIT_BYTES {
+    fn enter(&mut self, end: usize, line_end: usize) -> Result<(), ReadError> {
+        let start = self.next;
+        if end + line_end - start > LINE_LIMIT_BYTES {
             return Err(self.too_long());
         }
-        let (start, end) = (self.next, self.next + length);
         self.next = end + line_end;
+        self.passed += 1;
         let line = &self.block[start..end];
         self.line = start..end - usize::from(line.ends_with(b"\r"));
         if self.number == 1 && line.starts_with(b"\xef\xbb\xbf") {
@@ -161,6 +174,8 @@ impl Lines {
         self.block.copy_within(self.next..self.filled, 0);
         self.filled -= self.next;
         (self.next, self.line) = (0, 0..0);
+        self.line_ends.clear();
+        self.passed = 0;
         loop {
             if self.filled > LINE_LIMIT_BYTES {
                 return Err(self.too_long());
@@ -175,8 +190,10 @@ impl Lines {
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
                 Err(error) => return Err(Fault::from(error).at(Place::Line(self.number))),
             }
-            if let Some(length) = memchr::memchr(b'\n', &self.block[before..self.filled]) {
-                return self.enter(before + length, 1).map(|()| true);
+            // One search for all line ends of a block is faster than one for each line.
+            self.line_ends.extend(memchr::memchr_iter(b'\n', &self.block[before..self.filled]).map(|at| before + at));
+            if let Some(&end) = self.line_ends.first() {
+                return self.enter(end, 1).map(|()| true);
             }
         }
     }

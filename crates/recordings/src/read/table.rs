@@ -205,12 +205,18 @@ impl<C: Cells> Table<C> {
 
     #[inline]
     fn vehicle(&mut self, id: usize) -> Result<usize, Fault> {
+        // Most files list vehicles in turn.
+        let (next, name) = self.names.after(self.vehicle);
+        if !name.is_empty() && self.cells.has_name(id, name) {
+            self.vehicle = next;
+            return Ok(next);
+        }
         let name = self.cells.name(id)?;
         let name = name.trim();
         if name.is_empty() {
             return Err(empty(&self.cells, id));
         }
-        self.vehicle = self.names.index(name, self.vehicle)?;
+        self.vehicle = self.names.index(name)?;
         Ok(self.vehicle)
     }
 

@@ -249,7 +249,7 @@ impl Poses {
     }
 
     fn push(&mut self, name: &str, time_ns: i64, position: Vector3<f64>, rows: &mut Vec<Row>) -> Result<(), Fault> {
-        self.vehicle = self.names.index(name, self.vehicle)?;
+        self.vehicle = self.names.index(name)?;
         let (stamp, vehicle) = (Stamp::Whole(time_ns), self.vehicle);
         rows.push(Row { stamp, place: self.messages, vehicle, position, velocity: None, radius: None });
         Ok(())
