@@ -85,6 +85,9 @@ pub(super) struct RunArguments {
     /// Graphics adapter: best, hardware, software, none, or a part of its name.
     #[arg(long, value_name = "NAME", default_value = "best")]
     adapter: String,
+    /// Leave out the engine where no contact is possible, except for each eighth step, which is compared bit by bit.
+    #[arg(long)]
+    free_steps: bool,
     /// Repeat the flight at half the step, and report the differences.
     #[arg(long)]
     verify: bool,
@@ -135,12 +138,14 @@ fn fly(arguments: &RunArguments, force: bool, opens: bool, terminal: &Terminal) 
         }
         _ => command_line(words.iter().copied()),
     };
-    let words: Vec<_> = ["run", &what.argument].into_iter().chain(sets).chain(plant).collect();
+    let free_steps = arguments.free_steps.then_some("--free-steps");
+    let words: Vec<_> = ["run", &what.argument].into_iter().chain(sets).chain(plant).chain(free_steps).collect();
     let request = RunRequest {
         out: arguments.out.clone(),
         force,
         figures: !arguments.no_figures,
         formats: figure_formats(&arguments.figures),
+        free_steps: arguments.free_steps,
         verify: arguments.verify,
         threads: arguments.threads.map(usize::from),
         ..RunRequest::new(&scenario, repeat(&words))

@@ -103,7 +103,7 @@ fn the_keys_of_the_report_are_the_documented_ones() {
         "energy.initial energy.final energy.max_over_initial energy.max_over_leg_start energy.rose",
         "control.peak_m_s2 control.final_m_s2",
         "velocity.disagreement_m_s velocity.common_m_s",
-        "run.duration_s run.dt_s run.steps run.refined_steps run.overlong_steps",
+        "run.duration_s run.dt_s run.steps run.engine_steps run.refined_steps run.overlong_steps",
         "run.ended_early run.vehicles run.state_hash",
         "performance.wall_s performance.real_time_factor performance.law_s performance.energy_s",
         "performance.physics_s performance.airframe_s performance.audit_s performance.record_s",

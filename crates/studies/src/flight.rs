@@ -11,6 +11,7 @@ use tautline_core::text::counted;
 use tautline_laws::law::LawError;
 use tautline_report::report::{Reason, Report, Status};
 use tautline_report::run::run_with;
+use tautline_sim::plant::FreeSteps;
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::{ExternalLaw, Scenario};
 use tautline_sim::sim::{Breakdown, Components, Ending, SimError};
@@ -99,7 +100,11 @@ pub fn fly(
 ) -> Result<Option<FlightSummary>, SimError> {
     let mut effort = Effort::default();
     let (preflight, parts) = (Preflight::of(scenario)?, Components::of(scenario)?);
+    let parts = parts.with_free_steps(FreeSteps::Compared);
     let (report, ending) = run_with(scenario, &preflight, parts, &mut effort, carry_on)?;
+    if let Ending::BrokeDown(breakdown @ Breakdown::EngineDiffers { .. }) = ending {
+        return Err(SimError::EngineDiffers(breakdown));
+    }
     if let Some(law) = &scenario.external_law {
         refuse_failed_law(law, &ending, &report)?;
     }

@@ -245,6 +245,8 @@ pub struct Run {
     pub dt_s: f64,
     /// Steps flown.
     pub steps: u64,
+    /// Steps of the physics engine, parts and repetitions included. Null for a plant without an engine.
+    pub engine_steps: Option<u64>,
     /// Steps that were flown in parts, because the law was too fast for them or vehicles were too close.
     pub refined_steps: u64,
     /// Steps whose shortest part was still longer than the law allows. From there on the motion is not that of
@@ -361,11 +363,12 @@ impl FlightResult<'_> {
     }
 
     fn run(&self) -> Run {
-        let Flight { duration_s, steps, refined_steps, overlong_steps, .. } = *self.flight;
+        let Flight { duration_s, steps, engine_steps, refined_steps, overlong_steps, .. } = *self.flight;
         Run {
             duration_s,
             dt_s: self.scenario.time.dt_s,
             steps,
+            engine_steps,
             refined_steps,
             overlong_steps,
             ended_early: Some(self.flight.ending.clone()).filter(|ending| *ending != Ending::Completed),

@@ -115,6 +115,7 @@ impl Case {
             duration_s: 120.0,
             steps: 28_800,
             refined_steps: 0,
+            engine_steps: None,
             overlong_steps: 0,
             certificate: self.certificate.clone(),
             audit: self.audit.clone(),

@@ -15,13 +15,14 @@ use crate::figures::{self, Criteria, Figure, Format};
 use crate::flight_log::FlightLog;
 use crate::replay::{NoReplay, PAGE_BYTES, Replay, Stage};
 use crate::report::{Report, RunPage};
-use crate::run::{run_while, verify};
+use crate::run::{run_with, verify};
 use tautline_core::files::write_atomically;
 use tautline_core::text::seconds;
 use tautline_recordings::mcap::{Header, McapRecorder};
+use tautline_sim::plant::FreeSteps;
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::Scenario;
-use tautline_sim::sim;
+use tautline_sim::sim::{self, Components};
 
 /// Name of the recording in the folder of a run.
 pub const RECORDING: &str = "run.mcap";
@@ -46,6 +47,8 @@ pub struct RunRequest<'a> {
     pub figures: bool,
     /// Formats of the files of figures.
     pub formats: Vec<Format>,
+    /// Whether steps without possible contact leave out the engine, which makes each eighth of them for comparison.
+    pub free_steps: bool,
     /// Whether the scenario is flown again at half the step.
     pub verify: bool,
     /// Number of threads; a flight uses at most two. By default the number of cores. The recording has the same
@@ -60,7 +63,18 @@ impl<'a> RunRequest<'a> {
     #[must_use]
     pub fn new(scenario: &'a Scenario, command: String) -> Self {
         let (out, threads, formats) = (None, None, vec![Format::Svg]);
-        Self { scenario, command, out, force: false, figures: true, formats, verify: false, threads, is_timed: true }
+        Self {
+            scenario,
+            command,
+            out,
+            force: false,
+            figures: true,
+            formats,
+            free_steps: false,
+            verify: false,
+            threads,
+            is_timed: true,
+        }
     }
 
     /// Returns a request that overwrites its folder and writes the same bytes each time.
@@ -107,7 +121,13 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
     let folder = OutFolder::at(path, "run", "report.json");
     let _lock = folder.open(request.force)?;
     let mut log = FlightLog::of(scenario);
-    let mut report = within(&threads, scenario, || fly(scenario, &preflight, &folder, pictures, monitor, &mut log))?;
+    let mut report = within(&threads, scenario, || {
+        let mut parts = Components::of(scenario)?;
+        if request.free_steps {
+            parts = parts.with_free_steps(FreeSteps::Compared);
+        }
+        fly((scenario, &preflight), parts, &folder, pictures, monitor, &mut log)
+    })?;
     if let Some(closest) = report.closest_pair() {
         log.conclude(closest.separation_m, closest.time_s);
     }
@@ -146,8 +166,8 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
 
 /// Flies the scenario. The recording is closed when this function returns, with or without an error.
 fn fly(
-    scenario: &Scenario,
-    preflight: &Preflight,
+    (scenario, preflight): (&Scenario, &Preflight),
+    parts: Components,
     folder: &OutFolder,
     pictures: &dyn Pictures,
     monitor: &dyn Monitor,
@@ -165,7 +185,8 @@ fn fly(
         }
         if monitor.is_interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let flown = run_while(scenario, preflight, &mut (&mut recording, log), &mut carry_on);
+    let flown = run_with(scenario, preflight, parts, &mut (&mut recording, log), &mut carry_on);
+    let flown = flown.map(|(report, _)| report);
     monitor.finish();
     let closed = match &flown {
         Ok(report) => recording.close(run_audit(scenario, report)),

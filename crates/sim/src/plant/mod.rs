@@ -80,9 +80,14 @@ pub trait Plant: DynClone + Send {
     /// Appends the pairs whose solid hulls collided in the last [`Plant::advance`]. Plants of points append nothing.
     fn hull_contacts(&self, _contacts: &mut Vec<HullContact>) {}
 
-    /// Allows steps without collision detection while no contact is possible. The motion has the same bits. Plants
+    /// Allows free steps: steps without the engine while no contact is possible. The motion has the same bits. Plants
     /// without an engine have no such steps.
-    fn allow_free_steps(&mut self) {}
+    fn allow_free_steps(&mut self, _free: FreeSteps) {}
+
+    /// Returns the number of steps that the engine made, undone steps included; `None` for a plant without an engine.
+    fn engine_steps(&self) -> Option<u64> {
+        None
+    }
 
     /// Returns the wall-clock time spent in forces, rotors and attitude loops.
     fn airframe_time(&self) -> Duration {
@@ -152,12 +157,31 @@ pub struct HullContact {
     pub closing_m_s: f64,
 }
 
+/// Treatment of free steps, which the engine may be left out of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FreeSteps {
+    /// The engine makes none of them.
+    Trusted,
+    /// The engine makes each [`COMPARED_EACH`]th of them, from the same state. A result that differs in a bit is
+    /// [`PlantError::EngineDiffers`].
+    Compared,
+}
+
+/// Number of free steps of which the engine makes one ([`FreeSteps::Compared`]).
+pub const COMPARED_EACH: u32 = 8;
+
 /// Error of a step of a plant.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum PlantError {
     /// A position or velocity is not finite.
     #[error("the state of vehicle {} is no longer a finite number", vehicle + 1)]
     NotFinite {
+        /// The vehicle, from 0.
+        vehicle: usize,
+    },
+    /// The engine moves a vehicle otherwise than a free step does: a defect.
+    #[error("a free step moves vehicle {} otherwise than the engine", vehicle + 1)]
+    EngineDiffers {
         /// The vehicle, from 0.
         vehicle: usize,
     },

@@ -30,6 +30,8 @@ pub struct Flight {
     pub duration_s: f64,
     /// Number of whole steps.
     pub steps: u64,
+    /// Number of steps that the engine made, parts and undone ones included; `None` for a plant without an engine.
+    pub engine_steps: Option<u64>,
     /// Number of steps that were divided.
     pub refined_steps: u64,
     /// Number of steps whose shortest substep was longer than the law allows. From the first one on, the motion is not
@@ -178,6 +180,14 @@ pub enum Breakdown {
         /// Required position resolution: the tolerance of arrival \[m\].
         required_m: f64,
     },
+    /// The engine moves a vehicle otherwise than a step without it ([`crate::plant::FreeSteps`]): a defect.
+    #[error("step {step}: the engine moves vehicle {} otherwise than the step without it", vehicle + 1)]
+    EngineDiffers {
+        /// The step, from 1.
+        step: u64,
+        /// The vehicle, from 0.
+        vehicle: usize,
+    },
     /// The solver of the plant cannot continue.
     #[error("step {step}: the equation of motion cannot be solved to its tolerances")]
     Stalled {
@@ -240,6 +250,9 @@ pub enum SimError {
         /// Reason, a sentence.
         reason: String,
     },
+    /// The engine moves a vehicle otherwise than a step without it: a defect.
+    #[error("{0}; please report this with the scenario")]
+    EngineDiffers(Breakdown),
     /// The scenario has no formation.
     #[error("the scenario has no leg")]
     NoLeg,
@@ -272,6 +285,7 @@ impl_coded! { Ending {
     Self::BrokeDown(Breakdown::CommandOutOfRange { .. }) => "command-out-of-range",
     Self::BrokeDown(Breakdown::StateNotFinite { .. }) => "state-not-finite",
     Self::BrokeDown(Breakdown::Unresolved { .. }) => "positions-unresolved",
+    Self::BrokeDown(Breakdown::EngineDiffers { .. }) => "engine-differs",
     Self::BrokeDown(Breakdown::Stalled { .. }) => "solver-stalled",
     Self::BrokeDown(Breakdown::Bent { .. }) => "path-bends",
     Self::BrokeDown(Breakdown::Audit { .. }) => "audit-refused",
@@ -286,6 +300,7 @@ impl From<SimError> for Failure {
             | SimError::Obstacle(_)
             | SimError::Vehicles { .. }
             | SimError::Commands { .. }
+            | SimError::EngineDiffers(_)
             | SimError::ShieldedCommands => Self::new("simulation/inconsistent", false, error.to_string()),
             SimError::Shield(error) => error.into(),
             SimError::ExternalLaw { .. } => Self::input(

@@ -8,7 +8,7 @@ use super::judge::{AuditResults, Judge};
 use super::monitors::EnergyMonitor;
 use super::monitors::{IntegrationError, RoundingBound};
 use crate::link::{self, Imperfections};
-use crate::plant::{self, Plant, StepPath};
+use crate::plant::{self, FreeSteps, Plant, StepPath};
 use crate::scenario::Scenario;
 use crate::shield::ShieldStage;
 use tautline_core::record::{Channel, Event, Peaks, Sample};
@@ -226,9 +226,10 @@ impl Simulation {
         self.plant.stop_measuring_time();
     }
 
-    /// Allows steps without the engine while no contact is possible. The bits are the same.
-    pub(super) fn allow_free_steps(&mut self) {
-        self.plant.allow_free_steps();
+    /// Allows steps without the engine while no contact is possible ([`Plant::allow_free_steps`]). The bits are the
+    /// same.
+    pub fn allow_free_steps(&mut self, free: FreeSteps) {
+        self.plant.allow_free_steps(free);
     }
 
     /// Returns the ending of the flight; `None` in flight.
@@ -333,6 +334,7 @@ impl Simulation {
             ending: self.ending.unwrap_or(Ending::Interrupted),
             duration_s: self.time_s,
             steps: self.steps,
+            engine_steps: self.plant.engine_steps(),
             refined_steps: self.refined_steps,
             overlong_steps: self.overlong_steps,
             certificate,
@@ -371,6 +373,13 @@ impl Components {
     /// [`SimError::Law`] if the parameters give no law; for a valid scenario only if memory cannot be allocated.
     pub fn of(scenario: &Scenario) -> Result<Self, SimError> {
         Ok(Self::with_law(scenario, scenario.flown_law()?))
+    }
+
+    /// Allows steps without the engine while no contact is possible, for studies. The bits are the same.
+    #[must_use]
+    pub fn with_free_steps(mut self, free: FreeSteps) -> Self {
+        self.plant.allow_free_steps(free);
+        self
     }
 
     /// Returns the components of a scenario under another law.

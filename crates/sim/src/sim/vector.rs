@@ -6,6 +6,7 @@ use rayon::{Scope, ThreadPool};
 
 use super::ending::{MAX_COMMAND_M_S2, SimError};
 use super::simulation::Simulation;
+use crate::plant::FreeSteps;
 use crate::scenario::{
     BYTES_PER_EDGE, BYTES_PER_VEHICLE, Draw, MAX_MEMORY_BYTES, NamedLaw, Scenario, ScenarioError, Template,
 };
@@ -501,7 +502,7 @@ impl Starts {
             Simulation::new(self.template.own())?
         };
         simulation.stop_measuring_time();
-        simulation.allow_free_steps();
+        simulation.allow_free_steps(FreeSteps::Trusted);
         Ok(simulation)
     }
 }

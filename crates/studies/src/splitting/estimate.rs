@@ -10,8 +10,9 @@ use super::lineage::{Genealogy, Lineage};
 use crate::statistics::{CONFIDENCE, Estimate, Proportion};
 use tautline_core::failure::Failure;
 use tautline_core::record::{Event, RecordError, Sample, Sink, StateHash, Step};
+use tautline_sim::plant::FreeSteps;
 use tautline_sim::scenario::Scenario;
-use tautline_sim::sim::{Flight, SavedState, SimError, Simulation, continue_flight};
+use tautline_sim::sim::{Breakdown, Ending, Flight, SavedState, SimError, Simulation, continue_flight};
 
 /// Recommended smallest number of flights. With fewer, many estimates end without a survivor.
 const ENOUGH: usize = 100;
@@ -121,9 +122,13 @@ pub fn estimate(
     carry_on: &mut dyn FnMut(u64) -> ControlFlow<()>,
 ) -> Result<Option<Splitting>, Failure> {
     check(scenario, settings)?;
-    let mut path = SimulatedFlight { scenario, simulation: simulation_at_start(scenario, scenario.noise_seed)? };
+    let simulation = simulation_at_start(scenario, scenario.noise_seed)?;
+    let mut path = SimulatedFlight { scenario, simulation, defect: None };
     let rule = SplittingRule::new(settings.flights, settings.kill, 0.0);
     let Some(mut split) = split(&mut path, rule, [seed, repetition], carry_on)? else { return Ok(None) };
+    if let Some(defect) = path.defect {
+        return Err(SimError::EngineDiffers(defect).into());
+    }
     let bad = bad(&mut path, &mut split, settings.keep);
     let SplitResult { probability, iterations, extinct, steps, .. } = split;
     let [flights, kill] = [settings.flights, settings.kill].map(|number| number as u64);
@@ -159,6 +164,8 @@ fn is_noisy(scenario: &Scenario) -> bool {
 struct SimulatedFlight<'a> {
     scenario: &'a Scenario,
     simulation: Simulation,
+    /// First difference between the engine and a step without it.
+    defect: Option<Breakdown>,
 }
 
 impl RandomProcess for SimulatedFlight<'_> {
@@ -175,6 +182,9 @@ impl RandomProcess for SimulatedFlight<'_> {
         self.simulation.step();
         // The replay of a flight reports its events.
         drop(self.simulation.events());
+        if let Some(Ending::BrokeDown(defect @ Breakdown::EngineDiffers { .. })) = self.simulation.ending() {
+            self.defect.get_or_insert_with(|| defect.clone());
+        }
         goes_on
     }
 
@@ -289,7 +299,9 @@ pub fn replay(scenario: &Scenario, genealogy: &Genealogy, sink: &mut dyn Sink) -
 
 /// Returns the scenario at its start, with a seed of noise.
 fn simulation_at_start(scenario: &Scenario, noise_seed: u64) -> Result<Simulation, SimError> {
-    Simulation::new(&Scenario { noise_seed, ..scenario.clone() })
+    let mut simulation = Simulation::new(&Scenario { noise_seed, ..scenario.clone() })?;
+    simulation.allow_free_steps(FreeSteps::Compared);
+    Ok(simulation)
 }
 
 /// Mean of independent estimates of one probability.

@@ -3,11 +3,11 @@
 use nalgebra::Vector3;
 use rapier3d::prelude::{LockedAxes, PhysicsWorld, RigidBody, RigidBodyBuilder, RigidBodyHandle, Vector};
 
-use super::proximity::Proximity;
+use super::proximity::{Maker, Proximity};
 use super::world::{
     Engine, empty_world, from_engine, hull, hull_contacts, insert_obstacle, keep_out, keep_out_contacts, to_engine,
 };
-use crate::plant::{Air, HullContact, Plant, PlantError, StepPath};
+use crate::plant::{Air, FreeSteps, HullContact, Plant, PlantError, StepPath};
 use crate::scenario::{Scenario, Space};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Pair, Rows, Swarm, mean_row, row, set_row};
@@ -25,6 +25,8 @@ pub(super) struct Bodies {
     proximity: Proximity,
     /// Whether the last step was free: the engine did not step.
     was_free: bool,
+    /// Positions and velocities from which the engine repeats a free step, then those of the free step.
+    compared: (Vec<Vector>, Vec<Vector>),
     /// Accelerations held over the step, with the push of the wind at its beginning \[m/s^2\].
     held: Rows,
     /// Wind, if any.
@@ -66,6 +68,7 @@ impl Bodies {
             inverse_masses,
             proximity: Proximity::of(scenario),
             was_free: false,
+            compared: (Vec::new(), Vec::new()),
             held: Rows::zeros(scenario.count()),
             air: Air::of(scenario),
             drift_m_s: Rows::zeros(scenario.count()),
@@ -149,6 +152,27 @@ impl Bodies {
         Ok(())
     }
 
+    /// Moves bodies without contacts, and again with the engine. The results must be the same.
+    fn drift_in_both(&mut self, dt_s: f64) -> Result<(), PlantError> {
+        self.compared.0.clone_from(&self.positions);
+        self.compared.1.clone_from(&self.velocities);
+        self.drift_freely(dt_s)?;
+        std::mem::swap(&mut self.positions, &mut self.compared.0);
+        std::mem::swap(&mut self.velocities, &mut self.compared.1);
+        let proximity = self.proximity.clone();
+        self.drift_in_engine(dt_s)?;
+        let is_same = |(engine, free): (&Vector, &Vector)| bits(*engine) == bits(*free);
+        let differs = |i: &usize| {
+            !is_same((&self.positions[*i], &self.compared.0[*i]))
+                || !is_same((&self.velocities[*i], &self.compared.1[*i]))
+        };
+        if let Some(vehicle) = (0..self.positions.len()).find(differs) {
+            return Err(PlantError::EngineDiffers { vehicle });
+        }
+        self.proximity = proximity;
+        Ok(())
+    }
+
     /// Returns each velocity \[m/s\], completed by the second half kick of the held acceleration if that is pending.
     fn velocities_m_s(&self) -> impl Iterator<Item = Vector3<f64>> {
         let half_decay = self.half_decay(self.drifted_s);
@@ -168,6 +192,12 @@ impl Bodies {
     pub(super) fn was_free(&self) -> bool {
         self.was_free
     }
+
+    /// Changes the last bit of the inverse mass of a vehicle in free steps.
+    pub(super) fn change_inverse_mass(&mut self, vehicle: usize) {
+        self.inverse_masses[vehicle].x = self.inverse_masses[vehicle].x.next_up();
+        self.inverse_masses[vehicle].y = self.inverse_masses[vehicle].y.next_up();
+    }
 }
 
 impl Clone for Bodies {
@@ -179,6 +209,7 @@ impl Clone for Bodies {
             velocities: self.velocities.clone(),
             inverse_masses: self.inverse_masses.clone(),
             proximity: self.proximity.clone(),
+            compared: (Vec::new(), Vec::new()),
             held: self.held.clone(),
             air: self.air.clone(),
             drift_m_s: self.drift_m_s.clone(),
@@ -196,11 +227,12 @@ impl Plant for Bodies {
 
     fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut StepPath) -> Result<(), PlantError> {
         self.begin_drift(dt_s);
-        self.was_free = self.proximity.begin_step(self.positions.iter().copied());
-        if self.was_free {
-            self.drift_freely(dt_s)?;
-        } else {
-            self.drift_in_engine(dt_s)?;
+        let maker = self.proximity.begin_step(self.positions.iter().copied());
+        self.was_free = maker == Maker::FreeStep;
+        match maker {
+            Maker::Engine => self.drift_in_engine(dt_s)?,
+            Maker::FreeStep => self.drift_freely(dt_s)?,
+            Maker::Both => self.drift_in_both(dt_s)?,
         }
         self.drifted_s = dt_s;
         if let Some(air) = &mut self.air {
@@ -265,8 +297,12 @@ impl Plant for Bodies {
         }
     }
 
-    fn allow_free_steps(&mut self) {
-        self.proximity.allow_free_steps();
+    fn allow_free_steps(&mut self, free: FreeSteps) {
+        self.proximity.allow_free_steps(free);
+    }
+
+    fn engine_steps(&self) -> Option<u64> {
+        Some(self.proximity.engine_steps())
     }
 
     fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {
@@ -280,6 +316,10 @@ impl Plant for Bodies {
             hull_contacts(&self.engine.world, &self.began_m, &self.drift_m_s, contacts);
         }
     }
+}
+
+fn bits(vector: Vector) -> [u64; 3] {
+    vector.to_array().map(f64::to_bits)
 }
 
 /// Sets a vector unless it is equal, like the engine: then a zero keeps its sign.

@@ -48,9 +48,10 @@
 //! it: they are evidence that comes one step late, not the verdict.
 //!
 //! # Free steps
-//! In a vector simulation of up to 128 vehicles without obstacles, the engine does not step while every pair is farther
-//! apart than its contacts reach. The plants then do the operations of the engine for a body without contacts. In all
-//! other flights the engine makes every step.
+//! While every pair is farther apart than the contacts of the engine reach, the plants can do the operations of the
+//! engine for a body without contacts. Vector simulations of up to 128 vehicles without obstacles leave the engine out
+//! of these steps. In studies the engine makes each eighth of them too, and any difference is an error. In all other
+//! flights the engine makes every step.
 
 mod bodies;
 mod proximity;

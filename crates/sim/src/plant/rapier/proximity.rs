@@ -1,4 +1,4 @@
-//! Decides which steps the engine may be left out of, where a caller allows that: in a vector simulation.
+//! Decides which steps the engine may be left out of, where a caller allows that: in vector simulations and studies.
 //!
 //! Bodies of the engine act on each other only through contacts. The engine reports contacts only for pairs within a
 //! reach: two keep-out balls that touch, or two hulls within the contact prediction. While every pair is farther apart
@@ -12,6 +12,7 @@
 
 use rapier3d::prelude::Vector;
 
+use crate::plant::{COMPARED_EACH, FreeSteps};
 use crate::scenario::{CONTACT_PREDICTION_M, Scenario};
 
 /// Largest number of vehicles with free steps: the search of the nearest pair is quadratic.
@@ -19,13 +20,27 @@ const MAX_COUNT: usize = 128;
 /// Distance beyond the engine's reach from which a step is free \[m\]. It exceeds any rounding.
 const MARGIN_M: f64 = 1e-3;
 
+/// What makes a step.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Maker {
+    Engine,
+    /// The plant alone.
+    FreeStep,
+    /// The plant and the engine, from the same state.
+    Both,
+}
+
 /// Distance of the nearest pair from the engine's reach, with the memory that bounds it from step to step.
 #[derive(Clone, Debug)]
 pub(super) struct Proximity {
     /// Distance of two centres below which the engine may report contacts; infinite where that is not known \[m\].
     reach_m: f64,
-    /// Whether free steps are allowed.
-    is_allowed: bool,
+    /// Treatment of free steps; `None` if none are allowed.
+    free: Option<FreeSteps>,
+    /// Number of free steps since the engine made one.
+    unseen: u32,
+    /// Number of steps that the engine made.
+    engine_steps: u64,
     /// Lower bound of the distance of any pair beyond the reach \[m\]; not positive if unknown.
     beyond_m: f64,
     /// Whether the last step began with every pair beyond the reach.
@@ -38,7 +53,7 @@ impl Proximity {
         let contact_m = scenario.metric().shortest_m(scenario.delta_m).max(2.0 * hull_m) + 2.0 * CONTACT_PREDICTION_M;
         let reach_m = if Self::may_have_free_steps(scenario) { contact_m + MARGIN_M } else { f64::INFINITY };
         // A new engine has no contacts.
-        Self { reach_m, is_allowed: false, beyond_m: 0.0, began_beyond: true }
+        Self { reach_m, free: None, unseen: 0, engine_steps: 0, beyond_m: 0.0, began_beyond: true }
     }
 
     /// Returns whether flights of a scenario may have free steps. Hulls also touch obstacles.
@@ -47,13 +62,33 @@ impl Proximity {
     }
 
     /// Allows free steps.
-    pub(super) fn allow_free_steps(&mut self) {
-        self.is_allowed = true;
+    pub(super) fn allow_free_steps(&mut self, free: FreeSteps) {
+        self.free = Some(free);
     }
 
-    /// Returns whether the step from these positions, relative to the engine's origin, is free.
-    pub(super) fn begin_step(&mut self, positions: impl Iterator<Item = Vector> + Clone) -> bool {
-        if !self.is_allowed || self.reach_m == f64::INFINITY {
+    /// Returns the number of steps that the engine made.
+    pub(super) fn engine_steps(&self) -> u64 {
+        self.engine_steps
+    }
+
+    /// Returns what makes the step from these positions, relative to the engine's origin.
+    pub(super) fn begin_step(&mut self, positions: impl Iterator<Item = Vector> + Clone) -> Maker {
+        let allowed = self.free;
+        let free = allowed.filter(|_| self.is_free(positions));
+        let maker = match free {
+            Some(free) => {
+                self.unseen = (self.unseen + 1) % COMPARED_EACH;
+                if free == FreeSteps::Compared && self.unseen == 0 { Maker::Both } else { Maker::FreeStep }
+            }
+            None => Maker::Engine,
+        };
+        self.engine_steps += u64::from(maker != Maker::FreeStep);
+        maker
+    }
+
+    /// Returns whether the step from these positions is free.
+    fn is_free(&mut self, positions: impl Iterator<Item = Vector> + Clone) -> bool {
+        if self.reach_m == f64::INFINITY {
             return false;
         }
         if self.beyond_m <= 0.0 || self.beyond_m.is_nan() {
@@ -76,7 +111,8 @@ impl Proximity {
     /// Makes every step free, whatever the distances.
     #[cfg(test)]
     pub(super) fn with_free_steps_only(&mut self) {
-        (self.reach_m, self.beyond_m, self.began_beyond, self.is_allowed) = (0.0, f64::INFINITY, true, true);
+        (self.reach_m, self.beyond_m, self.began_beyond) = (0.0, f64::INFINITY, true);
+        self.allow_free_steps(FreeSteps::Trusted);
     }
 }
 
@@ -181,8 +217,16 @@ mod tests {
         command: impl Fn(usize, &Swarm) -> Rows,
     ) -> Seen {
         let mut free = make();
-        free.allow_free_steps();
+        free.allow_free_steps(FreeSteps::Trusted);
         let with = fly(free.as_mut(), dt_s, steps, &command);
+        let mut compared = make();
+        compared.allow_free_steps(FreeSteps::Compared);
+        let shown = fly(compared.as_mut(), dt_s, steps, &command);
+        assert_eq!((&shown.bits, &shown.keep_out, &shown.hulls), (&with.bits, &with.keep_out, &with.hulls));
+        // Undone steps count too.
+        let made = compared.engine_steps().expect("an engine");
+        let expected = (with.bits.len() / (6 * compared.count()) - with.free_steps + with.free_steps / 8) as u64;
+        assert!((expected..expected + expected / 8 + 20).contains(&made), "{made} steps, expected {expected}");
         let without = fly(make().as_mut(), dt_s, steps, &command);
         assert_eq!(without.free_steps, 0);
         let differing = with.bits.iter().zip(&without.bits).position(|(a, b)| a != b);
@@ -274,10 +318,29 @@ mod tests {
     }
 
     #[test]
+    fn a_free_step_that_differs_from_the_engine_is_an_error() {
+        let scenario = scenario("pentagon", &[]);
+        let mut plant = points(&scenario);
+        plant.allow_free_steps(FreeSteps::Compared);
+        // Another inverse mass than that of the engine's body, in the last bit.
+        plant.change_inverse_mass(2);
+        let (mut state, mut path) = (scenario.start.clone(), StepPath::default());
+        let mut steps = 0;
+        let error = loop {
+            plant.apply(&shaken(steps, &state), &mut state);
+            steps += 1;
+            if let Err(error) = plant.advance(scenario.time.dt_s, &mut state, &mut path) {
+                break error;
+            }
+        };
+        assert_eq!((error, steps), (crate::plant::PlantError::EngineDiffers { vehicle: 2 }, 8));
+    }
+
+    #[test]
     fn a_state_that_is_not_finite_is_an_error_of_the_vehicle() {
         let scenario = scenario("pentagon", &["swarm={a22_per_s=0, mass_kg=10}"]);
         let mut plant = points(&scenario);
-        plant.allow_free_steps();
+        plant.allow_free_steps(FreeSteps::Trusted);
         let (mut state, mut path) = (scenario.start.clone(), StepPath::default());
         let mut held = Rows::zeros(scenario.count());
         for step in 0..4 {

@@ -5,11 +5,11 @@ use std::time::Duration;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rapier3d::prelude::{MassProperties, Real, RigidBody, RigidBodyBuilder, RigidBodyHandle, Rotation, Vector};
 
-use super::proximity::Proximity;
+use super::proximity::{Maker, Proximity};
 use super::world::{
     Engine, empty_world, from_engine, hull, hull_contacts, insert_obstacle, keep_out, keep_out_contacts, to_engine,
 };
-use crate::plant::{HullContact, Plant, PlantError, Quadrotors, StepPath};
+use crate::plant::{FreeSteps, HullContact, Plant, PlantError, Quadrotors, StepPath};
 use crate::scenario::Scenario;
 use crate::sim::Stopwatch;
 use crate::vehicle::{Drift, Fleet};
@@ -29,6 +29,8 @@ pub(super) struct Fliers {
     proximity: Proximity,
     /// Whether the last step was free: the engine did not step.
     was_free: bool,
+    /// Bodies from which the engine repeats a free step, then those after the free step.
+    compared: Vec<Body>,
     fleet: Fleet,
     /// First half of the current step.
     drifts: Vec<Drift>,
@@ -68,6 +70,11 @@ impl Body {
         self.position += moved;
         moved
     }
+
+    fn bits(&self) -> ([[u64; 3]; 3], [u64; 4]) {
+        let vectors = [self.position, self.linear, self.angular];
+        (vectors.map(|vector| vector.to_array().map(f64::to_bits)), self.rotation.to_array().map(f64::to_bits))
+    }
 }
 
 impl Fliers {
@@ -104,6 +111,7 @@ impl Fliers {
             bodies,
             proximity: Proximity::of(scenario),
             was_free: false,
+            compared: Vec::new(),
             fleet,
             drifts: Vec::with_capacity(count),
             drift_m_s,
@@ -166,6 +174,21 @@ impl Fliers {
         Ok(())
     }
 
+    /// Moves and turns the bodies without contacts, and again with the engine. The results must be the same.
+    fn drift_in_both(&mut self, dt_s: f64) -> Result<(), PlantError> {
+        self.compared.clone_from(&self.bodies);
+        self.drift_freely(dt_s)?;
+        std::mem::swap(&mut self.bodies, &mut self.compared);
+        let proximity = self.proximity.clone();
+        self.drift_in_engine(dt_s)?;
+        let mut both = self.bodies.iter().zip(&self.compared);
+        if let Some(vehicle) = both.position(|(engine, free)| engine.bits() != free.bits()) {
+            return Err(PlantError::EngineDiffers { vehicle });
+        }
+        self.proximity = proximity;
+        Ok(())
+    }
+
     /// Takes the poses after the drift and applies the other half of the kick.
     fn end(&mut self, dt_s: f64) {
         let lag = self.fleet.dynamics.rotor_lag(dt_s);
@@ -204,6 +227,7 @@ impl Clone for Fliers {
             bodies: self.bodies.clone(),
             proximity: self.proximity.clone(),
             was_free: self.was_free,
+            compared: Vec::new(),
             fleet: self.fleet.clone(),
             drifts: self.drifts.clone(),
             drift_m_s: self.drift_m_s.clone(),
@@ -232,11 +256,12 @@ impl Plant for Fliers {
         self.fleet.run_attitude();
         self.begin(dt_s);
         self.airframe += began.elapsed();
-        self.was_free = self.proximity.begin_step(self.bodies.iter().map(|body| body.position));
-        if self.was_free {
-            self.drift_freely(dt_s)?;
-        } else {
-            self.drift_in_engine(dt_s)?;
+        let maker = self.proximity.begin_step(self.bodies.iter().map(|body| body.position));
+        self.was_free = maker == Maker::FreeStep;
+        match maker {
+            Maker::Engine => self.drift_in_engine(dt_s)?,
+            Maker::FreeStep => self.drift_freely(dt_s)?,
+            Maker::Both => self.drift_in_both(dt_s)?,
         }
         let began = self.stopwatch.start();
         self.end(dt_s);
@@ -264,8 +289,12 @@ impl Plant for Fliers {
         self.proximity.forget();
     }
 
-    fn allow_free_steps(&mut self) {
-        self.proximity.allow_free_steps();
+    fn allow_free_steps(&mut self, free: FreeSteps) {
+        self.proximity.allow_free_steps(free);
+    }
+
+    fn engine_steps(&self) -> Option<u64> {
+        Some(self.proximity.engine_steps())
     }
 
     fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {

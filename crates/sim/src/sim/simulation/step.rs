@@ -150,6 +150,7 @@ impl Simulation {
         };
         let undefined = moved.map_err(|error| match error {
             PlantError::NotFinite { vehicle } => Breakdown::StateNotFinite { step, vehicle }.into(),
+            PlantError::EngineDiffers { vehicle } => Breakdown::EngineDiffers { step, vehicle }.into(),
             PlantError::Stalled => Breakdown::Stalled { step }.into(),
             PlantError::Law(source) => Ending::LawUndefined(source),
         })?;
