@@ -9,6 +9,8 @@
 //! | [`target`] | legs of formations, arrival criteria, assignment of vehicles to slots |
 //! | [`space`] | neighbours by distance, point sets with a minimum spacing, shapes of obstacles |
 //! | [`wind`] | mean wind, gusts and turbulence by exact filters |
+//!
+//! The feature `drawn`, on by default, holds formations drawn as letters, SVG and PNG pictures: `formation::Drawing`.
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 

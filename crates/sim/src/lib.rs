@@ -19,6 +19,9 @@
 //! | [`continuous`] | solution of the equations of motion in continuous time |
 //! | [`metrics`] | running metrics of recorded samples |
 //! | [`plan`] | formations of a flight, their placement over the swarm, and edge tensions |
+//!
+//! The feature `drawn`, on by default, reads formations drawn as letters, SVG and PNG pictures. A build without it
+//! refuses these shapes with an error that names the feature.
 
 #![deny(clippy::print_stdout, clippy::print_stderr, clippy::dbg_macro)]
 

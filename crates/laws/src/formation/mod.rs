@@ -4,17 +4,20 @@
 //! here may exclude these motions.
 
 mod assignment;
+#[cfg(feature = "drawn")]
 mod drawn;
 mod fit;
 mod shapes;
 
 use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
 
 use crate::space::closest_pair;
 use tautline_core::swarm::{Pair, Rows, row, separation, set_row};
 
 pub use assignment::{most_assigned, optimal_slots, optimal_slots_around};
-pub use drawn::{Drawing, DrawingError, Ink, MAX_DRAWN_SLOTS, MAX_PIXELS, MAX_TEXT_CHARS};
+#[cfg(feature = "drawn")]
+pub use drawn::{Drawing, DrawingError, MAX_DRAWN_SLOTS, MAX_PIXELS, MAX_TEXT_CHARS};
 pub use fit::affine_dimension;
 pub use fit::{Freedom, PositionError, RigidMotion, best_rigid_motion, procrustes_rms_m};
 pub use fit::{evaluated_edges, largest_edge_error_m};
@@ -132,6 +135,18 @@ impl Formation {
     pub fn min_distance(&self) -> Option<(Pair, f64)> {
         closest_pair(&self.slots_m)
     }
+}
+
+/// Pixels of a picture that are drawn.
+#[derive(Clone, Copy, Debug, Deserialize, Eq, PartialEq, Serialize, schemars::JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Ink {
+    /// Pixels darker than middle grey on white.
+    Dark,
+    /// Pixels lighter than middle grey on black.
+    Light,
+    /// Pixels with an opacity of more than half.
+    Opaque,
 }
 
 #[cfg(test)]

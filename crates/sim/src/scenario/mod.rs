@@ -9,6 +9,8 @@ mod build;
 pub mod builtin;
 mod check;
 mod document;
+#[cfg(feature = "drawn")]
+mod drawing;
 mod environment;
 mod error;
 mod external;

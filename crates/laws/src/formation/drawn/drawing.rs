@@ -2,10 +2,10 @@
 
 use thiserror::Error;
 
-use crate::formation::Formation;
+use crate::formation::{Formation, Ink};
 
 use super::outline::{self, Curves, Point, Region, regions};
-use super::picture::{Ink, Mask, mask};
+use super::picture::{Mask, mask};
 use super::spread::spread;
 
 use tautline_core::swarm::{Rows, set_row};

@@ -13,4 +13,3 @@ mod tests;
 pub use drawing::Drawing;
 pub use drawing::DrawingError;
 pub use drawing::{MAX_DRAWN_SLOTS, MAX_PIXELS, MAX_TEXT_CHARS};
-pub use picture::Ink;

@@ -3,22 +3,10 @@
 use std::io::Cursor;
 
 use png::{ColorType, Decoder, DecodingError, Limits, Transformations};
-use serde::{Deserialize, Serialize};
 
 use super::drawing::{DrawingError, MAX_PIXELS};
 use super::outline::{Point, Region};
-
-/// Pixels of a picture that are drawn.
-#[derive(Clone, Copy, Debug, Deserialize, Eq, PartialEq, Serialize, schemars::JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Ink {
-    /// Pixels darker than middle grey on white.
-    Dark,
-    /// Pixels lighter than middle grey on black.
-    Light,
-    /// Pixels with an opacity of more than half.
-    Opaque,
-}
+use crate::formation::Ink;
 
 /// Returns the drawn part of a PNG picture. Without an ink: opaque pixels if some pixel is not opaque, else dark ones.
 pub(super) fn mask(bytes: &[u8], ink: Option<Ink>) -> Result<Mask, DrawingError> {
