@@ -167,7 +167,7 @@ pub enum FreeSteps {
     Compared,
 }
 
-/// Number of free steps of which the engine makes one ([`FreeSteps::Compared`]).
+/// The engine repeats one of this number of free steps ([`FreeSteps::Compared`]).
 pub const COMPARED_EACH: u32 = 8;
 
 /// Error of a step of a plant.
