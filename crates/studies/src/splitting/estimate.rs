@@ -183,7 +183,7 @@ impl RandomProcess for SimulatedFlight<'_> {
         // The replay of a flight reports its events.
         drop(self.simulation.events());
         if let Some(Ending::BrokeDown(defect @ Breakdown::EngineDiffers { .. })) = self.simulation.ending() {
-            self.defect.get_or_insert_with(|| defect.clone());
+            self.defect.get_or_insert(*defect);
         }
         goes_on
     }
