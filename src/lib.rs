@@ -39,7 +39,7 @@
 pub mod cli;
 
 pub use tautline_audit as audit;
-pub use tautline_core::{fact, failure, files, monitor, nalgebra, option, record, swarm, text, track};
+pub use tautline_core::{fact, failure, files, monitor, nalgebra, obstacle, option, record, swarm, text, track};
 pub use tautline_laws::{formation, graph, law, observation, space, target, wind};
 pub use tautline_recordings::{export, mcap, read};
 #[cfg(feature = "viewer")]

@@ -231,9 +231,9 @@ fn a_peak_of_the_start_gives_control_a_logarithmic_axis() {
 
 #[test]
 fn paths_show_obstacles_within_the_axes() {
-    let ball = |x: f64, radius_m: f64| tautline::audit::Obstacle {
+    let ball = |x: f64, radius_m: f64| tautline::audit::MovingObstacle {
         name: "ball".to_owned(),
-        shape: tautline::audit::Shape::Ball { radius_m },
+        shape: tautline::obstacle::Shape::Ball { radius_m },
         clearance_m: None,
         path: vec![(0.0, [x, 1.0, 0.0].into())],
     };

@@ -4,11 +4,12 @@ use super::auditor::{AuditError, check_instant};
 use super::cross_check::KeepOut;
 use super::enclosure::Target;
 use super::ledger::{ClosestPairs, Lists, Results};
-use super::obstacle::{Obstacle, ObstacleError, ObstacleFault};
+use super::obstacle::{self, MovingObstacle, ObstacleError, ObstacleFault};
 use super::outcome::{Approach, ObjectPair, ParryEvidence, Status, Undecided, Violation};
 use super::pair_sweep::PairSweep;
 use super::segment::Segment;
 use super::sweep::{Interval, MIN_LIMIT_M};
+use tautline_core::obstacle::Obstacle;
 use tautline_core::swarm::{Rows, row};
 
 /// Rounding of a distance from a surface, relative to the lengths that it is computed from.
@@ -39,7 +40,6 @@ pub struct ClearanceAuditor {
 #[derive(Clone, Debug)]
 struct GuardedObstacle {
     obstacle: Obstacle,
-    place_m: nalgebra::Vector3<f64>,
     keep_out: KeepOut,
 }
 
@@ -75,20 +75,17 @@ pub struct ClearanceOutcome {
 }
 
 impl ClearanceAuditor {
-    /// Creates an auditor of `vehicles` vehicles among obstacles at rest, each with a clearance.
+    /// Creates an auditor of `vehicles` vehicles among obstacles at rest.
     ///
     /// # Errors
-    /// [`ObstacleError`] if an obstacle is invalid, moves, or has no clearance above zero.
+    /// [`ObstacleError`] if an obstacle is invalid, or has no clearance above zero.
     pub fn new(vehicles: usize, obstacles: &[Obstacle]) -> Result<Self, ObstacleError> {
         let judged = obstacles.iter().map(|obstacle| {
-            obstacle.check()?;
-            let wrong = |fault| ObstacleError { name: obstacle.name.clone(), fault };
-            let [(_, place_m)] = obstacle.path[..] else {
-                return Err(wrong(ObstacleFault::Moves));
-            };
-            let limit_m = obstacle.clearance_m.filter(|&limit_m| limit_m >= MIN_LIMIT_M);
-            let limit_m = limit_m.ok_or_else(|| wrong(ObstacleFault::NoClearance))?;
-            Ok(GuardedObstacle { obstacle: obstacle.clone(), place_m, keep_out: KeepOut::new(limit_m) })
+            MovingObstacle::from(obstacle).check()?;
+            if obstacle.clearance_m < MIN_LIMIT_M {
+                return Err(ObstacleError { name: obstacle.name.clone(), fault: ObstacleFault::NoClearance });
+            }
+            Ok(GuardedObstacle { obstacle: obstacle.clone(), keep_out: KeepOut::new(obstacle.clearance_m) })
         });
         Ok(Self {
             obstacles: judged.collect::<Result<_, _>>()?,
@@ -138,9 +135,9 @@ impl ClearanceAuditor {
         let (from, to) = (row(&self.positions_m, vehicle), row(positions_m, vehicle));
         let (moved_m, is_first) = ((to - from).norm(), self.time_s.is_none());
         for index in 0..self.obstacles.len() {
-            let GuardedObstacle { obstacle, place_m, keep_out } = &self.obstacles[index];
+            let GuardedObstacle { obstacle: Obstacle { place_m, shape, .. }, keep_out } = &self.obstacles[index];
             let (place, limit_m) = (vehicle * self.obstacles.len() + index, keep_out.delta_m);
-            let end_m = obstacle.shape.distance(to - place_m);
+            let end_m = obstacle::distance(shape, to - place_m);
             let start_m = if is_first { end_m } else { self.distances_m[place] };
             self.distances_m[place] = end_m;
             self.smallest_margin_m = self.smallest_margin_m.min(end_m - limit_m);
@@ -152,7 +149,7 @@ impl ClearanceAuditor {
                 continue;
             }
             let known = self.results.ledger.violations.len();
-            let (target, may_violate) = (Target::Shape(&obstacle.shape), least_m < limit_m);
+            let (target, may_violate) = (Target::Shape(shape), least_m < limit_m);
             let standing = Segment::straight(step.from_s, step.to_s, *place_m, *place_m);
             let flying = Segment::straight(step.from_s, step.to_s, from, to);
             PairSweep { pair, target, keep_out: keep_out.clone(), cutoff, judges: true, may_violate, above: None }
@@ -196,8 +193,7 @@ impl ClearanceAuditor {
 /// inside.
 #[must_use]
 pub fn swept_distance_m(obstacle: &Obstacle, from: nalgebra::Vector3<f64>, to: nalgebra::Vector3<f64>) -> f64 {
-    let place_m = obstacle.path.first().map_or_else(nalgebra::Vector3::zeros, |&(_, place_m)| place_m);
-    obstacle.shape.closest(from - place_m, to - place_m).0
+    obstacle::closest(&obstacle.shape, from - obstacle.place_m, to - obstacle.place_m).0
 }
 
 #[cfg(test)]
@@ -207,9 +203,10 @@ mod tests {
 
     use super::*;
     use crate::obstacle::one_of_each;
+    use tautline_core::obstacle::Shape;
 
-    fn obstacle_at_origin(shape: super::super::Shape, clearance_m: f64) -> Obstacle {
-        Obstacle { name: "o".to_owned(), shape, clearance_m: Some(clearance_m), path: vec![(0.0, Vector3::zeros())] }
+    fn obstacle_at_origin(shape: Shape, clearance_m: f64) -> Obstacle {
+        Obstacle { name: "o".to_owned(), place_m: Vector3::zeros(), shape, clearance_m }
     }
 
     fn fly(auditor: &mut ClearanceAuditor, way: &[[f64; 3]]) -> (usize, usize) {
@@ -226,7 +223,7 @@ mod tests {
     fn a_vehicle_that_passes_an_obstacle_between_two_instants_is_found() {
         for shape in one_of_each() {
             let mut auditor = ClearanceAuditor::new(1, &[obstacle_at_origin(shape, 0.5)]).unwrap();
-            let along = if matches!(shape, super::super::Shape::HalfSpace { .. }) {
+            let along = if matches!(shape, Shape::HalfSpace { .. }) {
                 [[0.0, 0.0, 9.0], [0.0, 0.0, 0.5], [0.0, 0.0, 9.0]]
             } else {
                 [[-9.0, 0.1, 0.0], [9.0, 0.1, 0.0], [9.0, 20.0, 0.0]]
@@ -243,7 +240,7 @@ mod tests {
 
     #[test]
     fn a_violation_over_several_steps_is_one_and_may_last_to_the_end() {
-        let ball = super::super::Shape::Ball { radius_m: 1.0 };
+        let ball = Shape::Ball { radius_m: 1.0 };
         let mut auditor = ClearanceAuditor::new(1, &[obstacle_at_origin(ball, 1.0)]).unwrap();
         let way = [[-4.0, 0.0, 0.0], [-1.5, 0.0, 0.0], [1.5, 0.0, 0.0], [4.0, 0.0, 0.0], [1.5, 0.0, 0.0]];
         assert_eq!(fly(&mut auditor, &way), (2, 1));
@@ -257,12 +254,10 @@ mod tests {
 
     #[test]
     fn invalid_input_is_refused_and_keeps_the_outcome_undecided() {
-        let ball = obstacle_at_origin(super::super::Shape::Ball { radius_m: 1.0 }, 1.0);
+        let ball = obstacle_at_origin(Shape::Ball { radius_m: 1.0 }, 1.0);
         for wrong in [
-            Obstacle { clearance_m: None, ..ball.clone() },
-            Obstacle { clearance_m: Some(0.0), ..ball.clone() },
-            Obstacle { path: vec![(0.0, Vector3::zeros()), (1.0, Vector3::x())], ..ball.clone() },
-            Obstacle { shape: super::super::Shape::Ball { radius_m: -1.0 }, ..ball.clone() },
+            Obstacle { clearance_m: 0.0, ..ball.clone() },
+            Obstacle { shape: Shape::Ball { radius_m: -1.0 }, ..ball.clone() },
         ] {
             assert!(ClearanceAuditor::new(1, &[wrong]).is_err());
         }

@@ -10,9 +10,10 @@ use parry3d::shape::{Ball, Capsule, Cuboid, Cylinder, HalfSpace};
 
 use super::cylinder::Cylinder as SafetyCylinder;
 use super::enclosure::{Minimum, Search, Target};
-use super::obstacle::Shape;
+use super::obstacle;
 use super::polynomial::{motion_deviation, value};
 use super::sweep::{ClosestPoint, RelativeMotion, Span, larger};
+use tautline_core::obstacle::Shape;
 
 /// Largest number of chords per segment of a curve.
 const MAX_CHORDS: u32 = 64;
@@ -78,7 +79,7 @@ fn from_shape(shape: &Shape, limit: f64, found: &Minimum, position: impl Fn(f64)
     let points = (0..=PARTS).map(|k| f64::from(k) / f64::from(PARTS));
     let measured = |u: f64| {
         let point = position(u);
-        (distance(shape, point), ROUNDING * (point.norm() + shape.radius() + limit))
+        (distance(shape, point), ROUNDING * (point.norm() + obstacle::radius(shape) + limit))
     };
     let (there, rounding) = measured(found.at);
     let same = (there - found.upper.max(0.0)).abs() <= rounding;
@@ -117,7 +118,7 @@ pub(super) fn from_cylinder(
 /// Returns the distance of a point from a shape by parry, zero inside.
 fn distance(shape: &Shape, point: Vector3<f64>) -> f64 {
     let vector = |v: Vector3<f64>| Vector::new(v.x, v.y, v.z);
-    let point = vector(shape.in_box_frame(point));
+    let point = vector(obstacle::in_box_frame(shape, point));
     match shape {
         Shape::Ball { radius_m } => Ball::new(*radius_m).distance_to_local_point(point, true),
         Shape::Box { half_m, .. } => Cuboid::new(vector(*half_m)).distance_to_local_point(point, true),
@@ -264,7 +265,7 @@ mod tests {
             for k in 0..50_u32 {
                 let turn = f64::from(k) * 2.4;
                 let point = Vector3::new(3.0 * turn.cos(), 3.0 * turn.sin(), 0.1 * f64::from(k) - 2.0);
-                let ours = shape.distance(point).max(0.0);
+                let ours = obstacle::distance(&shape, point).max(0.0);
                 assert!((distance(&shape, point) - ours).abs() < 1e-14, "{shape:?} {point:?}");
             }
         }
@@ -279,7 +280,7 @@ mod tests {
                 // Past the obstacle: nearest somewhere between the ends.
                 let across = Vector3::new(-far.y, far.x, 0.0).normalize();
                 let along = |u: f64| far + across * (6e6 * u - 2.9e6);
-                let (lower, fraction) = shape.closest(along(0.0), along(1.0));
+                let (lower, fraction) = obstacle::closest(&shape, along(0.0), along(1.0));
                 let right = Minimum { lower, upper: lower, at: fraction };
                 assert!(from_shape(&shape, 1.0, &right, along).agrees, "{shape:?} {far:?}");
                 // Inside, parry returns zero at every depth.
@@ -294,7 +295,7 @@ mod tests {
     fn a_wrong_minimum_is_a_disagreement() {
         let along = |u: f64| Vector3::new(6.0 * u - 3.0, 2.0, 0.0);
         for shape in one_of_each() {
-            let (lower, fraction) = shape.closest(along(0.0), along(1.0));
+            let (lower, fraction) = obstacle::closest(&shape, along(0.0), along(1.0));
             let right = Minimum { lower, upper: lower, at: fraction };
             assert!(from_shape(&shape, 1.0, &right, along).agrees, "{shape:?}");
             for wrong in [Minimum { upper: lower + 0.1, ..right }, Minimum { lower: lower + 3.0, ..right }] {

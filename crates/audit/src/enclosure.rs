@@ -8,10 +8,11 @@
 use nalgebra::Vector3;
 
 use super::cylinder::Cylinder;
-use super::obstacle::Shape;
+use super::obstacle;
 use super::outcome::WIDTH_M;
 use super::polynomial::{BernsteinBasis, classify_parts, rescale, value};
 use super::sweep::{RelativeMotion, Span};
+use tautline_core::obstacle::Shape;
 
 /// Largest number of parts that a search examines before it returns the interval reached so far.
 const MAX_PARTS: usize = 20_000;
@@ -37,7 +38,7 @@ impl Target<'_> {
         match self {
             Self::Origin => point.norm(),
             Self::Cylinder(cylinder) => cylinder.distance(point),
-            Self::Shape(shape) => shape.distance(point),
+            Self::Shape(shape) => obstacle::distance(shape, point),
         }
     }
 
@@ -120,7 +121,7 @@ impl<'a> Search<'a> {
                 let approach = motion.closest();
                 (approach.separation_m(), approach.at)
             }
-            (Some(motion), Target::Shape(shape)) => shape.closest(motion.from, motion.to),
+            (Some(motion), Target::Shape(shape)) => obstacle::closest(shape, motion.from, motion.to),
             (None, _) | (_, Target::Cylinder(_)) => return self.minimum_within((0.0, 1.0), cutoff),
         };
         (lower < cutoff).then_some(Minimum { lower, upper: lower, at: fraction })
@@ -276,10 +277,10 @@ impl<'a> Search<'a> {
         let (mut motion_deviation, mut high) = (0.0_f64, f64::NEG_INFINITY);
         for (k, control) in self.basis.points(&self.part).enumerate() {
             motion_deviation = motion_deviation.max((control - (from + (to - from) * (k as f64 / last))).norm());
-            high = high.max(shape.distance(control));
+            high = high.max(obstacle::distance(shape, control));
         }
         let rounding = 4.0 * n as f64 * f64::EPSILON * self.magnitude();
-        (shape.closest(from, to).0 - motion_deviation - rounding, high + rounding)
+        (obstacle::closest(shape, from, to).0 - motion_deviation - rounding, high + rounding)
     }
 
     /// Returns a bound on the sum of the terms of a position.
@@ -365,7 +366,7 @@ mod tests {
 
     #[test]
     fn the_distance_of_a_curve_from_an_obstacle_is_enclosed() {
-        let shape = Shape::Box { half_m: Vector3::repeat(0.25), yaw_rad: 0.0 };
+        let shape = Shape::Box { half_m: Vector3::repeat(0.25), yaw_deg: 0.0 };
         // A parabola over the box: z = 1 + (u - 1/2)^2, x from -1 to 1.
         let r = [Vector3::new(-1.0, 0.0, 1.25), Vector3::new(2.0, 0.0, -1.0), Vector3::new(0.0, 0.0, 1.0)];
         let found = Search::new(Target::Shape(&shape), &r).minimum(f64::INFINITY).unwrap();

@@ -63,7 +63,7 @@ pub use cylinder::Cylinder;
 pub use decimals::are_decimals_apart;
 pub use findings::{LISTED, Tally};
 pub use nalgebra;
-pub use obstacle::{Obstacle, ObstacleError, ObstacleFault, Shape};
+pub use obstacle::{MovingObstacle, ObstacleError, ObstacleFault};
 pub use outcome::{
     Approach, AuditOutcome, Disagreement, ObjectPair, ParryEvidence, Status, StepFinding, Undecided, Violation,
 };

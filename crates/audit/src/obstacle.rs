@@ -1,21 +1,22 @@
-//! Obstacles: shapes, paths, and distances from them.
+//! Obstacles: their paths, and distances from them.
 
 use nalgebra::Vector3;
 
 use super::segment::Segment;
 use super::sweep::{MAX_LENGTH_M, RelativeMotion};
+use tautline_core::obstacle::{Obstacle, Shape};
 
 /// Bound of the time before the first and after the last point of a path, during which the obstacle stands still \[s\].
 const ALWAYS_S: f64 = 1e300;
 /// Largest computed distance from a box, relative to the coordinates, at which a path may still enter the box.
 const INSIDE: f64 = 1e-9;
 
-/// Object that vehicles must stay clear of.
+/// Object on a path that vehicles must stay clear of.
 ///
 /// A vehicle must stay [`clearance_m`](Self::clearance_m) away from its surface. The default is the larger of the
 /// vehicle's radius and delta / 2, so that a keep-out ball may touch an obstacle as it may touch another one.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Obstacle {
+pub struct MovingObstacle {
     /// Name.
     pub name: String,
     /// Shape.
@@ -25,37 +26,6 @@ pub struct Obstacle {
     /// Path: times \[s\] and positions \[m\]. One point for an obstacle at rest, else points at increasing times,
     /// joined by straight lines. The obstacle stands still before the first and after the last point.
     pub path: Vec<(f64, Vector3<f64>)>,
-}
-
-/// Shape of an obstacle, relative to its position.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shape {
-    /// A ball.
-    Ball {
-        /// Radius \[m\].
-        radius_m: f64,
-    },
-    /// Upright box.
-    Box {
-        /// Half lengths \[m\].
-        half_m: Vector3<f64>,
-        /// Rotation about the vertical \[rad\], counter-clockwise seen from above.
-        yaw_rad: f64,
-    },
-    /// All points within a radius of a line segment.
-    Capsule {
-        /// First end of the line segment, relative to the position of the obstacle \[m\].
-        from_m: Vector3<f64>,
-        /// Second end \[m\].
-        to_m: Vector3<f64>,
-        /// Radius \[m\].
-        radius_m: f64,
-    },
-    /// All points behind a plane through the position of the obstacle.
-    HalfSpace {
-        /// Normal that points out of the half-space; of any length but zero.
-        normal: Vector3<f64>,
-    },
 }
 
 /// Error in the definition of an obstacle.
@@ -78,7 +48,7 @@ pub enum ObstacleFault {
     /// A length of a box is not above 0, or too large.
     #[error("every length of the box must be above 0 m")]
     BoxLength,
-    /// The yaw of a box \[rad\] is not finite.
+    /// The yaw of a box \[deg\] is not finite.
     #[error("the yaw must be a finite number, got {0:?}")]
     Yaw(f64),
     /// An end of a capsule is not finite, or too far away.
@@ -90,7 +60,7 @@ pub enum ObstacleFault {
     /// The clearance \[m\] is negative, not finite or too large.
     #[error("the clearance must be at least 0 m, got {0:?}")]
     Clearance(f64),
-    /// The clearance of an obstacle of a flight is missing or 0.
+    /// The clearance of an obstacle of a flight is 0.
     #[error("the clearance must be above 0 m")]
     NoClearance,
     /// The path has no point.
@@ -107,12 +77,16 @@ pub enum ObstacleFault {
         /// Time of the point before it \[s\].
         before_s: f64,
     },
-    /// An obstacle of a flight moves.
-    #[error("it moves; an obstacle of a flight must be at rest")]
-    Moves,
 }
 
-impl Obstacle {
+impl From<&Obstacle> for MovingObstacle {
+    fn from(obstacle: &Obstacle) -> Self {
+        let Obstacle { name, place_m, shape, clearance_m } = obstacle.clone();
+        Self { name, shape, clearance_m: Some(clearance_m), path: vec![(0.0, place_m)] }
+    }
+}
+
+impl MovingObstacle {
     /// Checks that the obstacle can be judged.
     ///
     /// # Errors
@@ -126,7 +100,7 @@ impl Obstacle {
                 return wrong(ObstacleFault::Radius(*radius_m));
             }
             Shape::Box { half_m, .. } if !half_m.iter().all(|x| length(*x)) => return wrong(ObstacleFault::BoxLength),
-            Shape::Box { yaw_rad, .. } if !yaw_rad.is_finite() => return wrong(ObstacleFault::Yaw(*yaw_rad)),
+            Shape::Box { yaw_deg, .. } if !yaw_deg.is_finite() => return wrong(ObstacleFault::Yaw(*yaw_deg)),
             Shape::Capsule { from_m, to_m, .. } if !(place(from_m) && place(to_m)) => {
                 return wrong(ObstacleFault::CapsuleEnd);
             }
@@ -180,7 +154,7 @@ impl Obstacle {
     pub fn scaled(&self, factor: f64) -> Self {
         let shape = match self.shape {
             Shape::Ball { radius_m } => Shape::Ball { radius_m: radius_m * factor },
-            Shape::Box { half_m, yaw_rad } => Shape::Box { half_m: half_m * factor, yaw_rad },
+            Shape::Box { half_m, yaw_deg } => Shape::Box { half_m: half_m * factor, yaw_deg },
             Shape::Capsule { from_m, to_m, radius_m } => {
                 Shape::Capsule { from_m: from_m * factor, to_m: to_m * factor, radius_m: radius_m * factor }
             }
@@ -205,114 +179,114 @@ impl Obstacle {
     }
 }
 
-impl Shape {
-    /// Returns the distance of a point from the surface \[m\], negative inside. The point is relative to the obstacle's
-    /// position.
-    pub(super) fn distance(&self, point: Vector3<f64>) -> f64 {
-        if let Self::HalfSpace { normal } = self {
-            return point.dot(&normal.normalize());
-        }
-        let point = self.in_box_frame(point);
-        let off = self.offset_from_core(point).norm();
-        match self {
-            Self::Box { half_m, .. } if off == 0.0 => (point.abs() - half_m).max(),
-            _ => off - self.radius(),
-        }
+/// Returns the distance of a point from the surface \[m\], negative inside. The point is relative to the obstacle's
+/// position.
+pub(super) fn distance(shape: &Shape, point: Vector3<f64>) -> f64 {
+    if let Shape::HalfSpace { normal } = shape {
+        return point.dot(&normal.normalize());
     }
+    let point = in_box_frame(shape, point);
+    let off = offset_from_core(shape, point).norm();
+    match shape {
+        Shape::Box { half_m, .. } if off == 0.0 => (point.abs() - half_m).max(),
+        _ => off - radius(shape),
+    }
+}
 
-    /// Returns the smallest distance of a point on a straight path, and the fraction of the path at which it is first
-    /// reached.
-    ///
-    /// The core of a shape is a point, a line segment or a box. The vector from the nearest point of the core to the
-    /// moving point is linear in the fraction between changes of the nearest feature. Each part has a closed form.
-    pub(super) fn closest(&self, from: Vector3<f64>, to: Vector3<f64>) -> (f64, f64) {
-        if let Self::HalfSpace { .. } = self {
-            let (start, end) = (self.distance(from), self.distance(to));
-            return if end < start { (end, 1.0) } else { (start, 0.0) };
-        }
-        let (from, to) = (self.in_box_frame(from), self.in_box_frame(to));
-        let position = |u: f64| if u >= 1.0 { to } else { from + (to - from) * u };
-        let mut best = (f64::INFINITY, 0.0);
-        let mut start = (0.0, self.offset_from_core(from));
-        for u in self.feature_changes(from, to).into_iter().chain([1.0]) {
-            let end = (u, self.offset_from_core(position(u)));
-            let part = RelativeMotion::new(start.1, end.1).closest();
-            if part.squared < best.0 {
-                best = (part.squared, start.0 + (end.0 - start.0) * part.at);
-            }
-            start = end;
-        }
-        let outside = (best.0.sqrt() - self.radius(), best.1);
-        let Self::Box { half_m, .. } = self else { return outside };
-        // The ends of the part inside the box are rounded and may lie outside.
-        let rounding = INSIDE * (from.amax() + to.amax() + half_m.amax());
-        if outside.0 > rounding {
-            return outside;
-        }
-        let inside = deepest(half_m, from, to);
-        if inside.0 <= 0.0 { inside } else { outside }
+/// Returns the smallest distance of a point on a straight path, and the fraction of the path at which it is first
+/// reached.
+///
+/// The core of a shape is a point, a line segment or a box. The vector from the nearest point of the core to the
+/// moving point is linear in the fraction between changes of the nearest feature. Each part has a closed form.
+pub(super) fn closest(shape: &Shape, from: Vector3<f64>, to: Vector3<f64>) -> (f64, f64) {
+    if let Shape::HalfSpace { .. } = shape {
+        let (start, end) = (distance(shape, from), distance(shape, to));
+        return if end < start { (end, 1.0) } else { (start, 0.0) };
     }
+    let (from, to) = (in_box_frame(shape, from), in_box_frame(shape, to));
+    let position = |u: f64| if u >= 1.0 { to } else { from + (to - from) * u };
+    let mut best = (f64::INFINITY, 0.0);
+    let mut start = (0.0, offset_from_core(shape, from));
+    for u in feature_changes(shape, from, to).into_iter().chain([1.0]) {
+        let end = (u, offset_from_core(shape, position(u)));
+        let part = RelativeMotion::new(start.1, end.1).closest();
+        if part.squared < best.0 {
+            best = (part.squared, start.0 + (end.0 - start.0) * part.at);
+        }
+        start = end;
+    }
+    let outside = (best.0.sqrt() - radius(shape), best.1);
+    let Shape::Box { half_m, .. } = shape else { return outside };
+    // The ends of the part inside the box are rounded and may lie outside.
+    let rounding = INSIDE * (from.amax() + to.amax() + half_m.amax());
+    if outside.0 > rounding {
+        return outside;
+    }
+    let inside = deepest(half_m, from, to);
+    if inside.0 <= 0.0 { inside } else { outside }
+}
 
-    pub(super) fn radius(&self) -> f64 {
-        match self {
-            Self::Ball { radius_m } | Self::Capsule { radius_m, .. } => *radius_m,
-            Self::Box { .. } | Self::HalfSpace { .. } => 0.0,
-        }
+/// Returns the radius around the core \[m\].
+pub(super) fn radius(shape: &Shape) -> f64 {
+    match shape {
+        Shape::Ball { radius_m } | Shape::Capsule { radius_m, .. } => *radius_m,
+        Shape::Box { .. } | Shape::HalfSpace { .. } => 0.0,
     }
+}
 
-    /// Transforms a point into the frame in which a box is not rotated.
-    pub(super) fn in_box_frame(&self, point: Vector3<f64>) -> Vector3<f64> {
-        match self {
-            Self::Box { yaw_rad, .. } if *yaw_rad != 0.0 => {
-                let (sin, cos) = (libm::sin(*yaw_rad), libm::cos(*yaw_rad));
-                Vector3::new(cos * point.x + sin * point.y, cos * point.y - sin * point.x, point.z)
-            }
-            _ => point,
+/// Transforms a point into the frame in which a box is not rotated.
+pub(super) fn in_box_frame(shape: &Shape, point: Vector3<f64>) -> Vector3<f64> {
+    match shape {
+        Shape::Box { yaw_deg, .. } if *yaw_deg != 0.0 => {
+            let yaw_rad = yaw_deg.to_radians();
+            let (sin, cos) = (libm::sin(yaw_rad), libm::cos(yaw_rad));
+            Vector3::new(cos * point.x + sin * point.y, cos * point.y - sin * point.x, point.z)
         }
+        _ => point,
     }
+}
 
-    /// Returns the vector from the nearest point of the core to a point.
-    fn offset_from_core(&self, point: Vector3<f64>) -> Vector3<f64> {
-        match self {
-            Self::Ball { .. } | Self::HalfSpace { .. } => point,
-            Self::Box { half_m, .. } => point.zip_map(half_m, |x, half| x - x.clamp(-half, half)),
-            Self::Capsule { from_m, to_m, .. } => {
-                let (along, aside) = (to_m - from_m, point - from_m);
-                let squared = along.norm_squared();
-                let share = if squared > 0.0 { (aside.dot(&along) / squared).clamp(0.0, 1.0) } else { 0.0 };
-                aside - along * share
-            }
+/// Returns the vector from the nearest point of the core to a point.
+fn offset_from_core(shape: &Shape, point: Vector3<f64>) -> Vector3<f64> {
+    match shape {
+        Shape::Ball { .. } | Shape::HalfSpace { .. } => point,
+        Shape::Box { half_m, .. } => point.zip_map(half_m, |x, half| x - x.clamp(-half, half)),
+        Shape::Capsule { from_m, to_m, .. } => {
+            let (along, aside) = (to_m - from_m, point - from_m);
+            let squared = along.norm_squared();
+            let share = if squared > 0.0 { (aside.dot(&along) / squared).clamp(0.0, 1.0) } else { 0.0 };
+            aside - along * share
         }
     }
+}
 
-    /// Returns the fractions of a straight path at which the nearest feature changes, in order.
-    fn feature_changes(&self, from: Vector3<f64>, to: Vector3<f64>) -> Vec<f64> {
-        let by = to - from;
-        let mut found = Vec::new();
-        let mut cross = |start: f64, rate: f64| {
-            let u = -start / rate;
-            if u > 0.0 && u < 1.0 {
-                found.push(u);
-            }
-        };
-        match self {
-            Self::Ball { .. } | Self::HalfSpace { .. } => {}
-            Self::Box { half_m, .. } => {
-                for axis in 0..3 {
-                    cross(from[axis] - half_m[axis], by[axis]);
-                    cross(from[axis] + half_m[axis], by[axis]);
-                }
-            }
-            Self::Capsule { from_m, to_m, .. } => {
-                let along = to_m - from_m;
-                let (start, rate) = ((from - from_m).dot(&along), by.dot(&along));
-                cross(start, rate);
-                cross(start - along.norm_squared(), rate);
+/// Returns the fractions of a straight path at which the nearest feature changes, in order.
+fn feature_changes(shape: &Shape, from: Vector3<f64>, to: Vector3<f64>) -> Vec<f64> {
+    let by = to - from;
+    let mut found = Vec::new();
+    let mut cross = |start: f64, rate: f64| {
+        let u = -start / rate;
+        if u > 0.0 && u < 1.0 {
+            found.push(u);
+        }
+    };
+    match shape {
+        Shape::Ball { .. } | Shape::HalfSpace { .. } => {}
+        Shape::Box { half_m, .. } => {
+            for axis in 0..3 {
+                cross(from[axis] - half_m[axis], by[axis]);
+                cross(from[axis] + half_m[axis], by[axis]);
             }
         }
-        found.sort_unstable_by(f64::total_cmp);
-        found
+        Shape::Capsule { from_m, to_m, .. } => {
+            let along = to_m - from_m;
+            let (start, rate) = ((from - from_m).dot(&along), by.dot(&along));
+            cross(start, rate);
+            cross(start - along.norm_squared(), rate);
+        }
     }
+    found.sort_unstable_by(f64::total_cmp);
+    found
 }
 
 /// Returns the largest depth of a straight path in a box that it meets, as a negative distance, and the first fraction
@@ -341,7 +315,7 @@ fn deepest(half_m: &Vector3<f64>, from: Vector3<f64>, to: Vector3<f64>) -> (f64,
 pub(super) fn one_of_each() -> [Shape; 4] {
     [
         Shape::Ball { radius_m: 0.7 },
-        Shape::Box { half_m: Vector3::new(1.0, 0.5, 2.0), yaw_rad: 0.6 },
+        Shape::Box { half_m: Vector3::new(1.0, 0.5, 2.0), yaw_deg: 34.0 },
         Shape::Capsule { from_m: Vector3::new(-1.0, 0.0, 0.0), to_m: Vector3::new(1.0, 1.0, 0.5), radius_m: 0.3 },
         Shape::HalfSpace { normal: Vector3::new(0.0, 3.0, 4.0) },
     ]
@@ -361,12 +335,12 @@ mod tests {
                 let turn = f64::from(k) * 2.4;
                 let from = Vector3::new(3.0 * turn.cos(), 3.0 * turn.sin(), 0.1 * f64::from(k) - 2.0);
                 let to = Vector3::new(-3.0 * (turn + 0.4).cos(), -2.0 * turn.sin(), 1.5 - 0.07 * f64::from(k));
-                let (found, u) = shape.closest(from, to);
+                let (found, u) = closest(&shape, from, to);
                 let sampled =
-                    (0..=STEPS).map(|s| shape.distance(from + (to - from) * (f64::from(s) / f64::from(STEPS))));
+                    (0..=STEPS).map(|s| distance(&shape, from + (to - from) * (f64::from(s) / f64::from(STEPS))));
                 let sampled = sampled.fold(f64::INFINITY, f64::min);
                 assert!(found <= sampled + 1e-12 && sampled - found < TOLERANCE_M, "{shape:?}: {found} {sampled}");
-                assert!((shape.distance(from + (to - from) * u) - found).abs() < 1e-12, "{shape:?}");
+                assert!((distance(&shape, from + (to - from) * u) - found).abs() < 1e-12, "{shape:?}");
             }
         }
     }
@@ -382,14 +356,14 @@ mod tests {
         let mut entered = 0;
         for _ in 0..20_000 {
             let half_m = Vector3::from_fn(|_, _| random(0.1, 3.0));
-            let yaw_rad = if random(0.0, 1.0) < 0.5 { 0.0 } else { random(-3.0, 3.0) };
-            let shape = Shape::Box { half_m, yaw_rad };
+            let yaw_deg = if random(0.0, 1.0) < 0.5 { 0.0 } else { random(-180.0, 180.0) };
+            let shape = Shape::Box { half_m, yaw_deg };
             let [from, to] = [0; 2].map(|_| Vector3::from_fn(|_, _| random(-9.0, 9.0)));
-            let (found, u) = shape.closest(from, to);
-            let sampled = (0..=40).map(|s| shape.distance(from + (to - from) * (f64::from(s) / 40.0)));
+            let (found, u) = closest(&shape, from, to);
+            let sampled = (0..=40).map(|s| distance(&shape, from + (to - from) * (f64::from(s) / 40.0)));
             let sampled = sampled.fold(f64::INFINITY, f64::min);
             assert!(found <= sampled + 1e-12, "{shape:?} {from:?} {to:?}: {found} {sampled}");
-            assert!((shape.distance(from + (to - from) * u) - found).abs() < 1e-12, "{shape:?} {from:?} {to:?}");
+            assert!((distance(&shape, from + (to - from) * u) - found).abs() < 1e-12, "{shape:?} {from:?} {to:?}");
             entered += u32::from(found < 0.0);
         }
         assert!(entered > 1000, "{entered}");
@@ -397,23 +371,23 @@ mod tests {
 
     #[test]
     fn an_obstacle_with_invalid_size_position_or_times_is_refused() {
-        let good = Obstacle {
+        let good = MovingObstacle {
             name: "tower".to_owned(),
             shape: Shape::Ball { radius_m: 1.0 },
             clearance_m: None,
             path: vec![(0.0, Vector3::zeros()), (1.0, Vector3::x())],
         };
         assert_eq!(good.check(), Ok(()));
-        assert_eq!(Obstacle { clearance_m: Some(0.0), ..good.clone() }.check(), Ok(()));
+        assert_eq!(MovingObstacle { clearance_m: Some(0.0), ..good.clone() }.check(), Ok(()));
         for wrong in [
-            Obstacle { shape: Shape::Ball { radius_m: 0.0 }, ..good.clone() },
-            Obstacle { shape: Shape::Box { half_m: Vector3::new(1.0, -1.0, 1.0), yaw_rad: 0.0 }, ..good.clone() },
-            Obstacle { shape: Shape::HalfSpace { normal: Vector3::zeros() }, ..good.clone() },
-            Obstacle { clearance_m: Some(f64::NAN), ..good.clone() },
-            Obstacle { clearance_m: Some(-1e-300), ..good.clone() },
-            Obstacle { path: vec![], ..good.clone() },
-            Obstacle { path: vec![(1.0, Vector3::zeros()), (1.0, Vector3::x())], ..good.clone() },
-            Obstacle { path: vec![(0.0, Vector3::repeat(f64::NAN))], ..good.clone() },
+            MovingObstacle { shape: Shape::Ball { radius_m: 0.0 }, ..good.clone() },
+            MovingObstacle { shape: Shape::Box { half_m: Vector3::new(1.0, -1.0, 1.0), yaw_deg: 0.0 }, ..good.clone() },
+            MovingObstacle { shape: Shape::HalfSpace { normal: Vector3::zeros() }, ..good.clone() },
+            MovingObstacle { clearance_m: Some(f64::NAN), ..good.clone() },
+            MovingObstacle { clearance_m: Some(-1e-300), ..good.clone() },
+            MovingObstacle { path: vec![], ..good.clone() },
+            MovingObstacle { path: vec![(1.0, Vector3::zeros()), (1.0, Vector3::x())], ..good.clone() },
+            MovingObstacle { path: vec![(0.0, Vector3::repeat(f64::NAN))], ..good.clone() },
         ] {
             assert!(wrong.check().is_err(), "{wrong:?}");
         }

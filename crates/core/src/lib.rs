@@ -10,6 +10,7 @@
 //! | [`text`] | formatting of numbers |
 //! | [`failure`], [`monitor`] | errors of requests, and their interface to a caller |
 //! | [`files`] | atomic writes |
+//! | [`obstacle`] | obstacles at rest and their shapes |
 //! | [`half_spaces`] | the point nearest to a wish in half-spaces and a ball, for laws and the shield |
 //!
 //! SI units; each name ends with its unit (`clearance_m`). One inertial frame, z up. Vehicles count from 0 in code and
@@ -22,6 +23,7 @@ pub mod failure;
 pub mod files;
 pub mod half_spaces;
 pub mod monitor;
+pub mod obstacle;
 pub mod option;
 pub mod record;
 pub mod swarm;

@@ -10,8 +10,8 @@ use nalgebra::Vector3;
 
 use crate::formation::Formation;
 use crate::graph::Graph;
-use crate::space::Obstacle;
 use crate::target::Target;
+use tautline_core::obstacle::Obstacle;
 use tautline_core::swarm::{Rows, Swarm, row};
 
 /// Input of a control law at one instant. SI units, one inertial frame.

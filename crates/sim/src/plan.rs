@@ -5,6 +5,7 @@ use std::sync::LazyLock;
 use nalgebra::{Matrix3, Vector3};
 
 use crate::scenario::Scenario;
+use tautline_core::obstacle::Obstacle;
 use tautline_core::record::Event;
 use tautline_core::swarm::{Pair, row};
 use tautline_core::swarm::{Rows, mean_row};
@@ -12,7 +13,6 @@ use tautline_laws::formation::{Formation, Freedom, RigidMotion, best_rigid_motio
 use tautline_laws::graph::Graph;
 use tautline_laws::law::LawSpec;
 use tautline_laws::law::{EdgeTension, EdgeTensionKeys};
-use tautline_laws::space::Obstacle;
 use tautline_laws::target::{Guidance, LegHistory};
 
 /// Formations, graph and edge tensions of a flight.

@@ -19,7 +19,6 @@ use tautline_report::report::page::{self, Badge, Tone};
 use tautline_report::request::{Pictures, ScenarioRequest};
 use tautline_report::run::run_with_free_steps;
 use tautline_sim::scenario::{Draw, ExternalLaw, NamedLaw, Scenario, Template};
-use tautline_sim::sim::audit_obstacle;
 
 /// Assumptions of the numbers.
 const ASSUMED: [&str; 5] = [
@@ -264,7 +263,7 @@ impl Options {
         let (flights, logs): (Vec<_>, Vec<_>) =
             flown.into_iter().map(|(law, seed, scenario, closest, log)| ((law, seed, scenario, closest), log)).unzip();
         let figure = |((law, seed, scenario, ([a, b], at_s, min_m)), log): (&Flown<'_>, &FlightLog)| {
-            let obstacles: Vec<_> = scenario.obstacles.iter().map(audit_obstacle).collect();
+            let obstacles: Vec<_> = scenario.obstacles.iter().map(Into::into).collect();
             let figure = at_closest(&law.name, log, &obstacles, Some(([a - 1, b - 1], *at_s)), &logs);
             let runs = study.runs;
             Figure {

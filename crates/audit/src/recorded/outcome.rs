@@ -11,7 +11,7 @@ use super::well_clear::WellClearOutcome;
 use super::window::within;
 use crate::envelope::EnvelopeOutcome;
 use crate::findings::{Finding, LISTED, Shortlist, Tally};
-use crate::obstacle::Obstacle;
+use crate::obstacle::MovingObstacle;
 use crate::outcome::{Approach, ObjectPair, ParryEvidence, Status, Undecided, Violation};
 use crate::slices::Slice;
 use crate::sweep::Interval;
@@ -220,7 +220,7 @@ impl Outcome {
 
     /// Returns the names of a pair, given the judged obstacles.
     #[must_use]
-    pub fn names(&self, pair: ObjectPair, obstacles: &[Obstacle]) -> [String; 2] {
+    pub fn names(&self, pair: ObjectPair, obstacles: &[MovingObstacle]) -> [String; 2] {
         match pair {
             ObjectPair::Vehicles(pair) => [self.name(pair.first()), self.name(pair.second())],
             ObjectPair::Obstacle { vehicle, obstacle } => {

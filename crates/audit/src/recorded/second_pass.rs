@@ -6,11 +6,12 @@ use super::outcome::{Gap, Outcome};
 use super::settings::{RecordedError, Settings};
 use super::vehicle::Vehicle;
 use crate::enclosure::Target;
-use crate::obstacle::Shape;
+use crate::obstacle;
 use crate::outcome::ObjectPair;
 use crate::pair_sweep::{Overlap, overlaps};
 use crate::segment::Segment;
 use crate::sweep::Interval;
+use tautline_core::obstacle::Shape;
 use tautline_core::swarm::{Rows, set_row};
 use tautline_core::track::Item;
 
@@ -265,7 +266,7 @@ fn samples(overlap: &Overlap<'_>, target: Target<'_>, found: &mut Vec<PairSample
         let closest = match target {
             Target::Origin => motion.closest().at,
             Target::Cylinder(cylinder) => cylinder.closest(&motion).1,
-            Target::Shape(shape) => shape.closest(motion.from, motion.to).1,
+            Target::Shape(shape) => obstacle::closest(shape, motion.from, motion.to).1,
         };
         times_s.push(from_s + (to_s - from_s) * closest);
     }

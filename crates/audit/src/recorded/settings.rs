@@ -8,7 +8,7 @@ use serde::Deserialize;
 use crate::cylinder::Cylinder;
 use crate::enclosure::Target;
 use crate::envelope::{Envelope, Limit, Quantity};
-use crate::obstacle::{Obstacle, ObstacleError};
+use crate::obstacle::{MovingObstacle, ObstacleError};
 use crate::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
 use crate::well_clear::WellClear;
 use tautline_core::option::{
@@ -133,7 +133,7 @@ pub struct Settings {
     /// Names of the vehicles to judge; `None` for all.
     pub only: Option<BTreeSet<String>>,
     /// Obstacles.
-    pub obstacles: Vec<Obstacle>,
+    pub obstacles: Vec<MovingObstacle>,
     /// Yaw setpoints of vehicles by name, for a limit of the yaw rate: times \[s\] in ascending order, and yaw \[deg\].
     pub yaw: BTreeMap<String, Vec<[f64; 2]>>,
     /// Limits on single vehicles. If they are the only limits, separations are not judged.
@@ -364,7 +364,7 @@ impl Limits {
     }
 
     /// Returns the limit for the centre of a vehicle with this radius and an obstacle's surface.
-    pub(super) fn of_obstacle(self, obstacle: &Obstacle, radius: f64) -> f64 {
+    pub(super) fn of_obstacle(self, obstacle: &MovingObstacle, radius: f64) -> f64 {
         obstacle.clearance_m.unwrap_or(if self.by_radii { (0.5 * self.delta).max(radius) } else { 0.5 * self.delta })
     }
 }

@@ -18,7 +18,7 @@ use crate::cross_check::KeepOut;
 use crate::cylinder::Cylinder;
 use crate::enclosure::Target;
 use crate::ledger::{MAX_KEPT, Results};
-use crate::obstacle::Obstacle;
+use crate::obstacle::{self, MovingObstacle};
 use crate::outcome::ObjectPair;
 use crate::pair_sweep::PairSweep;
 use crate::polynomial::motion_deviation;
@@ -70,7 +70,7 @@ pub(super) struct Windows {
 /// Obstacle with its path.
 #[derive(Clone, Debug)]
 struct JudgedObstacle {
-    obstacle: Obstacle,
+    obstacle: MovingObstacle,
     path: Vec<Segment>,
     /// Whether vehicles land on the obstacle, which exempts it while they are on the ground.
     is_landed_on: bool,
@@ -112,8 +112,8 @@ impl ExtentPair {
 
 impl Windows {
     /// Returns windows that judge separations, and distances from obstacles; vehicles land on those in `land_on`.
-    pub(super) fn new(limits: Limits, obstacles: &[Obstacle], land_on: &BTreeSet<String>) -> Self {
-        let judged = |obstacle: &Obstacle| {
+    pub(super) fn new(limits: Limits, obstacles: &[MovingObstacle], land_on: &BTreeSet<String>) -> Self {
+        let judged = |obstacle: &MovingObstacle| {
             let is_landed_on = land_on.contains(&obstacle.name);
             // A pair is skipped if both objects are on the ground.
             let placed = |part| Segment { grounded: Some(is_landed_on), ..part };
@@ -279,7 +279,7 @@ impl Windows {
                 let pair = ObjectPair::Obstacle { vehicle: extent.vehicle, obstacle: index };
                 let limit = self.limits.of_obstacle(obstacle, extent.radius);
                 let (cutoff, chord) = (results.obstacles.cutoff(pair, limit), &extent.chord);
-                let between = obstacle.shape.closest(chord.from - place.from, chord.to - place.to).0;
+                let between = obstacle::closest(&obstacle.shape, chord.from - place.from, chord.to - place.to).0;
                 let least = between - chord.motion_deviation - place.motion_deviation;
                 if least < limit.max(cutoff) {
                     let (target, keep_out) = (Target::Shape(&obstacle.shape), KeepOut::new(limit));

@@ -1,8 +1,9 @@
 //! Distances of a pair over time, and straight lines beside curves.
 
 use nalgebra::Vector3;
+use tautline_audit::Status;
 use tautline_audit::recorded::{Interpolation, ObjectPair, Outcome, PairSample, PairSeries, Settings};
-use tautline_audit::{Shape, Status};
+use tautline_core::obstacle::Shape;
 use tautline_core::swarm::Pair;
 use tautline_core::track::{Item, Piece, Sample};
 

@@ -8,7 +8,8 @@ use std::time::{Duration, Instant};
 use nalgebra::Vector3;
 use tautline_audit::envelope::{Envelope, Fence, Limit, Quantity};
 use tautline_audit::recorded::{Interpolation, Outcome, RecordedError, Settings, TrackAuditor, audit};
-use tautline_audit::{LISTED, Obstacle, Shape, Status};
+use tautline_audit::{LISTED, MovingObstacle, Status};
+use tautline_core::obstacle::Shape;
 use tautline_core::track::{Item, Piece, Sample};
 
 use crate::recorded::{obstacle_at, seen};
@@ -213,7 +214,7 @@ fn undecided_times_of_obstacles_are_counted_apart() {
     let settings = Settings {
         motion: Some(Interpolation::Bounded),
         max_accel_m_s2: Some(1.0),
-        obstacles: vec![Obstacle { clearance_m: Some(1.0), ..ground }],
+        obstacles: vec![MovingObstacle { clearance_m: Some(1.0), ..ground }],
         ..Settings::delta(1.0)
     };
     let outcome = judge(count, &items, settings);

@@ -7,7 +7,8 @@ use proptest::prelude::*;
 use tautline_audit::recorded::{
     Interpolation, ObjectPair, Outcome, RecordedError, Settings, TrackAuditor, VehicleSettings, audit,
 };
-use tautline_audit::{Obstacle, Shape, Status};
+use tautline_audit::{MovingObstacle, Status};
+use tautline_core::obstacle::Shape;
 use tautline_core::track::{Item, Piece, Sample};
 
 use super::recorded_curves::curves;
@@ -287,17 +288,17 @@ fn the_limit_is_the_larger_of_delta_and_the_radii() {
     }
 }
 
-pub(crate) fn obstacle_at(shape: Shape, at: [f64; 3]) -> Obstacle {
-    Obstacle { name: "obstacle".to_owned(), shape, clearance_m: None, path: vec![(0.0, at.into())] }
+pub(crate) fn obstacle_at(shape: Shape, at: [f64; 3]) -> MovingObstacle {
+    MovingObstacle { name: "obstacle".to_owned(), shape, clearance_m: None, path: vec![(0.0, at.into())] }
 }
 
 #[test]
 fn distances_from_obstacles_are_judged() {
     let flight = [seen(0, 0.0, [-5.0, 0.0, 2.0]), seen(0, 1.0, [5.0, 0.0, 2.0])];
     // A keep-out ball of delta / 2 = 0.5 m must not enter.
-    let with = |obstacle: Obstacle| Settings { obstacles: vec![obstacle], ..Settings::delta(1.0) };
+    let with = |obstacle: MovingObstacle| Settings { obstacles: vec![obstacle], ..Settings::delta(1.0) };
     let ball = Shape::Ball { radius_m: 1.0 };
-    let cuboid = Shape::Box { half_m: Vector3::new(1.0, 1.0, 1.0), yaw_rad: 0.3 };
+    let cuboid = Shape::Box { half_m: Vector3::new(1.0, 1.0, 1.0), yaw_deg: 17.0 };
     let capsule =
         Shape::Capsule { from_m: Vector3::new(0.0, -3.0, 0.0), to_m: Vector3::new(0.0, 3.0, 0.0), radius_m: 1.0 };
     for shape in [ball, cuboid, capsule] {
@@ -309,7 +310,7 @@ fn distances_from_obstacles_are_judged() {
             (Some(0.0), 1.0, Status::Clear),
             (Some(0.0), 1.1, Status::Violation),
         ] {
-            let outcome = judge(&flight, with(Obstacle { clearance_m, ..obstacle_at(shape, [0.0, 0.0, z]) }));
+            let outcome = judge(&flight, with(MovingObstacle { clearance_m, ..obstacle_at(shape, [0.0, 0.0, z]) }));
             assert_eq!((outcome.status, outcome.parry.disagreements), (expected, 0), "{shape:?} {z} {outcome:?}");
             assert!((outcome.obstacles[0].lower_m - (1.0 - z)).abs() < 1e-9, "{outcome:?}");
         }
@@ -317,10 +318,10 @@ fn distances_from_obstacles_are_judged() {
     let ground = |z| obstacle_at(Shape::HalfSpace { normal: Vector3::z() }, [0.0, 0.0, z]);
     assert_eq!(status(&flight, with(ground(1.5))), Status::Clear);
     assert_eq!(status(&flight, with(ground(1.6))), Status::Violation);
-    let wider = Obstacle { clearance_m: Some(0.7), ..ground(1.4) };
+    let wider = MovingObstacle { clearance_m: Some(0.7), ..ground(1.4) };
     assert_eq!(status(&flight, with(wider)), Status::Violation);
     // A moving obstacle that crosses while the vehicle passes, or 3 s later.
-    let moving = |late_s: f64| Obstacle {
+    let moving = |late_s: f64| MovingObstacle {
         path: vec![(late_s, Vector3::new(0.0, -10.0, 2.0)), (late_s + 1.0, Vector3::new(0.0, 10.0, 2.0))],
         ..obstacle_at(ball, [0.0; 3])
     };
@@ -333,8 +334,8 @@ fn distances_from_obstacles_are_judged() {
     assert_eq!((outcome.parry.disagreements, outcome.status), (0, Status::Clear));
     // Alpha begins inside one box, 0.1 m deep, and never comes near the other.
     for (at, expected) in [([0.3, 1.0, 1.5], Status::Violation), ([0.3, 1.0, 9.5], Status::Clear)] {
-        let cuboid = Shape::Box { half_m: Vector3::repeat(0.1), yaw_rad: 0.3 };
-        let entered = with(Obstacle { clearance_m: Some(0.0), ..obstacle_at(cuboid, at) });
+        let cuboid = Shape::Box { half_m: Vector3::repeat(0.1), yaw_deg: 17.0 };
+        let entered = with(MovingObstacle { clearance_m: Some(0.0), ..obstacle_at(cuboid, at) });
         let outcome = judge(&curves(5.0), entered);
         assert_eq!((outcome.parry.disagreements, outcome.status), (0, expected), "{outcome:?}");
     }
@@ -431,7 +432,7 @@ fn noise_is_judged_without_sweeping_all_pairs() {
 fn obstacles_count_on_the_ground_unless_vehicles_land_on_them() {
     // Both climb through a height of 1 m at 5 s.
     let items = [(0.0, 0.0), (10.0, 2.0)].map(|(t, z)| [seen(0, t, [0.0, 0.0, z]), seen(1, t, [5.0, 0.0, z])]).concat();
-    let ground = Obstacle {
+    let ground = MovingObstacle {
         clearance_m: Some(0.5),
         ..obstacle_at(Shape::HalfSpace { normal: Vector3::new(0.0, 0.0, 1.0) }, [0.0; 3])
     };

@@ -4,8 +4,9 @@ use super::error::{LawError, ParameterError};
 use super::interface::LawContext;
 use super::tension::{EdgeTension, TensionError};
 use crate::observation::Observation;
-use crate::space::Obstacle;
+use crate::space::clearance_margin_m;
 use crate::target::Leg;
+use tautline_core::obstacle::Obstacle;
 use tautline_core::swarm::{Rows, row, set_row};
 
 /// Edge tension on the clearance margin of a vehicle at an obstacle: its distance from the surface less the clearance.
@@ -48,7 +49,7 @@ impl ClearanceTension {
         for vehicle in 0..positions_m.nrows() {
             let position_m = row(positions_m, vehicle);
             for (obstacle, solid) in obstacles.iter().enumerate() {
-                let (clearance_margin_m, outward) = solid.clearance_margin_m(position_m);
+                let (clearance_margin_m, outward) = clearance_margin_m(solid, position_m);
                 if clearance_margin_m >= self.tension.rest_m() {
                     continue;
                 }
@@ -91,7 +92,7 @@ pub(super) fn slot_clearance_margin_m(context: &LawContext<'_>) -> Result<f64, P
     for formation in std::iter::once(context.formation).chain(later) {
         for vehicle in 0..formation.count() {
             for (obstacle, solid) in context.obstacles.iter().enumerate() {
-                let (clearance_margin_m, _) = solid.clearance_margin_m(row(&formation.slots_m, vehicle) + place_m);
+                let (clearance_margin_m, _) = clearance_margin_m(solid, row(&formation.slots_m, vehicle) + place_m);
                 if clearance_margin_m <= 0.0 {
                     let clearance_m = solid.clearance_m;
                     let distance_m = clearance_margin_m + clearance_m;

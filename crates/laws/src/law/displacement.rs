@@ -18,8 +18,9 @@ use super::tension::{EdgeTension, TensionError};
 use crate::formation::Formation;
 use crate::graph::Pinning;
 use crate::observation::Observation;
-use crate::space::{CellList, Metric, Obstacle};
+use crate::space::{CellList, Metric};
 use crate::target::{Guidance, ReferenceMotion, SettlingMode, Target};
+use tautline_core::obstacle::Obstacle;
 use tautline_core::swarm::{Pair, Rows, row, set_row};
 
 /// Keys of `[law]` with `kind = "displacement"`.

@@ -2,8 +2,9 @@
 
 use crate::formation::Formation;
 use crate::graph::Graph;
-use crate::space::{Metric, Obstacle};
+use crate::space::{Metric, clearance_margin_m};
 use tautline_core::failure::Failure;
+use tautline_core::obstacle::Obstacle;
 use tautline_core::swarm::{Pair, Swarm, first_row_not_finite, row};
 use tautline_core::text::{beside_limit, exact};
 
@@ -152,7 +153,7 @@ impl LawError {
             }
             Self::Obstacle { vehicle, obstacle, distance_m: known_m, clearance_m } => {
                 let Some(solid) = obstacles.get(obstacle) else { return self };
-                let true_m = solid.clearance_margin_m(place(vehicle)).0 + solid.clearance_m;
+                let true_m = clearance_margin_m(solid, place(vehicle)).0 + solid.clearance_m;
                 if differs(known_m, true_m) {
                     Self::KnownObstacle { vehicle, obstacle, known_m, true_m, clearance_m }
                 } else {

@@ -9,9 +9,10 @@ use super::modes::Linear;
 use crate::formation::{Formation, Freedom};
 use crate::graph::{Graph, Pinning};
 use crate::observation::Observation;
-use crate::space::{Metric, Obstacle};
+use crate::space::Metric;
 use crate::target::{Guidance, Leg, Reference, SettlingMode, Target};
 use crate::wind::WindSpec;
+use tautline_core::obstacle::Obstacle;
 use tautline_core::swarm::Rows;
 
 /// Control law: maps the states that the vehicles know to one acceleration per vehicle.

@@ -7,9 +7,9 @@ use super::geometry::has_few_edges;
 use super::labels::{LabelLayout, width};
 use super::{Annotation, pixels};
 use tautline_audit::{Status, Violation};
+use tautline_core::obstacle::Shape;
 use tautline_core::swarm::{Bounce, Pair};
 use tautline_core::text::{at_least, beside_limit, exact};
-use tautline_laws::space::Shape;
 use tautline_report::replay::is_between;
 use tautline_sim::plan::Plan;
 

@@ -8,8 +8,8 @@ use super::camera::{Area, Camera, CameraSpec, Direction};
 use super::compose::View;
 use crate::error::RenderError;
 use crate::timeline::Timeline;
+use tautline_core::obstacle::{Obstacle, Shape};
 use tautline_core::swarm::{Pair, Rows, row};
-use tautline_laws::space::{Obstacle, Shape};
 use tautline_report::flight_log::{Frame, Keyframe};
 use tautline_report::replay::Viewpoint;
 

@@ -10,8 +10,8 @@ use super::compose::SceneBuilder;
 use super::extent::is_level;
 use super::{Ball, Disc, Line, Scene, single};
 use crate::timeline::QuadrotorShape;
+use tautline_core::obstacle::{Obstacle, Shape};
 use tautline_core::swarm::Pair;
-use tautline_laws::space::{Obstacle, Shape};
 use tautline_sim::plan::Plan;
 
 /// Largest number of edges that are drawn; more would hide the vehicles.

@@ -63,7 +63,7 @@ pub use validation::{Step, convergence, tension_curve};
 
 use spans::Spans;
 pub(crate) use svg::page_rules;
-use tautline_audit::Obstacle;
+use tautline_audit::MovingObstacle;
 use tautline_laws::graph::Graph;
 use tautline_laws::target::Leg;
 
@@ -98,7 +98,7 @@ pub struct Criteria<'a> {
     /// Largest thrust of a rotor \[N\].
     pub most_thrust_n: Option<f64>,
     /// Obstacles.
-    pub obstacles: &'a [Obstacle],
+    pub obstacles: &'a [MovingObstacle],
 }
 
 /// Draws all figures that a run has data for, in reading order.

@@ -2,7 +2,8 @@
 
 use nalgebra::{Rotation2, Rotation3, Vector2, Vector3};
 
-use tautline_audit::{Obstacle, Shape};
+use tautline_audit::MovingObstacle;
+use tautline_core::obstacle::Shape;
 
 /// Number of corners of a full circle.
 const CORNERS: u32 = 48;
@@ -16,14 +17,14 @@ pub(super) struct Window {
 
 /// Returns the outline of an obstacle at its first position, within a window: x and y \[m\]. It is empty for level
 /// ground and for an obstacle outside.
-pub(super) fn outline(obstacle: &Obstacle, window: Window) -> Vec<(f64, f64)> {
+pub(super) fn outline(obstacle: &MovingObstacle, window: Window) -> Vec<(f64, f64)> {
     let Some((_, place_m)) = obstacle.path.first() else { return Vec::new() };
     let place = place_m.xy();
     let corners = match obstacle.shape {
         Shape::Ball { radius_m } => stadium(Vector2::zeros(), Vector2::zeros(), radius_m),
         Shape::Capsule { from_m, to_m, radius_m } => stadium(from_m.xy(), to_m.xy(), radius_m),
-        Shape::Box { half_m, yaw_rad } => [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]
-            .map(|(x, y)| Rotation2::new(yaw_rad) * Vector2::new(x * half_m.x, y * half_m.y))
+        Shape::Box { half_m, yaw_deg } => [(1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0), (1.0, -1.0)]
+            .map(|(x, y)| Rotation2::new(yaw_deg.to_radians()) * Vector2::new(x * half_m.x, y * half_m.y))
             .to_vec(),
         Shape::HalfSpace { normal } => {
             let Some(out) = normal.xy().try_normalize(1e-3 * normal.norm()) else { return Vec::new() };
@@ -126,13 +127,13 @@ fn beside(along: Vector3<f64>) -> [Vector3<f64>; 2] {
 
 /// Returns the outline of an obstacle at its first position as lines within a box. A box has its edges, and a ball has
 /// great circles. A capsule has rings and two lengthwise sections.
-pub(super) fn wires(obstacle: &Obstacle, room: &Room) -> Vec<Vec<Vector3<f64>>> {
+pub(super) fn wires(obstacle: &MovingObstacle, room: &Room) -> Vec<Vec<Vector3<f64>>> {
     let Some(&(_, place)) = obstacle.path.first() else { return Vec::new() };
     let closed: Vec<Vec<Vector3<f64>>> = match obstacle.shape {
         Shape::Ball { radius_m } => capsule(Vector3::zeros(), Vector3::zeros(), radius_m),
         Shape::Capsule { from_m, to_m, radius_m } => capsule(from_m, to_m, radius_m),
-        Shape::Box { half_m, yaw_rad } => {
-            let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_rad);
+        Shape::Box { half_m, yaw_deg } => {
+            let turn = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_deg.to_radians());
             let face = |axis: usize, side: f64| {
                 let [one, other] = [(axis + 1) % 3, (axis + 2) % 3];
                 let corner = |(a, b): (f64, f64)| {
@@ -195,14 +196,14 @@ mod tests {
     fn wires_stay_within_the_box_and_on_the_surface() {
         let room = Room { low: Vector3::repeat(-10.0), high: Vector3::repeat(10.0) };
         let at = |shape, place_m| {
-            wires(&Obstacle { name: String::new(), shape, clearance_m: None, path: vec![(0.0, place_m)] }, &room)
+            wires(&MovingObstacle { name: String::new(), shape, clearance_m: None, path: vec![(0.0, place_m)] }, &room)
         };
         let ball = at(Shape::Ball { radius_m: 2.0 }, Vector3::new(9.0, 0.0, 0.0));
         let places = || ball.iter().flatten();
         assert!(places().all(|place| place.x <= 10.0 + 1e-9), "{ball:?}");
         assert!(places().any(|place| (place.x - 10.0).abs() < 1e-9), "cut by a wall");
         assert!(places().all(|place| (place - Vector3::new(9.0, 0.0, 0.0)).norm() < 2.0 + 1e-9));
-        let house = at(Shape::Box { half_m: Vector3::new(1.0, 2.0, 3.0), yaw_rad: 0.3 }, Vector3::zeros());
+        let house = at(Shape::Box { half_m: Vector3::new(1.0, 2.0, 3.0), yaw_deg: 17.0 }, Vector3::zeros());
         assert_eq!(house.iter().map(Vec::len).collect::<Vec<_>>(), [5, 5, 5, 5], "four closed faces");
         let ground = at(Shape::HalfSpace { normal: Vector3::z() }, Vector3::zeros());
         assert_eq!(ground.iter().map(Vec::len).collect::<Vec<_>>(), [5], "a rectangle");
@@ -214,7 +215,7 @@ mod tests {
     const WINDOW: Window = Window { low: (-10.0, -10.0), high: (10.0, 10.0) };
 
     fn area(shape: Shape, place_m: Vector3<f64>) -> f64 {
-        let obstacle = Obstacle { name: String::new(), shape, clearance_m: None, path: vec![(0.0, place_m)] };
+        let obstacle = MovingObstacle { name: String::new(), shape, clearance_m: None, path: vec![(0.0, place_m)] };
         let corners = outline(&obstacle, WINDOW);
         let next = corners.iter().cycle().skip(1);
         0.5 * corners.iter().zip(next).map(|(a, b)| a.0 * b.1 - a.1 * b.0).sum::<f64>().abs()
@@ -229,7 +230,7 @@ mod tests {
         assert_eq!(area(ball, Vector3::new(30.0, 0.0, 0.0)), 0.0);
         let cable = Shape::Capsule { from_m: -Vector3::x() * 3.0, to_m: Vector3::x() * 3.0, radius_m: 0.5 };
         assert!((area(cable, Vector3::zeros()) - 6.0 - 0.25 * std::f64::consts::PI).abs() < 0.05);
-        let house = Shape::Box { half_m: Vector3::new(1.0, 2.0, 3.0), yaw_rad: 0.7 };
+        let house = Shape::Box { half_m: Vector3::new(1.0, 2.0, 3.0), yaw_deg: 40.0 };
         assert!((area(house, Vector3::zeros()) - 8.0).abs() < 1e-9);
         let wall = Shape::HalfSpace { normal: Vector3::new(0.0, 2.0, 0.0) };
         assert!((area(wall, Vector3::new(3.0, -5.0, 0.0)) - 100.0).abs() < 1e-6);

@@ -8,7 +8,7 @@ use super::outlines::{Window, outline};
 use super::spans::Spans;
 use super::svg::{Colour, INK, Marker, OBSTACLE, PALETTE, SOFT_INK, Stroke};
 use crate::flight_log::{FEW_VEHICLES, FlightLog};
-use tautline_audit::Obstacle;
+use tautline_audit::MovingObstacle;
 
 /// Free share of the extent on each side.
 const MARGIN: f64 = 0.06;
@@ -19,7 +19,7 @@ pub(super) const MOST_PATHS: usize = 300;
 /// vehicles have colours and numbers. Of more than 300 vehicles, 300 are drawn: the two of the closest approach, and
 /// others chosen evenly. Obstacles are drawn at their first position.
 #[must_use]
-pub fn paths(log: &FlightLog, obstacles: &[Obstacle], title: &str) -> Figure {
+pub fn paths(log: &FlightLog, obstacles: &[MovingObstacle], title: &str) -> Figure {
     let spans = Spans::of(log);
     let mut chart = from_above(&spans, &[], obstacles);
     for (k, &i) in drawn(log, MOST_PATHS).iter().enumerate() {
@@ -46,7 +46,7 @@ const STILL_PATHS: usize = 40;
 pub fn at_closest(
     name: &str,
     log: &FlightLog,
-    obstacles: &[Obstacle],
+    obstacles: &[MovingObstacle],
     closest: Option<([usize; 2], f64)>,
     beside: &[FlightLog],
 ) -> Figure {
@@ -75,7 +75,7 @@ pub fn at_closest(
 }
 
 /// Returns an empty chart of x and y \[m\] in equal units, with the obstacles.
-fn from_above(spans: &Spans<'_>, beside: &[Spans<'_>], obstacles: &[Obstacle]) -> Chart {
+fn from_above(spans: &Spans<'_>, beside: &[Spans<'_>], obstacles: &[MovingObstacle]) -> Chart {
     let axis = |axis: usize, label: &str| {
         let extents = beside.iter().chain([spans]).filter_map(|spans| spans.extent(axis));
         let (low, high) = extents.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1))).unwrap_or((0.0, 1.0));

@@ -11,7 +11,8 @@ use super::paths::{Look, MOST_PATHS, description, drawn};
 use super::spans::Spans;
 use super::svg::{Align, Canvas, GRID, Marker, OBSTACLE, Point, SOFT_INK, Stroke, thinned};
 use crate::flight_log::FlightLog;
-use tautline_audit::{Obstacle, Shape};
+use tautline_audit::MovingObstacle;
+use tautline_core::obstacle::Shape;
 use tautline_core::swarm::row;
 
 /// Angles of the view \[rad\].
@@ -30,7 +31,7 @@ const REACH: f64 = 0.15;
 /// Draws the paths in space: x, y and z \[m\] in a parallel projection with equal units. Selection, marks and colours
 /// are those of [`paths`](super::paths()). Obstacles near the paths are drawn as outlines, at their first position.
 #[must_use]
-pub fn paths_in_space(log: &FlightLog, obstacles: &[Obstacle], title: &str) -> Figure {
+pub fn paths_in_space(log: &FlightLog, obstacles: &[MovingObstacle], title: &str) -> Figure {
     let spans = Spans::of(log);
     let view = View::of(&spans, obstacles);
     let mut canvas = Canvas::new((WIDTH, view.height()), title, WIDTH / 2.0);
@@ -78,7 +79,7 @@ struct View {
 }
 
 impl View {
-    fn of(spans: &Spans<'_>, obstacles: &[Obstacle]) -> Self {
+    fn of(spans: &Spans<'_>, obstacles: &[MovingObstacle]) -> Self {
         let paths = [0, 1, 2].map(|axis| spans.extent(axis).unwrap_or((0.0, 1.0)));
         let reach = REACH * paths.iter().map(|(low, high)| high - low).fold(0.0, f64::max);
         let around = Room {

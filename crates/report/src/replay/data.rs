@@ -15,7 +15,8 @@ use super::{
 };
 use crate::figures::{Figure, at_closest};
 use crate::flight_log::FlightLog;
-use tautline_audit::{Obstacle, Shape};
+use tautline_audit::MovingObstacle;
+use tautline_core::obstacle::Shape;
 use tautline_core::swarm::{Rows, row};
 
 /// Largest number of findings.
@@ -320,7 +321,7 @@ fn in_order(moments: &[Moment]) -> impl Iterator<Item = &Moment> {
 /// Returns the obstacles, with their positions at the findings that involve them.
 fn obstacle_meshes(stage: &Stage, extent: &Extent, moments: &[Moment], room_bytes: usize) -> Vec<Thing> {
     let most = (room_bytes / 4 / POINT_BYTES / stage.obstacles.len().max(1)).clamp(4, MOST_POINTS);
-    let thing = |(k, obstacle): (usize, &Obstacle)| {
+    let thing = |(k, obstacle): (usize, &MovingObstacle)| {
         let own = moments.iter().filter(|moment| moment.obstacle == Some(k));
         let times_s: Vec<_> = own.map(|moment| moment.span.at_s).collect();
         Thing::of(obstacle, extent, &times_s, most)
@@ -362,7 +363,7 @@ fn written(data: &Data<'_>) -> String {
 }
 
 /// Returns the height of an obstacle that is level ground \[m\].
-fn ground_m(obstacle: &Obstacle) -> Option<f64> {
+fn ground_m(obstacle: &MovingObstacle) -> Option<f64> {
     let Shape::HalfSpace { normal } = obstacle.shape else { return None };
     (normal.xy().norm() <= 1e-3 * normal.z).then(|| obstacle.path.first().map(|point| point.1.z)).flatten()
 }

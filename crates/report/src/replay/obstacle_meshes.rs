@@ -6,7 +6,8 @@ use serde::Serialize;
 use super::stage::Extent;
 use super::{LONGEST_NAME, cut, singles};
 use crate::simplify::needed;
-use tautline_audit::{Obstacle, Shape};
+use tautline_audit::MovingObstacle;
+use tautline_core::obstacle::Shape;
 
 /// An obstacle as data of a page.
 #[derive(Clone, Debug, Serialize)]
@@ -31,7 +32,7 @@ pub(super) const POINT_BYTES: usize = 4 * 26;
 impl Thing {
     /// Returns the data of an obstacle, with a path of about `most` points that includes its positions at `times_s`
     /// \[s\].
-    pub(super) fn of(obstacle: &Obstacle, extent: &Extent, times_s: &[f64], most: usize) -> Self {
+    pub(super) fn of(obstacle: &MovingObstacle, extent: &Extent, times_s: &[f64], most: usize) -> Self {
         let place_m = obstacle.path.first().map_or(Vector3::zeros(), |point| point.1);
         let mesh = Mesh::of(&obstacle.shape, extent.middle_m() - place_m, 1.5 * extent.reach_m());
         let (kept, off_m) = simplified(&obstacle.path, times_s, most);
@@ -98,7 +99,7 @@ impl Mesh {
     pub(super) fn of(shape: &Shape, middle: Vector3<f64>, reach_m: f64) -> Self {
         match *shape {
             Shape::Ball { .. } => Self::default(),
-            Shape::Box { half_m, yaw_rad } => of_box(half_m, yaw_rad),
+            Shape::Box { half_m, yaw_deg } => of_box(half_m, yaw_deg.to_radians()),
             Shape::Capsule { from_m, to_m, radius_m } => of_capsule(from_m, to_m, radius_m),
             Shape::HalfSpace { normal } => of_plane(normal.normalize(), middle, reach_m),
         }
@@ -225,15 +226,15 @@ mod tests {
     fn corners_are_on_the_surface_and_normals_point_outwards() {
         let middle = Vector3::new(1.0, 2.0, 3.0);
         let shapes = [
-            Shape::Box { half_m: Vector3::new(1.0, 2.0, 3.0), yaw_rad: 0.4 },
+            Shape::Box { half_m: Vector3::new(1.0, 2.0, 3.0), yaw_deg: 23.0 },
             Shape::Capsule { from_m: Vector3::new(-1.0, 0.0, 0.5), to_m: Vector3::new(2.0, 1.0, 0.0), radius_m: 0.7 },
             Shape::Capsule { from_m: Vector3::zeros(), to_m: Vector3::zeros(), radius_m: 0.7 },
             Shape::HalfSpace { normal: Vector3::new(0.0, 1.0, 2.0) },
         ];
         for shape in shapes {
             let off = |at: &Vector3<f64>| match shape {
-                Shape::Box { half_m, yaw_rad } => {
-                    let at = Rotation3::from_axis_angle(&Vector3::z_axis(), -yaw_rad) * at;
+                Shape::Box { half_m, yaw_deg } => {
+                    let at = Rotation3::from_axis_angle(&Vector3::z_axis(), -yaw_deg.to_radians()) * at;
                     at.zip_map(&half_m, |x, half| x.abs() - half).max()
                 }
                 Shape::Capsule { from_m, to_m, radius_m } => {

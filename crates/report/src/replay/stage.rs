@@ -5,10 +5,10 @@ use serde::Serialize;
 
 use super::{Viewpoint, base64_of, singles};
 use crate::flight_log::FlightLog;
-use tautline_audit::{Obstacle, Shape};
+use tautline_audit::MovingObstacle;
+use tautline_core::obstacle::Shape;
 use tautline_core::swarm::{Rows, mean_row, row};
 use tautline_laws::formation::Formation;
-use tautline_laws::space;
 use tautline_sim::plan::Plan;
 use tautline_sim::scenario::Scenario;
 
@@ -26,7 +26,7 @@ pub struct Stage {
     /// Rotors of every vehicle, if the vehicles are quadrotors.
     pub rotors: Option<Rotors>,
     /// Obstacles.
-    pub obstacles: Vec<Obstacle>,
+    pub obstacles: Vec<MovingObstacle>,
 }
 
 /// Rotors of a quadrotor.
@@ -76,25 +76,18 @@ impl Stage {
 
     /// Returns the direction from which the replay shows a flight first. Moving obstacles do not count.
     pub(super) fn viewpoint(&self, log: &FlightLog) -> Viewpoint {
-        let shape = |shape: &Shape| match *shape {
-            Shape::Ball { radius_m } => space::Shape::Ball { radius_m },
-            Shape::Box { half_m, yaw_rad } => space::Shape::Box { half_m, yaw_deg: yaw_rad.to_degrees() },
-            Shape::Capsule { from_m, to_m, radius_m } => space::Shape::Capsule { from_m, to_m, radius_m },
-            Shape::HalfSpace { normal } => space::Shape::HalfSpace { normal },
-        };
-        let at_rest = |of: &Obstacle| matches!(*of.path, [(_, at_m)] if at_m.iter().all(|x| x.is_finite()));
+        let at_rest = |of: &MovingObstacle| matches!(*of.path, [(_, at_m)] if at_m.iter().all(|x| x.is_finite()));
         let obstacles = self.obstacles.iter().filter(|of| at_rest(of));
-        Viewpoint::of(&[log], &obstacles.map(|of| (shape(&of.shape), of.path[0].1)).collect::<Vec<_>>())
+        Viewpoint::of(&[log], &obstacles.map(|of| (of.shape, of.path[0].1)).collect::<Vec<_>>())
     }
 
     pub(super) fn drawn_radius_m(&self, vehicle: usize) -> f64 {
         self.radius_m.get(vehicle).copied().flatten().unwrap_or_else(|| self.unknown_radius_m())
     }
 
-    /// Returns the stage of a scenario, with its obstacles in the form of the audit. Later changes of the target are in
-    /// the log.
+    /// Returns the stage of a scenario. Later changes of the target are in the log.
     #[must_use]
-    pub fn of(scenario: &Scenario, obstacles: Vec<Obstacle>) -> Self {
+    pub fn of(scenario: &Scenario) -> Self {
         Self {
             vehicles: (1..=scenario.count()).map(|number| number.to_string()).collect(),
             radius_m: scenario.hull_radius_m.iter().copied().map(Some).collect(),
@@ -104,7 +97,7 @@ impl Stage {
                 .airframe
                 .quadrotor()
                 .map(|of| Rotors { at_m: of.model.rotor_positions_m, radius_m: of.model.rotor_radius_m }),
-            obstacles,
+            obstacles: scenario.obstacles.iter().map(MovingObstacle::from).collect(),
         }
     }
 }
@@ -157,7 +150,7 @@ impl Extent {
 }
 
 /// Returns a box around an obstacle at each point of its path; empty for an unbounded obstacle.
-fn boxes(obstacle: &Obstacle) -> Vec<(Vector3<f64>, Vector3<f64>)> {
+fn boxes(obstacle: &MovingObstacle) -> Vec<(Vector3<f64>, Vector3<f64>)> {
     let (low, high) = match obstacle.shape {
         Shape::Ball { radius_m } => (Vector3::repeat(-radius_m), Vector3::repeat(radius_m)),
         Shape::Box { half_m, .. } => (Vector3::repeat(-half_m.norm()), Vector3::repeat(half_m.norm())),

@@ -7,7 +7,8 @@ use serde_json::Value;
 
 use super::*;
 use crate::flight_log::FlightLog;
-use tautline_audit::{Approach, ObjectPair, Obstacle, Shape, Slice, Slices};
+use tautline_audit::{Approach, MovingObstacle, ObjectPair, Slice, Slices};
+use tautline_core::obstacle::Shape;
 use tautline_core::record::Sample;
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm, set_row};
 use tautline_sim::scenario::{Scenario, Source};
@@ -149,7 +150,7 @@ fn absent_vehicles_are_not_packed() {
 fn foreign_text_is_escaped_and_cut() {
     let mut hostile = stage(2);
     hostile.vehicles = vec!["</script><script>alert(1)</script>".to_owned(), "ü".repeat(5_000_000)];
-    hostile.obstacles = vec![Obstacle {
+    hostile.obstacles = vec![MovingObstacle {
         name: "<!--".repeat(9000),
         shape: Shape::Ball { radius_m: 1.0 },
         clearance_m: None,
@@ -175,7 +176,7 @@ fn packs_slots_links_and_reference() {
         _ => slots_m[(i, 2)],
     });
     take(&mut log, 0.0, turned, None);
-    let (_, data) = packed(&Stage::of(&scenario, Vec::new()), &log, &[], PAGE_BYTES);
+    let (_, data) = packed(&Stage::of(&scenario), &log, &[], PAGE_BYTES);
     assert_eq!(
         (data["axes"].as_u64(), data["points"].as_u64(), data["tension"].as_bool()),
         (Some(5), Some(9), Some(true))

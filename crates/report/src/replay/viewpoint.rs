@@ -4,8 +4,9 @@ use nalgebra::Vector3;
 use serde::Serialize;
 
 use crate::flight_log::FlightLog;
+use tautline_core::obstacle::Shape;
 use tautline_core::swarm::row;
-use tautline_laws::space::Shape;
+use tautline_laws::space::signed_distance_m;
 
 /// Largest number of positions from which the extent of a flight is computed.
 const PLACES: usize = 200_000;
@@ -107,7 +108,7 @@ pub fn is_between(shape: &Shape, at_m: Vector3<f64>, from_m: Vector3<f64>, to_m:
     // Steps of the distance to the surface end beyond the shape, inside it or at the other point.
     for _ in 0..SIGHT_STEPS {
         let point = from_m + towards * (along / length);
-        let (free_m, _) = shape.signed_distance_m(point - at_m);
+        let (free_m, _) = signed_distance_m(shape, point - at_m);
         if free_m <= 0.0 {
             return true;
         }

@@ -5,11 +5,11 @@ use std::time::Duration;
 use nalgebra::Vector3;
 
 use super::*;
-use tautline_audit::{AuditOutcome, Auditor, ClearanceAuditor, ClearanceOutcome, Obstacle, Shape};
+use tautline_audit::{AuditOutcome, Auditor, ClearanceAuditor, ClearanceOutcome};
+use tautline_core::obstacle::{Obstacle, Shape};
 use tautline_core::record::EnergyRise;
 use tautline_core::swarm::{Bounce, Pair, Rows};
 use tautline_laws::law::{Certificate, LawError, LegBound, VoidReason};
-use tautline_laws::space;
 use tautline_laws::target::Arrival;
 use tautline_sim::metrics::{LegSummary, Summary};
 use tautline_sim::preflight::{Code, Preflight, Warning};
@@ -99,10 +99,10 @@ impl Case {
         preflight.start_dimension = self.trap_dimension.unwrap_or(preflight.formation_dimension);
         preflight.velocity_margin_per_s = self.energy_falls.then_some(1.0);
         scenario.legs = vec![scenario.legs[0].clone(); self.legs];
-        scenario.obstacles = vec![space::Obstacle {
+        scenario.obstacles = vec![Obstacle {
             name: "tower".to_owned(),
             place_m: Vector3::zeros(),
-            shape: space::Shape::Ball { radius_m: 1.0 },
+            shape: Shape::Ball { radius_m: 1.0 },
             clearance_m: 0.5,
         }];
         if self.in_metres.is_some() {
@@ -614,9 +614,9 @@ fn energy_rise_is_a_reason_if_the_energy_is_proved_never_to_grow() {
 fn passing_a_ball(miss_m: f64) -> ClearanceOutcome {
     let ball = Obstacle {
         name: "tower".to_owned(),
+        place_m: Vector3::zeros(),
         shape: Shape::Ball { radius_m: 1.0 },
-        clearance_m: Some(0.5),
-        path: vec![(0.0, Vector3::zeros())],
+        clearance_m: 0.5,
     };
     let mut auditor = ClearanceAuditor::new(2, &[ball]).expect("a judge");
     for (time_s, x) in [(0.0, -9.0), (1.0, 9.0)] {

@@ -16,13 +16,14 @@ use crate::flight_log::FlightLog;
 use crate::replay::{NoReplay, PAGE_BYTES, Replay, Stage};
 use crate::report::{Report, RunPage};
 use crate::run::{run_with, verify};
+use tautline_audit::MovingObstacle;
 use tautline_core::files::write_atomically;
 use tautline_core::text::seconds;
 use tautline_recordings::mcap::{Header, McapRecorder};
 use tautline_sim::plant::FreeSteps;
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::Scenario;
-use tautline_sim::sim::{self, Components};
+use tautline_sim::sim::Components;
 
 /// Name of the recording in the folder of a run.
 pub const RECORDING: &str = "run.mcap";
@@ -221,13 +222,13 @@ pub fn replay_of_run(
     report: &Report,
     room_bytes: usize,
 ) -> Result<Replay, NoReplay> {
-    let stage = Stage::of(scenario, scenario.obstacles.iter().map(sim::audit_obstacle).collect());
+    let stage = Stage::of(scenario);
     Replay::new(&stage, log, &report.moments(), report.judgement(), room_bytes)
 }
 
 /// Returns the charts of a run.
 fn figures(scenario: &Scenario, log: &FlightLog, report: &Report) -> Vec<Figure> {
-    let obstacles: Vec<_> = scenario.obstacles.iter().map(sim::audit_obstacle).collect();
+    let obstacles: Vec<_> = scenario.obstacles.iter().map(MovingObstacle::from).collect();
     let criteria = Criteria {
         delta_m: scenario.delta_m,
         certified_m: report.certificate.separation_m,

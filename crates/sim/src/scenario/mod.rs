@@ -43,7 +43,7 @@ pub use limits::{
     BYTES_PER_EDGE, BYTES_PER_VEHICLE, CONTACT_PREDICTION_M, LARGEST, MAX_HALVINGS, MAX_MEMORY_BYTES, MAX_NAME_CHARS,
     MAX_STEPS, SMALLEST,
 };
-pub use obstacles::{OBSTACLE_HELP, ObstacleTable, Solid};
+pub use obstacles::{OBSTACLE_HELP, ObstacleTable};
 pub use resolution::Drift;
 pub use resolved::Resolved;
 pub use schema::{TomlSchema, key_choices, key_paths, schema, takes_integers_only};

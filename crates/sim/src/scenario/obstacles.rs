@@ -28,10 +28,12 @@ use serde::{Deserialize, Serialize};
 use super::error::{ErrorKind, ScenarioError};
 use super::limits::{CONTACT_PREDICTION_M, SLOT_MARGIN, SMALLEST};
 use super::spec::Scenario;
+use tautline_audit::MovingObstacle;
+use tautline_core::obstacle::{Obstacle, Shape};
 use tautline_core::option::OBSTACLES;
 use tautline_core::swarm::{Rows, row, set_row};
 use tautline_core::text::beside_limit;
-use tautline_laws::space::{Obstacle, Shape, smallest_clearance_margin};
+use tautline_laws::space::{signed_distance_m, smallest_clearance_margin};
 
 /// Remedy for a wrong obstacle: the format of the table.
 pub const OBSTACLE_HELP: &str = "an obstacle has a name, one of ball, box, capsule and half_space, and at_m = [x, y, \
@@ -115,22 +117,12 @@ struct HalfSpace {
     normal: [f64; 3],
 }
 
-/// Content of an `[[obstacle]]` table.
-pub struct Solid {
-    /// Shape relative to the position.
-    pub shape: Shape,
-    /// Times \[s\] and positions \[m\]; one entry for an obstacle at rest.
-    pub path: Vec<(f64, Vector3<f64>)>,
-    /// Smallest distance \[m\] of the centre of a vehicle from the surface, if given.
-    pub clearance_m: Option<f64>,
-}
-
 impl ObstacleTable {
-    /// Returns the shape, the path and the clearance.
+    /// Returns the obstacle in the form of the audit, unchecked.
     ///
     /// # Errors
     /// A message about a wrong table, one sentence.
-    pub fn solid(self) -> Result<Solid, String> {
+    pub fn into_moving(self) -> Result<MovingObstacle, String> {
         let Self { name, ball, cuboid, capsule, half_space, at_m, path, clearance_m } = self;
         let in_space = capsule.is_some() || half_space.is_some();
         let shapes = [
@@ -154,20 +146,20 @@ impl ObstacleTable {
             (None, None) => return Err(format!("obstacle `{name}` has neither at_m nor path")),
             (Some(_), Some(_)) => return Err(format!("obstacle `{name}` has both at_m and path")),
         };
-        Ok(Solid { shape, path, clearance_m })
+        Ok(MovingObstacle { name, shape, clearance_m, path })
     }
 
     /// Returns the obstacle at rest, with a default clearance \[m\].
     pub(super) fn obstacle(&self, number: usize, clearance_m: f64) -> Result<Obstacle, ScenarioError> {
         let wrong = |said: String| ScenarioError::new(said).with_kind(ErrorKind::Obstacle).at_entry("obstacle", number);
-        let Solid { shape, path, clearance_m: own_m } =
-            self.clone().solid().map_err(|said| wrong(said).with_help(OBSTACLE_HELP))?;
+        let MovingObstacle { name, shape, clearance_m: own_m, path } =
+            self.clone().into_moving().map_err(|said| wrong(said).with_help(OBSTACLE_HELP))?;
         let [(_, place_m)] = path[..] else {
             let command = format!("tautline audit {}", OBSTACLES.argument());
-            return Err(wrong(format!("obstacle `{}` moves", self.name))
+            return Err(wrong(format!("obstacle `{name}` moves"))
                 .with_help(format!("give at_m = [x, y, z]; only `{command}` takes obstacles that move")));
         };
-        Ok(Obstacle { name: self.name.clone(), place_m, shape, clearance_m: own_m.unwrap_or(clearance_m) })
+        Ok(Obstacle { name, place_m, shape, clearance_m: own_m.unwrap_or(clearance_m) })
     }
 }
 
@@ -253,7 +245,7 @@ impl Scenario {
 
     fn refuse(&self, point_m: Vector3<f64>, number: usize, subject: std::fmt::Arguments<'_>) -> ScenarioError {
         let Obstacle { name, clearance_m, shape, place_m } = &self.obstacles[number];
-        let (distance_m, _) = shape.signed_distance_m(point_m - place_m);
+        let (distance_m, _) = signed_distance_m(shape, point_m - place_m);
         let said = if distance_m <= 0.0 {
             format!("{subject} inside obstacle `{name}`")
         } else {

@@ -10,12 +10,13 @@ use super::time::TimeSpec;
 use crate::link::{ActuationSpec, Failure, NetworkSpec, SensingSpec};
 use crate::shield::ShieldSpec;
 use crate::vehicle::Airframe;
+use tautline_core::obstacle::Obstacle;
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::formation::Formation;
 use tautline_laws::graph::Graph;
 use tautline_laws::law::{EdgeTensionKeys, Law, LawContext, LawSpec, ParameterError, WindExposure};
 use tautline_laws::observation::Observation;
-use tautline_laws::space::{Metric, Obstacle};
+use tautline_laws::space::Metric;
 use tautline_laws::target::{Arrival, DeadlockOptions, Guidance, Leg, Reference, Target};
 use tautline_laws::wind::{Wind, WindSpec};
 

@@ -13,8 +13,8 @@ use crate::vehicle::{
     self, Airframe, Fleet, Ground, Heading, MODELS, Model, ModelError, ModelParseError, Quadrotor, Unicycle,
 };
 use tautline_core::failure::Place;
+use tautline_core::obstacle::{Obstacle, Shape};
 use tautline_core::swarm::row;
-use tautline_laws::space::{Obstacle, Shape};
 
 const MODEL: &str = "vehicle.model";
 const POINT: &str = "point";

@@ -34,10 +34,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::scenario::{ErrorKind, MAX_MEMORY_BYTES, Scenario, ScenarioError, Space};
 use crate::sim::MAX_BEND;
+use tautline_core::obstacle;
 use tautline_core::swarm::row;
 use tautline_core::text::shortest;
 use tautline_laws::law::{Certificate, VoidReason};
-use tautline_laws::space::Shape;
+use tautline_laws::space::signed_distance_m;
 use tautline_shield::fleet::{PairRoom, closest_starts};
 use tautline_shield::obstacle::ConvexBody;
 use tautline_shield::{Fleet, Limits, Obstacle, Settings, ShieldError, Start, State};
@@ -247,10 +248,7 @@ impl Scenario {
 
     /// Returns the shields of all vehicles at these starts, with planes before the obstacles.
     pub(crate) fn shield_fleet(&self, limits: &Limits, states: &[State]) -> Result<Fleet, ScenarioError> {
-        let keep_out = |obstacle: &tautline_laws::space::Obstacle| {
-            let clearance_m = obstacle.clearance_m;
-            Obstacle::new(Solid { shape: obstacle.shape, place_m: obstacle.place_m }, clearance_m)
-        };
+        let keep_out = |obstacle: &obstacle::Obstacle| Obstacle::new(Solid(obstacle.clone()), obstacle.clearance_m);
         let obstacles: Vec<_> = self.obstacles.iter().map(keep_out).collect();
         let fleet = Fleet::new(&vec![*limits; self.count()], states);
         let fleet = fleet.and_then(|fleet| fleet.with_obstacles(&obstacles));
@@ -392,16 +390,13 @@ impl Scenario {
     }
 }
 
-/// Shape of an obstacle; all of them are convex.
-#[derive(Clone, Copy, Debug)]
-struct Solid {
-    shape: Shape,
-    place_m: Vector3<f64>,
-}
+/// Obstacle; all shapes are convex.
+#[derive(Debug)]
+struct Solid(obstacle::Obstacle);
 
 impl ConvexBody for Solid {
     fn closest_point_m(&self, point_m: &Vector3<f64>) -> Option<Vector3<f64>> {
-        let (distance_m, normal) = self.shape.signed_distance_m(point_m - self.place_m);
+        let (distance_m, normal) = signed_distance_m(&self.0.shape, point_m - self.0.place_m);
         (distance_m > 0.0).then(|| point_m - normal * distance_m)
     }
 }

@@ -5,11 +5,12 @@ use crate::link::Imperfections;
 use crate::plant::Feedback;
 use crate::scenario::Scenario;
 use crate::shield::ShieldStage;
+use tautline_core::obstacle::Obstacle;
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::graph::Graph;
 use tautline_laws::law::{Certificate, Law, LawError, certificate_through};
 use tautline_laws::observation::{Observation, OtherStates};
-use tautline_laws::space::{Metric, Obstacle, VerletList};
+use tautline_laws::space::{Metric, VerletList};
 use tautline_laws::target::{Change, CurrentTarget, Guidance, Supervisor};
 
 /// Control loop between the true state and the actuators, with all of its memory.

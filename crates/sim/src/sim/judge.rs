@@ -3,16 +3,16 @@
 use super::ending::SimError;
 use crate::plant::{HullContact, Plant, StepPath};
 use crate::scenario::Scenario;
-use tautline_audit as audit;
 use tautline_audit::{
-    AuditError, AuditOutcome, Auditor, ClearanceAuditor, ClearanceFinding, ClearanceOutcome, ObjectPair, Obstacle,
-    Status, StepFinding, Violation, swept_distance_m, swept_separation_m,
+    AuditError, AuditOutcome, Auditor, ClearanceAuditor, ClearanceFinding, ClearanceOutcome, ObjectPair, Status,
+    StepFinding, Violation, swept_distance_m, swept_separation_m,
 };
+use tautline_core::obstacle::Obstacle;
 use tautline_core::record::Event;
 use tautline_core::swarm::{Bounce, ClosestApproach, Pair, Rows, Swarm, row};
 use tautline_laws::graph::Graph;
 use tautline_laws::law::Law;
-use tautline_laws::space::{self, CellList, Metric};
+use tautline_laws::space::{CellList, Metric};
 
 /// Auditor with the state that the loop needs from step to step.
 #[derive(Clone)]
@@ -71,7 +71,7 @@ pub(super) struct AuditResults {
 impl Judge {
     pub(super) fn new(scenario: &Scenario) -> Result<Self, SimError> {
         let count = scenario.count();
-        let obstacles: Vec<_> = scenario.obstacles.iter().map(audit_obstacle).collect();
+        let obstacles = scenario.obstacles.clone();
         let clearance = if obstacles.is_empty() { None } else { Some(ClearanceAuditor::new(count, &obstacles)?) };
         let metric = scenario.metric();
         let widest_m = 2.0 * scenario.hull_radius_m.iter().copied().fold(0.0, f64::max);
@@ -293,7 +293,7 @@ impl Judge {
     fn comes_near_obstacle(&self, start: &Rows, path: &StepPath, end: &Swarm) -> bool {
         (0..start.nrows()).any(|i| {
             self.obstacles.iter().any(|obstacle| {
-                let limit_m = obstacle.clearance_m.unwrap_or_default();
+                let limit_m = obstacle.clearance_m;
                 let mut from = row(start, i);
                 let least_m = limit_m + 0.5 * (swept_distance_m(obstacle, from, from) - limit_m);
                 path.instants().map(|(_, rows)| rows).chain([&end.positions_m]).any(|rows| {
@@ -411,31 +411,10 @@ fn note(finding: StepFinding<'_>, closest: &mut Option<ClosestApproach>, nearest
     }
 }
 
-/// Returns an obstacle at rest in the types of the audit.
-#[must_use]
-pub fn audit_obstacle(obstacle: &space::Obstacle) -> audit::Obstacle {
-    audit::Obstacle {
-        name: obstacle.name.clone(),
-        shape: audit_shape(obstacle.shape),
-        clearance_m: Some(obstacle.clearance_m),
-        path: vec![(0.0, obstacle.place_m)],
-    }
-}
-
-/// Returns a shape in the types of the audit.
-#[must_use]
-pub fn audit_shape(shape: space::Shape) -> audit::Shape {
-    match shape {
-        space::Shape::Ball { radius_m } => audit::Shape::Ball { radius_m },
-        space::Shape::Box { half_m, yaw_deg } => audit::Shape::Box { half_m, yaw_rad: yaw_deg.to_radians() },
-        space::Shape::Capsule { from_m, to_m, radius_m } => audit::Shape::Capsule { from_m, to_m, radius_m },
-        space::Shape::HalfSpace { normal } => audit::Shape::HalfSpace { normal },
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tautline_core::obstacle::Shape;
     use tautline_laws::formation::Formation;
 
     #[test]
@@ -459,10 +438,10 @@ mod tests {
     fn a_bend_past_an_obstacle_counts_beside_a_violation() {
         let line = |from_m: f64| Rows::from_row_slice(&[from_m, 0.0, 0.0, from_m + 9.0, 0.0, 0.0]);
         let mut scenario = Scenario::new("two", Swarm::at_rest(line(3.0)), Formation::line(2, 9.0), 2.0, 2.0);
-        scenario.obstacles = vec![tautline_laws::space::Obstacle {
+        scenario.obstacles = vec![Obstacle {
             name: "ball".to_owned(),
             place_m: nalgebra::Vector3::zeros(),
-            shape: tautline_laws::space::Shape::Ball { radius_m: 1.0 },
+            shape: Shape::Ball { radius_m: 1.0 },
             clearance_m: 1.0,
         }];
         let (mut judge, mut events) = (Judge::new(&scenario).expect("a judge"), Vec::new());

@@ -15,7 +15,6 @@ mod vector;
 pub use ending::{Breakdown, Ending, Flight, Performance, SimError};
 pub(crate) use ending::{MAX_BEND, Stopwatch};
 pub(crate) use judge::check_judge;
-pub use judge::{audit_obstacle, audit_shape};
 pub use simulation::{Components, SavedState, Simulation};
 pub use vector::{SeedChoice, States, StatesMut, Threads, VectorError, VectorSimulation};
 

@@ -6,12 +6,13 @@
 
 use nalgebra::Vector3;
 use tautline_audit::Status;
+use tautline_core::obstacle::{Obstacle, Shape};
 use tautline_core::record::Event;
 use tautline_core::swarm::{Rows, Swarm, separation};
 use tautline_laws::formation::Formation;
 use tautline_laws::graph::{Graph, Pinning};
 use tautline_laws::law::{DisplacementKeys, LawSpec, VoidReason};
-use tautline_laws::space::{Obstacle, Shape, smallest_clearance_margin};
+use tautline_laws::space::smallest_clearance_margin;
 use tautline_laws::target::{DeadlockMode, Guidance, Leg, LegTrigger, ReferenceMotion};
 use tautline_sim::plant;
 use tautline_sim::scenario::{PlantSpec, Scenario, Source};

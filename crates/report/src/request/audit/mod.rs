@@ -34,7 +34,7 @@ use crate::report::recorded::{Clock, RecordedReport, Source};
 use replays::Instants;
 use side_files::{ItemSpan, SideFiles};
 use tautline_audit::recorded::{ObjectPair, Outcome, PairSample, PairSeries, Presence, Settings, TrackAuditor};
-use tautline_audit::{Obstacle, Violation, are_decimals_apart};
+use tautline_audit::{MovingObstacle, Violation, are_decimals_apart};
 use tautline_core::fact::{Fact, FactKind, Source as FactSource};
 use tautline_core::files::write_atomically;
 use tautline_core::option::{OBSTACLES, OFFSET};
@@ -365,7 +365,7 @@ fn read_until(
 struct RecordedLimits<'a> {
     delta_m: Option<f64>,
     ellipsoid_m: Option<Vector3<f64>>,
-    obstacles: Option<&'a [Obstacle]>,
+    obstacles: Option<&'a [MovingObstacle]>,
 }
 
 impl<'a> RecordedLimits<'a> {

@@ -9,7 +9,7 @@ use super::AuditRequest;
 use crate::report::recorded::{EarlyEnd, RunObjection};
 use crate::report::{Finding, Objects, Report};
 use tautline_audit::recorded::{Approach, ObjectPair, Outcome, Settings, TOUCHING_ELLIPSOIDS, VehicleSettings};
-use tautline_audit::{Obstacle, ParryEvidence, Status, Tally, Violation};
+use tautline_audit::{MovingObstacle, ParryEvidence, Status, Tally, Violation};
 use tautline_core::option::{DELTA, INDEPENDENT};
 use tautline_core::record::Event;
 use tautline_core::swarm::Pair;
@@ -17,8 +17,8 @@ use tautline_core::text::{counted, exact};
 use tautline_recordings::mcap::{Entry, RunAudit, RunFinding, StoredAudit};
 use tautline_recordings::read;
 use tautline_recordings::read::ReadOptions;
+use tautline_sim::scenario;
 use tautline_sim::scenario::Scenario;
-use tautline_sim::{scenario, sim};
 
 /// Relative rounding difference of two distances at the same instant, computed in two ways.
 const SAME: f64 = 1e-9;
@@ -31,7 +31,7 @@ pub struct OwnRecording {
     /// Half axes of the ellipsoid around each vehicle \[m\].
     pub(super) ellipsoid_m: Option<Vector3<f64>>,
     /// Obstacles of the scenario.
-    pub(super) obstacles: Vec<Obstacle>,
+    pub(super) obstacles: Vec<MovingObstacle>,
     /// Early end of the flight, if it has one.
     pub(super) early_end: Option<EarlyEnd>,
     audit: StoredAudit,
@@ -118,7 +118,7 @@ impl OwnRecording {
         Self {
             limit_m: if ellipsoid_m.is_some() { TOUCHING_ELLIPSOIDS } else { delta_m * scale },
             ellipsoid_m,
-            obstacles: scenario.obstacles.iter().map(|obstacle| sim::audit_obstacle(obstacle).scaled(scale)).collect(),
+            obstacles: scenario.obstacles.iter().map(|obstacle| MovingObstacle::from(obstacle).scaled(scale)).collect(),
             early_end: None,
             audit: StoredAudit::None,
             run_findings: Vec::new(),

@@ -2,7 +2,7 @@
 
 use super::super::Failure;
 use super::AuditRequest;
-use tautline_audit::Obstacle;
+use tautline_audit::MovingObstacle;
 use tautline_audit::envelope::Quantity;
 use tautline_audit::recorded::Settings;
 use tautline_core::option::{ABOVE, COLUMN, CYLINDER, FROM, IDS, ORIGIN, TO, WELL_CLEAR};
@@ -45,7 +45,7 @@ impl RequestedLimits<'_> {
         cylinder.or_else(|| self.settings.well_clear.map(|_| WELL_CLEAR.to_string()))
     }
 
-    fn obstacle(&self, is_asked: fn(&Obstacle) -> bool) -> Option<String> {
+    fn obstacle(&self, is_asked: fn(&MovingObstacle) -> bool) -> Option<String> {
         let obstacle = self.settings.obstacles.iter().find(|obstacle| is_asked(obstacle));
         obstacle.map(|obstacle| format!("the obstacle `{}`", obstacle.name))
     }

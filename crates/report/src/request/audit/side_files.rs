@@ -2,7 +2,7 @@
 //! share with the judged window.
 
 use super::super::Failure;
-use tautline_audit::Obstacle;
+use tautline_audit::MovingObstacle;
 use tautline_audit::recorded::{Outcome, Settings};
 use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::option::OFFSET;
@@ -190,7 +190,7 @@ impl ItemSpan {
 }
 
 /// Returns the time from the first to the last point of a path; `None` at rest.
-fn span_s(obstacle: &Obstacle) -> Option<[f64; 2]> {
+fn span_s(obstacle: &MovingObstacle) -> Option<[f64; 2]> {
     match &obstacle.path[..] {
         [(first_s, _), .., (last_s, _)] => Some([*first_s, *last_s]),
         _ => None,
@@ -208,7 +208,7 @@ pub(super) fn seconds_of(epoch_ns: i64) -> f64 {
     (epoch_ns / 1_000_000_000) as f64 + (epoch_ns % 1_000_000_000) as f64 * 1e-9
 }
 
-fn ambiguous(obstacle: &Obstacle, epoch_s: f64) -> Failure {
+fn ambiguous(obstacle: &MovingObstacle, epoch_s: f64) -> Failure {
     let message = format!(
         "the path of the obstacle `{}` meets the judged window with times from the epoch of the recording, {epoch_s:?} \
          s, and with times from 0",
@@ -220,13 +220,13 @@ fn ambiguous(obstacle: &Obstacle, epoch_s: f64) -> Failure {
 #[cfg(test)]
 mod tests {
     use nalgebra::Vector3;
-    use tautline_audit::Shape;
+    use tautline_core::obstacle::Shape;
 
     use super::*;
 
-    fn truck(times_s: [f64; 2]) -> Obstacle {
+    fn truck(times_s: [f64; 2]) -> MovingObstacle {
         let path = times_s.map(|time_s| (time_s, Vector3::zeros())).to_vec();
-        Obstacle { name: "truck".to_owned(), shape: Shape::Ball { radius_m: 1.0 }, clearance_m: None, path }
+        MovingObstacle { name: "truck".to_owned(), shape: Shape::Ball { radius_m: 1.0 }, clearance_m: None, path }
     }
 
     fn aligned(times_s: [f64; 2], epoch_s: i64, first_s: f64) -> Result<[f64; 2], String> {

@@ -6,10 +6,9 @@ use serde::Deserialize;
 
 use super::super::Failure;
 use super::toml_file::TomlFile;
-use tautline_audit::Obstacle;
+use tautline_audit::MovingObstacle;
 use tautline_audit::envelope::Fence;
-use tautline_sim::scenario::{OBSTACLE_HELP, ObstacleTable, Solid};
-use tautline_sim::sim;
+use tautline_sim::scenario::{OBSTACLE_HELP, ObstacleTable};
 
 /// Largest size of a file \[bytes\].
 const MOST_BYTES: u64 = 64 << 20;
@@ -31,11 +30,11 @@ struct ObstacleDocument {
 }
 
 /// Reads the obstacles of a file.
-pub(super) fn read_obstacles(path: &Path) -> Result<Vec<Obstacle>, Failure> {
+pub(super) fn read_obstacles(path: &Path) -> Result<Vec<MovingObstacle>, Failure> {
     parse_obstacles(&OBSTACLES.read(path)?, path)
 }
 
-fn parse_obstacles(text: &str, path: &Path) -> Result<Vec<Obstacle>, Failure> {
+fn parse_obstacles(text: &str, path: &Path) -> Result<Vec<MovingObstacle>, Failure> {
     let document: ObstacleDocument = OBSTACLES.parse(text, path)?;
     if document.obstacle.is_empty() {
         return Err(OBSTACLES.wrong(text, path, 0, "the file has no [[obstacle]]"));
@@ -47,10 +46,8 @@ fn parse_obstacles(text: &str, path: &Path) -> Result<Vec<Obstacle>, Failure> {
     document.obstacle.into_iter().map(judged).collect()
 }
 
-fn obstacle(table: ObstacleTable) -> Result<Obstacle, String> {
-    let name = table.name.clone();
-    let Solid { shape, path, clearance_m } = table.solid()?;
-    let obstacle = Obstacle { name, shape: sim::audit_shape(shape), clearance_m, path };
+fn obstacle(table: ObstacleTable) -> Result<MovingObstacle, String> {
+    let obstacle = table.into_moving()?;
     obstacle.check().map(|()| obstacle).map_err(|error| error.to_string())
 }
 
@@ -91,9 +88,9 @@ mod tests {
     use nalgebra::Vector3;
 
     use super::*;
-    use tautline_audit::Shape;
+    use tautline_core::obstacle::Shape;
 
-    fn read(text: &str) -> Result<Vec<Obstacle>, String> {
+    fn read(text: &str) -> Result<Vec<MovingObstacle>, String> {
         parse_obstacles(text, Path::new("obstacles.toml")).map_err(|failure| failure.message().to_owned())
     }
 

@@ -10,8 +10,8 @@ use rapier3d::prelude::{
 
 use crate::plant::HullContact;
 use crate::scenario::CONTACT_PREDICTION_M;
+use tautline_core::obstacle::{Obstacle, Shape};
 use tautline_core::swarm::{Pair, Rows, row};
-use tautline_laws::space::{Obstacle, Shape};
 
 /// Group of hulls, which collide with hulls.
 const HULL: Group = Group::GROUP_1;

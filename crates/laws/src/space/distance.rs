@@ -1,82 +1,59 @@
-//! Shapes of obstacles and distances from their surfaces.
+//! Distances from the surfaces of obstacles.
 
 use nalgebra::Vector3;
 
-/// Shape of an obstacle around its position.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Shape {
-    /// Ball.
-    Ball {
-        /// Radius \[m\].
-        radius_m: f64,
-    },
-    /// Upright box.
-    Box {
-        /// Half side lengths \[m\].
-        half_m: Vector3<f64>,
-        /// Rotation about the vertical \[deg\], counterclockwise from above.
-        yaw_deg: f64,
-    },
-    /// Capsule: all points within a radius of a straight line segment.
-    Capsule {
-        /// One end of the segment, relative to the obstacle's position \[m\].
-        from_m: Vector3<f64>,
-        /// The other end \[m\].
-        to_m: Vector3<f64>,
-        /// Radius \[m\].
-        radius_m: f64,
-    },
-    /// Half-space behind a plane through the obstacle's position.
-    HalfSpace {
-        /// Outward normal, of any nonzero length.
-        normal: Vector3<f64>,
-    },
+use tautline_core::obstacle::{Obstacle, Shape};
+use tautline_core::swarm::{Rows, row};
+
+/// Returns the distance of a point from the surface \[m\], negative inside, and the outward unit normal at the
+/// nearest surface point, which is the gradient of the distance. The point is relative to the obstacle's position
+/// \[m\].
+///
+/// If several surface points are nearest (centre of a ball, axis of a capsule, inner diagonal of a box), the normal
+/// is that of one of them.
+#[must_use]
+pub fn signed_distance_m(shape: &Shape, point_m: Vector3<f64>) -> (f64, Vector3<f64>) {
+    match *shape {
+        Shape::Ball { radius_m } => from_core(point_m, radius_m, Vector3::z()),
+        Shape::Box { half_m, yaw_deg: 0.0 } => from_box(point_m, half_m),
+        Shape::Box { half_m, yaw_deg } => {
+            let yaw_rad = yaw_deg.to_radians();
+            let (sin, cos) = (libm::sin(yaw_rad), libm::cos(yaw_rad));
+            let turned = Vector3::new(cos * point_m.x + sin * point_m.y, cos * point_m.y - sin * point_m.x, point_m.z);
+            let (distance_m, normal) = from_box(turned, half_m);
+            let back = Vector3::new(cos * normal.x - sin * normal.y, sin * normal.x + cos * normal.y, normal.z);
+            (distance_m, back)
+        }
+        Shape::Capsule { from_m, to_m, radius_m } => {
+            let (along, aside) = (to_m - from_m, point_m - from_m);
+            let squared = along.norm_squared();
+            let share = if squared > 0.0 { (aside.dot(&along) / squared).clamp(0.0, 1.0) } else { 0.0 };
+            from_core(aside - along * share, radius_m, across(along))
+        }
+        Shape::HalfSpace { normal } => {
+            let normal = normal.normalize();
+            (point_m.dot(&normal), normal)
+        }
+    }
 }
 
-impl Shape {
-    /// Returns the largest distance of its points from its position \[m\]; 0 for a half-space, which is unbounded.
-    #[must_use]
-    pub fn reach_m(&self) -> f64 {
-        match *self {
-            Self::Ball { radius_m } => radius_m,
-            Self::Box { half_m, .. } => half_m.norm(),
-            Self::Capsule { from_m, to_m, radius_m } => from_m.norm().max(to_m.norm()) + radius_m,
-            Self::HalfSpace { .. } => 0.0,
-        }
-    }
+/// Returns the clearance margin of a point \[m\], its distance from the surface less the clearance, and the gradient of
+/// the margin, a unit vector ([`signed_distance_m`]).
+#[must_use]
+pub fn clearance_margin_m(obstacle: &Obstacle, point_m: Vector3<f64>) -> (f64, Vector3<f64>) {
+    let (distance_m, normal) = signed_distance_m(&obstacle.shape, point_m - obstacle.place_m);
+    (distance_m - obstacle.clearance_m, normal)
+}
 
-    /// Returns the distance of a point from the surface \[m\], negative inside, and the outward unit normal at the
-    /// nearest surface point, which is the gradient of the distance. The point is relative to the obstacle's position
-    /// \[m\].
-    ///
-    /// If several surface points are nearest (centre of a ball, axis of a capsule, inner diagonal of a box), the normal
-    /// is that of one of them.
-    #[must_use]
-    pub fn signed_distance_m(&self, point_m: Vector3<f64>) -> (f64, Vector3<f64>) {
-        match *self {
-            Self::Ball { radius_m } => from_core(point_m, radius_m, Vector3::z()),
-            Self::Box { half_m, yaw_deg: 0.0 } => from_box(point_m, half_m),
-            Self::Box { half_m, yaw_deg } => {
-                let yaw_rad = yaw_deg.to_radians();
-                let (sin, cos) = (libm::sin(yaw_rad), libm::cos(yaw_rad));
-                let turned =
-                    Vector3::new(cos * point_m.x + sin * point_m.y, cos * point_m.y - sin * point_m.x, point_m.z);
-                let (distance_m, normal) = from_box(turned, half_m);
-                let back = Vector3::new(cos * normal.x - sin * normal.y, sin * normal.x + cos * normal.y, normal.z);
-                (distance_m, back)
-            }
-            Self::Capsule { from_m, to_m, radius_m } => {
-                let (along, aside) = (to_m - from_m, point_m - from_m);
-                let squared = along.norm_squared();
-                let share = if squared > 0.0 { (aside.dot(&along) / squared).clamp(0.0, 1.0) } else { 0.0 };
-                from_core(aside - along * share, radius_m, across(along))
-            }
-            Self::HalfSpace { normal } => {
-                let normal = normal.normalize();
-                (point_m.dot(&normal), normal)
-            }
-        }
-    }
+/// Returns the smallest clearance margin of any position at any obstacle \[m\], with the row and the obstacle; `None`
+/// without positions or obstacles.
+#[must_use]
+pub fn smallest_clearance_margin(obstacles: &[Obstacle], positions_m: &Rows) -> Option<(f64, usize, usize)> {
+    let margins = (0..positions_m.nrows()).flat_map(|i| {
+        let point_m = row(positions_m, i);
+        obstacles.iter().enumerate().map(move |(k, obstacle)| (clearance_margin_m(obstacle, point_m).0, i, k))
+    });
+    margins.min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
 /// Returns distance and normal for the surface at `radius_m` around a core, from the vector `off` that points from the
@@ -161,7 +138,7 @@ mod tests {
 
         #[test]
         fn distances_match_parry(shape in shape(), point in vector(5.0)) {
-            let (distance_m, _) = shape.signed_distance_m(point);
+            let (distance_m, _) = signed_distance_m(&shape, point);
             prop_assert!((distance_m - by_parry(&shape, point)).abs() < TOLERANCE_M, "{shape:?}: {distance_m}");
         }
 
@@ -169,12 +146,12 @@ mod tests {
         fn the_surface_lies_at_the_distance_along_the_normal(
             shape in shape(), point in vector(5.0), directions in prop::collection::vec(vector(1.0), 200),
         ) {
-            let (distance_m, normal) = shape.signed_distance_m(point);
+            let (distance_m, normal) = signed_distance_m(&shape, point);
             prop_assert!((normal.norm() - 1.0).abs() < TOLERANCE_M);
-            let (on_surface, _) = shape.signed_distance_m(point - normal * distance_m);
+            let (on_surface, _) = signed_distance_m(&shape, point - normal * distance_m);
             prop_assert!(on_surface.abs() < TOLERANCE_M, "{shape:?}: {on_surface}");
             for direction in directions.iter().filter_map(|d| d.try_normalize(0.1)) {
-                let (nearer, _) = shape.signed_distance_m(point + direction * (distance_m.abs() * 0.999));
+                let (nearer, _) = signed_distance_m(&shape, point + direction * (distance_m.abs() * 0.999));
                 prop_assert!(nearer * distance_m >= 0.0, "{shape:?}: the surface is crossed on the way");
             }
         }
@@ -182,8 +159,8 @@ mod tests {
         #[test]
         fn the_normal_is_the_gradient_of_the_distance(shape in shape(), point in vector(5.0)) {
             const STEP_M: f64 = 1e-6;
-            let (distance_m, normal) = shape.signed_distance_m(point);
-            let (farther_m, same) = shape.signed_distance_m(point + normal * STEP_M);
+            let (distance_m, normal) = signed_distance_m(&shape, point);
+            let (farther_m, same) = signed_distance_m(&shape, point + normal * STEP_M);
             // Excludes points where the nearest feature changes within the step.
             prop_assume!((same - normal).norm() < 1e-3);
             prop_assert!((farther_m - distance_m - STEP_M).abs() < 1e-9, "{shape:?}");
@@ -193,12 +170,12 @@ mod tests {
     #[test]
     fn the_normal_is_defined_where_several_surface_points_are_nearest() {
         let up = Vector3::z();
-        assert_eq!(Shape::Ball { radius_m: 2.0 }.signed_distance_m(Vector3::zeros()), (-2.0, up));
+        assert_eq!(signed_distance_m(&Shape::Ball { radius_m: 2.0 }, Vector3::zeros()), (-2.0, up));
         let capsule = |to_m| Shape::Capsule { from_m: Vector3::zeros(), to_m, radius_m: 0.5 };
-        assert_eq!(capsule(Vector3::x()).signed_distance_m(Vector3::x() * 0.5), (-0.5, up));
-        assert_eq!(capsule(up).signed_distance_m(up * 0.5), (-0.5, Vector3::x()));
-        assert_eq!(capsule(Vector3::zeros()).signed_distance_m(Vector3::zeros()), (-0.5, up));
+        assert_eq!(signed_distance_m(&capsule(Vector3::x()), Vector3::x() * 0.5), (-0.5, up));
+        assert_eq!(signed_distance_m(&capsule(up), up * 0.5), (-0.5, Vector3::x()));
+        assert_eq!(signed_distance_m(&capsule(Vector3::zeros()), Vector3::zeros()), (-0.5, up));
         let cube = Shape::Box { half_m: Vector3::repeat(1.0), yaw_deg: 0.0 };
-        assert_eq!(cube.signed_distance_m(Vector3::zeros()), (-1.0, Vector3::x()));
+        assert_eq!(signed_distance_m(&cube, Vector3::zeros()), (-1.0, Vector3::x()));
     }
 }
