@@ -10,7 +10,7 @@ use anstream::stream::RawStream;
 use anstream::{AutoStream, ColorChoice};
 use anstyle::{AnsiColor, Style};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use miette::{GraphicalReportHandler, LabeledSpan, MietteDiagnostic, NamedSource, Report};
+use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
 use serde::Serialize;
 
 use tautline_report::request::{Failure, Monitor, blanked};
@@ -86,10 +86,21 @@ fn coloured_line(line: &str) -> String {
     shown + &line[done..]
 }
 
+/// Sets whether the output of this process has colours; `Auto` leaves the choice to the environment.
+pub(super) fn set_colours(choice: clap::ColorChoice) {
+    let choice = match choice {
+        clap::ColorChoice::Auto => ColorChoice::Auto,
+        clap::ColorChoice::Always => ColorChoice::Always,
+        clap::ColorChoice::Never => ColorChoice::Never,
+    };
+    choice.write_global();
+}
+
 /// Returns whether a stream has colours. `CLICOLOR_FORCE=0` asks for no more than the default, but `anstream` forces
 /// colours for any value.
 fn colour_choice(stream: &impl RawStream) -> ColorChoice {
-    let forces_nothing = std::env::var_os("CLICOLOR_FORCE").is_some_and(|value| value == "0");
+    let is_given = ColorChoice::global() != ColorChoice::Auto;
+    let forces_nothing = !is_given && std::env::var_os("CLICOLOR_FORCE").is_some_and(|value| value == "0");
     if forces_nothing && !stream.is_terminal() { ColorChoice::Never } else { AutoStream::choice(stream) }
 }
 
@@ -309,7 +320,12 @@ pub(super) fn show(failure: &Failure) -> Exit {
         None => Report::new(diagnostic),
     };
     let mut text = String::new();
-    if GraphicalReportHandler::new().render_report(&mut text, report.as_ref()).is_err() {
+    let handler = match ColorChoice::global() {
+        ColorChoice::Always | ColorChoice::AlwaysAnsi => GraphicalReportHandler::new_themed(GraphicalTheme::unicode()),
+        ColorChoice::Never => GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor()),
+        ColorChoice::Auto => GraphicalReportHandler::new(),
+    };
+    if handler.render_report(&mut text, report.as_ref()).is_err() {
         text = format!("error: {failure}\n");
     }
     // An error here means that standard error is closed.

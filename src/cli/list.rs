@@ -3,6 +3,7 @@
 use std::path::Path;
 
 use clap::Args;
+use serde::Serialize;
 
 use super::{Exit, completions, console};
 use tautline_core::text::aligned;
@@ -16,9 +17,26 @@ pub(super) struct ListArguments {
     /// Print this built-in scenario as TOML, or the scenario in a recording of `tautline run` with all defaults.
     #[arg(long, value_name = "NAME|RECORDING", add = completions::scenario())]
     show: Option<String>,
+    /// Print the list as JSON.
+    #[arg(long, conflicts_with = "show")]
+    json: bool,
+}
+
+/// Built-in scenario with the size of its flight, which decides how long a flight takes.
+#[derive(Debug, Serialize)]
+struct Listed {
+    name: &'static str,
+    vehicles: usize,
+    duration_s: f64,
+    steps: u64,
+    content: &'static str,
 }
 
 pub(super) fn list(arguments: &ListArguments) -> Result<Exit, Failure> {
+    if arguments.json {
+        console::json(&listed()?)?;
+        return Ok(Exit::Good);
+    }
     let text = match &arguments.show {
         Some(name) => match builtin::find(name) {
             Some(builtin) => builtin.toml.to_owned(),
@@ -49,17 +67,23 @@ fn of_recording(name: &str) -> Result<String, Failure> {
     Ok(recording.header().scenario_toml.clone())
 }
 
-/// Returns the built-in scenarios with the size of their flights, which decides how long a flight takes.
-fn table() -> Result<String, Failure> {
-    let heading = ["scenario", "vehicles", "time", "steps", "content"].map(str::to_owned).to_vec();
-    let row = |builtin: &builtin::Builtin| {
+fn listed() -> Result<Vec<Listed>, Failure> {
+    let read = |builtin: &builtin::Builtin| {
         let scenario = Scenario::read(&Source::Builtin(builtin.name.to_owned()), &[])?;
-        let (vehicles, time) = (scenario.count().to_string(), format!("{} s", scenario.time.duration_s));
-        let (steps, content) = (scenario.time.steps().to_string(), builtin.summary.to_owned());
-        Ok(vec![builtin.name.to_owned(), vehicles, time, steps, content])
+        let (vehicles, duration_s, steps) = (scenario.count(), scenario.time.duration_s, scenario.time.steps());
+        Ok(Listed { name: builtin.name, vehicles, duration_s, steps, content: builtin.summary })
     };
-    let rows = std::iter::once(Ok(heading)).chain(builtin::all().iter().map(row));
-    Ok(aligned(&rows.collect::<Result<Vec<_>, Failure>>()?))
+    builtin::all().iter().map(read).collect()
+}
+
+fn table() -> Result<String, Failure> {
+    let heading = ["scenario", "vehicles", "time", "steps", "content"].map(str::to_owned);
+    let row = |of: Listed| {
+        let (vehicles, time, steps) = (of.vehicles.to_string(), format!("{} s", of.duration_s), of.steps.to_string());
+        vec![of.name.to_owned(), vehicles, time, steps, of.content.to_owned()]
+    };
+    let rows = listed()?.into_iter().map(row);
+    Ok(aligned(&std::iter::once(heading.to_vec()).chain(rows).collect::<Vec<_>>()))
 }
 
 /// Prints the JSON Schema of the scenario file.

@@ -13,6 +13,7 @@ mod doctor;
 #[cfg(feature = "viewer")]
 mod drawing;
 mod export;
+mod hints;
 mod list;
 mod new;
 mod reading;
@@ -30,7 +31,8 @@ use std::fmt::{self, Formatter};
 use std::process::ExitCode;
 use std::sync::{Once, PoisonError, RwLock};
 
-use clap::{Parser, Subcommand};
+use clap::error::ErrorKind;
+use clap::{ColorChoice, CommandFactory as _, Parser, Subcommand};
 
 use console::Exit;
 use tautline_core::option::{FORMAT, FPS, Opt, spell_with};
@@ -57,11 +59,17 @@ pub fn entry(arguments: &[OsString]) -> u8 {
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(usage) => {
+            let usage = hints::with_hints(usage, &Arguments::command(), words.first().map(String::as_str));
             console::usage(&usage);
             return if usage.use_stderr() { Exit::WrongInput } else { Exit::Good } as u8;
         }
     };
-    let command = arguments.command.unwrap_or_else(|| Command::Run(run::RunArguments::parse_from(["run"])));
+    console::set_colours(arguments.color);
+    let Some(command) = arguments.command else {
+        let help = Arguments::command().render_help();
+        console::usage(&Arguments::command().error(ErrorKind::DisplayHelp, help.ansi()));
+        return Exit::Good as u8;
+    };
     #[cfg(all(feature = "viewer", target_os = "linux"))]
     if match &command {
         Command::Run(run) => run.draws(),
@@ -78,7 +86,7 @@ pub fn entry(arguments: &[OsString]) -> u8 {
 
 /// Fly formations of vehicles in a rigid-body engine and prove that no two come too close.
 ///
-/// Without a command, flies the built-in scenario `pentagon`.
+/// Begin with `tautline run`, which flies a built-in scenario, or with `tautline audit RECORDING --delta METRES`.
 #[derive(Debug, Parser)]
 #[command(
     version,
@@ -95,6 +103,10 @@ Environment:
   CLICOLOR_FORCE=1  Colours, also in files and pipes; 0 is the default."
 )]
 struct Arguments {
+    /// Colours: auto (on a terminal), always or never.
+    #[arg(long, global = true, value_name = "WHEN", default_value = "auto", hide_default_value = true)]
+    #[arg(hide_possible_values = true)]
+    color: ColorChoice,
     #[command(subcommand)]
     command: Option<Command>,
 }

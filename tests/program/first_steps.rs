@@ -145,6 +145,42 @@ fn bash_completes_words_that_it_splits() {
 }
 
 #[test]
+fn without_a_command_the_help_is_shown_and_wrong_words_have_tips() {
+    let folder = folder();
+    let help = ran(folder.path(), &[]);
+    assert_eq!((help.exit, help.err.as_str()), (GOOD, ""));
+    assert!(help.out.contains("Usage: tautline") && help.out.contains("audit"), "{}", help.out);
+    assert_eq!(fs::read_dir(folder.path()).expect("the folder").count(), 0, "nothing was flown");
+    for (arguments, tip) in [
+        (&["rnu"][..], "'run'"),
+        (&["pentagon"], "tautline run pentagon"),
+        (&["mine.toml"], "tautline run mine.toml"),
+        (&["flight.csv"], "tautline audit flight.csv --delta METRES"),
+        (&["run", "--st", "law.kind=orca"], "'--set'"),
+        (&["audit", "flight.csv", "--delta", "2m"], "a length is a number of metres without a unit, such as 2"),
+    ] {
+        let wrong = ran(folder.path(), arguments);
+        assert_eq!((wrong.exit, wrong.out.as_str()), (WRONG_INPUT, ""), "{arguments:?}");
+        assert!(wrong.err.contains(tip), "{arguments:?}: {}", wrong.err);
+    }
+    let far = ran(folder.path(), &["juggle"]);
+    assert!(far.exit == WRONG_INPUT && !far.err.contains("tip"), "{}", far.err);
+}
+
+#[test]
+fn colours_are_a_choice() {
+    let folder = folder();
+    fs::write(folder.path().join("two.csv"), "t,id,x,y,z\n0,a,0,0,0\n0,b,9,0,0\n").expect("written");
+    for (choice, has_colours) in [("always", true), ("never", false), ("auto", false)] {
+        let judged = ran(folder.path(), &["audit", "two.csv", "--delta", "1", "--color", choice]);
+        let refused = ran(folder.path(), &["audit", "none.csv", "--delta", "1", "--color", choice]);
+        for text in [&judged.out, &refused.err] {
+            assert_eq!(text.contains('\u{1b}'), has_colours, "{choice}: {text}");
+        }
+    }
+}
+
+#[test]
 fn a_missing_file_or_folder_is_named_with_a_remedy() {
     let folder = folder();
     fs::write(folder.path().join("two.csv"), "t,id,x,y,z\n0,a,0,0,0\n0,b,9,0,0\n").expect("written");

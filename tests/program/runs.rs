@@ -156,6 +156,22 @@ fn the_readme_shows_what_the_program_prints() {
 }
 
 #[test]
+fn free_steps_leave_out_most_steps_of_the_engine_and_change_no_bit() {
+    let folder = folder();
+    let flown = |more: &[&str]| json(&run(folder.path(), &[&SHORT[..], more, &["--json", "--force"]].concat()).out);
+    let (whole, free) = (flown(&[]), flown(&["--free-steps"]));
+    let steps = |report: &Value| report["run"]["engine_steps"].as_u64().expect("a number");
+    assert!(steps(&whole) >= whole["run"]["steps"].as_u64().expect("a number"), "{whole}");
+    assert!(2 * steps(&free) < steps(&whole), "{} of {} steps", steps(&free), steps(&whole));
+    let without_count = |mut report: Value| {
+        report["run"]["engine_steps"] = Value::Null;
+        report["performance"] = Value::Null;
+        report
+    };
+    assert_eq!(without_count(free), without_count(whole));
+}
+
+#[test]
 fn with_json_text_goes_to_standard_error_unless_quiet() {
     let folder = folder();
     let talking = run(folder.path(), &[&SHORT[..], &["--json"]].concat());
@@ -330,6 +346,12 @@ fn list_names_every_built_in_and_shows_one_as_toml() {
     }
     let pentagon = listed.out.lines().nth(1).expect("a row").split_whitespace().take(5).collect::<Vec<_>>();
     assert_eq!(pentagon, ["pentagon", "5", "120", "s", "28800"]);
+    let rows = json(&ran(folder.path(), &["list", "--json"]).out);
+    assert_eq!(rows.as_array().map(Vec::len), Some(builtin::all().len()));
+    let expected = serde_json::json!({
+        "name": "pentagon", "vehicles": 5, "duration_s": 120.0, "steps": 28800, "content": builtin::all()[0].summary,
+    });
+    assert_eq!(rows[0], expected);
     let unknown = ran(folder.path(), &["list", "--show", "heptagon"]);
     assert_eq!((unknown.exit, unknown.out.as_str()), (WRONG_INPUT, ""));
     assert!(unknown.err.contains("heptagon") && unknown.err.contains("tautline list"), "{}", unknown.err);

@@ -91,7 +91,9 @@ pub(super) fn exceeded_margin(margins: &[PredictedMargin], scenario: &Scenario) 
             Bound::AtLeast => (given < value, "lower"),
         };
         is_beyond.then(|| {
-            let common = if margin.key == NETWORK_LATENCY { " of the swarm, common motion included," } else { "" };
+            // With a22 > 0 the common motion grows at any delay, and the margin leaves it out.
+            let has_common = margin.key == NETWORK_LATENCY && scenario.velocity_coefficient_per_s() <= 0.0;
+            let common = if has_common { " of the swarm, common motion included," } else { "" };
             format!(
                 "{} = {given} is beyond the {limit} limit {}: a small disturbance{common} grows, even without other \
                  imperfections.",
