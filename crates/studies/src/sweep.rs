@@ -13,7 +13,7 @@ use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
 use tautline_core::failure::Failure;
 use tautline_core::option::{RUNS, SEED, SET, SWEEP_KEY, VERDICT};
-use tautline_core::text::{beside_limit, counted, shortest};
+use tautline_core::text::{beside_limit, capitalised, counted, shortest};
 use tautline_report::figures::{Figure, GridAxis, Separation, Share, heat_map, separations, shares};
 use tautline_report::report::page::{Badge, Tone};
 use tautline_report::request::ScenarioRequest;
@@ -474,8 +474,7 @@ impl Study for Sweep {
     }
 
     fn records(&self) -> Table {
-        let does = self.question.words()[0];
-        let (does, is_single) = (format!("{}{}", does[..1].to_uppercase(), &does[1..]), self.runs.count == 1);
+        let (does, is_single) = (capitalised(self.question.words()[0]), self.runs.count == 1);
         let table = Table::of(if is_single { "One flight each" } else { "With 95 % intervals" }, &self.points);
         let share = if is_single { Kind::OneFlight } else { Kind::Share };
         // The median of one flight is its separation, so only files have it.
