@@ -287,8 +287,8 @@ pub(crate) fn campaign(
         external_law,
         ..CampaignRequest::new(spec)
     };
-    let answer = whole(answered(py, has_law, |monitor| tautline::campaign::campaign(&request, &(), monitor))?)?;
-    Ok((answer_of(&answer.summary)?, answer.folder))
+    let summary = whole(answered(py, has_law, |monitor| tautline::campaign::campaign(&request, &(), monitor))?)?;
+    Ok((answer_of(&summary)?, request.folder()))
 }
 
 /// Returns share, lower and upper bound of `count` of `of` (Clopper and Pearson, 95 %).

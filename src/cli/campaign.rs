@@ -10,7 +10,7 @@ use super::run::pictures;
 use tautline_report::request::{Failure, Pictures, command_line};
 use tautline_studies::Study as _;
 use tautline_studies::campaign::{
-    self as study, CampaignAnswer, CampaignRequest, Folder, Program, ReplayRequest, listed, parse,
+    self as study, CampaignRequest, Folder, Program, ReplayRequest, Summary, listed, parse,
 };
 
 /// Arguments of `tautline campaign`.
@@ -234,9 +234,9 @@ impl AnswerOptions {
     }
 
     /// Answers a request, and prints the answer as JSON with `--json`.
-    fn run(&self, request: impl FnOnce(&Terminal) -> Result<Option<CampaignAnswer>, Failure>) -> Result<Exit, Failure> {
+    fn run(&self, request: impl FnOnce(&Terminal) -> Result<Option<Summary>, Failure>) -> Result<Exit, Failure> {
         let monitor = Terminal::new(Console { data_on_stdout: self.json, quiet: self.quiet })?;
-        let Some(CampaignAnswer { summary, .. }) = request(&monitor)? else { return Ok(Exit::Bad) };
+        let Some(summary) = request(&monitor)? else { return Ok(Exit::Bad) };
         if self.json {
             console::json(&summary)?;
         }

@@ -117,6 +117,13 @@ fn rounded_in_powers(number: f64, sign: f64) -> String {
     format!("{:.1e}", rounded + sign * 10_f64.powi(exponent - 1))
 }
 
+/// Returns a text with its first letter in upper case.
+#[must_use]
+pub fn capitalised(text: &str) -> String {
+    let (first, rest) = text.split_at(text.chars().next().map_or(0, char::len_utf8));
+    first.to_uppercase() + rest
+}
+
 /// Replaces the control characters that reverse the direction of text by U+FFFD. Names in foreign files may contain
 /// them.
 #[must_use]

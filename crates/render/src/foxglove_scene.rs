@@ -109,7 +109,7 @@ impl FoxgloveScene {
         });
         let mut lines = LinePrimitive {
             r#type: LineType::LineList.into(),
-            pose: Some(pose(Vector3::default())),
+            pose: Some(pose(nalgebra::Vector3::zeros(), UnitQuaternion::identity())),
             thickness: EDGE_M,
             ..LinePrimitive::default()
         };
@@ -181,7 +181,7 @@ fn cube(obstacle: &Obstacle) -> Option<CubePrimitive> {
         Shape::Ball { .. } | Shape::Capsule { .. } => return None,
     };
     Some(CubePrimitive {
-        pose: Some(rotated_pose(obstacle.place_m, turn)),
+        pose: Some(pose(obstacle.place_m, turn)),
         size: Some(Vector3 { x: size.x, y: size.y, z: size.z }),
         color: Some(colour(Theme::Dark.obstacle())),
     })
@@ -192,7 +192,7 @@ fn cylinder(obstacle: &Obstacle) -> Option<CylinderPrimitive> {
     let Shape::Capsule { from_m, to_m, radius_m } = obstacle.shape else { return None };
     let side = 2.0 * radius_m;
     Some(CylinderPrimitive {
-        pose: Some(rotated_pose(obstacle.place_m + (from_m + to_m) / 2.0, from_z(to_m - from_m))),
+        pose: Some(pose(obstacle.place_m + (from_m + to_m) / 2.0, from_z(to_m - from_m))),
         size: Some(Vector3 { x: side, y: side, z: (to_m - from_m).norm() + side }),
         bottom_scale: 1.0,
         top_scale: 1.0,
@@ -237,7 +237,7 @@ fn quadrotor(
 ) -> QuadrotorParts {
     let (arm_m, side) = (shape.arm_m(), 2.0 * shape.rotor_radius_m);
     let rotors = shape.rotors_m.map(|rotor_m| CylinderPrimitive {
-        pose: Some(rotated_pose(place_m + attitude * rotor_m, attitude)),
+        pose: Some(pose(place_m + attitude * rotor_m, attitude)),
         size: Some(Vector3 { x: side, y: side, z: ROTOR * arm_m }),
         bottom_scale: 1.0,
         top_scale: 1.0,
@@ -247,7 +247,7 @@ fn quadrotor(
     let ends = shape.rotors_m.into_iter().chain([ahead_m]);
     let arms = LinePrimitive {
         r#type: LineType::LineList.into(),
-        pose: Some(rotated_pose(place_m, attitude)),
+        pose: Some(pose(place_m, attitude)),
         thickness: ARM * arm_m,
         points: ends.flat_map(|end| [Point3::default(), Point3 { x: end.x, y: end.y, z: end.z }]).collect(),
         color: Some(colour(shown)),
@@ -257,7 +257,7 @@ fn quadrotor(
 }
 
 /// Returns the pose at a position with a rotation.
-fn rotated_pose(place: nalgebra::Vector3<f64>, turn: UnitQuaternion<f64>) -> Pose {
+fn pose(place: nalgebra::Vector3<f64>, turn: UnitQuaternion<f64>) -> Pose {
     let [x, y, z, w] = turn.coords.into();
     Pose {
         position: Some(Vector3 { x: place.x, y: place.y, z: place.z }),
@@ -269,15 +269,10 @@ fn rotated_pose(place: nalgebra::Vector3<f64>, turn: UnitQuaternion<f64>) -> Pos
 fn ball(place: nalgebra::Vector3<f64>, radius_m: f64, shown: Colour) -> SpherePrimitive {
     let side = 2.0 * radius_m;
     SpherePrimitive {
-        pose: Some(pose(Vector3 { x: place.x, y: place.y, z: place.z })),
+        pose: Some(pose(place, UnitQuaternion::identity())),
         size: Some(Vector3 { x: side, y: side, z: side }),
         color: Some(colour(shown)),
     }
-}
-
-/// Returns the pose at a position without a rotation.
-fn pose(position: Vector3) -> Pose {
-    Pose { position: Some(position), orientation: Some(Quaternion { x: 0.0, y: 0.0, z: 0.0, w: 1.0 }) }
 }
 
 /// Converts a colour to Foxglove's type.

@@ -106,9 +106,10 @@ impl BaseScenario {
 }
 
 /// Seeds of the flights of one value or point. A single flight keeps the seeds of the scenario.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Runs {
     /// Number of flights.
+    #[serde(rename = "runs")]
     pub count: u64,
     /// Seed of the first flight; flight k, from 0, has this seed plus k.
     pub seed: u64,

@@ -12,7 +12,7 @@ use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
 use tautline_core::failure::{Failure, in_range};
 use tautline_core::option::{self, KEY, LOG, MARGIN_FROM, MARGIN_TO, RUNS, SCAN, SEED, VERDICT};
-use tautline_core::text::{counted, shortest, significant};
+use tautline_core::text::{capitalised, counted, shortest, significant};
 use tautline_report::figures::{Separation, Share, margin as figure, separations, verdicts};
 use tautline_report::report::page::{Badge, Tone};
 use tautline_report::request::ScenarioRequest;
@@ -355,8 +355,7 @@ impl Study for Margin {
     }
 
     fn records(&self) -> Table {
-        let does = self.question.words()[0];
-        let does = format!("{}{}", does[..1].to_uppercase(), &does[1..]);
+        let does = capitalised(self.question.words()[0]);
         Table::of(if self.runs == 1 { "One flight each" } else { "With 95 % intervals" }, &self.probes)
             .column(&self.key, &self.key, Kind::Exact, |probe| probe.value)
             .column("runs", "", Kind::Count, |probe| probe.held.of)

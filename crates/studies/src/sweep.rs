@@ -13,7 +13,7 @@ use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
 use tautline_core::failure::Failure;
 use tautline_core::option::{RUNS, SEED, SET, SWEEP_KEY, VERDICT};
-use tautline_core::text::{beside_limit, counted, shortest};
+use tautline_core::text::{beside_limit, capitalised, counted, shortest};
 use tautline_report::figures::{Figure, GridAxis, Separation, Share, heat_map, separations, shares};
 use tautline_report::report::page::{Badge, Tone};
 use tautline_report::request::ScenarioRequest;
@@ -93,12 +93,9 @@ pub struct Sweep {
     pub keys: Vec<SweptKey>,
     /// Verdict whose share is counted.
     pub question: Criterion,
-    /// Runs of each point.
-    pub runs: u64,
-    /// Seed of the first run.
-    pub seed: u64,
-    /// Jitter along each axis of a start without randomness \[m\].
-    pub jitter_m: Option<f64>,
+    /// Runs of each point, with their seeds.
+    #[serde(flatten)]
+    pub runs: Runs,
     /// Confidence of all intervals.
     pub confidence: f64,
     /// Number of points of the grid.
@@ -307,9 +304,7 @@ impl Experiment for Options {
             about: About::new(own),
             keys: self.keys.clone(),
             question: self.question,
-            runs: self.runs,
-            seed: self.seed,
-            jitter_m: runs.jitter_m,
+            runs,
             confidence: CONFIDENCE,
             points_asked: points.len() as u64,
             interrupted: flown.len() < points.len(),
@@ -441,7 +436,8 @@ impl Study for Sweep {
             count => format!(", {} could not be flown", counted(count, "run", "runs")),
         };
         let interrupted = if self.interrupted { format!("INTERRUPTED after {}: ", self.size()) } else { String::new() };
-        let every = if self.runs == 1 { String::new() } else { format!(" in each of {} runs", self.runs) };
+        let runs = self.runs.count;
+        let every = if runs == 1 { String::new() } else { format!(" in each of {runs} runs") };
         let worst = self.worst().and_then(|(point, flight)| Some((point, flight.min_m?))).map(|(point, min_m)| {
             let shown = beside_limit(min_m, self.about.delta_m, 3);
             format!("; the smallest separation is {shown} m with {}", sets(&self.keys, &point.values).join(", "))
@@ -473,17 +469,16 @@ impl Study for Sweep {
         let identical = self.points.iter().filter_map(|point| {
             FlightSample::new(&point.flights).note(&format!("with {}", sets(&self.keys, &point.values).join(", ")))
         });
-        let notes = [refused, self.jitter_m.map(jitter_note), self.about.note()].into_iter().flatten();
+        let notes = [refused, self.runs.jitter_m.map(jitter_note), self.about.note()].into_iter().flatten();
         notes.chain(inert).chain(identical.take(MOST_NOTES)).collect()
     }
 
     fn records(&self) -> Table {
-        let does = self.question.words()[0];
-        let does = format!("{}{}", does[..1].to_uppercase(), &does[1..]);
-        let table = Table::of(if self.runs == 1 { "One flight each" } else { "With 95 % intervals" }, &self.points);
-        let share = if self.runs == 1 { Kind::OneFlight } else { Kind::Share };
+        let (does, is_single) = (capitalised(self.question.words()[0]), self.runs.count == 1);
+        let table = Table::of(if is_single { "One flight each" } else { "With 95 % intervals" }, &self.points);
+        let share = if is_single { Kind::OneFlight } else { Kind::Share };
         // The median of one flight is its separation, so only files have it.
-        let median = if self.runs == 1 { " [m]" } else { "Separation, median [m]" };
+        let median = if is_single { " [m]" } else { "Separation, median [m]" };
         let keys = self.keys.iter().enumerate();
         let table = keys.fold(table, |table, (k, SweptKey { key, .. })| {
             table.column(key, key, Kind::Exact, |point| point.values.get(k).copied())
@@ -537,8 +532,7 @@ impl Study for Sweep {
 
     fn repeats(&self, scenario: &ScenarioRequest) -> Vec<(String, String)> {
         let repeat = |(point, flight): (&Point, &FlightSummary)| {
-            let runs = Runs { count: self.runs, seed: self.seed, jitter_m: self.jitter_m };
-            let sets = [runs.sets(flight.seed - self.seed), sets(&self.keys, &point.values)].concat();
+            let sets = [self.runs.sets(flight.seed - self.runs.seed), sets(&self.keys, &point.values)].concat();
             ("The flight with the smallest separation:".to_owned(), scenario.command("run", [], &sets))
         };
         self.worst().map(repeat).into_iter().collect()

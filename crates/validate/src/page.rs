@@ -4,6 +4,7 @@ use super::claim::{Claim, Group, Kind, MeasureError, Validation};
 use super::convergence::Refinement;
 use super::detectors::{BuiltinFlight, Flights};
 use super::tension;
+use tautline_core::text::capitalised;
 use tautline_report::figures::{self, Figure, Step};
 use tautline_report::report::page::{self, Badge, Markup, Page, Render as _, Tone, noted, section};
 
@@ -75,11 +76,6 @@ impl Validation {
         });
         std::iter::once(head.to_owned()).chain(rows).collect()
     }
-}
-
-fn capitalised(text: &str) -> String {
-    let mut rest = text.chars();
-    rest.next().map(|first| first.to_uppercase().chain(rest).collect()).unwrap_or_default()
 }
 
 /// Returns the row of a claim.

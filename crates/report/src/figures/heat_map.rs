@@ -3,7 +3,7 @@
 use super::Figure;
 use super::axis::{Axis, extent};
 use super::chart::{TITLE, WIDTH};
-use tautline_core::text::at_least;
+use tautline_core::text::{at_least, capitalised};
 
 use super::svg::{Align, Canvas, Marker, SOFT_INK, Stroke, TEXT, text_px};
 
@@ -111,11 +111,6 @@ fn description(label: &str, [x, y]: [GridAxis<'_>; 2], numbers: &[Option<f64>]) 
     };
     let crossed = if without > 0 { format!("; {without} crossed cells have none") } else { String::new() };
     format!("{} over {} (to the right) and {} (upwards): {spanned}{crossed}.", capitalised(label), x.key, y.key)
-}
-
-fn capitalised(words: &str) -> String {
-    let mut chars = words.chars();
-    chars.next().map_or_else(String::new, |first| first.to_uppercase().chain(chars).collect())
 }
 
 /// Returns the colour of a place on the scale, from 0 to 1, and a colour of words that can be read on it.

@@ -14,7 +14,7 @@ use tautline_audit::Status;
 use tautline_core::fact::Coded;
 use tautline_core::swarm::Bounce;
 use tautline_core::text::{
-    at_least, below_bound, beside_limit, counted, exact, metres, seconds, separation, table, up_to,
+    at_least, below_bound, beside_limit, capitalised, counted, exact, metres, seconds, separation, table, up_to,
 };
 use tautline_sim::link::Traffic;
 use tautline_sim::scenario::TimeSpec;
@@ -706,12 +706,6 @@ fn network_line(&Traffic { sent, lost, age_p95_s }: &Traffic) -> String {
     let age = age_p95_s
         .map_or_else(String::new, |age_s| format!("; 95 % of the states held were no older than {age_s:.3} s"));
     format!("{lost} of {sent} messages lost ({share:.1} %){age}")
-}
-
-/// Returns a text with its first letter in upper case.
-fn capitalised(text: &str) -> String {
-    let (first, rest) = text.split_at(text.chars().next().map_or(0, char::len_utf8));
-    first.to_uppercase() + rest
 }
 
 /// Writes the label of `label: detail` in capitals.

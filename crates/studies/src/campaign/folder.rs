@@ -33,15 +33,6 @@ const GROUP_ROWS: usize = 50_000;
 /// Files beside the parts that a new campaign does not overwrite.
 const LEFT: [&str; 3] = ["results.parquet", "campaign.json", "campaign.html"];
 
-/// Result of a merge.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Merged {
-    /// The answer.
-    pub summary: Summary,
-    /// SHA-256 of the table.
-    pub sha256: String,
-}
-
 /// Folder with the campaign in it.
 #[derive(Clone, Debug)]
 pub struct Folder {
@@ -239,12 +230,13 @@ impl Folder {
 }
 
 impl Folder {
-    /// Writes `results.parquet` and `campaign.json`. Their bytes are the same for any number of shards, threads and
-    /// interruptions. Runs after an early stop are left out, flown or not.
+    /// Writes `results.parquet` and `campaign.json`. Returns the answer and the SHA-256 of the table. The bytes of both
+    /// files are the same for any number of shards, threads and interruptions. Runs after an early stop are left out,
+    /// flown or not.
     ///
     /// # Errors
     /// As [`Folder::read`], and [`Failure`] if shards are missing or a file cannot be written.
-    pub fn merge(&self) -> Result<Merged, Failure> {
+    pub fn merge(&self) -> Result<(Summary, String), Failure> {
         let path = self.file(RESULTS);
         let summary = write_atomically_with(&path, |file| {
             let failed =
@@ -271,7 +263,7 @@ impl Folder {
         let json = summary.to_json().map_err(|error| file_failure("write", &answer)(error.into()))?;
         write_atomically(&answer, json.as_bytes())?;
         let bytes = fs::read(&path).map_err(file_failure("read", &path))?;
-        Ok(Merged { summary, sha256: sha256_hex(&bytes) })
+        Ok((summary, sha256_hex(&bytes)))
     }
 
     /// Returns the answer of all flown rows without writing it.

@@ -18,10 +18,10 @@ mod tally;
 mod vary;
 
 pub use flights::{Campaign, Law, MOST_RUNS};
-pub use folder::{ANSWER, Folder, Manifest, Merged, Program, RESULTS, listed, parse};
+pub use folder::{ANSWER, Folder, Manifest, Program, RESULTS, listed, parse};
 pub use replay::{ReplayRequest, WorstFlight, replay};
-pub use request::{CampaignAnswer, CampaignRequest, MOST_WORST, campaign, fly_shards, merge, missing_shards, report};
-pub use shard::{PartState, Row, SeparationVerdict, Shard};
+pub use request::{CampaignRequest, MOST_WORST, campaign, fly_shards, merge, missing_shards, report};
+pub use shard::{PartState, Row, Shard};
 pub use spec::{Method, Spec, Stop};
 pub use summary::{LawSummary, Pair, Quantiles, Summary, ViolatedRun, Worst};
 pub use tally::{Bin, BinShares, BoundKind, Intervals, Tally, UpperBound, Varied};

@@ -43,15 +43,6 @@ pub struct CampaignRequest {
     pub external_law: Option<ExternalLaw>,
 }
 
-/// Answer of a campaign.
-#[derive(Clone, Debug)]
-pub struct CampaignAnswer {
-    /// Numbers, as in `campaign.json`.
-    pub summary: Summary,
-    /// Folder of the campaign.
-    pub folder: PathBuf,
-}
-
 impl CampaignRequest {
     /// Returns the request for a specification, with 10 worst flights on the page.
     #[must_use]
@@ -71,6 +62,12 @@ impl CampaignRequest {
     /// Returns the name of the campaign.
     fn name(&self) -> String {
         self.spec.file_stem().map_or_else(|| "campaign".to_owned(), |stem| stem.to_string_lossy().into_owned())
+    }
+
+    /// Returns the folder of the campaign.
+    #[must_use]
+    pub fn folder(&self) -> PathBuf {
+        self.out.clone().unwrap_or_else(|| Path::new("out").join(self.name()))
     }
 
     /// Reads the specification and adds the keys of the request.
@@ -103,8 +100,7 @@ impl CampaignRequest {
         let folder = self.spec.parent().unwrap_or(Path::new(""));
         let (spec, law) = (self.read()?, self.external_law.as_ref());
         let campaign = Campaign::plan(&spec, &self.name(), folder, self.shards, Program::running()?, law)?;
-        let out = self.out.clone().unwrap_or_else(|| Path::new("out").join(self.name()));
-        Folder::plan(&out, campaign, self.shards.is_some())
+        Folder::plan(&self.folder(), campaign, self.shards.is_some())
     }
 }
 
@@ -117,7 +113,7 @@ pub fn campaign(
     request: &CampaignRequest,
     pictures: &dyn Pictures,
     monitor: &dyn Monitor,
-) -> Result<Option<CampaignAnswer>, Failure> {
+) -> Result<Option<Summary>, Failure> {
     in_range(WORST, &request.worst, &(0..=MOST_WORST))?;
     let batch = Batch::for_laws(request.threads, monitor, &request.external_law)?;
     let folder = request.plan()?;
@@ -210,9 +206,9 @@ pub fn merge(
     worst: usize,
     pictures: &dyn Pictures,
     monitor: &dyn Monitor,
-) -> Result<Option<CampaignAnswer>, Failure> {
-    let merged = folder.merge()?;
-    answer(folder, merged.summary, worst, Some(&merged.sha256), pictures, monitor)
+) -> Result<Option<Summary>, Failure> {
+    let (summary, sha256) = folder.merge()?;
+    answer(folder, summary, worst, Some(&sha256), pictures, monitor)
 }
 
 /// Reports the answer of a merged campaign again, and rewrites its page. Returns `None` after an interruption.
@@ -224,7 +220,7 @@ pub fn report(
     worst: usize,
     pictures: &dyn Pictures,
     monitor: &dyn Monitor,
-) -> Result<Option<CampaignAnswer>, Failure> {
+) -> Result<Option<Summary>, Failure> {
     answer(folder, folder.summary()?, worst, None, pictures, monitor)
 }
 
@@ -236,7 +232,7 @@ fn answer(
     sha256: Option<&str>,
     pictures: &dyn Pictures,
     monitor: &dyn Monitor,
-) -> Result<Option<CampaignAnswer>, Failure> {
+) -> Result<Option<Summary>, Failure> {
     in_range(WORST, &worst, &(0..=MOST_WORST))?;
     for note in summary.notes() {
         monitor.warn(&format!("note: {note}"));
@@ -271,5 +267,5 @@ fn answer(
     } else {
         monitor.say(&format!("wrote {}", path.display()));
     }
-    Ok(Some(CampaignAnswer { summary, folder: folder.path().to_owned() }))
+    Ok(Some(summary))
 }

@@ -20,7 +20,7 @@ use super::flights::Campaign;
 use super::folder::{Folder, JOURNAL, Manifest, different_results, file_failure, other_campaign, remove_if_present};
 use crate::SCHEMA_VERSION;
 use crate::batch::Batch;
-use crate::flight::{FlightSummary, Outcome};
+use crate::flight::FlightSummary;
 use crate::splitting::Splitting;
 use crate::table::{Cell, Column, Kind};
 use tautline_core::failure::Failure;
@@ -311,34 +311,7 @@ pub struct Row {
     pub splitting: Option<Splitting>,
 }
 
-/// Verdict on the separation of a row.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SeparationVerdict {
-    /// No violation up to the end of the flight.
-    Clear,
-    /// A violation.
-    Violated,
-    /// The flight ended early without a violation, or the judge cannot decide.
-    Unknown,
-    /// The drawn values cannot be flown.
-    NotFlown,
-    /// The row is an estimate.
-    Estimated,
-}
-
 impl Row {
-    /// Returns the verdict on the separation.
-    #[must_use]
-    pub fn known(&self) -> SeparationVerdict {
-        match self.flight.as_ref().map(|flight| flight.outcome) {
-            None if self.splitting.is_some() => SeparationVerdict::Estimated,
-            None => SeparationVerdict::NotFlown,
-            Some(Outcome::Clear) => SeparationVerdict::Clear,
-            Some(Outcome::Violated) => SeparationVerdict::Violated,
-            Some(Outcome::EndedEarly | Outcome::Undecided) => SeparationVerdict::Unknown,
-        }
-    }
-
     /// Returns the smallest separation less delta \[m\].
     #[must_use]
     pub fn clearance_m(&self) -> Option<f64> {

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::flights::{Campaign, Law};
-use super::shard::{Row, SeparationVerdict};
+use super::shard::Row;
 use super::tally::{Intervals, Tally, UpperBound};
 use super::tally::{KeyColumn, Varied};
 use crate::Criterion;
@@ -185,9 +185,8 @@ impl SummaryAccumulator {
         }
         let Some(numbers) = self.laws.get_mut(row.law) else { return true };
         numbers.take(row);
-        let reached = row.flight.as_ref().is_some_and(|flight| flight.reached);
-        for (column, value) in std::iter::zip(&mut self.keys, &row.drawn) {
-            column.take(row.law, value, row.known(), reached);
+        if let Some(flight) = &row.flight {
+            std::iter::zip(&mut self.keys, &row.drawn).for_each(|(column, value)| column.take(row.law, value, flight));
         }
         true
     }
@@ -246,9 +245,8 @@ impl SummaryAccumulator {
 
 impl LawNumbers {
     fn take(&mut self, row: &Row) {
-        let (known, reached) = (row.known(), row.flight.as_ref().is_some_and(|flight| flight.reached));
-        self.outcomes
-            .push((known != SeparationVerdict::NotFlown).then_some([known == SeparationVerdict::Clear, reached]));
+        let outcome = |flight: &FlightSummary| [flight.outcome == Outcome::Clear, flight.reached];
+        self.outcomes.push(row.flight.as_ref().map(outcome));
         if let Some(flight) = &row.flight {
             self.clearance_m.extend(row.clearance_m());
             self.reached_at_s.extend(flight.reached_at_s.filter(|_| flight.reached));

@@ -3,10 +3,11 @@
 use serde::Serialize;
 use serde_json::Value;
 
-use super::shard::{Row, SeparationVerdict};
+use super::shard::Row;
 use super::spec::Stop;
 use super::vary::Variation;
 use crate::Criterion;
+use crate::flight::{FlightSummary, Outcome};
 use crate::statistics::{CONFIDENCE, Proportion, anytime};
 
 /// Number of runs at the first look for an early stop; each later look has twice the number.
@@ -95,18 +96,19 @@ pub struct Counts {
 
 impl Counts {
     fn take(&mut self, row: &Row) {
-        let counter = match row.known() {
-            SeparationVerdict::Clear => &mut self.clear,
-            SeparationVerdict::Violated => &mut self.violated,
-            SeparationVerdict::Unknown => &mut self.unknown,
-            SeparationVerdict::NotFlown => &mut self.not_flown,
-            SeparationVerdict::Estimated => return,
+        let Some(flight) = &row.flight else {
+            self.not_flown += u64::from(row.splitting.is_none());
+            return;
         };
-        *counter += 1;
-        self.flown += u64::from(row.flight.is_some());
-        self.reached += u64::from(row.flight.as_ref().is_some_and(|flight| flight.reached));
-        self.certificates_broken += u64::from(row.flight.as_ref().is_some_and(|flight| flight.breaks_certificate));
-        self.pass += u64::from(row.flight.as_ref().is_some_and(|flight| flight.pass));
+        *match flight.outcome {
+            Outcome::Clear => &mut self.clear,
+            Outcome::Violated => &mut self.violated,
+            Outcome::EndedEarly | Outcome::Undecided => &mut self.unknown,
+        } += 1;
+        self.flown += 1;
+        self.reached += u64::from(flight.reached);
+        self.certificates_broken += u64::from(flight.breaks_certificate);
+        self.pass += u64::from(flight.pass);
     }
 
     /// Returns the share of flights that show a verdict.
@@ -248,7 +250,7 @@ pub(super) struct KeyColumn {
 struct Flight {
     law: usize,
     value: Value,
-    known: SeparationVerdict,
+    outcome: Outcome,
     reached: bool,
 }
 
@@ -267,9 +269,10 @@ impl KeyColumn {
     }
 
     /// Adds a flight.
-    pub(super) fn take(&mut self, law: usize, value: &Value, known: SeparationVerdict, reached: bool) {
-        if !self.is_seed && !matches!(known, SeparationVerdict::NotFlown | SeparationVerdict::Estimated) {
-            self.flights.push(Flight { law, value: value.clone(), known, reached });
+    pub(super) fn take(&mut self, law: usize, value: &Value, flight: &FlightSummary) {
+        if !self.is_seed {
+            let (outcome, reached) = (flight.outcome, flight.reached);
+            self.flights.push(Flight { law, value: value.clone(), outcome, reached });
         }
     }
 
@@ -358,9 +361,9 @@ impl KeyColumn {
             let count = |is_counted: &dyn Fn(&Flight) -> bool| {
                 members.iter().filter(|flight| flight.law == law && is_counted(flight)).count() as u64
             };
-            let unknown = count(&|flight| flight.known == SeparationVerdict::Unknown);
+            let unknown = count(&|flight| matches!(flight.outcome, Outcome::EndedEarly | Outcome::Undecided));
             BinShares {
-                violated: intervals.share(count(&|flight| flight.known == SeparationVerdict::Violated), unknown, total),
+                violated: intervals.share(count(&|flight| flight.outcome == Outcome::Violated), unknown, total),
                 reached: intervals.share(count(&|flight| flight.reached), 0, total),
             }
         };

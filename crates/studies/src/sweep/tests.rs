@@ -64,7 +64,7 @@ fn every_point_has_its_flights_and_a_curve() {
         assert_eq!(point.flights.iter().map(|flight| flight.seed).collect::<Vec<_>>(), [7, 8, 9]);
         assert_eq!((point.held.count, point.held.of, point.refused), (3, 3, 0));
     }
-    assert!(sweep.jitter_m == Some(0.1) && sweep.notes().len() == 1, "{:?}", sweep.notes());
+    assert!(sweep.runs.jitter_m == Some(0.1) && sweep.notes().len() == 1, "{:?}", sweep.notes());
     assert!(sweep.headline().starts_with("pair stays clear in each of 3 runs at 2 of 2 points; the smallest"));
     let csv = String::from_utf8(sweep.to_csv().expect("csv")).expect("text");
     assert!(csv.starts_with("law.alpha,held_count,held_share,held_low,held_high,violated_count,"), "{csv}");
@@ -107,7 +107,7 @@ fn swept_seeds_and_jitters_override_the_defaults() {
     let [still, moved] = &sweep.points[..] else { panic!("two points") };
     assert_eq!(still.flights[0].state_hash, still.flights[1].state_hash, "a jitter of 0 moves nothing");
     assert_ne!(moved.flights[0].state_hash, moved.flights[1].state_hash);
-    assert!(sweep.jitter_m.is_none());
+    assert!(sweep.runs.jitter_m.is_none());
     assert!(still.repeated && !moved.repeated);
     assert_eq!((still.held.low, still.held.high, still.held.confidence), (1.0, 1.0, 1.0), "no sample");
     assert!(moved.held.low < 1.0, "two flights of a sample");
@@ -133,7 +133,7 @@ fn flights_without_noise_are_one_flight_at_the_points_without_noise() {
     let noise = ["sensing.rate_hz=60", "sensing.position_noise_m=0.01"];
     let sweep = swept_from(&noise, &options(&["sensing.position_noise_m=0,0.001"], 6));
     let [exact, noisy] = &sweep.points[..] else { panic!("two points") };
-    assert!(exact.repeated && !noisy.repeated, "{:?}", sweep.jitter_m);
+    assert!(exact.repeated && !noisy.repeated, "{:?}", sweep.runs.jitter_m);
     assert_eq!((exact.min_median_m.low, noisy.min_median_m.low.is_some()), (None, true), "{noisy:?}");
 }
 
