@@ -286,6 +286,7 @@ run
   duration_s
   dt_s
   steps
+  engine_steps
   refined_steps
   overlong_steps
   ended_early
