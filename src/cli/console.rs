@@ -236,6 +236,11 @@ impl Monitor for Terminal {
     }
 }
 
+/// Prints a help. A closed stream is ignored.
+pub(super) fn help(help: &clap::builder::StyledStr) {
+    let _ = write!(AutoStream::new(io::stdout(), colour_choice(&io::stdout())), "{}", help.ansi());
+}
+
 /// Prints the help, the version, or an error of the arguments. A closed stream is ignored.
 pub(super) fn usage(usage: &clap::Error) {
     let text = usage.render().ansi().to_string();

@@ -31,7 +31,6 @@ use std::fmt::{self, Formatter};
 use std::process::ExitCode;
 use std::sync::{Once, PoisonError, RwLock};
 
-use clap::error::ErrorKind;
 use clap::{ColorChoice, CommandFactory as _, Parser, Subcommand};
 
 use console::Exit;
@@ -66,8 +65,7 @@ pub fn entry(arguments: &[OsString]) -> u8 {
     };
     console::set_colours(arguments.color);
     let Some(command) = arguments.command else {
-        let help = Arguments::command().render_help();
-        console::usage(&Arguments::command().error(ErrorKind::DisplayHelp, help.ansi()));
+        console::help(&Arguments::command().render_help());
         return Exit::Good as u8;
     };
     #[cfg(all(feature = "viewer", target_os = "linux"))]

@@ -266,9 +266,9 @@ fn colliding_hulls_end_the_judged_flight_and_points_pass_through() {
 }
 
 #[test]
-fn without_arguments_the_pentagon_is_flown_into_out() {
+fn without_a_scenario_the_pentagon_is_flown_into_out() {
     let folder = folder();
-    let Ran { exit, out, err } = ran(folder.path(), &[]);
+    let Ran { exit, out, err } = ran(folder.path(), &["run"]);
     assert_eq!(exit, GOOD, "{err}");
     assert!(out.starts_with("CLEAR: "), "{out}");
     let run_folder = folder.path().join("out/pentagon");
