@@ -57,7 +57,7 @@ class Command(Case):
     def test_python_has_every_option_of_the_command_line(self) -> None:
         options = set(re.findall(r"^ +(?:-., )?--([a-z-]+)", tautline("audit", "--help").stdout, re.MULTILINE))
         self.assertIn("max-gap", options)
-        outputs = {"json", "quiet", "junit", "events", "html", "figures", "summary", "annotations", "proof"}
+        outputs = {"color", "json", "quiet", "junit", "events", "html", "figures", "summary", "annotations", "proof"}
         outputs |= {"allow-undecided", "no-config", "help"}
         taken = {*inspect.signature(tl.audit).parameters, *inspect.signature(_arguments.read_options).parameters}
         taken |= {"from", "to"} if {"from_s", "to_s"} <= taken else set()
