@@ -86,14 +86,17 @@ fn coloured_line(line: &str) -> String {
     shown + &line[done..]
 }
 
-/// Sets whether the output of this process has colours; `Auto` leaves the choice to the environment.
-pub(super) fn set_colours(choice: clap::ColorChoice) {
-    let choice = match choice {
-        clap::ColorChoice::Auto => ColorChoice::Auto,
-        clap::ColorChoice::Always => ColorChoice::Always,
-        clap::ColorChoice::Never => ColorChoice::Never,
-    };
-    choice.write_global();
+/// Sets whether the output of this process has colours, help and errors of arguments included, by the option `--color`.
+/// Otherwise the environment decides.
+pub(super) fn set_colours(words: &[String]) {
+    let mut given = words.iter().zip(words.iter().skip(1)).filter(|(option, _)| *option == "--color");
+    let joined = words.iter().find_map(|word| word.strip_prefix("--color="));
+    match given.next().map(|(_, value)| value.as_str()).or(joined) {
+        Some("always") => ColorChoice::Always,
+        Some("never") => ColorChoice::Never,
+        _ => ColorChoice::Auto,
+    }
+    .write_global();
 }
 
 /// Returns whether a stream has colours. `CLICOLOR_FORCE=0` asks for no more than the default, but `anstream` forces
@@ -327,7 +330,10 @@ pub(super) fn show(failure: &Failure) -> Exit {
     let mut text = String::new();
     let handler = match ColorChoice::global() {
         ColorChoice::Always | ColorChoice::AlwaysAnsi => GraphicalReportHandler::new_themed(GraphicalTheme::unicode()),
-        ColorChoice::Never => GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor()),
+        ColorChoice::Never if io::stderr().is_terminal() => {
+            GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor())
+        }
+        ColorChoice::Never => GraphicalReportHandler::new_themed(GraphicalTheme::none()),
         ColorChoice::Auto => GraphicalReportHandler::new(),
     };
     if handler.render_report(&mut text, report.as_ref()).is_err() {

@@ -14,8 +14,7 @@ use tautline_sim::scenario::builtin;
 const MOST_CHANGES: usize = 2;
 
 /// Adds tips to an error: the command or option that was meant, what to do with a file, and the form of a length.
-/// `first` is the first argument.
-pub(super) fn with_hints(mut usage: clap::Error, program: &Command, first: Option<&str>) -> clap::Error {
+pub(super) fn with_hints(mut usage: clap::Error, program: &Command, words: &[String]) -> clap::Error {
     let given = |kind| match usage.get(kind) {
         Some(ContextValue::String(text)) => text.clone(),
         _ => String::new(),
@@ -23,7 +22,8 @@ pub(super) fn with_hints(mut usage: clap::Error, program: &Command, first: Optio
     match usage.kind() {
         ErrorKind::InvalidSubcommand => {
             let word = given(ContextKind::InvalidSubcommand);
-            if usage.get(ContextKind::SuggestedSubcommand).is_some() {
+            let is_of_command = words.iter().take_while(|other| **other != word).any(|name| names(program, name));
+            if is_of_command || usage.get(ContextKind::SuggestedSubcommand).is_some() {
                 return usage;
             }
             if let Some(way) = way_with(&word) {
@@ -34,7 +34,7 @@ pub(super) fn with_hints(mut usage: clap::Error, program: &Command, first: Optio
         }
         ErrorKind::UnknownArgument if usage.get(ContextKind::SuggestedArg).is_none() => {
             let word = given(ContextKind::InvalidArg);
-            let command = first.and_then(|name| program.find_subcommand(name)).unwrap_or(program);
+            let command = words.iter().find_map(|name| program.find_subcommand(name)).unwrap_or(program);
             let options = command.get_arguments().filter_map(|argument| argument.get_long());
             if let Some(name) = word.strip_prefix("--").and_then(|word| nearest(word, options)) {
                 usage.remove(ContextKind::Suggested);
@@ -45,12 +45,17 @@ pub(super) fn with_hints(mut usage: clap::Error, program: &Command, first: Optio
             let word = given(ContextKind::InvalidValue);
             let digits = word.trim_end_matches(|c: char| c.is_alphabetic() || c.is_whitespace());
             if digits.parse::<f64>().is_ok() {
-                tip(&mut usage, &format!("a length is a number of metres without a unit, such as {digits}"));
+                let example = if word.strip_prefix(digits).map(str::trim) == Some("m") { digits } else { "0.5" };
+                tip(&mut usage, &format!("a length is a number of metres without a unit, such as {example}"));
             }
         }
         _ => {}
     }
     usage
+}
+
+fn names(program: &Command, word: &str) -> bool {
+    program.find_subcommand(word).is_some()
 }
 
 fn tip(usage: &mut clap::Error, text: &str) {

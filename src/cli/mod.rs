@@ -55,15 +55,15 @@ pub fn entry(arguments: &[OsString]) -> u8 {
     }
     let words: Vec<_> = arguments.iter().skip(1).map(|word| word.to_string_lossy().into_owned()).collect();
     let line = command_line(words.iter().map(String::as_str));
+    console::set_colours(&words);
     let arguments = match Arguments::try_parse_from(arguments) {
         Ok(arguments) => arguments,
         Err(usage) => {
-            let usage = hints::with_hints(usage, &Arguments::command(), words.first().map(String::as_str));
+            let usage = hints::with_hints(usage, &Arguments::command(), &words);
             console::usage(&usage);
             return if usage.use_stderr() { Exit::WrongInput } else { Exit::Good } as u8;
         }
     };
-    console::set_colours(arguments.color);
     let Some(command) = arguments.command else {
         console::help(&Arguments::command().render_help());
         return Exit::Good as u8;

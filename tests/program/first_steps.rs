@@ -157,14 +157,18 @@ fn without_a_command_the_help_is_shown_and_wrong_words_have_tips() {
         (&["mine.toml"], "tautline run mine.toml"),
         (&["flight.csv"], "tautline audit flight.csv --delta METRES"),
         (&["run", "--st", "law.kind=orca"], "'--set'"),
-        (&["audit", "flight.csv", "--delta", "2m"], "a length is a number of metres without a unit, such as 2"),
+        (&["audit", "flight.csv", "--delta", "2m"], "a length is a number of metres without a unit, such as 2\n"),
+        (&["audit", "flight.csv", "--delta", "500mm"], "a length is a number of metres without a unit, such as 0.5\n"),
+        (&["--color", "never", "run", "--st", "law.kind=orca"], "'--set'"),
     ] {
         let wrong = ran(folder.path(), arguments);
         assert_eq!((wrong.exit, wrong.out.as_str()), (WRONG_INPUT, ""), "{arguments:?}");
         assert!(wrong.err.contains(tip), "{arguments:?}: {}", wrong.err);
     }
-    let far = ran(folder.path(), &["juggle"]);
-    assert!(far.exit == WRONG_INPUT && !far.err.contains("tip"), "{}", far.err);
+    for arguments in [&["juggle"][..], &["campaign", "spec.toml"]] {
+        let far = ran(folder.path(), arguments);
+        assert!(far.exit == WRONG_INPUT && !far.err.contains("tip"), "{}", far.err);
+    }
 }
 
 #[test]
@@ -174,7 +178,8 @@ fn colours_are_a_choice() {
     for (choice, has_colours) in [("always", true), ("never", false), ("auto", false)] {
         let judged = ran(folder.path(), &["audit", "two.csv", "--delta", "1", "--color", choice]);
         let refused = ran(folder.path(), &["audit", "none.csv", "--delta", "1", "--color", choice]);
-        for text in [&judged.out, &refused.err] {
+        let usage = ran(folder.path(), &["--color", choice, "run", "--nope"]);
+        for text in [&judged.out, &refused.err, &usage.err] {
             assert_eq!(text.contains('\u{1b}'), has_colours, "{choice}: {text}");
         }
     }

@@ -291,8 +291,8 @@ impl Experiment for Options {
             };
             match batch.fly(&scenario, runs.seed(run)) {
                 Ok(flight) => Ok(flight.map(Ok)),
-                // A defect of an external law is no property of a point.
-                Err(error @ SimError::ExternalLaw { .. }) => Err(Failure::from(error)),
+                // A defect of an external law or of the engine is no property of a point.
+                Err(error @ (SimError::ExternalLaw { .. } | SimError::EngineDiffers(_))) => Err(Failure::from(error)),
                 Err(error) => Ok(Some(Err(error.to_string()))),
             }
         })?;

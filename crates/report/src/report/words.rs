@@ -629,7 +629,7 @@ impl Report {
     fn run_line(&self) -> String {
         let run = &self.run;
         let by_engine = run.engine_steps.filter(|&steps| steps < run.steps);
-        let by_engine = by_engine.map_or_else(String::new, |steps| format!(", {steps} of them by the engine"));
+        let by_engine = by_engine.map_or_else(String::new, |steps| format!(", {steps} steps of the engine"));
         format!(
             "{} vehicles, {} s in {} steps of {:.3} ms{by_engine}, state {}",
             run.vehicles,

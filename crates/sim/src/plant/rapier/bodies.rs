@@ -5,7 +5,8 @@ use rapier3d::prelude::{LockedAxes, PhysicsWorld, RigidBody, RigidBodyBuilder, R
 
 use super::proximity::{Maker, Proximity};
 use super::world::{
-    Engine, empty_world, from_engine, hull, hull_contacts, insert_obstacle, keep_out, keep_out_contacts, to_engine,
+    Engine, empty_world, first_in_contact, from_engine, hull, hull_contacts, insert_obstacle, keep_out,
+    keep_out_contacts, to_engine,
 };
 use crate::plant::{Air, FreeSteps, HullContact, Plant, PlantError, StepPath};
 use crate::scenario::{Scenario, Space};
@@ -167,6 +168,9 @@ impl Bodies {
                 || !is_same((&self.velocities[*i], &self.compared.1[*i]))
         };
         if let Some(vehicle) = (0..self.positions.len()).find(differs) {
+            return Err(PlantError::EngineDiffers { vehicle });
+        }
+        if let Some(vehicle) = first_in_contact(&self.engine.world) {
             return Err(PlantError::EngineDiffers { vehicle });
         }
         self.proximity = proximity;

@@ -37,7 +37,7 @@ pub(super) struct Proximity {
     reach_m: f64,
     /// Treatment of free steps; `None` if none are allowed.
     free: Option<FreeSteps>,
-    /// Number of free steps since the engine made one.
+    /// Number of free steps since the last comparison.
     unseen: u32,
     /// Number of steps that the engine made.
     engine_steps: u64,
@@ -64,6 +64,8 @@ impl Proximity {
     /// Allows free steps.
     pub(super) fn allow_free_steps(&mut self, free: FreeSteps) {
         self.free = Some(free);
+        // The last step of the engine may have had contacts.
+        self.began_beyond &= self.engine_steps == 0;
     }
 
     /// Returns the number of steps that the engine made.
@@ -293,6 +295,20 @@ mod tests {
         Proximity::with_free_steps_only(Bodies::proximity(&mut blind));
         let blind = fly(&mut blind, scenario.time.dt_s, 2400, colliding);
         assert!(blind.hulls.is_empty() && blind.bits != seen.bits);
+
+        // The comparison finds that, for keep-out balls too, which change no motion.
+        for hull_radius_m in [scenario.hull_radius_m.clone(), vec![1e-3; 2]] {
+            let scenario = Scenario { hull_radius_m, ..scenario.clone() };
+            let mut checked = points(&scenario);
+            Proximity::with_free_steps_only(Bodies::proximity(&mut checked));
+            checked.allow_free_steps(FreeSteps::Compared);
+            let (mut state, mut path) = (scenario.start.clone(), StepPath::default());
+            let found = (0..2400).find_map(|step| {
+                checked.apply(&colliding(step, &state), &mut state);
+                checked.advance(scenario.time.dt_s, &mut state, &mut path).err()
+            });
+            assert_eq!(found, Some(crate::plant::PlantError::EngineDiffers { vehicle: 0 }));
+        }
     }
 
     #[test]

@@ -7,7 +7,8 @@ use rapier3d::prelude::{MassProperties, Real, RigidBody, RigidBodyBuilder, Rigid
 
 use super::proximity::{Maker, Proximity};
 use super::world::{
-    Engine, empty_world, from_engine, hull, hull_contacts, insert_obstacle, keep_out, keep_out_contacts, to_engine,
+    Engine, empty_world, first_in_contact, from_engine, hull, hull_contacts, insert_obstacle, keep_out,
+    keep_out_contacts, to_engine,
 };
 use crate::plant::{FreeSteps, HullContact, Plant, PlantError, Quadrotors, StepPath};
 use crate::scenario::Scenario;
@@ -183,6 +184,9 @@ impl Fliers {
         self.drift_in_engine(dt_s)?;
         let mut both = self.bodies.iter().zip(&self.compared);
         if let Some(vehicle) = both.position(|(engine, free)| engine.bits() != free.bits()) {
+            return Err(PlantError::EngineDiffers { vehicle });
+        }
+        if let Some(vehicle) = first_in_contact(&self.engine.world) {
             return Err(PlantError::EngineDiffers { vehicle });
         }
         self.proximity = proximity;

@@ -109,6 +109,14 @@ pub(super) fn keep_out_contacts(world: &PhysicsWorld, pairs: &mut Vec<Pair>) {
     pairs[before..].sort_unstable();
 }
 
+/// Returns the first vehicle with an overlap of keep-out balls, or with a contact of hulls, be it only a predicted one.
+pub(super) fn first_in_contact(world: &PhysicsWorld) -> Option<usize> {
+    let mut pairs = Vec::new();
+    keep_out_contacts(world, &mut pairs);
+    let is_of_hulls = has_hull_contacts(world);
+    pairs.first().map(|pair| pair.first()).or(is_of_hulls.then_some(0))
+}
+
 /// Appends the pairs whose hulls collided in the last step, in index order. Their closing speeds follow from the
 /// positions \[m\] at the start of the step and the velocities \[m/s\] before the collision.
 pub(super) fn hull_contacts(world: &PhysicsWorld, began_m: &Rows, drift_m_s: &Rows, contacts: &mut Vec<HullContact>) {
