@@ -102,6 +102,7 @@ Environment:
 )]
 struct Arguments {
     /// Colours: auto (on a terminal), always or never.
+    // `console::set_colours` reads it before the arguments are parsed.
     #[arg(long, global = true, value_name = "WHEN", default_value = "auto", hide_default_value = true)]
     #[arg(hide_possible_values = true)]
     color: ColorChoice,

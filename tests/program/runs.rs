@@ -169,6 +169,8 @@ fn free_steps_leave_out_most_steps_of_the_engine_and_change_no_bit() {
         report
     };
     assert_eq!(without_count(free), without_count(whole));
+    let flown = run(folder.path(), &[&SHORT[..], &["--free-steps", "--plant", "ideal", "--force"]].concat());
+    assert!(flown.err.contains("no step left out the engine"), "{}", flown.err);
 }
 
 #[test]

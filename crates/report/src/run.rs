@@ -8,7 +8,6 @@ use std::ops::ControlFlow;
 use crate::report::{FlightResult, Report, Verification};
 use tautline_core::record::{Sink, StateHash, record_in_thread};
 use tautline_sim::metrics::Metrics;
-use tautline_sim::plant::FreeSteps;
 use tautline_sim::preflight::Preflight;
 use tautline_sim::scenario::Scenario;
 use tautline_sim::sim::{self, Components, Ending, SimError};
@@ -19,16 +18,6 @@ use tautline_sim::sim::{self, Components, Ending, SimError};
 /// [`SimError`]. Everything recorded up to then stays recorded.
 pub fn run(scenario: &Scenario, sink: &mut (impl Sink + Send)) -> Result<Report, SimError> {
     run_while(scenario, &Preflight::of(scenario)?, sink, &mut |_| ControlFlow::Continue(()))
-}
-
-/// Flies a scenario like [`run`], with steps without the engine as in a study. The report and all samples have the same
-/// bits; only the number of steps of the engine differs.
-///
-/// # Errors
-/// As [`run`].
-pub fn run_with_free_steps(scenario: &Scenario, sink: &mut (impl Sink + Send)) -> Result<Report, SimError> {
-    let parts = Components::of(scenario)?.with_free_steps(FreeSteps::Compared);
-    Ok(run_with(scenario, &Preflight::of(scenario)?, parts, sink, &mut |_| ControlFlow::Continue(()))?.0)
 }
 
 /// Smallest number of vehicles for which samples are recorded in a thread of their own. Below it, the handover costs

@@ -17,7 +17,7 @@ use tautline_report::figures::{Figure, OfLaw, at_closest, by_law};
 use tautline_report::flight_log::FlightLog;
 use tautline_report::report::page::{self, Badge, Tone};
 use tautline_report::request::{Pictures, ScenarioRequest};
-use tautline_report::run::run_with_free_steps;
+use tautline_report::run::run;
 use tautline_sim::scenario::{Draw, ExternalLaw, NamedLaw, Scenario, Template};
 
 /// Assumptions of the numbers.
@@ -257,7 +257,7 @@ impl Options {
             let named = self.law(base.template(), &law.name)?;
             let scenario = drawn(base.template(), &named, worst.seed, study.jitter_m)?;
             let mut log = FlightLog::of(&scenario).within(HISTORY_BYTES);
-            run_with_free_steps(&scenario, &mut log)?;
+            run(&scenario, &mut log)?;
             flown.push((law, worst.seed, scenario, (pair, at_s, min_m), log));
         }
         let (flights, logs): (Vec<_>, Vec<_>) =

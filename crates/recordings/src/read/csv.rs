@@ -438,7 +438,8 @@ fn decimal_comma(line: &[u8]) -> Option<String> {
     (words.len() > 1 && words.iter().all(number)).then(|| (*comma).to_owned())
 }
 
-/// Returns a word whose highest bit of each byte, from the lowest on, is set where `bytes` has this byte.
+/// Returns a mask of the bytes that equal `byte`: the highest bit of each is set. The first byte is the lowest of the
+/// mask.
 #[inline]
 fn matches(bytes: [u8; 8], byte: u8) -> u64 {
     const LOW_BITS: u64 = 0x7f7f_7f7f_7f7f_7f7f;

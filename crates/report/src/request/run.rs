@@ -156,6 +156,12 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
         monitor.say(&reason.to_string());
     }
     monitor.say(&format!("wrote {}: {RECORDING}, report.json and report.html", folder.path().display()));
+    if request.free_steps && report.run.engine_steps.is_none_or(|made| made >= report.run.steps) {
+        monitor.warn(
+            "note: no step left out the engine: that needs the plant rapier, no obstacles, at most 128 vehicles, and \
+             vehicles out of contact",
+        );
+    }
     if report.run.is_interrupted() {
         let at = seconds(report.run.duration_s);
         monitor.warn(&format!(

@@ -157,17 +157,17 @@ pub struct HullContact {
     pub closing_m_s: f64,
 }
 
-/// Treatment of free steps, which the engine may be left out of.
+/// Treatment of free steps: steps that need no engine, because no contact is possible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FreeSteps {
     /// The engine makes none of them.
     Trusted,
-    /// The engine makes each [`COMPARED_EACH`]th of them, from the same state. A result that differs in a bit is
-    /// [`PlantError::EngineDiffers`].
+    /// The engine repeats each [`COMPARED_EACH`]th of them from the same state. A result that differs in a bit, or a
+    /// contact, is [`PlantError::EngineDiffers`].
     Compared,
 }
 
-/// The engine repeats one of this number of free steps ([`FreeSteps::Compared`]).
+/// Free steps from one that the engine repeats to the next ([`FreeSteps::Compared`]).
 pub const COMPARED_EACH: u32 = 8;
 
 /// Error of a step of a plant.
@@ -179,8 +179,8 @@ pub enum PlantError {
         /// The vehicle, from 0.
         vehicle: usize,
     },
-    /// The engine moves a vehicle otherwise than a free step does: a defect.
-    #[error("a free step moves vehicle {} otherwise than the engine", vehicle + 1)]
+    /// The engine and a free step move a vehicle differently, or the engine reports a contact: a defect.
+    #[error("a free step of vehicle {} differs from a step of the engine", vehicle + 1)]
     EngineDiffers {
         /// The vehicle, from 0.
         vehicle: usize,

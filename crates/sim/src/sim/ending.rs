@@ -180,8 +180,8 @@ pub enum Breakdown {
         /// Required position resolution: the tolerance of arrival \[m\].
         required_m: f64,
     },
-    /// The engine moves a vehicle otherwise than a step without it ([`crate::plant::FreeSteps`]): a defect.
-    #[error("step {step}: the engine moves vehicle {} otherwise than the step without it", vehicle + 1)]
+    /// A step with the engine and one without it differ for a vehicle ([`crate::plant::FreeSteps`]): a defect.
+    #[error("step {step}: the step without the engine differs from that of the engine for vehicle {}", vehicle + 1)]
     EngineDiffers {
         /// The step, from 1.
         step: u64,
@@ -250,7 +250,7 @@ pub enum SimError {
         /// Reason, a sentence.
         reason: String,
     },
-    /// The engine moves a vehicle otherwise than a step without it: a defect.
+    /// A step with the engine and one without it differ for a vehicle: a defect.
     #[error("{0}; please report this with the scenario")]
     EngineDiffers(Breakdown),
     /// The scenario has no formation.

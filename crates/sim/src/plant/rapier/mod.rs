@@ -49,9 +49,9 @@
 //!
 //! # Free steps
 //! While every pair is farther apart than the contacts of the engine reach, the plants can do the operations of the
-//! engine for a body without contacts. Vector simulations of up to 128 vehicles without obstacles leave the engine out
-//! of these steps. In studies the engine makes each eighth of them too, and any difference is an error. In all other
-//! flights the engine makes every step.
+//! engine for a body without contacts. Vector simulations, studies and `tautline run --free-steps` leave the engine
+//! out of these steps, for up to 128 vehicles without obstacles. Except in vector simulations, the engine repeats each
+//! eighth of them, and any difference is an error. In all other flights the engine makes every step.
 
 mod bodies;
 mod proximity;

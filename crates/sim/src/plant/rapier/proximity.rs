@@ -1,4 +1,4 @@
-//! Decides which steps the engine may be left out of, where a caller allows that: in vector simulations and studies.
+//! Decides which steps are free of the engine, where a caller allows that: vector simulations, studies, `--free-steps`.
 //!
 //! Bodies of the engine act on each other only through contacts. The engine reports contacts only for pairs within a
 //! reach: two keep-out balls that touch, or two hulls within the contact prediction. While every pair is farther apart

@@ -109,7 +109,8 @@ pub(super) fn keep_out_contacts(world: &PhysicsWorld, pairs: &mut Vec<Pair>) {
     pairs[before..].sort_unstable();
 }
 
-/// Returns the first vehicle with an overlap of keep-out balls, or with a contact of hulls, be it only a predicted one.
+/// Returns the first vehicle with an overlap of keep-out balls; vehicle 0 if only hulls have a contact, even a
+/// predicted one.
 pub(super) fn first_in_contact(world: &PhysicsWorld) -> Option<usize> {
     let mut pairs = Vec::new();
     keep_out_contacts(world, &mut pairs);
