@@ -18,7 +18,7 @@ draw "$out/sphere" --out "$out/ball" --at end --camera follow --theme light
 draw "$out/obstacles" --out "$out/among" --at 10 --camera follow
 draw "$out/show" --out "$out/word" --at 23.8 --theme light
 target/release/tautline render pentagon-laplacian --beside pentagon --film docs/gallery/first.gif \
-    --size 800x400 --fps 12 --until 16 --speed 2 --quiet
+    --size 800x400 --film-fps 12 --until 16 --speed 2 --quiet
 
 target/release/tautline compare swap --laws laplacian,orca,cbf-qp,displacement --shield --runs 20 \
     --set actuation.max_accel_m_s2=5 --html "$out/compare.html" --quiet

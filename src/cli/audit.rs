@@ -1,16 +1,16 @@
 //! `tautline audit`: arguments, and reports on one or several recordings.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde::Serialize;
 
 use super::console::{Console, Terminal};
+use super::json::JsonArgument;
 use super::reading::ReadArguments;
 use super::run::figure_formats;
-use super::{Exit, audit_formats, console, reading};
+use super::{Exit, audit_formats, console};
 use tautline_core::files::write_atomically;
-use tautline_recordings::read::Format;
 use tautline_report::report::recorded::RecordedReport;
 use tautline_report::request::outputs::NamedPath;
 use tautline_report::request::{AuditOptions, AuditRequest, AuditedRecording, Failure, Monitor as _, Subject};
@@ -45,7 +45,7 @@ pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, 
     complete.try_for_each(|asked| asked.check_outputs(&arguments.outputs()))?;
     // A log that the system searches for annotations contains no other lines with untrusted names.
     let quiet = arguments.quiet || arguments.annotations.is_some();
-    let console = Console { data_on_stdout: arguments.json, quiet };
+    let console = Console { data_on_stdout: arguments.json.is_piped(), quiet };
     let monitor = Terminal::that_abandons(console, "interrupted: the audit is incomplete; give the command again")?;
     let mut answers = Vec::new();
     for (recording, asked) in asked {
@@ -61,7 +61,7 @@ pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, 
     if !is_one {
         monitor.say(&audit_formats::counts(&answers));
     }
-    write_answers(arguments, &answers, is_one)?;
+    write_answers(arguments, &answers, is_one, console)?;
     let (judged, failures): (Vec<_>, Vec<_>) = answers.into_iter().map(|one| one.audited).partition(Result::is_ok);
     let worst = judged.iter().flatten().map(|audit| Exit::good_if(audit.is_good())).max_by_key(|exit| *exit as u8);
     match failures.into_iter().filter_map(Result::err).max_by_key(|failure| Exit::of(failure) as u8) {
@@ -74,28 +74,36 @@ pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, 
 
 /// Writes the machine-readable outputs: one report for one recording, a list with all failures for several. Every list
 /// is in the order of the arguments.
-fn write_answers(arguments: &AuditArguments, answers: &[Answer], is_one: bool) -> Result<(), Failure> {
-    if arguments.json {
-        match answers {
-            [Answer { audited: Ok(audited), .. }] if is_one => console::json(&audited.report)?,
-            _ if is_one => {}
-            answers => console::json(&answers.iter().map(JsonAnswer::new).collect::<Vec<_>>())?,
-        }
+fn write_answers(
+    arguments: &AuditArguments,
+    answers: &[Answer],
+    is_one: bool,
+    console: Console,
+) -> Result<(), Failure> {
+    match answers {
+        [Answer { audited: Ok(audited), .. }] if is_one => arguments.json.write(&audited.report, console)?,
+        _ if is_one => {}
+        answers => arguments.json.write(&answers.iter().map(JsonAnswer::new).collect::<Vec<_>>(), console)?,
     }
     if let Some(Annotations::Github) = arguments.annotations {
         let lines = audit_formats::github(answers);
-        if arguments.json { console::beside(&lines) } else { console::data(&lines)? }
+        if arguments.json.is_piped() { console::beside(&lines) } else { console::data(&lines)? }
     }
+    let write = |file: &Path, bytes: &[u8]| -> Result<(), Failure> {
+        write_atomically(file, bytes)?;
+        console.say(&format!("wrote {}", file.display()));
+        Ok(())
+    };
     if let Some(file) = &arguments.events {
-        write_atomically(file, &audit_formats::csv(answers, !is_one)?)?;
+        write(file, &audit_formats::csv(answers, !is_one)?)?;
     }
     if let Some(file) = &arguments.junit {
-        write_atomically(file, audit_formats::junit(answers)?.as_bytes())?;
+        write(file, audit_formats::junit(answers)?.as_bytes())?;
     }
     if let Some(file) = &arguments.summary {
         // The steps of a job append to the same page.
         let before = if file.is_file() { std::fs::read(file).unwrap_or_default() } else { Vec::new() };
-        write_atomically(file, &[before, audit_formats::markdown(answers).into_bytes()].concat())?;
+        write(file, &[before, audit_formats::markdown(answers).into_bytes()].concat())?;
     }
     Ok(())
 }
@@ -126,42 +134,37 @@ violation. The limit of two vehicles is max(delta, r1 + r2).")]
 pub(super) struct AuditArguments {
     #[command(flatten)]
     reading: ReadArguments,
-    /// Format of the recording [default: detected from its content].
-    #[arg(long, value_name = "FORMAT", value_parser = reading::format(), help_heading = "Reading")]
-    format: Option<Format>,
-
     #[command(flatten)]
     options: AuditOptions,
 
-    /// Print the report as JSON on standard output; all text goes to standard error.
-    #[arg(long, help_heading = "Output")]
-    json: bool,
+    #[command(flatten, next_help_heading = "Output")]
+    json: JsonArgument,
     /// Print no summary and no progress.
-    #[arg(long, help_heading = "Output")]
+    #[arg(long, short)]
     quiet: bool,
     /// Write the verdict as a `JUnit` file.
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
     /// Write violations, undecided times and gaps as CSV.
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    #[arg(long, value_name = "FILE")]
     events: Option<PathBuf>,
     /// Write a report page with figures.
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
     /// Write the figures of the page into the folder NAME-figures beside NAME.html, in these formats; PDF and PNG have
     /// the width of a paper's column, 85 mm.
-    #[arg(long, value_name = "FORMAT,...", value_delimiter = ',', requires = "html", help_heading = "Output")]
+    #[arg(long, value_name = "FORMAT,...", value_delimiter = ',', requires = "html")]
     #[arg(value_parser = ["svg", "pdf", "png"])]
     figures: Vec<String>,
     /// Write a proof of the verdict that `check_proof.py` checks in exact arithmetic without this program; only for a
     /// CSV table with --delta.
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    #[arg(long, value_name = "FILE")]
     proof: Option<PathBuf>,
     /// Write a summary in Markdown, for example for the page of a job.
-    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    #[arg(long, value_name = "FILE")]
     summary: Option<PathBuf>,
     /// Print an annotation for each recording, in the format of this CI system.
-    #[arg(long, value_name = "SYSTEM", help_heading = "Output")]
+    #[arg(long, value_name = "SYSTEM")]
     annotations: Option<Annotations>,
 }
 
@@ -175,7 +178,7 @@ enum Annotations {
 impl AuditArguments {
     /// Returns the request for the recording in these files. `command` repeats the request.
     fn request(&self, paths: Vec<PathBuf>, command: &str) -> AuditRequest<'static> {
-        let subject = Subject::Files { paths, options: Box::new(self.reading.options(self.format)) };
+        let subject = Subject::Files { paths, options: Box::new(self.reading.options()) };
         AuditRequest {
             command: command.to_owned(),
             html: self.html.clone(),
@@ -188,7 +191,8 @@ impl AuditArguments {
     /// Returns the output files that cover all recordings, with their options.
     fn outputs(&self) -> Vec<NamedPath<'_>> {
         let outputs = [("--events", &self.events), ("--junit", &self.junit), ("--summary", &self.summary)];
-        outputs.into_iter().filter_map(|(option, path)| Some((option.to_owned(), path.as_deref()?))).collect()
+        let outputs = outputs.into_iter().filter_map(|(option, path)| Some((option.to_owned(), path.as_deref()?)));
+        outputs.chain(self.json.file()).collect()
     }
 }
 
@@ -273,7 +277,7 @@ mod tests {
         ("plan-delay", &["--plan", "@/planned.csv", "--plan-delay", "0"], true),
         ("tube", &["--plan", "@/planned.csv", "--tube", "1"], true),
         ("from", &["--delta", "1", "--from", "0"], true),
-        ("to", &["--delta", "1", "--to", "20"], true),
+        ("until", &["--delta", "1", "--until", "20"], true),
         ("above", &["--delta", "1", "--above", "1"], false),
         ("land-on", &["--delta", "1", "--above", "1", "--land-on", "o", "--obstacles", "@/rest.toml"], false),
         ("ids", &["--delta", "1", "--ids", "a,b"], false),
@@ -299,7 +303,7 @@ mod tests {
         ("time-unit", &["--limit", "speed=2", "--time-unit", "s"], false),
         ("time-scale", &["--limit", "speed=2", "--time-scale", "1"], false),
         ("fps", &["--limit", "speed=99", "--fps", "25"], false),
-        ("format", &["--delta", "1", "--format", "csv"], false),
+        ("input-format", &["--delta", "1", "--input-format", "csv"], false),
         ("join", &["--delta", "1", "--join"], false),
         ("sort", &["--delta", "1", "--sort"], false),
         ("duplicates", &["--delta", "1", "--duplicates", "first"], false),

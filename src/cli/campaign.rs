@@ -6,6 +6,7 @@ use clap::{Args, Subcommand};
 
 use super::Exit;
 use super::console::{self, Console, Terminal};
+use super::json::JsonArgument;
 use super::run::pictures;
 use tautline_report::request::{Failure, Pictures, command_line};
 use tautline_studies::Study as _;
@@ -60,7 +61,7 @@ struct RunArguments {
     #[command(flatten)]
     spec: SpecArguments,
     /// Folder of the campaign [default: out/NAME with the name of the specification].
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Number of shards [default: one for 250 runs]; finished shards are not flown again.
     #[arg(long, value_name = "N")]
@@ -77,7 +78,7 @@ struct PlanArguments {
     #[command(flatten)]
     spec: SpecArguments,
     /// Folder of the campaign.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     out: PathBuf,
     /// Number of shards [default: one for 250 runs].
     #[arg(long, value_name = "N")]
@@ -96,7 +97,7 @@ struct ShardArguments {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=256))]
     threads: u16,
     /// Print no progress.
-    #[arg(long)]
+    #[arg(long, short)]
     quiet: bool,
 }
 
@@ -125,11 +126,10 @@ struct AnswerOptions {
     /// Take no pictures of these flights.
     #[arg(long)]
     no_snapshots: bool,
-    /// Print the answer as JSON on standard output; all text goes to standard error.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    json: JsonArgument,
     /// Print no summary and no progress.
-    #[arg(long)]
+    #[arg(long, short)]
     quiet: bool,
 }
 
@@ -147,7 +147,7 @@ struct ReplayArguments {
     #[arg(long, value_name = "K")]
     bad: Option<usize>,
     /// Folder for the recording and the report [default: worst/LAW-run-I in the folder of the campaign].
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Take no pictures.
     #[arg(long)]
@@ -233,13 +233,12 @@ impl AnswerOptions {
         pictures("best", !self.no_snapshots)
     }
 
-    /// Answers a request, and prints the answer as JSON with `--json`.
+    /// Answers a request, and writes the answer as JSON if asked.
     fn run(&self, request: impl FnOnce(&Terminal) -> Result<Option<Summary>, Failure>) -> Result<Exit, Failure> {
-        let monitor = Terminal::new(Console { data_on_stdout: self.json, quiet: self.quiet })?;
-        let Some(summary) = request(&monitor)? else { return Ok(Exit::Bad) };
-        if self.json {
-            console::json(&summary)?;
-        }
+        let console = Console { data_on_stdout: self.json.is_piped(), quiet: self.quiet };
+        self.json.check("", true)?;
+        let Some(summary) = request(&Terminal::new(console)?)? else { return Ok(Exit::Bad) };
+        self.json.write(&summary, console)?;
         Ok(Exit::good_if(summary.is_good()))
     }
 }

@@ -6,11 +6,11 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use annotate_snippets::{AnnotationKind, Group, Level, Renderer, Snippet, normalize_untrusted_str};
 use anstream::stream::RawStream;
 use anstream::{AutoStream, ColorChoice};
 use anstyle::{AnsiColor, Style};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
 use serde::Serialize;
 
 use tautline_report::request::{Failure, Monitor, blanked};
@@ -174,6 +174,11 @@ impl Terminal {
         Self { console, bar, interruption: Arc::default(), abandonment: Arc::default() }
     }
 
+    /// Returns the output settings.
+    pub(super) fn console(&self) -> Console {
+        self.console
+    }
+
     /// From now on the first Ctrl-C interrupts the work and does not end the process.
     #[cfg(feature = "viewer")]
     pub(super) fn abandons_no_more(&self) {
@@ -271,10 +276,10 @@ pub(super) fn beside(text: &str) {
     let _ = io::stderr().lock().write_all(text.as_bytes());
 }
 
-/// Writes an answer to standard output, as indented JSON.
-pub(super) fn json(answer: &impl Serialize) -> Result<(), Failure> {
+/// Returns an answer as indented JSON.
+pub(super) fn to_json(answer: &impl Serialize) -> Result<String, Failure> {
     match serde_json::to_string_pretty(answer) {
-        Ok(json) => data(&(json + "\n")),
+        Ok(json) => Ok(json + "\n"),
         Err(error) => Err(Failure::machine("files/cannot-write", format!("cannot write the answer: {error}"))),
     }
 }
@@ -316,31 +321,20 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// Prints a failure on standard error.
+/// Prints a failure on standard error: what is wrong, where, the remedy, and the code.
 pub(super) fn show(failure: &Failure) -> Exit {
-    let mut diagnostic = MietteDiagnostic::new(failure.message()).with_code(failure.code());
-    diagnostic.help = failure.help().map(str::to_owned);
-    let report = match failure.place() {
-        Some(place) => {
-            diagnostic.labels = Some(vec![LabeledSpan::underline(place.span.clone())]);
-            Report::new(diagnostic).with_source_code(NamedSource::new(&place.source, place.text.clone()))
-        }
-        None => Report::new(diagnostic),
-    };
-    let mut text = String::new();
-    let handler = match ColorChoice::global() {
-        ColorChoice::Always | ColorChoice::AlwaysAnsi => GraphicalReportHandler::new_themed(GraphicalTheme::unicode()),
-        ColorChoice::Never if io::stderr().is_terminal() => {
-            GraphicalReportHandler::new_themed(GraphicalTheme::unicode_nocolor())
-        }
-        ColorChoice::Never => GraphicalReportHandler::new_themed(GraphicalTheme::none()),
-        ColorChoice::Auto => GraphicalReportHandler::new(),
-    };
-    if handler.render_report(&mut text, report.as_ref()).is_err() {
-        text = format!("error: {failure}\n");
+    let mut error = Group::with_title(Level::ERROR.primary_title(failure.message()));
+    if let Some(place) = failure.place() {
+        let at = AnnotationKind::Primary.span(place.span.clone());
+        error = error.element(Snippet::source(&place.text).path(&place.source).annotation(at));
     }
+    if let Some(help) = failure.help() {
+        error = error.element(Level::HELP.message(normalize_untrusted_str(help)));
+    }
+    error = error.element(Level::NOTE.with_name("code").message(failure.code()));
+    let text = Renderer::styled().render(&[error]);
     // An error here means that standard error is closed.
-    let _ = io::stderr().lock().write_all(text.as_bytes());
+    let _ = writeln!(AutoStream::new(io::stderr(), colour_choice(&io::stderr())), "{text}");
     Exit::of(failure)
 }
 

@@ -7,15 +7,15 @@ use clap::Args;
 use serde::Serialize;
 
 use super::Exit;
-use super::console::{self, Console};
+use super::console::Console;
+use super::json::JsonArgument;
 use tautline_report::request::Failure;
 
 /// Arguments of `tautline doctor`.
 #[derive(Debug, Args)]
 pub(super) struct DoctorArguments {
-    /// Print the findings as JSON on standard output.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    json: JsonArgument,
 }
 
 /// A capability of the machine.
@@ -40,12 +40,9 @@ impl Finding {
 }
 
 pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Exit, Failure> {
+    arguments.json.check("", true)?;
     let findings = findings();
-    if arguments.json {
-        console::json(&findings)?;
-        return Ok(Exit::Good);
-    }
-    let console = Console { data_on_stdout: false, quiet: false };
+    let console = Console { data_on_stdout: arguments.json.is_piped(), quiet: arguments.json.is_piped() };
     for finding in &findings {
         let mark = if finding.available { "yes" } else { "no" };
         console.say(&format!("{:<10} {mark:<4} {}", finding.name, finding.found));
@@ -53,6 +50,7 @@ pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Exit, Failure> {
             console.say(&format!("{:<10} {:<4} remedy: {remedy}", "", ""));
         }
     }
+    arguments.json.write(&findings, console)?;
     Ok(Exit::Good)
 }
 

@@ -7,7 +7,7 @@ use clap::builder::TypedValueParser;
 
 use super::Exit;
 use super::console::{self, Console, Terminal};
-use super::reading::{self, ReadArguments};
+use super::reading::ReadArguments;
 use tautline_recordings::export::WRITTEN;
 use tautline_recordings::export::drones::Dialect;
 use tautline_recordings::read::Format;
@@ -18,12 +18,13 @@ use tautline_report::request::{
 /// Arguments of `tautline export`.
 #[derive(Debug, Args)]
 pub(super) struct ExportArguments {
-    /// File to write; a folder for `--to crazyflie`, `skyb` and `px4-show`.
+    /// File to write; a folder for the formats `crazyflie`, `skyb` and `px4-show`.
     #[arg(long, short, value_name = "PATH")]
-    output: PathBuf,
-    /// Format to write [default: from the extension of the file].
-    #[arg(long, value_name = "FORMAT", value_parser = written_format(), conflicts_with = "to")]
-    format: Option<Format>,
+    out: PathBuf,
+    /// Format to write [default: csv, parquet, npz or mcap, from the extension of the file]. Drones fly the others:
+    /// the written motion is judged, and nothing is written if it is not clear.
+    #[arg(long, value_name = "FORMAT", value_parser = written())]
+    format: Option<Written>,
     /// Sampling rate [Hz] of curves, of setpoints [default: 20] or of VVIZ [default: 30]; the motion between the
     /// samples is lost.
     #[arg(long, value_name = "HZ", allow_negative_numbers = true)]
@@ -34,17 +35,20 @@ pub(super) struct ExportArguments {
     /// Print no text.
     #[arg(long, short)]
     quiet: bool,
-    /// Format that drones fly. The written motion is judged; nothing is written if it is not clear.
-    #[arg(long, value_name = "FORMAT", value_parser = dialect(), help_heading = "For drones")]
-    to: Option<Dialect>,
     #[command(flatten)]
     drones: DroneExportOptions,
     // Last, because its help heading also applies to all later arguments.
     #[command(flatten)]
     reading: ReadArguments,
-    /// Format of the recording [default: detected from its content].
-    #[arg(long, value_name = "FORMAT", value_parser = reading::format())]
-    input_format: Option<Format>,
+}
+
+/// Format that is written.
+#[derive(Clone, Copy, Debug)]
+enum Written {
+    /// Recording.
+    Recording(Format),
+    /// Flight for drones.
+    Flight(Dialect),
 }
 
 pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
@@ -54,20 +58,25 @@ pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
         return Err(Failure::input("usage/several-recordings", message, help));
     };
     let terminal = Terminal::new(Console { data_on_stdout: false, quiet: arguments.quiet })?;
-    let ExportArguments { output, format, sample_hz, force, to, drones, .. } = arguments;
+    let (format, dialect) = match arguments.format {
+        Some(Written::Recording(format)) => (Some(format), None),
+        Some(Written::Flight(dialect)) => (None, Some(dialect)),
+        None => (None, None),
+    };
     let file = ExportRequest {
         paths: paths.clone(),
-        options: arguments.reading.options(arguments.input_format),
-        output: output.clone(),
-        format: *format,
-        sample_hz: *sample_hz,
-        force: *force,
+        options: arguments.reading.options(),
+        output: arguments.out.clone(),
+        format,
+        sample_hz: arguments.sample_hz,
+        force: arguments.force,
     };
-    let Some(dialect) = *to else {
+    let Some(dialect) = dialect else {
+        arguments.drones.refuse()?;
         export_file(&file, &terminal)?;
         return Ok(Exit::Good);
     };
-    let request = DroneExportRequest { file, dialect, options: drones.clone() };
+    let request = DroneExportRequest { file, dialect, options: arguments.drones.clone() };
     match export_drones(&request, &terminal)?.refusal {
         None => Ok(Exit::Good),
         Some(refusal) => {
@@ -78,11 +87,8 @@ pub(super) fn export(arguments: &ExportArguments) -> Result<Exit, Failure> {
 }
 
 /// Returns a parser of writable formats.
-fn written_format() -> impl TypedValueParser<Value = Format> {
-    one_of(WRITTEN.iter().map(|format| (format.name.into(), *format)).collect())
-}
-
-/// Returns a parser of formats of drones.
-fn dialect() -> impl TypedValueParser<Value = Dialect> {
-    one_of(Dialect::ALL.map(|dialect| (dialect.name().into(), dialect)).into())
+fn written() -> impl TypedValueParser<Value = Written> {
+    let recordings = WRITTEN.iter().map(|format| (format.name.into(), Written::Recording(*format)));
+    let flights = Dialect::ALL.map(|dialect| (dialect.name().into(), Written::Flight(dialect)));
+    one_of(recordings.chain(flights).collect())
 }

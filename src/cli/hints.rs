@@ -32,6 +32,10 @@ pub(super) fn with_hints(mut usage: clap::Error, program: &Command, words: &[Str
                 usage.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![name]));
             }
         }
+        // The word behind was taken as the scenario.
+        ErrorKind::UnknownArgument if let Some(file) = behind_json(words) => {
+            tip(&mut usage, &format!("a file of JSON follows an equals sign: --json={file}"));
+        }
         ErrorKind::UnknownArgument if usage.get(ContextKind::SuggestedArg).is_none() => {
             let word = given(ContextKind::InvalidArg);
             let command = words.iter().find_map(|name| program.find_subcommand(name)).unwrap_or(program);
@@ -52,6 +56,12 @@ pub(super) fn with_hints(mut usage: clap::Error, program: &Command, words: &[Str
         _ => {}
     }
     usage
+}
+
+/// Returns the word behind `--json`, which takes its file behind an equals sign.
+fn behind_json(words: &[String]) -> Option<&str> {
+    let place = words.iter().position(|word| word == "--json")?;
+    words.get(place + 1).map(String::as_str).filter(|word| word.ends_with(".json"))
 }
 
 fn names(program: &Command, word: &str) -> bool {

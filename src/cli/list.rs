@@ -5,7 +5,9 @@ use std::path::Path;
 use clap::Args;
 use serde::Serialize;
 
-use super::{Exit, completions, console};
+use super::console::{self, Console};
+use super::json::JsonArgument;
+use super::{Exit, completions};
 use tautline_core::text::aligned;
 use tautline_recordings::mcap::McapRecording;
 use tautline_report::request::Failure;
@@ -15,11 +17,10 @@ use tautline_sim::scenario::{self, Scenario, Source, builtin};
 #[derive(Debug, Args)]
 pub(super) struct ListArguments {
     /// Print this built-in scenario as TOML, or the scenario in a recording of `tautline run` with all defaults.
-    #[arg(long, value_name = "NAME|RECORDING", add = completions::scenario())]
+    #[arg(long, value_name = "NAME|RECORDING", conflicts_with = "json", add = completions::scenario())]
     show: Option<String>,
-    /// Print the list as JSON.
-    #[arg(long, conflicts_with = "show")]
-    json: bool,
+    #[command(flatten)]
+    json: JsonArgument,
 }
 
 /// Built-in scenario with the size of its flight, which decides how long a flight takes.
@@ -33,8 +34,9 @@ struct Listed {
 }
 
 pub(super) fn list(arguments: &ListArguments) -> Result<Exit, Failure> {
-    if arguments.json {
-        console::json(&listed()?)?;
+    if arguments.json.place().is_some() {
+        arguments.json.check("", true)?;
+        arguments.json.write(&listed()?, Console { data_on_stdout: arguments.json.is_piped(), quiet: false })?;
         return Ok(Exit::Good);
     }
     let text = match &arguments.show {
@@ -88,6 +90,6 @@ fn table() -> Result<String, Failure> {
 
 /// Prints the JSON Schema of the scenario file.
 pub(super) fn schema() -> Result<Exit, Failure> {
-    console::json(&scenario::schema())?;
+    console::data(&console::to_json(&scenario::schema())?)?;
     Ok(Exit::Good)
 }

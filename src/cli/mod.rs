@@ -14,6 +14,7 @@ mod doctor;
 mod drawing;
 mod export;
 mod hints;
+mod json;
 mod list;
 mod new;
 mod reading;
@@ -29,12 +30,12 @@ mod watch;
 use std::ffi::OsString;
 use std::fmt::{self, Formatter};
 use std::process::ExitCode;
-use std::sync::{Once, PoisonError, RwLock};
+use std::sync::Once;
 
 use clap::{ColorChoice, CommandFactory as _, Parser, Subcommand};
 
 use console::Exit;
-use tautline_core::option::{FORMAT, FPS, Opt, spell_with};
+use tautline_core::option::{Opt, spell_with};
 use tautline_recordings::read;
 use tautline_report::request::{Failure, command_line};
 
@@ -49,7 +50,6 @@ pub fn main() -> ExitCode {
 pub fn entry(arguments: &[OsString]) -> u8 {
     quiet_guarded_panics();
     spell_with(as_argument);
-    remember_command(arguments);
     if completions::answer(arguments) {
         return Exit::Good as u8;
     }
@@ -153,29 +153,10 @@ enum Command {
     Completions(completions::CompletionsArguments),
 }
 
-/// Remembers the command, by which options are named in messages.
-fn remember_command(arguments: &[OsString]) {
-    let command = arguments.get(1).map(|word| word.to_string_lossy().into_owned()).unwrap_or_default();
-    *COMMAND.write().unwrap_or_else(PoisonError::into_inner) = command;
-}
-
-/// Name of the command of this process, such as `audit`.
-static COMMAND: RwLock<String> = RwLock::new(String::new());
-
 /// Writes an option as on the command line, such as `--time-unit ms`.
 fn as_argument(option: Opt, value: Option<&str>, out: &mut Formatter<'_>) -> fmt::Result {
-    let command = COMMAND.read().unwrap_or_else(PoisonError::into_inner);
-    write!(out, "--{}", name_of(option, &command))?;
+    write!(out, "--{}", option.name)?;
     value.map_or(Ok(()), |value| write!(out, " {value}"))
-}
-
-/// Returns the name of an option in a command: options of readers have other names beside equal options of the output.
-fn name_of(option: Opt, command: &str) -> &'static str {
-    match (option, command) {
-        (FPS, "render") => "recording-fps",
-        (FORMAT, "export" | "render" | "view") => "input-format",
-        (option, _) => option.name,
-    }
 }
 
 /// Silences the panic hook for panics that become errors.
@@ -223,12 +204,12 @@ fn dispatch(command: Command, line: &str) -> Result<Exit, Failure> {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeSet;
+    use std::collections::{BTreeMap, BTreeSet};
 
     use clap::CommandFactory as _;
     use tautline_core::option;
 
-    use super::{Arguments, name_of};
+    use super::Arguments;
 
     #[test]
     fn the_arguments_are_consistent() {
@@ -254,8 +235,33 @@ mod tests {
             let Some(command) = program.find_subcommand(name) else { continue };
             let names: BTreeSet<_> = command.get_arguments().filter_map(|argument| argument.get_long()).collect();
             for option in [option::FPS, option::FORMAT, option::TIME_UNIT, option::COLUMN, option::SCALE] {
-                assert!(names.contains(name_of(option, name)), "{name}: {option:?}");
+                assert!(names.contains(option.name), "{name}: {option:?}");
             }
         }
+    }
+
+    #[test]
+    fn an_option_means_the_same_in_all_commands() {
+        fn add<'a>(command: &'a clap::Command, at: &str, seen: &mut BTreeMap<&'a str, BTreeMap<String, Vec<String>>>) {
+            for argument in command.get_arguments() {
+                let Some(name) = argument.get_long() else { continue };
+                let values = argument.get_value_names().unwrap_or_default().first().map_or("", |value| value.as_str());
+                // What is written depends on the command, and so do the values of a key.
+                let value = match values {
+                    "DIR" | "FILE" if name == "out" => "PATH",
+                    values if name == "key" => values.split_once("=FROM..TO").map_or(values, |(key, _)| key),
+                    values => values,
+                };
+                let form = format!("{:?} {value}", argument.get_short());
+                seen.entry(name).or_default().entry(form).or_default().push(format!("{at} {}", command.get_name()));
+            }
+            command.get_subcommands().for_each(|below| add(below, command.get_name(), seen));
+        }
+        let mut command = Arguments::command();
+        command.build();
+        let mut seen = BTreeMap::new();
+        add(&command, "", &mut seen);
+        let differ: Vec<_> = seen.iter().filter(|(_, forms)| forms.len() > 1).collect();
+        assert!(differ.is_empty(), "{differ:#?}");
     }
 }

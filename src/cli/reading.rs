@@ -30,6 +30,9 @@ pub(super) struct ReadArguments {
     /// Read several files, one for each vehicle, as one recording.
     #[arg(long)]
     join: bool,
+    /// Format of the recording [default: detected from its content].
+    #[arg(long, value_name = "FORMAT", value_parser = format())]
+    input_format: Option<Format>,
     /// Unit of time [default: as stated in the recording, or estimated from its numbers].
     #[arg(long, value_name = "UNIT", value_parser = unit())]
     time_unit: Option<TimeUnit>,
@@ -113,14 +116,14 @@ impl ReadArguments {
         if self.join { vec![paths.collect()] } else { paths.map(|path| vec![path]).collect() }
     }
 
-    /// Returns the options for reading each recording, with its format if known.
-    pub(super) fn options(&self, format: Option<Format>) -> ReadOptions {
+    /// Returns the options for reading each recording.
+    pub(super) fn options(&self) -> ReadOptions {
         let mut columns = ColumnNames::default();
         for (role, name) in &self.columns {
             columns.set(role, name);
         }
         ReadOptions {
-            format,
+            format: self.input_format,
             time_unit: self.time_unit,
             times_per_second: self.frames_per_s.or(self.time_scale.map(f64::recip)),
             sort: self.sort,
@@ -199,7 +202,7 @@ fn dimensions() -> impl TypedValueParser<Value = Dimensions> {
 }
 
 /// Returns a parser of readable formats.
-pub(super) fn format() -> impl TypedValueParser<Value = Format> {
+fn format() -> impl TypedValueParser<Value = Format> {
     one_of(
         Format::all()
             .map(|format| (PossibleValue::new(format.name).help(format.docs.replace('`', "")), format))

@@ -8,7 +8,7 @@ use clap::Args;
 use rayon::iter::{IntoParallelRefIterator as _, ParallelIterator as _};
 
 use super::console::{Console, Terminal};
-use super::reading::{self, ReadArguments};
+use super::reading::ReadArguments;
 use super::{Exit, completions, drawing};
 use tautline_core::files::{write_atomically, write_atomically_with};
 use tautline_render::{
@@ -30,8 +30,6 @@ const WAITING_BYTES: usize = 256 << 20;
 
 /// Arguments of `tautline render`.
 #[derive(Debug, Args)]
-// `--fps` is the frame rate of the film here.
-#[command(mut_arg("frames_per_s", |frames_per_s| frames_per_s.long("recording-fps")))]
 #[command(mut_arg("recording", |what| {
     let help = "Recording, scenario file, or name of a built-in scenario, which is flown without a recording";
     what.value_name("RECORDING|SCENARIO").help(help).long_help(help).add(completions::scenario())
@@ -39,14 +37,14 @@ const WAITING_BYTES: usize = 256 << 20;
 pub(super) struct RenderArguments {
     /// Safety distance for a recording without one [m]: vehicles get shells of half of it, and violations are those of
     /// straight lines between samples.
-    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
     delta: Option<f64>,
     /// Times of pictures: start, closest, end, or seconds, separated by commas [default: start,closest,end, unless
     /// another output is given].
     #[arg(long, value_name = "TIMES", value_delimiter = ',', allow_negative_numbers = true)]
     at: Vec<String>,
-    /// Take a picture every S seconds of the flight.
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    /// Take a picture each SECONDS of the flight.
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     every: Option<f64>,
     /// Write a film: .mp4 (H.264; needs ffmpeg, or a build with --features film) or .gif.
     #[arg(long, value_name = "FILE")]
@@ -58,17 +56,17 @@ pub(super) struct RenderArguments {
     #[arg(long, value_name = "RECORDING|SCENARIO", add = completions::scenario())]
     beside: Option<PathBuf>,
     /// Last time of films, sheets and --every [s] [default: the end].
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     until: Option<f64>,
     /// Folder for the pictures [default: `snapshots` beside the recording, or in out/NAME for a scenario].
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Width and height of a picture, or of the whole sheet, in pixels.
     #[arg(long, value_name = "WxH", default_value = "1280x720", value_parser = drawing::size)]
     size: [u32; 2],
     /// Frames per second of the film [default: 30].
     #[arg(long, value_name = "N", requires = "film")]
-    fps: Option<u32>,
+    film_fps: Option<u32>,
     /// Seconds of flight per second of film [default: 1, or more to keep the film below 20 s].
     #[arg(long, value_name = "X", allow_negative_numbers = true, requires = "film")]
     speed: Option<f64>,
@@ -80,7 +78,7 @@ pub(super) struct RenderArguments {
     #[arg(long, default_value = "vehicle", value_parser = drawing::colouring())]
     colour: Colouring,
     /// Length of trails [s] [default: from the start].
-    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     trail: Option<f64>,
     /// Theme.
     #[arg(long, default_value = "dark", value_parser = drawing::theme())]
@@ -89,14 +87,11 @@ pub(super) struct RenderArguments {
     #[arg(long, value_name = "NAME", default_value = "best")]
     adapter: String,
     /// Print no summary and no progress.
-    #[arg(long)]
+    #[arg(long, short)]
     quiet: bool,
     // Last, because its help heading also applies to all later arguments.
     #[command(flatten)]
     reading: ReadArguments,
-    /// Format of the recording [default: detected from its content].
-    #[arg(long, value_name = "FORMAT", value_parser = reading::format())]
-    input_format: Option<tautline_recordings::read::Format>,
 }
 
 /// Picture to take.
@@ -147,8 +142,8 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     }
     let camera: CameraSpec = arguments.camera.parse()?;
     let film = arguments.film.as_deref().map(|path| Ok::<_, Failure>((path, FilmFormat::of(path)?))).transpose()?;
-    let fps = arguments.fps.unwrap_or(FPS);
-    let reading = arguments.reading.options(arguments.input_format);
+    let fps = arguments.film_fps.unwrap_or(FPS);
+    let reading = arguments.reading.options();
     let recording = arguments.reading.only("drawn")?;
     let paths: Vec<&Path> = std::iter::once(recording).chain(arguments.beside.as_deref()).collect();
     let read = |path: &&Path| drawing::flight(&recording_in(path), &reading, arguments.delta, console);

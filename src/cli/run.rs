@@ -6,6 +6,7 @@ use std::time::Duration;
 use clap::{Args, Parser};
 
 use super::console::{self, Console, Terminal};
+use super::json::JsonArgument;
 use super::{Exit, completions};
 use tautline_report::figures::Format;
 use tautline_report::request::{
@@ -61,7 +62,7 @@ pub(super) struct RunArguments {
     #[arg(long, value_name = "PLANT", value_parser = ["rapier", "ideal"])]
     plant: Option<String>,
     /// Folder for the recording and the report [default: out/NAME with the name of the scenario].
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Overwrite a folder with a finished run.
     #[arg(long)]
@@ -91,11 +92,13 @@ pub(super) struct RunArguments {
     /// Repeat the flight at half the step, and report the differences.
     #[arg(long)]
     verify: bool,
-    /// Print the report as JSON on standard output; all text goes to standard error.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    json: JsonArgument,
+    /// Print all findings: formation, energy, commands, velocities, radio, shield, times.
+    #[arg(long, short)]
+    verbose: bool,
     /// Print no summary and no progress.
-    #[arg(long)]
+    #[arg(long, short)]
     quiet: bool,
     /// Number of threads, at most 2 in use [default: one for each core]; the recording is the same for any number.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..))]
@@ -111,7 +114,8 @@ impl RunArguments {
 }
 
 pub(super) fn run(arguments: &RunArguments) -> Result<Exit, Failure> {
-    let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
+    let console = Console { data_on_stdout: arguments.json.is_piped(), quiet: arguments.quiet };
+    arguments.json.check(&arguments.what.scenario, arguments.force)?;
     let terminal = Terminal::new(console)?;
     if arguments.watch {
         return watch(arguments, &terminal);
@@ -148,26 +152,16 @@ fn fly(arguments: &RunArguments, force: bool, opens: bool, terminal: &Terminal) 
         free_steps: arguments.free_steps,
         verify: arguments.verify,
         threads: arguments.threads.map(usize::from),
+        verbose: arguments.verbose,
         ..RunRequest::new(&scenario, repeat(&words))
     };
     let pictures = pictures(&arguments.adapter, !arguments.no_snapshots);
     let left = run_into(&request, &*pictures, terminal)?;
-    terminal.say(&next_steps(&left.page));
     if opens && let Err(error) = open::that_detached(&left.page) {
         terminal.warn(&format!("note: cannot open the report in a browser: {error}"));
     }
-    if arguments.json {
-        console::json(&left.report)?;
-    }
+    arguments.json.write(&left.report, terminal.console())?;
     Ok(Exit::good_if(left.report.verdict.pass))
-}
-
-/// Returns where to look at a run with this page.
-fn next_steps(page: &Path) -> String {
-    let folder = page.parent().unwrap_or(Path::new(".")).to_string_lossy();
-    let view = command_line(["view", &folder].into_iter());
-    let window = if cfg!(feature = "viewer") { format!(", or `{view}`") } else { String::new() };
-    format!("to look at it: open {}{window}", page.display())
 }
 
 /// Flies the scenario, and again whenever its file changes, until an interruption. A scenario that cannot be flown is
@@ -230,27 +224,25 @@ pub(super) struct CheckArguments {
     #[arg(long)]
     identify: bool,
     /// With --identify: write a model file with the measured table; comments of an existing file stay.
-    #[arg(long, value_name = "FILE", requires = "identify")]
+    #[arg(long, short, value_name = "FILE", requires = "identify")]
     out: Option<PathBuf>,
-    /// Print the findings as JSON on standard output; all text goes to standard error.
-    #[arg(long)]
-    json: bool,
+    #[command(flatten)]
+    json: JsonArgument,
     /// Print no summary.
-    #[arg(long)]
+    #[arg(long, short)]
     quiet: bool,
 }
 
 pub(super) fn check(arguments: &CheckArguments) -> Result<Exit, Failure> {
-    let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
+    let console = Console { data_on_stdout: arguments.json.is_piped(), quiet: arguments.quiet };
+    arguments.json.check(&arguments.what.scenario, true)?;
     if arguments.identify {
         let found = identify(&arguments.what.request()?, arguments.out.as_deref())?;
         console.say(&format!("{}\n{}", found.measured, found.table.trim_end()));
         if let Some(path) = &arguments.out {
             console.say(&format!("wrote {}", path.display()));
         }
-        if arguments.json {
-            console::json(&found.measured)?;
-        }
+        arguments.json.write(&found.measured, console)?;
         return Ok(Exit::Good);
     }
     let scenario = arguments.what.request()?.read()?;
@@ -259,8 +251,6 @@ pub(super) fn check(arguments: &CheckArguments) -> Result<Exit, Failure> {
     for warning in &found.warnings {
         console.say(&warning.to_string());
     }
-    if arguments.json {
-        console::json(&found)?;
-    }
+    arguments.json.write(&found, console)?;
     Ok(Exit::good_if(!found.refuses()))
 }

@@ -1,11 +1,12 @@
 //! `tautline compare`, `margin`, `sweep` and `attack`: studies of many flights of one scenario.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use clap::builder::{PossibleValue, TypedValueParser};
 
 use super::console::{Console, Terminal};
+use super::json::JsonArgument;
 use super::run::{ScenarioArguments, pictures};
 use super::{Exit, completions};
 use tautline_report::request::{Failure, one_of};
@@ -13,8 +14,8 @@ use tautline_studies::attack::{Bound, FLIGHTS, SEEDS_OF_A_CANDIDATE};
 use tautline_studies::margin::Range;
 use tautline_studies::sweep::SweptKey;
 use tautline_studies::{
-    Criterion, Experiment, MOST_RUNS, SEEDS, Study as _, StudyFiles, StudyRequest, answer, attack, compare, margin,
-    sweep,
+    Criterion, Experiment, MOST_RUNS, SEEDS, Study as _, StudyFiles, StudyRequest, answer, attack, compare, key_range,
+    margin, sweep,
 };
 
 /// Scenario, files and threads of a study.
@@ -22,10 +23,10 @@ use tautline_studies::{
 pub(super) struct StudyArguments {
     #[command(flatten)]
     what: ScenarioArguments,
-    /// Write all numbers as JSON; - is standard output, also for the next three options.
-    #[arg(long, value_name = "FILE")]
-    json: Option<PathBuf>,
-    /// Write a table as CSV, with a row for each law, value, point, or new worst candidate.
+    #[command(flatten)]
+    json: JsonArgument,
+    /// Write a table as CSV, with a row for each law, value, point, or new worst candidate; - is standard output, also
+    /// for the next two options.
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
     /// Write the tables as LaTeX.
@@ -41,7 +42,7 @@ pub(super) struct StudyArguments {
     #[arg(long, value_name = "NAME", default_value = "best")]
     adapter: String,
     /// Print no table and no progress.
-    #[arg(long)]
+    #[arg(long, short)]
     quiet: bool,
     /// Number of threads [default: one for each core]; the result is the same for any number.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
@@ -52,7 +53,7 @@ impl StudyArguments {
     /// Flies a study and writes its files.
     fn answer<E: Experiment>(&self, options: E) -> Result<Exit, Failure> {
         let files = StudyFiles {
-            json: self.json.clone(),
+            json: self.json.place().map(Path::to_owned),
             csv: self.csv.clone(),
             latex: self.latex.clone(),
             html: self.html.clone(),
@@ -90,7 +91,7 @@ pub(super) struct CompareArguments {
     runs: RunArguments,
     /// Laws to compare: kinds, or names of tables [laws.NAME] [default: all such tables, or all kinds if there is no
     /// table].
-    #[arg(long, value_name = "NAMES", value_delimiter = ',', add = completions::choice("law.kind"))]
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',', add = completions::choice("law.kind"))]
     laws: Option<Vec<String>>,
     /// Fly each law twice: without the shield (NAME+bare) and under it (NAME+shield), with the keys of [shield].
     #[arg(long)]
@@ -128,15 +129,9 @@ pub(super) struct MarginArguments {
     study: StudyArguments,
     #[command(flatten)]
     runs: RunArguments,
-    /// Key to vary, such as `time.control_hz`.
-    #[arg(long, value_name = "KEY.PATH", add = completions::key(""))]
-    key: String,
-    /// First value of the key.
-    #[arg(long, value_name = "A", allow_negative_numbers = true)]
-    from: f64,
-    /// Last value of the key.
-    #[arg(long, value_name = "B", allow_negative_numbers = true)]
-    to: f64,
+    /// Key with the first and the last of its values, such as `time.duration_s=20..40`.
+    #[arg(long, value_name = "KEY=FROM..TO", value_parser = key_range, add = completions::key("="))]
+    key: (String, [f64; 2]),
     /// Verdict that every run must show.
     #[arg(long, value_name = "WHAT", default_value = "pass", value_parser = verdict())]
     verdict: Criterion,
@@ -163,9 +158,10 @@ fn verdict() -> impl TypedValueParser<Value = Criterion> {
 impl MarginArguments {
     pub(super) fn run(&self) -> Result<Exit, Failure> {
         let (scan, halvings, logarithmic) = (self.scan.into(), self.halvings, self.log);
+        let (key, [from, to]) = self.key.clone();
         self.study.answer(margin::Options {
-            key: self.key.clone(),
-            range: Range { from: self.from, to: self.to, scan, halvings, logarithmic },
+            key,
+            range: Range { from, to, scan, halvings, logarithmic },
             question: self.verdict,
             runs: self.runs.runs.unwrap_or(1),
             seed: self.runs.seed,
@@ -184,11 +180,11 @@ pub(super) struct SweepArguments {
     study: StudyArguments,
     #[command(flatten)]
     runs: RunArguments,
-    /// Key with evenly spaced or listed values: `sensing.latency_s=0:0.1:11` or `law.alpha=0.5,1,2`; give it twice for
+    /// Key with evenly spaced or listed values: `sensing.latency_s=0..0.1:11` or `law.alpha=0.5,1,2`; give it twice for
     /// a grid.
     #[arg(
         long = "key",
-        value_name = "KEY=FROM:TO:COUNT|KEY=V1,V2,...",
+        value_name = "KEY=FROM..TO:COUNT|KEY=V1,V2,...",
         required = true,
         add = completions::key("=")
     )]
@@ -218,11 +214,11 @@ pub(super) struct AttackArguments {
     #[command(flatten)]
     study: StudyArguments,
     /// Numeric key with its bounds, such as `sensing.latency_s=0..0.1`; repeatable.
-    #[arg(long, value_name = "KEY=LOW..HIGH", add = completions::key("="))]
+    #[arg(long, value_name = "KEY=FROM..TO", add = completions::key("="))]
     vary: Vec<String>,
     /// Move each start by up to R metres along each axis.
     #[arg(long, value_name = "R", allow_negative_numbers = true)]
-    start: Option<f64>,
+    move_start: Option<f64>,
     /// Change each initial velocity by up to V m/s along each axis.
     #[arg(long, value_name = "V", allow_negative_numbers = true)]
     velocity: Option<f64>,
@@ -244,7 +240,7 @@ pub(super) struct AttackArguments {
     #[arg(long, value_name = "S", default_value_t = 0)]
     seed: u64,
     /// Repeat the worst flight, and write its recording, report and pictures into this folder, as `tautline run` does.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, short, value_name = "DIR")]
     out: Option<PathBuf>,
 }
 
@@ -258,7 +254,7 @@ impl AttackArguments {
     pub(super) fn run(&self) -> Result<Exit, Failure> {
         self.study.answer(attack::Options {
             vary: self.vary.iter().map(|text| Bound::parse(text)).collect::<Result<_, _>>()?,
-            start_m: self.start,
+            start_m: self.move_start,
             velocity_m_s: self.velocity,
             apart_m: self.apart,
             flights: self.flights,

@@ -7,10 +7,9 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use clap::Args;
 
 use super::console::{self, Console};
-use super::reading::{self, ReadArguments};
+use super::reading::ReadArguments;
 use super::{Exit, completions, drawing};
 use tautline_core::record::{Event, RecordError, Sample, Sink};
-use tautline_recordings::read::Format;
 use tautline_render::{LiveUpdate, Theme, Timeline, WINDOW_KEYS, show};
 use tautline_report::request::{Failure, ScenarioRequest};
 use tautline_sim::scenario::Scenario;
@@ -31,7 +30,7 @@ pub(super) struct ViewArguments {
     #[arg(long = "set", value_name = "KEY.PATH=VALUE", add = completions::setting())]
     overrides: Vec<String>,
     /// Safety distance for a recording without one [m].
-    #[arg(long, value_name = "M", allow_negative_numbers = true)]
+    #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
     delta: Option<f64>,
     /// Theme.
     #[arg(long, default_value = "dark", value_parser = drawing::theme())]
@@ -42,9 +41,6 @@ pub(super) struct ViewArguments {
     // Last, because its help heading also applies to all later arguments.
     #[command(flatten)]
     reading: ReadArguments,
-    /// Format of the recording [default: detected from its content].
-    #[arg(long, value_name = "FORMAT", value_parser = reading::format())]
-    input_format: Option<Format>,
 }
 
 /// Returns the keys of the window for the help.
@@ -55,7 +51,7 @@ fn keys() -> String {
 
 pub(super) fn view(arguments: &ViewArguments) -> Result<Exit, Failure> {
     let path = arguments.reading.only("shown")?;
-    let reading = arguments.reading.options(arguments.input_format);
+    let reading = arguments.reading.options();
     let console = Console { data_on_stdout: true, quiet: false };
     let is_recording = path.exists() && !drawing::is_scenario(path);
     let (timeline, live) = if is_recording {

@@ -1,6 +1,7 @@
 //! `tautline watch`: a live monitor of separation.
 
-use std::io;
+use std::fs::File;
+use std::io::{self, Write as _};
 use std::net::SocketAddr;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -9,11 +10,12 @@ use clap::Args;
 use clap::builder::PossibleValue;
 
 use super::console::{self, Console, Exit, Terminal};
+use super::json::JsonArgument;
 use super::reading::origin;
 use tautline_core::track::EarthOrigin;
-use tautline_recordings::read::{self, EarthFrame, ReadError, ReadOptions};
+use tautline_recordings::read::{self, EarthFrame, ReadError};
 use tautline_report::report::page::live_page;
-use tautline_report::request::{ExportRequest, Failure, Monitor as _, Silent, export_file, one_of};
+use tautline_report::request::{Failure, Monitor as _, one_of};
 use tautline_watch::foxglove_server::FoxgloveServer;
 use tautline_watch::page::Page;
 use tautline_watch::source::{self, Feed, MavlinkFrame, NamingOptions, OwnedPose};
@@ -68,7 +70,7 @@ pub(super) struct WatchArguments {
     #[arg(long, value_name = "COUNT", conflicts_with = "ids")]
     expect: Option<usize>,
     /// Names of vehicles that must be heard before anything is clear, separated by commas.
-    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     ids: Vec<String>,
     /// Largest number of vehicles; a message of a further vehicle is an error.
     #[arg(long, value_name = "COUNT", default_value_t = 2000)]
@@ -98,11 +100,11 @@ pub(super) struct WatchArguments {
     /// Largest deviation from the plan [m].
     #[arg(long, value_name = "METRES", default_value_t = 0.5, allow_negative_numbers = true, requires = "plan")]
     tube: f64,
-    /// Write the used positions to a .csv or .mcap file for `tautline audit`.
+    /// Write the used positions to a .csv or .mcap file for `tautline audit`, as FILE.partial until the end.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Overwrite an existing recording.
-    #[arg(long, requires = "record")]
+    /// Overwrite an existing recording, and the file of --json.
+    #[arg(long)]
     force: bool,
     /// Serve a live page on this address [default: 127.0.0.1:8737, for this machine only].
     #[arg(
@@ -124,9 +126,9 @@ pub(super) struct WatchArguments {
         value_parser = own_address::<8765>
     )]
     foxglove: Option<SocketAddr>,
-    /// Write each notice to standard output as a line of JSON.
-    #[arg(long)]
-    json: bool,
+    // Each notice is a line.
+    #[command(flatten)]
+    json: JsonArgument,
     /// Print no text.
     #[arg(long, short)]
     quiet: bool,
@@ -152,9 +154,14 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<Exit, Failure> {
     let monitor = Monitor::new(settings, plan).map_err(|error| {
         Failure::input("watch/setting", error.to_string(), "give a number in this range; tautline watch --help")
     })?;
-    let console = Console { data_on_stdout: arguments.json, quiet: arguments.quiet };
-    let mut outputs =
-        Outputs { console, json: arguments.json, recorder: arguments.recorder()?, page: None, foxglove: None };
+    let console = Console { data_on_stdout: arguments.json.is_piped(), quiet: arguments.quiet };
+    let mut outputs = Outputs {
+        console,
+        lines: Lines::open(&arguments.json, arguments.force)?,
+        recorder: arguments.recorder()?,
+        page: None,
+        foxglove: None,
+    };
     let terminal = Terminal::new(console)?;
     if let Some(address) = arguments.page {
         let page = Page::serve(address, live_page()).map_err(|error| {
@@ -183,7 +190,10 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<Exit, Failure> {
         page.finish();
     }
     // The recording is complete even if another output failed.
-    let recorded = outputs.recorder.map_or(Ok(true), |recorder| recorder.finish(console));
+    let recorded = match (outputs.recorder, &arguments.record) {
+        (Some(record), Some(path)) => finish(record, path, console),
+        _ => Ok(true),
+    };
     let passes = watched?.passes();
     Ok(Exit::good_if(recorded? && passes))
 }
@@ -308,26 +318,19 @@ impl WatchArguments {
         Ok(plan)
     }
 
-    fn recorder(&self) -> Result<Option<Recorder>, Failure> {
+    fn recorder(&self) -> Result<Option<Record>, Failure> {
         let Some(path) = &self.record else { return Ok(None) };
-        let extension = path.extension().and_then(|of| of.to_str()).unwrap_or_default();
-        let is_mcap = match extension {
-            "csv" => false,
-            "mcap" => true,
-            _ => {
-                let message = format!("--record: not a name of a recording ({:?})", path.display().to_string());
-                return Err(Failure::input("watch/record", message, "give a name that ends in .csv or .mcap"));
-            }
-        };
-        let table = if is_mcap { path.with_extension("mcap.csv") } else { path.clone() };
-        // The watch writes all three.
-        let partial = Record::partial_of(&table);
-        if let Some(there) = [path, &table, &partial].into_iter().find(|of| of.exists() && !self.force) {
+        if !Record::is_written(path) {
+            let message = format!("--record: not a name of a recording ({:?})", path.display().to_string());
+            return Err(Failure::input("watch/record", message, "give a name that ends in .csv or .mcap"));
+        }
+        // The watch writes both.
+        let partial = Record::partial_of(path);
+        if let Some(there) = [path, &partial].into_iter().find(|of| of.exists() && !self.force) {
             let message = format!("--record: the file exists ({})", there.display());
             return Err(Failure::input("watch/record", message, "give another name, or --force to overwrite it"));
         }
-        let record = Record::create(&table).map_err(|error| cannot_write(&table, &error))?;
-        Ok(Some(Recorder { record, table, path: path.clone(), is_mcap }))
+        Ok(Some(Record::create(path).map_err(|error| cannot_write(path, &error))?))
     }
 
     fn start(&self, source: Address, feed: Feed, console: Console) -> Result<(), Failure> {
@@ -363,59 +366,56 @@ fn cannot_write(path: &Path, error: &io::Error) -> Failure {
     Failure::machine("files/cannot-write", message).with_help("write to another folder")
 }
 
-/// Recording of the watch: a table, which becomes an MCAP file at the end.
-struct Recorder {
-    record: Record,
-    table: PathBuf,
-    path: PathBuf,
-    is_mcap: bool,
+/// Completes a recording. Returns whether it has positions; without any, no file stays.
+fn finish(record: Record, path: &Path, console: Console) -> Result<bool, Failure> {
+    let rows = record.rows();
+    if rows == 0 {
+        record.discard().map_err(|error| cannot_write(path, &error))?;
+        console.warn(&format!("--record: no position was heard, so {} is not written", path.display()));
+        return Ok(false);
+    }
+    record.finish().map_err(|error| cannot_write(path, &error))?;
+    console.warn(&format!("recorded {rows} positions in {}", path.display()));
+    Ok(true)
 }
 
-impl Recorder {
-    /// Completes the recording. Returns whether it has positions; without any, no file stays.
-    fn finish(self, console: Console) -> Result<bool, Failure> {
-        let rows = self.record.rows();
-        if rows == 0 {
-            self.record.discard().map_err(|error| cannot_write(&self.table, &error))?;
-            console.warn(&format!("--record: no position was heard, so {} is not written", self.path.display()));
-            return Ok(false);
-        }
-        self.record.finish().map_err(|error| cannot_write(&self.table, &error))?;
-        if self.is_mcap {
-            let request = ExportRequest {
-                paths: vec![self.table.clone()],
-                options: ReadOptions { sort: true, ..ReadOptions::default() },
-                output: self.path.clone(),
-                format: None,
-                sample_hz: None,
-                force: true,
-            };
-            export_file(&request, &Silent::default()).map_err(|failure| {
-                let help = format!("the positions are in {}", self.table.display());
-                failure.under("--record").with_help(help)
-            })?;
-            let _ = std::fs::remove_file(&self.table);
-        }
-        console.warn(&format!("recorded {rows} positions in {}", self.path.display()));
-        Ok(true)
+/// Place of the notices as lines of JSON.
+enum Lines {
+    None,
+    Piped,
+    File(File),
+}
+
+impl Lines {
+    fn open(json: &JsonArgument, force: bool) -> Result<Self, Failure> {
+        json.check("", force)?;
+        Ok(match json.file() {
+            Some((_, path)) => Self::File(File::create(path).map_err(|error| cannot_write(path, &error))?),
+            None if json.is_piped() => Self::Piped,
+            None => Self::None,
+        })
     }
 }
 
 /// All outputs of a watch.
 struct Outputs {
     console: Console,
-    json: bool,
-    recorder: Option<Recorder>,
+    lines: Lines,
+    recorder: Option<Record>,
     page: Option<Page>,
     foxglove: Option<FoxgloveServer>,
 }
 
 impl Output for Outputs {
     fn notice(&mut self, notice: &Notice) -> io::Result<()> {
-        if self.json {
-            console::data(&format!("{}\n", notice.json)).map_err(|failure| io::Error::other(failure.to_string()))?;
-        } else {
-            self.console.say(&notice.text);
+        let line = format!("{}\n", notice.json);
+        match &mut self.lines {
+            Lines::None => self.console.say(&notice.text),
+            Lines::Piped => console::data(&line).map_err(|failure| io::Error::other(failure.to_string()))?,
+            Lines::File(file) => {
+                file.write_all(line.as_bytes())?;
+                self.console.say(&notice.text);
+            }
         }
         if let Some(page) = &mut self.page {
             page.notice(notice);
@@ -427,7 +427,7 @@ impl Output for Outputs {
     }
 
     fn pose(&mut self, time_s: f64, pose: &OwnedPose) -> io::Result<()> {
-        self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.record.push(time_s, pose))
+        self.recorder.as_mut().map_or(Ok(()), |recorder| recorder.push(time_s, pose))
     }
 
     fn assessed(&mut self, of: &Assessment, monitor: &Monitor) -> io::Result<()> {

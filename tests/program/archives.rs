@@ -39,9 +39,9 @@ fn audit(folder: &Path, arguments: &[&str]) -> Ran {
     ran_by(TAUTLINE, folder, &[&["audit", "--delta", "1.9"], arguments].concat())
 }
 
-/// Returns standard error without the frame of an error and its line breaks.
+/// Returns standard error with single blanks.
 fn words(ran: &Ran) -> String {
-    ran.err.split_whitespace().filter(|word| !word.starts_with(['│', '×', '╰', '├', '─'])).collect::<Vec<_>>().join(" ")
+    ran.err.split_whitespace().collect::<Vec<_>>().join(" ")
 }
 
 /// Writes the same files into a folder and into an archive.

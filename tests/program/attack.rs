@@ -17,7 +17,7 @@ fn ran(folder: &Path, arguments: &[&str]) -> Ran {
 #[test]
 fn the_printed_command_and_the_recording_repeat_the_worst_flight() {
     let folder = tempfile::tempdir().expect("a folder");
-    let search = ["attack", "pentagon", "--start", "0.4", "--flights", "24", "--out", "worst", "--json", "-"];
+    let search = ["attack", "pentagon", "--move-start", "0.4", "--flights", "24", "--out", "worst", "--json"];
     let Ran { exit, out, err } = ran(folder.path(), &[&search[..], &SHORT].concat());
     assert_eq!(exit, Some(1), "{err}");
     assert!(err.contains("VIOLATION found: ") && err.contains("a search, not a proof"), "{err}");
@@ -55,7 +55,7 @@ fn a_search_without_a_violation_exits_with_0_and_is_no_proof() {
     let search = ["attack", "pentagon", "--vary", "law.alpha=0.5..2", "--flights", "9", "--set", "time.duration_s=3"];
     let files = |name: &str, threads: &str| {
         let [csv, html, json] = ["csv", "html", "json"].map(|kind| format!("{name}.{kind}"));
-        let more = ["--threads", threads, "--csv", &csv, "--html", &html, "--json", &json];
+        let more = ["--threads", threads, "--csv", &csv, "--html", &html, &format!("--json={json}")];
         let Ran { exit, out, err } = ran(folder.path(), &[&search[..], &more].concat());
         assert_eq!(exit, Some(0), "{err}");
         assert!(out.starts_with("no violation found in 9 flights: smallest separation "), "{out}");
@@ -79,19 +79,19 @@ fn wrong_input_is_refused_with_a_remedy_before_a_flight() {
         (&["--vary", "law.kind=1..2"], "scenario/wrong-type"),
         (&["--vary", "law.alpha=1..2", "--vary", "law.alpha=2..3"], "attack/key-twice"),
         (&["--vary", "noise.seed=1..2"], "attack/seed-varied"),
-        (&["--start", "0"], "attack/out-of-range"),
-        (&["--start", "1", "--flights", "2", "--seeds", "3"], "attack/too-few-flights"),
-        (&["--start", "1", "--seeds", "2"], "attack/nothing-random"),
-        (&["--start", "1", "--json", "there.json"], "files/exists"),
-        (&["--start", "1", "--json", "-", "--csv", "-"], "files/one-standard-output"),
-        (&["--start", "1", "--set", "law.delta_m=9"], "scenario/within-delta"),
+        (&["--move-start", "0"], "attack/out-of-range"),
+        (&["--move-start", "1", "--flights", "2", "--seeds", "3"], "attack/too-few-flights"),
+        (&["--move-start", "1", "--seeds", "2"], "attack/nothing-random"),
+        (&["--move-start", "1", "--json=there.json"], "files/exists"),
+        (&["--move-start", "1", "--json", "--csv", "-"], "files/one-standard-output"),
+        (&["--move-start", "1", "--set", "law.delta_m=9"], "scenario/within-delta"),
     ] {
         let ran = ran(folder.path(), &[&["attack", "pentagon"], arguments].concat());
         assert_eq!((ran.exit, ran.code()), (Some(2), code), "{arguments:?}: {}", ran.err);
         assert!(ran.err.contains("help:"), "{arguments:?}: {}", ran.err);
     }
     // Values that clap refuses have no code.
-    let none = ran(folder.path(), &["attack", "pentagon", "--start", "1", "--flights", "0"]);
+    let none = ran(folder.path(), &["attack", "pentagon", "--move-start", "1", "--flights", "0"]);
     assert_eq!((none.exit, none.code()), (Some(2), ""), "{}", none.err);
 }
 
@@ -101,19 +101,10 @@ fn a_violation_of_the_unchanged_scenario_exits_with_1() {
     let ran = ran_by(
         TAUTLINE,
         folder.path(),
-        &[
-            "attack",
-            "pentagon-laplacian",
-            "--vary",
-            "time.duration_s=1.1..1.9",
-            "--flights",
-            "3",
-            "--quiet",
-            "--json",
-            "-",
-        ],
+        &["attack", "pentagon-laplacian", "--vary", "time.duration_s=1.1..1.9", "--flights", "3", "--quiet", "--json"],
     );
     assert_eq!(ran.exit, Some(1), "{}{}", ran.out, ran.err);
-    let nothing = ["attack", "pentagon", "--set", "time.duration_s=2", "--start", "1e300", "--flights", "2", "--quiet"];
+    let nothing =
+        ["attack", "pentagon", "--set", "time.duration_s=2", "--move-start", "1e300", "--flights", "2", "--quiet"];
     assert_eq!(ran_by(TAUTLINE, folder.path(), &nothing).exit, Some(1), "nothing flown is nothing known");
 }

@@ -58,7 +58,7 @@ fn options_in_seconds_need_a_known_unit_of_time() {
     let every_two = "t,id,x,y,z\n0,a,0,0,0\n0,b,1.5,0,0\n2,a,0,0,0\n2,b,1.5,0,0\n4,a,0,0,0\n4,b,1.5,0,0\n";
     let folder = folder(&[("log.csv", every_two)]);
     let bounded = ["log.csv", "--delta", "1", "--motion", "bounded", "--max-accel", "1"];
-    for asked in [&bounded[3..], &["--from", "0"], &["--to", "3"], &["--max-gap", "5"], &["--offset", "a=1"]] {
+    for asked in [&bounded[3..], &["--from", "0"], &["--until", "3"], &["--max-gap", "5"], &["--offset", "a=1"]] {
         let ran = audit(folder.path(), &[&bounded[..3], asked].concat());
         assert_eq!(ran.exit, Some(2), "{ran:?}");
         assert!(ran.err.contains("log.csv") && ran.err.contains("give --time-unit ms, or --time-unit s"), "{ran:?}");
@@ -227,9 +227,9 @@ fn every_option_of_judging_works() {
         (&["--radius", "alpha=0.4", "--radius", "bravo=0.7"], 1),
         (&["--ellipsoid", "0.4,0.4,2"], 0),
         (&["--ellipsoid", "0.6,0.6,2"], 1),
-        (&["--delta", "2", "--to", "0.4"], 0),
+        (&["--delta", "2", "--until", "0.4"], 0),
         (&["--delta", "2", "--from", "0.6"], 0),
-        (&["--delta", "2", "--from", "0.3", "--to", "0.45"], 1),
+        (&["--delta", "2", "--from", "0.3", "--until", "0.45"], 1),
         (&["--delta", "2", "--above", "0.5"], 1),
         (&["--delta", "2", "--above", "-0.5"], 1),
         (&["--delta", "0.5", "--ids", "alpha,bravo"], 0),
@@ -273,7 +273,7 @@ fn wrong_input_exits_with_2_and_a_remedy() {
         (&["pass.csv", "--delta", "1", "--motion", "bounded"], "audit/no-acceleration-bound"),
         (&["pass.csv", "--delta", "1", "--max-accel", "1"], "audit/unused-acceleration"),
         (&["pass.csv", "--delta", "1", "--motion", "polynomial"], "audit/no-curves"),
-        (&["pass.csv", "--delta", "1", "--from", "2", "--to", "1"], "audit/empty-window"),
+        (&["pass.csv", "--delta", "1", "--from", "2", "--until", "1"], "audit/empty-window"),
         (&["pass.csv", "--delta", "1", "--obstacles", "bad.toml"], "audit/obstacle-file"),
         (&["pass.csv", "--delta", "1", "--obstacles", "none.toml"], "files/cannot-read"),
         (&["pass.csv", "--ellipsoid", "1,2"], ""),

@@ -38,7 +38,7 @@ fn json(text: &str) -> Value {
 
 /// Returns the comparison of laws as JSON, and standard error.
 fn compared(folder: &Path, what: &[&str], more: &[&str]) -> (Value, String) {
-    let Ran { exit, out, err } = ran(folder, &[&["compare"], what, more, &["--json", "-"]].concat());
+    let Ran { exit, out, err } = ran(folder, &[&["compare"], what, more, &["--json"]].concat());
     assert_eq!(exit, Some(0), "{err}");
     (json(&out), err)
 }
@@ -143,7 +143,7 @@ fn files(folder: &Path, variable: &str, more: &[&str]) -> [String; 4] {
     let names = ["c.json", "c.csv", "c.tex", "c.html"];
     let mut command = Command::new(TAUTLINE);
     command.arg("compare").args(CROSSING).args(["--laws=potential,edge-tension,laplacian", "--runs=3", "--quiet"]);
-    command.args(["--json", names[0], "--csv", names[1], "--latex", names[2], "--html", names[3], "--force"]);
+    command.args(["--json=c.json", "--csv", names[1], "--latex", names[2], "--html", names[3], "--force"]);
     command.args(["--adapter", "an adapter that is nowhere"]).args(more);
     command.current_dir(folder).env("XDG_RUNTIME_DIR", folder).env("RAYON_NUM_THREADS", variable);
     let done = command.output().expect("the program");
@@ -342,11 +342,11 @@ fn wrong_input_is_refused_with_a_remedy_before_a_flight() {
         (&["pair.toml", "--runs", "0"], "", ""),
         (&["pair.toml", "--seed", "-1"], "", ""),
         (&["nowhere"], "scenario/not-found", ""),
-        (&["pair.toml", "--csv", "a.txt", "--json", "./a.txt"], "files/overwrites-input", "another file"),
+        (&["pair.toml", "--csv", "a.txt", "--json=./a.txt"], "files/overwrites-input", "another file"),
         (&["pair.toml", "--csv", "pair.toml"], "files/overwrites-input", "another file"),
-        (&["pair.toml", "--json", "new.json", "--csv", "folder.csv"], "files/is-directory", "a file in this directory"),
+        (&["pair.toml", "--json=new.json", "--csv", "folder.csv"], "files/is-directory", "a file in this directory"),
         (&["pair.toml", "--html", "earlier.html"], "files/exists", "--force"),
-        (&["pair.toml", "--csv", "-", "--json", "-"], "files/one-standard-output", "into a file"),
+        (&["pair.toml", "--csv", "-", "--json"], "files/one-standard-output", "into a file"),
     ];
     for (arguments, code, shown) in cases {
         let ran = ran(at, &[&["compare"], *arguments].concat());
@@ -357,7 +357,7 @@ fn wrong_input_is_refused_with_a_remedy_before_a_flight() {
     }
     // Every command checks these tables.
     assert_eq!(ran(at, &["check", "value.toml"]).exit, Some(2));
-    let nowhere = ran(at, &["compare", "pair.toml", "--json", "pair.toml/deep/c.json"]);
+    let nowhere = ran(at, &["compare", "pair.toml", "--json=pair.toml/deep/c.json"]);
     assert_eq!((nowhere.exit, nowhere.out.as_str()), (Some(3), ""), "{}", nowhere.err);
     assert!(nowhere.err.contains("cannot write") && nowhere.err.contains("--json"), "{}", nowhere.err);
     assert_eq!(fs::read_dir(at).expect("a folder").count(), before, "nothing is written");

@@ -1,4 +1,4 @@
-//! `tautline export --to` as a process: what drones hold is judged, and refused files leave nothing behind.
+//! `tautline export --format` as a process: what drones hold is judged, and refused files leave nothing behind.
 
 use std::f64::consts::TAU;
 use std::fmt::Write as _;
@@ -62,7 +62,7 @@ fn every_dialect_is_judged_and_audited_again() {
         ("px4-show", "px4", &[], vec!["a.csv", "b.csv"], "CLEAR if"),
         ("vviz", "show.vviz", &[], vec![], "CLEAR if straight between samples"),
     ] {
-        let arguments = ["export", "flight.csv", "--to", to, "-o", output, "--delta", "1.5"];
+        let arguments = ["export", "flight.csv", "--format", to, "-o", output, "--delta", "1.5"];
         let done = ran(folder.path(), &[&arguments[..], more].concat());
         let text = said(&done);
         assert_eq!(done.exit, Some(0), "{to}: {text}");
@@ -98,7 +98,7 @@ fn violations_are_refused_and_leave_nothing() {
         ("1.5", "0.01", "the flight itself is not clear"),
         ("0.99", "0.3", "the flight is clear, but not the written motion"),
     ] {
-        let arguments = ["export", "corner.csv", "--to", "crazyflie", "-o", "cf"];
+        let arguments = ["export", "corner.csv", "--format", "crazyflie", "-o", "cf"];
         let refused = ran(folder.path(), &[&arguments[..], &["--delta", delta, "--tolerance", tolerance]].concat());
         assert_eq!(refused.exit, Some(1), "{}", said(&refused));
         assert_eq!(refused.code(), "export/violation");
@@ -186,7 +186,7 @@ fn wrong_input_ends_with_2_and_leaves_nothing() {
         ("distant.csv", "crazyflie", &[], "export/tolerance", ["rounds positions", "origin"]),
     ] {
         let output = if to == "skyc" || to == "vviz" { "show" } else { "out" };
-        let arguments = [&["export", input, "--to", to, "-o", output, "--delta", "0.5"], more].concat();
+        let arguments = [&["export", input, "--format", to, "-o", output, "--delta", "0.5"], more].concat();
         let refused = ran(folder.path(), &arguments);
         assert_eq!((refused.exit, refused.code()), (Some(2), code), "{arguments:?}: {}", said(&refused));
         for word in words {
@@ -195,13 +195,13 @@ fn wrong_input_ends_with_2_and_leaves_nothing() {
         assert_eq!(names(folder.path()), before, "{arguments:?}");
     }
     // No parent is made.
-    let deep = ran(folder.path(), &["export", "flight.csv", "--to", "skyb", "-o", "new/x/y", "--delta", "1"]);
+    let deep = ran(folder.path(), &["export", "flight.csv", "--format", "skyb", "-o", "new/x/y", "--delta", "1"]);
     assert_eq!((deep.exit, deep.code()), (Some(2), "files/no-folder"), "{}", said(&deep));
     assert_eq!(names(folder.path()), before);
-    let unknown = ran(folder.path(), &["export", "flight.csv", "--to", "foo", "-o", "out"]);
+    let unknown = ran(folder.path(), &["export", "flight.csv", "--format", "foo", "-o", "out"]);
     assert_eq!(unknown.exit, Some(2));
     assert!(said(&unknown).contains("crazyflie, skyb, skyc, px4-show, vviz"), "{}", said(&unknown));
-    let kept = ["export", "flight.csv", "--to", "skyb", "-o", "full", "--delta", "1", "--force"];
+    let kept = ["export", "flight.csv", "--format", "skyb", "-o", "full", "--delta", "1", "--force"];
     assert_eq!(ran(folder.path(), &kept).code(), "files/exists");
     assert_eq!(fs::read_to_string(folder.path().join("full/notes.md")).expect("read"), "mine");
 }
@@ -210,7 +210,7 @@ fn wrong_input_ends_with_2_and_leaves_nothing() {
 fn a_part_of_a_flight_counts_from_its_start() {
     let folder = folder();
     let part = ["--from", "1.5", "--until", "4.25", "--delta", "1"];
-    let arguments = [&["export", "flight.csv", "--to", "skyc", "-o", "part.skyc"][..], &part].concat();
+    let arguments = [&["export", "flight.csv", "--format", "skyc", "-o", "part.skyc"][..], &part].concat();
     let done = ran(folder.path(), &arguments);
     assert_eq!(done.exit, Some(0), "{}", said(&done));
     assert!(said(&done).contains("1.500 s to 4.250 s; 1.5 s of the flight are 0 s of the files"), "{}", said(&done));
@@ -222,7 +222,7 @@ fn a_part_of_a_flight_counts_from_its_start() {
     assert_eq!(ran(folder.path(), &arguments).code(), "files/exists");
     assert_eq!(ran(folder.path(), &[&arguments[..], &["--force", "--quiet"]].concat()).exit, Some(0));
     let into = |name: &str, to: &str, more: &[&str]| {
-        ran(folder.path(), &[&["export", "flight.csv", "--to", to, "-o", name, "--delta", "1"], more].concat())
+        ran(folder.path(), &[&["export", "flight.csv", "--format", to, "-o", name, "--delta", "1"], more].concat())
     };
     assert_eq!(into("out", "crazyflie", &[]).exit, Some(0));
     assert_eq!(into("out", "skyb", &[]).code(), "files/exists");
@@ -235,14 +235,14 @@ fn one_vehicle_is_written_and_not_judged() {
     let folder = folder();
     let one: String = circles().lines().filter(|line| !line.contains(",b,")).flat_map(|line| [line, "\n"]).collect();
     fs::write(folder.path().join("one.csv"), one).expect("written");
-    let done = ran(folder.path(), &["export", "one.csv", "--to", "crazyflie", "-o", "one"]);
+    let done = ran(folder.path(), &["export", "one.csv", "--format", "crazyflie", "-o", "one"]);
     assert_eq!(done.exit, Some(0), "{}", said(&done));
     assert!(
         said(&done).contains("not judged: there is one vehicle") && !said(&done).contains("CLEAR"),
         "{}",
         said(&done)
     );
-    let two = ran(folder.path(), &["export", "flight.csv", "--to", "crazyflie", "-o", "two"]);
+    let two = ran(folder.path(), &["export", "flight.csv", "--format", "crazyflie", "-o", "two"]);
     assert_eq!((two.exit, two.code()), (Some(2), "audit/no-limit"), "{}", said(&two));
     assert!(said(&two).contains("give --delta or --ellipsoid") && !said(&two).contains("--fence"), "{}", said(&two));
 }
@@ -262,7 +262,7 @@ fn obstacles_move_with_the_exported_part() {
     };
     let exported = |crossing_s: f64, output: &str| {
         write("ball.toml", &ball(crossing_s));
-        let arguments = ["export", "line.csv", "--to", "skyc", "-o", output, "--obstacles", "ball.toml"];
+        let arguments = ["export", "line.csv", "--format", "skyc", "-o", output, "--obstacles", "ball.toml"];
         ran(folder.path(), &[&arguments[..], &["--delta", "0.5", "--from", "4.5"]].concat())
     };
     // It crosses at 2.5 s, which is 7 s of the flight in times of the files.
@@ -285,14 +285,14 @@ fn force_keeps_the_input_and_files_of_others() {
     fs::create_dir(&data).expect("a folder");
     fs::write(data.join("ok.csv"), circles()).expect("written");
     let export = |input: &str, output: &str| {
-        ran(folder.path(), &["export", input, "--to", "skyb", "-o", output, "--force", "--delta", "1"])
+        ran(folder.path(), &["export", input, "--format", "skyb", "-o", output, "--force", "--delta", "1"])
     };
     let refused = export("data/ok.csv", "data");
     assert_eq!(refused.exit, Some(2), "{}", said(&refused));
     assert_eq!(names(&data), ["ok.csv"]);
     // An input between files of an export.
     fs::write(folder.path().join("flight.csv"), circles()).expect("written");
-    let cf = ["export", "flight.csv", "--to", "crazyflie", "-o", "cf", "--delta", "1"];
+    let cf = ["export", "flight.csv", "--format", "crazyflie", "-o", "cf", "--delta", "1"];
     assert_eq!(ran(folder.path(), &cf).exit, Some(0));
     let inside = export("cf/a.csv", "cf");
     assert_eq!((inside.exit, inside.code()), (Some(2), "files/overwrites-input"), "{}", said(&inside));

@@ -29,12 +29,27 @@ fn a_new_scenario_flies_clear_and_reaches_its_formation() {
     let folder = folder();
     let new = ran(folder.path(), &["new", "ring"]);
     assert_eq!((new.exit, new.err.as_str()), (GOOD, ""));
-    assert_eq!(new.out, "wrote ring.toml\nnext: tautline run ring.toml --open\n");
+    assert!(new.out.starts_with("wrote ring.toml: six vehicles fly to a ring; "), "{}", new.out);
+    assert!(new.out.ends_with("next: tautline run ring.toml --open\n"), "{}", new.out);
     let run = ran(folder.path(), &["run", "ring.toml", "--no-snapshots"]);
     assert_eq!((run.exit, run.err.as_str()), (GOOD, ""), "{}", run.out);
     assert!(run.out.starts_with("CLEAR: "), "{}", run.out);
-    assert!(run.out.contains("open out/ring/report.html, or `tautline view out/ring`"), "{}", run.out);
+    assert!(run.out.contains("wrote out/ring/report.html with a replay"), "{}", run.out);
     assert!(folder.path().join("out/ring/report.html").is_file());
+}
+
+#[test]
+fn a_new_scenario_begins_with_a_built_in_one_of_its_name_or_of_the_option() {
+    let folder = folder();
+    let new = |arguments: &[&str]| ran(folder.path(), &[&["new"], arguments].concat());
+    let read = |file: &str| fs::read_to_string(folder.path().join(file)).expect("a scenario");
+    assert_eq!(new(&["swap"]).out.lines().next(), Some("wrote swap.toml: the built-in scenario swap"));
+    assert_eq!(read("swap.toml"), ran(folder.path(), &["list", "--show", "swap"]).out);
+    assert_eq!(new(&["mine", "--like", "swap"]).exit, GOOD);
+    assert_eq!(read("mine.toml"), read("swap.toml").replace("name = \"swap\"", "name = \"mine\""));
+    let unknown = new(&["other", "--like", "nothing"]);
+    assert_eq!((unknown.exit, unknown.code()), (WRONG_INPUT, "scenario/not-found"));
+    assert!(!folder.path().join("other.toml").exists());
 }
 
 #[test]
@@ -99,7 +114,7 @@ fn completion_knows_scenarios_files_and_keys() {
     fs::write(folder.path().join("circus.toml"), "").expect("a file");
     assert_eq!(completed(folder.path(), &["tautline", "run", "circ"]), ["circle", "circus.toml"]);
     assert_eq!(completed(folder.path(), &["tautline", "run", "--set", "law.delta"]), ["law.delta_m="]);
-    assert_eq!(completed(folder.path(), &["tautline", "margin", "--key", "time.dt"]), ["time.dt_s"]);
+    assert_eq!(completed(folder.path(), &["tautline", "margin", "--key", "time.dt"]), ["time.dt_s="]);
     assert_eq!(completed(folder.path(), &["tautline", "run", "--set", "nowhere"]), [] as [&str; 0]);
     for (words, candidates) in [
         (&["render", "--camera", "fr"][..], &["front"][..]),

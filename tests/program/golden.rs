@@ -59,7 +59,7 @@ const QUESTIONS: &[&str] = &[
     "--delta 1 --fence fence.toml --obstacles obstacles.toml",
     "--ellipsoid 0.5,0.5,1",
     "--cylinder 1,2",
-    "--delta 1 --from 2 --to 6",
+    "--delta 1 --from 2 --until 6",
     "--delta 1 --above 0.5",
     "--delta 1 --allow-undecided --max-gap 1",
 ];
@@ -107,15 +107,15 @@ const AUDITS: &[&str] = &[
     "out/obstacles --independent",
     "out/crazyflies",
     "out/hexagon",
-    "out/gusts --to 2",
+    "out/gusts --until 2",
 ];
 
 /// Studies.
 const STUDIES: &[&str] = &[
-    "compare swap --runs 1 --set time.duration_s=8 --json -",
-    "sweep pentagon --key law.alpha=0.5,1 --runs 1 --set time.duration_s=8 --json -",
-    "attack pentagon-laplacian --start 0.1 --flights 4 --set time.duration_s=6 --json -",
-    "margin swap --key law.delta_m --from 0.5 --to 1.5 --scan 2 --halvings 1 --runs 1 --set time.duration_s=8 --json -",
+    "compare swap --runs 1 --set time.duration_s=8 --json",
+    "sweep pentagon --key law.alpha=0.5,1 --runs 1 --set time.duration_s=8 --json",
+    "attack pentagon-laplacian --move-start 0.1 --flights 4 --set time.duration_s=6 --json",
+    "margin swap --key law.delta_m=0.5..1.5 --scan 2 --halvings 1 --runs 1 --set time.duration_s=8 --json",
 ];
 
 /// `SplitMix64` (Steele, Lea, Flood 2014): the same recordings on every machine.

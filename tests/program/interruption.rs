@@ -140,7 +140,7 @@ fn assert_the_audit_agrees(folder: &Path, last_s: f64) {
     assert!(fs::read_to_string(folder.join("found.md")).expect("a summary").contains("UNDECIDED"));
     assert_eq!(audit(&["--allow-undecided"]).exit, Some(0));
     // A window that was flown completely is judged normally.
-    let part = audit(&["--to", "1", "--json"]);
+    let part = audit(&["--until", "1", "--json"]);
     let report: Value = serde_json::from_str(&part.out).expect("JSON");
     let ended_early = at(&report, "/ended_early");
     assert_eq!((part.exit, &report["status"], ended_early), (Some(0), &Value::from("clear"), &Value::Null));
@@ -218,7 +218,7 @@ fn an_interrupted_film_leaves_no_file_and_names_the_kept_pictures() {
         names.sort();
         names
     };
-    let film = ["render", "pentagon", "--at", "start", "--film", "film.gif", "--fps", "50", "--adapter", "none"];
+    let film = ["render", "pentagon", "--at", "start", "--film", "film.gif", "--film-fps", "50", "--adapter", "none"];
     let child = Command::new(TAUTLINE)
         .args(film)
         .args(["--speed", "0.1", "--out", "."])
@@ -291,9 +291,9 @@ fn an_interrupted_command_says_what_is_kept_and_how_to_continue() {
         (&["run", "--no-snapshots", "--set", DRAG, "--set", FOREVER][..], 1, "the same command begins again"),
         (&["campaign", "run", "spec.toml"], 1, "finished flights are kept; the same command continues"),
         (&["compare", "--set", DRAG, "--set", FOREVER], 1, begins),
-        (&["sweep", "--key", "law.alpha=0.5:1:3", "--set", DRAG, "--set", FOREVER], 1, begins),
-        (&["margin", "--key", "law.alpha", "--from", "1", "--to", "2", "--set", DRAG, "--set", FOREVER], 1, begins),
-        (&["attack", "--start", "0.1", "--set", DRAG, "--set", FOREVER], 1, begins),
+        (&["sweep", "--key", "law.alpha=0.5..1:3", "--set", DRAG, "--set", FOREVER], 1, begins),
+        (&["margin", "--key", "law.alpha=1..2", "--set", DRAG, "--set", FOREVER], 1, begins),
+        (&["attack", "--move-start", "0.1", "--set", DRAG, "--set", FOREVER], 1, begins),
         (&["validate"], 130, "interrupted: nothing was written; give the command again"),
         (&["render", "forever.toml"], 130, "interrupted: nothing was written; give the command again"),
         (&["audit", "long.csv", "--delta", "1"], 130, "interrupted: the audit is incomplete; give the command again"),

@@ -282,14 +282,13 @@ fn every_key_of_the_check_is_on_its_page() {
 
 #[test]
 fn every_key_of_a_comparison_is_on_its_page() {
-    let quick = ["compare", "--laws", "edge-tension", "--runs", "1", "--json", "-", "--set", "time.duration_s=1.5"];
+    let quick = ["compare", "--laws", "edge-tension", "--runs", "1", "--json", "--set", "time.duration_s=1.5"];
     assert_eq!(plain(&documented_study("compare --json")), printed(&[&quick], by_kind));
 }
 
 #[test]
 fn every_key_of_an_attack_is_on_its_page() {
-    let quick =
-        ["attack", "--vary", "law.alpha=0.9..1.1", "--flights", "1", "--json", "-", "--set", "time.duration_s=1.5"];
+    let quick = ["attack", "--vary", "law.alpha=0.9..1.1", "--flights", "1", "--json", "--set", "time.duration_s=1.5"];
     assert_eq!(plain(&documented_study("attack --json")), printed(&[&quick], by_kind));
 }
 

@@ -79,7 +79,7 @@ fn without_delta_no_separation_is_judged() {
 
 #[test]
 fn one_file_holds_fence_and_obstacles() {
-    let (ran, _) = audit(&["--delta", "1", "--obstacles", "venue.toml", "--fence", "venue.toml", "--to", "2.9"]);
+    let (ran, _) = audit(&["--delta", "1", "--obstacles", "venue.toml", "--fence", "venue.toml", "--until", "2.9"]);
     assert!(ran.exit == Some(0) && ran.out.contains("mast"), "{ran:?}");
 }
 

@@ -47,11 +47,8 @@ mod sweep;
 mod watch;
 
 impl program::Ran {
-    /// Returns the stable code of the error: the first line on standard error that is `area/problem`, or nothing.
+    /// Returns the stable code of the error: the rest of the first line `= code:` on standard error, or nothing.
     pub(crate) fn code(&self) -> &str {
-        let is_word = |word: &str| !word.is_empty() && word.bytes().all(|b| b.is_ascii_alphanumeric() || b == b'-');
-        let is_code =
-            |line: &&str| line.split_once('/').is_some_and(|(area, problem)| is_word(area) && is_word(problem));
-        self.err.lines().map(str::trim).find(is_code).unwrap_or_default()
+        self.err.lines().find_map(|line| line.trim_start().strip_prefix("= code: ")).unwrap_or_default()
     }
 }

@@ -7,14 +7,14 @@ use serde_json::Value;
 use crate::program::{Ran, TAUTLINE, ran_by};
 
 /// A range with a turn: the pentagon reaches its formation only with enough time.
-const SEARCH: [&str; 8] = ["pentagon", "--key", "time.duration_s", "--from", "30", "--to", "40", "--quiet"];
+const SEARCH: [&str; 4] = ["pentagon", "--key", "time.duration_s=30..40", "--quiet"];
 
 fn ran(folder: &Path, arguments: &[&str]) -> Ran {
     ran_by(TAUTLINE, folder, arguments)
 }
 
 fn margin(folder: &Path, more: &[&str]) -> Value {
-    let Ran { exit, out, err } = ran(folder, &[&["margin"], &SEARCH[..], more, &["--json", "-"]].concat());
+    let Ran { exit, out, err } = ran(folder, &[&["margin"], &SEARCH[..], more, &["--json"]].concat());
     assert_eq!(exit, Some(0), "{err}");
     serde_json::from_str(&out).expect("JSON")
 }
@@ -55,9 +55,7 @@ fn page_and_table_are_the_same_for_any_number_of_threads() {
     let [csv, html] = files("one", "1");
     assert_eq!([&csv, &html], files("two", "2").each_ref());
     assert_eq!(csv.lines().count(), 4);
-    for part in
-        ["<svg", "the verdict turns in between", "tautline margin pentagon --key time.duration_s", "tautline run"]
-    {
+    for part in ["<svg", "the verdict turns in between", "time.duration_s=30.0..40.0", "tautline run"] {
         assert!(html.contains(part), "{part}");
     }
 }
@@ -65,14 +63,11 @@ fn page_and_table_are_the_same_for_any_number_of_threads() {
 #[test]
 fn a_verdict_that_never_holds_exits_with_1_and_one_that_always_holds_with_0() {
     let folder = tempfile::tempdir().expect("a folder");
-    let asked = |from: &str, to: &str| {
-        let key = ["margin", "pentagon", "--key", "time.duration_s", "--from", from, "--to", to, "--scan", "2"];
-        ran(folder.path(), &key)
-    };
-    let nowhere = asked("2", "3");
+    let asked = |key: &str| ran(folder.path(), &["margin", "pentagon", "--key", key, "--scan", "2"]);
+    let nowhere = asked("time.duration_s=2..3");
     assert_eq!(nowhere.exit, Some(1));
     assert!(nowhere.out.contains("fails at any value of time.duration_s tried, from 2 to 3"), "{}", nowhere.out);
-    let everywhere = asked("40", "41");
+    let everywhere = asked("time.duration_s=40..41");
     assert_eq!(everywhere.exit, Some(0));
     assert!(everywhere.out.contains("passes at every value of time.duration_s tried"), "{}", everywhere.out);
 }
@@ -81,19 +76,19 @@ fn a_verdict_that_never_holds_exits_with_1_and_one_that_always_holds_with_0() {
 fn wrong_input_is_refused_with_a_remedy_before_a_flight() {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("there.json"), "").expect("a file");
-    let key = |key: &'static str, from: &'static str, to: &'static str| {
-        vec!["margin", "pentagon", "--key", key, "--from", from, "--to", to]
-    };
-    let with = |more: &[&'static str]| [key("law.alpha", "1", "2"), more.to_vec()].concat();
+    let key = |key: &'static str| vec!["margin", "pentagon", "--key", key];
+    let with = |more: &[&'static str]| [key("law.alpha=1..2"), more.to_vec()].concat();
     for (arguments, code) in [
-        (key("law.alfa", "1", "2"), "scenario/unknown-key"),
-        (key("law.alpha", "1", "1"), "margin/range"),
-        (key("law.alpha", "-1", "1"), "scenario/out-of-range"),
-        (key("law..alpha", "1", "2"), "scenario/override"),
-        (with(&["--json", "there.json"]), "files/exists"),
-        (with(&["--json", "-", "--csv", "-"]), "files/one-standard-output"),
+        (key("law.alfa=1..2"), "scenario/unknown-key"),
+        (key("law.alpha=1..1"), "margin/range"),
+        (key("law.alpha=-1..1"), "scenario/out-of-range"),
+        (key("law..alpha=1..2"), "scenario/override"),
+        (with(&["--json=there.json"]), "files/exists"),
+        (with(&["--json", "--csv", "-"]), "files/one-standard-output"),
+        ([key("law.alpha=-1..1"), vec!["--log"]].concat(), "margin/range"),
         // Values that clap refuses have no code.
-        (with(&["--log", "--from", "-1"]), ""),
+        (key("law.alpha"), ""),
+        (key("law.alpha=1..b"), ""),
         (with(&["--runs", "0"]), ""),
         (with(&["--scan", "1"]), ""),
     ] {
@@ -106,11 +101,10 @@ fn wrong_input_is_refused_with_a_remedy_before_a_flight() {
 fn integer_keys_and_the_control_rate_of_quadrotors_work() {
     let folder = tempfile::tempdir().expect("a folder");
     let short = ["--set", "time.duration_s=1.5", "--scan", "2", "--halvings", "0", "--verdict", "clear"];
-    for (scenario, key, from, to) in
-        [("pentagon", "noise.seed", "1", "2"), ("crazyflies", "time.control_hz", "50", "100")]
+    for (scenario, key, range) in
+        [("pentagon", "noise.seed", "noise.seed=1..2"), ("crazyflies", "time.control_hz", "time.control_hz=50..100")]
     {
-        let ran =
-            ran(folder.path(), &[&["margin", scenario, "--key", key, "--from", from, "--to", to], &short[..]].concat());
+        let ran = ran(folder.path(), &[&["margin", scenario, "--key", range], &short[..]].concat());
         assert_eq!(ran.exit, Some(0), "{}", ran.err);
         assert!(ran.out.contains(&format!("stays clear at every value of {key} tried")), "{}", ran.out);
     }

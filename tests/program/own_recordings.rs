@@ -99,7 +99,7 @@ fn a_recording_has_the_verdict_of_its_run() {
 fn other_options_are_judged_from_the_samples_with_a_note() {
     let folder = pentagon();
     for more in [
-        &["--from", "1", "--to", "3"][..],
+        &["--from", "1", "--until", "3"][..],
         &["--ids", "1,2,3"],
         &["--delta", "1.5"],
         &["--radius", "0.9"],
@@ -378,7 +378,8 @@ fn violations_between_samples_are_in_the_audit_of_the_recording() {
     let all = violations(&report).iter();
     let deepest = all.map(|violation| number(violation, "/value/lower")).fold(f64::INFINITY, f64::min);
     let least = (0.99 * deepest).to_string();
-    for more in [&["--ids", &ids, "--delta", &least][..], &["--to", &before], &["--delta", &least], &["--independent"]]
+    for more in
+        [&["--ids", &ids, "--delta", &least][..], &["--until", &before], &["--delta", &least], &["--independent"]]
     {
         let part = audit(folder.path(), &[&["flown"], more].concat());
         assert!(part.exit == Some(0) && part.out.starts_with("CLEAR if straight"), "{more:?}: {part:?}");

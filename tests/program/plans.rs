@@ -154,7 +154,7 @@ fn times_without_plan_or_flight_are_undecided() {
         "{ran:?}"
     );
     assert!(ran.out.contains("no flight") && ran.out.contains("no plan"), "{ran:?}");
-    let within = audit(folder.path(), &[&late[..], &["--from", "0", "--to", "2.5"]].concat());
+    let within = audit(folder.path(), &[&late[..], &["--from", "0", "--until", "2.5"]].concat());
     assert_eq!(within.exit, Some(0), "{within:?}");
 }
 
@@ -187,7 +187,7 @@ fn an_estimated_delay_limits_the_verdict_to_the_common_time() {
     let [from_s, to_s] = [0, 1].map(|k| report["plan"]["common_s"][k].as_f64().expect("a time"));
     assert!((from_s - 2.5).abs() < 1e-9 && (to_s - 5.5).abs() < 1e-3, "{report}");
     // The claim about the whole flight, or about a given window, stays undecided.
-    for window in [&["--plan-delay", "1.5"][..], &["--to", "7"]] {
+    for window in [&["--plan-delay", "1.5"][..], &["--until", "7"]] {
         let whole = audit(folder.path(), &[&asked[..], window].concat());
         assert_eq!(whole.exit, Some(1), "{whole:?}");
         assert!(whole.out.starts_with("UNDECIDED: the distance of cf1") && whole.out.contains("no plan"), "{whole:?}");

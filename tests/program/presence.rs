@@ -54,7 +54,8 @@ fn missing_required_presence_is_undecided_with_names() {
     let (_, folder) = audit(&[60, 60, 55], &["--delta", "1", "--require-presence", "--junit", "j.xml"]);
     let junit = fs::read_to_string(folder.path().join("j.xml")).expect("cases");
     assert!(junit.contains(r#"name="presence""#) && junit.contains("vehicle is not seen throughout"), "{junit}");
-    let (window, _) = audit(&[60, 60, 55], &["--delta", "1", "--require-presence", "--to", "55", "--time-unit", "s"]);
+    let (window, _) =
+        audit(&[60, 60, 55], &["--delta", "1", "--require-presence", "--until", "55", "--time-unit", "s"]);
     assert_eq!(window.exit, Some(0), "{window:?}");
     let (never, _) = audit(&[60, 60, 55], &["--delta", "1", "--require-presence", "--from", "57", "--time-unit", "s"]);
     assert!(never.exit == Some(1) && never.out.contains("v2 is not seen"), "{never:?}");

@@ -43,7 +43,7 @@ fn refused(folder: &Path, scenario: &str, more: &[&str]) -> (String, String) {
     assert!(!err.contains("panicked") && !err.contains("RUST_BACKTRACE"), "{err}");
     assert!(err.contains("help:"), "a remedy is named: {err}");
     assert_eq!(names(), before, "nothing is written");
-    // The terminal breaks long lines.
+    // The frame of the excerpt is left out.
     (code, err.split_whitespace().filter(|word| *word != "|").collect::<Vec<_>>().join(" "))
 }
 
@@ -68,7 +68,7 @@ fn a_scenario_that_cannot_be_flown_is_refused_at_its_place() {
         fs::write(folder.path().join("wrong.toml"), RIGHT.replacen(from, to, 1)).expect("a file");
         let (found, message) = refused(folder.path(), "wrong.toml", &[]);
         assert_eq!(found, code, "{message}");
-        assert!(message.contains(&format!("wrong.toml{place}]")), "{place}: {message}");
+        assert!(message.contains(&format!("--> wrong.toml{place} ")), "{place}: {message}");
     }
 }
 
@@ -93,9 +93,10 @@ fn a_file_that_is_no_scenario_is_refused_by_name() {
 #[test]
 fn a_wrong_override_is_refused_at_its_place() {
     let folder = folder();
-    for (set, code, place) in
-        [("law.delta_n=2", "scenario/unknown-key", "--set:1:5]"), ("law.delta_m", "scenario/override", "--set:1:1]")]
-    {
+    for (set, code, place) in [
+        ("law.delta_n=2", "scenario/unknown-key", "--> --set:1:5 "),
+        ("law.delta_m", "scenario/override", "--> --set:1:1 "),
+    ] {
         let (found, message) = refused(folder.path(), "pentagon", &["--set", set]);
         assert_eq!(found, code, "{message}");
         assert!(message.contains(place), "{place}: {message}");
@@ -121,7 +122,7 @@ fn an_error_that_an_override_causes_is_placed_in_the_override() {
     ] {
         let harmless = ["--set", "time.max_rate_dt=0.1", "--set", set, "--set", "start.seed=3"];
         let (_, message) = refused(folder.path(), scenario, &harmless);
-        assert!(message.contains(&format!("[{place}")), "{scenario} {set}: {message}");
+        assert!(message.contains(&format!("--> {place}")), "{scenario} {set}: {message}");
     }
 }
 

@@ -40,10 +40,10 @@ fn a_cylinder_tells_beside_from_above() {
 
 #[test]
 fn well_clear_is_in_every_answer() {
-    let lost = audit("traffic.csv", HEAD_ON, &["--well-clear", "do-365", "--to", "170"]);
+    let lost = audit("traffic.csv", HEAD_ON, &["--well-clear", "do-365", "--until", "170"]);
     assert_eq!(lost.exit, Some(1), "{lost:?}");
     assert!(lost.out.starts_with("VIOLATION: a and b are not well clear from 161."), "{lost:?}");
-    let far = audit("traffic.csv", HEAD_ON, &["--well-clear", "f3442", "--to", "170"]);
+    let far = audit("traffic.csv", HEAD_ON, &["--well-clear", "f3442", "--until", "170"]);
     assert!(far.exit == Some(0) && far.out.contains("well clear (609.600 m, 76.200 m high)"), "{far:?}");
     let report: Value =
         serde_json::from_str(&audit("traffic.csv", HEAD_ON, &["--well-clear", "1219.2,137.16,35", "--json"]).out)
@@ -58,7 +58,7 @@ fn the_replay_shows_a_loss_of_well_clear() {
     let page = |thresholds: &str| {
         let folder = tempfile::tempdir().expect("a folder");
         fs::write(folder.path().join("traffic.csv"), HEAD_ON).expect("written");
-        let words = ["audit", "traffic.csv", "--well-clear", thresholds, "--to", "170", "--time-unit", "s"];
+        let words = ["audit", "traffic.csv", "--well-clear", thresholds, "--until", "170", "--time-unit", "s"];
         ran_by(TAUTLINE, folder.path(), &[&words[..], &["--html", "page.html"]].concat());
         fs::read_to_string(folder.path().join("page.html")).expect("a page")
     };

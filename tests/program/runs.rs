@@ -140,9 +140,14 @@ fn the_verdict_comes_first_and_the_paths_of_files_last() {
     let lines: Vec<&str> = out.lines().collect();
     assert!(lines[0].starts_with("CLEAR: never closer than 2.4"), "{out}");
     assert!(lines[0].contains("(delta 2.000 m), formation reached at 3"), "{out}");
-    let [.., wrote, look] = &lines[..] else { panic!("{out}") };
-    assert_eq!(*wrote, "wrote out: run.mcap, report.json and report.html");
-    assert!(look.starts_with("to look at it: open out/report.html"), "{out}");
+    let names: Vec<_> = lines.iter().filter_map(|line| line.split_whitespace().next()).collect();
+    assert_eq!(names, ["CLEAR:", "separation", "audit", "wrote"], "four lines: {out}");
+    assert_eq!(lines[3], "wrote out/report.html with a replay, report.json and run.mcap");
+    let all = run(folder.path(), &["--verbose", "--force"]).out;
+    assert!(lines.iter().all(|line| all.lines().any(|one| one == *line)), "{all}");
+    for name in ["formation", "energy", "control", "velocity", "run", "performance"] {
+        assert!(all.lines().any(|line| line.starts_with(name)), "{name}: {all}");
+    }
     assert!(!out.contains('\u{1b}'), "no colour and no progress bar in a pipe");
 }
 
@@ -151,8 +156,8 @@ fn the_readme_shows_what_the_program_prints() {
     let readme = include_str!("../../README.md");
     let of_run = readme.split("tautline run pentagon").nth(1).expect("the command");
     let shown = of_run.split("```text\n").nth(1).and_then(|rest| rest.split("```").next()).expect("a transcript");
-    let printed = run(folder().path(), &[]).out;
-    assert!(printed.starts_with(shown), "the README shows\n{shown}\nand the program prints\n{printed}");
+    let printed = run(folder().path(), &[]).out.replace("wrote out/", "wrote out/pentagon/");
+    assert!(printed == shown, "the README shows\n{shown}\nand the program prints\n{printed}");
 }
 
 #[test]

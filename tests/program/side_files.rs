@@ -147,7 +147,7 @@ fn an_offset_that_parts_the_vehicles_is_refused() {
         }
     }
     // The window is shorter than the offset, and the recording is longer.
-    let window = ["rest.csv", "--delta", "1", "--offset", "b=5", "--from", "10", "--to", "12"];
+    let window = ["rest.csv", "--delta", "1", "--offset", "b=5", "--from", "10", "--until", "12"];
     assert_eq!(audit(folder.path(), &window).exit, Some(0));
 }
 
@@ -233,11 +233,11 @@ fn a_guessed_unit_of_time_is_not_exported() {
     let table = |name: &str| at_rest(0).replace("t_s,", &format!("{name},"));
     let folder = folder(&[("guess.csv", table("t")), ("seconds.csv", table("t_s"))]);
     let export = |arguments: &[&str]| ran_by(TAUTLINE, folder.path(), &[&["export"], arguments].concat());
-    let refused = export(&["guess.csv", "--output", "out.csv"]);
+    let refused = export(&["guess.csv", "--out", "out.csv"]);
     assert_eq!((refused.exit, refused.code()), (Some(2), "export/guessed-time-unit"), "{refused:?}");
     assert!(!folder.path().join("out.csv").exists());
-    assert_eq!(export(&["guess.csv", "--time-unit", "s", "--output", "out.csv"]).exit, Some(0));
-    assert_eq!(export(&["seconds.csv", "--output", "other.csv"]).exit, Some(0));
+    assert_eq!(export(&["guess.csv", "--time-unit", "s", "--out", "out.csv"]).exit, Some(0));
+    assert_eq!(export(&["seconds.csv", "--out", "other.csv"]).exit, Some(0));
     // A unit that contradicts the name of the column is refused.
     let other = audit(folder.path(), &["seconds.csv", "--delta", "1", "--time-unit", "ms"]);
     assert_eq!((other.exit, other.code()), (Some(2), "recording/unit-conflict"), "{other:?}");

@@ -15,7 +15,7 @@ fn ran(folder: &Path, arguments: &[&str]) -> Ran {
 #[test]
 fn each_point_has_the_bits_of_run() {
     let folder = tempfile::tempdir().expect("a folder");
-    let grid = ["--key", "law.alpha=0.5,2", "--key", "start.jitter_m=0.1", "--runs", "2", "--json", "-"];
+    let grid = ["--key", "law.alpha=0.5,2", "--key", "start.jitter_m=0.1", "--runs", "2", "--json"];
     let Ran { exit, out, err } = ran(folder.path(), &[&grid[..], &["--verdict", "clear"]].concat());
     assert_eq!(exit, Some(0), "{err}");
     assert!(err.contains("pentagon stays clear in each of 2 runs at 2 of 2 points"), "{err}");
@@ -43,7 +43,7 @@ fn files_are_the_same_for_any_number_of_threads() {
     let files = |name: &str, threads: &str| {
         let files = ["csv", "html", "latex"].map(|kind| format!("{name}.{kind}"));
         let [csv, html, latex] = files.each_ref().map(String::as_str);
-        let grid = ["--key", "law.alpha=0.5,1", "--key", "law.delta_m=1:9:3", "--quiet", "--threads", threads];
+        let grid = ["--key", "law.alpha=0.5,1", "--key", "law.delta_m=1..9:3", "--quiet", "--threads", threads];
         let ran = ran(folder.path(), &[&grid[..], &["--csv", csv, "--html", html, "--latex", latex]].concat());
         // Most of the points cannot be flown.
         assert_eq!((ran.exit, ran.out.as_str()), (Some(1), ""), "{}", ran.err);
@@ -67,11 +67,11 @@ fn wrong_input_is_refused_with_its_remedy() {
     for (arguments, code) in [
         (&["--key", "law.alpha"][..], "sweep/key"),
         (&["--key", "law.alpha=0:1"], "sweep/key"),
-        (&["--key", "law.alpha=1:1:3"], "sweep/key"),
+        (&["--key", "law.alpha=1..1:3"], "sweep/key"),
         (&["--key", "law.alpha=nan"], "sweep/key"),
         (&["--key", "law.alpha=1", "--key", "law.alpha=2"], "sweep/grid"),
         (&["--key", "law.alpha=1", "--key", "law.delta_m=2", "--key", "time.dt_s=1"], "sweep/grid"),
-        (&["--key", "law.alpha=1:2:60", "--key", "law.delta_m=1:2:60"], "sweep/grid"),
+        (&["--key", "law.alpha=1..2:60", "--key", "law.delta_m=1..2:60"], "sweep/grid"),
         (&["--key", "time.max_halvings=0,0.5"], "sweep/grid"),
         (&["--key", "law.alfa=1,2"], "scenario/unknown-key"),
         (&["--key", "law..alpha=1,2"], "scenario/override"),
@@ -95,7 +95,7 @@ fn the_examples_of_the_help_fly() {
         let help = ran_by(TAUTLINE, folder.path(), &[study, "--help"]).out;
         for example in help.split('`').skip(1).step_by(2).filter(|text| text.contains('.') && text.contains('=')) {
             let flights: &[&str] = if study == "attack" { &["--flights", "3"] } else { &[] };
-            let arguments = [&[study], &SHORT[..], flights, &[option, example, "--json", "-"]].concat();
+            let arguments = [&[study], &SHORT[..], flights, &[option, example, "--json"]].concat();
             let ran = ran_by(TAUTLINE, folder.path(), &arguments);
             let found: Value = serde_json::from_str(&ran.out).unwrap_or_else(|error| panic!("{error}: {ran:?}"));
             let points = found["points"].as_array().into_iter().flatten().chain([&found]);

@@ -239,7 +239,7 @@ fn the_recording_is_judged_to_the_same_violations() {
             };
             assert_eq!(seen.iter().filter(same).count(), 1, "{of}\n{}", ran.out);
         }
-        assert!(!folder.path().join("watch.mcap.csv").exists());
+        assert!(!folder.path().join(format!("{file}.partial")).exists());
     }
     // Negative twin: at a smaller delta both find nothing.
     let clear = watched(folder.path(), &["--time", "stamps", "--delta", "0.05", "--json"], &input);
@@ -258,16 +258,50 @@ fn a_recording_overwrites_no_other_file_and_is_not_empty() {
     assert_eq!(empty.exit, Some(1), "{empty:?}");
     assert!(empty.err.contains("no position was heard, so r.mcap is not written"), "{empty:?}");
     assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 0);
-    for other in ["r.mcap.csv", "r.mcap.csv.partial"] {
+    for other in ["r.mcap", "r.mcap.partial"] {
         fs::write(folder.path().join(other), "mine").expect("a file");
         let refused = record(&approach(0.0, 0.0), &[]);
         assert_eq!((refused.exit, refused.code()), (Some(2), "watch/record"), "{refused:?}");
         assert_eq!(fs::read_to_string(folder.path().join(other)).expect("the file"), "mine");
         fs::remove_file(folder.path().join(other)).expect("the file");
     }
-    fs::write(folder.path().join("r.mcap.csv"), "old").expect("a file");
+    fs::write(folder.path().join("r.mcap"), "old").expect("a file");
     assert_eq!(record(&approach(0.0, 0.0), &["--force"]).exit, Some(0));
     assert!(folder.path().join("r.mcap").exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_recording_of_a_killed_watch_is_read_up_to_the_last_second() {
+    let folder = tempdir().expect("a folder");
+    let mut child = Command::new(TAUTLINE)
+        .args(["watch", "--record", "r.mcap", "--json=lines.jsonl"])
+        .args(STAMPS)
+        .current_dir(folder.path())
+        .stdin(Stdio::piped())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .expect("the program runs");
+    let mut input = child.stdin.take().expect("a pipe");
+    input.write_all(approach(0.0, 0.0).as_bytes()).expect("the program listens");
+    let audit = || {
+        let words = ["audit", "r.mcap.partial", "--delta", "1", "--allow-unfinished", "--json"];
+        let judged = ran_by(TAUTLINE, folder.path(), &words);
+        serde_json::from_str::<Value>(&judged.out).ok().and_then(|report| report["window_s"][1].as_f64())
+    };
+    // Positions of the fifth second, from 4 s on, are written at its beginning.
+    while audit().is_none_or(|end_s| end_s < 3.9) {
+        assert!(child.try_wait().expect("its state").is_none(), "the watch ended early");
+    }
+    child.kill().expect("killed");
+    child.wait().expect("ended");
+    assert!(audit().is_some_and(|end_s| (3.9..=4.0).contains(&end_s)), "{:?}", audit());
+    assert!(!folder.path().join("r.mcap").exists());
+    let refused = ran_by(TAUTLINE, folder.path(), &["audit", "r.mcap.partial", "--delta", "1"]);
+    assert_eq!(refused.exit, Some(2), "an unfinished file is read on request only: {refused:?}");
+    let lines = fs::read_to_string(folder.path().join("lines.jsonl")).expect("the notices");
+    assert!(lines.lines().all(|line| serde_json::from_str::<Value>(line).is_ok()), "{lines}");
 }
 
 #[cfg(target_os = "linux")]

@@ -79,7 +79,7 @@ class Studies(Case):
         hashes = [[flight.state_hash for flight in law.flights] for law in answer.laws]
         self.assertNotEqual(*hashes)
         # The built-in law beside it flies as without it, and as the command line flies it.
-        line = ["compare", "pentagon", "--laws", "edge-tension", "--runs", "2", "--seed", "3", "--json", "-", "--quiet"]
+        line = ["compare", "pentagon", "--laws", "edge-tension", "--runs", "2", "--seed", "3", "--json", "--quiet"]
         printed = printed_json([*line, "--set", "time.duration_s=2.0"])
         self.assertEqual([flight["state_hash"] for flight in printed["laws"][0]["flights"]], hashes[0])
 

@@ -98,7 +98,7 @@ class Crazyflie(unittest.TestCase):
                     print(f"{k / 25},{name},{math.cos(turn)},{math.sin(turn)},{1 + 0.002 * k}", file=file)
 
     def export(self, output, *more):
-        words = [PROGRAM, "export", "flight.csv", "--to", "crazyflie", "-o", output, "--delta", "1.5", *more]
+        words = [PROGRAM, "export", "flight.csv", "--format", "crazyflie", "-o", output, "--delta", "1.5", *more]
         done = subprocess.run(words, cwd=self.folder, capture_output=True, text=True, timeout=120)
         self.assertEqual(done.returncode, 0, done.stderr)
         return self.folder / output

@@ -56,11 +56,11 @@ fn pages_of_studies_fit_every_screen() {
         assert!(program.status.code() <= Some(1), "{}", String::from_utf8_lossy(&program.stderr));
         page
     };
-    let grid = ["--key", "start.jitter_m=0:0.4:3", "--key", "law.delta_m=1,2,9", "--runs", "2", "--verdict", "clear"];
+    let grid = ["--key", "start.jitter_m=0..0.4:3", "--key", "law.delta_m=1,2,9", "--runs", "2", "--verdict", "clear"];
     check(folder.path(), &page("sweep", &grid), "pentagon: start.jitter_m and law.delta_m", "6 of 9 points", 2);
-    let margin = ["--key", "law.alpha", "--from", "0.5", "--to", "2", "--scan", "2", "--runs", "2"];
+    let margin = ["--key", "law.alpha=0.5..2", "--scan", "2", "--runs", "2"];
     check(folder.path(), &page("margin", &margin), "pentagon: law.alpha", "fails", 2);
-    check(folder.path(), &page("attack", &["--start", "0.4", "--flights", "6"]), "pentagon", "a search", 1);
+    check(folder.path(), &page("attack", &["--move-start", "0.4", "--flights", "6"]), "pentagon", "a search", 1);
 }
 
 #[test]

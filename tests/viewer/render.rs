@@ -116,7 +116,7 @@ fn render_without_a_driver_draws_by_itself() {
 fn two_scenarios_are_drawn_side_by_side() {
     let folder = tempfile::tempdir().expect("a folder");
     let flights = ["render", "pentagon-laplacian", "--beside", "pentagon", "--size", "321x90", "--adapter", "none"];
-    let film = ["--film", "both.gif", "--fps", "5", "--until", "2", "--at", "2"];
+    let film = ["--film", "both.gif", "--film-fps", "5", "--until", "2", "--at", "2"];
     let Ran { exit, err, .. } = ran(folder.path(), &[&flights[..], &film].concat());
     assert_eq!(exit, GOOD, "{err}");
     let gif = fs::File::open(folder.path().join("both.gif")).expect("a film");
@@ -159,7 +159,7 @@ fn every_kind_of_picture_is_written_to_its_target() {
     assert_eq!(size_of(&at("c/sheet.png")), [159, 90]);
     let films: &[_] = if cfg!(feature = "film") { &["d.mp4", "d.gif"] } else { &["d.gif"] };
     for film in films {
-        render(&["--film", film, "--fps", "5"]);
+        render(&["--film", film, "--film-fps", "5"]);
         assert!(fs::metadata(at(film)).expect(film).len() > 1000, "{film}");
     }
     let gif = fs::File::open(at("d.gif")).expect("a film");
@@ -207,12 +207,12 @@ fn invalid_requests_are_refused_with_a_remedy() {
         (&["out/run.mcap", "--sheet", "4000x4"], WRONG_INPUT, "do not fit into"),
         (&["out/run.mcap", "--sheet", "10x10", "--size", "60000x60000"], WRONG_INPUT, "pixels a side"),
         (&["out/run.mcap", "--film", "film.avi"], WRONG_INPUT, "does not end in .mp4 or .gif"),
-        (&["out/run.mcap", "--film", "film.gif", "--fps", "0"], WRONG_INPUT, "got 0"),
+        (&["out/run.mcap", "--film", "film.gif", "--film-fps", "0"], WRONG_INPUT, "got 0"),
         (&["out/run.mcap", "--film", "film.mp4", "--size", "101x50"], WRONG_INPUT, "even sides"),
         (&["out/run.mcap", "--film", "film.mp4", "--speed", "0"], WRONG_INPUT, "--speed: must be more than 0, got 0"),
         (&["out/run.mcap", "--film", "film.mp4", "--speed", "-3"], WRONG_INPUT, "--speed: must be more than 0, got -3"),
         (&["out/run.mcap", "--speed", "2"], WRONG_INPUT, "required arguments were not provided: --film <FILE>"),
-        (&["out/run.mcap", "--at", "end", "--fps", "10"], WRONG_INPUT, "not provided: --film <FILE>"),
+        (&["out/run.mcap", "--at", "end", "--film-fps", "10"], WRONG_INPUT, "not provided: --film <FILE>"),
         (
             &["out/run.mcap", "--film", "film.mp4", "--speed", "nan"],
             WRONG_INPUT,
@@ -300,7 +300,7 @@ fn no_output_overwrites_another_or_the_recording() {
         assert_eq!(fs::read_to_string(folder.path().join(name)).expect(name), rows);
     }
     let apart = ["render", "r.gif", "--out", "new", "--at", "start", "--film", "new/film.gif", "--size", "64x36"];
-    let Ran { exit, err, .. } = ran(folder.path(), &[&apart[..], &["--fps", "2"]].concat());
+    let Ran { exit, err, .. } = ran(folder.path(), &[&apart[..], &["--film-fps", "2"]].concat());
     assert_eq!(exit, GOOD, "{err}");
     assert_eq!(names(&folder.path().join("new")), ["film.gif", "start.png"]);
 }

@@ -133,7 +133,6 @@ options! {
     DELTA = "delta" "delta" Number;
     DIMENSIONS = "dimensions" "dimensions" Number;
     DISTINCT = "distinct" "distinct" Flag;
-    DRONE_FORMAT = "to" "to" Word;
     DUPLICATES = "duplicates" "duplicates" Word;
     ELLIPSOID = "ellipsoid" "ellipsoid" Number;
     EXPECT = "expect" "expect" Number;
@@ -141,10 +140,10 @@ options! {
     EXPORT_FORMAT = "format" "to" Word;
     FENCE = "fence" "fence" Number;
     FILM = "film" "film" Number;
-    FILM_FPS = "fps" "film_fps" Number;
+    FILM_FPS = "film-fps" "film_fps" Number;
     FLIGHTS = "flights" "flights" Number;
     FORCE = "force" "overwrite" Flag;
-    FORMAT = "format" "format" Word;
+    FORMAT = "input-format" "format" Word;
     FPS = "fps" "fps" Number;
     FRAME = "frame" "frame" Word;
     FROM = "from" "from_s" Number;
@@ -156,7 +155,6 @@ options! {
     INDEPENDENT = "independent" "independent" Flag;
     JOIN = "join" "join" Flag;
     JSON = "json" "json" Number;
-    KEY = "key" "key" Word;
     LAND_ON = "land-on" "land_on" Word;
     LATENCY = "latency" "latency" Number;
     LATEX = "latex" "latex" Number;
@@ -165,12 +163,12 @@ options! {
     LAYOUT = "layout" "layout" Word;
     LIMIT = "limit" "limit" NamedNumber;
     LOG = "log" "log" Flag;
-    MARGIN_FROM = "from" "start" Number;
-    MARGIN_TO = "to" "stop" Number;
+    MARGIN_KEY = "key" "key" NamedNumber;
     MAX_ACCEL = "max-accel" "max_accel" NamedNumber;
     MAX_AGE = "max-age" "max_age" Number;
     MAX_GAP = "max-gap" "max_gap" Number;
     MAX_VEHICLES = "max-vehicles" "max_vehicles" Number;
+    MOVE_START = "move-start" "start" Number;
     MOTION = "motion" "motion" Word;
     NO_CONFIG = "no-config" "config" Off;
     OBSTACLES = "obstacles" "obstacles" Number;
@@ -178,7 +176,7 @@ options! {
     ONE_VEHICLE = "one-vehicle" "one_vehicle" Flag;
     ORIGIN = "origin" "origin" Number;
     OUT = "out" "out" Number;
-    OUTPUT = "output" "output" Number;
+    OUTPUT = "out" "output" Number;
     PLAN = "plan" "plan" Number;
     PLAN_DELAY = "plan-delay" "plan_delay" Number;
     POSITION_ERROR = "position-error" "position_error" Number;
@@ -205,7 +203,6 @@ options! {
     THREADS = "threads" "threads" Number;
     TIME_SCALE = "time-scale" "time_scale" Number;
     TIME_UNIT = "time-unit" "time_unit" Word;
-    TO = "to" "to_s" Number;
     TOLERANCE = "tolerance" "tolerance" Number;
     TOPIC = "topic" "topic" Word;
     TUBE = "tube" "tube" Number;

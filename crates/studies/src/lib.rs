@@ -44,3 +44,14 @@ pub const MOST_RUNS: u64 = 1_000_000;
 pub const SEEDS: RangeInclusive<u64> = 0..=i64::MAX as u64 - MOST_RUNS;
 /// Admitted numbers of threads.
 pub const THREADS: RangeInclusive<usize> = 1..=256;
+
+/// Parses `KEY=FROM..TO`, two values of a key.
+///
+/// # Errors
+/// The reason, if the text has another form or a value is not a number.
+pub fn key_range(text: &str) -> Result<(String, [f64; 2]), String> {
+    let parts = text.split_once('=').and_then(|(key, range)| Some((key.trim(), range.split_once("..")?)));
+    let Some((key, (from, to))) = parts else { return Err("is not KEY=FROM..TO".to_owned()) };
+    let number = |end: &str| end.trim().parse().map_err(|_| format!("`{}` is not a number", end.trim()));
+    Ok((key.to_owned(), [number(from)?, number(to)?]))
+}

@@ -11,7 +11,7 @@ use crate::statistics::{CONFIDENCE, Proportion};
 use crate::study::{About, Block, Experiment, Section, Study};
 use crate::table::{Kind, Table};
 use tautline_core::failure::{Failure, in_range};
-use tautline_core::option::{self, KEY, LOG, MARGIN_FROM, MARGIN_TO, RUNS, SCAN, SEED, VERDICT};
+use tautline_core::option::{self, LOG, MARGIN_KEY, RUNS, SCAN, SEED, VERDICT};
 use tautline_core::text::{capitalised, counted, shortest, significant};
 use tautline_report::figures::{Separation, Share, margin as figure, separations, verdicts};
 use tautline_report::report::page::{Badge, Tone};
@@ -145,6 +145,11 @@ impl Options {
         base.with(&sets).map_err(|error| Failure::from(error).under(&self.under(value)))
     }
 
+    /// Returns the key with its range, `KEY=FROM..TO`.
+    fn key_range(&self) -> String {
+        format!("{}={:?}..{:?}", self.key, self.range.from, self.range.to)
+    }
+
     fn under(&self, value: f64) -> String {
         format!("with {} = {value}", self.key)
     }
@@ -160,7 +165,7 @@ impl Experiment for Options {
         in_range(SCAN, &self.range.scan, &SCANS)?;
         in_range(option::HALVINGS, &self.range.halvings, &HALVINGS)?;
         let Range { from, to, logarithmic, .. } = self.range;
-        let given = format!("{} {}", MARGIN_FROM.set(from), MARGIN_TO.set(to));
+        let given = MARGIN_KEY.set(self.key_range());
         let why = if !from.is_finite() || !to.is_finite() {
             format!("{given}: the range is not finite")
         } else if from == to {
@@ -170,17 +175,14 @@ impl Experiment for Options {
         } else {
             return Ok(());
         };
-        let help =
-            format!("give {MARGIN_FROM} and {MARGIN_TO} two different finite numbers, with {LOG} both more than 0");
+        let help = format!("give two different finite numbers, with {LOG} both more than 0");
         Err(Failure::input("margin/range", why, help))
     }
 
     fn arguments(&self, _study: &Margin) -> Vec<String> {
-        let Self { key, range, question, runs, seed } = self;
+        let Self { range, question, runs, seed, .. } = self;
         let mut arguments: Vec<_> = [
-            (KEY, key.clone()),
-            (MARGIN_FROM, format!("{:?}", range.from)),
-            (MARGIN_TO, format!("{:?}", range.to)),
+            (MARGIN_KEY, self.key_range()),
             (RUNS, runs.to_string()),
             (SEED, seed.to_string()),
             (VERDICT, question.name().to_owned()),

@@ -114,14 +114,14 @@ fn wrong_values(why: &str) -> Failure {
 /// Returns the failure of a text.
 fn wrong(why: &str) -> Failure {
     let help = format!(
-        "write KEY=FROM:TO:COUNT with two different finite numbers and a count from 2 to {MOST_POINTS}, or \
+        "write KEY=FROM..TO:COUNT with two different finite numbers and a count from 2 to {MOST_POINTS}, or \
          KEY=V1,V2,... with finite numbers"
     );
     Failure::input("sweep/key", why, help)
 }
 
 impl SweptKey {
-    /// Parses `KEY=FROM:TO:COUNT` or `KEY=V1,V2,...`.
+    /// Parses `KEY=FROM..TO:COUNT` or `KEY=V1,V2,...`.
     ///
     /// # Errors
     /// [`Failure`] `sweep/key`.
@@ -133,27 +133,26 @@ impl SweptKey {
             let number = text.trim().parse::<f64>();
             number.map_err(|_| wrong(&format!("{}: `{}` is not a number", SWEEP_KEY.set(key), text.trim())))
         };
-        match values.split(':').collect::<Vec<_>>()[..] {
-            [list] => Self::new(key, list.split(',').map(number).collect::<Result<_, _>>()?),
-            [from, to, count] => {
-                let most = MOST_POINTS;
-                let count =
-                    count.trim().parse::<usize>().ok().filter(|count| (2..=most).contains(count)).ok_or_else(|| {
-                        let option = SWEEP_KEY.set(text);
-                        wrong(&format!("{option}: the count must be from 2 to {most}, got `{}`", count.trim()))
-                    })?;
-                let (from, to) = (number(from)?, number(to)?);
-                if from == to || !(to - from).is_finite() {
-                    let option = SWEEP_KEY.set(text);
-                    return Err(wrong(&format!("{option}: the ends must be two different finite numbers")));
-                }
-                let range = Bound { key: key.to_owned(), low: from.min(to), high: from.max(to), whole: false };
-                let part = |k: usize| k as f64 / (count - 1) as f64;
-                let value = |k: usize| range.at(if from <= to { part(k) } else { 1.0 - part(k) });
-                Self::new(key, (0..count).map(value).collect())
-            }
-            _ => Err(wrong(&format!("{}: is neither KEY=FROM:TO:COUNT nor a list", SWEEP_KEY.set(text)))),
+        let Some((from, rest)) = values.split_once("..") else {
+            return Self::new(key, values.split(',').map(number).collect::<Result<_, _>>()?);
+        };
+        let Some((to, count)) = rest.split_once(':') else {
+            return Err(wrong(&format!("{}: is neither KEY=FROM..TO:COUNT nor a list", SWEEP_KEY.set(text))));
+        };
+        let most = MOST_POINTS;
+        let count = count.trim().parse::<usize>().ok().filter(|count| (2..=most).contains(count)).ok_or_else(|| {
+            let option = SWEEP_KEY.set(text);
+            wrong(&format!("{option}: the count must be from 2 to {most}, got `{}`", count.trim()))
+        })?;
+        let (from, to) = (number(from)?, number(to)?);
+        if from == to || !(to - from).is_finite() {
+            let option = SWEEP_KEY.set(text);
+            return Err(wrong(&format!("{option}: the ends must be two different finite numbers")));
         }
+        let range = Bound { key: key.to_owned(), low: from.min(to), high: from.max(to), whole: false };
+        let part = |k: usize| k as f64 / (count - 1) as f64;
+        let value = |k: usize| range.at(if from <= to { part(k) } else { 1.0 - part(k) });
+        Self::new(key, (0..count).map(value).collect())
     }
 
     /// Returns whether the key is a seed.

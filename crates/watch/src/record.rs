@@ -5,15 +5,27 @@ use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use crate::source::OwnedPose;
+use tautline_recordings::export::TrackRecorder;
 
-/// Poses as CSV with the columns `time_s,id,x,y,z,vx,vy,vz`, in a file `PATH.partial` until it is complete.
+/// Recording of poses in a file `PATH.partial` until it is complete.
+///
+/// It is written at least once per second of the recording. A file that was not completed can be read, an MCAP file
+/// with `allow_unfinished`.
 pub struct Record {
-    file: BufWriter<File>,
+    file: Poses,
     partial: PathBuf,
     path: PathBuf,
     /// Time of the last flush \[s\].
     flushed_s: f64,
     rows: u64,
+}
+
+/// Form of a recording.
+enum Poses {
+    /// Columns `time_s,id,x,y,z,vx,vy,vz`.
+    Csv(BufWriter<File>),
+    /// Messages, one for each pose.
+    Mcap(Box<TrackRecorder>),
 }
 
 /// Extension of an incomplete file.
@@ -29,14 +41,26 @@ impl Record {
         PathBuf::from(name)
     }
 
-    /// Creates the file `PATH.partial`.
+    /// Returns whether the extension of a file is that of a recording: `csv` or `mcap`.
+    #[must_use]
+    pub fn is_written(path: &Path) -> bool {
+        path.extension().is_some_and(|of| of == "csv" || of == "mcap")
+    }
+
+    /// Creates the file `PATH.partial`, as MCAP if this is the extension of the path, otherwise as CSV.
     ///
     /// # Errors
     /// If the file cannot be created.
     pub fn create(path: &Path) -> io::Result<Self> {
         let partial = Self::partial_of(path);
-        let mut file = BufWriter::new(File::create(&partial)?);
-        file.write_all(b"time_s,id,x,y,z,vx,vy,vz\n")?;
+        let file = File::create(&partial)?;
+        let file = if path.extension().is_some_and(|of| of == "mcap") {
+            Poses::Mcap(Box::new(TrackRecorder::new(file)?))
+        } else {
+            let mut file = BufWriter::new(file);
+            file.write_all(b"time_s,id,x,y,z,vx,vy,vz\n")?;
+            Poses::Csv(file)
+        };
         Ok(Self { file, partial, path: path.to_owned(), flushed_s: f64::NEG_INFINITY, rows: 0 })
     }
 
@@ -45,17 +69,25 @@ impl Record {
     /// # Errors
     /// If the file cannot be written.
     pub fn push(&mut self, time_s: f64, pose: &OwnedPose) -> io::Result<()> {
-        let at = pose.position_m;
-        let id = quoted(&pose.id);
-        write!(self.file, "{time_s:?},{id},{:?},{:?},{:?},", at.x, at.y, at.z)?;
-        match pose.velocity_m_s {
-            Some(of) => writeln!(self.file, "{:?},{:?},{:?}", of.x, of.y, of.z)?,
-            None => writeln!(self.file, ",,")?,
+        match &mut self.file {
+            Poses::Csv(file) => {
+                let at = pose.position_m;
+                let id = quoted(&pose.id);
+                write!(file, "{time_s:?},{id},{:?},{:?},{:?},", at.x, at.y, at.z)?;
+                match pose.velocity_m_s {
+                    Some(of) => writeln!(file, "{:?},{:?},{:?}", of.x, of.y, of.z)?,
+                    None => writeln!(file, ",,")?,
+                }
+            }
+            Poses::Mcap(file) => file.push(time_s, &pose.id, pose.position_m, pose.velocity_m_s)?,
         }
         self.rows += 1;
         if time_s >= self.flushed_s + 1.0 {
             self.flushed_s = time_s;
-            self.file.flush()?;
+            match &mut self.file {
+                Poses::Csv(file) => file.flush()?,
+                Poses::Mcap(file) => file.flush()?,
+            }
         }
         Ok(())
     }
@@ -71,6 +103,7 @@ impl Record {
     /// # Errors
     /// If the file cannot be removed.
     pub fn discard(self) -> io::Result<()> {
+        drop(self.file);
         std::fs::remove_file(&self.partial)
     }
 
@@ -78,9 +111,12 @@ impl Record {
     ///
     /// # Errors
     /// If the file cannot be written or renamed.
-    pub fn finish(mut self) -> io::Result<()> {
-        self.file.flush()?;
-        self.file.get_ref().sync_all()?;
+    pub fn finish(self) -> io::Result<()> {
+        match self.file {
+            Poses::Csv(mut file) => file.flush()?,
+            Poses::Mcap(file) => file.finish()?,
+        }
+        File::options().append(true).open(&self.partial)?.sync_all()?;
         std::fs::rename(&self.partial, &self.path)
     }
 }
@@ -106,24 +142,26 @@ mod tests {
     #[test]
     fn a_recording_is_read_back_with_the_same_numbers() {
         let folder = tempfile::tempdir().expect("a folder");
-        let path = folder.path().join("watch.csv");
-        let mut record = Record::create(&path).expect("a file");
-        let third = 1.0 / 3.0;
-        for (t_s, id) in [(0.1, "a, b"), (0.1, "c"), (0.2, "a, b"), (0.2, "c")] {
-            let position_m = Vector3::new(third, -t_s, 7.0);
-            let velocity_m_s = Some(Vector3::new(0.0, -1.0, third));
-            record
-                .push(t_s, &OwnedPose { t_s, id: id.to_owned(), position_m, velocity_m_s, accuracy_m: None })
-                .expect("a row");
+        for name in ["watch.csv", "watch.mcap"] {
+            let path = folder.path().join(name);
+            let mut record = Record::create(&path).expect("a file");
+            let third = 1.0 / 3.0;
+            for (t_s, id) in [(0.1, "a, b"), (0.1, "c"), (0.2, "a, b"), (0.2, "c")] {
+                let position_m = Vector3::new(third, -t_s, 7.0);
+                let velocity_m_s = Some(Vector3::new(0.0, -1.0, third));
+                record
+                    .push(t_s, &OwnedPose { t_s, id: id.to_owned(), position_m, velocity_m_s, accuracy_m: None })
+                    .expect("a row");
+            }
+            assert!(!path.exists());
+            record.finish().expect("a file");
+            let mut tracks = open(&path, &ReadOptions::default()).expect("a recording");
+            let mut items = Vec::new();
+            while tracks.read(&mut items).expect("rows") {}
+            assert_eq!(tracks.vehicles(), ["a, b", "c"]);
+            let Item::Sample(first) = &items[0] else { panic!("{items:?}") };
+            assert_eq!((first.time_s, first.position_m), (0.1, Vector3::new(third, -0.1, 7.0)));
+            assert_eq!((items.len(), first.velocity_m_s), (4, Some(Vector3::new(0.0, -1.0, third))));
         }
-        assert!(!path.exists());
-        record.finish().expect("a file");
-        let mut tracks = open(&path, &ReadOptions::default()).expect("a recording");
-        let mut items = Vec::new();
-        while tracks.read(&mut items).expect("rows") {}
-        assert_eq!(tracks.vehicles(), ["a, b", "c"]);
-        let Item::Sample(first) = &items[0] else { panic!("{items:?}") };
-        assert_eq!((first.time_s, first.position_m), (0.1, Vector3::new(third, -0.1, 7.0)));
-        assert_eq!((items.len(), first.velocity_m_s), (4, Some(Vector3::new(0.0, -1.0, third))));
     }
 }

@@ -3,7 +3,7 @@
 use tautline_core::failure::Failure;
 use tautline_core::option::{
     ABOVE, ACCEL_WINDOW, CYLINDER, DELTA, ELLIPSOID, FENCE, FROM, IDS, LAND_ON, LIMIT, MAX_ACCEL, MOTION, OFFSET,
-    RADIUS, TIME_SCALE, TO, WELL_CLEAR,
+    RADIUS, TIME_SCALE, UNTIL, WELL_CLEAR,
 };
 
 use super::RecordedError;
@@ -24,7 +24,7 @@ impl From<RecordedError> for Failure {
                 ("audit/out-of-range", message, help)
             }
             RecordedError::EmptyWindow { .. } => {
-                ("audit/empty-window", message, format!("give a {TO} that is at least {FROM}"))
+                ("audit/empty-window", message, format!("give a {UNTIL} that is at least {FROM}"))
             }
             RecordedError::NoBound { .. } => {
                 let [of_all, of_one] = ["A", "NAME=A"].map(|value| MAX_ACCEL.set(value));
@@ -131,7 +131,7 @@ mod tests {
                 "from_s: must be a finite number, got NaN (give from_s=NUMBER, where NUMBER is a finite number)",
             ),
             (
-                Settings { to_s: Some(f64::NAN), ..delta.clone() },
+                Settings { until_s: Some(f64::NAN), ..delta.clone() },
                 "to_s: must be a finite number, got NaN (give to_s=NUMBER, where NUMBER is a finite number)",
             ),
             (

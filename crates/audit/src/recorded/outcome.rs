@@ -236,7 +236,7 @@ const ROUNDING: f64 = 1e-6;
 /// Returns the window of the verdict \[s\]: that of the settings, completed by the span of all samples.
 pub(super) fn window(settings: &Settings, span_s: Option<(f64, f64)>) -> Option<Interval> {
     let (first_s, last_s) = span_s.map_or((None, None), |(from_s, to_s)| (Some(from_s), Some(to_s)));
-    Some(Interval { from_s: settings.from_s.or(first_s)?, to_s: settings.to_s.or(last_s)? })
+    Some(Interval { from_s: settings.from_s.or(first_s)?, to_s: settings.until_s.or(last_s)? })
 }
 
 /// Returns the selected vehicles that are not present over the whole window, by index. Vehicles have their own sample

@@ -121,14 +121,14 @@ impl PlanFindings {
             vehicles.insert(name.clone(), VehicleSettings { radius_m, offset_s: shift_s, max_accel_m_s2: None });
         }
         let only = Some(vehicles.keys().cloned().collect());
-        let (from_s, to_s) =
-            self.common_s.map_or((settings.from_s, settings.to_s), |span_s| (Some(span_s.0), Some(span_s.1)));
+        let (from_s, until_s) =
+            self.common_s.map_or((settings.from_s, settings.until_s), |span_s| (Some(span_s.0), Some(span_s.1)));
         // A flight above the ground is planned above it, less the largest distance.
         let most_m =
             self.deviations.iter().map(|deviation| deviation.upper_m).fold(self.tube_m.unwrap_or(0.0), f64::max);
         let above_m = settings.above_m.map(|above_m| above_m - most_m * (1.0 + ROUNDING) - ROUNDING * above_m.abs());
         let max_gap_s = (!self.has_curves).then_some(f64::INFINITY);
-        Some(Settings { from_s, to_s, above_m, max_gap_s, vehicles, only, ..Settings::default() })
+        Some(Settings { from_s, until_s, above_m, max_gap_s, vehicles, only, ..Settings::default() })
     }
 }
 
@@ -207,7 +207,7 @@ impl PlanComparison {
             Some(delay_s) => delay_s,
             None => self.estimated_delay(shift_s)?,
         };
-        let plan = self.planned(shift_s + delay_s, self.settings.from_s, self.settings.to_s)?;
+        let plan = self.planned(shift_s + delay_s, self.settings.from_s, self.settings.until_s)?;
         let (mut deviations, mut unknown) = (Vec::new(), Vec::new());
         for (index, vehicle) in self.flight.iter().enumerate() {
             let Some(planned) = plan.get(&vehicle.name).filter(|_| vehicle.is_selected) else { continue };
@@ -236,11 +236,11 @@ impl PlanComparison {
         &self,
         offset_s: f64,
         from_s: Option<f64>,
-        to_s: Option<f64>,
+        until_s: Option<f64>,
     ) -> Result<BTreeMap<String, Vec<Segment>>, RecordedError> {
         let of_vehicle = |(name, items): &(String, Vec<Item>)| {
             let own = VehicleSettings { offset_s, ..VehicleSettings::default() };
-            let settings = Settings { vehicles: [(name.clone(), own)].into(), from_s, to_s, ..Settings::default() };
+            let settings = Settings { vehicles: [(name.clone(), own)].into(), from_s, until_s, ..Settings::default() };
             // Samples of a plan are joined by straight lines, however far apart they are.
             let is_curve = items.iter().all(|item| matches!(item, Item::Piece(_)));
             let mut vehicle = Vehicle::new(name, &settings, if is_curve { 0.0 } else { f64::INFINITY });
@@ -271,9 +271,9 @@ impl PlanComparison {
         let most_s = delay_s.abs() + interval_s.max(SHORTEST_UNKNOWN_S);
         let is_explained = |given: Option<f64>, apart_s: f64| given.is_some() || apart_s.abs() <= most_s;
         let is_explained = is_explained(self.settings.from_s, flown.0 - planned.0)
-            && is_explained(self.settings.to_s, flown.1 - planned.1);
+            && is_explained(self.settings.until_s, flown.1 - planned.1);
         let from_s = self.settings.from_s.unwrap_or(flown.0.max(planned.0));
-        let to_s = self.settings.to_s.unwrap_or(flown.1.min(planned.1));
+        let to_s = self.settings.until_s.unwrap_or(flown.1.min(planned.1));
         let least_s = LEAST_COMMON * (flown.1 - flown.0).min(planned.1 - planned.0);
         (is_explained && to_s > from_s && to_s - from_s >= least_s).then_some((from_s, to_s))
     }

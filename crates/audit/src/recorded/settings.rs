@@ -13,7 +13,7 @@ use crate::sweep::{Interval, MAX_LENGTH_M, MIN_LIMIT_M};
 use crate::well_clear::WellClear;
 use tautline_core::option::{
     ABOVE, ACCEL_WINDOW, CYLINDER, DELTA, ELLIPSOID, FROM, LAND_ON, LIMIT, MAX_ACCEL, MAX_GAP, MOTION, OBSTACLES,
-    OFFSET, Opt, RADIUS, TO, WELL_CLEAR,
+    OFFSET, Opt, RADIUS, UNTIL, WELL_CLEAR,
 };
 
 /// Largest accepted number: a length \[m\], a time \[s\] or an acceleration \[m/s^2\].
@@ -117,7 +117,7 @@ pub struct Settings {
     /// Start of the judged window \[s\].
     pub from_s: Option<f64>,
     /// End of the judged window \[s\].
-    pub to_s: Option<f64>,
+    pub until_s: Option<f64>,
     /// Height at or below which vehicles are on the ground \[m\]. A pair of vehicles is not judged while both are.
     pub above_m: Option<f64>,
     /// Names of obstacles on which vehicles land, such as the ground or a pad. Their distance from a vehicle is not
@@ -164,7 +164,7 @@ impl Settings {
             cylinder: _,
             well_clear,
             from_s,
-            to_s,
+            until_s,
             above_m: _,
             land_on: _,
             max_gap_s,
@@ -183,7 +183,7 @@ impl Settings {
             timed.extend(is_timed.then(|| TimedSetting::new(option)));
         };
         add(from_s.is_some(), FROM);
-        add(to_s.is_some(), TO);
+        add(until_s.is_some(), UNTIL);
         // An infinite gap joins all samples, whatever their unit of time.
         add(max_gap_s.is_some_and(f64::is_finite), MAX_GAP);
         add(max_accel_m_s2.is_some(), MAX_ACCEL);
@@ -202,7 +202,7 @@ impl Settings {
     }
 
     pub(super) fn window(&self) -> Interval {
-        Interval { from_s: self.from_s.unwrap_or(f64::NEG_INFINITY), to_s: self.to_s.unwrap_or(f64::INFINITY) }
+        Interval { from_s: self.from_s.unwrap_or(f64::NEG_INFINITY), to_s: self.until_s.unwrap_or(f64::INFINITY) }
     }
 
     /// Returns whether the settings limit separations or distances from obstacles, apart from a recording's own radii.
@@ -278,7 +278,7 @@ impl Settings {
             }
         }
         check(FROM, self.from_s, FINITE)?;
-        check(TO, self.to_s, FINITE)?;
+        check(UNTIL, self.until_s, FINITE)?;
         check(ABOVE, self.above_m, FINITE)?;
         // An infinite gap joins all samples.
         check(MAX_GAP, self.max_gap_s.filter(|gap_s| *gap_s != f64::INFINITY), NOT_NEGATIVE)?;

@@ -214,7 +214,7 @@ fn only_the_window_is_judged() {
     let items: Vec<_> = (0..=30).map(|k| f64::from(k) * 0.1).map(|t| sample(t, place(t), None)).collect();
     let window = |from_s, to_s| Settings {
         from_s: Some(from_s),
-        to_s: Some(to_s),
+        until_s: Some(to_s),
         ..with_envelope(limits(&[(Quantity::Speed, 4.0), (Quantity::Acceleration, 4.0)]))
     };
     let of = |from_s, to_s| judged(&items, window(from_s, to_s)).1.iter().map(|found| found.status).collect::<Vec<_>>();
@@ -229,7 +229,7 @@ fn only_the_window_is_judged() {
 fn a_window_inside_an_interval_is_interpolated() {
     let items = [(0.0, 10.0), (4.0, 18.0)].map(|(t, z)| sample(t, Vector3::new(0.0, 0.0, z), None));
     let settings =
-        Settings { from_s: Some(1.0), to_s: Some(3.0), ..with_envelope(limits(&[(Quantity::Height, 20.0)])) };
+        Settings { from_s: Some(1.0), until_s: Some(3.0), ..with_envelope(limits(&[(Quantity::Height, 20.0)])) };
     let extreme = judged(&items, settings).1[0].extreme.expect("a height");
     assert_eq!((extreme.lower, extreme.upper, extreme.at_s), (16.0, 16.0, 3.0));
 }
@@ -245,7 +245,7 @@ fn a_gap_has_no_speed_and_counts_only_in_the_window() {
     let found = |from_s, to_s| {
         let settings = Settings {
             from_s,
-            to_s,
+            until_s: to_s,
             ..with_envelope(limits(&[(Quantity::Speed, 2.0), (Quantity::Acceleration, 2.0)]))
         };
         let outcome = audit(&["one".to_owned()], &items, settings).expect("a verdict");
@@ -267,7 +267,7 @@ fn an_acceleration_needed_somewhere_is_undecided_in_a_part() {
         motion: Some(Interpolation::Bounded),
         max_accel_m_s2: Some(10.0),
         from_s,
-        to_s,
+        until_s: to_s,
         ..with_envelope(limits(&[(Quantity::Acceleration, 1.0)]))
     };
     assert_eq!(judged(&items, settings(None, None)).0, Status::Violation);

@@ -77,7 +77,7 @@ fn a_window_that_cuts_lines_is_judged_exactly() {
         let mut random = Random(number);
         let from_s = random.between(0.0, 0.7);
         let window_s = [from_s, from_s + random.between(0.0, 1.0)];
-        let settings = Settings { from_s: Some(window_s[0]), to_s: Some(window_s[1]), ..Settings::default() };
+        let settings = Settings { from_s: Some(window_s[0]), until_s: Some(window_s[1]), ..Settings::default() };
         check(number, &scene(number), &settings, window_s)
     });
     assert!(judged.count() as u64 > scenes() / 4);

@@ -136,7 +136,7 @@ fn times_of_one_alone_are_unknown() {
     assert_eq!((of.from_s, of.to_s, of.is_flown), (8.0, 10.0, true));
     // Within a window that both cover, everything is known. A flown end without a plan counts, however short.
     for (to_s, status) in [(8.0, Status::Clear), (8.05, Status::Undecided)] {
-        let window = Settings { to_s: Some(to_s), ..Settings::default() };
+        let window = Settings { until_s: Some(to_s), ..Settings::default() };
         assert_eq!(compare(&window, &flight, &plan, Some(0.0), Some(1.0)).status, status, "{to_s}");
     }
     // A planned end without samples does not count if it is shorter than an interval.
@@ -147,7 +147,7 @@ fn times_of_one_alone_are_unknown() {
     }
     // A gap in the flight.
     let gappy: Vec<_> = flight.iter().filter(|item| !(2.05..3.95).contains(&item.time_s())).cloned().collect();
-    let window = Settings { to_s: Some(8.0), ..Settings::default() };
+    let window = Settings { until_s: Some(8.0), ..Settings::default() };
     let found = compare(&window, &gappy, &plan, Some(0.0), Some(1.0));
     let [of] = found.unknown[..] else { panic!("{:?}", found.unknown) };
     assert!(!of.is_flown && (of.from_s - 2.0).abs() < 1e-9 && (of.to_s - 4.0).abs() < 1e-9, "{of:?}");

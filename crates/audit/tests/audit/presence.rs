@@ -58,11 +58,11 @@ fn vehicles_present_throughout_are_not_absent_at_any_sampling() {
 #[test]
 fn absences_refer_to_the_window_and_the_selected_vehicles() {
     let tracks = || [track(0, 0.0, 10.0, 1.0), track(1, 0.0, 10.0, 1.0), track(2, 0.0, 4.0, 1.0)];
-    let early = judge(&tracks(), Settings { to_s: Some(4.0), ..required() });
+    let early = judge(&tracks(), Settings { until_s: Some(4.0), ..required() });
     assert_eq!((early.status, early.absences.len()), (Status::Clear, 0));
     let late = judge(&tracks(), Settings { from_s: Some(6.0), ..required() });
     assert_eq!((late.status, late.absences[0]), (Status::Undecided, Absence { vehicle: 2, seen: None }));
-    let longer = judge(&tracks(), Settings { to_s: Some(60.0), ..required() });
+    let longer = judge(&tracks(), Settings { until_s: Some(60.0), ..required() });
     assert_eq!((longer.status, longer.absences.len()), (Status::Undecided, 3));
     let only = Some(["alpha", "bravo"].map(str::to_owned).into());
     assert_eq!(judge(&tracks(), Settings { only, ..required() }).status, Status::Clear);

@@ -169,7 +169,7 @@ fn very_short_intervals_are_judged_or_refused() {
 
 #[test]
 fn a_window_clips_exactly() {
-    let inside = |from_s, to_s| Settings { from_s, to_s, ..Settings::delta(2.0) };
+    let inside = |from_s, until_s| Settings { from_s, until_s, ..Settings::delta(2.0) };
     // Below delta from 0.5 - sqrt(3) / 20 = 0.4134 s on.
     assert_eq!(status(&pass(1.0), inside(None, Some(0.41))), Status::Clear);
     assert_eq!(status(&pass(1.0), inside(Some(0.59), None)), Status::Clear);
@@ -375,7 +375,7 @@ fn invalid_recordings_and_settings_are_refused() {
         Settings::delta(0.0),
         Settings::delta(f64::NAN),
         Settings { max_gap_s: Some(-1.0), ..Settings::delta(1.0) },
-        Settings { from_s: Some(2.0), to_s: Some(1.0), ..Settings::delta(1.0) },
+        Settings { from_s: Some(2.0), until_s: Some(1.0), ..Settings::delta(1.0) },
         Settings { ellipsoid_m: Some(Vector3::new(1.0, 0.0, 1.0)), ..Settings::default() },
     ] {
         assert!(TrackAuditor::new(settings.clone()).is_err(), "{settings:?}");

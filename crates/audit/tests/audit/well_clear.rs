@@ -53,12 +53,12 @@ fn a_loss_over_many_samples_is_one_finding() {
     // Separations are not judged.
     assert_eq!((found.separation, found.closest.len()), (None, 0));
     // Up to 5 s before the distance is below D, the criterion of time alone is violated.
-    let cut = Settings { to_s: Some(180.0), ..well_clear(WellClear::DO_365) };
+    let cut = Settings { until_s: Some(180.0), ..well_clear(WellClear::DO_365) };
     let cut = judge(&flights(&HEAD_ON, 1.0, 300.0), cut);
     let early = cut.well_clear.as_ref().expect("asked").violations[0];
     assert!(early.horizontal_m > 1.6 * WellClear::DO_365.horizontal_m, "{early:?}");
     let without = WellClear { tau_s: 0.0, ..WellClear::DO_365 };
-    let cut = Settings { to_s: Some(180.0), ..well_clear(without) };
+    let cut = Settings { until_s: Some(180.0), ..well_clear(without) };
     assert_eq!(judge(&flights(&HEAD_ON, 1.0, 300.0), cut).status, Status::Clear);
 }
 

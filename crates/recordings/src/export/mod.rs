@@ -17,6 +17,8 @@ mod source;
 
 pub use crate::read::Format;
 pub use error::ExportError;
+#[cfg(feature = "mcap")]
+pub use mcap::TrackRecorder;
 
 use std::fs::File;
 

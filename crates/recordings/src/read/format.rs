@@ -5,7 +5,7 @@ use std::ops::Deref;
 
 /// Properties of a format.
 pub struct FormatInfo {
-    /// Name for `--format`.
+    /// Name for `--input-format`.
     pub name: &'static str,
     /// Name in sentences, with its article.
     pub title: &'static str,

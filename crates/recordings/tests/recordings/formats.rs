@@ -173,7 +173,7 @@ fn docs_list_every_reader() {
         let extensions = extensions.iter().map(|extension| format!("`.{extension}`")).collect::<Vec<_>>().join(", ");
         format!("| `{name}` | {extensions} | {docs} |\n")
     };
-    let head = "| `--format` | usual extensions | format |\n| --- | --- | --- |\n".to_owned();
+    let head = "| `--input-format` | usual extensions | format |\n| --- | --- | --- |\n".to_owned();
     let table = Format::all().map(|format| row(&format)).fold(head, |table, row| table + &row) + "\n";
     assert!(docs.contains(&table), "docs/recordings.md must hold this table:\n{table}");
     let details = docs.lines().filter_map(|line| line.split(" | ").nth(1)?.strip_prefix('`')?.strip_suffix('`'));

@@ -518,6 +518,12 @@ impl Report {
         table(self.rows().into_iter().chain(times))
     }
 
+    /// Returns the lines of [`Report::text`] on distances and on the audit.
+    #[must_use]
+    pub fn brief(&self) -> String {
+        table(self.rows().into_iter().filter(|(name, _)| matches!(&**name, "separation" | "obstacles" | "audit")))
+    }
+
     /// Returns the name of each part of the flight and the finding on it, without wall-clock times.
     pub(super) fn rows(&self) -> Vec<(String, String)> {
         let (control, velocity) = (&self.control, &self.velocity);
@@ -538,7 +544,7 @@ impl Report {
             ("formation", Some(self.formation_line())),
             ("energy", Some(self.energy_line())),
             ("control", Some(format!("peak {peak}, final {last} m/s^2"))),
-            ("velocity", Some(format!("disagreement {disagreement}, common {common} m/s"))),
+            ("velocity", Some(format!("final mean {common} m/s, relative to it at most {disagreement} m/s"))),
             ("run", Some(self.run_line())),
             ("verified", self.verification.as_ref().map(Verification::line)),
         ];
@@ -587,10 +593,10 @@ impl Report {
             n => format!("{} of the two detectors", counted(n, "disagreement", "disagreements")),
         };
         let swept = self.answer.detectors.map_or(String::new(), |swept| {
-            let contacts = swept
-                .rapier_contact_pairs
-                .map(|pairs| counted(pairs, "contact pair of keep-out shells", "contact pairs of keep-out shells"))
-                .map(|pairs| format!(", {pairs} seen by the engine"));
+            let contacts = swept.rapier_contact_pairs.map(|pairs| match pairs {
+                0 => ", the engine saw no contact".to_owned(),
+                _ => format!(", the engine saw {}", counted(pairs, "pair in contact", "pairs in contact")),
+            });
             format!(
                 " in {}, {} swept; {detectors}{}",
                 counted(swept.steps.unwrap_or_default(), "step", "steps"),
@@ -631,7 +637,7 @@ impl Report {
         let by_engine = run.engine_steps.filter(|&steps| steps < run.steps);
         let by_engine = by_engine.map_or_else(String::new, |steps| format!(", {steps} steps of the engine"));
         format!(
-            "{} vehicles, {} s in {} steps of {:.3} ms{by_engine}, state {}",
+            "{} vehicles, {} s in {} steps of {:.3} ms{by_engine}, hash of the final state {}",
             run.vehicles,
             // To a microsecond, without trailing zeros.
             (run.duration_s * 1e6).round() / 1e6,

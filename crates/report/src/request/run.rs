@@ -55,6 +55,8 @@ pub struct RunRequest<'a> {
     /// Number of threads; a flight uses at most two. By default the number of cores. The recording has the same
     /// bits for any number.
     pub threads: Option<usize>,
+    /// Whether all findings are told, not only the verdict, the smallest distances and the audit.
+    pub verbose: bool,
     /// Whether the report contains wall-clock times. Without them equal flights give equal bytes.
     pub is_timed: bool,
 }
@@ -74,6 +76,7 @@ impl<'a> RunRequest<'a> {
             free_steps: false,
             verify: false,
             threads,
+            verbose: false,
             is_timed: true,
         }
     }
@@ -151,11 +154,12 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
     let page = write_page(folder.path(), &report, &page, &request.formats)?;
     report.write(&folder.report())?;
 
-    monitor.say(&format!("{}\n{}", report.headline(), report.text()));
+    let found = if request.verbose { report.text() } else { report.brief() };
+    monitor.say(&format!("{}\n{found}", report.headline()));
     for reason in &report.verdict.reasons {
         monitor.say(&reason.to_string());
     }
-    monitor.say(&format!("wrote {}: {RECORDING}, report.json and report.html", folder.path().display()));
+    monitor.say(&format!("wrote {} with a replay, report.json and {RECORDING}", page.display()));
     if request.free_steps && report.run.engine_steps.is_none_or(|made| made >= report.run.steps) {
         monitor.warn(
             "note: no step left out the engine: that needs the plant rapier, no obstacles, at most 128 vehicles, and \

@@ -116,7 +116,7 @@ fn wrong_requests_have_error_codes() {
     assert_eq!(code(unused, same), "audit/unused-acceleration");
     let unbound = AuditOptions { motion: Some(Interpolation::Bounded), ..one.clone() };
     assert_eq!(code(unbound, same), "audit/no-acceleration-bound");
-    let empty = AuditOptions { from_s: Some(1.0), to_s: Some(0.5), ..one.clone() };
+    let empty = AuditOptions { from_s: Some(1.0), until_s: Some(0.5), ..one.clone() };
     assert_eq!(code(empty, same), "audit/empty-window");
     let ghost = AuditOptions { ids: vec!["ghost".to_owned().into()], ..one.clone() };
     assert_eq!(code(ghost, same), "audit/unknown-vehicle");

@@ -77,21 +77,27 @@ pub fn find(name: &str) -> Option<&'static Builtin> {
 }
 
 /// Returns the text of a new scenario file, with comments; `None` if the name is not 1 to 64 letters, digits, `-` and
-/// `_`. Lines such as `#key = value` are optional keys.
+/// `_`. It repeats a built-in scenario under the new name, or has six vehicles that fly to a ring, and then lines such
+/// as `#key = value` are optional keys.
 #[must_use]
-pub fn new_scenario(name: &str) -> Option<String> {
+pub fn new_scenario(name: &str, from: Option<&Builtin>) -> Option<String> {
     let is_name = (1..=MAX_NAME_CHARS).contains(&name.len()) && name.chars().all(is_name_character);
-    is_name.then(|| embedded!("new-scenario.toml").replace("NAME", name))
+    is_name.then(|| match from {
+        Some(builtin) => {
+            builtin.toml.replacen(&format!("\nname = \"{}\"", builtin.name), &format!("\nname = \"{name}\""), 1)
+        }
+        None => embedded!("new-scenario.toml").replace("NAME", name),
+    })
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::{Scenario, Source};
-    use super::new_scenario;
+    use super::{all, new_scenario};
 
     #[test]
     fn a_new_scenario_is_valid_with_and_without_its_optional_keys() {
-        let text = new_scenario("ring").expect("a name");
+        let text = new_scenario("ring", None).expect("a name");
         let optional = |line: &str| {
             line.strip_prefix('#')
                 .filter(|rest| rest.starts_with(|c: char| c.is_ascii_lowercase() || c == '['))
@@ -107,9 +113,20 @@ mod tests {
     }
 
     #[test]
+    fn a_built_in_scenario_is_repeated_under_another_name() {
+        for builtin in all() {
+            let text = new_scenario("mine", Some(builtin)).expect("a name");
+            let source = Source::Text { name: "mine".to_owned(), text };
+            let mine = Scenario::read(&source, &[]).expect(builtin.name);
+            let own = Scenario::read(&Source::Builtin(builtin.name.to_owned()), &[]).expect(builtin.name);
+            assert_eq!((mine.name.as_str(), mine.count()), ("mine", own.count()));
+        }
+    }
+
+    #[test]
     fn a_wrong_name_gives_no_scenario() {
         for name in ["", "a b", "a/b", "ä", "\"", &"a".repeat(65)] {
-            assert_eq!(new_scenario(name), None, "{name}");
+            assert_eq!(new_scenario(name, None), None, "{name}");
         }
     }
 }

@@ -23,7 +23,7 @@ use crate::table::{Kind, Table};
 use cma_es::{Optimiser, folded};
 use tautline_core::failure::{Failure, in_range};
 use tautline_core::monitor::{Monitor, Quiet};
-use tautline_core::option::{self, APART, SEED, SEEDS, START, VARY, VELOCITY};
+use tautline_core::option::{self, APART, MOVE_START, SEED, SEEDS, VARY, VELOCITY};
 use tautline_core::text::{beside_limit, counted, exact, seconds};
 use tautline_report::figures::attack as figure;
 use tautline_report::report::page::{Badge, Tone};
@@ -157,7 +157,7 @@ impl Experiment for Options {
 
     fn arguments(&self, _study: &Attack) -> Vec<String> {
         let vary = self.vary.iter().map(|range| (VARY, range.to_string()));
-        let reaches = [(START, self.start_m), (VELOCITY, self.velocity_m_s), (APART, self.apart_m)];
+        let reaches = [(MOVE_START, self.start_m), (VELOCITY, self.velocity_m_s), (APART, self.apart_m)];
         let reaches = reaches.into_iter().filter_map(|(option, by)| Some((option, format!("{:?}", by?))));
         let counts = [(option::FLIGHTS, self.flights), (SEEDS, self.seeds), (SEED, self.seed)];
         let counts = counts.into_iter().map(|(option, count)| (option, count.to_string()));

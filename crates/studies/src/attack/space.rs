@@ -6,8 +6,9 @@ use serde::Serialize;
 
 use super::Options;
 use crate::base::{BaseScenario, overlap, refusal};
+use crate::key_range;
 use tautline_core::failure::Failure;
-use tautline_core::option::{APART, FLIGHTS, SEEDS, START, VARY, VELOCITY};
+use tautline_core::option::{APART, FLIGHTS, MOVE_START, SEEDS, VARY, VELOCITY};
 use tautline_core::swarm::{Rows, separation};
 use tautline_core::text::{at_least, beside_limit, shortest};
 use tautline_sim::scenario::{Scenario, ScenarioError};
@@ -42,17 +43,13 @@ impl fmt::Display for Bound {
 }
 
 impl Bound {
-    /// Parses `KEY=LOW..HIGH`.
+    /// Parses `KEY=FROM..TO`.
     ///
     /// # Errors
     /// [`Failure`] `attack/variation`.
     pub fn parse(text: &str) -> Result<Self, Failure> {
-        let parts = text.split_once('=').and_then(|(key, range)| Some((key.trim(), range.split_once("..")?)));
-        let Some((key, (low, high))) = parts else { return Err(wrong(text, "is not KEY=LOW..HIGH")) };
-        let number = |end: &str| {
-            end.trim().parse::<f64>().map_err(|_| wrong(text, &format!("`{}` is not a number", end.trim())))
-        };
-        Self::new(key, number(low)?, number(high)?)
+        let (key, [low, high]) = key_range(text).map_err(|why| wrong(text, &why))?;
+        Self::new(&key, low, high)
     }
 
     /// Returns the bounds of a key.
@@ -124,20 +121,20 @@ impl SearchSpace {
             is_random |= varied.is_random_in_flight();
             space.bounds.push(bound);
         }
-        let reaches = [(START, start_m), (VELOCITY, velocity_m_s)];
+        let reaches = [(MOVE_START, start_m), (VELOCITY, velocity_m_s)];
         for (option, by) in reaches.into_iter().filter_map(|(option, by)| Some((option, by?))) {
             if !(by.is_finite() && by > 0.0) {
                 return Err(Failure::input(
                     "attack/out-of-range",
                     format!("{}: must be a finite number above 0", option.set(by)),
-                    format!("give {START} in metres and {VELOCITY} in metres per second"),
+                    format!("give {MOVE_START} in metres and {VELOCITY} in metres per second"),
                 ));
             }
         }
         space.check_apart()?;
         space.bounds.extend(space.start_bounds());
         if space.bounds.is_empty() {
-            let (start, key) = (START.set(1), VARY.set("sensing.latency_s=0..0.1"));
+            let (start, key) = (MOVE_START.set(1), VARY.set("sensing.latency_s=0..0.1"));
             return Err(Failure::input(
                 "attack/nothing-varied",
                 "nothing is varied",
@@ -223,7 +220,7 @@ impl SearchSpace {
             return Err(Failure::input(
                 "attack/key-twice",
                 format!("{}: the key is varied twice", VARY.set(key)),
-                format!("vary each key once; {START} and {VELOCITY} vary the whole of [start]"),
+                format!("vary each key once; {MOVE_START} and {VELOCITY} vary the whole of [start]"),
             ));
         }
         if key.rsplit('.').next() == Some("seed") {

@@ -28,9 +28,9 @@ fn swept_from(sets: &[&str], options: &Options) -> Sweep {
 #[test]
 fn values_are_spaced_or_listed() {
     let values = |text: &str| SweptKey::parse(text).expect(text).values;
-    assert_eq!(values("law.alpha=0:1:5"), [0.0, 0.25, 0.5, 0.75, 1.0]);
-    assert_eq!(values("law.alpha=1:0:3"), [1.0, 0.5, 0.0]);
-    assert_eq!(values("law.alpha=0:0.4:5"), [0.0, 0.1, 0.2, 0.3, 0.4], "few digits");
+    assert_eq!(values("law.alpha=0..1:5"), [0.0, 0.25, 0.5, 0.75, 1.0]);
+    assert_eq!(values("law.alpha=1..0:3"), [1.0, 0.5, 0.0]);
+    assert_eq!(values("law.alpha=0..0.4:5"), [0.0, 0.1, 0.2, 0.3, 0.4], "few digits");
     assert_eq!(values("law.alpha=1, 2,5"), [1.0, 2.0, 5.0]);
     assert_eq!(values("law.alpha=3"), vec![3.0]);
     for (text, why) in [
@@ -38,11 +38,11 @@ fn values_are_spaced_or_listed() {
         ("law.alpha=", "`` is not a number"),
         ("law.alpha=1,x", "`x` is not a number"),
         ("law.alpha=0:1", "is neither KEY=FROM:TO:COUNT nor a list"),
-        ("law.alpha=0:1:0", "got `0`"),
-        ("law.alpha=0:1:2.5", "got `2.5`"),
-        ("law.alpha=0:1:999999", "got `999999`"),
-        ("law.alpha=1:1:3", "two different finite numbers"),
-        ("law.alpha=0:1:1", "the count must be from 2 to 2500, got `1`"),
+        ("law.alpha=0..1:0", "got `0`"),
+        ("law.alpha=0..1:2.5", "got `2.5`"),
+        ("law.alpha=0..1:999999", "got `999999`"),
+        ("law.alpha=1..1:3", "two different finite numbers"),
+        ("law.alpha=0..1:1", "the count must be from 2 to 2500, got `1`"),
         ("law.alpha=0:inf:3", "two different finite numbers"),
         ("law.alpha=0,inf", "is not finite"),
         ("law.alpha=nan,1", "NaN is not finite"),
@@ -160,17 +160,17 @@ fn wrong_grids_are_refused() {
     let axes = ["start.positions_m.2.x=1,2", "start.positions_m.2.1=3"];
     assert_eq!(refused(&options(&axes, 1)).0, "sweep/grid", "the name and the number of one axis");
     assert_eq!(refused(&Options { runs: 0, ..key("law.alpha=1") }).0, "request/out-of-range");
-    let (code, said) = refused(&options(&["law.alpha=0:1:51", "law.delta_m=0:1:50"], 1));
+    let (code, said) = refused(&options(&["law.alpha=0..1:51", "law.delta_m=0..1:50"], 1));
     assert!(
         code == "sweep/grid" && said.contains("points, got 2550") && said.contains(&MOST_POINTS.to_string()),
         "{said}"
     );
     assert!(
-        refused(&options(&["law.alpha=0:1:50"], 1_000_000))
+        refused(&options(&["law.alpha=0..1:50"], 1_000_000))
             .1
             .contains("runs=1000000: 50 points must have at most 10000000 flights, got 50000000")
     );
-    let (code, said) = refused(&key("time.max_halvings=0:5:3"));
+    let (code, said) = refused(&key("time.max_halvings=0..5:3"));
     assert!(code == "sweep/grid" && said.contains("takes integers only, got 2.5"), "{said}");
     assert_eq!(refused(&key("law.alfa=1,2")).0, "scenario/unknown-key");
     assert_eq!(refused(&key("law.kind=1,2")).0, "scenario/wrong-type");

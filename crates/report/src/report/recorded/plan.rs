@@ -7,7 +7,7 @@ use crate::report::answer::{Answer, Enclosure, Finding, FindingList, Part};
 use crate::report::section::Section;
 use tautline_audit::recorded::{Outcome, PlanFindings};
 use tautline_audit::{Status, Tally, recorded};
-use tautline_core::option::{FROM, TO};
+use tautline_core::option::{FROM, UNTIL};
 use tautline_core::text::{at_least, at_most, beside_limit, exact, fixed, seconds};
 
 /// Findings on a flight against its plan.
@@ -182,7 +182,7 @@ impl PlanReport {
                     let (from, to) = (fixed(*from_s, 3), fixed(*to_s, 3));
                     format!(
                         "the distance of {vehicle} from the plan is not known from {from} s to {to} s: no {missing}; \
-                         {FROM} and {TO} select the time to judge ({delay})"
+                         {FROM} and {UNTIL} select the time to judge ({delay})"
                     )
                 }
                 (None, Some((vehicle, PlanDistance { upper_m, lower_m, .. }))) => {

@@ -225,7 +225,7 @@ impl PresenceSummary {
         };
         let (first_s, last_s) = (outcome.span_s.map(|span| span.0), outcome.span_s.map(|span| span.1));
         Self {
-            window_s: settings.from_s.or(first_s).zip(settings.to_s.or(last_s)),
+            window_s: settings.from_s.or(first_s).zip(settings.until_s.or(last_s)),
             required: settings.require_presence,
             throughout: asked.saturating_sub(partly),
             partly,
@@ -450,7 +450,7 @@ impl Question {
             plan: None,
             above_m: settings.above_m,
             from_s: settings.from_s,
-            to_s: settings.to_s,
+            to_s: settings.until_s,
         }
     }
 }

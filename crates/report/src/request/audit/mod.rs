@@ -252,7 +252,7 @@ impl ConfiguredAudit<'_> {
         // An early end of the flight does not affect a window that ends before it.
         let is_beyond = |to_s: f64| outcome.span_s.is_none_or(|(_, end_s)| to_s > end_s);
         let early_end = own.and_then(|own| own.early_end.clone());
-        let early_end = early_end.filter(|_| settings.to_s.is_none_or(is_beyond));
+        let early_end = early_end.filter(|_| settings.until_s.is_none_or(is_beyond));
         let mut report = early_end.into_iter().fold(report, RecordedReport::with_early_end);
         report.is_decimal_tie = tie.is_some();
         let late: Vec<_> = tie.into_iter().chain(report.shortened()).collect();

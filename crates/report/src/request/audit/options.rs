@@ -121,8 +121,8 @@ pub struct AuditOptions {
     #[cfg_attr(feature = "cli", arg(long = "from", value_name = "SECONDS", allow_negative_numbers = true))]
     pub from_s: Option<f64>,
     /// End of the judged window [s].
-    #[cfg_attr(feature = "cli", arg(long = "to", value_name = "SECONDS", allow_negative_numbers = true))]
-    pub to_s: Option<f64>,
+    #[cfg_attr(feature = "cli", arg(long = "until", value_name = "SECONDS", allow_negative_numbers = true))]
+    pub until_s: Option<f64>,
     /// Ignore pairs of vehicles while both are at or below this height [m].
     #[serde(alias = "above")]
     #[cfg_attr(feature = "cli", arg(long = "above", value_name = "Z", allow_negative_numbers = true))]
@@ -251,7 +251,7 @@ impl AuditOptions {
             cylinder: self.cylinder_m,
             well_clear: self.well_clear,
             from_s: self.from_s,
-            to_s: self.to_s,
+            until_s: self.until_s,
             above_m: self.above_m,
             land_on: names(&self.land_on),
             max_gap_s: self.max_gap_s,

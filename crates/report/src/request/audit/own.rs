@@ -320,7 +320,7 @@ impl OwnRecording {
         let in_window = |found: &Violation<ObjectPair>| {
             !self.is_read_as_written
                 || (settings.from_s.is_none_or(|from_s| found.to_s >= from_s)
-                    && settings.to_s.is_none_or(|to_s| found.from_s <= to_s))
+                    && settings.until_s.is_none_or(|to_s| found.from_s <= to_s))
         };
         let is_closer = |found: &Violation<ObjectPair>| match found.pair {
             ObjectPair::Vehicles(pair) => {
@@ -361,7 +361,7 @@ impl OwnRecording {
             && settings.radius_m.is_none()
             && settings.vehicles.values().all(|of| *of == VehicleSettings::default())
             && settings.only.is_none()
-            && (settings.from_s, settings.to_s, settings.above_m) == (None, None, None)
+            && (settings.from_s, settings.until_s, settings.above_m) == (None, None, None)
             && settings.obstacles == self.obstacles
             && (request.options.motion, request.options.max_gap_s) == (None, None)
     }

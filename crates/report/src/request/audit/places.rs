@@ -5,7 +5,7 @@ use super::AuditRequest;
 use tautline_audit::MovingObstacle;
 use tautline_audit::envelope::Quantity;
 use tautline_audit::recorded::Settings;
-use tautline_core::option::{ABOVE, COLUMN, CYLINDER, FROM, IDS, ORIGIN, TO, WELL_CLEAR};
+use tautline_core::option::{ABOVE, COLUMN, CYLINDER, FROM, IDS, ORIGIN, UNTIL, WELL_CLEAR};
 use tautline_core::track::{Item, Tracks};
 use tautline_recordings::read::ReadError;
 
@@ -119,10 +119,10 @@ impl HeightCheck<'_> {
     /// Rejects judged positions so far from the origin that level ground is well below the tangent plane.
     pub(super) fn check(&self, path: &str, names: &[String], items: &[Item]) -> Result<(), Failure> {
         let Some(asked) = &self.asked else { return Ok(()) };
-        let Settings { from_s, to_s, only, .. } = self.settings;
+        let Settings { from_s, until_s, only, .. } = self.settings;
         let is_judged = |name: &str, time_s: f64| {
             from_s.is_none_or(|from_s| time_s >= from_s)
-                && to_s.is_none_or(|to_s| time_s <= to_s)
+                && until_s.is_none_or(|until_s| time_s <= until_s)
                 && only.as_ref().is_none_or(|only| only.contains(name))
         };
         for item in items {
@@ -137,7 +137,7 @@ impl HeightCheck<'_> {
                      {drop_m:.1} m lower, and {asked} needs heights above the ground"
                 );
                 let help = format!(
-                    "give an {ORIGIN} within 3 km of all vehicles, or judge a part with {IDS}, {FROM} and {TO}"
+                    "give an {ORIGIN} within 3 km of all vehicles, or judge a part with {IDS}, {FROM} and {UNTIL}"
                 );
                 return Err(Failure::input("audit/far-from-origin", message, help));
             }

@@ -16,7 +16,7 @@ use tautline_audit::Status;
 use tautline_audit::recorded::{Interpolation, Outcome, Settings};
 use tautline_core::files::write_atomically;
 use tautline_core::option::{
-    ABOVE, CYLINDER, DELTA, ELLIPSOID, FENCE, FROM, IDS, LIMIT, MAX_GAP, OFFSET, PROOF, RADIUS, TO, WELL_CLEAR,
+    ABOVE, CYLINDER, DELTA, ELLIPSOID, FENCE, FROM, IDS, LIMIT, MAX_GAP, OFFSET, PROOF, RADIUS, UNTIL, WELL_CLEAR,
 };
 use tautline_core::record::sha256_hex;
 use tautline_recordings::read::{ColumnNames, ReadOptions, TimeUnit};
@@ -126,7 +126,7 @@ pub(super) fn check(request: &AuditRequest<'_>, settings: &Settings) -> Result<(
         (!settings.obstacles.is_empty(), "obstacles".to_owned()),
         (!settings.envelope.is_empty(), format!("{LIMIT} and {FENCE}")),
         (settings.above_m.is_some(), ABOVE.to_string()),
-        (settings.from_s.is_some() || settings.to_s.is_some(), format!("a part of a recording ({FROM}, {TO})")),
+        (settings.from_s.is_some() || settings.until_s.is_some(), format!("a part of a recording ({FROM}, {UNTIL})")),
         (settings.only.is_some(), format!("some of the vehicles ({IDS})")),
     ];
     if let Some((_, what)) = is_other.iter().find(|(is_asked, _)| *is_asked) {

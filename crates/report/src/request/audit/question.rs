@@ -8,7 +8,7 @@ use crate::figures::Format as FigureFormat;
 use tautline_audit::recorded::{Interpolation, Outcome, Settings, TimedSetting, VehicleSettings};
 use tautline_core::fact::{BOUNDED, CURVES, EVERY_STEP, Fact, FactKind, HELD, RUN_AUDIT, STRAIGHT, Source};
 use tautline_core::option::{
-    COLUMN, EXPECT_VEHICLES, FENCE, FRAME, FROM, HTML, IDS, LIMIT, MOTION, OBSTACLES, PLAN, PROOF, TIME_UNIT, TO,
+    COLUMN, EXPECT_VEHICLES, FENCE, FRAME, FROM, HTML, IDS, LIMIT, MOTION, OBSTACLES, PLAN, PROOF, TIME_UNIT, UNTIL,
 };
 use tautline_core::text::counted;
 use tautline_core::track::{Clock as TrackClock, Item};
@@ -128,8 +128,8 @@ impl<'a> AuditRequest<'a> {
             );
             return Err(Failure::input("audit/nothing-to-judge", message, help));
         }
-        if judged == 0 && (settings.from_s.is_some() || settings.to_s.is_some()) {
-            let message = format!("{path}: no vehicle is present between {FROM} and {TO}");
+        if judged == 0 && (settings.from_s.is_some() || settings.until_s.is_some()) {
+            let message = format!("{path}: no vehicle is present between {FROM} and {UNTIL}");
             return Err(Failure::input(
                 "audit/empty-window",
                 message,

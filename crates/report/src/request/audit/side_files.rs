@@ -200,7 +200,7 @@ fn span_s(obstacle: &MovingObstacle) -> Option<[f64; 2]> {
 /// Returns the judged window, if anything is judged.
 fn window_s(settings: &Settings, outcome: &Outcome) -> Option<[f64; 2]> {
     let (first_s, last_s) = outcome.span_s?;
-    Some([settings.from_s.unwrap_or(first_s), settings.to_s.unwrap_or(last_s)])
+    Some([settings.from_s.unwrap_or(first_s), settings.until_s.unwrap_or(last_s)])
 }
 
 /// Returns an epoch in seconds. A whole number of seconds has no rounding.

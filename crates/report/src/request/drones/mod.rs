@@ -22,7 +22,8 @@ use crate::report::recorded::RecordedReport;
 use tautline_audit::envelope::{Limit, Quantity};
 use tautline_audit::recorded::Settings;
 use tautline_core::option::{
-    COLUMN, COMPRESSED, DELTA, DRONE_FORMAT, ELLIPSOID, FORCE, FROM, OBSTACLES, OUTPUT, SAMPLE_HZ, SKYB_VERSION, UNTIL,
+    COLUMN, COMPRESSED, DELTA, ELLIPSOID, EXPORT_FORMAT, FORCE, FROM, OBSTACLES, OUTPUT, Opt, SAMPLE_HZ, SKYB_VERSION,
+    TOLERANCE, UNTIL,
 };
 use tautline_recordings::export::drones::{self, Dialect, DroneOptions, FlownVehicle};
 
@@ -40,34 +41,34 @@ const NEWEST_SKYB: u8 = 2;
 #[allow(rustdoc::broken_intra_doc_links, reason = "units are in brackets, as in the help")]
 pub struct DroneExportOptions {
     /// Largest distance of the written motion from the flight [m] [default: 0.01; none for px4-show and vviz].
-    #[cfg_attr(feature = "cli", arg(long = "tolerance", value_name = "METRES", requires = "to"))]
+    #[cfg_attr(feature = "cli", arg(long = "tolerance", value_name = "METRES"))]
     #[cfg_attr(feature = "cli", arg(allow_negative_numbers = true))]
     pub tolerance_m: Option<f64>,
     /// Safety distance between two centres [m] [default: that of the recording].
-    #[cfg_attr(feature = "cli", arg(long = "delta", value_name = "METRES", requires = "to"))]
+    #[cfg_attr(feature = "cli", arg(long = "delta", value_name = "METRES"))]
     #[cfg_attr(feature = "cli", arg(allow_negative_numbers = true))]
     pub delta_m: Option<f64>,
     /// Half axes [m] of an ellipsoid around each vehicle, or a name (crazyswarm, crazyflie-firmware) [default: those of
     /// the recording].
-    #[cfg_attr(feature = "cli", arg(long = "ellipsoid", value_name = "AX,AY,AZ", requires = "to"))]
+    #[cfg_attr(feature = "cli", arg(long = "ellipsoid", value_name = "AX,AY,AZ"))]
     #[cfg_attr(feature = "cli", arg(value_parser = rules::ellipsoid, allow_hyphen_values = true))]
     pub ellipsoid_m: Option<Vector3<f64>>,
     /// TOML file of obstacles [default: those of the recording].
-    #[cfg_attr(feature = "cli", arg(long, value_name = "FILE", requires = "to"))]
+    #[cfg_attr(feature = "cli", arg(long, value_name = "FILE"))]
     pub obstacles: Option<PathBuf>,
     /// Start of the exported part of the flight [s].
-    #[cfg_attr(feature = "cli", arg(long = "from", value_name = "SECONDS", requires = "to"))]
+    #[cfg_attr(feature = "cli", arg(long = "from", value_name = "SECONDS"))]
     #[cfg_attr(feature = "cli", arg(allow_negative_numbers = true))]
     pub from_s: Option<f64>,
     /// End of the exported part of the flight [s].
-    #[cfg_attr(feature = "cli", arg(long = "until", value_name = "SECONDS", requires = "to"))]
+    #[cfg_attr(feature = "cli", arg(long = "until", value_name = "SECONDS"))]
     #[cfg_attr(feature = "cli", arg(allow_negative_numbers = true))]
     pub until_s: Option<f64>,
     /// Write the compressed form of a Crazyflie, whose coordinates reach 32.767 m.
-    #[cfg_attr(feature = "cli", arg(long = "compressed", requires = "to"))]
+    #[cfg_attr(feature = "cli", arg(long = "compressed"))]
     pub is_compressed: bool,
     /// Version of .skyb files: 1, or 2 with a checksum [default: 2].
-    #[cfg_attr(feature = "cli", arg(long, value_name = "VERSION", requires = "to"))]
+    #[cfg_attr(feature = "cli", arg(long, value_name = "VERSION"))]
     pub skyb_version: Option<u8>,
 }
 
@@ -121,6 +122,36 @@ pub fn export_drones(request: &DroneExportRequest, monitor: &dyn Monitor) -> Res
     Ok(answer)
 }
 
+impl DroneExportOptions {
+    /// Returns the first option that is given.
+    fn given(&self) -> Option<Opt> {
+        let Self { tolerance_m, delta_m, ellipsoid_m, obstacles, from_s, until_s, is_compressed, skyb_version } = self;
+        let all = [
+            (tolerance_m.is_some(), TOLERANCE),
+            (delta_m.is_some(), DELTA),
+            (ellipsoid_m.is_some(), ELLIPSOID),
+            (obstacles.is_some(), OBSTACLES),
+            (from_s.is_some(), FROM),
+            (until_s.is_some(), UNTIL),
+            (*is_compressed, COMPRESSED),
+            (skyb_version.is_some(), SKYB_VERSION),
+        ];
+        all.into_iter().find_map(|(is_given, option)| is_given.then_some(option))
+    }
+
+    /// Rejects options for an export that is not for drones.
+    ///
+    /// # Errors
+    /// [`Failure`] `export/unused-option` that names the first option.
+    pub fn refuse(&self) -> Result<(), Failure> {
+        let Some(option) = self.given() else { return Ok(()) };
+        let formats = Dialect::ALL.map(|dialect| dialect.name()).join(", ");
+        let message = format!("{option}: has an effect in exports for drones only");
+        let help = format!("leave it out, or give {EXPORT_FORMAT} one of {formats}");
+        Err(Failure::input("export/unused-option", message, help))
+    }
+}
+
 impl DroneExportRequest {
     /// Checks the options and the output.
     fn check(&self) -> Result<(), Failure> {
@@ -132,8 +163,8 @@ impl DroneExportRequest {
             (sample_hz.is_some() && !dialect.is_sampled(), SAMPLE_HZ, "px4-show", " or vviz"),
         ];
         if let Some((_, option, format, others)) = unused.into_iter().find(|(is_unused, ..)| *is_unused) {
-            let message = format!("{option}: has no effect with {}", DRONE_FORMAT.set(dialect.name()));
-            let help = format!("leave it out, or give {}{others}", DRONE_FORMAT.set(format));
+            let message = format!("{option}: has no effect with {}", EXPORT_FORMAT.set(dialect.name()));
+            let help = format!("leave it out, or give {}{others}", EXPORT_FORMAT.set(format));
             return Err(Failure::input("export/unused-option", message, help));
         }
         if options.ellipsoid_m.is_some() && options.obstacles.is_some() {
@@ -194,7 +225,7 @@ impl DroneExportRequest {
             ellipsoid_m,
             obstacles,
             from_s,
-            to_s: until_s,
+            until_s,
             no_config: true,
             ..AuditOptions::default()
         };
@@ -358,7 +389,7 @@ impl Flight {
             *time_s -= from_s;
         }
         settings.max_gap_s = Some(f64::INFINITY);
-        (settings.from_s, settings.to_s) = (None, None);
+        (settings.from_s, settings.until_s) = (None, None);
         Ok(Self { vehicles, span_s: (from_s, until_s), settings, has_pair, audit: report, notes })
     }
 }

@@ -1,0 +1,65 @@
+//! The option `--json[=FILE]` of all commands that answer with data.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde::Serialize;
+
+use super::console::{self, Console};
+use tautline_core::files::write_atomically;
+use tautline_report::request::Failure;
+use tautline_report::request::outputs::{self, NamedPath, is_standard_output};
+
+/// Place of an answer as JSON.
+#[derive(Clone, Debug, Args)]
+pub(super) struct JsonArgument {
+    /// Write the answer as JSON to standard output, with all text on standard error, or into FILE.
+    // The equals sign separates FILE from a recording or scenario that follows.
+    #[arg(long = "json", id = "json", value_name = "FILE", num_args = 0..=1, require_equals = true)]
+    #[arg(default_missing_value = "-")]
+    place: Option<PathBuf>,
+}
+
+impl JsonArgument {
+    /// Returns the place if the option is given; `-` is standard output.
+    pub(super) fn place(&self) -> Option<&Path> {
+        self.place.as_deref()
+    }
+
+    /// Returns whether standard output carries the answer.
+    pub(super) fn is_piped(&self) -> bool {
+        self.place().is_some_and(is_standard_output)
+    }
+
+    /// Returns the file, if the answer goes to one.
+    pub(super) fn file(&self) -> Option<NamedPath<'_>> {
+        self.place().filter(|place| !is_standard_output(place)).map(|file| ("--json".to_owned(), file))
+    }
+
+    /// Rejects a file that would overwrite the scenario or, without `force`, any file, and one that cannot be written.
+    pub(super) fn check(&self, scenario: &str, force: bool) -> Result<(), Failure> {
+        outputs::check_new(scenario, self.file().into_iter(), force)
+    }
+
+    /// Writes an answer if the option is given.
+    pub(super) fn write(&self, answer: &impl Serialize, console: Console) -> Result<(), Failure> {
+        self.write_text(|| console::to_json(answer), console)
+    }
+
+    /// Writes the JSON of an answer if the option is given.
+    pub(super) fn write_text(
+        &self,
+        answer: impl FnOnce() -> Result<String, Failure>,
+        console: Console,
+    ) -> Result<(), Failure> {
+        match self.place() {
+            None => Ok(()),
+            Some(place) if is_standard_output(place) => console::data(&answer()?),
+            Some(file) => {
+                write_atomically(file, answer()?.as_bytes())?;
+                console.say(&format!("wrote {}", file.display()));
+                Ok(())
+            }
+        }
+    }
+}
