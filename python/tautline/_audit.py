@@ -63,7 +63,7 @@ CHECKS: dict[str, Callable[[object, str], object]] = {
     "accel_window": optional_number,
     "config": lambda value, what: False if value is False else optional_path(value, what),
     "from_s": optional_number,
-    "to_s": optional_number,
+    "until_s": optional_number,
     "above": optional_number,
     "land_on": optional_names,
     "ids": optional_names,
@@ -214,7 +214,7 @@ class AuditOptions(TypedDict, total=False):
     accel_window: float | None
     config: PathLike | Literal[False] | None
     from_s: float | None
-    to_s: float | None
+    until_s: float | None
     above: float | None
     land_on: Iterable[str] | None
     ids: Iterable[str] | None
@@ -269,7 +269,7 @@ def audit(
     * ``tube``: largest allowed distance from the plan [m].
     * ``config``: ``tautline.toml`` with defaults for arguments that are not given. For a recording the default is the
       ``tautline.toml`` beside it. False reads no file.
-    * ``from_s``, ``to_s``: window of the audit [s].
+    * ``from_s``, ``until_s``: window of the audit [s].
     * ``above``: leaves out pairs of vehicles while both are at or below this height [m].
     * ``land_on``: names of obstacles on which vehicles land: left out for a vehicle at or below ``above``.
     * ``ids``: names of the vehicles to audit.

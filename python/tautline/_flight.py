@@ -126,7 +126,7 @@ class Flight(Judgement, Table):
 
         By default delta, ellipsoids and obstacles are those of the scenario, and the result is that of the run's own
         audit. Other options are evaluated on the recorded instants. A flight that ended early is ``UNDECIDED`` unless
-        a violation was found, or ``to_s`` ends the window earlier.
+        a violation was found, or ``until_s`` ends the window earlier.
         """
         return perform(self.t, self.positions, options, self._audited)
 

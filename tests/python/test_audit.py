@@ -177,7 +177,7 @@ class Arrays(Case):
     def test_radii_obstacles_windows_limits_and_names(self) -> None:
         t, p = passing()
         self.assertEqual(tl.audit(t, p, radius={"1": 0.5, "2": 0.6, "3": 0.1, "4": 0.1}).violations[0].limit, 1.1)
-        self.assertTrue(tl.audit(t, p, delta=1.5, to_s=1.0).is_clear)
+        self.assertTrue(tl.audit(t, p, delta=1.5, until_s=1.0).is_clear)
         self.assertTrue(tl.audit(t, p, delta=1.5, ids=["3", "4"]).is_clear)
         named = tl.audit(t, p, delta=1.5, names=["a", "b,c", "d", "e"], ids=["b,c", "d"])
         self.assertEqual(named.to_dict()["judged"], 2)

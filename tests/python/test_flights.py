@@ -211,7 +211,7 @@ class EarlyEnds(Case):
             t, p = tl.read(file).to_numpy()
             np.testing.assert_array_equal(t, f.t)
             np.testing.assert_array_equal(p, f.positions)
-        self.assertEqual(f.audit(to_s=0.5).status, "clear")
+        self.assertEqual(f.audit(until_s=0.5).status, "clear")
 
     def test_a_complete_flight_has_no_early_end(self) -> None:
         f = tl.fly(short())

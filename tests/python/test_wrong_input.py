@@ -107,7 +107,7 @@ class Arrays(Case):
             ("[possible values: linear, hold, polynomial, bounded]", {"delta": 1, "motion": "spline"}),
             ("with max_accel=A or max_accel={\"NAME\": A}", {"delta": 1, "motion": "bounded"}),
             ("max_accel has no effect without motion=\"bounded\"", {"delta": 1, "max_accel": 2.0}),
-            ("the window from 1.0 s to 0.5 s", {"delta": 1, "from_s": 1, "to_s": 0.5}),
+            ("the window from 1.0 s to 0.5 s", {"delta": 1, "from_s": 1, "until_s": 0.5}),
             ("no vehicle zz", {"delta": 1, "ids": ["zz"]}),
             ("4 vehicles to judge, not 5", {"delta": 1, "expect_vehicles": 5}),
         ):
