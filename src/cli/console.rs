@@ -28,18 +28,12 @@ pub(super) struct Console {
 }
 
 /// Words of verdicts with their colours. Of words with a common beginning the longest comes first.
-const VERDICTS: [(&str, AnsiColor); 19] = [
+const VERDICTS: [(&str, AnsiColor); 13] = [
     ("CERTIFICATE BROKEN", AnsiColor::Red),
     ("CLEAR", AnsiColor::Green),
-    ("DEFECT", AnsiColor::Red),
-    ("DOES NOT PASS", AnsiColor::Red),
     ("INTERRUPTED", AnsiColor::Yellow),
-    ("NOT FIRM", AnsiColor::Yellow),
-    ("NOT PASSED", AnsiColor::Red),
     ("NOT REACHED", AnsiColor::Yellow),
-    ("NOT VALID", AnsiColor::Red),
     ("OFF PLAN", AnsiColor::Red),
-    ("PASS", AnsiColor::Green),
     ("PROVED CLEAR", AnsiColor::Green),
     ("PROVED", AnsiColor::Green),
     ("REACHED", AnsiColor::Green),

@@ -18,7 +18,7 @@ impl Validation {
         let count = |kind: Kind| self.claims().filter(|claim| claim.kind == kind && claim.pass).count();
         let (all, failed) = (self.claims().count(), self.claims().filter(|claim| !claim.pass).count());
         if failed > 0 {
-            return format!("NOT VALID: {failed} of {all} claims are not as expected");
+            return format!("{failed} of {all} claims are not as expected");
         }
         format!(
             "valid: all {all} claims are as expected: {} of ours hold, {} of the paper's hold, {} of the paper's are \
@@ -304,7 +304,7 @@ mod tests {
         {
             let judged = validation(vec![claim("a", Kind::Ours, true), claim("b", kind, false)]);
             assert!(!judged.pass);
-            assert_eq!(judged.headline(), "NOT VALID: 1 of 2 claims are not as expected");
+            assert_eq!(judged.headline(), "1 of 2 claims are not as expected");
             assert!(judged.text().contains(outcome) && judged.markdown().contains(outcome));
             assert!(judged.to_html().contains("b: none"));
         }

@@ -392,7 +392,7 @@ impl Report {
             }
             Status::Clear => {
                 let reasons = || self.verdict.reasons.iter().map(ToString::to_string).collect::<Vec<_>>().join(" ");
-                let alone = || vec![format!("NOT PASSED: {}", reasons().trim_end_matches('.'))];
+                let alone = || vec![format!("NOT REACHED: {}", reasons().trim_end_matches('.'))];
                 let labelled = |(first, rest): (&String, &[String])| [&[capital_label(first)], rest].concat();
                 failures.split_first().map_or_else(alone, labelled)
             }
@@ -696,9 +696,9 @@ impl Verification {
     fn line(&self) -> String {
         let found = match (self.firm, self.pass) {
             (true, true) => "firm: at half the step it passes",
-            (true, false) => "DOES NOT PASS at half the step either (firm)",
-            (false, true) => "NOT FIRM, the outcome depends on the step: at half the step it passes",
-            (false, false) => "NOT FIRM, the outcome depends on the step: at half the step it does not pass",
+            (true, false) => "firm: at half the step it does not pass either",
+            (false, true) => "not firm, the outcome depends on the step: at half the step it passes",
+            (false, false) => "not firm, the outcome depends on the step: at half the step it does not pass",
         };
         let min_m = self.min_m.map_or("-".to_owned(), |min_m| at_least(min_m, 6));
         let reached =

@@ -419,7 +419,7 @@ impl Study for Attack {
         note(
             self.certificates_broken > 0,
             format!(
-                "DEFECT: in {} two vehicles came closer than certified, because of a defect of law, plant or step; \
+                "defect: in {} two vehicles came closer than certified, because of a defect of law, plant or step; \
                  please report it with the command below",
                 flights(self.certificates_broken)
             ),

@@ -109,7 +109,7 @@ fn a_search_without_a_violation_states_that_it_is_no_proof() {
 fn a_broken_certificate_comes_first_in_the_headline() {
     let attack = searched(&["law.kind=displacement"], &start_options(4));
     let says_so = |attack: &Attack| {
-        let noted = attack.notes().iter().any(|note| note.starts_with("DEFECT: in 1 flight two vehicles came closer"));
+        let noted = attack.notes().iter().any(|note| note.starts_with("defect: in 1 flight two vehicles came closer"));
         (attack.headline().starts_with("CERTIFICATE BROKEN, "), noted, attack.is_bad())
     };
     assert_eq!(says_so(&attack), (false, false, false));
