@@ -26,8 +26,8 @@ ignored() { cargo test $rust --lib --bins --tests -- --ignored; }
 # The release build must have the hashes of the debug build.
 bits() { cargo test --release -p tautline-sim --test bits; }
 
-# The H.264 encoder, which is not a default feature. The whole workspace is selected, so that its crates have the features
-# of the phase `crates` and are not compiled again; so it is in all phases below.
+# The H.264 encoder, which is not a default feature. The whole workspace is selected here and below: dependencies keep
+# the features of the phase `crates` and are not compiled again.
 film() { cargo test $rust --features tautline-render/mp4 --lib film; }
 
 # A minute for all fuzz targets, with the same inputs in each run; TAUTLINE_LONG=1 takes an hour, with others.
