@@ -62,6 +62,9 @@ pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, 
         monitor.say(&audit_formats::counts(&answers));
     }
     write_answers(arguments, &answers, is_one, console)?;
+    if let ([Answer { audited: Ok(_), .. }], Some(page), true) = (&answers[..], &arguments.html, arguments.open) {
+        monitor.open_page(page);
+    }
     let (judged, failures): (Vec<_>, Vec<_>) = answers.into_iter().map(|one| one.audited).partition(Result::is_ok);
     let worst = judged.iter().flatten().map(|audit| Exit::good_if(audit.is_good())).max_by_key(|exit| *exit as u8);
     match failures.into_iter().filter_map(Result::err).max_by_key(|failure| Exit::of(failure) as u8) {
@@ -151,6 +154,9 @@ pub(super) struct AuditArguments {
     /// Write a report page with figures.
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+    /// Open the page in a browser.
+    #[arg(long, requires = "html")]
+    open: bool,
     /// Write the figures of the page into the folder NAME-figures beside NAME.html, in these formats; PDF and PNG have
     /// the width of a paper's column, 85 mm.
     #[arg(long, value_name = "FORMAT,...", value_delimiter = ',', requires = "html")]
@@ -294,6 +300,7 @@ mod tests {
         ("junit", &["--delta", "1", "--junit", "@/o.xml"], false),
         ("events", &["--delta", "1", "--events", "@/o.csv"], false),
         ("html", &["--delta", "1", "--html", "@/o.html"], false),
+        ("open", &["--delta", "1", "--html", "@/o.html", "--open"], false),
         ("figures", &["--delta", "1", "--html", "@/o.html", "--figures", "svg"], false),
         ("proof", &["--delta", "1", "--proof", "@/o.json"], false),
         ("summary", &["--delta", "1", "--summary", "@/o.md"], false),

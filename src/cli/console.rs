@@ -1,6 +1,7 @@
 //! Output of the program: text, data, progress, failures and exit codes.
 
 use std::io::{self, IsTerminal as _, Write as _};
+use std::path::Path;
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -197,6 +198,13 @@ impl Terminal {
         ctrlc::set_handler(handler)
             .map_err(|error| Failure::machine("machine/signals", format!("cannot listen to Ctrl-C: {error}")))?;
         Ok(terminal)
+    }
+
+    /// Opens a page in the browser; says so if it cannot.
+    pub(super) fn open_page(&self, page: &Path) {
+        if let Err(error) = open::that_detached(page) {
+            self.warn(&format!("note: cannot open {} in a browser: {error}", page.display()));
+        }
     }
 
     fn bar(&self) -> ProgressBar {

@@ -157,8 +157,8 @@ fn fly(arguments: &RunArguments, force: bool, opens: bool, terminal: &Terminal) 
     };
     let pictures = pictures(&arguments.adapter, !arguments.no_snapshots);
     let left = run_into(&request, &*pictures, terminal)?;
-    if opens && let Err(error) = open::that_detached(&left.page) {
-        terminal.warn(&format!("note: cannot open the report in a browser: {error}"));
+    if opens {
+        terminal.open_page(&left.page);
     }
     arguments.json.write(&left.report, terminal.console())?;
     Ok(Exit::good_if(left.report.verdict.pass))

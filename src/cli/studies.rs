@@ -35,6 +35,9 @@ pub(super) struct StudyArguments {
     /// Write a page with tables and figures.
     #[arg(long, value_name = "FILE")]
     html: Option<PathBuf>,
+    /// Open the page in a browser.
+    #[arg(long, requires = "html")]
+    open: bool,
     /// Overwrite existing files, and a folder with a finished run.
     #[arg(long)]
     force: bool,
@@ -63,6 +66,9 @@ impl StudyArguments {
         let threads = self.threads.map(usize::from);
         let request = StudyRequest { scenario: self.what.request()?, options, files, threads };
         let study = answer(&request, &*pictures(&self.adapter, true), &monitor)?;
+        if let (true, Some(page)) = (self.open && study.is_some(), &self.html) {
+            monitor.open_page(page);
+        }
         Ok(Exit::good_if(study.is_some_and(|study| study.is_good())))
     }
 }

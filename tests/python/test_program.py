@@ -58,7 +58,7 @@ class Command(Case):
         options = set(re.findall(r"^ +(?:-., )?--([a-z-]+)", tautline("audit", "--help").stdout, re.MULTILINE))
         self.assertIn("max-gap", options)
         outputs = {"color", "json", "quiet", "junit", "events", "html", "figures", "summary", "annotations", "proof"}
-        outputs |= {"allow-undecided", "no-config", "help"}
+        outputs |= {"allow-undecided", "no-config", "help", "open"}
         taken = {*inspect.signature(tl.audit).parameters, *inspect.signature(_arguments.read_options).parameters}
         taken |= {"from", "until", "input-format"} if {"from_s", "until_s", "format"} <= taken else set()
         missing = {name for name in options - outputs - taken if name.replace("-", "_") not in taken}
