@@ -37,7 +37,6 @@ pub enum StoredAudit {
 ///
 /// A file that was not closed yields all entries of its complete chunks. Damage yields an error, after which the
 /// iterator ends.
-/// iterator ends.
 pub struct McapRecording {
     topics: TopicReader,
     contents: Contents,

@@ -1,6 +1,4 @@
-//! Converts recordings to axes x east, y north and z up.
-//!
-//! The directions of the axes come from the user or from column names:
+//! Directions of axes by column names, and their conversion to x east, y north and z up.
 //!
 //! | columns | frame | vehicle |
 //! | --- | --- | --- |
@@ -13,28 +11,10 @@
 use std::collections::BTreeSet;
 
 use super::axes::Axes;
-use super::error::{ContentKind, Fault, ReadError, quoted, refuse};
+use super::error::{ContentKind, Fault, quoted, refuse};
 use super::heading;
 use super::options::{ColumnNames, ReadOptions};
-use super::order::Recording;
 use tautline_core::option::{AXES, COLUMN, SCALE};
-use tautline_core::track::{Item, Metadata, Tracks};
-
-/// Applies the mapping of the user to a recording.
-pub(super) fn turned(recording: Recording, options: &ReadOptions) -> Result<Recording, ReadError> {
-    if options.turn().is_identity() {
-        return Ok(recording);
-    }
-    if recording.is_planar() && !options.turn().keeps_plane() {
-        let problem = format!("{AXES} maps its third axis to x or y, but it has none");
-        let column = COLUMN.set("z=NAME");
-        let remedy = format!("name the column of the third axis with {column}, or keep z in {AXES}");
-        return refuse(ContentKind::ContradictsOption, problem, remedy);
-    }
-    let mut metadata = recording.metadata().clone();
-    metadata.notes.push(options.turn().note());
-    Ok(Box::new(MappedRecording { recording, axes: options.turn(), metadata }))
-}
 
 /// Refuses a mapping of axes by the user if the directions are known; `what` names their source.
 pub(super) fn refuse_known(options: &ReadOptions, what: &str) -> Result<(), Fault> {
@@ -58,49 +38,6 @@ pub(super) fn refuse_turned_height(options: &ReadOptions, column: &str) -> Resul
     let named = COLUMN.set(format!("z={column}"));
     let remedy = format!("keep z in {AXES} and {SCALE}, or take the numbers as z with {named}");
     refuse(ContentKind::ContradictsOption, problem, remedy)
-}
-
-struct MappedRecording {
-    recording: Recording,
-    axes: Axes,
-    metadata: Metadata,
-}
-
-impl Tracks for MappedRecording {
-    type Error = ReadError;
-
-    fn vehicles(&self) -> &[String] {
-        self.recording.vehicles()
-    }
-
-    fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
-        let before = items.len();
-        let more = self.recording.read(items)?;
-        for item in &mut items[before..] {
-            match item {
-                Item::Sample(sample) => {
-                    if sample.radius_m.is_some() && !self.axes.keeps_lengths() {
-                        let problem = format!("{SCALE} has different factors for its axes, but vehicles have a radius");
-                        let remedy = format!("give one factor in {SCALE}");
-                        return refuse(ContentKind::ContradictsOption, problem, remedy);
-                    }
-                    sample.position_m = self.axes.turn(sample.position_m);
-                    sample.velocity_m_s = sample.velocity_m_s.map(|velocity| self.axes.turn(velocity));
-                }
-                Item::Piece(piece) => {
-                    piece.coefficients.iter_mut().for_each(|coefficient| *coefficient = self.axes.turn(*coefficient));
-                }
-            }
-        }
-        if !more {
-            self.metadata.notes = [self.recording.notes(), &[self.axes.note()]].concat();
-        }
-        Ok(more)
-    }
-
-    fn metadata(&self) -> &Metadata {
-        &self.metadata
-    }
 }
 
 /// Remedy for positions with a separate origin per vehicle.

@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::option::{COLUMN, ONE_VEHICLE, SCALE};
 
-use super::agreement::{Compared, SecondPosition};
+use super::agreement::Compared;
 use super::clock::SubunitColumn;
 use super::convention::Convention;
 use super::error::{ContentKind, Fault, list, quoted, refuse};
@@ -23,6 +23,9 @@ use super::{aviation, clock, convention, heading, identity};
 
 /// Names of places that are not vehicles.
 const PLACES: [&str; 7] = ["home", "origin", "base", "datum", "ref", "reference", "launch"];
+
+/// Names before the coordinates in messages of ROS.
+const POSES: [&str; 4] = ["pose", "pose.pose", "/pose", "/pose/pose"];
 
 /// Roles of the columns of a table.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -58,10 +61,8 @@ pub(super) struct Layout {
     pub(super) counts_from_boot: bool,
     /// Column of the vertical rate of a long table, and the size of its unit \[m/s\] if its name has one.
     pub(super) rate: Option<(usize, Option<f64>)>,
-    /// Second position of each vehicle, on the Earth, beside the one that is read. Empty if no vehicle has one.
-    pub(super) second: Vec<Option<SecondPosition>>,
-    /// Whether the names of the position columns contain the names of vehicles.
-    pub(super) has_named_positions: bool,
+    /// Positions of each vehicle in metres and on the Earth, if it has both. Empty if no vehicle has.
+    pub(super) compared: Vec<Option<Compared>>,
     /// Whether a vehicle has no height column: then no height is used.
     pub(super) is_planar: bool,
     /// Facts that follow from the header and the options.
@@ -96,6 +97,12 @@ impl Layout {
         let others = (0..header.len()).filter(|&column| !is_taken(column));
         let names = &convention.header;
         let mut headings: Vec<_> = others.filter_map(|column| Some((column, Heading::of(&names[column])?))).collect();
+        // Messages of ROS in a table that names the vehicles: `pose.position.x`.
+        let is_plain = |(_, heading): &(usize, Heading<'_>)| heading.vehicle.is_empty() && heading.role == POSITION;
+        if id.is_some() && !headings.iter().any(is_plain) {
+            let of_poses = headings.iter_mut().filter(|(_, heading)| POSES.contains(&heading.vehicle));
+            of_poses.for_each(|(_, heading)| heading.vehicle = "");
+        }
         let on_earth = columns.are_on_earth(&headings)?;
         columns.place = if on_earth { EARTH } else { POSITION };
         let places = if on_earth || convention.reference.is_some() { Vec::new() } else { headings.clone() };
@@ -140,7 +147,6 @@ impl Layout {
             bodies,
             on_earth,
             is_planar,
-            has_named_positions: !one && id.is_none(),
             counts_from_boot: convention.counts_from_boot || heading::is_boot_time(&header[time]),
             ..Self::default()
         };
@@ -161,7 +167,7 @@ impl Layout {
         layout.notes.extend(columns.heights_used(&layout, options)?);
         layout.facts = columns.facts(&layout, options);
         layout.convention = convention.clone();
-        layout.compare(header, options, &vehicles, &places)?;
+        layout.compare(header, options, &vehicles, (&places, !one && id.is_none()))?;
         layout.check(header, options, one)?;
         if let [first, ..] = layout.slots.ids[..] {
             layout
@@ -190,16 +196,12 @@ impl Layout {
         if !convention.has_directions() || convention.reference.is_some() {
             return Ok(());
         }
-        let of_heights: BTreeSet<_> = heights
-            .among(self.bodies.iter().filter_map(|body| body.position[2]))
-            .iter()
-            .map(|height| height.0)
-            .collect();
+        let of_heights = heights.among(self.bodies.iter().filter_map(|body| body.position[2]));
         let columns_of =
             |body: &VehicleColumns| body.position.into_iter().chain(body.velocity.unwrap_or_default()).flatten();
         let positions = self.bodies.iter().flat_map(columns_of);
         let (directed, others): (Vec<_>, Vec<_>) = positions
-            .filter(|column| !of_heights.contains(column))
+            .filter(|column| !of_heights.contains_key(column))
             .partition(|column| convention.directed.contains(column));
         match (&directed[..], &others[..]) {
             (&[directed, ..], &[other, ..]) => {
@@ -244,9 +246,8 @@ impl Layout {
         // Pandas renames a second column `x` to `x.1`.
         let repeats = |&column: &usize| {
             let (stem, number) = header[column].rsplit_once('.')?;
-            let is_number = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
             let is_read = |read: usize| header[read] == stem && Heading::of(&convention.header[read]).is_some();
-            (is_number && used.iter().any(|&read| is_read(read))).then_some((column, stem))
+            (heading::is_number(number) && used.iter().any(|&read| is_read(read))).then_some((column, stem))
         };
         if let Some((column, stem)) = unused.clone().find_map(|column| repeats(&column)) {
             let problem = format!("column {} repeats column {}", quoted(&header[column]), quoted(stem));
@@ -281,12 +282,13 @@ impl Layout {
     }
 
     /// Finds columns with which the positions are compared: a vertical rate, and a second position on the Earth.
+    /// `is_wide`: the names of the position columns contain the names of vehicles.
     fn compare(
         &mut self,
         header: &[String],
         options: &ReadOptions,
         vehicles: &[String],
-        places: &[(usize, Heading<'_>)],
+        (places, is_wide): (&[(usize, Heading<'_>)], bool),
     ) -> Result<(), Fault> {
         let has_height = |body: &VehicleColumns| body.position[2].is_some();
         self.rate = aviation::rate_column(header).filter(|_| matches!(&self.bodies[..], [body] if has_height(body)));
@@ -294,53 +296,50 @@ impl Layout {
         if self.on_earth || is_chosen {
             return Ok(());
         }
-        let mut notes = Vec::new();
-        let mut place_of = |vehicle: &String, body: &VehicleColumns| {
-            let found = |is_role: &dyn Fn(Role) -> bool| {
-                let is_meant = |(_, found): &&(usize, Heading<'_>)| found.vehicle == vehicle && is_role(found.role);
-                places.iter().filter(is_meant).copied().collect::<Vec<_>>()
-            };
+        let mut found: BTreeMap<_, Vec<(usize, Option<&str>)>> = BTreeMap::new();
+        for (column, Heading { vehicle, role, unit, .. }) in places.iter().filter(|(_, found)| found.role >= EARTH) {
+            found.entry((*vehicle, *role)).or_default().push((*column, *unit));
+        }
+        let columns_of = |vehicle, role| found.get(&(vehicle, role)).map_or(&[][..], Vec::as_slice);
+        let has_directions = self.convention.has_directions();
+        let (mut notes, mut compared) = (Vec::new(), Vec::new());
+        for (vehicle, body) in vehicles.iter().zip(&self.bodies) {
             // Of several pairs of degrees, the first is compared.
-            let [lat, lon] = [0, 1].map(|axis| found(&|role| role == EARTH + axis).first().copied());
-            let ((lat, of_lat), (lon, of_lon)) = (lat?, lon?);
-            // Several heights may be measured from different surfaces.
-            let height = match found(&|role| matches!(role, HEIGHT | DEPTH))[..] {
-                [height] if body.position[2].is_some() => Some(height),
-                _ => None,
+            let [lat, lon] = [0, 1].map(|axis| columns_of(vehicle, EARTH + axis).first());
+            let Some((&(lat, of_lat), &(lon, of_lon))) = lat.zip(lon) else {
+                compared.push(None);
+                continue;
             };
-            let degrees = |found: Heading<'_>| found.unit.map_or(Some(1.0), heading::degrees);
-            let up = height.map_or(1.0, |(_, found)| {
-                let metres = found.unit.and_then(|unit| heading::size_of(unit, false)).unwrap_or(1.0);
-                if found.role == DEPTH { -metres } else { metres }
-            });
-            let columns = [Some(lat), Some(lon), height.map(|(column, _)| column)];
-            let Some((lat_degrees, lon_degrees)) = degrees(of_lat).zip(degrees(of_lon)) else {
+            // Several heights may be measured from different surfaces.
+            let heights = [(HEIGHT, 1.0), (DEPTH, -1.0)].map(|(role, sign)| (columns_of(vehicle, role), sign));
+            let (height, up) = match heights {
+                _ if body.position[2].is_none() => (None, 1.0),
+                [(&[(column, unit)], sign), (&[], _)] | [(&[], _), (&[(column, unit)], sign)] => {
+                    (Some(column), sign * unit.and_then(|unit| heading::size_of(unit, false)).unwrap_or(1.0))
+                }
+                _ => (None, 1.0),
+            };
+            let degrees = |unit: Option<&str>| unit.map_or(Some(1.0), heading::degrees);
+            let degrees = degrees(of_lat).zip(degrees(of_lon));
+            if degrees.is_none() {
                 let [lat, lon] = [lat, lon].map(|column| quoted(&header[column]));
                 notes.push(format!("positions are not compared with {lat} and {lon}: the unit is unknown"));
-                return None;
-            };
-            Some(SecondPosition { columns, units: [lat_degrees, lon_degrees, up] })
-        };
-        let second: Vec<_> = vehicles.iter().zip(&self.bodies).map(|(vehicle, body)| place_of(vehicle, body)).collect();
+            }
+            compared.push(degrees.map(|(lat_degrees, lon_degrees)| Compared {
+                metric: body.position,
+                earth: [Some(lat), Some(lon), height],
+                units: [lat_degrees, lon_degrees, up],
+                has_directions,
+                is_wide,
+            }));
+        }
         self.notes.extend(notes);
-        self.second = if second.iter().any(Option::is_some) { second } else { Vec::new() };
-        if let Some(compared) = self.first_compared().filter(|_| options.is_joined) {
+        self.compared = if compared.iter().any(Option::is_some) { compared } else { Vec::new() };
+        if let Some(compared) = self.compared.iter().flatten().next().filter(|_| options.is_joined) {
             let problem = "it has positions in metres and on the Earth, which are not compared between files";
             return Err(compared.fault(problem.to_owned(), header));
         }
         Ok(())
-    }
-
-    /// Returns the columns of both positions of the first vehicle that has two.
-    pub(super) fn first_compared(&self) -> Option<Compared> {
-        (0..self.second.len()).find_map(|vehicle| self.compared(vehicle))
-    }
-
-    /// Returns the columns of both positions of a vehicle, if it has two.
-    pub(super) fn compared(&self, vehicle: usize) -> Option<Compared> {
-        let (second, body) = self.second.get(vehicle)?.as_ref().zip(self.bodies.get(vehicle))?;
-        let (has_directions, is_wide) = (self.convention.has_directions(), self.has_named_positions);
-        Some(Compared { metric: body.position, earth: second.columns, has_directions, is_wide })
     }
 
     /// Returns the columns that are read or examined, each once, in ascending order.
@@ -352,7 +351,7 @@ impl Layout {
             .chain(self.suspects.iter().copied())
             .chain(self.slots.watched.iter().flatten().copied())
             .chain(self.rate.map(|(column, _)| column))
-            .chain(self.second.iter().flatten().flat_map(|second| second.columns).flatten())
+            .chain(self.compared.iter().flatten().flat_map(|compared| compared.earth).flatten())
             .collect();
         columns.into_iter().collect()
     }
@@ -399,23 +398,13 @@ fn refuse_two_frames(in_other_frame: BTreeSet<&str>, names: &[String], on_earth:
     let is_known = |vehicle: &str| names.iter().any(|name| is_part(name, vehicle) || is_part(vehicle, name));
     let is_place = |vehicle: &str| PLACES.contains(&vehicle.to_lowercase().as_str());
     let lost = in_other_frame.into_iter().find(|vehicle| !is_known(vehicle) && !is_place(vehicle));
-    lost.map_or(Ok(()), |vehicle| Err(two_frames(vehicle, &names[0], on_earth)))
-}
-
-/// Returns the fault of a table that gives `vehicle` in another frame than the vehicle `read`.
-fn two_frames(vehicle: &str, read: &str, on_earth: bool) -> Fault {
+    let Some((vehicle, read)) = lost.zip(names.first()) else { return Ok(()) };
     let kinds = ["metres", "latitude and longitude"];
     let (kind, other) = if on_earth { (kinds[0], kinds[1]) } else { (kinds[1], kinds[0]) };
-    let problem = format!(
-        "the position of vehicle {} is given in {kind}, that of vehicle {} in {other}",
-        quoted(vehicle),
-        quoted(read)
-    );
-    Fault::content(
-        ContentKind::SeveralFrames,
-        problem,
-        "give the positions of all vehicles in one frame, or remove the columns of the other frame",
-    )
+    let [vehicle, read] = [vehicle, read].map(quoted);
+    let problem = format!("the position of vehicle {vehicle} is given in {kind}, that of vehicle {read} in {other}");
+    let remedy = "give the positions of all vehicles in one frame, or remove the columns of the other frame";
+    refuse(ContentKind::SeveralFrames, problem, remedy)
 }
 
 /// Returns the vehicle column and other possible ones; a column given by the user has no alternatives.
@@ -469,16 +458,13 @@ pub(super) fn missing(header: &[String], role: Role, suffix: &str) -> Fault {
     let problem = format!("no column gives {}{suffix}; its columns are {}", WORDS[role], list(header, 12));
     let column = COLUMN.set(format!("{}=NAME", ColumnNames::ROLES[role]));
     let remedy = format!("name the column with {column}, or rename it");
-    Fault::content(kind_of_missing(role), problem, remedy)
-}
-
-fn kind_of_missing(role: Role) -> ContentKind {
-    match role {
+    let kind = match role {
         TIME => ContentKind::NoTimeColumn,
         ID => ContentKind::NoVehicleColumn,
         _ if is_velocity(role) || role == RADIUS => ContentKind::MissingColumn,
         _ => ContentKind::NoPositionColumn,
-    }
+    };
+    Fault::content(kind, problem, remedy)
 }
 
 /// Columns found so far, by vehicle name and role; the name is empty for columns of all vehicles.
@@ -539,7 +525,7 @@ impl<'a> Columns<'a> {
     /// If a height without a unit is beside columns of aircraft, whose heights are usually in feet.
     pub(super) fn heights_used(&self, layout: &Layout, options: &ReadOptions) -> Result<Option<String>, Fault> {
         let used = self.heights_of(layout);
-        let Some(&(first, is_turned)) = used.first() else { return Ok(None) };
+        let Some((&first, &is_turned)) = used.first_key_value() else { return Ok(None) };
         let aircraft = aviation::column_of_aircraft(self.header, layout.id, first);
         if let Some(other) = aircraft.filter(|_| !self.units.contains_key(&first) && options.scale.is_none()) {
             let [height, other] = [&self.header[first], other].map(|name| quoted(name));
@@ -556,7 +542,7 @@ impl<'a> Columns<'a> {
         if self.place != EARTH {
             convention::refuse_turned_height(options, &self.header[first])?;
         }
-        let names: Vec<_> = used.iter().map(|(column, _)| self.header[*column].clone()).collect();
+        let names: Vec<_> = used.keys().map(|column| &self.header[*column]).collect();
         let turned = if is_turned { ", with opposite sign" } else { "" };
         let scale = options.metres();
         let unit = match self.units.get(&first) {
@@ -572,7 +558,7 @@ impl<'a> Columns<'a> {
     }
 
     /// Returns the columns that are read as heights by their names, and whether the sign is inverted.
-    fn heights_of(&self, layout: &Layout) -> Vec<(usize, bool)> {
+    fn heights_of(&self, layout: &Layout) -> BTreeMap<usize, bool> {
         self.heights.among(layout.bodies.iter().filter_map(|body| body.position[2]))
     }
 
@@ -591,7 +577,7 @@ impl<'a> Columns<'a> {
         if !layout.on_earth {
             facts.push(unit(FactKind::LengthUnit, lengths.clone().find_map(unit_of)));
         }
-        let height = self.heights_of(layout).first().map(|(column, _)| *column);
+        let height = self.heights_of(layout).first_key_value().map(|(column, _)| *column);
         let third = layout.bodies.first().and_then(|body| body.position[2]);
         if let Some(column) = height.or(third.filter(|_| layout.on_earth)) {
             let is_convention = aviation::is_state_vectors(self.header) && options.scale.is_none();

@@ -5,7 +5,7 @@ use nalgebra::Vector3;
 use super::cells::{Cells, number, vector};
 use super::convention;
 use super::convention::GLOBAL;
-use super::earth::{Geodetic, LocalFrame, is_no_fix};
+use super::earth::{EarthFrame, Geodetic, is_no_fix};
 use super::error::{ContentKind, Fault, ReadError, refuse};
 use super::layout::Layout;
 use super::options::ReadOptions;
@@ -13,11 +13,11 @@ use super::order::Row;
 use tautline_core::option::ORIGIN;
 
 /// Returns the frame of a table with places on the Earth: of the user's origin, or of the first place of the table.
-pub(super) fn origin<C: Cells>(
-    cells: &mut C,
+pub(super) fn origin(
+    cells: &mut impl Cells,
     layout: &Layout,
     options: &ReadOptions,
-) -> Result<Option<LocalFrame>, ReadError> {
+) -> Result<Option<EarthFrame>, ReadError> {
     let reference = layout.convention.reference;
     if !layout.on_earth && reference.is_none() {
         let needless = Fault::content(
@@ -35,9 +35,9 @@ pub(super) fn origin<C: Cells>(
             Some(columns) => measured_from(cells, columns),
             None => fix(cells, layout, &mut unfixed),
         };
-        let at_row = |fault: Fault| fault.at(C::place(cells.row()));
+        let at_row = |fault| cells.fault(fault);
         if let Some(place) = place.map_err(at_row)? {
-            return Ok(Some(LocalFrame::first(place, options).map_err(at_row)?));
+            return Ok(Some(EarthFrame::first(place, options).map_err(at_row)?));
         }
     }
     if reference.is_some() {
@@ -84,8 +84,8 @@ pub(super) fn convert_to_local(
     cells: &impl Cells,
     row: &mut Row,
     (columns, valid): ([usize; 3], &[usize]),
-    local: Option<LocalFrame>,
-    row_frame: &mut Option<LocalFrame>,
+    local: Option<EarthFrame>,
+    row_frame: &mut Option<EarthFrame>,
 ) -> Result<bool, Fault> {
     for &column in valid {
         if matches!(cells.text(column)?.trim(), "0" | "0.0" | "false" | "False") {
@@ -95,7 +95,7 @@ pub(super) fn convert_to_local(
     let (Some(place), Some(local)) = (measured_from(cells, columns)?, local) else { return Ok(false) };
     let row_frame = match row_frame.filter(|row_frame| row_frame.is_at(place)) {
         Some(row_frame) => row_frame,
-        None => *row_frame.insert(LocalFrame::at(place)?),
+        None => *row_frame.insert(EarthFrame::at(place)?),
     };
     row.position = local.position_from(&row_frame, row.position);
     row.velocity = row.velocity.map(|velocity| local.direction_from(&row_frame, velocity));

@@ -14,26 +14,16 @@
 //! If the shape is ambiguous (3 x 3 x 3, or T x 3 x 2), neither `--layout` nor `axes` decides, the archive is refused.
 //! Arrays in the usual order are streamed; others are read into memory.
 
-use std::collections::BTreeSet;
-
 use nalgebra::Vector3;
 
 use super::clock::Stamp;
 use super::error::{ContentKind, Fault, Place, ReadError, one_of, refuse};
-use super::format::Format;
 use super::identity::Names;
 use super::npy::Array;
 use super::options::{ArrayAxis, ArrayLayout, ReadOptions};
 use super::order::{BATCH, Ordered, PLANAR, Recording, RecordingInfo, Row, Rows};
-use super::reader::Reader;
 use super::source::{Archive, Source};
 use super::time_unit::TimeUnit;
-
-pub(super) const READER: Reader = Reader {
-    format: Format::NPZ,
-    sniff: |head| head.begins_with_any(Format::NPZ.magic) && memchr::memmem::find(head.bytes, b".npy").is_some(),
-    open: |source, options| open(&source.clone().seekable()?, options),
-};
 use tautline_core::option::{COLUMN, LAYOUT};
 
 const TIMES: [&str; 4] = ["t", "time", "times", "timestamps"];
@@ -41,6 +31,7 @@ const POSITIONS: [&str; 4] = ["positions", "position", "pos", "xyz"];
 
 /// Opens an archive.
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+    let source = &source.clone().seekable()?;
     let mut arrays = Arrays { archive: Archive::open(&source.path)? };
     let time = match options.columns.get("t") {
         Some(given) => Some(given.clone()),
@@ -83,12 +74,9 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let names = arrays.optional("names", |arrays| arrays.names(table.vehicles()))?;
     let epoch_ns = arrays.optional("epoch_ns", |arrays| Ok(arrays.array("epoch_ns")?.next_stamp()?))?;
 
-    let names = names.map(Names::from_list).transpose()?.unwrap_or_default();
-    let mut notes = Vec::new();
-    if table.axes() == 2 {
-        notes.push(format!("positions have two axes and no height: {PLANAR}"));
-    }
     let is_planar = table.axes() == 2;
+    let notes = is_planar.then(|| format!("positions have two axes and no height: {PLANAR}")).into_iter().collect();
+    let names = names.unwrap_or_default();
     let rows = Instants { name: positions, times, at: 0, table, velocities, seen, radii, names };
     let none = Fault::content(ContentKind::Empty, "it holds no position", "save at least one instant of one vehicle");
     let mut info = RecordingInfo::new(source, options, unit, notes, none);
@@ -225,18 +213,16 @@ impl Arrays {
     }
 
     /// Returns the names of the vehicles; their number must be `vehicles`.
-    fn names(&mut self, vehicles: usize) -> Result<Vec<String>, ReadError> {
+    fn names(&mut self, vehicles: usize) -> Result<Names, ReadError> {
         let names = self.texts("names")?;
-        let different: BTreeSet<_> = names.iter().collect();
-        let (kind, problem) = match different.len() {
-            _ if names.len() != vehicles => {
-                (ContentKind::ArrayShape, format!("it has {} elements for {vehicles} vehicles", names.len()))
-            }
-            count if count < vehicles => (ContentKind::VehicleTwice, "two vehicles have the same name".to_owned()),
-            _ => return Ok(names),
-        };
+        let count = names.len();
+        let names = Names::from_list(names).map_err(in_array("names"))?;
+        if count == vehicles {
+            return Ok(names);
+        }
+        let problem = format!("it has {count} elements for {vehicles} vehicles");
         let remedy = "save a distinct name for each vehicle, or omit `names`";
-        Err(in_array("names")(Fault::content(kind, problem, remedy)))
+        Err(in_array("names")(Fault::content(ContentKind::ArrayShape, problem, remedy)))
     }
 
     fn texts(&mut self, name: &str) -> Result<Vec<String>, ReadError> {

@@ -11,13 +11,13 @@ use super::aviation::ClimbMonitor;
 use super::axes::Axes;
 use super::cells::{Cells, empty, number, odd_number, vector};
 use super::clock::{Date, Probe, Stamp};
-use super::earth::{LocalFrame, is_no_fix, no_fixes};
-use super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
+use super::earth::{EarthFrame, is_no_fix, no_fixes};
+use super::error::{ContentKind, Fault, Place, ReadError, list, quoted, refuse};
 use super::identity::{AlternativeId, Names, SuspectColumn, SwapMonitor};
 use super::layout::{Layout, VehicleColumns};
 use super::local_origin::{convert_to_local, origin};
 use super::options::ReadOptions;
-use super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
+use super::order::{BATCH, Findings, Ordered, Recording, RecordingInfo, Row, Rows, observe};
 use super::source::Source as File;
 use super::time_unit::TimeUnit;
 
@@ -27,14 +27,13 @@ const MOST_SUSPECTED: usize = 256;
 /// Long or wide table.
 struct Table<C> {
     cells: C,
+    options: ReadOptions,
     layout: Layout,
     names: Names,
     /// Frame that converts latitude, longitude and height to metres.
-    local: Option<LocalFrame>,
+    local: Option<EarthFrame>,
     /// Frame of the last origin, if rows have their own origin.
-    row_frame: Option<LocalFrame>,
-    /// Whether the clock starts with the vehicle and other files are read too.
-    has_own_clock: bool,
+    row_frame: Option<EarthFrame>,
     /// First time, if times are dates.
     dates: Option<Date>,
     /// Alternative vehicle columns.
@@ -47,12 +46,9 @@ struct Table<C> {
     named: usize,
     /// Comparison of heights with a vertical rate.
     climb: Option<ClimbMonitor>,
-    /// Whether the user gives the unit of heights.
-    is_height_unit_given: bool,
     /// Comparison with a second position on the Earth, and the axes of the first one in metres.
     agreement: Option<(FrameAgreement, Axes)>,
-    /// Whether a row that lacks a coordinate has no position, and the number of such rows.
-    skips_incomplete: bool,
+    /// Number of rows omitted because they lack a coordinate.
     incomplete: u64,
     /// Number of time units per second, once known.
     per_second: f64,
@@ -94,11 +90,9 @@ pub(super) fn open<C: Cells + 'static>(
     cells.restart(&layout.columns_to_observe(), true)?;
     // For places on the Earth the scale applies to heights only, and is part of the column factors.
     info.scale = if layout.on_earth { 1.0 } else { info.scale };
-    let counts_from_boot = layout.counts_from_boot;
-    let has_own_clock = options.is_joined && counts_from_boot;
     info.is_unit_in_file = true;
     info.metadata.facts.extend(layout.facts.iter().cloned());
-    info.metadata.facts.push(if counts_from_boot {
+    info.metadata.facts.push(if layout.counts_from_boot {
         Fact::name(FactKind::Clock, Source::Default, "times since the start of each vehicle's computer")
     } else {
         Fact::name(FactKind::Clock, Source::Deduced, "one column")
@@ -106,21 +100,19 @@ pub(super) fn open<C: Cells + 'static>(
     let alternative_ids = layout.alternative_ids.iter().copied().map(AlternativeId::new).collect();
     let watches = layout.slots.watched.iter().cloned().map(SwapMonitor::new).collect();
     let climb = layout.rate.map(ClimbMonitor::new);
-    let agreement =
-        (!layout.second.is_empty()).then(|| (FrameAgreement::default(), options.turn().scaled([options.metres(); 3])));
+    let agreement = (!layout.compared.is_empty())
+        .then(|| (FrameAgreement::default(), options.turn().scaled([options.metres(); 3])));
     let table = Table {
         climb,
-        is_height_unit_given: options.scale.is_some(),
         agreement,
-        skips_incomplete: options.skip_incomplete,
         incomplete: 0,
         per_second: 1.0,
         cells,
+        options: options.clone(),
         layout,
         names,
         local,
         row_frame: None,
-        has_own_clock,
         dates,
         alternative_ids,
         suspects: Vec::new(),
@@ -147,10 +139,6 @@ fn dates<C: Cells>(cells: &mut C, layout: &Layout, options: &ReadOptions) -> Res
 }
 
 impl<C: Cells> Table<C> {
-    fn at_row(&self, fault: Fault) -> ReadError {
-        fault.at(C::place(self.cells.row()))
-    }
-
     #[inline]
     fn stamp(&mut self) -> Result<Stamp, Fault> {
         let Some(column) = self.layout.time else {
@@ -227,15 +215,11 @@ impl<C: Cells> Table<C> {
         let first = self.layout.id.map_or(Ok(0), |id| self.vehicle(id))?;
         for place in 0..self.layout.bodies.len() {
             let body = &self.layout.bodies[place];
-            let found = row(&self.cells, stamp, first + place, body, &self.layout.metres, self.skips_incomplete)?;
-            let mut row = match found {
-                Found::Row(row) => row,
-                Found::Incomplete => {
-                    self.incomplete += 1;
-                    continue;
-                }
-                Found::Unseen => continue,
-            };
+            if self.options.skip_incomplete && is_incomplete(&self.cells, body) {
+                self.incomplete += 1;
+                continue;
+            }
+            let Some(mut row) = row(&self.cells, stamp, first + place, body, &self.layout.metres)? else { continue };
             if let Some(&id) = self.layout.slots.ids.get(place) {
                 row.vehicle = self.vehicle(id)?;
                 self.named += 1;
@@ -280,10 +264,10 @@ impl<C: Cells> Table<C> {
             climb.observe(row.vehicle, row.stamp, row.position.z, rate);
         }
         let Some((agreement, axes)) = &mut self.agreement else { return Ok(()) };
-        let Some(Some(second)) = self.layout.second.get(place) else { return Ok(()) };
+        let Some(Some(compared)) = self.layout.compared.get(place) else { return Ok(()) };
         let mut there = Vector3::zeros();
         let mut has_heights = false;
-        for (axis, (column, unit)) in second.columns.iter().zip(second.units).enumerate() {
+        for (axis, (column, unit)) in compared.earth.iter().zip(compared.units).enumerate() {
             let Some(column) = *column else { continue };
             match self.cells.number(column).filter(|number| number.is_finite()) {
                 Some(number) => (there[axis], has_heights) = (number * unit, axis == 2),
@@ -295,12 +279,9 @@ impl<C: Cells> Table<C> {
         if is_no_fix(&there) {
             return Ok(());
         }
-        let Err(found) = agreement.observe(row.vehicle, axes.turn(row.position), there, has_heights) else {
-            return Ok(());
-        };
-        self.layout.compared(place).map_or(Ok(()), |compared| {
+        agreement.observe(row.vehicle, axes.turn(row.position), there, has_heights).map_err(|found| {
             let name = self.names.all().get(row.vehicle).map_or("", String::as_str);
-            Err(compared.fault_of_row(self.cells.header(), name, &found))
+            compared.fault_of_row(self.cells.header(), name, &found)
         })
     }
 
@@ -321,7 +302,7 @@ impl<C: Cells> Table<C> {
             let value = self.cells.text(suspect.column)?;
             suspect.observe(value.trim(), row.stamp.approximately(), row.position);
         }
-        suspects.retain(|suspect| !suspect.is_cleared());
+        suspects.retain(|suspect| !suspect.cleared);
         Ok(())
     }
 
@@ -377,17 +358,18 @@ impl<C: Cells> Table<C> {
     }
 }
 
-/// Position of a vehicle in a row.
-enum Found {
-    Row(Row),
-    /// The vehicle was not seen: all cells are empty.
-    Unseen,
-    /// Some cells are empty.
-    Incomplete,
+/// Returns whether some cells of a position or velocity are empty, and others are not.
+fn is_incomplete(cells: &impl Cells, body: &VehicleColumns) -> bool {
+    let is_empty = |column: usize| cells.text(column).is_ok_and(|text| text.trim().is_empty());
+    let are_mixed = |columns: [Option<usize>; 3]| {
+        let mut empty = columns.into_iter().flatten().map(is_empty);
+        let first = empty.next();
+        empty.any(|other| Some(other) != first)
+    };
+    are_mixed(body.position) || body.velocity.is_some_and(are_mixed)
 }
 
-/// Returns the position of a vehicle in a row. A position or velocity with some empty cells is an error, unless
-/// `skips_incomplete` is set.
+/// Returns the position of a vehicle in a row; `None` if the vehicle was not seen, and all its cells are empty.
 #[inline]
 fn row(
     cells: &impl Cells,
@@ -395,17 +377,8 @@ fn row(
     vehicle: usize,
     body: &VehicleColumns,
     metres: &[f64],
-    skips_incomplete: bool,
-) -> Result<Found, Fault> {
-    let is_incomplete = |columns: &[Option<usize>; 3]| {
-        let is_empty = |column: &usize| cells.text(*column).is_ok_and(|text| text.trim().is_empty());
-        let empty = columns.iter().flatten().filter(|column| is_empty(column)).count();
-        empty > 0 && empty < columns.iter().flatten().count()
-    };
-    if skips_incomplete && (is_incomplete(&body.position) || body.velocity.as_ref().is_some_and(is_incomplete)) {
-        return Ok(Found::Incomplete);
-    }
-    let Some(position) = vector(cells, &body.position, metres)? else { return Ok(Found::Unseen) };
+) -> Result<Option<Row>, Fault> {
+    let Some(position) = vector(cells, &body.position, metres)? else { return Ok(None) };
     let velocity = body.velocity.as_ref().map(|columns| vector(cells, columns, metres)).transpose()?.flatten();
     let radius = match body.radius {
         Some(column) => number(cells, column)?.map(|radius| radius * metres[column]),
@@ -415,7 +388,7 @@ fn row(
         let problem = format!("column `{}` holds {radius}, a negative radius", cells.header()[column]);
         return refuse(ContentKind::Radius, problem, "write 0 or a positive number");
     }
-    Ok(Found::Row(Row { stamp, place: cells.row(), vehicle, position, velocity, radius }))
+    Ok(Some(Row { stamp, place: cells.row(), vehicle, position, velocity, radius }))
 }
 
 impl<C: Cells> Rows for Table<C> {
@@ -425,7 +398,7 @@ impl<C: Cells> Rows for Table<C> {
             if !self.cells.advance()? {
                 return self.several_vehicles_fault().map_or(Ok(rows.len() > before), |fault| Err(fault.into()));
             }
-            self.append(rows).map_err(|fault| self.at_row(fault))?;
+            self.append(rows).map_err(|fault| self.cells.fault(fault))?;
         }
         Ok(rows.len() > before)
     }
@@ -448,36 +421,31 @@ impl<C: Cells> Rows for Table<C> {
         self.names.settle();
     }
 
-    fn late_notes(&self) -> Vec<String> {
-        const LISTED: usize = 12;
-        let names = self.no_fixes.keys().filter_map(|&vehicle| self.names.all().get(vehicle));
-        let mut listed: Vec<_> = names.take(LISTED).map(|name| quoted(name)).collect();
-        listed.extend((self.no_fixes.len() > LISTED).then(|| "...".to_owned()));
-        let vehicles = format!(" of {}", listed.join(", "));
-        let mut notes: Vec<_> = no_fixes(self.no_fixes.values().sum(), &vehicles).into_iter().collect();
+    /// Refuses heights or positions that contradict other columns of the table.
+    fn late_findings(&self) -> Result<Findings, Fault> {
+        let (mut notes, mut facts) = Findings::default();
+        let vehicles = self.no_fixes.keys().filter_map(|&vehicle| self.names.all().get(vehicle));
+        let vehicles = format!(" of {}", list(&vehicles.collect::<Vec<_>>(), 12));
+        notes.extend(no_fixes(self.no_fixes.values().sum(), &vehicles));
         if self.incomplete > 0 {
             notes.push(format!("positions omitted because one of their coordinates is empty: {}", self.incomplete));
+            facts.push(Fact::number(FactKind::Rows, Source::Declared, self.incomplete as f64, "incomplete"));
         }
-        if let Some(fault) = self.contradicting_rate().filter(|_| self.is_height_unit_given) {
-            notes.push(format!("the given unit of heights is used, but {fault}"));
+        match self.contradicting_rate() {
+            Some(fault) if self.options.scale.is_some() => {
+                notes.push(format!("the given unit of heights is used, but {fault}"));
+            }
+            Some(fault) => return Err(fault),
+            None => {}
         }
-        notes.extend(self.agreement.iter().flat_map(|(agreement, _)| agreement.notes(self.names.all())));
-        notes
-    }
-
-    fn late_facts(&self) -> Vec<Fact> {
-        let incomplete = Fact::number(FactKind::Rows, Source::Declared, self.incomplete as f64, "incomplete");
-        let agreement = self.agreement.as_ref().map(|(agreement, _)| agreement.fact());
-        (self.incomplete > 0).then_some(incomplete).into_iter().chain(agreement).collect()
-    }
-
-    /// Returns the fault of heights or positions that contradict other columns of the table.
-    fn late_fault(&self) -> Option<Fault> {
-        let of_heights = self.contradicting_rate().filter(|_| !self.is_height_unit_given);
-        of_heights.or_else(|| {
-            let (agreement, _) = self.agreement.as_ref()?;
-            agreement.fault(self.names.all(), self.cells.header(), &self.layout.first_compared()?)
-        })
+        if let Some((agreement, _)) = &self.agreement {
+            let compared = self.layout.compared.iter().flatten().next();
+            let fault = compared.and_then(|compared| agreement.fault(self.names.all(), self.cells.header(), compared));
+            fault.map_or(Ok(()), Err)?;
+            notes.extend(agreement.notes(self.names.all()));
+            facts.push(agreement.fact());
+        }
+        Ok((notes, facts))
     }
 
     fn settle_clock(&mut self, per_second: f64) {
@@ -485,18 +453,18 @@ impl<C: Cells> Rows for Table<C> {
     }
 
     fn place(&self, number: u64) -> Place {
-        C::place(number)
+        self.cells.place(number)
     }
 
     fn is_wide(&self) -> bool {
         self.layout.id.is_none()
     }
 
-    fn facts(&self) -> Vec<Fact> {
+    fn findings(&self) -> Findings {
         // After a survey all names of a long table are known.
-        let is_of_several = self.layout.counts_from_boot && self.names.all().len() > 1;
-        let is_assumed = self.has_own_clock || is_of_several;
-        is_assumed.then(|| Fact::new(FactKind::CommonStart, Source::Default)).into_iter().collect()
+        let is_assumed = self.layout.counts_from_boot && (self.options.is_joined || self.names.all().len() > 1);
+        let start = is_assumed.then(|| Fact::new(FactKind::CommonStart, Source::Default));
+        (Vec::new(), start.into_iter().collect())
     }
 
     /// Reads only times and names, which is several times faster.
@@ -506,17 +474,16 @@ impl<C: Cells> Rows for Table<C> {
         columns.extend(&self.layout.alternative_ids);
         columns.sort_unstable();
         self.cells.restart(&columns, false)?;
-        let mut probe: Option<Probe> = None;
+        let mut probe = None;
         let (mut rows, mut first, mut is_one_instant) = (0, None, true);
         while self.cells.advance()? {
             let stamp = self.stamp().and_then(|stamp| self.vehicle(id).map(|_| stamp));
-            let stamp = stamp.map_err(|fault| self.at_row(fault))?;
-            probe.get_or_insert_with(|| Probe::new(stamp)).observe(stamp, self.vehicle);
+            let stamp = stamp.map_err(|fault| self.cells.fault(fault))?;
+            observe(&mut probe, stamp, self.vehicle);
             rows += 1;
             is_one_instant &= *first.get_or_insert(stamp) == stamp;
             for alternative in &mut self.alternative_ids {
-                let value =
-                    self.cells.text(alternative.column).map_err(|fault| fault.at(C::place(self.cells.row())))?;
+                let value = self.cells.text(alternative.column).map_err(|fault| self.cells.fault(fault))?;
                 alternative.observe(self.vehicle, value.trim());
             }
         }

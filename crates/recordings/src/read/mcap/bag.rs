@@ -9,9 +9,9 @@ use std::path::{Component, Path, PathBuf};
 use serde::Deserialize;
 
 use super::super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
+use super::super::head::{BAG, BAG_INDEX, BAG_INDEX_LIMIT_BYTES};
 use super::super::options::ReadOptions;
 use super::super::order::Recording;
-use super::super::reader::{BAG, BAG_INDEX, BAG_INDEX_LIMIT_BYTES};
 use super::super::source::{Source, ZSTD_MAGIC};
 use super::foreign;
 use super::split::SplitFiles;
@@ -74,7 +74,7 @@ fn bytes_of(path: &Path) -> Result<Vec<u8>, Fault> {
 
 fn read(path: &Path) -> Result<Bag, ReadError> {
     let bytes = bytes_of(path)?;
-    let text = std::str::from_utf8(&bytes).map_err(|_| Fault::NotUtf8)?;
+    let text = std::str::from_utf8(&bytes).map_err(|_| Fault::not_utf8())?;
     let metadata: Metadata = serde_saphyr::from_str(text).map_err(|error| {
         let place = error.location().map(|location| Place::Line(location.line()));
         let message = error.to_string();

@@ -9,7 +9,7 @@ use super::super::earth::{is_no_fix, no_fixes};
 use super::super::error::{ContentKind, Fault, Place, ReadError, UNSEEN, quoted, refuse};
 use super::super::identity::Names;
 use super::super::options::{Duplicates, MessageClock, ReadOptions};
-use super::super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
+use super::super::order::{BATCH, Findings, Ordered, Recording, RecordingInfo, Row, Rows};
 use super::super::source::Source;
 use super::super::time_unit::TimeUnit;
 use super::messages::{EARTH, Observation, PoseKind, VehicleKey, is_list, reader_of_topic};
@@ -31,7 +31,7 @@ pub(super) fn open(whole: &Source, mut splits: SplitFiles, options: &ReadOptions
     let mut info = RecordingInfo::new(whole, options, Some(TimeUnit::Nanoseconds), splits.notes.clone(), none);
     info.metadata.earth_origin = plan.local().map(|local| local.measured_from(options.origin));
     // Duplicates of messages indicate overlapping files and are refused by default.
-    info.duplicates = info.duplicates.or(Some(Duplicates::Refuse));
+    info.options.duplicates = options.duplicates.or(Some(Duplicates::Refuse));
     let foreign = ForeignRows { splits, poses: Poses::new(plan), listed: true, shown: Vec::new(), starts: Vec::new() };
     Ok(Box::new(Ordered::open(foreign, info)?))
 }
@@ -99,12 +99,8 @@ impl Rows for ForeignRows {
         }
     }
 
-    fn notes(&self) -> Vec<String> {
-        self.poses.notes()
-    }
-
-    fn facts(&self) -> Vec<Fact> {
-        self.poses.facts()
+    fn findings(&self) -> Findings {
+        (self.poses.notes(), self.poses.facts())
     }
 
     fn place(&self, number: u64) -> Place {

@@ -137,7 +137,7 @@ impl Rows for Exported {
         while rows.len() < before + BATCH {
             match self.topics.next()? {
                 Some(Part::Message(message)) => {
-                    let damaged = |reason| Fault::Damaged(reason).at(Place::Byte(message.offset));
+                    let damaged = |reason| Fault::damaged(reason).at(Place::Byte(message.offset));
                     self.instants.take(&message, rows).map_err(damaged)?;
                 }
                 Some(_) => {}

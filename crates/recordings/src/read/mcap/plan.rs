@@ -7,7 +7,7 @@ use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::option::ORIGIN;
 
 use super::super::convention;
-use super::super::earth::LocalFrame;
+use super::super::earth::EarthFrame;
 use super::super::error::{ContentKind, Fault, ReadError, quoted, refuse};
 use super::super::options::{MessageClock, ReadOptions};
 use super::messages::{EARTH, PoseKind, VehicleKey};
@@ -22,7 +22,7 @@ pub(super) struct ReadPlan {
     /// Frame to which all positions are transformed.
     pub(super) target_frame: Option<String>,
     /// Local frame of places on the Earth, if there are any.
-    pub(super) earth: Option<LocalFrame>,
+    pub(super) earth: Option<EarthFrame>,
     /// Transforms from each frame in use to the requested frame, by namespace and frame; `None` without a
     /// connection.
     chains: BTreeMap<String, BTreeMap<String, Option<Chain>>>,
@@ -56,7 +56,7 @@ impl ReadPlan {
         let origin = options.origin.map(Vector3::from).or(first_fix).filter(|_| first_fix.is_some());
         let mut plan = Self {
             target_frame: options.frame.clone(),
-            earth: origin.map(LocalFrame::at).transpose()?,
+            earth: origin.map(EarthFrame::at).transpose()?,
             chains: BTreeMap::new(),
             bodies: BTreeMap::new(),
             clock: MessageClock::Stamp,
@@ -286,7 +286,7 @@ impl ReadPlan {
     }
 
     /// Returns the local frame of places on the Earth, if these are read.
-    pub(super) fn local(&self) -> Option<LocalFrame> {
+    pub(super) fn local(&self) -> Option<EarthFrame> {
         self.earth.filter(|_| self.target_frame.is_none())
     }
 

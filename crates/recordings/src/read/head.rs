@@ -1,22 +1,11 @@
-//! Type of a reader, and the first bytes by which it recognises a file.
+//! First bytes of a file, by which its format is recognised, and the index of a ROS 2 bag.
 
 use std::fs::File;
 use std::io::Read as _;
 use std::path::Path;
 
 use super::error::{Fault, ReadError};
-use super::format::Format;
-use super::options::ReadOptions;
-use super::order::Recording;
 use super::source::Source;
-
-/// Reader of a format.
-pub(super) struct Reader {
-    pub(super) format: Format,
-    /// Whether a file is of this format, by its first bytes. The first reader that accepts a file reads it.
-    pub(super) sniff: fn(&Head<'_>) -> bool,
-    pub(super) open: fn(&Source, &ReadOptions) -> Result<Recording, ReadError>,
-}
 
 /// First bytes of a file.
 pub(super) struct Head<'a> {
@@ -58,7 +47,7 @@ const HEAD_BYTES: u64 = 64 * 1024;
 pub(super) fn head_of(source: &Source) -> Result<Vec<u8>, ReadError> {
     let mut head = Vec::new();
     source.bytes()?.take(HEAD_BYTES).read_to_end(&mut head)?;
-    if head.is_empty() { Err(Fault::Empty.into()) } else { Ok(head) }
+    if head.is_empty() { Err(Fault::empty().into()) } else { Ok(head) }
 }
 
 /// Name of the archive entry with a Skybrush show.
