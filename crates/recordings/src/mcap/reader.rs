@@ -6,12 +6,11 @@ use std::path::Path;
 use serde::de::DeserializeOwned;
 
 use super::message::{
-    AUDIT, CHANNEL_SCHEMA, ChannelMessage, EventMessage, RunTopic, SummaryMessage, SwarmMessage, fault,
+    AUDIT, CHANNEL_SCHEMA, ChannelMessage, EventMessage, Header, RunAudit, RunTopic, SummaryMessage, SwarmMessage,
+    fault,
 };
 use super::topic::{CDR, DeclaredTopic, Message, Part, Topic, TopicReader, decode};
-use super::{Header, RunAudit};
-use tautline_core::record::MessageHash;
-use tautline_core::record::{Event, OwnedSample, ReadFault, RecordError};
+use tautline_core::record::{Event, MessageHash, OwnedSample, ReadFault, RecordError};
 
 /// Entry of a recording, in the order of the file.
 #[derive(Clone, Debug, PartialEq)]

@@ -165,11 +165,6 @@ pub(super) struct FrameAgreement {
 }
 
 impl FrameAgreement {
-    /// Restarts at the first row.
-    pub(super) fn rewind(&mut self) {
-        *self = Self::default();
-    }
-
     /// Records both positions in a row of a vehicle. `has_heights`: whether both have a height.
     pub(super) fn observe(
         &mut self,

@@ -29,7 +29,7 @@ use super::clock::Stamp;
 use super::error::{ContentKind, Fault, Place, ReadError, UNSEEN, first_few, quoted, refuse};
 use super::heading;
 use super::options::ReadOptions;
-use super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
+use super::order::{Ordered, Recording, RecordingInfo, Row, Rows};
 use super::source::{Lines, Source};
 use super::time_unit::TimeUnit;
 use tautline_core::option::SCALE;
@@ -172,11 +172,8 @@ fn middle(cells: &[&[u8]], markers: &[[usize; 3]]) -> Result<Option<Vector3<f64>
 fn number(cells: &[&[u8]], column: usize) -> Result<Option<f64>, Fault> {
     let Some(cell) = cells.get(column) else {
         let problem = format!("it has {} fields, but field {} belongs to a vehicle", cells.len(), column + 1);
-        return refuse(
-            ContentKind::FieldCount,
-            problem,
-            "every line needs one field per column; the fields of a lost marker are empty",
-        );
+        let remedy = "every line needs one field per column; the fields of a lost marker are empty";
+        return refuse(ContentKind::FieldCount, problem, remedy);
     };
     parse_number(column + 1, str::from_utf8(cell).map_err(|_| Fault::not_utf8())?, UNSEEN)
 }
@@ -184,15 +181,11 @@ fn number(cells: &[&[u8]], column: usize) -> Result<Option<f64>, Fault> {
 impl Rows for Table {
     /// The table ends with the file, or at a blank line.
     fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
-        let before = rows.len();
-        while rows.len() < before + BATCH && !self.ended {
-            self.ended = !self.lines.advance()? || is_blank(self.lines.line());
-            if self.ended {
-                break;
-            }
+        self.ended = self.ended || !self.lines.advance()? || is_blank(self.lines.line());
+        if !self.ended {
             self.append(rows).map_err(|fault| fault.at(self.lines.place()))?;
         }
-        Ok(rows.len() > before)
+        Ok(!self.ended)
     }
 
     fn vehicles(&self) -> &[String] {
@@ -356,11 +349,8 @@ pub(super) fn open_vicon(source: &Source, options: &ReadOptions) -> Result<Recor
     let Some(head) = objects.or_else(|| heads.iter().find(|head| head.section == MARKERS)) else {
         let sections: Vec<_> = heads.iter().map(|head| head.section.as_str()).collect();
         let problem = format!("it has neither objects nor trajectories; its sections are {}", sections.join(", "));
-        return refuse(
-            ContentKind::NoPositions,
-            problem,
-            "export the trajectories of markers, or the objects of Tracker",
-        );
+        let remedy = "export the trajectories of markers, or the objects of Tracker";
+        return refuse(ContentKind::NoPositions, problem, remedy);
     };
     let mut capture = head.capture().map_err(|fault| fault.at(Place::Line(head.first_line - 1)))?;
     let read = |name: &str| capture.vehicles.iter().any(|(vehicle, _)| vehicle == subject(name));
@@ -409,11 +399,8 @@ impl ViconSection {
         let rate = self.rate.parse().ok().filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
         let rate = rate.ok_or_else(|| {
             let problem = format!("the rate of {} must be a positive number, got {}", self.section, quoted(&self.rate));
-            Fault::content(
-                ContentKind::FrameRate,
-                problem,
-                "export again: the second line of a section gives the number of frames per second",
-            )
+            let remedy = "export again: the second line of a section gives the number of frames per second";
+            Fault::content(ContentKind::FrameRate, problem, remedy)
         })?;
         let is_objects = self.axes.iter().any(|axis| axis == "TX");
         let markers = self.markers(if is_objects { ["TX", "TY", "TZ"] } else { ["X", "Y", "Z"] });
@@ -421,20 +408,14 @@ impl ViconSection {
         let parts = markers.len();
         let vehicles = by_subject(markers)?;
         if vehicles.is_empty() {
-            return refuse(
-                ContentKind::NoPositions,
-                "it has no named marker and no object",
-                "export again, with labelled trajectories",
-            );
+            let remedy = "export again, with labelled trajectories";
+            return refuse(ContentKind::NoPositions, "it has no named marker and no object", remedy);
         }
         if is_objects && vehicles.len() < parts {
             let several = vehicles.iter().find(|(_, columns)| columns.len() > 1).map_or("", |(name, _)| name);
             let problem = format!("{} has several segments", quoted(several));
-            return refuse(
-                ContentKind::AmbiguousColumn,
-                problem,
-                "export objects with one segment each, or the trajectories of markers",
-            );
+            let remedy = "export objects with one segment each, or the trajectories of markers";
+            return refuse(ContentKind::AmbiguousColumn, problem, remedy);
         }
         let notes = note_of_markers(&vehicles).into_iter().collect();
         let when = TimeSource::Frames(rate);

@@ -94,11 +94,6 @@ impl<T: AsRef<[u8]>> Cell<T> {
     }
 }
 
-/// Returns the fault of an empty cell.
-pub(super) fn empty(cells: &impl Cells, column: usize) -> Fault {
-    Fault::empty_cell(&cells.header()[column])
-}
-
 /// Returns the finite number in a cell; `None` for an empty cell.
 #[inline]
 pub(super) fn number(cells: &impl Cells, column: usize) -> Result<Option<f64>, Fault> {

@@ -233,7 +233,8 @@ impl Probe {
 #[derive(Clone, Debug)]
 pub(super) struct Timing {
     pub(super) clock: Clock,
-    per_second: f64,
+    /// Number of units per second.
+    pub(super) per_second: f64,
     /// Epoch: a whole number of seconds, in units.
     epoch: i64,
 }
@@ -259,11 +260,6 @@ impl Timing {
         let (epoch, epoch_ns) = epoch.unwrap_or((0, 0));
         let clock = Clock { unit: name, inferred: why.is_some(), other_unit: other.map(TimeUnit::name), epoch_ns };
         (Self { clock, per_second: per_second as f64, epoch }, note)
-    }
-
-    /// Returns the number of units per second.
-    pub(super) fn per_second(&self) -> f64 {
-        self.per_second
     }
 
     /// Returns a clock with `per_second` units per second.

@@ -21,11 +21,8 @@ pub(super) fn refuse_known(options: &ReadOptions, what: &str) -> Result<(), Faul
     if options.turn().is_identity() {
         return Ok(());
     }
-    refuse(
-        ContentKind::ContradictsOption,
-        format!("{what} gives the directions of its axes"),
-        format!("omit {AXES} and the signs of {SCALE}"),
-    )
+    let remedy = format!("omit {AXES} and the signs of {SCALE}");
+    refuse(ContentKind::ContradictsOption, format!("{what} gives the directions of its axes"), remedy)
 }
 
 /// Refuses a mapping that changes the direction of a height column.
@@ -101,14 +98,19 @@ impl Convention {
         self.directed.insert(column);
     }
 
-    /// Renames the columns that consist of this prefix and an axis, such as `vx`.
-    fn turn_all(&mut self, lower: &[String], start: &str, axes: &Axes) {
-        for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
-            let named = lower.iter().enumerate().filter(|(_, name)| name.strip_prefix(start) == Some(letter));
-            for (column, _) in named {
-                self.turn(column, axes, axis, [start, ""]);
+    /// Returns the convention of one vehicle whose columns of an axis behind these prefixes are north, east and down.
+    fn of_ned(&self, lower: &[String], starts: [&str; 2]) -> Self {
+        let (mut turned, ned) = (self.clone(), Axes::from_name("ned").unwrap_or_default());
+        for (column, name) in lower.iter().enumerate() {
+            for start in starts {
+                let axis = ["x", "y", "z"].iter().position(|axis| name.strip_prefix(start) == Some(axis));
+                if let Some(axis) = axis {
+                    turned.turn(column, &ned, axis, [start, ""]);
+                }
             }
         }
+        turned.is_one_vehicle = true;
+        turned
     }
 
     fn of_px4(&self, lower: &[String]) -> Result<Option<Self>, Fault> {
@@ -122,14 +124,10 @@ impl Convention {
             let problem = "its positions are relative to `ref_lat` and `ref_lon`, but there is no column `ref_alt`";
             return refuse(ContentKind::MissingColumn, problem, GLOBAL);
         };
-        let mut px4 = self.clone();
-        for start in ["", "v"] {
-            px4.turn_all(lower, start, &ned());
-        }
+        let mut px4 = self.of_ned(lower, ["", "v"]);
         px4.reference = Some([lat, lon, alt]);
         px4.valid = ["xy_valid", "z_valid"].into_iter().filter_map(index_of).collect();
         px4.counts_from_boot = index_of("timestamp").is_some();
-        px4.is_one_vehicle = true;
         let what = "positions are north, east and down of `ref_lat`, `ref_lon` and `ref_alt` (PX4)";
         let clock = "; times count from the start of the vehicle's computer";
         px4.note = Some(format!("{what}{}", if px4.counts_from_boot { clock } else { "" }));
@@ -138,16 +136,11 @@ impl Convention {
 
     fn of_drone_show(&self, lower: &[String]) -> Option<Self> {
         let is_there = |name: &str| lower.iter().any(|known| known == name);
-        if !["t", "px", "py", "pz", "ledr", "ledg", "ledb"].into_iter().all(is_there) {
-            return None;
-        }
-        let mut show = self.clone();
-        for start in ["p", "v"] {
-            show.turn_all(lower, start, &ned());
-        }
-        show.is_one_vehicle = true;
-        show.note = Some("positions are north, east and down (MAVSDK Drone Show)".to_owned());
-        Some(show)
+        ["t", "px", "py", "pz", "ledr", "ledg", "ledb"].into_iter().all(is_there).then(|| {
+            let mut show = self.of_ned(lower, ["p", "v"]);
+            show.note = Some("positions are north, east and down (MAVSDK Drone Show)".to_owned());
+            show
+        })
     }
 
     fn of_euroc(&self, lower: &[String]) -> Option<Self> {
@@ -208,10 +201,6 @@ impl Convention {
         turned.note = Some("positions are converted to east, north and up, by the names of columns".to_owned());
         Some(turned)
     }
-}
-
-fn ned() -> Axes {
-    Axes::from_name("ned").unwrap_or_default()
 }
 
 /// Splits a name into the part before its unit and the unit as written.

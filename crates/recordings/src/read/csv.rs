@@ -75,15 +75,15 @@ pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Re
     let mut text = TextTable::open(source, format)?;
     if format == Format::TEXT && !text.named && options.dimensions.is_none() {
         match trajnet(source, text.separator)? {
-            TrajnetMatch::Certain => text = TextTable::open(source, Format::TRAJNET)?,
-            TrajnetMatch::Possible => {
+            Some(true) => text = TextTable::open(source, Format::TRAJNET)?,
+            Some(false) => {
                 let problem = "each line may be a frame, a vehicle, x and y, or a time, x, y and z: the first two \
                                numbers are whole";
                 let remedy =
                     format!("use {}, or {} for a time and a position", FORMAT.set("trajnet"), DIMENSIONS.set("3"));
                 return refuse(ContentKind::AmbiguousLayout, problem, remedy);
             }
-            TrajnetMatch::None => {}
+            None => {}
         }
     }
     let header_row = text.row();
@@ -322,41 +322,31 @@ fn next_line(lines: &mut Lines, comments: bool) -> Result<bool, ReadError> {
     }
 }
 
-/// Likeness of a table of plain numbers to the `TrajNet` format.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum TrajnetMatch {
-    /// The numbers cannot be a frame and a vehicle.
-    None,
-    /// The first two numbers of each line are whole, and no two successive lines have the same frame.
-    Possible,
-    /// Some successive lines have the same frame and different vehicles.
-    Certain,
-}
-
-/// Compares a table without a header to `TrajNet`: whole numbers for frame and vehicle, and two more numbers.
-fn trajnet(source: &Source, separator: Separator) -> Result<TrajnetMatch, ReadError> {
+/// Compares a table without a header to `TrajNet`: whole numbers for frame and vehicle, and two more numbers. Returns
+/// `None` for other numbers, else whether it is certain: some successive lines have the same frame.
+fn trajnet(source: &Source, separator: Separator) -> Result<Option<bool>, ReadError> {
     let mut lines = Lines::new(source)?;
     let (mut fields, mut frame, mut vehicles) = (Fields::default(), None, BTreeSet::new());
-    let mut likeness = TrajnetMatch::Possible;
+    let mut is_certain = false;
     while next_line(&mut lines, true)? {
         if fields.split(lines.line(), separator, usize::MAX).is_err() || fields.ends.len() != TRAJNET_COLUMNS.len() {
-            return Ok(TrajnetMatch::None);
+            return Ok(None);
         }
         let whole = |index| {
             let text = str::from_utf8(fields.bytes(lines.line(), index)).ok()?;
             Stamp::parse(text.trim())?.whole()
         };
-        let (Some(of_frame), Some(vehicle)) = (whole(0), whole(1)) else { return Ok(TrajnetMatch::None) };
+        let (Some(of_frame), Some(vehicle)) = (whole(0), whole(1)) else { return Ok(None) };
         if frame.replace(of_frame) == Some(of_frame) {
-            likeness = TrajnetMatch::Certain;
+            is_certain = true;
         } else {
             vehicles.clear();
         }
         if !vehicles.insert(vehicle) {
-            return Ok(TrajnetMatch::None);
+            return Ok(None);
         }
     }
-    Ok(likeness)
+    Ok(Some(is_certain))
 }
 
 /// Splits a line of names.

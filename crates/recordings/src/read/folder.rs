@@ -147,11 +147,8 @@ impl Folder {
         };
         let part = if self.files.is_empty() { "" } else { "some of " };
         let problem = format!("{part}its tables are in folders: {}", first_few(&folders, LISTED));
-        Fault::content(
-            ContentKind::Folder,
-            problem,
-            format!("{remedy}; the tables of one recording must be in one folder, one per vehicle"),
-        )
+        let remedy = format!("{remedy}; the tables of one recording must be in one folder, one per vehicle");
+        Fault::content(ContentKind::Folder, problem, remedy)
     }
 
     fn sorted(mut self) -> Self {
@@ -275,24 +272,21 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
         let without = without.join(", ");
         notes.push(format!("no height is known of {without}: the heights of the other files are not used"));
     }
-    let mut facts = vec![
+    let facts = vec![
         Fact::name(FactKind::Identity, fact::Source::Convention, "each file is one vehicle"),
         Fact::name(FactKind::Clock, fact::Source::Default, "one clock for all files"),
     ];
-    for fact in recordings.iter().flat_map(|tracks| tracks.facts()) {
-        if fact.kind != FactKind::Identity && !facts.contains(fact) {
-            facts.push(fact.clone());
-        }
-    }
     let mut joined = Vec::new();
     for ((path, tracks), own) in paths.into_iter().zip(recordings).zip(&clocks) {
-        note_new(&mut notes, tracks.notes());
         let shift_s = own.epoch_ns.saturating_sub(clock.epoch_ns) as f64 / 1e9;
         let waiting = Vec::new().into_iter().peekable();
         joined.push(JoinedFile { path, tracks, shift_s, waiting, until_s: f64::NEG_INFINITY });
     }
     let earth_origin = joined.iter().find_map(|part| part.tracks.earth_origin()).copied();
-    let metadata = Metadata { clock, notes, facts, is_planar, earth_origin, ..Metadata::default() };
+    let mut metadata = Metadata { clock, notes, facts, is_planar, earth_origin, ..Metadata::default() };
+    for part in &joined {
+        learn(&mut metadata, part.tracks.metadata());
+    }
     Ok(Box::new(Joined { vehicles, parts: joined, metadata }))
 }
 
@@ -353,11 +347,16 @@ fn check_frames(recordings: &[Recording], paths: &[PathBuf]) -> Result<(), ReadE
     })
 }
 
-/// Appends notes that are not yet present.
-fn note_new(notes: &mut Vec<String>, of_part: &[String]) {
-    for note in of_part {
-        if !notes.contains(note) {
-            notes.push(note.clone());
+/// Appends notes of a file, and its facts except on names, that are not yet present.
+fn learn(metadata: &mut Metadata, of_part: &Metadata) {
+    for note in &of_part.notes {
+        if !metadata.notes.contains(note) {
+            metadata.notes.push(note.clone());
+        }
+    }
+    for fact in &of_part.facts {
+        if fact.kind != FactKind::Identity && !metadata.facts.contains(fact) {
+            metadata.facts.push(fact.clone());
         }
     }
 }
@@ -414,9 +413,9 @@ impl Tracks for Joined {
         }
         items[before..].sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
         if items.len() == before {
-            // Some notes appear only at the end.
+            // Some notes and facts appear only at the end.
             for part in &self.parts {
-                note_new(&mut self.metadata.notes, part.tracks.notes());
+                learn(&mut self.metadata, part.tracks.metadata());
             }
         }
         Ok(items.len() > before)

@@ -260,13 +260,8 @@ pub(super) fn is_main_time(name: &str) -> bool {
     NAMES.contains(&time_and_unit(name).0.as_str())
 }
 
-/// Name of times since the start of the vehicle's computer, without unit.
-const BOOT_TIME: &str = "time_boot";
-
-/// Returns whether a column gives times since the start of the vehicle's computer, as `time_boot_ms` of `MAVLink` does.
-pub(super) fn is_boot_time(name: &str) -> bool {
-    time_and_unit(name).0 == BOOT_TIME
-}
+/// Name of times since the start of the vehicle's computer without unit, as `time_boot_ms` of `MAVLink`.
+pub(super) const BOOT_TIME: &str = "time_boot";
 
 /// Returns whether a column counts frames or steps.
 pub(super) fn is_frame(name: &str) -> bool {
@@ -313,11 +308,6 @@ pub(super) fn rank_of_name(name: &str) -> Option<u8> {
 /// Returns whether a column holds the address of an aircraft, which names it better than other columns do.
 pub(super) fn is_aircraft_address(name: &str) -> bool {
     matches!(joined(name).as_str(), "icao24" | "icao" | "hex" | "hexident")
-}
-
-/// Returns whether a column holds the direction of flight beside a column that names aircraft.
-pub(super) fn is_track(name: &str) -> bool {
-    joined(name) == "track"
 }
 
 /// Returns whether a column names aircraft, and no other vehicles.

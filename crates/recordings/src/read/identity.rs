@@ -177,7 +177,8 @@ impl AlternativeId {
 #[derive(Clone, Debug, Default)]
 pub(super) struct SuspectColumn {
     pub(super) column: usize,
-    values: HashMap<Box<str>, Value>,
+    /// Last two rows of each value.
+    values: HashMap<Box<str>, Track>,
     last: Option<Box<str>>,
     /// Last two rows, of any value.
     track: Track,
@@ -195,13 +196,6 @@ pub(super) struct SuspectColumn {
     has_decimals: bool,
     /// Whether it cannot name vehicles.
     pub(super) cleared: bool,
-}
-
-/// Statistics of one value.
-#[derive(Clone, Copy, Debug, Default)]
-struct Value {
-    rows: u64,
-    track: Track,
 }
 
 /// Last two rows, each with its time.
@@ -244,12 +238,11 @@ impl SuspectColumn {
             self.last = Some(value.into());
         }
         let among_all = self.track.push(time, position);
-        let entry = match self.values.get_mut(value) {
-            Some(entry) => entry,
+        let own = match self.values.get_mut(value) {
+            Some(own) => own,
             None => self.values.entry(value.into()).or_default(),
         };
-        entry.rows += 1;
-        let among_own = entry.track.push(time, position);
+        let among_own = own.push(time, position);
         if let (Some(all), Some(own)) = (among_all, among_own) {
             self.compared += 1;
             self.off[0] += own;
@@ -357,11 +350,8 @@ pub(super) fn examine(header: &[String], unused: &[usize], vehicles: &[String]) 
     {
         let [column, vehicle] = [&header[first], &vehicles[vehicle]].map(|name| quoted(name));
         let problem = format!("column {column} may name a vehicle, but there is no such column for {vehicle}");
-        return refuse(
-            ContentKind::AmbiguousVehicle,
-            problem,
-            "add such a column for each vehicle, or remove these columns",
-        );
+        let remedy = "add such a column for each vehicle, or remove these columns";
+        return refuse(ContentKind::AmbiguousVehicle, problem, remedy);
     }
     if let Some([x, y]) = further(&others) {
         let problem = format!("the columns {} and {} may be the position of a further vehicle", quoted(x), quoted(y));

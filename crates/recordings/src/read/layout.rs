@@ -13,7 +13,8 @@ use super::clock::SubunitColumn;
 use super::convention::Convention;
 use super::error::{ContentKind, Fault, list, quoted, refuse};
 use super::heading::{
-    DEPTH, EARTH, HEIGHT, Heading, Heights, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity,
+    BOOT_TIME, DEPTH, EARTH, HEIGHT, Heading, Heights, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle,
+    is_velocity,
 };
 use super::identity::Slots;
 use super::options::{ColumnNames, ReadOptions};
@@ -97,11 +98,8 @@ impl Layout {
         let others = (0..header.len()).filter(|&column| !is_taken(column));
         let names = &convention.header;
         let mut headings: Vec<_> = others.filter_map(|column| Some((column, Heading::of(&names[column])?))).collect();
-        // Messages of ROS in a table that names the vehicles: `pose.position.x`.
-        let is_plain = |(_, heading): &(usize, Heading<'_>)| heading.vehicle.is_empty() && heading.role == POSITION;
-        if id.is_some() && !headings.iter().any(is_plain) {
-            let of_poses = headings.iter_mut().filter(|(_, heading)| POSES.contains(&heading.vehicle));
-            of_poses.for_each(|(_, heading)| heading.vehicle = "");
+        if id.is_some() {
+            without_poses(&mut headings);
         }
         let on_earth = columns.are_on_earth(&headings)?;
         columns.place = if on_earth { EARTH } else { POSITION };
@@ -131,11 +129,14 @@ impl Layout {
         if !one && id.is_none() {
             refuse_two_frames(in_other_frame, &names, on_earth)?;
         }
-        let bodies = vehicles.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<Vec<_>, _>>()?;
+        let mut bodies = vehicles.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<Vec<_>, _>>()?;
         let flat = vehicles.iter().zip(&bodies).filter(|(_, body)| body.position[2].is_none());
         let flat: Vec<_> = flat.map(|(vehicle, _)| vehicle.clone()).collect();
         let is_planar = !flat.is_empty();
-        let bodies = if is_planar { bodies.into_iter().map(VehicleColumns::flattened).collect() } else { bodies };
+        for body in bodies.iter_mut().filter(|_| is_planar) {
+            body.position[2] = None;
+            body.velocity.iter_mut().for_each(|velocity| velocity[2] = None);
+        }
         let mut layout = Self {
             time: Some(time),
             rest,
@@ -147,7 +148,7 @@ impl Layout {
             bodies,
             on_earth,
             is_planar,
-            counts_from_boot: convention.counts_from_boot || heading::is_boot_time(&header[time]),
+            counts_from_boot: convention.counts_from_boot || heading::time_and_unit(&header[time]).0 == BOOT_TIME,
             ..Self::default()
         };
         layout.refuse_other_frames(header, &columns.heights, &convention)?;
@@ -207,11 +208,8 @@ impl Layout {
             (&[directed, ..], &[other, ..]) => {
                 let [directed, other] = [directed, other].map(|column| quoted(&header[column]));
                 let problem = format!("column {directed} gives the direction of its axis, column {other} does not");
-                refuse(
-                    ContentKind::SeveralFrames,
-                    problem,
-                    "name the axes of all positions alike, as in `x_ned` or `north`",
-                )
+                let remedy = "name the axes of all positions alike, as in `x_ned` or `north`";
+                refuse(ContentKind::SeveralFrames, problem, remedy)
             }
             _ => Ok(()),
         }
@@ -251,11 +249,8 @@ impl Layout {
         };
         if let Some((column, stem)) = unused.clone().find_map(|column| repeats(&column)) {
             let problem = format!("column {} repeats column {}", quoted(&header[column]), quoted(stem));
-            return refuse(
-                ContentKind::AmbiguousColumn,
-                problem,
-                "rename the columns of each vehicle, or remove these columns",
-            );
+            let remedy = "rename the columns of each vehicle, or remove these columns";
+            return refuse(ContentKind::AmbiguousColumn, problem, remedy);
         }
         let unused: Vec<_> = unused.map(|column| &*header[column]).filter(|name| !name.is_empty()).collect();
         let is_decided = is_one_vehicle || convention.is_one_vehicle;
@@ -302,37 +297,28 @@ impl Layout {
         }
         let columns_of = |vehicle, role| found.get(&(vehicle, role)).map_or(&[][..], Vec::as_slice);
         let has_directions = self.convention.has_directions();
-        let (mut notes, mut compared) = (Vec::new(), Vec::new());
-        for (vehicle, body) in vehicles.iter().zip(&self.bodies) {
+        let metres = |unit: Option<&str>| unit.and_then(|unit| heading::size_of(unit, false)).unwrap_or(1.0);
+        let degrees = |unit: Option<&str>| unit.map_or(Some(1.0), heading::degrees);
+        let mut notes = Vec::new();
+        let compared = vehicles.iter().zip(&self.bodies).map(|(vehicle, body)| {
             // Of several pairs of degrees, the first is compared.
-            let [lat, lon] = [0, 1].map(|axis| columns_of(vehicle, EARTH + axis).first());
-            let Some((&(lat, of_lat), &(lon, of_lon))) = lat.zip(lon) else {
-                compared.push(None);
-                continue;
-            };
+            let [lat, lon] = [0, 1].map(|axis| columns_of(vehicle, EARTH + axis).first().copied());
+            let ((lat, of_lat), (lon, of_lon)) = (lat?, lon?);
             // Several heights may be measured from different surfaces.
-            let heights = [(HEIGHT, 1.0), (DEPTH, -1.0)].map(|(role, sign)| (columns_of(vehicle, role), sign));
-            let (height, up) = match heights {
-                _ if body.position[2].is_none() => (None, 1.0),
-                [(&[(column, unit)], sign), (&[], _)] | [(&[], _), (&[(column, unit)], sign)] => {
-                    (Some(column), sign * unit.and_then(|unit| heading::size_of(unit, false)).unwrap_or(1.0))
-                }
+            let (height, up) = match (columns_of(vehicle, HEIGHT), columns_of(vehicle, DEPTH)) {
+                (&[(column, unit)], []) if body.position[2].is_some() => (Some(column), metres(unit)),
+                ([], &[(column, unit)]) if body.position[2].is_some() => (Some(column), -metres(unit)),
                 _ => (None, 1.0),
             };
-            let degrees = |unit: Option<&str>| unit.map_or(Some(1.0), heading::degrees);
-            let degrees = degrees(of_lat).zip(degrees(of_lon));
-            if degrees.is_none() {
+            let Some((lat_degrees, lon_degrees)) = degrees(of_lat).zip(degrees(of_lon)) else {
                 let [lat, lon] = [lat, lon].map(|column| quoted(&header[column]));
                 notes.push(format!("positions are not compared with {lat} and {lon}: the unit is unknown"));
-            }
-            compared.push(degrees.map(|(lat_degrees, lon_degrees)| Compared {
-                metric: body.position,
-                earth: [Some(lat), Some(lon), height],
-                units: [lat_degrees, lon_degrees, up],
-                has_directions,
-                is_wide,
-            }));
-        }
+                return None;
+            };
+            let (earth, units) = ([Some(lat), Some(lon), height], [lat_degrees, lon_degrees, up]);
+            Some(Compared { metric: body.position, earth, units, has_directions, is_wide })
+        });
+        let compared: Vec<_> = compared.collect();
         self.notes.extend(notes);
         self.compared = if compared.iter().any(Option::is_some) { compared } else { Vec::new() };
         if let Some(compared) = self.compared.iter().flatten().next().filter(|_| options.is_joined) {
@@ -381,6 +367,16 @@ impl Layout {
     }
 }
 
+/// Drops the names before the coordinates in messages of ROS, such as `pose.position.x`, unless plain names give x.
+fn without_poses(headings: &mut [(usize, Heading<'_>)]) {
+    let is_plain = |(_, heading): &(usize, Heading<'_>)| heading.vehicle.is_empty() && heading.role == POSITION;
+    if !headings.iter().any(is_plain) {
+        for (_, heading) in headings.iter_mut().filter(|(_, heading)| POSES.contains(&heading.vehicle)) {
+            heading.vehicle = "";
+        }
+    }
+}
+
 /// Returns the vehicles that have both horizontal coordinates of a frame. `first` is the role of the first coordinate.
 fn vehicles_of<'a>(first: Role, headings: &[(usize, Heading<'a>)]) -> BTreeSet<&'a str> {
     let column_of = |role: Role| {
@@ -413,7 +409,7 @@ fn naming_columns(header: &[String], time: usize, given: Option<usize>) -> (Opti
     let mut named: Vec<_> = (0..header.len()).filter(is_one).collect();
     // Beside the name of an aircraft, `track` is its direction.
     if named.iter().any(|&column| heading::names_aircraft(&header[column])) {
-        named.retain(|&column| !heading::is_track(&header[column]));
+        named.retain(|&column| heading::joined(&header[column]) != "track");
     }
     named.sort_by_key(|&column| !heading::is_aircraft_address(&header[column]));
     let mut named = named.into_iter();
@@ -427,15 +423,6 @@ pub(super) struct VehicleColumns {
     pub(super) position: [Option<usize>; 3],
     pub(super) velocity: Option<[Option<usize>; 3]>,
     pub(super) radius: Option<usize>,
-}
-
-impl VehicleColumns {
-    /// Removes the height.
-    pub(super) fn flattened(mut self) -> Self {
-        self.position[2] = None;
-        self.velocity.iter_mut().for_each(|velocity| velocity[2] = None);
-        self
-    }
 }
 
 const WORDS: [&str; 12] = [
@@ -667,11 +654,8 @@ impl<'a> Columns<'a> {
                 let unit = self.units.get(&column).map_or("deg", |unit| *unit);
                 metres[column] = heading::degrees(unit).ok_or_else(|| {
                     let problem = format!("column {name} has an unknown unit of angle, {}", quoted(unit));
-                    Fault::content(
-                        ContentKind::UnknownUnit,
-                        problem,
-                        "write degrees, without a unit in the column name",
-                    )
+                    let remedy = "write degrees, without a unit in the column name";
+                    Fault::content(ContentKind::UnknownUnit, problem, remedy)
                 })?;
                 continue;
             }
@@ -708,11 +692,8 @@ impl<'a> Columns<'a> {
         };
         if let Some(silent) = silent {
             let problem = format!("column {other} has a unit in its name, but column {silent} has none");
-            return refuse(
-                ContentKind::UnitConflict,
-                problem,
-                "put a unit into the name of each column, as in `x [mm]`",
-            );
+            let remedy = "put a unit into the name of each column, as in `x [mm]`";
+            return refuse(ContentKind::UnitConflict, problem, remedy);
         }
         if scale != 1.0 {
             let given = SCALE.set(scale);

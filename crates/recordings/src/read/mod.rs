@@ -27,13 +27,13 @@ mod csv;
 pub(crate) mod curves;
 mod earth;
 pub(crate) mod error;
+mod evidence;
 mod folder;
 mod format;
 mod head;
 mod heading;
 mod identity;
 mod layout;
-mod local_origin;
 #[cfg(feature = "mcap")]
 pub(crate) mod mcap;
 mod npy;
@@ -183,8 +183,7 @@ pub fn open_run(path: &Path) -> Option<McapRecording> {
 /// Returns the name of several files that form one recording.
 #[must_use]
 pub fn recording_name(paths: &[&Path]) -> String {
-    const LISTED: usize = 3;
-    error::first_few(&paths.iter().map(|path| path.to_string_lossy()).collect::<Vec<_>>(), LISTED)
+    error::first_few(&paths.iter().map(|path| path.to_string_lossy()).collect::<Vec<_>>(), 3)
 }
 
 /// Returns the rules that the recording itself states, as Skybrush shows do; `None` for any other recording.

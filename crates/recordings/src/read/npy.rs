@@ -153,11 +153,8 @@ impl Array {
 }
 
 fn not(what: &str, found: &str) -> Fault {
-    Fault::content(
-        ContentKind::ElementType,
-        format!("its elements are {found}, expected {what}"),
-        "save float64, int64 or text",
-    )
+    let remedy = "save float64, int64 or text";
+    Fault::content(ContentKind::ElementType, format!("its elements are {found}, expected {what}"), remedy)
 }
 
 fn read_exactly(bytes: &mut impl Read, buffer: &mut [u8]) -> Result<(), Fault> {

@@ -17,11 +17,11 @@
 use nalgebra::Vector3;
 
 use super::clock::Stamp;
-use super::error::{ContentKind, Fault, Place, ReadError, one_of, refuse};
+use super::error::{ContentKind, Fault, Place, ReadError, one_of, quoted, refuse};
 use super::identity::Names;
 use super::npy::Array;
 use super::options::{ArrayAxis, ArrayLayout, ReadOptions};
-use super::order::{BATCH, Ordered, PLANAR, Recording, RecordingInfo, Row, Rows};
+use super::order::{Ordered, PLANAR, Recording, RecordingInfo, Row, Rows};
 use super::source::{Archive, Source};
 use super::time_unit::TimeUnit;
 use tautline_core::option::{COLUMN, LAYOUT};
@@ -33,21 +33,8 @@ const POSITIONS: [&str; 4] = ["positions", "position", "pos", "xyz"];
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let source = &source.clone().seekable()?;
     let mut arrays = Arrays { archive: Archive::open(&source.path)? };
-    let time = match options.columns.get("t") {
-        Some(given) => Some(given.clone()),
-        None => arrays.only_of(&TIMES, "t")?,
-    };
-    let time = time
-        .filter(|name| arrays.holds(name))
-        .ok_or_else(|| arrays.missing(ContentKind::NoTimeColumn, "times", "t"))?;
-    let positions = match options.columns.get("x") {
-        Some(given) => Some(given.clone()),
-        None => arrays.only_of(&POSITIONS, "x")?,
-    };
-    let positions = positions
-        .filter(|name| arrays.holds(name))
-        .ok_or_else(|| arrays.missing(ContentKind::NoPositionColumn, "positions", "positions"))?;
-
+    let time = arrays.of_role(options, "t", &TIMES, ContentKind::NoTimeColumn)?;
+    let positions = arrays.of_role(options, "x", &POSITIONS, ContentKind::NoPositionColumn)?;
     let mut stamps = arrays.array(&time)?;
     let unit = stamps.unit().or_else(|| time.rsplit_once('_').and_then(|(_, unit)| TimeUnit::from_name(unit)));
     let mut times = Vec::new();
@@ -143,34 +130,28 @@ impl Arrays {
         self.archive.holds(&format!("{name}.npy"))
     }
 
-    /// Returns the array with one of these names, optionally with a unit of time as suffix. Two such arrays are
-    /// refused.
-    fn only_of(&self, names: &[&str], option: &str) -> Result<Option<String>, Fault> {
+    /// Returns the array of a role: the one that the user names, else the only one with one of these names, optionally
+    /// with a unit of time as suffix. Two such arrays are refused, and none with a fault of this kind.
+    fn of_role(&self, options: &ReadOptions, role: &str, names: &[&str], kind: ContentKind) -> Result<String, Fault> {
         let units = TimeUnit::ALL.map(|unit| format!("_{}", unit.name()));
         let ends = std::iter::once("").chain(units.iter().map(String::as_str));
-        let candidates = ends.flat_map(|end| names.iter().map(move |name| format!("{name}{end}")));
-        let mut found = candidates.filter(|name| self.holds(name));
+        let usual = ends.flat_map(|end| names.iter().map(move |name| format!("{name}{end}")));
+        let known = options.columns.get(role).map_or_else(|| usual.collect(), |given| vec![given.clone()]);
+        let mut found = known.into_iter().filter(|name| self.holds(name));
+        let named = COLUMN.set(format!("{role}=NAME"));
         match (found.next(), found.next()) {
+            (Some(only), None) => Ok(only),
             (Some(first), Some(second)) => {
                 let problem = format!("the arrays `{first}` and `{second}` both give the {}", names[1]);
-                refuse(
-                    ContentKind::AmbiguousColumn,
-                    problem,
-                    format!("name one of them with {}", COLUMN.set(format!("{option}=NAME"))),
-                )
+                refuse(ContentKind::AmbiguousColumn, problem, format!("name one of them with {named}"))
             }
-            (first, _) => Ok(first),
+            (None, _) => {
+                let all = self.archive.names();
+                let all: Vec<_> = all.iter().filter_map(|name| name.strip_suffix(".npy")).map(quoted).collect();
+                let problem = format!("no array gives the {}s; its arrays are {}", names[1], all.join(", "));
+                refuse(kind, problem, format!("save it as `{}`, or name it with {named}", names[0]))
+            }
         }
-    }
-
-    fn missing(&self, kind: ContentKind, role: &str, usual: &str) -> Fault {
-        let names = self.archive.names();
-        let names: Vec<_> =
-            names.iter().filter_map(|name| name.strip_suffix(".npy")).map(super::error::quoted).collect();
-        let option = if usual == "t" { "t" } else { "x" };
-        let problem = format!("no array gives the {role}; its arrays are {}", names.join(", "));
-        let remedy = format!("save it as `{usual}`, or name it with {}", COLUMN.set(format!("{option}=NAME")));
-        Fault::content(kind, problem, remedy)
     }
 
     fn array(&mut self, name: &str) -> Result<Array, ReadError> {
@@ -323,11 +304,8 @@ fn next_radius(numbers: &mut Numbers) -> Result<Option<f64>, Fault> {
     if radius.is_nan() || (radius >= 0.0 && radius.is_finite()) {
         return Ok(Some(radius).filter(|radius| !radius.is_nan()));
     }
-    refuse(
-        ContentKind::Radius,
-        format!("the radius is {radius}"),
-        "radii must be finite and not negative, or NaN if unknown",
-    )
+    let remedy = "radii must be finite and not negative, or NaN if unknown";
+    refuse(ContentKind::Radius, format!("the radius is {radius}"), remedy)
 }
 
 /// Rows of an archive.
@@ -361,11 +339,8 @@ impl Instants {
         // NaN marks vehicles without a velocity.
         let velocity = velocity.filter(|velocity| !velocity.iter().all(|x| x.is_nan()));
         if velocity.is_some_and(|velocity| velocity.iter().any(|x| !x.is_finite())) {
-            return refuse(
-                ContentKind::NotFinite,
-                "the velocity is not finite",
-                "velocities must be finite, or all NaN if unknown",
-            );
+            let remedy = "velocities must be finite, or all NaN if unknown";
+            return refuse(ContentKind::NotFinite, "the velocity is not finite", remedy);
         }
         let place = (self.at * self.table.vehicles() + vehicle) as u64;
         Ok(Some(Row { stamp, place, vehicle, position, velocity, radius }))
@@ -374,21 +349,18 @@ impl Instants {
 
 impl Rows for Instants {
     fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
-        let before = rows.len();
-        while rows.len() < before + BATCH {
-            let Some(&stamp) = self.times.get(self.at) else { break };
-            for vehicle in 0..self.table.vehicles() {
-                let place = (self.at * self.table.vehicles() + vehicle) as u64;
-                let row = self.row(stamp, vehicle).map_err(|fault| fault.at(self.place(place)))?;
-                rows.extend(row);
-            }
-            if self.names.all().is_empty() {
-                // Reading an instant has confirmed the number of vehicles in the header.
-                self.names = Names::numbered(self.table.vehicles());
-            }
-            self.at += 1;
+        let Some(&stamp) = self.times.get(self.at) else { return Ok(false) };
+        for vehicle in 0..self.table.vehicles() {
+            let place = (self.at * self.table.vehicles() + vehicle) as u64;
+            let row = self.row(stamp, vehicle).map_err(|fault| fault.at(self.place(place)))?;
+            rows.extend(row);
         }
-        Ok(rows.len() > before)
+        if self.names.all().is_empty() {
+            // Reading an instant has confirmed the number of vehicles in the header.
+            self.names = Names::numbered(self.table.vehicles());
+        }
+        self.at += 1;
+        Ok(true)
     }
 
     fn vehicles(&self) -> &[String] {

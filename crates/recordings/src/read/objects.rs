@@ -400,11 +400,8 @@ impl Objects {
 
 fn take_apart(line: &[u8], flat: &mut Vec<(String, Cell)>, lists: &mut Vec<(String, usize)>) -> Result<(), Fault> {
     let refused = |what: String| {
-        Fault::content(
-            ContentKind::Malformed,
-            format!("it is not a JSON object: {what}"),
-            "write one object like {\"t\": 0, \"id\": \"a\", ...} per line",
-        )
+        let remedy = "write one object like {\"t\": 0, \"id\": \"a\", ...} per line";
+        Fault::content(ContentKind::Malformed, format!("it is not a JSON object: {what}"), remedy)
     };
     if !line.starts_with(b"{") {
         return Err(refused("it does not begin with a brace".to_owned()));

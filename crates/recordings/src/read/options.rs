@@ -276,11 +276,8 @@ impl ReadOptions {
         let metres = self.metres();
         if !(metres.is_finite() && metres > 0.0) {
             let problem = format!("{SCALE} must be positive, got {metres}");
-            return refuse(
-                ContentKind::OptionOutOfRange,
-                problem,
-                "give a positive number of metres per unit of length",
-            );
+            let remedy = "give a positive number of metres per unit of length";
+            return refuse(ContentKind::OptionOutOfRange, problem, remedy);
         }
         if let Some(rate) = self.times_per_second.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
             let problem = format!("the number of time units per second must be positive, got {rate}");
@@ -308,11 +305,8 @@ impl ReadOptions {
         }
         if !self.turn().are_finite() {
             let problem = format!("a factor of {SCALE} is 0 or not finite");
-            return refuse(
-                ContentKind::OptionOutOfRange,
-                problem,
-                "give three finite numbers other than 0, such as 1,1,-1",
-            );
+            let remedy = "give three finite numbers other than 0, such as 1,1,-1";
+            return refuse(ContentKind::OptionOutOfRange, problem, remedy);
         }
         Ok(())
     }

@@ -92,9 +92,9 @@ impl<R: Rows> Ordered<R> {
         let mut ended = false;
         let mut probe = None;
         if rows.is_wide() {
-            ended = !rows.next(&mut first)?;
+            ended = !rows.next_batch(&mut first)?;
             while sort && !ended {
-                ended = !rows.next(&mut first)?;
+                ended = !rows.next_batch(&mut first)?;
             }
             for row in &first {
                 observe(&mut probe, row.stamp, row.vehicle);
@@ -110,7 +110,7 @@ impl<R: Rows> Ordered<R> {
         let settled = || Timing::settle(&probe, options.time_unit.or(info.unit));
         let (mut timing, note) = options.times_per_second.map_or_else(settled, |rate| (Timing::given(rate), None));
         timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(info.epoch_ns);
-        rows.settle_clock(timing.per_second());
+        rows.settle_clock(timing.per_second);
         metadata.notes.extend(note);
         // After a survey, notes and facts cover all rows.
         let (notes, facts) = rows.findings();
@@ -121,7 +121,7 @@ impl<R: Rows> Ordered<R> {
             rows.rewind()?;
         }
         if !probe.in_order {
-            while rows.next(&mut first)? {}
+            while rows.next_batch(&mut first)? {}
             if !sort {
                 refuse_steps_back(&first, &rows, &timing)?;
             }
@@ -286,7 +286,7 @@ impl<R: Rows> Ordered<R> {
     fn peek(&mut self) -> Result<Option<&Row>, ReadError> {
         if self.batch.len() == 0 && !self.ended {
             let mut batch = Vec::with_capacity(BATCH);
-            self.ended = !self.rows.next(&mut batch)?;
+            self.ended = !self.rows.next_batch(&mut batch)?;
             self.batch = batch.into_iter();
         }
         Ok(self.batch.as_slice().first())
@@ -362,8 +362,16 @@ pub(super) type Findings = (Vec<String>, Vec<Fact>);
 
 /// Reader of a recording that yields samples row by row.
 pub(super) trait Rows {
-    /// Appends about [`BATCH`] rows in the order of the file. Returns `false` if no row was left.
+    /// Appends the rows of the next part of the file: a line, an instant or a message. Returns `false` after the last
+    /// part.
     fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError>;
+
+    /// Appends about [`BATCH`] rows in the order of the file. Returns `false` if no row was left.
+    fn next_batch(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
+        let before = rows.len();
+        while rows.len() < before + BATCH && self.next(rows)? {}
+        Ok(rows.len() > before)
+    }
 
     /// Restarts at the first row. A reader whose time only runs forwards is read once and need not implement this.
     fn rewind(&mut self) -> Result<(), ReadError> {
@@ -405,7 +413,7 @@ pub(super) trait Rows {
     /// Reads all times and names. Returns `None` if there are no rows.
     fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
         let (mut probe, mut batch) = (None, Vec::new());
-        while self.next(&mut batch)? {
+        while self.next_batch(&mut batch)? {
             batch.drain(..).for_each(|row| observe(&mut probe, row.stamp, row.vehicle));
         }
         Ok(probe)

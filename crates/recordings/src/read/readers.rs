@@ -45,15 +45,17 @@ static READERS: &[Reader] = &[
     Reader { format: Format::MCAP, accepts: BY_MAGIC, open: open_with!("mcap", super::mcap::open) },
     Reader { format: Format::NPZ, accepts: |head| finds(head.bytes, b".npy"), open: npz::open },
     Reader { format: Format::SKYB, accepts: BY_MAGIC, open: open_with!("shows", super::compressed::open_skyb) },
-    Reader { format: Format::OBJECTS, accepts: |head| head.is_text(objects::are_in), open: objects::open },
+    Reader { format: Format::OBJECTS, accepts: |head| head.text.is_some_and(objects::are_in), open: objects::open },
     Reader {
         format: Format::VVIZ,
-        accepts: |head| head.is_text(|text| text.starts_with(b"{") && VVIZ_KEYS.iter().any(|key| finds(text, key))),
+        accepts: |head| {
+            head.text.is_some_and(|text| text.starts_with(b"{") && VVIZ_KEYS.iter().any(|key| finds(text, key)))
+        },
         open: open_with!("shows", super::vviz::open),
     },
     Reader {
         format: Format::SKYBRUSH,
-        accepts: |head| head.begins_with_any(Format::NPZ.magic) || head.is_text(|text| text.starts_with(b"{")),
+        accepts: |head| head.begins_with_any(Format::NPZ.magic) || head.text.is_some_and(|text| text.starts_with(b"{")),
         open: open_with!("shows", super::skybrush::open),
     },
     Reader {
@@ -68,13 +70,17 @@ static READERS: &[Reader] = &[
     },
     Reader {
         format: Format::MOTIVE,
-        accepts: |head| head.is_text(|text| text.starts_with(capture::MOTIVE)),
+        accepts: |head| head.text.is_some_and(|text| text.starts_with(capture::MOTIVE)),
         open: capture::open_motive,
     },
-    Reader { format: Format::VICON, accepts: |head| head.is_text(capture::is_vicon), open: capture::open_vicon },
+    Reader {
+        format: Format::VICON,
+        accepts: |head| head.text.is_some_and(capture::is_vicon),
+        open: capture::open_vicon,
+    },
     Reader {
         format: Format::BEZIER,
-        accepts: |head| head.is_text(bezier::has_header),
+        accepts: |head| head.text.is_some_and(bezier::has_header),
         open: |source, options| bezier::open(alone(source), None, options),
     },
     Reader {

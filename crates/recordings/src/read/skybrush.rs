@@ -80,11 +80,8 @@ fn show(source: &Source) -> Result<(Show, Option<Archive>), ReadError> {
         Some(archive) if archive.holds(SHOW) => parse(&archive.document(SHOW)?, Some(SHOW))?,
         Some(_) => {
             let problem = format!("it is an archive with neither `{SHOW}` nor NumPy arrays nor tables");
-            return refuse(
-                ContentKind::UnknownFormat,
-                problem,
-                "give a .skyc or .npz file, or pack one table per vehicle",
-            );
+            let remedy = "give a .skyc or .npz file, or pack one table per vehicle";
+            return refuse(ContentKind::UnknownFormat, problem, remedy);
         }
         None => {
             let mut bytes = Vec::new();

@@ -278,11 +278,8 @@ impl Archive {
         let (method, start, crc) = (entry.compression(), entry.data_start(), entry.crc32());
         let packed_bytes = entry.compressed_size();
         if entry.encrypted() {
-            return refuse(
-                ContentKind::UnsupportedCompression,
-                "it is encrypted",
-                "give an archive without a password",
-            );
+            let remedy = "give an archive without a password";
+            return refuse(ContentKind::UnsupportedCompression, "it is encrypted", remedy);
         }
         let start = start.ok_or_else(|| Fault::damaged("the entry has no offset in the archive"))?;
         let mut file = File::open(&self.path)?;

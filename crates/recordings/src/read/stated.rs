@@ -1,4 +1,4 @@
-//! Mapping of the axes by the user, facts that every recording states, and the search for vehicles that are recorded under two names.
+//! Mapping of the axes by the user, facts that every recording states, and the search for vehicles under two names.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};

@@ -23,7 +23,7 @@ use super::convention;
 use super::earth::{EarthFrame, is_no_fix, no_fixes};
 use super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
 use super::options::ReadOptions;
-use super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
+use super::order::{Ordered, Recording, RecordingInfo, Row, Rows};
 use super::source::Source;
 use super::time_unit::TimeUnit;
 
@@ -48,11 +48,8 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         [topic] if topic == GLOBAL || topic == LOCAL => Some(topic.as_str()),
         [topic, ..] => {
             let problem = format!("{} is not a position topic", quoted(topic));
-            return refuse(
-                ContentKind::UnknownTopic,
-                problem,
-                format!("use {} or {}", TOPIC.set(GLOBAL), TOPIC.set(LOCAL)),
-            );
+            let remedy = format!("use {} or {}", TOPIC.set(GLOBAL), TOPIC.set(LOCAL));
+            return refuse(ContentKind::UnknownTopic, problem, remedy);
         }
     };
     let mut log = Log::default();
@@ -383,11 +380,8 @@ fn flags(body: &[u8]) -> Result<u64, Fault> {
     let needed: [u8; 8] = take(body, 8)?;
     if needed[0] & !APPENDED != 0 || needed[1..].iter().any(|&byte| byte != 0) {
         let problem = "unknown version of ULog";
-        return refuse(
-            ContentKind::UnsupportedFormat,
-            problem,
-            "convert its vehicle_global_position with `ulog2csv`, and give the result",
-        );
+        let remedy = "convert its vehicle_global_position with `ulog2csv`, and give the result";
+        return refuse(ContentKind::UnsupportedFormat, problem, remedy);
     }
     let appended = u64::from_le_bytes(take(body, 16)?);
     Ok(if needed[0] & APPENDED == 0 || appended == 0 { u64::MAX } else { appended })
@@ -418,9 +412,9 @@ struct Positions {
 
 impl Rows for Positions {
     fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
-        let before = rows.len();
-        rows.extend(self.rows.by_ref().take(BATCH));
-        Ok(rows.len() > before)
+        let next = self.rows.next();
+        rows.extend(next);
+        Ok(next.is_some())
     }
 
     fn vehicles(&self) -> &[String] {

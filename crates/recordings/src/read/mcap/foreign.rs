@@ -9,7 +9,7 @@ use super::super::earth::{is_no_fix, no_fixes};
 use super::super::error::{ContentKind, Fault, Place, ReadError, UNSEEN, quoted, refuse};
 use super::super::identity::Names;
 use super::super::options::{Duplicates, MessageClock, ReadOptions};
-use super::super::order::{BATCH, Findings, Ordered, Recording, RecordingInfo, Row, Rows};
+use super::super::order::{Findings, Ordered, Recording, RecordingInfo, Row, Rows};
 use super::super::source::Source;
 use super::super::time_unit::TimeUnit;
 use super::messages::{EARTH, Observation, PoseKind, VehicleKey, is_list, reader_of_topic};
@@ -50,23 +50,20 @@ struct ForeignRows {
 
 impl Rows for ForeignRows {
     fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
-        let (before, poses, listed) = (rows.len(), &mut self.poses, &mut self.listed);
-        let mut more = true;
-        while more && rows.len() < before + BATCH {
-            let (files, messages) = (self.splits.opened_files(), poses.messages);
-            more = self.splits.visit(|part| {
-                match part {
-                    Part::Message(message) => poses.take(&message, rows)?,
-                    Part::Topic(topic) => *listed &= is_list(&topic.schema) || reader_of_topic(topic).is_none(),
-                    Part::Schema(_) | Part::Other => {}
-                }
-                Ok(())
-            })?;
-            if self.splits.opened_files() > files {
-                self.starts.push(messages);
+        let (poses, listed) = (&mut self.poses, &mut self.listed);
+        let (files, messages) = (self.splits.opened_files(), poses.messages);
+        let more = self.splits.visit(|part| {
+            match part {
+                Part::Message(message) => poses.take(&message, rows)?,
+                Part::Topic(topic) => *listed &= is_list(&topic.schema) || reader_of_topic(topic).is_none(),
+                Part::Schema(_) | Part::Other => {}
             }
+            Ok(())
+        })?;
+        if self.splits.opened_files() > files {
+            self.starts.push(messages);
         }
-        Ok(rows.len() > before)
+        Ok(more)
     }
 
     fn rewind(&mut self) -> Result<(), ReadError> {

@@ -262,20 +262,14 @@ impl ReadPlan {
         match &self.target_frame {
             Some(frame) => {
                 let problem = format!("no position is in the frame {}, nor can be transformed to it", quoted(frame));
-                Fault::content(
-                    ContentKind::UnusableFrame,
-                    problem,
-                    "name another frame, or record /tf and /tf_static from before the first position",
-                )
+                let remedy = "name another frame, or record /tf and /tf_static from before the first position";
+                Fault::content(ContentKind::UnusableFrame, problem, remedy)
             }
             None if trees().any(|tree| tree.frames().any(|frame| tree.moves(frame))) => {
                 let frames: Vec<_> = trees().flat_map(Tree::frames).map(quoted).collect();
                 let problem = format!("its transforms describe no vehicle; its frames are {}", frames.join(", "));
-                Fault::content(
-                    ContentKind::NoPositions,
-                    problem,
-                    "record the transforms of the vehicles' own frames too",
-                )
+                let remedy = "record the transforms of the vehicles' own frames too";
+                Fault::content(ContentKind::NoPositions, problem, remedy)
             }
             None => Fault::content(
                 ContentKind::NoPositions,
