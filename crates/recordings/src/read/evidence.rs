@@ -1,5 +1,6 @@
-//! Evidence in the rows of a table against its reading, weighed in one place: columns that may name vehicles, heights
-//! against a vertical rate, metres against degrees, and rows without a position.
+//! Evidence in the rows of a table against its reading, weighed in one place.
+//!
+//! Columns may name other vehicles, heights may contradict a vertical rate, and metres may contradict degrees.
 
 use std::collections::BTreeMap;
 
