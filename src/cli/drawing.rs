@@ -9,7 +9,7 @@ use clap::builder::TypedValueParser;
 
 use super::console::Console;
 use tautline_recordings::mcap::McapRecording;
-use tautline_recordings::read::{self, Fault, Format, ReadError, ReadOptions};
+use tautline_recordings::read::{self, Format, ReadError, ReadOptions};
 use tautline_render::{Colouring, FARTHEST_M, FlightLog, RenderError, Theme, Timeline, TracksError};
 use tautline_report::request::{Failure, ScenarioRequest, one_of};
 use tautline_report::run::run;
@@ -152,7 +152,7 @@ fn has_nothing_yet(recording: &Path, reading: &ReadOptions) -> bool {
     let read = File::open(recording).and_then(|file| file.take(FIRST_BYTES).read_to_end(&mut start));
     let ours = start.starts_with(b"\x89MCAP") && start.windows(9).any(|name| name == b"tautline ");
     let accept = ReadOptions { allow_unfinished: true, ..reading.clone() };
-    let no_positions = |error: &ReadError| matches!(error.fault, Fault::Content { .. });
+    let no_positions = |error: &ReadError| matches!(error.code(), "recording/no-positions" | "recording/empty");
     read.is_ok() && ours && read::open(recording, &accept).is_err_and(|error| no_positions(&error))
 }
 

@@ -14,6 +14,7 @@
 use nalgebra::Vector3;
 
 use crate::export::drones::fit::{DEGREE, POINTS, Piece};
+use crate::export::drones::motion::raise;
 
 /// Largest number of a control point. The smallest is its negative.
 pub(crate) const LARGEST: i16 = i16::MAX;
@@ -188,13 +189,7 @@ impl Trajectory {
 
 /// Raises the degree of Bernstein coefficients.
 fn raised(mut points: Vec<f64>, degree: usize) -> Vec<f64> {
-    while points.len() <= degree {
-        let n = points.len();
-        let share = |i: usize| i as f64 / n as f64;
-        let inner = (1..n).map(|i| points[i - 1] * share(i) + points[i] * (1.0 - share(i)));
-        let next: Vec<_> = std::iter::once(points[0]).chain(inner).chain([points[n - 1]]).collect();
-        points = next;
-    }
+    raise(&mut points, degree + 1);
     points
 }
 

@@ -1,14 +1,105 @@
 //! Messages of `run.mcap`, converted to CDR and back.
 
+use std::io;
 use std::sync::Arc;
 
 use serde::ser::SerializeSeq;
 use serde::{Deserialize, Serialize, Serializer};
 
-use super::topic::Topic;
-use tautline_core::record::{Channel, Event, OwnedSample, Peaks, ReadFault, Sample};
+use super::topic::{Topic, encode};
+use tautline_core::record::{Channel, Event, MessageHash, OwnedSample, Peaks, ReadFault, Sample, sha256_hex};
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm};
 use tautline_core::text::{at_least, up_to};
+
+/// Description of a run: the fields of `scenario.msg`, in order.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Header {
+    /// Name of the scenario.
+    pub scenario_name: String,
+    /// SHA-256 of `scenario_toml`, 64 hexadecimal digits.
+    pub scenario_sha256: String,
+    /// Number of vehicles N.
+    pub vehicles: usize,
+    /// Safety distance delta \[m\].
+    pub delta_m: f64,
+    /// The resolved scenario as TOML.
+    pub scenario_toml: String,
+}
+
+/// Audit of every step by the run itself: the fields of `audit.msg`, in order.
+///
+/// Lengths are in metres, or relative to the half axes if the scenario has ellipsoids.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RunAudit {
+    /// `clear`, `violation` or `undecided`.
+    pub status: String,
+    /// Reason why the run ended early; empty if the run was flown to its end.
+    pub ended_early: String,
+    /// Whether the samples are all steps of the run and every step was straight.
+    pub holds_every_step: bool,
+    /// Smallest distance that two centres must keep \[m\].
+    pub limit_m: f64,
+    /// Time flown \[s\].
+    pub duration_s: f64,
+    /// Steps that were judged.
+    pub steps: u64,
+    /// Pairs that were swept, summed over the steps.
+    pub pairs_checked: u64,
+    /// Number of all violations.
+    pub violations_count: u64,
+    /// Closest approach of two vehicles, and the closest approaches to obstacles.
+    pub closest: Vec<RunFinding>,
+    /// Violations in order of time, at most a bounded number.
+    pub violations: Vec<RunFinding>,
+    /// Hash of the messages and of this audit, computed by [`McapRecorder::close`](super::McapRecorder::close). The
+    /// hash reveals accidental changes and edits. It is not a signature: a program can recompute it.
+    pub sha256: String,
+}
+
+/// An approach or a violation of a [`RunAudit`]. Vehicles and obstacles are numbered from 1.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RunFinding {
+    /// The vehicle.
+    pub vehicle: u64,
+    /// The other vehicle; 0 for an approach to an obstacle.
+    pub other_vehicle: u64,
+    /// The obstacle; 0 for an approach of two vehicles.
+    pub obstacle: u64,
+    /// Required distance \[m\].
+    pub limit_m: f64,
+    /// Start of the violation \[s\]; equal to `min_at_s` for an approach.
+    pub from_s: f64,
+    /// End of the violation \[s\]; equal to `min_at_s` for an approach.
+    pub to_s: f64,
+    /// Smallest distance \[m\].
+    pub min_m: f64,
+    /// Time of the smallest distance \[s\].
+    pub min_at_s: f64,
+}
+
+impl RunAudit {
+    /// Returns the hash of the messages followed by this audit.
+    pub(super) fn hash(&self, mut messages: MessageHash) -> io::Result<String> {
+        let mut bytes = Vec::new();
+        encode(&Self { sha256: String::new(), ..self.clone() }, &mut bytes)?;
+        messages.take(AUDIT.name, &bytes);
+        Ok(messages.digits())
+    }
+}
+
+impl Header {
+    /// Returns the header of a run of this scenario and computes its hash.
+    #[must_use]
+    pub fn new(scenario_name: &str, scenario_toml: &str, vehicles: usize, delta_m: f64) -> Self {
+        Self {
+            scenario_name: scenario_name.to_owned(),
+            scenario_toml: scenario_toml.to_owned(),
+            scenario_sha256: sha256_hex(scenario_toml),
+            vehicles,
+            delta_m,
+        }
+    }
+}
 
 /// Topic that every run recording has.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

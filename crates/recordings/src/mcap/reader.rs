@@ -6,12 +6,11 @@ use std::path::Path;
 use serde::de::DeserializeOwned;
 
 use super::message::{
-    AUDIT, CHANNEL_SCHEMA, ChannelMessage, EventMessage, RunTopic, SummaryMessage, SwarmMessage, fault,
+    AUDIT, CHANNEL_SCHEMA, ChannelMessage, EventMessage, Header, RunAudit, RunTopic, SummaryMessage, SwarmMessage,
+    fault,
 };
 use super::topic::{CDR, DeclaredTopic, Message, Part, Topic, TopicReader, decode};
-use super::{Header, RunAudit};
-use tautline_core::record::MessageHash;
-use tautline_core::record::{Event, OwnedSample, ReadFault, RecordError};
+use tautline_core::record::{Event, MessageHash, OwnedSample, ReadFault, RecordError};
 
 /// Entry of a recording, in the order of the file.
 #[derive(Clone, Debug, PartialEq)]
@@ -36,7 +35,6 @@ pub enum StoredAudit {
 /// Opened recording: an iterator over its samples and events that holds one chunk in memory.
 ///
 /// A file that was not closed yields all entries of its complete chunks. Damage yields an error, after which the
-/// iterator ends.
 /// iterator ends.
 pub struct McapRecording {
     topics: TopicReader,

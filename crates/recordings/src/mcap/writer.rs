@@ -10,12 +10,11 @@ use mcap::write::NoSeek;
 use serde::Serialize;
 
 use super::message::{
-    AUDIT, ChannelMessage, EventMessage, RunTopic, SummaryMessage, SwarmMessage, channel_topic, topic_of_channel,
+    AUDIT, ChannelMessage, EventMessage, Header, RunAudit, RunTopic, SummaryMessage, SwarmMessage, channel_topic,
+    topic_of_channel,
 };
 use super::topic::{Topic, TopicWriter, encode, log_time_ns};
-use super::{Header, RunAudit};
-use tautline_core::record::MessageHash;
-use tautline_core::record::{Channel, Event, RecordError, Sample, Sink};
+use tautline_core::record::{Channel, Event, MessageHash, RecordError, Sample, Sink};
 
 /// Time after which the next message closes a chunk \[simulated s\].
 pub const FLUSH_PERIOD_S: f64 = 1.0;

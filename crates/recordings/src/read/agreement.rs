@@ -8,7 +8,7 @@ use nalgebra::{Matrix2, Vector2, Vector3};
 use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::option::COLUMN;
 
-use super::earth::{Geodetic, LocalFrame};
+use super::earth::{EarthFrame, Geodetic};
 use super::error::{ContentKind, Fault, list, quoted};
 
 /// Largest error of the difference of two fixes \[m\]: an uncorrected receiver is within 5 m (95 %).
@@ -38,14 +38,6 @@ const EARTH_M: f64 = 6.371e6;
 /// Returns how far a plane is from the surface of the Earth, at this distance from the point of contact \[m\].
 fn curvature_m(distance_m: f64) -> f64 {
     distance_m * distance_m / (2.0 * EARTH_M)
-}
-
-/// Columns of the second position of a vehicle: latitude, longitude, and height if both positions have one.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) struct SecondPosition {
-    pub(super) columns: [Option<usize>; 3],
-    /// Factors of its columns \[degrees or m\].
-    pub(super) units: [f64; 3],
 }
 
 /// Sums over the rows of a vehicle. Positions are counted from the first position of the table.
@@ -127,10 +119,8 @@ fn alignment(covariance: &Matrix2<f64>) -> Option<(Matrix2<f64>, f64)> {
 /// on the Earth.
 #[derive(Debug)]
 pub(super) enum RowContradiction {
-    /// Distances in the plane, in metres and on the Earth.
-    Plane([f64; 2]),
-    /// Differences of heights, in metres and on the Earth.
-    Height([f64; 2]),
+    /// Distances in metres and on the Earth, and their direction.
+    Distance([f64; 2], &'static str),
     NotOnEarth(Fault),
 }
 
@@ -154,20 +144,27 @@ impl Worst {
     }
 }
 
+/// Returns the worst pair of vehicles; `compare` returns difference and tolerance of two of them \[m\].
+fn worst_pair<T>(shifts: &[(usize, T)], compare: impl Fn(&T, &T) -> (f64, f64)) -> Option<Worst> {
+    let mut worst = None;
+    for (k, (first, shift)) in shifts.iter().enumerate() {
+        for (second, other) in &shifts[k + 1..] {
+            let (difference_m, tolerance_m) = compare(shift, other);
+            worst = Some(Worst { vehicles: [*first, *second], difference_m, tolerance_m }.or(worst));
+        }
+    }
+    worst
+}
+
 /// Comparison over all rows.
 #[derive(Debug, Default)]
 pub(super) struct FrameAgreement {
     vehicles: Vec<Sums>,
     /// Frame of the first place, its height, and the metric position there.
-    origin: Option<(LocalFrame, f64, Vector3<f64>)>,
+    origin: Option<(EarthFrame, f64, Vector3<f64>)>,
 }
 
 impl FrameAgreement {
-    /// Restarts at the first row.
-    pub(super) fn rewind(&mut self) {
-        *self = Self::default();
-    }
-
     /// Records both positions in a row of a vehicle. `has_heights`: whether both have a height.
     pub(super) fn observe(
         &mut self,
@@ -179,7 +176,7 @@ impl FrameAgreement {
         let (local, height, origin) = if let Some(origin) = self.origin {
             origin
         } else {
-            let local = LocalFrame::at(place).map_err(RowContradiction::NotOnEarth)?;
+            let local = EarthFrame::at(place).map_err(RowContradiction::NotOnEarth)?;
             *self.origin.insert((local, place.z, metric))
         };
         // Without a height, the place is taken at the height of the first one.
@@ -203,7 +200,7 @@ impl FrameAgreement {
         let far = [(metric - first).norm(), (earth - first_earth).norm()];
         let longest_m = far[0].max(far[1]);
         if (far[0] - far[1]).abs() > LARGEST_ERROR_M + PROJECTION * longest_m {
-            return Err(RowContradiction::Plane(far));
+            return Err(RowContradiction::Distance(far, "from its first position in the plane"));
         }
         if !has_heights {
             return Ok(());
@@ -219,7 +216,7 @@ impl FrameAgreement {
         let risen = [metric_up - heights.first[0], earth_up - heights.first[1]].map(f64::abs);
         let most_m = LARGEST_ERROR_M + BAROMETRIC * risen[0].max(risen[1]) + curvature_m(longest_m);
         if (risen[0] - risen[1]).abs() > most_m {
-            return Err(RowContradiction::Height(risen));
+            return Err(RowContradiction::Distance(risen, "above or below its first position"));
         }
         Ok(())
     }
@@ -238,44 +235,25 @@ impl FrameAgreement {
     fn worst_in_plane(&self, all: &Sums, turn: &Matrix2<f64>) -> Option<Worst> {
         let noise = self.seen().map(|(_, sums)| sums.count * sums.noise_m().powi(2)).sum::<f64>() / all.count;
         let evidence_m = SMALLEST_EVIDENCE_M + noise.sqrt().min(MOST_NOISE_M);
-        let shifts: Vec<_> =
-            self.seen().map(|(vehicle, sums)| (vehicle, sums.shift(turn), sums.earth / sums.count)).collect();
-        let mut worst = None;
-        for (k, (first, shift, mean)) in shifts.iter().enumerate() {
-            for (second, other_shift, other_mean) in &shifts[k + 1..] {
-                let tolerance_m = evidence_m + PROJECTION * (mean - other_mean).norm();
-                let difference_m = (shift - other_shift).norm();
-                let pair = Worst { vehicles: [*first, *second], difference_m, tolerance_m };
-                worst = Some(pair.or(worst));
-            }
-        }
-        worst
+        let shifts = self.seen().map(|(vehicle, sums)| (vehicle, (sums.shift(turn), sums.earth / sums.count)));
+        worst_pair(&shifts.collect::<Vec<_>>(), |(shift, mean), (other_shift, other_mean)| {
+            ((shift - other_shift).norm(), evidence_m + PROJECTION * (mean - other_mean).norm())
+        })
     }
 
     /// Returns the worst pair by the differences between its heights.
     fn worst_in_height(&self, all: &Sums) -> Option<Worst> {
         let all = all.heights;
         let up = 1.0_f64.copysign(all.products - all.earth * all.metric / all.count);
-        let shifts: Vec<_> = self
-            .seen()
-            .filter(|(_, sums)| sums.heights.count > 0.0)
-            .map(|(vehicle, sums)| {
-                let Heights { count, metric, earth, .. } = sums.heights;
-                (vehicle, (earth - up * metric) / count, earth / count, sums.earth / sums.count)
-            })
-            .collect();
-        let mut worst = None;
-        for (k, (first, shift, height, mean)) in shifts.iter().enumerate() {
-            for (second, other_shift, other_height, other_mean) in &shifts[k + 1..] {
-                let tolerance_m = HEIGHT_EVIDENCE_M
-                    + BAROMETRIC * (height - other_height).abs()
-                    + curvature_m((mean - other_mean).norm());
-                let difference_m = (shift - other_shift).abs();
-                let pair = Worst { vehicles: [*first, *second], difference_m, tolerance_m };
-                worst = Some(pair.or(worst));
-            }
-        }
-        worst
+        let with_heights = self.seen().filter(|(_, sums)| sums.heights.count > 0.0);
+        let shifts = with_heights.map(|(vehicle, sums)| {
+            let Heights { count, metric, earth, .. } = sums.heights;
+            (vehicle, ((earth - up * metric) / count, earth / count, sums.earth / sums.count))
+        });
+        worst_pair(&shifts.collect::<Vec<_>>(), |(shift, height, mean), (other_shift, other_height, other_mean)| {
+            let of_sensors_m = HEIGHT_EVIDENCE_M + BAROMETRIC * (height - other_height).abs();
+            ((shift - other_shift).abs(), of_sensors_m + curvature_m((mean - other_mean).norm()))
+        })
     }
 
     /// Returns the vehicle whose rows deviate most after a common turn and its own shift.
@@ -342,10 +320,9 @@ impl FrameAgreement {
     pub(super) fn notes(&self, names: &[String]) -> Vec<String> {
         const LISTED: usize = 12;
         let is_seen = |vehicle: usize| self.vehicles.get(vehicle).is_some_and(|sums| sums.count > 0.0);
-        let unseen: Vec<_> =
-            (0..names.len()).filter(|vehicle| !is_seen(*vehicle)).map(|vehicle| names[vehicle].clone()).collect();
-        let mut notes = Vec::new();
-        notes.extend(self.fact().value.map(|value| value.to_string()));
+        let unseen = names.iter().enumerate().filter(|(vehicle, _)| !is_seen(*vehicle));
+        let unseen: Vec<_> = unseen.map(|(_, name)| name).collect();
+        let mut notes: Vec<_> = self.fact().value.map(|value| value.to_string()).into_iter().collect();
         if !unseen.is_empty() && unseen.len() < names.len() {
             notes.push(format!("positions in metres are not compared with degrees for {}", list(&unseen, LISTED)));
         }
@@ -353,10 +330,13 @@ impl FrameAgreement {
     }
 }
 
-/// Columns of both positions of a vehicle.
+/// Columns of both positions of a vehicle: in metres, and on the Earth with a height if both positions have one.
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Compared {
     pub(super) metric: [Option<usize>; 3],
     pub(super) earth: [Option<usize>; 3],
+    /// Factors of the columns on the Earth \[degrees or m\].
+    pub(super) units: [f64; 3],
     /// Whether the names of the columns in metres give directions, which columns chosen by the user do not have.
     pub(super) has_directions: bool,
     /// Whether the header names several vehicles, whose columns the user cannot choose by role.
@@ -367,8 +347,7 @@ impl Compared {
     /// Returns the names of the columns in metres, and of those on the Earth.
     fn names(&self, header: &[String]) -> (String, String) {
         let listed = |columns: &[Option<usize>; 3]| {
-            let names: Vec<_> = columns.iter().flatten().map(|&column| quoted(&header[column])).collect();
-            names.join(", ")
+            list(&columns.iter().flatten().map(|&column| &*header[column]).collect::<Vec<_>>(), 3)
         };
         (listed(&self.metric), listed(&self.earth))
     }
@@ -377,14 +356,9 @@ impl Compared {
     pub(super) fn fault_of_row(&self, header: &[String], name: &str, found: &RowContradiction) -> Fault {
         let ((metric, earth), name) = (self.names(header), quoted(name));
         let problem = match found {
-            RowContradiction::Plane([by_metric, by_earth]) => format!(
-                "vehicle {name} is {by_metric:.3} m from its first position in the plane by {metric}, but \
-                 {by_earth:.3} m by {earth}"
-            ),
-            RowContradiction::Height([by_metric, by_earth]) => format!(
-                "vehicle {name} is {by_metric:.3} m above or below its first position by {metric}, but \
-                 {by_earth:.3} m by {earth}"
-            ),
+            RowContradiction::Distance([by_metric, by_earth], direction) => {
+                format!("vehicle {name} is {by_metric:.3} m {direction} by {metric}, but {by_earth:.3} m by {earth}")
+            }
             RowContradiction::NotOnEarth(fault) => {
                 format!("vehicle {name} has a position by {metric}, but {earth} are not a place on the Earth: {fault}")
             }

@@ -130,11 +130,6 @@ impl ClimbMonitor {
         Self { column, unit_m_s, slopes: Vec::new(), count: 0, rates: 0.0, heights: 0.0, products: 0.0 }
     }
 
-    /// Restarts at the first row.
-    pub(super) fn rewind(&mut self) {
-        *self = Self::new((self.column, self.unit_m_s));
-    }
-
     /// Records height \[m\] and rate of a vehicle.
     pub(super) fn observe(&mut self, vehicle: usize, stamp: Stamp, height_m: f64, rate: f64) {
         let time = stamp.approximately();

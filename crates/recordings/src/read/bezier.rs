@@ -12,24 +12,14 @@ use std::str;
 
 use nalgebra::Vector3;
 
+use super::cells::parse_number;
 use super::crazyflie::{Curve, curves_of};
-use super::curves::{Curves, powers};
-use super::error::{ContentKind, Fault, Place, ReadError, UNSEEN, quoted, refuse};
-use super::format::Format;
+use super::curves::{Curves, HIGHEST_DEGREE, powers};
+use super::error::{ContentKind, Fault, ReadError, UNSEEN, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::reader::Reader;
 use super::source::{Lines, Source};
 use tautline_core::track::{Item, Metadata};
-
-pub(super) const READER: Reader = Reader {
-    format: Format::BEZIER,
-    sniff: |head| head.is_text(|text| is_header(text.split(|&byte| byte == b'\n').next().unwrap_or_default())),
-    open: |source, options| open(vec![(source.stem(), vec![source.clone()])], None, options),
-};
-
-/// Highest supported degree.
-const HIGHEST_DEGREE: usize = 15;
 
 /// Degree of the pieces if the header does not give the axes.
 const USUAL_DEGREE: usize = 7;
@@ -60,8 +50,9 @@ pub(super) fn open(
     Ok(Curves::with_metadata(curves, Metadata { is_planar, ..Metadata::in_seconds(notes) }))
 }
 
-/// Returns whether a line is the header of a table of Bezier curves.
-fn is_header(line: &[u8]) -> bool {
+/// Returns whether the first line of a text is the header of a table of Bezier curves.
+pub(super) fn has_header(text: &[u8]) -> bool {
+    let line = text.split(|&byte| byte == b'\n').next().unwrap_or_default();
     let Ok(line) = str::from_utf8(line) else { return false };
     let mut names = names(line);
     ["duration", "p0x", "p0y"].iter().all(|name| names.next().is_some_and(|found| found.eq_ignore_ascii_case(name)))
@@ -76,8 +67,8 @@ fn append(curve: &mut Curve, file: &Source) -> Result<bool, ReadError> {
     let mut lines = Lines::new(file)?;
     let (mut columns, mut pieces) = (None, 0_u64);
     while lines.advance()? {
-        let place = Place::Line(lines.number());
-        let line = str::from_utf8(lines.line()).map_err(|_| Fault::NotUtf8.at(place.clone()))?.trim();
+        let place = lines.place();
+        let line = str::from_utf8(lines.line()).map_err(|_| Fault::not_utf8().at(place.clone()))?.trim();
         let columns = match &mut columns {
             _ if line.is_empty() => continue,
             None => {
@@ -91,7 +82,7 @@ fn append(curve: &mut Curve, file: &Source) -> Result<bool, ReadError> {
         pieces += 1;
     }
     match columns {
-        None => Err(Fault::Empty.into()),
+        None => Err(Fault::empty().into()),
         Some(_) if pieces == 0 => Err(Fault::header_only().into()),
         Some(columns) => Ok(columns.axes == Some(2)),
     }
@@ -107,7 +98,7 @@ struct Columns {
 
 impl Columns {
     fn of(header: &str) -> Result<Self, Fault> {
-        if !is_header(header.as_bytes()) {
+        if !has_header(header.as_bytes()) {
             let problem = format!("{} is not a header of Bezier curves", quoted(header));
             return refuse(ContentKind::NoHeader, problem, HEADER);
         }
@@ -157,17 +148,10 @@ impl Columns {
                 format!("the degree of the piece is {}, at most {HIGHEST_DEGREE} is supported", numbers / axes - 1);
             return refuse(ContentKind::Degree, problem, "use fewer control points");
         }
-        let mut values = Vec::with_capacity(fields.len());
-        for (index, field) in fields.iter().enumerate() {
-            values.push(match field.parse::<f64>() {
-                Ok(value) if value.is_finite() => value,
-                Ok(_) => return Err(Fault::not_finite(&(index + 1).to_string(), field, UNSEEN)),
-                Err(_) => {
-                    let problem = format!("column `{}` holds {}, which is not a number", index + 1, quoted(field));
-                    return refuse(ContentKind::NotANumber, problem, "write numbers with a decimal point");
-                }
-            });
-        }
+        let number = |(index, field): (usize, &&str)| {
+            parse_number(index + 1, field, UNSEEN)?.ok_or_else(|| Fault::empty_cell(index + 1))
+        };
+        let values = fields.iter().enumerate().map(number).collect::<Result<Vec<_>, _>>()?;
         let point = |numbers: &[f64]| Vector3::new(numbers[0], numbers[1], numbers.get(2).copied().unwrap_or(0.0));
         let points: Vec<_> = values[1..].chunks_exact(axes).map(point).collect();
         curve.push(values[0], powers(&points, values[0]))

@@ -24,13 +24,12 @@ use std::str;
 
 use nalgebra::Vector3;
 
+use super::cells::parse_number;
 use super::clock::Stamp;
-use super::error::{ContentKind, Fault, Place, ReadError, UNSEEN, quoted, refuse};
-use super::format::Format;
+use super::error::{ContentKind, Fault, Place, ReadError, UNSEEN, first_few, quoted, refuse};
 use super::heading;
 use super::options::ReadOptions;
-use super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
-use super::reader::Reader;
+use super::order::{Ordered, Recording, RecordingInfo, Row, Rows};
 use super::source::{Lines, Source};
 use super::time_unit::TimeUnit;
 use tautline_core::option::SCALE;
@@ -71,7 +70,7 @@ fn by_subject(markers: Vec<(String, [usize; 3])>) -> Result<Vec<MarkerColumns>, 
             let problem = format!("two markers have the name {}", quoted(&name));
             return refuse(ContentKind::VehicleTwice, problem, "give each marker its own name, and export again");
         }
-        let subject = name.split(':').next().unwrap_or_default().to_owned();
+        let subject = subject(&name).to_owned();
         let index = *known.entry(subject.clone()).or_insert(vehicles.len());
         if index == vehicles.len() {
             vehicles.push((subject, Vec::new()));
@@ -81,14 +80,17 @@ fn by_subject(markers: Vec<(String, [usize; 3])>) -> Result<Vec<MarkerColumns>, 
     Ok(vehicles)
 }
 
+/// Returns the length of a unit \[m\]; `remedy` is the remedy for an unknown one.
+fn unit_m(unit: &str, remedy: &str) -> Result<f64, Fault> {
+    let unknown = || format!("unknown unit of length {}", quoted(unit));
+    heading::size_of(unit, false).ok_or_else(|| Fault::content(ContentKind::UnknownUnit, unknown(), remedy))
+}
+
 /// Returns the note on names that are not read, with the first few names.
 fn note_of_others<'a>(why: &str, others: impl Iterator<Item = &'a str>) -> Option<String> {
     const LISTED: usize = 8;
-    let others: BTreeSet<_> = others.collect();
-    let more = others.len().saturating_sub(LISTED);
-    let listed = others.iter().take(LISTED).copied().collect::<Vec<_>>().join(", ");
-    let more = if more > 0 { format!(" and {more} more") } else { String::new() };
-    (!others.is_empty()).then(|| format!("not read, as {why}: {listed}{more}"))
+    let others: Vec<_> = others.collect::<BTreeSet<_>>().into_iter().collect();
+    (!others.is_empty()).then(|| format!("not read, as {why}: {}", first_few(&others, LISTED)))
 }
 
 /// Returns the note on vehicles with several markers.
@@ -135,7 +137,7 @@ impl Table {
     }
 
     fn stamp(&self, cells: &[&[u8]]) -> Result<Stamp, Fault> {
-        let needed = |column| number(cells, column)?.ok_or_else(|| Fault::empty_cell(&(column + 1).to_string()));
+        let needed = |column| number(cells, column)?.ok_or_else(|| Fault::empty_cell(column + 1));
         match self.capture.when {
             TimeSource::Column(column) => needed(column).map(Stamp::Real),
             TimeSource::Frames(rate) => {
@@ -159,7 +161,7 @@ fn middle(cells: &[&[u8]], markers: &[[usize; 3]]) -> Result<Option<Vector3<f64>
             (None, None, None) => return Ok(None),
             _ => {
                 let column = columns.iter().find(|column| cells.get(**column).is_some_and(|cell| cell.is_empty()));
-                return Err(Fault::empty_cell(&column.map_or(0, |column| column + 1).to_string()));
+                return Err(Fault::empty_cell(column.map_or(0, |column| column + 1)));
             }
         }
     }
@@ -170,37 +172,20 @@ fn middle(cells: &[&[u8]], markers: &[[usize; 3]]) -> Result<Option<Vector3<f64>
 fn number(cells: &[&[u8]], column: usize) -> Result<Option<f64>, Fault> {
     let Some(cell) = cells.get(column) else {
         let problem = format!("it has {} fields, but field {} belongs to a vehicle", cells.len(), column + 1);
-        return refuse(
-            ContentKind::FieldCount,
-            problem,
-            "every line needs one field per column; the fields of a lost marker are empty",
-        );
+        let remedy = "every line needs one field per column; the fields of a lost marker are empty";
+        return refuse(ContentKind::FieldCount, problem, remedy);
     };
-    let text = str::from_utf8(cell).map_err(|_| Fault::NotUtf8)?;
-    match text.parse::<f64>() {
-        _ if text.is_empty() => Ok(None),
-        Ok(number) if number.is_finite() => Ok(Some(number)),
-        Ok(_) => Err(Fault::not_finite(&(column + 1).to_string(), text, UNSEEN)),
-        Err(_) => {
-            let problem = format!("column `{}` holds {}, which is not a number", column + 1, quoted(text));
-            refuse(ContentKind::NotANumber, problem, "export again, with decimal points")
-        }
-    }
+    parse_number(column + 1, str::from_utf8(cell).map_err(|_| Fault::not_utf8())?, UNSEEN)
 }
 
 impl Rows for Table {
     /// The table ends with the file, or at a blank line.
     fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
-        let before = rows.len();
-        while rows.len() < before + BATCH && !self.ended {
-            let is_blank = |line: &[u8]| line.iter().all(|byte| matches!(byte, b',' | b' ' | b'\t'));
-            self.ended = !self.lines.advance()? || is_blank(self.lines.line());
-            if self.ended {
-                break;
-            }
-            self.append(rows).map_err(|fault| fault.at(Place::Line(self.lines.number())))?;
+        self.ended = self.ended || !self.lines.advance()? || is_blank(self.lines.line());
+        if !self.ended {
+            self.append(rows).map_err(|fault| fault.at(self.lines.place()))?;
         }
-        Ok(rows.len() > before)
+        Ok(!self.ended)
     }
 
     fn vehicles(&self) -> &[String] {
@@ -212,11 +197,8 @@ impl Rows for Table {
     }
 }
 
-pub(super) const MOTIVE: Reader = Reader {
-    format: Format::MOTIVE,
-    sniff: |head| head.is_text(|text| text.starts_with(b"Format Version,")),
-    open: open_motive,
-};
+/// First bytes of a Motive take.
+pub(super) const MOTIVE: &[u8] = b"Format Version,";
 
 /// Number of lines in which the column names must occur.
 const HEAD_LINES: u64 = 20;
@@ -236,7 +218,7 @@ struct MotiveHead {
 }
 
 /// Opens a Motive take.
-fn open_motive(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+pub(super) fn open_motive(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let head = MotiveHead::read(source)?;
     let capture = head.capture().map_err(|fault| fault.at(Place::Line(head.first_line - 1)))?;
     open(source, capture, options)
@@ -248,8 +230,7 @@ impl MotiveHead {
         let mut lines = Lines::new(source)?;
         let mut before = Vec::new();
         while lines.number() < HEAD_LINES && lines.advance()? {
-            let text = std::str::from_utf8(lines.line()).map_err(|_| Fault::NotUtf8.at(Place::Line(lines.number())))?;
-            let cells: Vec<String> = text.split(',').map(|cell| cell.trim().trim_matches('"').to_owned()).collect();
+            let cells = cells(str::from_utf8(lines.line()).map_err(|_| Fault::not_utf8().at(lines.place()))?);
             match (lines.number(), cells.first().map(String::as_str), cells.get(1).map(String::as_str)) {
                 (1, ..) => head.header = cells,
                 (_, Some("Frame"), _) => {
@@ -261,7 +242,7 @@ impl MotiveHead {
                 _ => before = cells,
             }
         }
-        Err(Fault::Truncated("the lines with the column names are missing".to_owned()).into())
+        Err(Fault::truncated("the lines with the column names are missing").into())
     }
 
     /// Returns the value of a name in the first line.
@@ -275,13 +256,7 @@ impl MotiveHead {
 
     fn capture(&self) -> Result<Capture, Fault> {
         let unit = self.header_value("Length Units").unwrap_or_default();
-        let metres = heading::size_of(unit, false).ok_or_else(|| {
-            Fault::content(
-                ContentKind::UnknownUnit,
-                format!("unknown unit of length {}", quoted(unit)),
-                "export it in metres",
-            )
-        })?;
+        let metres = unit_m(unit, "export it in metres")?;
         if let Some(space) = self.header_value("Coordinate Space").filter(|space| *space != "Global") {
             let problem = format!("its coordinate space is {}", quoted(space));
             return refuse(ContentKind::UnusableFrame, problem, "export it in global coordinates");
@@ -309,7 +284,7 @@ impl MotiveHead {
         }
         let mut notes = vec!["Motive has y up: its x, -z and y are read as x, y and z".to_owned()];
         notes.extend(note_of_markers(&vehicles));
-        let is_read = |name: &str| known.contains(name.split(':').next().unwrap_or_default());
+        let is_read = |name: &str| known.contains(subject(name));
         let others = self.names.iter().skip(2).map(String::as_str).filter(|name| !name.is_empty() && !is_read(name));
         let why = if has_bodies { "they are not rigid bodies" } else { "they are not labelled markers" };
         notes.extend(note_of_others(why, others));
@@ -331,9 +306,6 @@ impl MotiveHead {
     }
 }
 
-pub(super) const VICON: Reader =
-    Reader { format: Format::VICON, sniff: |head| head.is_text(is_export), open: open_vicon };
-
 /// Names of the first section of an export.
 const SECTIONS: [&str; 9] =
     ["Trajectories", "Objects", "Object", "Segments", "Model Outputs", "Devices", "Events", "Joints", "Global Angle"];
@@ -341,17 +313,20 @@ const SECTIONS: [&str; 9] =
 /// Name of the section with markers.
 const MARKERS: &str = "Trajectories";
 
-/// Returns whether a text begins with a section name and a rate.
-fn is_export(text: &[u8]) -> bool {
-    let mut lines = text.split(|&byte| byte == b'\n').map(cells);
+/// Returns whether a text is a Vicon export: it begins with a section name and a rate.
+pub(super) fn is_vicon(text: &[u8]) -> bool {
+    let mut lines = text.split(|&byte| byte == b'\n').map(|line| cells(&String::from_utf8_lossy(line)));
     let (first, second) = (lines.next().unwrap_or_default(), lines.next().unwrap_or_default());
     let rate = second.first().and_then(|rate| rate.parse::<f64>().ok());
     first.first().is_some_and(|name| SECTIONS.contains(&name.as_str())) && rate.is_some()
 }
 
+fn is_blank(line: &[u8]) -> bool {
+    line.iter().all(|byte| matches!(byte, b',' | b' ' | b'\t'))
+}
+
 /// Splits a line into cells, without empty ones at its end.
-fn cells(line: &[u8]) -> Vec<String> {
-    let text = String::from_utf8_lossy(line);
+fn cells(text: &str) -> Vec<String> {
     let mut cells: Vec<_> = text.split(',').map(|cell| cell.trim().trim_matches('"').to_owned()).collect();
     while cells.pop_if(|cell| cell.is_empty()).is_some() {}
     cells
@@ -368,17 +343,14 @@ struct ViconSection {
 }
 
 /// Opens a Vicon export.
-fn open_vicon(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+pub(super) fn open_vicon(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let heads = heads(source)?;
     let objects = heads.iter().find(|head| head.axes.iter().any(|axis| axis == "TX"));
     let Some(head) = objects.or_else(|| heads.iter().find(|head| head.section == MARKERS)) else {
         let sections: Vec<_> = heads.iter().map(|head| head.section.as_str()).collect();
         let problem = format!("it has neither objects nor trajectories; its sections are {}", sections.join(", "));
-        return refuse(
-            ContentKind::NoPositions,
-            problem,
-            "export the trajectories of markers, or the objects of Tracker",
-        );
+        let remedy = "export the trajectories of markers, or the objects of Tracker";
+        return refuse(ContentKind::NoPositions, problem, remedy);
     };
     let mut capture = head.capture().map_err(|fault| fault.at(Place::Line(head.first_line - 1)))?;
     let read = |name: &str| capture.vehicles.iter().any(|(vehicle, _)| vehicle == subject(name));
@@ -400,15 +372,14 @@ fn heads(source: &Source) -> Result<Vec<ViconSection>, ReadError> {
     let mut lines = Lines::new(source)?;
     let (mut heads, mut blank) = (Vec::new(), true);
     while lines.advance()? {
-        let is_first =
-            std::mem::replace(&mut blank, lines.line().iter().all(|byte| matches!(byte, b',' | b' ' | b'\t')));
-        let section = if is_first && !blank { cells(lines.line()) } else { continue };
+        let is_first = std::mem::replace(&mut blank, is_blank(lines.line()));
+        let section = if is_first && !blank { cells(&String::from_utf8_lossy(lines.line())) } else { continue };
         if section.len() != 1 {
             continue;
         }
         let mut head = Vec::new();
         while head.len() < 4 && !blank && lines.advance()? {
-            head.push(cells(lines.line()));
+            head.push(cells(&String::from_utf8_lossy(lines.line())));
             blank = head.last().is_some_and(Vec::is_empty);
         }
         let Ok([rate, names, axes, units]) = <[Vec<String>; 4]>::try_from(head) else { continue };
@@ -418,7 +389,7 @@ fn heads(source: &Source) -> Result<Vec<ViconSection>, ReadError> {
         }
     }
     if heads.is_empty() {
-        return Err(Fault::Truncated("the lines with the column names are missing".to_owned()).into());
+        return Err(Fault::truncated("the lines with the column names are missing").into());
     }
     Ok(heads)
 }
@@ -428,11 +399,8 @@ impl ViconSection {
         let rate = self.rate.parse().ok().filter(|rate: &f64| rate.is_finite() && *rate > 0.0);
         let rate = rate.ok_or_else(|| {
             let problem = format!("the rate of {} must be a positive number, got {}", self.section, quoted(&self.rate));
-            Fault::content(
-                ContentKind::FrameRate,
-                problem,
-                "export again: the second line of a section gives the number of frames per second",
-            )
+            let remedy = "export again: the second line of a section gives the number of frames per second";
+            Fault::content(ContentKind::FrameRate, problem, remedy)
         })?;
         let is_objects = self.axes.iter().any(|axis| axis == "TX");
         let markers = self.markers(if is_objects { ["TX", "TY", "TZ"] } else { ["X", "Y", "Z"] });
@@ -440,20 +408,14 @@ impl ViconSection {
         let parts = markers.len();
         let vehicles = by_subject(markers)?;
         if vehicles.is_empty() {
-            return refuse(
-                ContentKind::NoPositions,
-                "it has no named marker and no object",
-                "export again, with labelled trajectories",
-            );
+            let remedy = "export again, with labelled trajectories";
+            return refuse(ContentKind::NoPositions, "it has no named marker and no object", remedy);
         }
         if is_objects && vehicles.len() < parts {
             let several = vehicles.iter().find(|(_, columns)| columns.len() > 1).map_or("", |(name, _)| name);
             let problem = format!("{} has several segments", quoted(several));
-            return refuse(
-                ContentKind::AmbiguousColumn,
-                problem,
-                "export objects with one segment each, or the trajectories of markers",
-            );
+            let remedy = "export objects with one segment each, or the trajectories of markers";
+            return refuse(ContentKind::AmbiguousColumn, problem, remedy);
         }
         let notes = note_of_markers(&vehicles).into_iter().collect();
         let when = TimeSource::Frames(rate);
@@ -480,12 +442,6 @@ impl ViconSection {
                 format!("positions have different units: {} and {}", quoted(first), quoted(other.map_or("", |u| u)));
             return refuse(ContentKind::UnitConflict, problem, "export all positions in millimetres");
         }
-        heading::size_of(first, false).ok_or_else(|| {
-            Fault::content(
-                ContentKind::UnknownUnit,
-                format!("unknown unit of length {}", quoted(first)),
-                "export it in millimetres",
-            )
-        })
+        unit_m(first, "export it in millimetres")
     }
 }

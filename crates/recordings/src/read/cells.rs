@@ -1,6 +1,7 @@
 //! Access to the cells of a table, as numbers, times and names.
 
 use std::borrow::Cow;
+use std::{fmt, str};
 
 use nalgebra::Vector3;
 
@@ -23,7 +24,12 @@ pub(super) trait Cells {
     fn row(&self) -> u64;
 
     /// Returns the place of the row with this number.
-    fn place(row: u64) -> Place;
+    fn place(&self, row: u64) -> Place;
+
+    /// Returns a fault in the current row.
+    fn fault(&self, fault: Fault) -> ReadError {
+        fault.at(self.place(self.row()))
+    }
 
     /// Returns a cell as written; an empty string for an empty cell.
     fn text(&self, column: usize) -> Result<Cow<'_, str>, Fault>;
@@ -45,9 +51,47 @@ pub(super) trait Cells {
     }
 }
 
-/// Returns the fault of an empty cell.
-pub(super) fn empty(cells: &impl Cells, column: usize) -> Fault {
-    Fault::empty_cell(&cells.header()[column])
+/// Cell of a file whose cells have types.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) enum Cell<T = String> {
+    #[default]
+    Empty,
+    /// Wide enough for signed and unsigned integers of 64 bits.
+    Whole(i128),
+    Real(f64),
+    Text(T),
+}
+
+impl<T: AsRef<[u8]>> Cell<T> {
+    /// Returns the cell as text; an empty string for an empty cell.
+    pub(super) fn text(&self) -> Result<Cow<'_, str>, Fault> {
+        Ok(match self {
+            Self::Empty => "".into(),
+            Self::Whole(whole) => whole.to_string().into(),
+            Self::Real(real) => format!("{real:?}").into(),
+            Self::Text(text) => str::from_utf8(text.as_ref()).map_err(|_| Fault::not_utf8())?.into(),
+        })
+    }
+
+    /// Returns the number in a cell, which may be written as text.
+    pub(super) fn number(&self) -> Option<f64> {
+        match self {
+            Self::Empty => None,
+            Self::Whole(whole) => Some(*whole as f64),
+            Self::Real(real) => Some(*real),
+            Self::Text(text) => str::from_utf8(text.as_ref()).ok()?.trim().parse().ok(),
+        }
+    }
+
+    /// Returns the time in a cell, which may be written as text.
+    pub(super) fn stamp(&self) -> Option<Stamp> {
+        match self {
+            Self::Empty => None,
+            Self::Whole(whole) => Some(i64::try_from(*whole).map_or(Stamp::Real(*whole as f64), Stamp::Whole)),
+            Self::Real(real) => Some(Stamp::Real(*real)),
+            Self::Text(text) => Stamp::parse(str::from_utf8(text.as_ref()).ok()?.trim()),
+        }
+    }
 }
 
 /// Returns the finite number in a cell; `None` for an empty cell.
@@ -62,8 +106,12 @@ pub(super) fn number(cells: &impl Cells, column: usize) -> Result<Option<f64>, F
 /// Parses a cell without a plain finite number; `unseen` is the remedy for a number that is not finite.
 #[cold]
 pub(super) fn odd_number(cells: &impl Cells, column: usize, unseen: &str) -> Result<Option<f64>, Fault> {
-    let (text, column) = (cells.text(column)?, &cells.header()[column]);
-    let text = text.trim();
+    parse_number(&cells.header()[column], cells.text(column)?.trim(), unseen)
+}
+
+/// Parses the finite number of a column; `None` for an empty text. `unseen` is the remedy for a number that is not
+/// finite.
+pub(super) fn parse_number(column: impl fmt::Display, text: &str, unseen: &str) -> Result<Option<f64>, Fault> {
     let holds = |kind, what: &str, remedy| {
         let problem = format!("column `{column}` holds {}, {what}", quoted(text));
         refuse(kind, problem, remedy)

@@ -8,7 +8,7 @@ use chrono::{DateTime, NaiveDateTime};
 use super::error::{ContentKind, Fault, quoted, refuse};
 use super::heading;
 use super::options::ReadOptions;
-use super::time_unit::TimeUnit;
+use super::time_unit::{TimeUnit, seconds_of};
 use tautline_core::option::{COLUMN, FPS, TIME_SCALE, TIME_UNIT};
 use tautline_core::track::Clock;
 
@@ -233,7 +233,8 @@ impl Probe {
 #[derive(Clone, Debug)]
 pub(super) struct Timing {
     pub(super) clock: Clock,
-    per_second: f64,
+    /// Number of units per second.
+    pub(super) per_second: f64,
     /// Epoch: a whole number of seconds, in units.
     epoch: i64,
 }
@@ -259,11 +260,6 @@ impl Timing {
         let (epoch, epoch_ns) = epoch.unwrap_or((0, 0));
         let clock = Clock { unit: name, inferred: why.is_some(), other_unit: other.map(TimeUnit::name), epoch_ns };
         (Self { clock, per_second: per_second as f64, epoch }, note)
-    }
-
-    /// Returns the number of units per second.
-    pub(super) fn per_second(&self) -> f64 {
-        self.per_second
     }
 
     /// Returns a clock with `per_second` units per second.
@@ -425,24 +421,13 @@ fn both(header: &[String], a: &Candidate, b: &Candidate) -> Fault {
 /// Relative rounding of a unit of time.
 const ROUNDING: f64 = 1e-9;
 
-/// Returns the number of units of a name per second, also of units that are longer than a second.
-fn units_per_second(name: &str) -> Option<f64> {
-    let seconds = match name {
-        "min" | "mins" | "minute" | "minutes" => 60.0,
-        "h" | "hr" | "hrs" | "hour" | "hours" => 3600.0,
-        "d" | "day" | "days" => 86_400.0,
-        _ => return TimeUnit::from_name(name).map(|unit| unit.per_second() as f64),
-    };
-    Some(1.0 / seconds)
-}
-
 /// Returns the unit in the name of a time column, unless the user gives the unit. Refuses a given unit that contradicts
 /// the name.
 pub(super) fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<TimeUnit>, Fault> {
     let given = options.time_unit.map(|unit| unit.per_second() as f64).or(options.times_per_second);
     if let Some(given) = given {
-        let named = heading::unit_of_time_name(name).and_then(|unit| Some((units_per_second(&unit)?, unit)));
-        return match named.filter(|(per_second, _)| (per_second / given - 1.0).abs() > ROUNDING) {
+        let named = heading::time_and_unit(name).1.and_then(|unit| Some((seconds_of(&unit)?, unit)));
+        return match named.filter(|(seconds, _)| (seconds * given - 1.0).abs() > ROUNDING) {
             None => Ok(None),
             Some((_, unit)) => {
                 let problem = format!("column {} is in {} by its name, but another unit is given", quoted(name), unit);
@@ -456,7 +441,7 @@ pub(super) fn unit_of_time(name: &str, options: &ReadOptions) -> Result<Option<T
     }
     // `time (utc)` gives a zone, not a unit.
     let is_zone = |unit: &String| matches!(unit.as_str(), "utc" | "gmt" | "iso8601" | "iso 8601");
-    let Some(unit) = heading::unit_of_time_name(name).filter(|unit| !is_zone(unit)) else { return Ok(None) };
+    let Some(unit) = heading::time_and_unit(name).1.filter(|unit| !is_zone(unit)) else { return Ok(None) };
     TimeUnit::from_name(&unit).map(Some).ok_or_else(|| {
         let problem = format!("column {} has an unknown unit of time, {}", quoted(name), quoted(&unit));
         let remedy = format!("set its length in seconds with {TIME_SCALE}, such as 60 for minutes");

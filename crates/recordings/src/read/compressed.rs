@@ -5,12 +5,11 @@
 
 use std::io::Read as _;
 
-use super::curves::{Curves, piece, powers};
+use super::curves::{Curves, piece, powers, stand_throughout};
 use super::error::{ContentKind, Fault, Place, ReadError, refuse};
 use super::format::Format;
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::skybrush::stand_throughout;
 use super::source::Source;
 use crate::export::drones::fit::seconds;
 use crate::export::drones::skybrush as skyb;
@@ -76,7 +75,7 @@ fn crazyflie(bytes: &[u8]) -> Result<Decoded, ReadError> {
 
 fn skybrush(bytes: &[u8]) -> Result<Decoded, ReadError> {
     if !bytes.starts_with(skyb::MAGIC) {
-        return Err(Fault::WrongFormat(Format::SKYB).into());
+        return Err(Fault::wrong_format(Format::SKYB).into());
     }
     let (start, body) = trajectory_block(bytes, start_of_blocks(bytes)?)?;
     let Some((&first, segments)) = body.split_first() else {
@@ -100,7 +99,7 @@ fn start_of_blocks(bytes: &[u8]) -> Result<usize, ReadError> {
     let unsupported = |problem: String, byte: usize| {
         Err(Fault::content(ContentKind::UnsupportedFormat, problem, again).at(Place::Byte(byte as u64)))
     };
-    let missing = || Fault::Truncated("its header is incomplete".to_owned());
+    let missing = || Fault::truncated("its header is incomplete");
     match bytes.get(version_at).ok_or_else(missing)? {
         1 => return Ok(version_at + 1),
         2 => {}
@@ -118,7 +117,7 @@ fn start_of_blocks(bytes: &[u8]) -> Result<usize, ReadError> {
     let (stored, sum) = (stored.ok_or_else(missing)?, skyb::checksum(bytes));
     if stored != sum {
         let problem = format!("its checksum is {sum:08x}, and the file states {stored:08x}");
-        return Err(Fault::Damaged(problem).at(Place::Byte(skyb::CHECKSUM_AT as u64)));
+        return Err(Fault::damaged(problem).at(Place::Byte(skyb::CHECKSUM_AT as u64)));
     }
     Ok(end)
 }
@@ -132,7 +131,7 @@ fn trajectory_block(bytes: &[u8], mut offset: usize) -> Result<(usize, &[u8]), R
             Some((kind, body))
         };
         let Some((kind, body)) = block() else {
-            return Err(Fault::Truncated("a block is incomplete".to_owned()).at(Place::Byte(offset as u64)));
+            return Err(Fault::truncated("a block is incomplete").at(Place::Byte(offset as u64)));
         };
         if kind == skyb::TRAJECTORY {
             return Ok((offset + 3, body));
@@ -166,6 +165,5 @@ fn items(vehicle: usize, trajectory: &Trajectory, unit_m: f64, options: &ReadOpt
 
 /// Returns the error of an incomplete segment of a body that begins at an offset.
 fn truncated(fault: Truncated, start: usize) -> ReadError {
-    Fault::Truncated("a segment of its trajectory is incomplete".to_owned())
-        .at(Place::Byte((start + fault.byte) as u64))
+    Fault::truncated("a segment of its trajectory is incomplete").at(Place::Byte((start + fault.byte) as u64))
 }

@@ -1,6 +1,4 @@
-//! Converts recordings to axes x east, y north and z up.
-//!
-//! The directions of the axes come from the user or from column names:
+//! Directions of axes by column names, and their conversion to x east, y north and z up.
 //!
 //! | columns | frame | vehicle |
 //! | --- | --- | --- |
@@ -13,39 +11,18 @@
 use std::collections::BTreeSet;
 
 use super::axes::Axes;
-use super::error::{ContentKind, Fault, ReadError, quoted, refuse};
+use super::error::{ContentKind, Fault, quoted, refuse};
 use super::heading;
 use super::options::{ColumnNames, ReadOptions};
-use super::order::Recording;
 use tautline_core::option::{AXES, COLUMN, SCALE};
-use tautline_core::track::{Item, Metadata, Tracks};
-
-/// Applies the mapping of the user to a recording.
-pub(super) fn turned(recording: Recording, options: &ReadOptions) -> Result<Recording, ReadError> {
-    if options.turn().is_identity() {
-        return Ok(recording);
-    }
-    if recording.is_planar() && !options.turn().keeps_plane() {
-        let problem = format!("{AXES} maps its third axis to x or y, but it has none");
-        let column = COLUMN.set("z=NAME");
-        let remedy = format!("name the column of the third axis with {column}, or keep z in {AXES}");
-        return refuse(ContentKind::ContradictsOption, problem, remedy);
-    }
-    let mut metadata = recording.metadata().clone();
-    metadata.notes.push(options.turn().note());
-    Ok(Box::new(MappedRecording { recording, axes: options.turn(), metadata }))
-}
 
 /// Refuses a mapping of axes by the user if the directions are known; `what` names their source.
 pub(super) fn refuse_known(options: &ReadOptions, what: &str) -> Result<(), Fault> {
     if options.turn().is_identity() {
         return Ok(());
     }
-    refuse(
-        ContentKind::ContradictsOption,
-        format!("{what} gives the directions of its axes"),
-        format!("omit {AXES} and the signs of {SCALE}"),
-    )
+    let remedy = format!("omit {AXES} and the signs of {SCALE}");
+    refuse(ContentKind::ContradictsOption, format!("{what} gives the directions of its axes"), remedy)
 }
 
 /// Refuses a mapping that changes the direction of a height column.
@@ -58,49 +35,6 @@ pub(super) fn refuse_turned_height(options: &ReadOptions, column: &str) -> Resul
     let named = COLUMN.set(format!("z={column}"));
     let remedy = format!("keep z in {AXES} and {SCALE}, or take the numbers as z with {named}");
     refuse(ContentKind::ContradictsOption, problem, remedy)
-}
-
-struct MappedRecording {
-    recording: Recording,
-    axes: Axes,
-    metadata: Metadata,
-}
-
-impl Tracks for MappedRecording {
-    type Error = ReadError;
-
-    fn vehicles(&self) -> &[String] {
-        self.recording.vehicles()
-    }
-
-    fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
-        let before = items.len();
-        let more = self.recording.read(items)?;
-        for item in &mut items[before..] {
-            match item {
-                Item::Sample(sample) => {
-                    if sample.radius_m.is_some() && !self.axes.keeps_lengths() {
-                        let problem = format!("{SCALE} has different factors for its axes, but vehicles have a radius");
-                        let remedy = format!("give one factor in {SCALE}");
-                        return refuse(ContentKind::ContradictsOption, problem, remedy);
-                    }
-                    sample.position_m = self.axes.turn(sample.position_m);
-                    sample.velocity_m_s = sample.velocity_m_s.map(|velocity| self.axes.turn(velocity));
-                }
-                Item::Piece(piece) => {
-                    piece.coefficients.iter_mut().for_each(|coefficient| *coefficient = self.axes.turn(*coefficient));
-                }
-            }
-        }
-        if !more {
-            self.metadata.notes = [self.recording.notes(), &[self.axes.note()]].concat();
-        }
-        Ok(more)
-    }
-
-    fn metadata(&self) -> &Metadata {
-        &self.metadata
-    }
 }
 
 /// Remedy for positions with a separate origin per vehicle.
@@ -164,14 +98,19 @@ impl Convention {
         self.directed.insert(column);
     }
 
-    /// Renames the columns that consist of this prefix and an axis, such as `vx`.
-    fn turn_all(&mut self, lower: &[String], start: &str, axes: &Axes) {
-        for (axis, letter) in ["x", "y", "z"].into_iter().enumerate() {
-            let named = lower.iter().enumerate().filter(|(_, name)| name.strip_prefix(start) == Some(letter));
-            for (column, _) in named {
-                self.turn(column, axes, axis, [start, ""]);
+    /// Returns the convention of one vehicle whose columns of an axis behind these prefixes are north, east and down.
+    fn of_ned(&self, lower: &[String], starts: [&str; 2]) -> Self {
+        let (mut turned, ned) = (self.clone(), Axes::from_name("ned").unwrap_or_default());
+        for (column, name) in lower.iter().enumerate() {
+            for start in starts {
+                let axis = ["x", "y", "z"].iter().position(|axis| name.strip_prefix(start) == Some(axis));
+                if let Some(axis) = axis {
+                    turned.turn(column, &ned, axis, [start, ""]);
+                }
             }
         }
+        turned.is_one_vehicle = true;
+        turned
     }
 
     fn of_px4(&self, lower: &[String]) -> Result<Option<Self>, Fault> {
@@ -185,14 +124,10 @@ impl Convention {
             let problem = "its positions are relative to `ref_lat` and `ref_lon`, but there is no column `ref_alt`";
             return refuse(ContentKind::MissingColumn, problem, GLOBAL);
         };
-        let mut px4 = self.clone();
-        for start in ["", "v"] {
-            px4.turn_all(lower, start, &ned());
-        }
+        let mut px4 = self.of_ned(lower, ["", "v"]);
         px4.reference = Some([lat, lon, alt]);
         px4.valid = ["xy_valid", "z_valid"].into_iter().filter_map(index_of).collect();
         px4.counts_from_boot = index_of("timestamp").is_some();
-        px4.is_one_vehicle = true;
         let what = "positions are north, east and down of `ref_lat`, `ref_lon` and `ref_alt` (PX4)";
         let clock = "; times count from the start of the vehicle's computer";
         px4.note = Some(format!("{what}{}", if px4.counts_from_boot { clock } else { "" }));
@@ -201,16 +136,11 @@ impl Convention {
 
     fn of_drone_show(&self, lower: &[String]) -> Option<Self> {
         let is_there = |name: &str| lower.iter().any(|known| known == name);
-        if !["t", "px", "py", "pz", "ledr", "ledg", "ledb"].into_iter().all(is_there) {
-            return None;
-        }
-        let mut show = self.clone();
-        for start in ["p", "v"] {
-            show.turn_all(lower, start, &ned());
-        }
-        show.is_one_vehicle = true;
-        show.note = Some("positions are north, east and down (MAVSDK Drone Show)".to_owned());
-        Some(show)
+        ["t", "px", "py", "pz", "ledr", "ledg", "ledb"].into_iter().all(is_there).then(|| {
+            let mut show = self.of_ned(lower, ["p", "v"]);
+            show.note = Some("positions are north, east and down (MAVSDK Drone Show)".to_owned());
+            show
+        })
     }
 
     fn of_euroc(&self, lower: &[String]) -> Option<Self> {
@@ -271,10 +201,6 @@ impl Convention {
         turned.note = Some("positions are converted to east, north and up, by the names of columns".to_owned());
         Some(turned)
     }
-}
-
-fn ned() -> Axes {
-    Axes::from_name("ned").unwrap_or_default()
 }
 
 /// Splits a name into the part before its unit and the unit as written.

@@ -12,28 +12,14 @@ use nalgebra::Vector3;
 
 use super::cells::{Cells as _, number};
 use super::csv::TextTable;
-use super::curves::{Curves, VehicleItems, piece};
+use super::curves::{Curves, HIGHEST_DEGREE, VehicleItems, piece};
 use super::error::{ContentKind, Fault, ReadError, quoted, refuse};
 use super::format::Format;
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::reader::Reader;
 use super::source::Source;
 use tautline_core::option::START;
 use tautline_core::track::Item;
-
-pub(super) const READER: Reader = Reader {
-    format: Format::CRAZYFLIE,
-    sniff: |head| {
-        let begin = b"duration,";
-        let begins = |line: &[u8]| line.get(..begin.len()).is_some_and(|start| start.eq_ignore_ascii_case(begin));
-        head.line.is_some_and(begins)
-    },
-    open: |source, options| open(vec![(source.stem(), vec![source.clone()])], None, options),
-};
-
-/// Highest supported power.
-const HIGHEST_POWER: usize = 15;
 
 /// Opens the polynomials of these vehicles; the files of a vehicle are flown in sequence. `left_out` is the note on
 /// other files.
@@ -108,8 +94,8 @@ impl Columns {
         let mut highest = 0;
         for name in header {
             let Some(("x" | "y" | "z" | "X" | "Y" | "Z", power)) = name.split_once('^') else { continue };
-            let power = power.parse::<usize>().ok().filter(|&power| power <= HIGHEST_POWER).ok_or_else(|| {
-                let problem = format!("the power of column `{name}` is not a number up to {HIGHEST_POWER}");
+            let power = power.parse::<usize>().ok().filter(|&power| power <= HIGHEST_DEGREE).ok_or_else(|| {
+                let problem = format!("the power of column `{name}` is not a number up to {HIGHEST_DEGREE}");
                 Fault::content(ContentKind::Degree, problem, "use pieces of degree 7, as Crazyflie trajectories have")
             })?;
             highest = highest.max(power);
@@ -133,10 +119,10 @@ pub(super) struct Curve {
 impl Curve {
     fn append(&mut self, file: &Source) -> Result<(), ReadError> {
         let mut table = TextTable::open(file, Format::CRAZYFLIE)?;
-        let columns = Columns::of(table.header()).map_err(|fault| fault.at(TextTable::place(table.row())))?;
+        let columns = Columns::of(table.header()).map_err(|fault| table.fault(fault))?;
         let before = self.items.len();
         while table.advance()? {
-            self.piece(&table, &columns).map_err(|fault| fault.at(TextTable::place(table.row())))?;
+            self.piece(&table, &columns).map_err(|fault| table.fault(fault))?;
         }
         if self.items.len() == before { Err(Fault::header_only().into()) } else { Ok(()) }
     }

@@ -16,35 +16,13 @@ use super::format::Format;
 use super::layout::{Layout, VehicleColumns};
 use super::options::{Dimensions, ReadOptions};
 use super::order::Recording;
-use super::reader::Reader;
 use super::source::{Lines, Source};
 use super::time_unit::TimeUnit;
 use super::{clock, heading, table};
-
-/// CSV table; also a text file that has no line besides comments.
-pub(super) const CSV: Reader = Reader {
-    format: Format::CSV,
-    sniff: |head| head.text.is_some() && head.line.is_none_or(has_separators),
-    open: |source, options| open(source, Format::CSV, options),
-};
-
-/// Numbers separated by blanks; accepts any other text.
-pub(super) const TEXT: Reader = Reader {
-    format: Format::TEXT,
-    sniff: |head| head.text.is_some(),
-    open: |source, options| open(source, Format::TEXT, options),
-};
-
-/// `TrajNet` table; never recognised by its first bytes, but by [`trajnet`] in a [`TEXT`] file.
-pub(super) const TRAJNET: Reader = Reader {
-    format: Format::TRAJNET,
-    sniff: |_| false,
-    open: |source, options| open(source, Format::TRAJNET, options),
-};
 use tautline_core::option::{DIMENSIONS, FORMAT};
 
 /// Returns whether a line is CSV rather than numbers between blanks or brackets.
-fn has_separators(line: &[u8]) -> bool {
+pub(super) fn has_separators(line: &[u8]) -> bool {
     let has = |byte| memchr::memchr(byte, line).is_some();
     let is_number = |bytes: &[u8]| str::from_utf8(bytes).is_ok_and(|text| text.parse::<f64>().is_ok());
     let begins_with_a_number = line.split(u8::is_ascii_whitespace).next().is_some_and(is_number);
@@ -93,19 +71,19 @@ pub(super) struct TextTable {
 }
 
 /// Opens a table.
-fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Recording, ReadError> {
+pub(super) fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Recording, ReadError> {
     let mut text = TextTable::open(source, format)?;
     if format == Format::TEXT && !text.named && options.dimensions.is_none() {
         match trajnet(source, text.separator)? {
-            TrajnetMatch::Certain => text = TextTable::open(source, Format::TRAJNET)?,
-            TrajnetMatch::Possible => {
+            Some(true) => text = TextTable::open(source, Format::TRAJNET)?,
+            Some(false) => {
                 let problem = "each line may be a frame, a vehicle, x and y, or a time, x, y and z: the first two \
                                numbers are whole";
                 let remedy =
                     format!("use {}, or {} for a time and a position", FORMAT.set("trajnet"), DIMENSIONS.set("3"));
                 return refuse(ContentKind::AmbiguousLayout, problem, remedy);
             }
-            TrajnetMatch::None => {}
+            None => {}
         }
     }
     let header_row = text.row();
@@ -125,7 +103,7 @@ fn open(source: &Source, format: Format, options: &ReadOptions) -> Result<Record
         Err(fault) if !first.is_empty() => numbers().map_err(|_| fault),
         layout => layout,
     };
-    let layout = layout.map_err(|fault| fault.at(TextTable::place(header_row)))?;
+    let layout = layout.map_err(|fault| fault.at(Place::Line(header_row)))?;
     table::open(source, text, layout, None, 0, options)
 }
 
@@ -140,7 +118,7 @@ impl TextTable {
             comment = lines.line()[hashes..].trim_ascii().to_vec();
         }
         if lines.line().is_empty() {
-            return Err(Fault::Empty.into());
+            return Err(Fault::empty().into());
         }
         let mut text = Self {
             source: source.clone(),
@@ -156,7 +134,7 @@ impl TextTable {
             wanted: None,
             time: (Vec::new(), Stamp::Whole(0)),
         };
-        text.read_header(format, &comment).map_err(|fault| fault.at(Self::place(text.row())))?;
+        text.read_header(format, &comment).map_err(|fault| text.fault(fault))?;
         Ok(text)
     }
 
@@ -224,7 +202,7 @@ impl TextTable {
         if !units.get(time).is_some_and(is_of_time) || units.iter().any(is_number) {
             return Ok(());
         }
-        self.header = heading::with_units(&self.header, &units).map_err(|fault| fault.at(Self::place(self.row())))?;
+        self.header = heading::with_units(&self.header, &units).map_err(|fault| self.fault(fault))?;
         self.has_units = true;
         Ok(())
     }
@@ -289,7 +267,7 @@ impl Cells for TextTable {
         if !next_line(&mut self.lines, self.comments)? {
             return Ok(false);
         }
-        self.split().map(|()| true).map_err(|fault| fault.at(Self::place(self.row())))
+        self.split().map(|()| true).map_err(|fault| self.fault(fault))
     }
 
     #[inline]
@@ -297,7 +275,7 @@ impl Cells for TextTable {
         self.lines.number()
     }
 
-    fn place(row: u64) -> Place {
+    fn place(&self, row: u64) -> Place {
         Place::Line(row)
     }
 
@@ -344,41 +322,31 @@ fn next_line(lines: &mut Lines, comments: bool) -> Result<bool, ReadError> {
     }
 }
 
-/// Likeness of a table of plain numbers to the `TrajNet` format.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum TrajnetMatch {
-    /// The numbers cannot be a frame and a vehicle.
-    None,
-    /// The first two numbers of each line are whole, and no two successive lines have the same frame.
-    Possible,
-    /// Some successive lines have the same frame and different vehicles.
-    Certain,
-}
-
-/// Compares a table without a header to `TrajNet`: whole numbers for frame and vehicle, and two more numbers.
-fn trajnet(source: &Source, separator: Separator) -> Result<TrajnetMatch, ReadError> {
+/// Compares a table without a header to `TrajNet`: whole numbers for frame and vehicle, and two more numbers. Returns
+/// `None` for other numbers, else whether it is certain: some successive lines have the same frame.
+fn trajnet(source: &Source, separator: Separator) -> Result<Option<bool>, ReadError> {
     let mut lines = Lines::new(source)?;
     let (mut fields, mut frame, mut vehicles) = (Fields::default(), None, BTreeSet::new());
-    let mut likeness = TrajnetMatch::Possible;
+    let mut is_certain = false;
     while next_line(&mut lines, true)? {
         if fields.split(lines.line(), separator, usize::MAX).is_err() || fields.ends.len() != TRAJNET_COLUMNS.len() {
-            return Ok(TrajnetMatch::None);
+            return Ok(None);
         }
         let whole = |index| {
             let text = str::from_utf8(fields.bytes(lines.line(), index)).ok()?;
             Stamp::parse(text.trim())?.whole()
         };
-        let (Some(of_frame), Some(vehicle)) = (whole(0), whole(1)) else { return Ok(TrajnetMatch::None) };
+        let (Some(of_frame), Some(vehicle)) = (whole(0), whole(1)) else { return Ok(None) };
         if frame.replace(of_frame) == Some(of_frame) {
-            likeness = TrajnetMatch::Certain;
+            is_certain = true;
         } else {
             vehicles.clear();
         }
         if !vehicles.insert(vehicle) {
-            return Ok(TrajnetMatch::None);
+            return Ok(None);
         }
     }
-    Ok(likeness)
+    Ok(Some(is_certain))
 }
 
 /// Splits a line of names.
@@ -465,7 +433,7 @@ impl Fields {
 
     #[inline]
     fn text<'a>(&'a self, line: &'a [u8], index: usize) -> Result<&'a str, Fault> {
-        str::from_utf8(self.bytes(line, index)).map_err(|_| Fault::NotUtf8)
+        str::from_utf8(self.bytes(line, index)).map_err(|_| Fault::not_utf8())
     }
 
     /// Splits a line into its first `limit` fields.

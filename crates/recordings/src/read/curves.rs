@@ -7,12 +7,15 @@ use serde::de::DeserializeOwned;
 
 use super::error::{ContentKind, Fault, Place, ReadError};
 use super::order::{BATCH, Recording};
-use tautline_core::track::{Item, Metadata, Piece, Tracks};
+use tautline_core::track::{Item, Metadata, Piece, Sample, Tracks};
 
 /// Smallest jump between two pieces of a curve that is reported \[m\]. Files round to micrometres.
 const JUMP_M: f64 = 1e-3;
 /// Largest time between the ends of two curves that end at one instant \[s\]: sums of rounded durations differ.
 const SAME_INSTANT_S: f64 = 1e-5;
+
+/// Highest supported degree of a curve.
+pub(super) const HIGHEST_DEGREE: usize = 15;
 
 /// Names of vehicles, each with its items in order of time.
 pub(super) type VehicleItems = Vec<(String, Vec<Item>)>;
@@ -65,7 +68,7 @@ pub(super) fn from_json<T: DeserializeOwned>(bytes: &[u8], a_show: &str, remedy:
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     serde_json::from_slice(text).map_err(|error| {
         let fault = if error.is_eof() {
-            Fault::Truncated("the JSON ends before it is complete".to_owned())
+            Fault::truncated("the JSON ends before it is complete")
         } else {
             Fault::content(ContentKind::Malformed, format!("it is not the JSON of {a_show}: {error}"), remedy)
         };
@@ -118,8 +121,7 @@ pub(crate) fn powers(points: &[Vector3<f64>], duration_s: f64) -> Vec<Vector3<f6
 
 /// Extends curves that end within [`SAME_INSTANT_S`] of the latest end up to it.
 fn align_ends(vehicles: &mut [(String, Vec<Item>)]) {
-    let end_of = |item: &Item| if let Item::Piece(piece) = item { piece.to_s } else { f64::NEG_INFINITY };
-    let latest_s = vehicles.iter().filter_map(|(_, items)| items.last()).map(end_of).fold(f64::NEG_INFINITY, f64::max);
+    let latest_s = latest_end_s(vehicles.iter().filter_map(|(_, items)| items.last()));
     for (_, items) in vehicles {
         if let Some(Item::Piece(last)) = items.last_mut()
             && latest_s - last.to_s <= SAME_INSTANT_S
@@ -129,16 +131,37 @@ fn align_ends(vehicles: &mut [(String, Vec<Item>)]) {
     }
 }
 
-fn end_of(piece: &Piece) -> Vector3<f64> {
-    let duration = piece.to_s - piece.from_s;
-    piece.coefficients.iter().rev().fold(Vector3::zeros(), |sum, coefficient| sum * duration + coefficient)
+/// Returns the latest end of the pieces \[s\].
+fn latest_end_s<'a>(items: impl Iterator<Item = &'a Item>) -> f64 {
+    let end_s = |item: &Item| if let Item::Piece(piece) = item { piece.to_s } else { f64::NEG_INFINITY };
+    items.map(end_s).fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Extends a drone with a single point to the end of the show.
+pub(super) fn stand_throughout<'a>(curves: impl Iterator<Item = &'a mut Vec<Item>>) {
+    let mut curves: Vec<_> = curves.collect();
+    let end_s = latest_end_s(curves.iter().flat_map(|curve| curve.iter()));
+    for curve in &mut curves {
+        if let [Item::Sample(sample)] = curve[..]
+            && sample.time_s < end_s
+        {
+            let Sample { vehicle, time_s: from_s, position_m, .. } = sample;
+            curve[0] = Item::Piece(Piece { vehicle, from_s, to_s: end_s, coefficients: vec![position_m] });
+        }
+    }
+}
+
+/// Returns the position at a time since the start of a piece \[s\], by its coefficients.
+pub(super) fn value(coefficients: &[Vector3<f64>], time_s: f64) -> Vector3<f64> {
+    coefficients.iter().rev().fold(Vector3::zeros(), |sum, coefficient| sum * time_s + coefficient)
 }
 
 fn largest_jump(vehicles: &[(String, Vec<Item>)]) -> Option<String> {
     let jumps = vehicles.iter().flat_map(|(name, items)| {
         items.windows(2).filter_map(move |pair| match pair {
             [Item::Piece(before), Item::Piece(after)] => {
-                Some(((end_of(before) - after.coefficients.first()?).norm(), name, after.from_s))
+                let end = value(&before.coefficients, before.to_s - before.from_s);
+                Some(((end - after.coefficients.first()?).norm(), name, after.from_s))
             }
             _ => None,
         })

@@ -19,31 +19,48 @@ const FLATTENING: f64 = 1.0 / 298.257_223_563;
 /// Latitude and longitude \[degrees\], and height above the ellipsoid \[m\].
 pub(super) type Geodetic = Vector3<f64>;
 
-/// Local frame of an origin.
+/// Frame of metres east, north and up of an origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct LocalFrame {
+pub struct EarthFrame {
     origin: Geodetic,
     centre_m: Vector3<f64>,
     /// Rows: east, north, up.
     axes: Matrix3<f64>,
 }
 
-impl LocalFrame {
+impl EarthFrame {
+    /// Returns the frame of an origin: latitude and longitude \[degrees\], and height above the ellipsoid \[m\].
+    ///
+    /// # Errors
+    /// A sentence if the place is not on the Earth.
+    pub fn new(origin: [f64; 3]) -> Result<Self, String> {
+        Self::at(origin.into()).map_err(|fault| fault.to_string())
+    }
+
+    /// Converts a place, as in [`new`](Self::new), to metres east, north and up of the origin.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn position_m(&self, place: [f64; 3]) -> Result<Vector3<f64>, String> {
+        self.place(place.into()).map_err(|fault| fault.to_string())
+    }
+
+    /// Converts a direction east, north and up at a place to this frame.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn direction_at(&self, place: [f64; 3], direction: Vector3<f64>) -> Result<Vector3<f64>, String> {
+        Ok(self.direction_from(&Self::new(place)?, direction))
+    }
+
     /// Returns the frame of this origin.
     pub(super) fn at(origin: Geodetic) -> Result<Self, Fault> {
         let centre_m = centred(origin)?;
         let [(north_sine, north_cosine), (east_sine, east_cosine)] = angles(origin);
-        let axes = Matrix3::new(
-            -east_sine,
-            east_cosine,
-            0.0,
-            -north_sine * east_cosine,
-            -north_sine * east_sine,
-            north_cosine,
-            north_cosine * east_cosine,
-            north_cosine * east_sine,
-            north_sine,
-        );
+        let east = Vector3::new(-east_sine, east_cosine, 0.0);
+        let north = Vector3::new(-north_sine * east_cosine, -north_sine * east_sine, north_cosine);
+        let up = Vector3::new(north_cosine * east_cosine, north_cosine * east_sine, north_sine);
+        let axes = Matrix3::from_columns(&[east, north, up]).transpose();
         Ok(Self { origin, centre_m, axes })
     }
 
@@ -101,36 +118,6 @@ impl LocalFrame {
         let origin = self.origin();
         let confirmed = ORIGIN.set(&origin);
         format!("positions are metres east, north and up of {origin} on WGS 84 (confirm with {confirmed})")
-    }
-}
-
-/// Frame of metres east, north and up of an origin, for positions that arrive one by one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct EarthFrame(LocalFrame);
-
-impl EarthFrame {
-    /// Returns the frame of an origin: latitude and longitude \[degrees\], and height above the ellipsoid \[m\].
-    ///
-    /// # Errors
-    /// A sentence if the place is not on the Earth.
-    pub fn new(origin: [f64; 3]) -> Result<Self, String> {
-        LocalFrame::at(origin.into()).map(Self).map_err(|fault| fault.to_string())
-    }
-
-    /// Converts a place, as in [`new`](Self::new), to metres east, north and up of the origin.
-    ///
-    /// # Errors
-    /// As [`new`](Self::new).
-    pub fn position_m(&self, place: [f64; 3]) -> Result<Vector3<f64>, String> {
-        self.0.place(place.into()).map_err(|fault| fault.to_string())
-    }
-
-    /// Converts a direction east, north and up at a place to this frame.
-    ///
-    /// # Errors
-    /// As [`new`](Self::new).
-    pub fn direction_at(&self, place: [f64; 3], direction: Vector3<f64>) -> Result<Vector3<f64>, String> {
-        Ok(self.0.direction_from(&LocalFrame::at(place.into()).map_err(|fault| fault.to_string())?, direction))
     }
 }
 
@@ -229,7 +216,7 @@ mod tests {
     fn local_frame_is_a_rotation_and_a_shift() {
         let all: Vec<_> = places().collect();
         for origin in &all {
-            let local = LocalFrame::at(*origin).expect("a place");
+            let local = EarthFrame::at(*origin).expect("a place");
             assert_eq!(local.place(*origin).expect("a place"), Vector3::zeros());
             assert!((local.axes * local.axes.transpose() - Matrix3::identity()).norm() < 1e-15);
             assert!((local.axes.determinant() - 1.0).abs() < 1e-15);
@@ -241,7 +228,7 @@ mod tests {
     #[test]
     fn positions_keep_their_place_when_the_origin_changes() {
         let (here, other) = (vector![47.0, 8.0, 400.0], vector![47.01, 8.02, 450.0]);
-        let [here, other] = [here, other].map(|place| LocalFrame::at(place).expect("a place"));
+        let [here, other] = [here, other].map(|place| EarthFrame::at(place).expect("a place"));
         let place = vector![47.011, 8.019, 470.0];
         let moved = here.position_from(&other, other.place(place).expect("a place"));
         assert!((moved - here.place(place).expect("a place")).norm() < 4.0 * ROUNDING_M, "{moved}");
@@ -252,7 +239,7 @@ mod tests {
     #[test]
     fn arc_seconds_match_the_radii_of_curvature() {
         let origin = vector![47.0, 8.0, 0.0];
-        let local = LocalFrame::at(origin).expect("a place");
+        let local = EarthFrame::at(origin).expect("a place");
         let second = 1.0 / 3600.0;
         let squared = FLATTENING * (2.0 - FLATTENING);
         let sine = 47.0_f64.to_radians().sin();
@@ -267,10 +254,10 @@ mod tests {
 
     #[test]
     fn antimeridian_and_poles_need_no_special_case() {
-        let local = LocalFrame::at(vector![0.0, 179.999_99, 0.0]).expect("a place");
+        let local = EarthFrame::at(vector![0.0, 179.999_99, 0.0]).expect("a place");
         let over = local.place(vector![0.0, -179.999_99, 0.0]).expect("a place");
         assert!((over.x - 2.0e-5_f64.to_radians() * EQUATOR_M).abs() < 1e-6, "{over}");
-        let pole = LocalFrame::at(vector![90.0, 0.0, 0.0]).expect("a place");
+        let pole = EarthFrame::at(vector![90.0, 0.0, 0.0]).expect("a place");
         let turned = pole.place(vector![90.0, 123.0, 0.0]).expect("a place");
         assert!(turned.norm() < ROUNDING_M, "every longitude is the pole: {turned}");
     }
@@ -278,8 +265,8 @@ mod tests {
     #[test]
     fn places_off_the_earth_are_refused() {
         for place in [vector![90.1, 0.0, 0.0], vector![473_977_420.0, 0.0, 0.0], vector![f64::NAN, 0.0, 0.0]] {
-            assert!(LocalFrame::at(place).is_err(), "{place}");
+            assert!(EarthFrame::at(place).is_err(), "{place}");
         }
-        assert!(LocalFrame::at(vector![0.0, 360.1, 0.0]).is_err());
+        assert!(EarthFrame::at(vector![0.0, 360.1, 0.0]).is_err());
     }
 }

@@ -1,12 +1,11 @@
 //! Errors of readers: file, place, fault and remedy.
 
-use std::borrow::Cow;
 use std::path::Path;
 use std::{fmt, io};
 
 use super::format::Format;
 use tautline_core::failure::Failure;
-use tautline_core::option::{ALLOW_UNFINISHED, COLUMN, FORMAT, FPS, Opt, SCALE, SKIP_INCOMPLETE, SORT, TIME_SCALE};
+use tautline_core::option::{COLUMN, FORMAT, FPS, Opt, SCALE, SKIP_INCOMPLETE, SORT, TIME_SCALE};
 
 /// Longest quoted value in a message \[characters\].
 const LONGEST_QUOTE: usize = 60;
@@ -52,16 +51,21 @@ impl ReadError {
     /// Returns the remedy, as a sentence without a full stop.
     #[must_use]
     pub fn help(&self) -> String {
-        match self.fault {
-            Fault::UnknownFormat => format!("set {FORMAT} to one of {}", Format::names()),
-            ref fault => fault.help().into_owned(),
+        match &self.fault {
+            Fault::System(error) if error.kind() == io::ErrorKind::NotFound => "check the path".to_owned(),
+            Fault::System(_) => "check the permissions of the file, and the disk".to_owned(),
+            Fault::Content { remedy, .. } => remedy.clone(),
         }
     }
 
     /// Returns the stable code of the problem, such as `recording/unknown-format`.
     #[must_use]
     pub fn code(&self) -> &'static str {
-        self.fault.code()
+        match &self.fault {
+            Fault::System(error) if error.kind() == io::ErrorKind::NotFound => "recording/not-found",
+            Fault::System(_) => "recording/cannot-read",
+            Fault::Content { kind, .. } => kind.code(),
+        }
     }
 
     /// Returns whether the operating system failed, not the input.
@@ -117,34 +121,7 @@ pub enum Fault {
     /// Error of the operating system.
     #[error("cannot read the file: {0}")]
     System(#[source] io::Error),
-    /// The file has no bytes.
-    #[error("it is empty")]
-    Empty,
-    /// The content has no known format.
-    #[error("unknown format")]
-    UnknownFormat,
-    /// The content does not have the requested format.
-    #[error("it is not {}: it begins with other bytes", .0.title)]
-    WrongFormat(Format),
-    /// A line exceeds the limit \[bytes\].
-    #[error("the line is longer than {0} bytes")]
-    LineTooLong(usize),
-    /// The text is not UTF-8.
-    #[error("the text is not in UTF-8")]
-    NotUtf8,
-    /// The file is truncated; the missing part.
-    #[error("it is truncated: {0}")]
-    Truncated(String),
-    /// The file was not closed, so that its end may be missing.
-    #[error("the recorder did not close the file, so the end may be missing")]
-    Unfinished,
-    /// Compressed data exceed the growth limit; the sizes.
-    #[error("{0}")]
-    Bomb(String),
-    /// The content contradicts its format; the reason.
-    #[error("it is damaged: {0}")]
-    Damaged(String),
-    /// The content has the format, but is not valid motion.
+    /// The content cannot be read, or is not valid motion.
     #[error("{problem}")]
     Content {
         /// Kind of the problem.
@@ -156,196 +133,157 @@ pub enum Fault {
     },
 }
 
-/// Kind of a [`Fault::Content`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum ContentKind {
-    /// Several columns may hold a quantity.
-    AmbiguousColumn,
-    /// The layout of the numbers is ambiguous.
-    AmbiguousLayout,
-    /// Several topics may hold the positions.
-    AmbiguousTopics,
-    /// Several columns may name the vehicle.
-    AmbiguousVehicle,
-    /// An entry of the archive is missing or duplicate.
-    ArchiveEntry,
-    /// An array has the wrong shape.
-    ArrayShape,
-    /// The index of a ROS 2 bag contradicts its files.
-    BagIndex,
-    /// An option contradicts the file.
-    ContradictsOption,
-    /// The content contradicts its format.
-    Damaged,
-    /// A number has a decimal comma.
-    DecimalComma,
-    /// The degree of a curve is out of range.
-    Degree,
-    /// A vehicle has two positions at one time.
-    DuplicateRow,
-    /// A piece of a curve has no valid duration.
-    Duration,
-    /// The elements have a type that is not read.
-    ElementType,
-    /// There are no samples.
-    Empty,
-    /// A cell without a value needs one.
-    EmptyCell,
-    /// A row has the wrong number of fields.
-    FieldCount,
-    /// The folder has no tables, or tables in several folders.
-    Folder,
-    /// The frame rate is invalid.
-    FrameRate,
-    /// Times count frames of unknown duration.
-    Frames,
-    /// The knots of a B-spline have the wrong order or number.
-    Knots,
-    /// The line ends are those of no table.
-    LineEnds,
-    /// A list has the wrong length.
-    ListLength,
-    /// The text has the wrong structure.
-    Malformed,
-    /// A column is missing.
-    MissingColumn,
-    /// No row has a fix.
-    NoFix,
-    /// The header is missing.
-    NoHeader,
-    /// The origin of places on the Earth is missing.
-    NoOrigin,
-    /// The column of positions is missing.
-    NoPositionColumn,
-    /// No part of the file has positions.
-    NoPositions,
-    /// The column of times is missing.
-    NoTimeColumn,
-    /// The column of vehicles is missing.
-    NoVehicleColumn,
-    /// A pipe or device cannot be read twice.
-    NotAFile,
-    /// A text is not a number.
-    NotANumber,
-    /// A number is not finite.
-    NotFinite,
-    /// A latitude or longitude is out of range.
-    NotOnEarth,
-    /// An option is out of range.
-    OptionOutOfRange,
-    /// A number is too large.
-    Overflow,
-    /// A position jumps between two fixes.
-    PositionJump,
-    /// A radius is out of range.
-    Radius,
-    /// Times are of several clocks.
-    SeveralClocks,
-    /// Positions are in several frames.
-    SeveralFrames,
-    /// Rows of one vehicle may be of several.
-    SeveralVehicles,
-    /// Time runs backwards.
-    TimeBackwards,
-    /// A time has an unknown format.
-    TimeFormat,
-    /// Transforms are no tree of rigid motions.
-    Transforms,
-    /// Two options give the unit of time.
-    TwoTimeUnits,
-    /// Quotes are not closed.
-    UnclosedQuotes,
-    /// Units contradict each other.
-    UnitConflict,
-    /// The content has no known format.
-    UnknownFormat,
-    /// A named topic does not exist.
-    UnknownTopic,
-    /// A unit is unknown.
-    UnknownUnit,
-    /// A named vehicle does not exist.
-    UnknownVehicle,
-    /// The compression is not supported.
-    UnsupportedCompression,
-    /// The format is not supported.
-    UnsupportedFormat,
-    /// A frame cannot be used.
-    UnusableFrame,
-    /// An option has no meaning for the format.
-    UnusedOption,
-    /// Two vehicles may be the same.
-    VehicleTwice,
-    /// The content does not have the requested format.
-    WrongFormat,
+/// Defines [`ContentKind`] with the stable code of each kind.
+macro_rules! content_kinds {
+    ($(#[doc = $doc:literal] $kind:ident = $code:literal,)+) => {
+        /// Kind of a [`Fault::Content`].
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[non_exhaustive]
+        pub enum ContentKind {
+            $(#[doc = $doc] $kind,)+
+        }
+
+        impl ContentKind {
+            /// Returns the stable code, such as `recording/time-backwards`.
+            #[must_use]
+            pub fn code(self) -> &'static str {
+                match self {
+                    $(Self::$kind => concat!("recording/", $code),)+
+                }
+            }
+        }
+    };
 }
 
-impl ContentKind {
-    /// Returns the stable code, such as `recording/time-backwards`.
-    #[must_use]
-    pub fn code(self) -> &'static str {
-        match self {
-            Self::AmbiguousColumn => "recording/ambiguous-column",
-            Self::AmbiguousLayout => "recording/ambiguous-layout",
-            Self::AmbiguousTopics => "recording/ambiguous-topics",
-            Self::AmbiguousVehicle => "recording/ambiguous-vehicle",
-            Self::ArchiveEntry => "recording/archive-entry",
-            Self::ArrayShape => "recording/array-shape",
-            Self::BagIndex => "recording/bag-index",
-            Self::ContradictsOption => "recording/contradicts-option",
-            Self::Damaged => "recording/damaged",
-            Self::DecimalComma => "recording/decimal-comma",
-            Self::Degree => "recording/degree",
-            Self::DuplicateRow => "recording/duplicate-row",
-            Self::Duration => "recording/duration",
-            Self::ElementType => "recording/element-type",
-            Self::Empty => "recording/empty",
-            Self::EmptyCell => "recording/empty-cell",
-            Self::FieldCount => "recording/field-count",
-            Self::Folder => "recording/folder",
-            Self::FrameRate => "recording/frame-rate",
-            Self::Frames => "recording/frames",
-            Self::Knots => "recording/knots",
-            Self::LineEnds => "recording/line-ends",
-            Self::ListLength => "recording/list-length",
-            Self::Malformed => "recording/malformed",
-            Self::MissingColumn => "recording/missing-column",
-            Self::NoFix => "recording/no-fix",
-            Self::NoHeader => "recording/no-header",
-            Self::NoOrigin => "recording/no-origin",
-            Self::NoPositionColumn => "recording/no-position-column",
-            Self::NoPositions => "recording/no-positions",
-            Self::NoTimeColumn => "recording/no-time-column",
-            Self::NoVehicleColumn => "recording/no-vehicle-column",
-            Self::NotAFile => "recording/not-a-file",
-            Self::NotANumber => "recording/not-a-number",
-            Self::NotFinite => "recording/not-finite",
-            Self::NotOnEarth => "recording/not-on-earth",
-            Self::OptionOutOfRange => "recording/option-out-of-range",
-            Self::Overflow => "recording/overflow",
-            Self::PositionJump => "recording/position-jump",
-            Self::Radius => "recording/radius",
-            Self::SeveralClocks => "recording/several-clocks",
-            Self::SeveralFrames => "recording/several-frames",
-            Self::SeveralVehicles => "recording/several-vehicles",
-            Self::TimeBackwards => "recording/time-backwards",
-            Self::TimeFormat => "recording/time-format",
-            Self::Transforms => "recording/transforms",
-            Self::TwoTimeUnits => "recording/two-time-units",
-            Self::UnclosedQuotes => "recording/unclosed-quotes",
-            Self::UnitConflict => "recording/unit-conflict",
-            Self::UnknownFormat => "recording/unknown-format",
-            Self::UnknownTopic => "recording/unknown-topic",
-            Self::UnknownUnit => "recording/unknown-unit",
-            Self::UnknownVehicle => "recording/unknown-vehicle",
-            Self::UnsupportedCompression => "recording/unsupported-compression",
-            Self::UnsupportedFormat => "recording/unsupported-format",
-            Self::UnusableFrame => "recording/unusable-frame",
-            Self::UnusedOption => "recording/unused-option",
-            Self::VehicleTwice => "recording/vehicle-twice",
-            Self::WrongFormat => "recording/wrong-format",
-        }
-    }
+content_kinds! {
+    /// Several columns may hold a quantity.
+    AmbiguousColumn = "ambiguous-column",
+    /// The layout of the numbers is ambiguous.
+    AmbiguousLayout = "ambiguous-layout",
+    /// Several topics may hold the positions.
+    AmbiguousTopics = "ambiguous-topics",
+    /// Several columns may name the vehicle.
+    AmbiguousVehicle = "ambiguous-vehicle",
+    /// An entry of the archive is missing or duplicate.
+    ArchiveEntry = "archive-entry",
+    /// An array has the wrong shape.
+    ArrayShape = "array-shape",
+    /// The index of a ROS 2 bag contradicts its files.
+    BagIndex = "bag-index",
+    /// An option contradicts the file.
+    ContradictsOption = "contradicts-option",
+    /// The content contradicts its format.
+    Damaged = "damaged",
+    /// A number has a decimal comma.
+    DecimalComma = "decimal-comma",
+    /// The degree of a curve is out of range.
+    Degree = "degree",
+    /// A vehicle has two positions at one time.
+    DuplicateRow = "duplicate-row",
+    /// A piece of a curve has no valid duration.
+    Duration = "duration",
+    /// The elements have a type that is not read.
+    ElementType = "element-type",
+    /// There are no samples.
+    Empty = "empty",
+    /// A cell without a value needs one.
+    EmptyCell = "empty-cell",
+    /// A row has the wrong number of fields.
+    FieldCount = "field-count",
+    /// The folder has no tables, or tables in several folders.
+    Folder = "folder",
+    /// The frame rate is invalid.
+    FrameRate = "frame-rate",
+    /// Times count frames of unknown duration.
+    Frames = "frames",
+    /// Compressed data grow beyond the limit.
+    GrowsTooLarge = "grows-too-large",
+    /// The knots of a B-spline have the wrong order or number.
+    Knots = "knots",
+    /// The line ends are those of no table.
+    LineEnds = "line-ends",
+    /// A line exceeds the limit.
+    LineTooLong = "line-too-long",
+    /// A list has the wrong length.
+    ListLength = "list-length",
+    /// The text has the wrong structure.
+    Malformed = "malformed",
+    /// A column is missing.
+    MissingColumn = "missing-column",
+    /// No row has a fix.
+    NoFix = "no-fix",
+    /// The header is missing.
+    NoHeader = "no-header",
+    /// The origin of places on the Earth is missing.
+    NoOrigin = "no-origin",
+    /// The column of positions is missing.
+    NoPositionColumn = "no-position-column",
+    /// No part of the file has positions.
+    NoPositions = "no-positions",
+    /// The column of times is missing.
+    NoTimeColumn = "no-time-column",
+    /// The column of vehicles is missing.
+    NoVehicleColumn = "no-vehicle-column",
+    /// A pipe or device cannot be read twice.
+    NotAFile = "not-a-file",
+    /// A text is not a number.
+    NotANumber = "not-a-number",
+    /// A number is not finite.
+    NotFinite = "not-finite",
+    /// A latitude or longitude is out of range.
+    NotOnEarth = "not-on-earth",
+    /// The text is not UTF-8.
+    NotUtf8 = "not-utf8",
+    /// An option is out of range.
+    OptionOutOfRange = "option-out-of-range",
+    /// A number is too large.
+    Overflow = "overflow",
+    /// A position jumps between two fixes.
+    PositionJump = "position-jump",
+    /// A radius is out of range.
+    Radius = "radius",
+    /// Times are of several clocks.
+    SeveralClocks = "several-clocks",
+    /// Positions are in several frames.
+    SeveralFrames = "several-frames",
+    /// Rows of one vehicle may be of several.
+    SeveralVehicles = "several-vehicles",
+    /// Time runs backwards.
+    TimeBackwards = "time-backwards",
+    /// A time has an unknown format.
+    TimeFormat = "time-format",
+    /// Transforms are no tree of rigid motions.
+    Transforms = "transforms",
+    /// The file is truncated.
+    Truncated = "truncated",
+    /// Two options give the unit of time.
+    TwoTimeUnits = "two-time-units",
+    /// Quotes are not closed.
+    UnclosedQuotes = "unclosed-quotes",
+    /// The file was not closed, so that its end may be missing.
+    Unfinished = "unfinished",
+    /// Units contradict each other.
+    UnitConflict = "unit-conflict",
+    /// The content has no known format.
+    UnknownFormat = "unknown-format",
+    /// A named topic does not exist.
+    UnknownTopic = "unknown-topic",
+    /// A unit is unknown.
+    UnknownUnit = "unknown-unit",
+    /// A named vehicle does not exist.
+    UnknownVehicle = "unknown-vehicle",
+    /// The compression is not supported.
+    UnsupportedCompression = "unsupported-compression",
+    /// The format is not supported.
+    UnsupportedFormat = "unsupported-format",
+    /// A frame cannot be used.
+    UnusableFrame = "unusable-frame",
+    /// An option has no meaning for the format.
+    UnusedOption = "unused-option",
+    /// Two vehicles may be the same.
+    VehicleTwice = "vehicle-twice",
+    /// The content does not have the requested format.
+    WrongFormat = "wrong-format",
 }
 
 impl From<io::Error> for Fault {
@@ -353,8 +291,8 @@ impl From<io::Error> for Fault {
     fn from(error: io::Error) -> Self {
         use io::ErrorKind as Kind;
         match error.kind() {
-            Kind::FileTooLarge => Self::Bomb(error.to_string()),
-            Kind::UnexpectedEof => Self::Truncated("the end of its data is missing".to_owned()),
+            Kind::FileTooLarge => Self::grows_too_large(error.to_string()),
+            Kind::UnexpectedEof => Self::truncated("the end of its data is missing"),
             Kind::InvalidData | Kind::InvalidInput | Kind::Other => Self::damaged(error),
             _ => Self::System(error),
         }
@@ -370,8 +308,50 @@ impl Fault {
         Self::Content { kind, problem: problem.into(), remedy: remedy.into() }
     }
 
+    /// Returns the fault of a content that contradicts its format.
     pub(super) fn damaged(reason: impl fmt::Display) -> Self {
-        Self::Damaged(reason.to_string())
+        let remedy = format!("copy or record it again, or set {FORMAT}");
+        Self::content(ContentKind::Damaged, format!("it is damaged: {reason}"), remedy)
+    }
+
+    /// Returns the fault of a file whose end is missing; `what` names the missing part.
+    pub(super) fn truncated(what: impl fmt::Display) -> Self {
+        Self::content(ContentKind::Truncated, format!("it is truncated: {what}"), "copy or record it again")
+    }
+
+    /// Returns the fault of a file without bytes.
+    pub(super) fn empty() -> Self {
+        Self::content(ContentKind::Empty, "it is empty", NOTHING_RECORDED)
+    }
+
+    /// Returns the fault of an unknown content.
+    pub(super) fn unknown_format() -> Self {
+        let remedy = format!("set {FORMAT} to one of {}", Format::names());
+        Self::content(ContentKind::UnknownFormat, "unknown format", remedy)
+    }
+
+    /// Returns the fault of a content without the first bytes of the requested format.
+    pub(super) fn wrong_format(format: Format) -> Self {
+        let remedy = format!("omit {FORMAT} to recognise the content, or set another format");
+        let problem = format!("it is not {}: it begins with other bytes", format.title);
+        Self::content(ContentKind::WrongFormat, problem, remedy)
+    }
+
+    /// Returns the fault of a line above the limit \[bytes\].
+    pub(super) fn line_too_long(limit: usize) -> Self {
+        let remedy = "check the line ends; a recording has one line per time";
+        Self::content(ContentKind::LineTooLong, format!("the line is longer than {limit} bytes"), remedy)
+    }
+
+    /// Returns the fault of a text that is not UTF-8.
+    pub(super) fn not_utf8() -> Self {
+        Self::content(ContentKind::NotUtf8, "the text is not in UTF-8", "save it as UTF-8")
+    }
+
+    /// Returns the fault of compressed data that grow beyond the limit.
+    pub(super) fn grows_too_large(problem: String) -> Self {
+        let remedy = "if the size is expected, unpack it and give the unpacked file";
+        Self::content(ContentKind::GrowsTooLarge, problem, remedy)
     }
 
     /// Returns the fault of a format whose reader is a feature that this build lacks.
@@ -388,13 +368,13 @@ impl Fault {
     }
 
     /// Returns the fault of a number that is infinite or NaN.
-    pub(super) fn not_finite(column: &str, value: &str, remedy: &str) -> Self {
+    pub(super) fn not_finite(column: impl fmt::Display, value: &str, remedy: &str) -> Self {
         let problem = format!("column `{column}` holds {}, which is not finite", quoted(value));
         Self::content(ContentKind::NotFinite, problem, remedy)
     }
 
     /// Returns the fault of an empty cell where a value is required.
-    pub(super) fn empty_cell(column: &str) -> Self {
+    pub(super) fn empty_cell(column: impl fmt::Display) -> Self {
         let remedy = "fill it, or leave all cells of the position empty if the vehicle was not seen";
         Self::content(ContentKind::EmptyCell, format!("column `{column}` is empty"), remedy)
     }
@@ -409,11 +389,10 @@ impl Fault {
     }
 
     /// Returns the fault of decreasing time.
-    pub(super) fn time_backwards(time_s: f64, before_s: f64) -> Self {
-        let problem = format!("time runs backwards: {time_s} s comes after {before_s} s");
+    pub(super) fn time_backwards(problem: String) -> Self {
         let remedy = format!(
-            "check whether the clock was set; if rows belong to several vehicles, name their column with {}; if rows \
-             are only out of order, use {SORT}",
+            "check whether the clock was set; if the rows belong to several vehicles, name their column with {}; if \
+             the rows are only out of order, use {SORT}",
             COLUMN.set("id=NAME")
         );
         Self::content(ContentKind::TimeBackwards, problem, remedy)
@@ -432,45 +411,6 @@ impl Fault {
     pub(super) fn out_of_range() -> Self {
         let remedy = format!("check {SCALE} and the values");
         Self::content(ContentKind::Overflow, "a value exceeds the range of numbers", remedy)
-    }
-
-    fn code(&self) -> &'static str {
-        match self {
-            Self::System(error) if error.kind() == io::ErrorKind::NotFound => "recording/not-found",
-            Self::System(_) => "recording/cannot-read",
-            Self::Empty => "recording/empty",
-            Self::UnknownFormat => "recording/unknown-format",
-            Self::WrongFormat(_) => "recording/wrong-format",
-            Self::LineTooLong(_) => "recording/line-too-long",
-            Self::NotUtf8 => "recording/not-utf8",
-            Self::Truncated(_) => "recording/truncated",
-            Self::Unfinished => "recording/unfinished",
-            Self::Bomb(_) => "recording/grows-too-large",
-            Self::Damaged(_) => "recording/damaged",
-            Self::Content { kind, .. } => kind.code(),
-        }
-    }
-
-    fn help(&self) -> Cow<'_, str> {
-        let remedy = match self {
-            Self::System(error) if error.kind() == io::ErrorKind::NotFound => "check the path",
-            Self::System(_) => "check the permissions of the file, and the disk",
-            Self::Empty => NOTHING_RECORDED,
-            Self::UnknownFormat => return format!("set {FORMAT}").into(),
-            Self::WrongFormat(_) => {
-                return format!("omit {FORMAT} to recognise the content, or set another format").into();
-            }
-            Self::LineTooLong(_) => "check the line ends; a recording has one line per time",
-            Self::NotUtf8 => "save it as UTF-8",
-            Self::Truncated(_) => "copy or record it again",
-            Self::Unfinished => {
-                return format!("copy or record it again, or accept the complete part with {ALLOW_UNFINISHED}").into();
-            }
-            Self::Bomb(_) => "if the size is expected, unpack it and give the unpacked file",
-            Self::Damaged(_) => return format!("copy or record it again, or set {FORMAT}").into(),
-            Self::Content { remedy, .. } => remedy,
-        };
-        remedy.into()
     }
 }
 
@@ -500,14 +440,18 @@ pub(super) fn quoted(value: &str) -> String {
     format!("`{shown}`")
 }
 
-/// Lists the first `shown` names that are not empty, and the number of further ones.
-pub(super) fn list(names: &[String], shown: usize) -> String {
-    let names: Vec<_> = names.iter().filter(|name| !name.is_empty()).map(|name| quoted(name)).collect();
-    match names.len() {
-        0 => "none".to_owned(),
-        count if count > shown => format!("{} and {} more", names[..shown].join(", "), count - shown),
-        _ => names.join(", "),
-    }
+/// Lists the first `shown` names, and the number of further ones.
+pub(super) fn first_few(names: &[impl AsRef<str>], shown: usize) -> String {
+    let first: Vec<_> = names.iter().take(shown).map(AsRef::as_ref).collect();
+    let more = names.len().saturating_sub(shown);
+    first.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
+}
+
+/// Lists the first `shown` names that are not empty, quoted, and the number of further ones.
+pub(super) fn list(names: &[impl AsRef<str>], shown: usize) -> String {
+    let names = names.iter().map(AsRef::as_ref).filter(|name| !name.is_empty());
+    let names: Vec<_> = names.map(quoted).collect();
+    if names.is_empty() { "none".to_owned() } else { first_few(&names, shown) }
 }
 
 impl From<ReadError> for Failure {

@@ -6,11 +6,11 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::str;
 
-use super::error::{ContentKind, Fault, ReadError, quoted};
+use super::error::{ContentKind, Fault, ReadError, first_few, quoted};
+use super::head::head_of;
 use super::heading;
 use super::identity::spelling;
 use super::order::Recording;
-use super::reader::head_of;
 use super::source::{Archive, Source};
 use tautline_core::fact::{self, Fact, FactKind};
 use tautline_core::option::TIME_UNIT;
@@ -45,15 +45,35 @@ pub(super) struct Folder {
 }
 
 impl Folder {
-    /// Lists a folder.
+    /// Lists a folder. Its subfolders are read if it has no tables.
     pub(super) fn open(path: &Path) -> Result<Self, ReadError> {
-        let Entries { files, folders, mut left_out } = entries(path)?;
-        if !files.is_empty() {
-            left_out.extend(folders.iter().map(|folder| folder.stem() + "/"));
-            return Ok(Self { files, folders: Vec::new(), left_out }.sorted());
+        let (mut folder, below) = Self::list(path)?;
+        for source in below {
+            if folder.files.is_empty() {
+                folder.folders.push((source.stem(), Self::list(&source.path)?.0.files));
+            } else {
+                folder.left_out.push(source.stem() + "/");
+            }
         }
-        let folders = folders.iter().map(|folder| Ok((folder.stem(), entries(&folder.path)?.files)));
-        Ok(Self { files, folders: folders.collect::<Result<_, ReadError>>()?, left_out }.sorted())
+        Ok(folder.sorted())
+    }
+
+    /// Lists the tables of a folder, and its subfolders.
+    fn list(path: &Path) -> Result<(Self, Vec<Source>), ReadError> {
+        let error = |source| ReadError::new(path, Fault::System(source));
+        let (mut folder, mut below) = (Self::default(), Vec::new());
+        for entry in fs::read_dir(path).map_err(error)? {
+            let path = entry.map_err(error)?.path();
+            let source = Source::file(&path);
+            if path.is_dir() {
+                below.push(source);
+            } else if is_table(&path) && !is_note(&source) {
+                folder.files.push(source);
+            } else if !is_hidden(&path) {
+                folder.left_out.push(path.file_name().unwrap_or_default().to_string_lossy().into_owned());
+            }
+        }
+        Ok((folder, below))
     }
 
     /// Lists an archive. A single folder around all files is skipped.
@@ -90,13 +110,17 @@ impl Folder {
 
     /// Returns the note on files that are not read.
     pub(super) fn note(&self) -> Option<String> {
-        (!self.left_out.is_empty()).then(|| format!("not read, as they are not tables: {}", listed(&self.left_out)))
+        (!self.left_out.is_empty())
+            .then(|| format!("not read, as they are not tables: {}", first_few(&self.left_out, LISTED)))
     }
 
     /// Returns the fault of a folder or archive (`what`) without tables.
     pub(super) fn without_tables(&self, what: &str, remedy: &str) -> Fault {
-        let holds =
-            if self.left_out.is_empty() { String::new() } else { format!("; it contains {}", listed(&self.left_out)) };
+        let holds = if self.left_out.is_empty() {
+            String::new()
+        } else {
+            format!("; it contains {}", first_few(&self.left_out, LISTED))
+        };
         let alone = self.left_out.iter().find(|name| ALONE.contains(&&*extension(Path::new(name))));
         let remedy = match alone {
             Some(name) if what == ARCHIVE => format!("unpack it, and give {name}"),
@@ -122,12 +146,9 @@ impl Folder {
             _ => format!("give one of them: {}", folder.display()),
         };
         let part = if self.files.is_empty() { "" } else { "some of " };
-        let problem = format!("{part}its tables are in folders: {}", listed(&folders));
-        Fault::content(
-            ContentKind::Folder,
-            problem,
-            format!("{remedy}; the tables of one recording must be in one folder, one per vehicle"),
-        )
+        let problem = format!("{part}its tables are in folders: {}", first_few(&folders, LISTED));
+        let remedy = format!("{remedy}; the tables of one recording must be in one folder, one per vehicle");
+        Fault::content(ContentKind::Folder, problem, remedy)
     }
 
     fn sorted(mut self) -> Self {
@@ -148,13 +169,6 @@ impl Folder {
 /// Word for archives in errors.
 pub(super) const ARCHIVE: &str = "archive";
 
-/// Lists the first few names and the number of further ones.
-fn listed(names: &[String]) -> String {
-    let (first, more) = names.split_at(LISTED.min(names.len()));
-    let more = if more.is_empty() { String::new() } else { format!(" and {} more", more.len()) };
-    first.join(", ") + &more
-}
-
 fn is_hidden(path: &Path) -> bool {
     path.file_name().is_none_or(|name| name.to_string_lossy().starts_with('.'))
 }
@@ -171,32 +185,6 @@ fn is_note(source: &Source) -> bool {
 
 fn extension(path: &Path) -> String {
     path.extension().unwrap_or_default().to_string_lossy().to_lowercase()
-}
-
-/// Entries of a folder.
-struct Entries {
-    files: Vec<Source>,
-    folders: Vec<Source>,
-    left_out: Vec<String>,
-}
-
-/// Lists the tables and subfolders of a folder.
-fn entries(folder: &Path) -> Result<Entries, ReadError> {
-    let error = |source| ReadError::new(folder, Fault::System(source));
-    let (mut files, mut folders, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
-    for entry in fs::read_dir(folder).map_err(error)? {
-        let path = entry.map_err(error)?.path();
-        let source = Source::file(&path);
-        let (is_folder, is_table) = (path.is_dir(), is_table(&path) && !is_note(&source));
-        if is_folder {
-            folders.push(source);
-        } else if is_table {
-            files.push(source);
-        } else if !is_hidden(&path) {
-            left_out.push(path.file_name().unwrap_or_default().to_string_lossy().into_owned());
-        }
-    }
-    Ok(Entries { files, folders, left_out })
 }
 
 /// Returns a sort key that orders `cf9` before `cf10`: numbers are padded to one length.
@@ -251,7 +239,7 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
     check_own_names(&recordings, &paths, &vehicles)?;
     check_frames(&recordings, &paths)?;
     let clocks: Vec<Clock> = recordings.iter().map(|tracks| tracks.clock().clone()).collect();
-    let Some(first) = clocks.iter().min_by_key(|clock| clock.epoch_ns) else { return Err(Fault::Empty.into()) };
+    let Some(first) = clocks.iter().min_by_key(|clock| clock.epoch_ns) else { return Err(Fault::empty().into()) };
     for ((name, path), clock) in vehicles.iter().zip(&paths).zip(&clocks) {
         let guessed = clock.inferred || clocks[0].inferred;
         let problem = if clock.unit != clocks[0].unit && guessed {
@@ -284,24 +272,21 @@ pub(super) fn join(parts: Vec<(PathBuf, Recording)>, left_out: Option<String>) -
         let without = without.join(", ");
         notes.push(format!("no height is known of {without}: the heights of the other files are not used"));
     }
-    let mut facts = vec![
+    let facts = vec![
         Fact::name(FactKind::Identity, fact::Source::Convention, "each file is one vehicle"),
         Fact::name(FactKind::Clock, fact::Source::Default, "one clock for all files"),
     ];
-    for fact in recordings.iter().flat_map(|tracks| tracks.facts()) {
-        if fact.kind != FactKind::Identity && !facts.contains(fact) {
-            facts.push(fact.clone());
-        }
-    }
     let mut joined = Vec::new();
     for ((path, tracks), own) in paths.into_iter().zip(recordings).zip(&clocks) {
-        note_new(&mut notes, tracks.notes());
         let shift_s = own.epoch_ns.saturating_sub(clock.epoch_ns) as f64 / 1e9;
         let waiting = Vec::new().into_iter().peekable();
         joined.push(JoinedFile { path, tracks, shift_s, waiting, until_s: f64::NEG_INFINITY });
     }
     let earth_origin = joined.iter().find_map(|part| part.tracks.earth_origin()).copied();
-    let metadata = Metadata { clock, notes, facts, is_planar, earth_origin, ..Metadata::default() };
+    let mut metadata = Metadata { clock, notes, facts, is_planar, earth_origin, ..Metadata::default() };
+    for part in &joined {
+        learn(&mut metadata, part.tracks.metadata());
+    }
     Ok(Box::new(Joined { vehicles, parts: joined, metadata }))
 }
 
@@ -362,11 +347,16 @@ fn check_frames(recordings: &[Recording], paths: &[PathBuf]) -> Result<(), ReadE
     })
 }
 
-/// Appends notes that are not yet present.
-fn note_new(notes: &mut Vec<String>, of_part: &[String]) {
-    for note in of_part {
-        if !notes.contains(note) {
-            notes.push(note.clone());
+/// Appends notes of a file, and its facts except on names, that are not yet present.
+fn learn(metadata: &mut Metadata, of_part: &Metadata) {
+    for note in &of_part.notes {
+        if !metadata.notes.contains(note) {
+            metadata.notes.push(note.clone());
+        }
+    }
+    for fact in &of_part.facts {
+        if fact.kind != FactKind::Identity && !metadata.facts.contains(fact) {
+            metadata.facts.push(fact.clone());
         }
     }
 }
@@ -423,9 +413,9 @@ impl Tracks for Joined {
         }
         items[before..].sort_by(|a, b| a.time_s().total_cmp(&b.time_s()));
         if items.len() == before {
-            // Some notes appear only at the end.
+            // Some notes and facts appear only at the end.
             for part in &self.parts {
-                note_new(&mut self.metadata.notes, part.tracks.notes());
+                learn(&mut self.metadata, part.tracks.metadata());
             }
         }
         Ok(items.len() > before)

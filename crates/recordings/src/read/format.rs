@@ -24,6 +24,17 @@ pub struct FormatInfo {
 #[derive(Clone, Copy)]
 pub struct Format(&'static FormatInfo);
 
+/// Properties that most formats have.
+const CSV_TABLE: FormatInfo = FormatInfo {
+    name: "",
+    title: "",
+    extensions: &["csv"],
+    docs: "",
+    magic: &[],
+    supports: FormatOption::TABLE,
+    packing: Packing::Any,
+};
+
 impl Format {
     /// A log of PX4.
     pub const ULOG: Self = Self(&FormatInfo {
@@ -39,7 +50,7 @@ impl Format {
             FormatOption::Axes,
             FormatOption::Unfinished,
         ],
-        packing: Packing::Any,
+        ..CSV_TABLE
     });
     /// A table in Parquet.
     pub const PARQUET: Self = Self(&FormatInfo {
@@ -48,8 +59,7 @@ impl Format {
         extensions: &["parquet"],
         docs: "Table in Parquet, long or wide",
         magic: &[b"PAR1"],
-        supports: FormatOption::TABLE,
-        packing: Packing::Any,
+        ..CSV_TABLE
     });
     /// MCAP.
     pub const MCAP: Self = Self(&FormatInfo {
@@ -84,7 +94,7 @@ impl Format {
             FormatOption::Axes,
             FormatOption::OneVehicle,
         ],
-        packing: Packing::Any,
+        ..CSV_TABLE
     });
     /// Compiled Skybrush trajectories.
     pub const SKYB: Self = Self(&FormatInfo {
@@ -102,9 +112,7 @@ impl Format {
         title: "a table of JSON objects",
         extensions: &["jsonl", "ndjson", "json"],
         docs: "Table with an object of JSON in each line, or a JSON array of objects",
-        magic: &[],
-        supports: FormatOption::TABLE,
-        packing: Packing::Any,
+        ..CSV_TABLE
     });
     /// A VVIZ show.
     pub const VVIZ: Self = Self(&FormatInfo {
@@ -112,9 +120,8 @@ impl Format {
         title: "a VVIZ show",
         extensions: &["vviz"],
         docs: "VVIZ show of Verge Aero or Finale 3D",
-        magic: &[],
         supports: &[FormatOption::Rows],
-        packing: Packing::Any,
+        ..CSV_TABLE
     });
     /// A Skybrush show.
     pub const SKYBRUSH: Self = Self(&FormatInfo {
@@ -122,9 +129,9 @@ impl Format {
         title: "a Skybrush show",
         extensions: &["skyc", "json"],
         docs: "Skybrush show, or its JSON",
-        magic: &[],
         supports: &[FormatOption::Axes],
         packing: Packing::None,
+        ..CSV_TABLE
     });
     /// Compressed Crazyflie trajectories.
     pub const CRAZYFLIE_COMPRESSED: Self = Self(&FormatInfo {
@@ -132,49 +139,43 @@ impl Format {
         title: "a compressed Crazyflie trajectory",
         extensions: &["traj"],
         docs: "Compressed Crazyflie trajectory, a file for each vehicle in a folder",
-        magic: &[],
         supports: &[FormatOption::Axes],
         packing: Packing::Archive,
+        ..CSV_TABLE
     });
     /// A take of `OptiTrack` Motive.
     pub const MOTIVE: Self = Self(&FormatInfo {
         name: "motive",
         title: "a take of OptiTrack Motive",
-        extensions: &["csv"],
         docs: "Take of OptiTrack Motive as CSV",
-        magic: &[],
         supports: &[FormatOption::Rows],
-        packing: Packing::Any,
+        ..CSV_TABLE
     });
     /// An export of Vicon.
     pub const VICON: Self = Self(&FormatInfo {
         name: "vicon",
         title: "an export of Vicon",
-        extensions: &["csv"],
         docs: "Export of Vicon Nexus or Tracker as CSV",
-        magic: &[],
         supports: &[FormatOption::Rows, FormatOption::Axes],
-        packing: Packing::Any,
+        ..CSV_TABLE
     });
     /// Pieces of Bezier curves.
     pub const BEZIER: Self = Self(&FormatInfo {
         name: "bezier",
         title: "a table of Bezier curves",
-        extensions: &["csv"],
         docs: "Pieces of Bezier curves, a CSV for each vehicle in a folder",
-        magic: &[],
         supports: &[FormatOption::Starts, FormatOption::Axes],
         packing: Packing::Archive,
+        ..CSV_TABLE
     });
     /// Crazyflie polynomials.
     pub const CRAZYFLIE: Self = Self(&FormatInfo {
         name: "crazyflie",
         title: "a folder of Crazyflie polynomials",
-        extensions: &["csv"],
         docs: "Crazyflie polynomials, a CSV for each vehicle in a folder",
-        magic: &[],
         supports: &[FormatOption::Starts, FormatOption::Axes],
         packing: Packing::Archive,
+        ..CSV_TABLE
     });
     /// A table in CSV.
     pub const CSV: Self = Self(&FormatInfo {
@@ -182,9 +183,7 @@ impl Format {
         title: "a table in CSV",
         extensions: &["csv", "txt"],
         docs: "Table in text with a header, long (`t,id,x,y,z`) or wide (`t,x1,y1,z1,x2,...`)",
-        magic: &[],
-        supports: FormatOption::TABLE,
-        packing: Packing::Any,
+        ..CSV_TABLE
     });
     /// A table of `TrajNet`.
     pub const TRAJNET: Self = Self(&FormatInfo {
@@ -192,9 +191,7 @@ impl Format {
         title: "a table of TrajNet",
         extensions: &["txt"],
         docs: "Numbers between blanks: frame, vehicle, x and y",
-        magic: &[],
-        supports: FormatOption::TABLE,
-        packing: Packing::Any,
+        ..CSV_TABLE
     });
     /// Numbers separated by blanks.
     pub const TEXT: Self = Self(&FormatInfo {
@@ -202,7 +199,6 @@ impl Format {
         title: "a table in plain text",
         extensions: &["txt"],
         docs: "Numbers between blanks: `t x y z x y z ...`",
-        magic: &[],
         supports: &[
             FormatOption::TimeUnit,
             FormatOption::Rows,
@@ -213,7 +209,7 @@ impl Format {
             FormatOption::OneVehicle,
             FormatOption::Incomplete,
         ],
-        packing: Packing::Any,
+        ..CSV_TABLE
     });
 
     /// All formats, in the order of recognition.

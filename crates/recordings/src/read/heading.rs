@@ -1,11 +1,11 @@
 //! Parses column names: a quantity, optionally with a vehicle and a unit.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use tautline_core::fact::Source;
 
 use super::error::{ContentKind, Fault, quoted, refuse};
-use super::time_unit::TimeUnit;
+use super::time_unit::{TimeUnit, seconds_of};
 
 /// List of words, separated by blanks.
 #[derive(Clone, Copy)]
@@ -49,7 +49,7 @@ pub(super) const DEPTH: Role = EARTH + 3;
 const EARTH_NAMES: [&[&str]; 2] = [&["lat", "latitude"], &["lon", "lng", "long", "longitude"]];
 
 /// Prefixes of these names.
-const EARTH_STARTS: [&str; 4] = ["", "gps_", "gnss_", "global_"];
+const EARTH_STARTS: [&str; 7] = ["", "gps_", "gnss_", "global_", "geo_", "geodetic_", "wgs84_"];
 
 /// Names of heights and depths.
 const HEIGHT_NAMES: Words = Words("alt altitude height hgt elevation elev ele agl msl amsl asl hae up");
@@ -141,7 +141,8 @@ impl<'a> Heading<'a> {
     }
 }
 
-fn is_number(text: &str) -> bool {
+/// Returns whether a text consists of digits.
+pub(super) fn is_number(text: &str) -> bool {
     !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit())
 }
 
@@ -234,8 +235,7 @@ pub fn is_read(name: &str) -> bool {
 pub(super) fn time_and_unit(name: &str) -> (String, Option<String>) {
     let name = name.to_lowercase();
     let (stem, unit) = bracketed(&name);
-    let longer = ["min", "mins", "minute", "minutes", "h", "hr", "hrs", "hour", "hours", "day", "days"];
-    let ending = stem.rsplit_once('_').filter(|(_, end)| TimeUnit::from_name(end).is_some() || longer.contains(end));
+    let ending = stem.rsplit_once('_').filter(|(_, end)| seconds_of(end).is_some());
     let (stem, unit) = match (unit, ending) {
         (None, Some((stem, end))) => (stem, Some(end)),
         _ => (stem, unit),
@@ -250,7 +250,7 @@ pub(super) fn is_clock(name: &str) -> bool {
 
 /// Returns whether a column gives the time.
 pub(super) fn is_time(name: &str) -> bool {
-    is_main_time(name) || matches!(time_and_unit(name).0.as_str(), "tstamp" | "epoch" | BOOT_TIME)
+    is_main_time(name) || matches!(time_and_unit(name).0.as_str(), "tstamp" | "epoch" | "__time" | BOOT_TIME)
 }
 
 /// Returns whether a column gives the time, whatever other columns the table has.
@@ -260,13 +260,8 @@ pub(super) fn is_main_time(name: &str) -> bool {
     NAMES.contains(&time_and_unit(name).0.as_str())
 }
 
-/// Name of times since the start of the vehicle's computer, without unit.
-const BOOT_TIME: &str = "time_boot";
-
-/// Returns whether a column gives times since the start of the vehicle's computer, as `time_boot_ms` of `MAVLink` does.
-pub(super) fn is_boot_time(name: &str) -> bool {
-    time_and_unit(name).0 == BOOT_TIME
-}
+/// Name of times since the start of the vehicle's computer without unit, as `time_boot_ms` of `MAVLink`.
+pub(super) const BOOT_TIME: &str = "time_boot";
 
 /// Returns whether a column counts frames or steps.
 pub(super) fn is_frame(name: &str) -> bool {
@@ -277,11 +272,6 @@ pub(super) fn is_frame(name: &str) -> bool {
         .find_map(|end| name.strip_suffix(end))
         .unwrap_or(counted);
     matches!(counted, "frame" | "step" | "timestep" | "tick" | "iteration" | "picture")
-}
-
-/// Returns the unit in the name of a time column.
-pub(super) fn unit_of_time_name(name: &str) -> Option<String> {
-    time_and_unit(name).1
 }
 
 /// Words for vehicles in the names of vehicle columns, with or without a suffix of [`VEHICLE_ENDS`].
@@ -320,11 +310,6 @@ pub(super) fn is_aircraft_address(name: &str) -> bool {
     matches!(joined(name).as_str(), "icao24" | "icao" | "hex" | "hexident")
 }
 
-/// Returns whether a column holds the direction of flight beside a column that names aircraft.
-pub(super) fn is_track(name: &str) -> bool {
-    joined(name) == "track"
-}
-
 /// Returns whether a column names aircraft, and no other vehicles.
 pub(super) fn names_aircraft(name: &str) -> bool {
     is_aircraft_address(name) || matches!(joined(name).as_str(), "callsign" | "flight" | "tail" | "registration")
@@ -346,7 +331,7 @@ pub(super) fn with_units(header: &[String], below: &[&str]) -> Result<Vec<String
             return Ok(name.clone());
         }
         let own_unit = if is_time {
-            unit_of_time_name(name)
+            time_and_unit(name).1
         } else {
             let ending = || endings(name).next().map(|(_, unit, _)| unit);
             bracketed(name).1.or_else(ending).map(str::to_owned)
@@ -389,23 +374,16 @@ const LENGTHS_M: [(&[&str], f64); 10] = [
     (&["nmi"], 1852.0),
 ];
 
-/// Names of times in units of velocity, and their size \[s\].
-const TIMES_S: [(&[&str], f64); 4] =
-    [(&["s", "sec", "second"], 1.0), (&["ms"], 0.001), (&["min", "minute"], 60.0), (&["h", "hr", "hour"], 3600.0)];
-
 /// Units without brackets at the end of a name, as in `vx_m_s` and `x_mm`.
 const VELOCITY_ENDS: [&str; 6] = ["m_s", "cm_s", "mm_s", "km_s", "km_h", "ft_s"];
 const LENGTH_ENDS: [&str; 6] = ["m", "dm", "cm", "mm", "km", "ft"];
 
-fn size(names: &[(&[&str], f64)], name: &str) -> Option<f64> {
-    names.iter().find(|(known, _)| known.contains(&name)).map(|(_, size)| *size)
-}
-
 /// Returns the size of a unit of length \[m\] or velocity \[m/s\]; `None` for an unknown unit.
 pub(super) fn size_of(unit: &str, velocity: bool) -> Option<f64> {
     let unit = unit.trim().to_lowercase();
+    let metres = |name: &str| LENGTHS_M.iter().find(|(known, _)| known.contains(&name)).map(|(_, size_m)| *size_m);
     if !velocity {
-        return size(&LENGTHS_M, &unit);
+        return metres(&unit);
     }
     match unit.as_str() {
         "mps" => return Some(1.0),
@@ -414,7 +392,7 @@ pub(super) fn size_of(unit: &str, velocity: bool) -> Option<f64> {
     }
     let per = |separator| unit.split_once(separator);
     let (length, time) = per("/").or_else(|| per("_")).or_else(|| per(" per "))?;
-    Some(size(&LENGTHS_M, length.trim())? / size(&TIMES_S, time.trim())?)
+    Some(metres(length.trim())? / seconds_of(time.trim())?)
 }
 
 /// Returns the size of a unit of latitude and longitude \[degrees\]; `None` for an unknown unit.
@@ -422,7 +400,7 @@ pub(super) fn degrees(unit: &str) -> Option<f64> {
     match unit.trim().to_lowercase().as_str() {
         "deg" | "degree" | "degrees" | "°" => Some(1.0),
         "rad" | "radian" | "radians" => Some(1.0_f64.to_degrees()),
-        "dege7" | "1e-7 deg" | "1e7" => Some(1e-7),
+        "dege7" | "1e-7 deg" | "1e7" | "e7" => Some(1e-7),
         _ => None,
     }
 }
@@ -446,13 +424,9 @@ pub(super) fn endings(name: &str) -> impl Iterator<Item = (&str, &str, bool)> {
     })
 }
 
-/// Columns of a table that are recognised as heights or depths by their names.
+/// Columns of a table that are recognised as heights or depths by their names, and whether they count downwards.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Heights {
-    named: BTreeSet<usize>,
-    /// Columns that count downwards.
-    downward: BTreeSet<usize>,
-}
+pub(super) struct Heights(BTreeMap<usize, bool>);
 
 impl Heights {
     /// Assigns height and depth columns to the third position axis, if their vehicle has the other two axes and no
@@ -471,7 +445,7 @@ impl Heights {
         found.extend(given.map(|column| ((String::new(), third), column)));
         if let Some(column) = alt.filter(|column| given == Some(*column)) {
             let is_depth = Heading::of(&header[column]).is_some_and(|heading| heading.role == DEPTH);
-            heights.add(column, is_depth);
+            heights.0.insert(column, is_depth);
         }
         let all = headings.clone();
         let has = |vehicle: &str, role: Role| {
@@ -484,25 +458,19 @@ impl Heights {
             !is_height(*role) || (has(0) && has(1) && (third == HEIGHT || !has(2)))
         });
         for (column, heading) in headings.iter_mut().filter(|(_, heading)| is_height(heading.role)) {
-            heights.add(*column, heading.role == DEPTH);
+            heights.0.insert(*column, heading.role == DEPTH);
             heading.role = third;
         }
         heights
     }
 
-    fn add(&mut self, column: usize, is_depth: bool) {
-        self.named.insert(column);
-        self.downward.extend(is_depth.then_some(column));
-    }
-
     /// Returns the columns that count downwards.
     pub(super) fn downward(&self) -> impl Iterator<Item = usize> {
-        self.downward.iter().copied()
+        self.0.iter().filter(|(_, is_depth)| **is_depth).map(|(column, _)| *column)
     }
 
     /// Returns those of the given columns that are read as heights by name, and whether the sign is inverted.
-    pub(super) fn among(&self, columns: impl Iterator<Item = usize>) -> Vec<(usize, bool)> {
-        let columns: BTreeSet<_> = columns.filter(|column| self.named.contains(column)).collect();
-        columns.into_iter().map(|column| (column, self.downward.contains(&column))).collect()
+    pub(super) fn among(&self, columns: impl Iterator<Item = usize>) -> BTreeMap<usize, bool> {
+        columns.filter_map(|column| Some((column, *self.0.get(&column)?))).collect()
     }
 }

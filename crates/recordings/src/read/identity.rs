@@ -22,12 +22,11 @@ const APART: f64 = 0.5;
 /// Returns the comparison key of a vehicle name. Names of the same number have one key. So have names that differ only
 /// in case, in zeros before a number, or in marks and blanks that are not between two digits.
 pub(super) fn spelling(name: &str) -> String {
-    let digits = |text: &str| !text.is_empty() && text.bytes().all(|byte| byte.is_ascii_digit());
     let unsigned = name.strip_prefix('+').unwrap_or(name);
     let unsigned =
         if unsigned.trim_matches(['-', '0', '.']).is_empty() && unsigned.contains('0') { "0" } else { unsigned };
     let (whole, fraction) = unsigned.split_once('.').unwrap_or((unsigned, "0"));
-    if digits(whole) && fraction.bytes().all(|byte| byte == b'0') {
+    if heading::is_number(whole) && fraction.bytes().all(|byte| byte == b'0') {
         return whole.trim_start_matches('0').to_owned() + "#";
     }
     let letters: Vec<char> = name.trim().chars().collect();
@@ -46,16 +45,6 @@ pub(super) fn spelling(name: &str) -> String {
         in_number = if letter.is_ascii_digit() { in_number || is_kept } else { is_kept && letter == '.' };
     }
     if key.is_empty() { name.trim().to_lowercase() } else { key }
-}
-
-/// Returns the fault of two names with the same key.
-fn same_spelling_fault(first: &str, second: &str) -> Fault {
-    let problem = format!("the vehicles {} and {} differ only in how they are spelled", quoted(first), quoted(second));
-    Fault::content(
-        ContentKind::VehicleTwice,
-        problem,
-        "use one name per vehicle, and names that differ in more than spelling",
-    )
 }
 
 /// Vehicle names by index, and their indices.
@@ -96,7 +85,14 @@ impl Names {
     fn add(&mut self, name: String) -> Result<usize, Fault> {
         let index = self.in_order.len();
         if let Some(&first) = self.spellings.get(&spelling(&name)) {
-            return Err(same_spelling_fault(&self.in_order[first], &name));
+            let [first, second] = [&self.in_order[first], &name].map(|name| quoted(name));
+            let problem = if first == second {
+                format!("two vehicles have the name {first}")
+            } else {
+                format!("the vehicles {first} and {second} differ only in how they are spelled")
+            };
+            let remedy = "use one name per vehicle, and names that differ in more than spelling";
+            return refuse(ContentKind::VehicleTwice, problem, remedy);
         }
         self.spellings.insert(spelling(&name), index);
         self.indices.insert(name.as_str().into(), index);
@@ -138,7 +134,7 @@ impl Names {
 }
 
 /// Alternative vehicle column of a table, compared with the one in use.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct AlternativeId {
     pub(super) column: usize,
     /// Its value for each vehicle, and the vehicle of each value.
@@ -149,7 +145,7 @@ pub(super) struct AlternativeId {
 
 impl AlternativeId {
     pub(super) fn new(column: usize) -> Self {
-        Self { column, of: Vec::new(), vehicles: BTreeMap::new(), contradicts: false }
+        Self { column, ..Self::default() }
     }
 
     /// Records the value in a row of a vehicle.
@@ -178,10 +174,11 @@ impl AlternativeId {
 }
 
 /// Unused column, examined over the rows of one vehicle: its values may distinguish several vehicles.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct SuspectColumn {
     pub(super) column: usize,
-    values: HashMap<Box<str>, Value>,
+    /// Last two rows of each value.
+    values: HashMap<Box<str>, Track>,
     last: Option<Box<str>>,
     /// Last two rows, of any value.
     track: Track,
@@ -198,14 +195,7 @@ pub(super) struct SuspectColumn {
     /// Whether a value has decimals: a measurement, or an unusual vehicle number.
     has_decimals: bool,
     /// Whether it cannot name vehicles.
-    cleared: bool,
-}
-
-/// Statistics of one value.
-#[derive(Clone, Copy, Debug, Default)]
-struct Value {
-    rows: u64,
-    track: Track,
+    pub(super) cleared: bool,
 }
 
 /// Last two rows, each with its time.
@@ -225,24 +215,7 @@ impl Track {
 
 impl SuspectColumn {
     pub(super) fn new(column: usize) -> Self {
-        Self {
-            column,
-            values: HashMap::new(),
-            last: None,
-            track: Track::default(),
-            rows: 0,
-            changes: 0,
-            returns: 0,
-            backwards: [0; 2],
-            compared: 0,
-            off: [0.0; 2],
-            has_decimals: false,
-            cleared: false,
-        }
-    }
-
-    pub(super) fn is_cleared(&self) -> bool {
-        self.cleared
+        Self { column, ..Self::default() }
     }
 
     /// Records the value in the next row.
@@ -265,12 +238,11 @@ impl SuspectColumn {
             self.last = Some(value.into());
         }
         let among_all = self.track.push(time, position);
-        let entry = match self.values.get_mut(value) {
-            Some(entry) => entry,
+        let own = match self.values.get_mut(value) {
+            Some(own) => own,
             None => self.values.entry(value.into()).or_default(),
         };
-        entry.rows += 1;
-        let among_own = entry.track.push(time, position);
+        let among_own = own.push(time, position);
         if let (Some(all), Some(own)) = (among_all, among_own) {
             self.compared += 1;
             self.off[0] += own;
@@ -378,11 +350,8 @@ pub(super) fn examine(header: &[String], unused: &[usize], vehicles: &[String]) 
     {
         let [column, vehicle] = [&header[first], &vehicles[vehicle]].map(|name| quoted(name));
         let problem = format!("column {column} may name a vehicle, but there is no such column for {vehicle}");
-        return refuse(
-            ContentKind::AmbiguousVehicle,
-            problem,
-            "add such a column for each vehicle, or remove these columns",
-        );
+        let remedy = "add such a column for each vehicle, or remove these columns";
+        return refuse(ContentKind::AmbiguousVehicle, problem, remedy);
     }
     if let Some([x, y]) = further(&others) {
         let problem = format!("the columns {} and {} may be the position of a further vehicle", quoted(x), quoted(y));
@@ -441,7 +410,7 @@ fn of_vehicles<'a>(column: &'a str, vehicles: &[String]) -> Vec<(usize, &'a str)
         if unit == Some(vehicle) && !ends_in_digit(stem) {
             return Some(stem);
         }
-        let is_number = vehicle.bytes().all(|byte| byte.is_ascii_digit());
+        let is_number = heading::is_number(vehicle);
         let behind = stem.strip_prefix(vehicle.as_str()).and_then(|rest| rest.strip_prefix(SEPARATORS));
         behind.or_else(|| {
             let before = stem.strip_suffix(vehicle.as_str())?;
@@ -469,7 +438,7 @@ fn further<'a>(names: &[&'a str]) -> Option<[&'a str; 2]> {
     let lower = |name: &str| {
         let (stem, unit) = heading::bracketed(name);
         match unit {
-            Some(number) if number.bytes().all(|byte| byte.is_ascii_digit()) => name.to_lowercase(),
+            Some(number) if heading::is_number(number) => name.to_lowercase(),
             _ => stem.to_lowercase(),
         }
     };

@@ -8,12 +8,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::option::{COLUMN, ONE_VEHICLE, SCALE};
 
-use super::agreement::{Compared, SecondPosition};
+use super::agreement::Compared;
 use super::clock::SubunitColumn;
 use super::convention::Convention;
 use super::error::{ContentKind, Fault, list, quoted, refuse};
 use super::heading::{
-    DEPTH, EARTH, HEIGHT, Heading, Heights, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle, is_velocity,
+    BOOT_TIME, DEPTH, EARTH, HEIGHT, Heading, Heights, ID, POSITION, RADIUS, Role, TIME, VELOCITY, is_angle,
+    is_velocity,
 };
 use super::identity::Slots;
 use super::options::{ColumnNames, ReadOptions};
@@ -23,6 +24,9 @@ use super::{aviation, clock, convention, heading, identity};
 
 /// Names of places that are not vehicles.
 const PLACES: [&str; 7] = ["home", "origin", "base", "datum", "ref", "reference", "launch"];
+
+/// Names before the coordinates in messages of ROS.
+const POSES: [&str; 4] = ["pose", "pose.pose", "/pose", "/pose/pose"];
 
 /// Roles of the columns of a table.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -58,10 +62,8 @@ pub(super) struct Layout {
     pub(super) counts_from_boot: bool,
     /// Column of the vertical rate of a long table, and the size of its unit \[m/s\] if its name has one.
     pub(super) rate: Option<(usize, Option<f64>)>,
-    /// Second position of each vehicle, on the Earth, beside the one that is read. Empty if no vehicle has one.
-    pub(super) second: Vec<Option<SecondPosition>>,
-    /// Whether the names of the position columns contain the names of vehicles.
-    pub(super) has_named_positions: bool,
+    /// Positions of each vehicle in metres and on the Earth, if it has both. Empty if no vehicle has.
+    pub(super) compared: Vec<Option<Compared>>,
     /// Whether a vehicle has no height column: then no height is used.
     pub(super) is_planar: bool,
     /// Facts that follow from the header and the options.
@@ -96,6 +98,9 @@ impl Layout {
         let others = (0..header.len()).filter(|&column| !is_taken(column));
         let names = &convention.header;
         let mut headings: Vec<_> = others.filter_map(|column| Some((column, Heading::of(&names[column])?))).collect();
+        if id.is_some() {
+            without_poses(&mut headings);
+        }
         let on_earth = columns.are_on_earth(&headings)?;
         columns.place = if on_earth { EARTH } else { POSITION };
         let places = if on_earth || convention.reference.is_some() { Vec::new() } else { headings.clone() };
@@ -124,11 +129,14 @@ impl Layout {
         if !one && id.is_none() {
             refuse_two_frames(in_other_frame, &names, on_earth)?;
         }
-        let bodies = vehicles.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<Vec<_>, _>>()?;
+        let mut bodies = vehicles.iter().map(|vehicle| columns.body(vehicle)).collect::<Result<Vec<_>, _>>()?;
         let flat = vehicles.iter().zip(&bodies).filter(|(_, body)| body.position[2].is_none());
         let flat: Vec<_> = flat.map(|(vehicle, _)| vehicle.clone()).collect();
         let is_planar = !flat.is_empty();
-        let bodies = if is_planar { bodies.into_iter().map(VehicleColumns::flattened).collect() } else { bodies };
+        for body in bodies.iter_mut().filter(|_| is_planar) {
+            body.position[2] = None;
+            body.velocity.iter_mut().for_each(|velocity| velocity[2] = None);
+        }
         let mut layout = Self {
             time: Some(time),
             rest,
@@ -140,8 +148,7 @@ impl Layout {
             bodies,
             on_earth,
             is_planar,
-            has_named_positions: !one && id.is_none(),
-            counts_from_boot: convention.counts_from_boot || heading::is_boot_time(&header[time]),
+            counts_from_boot: convention.counts_from_boot || heading::time_and_unit(&header[time]).0 == BOOT_TIME,
             ..Self::default()
         };
         layout.refuse_other_frames(header, &columns.heights, &convention)?;
@@ -161,7 +168,7 @@ impl Layout {
         layout.notes.extend(columns.heights_used(&layout, options)?);
         layout.facts = columns.facts(&layout, options);
         layout.convention = convention.clone();
-        layout.compare(header, options, &vehicles, &places)?;
+        layout.compare(header, options, &vehicles, (&places, !one && id.is_none()))?;
         layout.check(header, options, one)?;
         if let [first, ..] = layout.slots.ids[..] {
             layout
@@ -190,26 +197,19 @@ impl Layout {
         if !convention.has_directions() || convention.reference.is_some() {
             return Ok(());
         }
-        let of_heights: BTreeSet<_> = heights
-            .among(self.bodies.iter().filter_map(|body| body.position[2]))
-            .iter()
-            .map(|height| height.0)
-            .collect();
+        let of_heights = heights.among(self.bodies.iter().filter_map(|body| body.position[2]));
         let columns_of =
             |body: &VehicleColumns| body.position.into_iter().chain(body.velocity.unwrap_or_default()).flatten();
         let positions = self.bodies.iter().flat_map(columns_of);
         let (directed, others): (Vec<_>, Vec<_>) = positions
-            .filter(|column| !of_heights.contains(column))
+            .filter(|column| !of_heights.contains_key(column))
             .partition(|column| convention.directed.contains(column));
         match (&directed[..], &others[..]) {
             (&[directed, ..], &[other, ..]) => {
                 let [directed, other] = [directed, other].map(|column| quoted(&header[column]));
                 let problem = format!("column {directed} gives the direction of its axis, column {other} does not");
-                refuse(
-                    ContentKind::SeveralFrames,
-                    problem,
-                    "name the axes of all positions alike, as in `x_ned` or `north`",
-                )
+                let remedy = "name the axes of all positions alike, as in `x_ned` or `north`";
+                refuse(ContentKind::SeveralFrames, problem, remedy)
             }
             _ => Ok(()),
         }
@@ -244,17 +244,13 @@ impl Layout {
         // Pandas renames a second column `x` to `x.1`.
         let repeats = |&column: &usize| {
             let (stem, number) = header[column].rsplit_once('.')?;
-            let is_number = !number.is_empty() && number.bytes().all(|byte| byte.is_ascii_digit());
             let is_read = |read: usize| header[read] == stem && Heading::of(&convention.header[read]).is_some();
-            (is_number && used.iter().any(|&read| is_read(read))).then_some((column, stem))
+            (heading::is_number(number) && used.iter().any(|&read| is_read(read))).then_some((column, stem))
         };
         if let Some((column, stem)) = unused.clone().find_map(|column| repeats(&column)) {
             let problem = format!("column {} repeats column {}", quoted(&header[column]), quoted(stem));
-            return refuse(
-                ContentKind::AmbiguousColumn,
-                problem,
-                "rename the columns of each vehicle, or remove these columns",
-            );
+            let remedy = "rename the columns of each vehicle, or remove these columns";
+            return refuse(ContentKind::AmbiguousColumn, problem, remedy);
         }
         let unused: Vec<_> = unused.map(|column| &*header[column]).filter(|name| !name.is_empty()).collect();
         let is_decided = is_one_vehicle || convention.is_one_vehicle;
@@ -281,12 +277,13 @@ impl Layout {
     }
 
     /// Finds columns with which the positions are compared: a vertical rate, and a second position on the Earth.
+    /// `is_wide`: the names of the position columns contain the names of vehicles.
     fn compare(
         &mut self,
         header: &[String],
         options: &ReadOptions,
         vehicles: &[String],
-        places: &[(usize, Heading<'_>)],
+        (places, is_wide): (&[(usize, Heading<'_>)], bool),
     ) -> Result<(), Fault> {
         let has_height = |body: &VehicleColumns| body.position[2].is_some();
         self.rate = aviation::rate_column(header).filter(|_| matches!(&self.bodies[..], [body] if has_height(body)));
@@ -294,53 +291,41 @@ impl Layout {
         if self.on_earth || is_chosen {
             return Ok(());
         }
+        let mut found: BTreeMap<_, Vec<(usize, Option<&str>)>> = BTreeMap::new();
+        for (column, Heading { vehicle, role, unit, .. }) in places.iter().filter(|(_, found)| found.role >= EARTH) {
+            found.entry((*vehicle, *role)).or_default().push((*column, *unit));
+        }
+        let columns_of = |vehicle, role| found.get(&(vehicle, role)).map_or(&[][..], Vec::as_slice);
+        let has_directions = self.convention.has_directions();
+        let metres = |unit: Option<&str>| unit.and_then(|unit| heading::size_of(unit, false)).unwrap_or(1.0);
+        let degrees = |unit: Option<&str>| unit.map_or(Some(1.0), heading::degrees);
         let mut notes = Vec::new();
-        let mut place_of = |vehicle: &String, body: &VehicleColumns| {
-            let found = |is_role: &dyn Fn(Role) -> bool| {
-                let is_meant = |(_, found): &&(usize, Heading<'_>)| found.vehicle == vehicle && is_role(found.role);
-                places.iter().filter(is_meant).copied().collect::<Vec<_>>()
-            };
+        let compared = vehicles.iter().zip(&self.bodies).map(|(vehicle, body)| {
             // Of several pairs of degrees, the first is compared.
-            let [lat, lon] = [0, 1].map(|axis| found(&|role| role == EARTH + axis).first().copied());
+            let [lat, lon] = [0, 1].map(|axis| columns_of(vehicle, EARTH + axis).first().copied());
             let ((lat, of_lat), (lon, of_lon)) = (lat?, lon?);
             // Several heights may be measured from different surfaces.
-            let height = match found(&|role| matches!(role, HEIGHT | DEPTH))[..] {
-                [height] if body.position[2].is_some() => Some(height),
-                _ => None,
+            let (height, up) = match (columns_of(vehicle, HEIGHT), columns_of(vehicle, DEPTH)) {
+                (&[(column, unit)], []) if body.position[2].is_some() => (Some(column), metres(unit)),
+                ([], &[(column, unit)]) if body.position[2].is_some() => (Some(column), -metres(unit)),
+                _ => (None, 1.0),
             };
-            let degrees = |found: Heading<'_>| found.unit.map_or(Some(1.0), heading::degrees);
-            let up = height.map_or(1.0, |(_, found)| {
-                let metres = found.unit.and_then(|unit| heading::size_of(unit, false)).unwrap_or(1.0);
-                if found.role == DEPTH { -metres } else { metres }
-            });
-            let columns = [Some(lat), Some(lon), height.map(|(column, _)| column)];
             let Some((lat_degrees, lon_degrees)) = degrees(of_lat).zip(degrees(of_lon)) else {
                 let [lat, lon] = [lat, lon].map(|column| quoted(&header[column]));
                 notes.push(format!("positions are not compared with {lat} and {lon}: the unit is unknown"));
                 return None;
             };
-            Some(SecondPosition { columns, units: [lat_degrees, lon_degrees, up] })
-        };
-        let second: Vec<_> = vehicles.iter().zip(&self.bodies).map(|(vehicle, body)| place_of(vehicle, body)).collect();
+            let (earth, units) = ([Some(lat), Some(lon), height], [lat_degrees, lon_degrees, up]);
+            Some(Compared { metric: body.position, earth, units, has_directions, is_wide })
+        });
+        let compared: Vec<_> = compared.collect();
         self.notes.extend(notes);
-        self.second = if second.iter().any(Option::is_some) { second } else { Vec::new() };
-        if let Some(compared) = self.first_compared().filter(|_| options.is_joined) {
+        self.compared = if compared.iter().any(Option::is_some) { compared } else { Vec::new() };
+        if let Some(compared) = self.compared.iter().flatten().next().filter(|_| options.is_joined) {
             let problem = "it has positions in metres and on the Earth, which are not compared between files";
             return Err(compared.fault(problem.to_owned(), header));
         }
         Ok(())
-    }
-
-    /// Returns the columns of both positions of the first vehicle that has two.
-    pub(super) fn first_compared(&self) -> Option<Compared> {
-        (0..self.second.len()).find_map(|vehicle| self.compared(vehicle))
-    }
-
-    /// Returns the columns of both positions of a vehicle, if it has two.
-    pub(super) fn compared(&self, vehicle: usize) -> Option<Compared> {
-        let (second, body) = self.second.get(vehicle)?.as_ref().zip(self.bodies.get(vehicle))?;
-        let (has_directions, is_wide) = (self.convention.has_directions(), self.has_named_positions);
-        Some(Compared { metric: body.position, earth: second.columns, has_directions, is_wide })
     }
 
     /// Returns the columns that are read or examined, each once, in ascending order.
@@ -352,7 +337,7 @@ impl Layout {
             .chain(self.suspects.iter().copied())
             .chain(self.slots.watched.iter().flatten().copied())
             .chain(self.rate.map(|(column, _)| column))
-            .chain(self.second.iter().flatten().flat_map(|second| second.columns).flatten())
+            .chain(self.compared.iter().flatten().flat_map(|compared| compared.earth).flatten())
             .collect();
         columns.into_iter().collect()
     }
@@ -382,6 +367,16 @@ impl Layout {
     }
 }
 
+/// Drops the names before the coordinates in messages of ROS, such as `pose.position.x`, unless plain names give x.
+fn without_poses(headings: &mut [(usize, Heading<'_>)]) {
+    let is_plain = |(_, heading): &(usize, Heading<'_>)| heading.vehicle.is_empty() && heading.role == POSITION;
+    if !headings.iter().any(is_plain) {
+        for (_, heading) in headings.iter_mut().filter(|(_, heading)| POSES.contains(&heading.vehicle)) {
+            heading.vehicle = "";
+        }
+    }
+}
+
 /// Returns the vehicles that have both horizontal coordinates of a frame. `first` is the role of the first coordinate.
 fn vehicles_of<'a>(first: Role, headings: &[(usize, Heading<'a>)]) -> BTreeSet<&'a str> {
     let column_of = |role: Role| {
@@ -399,23 +394,13 @@ fn refuse_two_frames(in_other_frame: BTreeSet<&str>, names: &[String], on_earth:
     let is_known = |vehicle: &str| names.iter().any(|name| is_part(name, vehicle) || is_part(vehicle, name));
     let is_place = |vehicle: &str| PLACES.contains(&vehicle.to_lowercase().as_str());
     let lost = in_other_frame.into_iter().find(|vehicle| !is_known(vehicle) && !is_place(vehicle));
-    lost.map_or(Ok(()), |vehicle| Err(two_frames(vehicle, &names[0], on_earth)))
-}
-
-/// Returns the fault of a table that gives `vehicle` in another frame than the vehicle `read`.
-fn two_frames(vehicle: &str, read: &str, on_earth: bool) -> Fault {
+    let Some((vehicle, read)) = lost.zip(names.first()) else { return Ok(()) };
     let kinds = ["metres", "latitude and longitude"];
     let (kind, other) = if on_earth { (kinds[0], kinds[1]) } else { (kinds[1], kinds[0]) };
-    let problem = format!(
-        "the position of vehicle {} is given in {kind}, that of vehicle {} in {other}",
-        quoted(vehicle),
-        quoted(read)
-    );
-    Fault::content(
-        ContentKind::SeveralFrames,
-        problem,
-        "give the positions of all vehicles in one frame, or remove the columns of the other frame",
-    )
+    let [vehicle, read] = [vehicle, read].map(quoted);
+    let problem = format!("the position of vehicle {vehicle} is given in {kind}, that of vehicle {read} in {other}");
+    let remedy = "give the positions of all vehicles in one frame, or remove the columns of the other frame";
+    refuse(ContentKind::SeveralFrames, problem, remedy)
 }
 
 /// Returns the vehicle column and other possible ones; a column given by the user has no alternatives.
@@ -424,7 +409,7 @@ fn naming_columns(header: &[String], time: usize, given: Option<usize>) -> (Opti
     let mut named: Vec<_> = (0..header.len()).filter(is_one).collect();
     // Beside the name of an aircraft, `track` is its direction.
     if named.iter().any(|&column| heading::names_aircraft(&header[column])) {
-        named.retain(|&column| !heading::is_track(&header[column]));
+        named.retain(|&column| heading::joined(&header[column]) != "track");
     }
     named.sort_by_key(|&column| !heading::is_aircraft_address(&header[column]));
     let mut named = named.into_iter();
@@ -438,15 +423,6 @@ pub(super) struct VehicleColumns {
     pub(super) position: [Option<usize>; 3],
     pub(super) velocity: Option<[Option<usize>; 3]>,
     pub(super) radius: Option<usize>,
-}
-
-impl VehicleColumns {
-    /// Removes the height.
-    pub(super) fn flattened(mut self) -> Self {
-        self.position[2] = None;
-        self.velocity.iter_mut().for_each(|velocity| velocity[2] = None);
-        self
-    }
 }
 
 const WORDS: [&str; 12] = [
@@ -469,16 +445,13 @@ pub(super) fn missing(header: &[String], role: Role, suffix: &str) -> Fault {
     let problem = format!("no column gives {}{suffix}; its columns are {}", WORDS[role], list(header, 12));
     let column = COLUMN.set(format!("{}=NAME", ColumnNames::ROLES[role]));
     let remedy = format!("name the column with {column}, or rename it");
-    Fault::content(kind_of_missing(role), problem, remedy)
-}
-
-fn kind_of_missing(role: Role) -> ContentKind {
-    match role {
+    let kind = match role {
         TIME => ContentKind::NoTimeColumn,
         ID => ContentKind::NoVehicleColumn,
         _ if is_velocity(role) || role == RADIUS => ContentKind::MissingColumn,
         _ => ContentKind::NoPositionColumn,
-    }
+    };
+    Fault::content(kind, problem, remedy)
 }
 
 /// Columns found so far, by vehicle name and role; the name is empty for columns of all vehicles.
@@ -539,7 +512,7 @@ impl<'a> Columns<'a> {
     /// If a height without a unit is beside columns of aircraft, whose heights are usually in feet.
     pub(super) fn heights_used(&self, layout: &Layout, options: &ReadOptions) -> Result<Option<String>, Fault> {
         let used = self.heights_of(layout);
-        let Some(&(first, is_turned)) = used.first() else { return Ok(None) };
+        let Some((&first, &is_turned)) = used.first_key_value() else { return Ok(None) };
         let aircraft = aviation::column_of_aircraft(self.header, layout.id, first);
         if let Some(other) = aircraft.filter(|_| !self.units.contains_key(&first) && options.scale.is_none()) {
             let [height, other] = [&self.header[first], other].map(|name| quoted(name));
@@ -556,7 +529,7 @@ impl<'a> Columns<'a> {
         if self.place != EARTH {
             convention::refuse_turned_height(options, &self.header[first])?;
         }
-        let names: Vec<_> = used.iter().map(|(column, _)| self.header[*column].clone()).collect();
+        let names: Vec<_> = used.keys().map(|column| &self.header[*column]).collect();
         let turned = if is_turned { ", with opposite sign" } else { "" };
         let scale = options.metres();
         let unit = match self.units.get(&first) {
@@ -572,7 +545,7 @@ impl<'a> Columns<'a> {
     }
 
     /// Returns the columns that are read as heights by their names, and whether the sign is inverted.
-    fn heights_of(&self, layout: &Layout) -> Vec<(usize, bool)> {
+    fn heights_of(&self, layout: &Layout) -> BTreeMap<usize, bool> {
         self.heights.among(layout.bodies.iter().filter_map(|body| body.position[2]))
     }
 
@@ -591,7 +564,7 @@ impl<'a> Columns<'a> {
         if !layout.on_earth {
             facts.push(unit(FactKind::LengthUnit, lengths.clone().find_map(unit_of)));
         }
-        let height = self.heights_of(layout).first().map(|(column, _)| *column);
+        let height = self.heights_of(layout).first_key_value().map(|(column, _)| *column);
         let third = layout.bodies.first().and_then(|body| body.position[2]);
         if let Some(column) = height.or(third.filter(|_| layout.on_earth)) {
             let is_convention = aviation::is_state_vectors(self.header) && options.scale.is_none();
@@ -681,11 +654,8 @@ impl<'a> Columns<'a> {
                 let unit = self.units.get(&column).map_or("deg", |unit| *unit);
                 metres[column] = heading::degrees(unit).ok_or_else(|| {
                     let problem = format!("column {name} has an unknown unit of angle, {}", quoted(unit));
-                    Fault::content(
-                        ContentKind::UnknownUnit,
-                        problem,
-                        "write degrees, without a unit in the column name",
-                    )
+                    let remedy = "write degrees, without a unit in the column name";
+                    Fault::content(ContentKind::UnknownUnit, problem, remedy)
                 })?;
                 continue;
             }
@@ -722,11 +692,8 @@ impl<'a> Columns<'a> {
         };
         if let Some(silent) = silent {
             let problem = format!("column {other} has a unit in its name, but column {silent} has none");
-            return refuse(
-                ContentKind::UnitConflict,
-                problem,
-                "put a unit into the name of each column, as in `x [mm]`",
-            );
+            let remedy = "put a unit into the name of each column, as in `x [mm]`";
+            return refuse(ContentKind::UnitConflict, problem, remedy);
         }
         if scale != 1.0 {
             let given = SCALE.set(scale);

@@ -27,23 +27,22 @@ mod csv;
 pub(crate) mod curves;
 mod earth;
 pub(crate) mod error;
+mod evidence;
 mod folder;
 mod format;
+mod head;
 mod heading;
 mod identity;
 mod layout;
-mod local_origin;
 #[cfg(feature = "mcap")]
 pub(crate) mod mcap;
 mod npy;
 mod npz;
 mod objects;
-mod optional;
 mod options;
 mod order;
 #[cfg(feature = "arrow")]
 pub(crate) mod parquet;
-mod reader;
 mod readers;
 #[cfg(feature = "shows")]
 mod show_rules;
@@ -68,10 +67,10 @@ pub use format::{Format, FormatInfo};
 pub use heading::is_read;
 #[cfg(feature = "mcap")]
 pub use mcap::{Channels, LivePose, has_live_poses, live_poses};
-#[cfg(not(feature = "mcap"))]
-pub use optional::Channels;
 pub use options::{ArrayAxis, ArrayLayout, ColumnNames, Dimensions, Duplicates, MessageClock, ReadOptions, Scale};
 pub use order::Recording;
+#[cfg(not(feature = "mcap"))]
+pub use readers::Channels;
 #[cfg(feature = "shows")]
 pub use show_rules::{ShowPolygon, ShowRules};
 pub use time_unit::TimeUnit;
@@ -96,15 +95,12 @@ use tautline_core::track::EarthOrigin;
 /// [`ReadError`] if the file cannot be read, has an unknown format, or its beginning is invalid.
 pub fn open(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
     let opened = match folder_of(path) {
-        _ if reader::is_bag(path) => open_bag(path, options),
+        _ if head::is_bag(path) => open_bag(path, options),
         Ok(Some(folder)) => open_folder(folder, options),
         Ok(None) => open_one(Source::file(path), options),
         Err(error) => Err(error),
     };
-    opened
-        .and_then(|recording| convention::turned(recording, options))
-        .map(|recording| stated::stated(recording, options, path))
-        .map_err(|error| error.of(path))
+    opened.and_then(|recording| stated::stated(recording, options, path)).map_err(|error| error.of(path))
 }
 
 /// Opens the plan of a flight, with its positions in the frame of the flight.
@@ -162,11 +158,9 @@ pub fn open_joined(paths: &[&Path], options: &ReadOptions) -> Result<Recording, 
             None => all.files.push(Source::file(path)),
         }
     }
-    let (opened, name) = (open_folder(all, options), recording_name(paths));
-    opened
-        .and_then(|recording| convention::turned(recording, options))
-        .map(|recording| stated::stated(recording, options, Path::new(&name)))
-        .map_err(|error| error.of(Path::new(&name)))
+    let name = recording_name(paths);
+    let opened = open_folder(all, options);
+    opened.and_then(|all| stated::stated(all, options, name.as_ref())).map_err(|error| error.of(name.as_ref()))
 }
 
 /// Opens the channels of a run recording or of an MCAP export; `None` without channels, and for any other recording.
@@ -189,10 +183,7 @@ pub fn open_run(path: &Path) -> Option<McapRecording> {
 /// Returns the name of several files that form one recording.
 #[must_use]
 pub fn recording_name(paths: &[&Path]) -> String {
-    const LISTED: usize = 3;
-    let named: Vec<_> = paths.iter().take(LISTED).map(|path| path.display().to_string()).collect();
-    let more = paths.len().saturating_sub(LISTED);
-    named.join(", ") + &if more > 0 { format!(" and {more} more") } else { String::new() }
+    error::first_few(&paths.iter().map(|path| path.to_string_lossy()).collect::<Vec<_>>(), 3)
 }
 
 /// Returns the rules that the recording itself states, as Skybrush shows do; `None` for any other recording.
@@ -211,7 +202,7 @@ pub fn show_rules(path: &Path, options: &ReadOptions) -> Result<Option<ShowRules
 fn folder_of(path: &Path) -> Result<Option<Folder>, ReadError> {
     let data = fs::metadata(path)?;
     if data.is_dir() {
-        if reader::is_bag(path) {
+        if head::is_bag(path) {
             let remedy = format!("open it without {JOIN}; its topics are the vehicles");
             return refuse(ContentKind::SeveralVehicles, "it is a ROS 2 bag, not a file with one vehicle", remedy);
         }
@@ -268,7 +259,7 @@ fn open_folder(mut folder: Folder, options: &ReadOptions) -> Result<Recording, R
 fn open_bag(path: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
     options.check()?;
     if let Some(format) = options.format.filter(|format| *format != Format::MCAP) {
-        return Err(Fault::WrongFormat(format).into());
+        return Err(Fault::wrong_format(format).into());
     }
     options.refuse_unsupported_options(Format::MCAP)?;
     #[cfg(feature = "mcap")]

@@ -7,6 +7,7 @@
 use std::io;
 use std::io::Read;
 
+use super::cells::Cell;
 use super::clock::Stamp;
 use super::error::{ContentKind, Fault};
 use super::time_unit::TimeUnit;
@@ -33,13 +34,6 @@ enum Kind {
     Unicode,
     /// Text with one byte per character.
     Bytes,
-}
-
-/// Element of an array.
-enum Element {
-    Whole(i64),
-    Real(f64),
-    Text(String),
 }
 
 /// Array being read, element by element in the order of the file.
@@ -103,7 +97,7 @@ impl Array {
         if let Kind::Time(unit) = self.kind { Some(unit) } else { None }
     }
 
-    fn next(&mut self) -> Result<Element, Fault> {
+    fn next(&mut self) -> Result<Cell, Fault> {
         read_exactly(&mut self.bytes, &mut self.element)?;
         self.left = self.left.saturating_sub(1);
         // Reading past the last element verifies the checksum of the archive.
@@ -118,64 +112,55 @@ impl Array {
         wide[..width].copy_from_slice(&self.element[..width]);
         let bits = u64::from_le_bytes(wide);
         Ok(match self.kind {
-            Kind::Float if width == 4 => Element::Real(f32::from_le_bytes([wide[0], wide[1], wide[2], wide[3]]).into()),
-            Kind::Float => Element::Real(f64::from_bits(bits)),
-            Kind::Unsigned => i64::try_from(bits).map_or(Element::Real(bits as f64), Element::Whole),
-            Kind::Time(_) if bits.cast_signed() == NOT_A_TIME => Element::Real(f64::NAN),
+            Kind::Float if width == 4 => Cell::Real(f32::from_le_bytes([wide[0], wide[1], wide[2], wide[3]]).into()),
+            Kind::Float => Cell::Real(f64::from_bits(bits)),
+            Kind::Unsigned => Cell::Whole(bits.into()),
+            Kind::Time(_) if bits.cast_signed() == NOT_A_TIME => Cell::Real(f64::NAN),
             Kind::Signed | Kind::Time(_) => {
                 let unused = 8 * (8 - width);
-                Element::Whole((bits << unused).cast_signed() >> unused)
+                Cell::Whole(((bits << unused).cast_signed() >> unused).into())
             }
             Kind::Unicode => {
                 let chars =
                     self.element.chunks_exact(4).map(|c| char::from_u32(u32::from_le_bytes([c[0], c[1], c[2], c[3]])));
                 // Reversing the whole element also reversed the order of characters.
                 let text: Option<String> = if self.big_endian { chars.rev().collect() } else { chars.collect() };
-                Element::Text(text.ok_or_else(|| Fault::damaged("a name is not text"))?)
+                Cell::Text(text.ok_or_else(|| Fault::damaged("a name is not text"))?)
             }
-            Kind::Bytes => Element::Text(String::from_utf8(self.element.clone()).map_err(|_| Fault::NotUtf8)?),
+            Kind::Bytes => Cell::Text(String::from_utf8(self.element.clone()).map_err(|_| Fault::not_utf8())?),
         })
     }
 
     /// Returns the next element as a number.
     pub(super) fn next_number(&mut self) -> Result<f64, Fault> {
-        match self.next()? {
-            Element::Whole(whole) => Ok(whole as f64),
-            Element::Real(real) => Ok(real),
-            Element::Text(_) => Err(not("numbers", "text")),
-        }
+        let cell = self.next()?;
+        cell.number().filter(|_| !matches!(cell, Cell::Text(_))).ok_or_else(|| not("numbers", "text"))
     }
 
     /// Returns the next element as a time.
     pub(super) fn next_stamp(&mut self) -> Result<Stamp, Fault> {
-        match self.next()? {
-            Element::Whole(whole) => Ok(Stamp::Whole(whole)),
-            Element::Real(real) => Ok(Stamp::Real(real)),
-            Element::Text(_) => Err(not("times", "text")),
-        }
+        let cell = self.next()?;
+        cell.stamp().filter(|_| !matches!(cell, Cell::Text(_))).ok_or_else(|| not("times", "text"))
     }
 
     /// Returns the next element as text.
     pub(super) fn next_text(&mut self) -> Result<String, Fault> {
         match self.next()? {
-            Element::Text(text) => Ok(text.trim_end_matches('\0').to_owned()),
+            Cell::Text(text) => Ok(text.trim_end_matches('\0').to_owned()),
             _ => Err(not("names", "numbers")),
         }
     }
 }
 
 fn not(what: &str, found: &str) -> Fault {
-    Fault::content(
-        ContentKind::ElementType,
-        format!("its elements are {found}, expected {what}"),
-        "save float64, int64 or text",
-    )
+    let remedy = "save float64, int64 or text";
+    Fault::content(ContentKind::ElementType, format!("its elements are {found}, expected {what}"), remedy)
 }
 
 fn read_exactly(bytes: &mut impl Read, buffer: &mut [u8]) -> Result<(), Fault> {
     match bytes.read_exact(buffer) {
         Err(error) if error.kind() == io::ErrorKind::UnexpectedEof => {
-            Err(Fault::Truncated("the array is shorter than its header declares".to_owned()))
+            Err(Fault::truncated("the array is shorter than its header declares"))
         }
         other => Ok(other?),
     }

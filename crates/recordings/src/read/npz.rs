@@ -14,26 +14,16 @@
 //! If the shape is ambiguous (3 x 3 x 3, or T x 3 x 2), neither `--layout` nor `axes` decides, the archive is refused.
 //! Arrays in the usual order are streamed; others are read into memory.
 
-use std::collections::BTreeSet;
-
 use nalgebra::Vector3;
 
 use super::clock::Stamp;
-use super::error::{ContentKind, Fault, Place, ReadError, one_of, refuse};
-use super::format::Format;
+use super::error::{ContentKind, Fault, Place, ReadError, one_of, quoted, refuse};
 use super::identity::Names;
 use super::npy::Array;
 use super::options::{ArrayAxis, ArrayLayout, ReadOptions};
-use super::order::{BATCH, Ordered, PLANAR, Recording, RecordingInfo, Row, Rows};
-use super::reader::Reader;
+use super::order::{Ordered, PLANAR, Recording, RecordingInfo, Row, Rows};
 use super::source::{Archive, Source};
 use super::time_unit::TimeUnit;
-
-pub(super) const READER: Reader = Reader {
-    format: Format::NPZ,
-    sniff: |head| head.begins_with_any(Format::NPZ.magic) && memchr::memmem::find(head.bytes, b".npy").is_some(),
-    open: |source, options| open(&source.clone().seekable()?, options),
-};
 use tautline_core::option::{COLUMN, LAYOUT};
 
 const TIMES: [&str; 4] = ["t", "time", "times", "timestamps"];
@@ -41,22 +31,10 @@ const POSITIONS: [&str; 4] = ["positions", "position", "pos", "xyz"];
 
 /// Opens an archive.
 pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+    let source = &source.clone().seekable()?;
     let mut arrays = Arrays { archive: Archive::open(&source.path)? };
-    let time = match options.columns.get("t") {
-        Some(given) => Some(given.clone()),
-        None => arrays.only_of(&TIMES, "t")?,
-    };
-    let time = time
-        .filter(|name| arrays.holds(name))
-        .ok_or_else(|| arrays.missing(ContentKind::NoTimeColumn, "times", "t"))?;
-    let positions = match options.columns.get("x") {
-        Some(given) => Some(given.clone()),
-        None => arrays.only_of(&POSITIONS, "x")?,
-    };
-    let positions = positions
-        .filter(|name| arrays.holds(name))
-        .ok_or_else(|| arrays.missing(ContentKind::NoPositionColumn, "positions", "positions"))?;
-
+    let time = arrays.of_role(options, "t", &TIMES, ContentKind::NoTimeColumn)?;
+    let positions = arrays.of_role(options, "x", &POSITIONS, ContentKind::NoPositionColumn)?;
     let mut stamps = arrays.array(&time)?;
     let unit = stamps.unit().or_else(|| time.rsplit_once('_').and_then(|(_, unit)| TimeUnit::from_name(unit)));
     let mut times = Vec::new();
@@ -83,12 +61,9 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
     let names = arrays.optional("names", |arrays| arrays.names(table.vehicles()))?;
     let epoch_ns = arrays.optional("epoch_ns", |arrays| Ok(arrays.array("epoch_ns")?.next_stamp()?))?;
 
-    let names = names.map(Names::from_list).transpose()?.unwrap_or_default();
-    let mut notes = Vec::new();
-    if table.axes() == 2 {
-        notes.push(format!("positions have two axes and no height: {PLANAR}"));
-    }
     let is_planar = table.axes() == 2;
+    let notes = is_planar.then(|| format!("positions have two axes and no height: {PLANAR}")).into_iter().collect();
+    let names = names.unwrap_or_default();
     let rows = Instants { name: positions, times, at: 0, table, velocities, seen, radii, names };
     let none = Fault::content(ContentKind::Empty, "it holds no position", "save at least one instant of one vehicle");
     let mut info = RecordingInfo::new(source, options, unit, notes, none);
@@ -155,34 +130,28 @@ impl Arrays {
         self.archive.holds(&format!("{name}.npy"))
     }
 
-    /// Returns the array with one of these names, optionally with a unit of time as suffix. Two such arrays are
-    /// refused.
-    fn only_of(&self, names: &[&str], option: &str) -> Result<Option<String>, Fault> {
+    /// Returns the array of a role: the one that the user names, else the only one with one of these names, optionally
+    /// with a unit of time as suffix. Two such arrays are refused, and none with a fault of this kind.
+    fn of_role(&self, options: &ReadOptions, role: &str, names: &[&str], kind: ContentKind) -> Result<String, Fault> {
         let units = TimeUnit::ALL.map(|unit| format!("_{}", unit.name()));
         let ends = std::iter::once("").chain(units.iter().map(String::as_str));
-        let candidates = ends.flat_map(|end| names.iter().map(move |name| format!("{name}{end}")));
-        let mut found = candidates.filter(|name| self.holds(name));
+        let usual = ends.flat_map(|end| names.iter().map(move |name| format!("{name}{end}")));
+        let known = options.columns.get(role).map_or_else(|| usual.collect(), |given| vec![given.clone()]);
+        let mut found = known.into_iter().filter(|name| self.holds(name));
+        let named = COLUMN.set(format!("{role}=NAME"));
         match (found.next(), found.next()) {
+            (Some(only), None) => Ok(only),
             (Some(first), Some(second)) => {
                 let problem = format!("the arrays `{first}` and `{second}` both give the {}", names[1]);
-                refuse(
-                    ContentKind::AmbiguousColumn,
-                    problem,
-                    format!("name one of them with {}", COLUMN.set(format!("{option}=NAME"))),
-                )
+                refuse(ContentKind::AmbiguousColumn, problem, format!("name one of them with {named}"))
             }
-            (first, _) => Ok(first),
+            (None, _) => {
+                let all = self.archive.names();
+                let all: Vec<_> = all.iter().filter_map(|name| name.strip_suffix(".npy")).map(quoted).collect();
+                let problem = format!("no array gives the {}s; its arrays are {}", names[1], all.join(", "));
+                refuse(kind, problem, format!("save it as `{}`, or name it with {named}", names[0]))
+            }
         }
-    }
-
-    fn missing(&self, kind: ContentKind, role: &str, usual: &str) -> Fault {
-        let names = self.archive.names();
-        let names: Vec<_> =
-            names.iter().filter_map(|name| name.strip_suffix(".npy")).map(super::error::quoted).collect();
-        let option = if usual == "t" { "t" } else { "x" };
-        let problem = format!("no array gives the {role}; its arrays are {}", names.join(", "));
-        let remedy = format!("save it as `{usual}`, or name it with {}", COLUMN.set(format!("{option}=NAME")));
-        Fault::content(kind, problem, remedy)
     }
 
     fn array(&mut self, name: &str) -> Result<Array, ReadError> {
@@ -225,18 +194,16 @@ impl Arrays {
     }
 
     /// Returns the names of the vehicles; their number must be `vehicles`.
-    fn names(&mut self, vehicles: usize) -> Result<Vec<String>, ReadError> {
+    fn names(&mut self, vehicles: usize) -> Result<Names, ReadError> {
         let names = self.texts("names")?;
-        let different: BTreeSet<_> = names.iter().collect();
-        let (kind, problem) = match different.len() {
-            _ if names.len() != vehicles => {
-                (ContentKind::ArrayShape, format!("it has {} elements for {vehicles} vehicles", names.len()))
-            }
-            count if count < vehicles => (ContentKind::VehicleTwice, "two vehicles have the same name".to_owned()),
-            _ => return Ok(names),
-        };
+        let count = names.len();
+        let names = Names::from_list(names).map_err(in_array("names"))?;
+        if count == vehicles {
+            return Ok(names);
+        }
+        let problem = format!("it has {count} elements for {vehicles} vehicles");
         let remedy = "save a distinct name for each vehicle, or omit `names`";
-        Err(in_array("names")(Fault::content(kind, problem, remedy)))
+        Err(in_array("names")(Fault::content(ContentKind::ArrayShape, problem, remedy)))
     }
 
     fn texts(&mut self, name: &str) -> Result<Vec<String>, ReadError> {
@@ -337,11 +304,8 @@ fn next_radius(numbers: &mut Numbers) -> Result<Option<f64>, Fault> {
     if radius.is_nan() || (radius >= 0.0 && radius.is_finite()) {
         return Ok(Some(radius).filter(|radius| !radius.is_nan()));
     }
-    refuse(
-        ContentKind::Radius,
-        format!("the radius is {radius}"),
-        "radii must be finite and not negative, or NaN if unknown",
-    )
+    let remedy = "radii must be finite and not negative, or NaN if unknown";
+    refuse(ContentKind::Radius, format!("the radius is {radius}"), remedy)
 }
 
 /// Rows of an archive.
@@ -375,11 +339,8 @@ impl Instants {
         // NaN marks vehicles without a velocity.
         let velocity = velocity.filter(|velocity| !velocity.iter().all(|x| x.is_nan()));
         if velocity.is_some_and(|velocity| velocity.iter().any(|x| !x.is_finite())) {
-            return refuse(
-                ContentKind::NotFinite,
-                "the velocity is not finite",
-                "velocities must be finite, or all NaN if unknown",
-            );
+            let remedy = "velocities must be finite, or all NaN if unknown";
+            return refuse(ContentKind::NotFinite, "the velocity is not finite", remedy);
         }
         let place = (self.at * self.table.vehicles() + vehicle) as u64;
         Ok(Some(Row { stamp, place, vehicle, position, velocity, radius }))
@@ -388,21 +349,18 @@ impl Instants {
 
 impl Rows for Instants {
     fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
-        let before = rows.len();
-        while rows.len() < before + BATCH {
-            let Some(&stamp) = self.times.get(self.at) else { break };
-            for vehicle in 0..self.table.vehicles() {
-                let place = (self.at * self.table.vehicles() + vehicle) as u64;
-                let row = self.row(stamp, vehicle).map_err(|fault| fault.at(self.place(place)))?;
-                rows.extend(row);
-            }
-            if self.names.all().is_empty() {
-                // Reading an instant has confirmed the number of vehicles in the header.
-                self.names = Names::numbered(self.table.vehicles());
-            }
-            self.at += 1;
+        let Some(&stamp) = self.times.get(self.at) else { return Ok(false) };
+        for vehicle in 0..self.table.vehicles() {
+            let place = (self.at * self.table.vehicles() + vehicle) as u64;
+            let row = self.row(stamp, vehicle).map_err(|fault| fault.at(self.place(place)))?;
+            rows.extend(row);
         }
-        Ok(rows.len() > before)
+        if self.names.all().is_empty() {
+            // Reading an instant has confirmed the number of vehicles in the header.
+            self.names = Names::numbered(self.table.vehicles());
+        }
+        self.at += 1;
+        Ok(true)
     }
 
     fn vehicles(&self) -> &[String] {

@@ -3,25 +3,20 @@
 //! pedestrian and a position in the object `track`; its lines with the object `scene` hold no position.
 
 use std::borrow::Cow;
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::fmt;
 use std::io::{BufReader, Bytes, Read};
 
 use serde::de::{DeserializeSeed, Error as _, IgnoredAny, MapAccess, SeqAccess, Visitor};
 
-use super::cells::Cells;
+use super::cells::{Cell, Cells};
 use super::clock::Stamp;
 use super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
-use super::format::Format;
 use super::layout::Layout;
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::reader::Reader;
 use super::source::{BLOCK_BYTES, LINE_LIMIT_BYTES, Lines, Source};
 use super::table;
-
-pub(super) const READER: Reader =
-    Reader { format: Format::OBJECTS, sniff: |head| head.is_text(|text| are_in(text) || is_array(text)), open };
 
 /// Largest number of columns; more indicate lists of changing length.
 const MOST_COLUMNS: usize = 100_000;
@@ -29,19 +24,12 @@ const MOST_COLUMNS: usize = 100_000;
 /// Keys of a position in `TrajNet++`, and the names of their columns.
 const TRAJNET: [(&str, &str); 4] = [("track.f", "frame"), ("track.p", "id"), ("track.x", "x"), ("track.y", "y")];
 
-/// Opens a table.
-pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let mut first = [0];
-    let mut bytes = source.bytes()?;
-    while bytes.read(&mut first)? == 1 && (first[0].is_ascii_whitespace() || BOM.contains(&first[0])) {}
-    if first == *b"[" { open_objects::<Elements>(source, options) } else { open_objects::<Lines>(source, options) }
-}
-
 /// Bytes of a mark at the beginning of a text in UTF-8.
 const BOM: [u8; 3] = [0xef, 0xbb, 0xbf];
 
-fn open_objects<T: ObjectText + 'static>(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let objects = Objects::<T>::open(source)?;
+/// Opens a table.
+pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
+    let objects = Objects::open(source)?;
     if objects.is_trajnet {
         objects.scenes.check(options)?;
     }
@@ -56,64 +44,75 @@ fn open_objects<T: ObjectText + 'static>(source: &Source, options: &ReadOptions)
             quoted(list)
         );
         let remedy = "name each vehicle in its object, as in {\"id\": \"a\", \"x\": 1, ...}";
-        return Err(Fault::content(ContentKind::ListLength, problem, remedy).at(T::place(*line)));
+        return Err(Fault::content(ContentKind::ListLength, problem, remedy).at(objects.text.place(*line)));
     }
     table::open(source, objects, layout, None, 0, options)
 }
 
-/// Returns whether a text begins with a complete object in one line and another object below.
+/// Returns whether a text begins with an array of objects, or with a complete object in one line and another object
+/// below.
 pub(super) fn are_in(text: &[u8]) -> bool {
+    if let Some(elements) = text.strip_prefix(b"[") {
+        return elements.trim_ascii_start().starts_with(b"{");
+    }
     let mut lines = text.split(|&byte| byte == b'\n').map(<[u8]>::trim_ascii).filter(|line| !line.is_empty());
     let is_object = |line: &[u8]| line.starts_with(b"{") && serde_json::from_slice::<IgnoredAny>(line).is_ok();
     lines.next().is_some_and(is_object) && lines.next().is_some_and(|line| line.starts_with(b"{"))
 }
 
-/// Returns whether a text begins with an array of objects.
-pub(super) fn is_array(text: &[u8]) -> bool {
-    text.strip_prefix(b"[").is_some_and(|elements| elements.trim_ascii_start().starts_with(b"{"))
+/// Text of objects, with one object in memory.
+enum ObjectText {
+    /// One object per line.
+    Lines(Lines),
+    Elements(Elements),
 }
 
-/// Text of objects, with one object in memory.
-trait ObjectText: Sized {
-    fn open(source: &Source) -> Result<Self, ReadError>;
+impl ObjectText {
+    fn open(source: &Source) -> Result<Self, ReadError> {
+        let mut first = [0];
+        let mut bytes = source.bytes()?;
+        while bytes.read(&mut first)? == 1 && (first[0].is_ascii_whitespace() || BOM.contains(&first[0])) {}
+        let is_array = first == *b"[";
+        Ok(if is_array { Self::Elements(Elements::open(source)?) } else { Self::Lines(Lines::new(source)?) })
+    }
 
     /// Moves to the next object; returns `false` after the last one.
-    fn advance(&mut self) -> Result<bool, ReadError>;
-
-    /// Returns the current object.
-    fn object(&self) -> &[u8];
-
-    /// Returns the number of the current object, from 1.
-    fn number(&self) -> u64;
-
-    /// Returns the place of the object with this number.
-    fn place(number: u64) -> Place;
-}
-
-impl ObjectText for Lines {
-    fn open(source: &Source) -> Result<Self, ReadError> {
-        Self::new(source)
-    }
-
     fn advance(&mut self) -> Result<bool, ReadError> {
-        while Self::advance(self)? {
-            if !self.line().trim_ascii().is_empty() {
-                return Ok(true);
+        match self {
+            Self::Elements(elements) => elements.advance(),
+            Self::Lines(lines) => {
+                while lines.advance()? {
+                    if !lines.line().trim_ascii().is_empty() {
+                        return Ok(true);
+                    }
+                }
+                Ok(false)
             }
         }
-        Ok(false)
     }
 
+    /// Returns the current object.
     fn object(&self) -> &[u8] {
-        self.line().trim_ascii()
+        match self {
+            Self::Lines(lines) => lines.line().trim_ascii(),
+            Self::Elements(elements) => &elements.element,
+        }
     }
 
+    /// Returns the number of the current object, from 1.
     fn number(&self) -> u64 {
-        Self::number(self)
+        match self {
+            Self::Lines(lines) => lines.number(),
+            Self::Elements(elements) => elements.number,
+        }
     }
 
-    fn place(number: u64) -> Place {
-        Place::Line(number)
+    /// Returns the place of the object with this number.
+    fn place(&self, number: u64) -> Place {
+        match self {
+            Self::Lines(_) => Place::Line(number),
+            Self::Elements(_) => Elements::place(number),
+        }
     }
 }
 
@@ -126,9 +125,16 @@ struct Elements {
 }
 
 impl Elements {
+    fn open(source: &Source) -> Result<Self, ReadError> {
+        let input = BufReader::with_capacity(BLOCK_BYTES, source.bytes()?).bytes();
+        let mut elements = Self { input, element: Vec::new(), number: 0, has_ended: false };
+        while elements.next_sign()? != b'[' {}
+        Ok(elements)
+    }
+
     fn byte(&mut self) -> Result<u8, ReadError> {
         let byte = self.input.next().transpose().map_err(|error| self.fault(error))?;
-        byte.ok_or_else(|| self.fault(Fault::Truncated("the end of its array is missing".to_owned())))
+        byte.ok_or_else(|| self.fault(Fault::truncated("the end of its array is missing")))
     }
 
     /// Returns the next byte that is not blank.
@@ -164,7 +170,7 @@ impl Elements {
         while depth > 0 {
             let byte = self.byte()?;
             if self.element.len() == LINE_LIMIT_BYTES {
-                return Err(self.fault(Fault::LineTooLong(LINE_LIMIT_BYTES)));
+                return Err(self.fault(Fault::line_too_long(LINE_LIMIT_BYTES)));
             }
             self.element.push(byte);
             match byte {
@@ -178,16 +184,8 @@ impl Elements {
         }
         Ok(())
     }
-}
 
-impl ObjectText for Elements {
-    fn open(source: &Source) -> Result<Self, ReadError> {
-        let input = BufReader::with_capacity(BLOCK_BYTES, source.bytes()?).bytes();
-        let mut elements = Self { input, element: Vec::new(), number: 0, has_ended: false };
-        while elements.next_sign()? != b'[' {}
-        Ok(elements)
-    }
-
+    /// Moves to the next object; returns `false` after the last one.
     fn advance(&mut self) -> Result<bool, ReadError> {
         if self.has_ended {
             return Ok(false);
@@ -212,37 +210,8 @@ impl ObjectText for Elements {
         }
     }
 
-    fn object(&self) -> &[u8] {
-        &self.element
-    }
-
-    fn number(&self) -> u64 {
-        self.number
-    }
-
     fn place(number: u64) -> Place {
         Place::Part(format!("element {number}"))
-    }
-}
-
-/// Value of a key.
-#[derive(Clone, Debug, Default, PartialEq)]
-enum Cell {
-    #[default]
-    Empty,
-    Whole(i64),
-    Real(f64),
-    Text(String),
-}
-
-impl fmt::Display for Cell {
-    fn fmt(&self, out: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Empty => Ok(()),
-            Self::Whole(whole) => write!(out, "{whole}"),
-            Self::Real(real) => write!(out, "{real}"),
-            Self::Text(text) => out.write_str(text),
-        }
     }
 }
 
@@ -269,7 +238,8 @@ impl Scenes {
         for (key, cell) in flat {
             match key.as_str() {
                 "scene.fps" => {
-                    let fps = cell.to_string();
+                    let text = || cell.text().map(Cow::into_owned).unwrap_or_default();
+                    let fps = cell.number().map_or_else(text, |fps| fps.to_string());
                     match &self.fps {
                         None => self.fps = Some(fps),
                         Some(first) if *first != fps => self.other_fps = Some(fps),
@@ -283,7 +253,7 @@ impl Scenes {
     }
 
     fn observe_frame(&mut self, cell: &Cell) {
-        let Some(frame) = cell.to_string().parse::<f64>().ok().and_then(|frame| Stamp::Real(frame).whole()) else {
+        let Some(frame) = cell.number().and_then(|frame| Stamp::Real(frame).whole()) else {
             self.is_uneven = true;
             return;
         };
@@ -330,9 +300,9 @@ impl Scenes {
 }
 
 /// Objects of a file, one by one.
-struct Objects<T> {
+struct Objects {
     source: Source,
-    text: T,
+    text: ObjectText,
     /// Whether objects without a key of `track` hold no position.
     is_trajnet: bool,
     scenes: Scenes,
@@ -346,12 +316,12 @@ struct Objects<T> {
     uneven: BTreeMap<String, u64>,
 }
 
-impl<T: ObjectText> Objects<T> {
+impl Objects {
     /// Opens a file and collects the keys of all objects.
     fn open(source: &Source) -> Result<Self, ReadError> {
         let mut objects = Self {
             source: source.clone(),
-            text: T::open(source)?,
+            text: ObjectText::open(source)?,
             is_trajnet: false,
             scenes: Scenes::default(),
             header: Vec::new(),
@@ -373,7 +343,7 @@ impl<T: ObjectText> Objects<T> {
                 let remedy =
                     "remove the lines of predictions, or judge each prediction as a file of its own, without this key";
                 let fault = Fault::content(ContentKind::AmbiguousLayout, problem, remedy);
-                return Err(fault.at(T::place(objects.text.number())));
+                return Err(objects.fault(fault));
             }
             objects.scenes.observe(&objects.flat);
             for (key, _) in &objects.flat {
@@ -384,14 +354,14 @@ impl<T: ObjectText> Objects<T> {
                     let problem = format!("its objects have more than {MOST_COLUMNS} different keys");
                     let remedy = "write one object per vehicle and time, with the same keys in all";
                     let fault = Fault::content(ContentKind::FieldCount, problem, remedy);
-                    return Err(fault.at(T::place(objects.text.number())));
+                    return Err(objects.fault(fault));
                 }
                 objects.columns.insert(key.clone(), objects.header.len());
                 objects.header.push(key.clone());
             }
         }
         if objects.header.is_empty() {
-            return Err(Fault::Empty.into());
+            return Err(Fault::empty().into());
         }
         objects.rename_trajnet();
         Ok(objects)
@@ -420,7 +390,7 @@ impl<T: ObjectText> Objects<T> {
                 return Ok(false);
             }
             take_apart(self.text.object(), &mut self.flat, &mut self.lists)
-                .map_err(|fault| fault.at(T::place(self.text.number())))?;
+                .map_err(|fault| fault.at(self.text.place(self.text.number())))?;
             if !self.is_trajnet || self.flat.iter().any(|(key, _)| key.starts_with("track.")) {
                 return Ok(true);
             }
@@ -430,11 +400,8 @@ impl<T: ObjectText> Objects<T> {
 
 fn take_apart(line: &[u8], flat: &mut Vec<(String, Cell)>, lists: &mut Vec<(String, usize)>) -> Result<(), Fault> {
     let refused = |what: String| {
-        Fault::content(
-            ContentKind::Malformed,
-            format!("it is not a JSON object: {what}"),
-            "write one object like {\"t\": 0, \"id\": \"a\", ...} per line",
-        )
+        let remedy = "write one object like {\"t\": 0, \"id\": \"a\", ...} per line";
+        Fault::content(ContentKind::Malformed, format!("it is not a JSON object: {what}"), remedy)
     };
     if !line.starts_with(b"{") {
         return Err(refused("it does not begin with a brace".to_owned()));
@@ -485,12 +452,12 @@ impl<'de> Visitor<'de> for Flat<'_> {
     }
 
     fn visit_i64<E>(self, value: i64) -> Result<(), E> {
-        self.push(Cell::Whole(value));
+        self.push(Cell::Whole(value.into()));
         Ok(())
     }
 
     fn visit_u64<E>(self, value: u64) -> Result<(), E> {
-        self.push(i64::try_from(value).map_or(Cell::Real(value as f64), Cell::Whole));
+        self.push(Cell::Whole(value.into()));
         Ok(())
     }
 
@@ -505,13 +472,13 @@ impl<'de> Visitor<'de> for Flat<'_> {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<(), A::Error> {
-        let mut known = Vec::new();
+        let mut known = HashSet::new();
         while let Some(key) = map.next_key::<String>()? {
+            let whole = if self.key.is_empty() { key.clone() } else { format!("{}.{key}", self.key) };
             if known.contains(&key) {
                 return Err(A::Error::custom(format!("the key {} occurs twice", quoted(&key))));
             }
-            let whole = if self.key.is_empty() { key.clone() } else { format!("{}.{key}", self.key) };
-            known.push(key);
+            known.insert(key);
             map.next_value_seed(Flat { key: whole, cells: self.cells, lists: self.lists })?;
         }
         Ok(())
@@ -542,13 +509,13 @@ impl<'de> Visitor<'de> for Flat<'_> {
     }
 }
 
-impl<T: ObjectText> Cells for Objects<T> {
+impl Cells for Objects {
     fn header(&self) -> &[String] {
         &self.header
     }
 
     fn restart(&mut self, _columns: &[usize], _all: bool) -> Result<(), ReadError> {
-        self.text = T::open(&self.source)?;
+        self.text = ObjectText::open(&self.source)?;
         Ok(())
     }
 
@@ -568,35 +535,23 @@ impl<T: ObjectText> Cells for Objects<T> {
         self.text.number()
     }
 
-    fn place(row: u64) -> Place {
-        T::place(row)
+    fn place(&self, row: u64) -> Place {
+        self.text.place(row)
     }
 
     fn text(&self, column: usize) -> Result<Cow<'_, str>, Fault> {
-        Ok(match &self.cells[column] {
-            Cell::Empty => "".into(),
-            Cell::Whole(whole) => whole.to_string().into(),
-            Cell::Real(real) => format!("{real:?}").into(),
-            Cell::Text(text) => text.as_str().into(),
-        })
+        self.cells[column].text()
     }
 
     fn number(&self, column: usize) -> Option<f64> {
-        match &self.cells[column] {
-            Cell::Whole(whole) => Some(*whole as f64),
-            Cell::Real(real) => Some(*real),
-            Cell::Text(text) => text.trim().parse().ok(),
-            Cell::Empty => None,
-        }
+        self.cells[column].number()
     }
 
     /// Formats a double as its shortest decimal, which restores the text of the file.
     fn stamp(&mut self, column: usize) -> Option<Stamp> {
         match &self.cells[column] {
-            Cell::Whole(whole) => Some(Stamp::Whole(*whole)),
             Cell::Real(real) => Stamp::parse(&format!("{real:?}")),
-            Cell::Text(text) => Stamp::parse(text.trim()),
-            Cell::Empty => None,
+            cell => cell.stamp(),
         }
     }
 }

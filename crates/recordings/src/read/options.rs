@@ -13,6 +13,29 @@ use tautline_core::option::{
     SKIP_INCOMPLETE, SORT, START, TIME_SCALE, TIME_UNIT, TOPIC,
 };
 
+/// Defines all variants of an option, and their names.
+macro_rules! named {
+    ($kind:ident, $($variant:ident = $name:literal),+) => {
+        impl $kind {
+            /// All variants.
+            pub const ALL: [Self; [$($name),+].len()] = [$(Self::$variant),+];
+
+            /// Returns the name for the command line.
+            #[must_use]
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $name),+
+                }
+            }
+        }
+    };
+}
+
+named!(ArrayAxis, Time = "time", Vehicle = "vehicle", Axis = "axis");
+named!(Dimensions, Plane = "2", Space = "3", PlaneVelocity = "2+2", SpaceVelocity = "3+3");
+named!(Duplicates, First = "first", Last = "last", Refuse = "refuse");
+named!(MessageClock, Stamp = "stamp", Log = "log");
+
 /// Meaning of an axis of an array of positions.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ArrayAxis {
@@ -37,16 +60,6 @@ impl ArrayAxis {
         [Self::Axis, Self::Time, Self::Vehicle],
         [Self::Axis, Self::Vehicle, Self::Time],
     ];
-
-    /// Returns the name of the axis for `--layout`.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Time => "time",
-            Self::Vehicle => "vehicle",
-            Self::Axis => "axis",
-        }
-    }
 
     /// Returns the name of a layout for `--layout`, such as `time,vehicle,axis`.
     #[must_use]
@@ -132,20 +145,6 @@ pub enum Dimensions {
 }
 
 impl Dimensions {
-    /// All variants.
-    pub const ALL: [Self; 4] = [Self::Plane, Self::Space, Self::PlaneVelocity, Self::SpaceVelocity];
-
-    /// Returns the name for `--dimensions`: `2`, `3`, `2+2` or `3+3`.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Plane => "2",
-            Self::Space => "3",
-            Self::PlaneVelocity => "2+2",
-            Self::SpaceVelocity => "3+3",
-        }
-    }
-
     /// Returns the number of axes, and the number of numbers.
     pub(super) fn counts(self) -> (usize, usize) {
         match self {
@@ -168,21 +167,6 @@ pub enum Duplicates {
     Refuse,
 }
 
-impl Duplicates {
-    /// All variants.
-    pub const ALL: [Self; 3] = [Self::First, Self::Last, Self::Refuse];
-
-    /// Returns the name for `--duplicates`.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::First => "first",
-            Self::Last => "last",
-            Self::Refuse => "refuse",
-        }
-    }
-}
-
 /// Clock of the messages of a recording.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MessageClock {
@@ -190,20 +174,6 @@ pub enum MessageClock {
     Stamp,
     /// Times at which the recorder logged the messages.
     Log,
-}
-
-impl MessageClock {
-    /// All variants.
-    pub const ALL: [Self; 2] = [Self::Stamp, Self::Log];
-
-    /// Returns the name for `--clock`.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Stamp => "stamp",
-            Self::Log => "log",
-        }
-    }
 }
 
 /// Names of columns given by the user, one per role of [`ColumnNames::ROLES`].
@@ -306,11 +276,8 @@ impl ReadOptions {
         let metres = self.metres();
         if !(metres.is_finite() && metres > 0.0) {
             let problem = format!("{SCALE} must be positive, got {metres}");
-            return refuse(
-                ContentKind::OptionOutOfRange,
-                problem,
-                "give a positive number of metres per unit of length",
-            );
+            let remedy = "give a positive number of metres per unit of length";
+            return refuse(ContentKind::OptionOutOfRange, problem, remedy);
         }
         if let Some(rate) = self.times_per_second.filter(|rate| !(rate.is_finite() && *rate > 0.0)) {
             let problem = format!("the number of time units per second must be positive, got {rate}");
@@ -338,11 +305,8 @@ impl ReadOptions {
         }
         if !self.turn().are_finite() {
             let problem = format!("a factor of {SCALE} is 0 or not finite");
-            return refuse(
-                ContentKind::OptionOutOfRange,
-                problem,
-                "give three finite numbers other than 0, such as 1,1,-1",
-            );
+            let remedy = "give three finite numbers other than 0, such as 1,1,-1";
+            return refuse(ContentKind::OptionOutOfRange, problem, remedy);
         }
         Ok(())
     }
@@ -380,11 +344,14 @@ impl ReadOptions {
 
     /// Returns the note on an unclosed file if the user accepts it, else the fault.
     pub(super) fn accept_unfinished(&self, complete: bool) -> Result<Vec<String>, Fault> {
-        let note = "the recording was not closed: it is read up to its last complete part";
-        match (complete, self.allow_unfinished) {
-            (true, _) => Ok(Vec::new()),
-            (false, true) => Ok(vec![note.to_owned()]),
-            (false, false) => Err(Fault::Unfinished),
+        if complete {
+            return Ok(Vec::new());
         }
+        if self.allow_unfinished {
+            return Ok(vec!["the recording was not closed: it is read up to its last complete part".to_owned()]);
+        }
+        let problem = "the recorder did not close the file, so the end may be missing";
+        let remedy = format!("copy or record it again, or accept the complete part with {ALLOW_UNFINISHED}");
+        refuse(ContentKind::Unfinished, problem, remedy)
     }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use nalgebra::Vector3;
 use tautline_core::fact::{Fact, FactKind, Source};
-use tautline_core::option::{COLUMN, DUPLICATES, SORT, TIME_UNIT};
+use tautline_core::option::{COLUMN, DUPLICATES, TIME_UNIT};
 
 use super::clock::{Probe, Stamp, Timing};
 use super::error::{ContentKind, Fault, Place, ReadError, quoted};
@@ -27,22 +27,15 @@ pub type Recording = Box<dyn Tracks<Error = ReadError>>;
 /// Properties of a recording besides its rows.
 pub(super) struct RecordingInfo {
     pub(super) path: PathBuf,
-    /// Unit of the times, if known.
+    pub(super) options: ReadOptions,
+    /// Unit of the times according to the file, if known. That of the user takes precedence.
     pub(super) unit: Option<TimeUnit>,
-    /// Number of time units per second, if given by the user.
-    pub(super) times_per_second: Option<f64>,
-    /// Whether the user gives the unit of the times.
-    pub(super) is_unit_given: bool,
     /// Whether a column of the file gives the unit of the times; else the format defines it.
     pub(super) is_unit_in_file: bool,
     /// Epoch of the times according to the file \[ns\].
     pub(super) epoch_ns: i64,
     /// Metres per unit of length.
     pub(super) scale: f64,
-    /// Whether to sort rows with decreasing time.
-    pub(super) sort: bool,
-    /// Choice among several rows of a vehicle at one time.
-    pub(super) duplicates: Option<Duplicates>,
     /// Metadata; the clock and the assumption are set while rows are read.
     pub(super) metadata: Metadata,
     /// Fault of a recording without rows.
@@ -50,29 +43,18 @@ pub(super) struct RecordingInfo {
 }
 
 impl RecordingInfo {
-    /// Returns the properties for these options. The unit of the user takes precedence over `file_unit`, the unit of
-    /// the file.
+    /// Returns the properties for these options; `unit` is the unit of times in the file.
     pub(super) fn new(
         source: &File,
         options: &ReadOptions,
-        file_unit: Option<TimeUnit>,
+        unit: Option<TimeUnit>,
         notes: Vec<String>,
         none: Fault,
     ) -> Self {
-        let unit = options.time_unit.or(file_unit);
-        Self {
-            path: source.display_path(),
-            unit,
-            times_per_second: options.times_per_second,
-            is_unit_given: options.time_unit.is_some() || options.times_per_second.is_some(),
-            is_unit_in_file: false,
-            epoch_ns: 0,
-            scale: options.metres(),
-            sort: options.sort,
-            duplicates: options.duplicates,
-            metadata: Metadata { notes, ..Metadata::default() },
-            none,
-        }
+        let (path, scale, metadata) =
+            (source.display_path(), options.metres(), Metadata { notes, ..Metadata::default() });
+        let options = options.clone();
+        Self { path, options, unit, is_unit_in_file: false, epoch_ns: 0, scale, metadata, none }
     }
 }
 
@@ -104,39 +86,42 @@ pub(super) struct Ordered<R> {
 impl<R: Rows> Ordered<R> {
     /// Reads the part of the recording that its order and its clock require.
     pub(super) fn open(mut rows: R, mut info: RecordingInfo) -> Result<Self, ReadError> {
-        let (sort, metadata) = (info.sort, &mut info.metadata);
+        let (options, metadata) = (&info.options, &mut info.metadata);
+        let sort = options.sort;
         let mut first = Vec::new();
         let mut ended = false;
-        let probe = if rows.is_wide() && sort {
-            while rows.next(&mut first)? {}
-            ended = true;
-            probe(&first)
-        } else if rows.is_wide() {
-            ended = !rows.next(&mut first)?;
-            let mut probe = probe(&first);
-            // Decreasing times are refused when they are reached.
-            if let Some(probe) = &mut probe {
-                probe.in_order = true;
+        let mut probe = None;
+        if rows.is_wide() {
+            ended = !rows.next_batch(&mut first)?;
+            while sort && !ended {
+                ended = !rows.next_batch(&mut first)?;
             }
-            probe
+            for row in &first {
+                observe(&mut probe, row.stamp, row.vehicle);
+            }
+            // Decreasing times are refused when they are reached, unless they are sorted.
+            if let Some(probe) = &mut probe {
+                probe.in_order |= !sort;
+            }
         } else {
-            rows.survey()?
-        };
+            probe = rows.survey()?;
+        }
         let Some(probe) = probe else { return Err(info.none.into()) };
-        let settled = || Timing::settle(&probe, info.unit);
-        let (mut timing, note) = info.times_per_second.map_or_else(settled, |rate| (Timing::given(rate), None));
+        let settled = || Timing::settle(&probe, options.time_unit.or(info.unit));
+        let (mut timing, note) = options.times_per_second.map_or_else(settled, |rate| (Timing::given(rate), None));
         timing.clock.epoch_ns = timing.clock.epoch_ns.saturating_add(info.epoch_ns);
-        rows.settle_clock(timing.per_second());
+        rows.settle_clock(timing.per_second);
         metadata.notes.extend(note);
         // After a survey, notes and facts cover all rows.
-        metadata.notes.extend(rows.notes());
-        metadata.facts.extend(rows.facts());
+        let (notes, facts) = rows.findings();
+        metadata.notes.extend(notes);
+        metadata.facts.extend(facts);
         if !rows.is_wide() {
             rows.settle_names();
             rows.rewind()?;
         }
         if !probe.in_order {
-            while rows.next(&mut first)? {}
+            while rows.next_batch(&mut first)? {}
             if !sort {
                 refuse_steps_back(&first, &rows, &timing)?;
             }
@@ -146,7 +131,7 @@ impl<R: Rows> Ordered<R> {
             metadata.notes.push("rows were not in order of time and were sorted".to_owned());
         }
         metadata.clock = timing.clock.clone();
-        let source = if info.is_unit_given {
+        let source = if options.time_unit.is_some() || options.times_per_second.is_some() {
             Source::Declared
         } else if timing.clock.inferred {
             Source::Inferred
@@ -155,7 +140,7 @@ impl<R: Rows> Ordered<R> {
         } else {
             Source::Convention
         };
-        metadata.facts.push(match info.times_per_second {
+        metadata.facts.push(match options.times_per_second {
             Some(rate) => Fact::number(FactKind::TimeUnit, source, rate.recip(), "s"),
             None => Fact::name(FactKind::TimeUnit, source, timing.clock.unit),
         });
@@ -186,7 +171,8 @@ impl<R: Rows> Ordered<R> {
         };
         let time_s = self.timing.seconds(row.stamp);
         if time_s < before {
-            return Err(self.error(row, Fault::time_backwards(time_s, before)));
+            let problem = format!("time runs backwards: {time_s} s comes after {before} s");
+            return Err(self.error(row, Fault::time_backwards(problem)));
         }
         self.now = Some((row.stamp, time_s));
         Ok(time_s)
@@ -224,7 +210,7 @@ impl<R: Rows> Ordered<R> {
     #[cold]
     fn repeat(&mut self, row: &Row, before: &Row, time_s: f64, items: &mut [Item]) -> Result<(), ReadError> {
         let is_equal = (row.position, row.velocity, row.radius) == (before.position, before.velocity, before.radius);
-        match self.info.duplicates.or(is_equal.then_some(Duplicates::First)) {
+        match self.info.options.duplicates.or(is_equal.then_some(Duplicates::First)) {
             Some(Duplicates::First) => {}
             Some(Duplicates::Last) => {
                 let sample = self.sample(row, time_s)?;
@@ -300,7 +286,7 @@ impl<R: Rows> Ordered<R> {
     fn peek(&mut self) -> Result<Option<&Row>, ReadError> {
         if self.batch.len() == 0 && !self.ended {
             let mut batch = Vec::with_capacity(BATCH);
-            self.ended = !self.rows.next(&mut batch)?;
+            self.ended = !self.rows.next_batch(&mut batch)?;
             self.batch = batch.into_iter();
         }
         Ok(self.batch.as_slice().first())
@@ -315,7 +301,7 @@ impl<R: Rows> Ordered<R> {
 
     fn try_read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
         let before = items.len();
-        let waits = self.info.duplicates == Some(Duplicates::Last);
+        let waits = self.info.options.duplicates == Some(Duplicates::Last);
         while items.len() < before + BATCH || (waits && self.continues_instant()?) {
             let Some(&row) = self.peek()? else { break };
             self.batch.next();
@@ -331,11 +317,9 @@ impl<R: Rows> Ordered<R> {
         }
         if items.len() == before && !self.finished {
             self.finished = true;
-            if let Some(fault) = self.rows.late_fault() {
-                return Err(fault.into());
-            }
-            self.info.metadata.notes.extend(self.rows.late_notes());
-            self.info.metadata.facts.extend(self.rows.late_facts());
+            let (notes, facts) = self.rows.late_findings()?;
+            self.info.metadata.notes.extend(notes);
+            self.info.metadata.facts.extend(facts);
         }
         Ok(items.len() > before)
     }
@@ -373,10 +357,21 @@ pub(super) struct Row {
     pub(super) radius: Option<f64>,
 }
 
+/// Notes for the user, and facts.
+pub(super) type Findings = (Vec<String>, Vec<Fact>);
+
 /// Reader of a recording that yields samples row by row.
 pub(super) trait Rows {
-    /// Appends about [`BATCH`] rows in the order of the file. Returns `false` if no row was left.
+    /// Appends the rows of the next part of the file: a line, an instant or a message. Returns `false` after the last
+    /// part.
     fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError>;
+
+    /// Appends about [`BATCH`] rows in the order of the file. Returns `false` if no row was left.
+    fn next_batch(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
+        let before = rows.len();
+        while rows.len() < before + BATCH && self.next(rows)? {}
+        Ok(rows.len() > before)
+    }
 
     /// Restarts at the first row. A reader whose time only runs forwards is read once and need not implement this.
     fn rewind(&mut self) -> Result<(), ReadError> {
@@ -389,29 +384,14 @@ pub(super) trait Rows {
     /// Puts the names in their final order after all of them have been read.
     fn settle_names(&mut self) {}
 
-    /// Notes for the user that are known while rows are read.
-    fn notes(&self) -> Vec<String> {
-        Vec::new()
+    /// Notes for the user and facts that are known before the first row is returned.
+    fn findings(&self) -> Findings {
+        Findings::default()
     }
 
-    /// Notes for the user that are known after all rows have been read.
-    fn late_notes(&self) -> Vec<String> {
-        Vec::new()
-    }
-
-    /// Facts that are known before the first row is returned.
-    fn facts(&self) -> Vec<Fact> {
-        Vec::new()
-    }
-
-    /// Facts that are known after all rows have been read.
-    fn late_facts(&self) -> Vec<Fact> {
-        Vec::new()
-    }
-
-    /// Fault that is known after all rows have been read.
-    fn late_fault(&self) -> Option<Fault> {
-        None
+    /// Notes and facts that are known after all rows have been read, or the fault that the rows show together.
+    fn late_findings(&self) -> Result<Findings, Fault> {
+        Ok(Findings::default())
     }
 
     /// Receives the number of time units per second.
@@ -432,29 +412,17 @@ pub(super) trait Rows {
 
     /// Reads all times and names. Returns `None` if there are no rows.
     fn survey(&mut self) -> Result<Option<Probe>, ReadError> {
-        survey(self)
-    }
-}
-
-/// Reads the times of all rows. Returns `None` if there are no rows.
-fn survey<R: Rows + ?Sized>(rows: &mut R) -> Result<Option<Probe>, ReadError> {
-    let mut probe: Option<Probe> = None;
-    let mut batch = Vec::new();
-    while rows.next(&mut batch)? {
-        for row in batch.drain(..) {
-            probe.get_or_insert_with(|| Probe::new(row.stamp)).observe(row.stamp, row.vehicle);
+        let (mut probe, mut batch) = (None, Vec::new());
+        while self.next_batch(&mut batch)? {
+            batch.drain(..).for_each(|row| observe(&mut probe, row.stamp, row.vehicle));
         }
+        Ok(probe)
     }
-    Ok(probe)
 }
 
-/// Returns the properties of the times of these rows, or `None` if there are no rows.
-pub(super) fn probe(rows: &[Row]) -> Option<Probe> {
-    let mut probe = Probe::new(rows.first()?.stamp);
-    for row in rows {
-        probe.observe(row.stamp, row.vehicle);
-    }
-    Some(probe)
+/// Records the time of a row.
+pub(super) fn observe(probe: &mut Option<Probe>, stamp: Stamp, vehicle: usize) {
+    probe.get_or_insert_with(|| Probe::new(stamp)).observe(stamp, vehicle);
 }
 
 /// Refuses rows of one vehicle whose time decreases in the order of the file.
@@ -472,12 +440,7 @@ pub(super) fn refuse_steps_back(rows: &[Row], source: &impl Rows, timing: &Timin
                 "vehicle {name} goes back in time: {time_s} s comes after {before_s} s at {}",
                 source.place(before.place)
             );
-            let remedy = format!(
-                "check whether its clock was set; if the rows belong to several vehicles, name their column with {}; \
-                 if the rows are only out of order, use {SORT}",
-                COLUMN.set("id=NAME")
-            );
-            return Err(Fault::content(ContentKind::TimeBackwards, problem, remedy).at(source.place(row.place)));
+            return Err(Fault::time_backwards(problem).at(source.place(row.place)));
         }
     }
     Ok(())

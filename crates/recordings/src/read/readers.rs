@@ -5,31 +5,119 @@ use std::str;
 
 use super::error::{ContentKind, Fault, ReadError, refuse};
 use super::format::{Format, Packing};
+use super::head::{BAG, Head, SHOW, TABLE, head_of};
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::reader::{BAG, Head, Reader, SHOW, TABLE, head_of};
 use super::source::{Archive, GZIP_MAGIC, Source};
-use super::{bezier, capture, crazyflie, csv, npz, objects, optional, ulog};
+use super::{bezier, capture, crazyflie, csv, npz, objects, ulog};
+use crate::segments::Trajectory;
+
+/// Returns the function that opens a file, or the fault of a feature that this build lacks.
+macro_rules! open_with {
+    ($feature:tt, $open:expr) => {{
+        #[cfg(feature = $feature)]
+        {
+            $open
+        }
+        #[cfg(not(feature = $feature))]
+        {
+            |_, _| Err(Fault::without_feature($feature).into())
+        }
+    }};
+}
+
+/// Reader of a format.
+struct Reader {
+    format: Format,
+    /// Whether a file with the first bytes of the format is of this format. The first reader that accepts a file reads
+    /// it.
+    accepts: fn(&Head<'_>) -> bool,
+    open: fn(&Source, &ReadOptions) -> Result<Recording, ReadError>,
+}
+
+/// Accepts every file with the first bytes of the format.
+const BY_MAGIC: fn(&Head<'_>) -> bool = |_| true;
 
 /// All readers, in the order of recognition.
 static READERS: &[Reader] = &[
-    ulog::READER,
-    optional::PARQUET,
-    optional::MCAP,
-    npz::READER,
-    optional::SKYB,
-    objects::READER,
-    optional::VVIZ,
-    optional::SKYBRUSH,
-    optional::CRAZYFLIE_COMPRESSED,
-    capture::MOTIVE,
-    capture::VICON,
-    bezier::READER,
-    crazyflie::READER,
-    csv::CSV,
-    csv::TRAJNET,
-    csv::TEXT,
+    Reader { format: Format::ULOG, accepts: BY_MAGIC, open: ulog::open },
+    Reader { format: Format::PARQUET, accepts: BY_MAGIC, open: open_with!("arrow", super::parquet::open) },
+    Reader { format: Format::MCAP, accepts: BY_MAGIC, open: open_with!("mcap", super::mcap::open) },
+    Reader { format: Format::NPZ, accepts: |head| finds(head.bytes, b".npy"), open: npz::open },
+    Reader { format: Format::SKYB, accepts: BY_MAGIC, open: open_with!("shows", super::compressed::open_skyb) },
+    Reader { format: Format::OBJECTS, accepts: |head| head.text.is_some_and(objects::are_in), open: objects::open },
+    Reader {
+        format: Format::VVIZ,
+        accepts: |head| {
+            head.text.is_some_and(|text| text.starts_with(b"{") && VVIZ_KEYS.iter().any(|key| finds(text, key)))
+        },
+        open: open_with!("shows", super::vviz::open),
+    },
+    Reader {
+        format: Format::SKYBRUSH,
+        accepts: |head| head.begins_with_any(Format::NPZ.magic) || head.text.is_some_and(|text| text.starts_with(b"{")),
+        open: open_with!("shows", super::skybrush::open),
+    },
+    Reader {
+        format: Format::CRAZYFLIE_COMPRESSED,
+        // A file without magic bytes: its segments must end with the last byte.
+        accepts: |head| {
+            let is_whole =
+                |(found, length): (Trajectory, usize)| length == head.bytes.len() && !found.segments.is_empty();
+            Trajectory::decode(head.bytes, true).is_ok_and(is_whole)
+        },
+        open: open_with!("shows", super::compressed::open_crazyflie),
+    },
+    Reader {
+        format: Format::MOTIVE,
+        accepts: |head| head.text.is_some_and(|text| text.starts_with(capture::MOTIVE)),
+        open: capture::open_motive,
+    },
+    Reader {
+        format: Format::VICON,
+        accepts: |head| head.text.is_some_and(capture::is_vicon),
+        open: capture::open_vicon,
+    },
+    Reader {
+        format: Format::BEZIER,
+        accepts: |head| head.text.is_some_and(bezier::has_header),
+        open: |source, options| bezier::open(alone(source), None, options),
+    },
+    Reader {
+        format: Format::CRAZYFLIE,
+        accepts: |head| head.line.is_some_and(|line| line.to_ascii_lowercase().starts_with(b"duration,")),
+        open: |source, options| crazyflie::open(alone(source), None, options),
+    },
+    Reader {
+        format: Format::CSV,
+        // Also a text without a line besides comments.
+        accepts: |head| head.text.is_some() && head.line.is_none_or(csv::has_separators),
+        open: |source, options| csv::open(source, Format::CSV, options),
+    },
+    Reader {
+        format: Format::TRAJNET,
+        // Recognised by all its lines, when it is read as text.
+        accepts: |_| false,
+        open: |source, options| csv::open(source, Format::TRAJNET, options),
+    },
+    Reader {
+        format: Format::TEXT,
+        accepts: |head| head.text.is_some(),
+        open: |source, options| csv::open(source, Format::TEXT, options),
+    },
 ];
+
+/// Keys before the long arrays of a VVIZ show.
+const VVIZ_KEYS: [&[u8]; 2] = [b"\"defaultPositionRate\"", b"\"agentTraversal\""];
+
+fn finds(bytes: &[u8], part: &[u8]) -> bool {
+    memchr::memmem::find(bytes, part).is_some()
+}
+
+/// Returns a file as the only one of its vehicle.
+fn alone(source: &Source) -> Vec<(String, Vec<Source>)> {
+    vec![(source.stem(), vec![source.clone()])]
+}
 
 /// Recognises the format of a file, and whether it is packed by gzip.
 pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<Format, ReadError> {
@@ -41,7 +129,7 @@ pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<F
     }
     let format = match forced {
         Some(format) if !format.magic.is_empty() && !Head::new(&head).begins_with_any(format.magic) => {
-            return Err(Fault::WrongFormat(format).into());
+            return Err(Fault::wrong_format(format).into());
         }
         Some(format) => format,
         None => format_of(&head)?,
@@ -62,7 +150,7 @@ pub(super) fn recognise(source: &mut Source, forced: Option<Format>) -> Result<F
 
 /// Opens a file of this format.
 pub(super) fn open(format: Format, source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
-    let reader = READERS.iter().find(|reader| reader.format == format).ok_or(Fault::UnknownFormat)?;
+    let reader = READERS.iter().find(|reader| reader.format == format).ok_or_else(Fault::unknown_format)?;
     (reader.open)(source, options)
 }
 
@@ -85,8 +173,9 @@ fn format_of(bytes: &[u8]) -> Result<Format, Fault> {
     if let Some(fault) = head.text.and_then(unsupported_text) {
         return Err(fault);
     }
-    let reader = READERS.iter().find(|reader| (reader.sniff)(&head)).ok_or(Fault::UnknownFormat)?;
-    Ok(reader.format)
+    let has_magic = |magic: &[&[u8]]| magic.is_empty() || head.begins_with_any(magic);
+    let reader = READERS.iter().find(|reader| has_magic(reader.format.magic) && (reader.accepts)(&head));
+    reader.map(|reader| reader.format).ok_or_else(Fault::unknown_format)
 }
 
 /// Unsupported formats: first bytes, description and remedy.
@@ -113,6 +202,16 @@ const DATAFLASH: &str = "write its POS messages with `mavlogdump.py --types POS 
 const UNPACK: &str = "unpack it, and give the folder";
 const EARTH: &str = "write it as a table t,id,lat,lon,alt: time, vehicle, degrees and metres";
 
+const RECORDS: &str = "write an array of rows, as `to_json(\"flight.json\", orient=\"records\")` does";
+
+/// Returns whether a text begins with an object of columns: `{"t":{"0":` or `{"columns":[`.
+fn is_of_columns(text: &[u8]) -> bool {
+    const LONGEST: usize = 200;
+    let signs: Vec<u8> = text.iter().copied().filter(|byte| !byte.is_ascii_whitespace()).take(LONGEST).collect();
+    let value = memchr::memchr(b':', &signs).map_or(&[][..], |colon| &signs[colon + 1..]);
+    value.starts_with(b"{\"0\":") || signs.starts_with(b"{\"columns\":[")
+}
+
 /// Returns the fault of a known but unsupported format.
 fn unsupported_bytes(head: &[u8]) -> Option<Fault> {
     if head.starts_with(b"\x93NUMPY") {
@@ -121,7 +220,7 @@ fn unsupported_bytes(head: &[u8]) -> Option<Fault> {
         return Some(Fault::content(ContentKind::NoTimeColumn, problem, remedy));
     }
     if head.starts_with(b"\xff\xfe") || head.starts_with(b"\xfe\xff") {
-        return Some(Fault::NotUtf8);
+        return Some(Fault::not_utf8());
     }
     // Each message of telemetry begins with the microseconds since 1970.
     if matches!(head, [0, 4..=7, _, _, _, _, _, _, 0xfd | 0xfe, ..]) {
@@ -148,14 +247,30 @@ fn unsupported_bytes(head: &[u8]) -> Option<Fault> {
 
 /// Returns the fault of a known but unsupported text format; the text has no leading blanks.
 fn unsupported_text(text: &[u8]) -> Option<Fault> {
-    let holds = |word: &str| memchr::memmem::find(text, word.as_bytes()).is_some();
+    let holds = |word: &str| finds(text, word.as_bytes());
     let (what, remedy) = match text.first()? {
         b'<' if holds("<gpx") => ("a GPX track", EARTH),
         b'<' if holds("<kml") => ("a KML file", EARTH),
         b'<' if holds("<html") || holds("<HTML") => ("a page of HTML", TABLE),
         b'<' => ("an XML file", TABLE),
-        b'[' if !objects::is_array(text) => ("JSON, but neither a Skybrush show nor an array of objects", TABLE),
+        b'{' if is_of_columns(text) => ("a JSON object of columns, as pandas writes", RECORDS),
+        b'[' if !objects::are_in(text) => ("JSON, but neither a Skybrush show nor an array of objects", TABLE),
         _ => return None,
     };
     Some(Fault::content(ContentKind::UnsupportedFormat, format!("it is {what}, which is not supported"), remedy))
+}
+
+/// Channels of a recording of tautline: this build reads none, because it lacks the feature `mcap`.
+#[cfg(not(feature = "mcap"))]
+pub enum Channels {}
+
+#[cfg(not(feature = "mcap"))]
+impl Channels {
+    /// Returns the channels of the next instant, one row per vehicle.
+    ///
+    /// # Errors
+    /// [`ReadError`] if the recording is damaged.
+    pub fn next(&mut self, _vehicles: usize) -> Result<Vec<tautline_core::record::Channel>, ReadError> {
+        match *self {}
+    }
 }

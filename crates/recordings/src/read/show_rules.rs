@@ -73,21 +73,22 @@ impl ShowRules {
         if !settings.is_object() && !settings.is_null() {
             rules.refuse("settings", format!("`settings` must be an object ({})", shown(settings)));
         }
-        match settings.get("validation") {
-            None | Some(Value::Null) => {}
-            Some(Value::Object(validation)) => rules.read_validation(validation, metres),
-            Some(other) => {
-                rules.refuse("validation", format!("`settings.validation` must be an object ({})", shown(other)));
-            }
+        if let Some(validation) = rules.section(settings, "validation") {
+            rules.read_validation(validation, metres);
         }
-        match settings.get("geofence") {
-            None | Some(Value::Null) => {}
-            Some(Value::Object(fence)) => rules.read_geofence(fence, metres, are_axes_kept),
-            Some(other) => {
-                rules.refuse("geofence", format!("`settings.geofence` must be an object ({})", shown(other)));
-            }
+        if let Some(fence) = rules.section(settings, "geofence") {
+            rules.read_geofence(fence, metres, are_axes_kept);
         }
         rules
+    }
+
+    /// Returns a part of the settings, if there is one.
+    fn section<'a>(&mut self, settings: &'a Value, key: &str) -> Option<&'a Map<String, Value>> {
+        let part = settings.get(key).filter(|part| !part.is_null())?;
+        if !part.is_object() {
+            self.refuse(key, format!("`settings.{key}` must be an object ({})", shown(part)));
+        }
+        part.as_object()
     }
 
     fn refuse(&mut self, key: &str, problem: String) {

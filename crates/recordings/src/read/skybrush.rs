@@ -14,17 +14,14 @@ use serde_json::Value;
 use serde_json::value::RawValue;
 
 use super::axes::Axes;
-use super::curves::{Curves, distinct, from_json, piece, powers};
+use super::curves::{Curves, HIGHEST_DEGREE, distinct, from_json, piece, powers, stand_throughout};
 use super::error::{ContentKind, Fault, Place, ReadError, refuse};
+use super::head::{SHOW, TABLE};
 use super::options::ReadOptions;
 use super::order::Recording;
-use super::reader::{SHOW, TABLE};
 use super::show_rules::ShowRules;
 use super::source::{Archive, Source};
-use tautline_core::track::{Item, Piece, Sample};
-
-/// Highest supported degree of a Bezier segment.
-const HIGHEST_DEGREE: usize = 15;
+use tautline_core::track::{Item, Sample};
 
 #[derive(Deserialize)]
 struct Show {
@@ -83,11 +80,8 @@ fn show(source: &Source) -> Result<(Show, Option<Archive>), ReadError> {
         Some(archive) if archive.holds(SHOW) => parse(&archive.document(SHOW)?, Some(SHOW))?,
         Some(_) => {
             let problem = format!("it is an archive with neither `{SHOW}` nor NumPy arrays nor tables");
-            return refuse(
-                ContentKind::UnknownFormat,
-                problem,
-                "give a .skyc or .npz file, or pack one table per vehicle",
-            );
+            let remedy = "give a .skyc or .npz file, or pack one table per vehicle";
+            return refuse(ContentKind::UnknownFormat, problem, remedy);
         }
         None => {
             let mut bytes = Vec::new();
@@ -174,21 +168,6 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         return refuse(ContentKind::NoPositions, "the show has no drone with a trajectory", remedy);
     }
     Ok(Curves::recording(distinct(names).into_iter().zip(curves).collect(), Vec::new()))
-}
-
-/// Extends a drone with a single point to the end of the show.
-pub(super) fn stand_throughout<'a>(curves: impl Iterator<Item = &'a mut Vec<Item>>) {
-    let mut curves: Vec<_> = curves.collect();
-    let end_of = |item: &Item| if let Item::Piece(piece) = item { piece.to_s } else { f64::NEG_INFINITY };
-    let end_s = curves.iter().flat_map(|curve| curve.iter()).map(end_of).fold(f64::NEG_INFINITY, f64::max);
-    for curve in &mut curves {
-        if let [Item::Sample(sample)] = curve[..]
-            && sample.time_s < end_s
-        {
-            let Sample { vehicle, time_s: from_s, position_m, .. } = sample;
-            curve[0] = Item::Piece(Piece { vehicle, from_s, to_s: end_s, coefficients: vec![position_m] });
-        }
-    }
 }
 
 /// Returns the document behind `$ref`.

@@ -141,6 +141,11 @@ impl Lines {
         self.number
     }
 
+    /// Returns its place.
+    pub(super) fn place(&self) -> Place {
+        Place::Line(self.number)
+    }
+
     /// Moves to the next line; returns `false` after the last one.
     #[inline]
     pub(super) fn advance(&mut self) -> Result<bool, ReadError> {
@@ -188,7 +193,7 @@ impl Lines {
                 Ok(0) => return self.enter(before, 0).map(|()| before > 0),
                 Ok(bytes) => self.filled += bytes,
                 Err(error) if error.kind() == io::ErrorKind::Interrupted => {}
-                Err(error) => return Err(Fault::from(error).at(Place::Line(self.number))),
+                Err(error) => return Err(Fault::from(error).at(self.place())),
             }
             // One search for all line ends of a block is faster than one for each line.
             self.line_ends.extend(memchr::memchr_iter(b'\n', &self.block[before..self.filled]).map(|at| before + at));
@@ -200,7 +205,7 @@ impl Lines {
 
     #[cold]
     fn too_long(&self) -> ReadError {
-        Fault::LineTooLong(LINE_LIMIT_BYTES).at(Place::Line(self.number))
+        Fault::line_too_long(LINE_LIMIT_BYTES).at(self.place())
     }
 }
 
@@ -240,9 +245,7 @@ pub(super) struct Archive {
 impl Archive {
     pub(super) fn open(path: &Path) -> Result<Self, Fault> {
         let zip = ZipArchive::new(BufReader::new(File::open(path)?)).map_err(|error| match error {
-            ZipError::InvalidArchive(_) if !has_end(path) => {
-                Fault::Truncated("the end of the archive is missing".to_owned())
-            }
+            ZipError::InvalidArchive(_) if !has_end(path) => Fault::truncated("the end of the archive is missing"),
             other => zip_fault(other),
         })?;
         if zip.has_duplicate_names()
@@ -275,11 +278,8 @@ impl Archive {
         let (method, start, crc) = (entry.compression(), entry.data_start(), entry.crc32());
         let packed_bytes = entry.compressed_size();
         if entry.encrypted() {
-            return refuse(
-                ContentKind::UnsupportedCompression,
-                "it is encrypted",
-                "give an archive without a password",
-            );
+            let remedy = "give an archive without a password";
+            return refuse(ContentKind::UnsupportedCompression, "it is encrypted", remedy);
         }
         let start = start.ok_or_else(|| Fault::damaged("the entry has no offset in the archive"))?;
         let mut file = File::open(&self.path)?;

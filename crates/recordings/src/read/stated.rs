@@ -1,13 +1,14 @@
-//! Facts that every recording states, and the search for vehicles that are recorded under two names.
+//! Mapping of the axes by the user, facts that every recording states, and the search for vehicles under two names.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 use tautline_core::fact::{Fact, FactKind, Source};
-use tautline_core::option::{DISTINCT, TOPIC};
+use tautline_core::option::{AXES, COLUMN, DISTINCT, SCALE, TOPIC};
 use tautline_core::track::{Item, Metadata, Sample, Tracks};
 
-use super::error::{ContentKind, Fault, ReadError, quoted};
+use super::axes::Axes;
+use super::error::{ContentKind, Fault, ReadError, quoted, refuse};
 use super::options::ReadOptions;
 use super::order::Recording;
 
@@ -18,25 +19,34 @@ const ENOUGH_TIMES: u32 = 3;
 /// origin, are no evidence.
 const ENOUGH_MOVES: u32 = 2;
 
-/// Adds the facts of a recording, and refuses one vehicle under two names.
-pub(super) fn stated(recording: Recording, options: &ReadOptions, path: &Path) -> Recording {
+/// Applies the mapping of the axes by the user, adds the facts that every recording has, and refuses one vehicle under
+/// two names.
+pub(super) fn stated(recording: Recording, options: &ReadOptions, path: &Path) -> Result<Recording, ReadError> {
+    let axes = options.turn();
+    if recording.is_planar() && !axes.keeps_plane() {
+        let problem = format!("{AXES} maps its third axis to x or y, but it has none");
+        let column = COLUMN.set("z=NAME");
+        let remedy = format!("name the column of the third axis with {column}, or keep z in {AXES}");
+        return refuse(ContentKind::ContradictsOption, problem, remedy);
+    }
     let metadata = completed(recording.metadata(), options);
     let is_known = metadata.facts.iter().any(|fact| fact.kind == FactKind::Identity && fact.source == Source::Recorded);
     let twins = (!options.distinct && !is_known).then(Twins::default);
-    Box::new(Stated { recording, metadata, path: path.to_owned(), options: options.clone(), twins })
+    Ok(Box::new(Stated { recording, axes, metadata, path: path.to_owned(), options: options.clone(), twins }))
 }
 
-/// Returns metadata with a fact of each kind that every recording has.
+/// Returns metadata with a note on the axes and a fact of each kind that every recording has.
 fn completed(metadata: &Metadata, options: &ReadOptions) -> Metadata {
     let mut metadata = metadata.clone();
+    let axes = Some(options.turn()).filter(|axes| !axes.is_identity());
+    metadata.notes.extend(axes.map(|axes| axes.note()));
     let facts = &mut metadata.facts;
-    let declared = |is_declared: bool, other: Source| if is_declared { Source::Declared } else { other };
     let frame = match &metadata.earth_origin {
         Some(origin) => {
-            let source = declared(!origin.is_inferred, Source::Deduced);
+            let source = if origin.is_inferred { Source::Deduced } else { Source::Declared };
             Fact::name(FactKind::Frame, source, format!("east, north and up of {origin}"))
         }
-        None if !options.turn().is_identity() => Fact::name(FactKind::Frame, Source::Declared, options.turn().note()),
+        None if axes.is_some() => Fact::name(FactKind::Frame, Source::Declared, options.turn().note()),
         None if metadata.has_directions => Fact::name(FactKind::Frame, Source::Deduced, "east, north and up"),
         None => Fact::name(FactKind::Frame, Source::Default, "one frame, z up"),
     };
@@ -64,6 +74,7 @@ fn completed(metadata: &Metadata, options: &ReadOptions) -> Metadata {
 
 struct Stated {
     recording: Recording,
+    axes: Axes,
     metadata: Metadata,
     path: PathBuf,
     options: ReadOptions,
@@ -81,6 +92,9 @@ impl Tracks for Stated {
     fn read(&mut self, items: &mut Vec<Item>) -> Result<bool, ReadError> {
         let before = items.len();
         let more = self.recording.read(items)?;
+        if !self.axes.is_identity() {
+            items[before..].iter_mut().try_for_each(|item| turn(item, self.axes))?;
+        }
         if let Some(twins) = &mut self.twins {
             items[before..].iter().for_each(|item| twins.observe(item));
         }
@@ -97,6 +111,25 @@ impl Tracks for Stated {
     fn metadata(&self) -> &Metadata {
         &self.metadata
     }
+}
+
+/// Maps the axes of an item.
+fn turn(item: &mut Item, axes: Axes) -> Result<(), Fault> {
+    match item {
+        Item::Sample(sample) => {
+            if sample.radius_m.is_some() && !axes.keeps_lengths() {
+                let problem = format!("{SCALE} has different factors for its axes, but vehicles have a radius");
+                let remedy = format!("give one factor in {SCALE}");
+                return refuse(ContentKind::ContradictsOption, problem, remedy);
+            }
+            sample.position_m = axes.turn(sample.position_m);
+            sample.velocity_m_s = sample.velocity_m_s.map(|velocity| axes.turn(velocity));
+        }
+        Item::Piece(piece) => {
+            piece.coefficients.iter_mut().for_each(|coefficient| *coefficient = axes.turn(*coefficient));
+        }
+    }
+    Ok(())
 }
 
 fn fault(names: &[String], first: usize, second: usize) -> Fault {

@@ -1,63 +1,37 @@
 //! Reads tables row by row, and their cells as numbers, times and names.
 
-use std::collections::BTreeMap;
-
 use nalgebra::Vector3;
 use tautline_core::fact::{Fact, FactKind, Source};
-use tautline_core::option::{COLUMN, FPS, TIME_SCALE, TIME_UNIT};
+use tautline_core::option::{COLUMN, FPS, ORIGIN, TIME_SCALE, TIME_UNIT};
 
-use super::agreement::FrameAgreement;
-use super::aviation::ClimbMonitor;
-use super::axes::Axes;
-use super::cells::{Cells, empty, number, odd_number, vector};
+use super::cells::{Cells, number, odd_number, vector};
 use super::clock::{Date, Probe, Stamp};
-use super::earth::{LocalFrame, is_no_fix, no_fixes};
+use super::convention::{self, GLOBAL};
+use super::earth::{EarthFrame, Geodetic, is_no_fix};
 use super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
-use super::identity::{AlternativeId, Names, SuspectColumn, SwapMonitor};
+use super::evidence::{Evidence, names_no_vehicle};
+use super::identity::Names;
 use super::layout::{Layout, VehicleColumns};
-use super::local_origin::{convert_to_local, origin};
 use super::options::ReadOptions;
-use super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
+use super::order::{Findings, Ordered, Recording, RecordingInfo, Row, Rows, observe};
 use super::source::Source as File;
 use super::time_unit::TimeUnit;
-
-/// Number of vehicles, from the first on, whose rows are examined for several vehicles under one name.
-const MOST_SUSPECTED: usize = 256;
 
 /// Long or wide table.
 struct Table<C> {
     cells: C,
+    options: ReadOptions,
     layout: Layout,
     names: Names,
     /// Frame that converts latitude, longitude and height to metres.
-    local: Option<LocalFrame>,
+    local: Option<EarthFrame>,
     /// Frame of the last origin, if rows have their own origin.
-    row_frame: Option<LocalFrame>,
-    /// Whether the clock starts with the vehicle and other files are read too.
-    has_own_clock: bool,
+    row_frame: Option<EarthFrame>,
     /// First time, if times are dates.
     dates: Option<Date>,
-    /// Alternative vehicle columns.
-    alternative_ids: Vec<AlternativeId>,
-    /// For each vehicle, unused columns that may distinguish several vehicles among its rows.
-    suspects: Vec<Vec<SuspectColumn>>,
-    /// Quantities of a wide table whose values may be vehicle names.
-    watches: Vec<SwapMonitor>,
-    /// Number of positions whose vehicle is named by a column of a wide table.
-    named: usize,
-    /// Comparison of heights with a vertical rate.
-    climb: Option<ClimbMonitor>,
-    /// Whether the user gives the unit of heights.
-    is_height_unit_given: bool,
-    /// Comparison with a second position on the Earth, and the axes of the first one in metres.
-    agreement: Option<(FrameAgreement, Axes)>,
-    /// Whether a row that lacks a coordinate has no position, and the number of such rows.
-    skips_incomplete: bool,
-    incomplete: u64,
+    evidence: Evidence,
     /// Number of time units per second, once known.
     per_second: f64,
-    /// Number of rows without a fix, by vehicle.
-    no_fixes: BTreeMap<usize, u64>,
     /// Vehicle of the last row.
     vehicle: usize,
     /// Number of rows before the current one.
@@ -94,39 +68,23 @@ pub(super) fn open<C: Cells + 'static>(
     cells.restart(&layout.columns_to_observe(), true)?;
     // For places on the Earth the scale applies to heights only, and is part of the column factors.
     info.scale = if layout.on_earth { 1.0 } else { info.scale };
-    let counts_from_boot = layout.counts_from_boot;
-    let has_own_clock = options.is_joined && counts_from_boot;
     info.is_unit_in_file = true;
     info.metadata.facts.extend(layout.facts.iter().cloned());
-    info.metadata.facts.push(if counts_from_boot {
+    info.metadata.facts.push(if layout.counts_from_boot {
         Fact::name(FactKind::Clock, Source::Default, "times since the start of each vehicle's computer")
     } else {
         Fact::name(FactKind::Clock, Source::Deduced, "one column")
     });
-    let alternative_ids = layout.alternative_ids.iter().copied().map(AlternativeId::new).collect();
-    let watches = layout.slots.watched.iter().cloned().map(SwapMonitor::new).collect();
-    let climb = layout.rate.map(ClimbMonitor::new);
-    let agreement =
-        (!layout.second.is_empty()).then(|| (FrameAgreement::default(), options.turn().scaled([options.metres(); 3])));
     let table = Table {
-        climb,
-        is_height_unit_given: options.scale.is_some(),
-        agreement,
-        skips_incomplete: options.skip_incomplete,
-        incomplete: 0,
+        evidence: Evidence::new(&layout, options),
         per_second: 1.0,
         cells,
+        options: options.clone(),
         layout,
         names,
         local,
         row_frame: None,
-        has_own_clock,
         dates,
-        alternative_ids,
-        suspects: Vec::new(),
-        watches,
-        named: 0,
-        no_fixes: BTreeMap::new(),
         vehicle: 0,
         count: 0,
     };
@@ -147,10 +105,6 @@ fn dates<C: Cells>(cells: &mut C, layout: &Layout, options: &ReadOptions) -> Res
 }
 
 impl<C: Cells> Table<C> {
-    fn at_row(&self, fault: Fault) -> ReadError {
-        fault.at(C::place(self.cells.row()))
-    }
-
     #[inline]
     fn stamp(&mut self) -> Result<Stamp, Fault> {
         let Some(column) = self.layout.time else {
@@ -183,14 +137,14 @@ impl<C: Cells> Table<C> {
             );
         }
         let number = odd_number(&self.cells, column, "remove the row: each row needs a time")?;
-        number.map(Stamp::Real).ok_or_else(|| empty(&self.cells, column))
+        number.map(Stamp::Real).ok_or_else(|| Fault::empty_cell(&self.cells.header()[column]))
     }
 
     /// Returns the time in a column of dates.
     fn date(&self, column: usize, first: Date) -> Result<Stamp, Fault> {
         let text = self.cells.text(column)?;
         if text.trim().is_empty() {
-            return Err(empty(&self.cells, column));
+            return Err(Fault::empty_cell(&self.cells.header()[column]));
         }
         let holds = |what: &str, remedy: &str| {
             let problem = format!("column `{}` holds {}, {what}", self.cells.header()[column], quoted(text.trim()));
@@ -214,7 +168,7 @@ impl<C: Cells> Table<C> {
         let name = self.cells.name(id)?;
         let name = name.trim();
         if name.is_empty() {
-            return Err(empty(&self.cells, id));
+            return Err(Fault::empty_cell(&self.cells.header()[id]));
         }
         self.vehicle = self.names.index(name)?;
         Ok(self.vehicle)
@@ -227,24 +181,19 @@ impl<C: Cells> Table<C> {
         let first = self.layout.id.map_or(Ok(0), |id| self.vehicle(id))?;
         for place in 0..self.layout.bodies.len() {
             let body = &self.layout.bodies[place];
-            let found = row(&self.cells, stamp, first + place, body, &self.layout.metres, self.skips_incomplete)?;
-            let mut row = match found {
-                Found::Row(row) => row,
-                Found::Incomplete => {
-                    self.incomplete += 1;
-                    continue;
-                }
-                Found::Unseen => continue,
-            };
-            if let Some(&id) = self.layout.slots.ids.get(place) {
-                row.vehicle = self.vehicle(id)?;
-                self.named += 1;
-            }
-            if self.layout.on_earth && is_no_fix(&row.position) {
-                *self.no_fixes.entry(row.vehicle).or_default() += 1;
+            if self.options.skip_incomplete && is_incomplete(&self.cells, body) {
+                self.evidence.incomplete += 1;
                 continue;
             }
-            self.compare(place, &row)?;
+            let Some(mut row) = row(&self.cells, stamp, first + place, body, &self.layout.metres)? else { continue };
+            if let Some(&id) = self.layout.slots.ids.get(place) {
+                row.vehicle = self.vehicle(id)?;
+                self.evidence.named += 1;
+            }
+            if self.layout.on_earth && self.evidence.lacks_fix(&row) {
+                continue;
+            }
+            self.evidence.compare(&self.cells, &self.layout, place, &row, self.names.all())?;
             if let Some(columns) = self.layout.convention.reference {
                 let valid = &self.layout.convention.valid;
                 if !convert_to_local(&self.cells, &mut row, (columns, valid), self.local, &mut self.row_frame)? {
@@ -260,134 +209,22 @@ impl<C: Cells> Table<C> {
             rows.push(row);
         }
         self.count += 1;
-        for watch in &mut self.watches {
-            let texts = watch.columns.iter().map(|&column| Ok(self.cells.text(column)?.trim().to_owned()));
-            let texts = texts.collect::<Result<Vec<_>, Fault>>()?;
-            watch.observe(texts, self.cells.header())?;
-        }
-        if !self.layout.suspects.is_empty() {
-            self.suspect(rows.last().filter(|row| row.place == self.cells.row()).copied())?;
-        }
-        Ok(())
-    }
-
-    /// Compares a position with the vertical rate and the second position of its row.
-    #[inline]
-    fn compare(&mut self, place: usize, row: &Row) -> Result<(), Fault> {
-        if let Some(climb) = &mut self.climb
-            && let Some(rate) = self.cells.number(climb.column).filter(|rate| rate.is_finite())
-        {
-            climb.observe(row.vehicle, row.stamp, row.position.z, rate);
-        }
-        let Some((agreement, axes)) = &mut self.agreement else { return Ok(()) };
-        let Some(Some(second)) = self.layout.second.get(place) else { return Ok(()) };
-        let mut there = Vector3::zeros();
-        let mut has_heights = false;
-        for (axis, (column, unit)) in second.columns.iter().zip(second.units).enumerate() {
-            let Some(column) = *column else { continue };
-            match self.cells.number(column).filter(|number| number.is_finite()) {
-                Some(number) => (there[axis], has_heights) = (number * unit, axis == 2),
-                // Without a height, the plane is still compared.
-                None if axis == 2 => {}
-                None => return Ok(()),
-            }
-        }
-        if is_no_fix(&there) {
-            return Ok(());
-        }
-        let Err(found) = agreement.observe(row.vehicle, axes.turn(row.position), there, has_heights) else {
-            return Ok(());
-        };
-        self.layout.compared(place).map_or(Ok(()), |compared| {
-            let name = self.names.all().get(row.vehicle).map_or("", String::as_str);
-            Err(compared.fault_of_row(self.cells.header(), name, &found))
-        })
-    }
-
-    /// Returns the fault of heights that contradict the vertical rate.
-    fn contradicting_rate(&self) -> Option<Fault> {
-        let height = self.layout.bodies.first().and_then(|body| body.position[2])?;
-        self.climb.as_ref()?.fault(self.per_second, self.cells.header(), height)
-    }
-
-    /// Examines the unused columns in a row of a vehicle.
-    fn suspect(&mut self, row: Option<Row>) -> Result<(), Fault> {
-        let Some(row) = row.filter(|row| row.vehicle < MOST_SUSPECTED) else { return Ok(()) };
-        while self.suspects.len() <= row.vehicle {
-            self.suspects.push(self.layout.suspects.iter().copied().map(SuspectColumn::new).collect());
-        }
-        let suspects = &mut self.suspects[row.vehicle];
-        for suspect in suspects.iter_mut() {
-            let value = self.cells.text(suspect.column)?;
-            suspect.observe(value.trim(), row.stamp.approximately(), row.position);
-        }
-        suspects.retain(|suspect| !suspect.is_cleared());
-        Ok(())
-    }
-
-    /// Returns the fault of a vehicle whose rows look like those of several vehicles.
-    fn several_vehicles_fault(&self) -> Option<Fault> {
-        let header = self.cells.header();
-        if let Some(&column) = self.layout.slots.ids.first().filter(|_| self.count > 2)
-            && self.names.all().len() == self.named
-        {
-            let problem =
-                format!("column {} has a different value in each row and so names no vehicle", quoted(&header[column]));
-            return Some(Fault::content(
-                ContentKind::AmbiguousVehicle,
-                problem,
-                "remove such columns if their values are not names",
-            ));
-        }
-        let id = self.layout.id.filter(|_| self.names.all().len() > 1);
-        self.suspects.iter().enumerate().find_map(|(vehicle, suspects)| {
-            let named = id.map(|id| (&*self.names.all()[vehicle], &*header[id]));
-            suspects.iter().find_map(|suspect| suspect.fault(&header[suspect.column], named))
-        })
-    }
-
-    /// Refuses a vehicle column that numbers the rows, or two vehicle columns that contradict each other.
-    fn check_names(&self, id: usize, rows: usize, is_one_instant: bool) -> Result<(), Fault> {
-        let header = self.cells.header();
-        let called = |column: usize| quoted(&header[column]);
-        // Two rows at two times may belong to two vehicles.
-        if rows > 2 && self.names.all().len() == rows && !is_one_instant && !self.layout.is_id_given {
-            let others: Vec<_> =
-                self.layout.alternative_ids.iter().chain(&self.layout.suspects).copied().map(called).collect();
-            let others = if others.is_empty() {
-                String::new()
-            } else {
-                format!("; the other columns are {}", others.join(", "))
-            };
-            let problem =
-                format!("column {} has a different value in each row and so names no vehicle{others}", called(id));
-            let column = COLUMN.set("id=NAME");
-            let remedy = format!("name the column of the vehicle with {column}, or remove this one");
-            return refuse(ContentKind::AmbiguousVehicle, problem, remedy);
-        }
-        if let Some(alternative) = self.alternative_ids.iter().find(|alternative| alternative.is_one()) {
-            let (first, other) = (called(id), called(alternative.column));
-            let problem =
-                format!("the columns {first} and {other} could both name the vehicle, but contradict each other");
-            let [first, other] = [id, alternative.column].map(|column| COLUMN.set(format!("id={}", header[column])));
-            let remedy = format!("choose one with {first} or {other}");
-            return refuse(ContentKind::AmbiguousVehicle, problem, remedy);
-        }
-        Ok(())
+        self.evidence.examine(&self.cells, &self.layout, rows.last())
     }
 }
 
-/// Position of a vehicle in a row.
-enum Found {
-    Row(Row),
-    /// The vehicle was not seen: all cells are empty.
-    Unseen,
-    /// Some cells are empty.
-    Incomplete,
+/// Returns whether some cells of a position or velocity are empty, and others are not.
+fn is_incomplete(cells: &impl Cells, body: &VehicleColumns) -> bool {
+    let is_empty = |column: usize| cells.text(column).is_ok_and(|text| text.trim().is_empty());
+    let are_mixed = |columns: [Option<usize>; 3]| {
+        let mut empty = columns.into_iter().flatten().map(is_empty);
+        let first = empty.next();
+        empty.any(|other| Some(other) != first)
+    };
+    are_mixed(body.position) || body.velocity.is_some_and(are_mixed)
 }
 
-/// Returns the position of a vehicle in a row. A position or velocity with some empty cells is an error, unless
-/// `skips_incomplete` is set.
+/// Returns the position of a vehicle in a row; `None` if the vehicle was not seen, and all its cells are empty.
 #[inline]
 fn row(
     cells: &impl Cells,
@@ -395,17 +232,8 @@ fn row(
     vehicle: usize,
     body: &VehicleColumns,
     metres: &[f64],
-    skips_incomplete: bool,
-) -> Result<Found, Fault> {
-    let is_incomplete = |columns: &[Option<usize>; 3]| {
-        let is_empty = |column: &usize| cells.text(*column).is_ok_and(|text| text.trim().is_empty());
-        let empty = columns.iter().flatten().filter(|column| is_empty(column)).count();
-        empty > 0 && empty < columns.iter().flatten().count()
-    };
-    if skips_incomplete && (is_incomplete(&body.position) || body.velocity.as_ref().is_some_and(is_incomplete)) {
-        return Ok(Found::Incomplete);
-    }
-    let Some(position) = vector(cells, &body.position, metres)? else { return Ok(Found::Unseen) };
+) -> Result<Option<Row>, Fault> {
+    let Some(position) = vector(cells, &body.position, metres)? else { return Ok(None) };
     let velocity = body.velocity.as_ref().map(|columns| vector(cells, columns, metres)).transpose()?.flatten();
     let radius = match body.radius {
         Some(column) => number(cells, column)?.map(|radius| radius * metres[column]),
@@ -415,28 +243,23 @@ fn row(
         let problem = format!("column `{}` holds {radius}, a negative radius", cells.header()[column]);
         return refuse(ContentKind::Radius, problem, "write 0 or a positive number");
     }
-    Ok(Found::Row(Row { stamp, place: cells.row(), vehicle, position, velocity, radius }))
+    Ok(Some(Row { stamp, place: cells.row(), vehicle, position, velocity, radius }))
 }
 
 impl<C: Cells> Rows for Table<C> {
+    #[inline]
     fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
-        let before = rows.len();
-        while rows.len() < before + BATCH {
-            if !self.cells.advance()? {
-                return self.several_vehicles_fault().map_or(Ok(rows.len() > before), |fault| Err(fault.into()));
-            }
-            self.append(rows).map_err(|fault| self.at_row(fault))?;
+        if self.cells.advance()? {
+            return self.append(rows).map(|()| true).map_err(|fault| self.cells.fault(fault));
         }
-        Ok(rows.len() > before)
+        let (header, names) = (self.cells.header(), self.names.all());
+        self.evidence.check_vehicles(header, &self.layout, names, self.count)?;
+        Ok(false)
     }
 
     fn rewind(&mut self) -> Result<(), ReadError> {
         self.count = 0;
-        self.no_fixes.clear();
-        self.suspects.clear();
-        (self.named, self.incomplete) = (0, 0);
-        self.climb.iter_mut().for_each(ClimbMonitor::rewind);
-        self.agreement.iter_mut().for_each(|(agreement, _)| agreement.rewind());
+        self.evidence = Evidence::new(&self.layout, &self.options);
         self.cells.restart(&self.layout.columns_to_observe(), true)
     }
 
@@ -448,36 +271,9 @@ impl<C: Cells> Rows for Table<C> {
         self.names.settle();
     }
 
-    fn late_notes(&self) -> Vec<String> {
-        const LISTED: usize = 12;
-        let names = self.no_fixes.keys().filter_map(|&vehicle| self.names.all().get(vehicle));
-        let mut listed: Vec<_> = names.take(LISTED).map(|name| quoted(name)).collect();
-        listed.extend((self.no_fixes.len() > LISTED).then(|| "...".to_owned()));
-        let vehicles = format!(" of {}", listed.join(", "));
-        let mut notes: Vec<_> = no_fixes(self.no_fixes.values().sum(), &vehicles).into_iter().collect();
-        if self.incomplete > 0 {
-            notes.push(format!("positions omitted because one of their coordinates is empty: {}", self.incomplete));
-        }
-        if let Some(fault) = self.contradicting_rate().filter(|_| self.is_height_unit_given) {
-            notes.push(format!("the given unit of heights is used, but {fault}"));
-        }
-        notes.extend(self.agreement.iter().flat_map(|(agreement, _)| agreement.notes(self.names.all())));
-        notes
-    }
-
-    fn late_facts(&self) -> Vec<Fact> {
-        let incomplete = Fact::number(FactKind::Rows, Source::Declared, self.incomplete as f64, "incomplete");
-        let agreement = self.agreement.as_ref().map(|(agreement, _)| agreement.fact());
-        (self.incomplete > 0).then_some(incomplete).into_iter().chain(agreement).collect()
-    }
-
-    /// Returns the fault of heights or positions that contradict other columns of the table.
-    fn late_fault(&self) -> Option<Fault> {
-        let of_heights = self.contradicting_rate().filter(|_| !self.is_height_unit_given);
-        of_heights.or_else(|| {
-            let (agreement, _) = self.agreement.as_ref()?;
-            agreement.fault(self.names.all(), self.cells.header(), &self.layout.first_compared()?)
-        })
+    fn late_findings(&self) -> Result<Findings, Fault> {
+        let (header, names) = (self.cells.header(), self.names.all());
+        self.evidence.findings(header, &self.layout, &self.options, names, self.per_second)
     }
 
     fn settle_clock(&mut self, per_second: f64) {
@@ -485,18 +281,18 @@ impl<C: Cells> Rows for Table<C> {
     }
 
     fn place(&self, number: u64) -> Place {
-        C::place(number)
+        self.cells.place(number)
     }
 
     fn is_wide(&self) -> bool {
         self.layout.id.is_none()
     }
 
-    fn facts(&self) -> Vec<Fact> {
+    fn findings(&self) -> Findings {
         // After a survey all names of a long table are known.
-        let is_of_several = self.layout.counts_from_boot && self.names.all().len() > 1;
-        let is_assumed = self.has_own_clock || is_of_several;
-        is_assumed.then(|| Fact::new(FactKind::CommonStart, Source::Default)).into_iter().collect()
+        let is_assumed = self.layout.counts_from_boot && (self.options.is_joined || self.names.all().len() > 1);
+        let start = is_assumed.then(|| Fact::new(FactKind::CommonStart, Source::Default));
+        (Vec::new(), start.into_iter().collect())
     }
 
     /// Reads only times and names, which is several times faster.
@@ -506,21 +302,119 @@ impl<C: Cells> Rows for Table<C> {
         columns.extend(&self.layout.alternative_ids);
         columns.sort_unstable();
         self.cells.restart(&columns, false)?;
-        let mut probe: Option<Probe> = None;
+        let mut probe = None;
         let (mut rows, mut first, mut is_one_instant) = (0, None, true);
         while self.cells.advance()? {
-            let stamp = self.stamp().and_then(|stamp| self.vehicle(id).map(|_| stamp));
-            let stamp = stamp.map_err(|fault| self.at_row(fault))?;
-            probe.get_or_insert_with(|| Probe::new(stamp)).observe(stamp, self.vehicle);
+            let stamp = self.stamp().and_then(|stamp| {
+                let vehicle = self.vehicle(id)?;
+                self.evidence.compare_names(&self.cells, vehicle).map(|()| stamp)
+            });
+            let stamp = stamp.map_err(|fault| self.cells.fault(fault))?;
+            observe(&mut probe, stamp, self.vehicle);
             rows += 1;
             is_one_instant &= *first.get_or_insert(stamp) == stamp;
-            for alternative in &mut self.alternative_ids {
-                let value =
-                    self.cells.text(alternative.column).map_err(|fault| fault.at(C::place(self.cells.row())))?;
-                alternative.observe(self.vehicle, value.trim());
-            }
         }
-        self.check_names(id, rows, is_one_instant)?;
+        let header = self.cells.header();
+        // Two rows at two times may belong to two vehicles.
+        if rows > 2 && self.names.all().len() == rows && !is_one_instant && !self.layout.is_id_given {
+            let others = self.layout.alternative_ids.iter().chain(&self.layout.suspects);
+            let others: Vec<_> = others.map(|&column| quoted(&header[column])).collect();
+            let others = if others.is_empty() {
+                others.concat()
+            } else {
+                format!("; the other columns are {}", others.join(", "))
+            };
+            let problem = names_no_vehicle(&header[id]) + &others;
+            let remedy = format!("name the column of the vehicle with {}, or remove this one", COLUMN.set("id=NAME"));
+            return refuse(ContentKind::AmbiguousVehicle, problem, remedy);
+        }
+        self.evidence.check_names(header, id)?;
         Ok(probe)
     }
+}
+
+/// Returns the frame of a table with places on the Earth: of the user's origin, or of the first place of the table.
+fn origin(cells: &mut impl Cells, layout: &Layout, options: &ReadOptions) -> Result<Option<EarthFrame>, ReadError> {
+    let reference = layout.convention.reference;
+    if !layout.on_earth && reference.is_none() {
+        let needless = Fault::content(
+            ContentKind::UnusedOption,
+            "it has no columns of latitude and longitude",
+            format!("omit {ORIGIN}"),
+        );
+        return if options.origin.is_some() { Err(needless.into()) } else { Ok(None) };
+    }
+    convention::refuse_known(options, "a table of latitudes and longitudes")?;
+    cells.restart(&layout.columns(), true)?;
+    let mut unfixed = false;
+    while cells.advance()? {
+        let place = match reference {
+            Some(columns) => measured_from(cells, columns),
+            None => fix(cells, layout, &mut unfixed),
+        };
+        let at_row = |fault| cells.fault(fault);
+        if let Some(place) = place.map_err(at_row)? {
+            return Ok(Some(EarthFrame::first(place, options).map_err(at_row)?));
+        }
+    }
+    if reference.is_some() {
+        let problem = "no row has the origin of its positions (`ref_lat`, `ref_lon`)";
+        return refuse(ContentKind::NoFix, problem, GLOBAL);
+    }
+    if unfixed {
+        let problem = "no row has a fix: all latitudes and longitudes are exactly 0";
+        return refuse(ContentKind::NoFix, problem, "record again with a fix, or give another file");
+    }
+    Ok(None)
+}
+
+/// Returns the origin of the positions in a row; `None` if a cell is empty or NaN, or latitude and longitude are 0.
+fn measured_from(cells: &impl Cells, columns: [usize; 3]) -> Result<Option<Geodetic>, Fault> {
+    let mut place = Vector3::zeros();
+    for (slot, column) in place.iter_mut().zip(columns) {
+        match cells.number(column) {
+            Some(number) if number.is_nan() => return Ok(None),
+            _ => match number(cells, column)? {
+                Some(number) => *slot = number,
+                None => return Ok(None),
+            },
+        }
+    }
+    Ok(Some(place).filter(|place| !is_no_fix(place)))
+}
+
+/// Returns the first place on the Earth in a row, if there is one. Sets `unfixed` for a place without a fix.
+fn fix(cells: &impl Cells, layout: &Layout, unfixed: &mut bool) -> Result<Option<Geodetic>, Fault> {
+    for body in &layout.bodies {
+        match vector(cells, &body.position, &layout.metres)? {
+            Some(place) if is_no_fix(&place) => *unfixed = true,
+            None => {}
+            place => return Ok(place),
+        }
+    }
+    Ok(None)
+}
+
+/// Converts a position with an origin in its row to the frame `local`; returns `false` if the origin is unknown or a
+/// validity column is 0. `row_frame` caches the frame of the origin.
+fn convert_to_local(
+    cells: &impl Cells,
+    row: &mut Row,
+    (columns, valid): ([usize; 3], &[usize]),
+    local: Option<EarthFrame>,
+    row_frame: &mut Option<EarthFrame>,
+) -> Result<bool, Fault> {
+    for &column in valid {
+        if matches!(cells.text(column)?.trim(), "0" | "0.0" | "false" | "False") {
+            return Ok(false);
+        }
+    }
+    let (Some(place), Some(local)) = (measured_from(cells, columns)?, local) else { return Ok(false) };
+    let row_frame = match row_frame.filter(|row_frame| row_frame.is_at(place)) {
+        Some(row_frame) => row_frame,
+        None => *row_frame.insert(EarthFrame::at(place)?),
+    };
+    row.position = local.position_from(&row_frame, row.position);
+    row.velocity = row.velocity.map(|velocity| local.direction_from(&row_frame, velocity));
+    Ok(true)
 }

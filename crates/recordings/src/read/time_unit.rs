@@ -51,3 +51,13 @@ impl TimeUnit {
         self.names().1
     }
 }
+
+/// Returns the length of the unit of time with this name \[s\], also of a unit that is longer than a second.
+pub(super) fn seconds_of(name: &str) -> Option<f64> {
+    match name {
+        "min" | "mins" | "minute" | "minutes" => Some(60.0),
+        "h" | "hr" | "hrs" | "hour" | "hours" => Some(3600.0),
+        "d" | "day" | "days" => Some(86_400.0),
+        _ => TimeUnit::from_name(name).map(|unit| 1.0 / unit.per_second() as f64),
+    }
+}

@@ -20,17 +20,12 @@ use tautline_core::option::TOPIC;
 
 use super::clock::Stamp;
 use super::convention;
-use super::earth::{LocalFrame, is_no_fix, no_fixes};
+use super::earth::{EarthFrame, is_no_fix, no_fixes};
 use super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
-use super::format::Format;
 use super::options::ReadOptions;
-use super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
-use super::reader::Reader;
+use super::order::{Ordered, Recording, RecordingInfo, Row, Rows};
 use super::source::Source;
 use super::time_unit::TimeUnit;
-
-pub(super) const READER: Reader =
-    Reader { format: Format::ULOG, sniff: |head| head.begins_with_any(Format::ULOG.magic), open };
 
 const GLOBAL: &str = "vehicle_global_position";
 const LOCAL: &str = "vehicle_local_position";
@@ -53,11 +48,8 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         [topic] if topic == GLOBAL || topic == LOCAL => Some(topic.as_str()),
         [topic, ..] => {
             let problem = format!("{} is not a position topic", quoted(topic));
-            return refuse(
-                ContentKind::UnknownTopic,
-                problem,
-                format!("use {} or {}", TOPIC.set(GLOBAL), TOPIC.set(LOCAL)),
-            );
+            let remedy = format!("use {} or {}", TOPIC.set(GLOBAL), TOPIC.set(LOCAL));
+            return refuse(ContentKind::UnknownTopic, problem, remedy);
         }
     };
     let mut log = Log::default();
@@ -70,7 +62,7 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         let remedy = "log vehicle_global_position, or give positions of a common frame as a table t,id,x,y,z";
         return refuse(ContentKind::NoFix, problem, remedy);
     };
-    let local = LocalFrame::first(first.origin, options)?;
+    let local = EarthFrame::first(first.origin, options)?;
     let rows = log.rows(fixes, &local)?;
     notes.push(local.note());
     notes.push(format!("positions are read from {topic}"));
@@ -294,16 +286,16 @@ impl Log {
         Ok(())
     }
 
-    fn rows(&self, fixes: &[Fix], local: &LocalFrame) -> Result<Vec<Row>, ReadError> {
+    fn rows(&self, fixes: &[Fix], local: &EarthFrame) -> Result<Vec<Row>, ReadError> {
         let mut fix_frame = *local;
         let row = |fix: &Fix| self.row(fix, local, &mut fix_frame).map_err(|fault| fault.at(Place::Byte(fix.at)));
         fixes.iter().map(row).collect()
     }
 
     /// Converts a position to the frame `local`; `fix_frame` caches the frame of the last origin.
-    fn row(&self, fix: &Fix, local: &LocalFrame, fix_frame: &mut LocalFrame) -> Result<Row, Fault> {
+    fn row(&self, fix: &Fix, local: &EarthFrame, fix_frame: &mut EarthFrame) -> Result<Row, Fault> {
         if !fix_frame.is_at(fix.origin) {
-            *fix_frame = LocalFrame::at(fix.origin)?;
+            *fix_frame = EarthFrame::at(fix.origin)?;
         }
         let time_us = i64::try_from(fix.time_us).ok().and_then(|time| time.checked_add(self.boot_us.unwrap_or(0)));
         let stamp = Stamp::Whole(time_us.ok_or_else(Fault::out_of_range)?);
@@ -378,7 +370,7 @@ fn take<const N: usize>(bytes: &[u8], offset: usize) -> Result<[u8; N], Fault> {
 }
 
 fn text(bytes: &[u8]) -> Result<&str, Fault> {
-    str::from_utf8(bytes).map_err(|_| Fault::NotUtf8)
+    str::from_utf8(bytes).map_err(|_| Fault::not_utf8())
 }
 
 /// Reads the flags of a log and returns the byte offset at which its messages end. Data that were appended after a
@@ -388,11 +380,8 @@ fn flags(body: &[u8]) -> Result<u64, Fault> {
     let needed: [u8; 8] = take(body, 8)?;
     if needed[0] & !APPENDED != 0 || needed[1..].iter().any(|&byte| byte != 0) {
         let problem = "unknown version of ULog";
-        return refuse(
-            ContentKind::UnsupportedFormat,
-            problem,
-            "convert its vehicle_global_position with `ulog2csv`, and give the result",
-        );
+        let remedy = "convert its vehicle_global_position with `ulog2csv`, and give the result";
+        return refuse(ContentKind::UnsupportedFormat, problem, remedy);
     }
     let appended = u64::from_le_bytes(take(body, 16)?);
     Ok(if needed[0] & APPENDED == 0 || appended == 0 { u64::MAX } else { appended })
@@ -423,9 +412,9 @@ struct Positions {
 
 impl Rows for Positions {
     fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
-        let before = rows.len();
-        rows.extend(self.rows.by_ref().take(BATCH));
-        Ok(rows.len() > before)
+        let next = self.rows.next();
+        rows.extend(next);
+        Ok(next.is_some())
     }
 
     fn vehicles(&self) -> &[String] {

@@ -86,11 +86,8 @@ pub(super) fn open(source: &Source, options: &ReadOptions) -> Result<Recording, 
         vehicles.push((name, items));
     }
     if vehicles.iter().all(|(_, items)| items.is_empty()) {
-        return refuse(
-            ContentKind::NoPositions,
-            "it has no drone with samples",
-            "export the show with the paths of its drones",
-        );
+        let remedy = "export the show with the paths of its drones";
+        return refuse(ContentKind::NoPositions, "it has no drone with samples", remedy);
     }
     let mut notes = vec!["axes of graphics are mapped to x right, y forward, z up".to_owned()];
     let still: Vec<_> = vehicles.iter().filter(|(_, items)| items.is_empty()).map(|(name, _)| quoted(name)).collect();

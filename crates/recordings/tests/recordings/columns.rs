@@ -230,3 +230,57 @@ fn tuples_and_single_vehicle_tables_are_read() {
     assert_eq!(one.vehicles, ["flight"]);
     refused(&ones("t,who,x,y,z"), &ReadOptions::default(), "recording/no-vehicle-column");
 }
+
+#[test]
+fn positions_of_messages_are_read_beside_a_column_of_vehicles() {
+    let header = "header.stamp.sec,header.stamp.nanosec,child_frame_id,pose.position.x,pose.position.y,pose.position.z";
+    let rows = "0,0,a,1,2,3\n0,0,b,4,5,6\n0,500000000,a,1,2,3\n0,500000000,b,4,5,6\n";
+    let found = read(&format!("{header},twist.linear.x\n{}", rows.replace('\n', ",9\n"))).expect("read");
+    assert_eq!(found.samples()[3], (0.5, "b", [4.0, 5.0, 6.0]));
+    let nested = header.replace("pose.", "pose.pose.");
+    assert_eq!(read(&format!("{nested}\n{rows}")).expect("read").samples(), found.samples());
+    let plotted = "__time,/a/pose/position/x,/a/pose/position/y,/a/pose/position/z\n0,1,2,3\n0.5,1,2,3\n";
+    assert_eq!(read(plotted).expect("read").samples()[1], (0.5, "/a/pose", [1.0, 2.0, 3.0]));
+    // Negative twins: plain names come first, two plain names are refused, and other quantities are no positions.
+    let both = read("t,id,x,y,pose.position.x,pose.position.y\n0,a,1,2,8,9\n1,a,1,2,8,9\n").expect("read");
+    assert_eq!(both.samples()[0].2, [1.0, 2.0, 0.0]);
+    refused(
+        "t,id,pose.position.x,pose.pose.position.x,pose.position.y\n0,a,1,2,3\n",
+        &ReadOptions::default(),
+        "recording/ambiguous-column",
+    );
+    refused("t,id,twist.linear.x,twist.linear.y\n0,a,1,2\n", &ReadOptions::default(), "recording/no-position-column");
+}
+
+#[test]
+fn degrees_have_several_names_and_units() {
+    let table = |names: &str, degree: f64| {
+        let [lat, lon] = [47.1, 8.2].map(|degrees: f64| (degrees / degree).round());
+        let row = |time: u8, by: f64| format!("{time},a,{:?},{lon:?},400\n", lat + by / degree);
+        read(&format!("t,id,{names}\n{}{}", row(0, 0.0), row(1, 1e-3)))
+    };
+    let north_m = |found: &Whole| found.samples()[1].2[1];
+    let expected = north_m(&read("t,id,lat,lon,alt\n0,a,47.1,8.2,400\n1,a,47.101,8.2,400\n").expect("degrees"));
+    for names in ["gps_lat_e7,gps_lon_e7,gps_alt", "lat_e7,lon_e7,alt", "geo_lat_e7,geo_lon_e7,geo_alt"] {
+        assert!((north_m(&table(names, 1e-7).expect(names)) - expected).abs() < 0.01, "{names}");
+    }
+    for names in ["geo_lat,geo_lon,geo_alt", "wgs84_latitude,wgs84_longitude,alt", "geodetic_lat,geodetic_lon,alt"] {
+        assert!(
+            (north_m(&table(names, 1.0).expect(names)) - north_m(&table("lat,lon,alt", 1.0).expect("degrees"))).abs()
+                < 1e-9,
+            "{names}"
+        );
+    }
+    // Negative twins: another power of ten, and degrees that are no place on the Earth.
+    assert_eq!(table("lat_e6,lon_e6,alt", 1e-6).expect_err("unknown").code(), "recording/no-position-column");
+    assert_eq!(table("lat,lon,alt", 1e-7).expect_err("too large").code(), "recording/not-on-earth");
+}
+
+#[test]
+fn whole_numbers_beyond_doubles_name_vehicles_exactly() {
+    let row = |time: f64, id: u64, x: u8| format!("{{\"t\": {time}, \"id\": {id}, \"x\": {x}, \"y\": 0, \"z\": 1}}\n");
+    let (a, b) = (u64::MAX - 1, u64::MAX);
+    let text: String = [0.0, 0.5].map(|time| row(time, a, 1) + &row(time, b, 9)).concat();
+    let found = read_with("flight.jsonl", &text, &ReadOptions::default()).expect("read");
+    assert_eq!(found.vehicles, [a.to_string(), b.to_string()]);
+}

@@ -806,6 +806,28 @@ fn rows_that_lack_a_coordinate_are_skipped_by_option() {
 }
 
 #[test]
+fn facts_of_all_rows_survive_a_mapping_of_the_axes_and_a_join() {
+    let text = "t_s,x,y,alt\n0,1,2,3\n1,1,2,\n2,1,2,5\n";
+    let options = |axes: Option<&str>| ReadOptions {
+        skip_incomplete: true,
+        one_vehicle: true,
+        axes: axes.map(|axes| axes.parse().expect("axes")),
+        ..usual()
+    };
+    for axes in [None, Some("nwu")] {
+        has(&facts("a.csv", text.as_bytes(), &options(axes)), ["rows", "declared", "1 incomplete"]);
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    for (name, rows) in [("a.csv", text), ("b.csv", "t_s,x,y,alt\n0,8,2,3\n1,8,2,3\n2,8,2,5\n")] {
+        fs::write(folder.path().join(name), rows).expect("written");
+    }
+    has(&facts_of(folder.path(), &options(None)), ["rows", "declared", "1 incomplete"]);
+    // Negative twin: complete rows have no such fact.
+    let complete = facts("b.csv", b"t_s,x,y,alt\n0,8,2,3\n1,8,2,3\n", &options(Some("nwu")));
+    assert!(complete.iter().all(|[kind, ..]| kind != "rows"), "{complete:?}");
+}
+
+#[test]
 fn unit_of_time_names_its_source() {
     for (text, options, source, unit) in [
         ("t_ms,id,x,y\n0,a,1,2\n5,a,1,2\n", usual(), "deduced", "ms"),

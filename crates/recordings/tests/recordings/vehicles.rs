@@ -208,6 +208,8 @@ fn unsupported_formats_have_a_remedy() {
         (b"<?xml version=\"1.0\"?>\n<kml xmlns=\"x\">", "KML", "lat,lon,alt"),
         (b"  <?xml version=\"1.0\"?><flight/>", "XML", "t,id,x,y,z"),
         (b"{\"type\": \"FeatureCollection\", \"features\": []}", "not a Skybrush show", "t,id,x,y,z"),
+        (b"{\"t\":{\"0\":0.0,\"1\":0.5},\"id\":{\"0\":\"a\"}}", "JSON object of columns", "orient=\"records\""),
+        (b"{ \"columns\": [\"t\", \"id\"], \"data\": [[0, \"a\"]]}", "JSON object of columns", "orient=\"records\""),
         (b"[[0, 1, 2]]", "neither a Skybrush show nor an array of objects", "t,id,x,y,z"),
         (b"\x89HDF\r\n\x1a\n\0", "HDF5", "numpy.savez"),
         (b"7z\xbc\xaf\x27\x1c\0\x04", "7z archive", "give the folder"),

@@ -11,7 +11,7 @@ use nalgebra::Vector3;
 use super::evaluation::{Evaluator, ROUNDING};
 use super::fit::{POINTS, Piece, seconds};
 use super::motion::{Arc, Motion};
-use super::{DroneError, DroneFile, EncodedVehicle, Work};
+use super::{DroneError, DroneFile, EncodedVehicle, Work, check_size};
 use crate::segments::{HEAD_BYTES, LARGEST, OutOfRange, Trajectory, rounding_m};
 
 /// Memory of the firmware for trajectories \[bytes\].
@@ -55,10 +55,7 @@ pub(super) fn polynomials(
         },
     )?;
     let bytes = found.len() * PIECE_BYTES;
-    if bytes > MEMORY_BYTES {
-        let (vehicle, pieces) = (name.to_owned(), found.len());
-        return Err(DroneError::TooLong { vehicle, pieces, bytes, what: MEMORY, most: MEMORY_BYTES, compresses: true });
-    }
+    check_size(name, [found.len(), bytes], (MEMORY, MEMORY_BYTES, true))?;
     let file = DroneFile { name: format!("{label}.csv"), bytes: csv(&found).into_bytes() };
     let (name, label) = (name.to_owned(), label.to_owned());
     Ok((file, EncodedVehicle { name, label, parts: found.len(), bytes, evaluation_m }))
@@ -167,17 +164,7 @@ pub(super) fn compressed(
     found.encode(&mut bytes);
     bytes.extend([0; HEAD_BYTES]);
     let (size, pieces) = (bytes.len(), found.segments.len());
-    if size > MEMORY_BYTES {
-        let vehicle = name.to_owned();
-        return Err(DroneError::TooLong {
-            vehicle,
-            pieces,
-            bytes: size,
-            what: MEMORY,
-            most: MEMORY_BYTES,
-            compresses: false,
-        });
-    }
+    check_size(name, [pieces, size], (MEMORY, MEMORY_BYTES, false))?;
     let file = DroneFile { name: format!("{label}.traj"), bytes };
     let evaluation_m = Evaluator::Crazyflie.errors_m(&found, UNIT_M);
     let (name, label) = (name.to_owned(), label.to_owned());

@@ -345,6 +345,16 @@ impl Work<'_> {
     }
 }
 
+/// Refuses a motion whose size exceeds a memory: its name, its size \[bytes\], and whether a compressed form exists.
+fn check_size(
+    name: &str,
+    [pieces, bytes]: [usize; 2],
+    (what, most, compresses): (&'static str, usize, bool),
+) -> Result<(), DroneError> {
+    let vehicle = name.to_owned();
+    if bytes > most { Err(DroneError::TooLong { vehicle, pieces, bytes, what, most, compresses }) } else { Ok(()) }
+}
+
 /// Returns the deviation of two motions from 0 s on. Each rests after its end.
 #[must_use]
 pub fn deviation_with_rests(flight: &Motion, curve: &Motion) -> Deviation {

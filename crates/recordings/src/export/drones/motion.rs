@@ -5,6 +5,8 @@
 //! most that of its longest coefficient, which bounds the distance at every instant of the part. Halving a part
 //! tightens the bound. Rounding of each operation is added.
 
+use std::ops::{Add, Mul};
+
 use nalgebra::Vector3;
 
 use crate::read::curves::powers;
@@ -306,18 +308,12 @@ fn split(points: &[Vector3<f64>], u: f64) -> (Vec<Vector3<f64>>, Vec<Vector3<f64
 }
 
 /// Raises the degree of Bernstein coefficients until there are `count`.
-fn raise(points: &mut Vec<Vector3<f64>>, count: usize) {
+pub(crate) fn raise<T: Copy + Add<Output = T> + Mul<f64, Output = T>>(points: &mut Vec<T>, count: usize) {
     while points.len() < count {
         let n = points.len();
-        let last = points[n - 1];
-        let mut raised = Vec::with_capacity(count);
-        raised.push(points[0]);
-        for i in 1..n {
-            let share = i as f64 / n as f64;
-            raised.push(points[i - 1] * share + points[i] * (1.0 - share));
-        }
-        raised.push(last);
-        *points = raised;
+        let share = |i: usize| i as f64 / n as f64;
+        let inner = (1..n).map(|i| points[i - 1] * share(i) + points[i] * (1.0 - share(i)));
+        *points = std::iter::once(points[0]).chain(inner).chain([points[n - 1]]).collect();
     }
 }
 

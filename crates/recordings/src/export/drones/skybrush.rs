@@ -19,7 +19,7 @@ use super::crazyflie::too_far;
 use super::evaluation::Evaluator;
 use super::fit::{Piece, seconds};
 use super::motion::Motion;
-use super::{DroneError, DroneFile, Encoded, EncodedVehicle, Vehicle, Work, first_error};
+use super::{DroneError, DroneFile, Encoded, EncodedVehicle, Vehicle, Work, check_size, first_error};
 use crate::segments::{LARGEST, Trajectory, rounding_m};
 
 /// First bytes of a `.skyb` file.
@@ -34,6 +34,8 @@ pub(crate) const CHECKSUM_AT: usize = 6;
 const LARGEST_SCALE: u32 = 127;
 /// Largest body of a block \[bytes\].
 const LARGEST_BODY: usize = u16::MAX as usize;
+/// Name of a block in messages.
+const BLOCK: &str = "a block of a .skyb file";
 /// Millimetres per metre.
 const MM_PER_M: f64 = 1000.0;
 
@@ -111,16 +113,8 @@ fn scale_byte(scale: u32) -> u8 {
 
 /// Returns a file with one block.
 fn file(name: &str, trajectory: &Trajectory, body: &[u8], version: u8) -> Result<Vec<u8>, DroneError> {
-    let Ok(length) = u16::try_from(body.len()) else {
-        return Err(DroneError::TooLong {
-            vehicle: name.to_owned(),
-            pieces: trajectory.segments.len(),
-            bytes: body.len(),
-            what: "a block of a .skyb file",
-            most: LARGEST_BODY,
-            compresses: false,
-        });
-    };
+    check_size(name, [trajectory.segments.len(), body.len()], (BLOCK, LARGEST_BODY, false))?;
+    let length = u16::try_from(body.len()).unwrap_or(u16::MAX);
     let mut bytes = [MAGIC, &[version]].concat();
     if version == 2 {
         bytes.push(HAS_CHECKSUM);
@@ -150,13 +144,11 @@ pub(super) fn show(work: &Work<'_>, vehicles: &[Vehicle<'_>]) -> Result<Encoded,
             };
             work.within(name, motion, rounding_m(unit_m), is_kept, encode)
         })?;
-        let mut bytes = Vec::new();
-        found.encode(&mut bytes);
-        if bytes.len() >= LARGEST_BODY {
-            // Skybrush would compile the drone to one block.
-            file(name, &found, &[&[scale_byte(scale)], &bytes[..]].concat(), 2)?;
-        }
-        let (parts, bytes) = (found.segments.len(), bytes.len() + 1);
+        let mut body = vec![scale_byte(scale)];
+        found.encode(&mut body);
+        let (parts, bytes) = (found.segments.len(), body.len());
+        // Skybrush compiles the drone to one block.
+        check_size(name, [parts, bytes], (BLOCK, LARGEST_BODY, false))?;
         let evaluation_m = Evaluator::Skybrush.errors_m(&found, unit_m(scale));
         let vehicle = EncodedVehicle { name: (*name).clone(), label: label.clone(), parts, bytes, evaluation_m };
         Ok((drone(label, &found, scale), vehicle))

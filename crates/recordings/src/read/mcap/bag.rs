@@ -9,9 +9,9 @@ use std::path::{Component, Path, PathBuf};
 use serde::Deserialize;
 
 use super::super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
+use super::super::head::{BAG, BAG_INDEX, BAG_INDEX_LIMIT_BYTES, bag_index};
 use super::super::options::ReadOptions;
 use super::super::order::Recording;
-use super::super::reader::{BAG, BAG_INDEX, BAG_INDEX_LIMIT_BYTES};
 use super::super::source::{Source, ZSTD_MAGIC};
 use super::foreign;
 use super::split::SplitFiles;
@@ -39,7 +39,7 @@ struct Bag {
 /// Opens a bag.
 pub(in crate::read) fn open(folder: &Path, options: &ReadOptions) -> Result<Recording, ReadError> {
     let metadata = folder.join(BAG_INDEX);
-    let bag = read(&metadata).map_err(|error| error.of(&metadata))?;
+    let bag = read(folder).map_err(|error| error.of(&metadata))?;
     let files = files_of(&bag, folder).map_err(|fault| ReadError::new(&metadata, fault))?;
     refuse_others(folder, &files)?;
     let packed = |path: &PathBuf| {
@@ -63,18 +63,12 @@ pub(in crate::read) fn open(folder: &Path, options: &ReadOptions) -> Result<Reco
     foreign::open(&Source::file(folder), SplitFiles::new(files, bag.message_count, options), options)
 }
 
-fn bytes_of(path: &Path) -> Result<Vec<u8>, Fault> {
-    let mut bytes = Vec::new();
-    File::open(path)?.take(BAG_INDEX_LIMIT_BYTES + 1).read_to_end(&mut bytes)?;
+fn read(folder: &Path) -> Result<Bag, ReadError> {
+    let bytes = bag_index(folder)?;
     if bytes.len() as u64 > BAG_INDEX_LIMIT_BYTES {
         return refuse(ContentKind::BagIndex, format!("it is longer than {BAG_INDEX_LIMIT_BYTES} bytes"), REINDEX);
     }
-    Ok(bytes)
-}
-
-fn read(path: &Path) -> Result<Bag, ReadError> {
-    let bytes = bytes_of(path)?;
-    let text = std::str::from_utf8(&bytes).map_err(|_| Fault::NotUtf8)?;
+    let text = std::str::from_utf8(&bytes).map_err(|_| Fault::not_utf8())?;
     let metadata: Metadata = serde_saphyr::from_str(text).map_err(|error| {
         let place = error.location().map(|location| Place::Line(location.line()));
         let message = error.to_string();
@@ -102,11 +96,8 @@ fn files_of(bag: &Bag, folder: &Path) -> Result<Vec<PathBuf>, Fault> {
     if mode == "MESSAGE" || !(format.is_empty() || format == "zstd") {
         let problem =
             format!("the bag is packed by {} in mode {}, which is not supported", quoted(format), quoted(&mode));
-        return refuse(
-            ContentKind::UnsupportedCompression,
-            problem,
-            "rewrite it with `ros2 bag convert`, uncompressed or with compression mode `file`",
-        );
+        let remedy = "rewrite it with `ros2 bag convert`, uncompressed or with compression mode `file`";
+        return refuse(ContentKind::UnsupportedCompression, problem, remedy);
     }
     if bag.relative_file_paths.is_empty() {
         return refuse(ContentKind::BagIndex, "the bag lists no files", REINDEX);

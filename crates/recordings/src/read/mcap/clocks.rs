@@ -26,7 +26,7 @@ const WINDOWS_NS: [u64; 3] = [1_000_000_000, 10_000_000_000, u64::MAX];
 const MOST_COMPARED: usize = 64;
 
 /// Source of positions: a topic, or a moving frame of a topic of transforms.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 struct SourceClock {
     name: String,
     /// Number of messages with and without a stamp.
@@ -115,14 +115,7 @@ impl Clocks {
             return index;
         }
         let name = if frame.is_empty() { quoted(topic) } else { format!("{} on {}", quoted(frame), quoted(topic)) };
-        self.sources.push(SourceClock {
-            name,
-            stamped: 0,
-            unstamped: 0,
-            is_mixed: false,
-            last: None,
-            delays: Default::default(),
-        });
+        self.sources.push(SourceClock { name, ..SourceClock::default() });
         let index = self.sources.len() - 1;
         self.indices.entry(topic.to_owned()).or_default().insert(frame.to_owned(), index);
         index

@@ -9,7 +9,7 @@ use super::super::earth::{is_no_fix, no_fixes};
 use super::super::error::{ContentKind, Fault, Place, ReadError, UNSEEN, quoted, refuse};
 use super::super::identity::Names;
 use super::super::options::{Duplicates, MessageClock, ReadOptions};
-use super::super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
+use super::super::order::{Findings, Ordered, Recording, RecordingInfo, Row, Rows};
 use super::super::source::Source;
 use super::super::time_unit::TimeUnit;
 use super::messages::{EARTH, Observation, PoseKind, VehicleKey, is_list, reader_of_topic};
@@ -31,7 +31,7 @@ pub(super) fn open(whole: &Source, mut splits: SplitFiles, options: &ReadOptions
     let mut info = RecordingInfo::new(whole, options, Some(TimeUnit::Nanoseconds), splits.notes.clone(), none);
     info.metadata.earth_origin = plan.local().map(|local| local.measured_from(options.origin));
     // Duplicates of messages indicate overlapping files and are refused by default.
-    info.duplicates = info.duplicates.or(Some(Duplicates::Refuse));
+    info.options.duplicates = options.duplicates.or(Some(Duplicates::Refuse));
     let foreign = ForeignRows { splits, poses: Poses::new(plan), listed: true, shown: Vec::new(), starts: Vec::new() };
     Ok(Box::new(Ordered::open(foreign, info)?))
 }
@@ -50,23 +50,20 @@ struct ForeignRows {
 
 impl Rows for ForeignRows {
     fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
-        let (before, poses, listed) = (rows.len(), &mut self.poses, &mut self.listed);
-        let mut more = true;
-        while more && rows.len() < before + BATCH {
-            let (files, messages) = (self.splits.opened_files(), poses.messages);
-            more = self.splits.visit(|part| {
-                match part {
-                    Part::Message(message) => poses.take(&message, rows)?,
-                    Part::Topic(topic) => *listed &= is_list(&topic.schema) || reader_of_topic(topic).is_none(),
-                    Part::Schema(_) | Part::Other => {}
-                }
-                Ok(())
-            })?;
-            if self.splits.opened_files() > files {
-                self.starts.push(messages);
+        let (poses, listed) = (&mut self.poses, &mut self.listed);
+        let (files, messages) = (self.splits.opened_files(), poses.messages);
+        let more = self.splits.visit(|part| {
+            match part {
+                Part::Message(message) => poses.take(&message, rows)?,
+                Part::Topic(topic) => *listed &= is_list(&topic.schema) || reader_of_topic(topic).is_none(),
+                Part::Schema(_) | Part::Other => {}
             }
+            Ok(())
+        })?;
+        if self.splits.opened_files() > files {
+            self.starts.push(messages);
         }
-        Ok(rows.len() > before)
+        Ok(more)
     }
 
     fn rewind(&mut self) -> Result<(), ReadError> {
@@ -99,12 +96,8 @@ impl Rows for ForeignRows {
         }
     }
 
-    fn notes(&self) -> Vec<String> {
-        self.poses.notes()
-    }
-
-    fn facts(&self) -> Vec<Fact> {
-        self.poses.facts()
+    fn findings(&self) -> Findings {
+        (self.poses.notes(), self.poses.facts())
     }
 
     fn place(&self, number: u64) -> Place {

@@ -106,14 +106,14 @@ impl From<RecordError> for ReadError {
             RecordError::Read { fault, .. } => fault,
         };
         match fault {
-            ReadFault::Empty => Fault::Empty.into(),
-            ReadFault::NotMcap => Fault::WrongFormat(Format::MCAP).into(),
+            ReadFault::Empty => Fault::empty().into(),
+            ReadFault::NotMcap => Fault::wrong_format(Format::MCAP).into(),
             ReadFault::TooLong { offset, bytes, limit } => {
                 let reason = format!("a record declares {bytes} bytes, more than the limit of {limit}");
-                Fault::Damaged(reason).at(Place::Byte(offset))
+                Fault::damaged(reason).at(Place::Byte(offset))
             }
-            ReadFault::Damaged { offset, reason } => Fault::Damaged(reason).at(Place::Byte(offset)),
-            ReadFault::Message { topic, reason } => Fault::Damaged(reason).at(Place::Part(format!("topic `{topic}`"))),
+            ReadFault::Damaged { offset, reason } => Fault::damaged(reason).at(Place::Byte(offset)),
+            ReadFault::Message { topic, reason } => Fault::damaged(reason).at(Place::Part(format!("topic `{topic}`"))),
             other => Fault::damaged(other).into(),
         }
     }

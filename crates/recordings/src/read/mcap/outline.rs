@@ -124,7 +124,7 @@ impl Outline {
         if !self.reads(message.of) {
             return Ok(Vec::new());
         }
-        reader(&message.of.encoding, message.bytes).map_err(|reason| Fault::Damaged(reason).at(place(*number, message)))
+        reader(&message.of.encoding, message.bytes).map_err(|reason| Fault::damaged(reason).at(place(*number, message)))
     }
 
     /// Records the number of poses in a list. Lists of different lengths do not identify vehicles and are refused. An

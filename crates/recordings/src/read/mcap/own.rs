@@ -18,7 +18,7 @@ use super::super::convention;
 use super::super::error::{ContentKind, Fault, Place, ReadError};
 use super::super::identity::Names;
 use super::super::options::ReadOptions;
-use super::super::order::{BATCH, Ordered, Recording, RecordingInfo, Row, Rows};
+use super::super::order::{Ordered, Recording, RecordingInfo, Row, Rows};
 use super::super::source::Source;
 use super::super::time_unit::TimeUnit;
 use crate::mcap::topic::{Message, Part, Topic, TopicReader, decode};
@@ -55,7 +55,7 @@ pub(super) fn open_export(source: &Source, options: &ReadOptions) -> Result<Reco
     let notes = options.accept_unfinished(topics.is_complete())?;
     let instants = Instants { names: Names::default(), axes: None, epoch_ns: 0, count: 0 };
     let mut exported = Exported { path: source.path.clone(), topics, instants };
-    exported.next(&mut Vec::new())?;
+    exported.next_batch(&mut Vec::new())?;
     let is_planar = exported.instants.axes == Some(2);
     let none = Fault::content(ContentKind::Empty, "it holds no instant", "export again");
     let mut info = RecordingInfo::new(source, options, Some(TimeUnit::Seconds), notes, none);
@@ -133,18 +133,12 @@ fn take(instant: &Instant, axes: usize, vehicles: usize, (number, rows): (u64, &
 
 impl Rows for Exported {
     fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
-        let before = rows.len();
-        while rows.len() < before + BATCH {
-            match self.topics.next()? {
-                Some(Part::Message(message)) => {
-                    let damaged = |reason| Fault::Damaged(reason).at(Place::Byte(message.offset));
-                    self.instants.take(&message, rows).map_err(damaged)?;
-                }
-                Some(_) => {}
-                None => break,
-            }
+        let Some(part) = self.topics.next()? else { return Ok(false) };
+        if let Part::Message(message) = part {
+            let damaged = |reason: String| Fault::damaged(reason).at(Place::Byte(message.offset));
+            self.instants.take(&message, rows).map_err(damaged)?;
         }
-        Ok(rows.len() > before)
+        Ok(true)
     }
 
     fn rewind(&mut self) -> Result<(), ReadError> {
@@ -245,23 +239,20 @@ struct Run {
 
 impl Rows for Run {
     fn next(&mut self, rows: &mut Vec<Row>) -> Result<bool, ReadError> {
-        let before = rows.len();
-        while rows.len() < before + BATCH {
-            let Some(entry) = self.recording.next() else { break };
-            let Entry::Sample(sample) = entry? else { continue };
-            if self.names.all().is_empty() {
-                // A sample has confirmed the number of vehicles in the header.
-                self.names = Names::numbered(self.vehicles);
-            }
-            self.samples += 1;
-            for vehicle in 0..self.vehicles {
-                let position = sample.swarm.positions_m.row(vehicle).transpose();
-                let velocity = Some(sample.swarm.velocities_m_s.row(vehicle).transpose());
-                let stamp = Stamp::Real(sample.time_s);
-                rows.push(Row { stamp, place: self.samples, vehicle, position, velocity, radius: None });
-            }
+        let Some(entry) = self.recording.next() else { return Ok(false) };
+        let Entry::Sample(sample) = entry? else { return Ok(true) };
+        if self.names.all().is_empty() {
+            // A sample has confirmed the number of vehicles in the header.
+            self.names = Names::numbered(self.vehicles);
         }
-        Ok(rows.len() > before)
+        self.samples += 1;
+        for vehicle in 0..self.vehicles {
+            let position = sample.swarm.positions_m.row(vehicle).transpose();
+            let velocity = Some(sample.swarm.velocities_m_s.row(vehicle).transpose());
+            let stamp = Stamp::Real(sample.time_s);
+            rows.push(Row { stamp, place: self.samples, vehicle, position, velocity, radius: None });
+        }
+        Ok(true)
     }
 
     fn vehicles(&self) -> &[String] {

@@ -7,7 +7,7 @@ use tautline_core::fact::{Fact, FactKind, Source};
 use tautline_core::option::ORIGIN;
 
 use super::super::convention;
-use super::super::earth::LocalFrame;
+use super::super::earth::EarthFrame;
 use super::super::error::{ContentKind, Fault, ReadError, quoted, refuse};
 use super::super::options::{MessageClock, ReadOptions};
 use super::messages::{EARTH, PoseKind, VehicleKey};
@@ -22,7 +22,7 @@ pub(super) struct ReadPlan {
     /// Frame to which all positions are transformed.
     pub(super) target_frame: Option<String>,
     /// Local frame of places on the Earth, if there are any.
-    pub(super) earth: Option<LocalFrame>,
+    pub(super) earth: Option<EarthFrame>,
     /// Transforms from each frame in use to the requested frame, by namespace and frame; `None` without a
     /// connection.
     chains: BTreeMap<String, BTreeMap<String, Option<Chain>>>,
@@ -56,7 +56,7 @@ impl ReadPlan {
         let origin = options.origin.map(Vector3::from).or(first_fix).filter(|_| first_fix.is_some());
         let mut plan = Self {
             target_frame: options.frame.clone(),
-            earth: origin.map(LocalFrame::at).transpose()?,
+            earth: origin.map(EarthFrame::at).transpose()?,
             chains: BTreeMap::new(),
             bodies: BTreeMap::new(),
             clock: MessageClock::Stamp,
@@ -262,20 +262,14 @@ impl ReadPlan {
         match &self.target_frame {
             Some(frame) => {
                 let problem = format!("no position is in the frame {}, nor can be transformed to it", quoted(frame));
-                Fault::content(
-                    ContentKind::UnusableFrame,
-                    problem,
-                    "name another frame, or record /tf and /tf_static from before the first position",
-                )
+                let remedy = "name another frame, or record /tf and /tf_static from before the first position";
+                Fault::content(ContentKind::UnusableFrame, problem, remedy)
             }
             None if trees().any(|tree| tree.frames().any(|frame| tree.moves(frame))) => {
                 let frames: Vec<_> = trees().flat_map(Tree::frames).map(quoted).collect();
                 let problem = format!("its transforms describe no vehicle; its frames are {}", frames.join(", "));
-                Fault::content(
-                    ContentKind::NoPositions,
-                    problem,
-                    "record the transforms of the vehicles' own frames too",
-                )
+                let remedy = "record the transforms of the vehicles' own frames too";
+                Fault::content(ContentKind::NoPositions, problem, remedy)
             }
             None => Fault::content(
                 ContentKind::NoPositions,
@@ -286,7 +280,7 @@ impl ReadPlan {
     }
 
     /// Returns the local frame of places on the Earth, if these are read.
-    pub(super) fn local(&self) -> Option<LocalFrame> {
+    pub(super) fn local(&self) -> Option<EarthFrame> {
         self.earth.filter(|_| self.target_frame.is_none())
     }
 

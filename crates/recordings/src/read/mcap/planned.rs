@@ -15,7 +15,7 @@ use nalgebra::Vector3;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 
-use super::super::curves::{Curves, VehicleItems, piece};
+use super::super::curves::{Curves, HIGHEST_DEGREE, VehicleItems, piece, value};
 use super::super::error::{ContentKind, Fault, Place, ReadError, quoted, refuse};
 use super::super::options::ReadOptions;
 use super::super::order::Recording;
@@ -31,9 +31,6 @@ use tautline_core::track::{Clock, Item, Metadata};
 
 /// Degree of the curves of EGO-Planner v2.
 const DEGREE: u8 = 5;
-
-/// Highest supported degree of a B-spline.
-const HIGHEST_DEGREE: i32 = 15;
 
 const NS_PER_S: i64 = 1_000_000_000;
 
@@ -189,17 +186,16 @@ impl Plan {
 
     fn last(&self) -> Vector3<f64> {
         let Some((from_s, to_s, coefficients)) = self.parts.last() else { return Vector3::zeros() };
-        coefficients.iter().rev().fold(Vector3::zeros(), |sum, coefficient| sum * (to_s - from_s) + coefficient)
+        value(coefficients, to_s - from_s)
     }
 
     /// Returns the drone and the curve of a message.
     fn of_b_spline(encoding: &str, bytes: &[u8]) -> Result<(i32, Self), Fault> {
         let Bspline { drone, degree, start, knots, points, .. } = decoded(encoding, bytes)?;
-        if !(1..=HIGHEST_DEGREE).contains(&degree) {
+        let Some(degree) = usize::try_from(degree).ok().filter(|degree| (1..=HIGHEST_DEGREE).contains(degree)) else {
             let problem = format!("order: must be 1 to {HIGHEST_DEGREE}, got {degree}");
             return refuse(ContentKind::Degree, problem, replan());
-        }
-        let degree = degree.unsigned_abs() as usize;
+        };
         refuse_not_finite("knots", &knots)?;
         refuse_not_finite("pos_pts", points.as_flattened())?;
         if points.len() <= degree {
@@ -325,9 +321,9 @@ fn durations(lengths: &[f32]) -> Result<Vec<f64>, Fault> {
 
 fn decoded<T: DeserializeOwned>(encoding: &str, bytes: &[u8]) -> Result<T, Fault> {
     if encoding != CDR {
-        return Err(Fault::Damaged("ROS 2 messages are supported in CDR only".to_owned()));
+        return Err(Fault::damaged("ROS 2 messages are supported in CDR only".to_owned()));
     }
-    decode(bytes).map_err(Fault::Damaged)
+    decode(bytes).map_err(Fault::damaged)
 }
 
 fn refuse_not_finite(name: &str, numbers: &[f64]) -> Result<(), Fault> {

@@ -21,7 +21,7 @@ const BODIES: [&str; 2] = ["base_link", "base_footprint"];
 const CARRIERS: [&str; 4] = ["map", "odom", "world", "earth"];
 
 /// Relation of a frame to its parent.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 struct Edge {
     parent: String,
     /// Constant pose, if there is one.
@@ -77,9 +77,7 @@ impl Tree {
     pub(super) fn learn(&mut self, child: &str, parent: &str, fixed_pose: Option<FramePose>) {
         let Some(known) = self.edges.get_mut(child) else {
             let (parent, moves) = (parent.to_owned(), fixed_pose.is_none());
-            let edge =
-                Edge { parent, fixed_pose, moves, second_parent: None, is_contradictory: false, samples: Vec::new() };
-            self.edges.insert(child.to_owned(), edge);
+            self.edges.insert(child.to_owned(), Edge { parent, fixed_pose, moves, ..Edge::default() });
             return;
         };
         if known.parent != parent && known.second_parent.is_none() {

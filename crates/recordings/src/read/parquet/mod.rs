@@ -20,7 +20,7 @@ use parquet::file::reader::{FileReader as _, SerializedFileReader};
 use parquet::schema::types::ColumnDescriptor;
 
 use self::pages::{Pages, delta_text};
-use crate::read::cells::Cells;
+use crate::read::cells::{self, Cells};
 use crate::read::clock::Stamp;
 use crate::read::error::{ContentKind, Fault, Place, ReadError, refuse};
 use crate::read::layout::Layout;
@@ -48,7 +48,7 @@ pub(in crate::read) fn open(source: &Source, options: &ReadOptions) -> Result<Re
     let mut file = File::open(&source.path)?;
     let file_bytes = file.metadata()?.len();
     if file_bytes < 12 {
-        return Err(Fault::Truncated("the end of the file is missing".to_owned()).into());
+        return Err(Fault::truncated("the end of the file is missing").into());
     }
     let mut end = [0; 8];
     file.seek(SeekFrom::End(-8))?;
@@ -60,7 +60,7 @@ pub(in crate::read) fn open(source: &Source, options: &ReadOptions) -> Result<Re
     let footer_bytes = i64::from(u32::from_le_bytes(length));
     if end[4..] != *b"PAR1" || file.seek(SeekFrom::End(-8 - footer_bytes)).is_err() {
         let what = "the end of the file, with the description of its columns, is missing".to_owned();
-        return Err(Fault::Truncated(what).into());
+        return Err(Fault::truncated(what).into());
     }
     let mut footer = Vec::new();
     file.try_clone()?.take(footer_bytes.cast_unsigned()).read_to_end(&mut footer)?;
@@ -78,8 +78,8 @@ pub(in crate::read) fn open(source: &Source, options: &ReadOptions) -> Result<Re
     layout.alternative_ids.retain(can_name);
     layout.suspects.retain(can_name);
     layout.rate = layout.rate.filter(|(column, _)| can_name(column));
-    if !layout.second.iter().flatten().flat_map(|second| second.columns).flatten().all(|column| can_name(&column)) {
-        layout.second.clear();
+    if !layout.compared.iter().flatten().flat_map(|compared| compared.earth).flatten().all(|column| can_name(&column)) {
+        layout.compared.clear();
     }
     let unit = layout.time.and_then(|time| unit_of(&schema.column(time)));
     for &column in &layout.columns() {
@@ -112,7 +112,9 @@ fn check_rows(reader: &SerializedFileReader<File>, columns: usize, file_bytes: u
     let rows = rows.filter(|&rows| u64::try_from(metadata.file_metadata().num_rows()) == Ok(rows));
     let rows = rows.ok_or_else(|| Fault::damaged("its number of rows is not the sum over its row groups"))?;
     if rows.saturating_mul(columns as u64) > FREE_CELLS.max(file_bytes.saturating_mul(CELLS_PER_BYTE)) {
-        return Err(Fault::Bomb(format!("it claims {rows} rows of {columns} columns in {file_bytes} bytes")));
+        return Err(Fault::grows_too_large(format!(
+            "it claims {rows} rows of {columns} columns in {file_bytes} bytes"
+        )));
     }
     Ok(())
 }
@@ -134,7 +136,7 @@ fn guarded<T>(call: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, Fault
     GUARDED.set(false);
     match outcome {
         Ok(Ok(value)) => Ok(value),
-        Ok(Err(ParquetError::EOF(what))) => Err(Fault::Truncated(what)),
+        Ok(Err(ParquetError::EOF(what))) => Err(Fault::truncated(what)),
         Ok(Err(ParquetError::External(error))) => Err(match error.downcast::<io::Error>() {
             Ok(error) => Fault::from(*error),
             Err(error) => Fault::damaged(error),
@@ -205,27 +207,21 @@ fn is_unsigned(column: &ColumnDescriptor) -> bool {
 }
 
 /// Cell of a column.
-enum Cell {
-    Empty,
-    /// Wide enough for signed and unsigned integers of 64 bits.
-    Whole(i128),
-    Real(f64),
-    Text(ByteArray),
-}
+type Cell = cells::Cell<ByteArray>;
 
 /// Reads the next cells of the column with this name.
 fn read_cells(column: &mut Column, name: &str, count: usize) -> Result<Vec<Cell>, Fault> {
     let (present, unsigned) = (column.present, column.unsigned);
     match &mut column.reader {
-        ColumnReader::DoubleColumnReader(reader) => cells(reader, present, count, Cell::Real),
-        ColumnReader::FloatColumnReader(reader) => cells(reader, present, count, |cell| Cell::Real(cell.into())),
-        ColumnReader::Int64ColumnReader(reader) => cells(reader, present, count, |cell| {
+        ColumnReader::DoubleColumnReader(reader) => read_records(reader, present, count, Cell::Real),
+        ColumnReader::FloatColumnReader(reader) => read_records(reader, present, count, |cell| Cell::Real(cell.into())),
+        ColumnReader::Int64ColumnReader(reader) => read_records(reader, present, count, |cell| {
             Cell::Whole(if unsigned { cell.cast_unsigned().into() } else { cell.into() })
         }),
-        ColumnReader::Int32ColumnReader(reader) => cells(reader, present, count, |cell| {
+        ColumnReader::Int32ColumnReader(reader) => read_records(reader, present, count, |cell| {
             Cell::Whole(if unsigned { cell.cast_unsigned().into() } else { cell.into() })
         }),
-        ColumnReader::ByteArrayColumnReader(reader) => cells(reader, present, count, Cell::Text),
+        ColumnReader::ByteArrayColumnReader(reader) => read_records(reader, present, count, Cell::Text),
         _ => refuse(
             ContentKind::ElementType,
             format!("column `{name}` holds neither numbers (float, double, int32, int64) nor text"),
@@ -234,23 +230,7 @@ fn read_cells(column: &mut Column, name: &str, count: usize) -> Result<Vec<Cell>
     }
 }
 
-/// Tries to read a cell after the last row of a group, and returns the number of cells found.
-fn one_more(column: &mut Column) -> Result<usize, Fault> {
-    fn of<D: DataType>(reader: &mut ColumnReaderImpl<D>) -> Result<usize, Fault> {
-        let (mut values, mut levels) = (Vec::new(), Vec::new());
-        guarded(|| reader.read_records(1, Some(&mut levels), None, &mut values)).map(|(records, ..)| records)
-    }
-    match &mut column.reader {
-        ColumnReader::DoubleColumnReader(reader) => of(reader),
-        ColumnReader::FloatColumnReader(reader) => of(reader),
-        ColumnReader::Int64ColumnReader(reader) => of(reader),
-        ColumnReader::Int32ColumnReader(reader) => of(reader),
-        ColumnReader::ByteArrayColumnReader(reader) => of(reader),
-        _ => Ok(0),
-    }
-}
-
-fn cells<D: DataType>(
+fn read_records<D: DataType>(
     reader: &mut ColumnReaderImpl<D>,
     present: i16,
     count: usize,
@@ -339,15 +319,14 @@ impl Groups {
             column.cells = read_cells(column, &self.header[column.number], count)?;
             if column.cells.len() != count {
                 let what = format!("column `{}` has fewer cells than its group has rows", self.header[column.number]);
-                return Err(Fault::Truncated(what));
+                return Err(Fault::truncated(what));
             }
         }
         self.cursor.rows_left -= count;
         if self.cursor.rows_left == 0 {
             for column in &mut self.columns {
-                let beyond = one_more(column)?;
-                if beyond > 0 {
-                    let name = &self.header[column.number];
+                let name = &self.header[column.number];
+                if !read_cells(column, name, 1)?.is_empty() {
                     return Err(Fault::damaged(format!("column `{name}` has more cells than its group has rows")));
                 }
             }
@@ -379,7 +358,7 @@ impl Cells for Groups {
         if self.cursor.at >= self.cursor.count {
             self.cursor.rows_before += self.cursor.count as u64;
             (self.cursor.count, self.cursor.at) = (0, 0);
-            self.cursor.count = self.fill().map_err(|fault| fault.at(Self::place(self.row())))?;
+            self.cursor.count = self.fill().map_err(|fault| self.fault(fault))?;
         }
         Ok(self.cursor.count > 0)
     }
@@ -388,32 +367,20 @@ impl Cells for Groups {
         self.cursor.rows_before + self.cursor.at as u64 + 1
     }
 
-    fn place(row: u64) -> Place {
+    fn place(&self, row: u64) -> Place {
         Place::Row(row)
     }
 
     fn text(&self, column: usize) -> Result<Cow<'_, str>, Fault> {
-        Ok(match self.cell(column) {
-            Cell::Empty => "".into(),
-            Cell::Whole(whole) => whole.to_string().into(),
-            Cell::Real(number) => number.to_string().into(),
-            Cell::Text(text) => text.as_utf8().map_err(|_| Fault::NotUtf8)?.into(),
-        })
+        self.cell(column).text()
     }
 
     fn number(&self, column: usize) -> Option<f64> {
-        match *self.cell(column) {
-            Cell::Whole(whole) => Some(whole as f64),
-            Cell::Real(number) => Some(number),
-            Cell::Empty | Cell::Text(_) => None,
-        }
+        self.cell(column).number()
     }
 
     fn stamp(&mut self, column: usize) -> Option<Stamp> {
-        match *self.cell(column) {
-            Cell::Whole(whole) => Some(i64::try_from(whole).map_or(Stamp::Real(whole as f64), Stamp::Whole)),
-            _ => self.number(column).map(Stamp::Real),
-        }
+        self.cell(column).stamp()
     }
 
     fn name(&self, column: usize) -> Result<Cow<'_, str>, Fault> {

@@ -1,22 +1,11 @@
-//! Type of a reader, and the first bytes by which it recognises a file.
+//! First bytes of a file, by which its format is recognised, and the index of a ROS 2 bag.
 
 use std::fs::File;
-use std::io::Read as _;
+use std::io::{self, Read as _};
 use std::path::Path;
 
 use super::error::{Fault, ReadError};
-use super::format::Format;
-use super::options::ReadOptions;
-use super::order::Recording;
 use super::source::Source;
-
-/// Reader of a format.
-pub(super) struct Reader {
-    pub(super) format: Format,
-    /// Whether a file is of this format, by its first bytes. The first reader that accepts a file reads it.
-    pub(super) sniff: fn(&Head<'_>) -> bool,
-    pub(super) open: fn(&Source, &ReadOptions) -> Result<Recording, ReadError>,
-}
 
 /// First bytes of a file.
 pub(super) struct Head<'a> {
@@ -39,11 +28,6 @@ impl<'a> Head<'a> {
     pub(super) fn begins_with_any(&self, magic: &[&[u8]]) -> bool {
         magic.iter().any(|magic| self.bytes.starts_with(magic))
     }
-
-    /// Returns whether the bytes are text and the text satisfies `has`.
-    pub(super) fn is_text(&self, has: impl FnOnce(&[u8]) -> bool) -> bool {
-        self.text.is_some_and(has)
-    }
 }
 
 /// Remedies for files of other formats.
@@ -58,7 +42,7 @@ const HEAD_BYTES: u64 = 64 * 1024;
 pub(super) fn head_of(source: &Source) -> Result<Vec<u8>, ReadError> {
     let mut head = Vec::new();
     source.bytes()?.take(HEAD_BYTES).read_to_end(&mut head)?;
-    if head.is_empty() { Err(Fault::Empty.into()) } else { Ok(head) }
+    if head.is_empty() { Err(Fault::empty().into()) } else { Ok(head) }
 }
 
 /// Name of the archive entry with a Skybrush show.
@@ -70,12 +54,18 @@ pub(super) const BAG_INDEX: &str = "metadata.yaml";
 /// Largest accepted index of a bag \[bytes\]: ten times the size for a thousand topics.
 pub(super) const BAG_INDEX_LIMIT_BYTES: u64 = 4 * 1024 * 1024;
 
+/// Returns the index of a ROS 2 bag, up to the first byte above the limit.
+pub(super) fn bag_index(folder: &Path) -> io::Result<Vec<u8>> {
+    let mut bytes = Vec::new();
+    File::open(folder.join(BAG_INDEX))?.take(BAG_INDEX_LIMIT_BYTES + 1).read_to_end(&mut bytes)?;
+    Ok(bytes)
+}
+
 /// Returns whether a folder is a ROS 2 bag.
 pub(super) fn is_bag(folder: &Path) -> bool {
-    let index = folder.join(BAG_INDEX);
-    let mut bytes = Vec::new();
-    let read = |file: File| file.take(BAG_INDEX_LIMIT_BYTES + 1).read_to_end(&mut bytes);
-    index.is_file()
-        && File::open(index).and_then(read).is_ok_and(|length| length as u64 <= BAG_INDEX_LIMIT_BYTES)
-        && memchr::memmem::find(&bytes, b"rosbag2_bagfile_information").is_some()
+    let is_index = |bytes: Vec<u8>| {
+        bytes.len() as u64 <= BAG_INDEX_LIMIT_BYTES
+            && memchr::memmem::find(&bytes, b"rosbag2_bagfile_information").is_some()
+    };
+    folder.join(BAG_INDEX).is_file() && bag_index(folder).is_ok_and(is_index)
 }
