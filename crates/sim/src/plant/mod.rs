@@ -94,8 +94,8 @@ pub trait Plant: DynClone + Send {
         Duration::ZERO
     }
 
-    /// Stops the measurement of [`Plant::airframe_time`].
-    fn stop_measuring_time(&mut self) {}
+    /// Sets whether [`Plant::airframe_time`] is measured, at first not.
+    fn measure_time(&mut self, _is_on: bool) {}
 
     /// Returns the recorded channels of the plant, such as attitude, with names and columns but no values.
     fn channels(&self) -> Vec<Channel> {
