@@ -160,7 +160,7 @@ pub struct HullContact {
 /// Treatment of free steps: steps that need no engine, because no contact is possible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FreeSteps {
-    /// The engine makes none of them.
+    /// The engine makes none of them. Pairs may be within delta; their contacts follow from their distances.
     Trusted,
     /// The engine repeats each [`COMPARED_EACH`]th of them from the same state. A result that differs in a bit, or a
     /// contact, is [`PlantError::EngineDiffers`].

@@ -99,8 +99,8 @@ pub enum Ending {
 
 /// Wall-clock time by kind of work. Concurrent work counts in each kind.
 ///
-/// A flight of at most 64 vehicles measures each 16th step, beginning with the second. The times of law, energy, physics
-/// and audit are then those of the measured steps, scaled to all steps.
+/// A flight of at most 64 vehicles measures each 16th step, beginning with the second. The times of law, energy,
+/// physics and audit are then those of the measured steps, scaled to all steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Performance {
     /// From the first to the last step.
@@ -120,7 +120,8 @@ pub struct Performance {
 }
 
 impl Performance {
-    /// Largest number of vehicles whose steps are sampled. Reading the clock takes a tenth of the step of a small swarm.
+    /// Largest number of vehicles whose steps are sampled. Reading the clock takes a tenth of the step of a small
+    /// swarm.
     const MOST_SAMPLED: usize = 64;
     /// Number of steps from one measured step to the next.
     const SAMPLED_EACH: u64 = 16;

@@ -21,7 +21,7 @@ const LOAD_OF_A_THREAD: u64 = 1000;
 const LOAD_OF_A_START: u64 = 100;
 /// Expected memory of a world besides its vehicles and edges \[bytes\].
 const BYTES_PER_WORLD: u128 = 65_536;
-/// Expected memory of a vehicle in the engine that a world keeps for the next contact \[bytes\].
+/// Expected memory of a vehicle in the engine, which a world has while hulls are within reach \[bytes\].
 const BYTES_PER_KEPT_VEHICLE: u128 = 1024;
 /// Number of seeds that are tried for a valid start.
 const MOST_SEEDS: u64 = 1000;
@@ -425,8 +425,8 @@ impl VectorSimulation {
         self.reset_while(chosen, seeds, states, &mut || true)
     }
 
-    /// Resets worlds like [`VectorSimulation::reset`], and calls `carries_on` every few hundredths of a second. Stops if
-    /// it returns false.
+    /// Resets worlds like [`VectorSimulation::reset`], and calls `carries_on` every few hundredths of a second. Stops
+    /// if it returns false.
     ///
     /// # Errors
     /// As [`VectorSimulation::reset`], and [`VectorError::Interrupted`]. No world is reset then.
@@ -527,8 +527,8 @@ impl World {
 }
 
 impl Starts {
-    /// Returns the found seed of each search, with the simulation at its start. Calls `carries_on` on the calling thread
-    /// every [`SEARCH_AT_ONCE`].
+    /// Returns the found seed of each search, with the simulation at its start. Calls `carries_on` on the calling
+    /// thread every [`SEARCH_AT_ONCE`].
     ///
     /// # Errors
     /// [`VectorError::Interrupted`] if `carries_on` returns false.

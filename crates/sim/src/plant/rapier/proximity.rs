@@ -1,8 +1,8 @@
 //! Decides which steps are free of the engine, where a caller allows that: vector simulations, studies, `--free-steps`.
 //!
-//! Bodies of the engine act on each other only through contacts of hulls. The engine solves such contacts only for pairs
-//! within a reach: two hulls within the contact prediction. While every pair is farther apart at the beginning of a
-//! step, the engine moves each body by its own velocity alone. The plants then do the same operations without the
+//! Bodies of the engine act on each other only through contacts of hulls. The engine solves such contacts only for
+//! pairs within a reach: two hulls within the contact prediction. While every pair is farther apart at the beginning of
+//! a step, the engine moves each body by its own velocity alone. The plants then do the same operations without the
 //! engine's step (a *free* step). The bits are the same: the tests of this module fly with and without free steps.
 //!
 //! The engine also reports overlaps of keep-out balls, which change no motion. Where its free steps are compared, every
