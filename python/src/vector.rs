@@ -152,6 +152,7 @@ impl VectorSimulation {
         let seeds: Vec<_> = seeds.into_iter().map(choice).collect();
         let workers = Workers::of(threads);
         let now = workers.now()?;
+        let mut signals = Signals::new();
         let begin = || -> Result<_, PyErr> {
             let parsed = request.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>();
             let template = parsed.and_then(|parsed| Template::read(&request.source, &parsed));
@@ -162,11 +163,13 @@ impl VectorSimulation {
                     request.argument
                 )));
             }
-            let mut worlds = sim::VectorSimulation::with_seeds(template, &seeds, now).map_err(raised)?;
+            let made = sim::VectorSimulation::with_seeds_while(template, &seeds, now, &mut || signals.are_silent());
+            let mut worlds = made.map_err(raised)?;
             worlds.set_autoreset(autoreset);
             Ok(worlds)
         };
-        let worlds = run_detached(py, begin)??;
+        let worlds = run_detached(py, begin)?;
+        let worlds = signals.raised.map_or(worlds, Err)?;
         let shape = [worlds.count(), worlds.vehicles()];
         let [count, vehicles] = shape;
         let made = Self {
@@ -197,8 +200,7 @@ impl VectorSimulation {
             (flown, signals.raised)
         };
         let (flown, raised_by_signal) = self.with(py, fly)?;
-        flown.map_err(raised)?;
-        raised_by_signal.map_or(Ok(()), Err)
+        raised_by_signal.map_or_else(|| flown.map_err(raised), Err)
     }
 
     /// Resets the chosen worlds, to these seeds if given, else to the next seed of each. With `first`, world e takes
@@ -215,7 +217,13 @@ impl VectorSimulation {
         let given = |k: usize| seeds.as_ref().and_then(|seeds| seeds.get(k).copied().flatten());
         let choices: Vec<_> =
             (0..chosen.len()).map(|k| given(k).map_or_else(|| next(k), SeedChoice::Exactly)).collect();
-        self.with(py, |worlds, states| worlds.reset(&chosen, Some(&choices), states))?.map_err(raised)
+        let reset = |worlds: &mut sim::VectorSimulation, states: &mut StatesMut<'_>| {
+            let mut signals = Signals::new();
+            let reset = worlds.reset_while(&chosen, Some(&choices), states, &mut || signals.are_silent());
+            (reset, signals.raised)
+        };
+        let (reset, raised_by_signal) = self.with(py, reset)?;
+        raised_by_signal.map_or_else(|| reset.map_err(raised), Err)
     }
 
     /// (E, N, 3) positions [m].

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import signal
 import subprocess
 import sys
 import tempfile
@@ -36,6 +37,42 @@ def printed_json(words: list[str]) -> dict:
     """Returns what the command line prints as JSON."""
     ran = subprocess.run([sys.executable, "-m", "tautline", *words], capture_output=True, check=False)
     return json.loads(ran.stdout)
+
+
+# Calls `do` and reports on standard output: `busy` once it has taken processor time, then how it ended.
+_INTERRUPTIBLE = """
+import signal, threading, time
+import numpy as np
+import tautline as tl
+signal.signal(signal.SIGINT, signal.default_int_handler)
+def interruptible(do):
+    def watch():
+        begin_s = time.process_time()
+        while time.process_time() - begin_s < 0.3:
+            time.sleep(0.005)
+        print("busy", flush=True)
+    threading.Thread(target=watch, daemon=True).start()
+    try:
+        do()
+        print("finished")
+    except KeyboardInterrupt:
+        print("interrupted")
+"""
+
+
+def interrupted(code: str, within_s: float = 60.0) -> list[str]:
+    """Runs code in a child process, sends SIGINT once its call of ``interruptible`` is busy, and returns the lines that
+    it prints from then on. Raises ``TimeoutExpired`` unless the child ends within a time after the signal [s]."""
+    command = [sys.executable, "-c", _INTERRUPTIBLE + code]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
+        try:
+            first = child.stdout.readline() if child.stdout else ""
+            child.send_signal(signal.SIGINT)
+            rest, _ = child.communicate(timeout=within_s)
+        except BaseException:
+            child.kill()
+            raise
+    return [first.strip(), *rest.split("\n")[:-1]][1:] if first == "busy\n" else [first.strip(), *rest.split("\n")]
 
 
 class Case(unittest.TestCase):

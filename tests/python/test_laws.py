@@ -1,6 +1,7 @@
 """Tests of laws in Python in studies: the same flights as alone, one thread, whole exceptions, honest certificates."""
 
 import json
+import os
 import subprocess
 import sys
 import threading
@@ -8,7 +9,7 @@ import traceback
 import unittest
 
 import tautline as tl
-from shared import Case, Springs, printed_json, short
+from shared import Case, Springs, interrupted, printed_json, short
 
 SPEC = """\
 scenario = "pentagon"
@@ -216,6 +217,15 @@ except KeyboardInterrupt:
 """
         ran = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=60)
         self.assertEqual((ran.stdout, ran.returncode), ("interrupted\n", 0), ran.stderr)
+
+
+    @unittest.skipUnless(os.name == "posix", "only systems with signals")
+    def test_ctrl_c_ends_a_validation_without_files(self) -> None:
+        # The whole validation takes minutes.
+        out = self.folder / "validation"
+        code = f"interruptible(lambda: tl.validate({str(out)!r}))"
+        self.assertEqual(interrupted(code), ["interrupted"])
+        self.assertFalse((out / "validate.json").exists())
 
 
 class Campaigns(Case):

@@ -11,7 +11,7 @@ from copy import deepcopy
 
 import numpy as np
 import tautline as tl
-from shared import Case
+from shared import Case, interrupted
 
 JITTER = {"start.jitter_m": 0.1, "time.duration_s": 3.0}
 
@@ -316,6 +316,37 @@ class Threads(Case):
         self.assertGreater(sim.steps.max(), 0, "the worlds were stepped before the signal")
         self.assertEqual(len(set(sim.steps.tolist())), 1)
         sim.step(np.zeros((50, 5, 3)))
+
+    @unittest.skipUnless(os.name == "posix", "only systems with signals")
+    def test_ctrl_c_ends_the_construction_of_worlds(self) -> None:
+        code = """
+sets = {"swarm.count": 1000, "start": {"shape": "grid", "spacing_m": 4, "jitter_m": 0.3}, "formation":
+        {"shape": "grid", "spacing_m": 4}}
+scenario = tl.Scenario(SOURCE, set=sets)
+begin_s = time.process_time()
+tl.VectorSimulation(scenario, 20, threads=THREADS)
+few_s = time.process_time() - begin_s
+interruptible(lambda: tl.VectorSimulation(scenario, 600, threads=THREADS))
+print(time.process_time() - begin_s - few_s < 15 * few_s)
+"""
+        source = self.folder / "grid.toml"
+        source.write_text("[law]\nkind = 'displacement'\ndelta_m = 2\n[time]\nduration_s = 10\n")
+        for threads in (1, 2):
+            ran = code.replace("SOURCE", repr(str(source))).replace("THREADS", str(threads))
+            self.assertEqual(interrupted(ran), ["interrupted", "True"])
+
+    @unittest.skipUnless(os.name == "posix", "only systems with signals")
+    def test_ctrl_c_ends_a_reset_before_any_world_is_reset(self) -> None:
+        code = """
+worlds = tl.VectorSimulation("pentagon", 10_000, set={"start.jitter_m": 0.1})
+before = worlds.seeds
+interruptible(worlds.reset)
+print((worlds.seeds == before).all())
+worlds.reset(np.arange(10_000) < 5)
+print(worlds.seeds[:6].tolist())
+"""
+        after = [10_000, 10_001, 10_002, 10_003, 10_004, 5]
+        self.assertEqual(interrupted(code), ["interrupted", "True", str(after)])
 
     @unittest.skipUnless(hasattr(os, "fork"), "only systems with fork")
     def test_a_fork_steps_with_threads_of_its_own(self) -> None:

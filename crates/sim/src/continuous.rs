@@ -93,6 +93,12 @@ pub enum IdealError {
         /// Last time that was reached \[s\].
         time_s: f64,
     },
+    /// The caller ended the solution.
+    #[error("the solution was interrupted at {time_s} s")]
+    Interrupted {
+        /// Last time that was reached \[s\].
+        time_s: f64,
+    },
     /// The output times do not increase from 0, or are not finite.
     #[error("time {} is out of order: times ascend from 0 and are finite", entry + 1)]
     Times {
@@ -130,6 +136,20 @@ pub fn solve(
     times_s: &[f64],
     tolerances: Tolerances,
 ) -> Result<Solution, IdealError> {
+    solve_while(scenario, law, times_s, tolerances, &|| true)
+}
+
+/// Solves like [`solve`], and calls `carries_on` after every solver step. Stops if it returns false.
+///
+/// # Errors
+/// As [`solve`], and [`IdealError::Interrupted`].
+pub fn solve_while(
+    scenario: &Scenario,
+    law: &mut dyn Law,
+    times_s: &[f64],
+    tolerances: Tolerances,
+    carries_on: &dyn Fn() -> bool,
+) -> Result<Solution, IdealError> {
     let in_order = |&entry: &usize| {
         let before_s = if entry == 0 { 0.0 } else { times_s[entry - 1] };
         times_s[entry].is_finite() && times_s[entry] >= before_s
@@ -152,7 +172,12 @@ pub fn solve(
     }
     let mut states = Vec::with_capacity(times_s.len());
     for &time_s in times_s {
-        solver.advance(time_s, &mut |solver| solver.search_last_step(&mut closest))?;
+        solver.advance(time_s, &mut |solver| {
+            if !carries_on() {
+                return Err(IdealError::Interrupted { time_s: solver.method.t() });
+            }
+            solver.search_last_step(&mut closest)
+        })?;
         states.push(solver.swarm());
     }
     Ok(Solution { states, closest })
@@ -259,7 +284,10 @@ impl From<IdealError> for PlantError {
     fn from(error: IdealError) -> Self {
         match error {
             IdealError::Law { source, .. } => Self::Law(source),
-            IdealError::Stalled { .. } | IdealError::Times { .. } | IdealError::Tolerances => Self::Stalled,
+            IdealError::Stalled { .. }
+            | IdealError::Interrupted { .. }
+            | IdealError::Times { .. }
+            | IdealError::Tolerances => Self::Stalled,
         }
     }
 }

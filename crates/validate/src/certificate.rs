@@ -56,7 +56,7 @@ type MakeLaw = fn(&Scenario) -> Result<Box<dyn Law>, ParameterError>;
 
 /// Flies a start under a law, against the certificate of the scenario's own law. A flight whose law or solver fails has
 /// the smallest separation NaN, which breaks the certificate.
-fn fly(start: &Scenario, make_law: MakeLaw) -> Result<Trial, MeasureError> {
+fn fly(start: &Scenario, make_law: MakeLaw, progress: &Progress<'_>) -> Result<Trial, MeasureError> {
     // The certificate does not depend on a22; the motion of the centre of mass does.
     let scenario = Scenario { a22_per_s: 0.1, ..start.clone() };
     let certificate = scenario.law()?.certificate(&scenario.observation(&scenario.start), &[]);
@@ -64,8 +64,10 @@ fn fly(start: &Scenario, make_law: MakeLaw) -> Result<Trial, MeasureError> {
     let energy_initial = certificate.energy_initial.unwrap_or(f64::NAN);
     let mut law = make_law(&scenario)?;
     let times_s = times(DURATION_S, SAMPLE_HZ);
-    let (continuous_m, energy_rise) = match continuous::solve(&scenario, law.as_mut(), &times_s, Tolerances::default())
-    {
+    let carries_on = || !progress.is_interrupted();
+    let tolerances = Tolerances::default();
+    let solved = continuous::solve_while(&scenario, law.as_mut(), &times_s, tolerances, &carries_on);
+    let (continuous_m, energy_rise) = match solved {
         Ok(solution) => {
             let energy = |state: &Swarm| law.energy(&scenario.observation(state)).unwrap_or(f64::NAN);
             let energies: Vec<f64> = solution.states.iter().map(energy).collect();
@@ -78,7 +80,7 @@ fn fly(start: &Scenario, make_law: MakeLaw) -> Result<Trial, MeasureError> {
 
     let dt_s = resolving_step_s(&scenario, certified_m)?;
     let (mut lowest, mut engine_energy_rise, mut engine_energy_excess) = (energy_initial, 0.0, 0.0);
-    let flight = engine_to_any_end(&with_step(&scenario, dt_s), law, |sample| {
+    let flight = engine_to_any_end(&with_step(&scenario, dt_s), law, progress, |sample| {
         let energy = sample.energy.unwrap_or(f64::NAN);
         engine_energy_rise = larger(engine_energy_rise, (energy - lowest) / energy_initial);
         engine_energy_excess = larger(engine_energy_excess, (energy - energy_initial) / energy_initial);
@@ -89,25 +91,26 @@ fn fly(start: &Scenario, make_law: MakeLaw) -> Result<Trial, MeasureError> {
 }
 
 pub(super) fn judge(progress: &Progress<'_>) -> ClaimsResult {
-    let trials = try_each(&random_starts(SEED, STARTS, DURATION_S)?, progress, |start| fly(start, Scenario::law))?;
-    let tight = tight()?;
-    progress(1);
+    let trials =
+        try_each(&random_starts(SEED, STARTS, DURATION_S)?, progress, |start| fly(start, Scenario::law, progress))?;
+    let tight = tight(progress)?;
+    progress.advance(1);
     let [energy, in_engine, certificate, certificate_in_engine] = claims(&trials)?;
     Ok(vec![energy, in_engine, certificate, tight, certificate_in_engine])
 }
 
 /// Returns the smallest clearance divided by the certified one, for two vehicles head on from 2 delta with these speeds
 /// \[m/s\].
-fn head_on(speed_m_s: f64) -> Result<f64, MeasureError> {
+fn head_on(speed_m_s: f64, progress: &Progress<'_>) -> Result<f64, MeasureError> {
     let mut swarm = Swarm::at_rest(Formation::line(2, 2.0 * DELTA_M).slots_m);
     (swarm.velocities_m_s[(0, 0)], swarm.velocities_m_s[(1, 0)]) = (speed_m_s, -speed_m_s);
     let scenario = Scenario::new("head-on", swarm, Formation::line(2, 2.0 * DELTA_M), DELTA_M, 1.0);
-    let closest = continuous(&scenario, &[scenario.time.duration_s], Tolerances::default())?.closest;
+    let closest = continuous(&scenario, &[scenario.time.duration_s], Tolerances::default(), progress)?.closest;
     Ok((separation_m(closest) - DELTA_M) / (certified_m(&scenario)? - DELTA_M))
 }
 
-fn tight() -> Result<Claim, MeasureError> {
-    let ratios = HEAD_ON_M_S.iter().map(|&speed_m_s| head_on(speed_m_s)).collect::<Result<Vec<_>, _>>()?;
+fn tight(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
+    let ratios = HEAD_ON_M_S.iter().map(|&speed_m_s| head_on(speed_m_s, progress)).collect::<Result<Vec<_>, _>>()?;
     let list = HEAD_ON_M_S.iter().zip(&ratios).map(|(speed_m_s, ratio)| format!("{ratio:.3} at {speed_m_s} m/s"));
     let last = ratios.last().copied().unwrap_or(f64::NAN);
     let claim = stated("certificate-is-tight")?;
@@ -195,6 +198,7 @@ mod tests {
     use rayon::prelude::*;
 
     use super::*;
+    use tautline_core::monitor::Silent;
     use tautline_core::swarm::Rows;
     use tautline_laws::law::LawError;
 
@@ -212,7 +216,7 @@ mod tests {
 
     fn fly_few() -> Vec<Trial> {
         let starts = random_starts(SEED, FEW, DURATION_S).expect("starts");
-        starts.par_iter().map(|start| fly(start, Scenario::law).expect("a flight")).collect()
+        starts.par_iter().map(|start| fly(start, Scenario::law, &Silent::default()).expect("a flight")).collect()
     }
 
     #[test]
@@ -244,7 +248,7 @@ mod tests {
         let trial = |dt_s: f64| {
             let law = scenario.law().expect("a law");
             let scenario = with_step(&scenario, dt_s);
-            let flight = engine_to_any_end(&scenario, law, |_| ()).expect("a flight");
+            let flight = engine_to_any_end(&scenario, law, &Silent::default(), |_| ()).expect("a flight");
             let engine_m = flight.audit.closest.expect("two vehicles").separation_m;
             Trial { certified_m, engine_m, dt_s, ..GOOD }
         };
@@ -294,7 +298,8 @@ mod tests {
     fn a_flipped_tension_fails_the_claims_about_energy_and_certificate() {
         let starts = random_starts(SEED, FEW, DURATION_S).expect("starts");
         let flipped: MakeLaw = |scenario| Ok(Box::new(Flipped(scenario.law()?, scenario.start.clone())));
-        let trials: Vec<Trial> = starts.par_iter().map(|start| fly(start, flipped).expect("a trial")).collect();
+        let trials: Vec<Trial> =
+            starts.par_iter().map(|start| fly(start, flipped, &Silent::default()).expect("a trial")).collect();
         for claim in claims(&trials).expect("claims") {
             assert!(!claim.pass, "{claim:?}");
         }

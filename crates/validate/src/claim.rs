@@ -4,6 +4,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize, Serializer};
 
 use super::convergence::Refinement;
+use tautline_core::monitor::Monitor;
 use tautline_report::figures::Figure;
 use tautline_report::report::Tool;
 
@@ -126,8 +127,8 @@ fn as_object<S: Serializer>(values: &[(&str, f64)], serializer: S) -> Result<S::
     serializer.collect_map(values.iter().copied())
 }
 
-/// Counts finished units of work, from any thread.
-pub(super) type Progress<'a> = dyn Fn(u64) + Sync + 'a;
+/// Receives finished units of work, from any thread, and ends the work at an interruption.
+pub(super) type Progress<'a> = dyn Monitor + 'a;
 
 /// Reason why claims could not be measured: a failed law, scenario or flight, which is a defect.
 pub(super) type MeasureError = Box<dyn std::error::Error + Send + Sync>;
@@ -135,19 +136,24 @@ pub(super) type MeasureError = Box<dyn std::error::Error + Send + Sync>;
 /// Measured claims, or the reason why they could not be measured.
 pub(super) type ClaimsResult = Result<Vec<Claim>, MeasureError>;
 
+/// Measurement of one claim.
+pub(super) type Measure = fn(&Progress<'_>) -> Result<Claim, MeasureError>;
+
 /// Returns the claim of a name from `claims.json`. It fails until it is measured.
 pub(super) fn stated(id: &str) -> Result<Claim, MeasureError> {
     let claims: Vec<Claim> = serde_json::from_str(include_str!("claims.json"))?;
     claims.into_iter().find(|claim| claim.id == id).ok_or_else(|| format!("unknown claim {id}").into())
 }
 
-/// Calls `attempt` for each trial in parallel, with a unit of work each, and returns the results in order.
+/// Calls `attempt` for each trial in parallel, with a unit of work each, and returns the results in order. An
+/// interruption is an error.
 pub(super) fn try_each<T: Sync, R: Send>(
     trials: &[T],
     progress: &Progress<'_>,
     attempt: impl Fn(&T) -> Result<R, MeasureError> + Sync,
 ) -> Result<Vec<R>, MeasureError> {
-    trials.par_iter().map(|trial| attempt(trial).inspect(|_| progress(1))).collect()
+    let try_one = |trial| if progress.is_interrupted() { Err("interrupted".into()) } else { attempt(trial) };
+    trials.par_iter().map(|trial| try_one(trial).inspect(|_| progress.advance(1))).collect()
 }
 
 /// Version of the keys of `validate.json`. It rises if a key is renamed, removed or changes its meaning.

@@ -47,13 +47,18 @@ fn largest_distance_m(a: &Swarm, b: &Swarm) -> f64 {
 }
 
 /// Flies with every step recorded and returns the errors against continuous states, without the order.
-fn fly(scenario: &Scenario, steps_hz: f64, reference: &[Swarm]) -> Result<Refinement, MeasureError> {
+fn fly(
+    scenario: &Scenario,
+    steps_hz: f64,
+    reference: &[Swarm],
+    progress: &Progress<'_>,
+) -> Result<Refinement, MeasureError> {
     let dt_s = 1.0 / steps_hz;
     let scenario = with_step(scenario, dt_s);
     let every = steps_hz / COMPARED_HZ;
     let mut flown = Refinement { dt_s, ..Refinement::default() };
     let (mut allowed, mut lowest, mut power) = (f64::NAN, f64::INFINITY, f64::NAN);
-    engine(&scenario, |sample| {
+    engine(&scenario, progress, |sample| {
         let entry = sample.step as f64 / every;
         if entry.fract() == 0.0 {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small count")]
@@ -80,10 +85,10 @@ fn order(coarse: f64, fine: f64) -> f64 {
 pub(super) fn measure(progress: &Progress<'_>) -> Result<Vec<Refinement>, MeasureError> {
     let mut scenario = builtin("pentagon")?;
     scenario.time.duration_s = DURATION_S;
-    let reference = continuous(&scenario, &times(DURATION_S, COMPARED_HZ), Tolerances::default())?.states;
+    let reference = continuous(&scenario, &times(DURATION_S, COMPARED_HZ), Tolerances::default(), progress)?.states;
     let mut refinements = STEPS_HZ
         .par_iter()
-        .map(|&steps_hz| fly(&scenario, steps_hz, &reference).inspect(|_| progress(1)))
+        .map(|&steps_hz| fly(&scenario, steps_hz, &reference, progress).inspect(|_| progress.advance(1)))
         .collect::<Result<Vec<_>, MeasureError>>()?;
     for fine in 1..refinements.len() {
         refinements[fine].order = Some(order(refinements[fine - 1].error_m, refinements[fine].error_m));
@@ -166,7 +171,7 @@ fn free_decay_error() -> Result<f64, MeasureError> {
 /// Returns the claim about free motion.
 pub(super) fn free_decay(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
     let largest = free_decay_error()?;
-    progress(1);
+    progress.advance(1);
     let claim = stated("free-decay")?;
     let words = format!(
         "relative error {} after {FREE_STEPS} steps of mixed lengths, a22 = {FREE_A22_PER_S:?} 1/s",

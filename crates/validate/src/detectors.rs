@@ -40,11 +40,11 @@ fn fly(name: &str, progress: &Progress<'_>) -> Result<BuiltinFlight, MeasureErro
         .with_freedom(freedom)
         .with_reference(scenario.reference.as_ref());
     let mut log = FlightLog::of(&scenario);
-    let flight = engine(&scenario, |sample| {
+    let flight = engine(&scenario, progress, |sample| {
         metrics.observe(sample);
         log.take(sample);
     })?;
-    progress(1);
+    progress.advance(1);
     let reached_at_s = metrics.finish().reached_at_s.unwrap_or(f64::NAN);
     Ok(BuiltinFlight { delta_m: scenario.delta_m, reached_at_s, flight, log })
 }

@@ -103,7 +103,7 @@ fn led(mut scenario: Scenario, leader: usize, motion: ReferenceMotion, feed_forw
     scenario
 }
 
-fn fly(reference: &Reference) -> Result<Deviation, MeasureError> {
+fn fly(reference: &Reference, progress: &Progress<'_>) -> Result<Deviation, MeasureError> {
     let mut scenario = scenario(reference.scenario, DisplacementKeys::default())?;
     if let Some(hub) = reference.hub {
         scenario.graph = star(scenario.count(), hub)?;
@@ -112,7 +112,7 @@ fn fly(reference: &Reference) -> Result<Deviation, MeasureError> {
         }
     }
     let times_s = times(DURATION_S, SAMPLE_HZ);
-    let solution = continuous(&scenario, &times_s, Tolerances::default())?;
+    let solution = continuous(&scenario, &times_s, Tolerances::default(), progress)?;
     let energy = scenario.law()?.energy(&scenario.observation(&scenario.start)).unwrap_or(f64::NAN);
     let complete = Graph::complete(scenario.count());
     let reached_s = reached_at_s(&times_s, &solution.states, scenario.formation(), &complete, REACHED_M);
@@ -146,7 +146,7 @@ fn flights(deviations: &[Deviation]) -> Result<[Claim; 2], MeasureError> {
 }
 
 /// Measures the largest distance error on a ring \[m\], with lambda2 and with N in the denominator of the gain.
-fn on_a_ring() -> Result<Claim, MeasureError> {
+fn on_a_ring(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
     let error_m = |share: f64| -> Result<f64, MeasureError> {
         let keys = DisplacementKeys { k_per_s2: share, zeta_per_s: share, alpha: 1.0 };
         let mut scenario = scenario("pentagon", keys)?;
@@ -161,7 +161,7 @@ fn on_a_ring() -> Result<Claim, MeasureError> {
         let flight = Scenario::new("ring", Swarm::at_rest(start.slots_m), slots, 1.0, DURATION_S);
         scenario =
             Scenario { law: scenario.law, plant: scenario.plant, a22_per_s, graph: Graph::ring(count), ..flight };
-        let last = super::flights::end(&scenario, Tolerances::default())?;
+        let last = super::flights::end(&scenario, Tolerances::default(), progress)?;
         Ok((0..count).map(|i| last.positions_m[(i, 2)].abs()).fold(0.0, larger))
     };
     let connectivity = Graph::ring(12).algebraic_connectivity();
@@ -198,17 +198,18 @@ impl Law for Flipped {
 
 /// Measures the largest energy of the pentagon flight divided by E(0), with the tension as it is and with its sign
 /// flipped.
-fn energies() -> Result<Claim, MeasureError> {
+fn energies(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
     let scenario = scenario("pentagon", DisplacementKeys::default())?;
     let times_s: Vec<f64> = times(3.0, SAMPLE_HZ);
     let mut watching = scenario.clone();
     watching.time.duration_s = 3.0;
+    let carries_on = || !progress.is_interrupted();
     let highest = |law: &mut dyn Law| -> f64 {
         let Ok(own) = scenario.law() else { return f64::NAN };
         let energy = |swarm: &Swarm| own.energy(&scenario.observation(swarm));
         let Some(initial) = energy(&scenario.start) else { return f64::NAN };
         // Two vehicles that attract each other fall below delta, where the energy is undefined.
-        match continuous::solve(&watching, law, &times_s, Tolerances::default()) {
+        match continuous::solve_while(&watching, law, &times_s, Tolerances::default(), &carries_on) {
             Ok(flown) => {
                 flown.states.iter().map(|state| energy(state).unwrap_or(f64::INFINITY) / initial).fold(0.0, larger)
             }
@@ -227,7 +228,7 @@ fn energies() -> Result<Claim, MeasureError> {
 }
 
 /// Measures the lag of the followers of an accelerating leader \[m\], with and without feed-forward.
-fn lags() -> Result<Claim, MeasureError> {
+fn lags(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
     const RADIUS_M: f64 = 1e4;
     const PERIOD_S: f64 = 2000.0;
     let lag_m = |fed: bool| -> Result<f64, MeasureError> {
@@ -241,7 +242,7 @@ fn lags() -> Result<Claim, MeasureError> {
             tautline_core::swarm::set_row(&mut on_slots.start.velocities_m_s, i, begins.velocity_m_s);
         }
         let scenario = led(on_slots, 0, circle, fed);
-        let last = super::flights::end(&scenario, Tolerances::default())?;
+        let last = super::flights::end(&scenario, Tolerances::default(), progress)?;
         let slots_m = &scenario.formation().slots_m;
         let offset_m = row(&last.positions_m, 0) - row(slots_m, 0);
         Ok((1..5).map(|i| (row(&last.positions_m, i) - row(slots_m, i) - offset_m).norm()).fold(0.0, larger))
@@ -260,11 +261,11 @@ fn lags() -> Result<Claim, MeasureError> {
 }
 
 pub(super) fn judge(progress: &Progress<'_>) -> ClaimsResult {
-    let deviations = try_each(&REFERENCES, progress, fly)?;
+    let deviations = try_each(&REFERENCES, progress, |reference| fly(reference, progress))?;
     let mut claims = flights(&deviations)?.to_vec();
     for claim in [on_a_ring, energies, lags] {
-        claims.push(claim()?);
-        progress(1);
+        claims.push(claim(progress)?);
+        progress.advance(1);
     }
     Ok(claims)
 }

@@ -53,10 +53,10 @@ impl Rest {
 }
 
 /// Flies to the pentagon with a22 = 0, on which relative motion does not depend.
-fn rest(start: Rows, tolerances: Tolerances) -> Result<Rest, MeasureError> {
+fn rest(start: Rows, tolerances: Tolerances, progress: &Progress<'_>) -> Result<Rest, MeasureError> {
     let formation = Formation::pentagon(SIDE_M);
     let scenario = Scenario::new("rest", Swarm::at_rest(start), formation, DELTA_M, ORDERING_S);
-    let last = end(&scenario, tolerances)?;
+    let last = end(&scenario, tolerances, progress)?;
     let mut control = Rows::zeros(scenario.count());
     scenario.law()?.command(&scenario.observation(&last), &mut control)?;
     Ok(Rest {
@@ -93,7 +93,7 @@ fn pentagon_orderings(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
     let places: Vec<usize> = (0..orderings.len()).collect();
     let rests = try_each(&places, progress, |&place| {
         let start = line(orderings[place], place as u64);
-        Ok((rest(start.clone(), Tolerances::default())?, rest(start, COARSE)?))
+        Ok((rest(start.clone(), Tolerances::default(), progress)?, rest(start, COARSE, progress)?))
     })?;
     let reached = rests.iter().filter(|(rest, _)| rest.reached()).count();
     let elsewhere: Vec<&Rest> = rests.iter().map(|(rest, _)| rest).filter(|rest| !rest.reached()).collect();
@@ -133,7 +133,7 @@ fn polygon(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
         let (space, extent_m, spacing_m) = (Space::Plane, POLYGON_HALF_EXTENT_M, POLYGON_SPACING_M);
         let start = scatter(POLYGON_COUNT, space, extent_m, spacing_m, &mut random)?;
         let scenario = Scenario::new("polygon", Swarm::at_rest(start), formation.clone(), POLYGON_DELTA_M, 1.0);
-        let states = continuous(&scenario, &POLYGON_TIMES_S, COARSE)?.states;
+        let states = continuous(&scenario, &POLYGON_TIMES_S, COARSE, progress)?.states;
         let error_m = |state: &Swarm| largest_edge_error_m(&state.positions_m, &formation, &scenario.graph);
         Ok(states.iter().map(|state| error_m(state) < REACHED_M).collect::<Vec<_>>())
     };

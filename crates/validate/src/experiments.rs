@@ -4,6 +4,7 @@ use nalgebra::Vector3;
 
 use super::claim::{Claim, ClaimsResult, MeasureError, Progress, stated, try_each};
 use super::flights::{builtin, certified_m, continuous, end, larger, reached_at_s, times};
+use tautline_core::monitor::Quiet;
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_core::text::bound;
 use tautline_laws::formation::{best_rigid_motion, largest_edge_error_m, procrustes_rms_m};
@@ -51,9 +52,9 @@ struct Experiment {
 }
 
 impl Experiment {
-    fn fly(scenario: Scenario) -> Result<Self, MeasureError> {
+    fn fly(scenario: Scenario, progress: &Progress<'_>) -> Result<Self, MeasureError> {
         let times_s = times(DURATION_S, RATE_HZ);
-        let solution = continuous(&scenario, &times_s, Tolerances::default())?;
+        let solution = continuous(&scenario, &times_s, Tolerances::default(), progress)?;
         Ok(Self { scenario, times_s, solution })
     }
 
@@ -96,19 +97,19 @@ impl Experiment {
 }
 
 pub(super) fn judge(progress: &Progress<'_>) -> ClaimsResult {
-    let parts: [fn() -> ClaimsResult; 6] = [
+    let parts: [fn(&Progress<'_>) -> ClaimsResult; 6] = [
         pentagon,
         circle,
-        || Ok(vec![baseline()?]),
-        || Ok(vec![straight_line()?]),
-        || Ok(vec![up_to_rigid_motion()?]),
-        || Ok(vec![relative_motion()?]),
+        |progress| Ok(vec![baseline(progress)?]),
+        |progress| Ok(vec![straight_line(progress)?]),
+        |progress| Ok(vec![up_to_rigid_motion(progress)?]),
+        |progress| Ok(vec![relative_motion(progress)?]),
     ];
-    Ok(try_each(&parts, progress, |part| part())?.concat())
+    Ok(try_each(&parts, progress, |part| part(progress))?.concat())
 }
 
-fn pentagon() -> ClaimsResult {
-    let flight = Experiment::fly(builtin("pentagon")?)?;
+fn pentagon(progress: &Progress<'_>) -> ClaimsResult {
+    let flight = Experiment::fly(builtin("pentagon")?, progress)?;
     let mut law = flight.scenario.law()?;
     let mut control = Rows::zeros(flight.scenario.count());
     law.command(&flight.scenario.observation(&flight.scenario.start), &mut control)?;
@@ -129,15 +130,15 @@ fn pentagon() -> ClaimsResult {
     Ok(vec![flight.formed("figure-2")?, against_reference(stated("figure-2-reference")?, &measured)])
 }
 
-fn circle() -> ClaimsResult {
-    let flight = Experiment::fly(builtin("circle")?)?;
+fn circle(progress: &Progress<'_>) -> ClaimsResult {
+    let flight = Experiment::fly(builtin("circle")?, progress)?;
     let (min_m, min_at_s) = flight.closest();
     let measured = [flight.energy_initial()?, certified_m(&flight.scenario)?, min_m, min_at_s, flight.reached_at_s()];
     Ok(vec![flight.formed("figure-3")?, against_reference(stated("figure-3-reference")?, &measured)])
 }
 
-fn baseline() -> Result<Claim, MeasureError> {
-    let flight = Experiment::fly(builtin("pentagon-laplacian")?)?;
+fn baseline(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
+    let flight = Experiment::fly(builtin("pentagon-laplacian")?, progress)?;
     let (min_m, min_at_s) = flight.closest();
     let (delta_m, error_m) = (flight.scenario.delta_m, flight.last_edge_error_m());
     let words = format!(
@@ -151,8 +152,8 @@ fn baseline() -> Result<Claim, MeasureError> {
     Ok(stated("figure-4")?.measured(words, values).pass(pass))
 }
 
-fn straight_line() -> Result<Claim, MeasureError> {
-    let flight = Experiment::fly(builtin("pentagon-collinear")?)?;
+fn straight_line(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
+    let flight = Experiment::fly(builtin("pentagon-collinear")?, progress)?;
     let (min_m, _) = flight.closest();
     let error_m = flight.last_edge_error_m();
     let states = &flight.solution.states;
@@ -167,8 +168,8 @@ fn straight_line() -> Result<Claim, MeasureError> {
 }
 
 /// Finding F6: a rotated and mirrored start gives a rotated and mirrored flight.
-fn up_to_rigid_motion() -> Result<Claim, MeasureError> {
-    let straight = Experiment::fly(builtin("pentagon")?)?;
+fn up_to_rigid_motion(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
+    let straight = Experiment::fly(builtin("pentagon")?, progress)?;
     let (sin, cos) = libm::sincos(TURN_RAD);
     let mut scenario = straight.scenario.clone();
     for i in 0..scenario.count() {
@@ -176,7 +177,7 @@ fn up_to_rigid_motion() -> Result<Claim, MeasureError> {
         let turned = Vector3::new(cos * start.x + sin * start.y, sin * start.x - cos * start.y, 0.0);
         set_row(&mut scenario.start.positions_m, i, turned);
     }
-    let turned = Experiment::fly(scenario)?;
+    let turned = Experiment::fly(scenario, progress)?;
     let formation = &turned.scenario.formation();
     let positions_m = turned.last_positions_m();
     let fits_m = [straight.last_positions_m(), positions_m].map(|end_m| procrustes_rms_m(end_m, formation));
@@ -200,11 +201,11 @@ fn up_to_rigid_motion() -> Result<Claim, MeasureError> {
 }
 
 /// Relative motion on the complete graph does not depend on a22.
-fn relative_motion() -> Result<Claim, MeasureError> {
-    let ends = try_each(&A22_PER_S, &|_| (), |&a22_per_s| {
+fn relative_motion(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
+    let ends = try_each(&A22_PER_S, &Quiet::new(progress), |&a22_per_s| {
         let mut scenario = Scenario { a22_per_s, ..builtin("pentagon")? };
         scenario.time.duration_s = COMPARED_S;
-        end(&scenario, Tolerances::default())
+        end(&scenario, Tolerances::default(), progress)
     })?;
     let offset = |swarm: &Swarm, i| row(&swarm.positions_m, i) - row(&swarm.positions_m, 0);
     let [first, others @ ..] = &ends[..] else { return Err("no flight to compare".into()) };

@@ -4,7 +4,7 @@ use std::ops::ControlFlow;
 
 use nalgebra::Vector3;
 
-use super::claim::MeasureError;
+use super::claim::{MeasureError, Progress};
 use tautline_core::record::{Event, RecordError, Sample, Sink};
 use tautline_core::swarm::{ClosestApproach, Swarm, mean_row, row, set_row};
 use tautline_laws::formation::{Formation, largest_edge_error_m};
@@ -29,14 +29,16 @@ pub(super) fn continuous(
     scenario: &Scenario,
     times_s: &[f64],
     tolerances: Tolerances,
+    progress: &Progress<'_>,
 ) -> Result<Solution, MeasureError> {
     let mut law = scenario.law()?;
-    Ok(continuous::solve(scenario, law.as_mut(), times_s, tolerances)?)
+    let carries_on = || !progress.is_interrupted();
+    Ok(continuous::solve_while(scenario, law.as_mut(), times_s, tolerances, &carries_on)?)
 }
 
 /// Returns the state in continuous time at the end of a scenario.
-pub(super) fn end(scenario: &Scenario, tolerances: Tolerances) -> Result<Swarm, MeasureError> {
-    let last = continuous(scenario, &[scenario.time.duration_s], tolerances)?.states.pop();
+pub(super) fn end(scenario: &Scenario, tolerances: Tolerances, progress: &Progress<'_>) -> Result<Swarm, MeasureError> {
+    let last = continuous(scenario, &[scenario.time.duration_s], tolerances, progress)?.states.pop();
     Ok(last.unwrap_or_else(|| scenario.start.clone()))
 }
 
@@ -68,8 +70,12 @@ pub(super) fn relative_speed_squared(swarm: &Swarm) -> f64 {
 }
 
 /// Flies a scenario in Rapier to its end; `observe` receives every recorded sample.
-pub(super) fn engine(scenario: &Scenario, observe: impl FnMut(&Sample<'_>)) -> Result<Flight, MeasureError> {
-    let flight = engine_to_any_end(scenario, scenario.law()?, observe)?;
+pub(super) fn engine(
+    scenario: &Scenario,
+    progress: &Progress<'_>,
+    observe: impl FnMut(&Sample<'_>),
+) -> Result<Flight, MeasureError> {
+    let flight = engine_to_any_end(scenario, scenario.law()?, progress, observe)?;
     match flight.ending {
         Ending::Completed => Ok(flight),
         ending => {
@@ -83,10 +89,16 @@ pub(super) fn engine(scenario: &Scenario, observe: impl FnMut(&Sample<'_>)) -> R
 pub(super) fn engine_to_any_end(
     scenario: &Scenario,
     law: Box<dyn Law>,
+    progress: &Progress<'_>,
     observe: impl FnMut(&Sample<'_>),
 ) -> Result<Flight, MeasureError> {
-    let go_on = &mut |_| ControlFlow::Continue(());
-    Ok(sim::fly(scenario, Components::with_law(scenario, law), &mut SampleSink(observe), go_on)?)
+    let parts = Components::with_law(scenario, law);
+    Ok(sim::fly(scenario, parts, &mut SampleSink(observe), &mut |_| go_on(progress))?)
+}
+
+/// Ends a flight at an interruption.
+pub(super) fn go_on(progress: &Progress<'_>) -> ControlFlow<()> {
+    if progress.is_interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
 }
 
 /// Returns the scenario in Rapier with another step \[s\], every step recorded, without refinement.
@@ -167,16 +179,17 @@ pub(super) fn random_starts(seed: u64, count: usize, duration_s: f64) -> Result<
 #[cfg(test)]
 mod tests {
     use super::*;
+    use tautline_core::monitor::Silent;
 
     #[test]
     fn a_flight_that_ends_early_is_an_error() {
         let mut scenario = builtin("pentagon").expect("a scenario");
         scenario.time.duration_s = 0.1;
-        assert!(engine(&scenario, |_| ()).is_ok());
+        assert!(engine(&scenario, &Silent::default(), |_| ()).is_ok());
         // Closer than delta within the first step, without refinement.
         scenario.time.max_halvings = 0;
         scenario.start.velocities_m_s[(0, 0)] = 600.0;
-        let error = engine(&scenario, |_| ()).expect_err("the law is undefined below delta");
+        let error = engine(&scenario, &Silent::default(), |_| ()).expect_err("the law is undefined below delta");
         assert!(error.to_string().starts_with("the flight of pentagon ended early, at "), "{error}");
         assert!(error.to_string().contains("LawUndefined("), "{error}");
     }

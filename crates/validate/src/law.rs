@@ -29,7 +29,7 @@ pub(super) fn judge(progress: &Progress<'_>) -> ClaimsResult {
         energy_rate_on_graphs(&states)?,
         literal_baseline()?,
     ];
-    progress(1);
+    progress.advance(1);
     Ok(claims)
 }
 

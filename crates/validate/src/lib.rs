@@ -34,7 +34,7 @@ use rayon::prelude::*;
 use claim::{ClaimsResult, MeasureError, Progress};
 use tautline_core::failure::{Failure, in_range};
 use tautline_core::files::write_atomically;
-use tautline_core::monitor::Monitor;
+use tautline_core::monitor::{Monitor, Silent};
 use tautline_core::option::THREADS;
 use tautline_report::figures::Format;
 use tautline_report::request::{OutFolder, figure_files, threads, write_files};
@@ -65,14 +65,15 @@ pub fn work() -> u64 {
 /// `displacement` or `margins`. Returns `None` for another name.
 #[must_use]
 pub fn judge(id: &str) -> Option<Group> {
-    PARTS.iter().find(|part| part.0 == id).map(|&(id, title, _, judge)| group(id, title, judge(&|_| ())))
+    PARTS.iter().find(|part| part.0 == id).map(|&(id, title, _, judge)| group(id, title, judge(&Silent::default())))
 }
 
-/// Measures every claim. `progress` receives the number of finished units of [`work`], from any thread.
+/// Measures every claim. `progress` receives the finished units of [`work`], from any thread. Its interruption ends all
+/// flights.
 ///
-/// If a flight fails, its group has a single claim, which fails.
+/// If a flight fails or is interrupted, its group has a single claim, which fails.
 #[must_use]
-pub fn validate(progress: &(dyn Fn(u64) + Sync)) -> Validation {
+pub fn validate(progress: &dyn Monitor) -> Validation {
     let began = Instant::now();
     let parts = || PARTS.par_iter().map(|&(id, title, _, judge)| group(id, title, judge(progress))).collect::<Vec<_>>();
     let engine = || -> Result<_, MeasureError> {
@@ -122,7 +123,7 @@ pub struct ValidateRequest {
 /// folder as finished and is written last.
 ///
 /// # Errors
-/// [`Failure`] if the folder holds a finished validation, or a file cannot be written.
+/// [`Failure`] if the folder holds a finished validation, the monitor interrupts the work, or a file cannot be written.
 pub fn validate_into(request: &ValidateRequest, monitor: &dyn Monitor) -> Result<Validation, Failure> {
     if let Some(number) = &request.threads {
         in_range(THREADS, number, &(1..=MOST_THREADS))?;
@@ -131,8 +132,11 @@ pub fn validate_into(request: &ValidateRequest, monitor: &dyn Monitor) -> Result
     let _lock = folder.open(request.force)?;
     let threads = threads(request.threads.unwrap_or(0))?;
     monitor.begin("validate", Some(work()));
-    let validation = threads.install(|| validate(&|units| monitor.advance(units)));
+    let validation = threads.install(|| validate(monitor));
     monitor.finish();
+    if monitor.is_interrupted() {
+        return Err(Failure::machine(Failure::INTERRUPTED, "interrupted: nothing was written"));
+    }
     let json = validation
         .to_json()
         .map_err(|error| Failure::machine("files/cannot-write", format!("cannot write the result: {error}")))?;

@@ -1,7 +1,7 @@
 //! Margins of delays and of held commands: growth of a disturbance of 1 mm against linear theory.
 
 use super::claim::{Claim, ClaimsResult, MeasureError, Progress, stated, try_each};
-use super::flights::{builtin, larger};
+use super::flights::{builtin, go_on, larger};
 use tautline_core::record::{Event, RecordError, Sample, Sink};
 use tautline_core::swarm::{Swarm, mean_row, row, set_row};
 use tautline_laws::graph::Graph;
@@ -122,11 +122,10 @@ impl Sink for DisturbanceSink<'_> {
 
 /// Returns the growth rate of the disturbance from the second quarter of a flight to the last \[1/s\]; infinite if the
 /// flight ended early.
-fn growth_per_s(scenario: &Scenario, counts_common: bool) -> Result<f64, MeasureError> {
+fn growth_per_s(scenario: &Scenario, counts_common: bool, progress: &Progress<'_>) -> Result<f64, MeasureError> {
     scenario.validate()?;
     let mut sink = DisturbanceSink { scenario, counts_common, sizes: Vec::new() };
-    let flight =
-        sim::fly(scenario, Components::of(scenario)?, &mut sink, &mut |_| std::ops::ControlFlow::Continue(()))?;
+    let flight = sim::fly(scenario, Components::of(scenario)?, &mut sink, &mut |_| go_on(progress))?;
     if flight.ending != Ending::Completed {
         return Ok(f64::INFINITY);
     }
@@ -140,14 +139,14 @@ fn growth_per_s(scenario: &Scenario, counts_common: bool) -> Result<f64, Measure
 
 /// Returns the measured and the predicted period between commands \[s\], by bisection within 4 % of the prediction. Two
 /// conditions of the prediction may coincide, so the growth rate is not linear there.
-fn period_s(graph: &str) -> Result<(f64, f64), MeasureError> {
+fn period_s(graph: &str, progress: &Progress<'_>) -> Result<(f64, f64), MeasureError> {
     const ASIDE: f64 = 0.04;
     let plain = disturbed(graph, NO_TENSION)?;
     let predicted_s = Kind::Held.predicted_s(&plain.law()?.linear(plain.formation()).ok_or("no modes")?);
     let grows = |share: f64| -> Result<bool, MeasureError> {
         let mut scenario = plain.clone();
         Kind::Held.set(&mut scenario, share * predicted_s);
-        Ok(growth_per_s(&scenario, false)? > 0.0)
+        Ok(growth_per_s(&scenario, false, progress)? > 0.0)
     };
     let (mut low, mut high) = (1.0 - ASIDE, 1.0 + ASIDE);
     if grows(low)? || !grows(high)? {
@@ -162,17 +161,17 @@ fn period_s(graph: &str) -> Result<(f64, f64), MeasureError> {
 
 /// Returns the measured and the predicted margin \[s\]. The measured margin is the zero of the line through the growth
 /// rates a little below and above the prediction.
-fn margin_s(kind: Kind, graph: &str) -> Result<(f64, f64), MeasureError> {
+fn margin_s(kind: Kind, graph: &str, progress: &Progress<'_>) -> Result<(f64, f64), MeasureError> {
     const ASIDE: f64 = 0.03;
     if kind == Kind::Held {
-        return period_s(graph);
+        return period_s(graph, progress);
     }
     let plain = disturbed(graph, NO_TENSION)?;
     let predicted_s = kind.predicted_s(&plain.law()?.linear(plain.formation()).ok_or("no modes")?);
     let rate = |share: f64| {
         let mut scenario = plain.clone();
         kind.set(&mut scenario, share * predicted_s);
-        growth_per_s(&scenario, kind == Kind::MessagesDelayed)
+        growth_per_s(&scenario, kind == Kind::MessagesDelayed, progress)
     };
     let (below, above) = (rate(1.0 - ASIDE)?, rate(1.0 + ASIDE)?);
     if !(below < 0.0 && above > 0.0) {
@@ -183,7 +182,7 @@ fn margin_s(kind: Kind, graph: &str) -> Result<(f64, f64), MeasureError> {
 }
 
 fn free(id: &str, kind: Kind, progress: &Progress<'_>) -> Result<Claim, MeasureError> {
-    let margins = try_each(&GRAPHS, progress, |graph| margin_s(kind, graph))?;
+    let margins = try_each(&GRAPHS, progress, |graph| margin_s(kind, graph, progress))?;
     let off = |&(measured_s, predicted_s): &(f64, f64)| (measured_s / predicted_s - 1.0).abs();
     let worst = margins.iter().map(off).fold(0.0, larger);
     let words: Vec<_> = GRAPHS
@@ -198,7 +197,7 @@ fn free(id: &str, kind: Kind, progress: &Progress<'_>) -> Result<Claim, MeasureE
 
 /// Returns the delay at which a disturbance of the pentagon in contact begins to grow, the contact formula and the
 /// formula without contact \[s\], by bisection between the two formulas.
-fn in_contact_s(near_is_late: bool) -> Result<[f64; 3], MeasureError> {
+fn in_contact_s(near_is_late: bool, progress: &Progress<'_>) -> Result<[f64; 3], MeasureError> {
     let mut plain = disturbed("complete", 1.0)?;
     plain.time.duration_s = PUSHED_S;
     let linear = plain.law()?.linear(plain.formation()).ok_or("no modes")?;
@@ -208,7 +207,7 @@ fn in_contact_s(near_is_late: bool) -> Result<[f64; 3], MeasureError> {
         let mut scenario = plain.clone();
         scenario.sensing.latency_s = latency_s;
         scenario.sensing.near_latency_s = (!near_is_late).then_some(0.0);
-        Ok(growth_per_s(&scenario, false)? > 0.0)
+        Ok(growth_per_s(&scenario, false, progress)? > 0.0)
     };
     if grows(contact_s)? || !grows(1.05 * free_s)? {
         return Ok([f64::NAN, contact_s, free_s]);
@@ -222,7 +221,7 @@ fn in_contact_s(near_is_late: bool) -> Result<[f64; 3], MeasureError> {
 }
 
 fn with_tension(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
-    let measured = try_each(&[true, false], progress, |&near_is_late| in_contact_s(near_is_late))?;
+    let measured = try_each(&[true, false], progress, |&near_is_late| in_contact_s(near_is_late, progress))?;
     let [[late_s, contact_s, free_s], [at_once_s, ..]] = measured[..] else { return Err("no margins".into()) };
     Ok(stated("margin-in-contact")?
         .measured(

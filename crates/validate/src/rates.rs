@@ -2,8 +2,9 @@
 
 use nalgebra::{DMatrix, Vector3};
 
-use super::claim::{Claim, ClaimsResult, MeasureError, Progress, stated, try_each};
+use super::claim::{Claim, ClaimsResult, Measure, MeasureError, Progress, stated, try_each};
 use super::flights::{continuous, end, engine, engine_to_any_end, larger, separation_m, with_step};
+use tautline_core::monitor::Quiet;
 use tautline_core::swarm::{Rows, Swarm, mean_row, set_row};
 use tautline_core::text::bound;
 use tautline_laws::formation::{Formation, largest_edge_error_m};
@@ -45,9 +46,8 @@ const STAR_S: f64 = 100.0;
 const FINE: Tolerances = Tolerances { relative: 1e-12, absolute: 1e-18 };
 
 pub(super) fn judge(progress: &Progress<'_>) -> ClaimsResult {
-    let parts: [fn() -> Result<Claim, MeasureError>; 5] =
-        [bent_hexagon, common_mode, common_mode_in_the_engine, lost_to_rounding, stars];
-    try_each(&parts, progress, |part| part())
+    let parts: [Measure; 5] = [bent_hexagon, common_mode, common_mode_in_the_engine, lost_to_rounding, stars];
+    try_each(&parts, progress, |part| part(progress))
 }
 
 fn hexagon() -> Formation {
@@ -71,9 +71,9 @@ fn bent() -> Scenario {
     Scenario::new("bent", start, hexagon(), DELTA_M, LOST_S)
 }
 
-fn bent_hexagon() -> Result<Claim, MeasureError> {
+fn bent_hexagon(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
     let scenario = bent();
-    let solution = continuous(&scenario, &BEND_TIMES_S, Tolerances::default())?;
+    let solution = continuous(&scenario, &BEND_TIMES_S, Tolerances::default(), progress)?;
     let bend_at = |k: usize| solution.states.get(k).map_or(f64::NAN, |state| bend_m(&state.positions_m));
     let (at_100_m, at_300_m, at_10000_m, at_30000_m) = (bend_at(0), bend_at(1), bend_at(2), bend_at(3));
     let exponent = (at_30000_m / at_10000_m).ln() / (BEND_TIMES_S[3] / BEND_TIMES_S[2]).ln();
@@ -108,16 +108,16 @@ fn common_rate(id: &str, last: &Swarm, duration_s: f64) -> Result<Claim, Measure
     Ok(claim.measured(words, [("rate_per_s", rate_per_s)]).pass(pass))
 }
 
-fn common_mode() -> Result<Claim, MeasureError> {
-    common_rate("common-mode", &end(&drifting(), Tolerances::default())?, COMMON_S)
+fn common_mode(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
+    common_rate("common-mode", &end(&drifting(), Tolerances::default(), progress)?, COMMON_S)
 }
 
-fn common_mode_in_the_engine() -> Result<Claim, MeasureError> {
-    let flight = engine(&with_step(&drifting(), ENGINE_STEP_S), |_| ())?;
+fn common_mode_in_the_engine(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
+    let flight = engine(&with_step(&drifting(), ENGINE_STEP_S), progress, |_| ())?;
     common_rate("common-mode-in-the-engine", &flight.last, flight.duration_s)
 }
 
-fn lost_to_rounding() -> Result<Claim, MeasureError> {
+fn lost_to_rounding(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
     let mut scenario = drifting();
     scenario.start.velocities_m_s.fill(0.0);
     scenario.time.duration_s = LOST_S;
@@ -126,7 +126,7 @@ fn lost_to_rounding() -> Result<Claim, MeasureError> {
     // The flight continues beyond the precision of positions, which is the effect to measure.
     scenario.arrival.edge_error_m = f64::INFINITY;
     let mut lost_at_s = f64::NAN;
-    let flight = engine_to_any_end(&scenario, scenario.law()?, |sample| {
+    let flight = engine_to_any_end(&scenario, scenario.law()?, progress, |sample| {
         let error_m = largest_edge_error_m(&sample.swarm.positions_m, scenario.formation(), &scenario.graph);
         let kept = error_m <= LOST_M;
         if lost_at_s.is_nan() && !kept {
@@ -153,7 +153,7 @@ fn lost_to_rounding() -> Result<Claim, MeasureError> {
 }
 
 /// Returns the growth rate of the relative velocities of a star in formation \[1/s\].
-fn star_rate_per_s(count: usize) -> Result<f64, MeasureError> {
+fn star_rate_per_s(count: usize, progress: &Progress<'_>) -> Result<f64, MeasureError> {
     let mut slots_m = Rows::zeros(count);
     let rim = Formation::circle(count - 1, STAR_RADIUS_M);
     slots_m.rows_mut(1, count - 1).copy_from(&rim.slots_m);
@@ -165,12 +165,12 @@ fn star_rate_per_s(count: usize) -> Result<f64, MeasureError> {
     scenario.space = Space::Volume;
     scenario.graph = Graph::star(count);
     scenario.a22_per_s = A22_PER_S;
-    Ok((end(&scenario, FINE)?.disagreement_m_s() / scenario.start.disagreement_m_s()).ln() / STAR_S)
+    Ok((end(&scenario, FINE, progress)?.disagreement_m_s() / scenario.start.disagreement_m_s()).ln() / STAR_S)
 }
 
-fn stars() -> Result<Claim, MeasureError> {
+fn stars(progress: &Progress<'_>) -> Result<Claim, MeasureError> {
     let expected = STARS.map(|count| A22_PER_S - (1.0 + A22_PER_S) / count as f64);
-    let rates = try_each(&STARS, &|_| (), |&count| star_rate_per_s(count))?;
+    let rates = try_each(&STARS, &Quiet::new(progress), |&count| star_rate_per_s(count, progress))?;
     let error_per_s = rates.iter().zip(expected).map(|(rate, expected)| (rate - expected).abs()).fold(0.0, larger);
     let claim = stated("star")?;
     let pass = error_per_s <= claim.limit();

@@ -18,7 +18,7 @@ const STEP: f64 = 1.0 / 1024.0;
 
 pub(super) fn judge(progress: &Progress<'_>) -> ClaimsResult {
     let claims = vec![minimum()?, figure_1()?, slope()?, curvature()?];
-    progress(1);
+    progress.advance(1);
     Ok(claims)
 }
 

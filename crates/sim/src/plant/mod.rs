@@ -94,8 +94,8 @@ pub trait Plant: DynClone + Send {
         Duration::ZERO
     }
 
-    /// Stops the measurement of [`Plant::airframe_time`].
-    fn stop_measuring_time(&mut self) {}
+    /// Sets whether [`Plant::airframe_time`] is measured, at first not.
+    fn measure_time(&mut self, _is_on: bool) {}
 
     /// Returns the recorded channels of the plant, such as attitude, with names and columns but no values.
     fn channels(&self) -> Vec<Channel> {
@@ -160,7 +160,7 @@ pub struct HullContact {
 /// Treatment of free steps: steps that need no engine, because no contact is possible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FreeSteps {
-    /// The engine makes none of them.
+    /// The engine makes none of them. Pairs may be within delta; their contacts follow from their distances.
     Trusted,
     /// The engine repeats each [`COMPARED_EACH`]th of them from the same state. A result that differs in a bit, or a
     /// contact, is [`PlantError::EngineDiffers`].

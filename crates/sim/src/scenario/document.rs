@@ -26,7 +26,7 @@ use tautline_laws::wind::WindSpec;
 
 /// Scenario: a swarm, its start, its formations and its control law. All numbers are in SI units, named at the end of
 /// the key. Vehicles and entries of lists are counted from 1.
-#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[schemars(title = "tautline scenario")]
 #[serde(deny_unknown_fields)]
 pub(super) struct Document {
@@ -121,7 +121,7 @@ impl Document {
 }
 
 /// Number and properties of the vehicles.
-#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct SwarmTable {
     /// Number of vehicles N. Required if neither the start nor the formation lists points; otherwise it must match
@@ -144,7 +144,7 @@ pub(super) struct SwarmTable {
 }
 
 /// Positions and velocities at the start: `positions_m`, or a `shape` with its keys.
-#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct StartTable {
     /// Position of each vehicle in m.
@@ -168,7 +168,7 @@ pub(super) struct StartTable {
 }
 
 /// A start without a list of positions.
-#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[schemars(tag = "shape")]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) enum StartShape {
@@ -208,7 +208,7 @@ pub(super) enum StartShape {
 }
 
 /// Slots of the first formation. Laws that control distances reach them up to rotation, reflection and translation.
-#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct FormationTable {
     #[serde(flatten)]
@@ -218,7 +218,7 @@ pub(super) struct FormationTable {
 }
 
 /// Later formation: a `shape`, or the slots of the previous formation with a new placement.
-#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LegTable {
     /// Time in s at which the leg begins, but not before the previous leg begins; or `"reached"`: once the previous
@@ -277,7 +277,7 @@ pub(super) enum Assignment {
 }
 
 /// Shape of a formation and its size.
-#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[schemars(tag = "shape")]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) enum FormationShape {
@@ -337,7 +337,7 @@ pub(super) enum FormationShape {
 }
 
 /// The control law and the safety distance.
-#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct LawTable {
     #[schemars(flatten)]
@@ -349,7 +349,7 @@ pub(super) struct LawTable {
 }
 
 /// Equations of motion that are solved.
-#[derive(Debug, Default, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct PlantTable {
     /// Plant that moves the vehicles.
@@ -357,7 +357,7 @@ pub(super) struct PlantTable {
 }
 
 /// Space around each vehicle that must stay empty.
-#[derive(Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Default, Deserialize, PartialEq, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SafetyTable {
     #[schemars(flatten)]

@@ -12,7 +12,7 @@ use tautline_laws::graph::{Graph, GraphError};
 const DEFAULT_DEGREE: u64 = 4;
 
 /// Pairs of vehicles that sense each other.
-#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct GraphTable {
     #[schemars(flatten)]
@@ -20,7 +20,7 @@ pub(super) struct GraphTable {
 }
 
 /// An undirected, connected graph.
-#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[schemars(tag = "kind")]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) enum GraphKind {

@@ -19,7 +19,7 @@ const PEAK_OVER_MEAN: f64 = 15.0 / 8.0;
 const JUMP: f64 = 10.0;
 
 /// Motion of the reference, which carries the formations, and the vehicles that know it.
-#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct ReferenceTable {
     /// Vehicles that know the reference: `"all"`, or a list of vehicles; all unless this or `leader` is given.
@@ -42,7 +42,7 @@ fn yes() -> bool {
 }
 
 /// Motion of the reference.
-#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[schemars(tag = "kind")]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub(super) enum ReferenceKind {

@@ -1,7 +1,6 @@
 //! Templates: a scenario file from which many flights are made, under other laws or from other starts.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -25,8 +24,9 @@ use tautline_laws::law::LawSpec;
 pub struct Template {
     name: String,
     toml: String,
-    folder: PathBuf,
     overrides: Vec<Override>,
+    /// Keys of the file, with the overrides.
+    document: Document,
     own: Scenario,
     start_is_random: bool,
     /// Assignment of vehicles to the slots of the first leg.
@@ -81,16 +81,16 @@ impl Template {
     /// As [`Scenario::read`].
     pub fn read(source: &Source, overrides: &[Override]) -> Result<Self, ScenarioError> {
         let (name, toml) = source.text()?;
-        let (own, start_is_random, assignment, laws) = Text { name: &name, toml: &toml, overrides }.read(|text| {
-            let document = decoded(text, source.folder())?;
-            let a22_per_s = document.velocity_coefficient_per_s();
-            let named = document.laws.iter();
-            let laws = named.map(|(name, other)| (name.clone(), other.kind.clone().complete(a22_per_s))).collect();
-            let (start_is_random, assignment) = (is_random(&document), document.formation.placement.assignment);
-            Ok((finish(document, text)?, start_is_random, assignment, laws))
-        })?;
-        let folder = source.folder().to_owned();
-        Ok(Self { own, start_is_random, assignment, laws, overrides: overrides.to_vec(), folder, name, toml })
+        let (document, own, start_is_random, assignment, laws) =
+            Text { name: &name, toml: &toml, overrides }.read(|text| {
+                let document = decoded(text, source.folder())?;
+                let a22_per_s = document.velocity_coefficient_per_s();
+                let named = document.laws.iter();
+                let laws = named.map(|(name, other)| (name.clone(), other.kind.clone().complete(a22_per_s))).collect();
+                let (start_is_random, assignment) = (is_random(&document), document.formation.placement.assignment);
+                Ok((document.clone(), finish(document, text)?, start_is_random, assignment, laws))
+            })?;
+        Ok(Self { document, own, start_is_random, assignment, laws, overrides: overrides.to_vec(), name, toml })
     }
 
     /// Returns the template with an external law, which all its scenarios fly.
@@ -184,7 +184,7 @@ impl Template {
     /// [`ScenarioError`] if that scenario is invalid, for example because two starts are within delta.
     pub fn scenario(&self, law: &NamedLaw, draw: Draw) -> Result<Scenario, ScenarioError> {
         let text = Text { name: &self.name, toml: &self.toml, overrides: &self.overrides };
-        let mut document = decoded(&text, &self.folder)?;
+        let mut document = self.document.clone();
         document.law.kind = law.law.clone();
         if let Some(enabled) = law.shield {
             document.shield = Some(ShieldSpec { enabled, ..document.shield.unwrap_or_default() });
@@ -207,7 +207,7 @@ fn is_random(document: &Document) -> bool {
 pub(super) type Laws = BTreeMap<String, OtherLaw>;
 
 /// Law of `[laws.NAME]`, which only `tautline compare` flies: the keys of its kind.
-#[derive(Debug, Deserialize, Serialize, JsonSchema)]
+#[derive(Clone, Debug, Deserialize, Serialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(super) struct OtherLaw {
     #[schemars(flatten)]

@@ -98,6 +98,9 @@ pub enum Ending {
 }
 
 /// Wall-clock time by kind of work. Concurrent work counts in each kind.
+///
+/// A flight of at most 64 vehicles measures each 16th step, beginning with the second. The times of law, energy,
+/// physics and audit are then those of the measured steps, scaled to all steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Performance {
     /// From the first to the last step.
@@ -116,7 +119,28 @@ pub struct Performance {
     pub record: Duration,
 }
 
-/// Clock of [`Performance`]. Reading it takes a tenth of the step of a small swarm.
+impl Performance {
+    /// Largest number of vehicles whose steps are sampled. Reading the clock takes a tenth of the step of a small
+    /// swarm.
+    const MOST_SAMPLED: usize = 64;
+    /// Number of steps from one measured step to the next.
+    const SAMPLED_EACH: u64 = 16;
+
+    /// Returns whether a step, from 1, is measured. The first step of a sampled flight also creates the engine.
+    pub(super) fn is_sampled(step: u64, vehicles: usize) -> bool {
+        vehicles > Self::MOST_SAMPLED || step % Self::SAMPLED_EACH == 2
+    }
+
+    /// Scales the times of the measured steps to all steps.
+    pub(super) fn scaled(self, steps: u64, measured: u64) -> Self {
+        let ratio = if measured == 0 { 1.0 } else { steps as f64 / measured as f64 };
+        let [law, energy, physics, airframe, audit] =
+            [self.law, self.energy, self.physics, self.airframe, self.audit].map(|time| time.mul_f64(ratio));
+        Self { law, energy, physics, airframe, audit, ..self }
+    }
+}
+
+/// Clock of [`Performance`].
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stopwatch {
     /// Whether times are measured; otherwise they are zero.
@@ -339,5 +363,21 @@ impl From<LawError> for Ending {
 impl From<Breakdown> for Ending {
     fn from(breakdown: Breakdown) -> Self {
         Self::BrokeDown(breakdown)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_of_measured_steps_are_scaled_to_all_steps() {
+        let second = Duration::from_secs(1);
+        let measured = Performance { law: second, physics: 2 * second, record: second, ..Performance::default() };
+        let scaled = measured.scaled(480, 30);
+        assert_eq!((scaled.law, scaled.physics, scaled.record), (16 * second, 32 * second, second));
+        assert_eq!(measured.scaled(1, 0), measured);
+        let sampled = |vehicles: usize| (1..=480).filter(|&step| Performance::is_sampled(step, vehicles)).count();
+        assert_eq!((sampled(5), sampled(64), sampled(65)), (30, 30, 480));
     }
 }

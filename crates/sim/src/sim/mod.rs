@@ -74,6 +74,9 @@ pub fn continue_flight(
 fn pass_to_sink(simulation: &mut Simulation, sink: &mut dyn Sink) -> Result<(), RecordError> {
     simulation.events().try_for_each(|event| sink.event(&event))?;
     sink.step(&Step { time_s: simulation.time_s(), swarm: simulation.state(), control: simulation.control() });
+    if !simulation.sample_is_due() {
+        return Ok(());
+    }
     let began = Instant::now();
     if let Some(sample) = simulation.sample() {
         sink.sample(&sample)?;

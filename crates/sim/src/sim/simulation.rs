@@ -70,6 +70,9 @@ pub struct Simulation {
     ending: Option<Ending>,
     pub(super) performance: Performance,
     stopwatch: Stopwatch,
+    /// Whether any steps are measured, and the number of those that were.
+    is_measured: bool,
+    measured_steps: u64,
 }
 
 /// State of a [`Simulation`] at one instant.
@@ -133,7 +136,9 @@ impl Simulation {
             sample_is_due: false,
             ending: None,
             performance: Performance::default(),
-            stopwatch: Stopwatch { is_on: true },
+            stopwatch: Stopwatch { is_on: false },
+            is_measured: true,
+            measured_steps: 0,
             resolution: RoundingBound::of(scenario),
             scenario: scenario.clone(),
         };
@@ -197,6 +202,7 @@ impl Simulation {
             return;
         }
         let step = self.steps + 1;
+        self.start_measuring(step);
         let flown = self.advance(step);
         self.sample_is_due = flown.is_ok() && self.scenario.time.records(step);
         let is_last = step == self.scenario.time.steps();
@@ -222,8 +228,17 @@ impl Simulation {
 
     /// Leaves all times of [`Performance`] at zero.
     pub(super) fn stop_measuring_time(&mut self) {
-        self.stopwatch.is_on = false;
-        self.plant.stop_measuring_time();
+        self.is_measured = false;
+    }
+
+    /// Measures the times of this step if it is one of the sample.
+    fn start_measuring(&mut self, step: u64) {
+        let is_on = self.is_measured && Performance::is_sampled(step, self.state.count());
+        self.measured_steps += u64::from(is_on);
+        if is_on != self.stopwatch.is_on {
+            self.stopwatch.is_on = is_on;
+            self.plant.measure_time(is_on);
+        }
     }
 
     /// Allows steps without the engine while no contact is possible ([`Plant::allow_free_steps`]). The bits are the
@@ -288,6 +303,11 @@ impl Simulation {
         self.events.drain(..)
     }
 
+    /// Returns whether [`Simulation::sample`] returns the present instant.
+    pub(super) fn sample_is_due(&self) -> bool {
+        self.sample_is_due
+    }
+
     /// Returns the present instant if the recording rate or the end of the flight requires it, once.
     pub fn sample(&mut self) -> Option<Sample<'_>> {
         if !std::mem::take(&mut self.sample_is_due) {
@@ -349,7 +369,8 @@ impl Simulation {
             traffic: self.controller.link.traffic(),
             shield,
             last: self.state,
-            performance: Performance { airframe: self.plant.airframe_time(), ..self.performance },
+            performance: Performance { airframe: self.plant.airframe_time(), ..self.performance }
+                .scaled(self.steps, self.measured_steps),
         }
     }
 }

@@ -1,6 +1,7 @@
 //! [`VectorSimulation`]: many worlds of one scenario that advance together.
 
 use std::sync::{Arc, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 
 use rayon::{Scope, ThreadPool};
 
@@ -20,10 +21,12 @@ const LOAD_OF_A_THREAD: u64 = 1000;
 const LOAD_OF_A_START: u64 = 100;
 /// Expected memory of a world besides its vehicles and edges \[bytes\].
 const BYTES_PER_WORLD: u128 = 65_536;
-/// Expected memory of a vehicle in the engine that a world keeps for the next contact \[bytes\].
+/// Expected memory of a vehicle in the engine, which a world has while hulls are within reach \[bytes\].
 const BYTES_PER_KEPT_VEHICLE: u128 = 1024;
 /// Number of seeds that are tried for a valid start.
 const MOST_SEEDS: u64 = 1000;
+/// Time between two calls of `carries_on` while starts are searched.
+const SEARCH_AT_ONCE: Duration = Duration::from_millis(50);
 /// Number of steps of single vehicles between two calls of `carries_on`.
 const VEHICLE_STEPS_AT_ONCE: u64 = 100_000;
 
@@ -159,6 +162,9 @@ pub enum VectorError {
         /// Reason of the last seed.
         why: ScenarioError,
     },
+    /// The caller ended the search of starts.
+    #[error("interrupted: no world was made or reset")]
+    Interrupted,
     /// The scenario cannot be flown in this way.
     #[error(transparent)]
     Sim(#[from] SimError),
@@ -180,8 +186,8 @@ struct World {
 struct Starts {
     template: Template,
     law: NamedLaw,
-    /// Whether start or flight depends on a seed.
-    is_random: bool,
+    /// The start of all worlds, if neither start nor flight depends on a seed.
+    common: Option<Mutex<Simulation>>,
     /// Number of worlds E.
     worlds: u64,
 }
@@ -195,6 +201,20 @@ struct Search {
     first: u64,
     /// Whether seeds after the first one are tried.
     goes_on: bool,
+}
+
+/// Found seed with the simulation at its start, or the error of a search.
+type Started = Result<(u64, Simulation), VectorError>;
+
+/// Search in progress.
+struct Attempt {
+    search: Search,
+    /// Next seed to try.
+    seed: u64,
+    /// Number of tried seeds.
+    tried: u64,
+    /// Result, once the search has ended.
+    made: Option<Started>,
 }
 
 impl Search {
@@ -224,6 +244,20 @@ impl VectorSimulation {
     /// # Errors
     /// As [`VectorSimulation::new`], and [`VectorError::NoSeed`].
     pub fn with_seeds(template: Template, seeds: &[SeedChoice], threads: Threads) -> Result<Self, VectorError> {
+        Self::with_seeds_while(template, seeds, threads, &mut || true)
+    }
+
+    /// Creates worlds like [`VectorSimulation::with_seeds`], and calls `carries_on` every few hundredths of a second.
+    /// Stops if it returns false.
+    ///
+    /// # Errors
+    /// As [`VectorSimulation::with_seeds`], and [`VectorError::Interrupted`].
+    pub fn with_seeds_while(
+        template: Template,
+        seeds: &[SeedChoice],
+        threads: Threads,
+        carries_on: &mut dyn FnMut() -> bool,
+    ) -> Result<Self, VectorError> {
         if seeds.is_empty() {
             return Err(VectorError::NoWorlds);
         }
@@ -233,7 +267,9 @@ impl VectorSimulation {
         }
         let vehicles = template.own().count();
         let is_random = template.start_is_random() || template.flight_is_random();
-        let starts = Starts { law: template.own_law(), template, is_random, worlds: seeds.len() as u64 };
+        let law = template.own_law();
+        let common = (!is_random).then(|| Simulation::new(template.own()).map(prepared)).transpose()?.map(Mutex::new);
+        let starts = Starts { template, law, common, worlds: seeds.len() as u64 };
         let searches: Vec<_> = seeds.iter().zip(0..).map(|(&choice, k)| Search::of(choice, k, k as u64)).collect();
         let world = |(seed, simulation)| World {
             seed,
@@ -242,7 +278,8 @@ impl VectorSimulation {
             rests: false,
             failure: None,
         };
-        let worlds = starts.simulations(&searches, &threads)?.into_iter().map(world).collect();
+        let made = starts.simulations(&searches, &threads, carries_on)?;
+        let worlds = made.into_iter().map(|made| made.map(world)).collect::<Result<_, _>>()?;
         Ok(Self { starts, worlds, vehicles, resets_ended: false, threads })
     }
 
@@ -316,7 +353,7 @@ impl VectorSimulation {
     /// hundredths of a second. Stops if it returns false.
     ///
     /// # Errors
-    /// As [`VectorSimulation::step`].
+    /// As [`VectorSimulation::step`], and [`VectorError::Interrupted`] before the first step.
     pub fn step_while(
         &mut self,
         commands: Option<&[f64]>,
@@ -331,19 +368,15 @@ impl VectorSimulation {
         let (count, vehicles, width) = (self.worlds.len() as u64, self.vehicles as u64, 3 * self.vehicles);
         let at_once = (VEHICLE_STEPS_AT_ONCE / (count * vehicles)).max(1);
         let (mut flown, mut failure) = (0, None);
+        self.worlds.iter_mut().for_each(|world| world.rests = false);
+        if self.resets_ended && steps > 0 {
+            failure = self.restart_ended(carries_on)?;
+        }
         while flown < steps {
-            let (is_first, some) = (flown == 0, at_once.min(steps - flown));
-            let (resets_ended, starts) = (self.resets_ended, &self.starts);
+            let some = at_once.min(steps - flown);
             let advance = |(k, world): (usize, &mut World)| {
-                world.rests &= !is_first;
-                if world.rests {
-                    return;
-                }
-                if world.simulation.ending().is_none() {
+                if !world.rests && world.simulation.ending().is_none() {
                     world.fly(commands.map(|commands| &commands[k * width..(k + 1) * width]), some);
-                } else if resets_ended && is_first {
-                    world.rests = true;
-                    world.failure = world.restart(starts, k).err();
                 }
             };
             for_each(&mut self.worlds, (&self.threads, some.saturating_mul(count * vehicles)), states, advance);
@@ -359,6 +392,25 @@ impl VectorSimulation {
         failure.map_or(Ok(()), Err)
     }
 
+    /// Resets the worlds that have ended. Returns the error of the first one without a valid start, which stays ended.
+    fn restart_ended(&mut self, carries_on: &mut dyn FnMut() -> bool) -> Result<Option<VectorError>, VectorError> {
+        let ended = |(k, world): (usize, &World)| {
+            let next = self.starts.later(world.seed);
+            world.simulation.ending().map(|_| Search::of(SeedChoice::Next, k, next))
+        };
+        let searches: Vec<_> = self.worlds.iter().enumerate().filter_map(ended).collect();
+        let mut failure = None;
+        for (search, made) in searches.iter().zip(self.starts.simulations(&searches, &self.threads, carries_on)?) {
+            let world = &mut self.worlds[search.world];
+            world.rests = true;
+            match made {
+                Ok(made) => (world.seed, world.simulation) = made,
+                Err(error) => failure = failure.or(Some(error)),
+            }
+        }
+        Ok(failure)
+    }
+
     /// Resets the chosen worlds to their starts, with these seeds or else with the next seed of each. Writes the states
     /// of all worlds. The seeds of other worlds are ignored.
     ///
@@ -370,6 +422,21 @@ impl VectorSimulation {
         seeds: Option<&[SeedChoice]>,
         states: &mut StatesMut<'_>,
     ) -> Result<(), VectorError> {
+        self.reset_while(chosen, seeds, states, &mut || true)
+    }
+
+    /// Resets worlds like [`VectorSimulation::reset`], and calls `carries_on` every few hundredths of a second. Stops
+    /// if it returns false.
+    ///
+    /// # Errors
+    /// As [`VectorSimulation::reset`], and [`VectorError::Interrupted`]. No world is reset then.
+    pub fn reset_while(
+        &mut self,
+        chosen: &[bool],
+        seeds: Option<&[SeedChoice]>,
+        states: &mut StatesMut<'_>,
+        carries_on: &mut dyn FnMut() -> bool,
+    ) -> Result<(), VectorError> {
         let count = self.count();
         self.check_lengths(states)?;
         check("mask", count, chosen.len())?;
@@ -377,7 +444,8 @@ impl VectorSimulation {
         let choice = |k| seeds.map_or(SeedChoice::Next, |seeds: &[SeedChoice]| seeds[k]);
         let next = |(k, world): (usize, &World)| Search::of(choice(k), k, self.starts.later(world.seed));
         let searches: Vec<_> = self.worlds.iter().enumerate().filter(|(k, _)| chosen[*k]).map(next).collect();
-        let made = self.starts.simulations(&searches, &self.threads)?;
+        let made = self.starts.simulations(&searches, &self.threads, carries_on)?;
+        let made = made.into_iter().collect::<Result<Vec<_>, _>>()?;
         for (search, (seed, simulation)) in searches.into_iter().zip(made) {
             (self.worlds[search.world].seed, self.worlds[search.world].simulation) = (seed, simulation);
         }
@@ -443,11 +511,6 @@ impl World {
         }
     }
 
-    fn restart(&mut self, starts: &Starts, place: usize) -> Result<(), VectorError> {
-        (self.seed, self.simulation) = starts.first(Search::of(SeedChoice::Next, place, starts.later(self.seed)))?;
-        Ok(())
-    }
-
     fn write(
         &self,
         (positions_m, velocities_m_s, clearance_m, is_over): (&mut [f64], &mut [f64], &mut f64, &mut bool),
@@ -464,28 +527,33 @@ impl World {
 }
 
 impl Starts {
-    /// Returns the found seeds, with simulations at their starts. An error is that of the first such world.
-    fn simulations(&self, searches: &[Search], threads: &Threads) -> Result<Vec<(u64, Simulation)>, VectorError> {
-        let mut made: Vec<_> = searches.iter().map(|_| None).collect();
+    /// Returns the found seed of each search, with the simulation at its start. Calls `carries_on` on the calling
+    /// thread every [`SEARCH_AT_ONCE`].
+    ///
+    /// # Errors
+    /// [`VectorError::Interrupted`] if `carries_on` returns false.
+    fn simulations(
+        &self,
+        searches: &[Search],
+        threads: &Threads,
+        carries_on: &mut dyn FnMut() -> bool,
+    ) -> Result<Vec<Started>, VectorError> {
+        let begin = |&search: &Search| Attempt { search, seed: search.first, tried: 0, made: None };
+        let mut attempts: Vec<_> = searches.iter().map(begin).collect();
         let helpers = threads.helpers(LOAD_OF_A_START * searches.len() as u64);
-        threads.share(helpers, searches.iter().zip(&mut made), |(&search, made)| {
-            *made = Some(self.first(search));
-        });
-        made.into_iter().flatten().collect()
-    }
-
-    /// Returns the first seed with a valid start, and the simulation at this start.
-    fn first(&self, Search { world, first, goes_on }: Search) -> Result<(u64, Simulation), VectorError> {
-        let (mut seed, mut tried) = (first, 1);
-        loop {
-            match self.simulation(world, seed) {
-                Err(VectorError::Seed { .. }) if goes_on && tried < MOST_SEEDS => {
-                    (seed, tried) = (self.later(seed), tried + 1);
+        while attempts.iter().any(|attempt| attempt.made.is_none()) {
+            let began = Instant::now();
+            let in_progress = attempts.iter_mut().filter(|attempt| attempt.made.is_none());
+            threads.share(helpers, in_progress, |attempt| {
+                while attempt.made.is_none() && began.elapsed() < SEARCH_AT_ONCE {
+                    attempt.try_next(self);
                 }
-                Err(VectorError::Seed { why, .. }) if goes_on => return Err(VectorError::NoSeed { world, first, why }),
-                made => return Ok((seed, made?)),
+            });
+            if !carries_on() {
+                return Err(VectorError::Interrupted);
             }
         }
+        Ok(attempts.into_iter().filter_map(|attempt| attempt.made).collect())
     }
 
     /// Returns the next seed of a world, among those of a scenario file.
@@ -495,15 +563,35 @@ impl Starts {
 
     /// Returns a simulation at the start of a seed.
     fn simulation(&self, world: usize, seed: u64) -> Result<Simulation, VectorError> {
-        let mut simulation = if self.is_random {
-            let drawn = self.template.scenario(&self.law, Draw { seed, jitter_m: None });
-            Simulation::new(&drawn.map_err(|why| VectorError::Seed { world, seed, why })?)?
-        } else {
-            Simulation::new(self.template.own())?
+        if let Some(common) = &self.common {
+            return Ok(common.lock().unwrap_or_else(PoisonError::into_inner).clone());
+        }
+        let drawn = self.template.scenario(&self.law, Draw { seed, jitter_m: None });
+        let drawn = drawn.map_err(|why| VectorError::Seed { world, seed, why })?;
+        Ok(prepared(Simulation::new(&drawn)?))
+    }
+}
+
+/// Returns a simulation as a world flies it: its time is not measured, and free steps are trusted.
+fn prepared(mut simulation: Simulation) -> Simulation {
+    simulation.stop_measuring_time();
+    simulation.allow_free_steps(FreeSteps::Trusted);
+    simulation
+}
+
+impl Attempt {
+    /// Tries the next seed.
+    fn try_next(&mut self, starts: &Starts) {
+        let Search { world, first, goes_on } = self.search;
+        self.tried += 1;
+        self.made = match starts.simulation(world, self.seed) {
+            Err(VectorError::Seed { .. }) if goes_on && self.tried < MOST_SEEDS => None,
+            Err(VectorError::Seed { why, .. }) if goes_on => Some(Err(VectorError::NoSeed { world, first, why })),
+            made => Some(made.map(|simulation| (self.seed, simulation))),
         };
-        simulation.stop_measuring_time();
-        simulation.allow_free_steps(FreeSteps::Trusted);
-        Ok(simulation)
+        if self.made.is_none() {
+            self.seed = starts.later(self.seed);
+        }
     }
 }
 

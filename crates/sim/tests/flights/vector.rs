@@ -220,3 +220,22 @@ fn a_world_without_a_valid_start_costs_the_others_no_step() {
     assert!(matches!(refused, VectorError::NoSeed { world: 0, .. }), "{refused}");
     assert_eq!((states.is_over[0], worlds.world(1).steps()), (true, 130));
 }
+
+#[test]
+fn an_interrupted_search_makes_and_resets_no_world() {
+    // Some seeds have no valid start, so that a search may go on for long.
+    let template = template("pentagon", &["start.jitter_m=0.1"]);
+    let seeds: Vec<_> = (0..40).map(SeedChoice::From).collect();
+    let make = |carries_on: &mut dyn FnMut() -> bool| {
+        VectorSimulation::with_seeds_while(template.clone(), &seeds, Threads::One, carries_on)
+    };
+    assert!(matches!(make(&mut || false), Err(VectorError::Interrupted)));
+    let mut worlds = make(&mut || true).expect("worlds");
+    let mut states = States::of(&worlds);
+    let all = vec![true; worlds.count()];
+    let refused = worlds.reset_while(&all, None, &mut states.borrow(), &mut || false);
+    assert!(matches!(refused, Err(VectorError::Interrupted)));
+    assert_eq!(worlds.seeds().collect::<Vec<_>>(), (0..40).collect::<Vec<_>>());
+    worlds.reset_while(&all, None, &mut states.borrow(), &mut || true).expect("reset");
+    assert_eq!(worlds.seeds().collect::<Vec<_>>(), (40..80).collect::<Vec<_>>());
+}

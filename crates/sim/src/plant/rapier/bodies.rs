@@ -1,12 +1,12 @@
 //! Points: rigid bodies without rotation that execute commanded accelerations.
 
 use nalgebra::Vector3;
-use rapier3d::prelude::{LockedAxes, PhysicsWorld, RigidBody, RigidBodyBuilder, RigidBodyHandle, Vector};
+use rapier3d::prelude::{ColliderSet, LockedAxes, RigidBodyBuilder, RigidBodyHandle, RigidBodySet, Vector};
 
 use super::proximity::{Maker, Proximity};
 use super::world::{
-    Engine, empty_world, first_in_contact, from_engine, hull, hull_contacts, insert_obstacle, keep_out,
-    keep_out_contacts, to_engine,
+    Engine, empty_world, first_in_contact, first_not_finite, from_engine, hull, hull_contacts, insert_obstacle,
+    keep_out, keep_out_contacts, to_engine,
 };
 use crate::plant::{Air, FreeSteps, HullContact, Plant, PlantError, StepPath};
 use crate::scenario::{Scenario, Space};
@@ -16,7 +16,6 @@ use tautline_core::swarm::{Pair, Rows, Swarm, mean_row, row, set_row};
 /// Swarm of rigid bodies, one per vehicle, in vehicle order.
 pub(super) struct Bodies {
     engine: Engine,
-    handles: Vec<RigidBodyHandle>,
     /// Positions from the engine's origin \[m\]. The bodies of the engine follow when it steps.
     positions: Vec<Vector>,
     /// Velocities, as the engine has them \[m/s\].
@@ -50,20 +49,31 @@ pub(super) struct Bodies {
 
 impl Bodies {
     pub(super) fn new(scenario: &Scenario) -> Self {
-        let mut world = empty_world();
         let origin_m = mean_row(&scenario.start.positions_m);
-        let insert = |i| insert_vehicle(&mut world, scenario, origin_m, i);
-        let handles: Vec<_> = (0..scenario.count()).map(insert).collect();
-        let each = |value_of: &dyn Fn(&RigidBody) -> Vector| -> Vec<_> {
-            handles.iter().map(|&handle| value_of(&world.bodies[handle])).collect()
+        let Swarm { positions_m, velocities_m_s } = &scenario.start;
+        let vehicles = Vehicles {
+            positions: (0..scenario.count()).map(|i| to_engine(row(positions_m, i) - origin_m)).collect(),
+            velocities: (0..scenario.count()).map(|i| to_engine(row(velocities_m_s, i))).collect(),
+            mass_kg: scenario.mass_kg.clone(),
+            hull_radius_m: scenario.hull_radius_m.clone(),
+            keep_out_m: scenario.metric().shortest_m(scenario.delta_m),
+            space: scenario.space,
         };
-        let positions = each(&|body| body.translation());
-        let velocities = each(&|body| body.linvel());
-        let inverse_masses = each(&|body| body.mass_properties().effective_inv_mass);
-        scenario.obstacles.iter().for_each(|obstacle| insert_obstacle(&mut world, obstacle, origin_m));
+        let (positions, velocities) = (vehicles.positions.clone(), vehicles.velocities.clone());
+        let inverse_masses = vehicles.inverse_masses();
+        let obstacles = scenario.obstacles.clone();
+        let create = move || {
+            let mut world = empty_world();
+            for i in 0..vehicles.positions.len() {
+                vehicles.insert(i, &mut world.bodies, &mut world.colliders);
+            }
+            for obstacle in &obstacles {
+                insert_obstacle(&mut world, obstacle, origin_m);
+            }
+            world
+        };
         Self {
-            engine: Engine::new(world, Proximity::may_have_free_steps(scenario)),
-            handles,
+            engine: Engine::new(create, Proximity::may_have_free_steps(scenario)),
             positions,
             velocities,
             inverse_masses,
@@ -129,25 +139,20 @@ impl Bodies {
 
     /// Moves bodies with the engine.
     fn drift_in_engine(&mut self, dt_s: f64) -> Result<(), PlantError> {
-        let Self { handles, positions, velocities, held, mass_kg, .. } = self;
-        self.engine.step(dt_s, |world| {
-            for (i, &handle) in handles.iter().enumerate() {
-                let body = &mut world.bodies[handle];
-                if body.translation() != positions[i] {
-                    body.set_translation(positions[i], true);
-                }
-                body.set_linvel(velocities[i], true);
-                body.reset_forces(false);
-                body.add_force(to_engine(row(held, i)) * mass_kg[i], true);
+        let Self { positions, velocities, held, mass_kg, .. } = self;
+        let world = self.engine.step(dt_s, |i, body| {
+            if body.translation() != positions[i] {
+                body.set_translation(positions[i], true);
             }
+            body.set_linvel(velocities[i], true);
+            body.reset_forces(false);
+            body.add_force(to_engine(row(held, i)) * mass_kg[i], true);
         });
-        if let Some(lost) = self.engine.world.quarantine().bodies().first() {
-            let vehicle = self.handles.iter().position(|h| h == lost).unwrap_or_default();
+        if let Some(vehicle) = first_not_finite(world) {
             return Err(PlantError::NotFinite { vehicle });
         }
-        for (i, &handle) in self.handles.iter().enumerate() {
-            let body = &self.engine.world.bodies[handle];
-            (self.positions[i], self.velocities[i]) = (body.translation(), body.linvel());
+        for ((_, body), (position, velocity)) in world.bodies.iter().zip(positions.iter_mut().zip(velocities)) {
+            (*position, *velocity) = (body.translation(), body.linvel());
         }
         self.proximity.forget();
         Ok(())
@@ -170,7 +175,7 @@ impl Bodies {
         if let Some(vehicle) = (0..self.positions.len()).find(differs) {
             return Err(PlantError::EngineDiffers { vehicle });
         }
-        if let Some(vehicle) = first_in_contact(&self.engine.world) {
+        if let Some(vehicle) = self.engine.world().and_then(first_in_contact) {
             return Err(PlantError::EngineDiffers { vehicle });
         }
         self.proximity = proximity;
@@ -208,7 +213,6 @@ impl Clone for Bodies {
     fn clone(&self) -> Self {
         Self {
             engine: self.engine.clone(),
-            handles: self.handles.clone(),
             positions: self.positions.clone(),
             velocities: self.velocities.clone(),
             inverse_masses: self.inverse_masses.clone(),
@@ -226,7 +230,7 @@ impl Clone for Bodies {
 
 impl Plant for Bodies {
     fn count(&self) -> usize {
-        self.handles.len()
+        self.positions.len()
     }
 
     fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut StepPath) -> Result<(), PlantError> {
@@ -235,7 +239,12 @@ impl Plant for Bodies {
         self.was_free = maker == Maker::FreeStep;
         match maker {
             Maker::Engine => self.drift_in_engine(dt_s)?,
-            Maker::FreeStep => self.drift_freely(dt_s)?,
+            Maker::FreeStep => {
+                if self.proximity.trusts_free_steps() {
+                    self.engine.discard();
+                }
+                self.drift_freely(dt_s)?;
+            }
             Maker::Both => self.drift_in_both(dt_s)?,
         }
         self.drifted_s = dt_s;
@@ -310,14 +319,16 @@ impl Plant for Bodies {
     }
 
     fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {
-        if !self.was_free {
-            keep_out_contacts(&self.engine.world, pairs);
+        if self.was_free {
+            pairs.extend_from_slice(self.proximity.overlaps());
+        } else if let Some(world) = self.engine.world() {
+            keep_out_contacts(world, pairs);
         }
     }
 
     fn hull_contacts(&self, contacts: &mut Vec<HullContact>) {
-        if !self.was_free {
-            hull_contacts(&self.engine.world, &self.began_m, &self.drift_m_s, contacts);
+        if let Some(world) = self.engine.world().filter(|_| !self.was_free) {
+            hull_contacts(world, &self.began_m, &self.drift_m_s, contacts);
         }
     }
 }
@@ -333,22 +344,53 @@ fn set(vector: &mut Vector, to: Vector) {
     }
 }
 
-fn insert_vehicle(world: &mut PhysicsWorld, scenario: &Scenario, origin_m: Vector3<f64>, i: usize) -> RigidBodyHandle {
-    let locked = match scenario.space {
-        Space::Plane => LockedAxes::ROTATION_LOCKED | LockedAxes::TRANSLATION_LOCKED_Z,
-        Space::Volume => LockedAxes::ROTATION_LOCKED,
-    };
-    let body = RigidBodyBuilder::dynamic()
-        .translation(to_engine(row(&scenario.start.positions_m, i) - origin_m))
-        .linvel(to_engine(row(&scenario.start.velocities_m_s, i)))
-        .locked_axes(locked)
-        .can_sleep(false);
-    let handle = world.bodies.insert(body);
+/// Vehicles of an engine before its first step.
+struct Vehicles {
+    /// Positions from the engine's origin \[m\].
+    positions: Vec<Vector>,
+    /// Velocities \[m/s\].
+    velocities: Vec<Vector>,
+    mass_kg: Vec<f64>,
+    hull_radius_m: Vec<f64>,
+    /// Diameter of the keep-out balls \[m\].
+    keep_out_m: f64,
+    space: Space,
+}
 
-    let hull = hull(scenario.hull_radius_m[i], i).mass(scenario.mass_kg[i]);
-    for collider in [hull, keep_out(scenario.metric().shortest_m(scenario.delta_m), i)] {
-        world.colliders.insert_with_parent(collider, handle, &mut world.bodies);
+impl Vehicles {
+    /// Inserts a vehicle.
+    fn insert(&self, i: usize, bodies: &mut RigidBodySet, colliders: &mut ColliderSet) -> RigidBodyHandle {
+        let locked = match self.space {
+            Space::Plane => LockedAxes::ROTATION_LOCKED | LockedAxes::TRANSLATION_LOCKED_Z,
+            Space::Volume => LockedAxes::ROTATION_LOCKED,
+        };
+        let body = RigidBodyBuilder::dynamic()
+            .translation(self.positions[i])
+            .linvel(self.velocities[i])
+            .locked_axes(locked)
+            .can_sleep(false);
+        let handle = bodies.insert(body);
+        let hull = hull(self.hull_radius_m[i], i).mass(self.mass_kg[i]);
+        for collider in [hull, keep_out(self.keep_out_m, i)] {
+            colliders.insert_with_parent(collider, handle, bodies);
+        }
+        bodies[handle].recompute_mass_properties_from_colliders(colliders);
+        handle
     }
-    world.bodies[handle].recompute_mass_properties_from_colliders(&world.colliders);
-    handle
+
+    /// Returns the inverse mass of each body along each axis, as the engine has it.
+    fn inverse_masses(&self) -> Vec<Vector> {
+        let mut found: Vec<Vector> = Vec::with_capacity(self.mass_kg.len());
+        for (i, numbers) in self.mass_kg.iter().zip(&self.hull_radius_m).enumerate() {
+            let is_same = |before: usize| numbers == (&self.mass_kg[before], &self.hull_radius_m[before]);
+            found.push(if i > 0 && is_same(i - 1) {
+                found[i - 1]
+            } else {
+                let (mut bodies, mut colliders) = (RigidBodySet::new(), ColliderSet::new());
+                let handle = self.insert(i, &mut bodies, &mut colliders);
+                bodies[handle].mass_properties().effective_inv_mass
+            });
+        }
+        found
+    }
 }

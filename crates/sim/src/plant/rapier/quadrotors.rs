@@ -3,12 +3,12 @@
 use std::time::Duration;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use rapier3d::prelude::{MassProperties, Real, RigidBody, RigidBodyBuilder, RigidBodyHandle, Rotation, Vector};
+use rapier3d::prelude::{MassProperties, Real, RigidBody, RigidBodyBuilder, Rotation, Vector};
 
 use super::proximity::{Maker, Proximity};
 use super::world::{
-    Engine, empty_world, first_in_contact, from_engine, hull, hull_contacts, insert_obstacle, keep_out,
-    keep_out_contacts, to_engine,
+    Engine, empty_world, first_in_contact, first_not_finite, from_engine, hull, hull_contacts, insert_obstacle,
+    keep_out, keep_out_contacts, to_engine,
 };
 use crate::plant::{FreeSteps, HullContact, Plant, PlantError, Quadrotors, StepPath};
 use crate::scenario::Scenario;
@@ -24,7 +24,6 @@ const HULL_FRICTION: Real = 0.5;
 /// collisions; the fleet computes forces, torques and the velocities around the engine's step.
 pub(super) struct Fliers {
     engine: Engine,
-    handles: Vec<RigidBodyHandle>,
     /// Poses and velocities, as the engine has them. The bodies of the engine follow when it steps.
     bodies: Vec<Body>,
     proximity: Proximity,
@@ -81,34 +80,44 @@ impl Body {
 impl Fliers {
     pub(super) fn new(scenario: &Scenario, mut fleet: Fleet) -> Self {
         fleet.compute_wrenches();
-        let mut world = empty_world();
-        let origin_m = mean_row(&scenario.start.positions_m);
-        let (model, inertia_kg_m2) = (fleet.dynamics.model(), fleet.dynamics.inertia_kg_m2());
-        let handles = fleet.states.iter().enumerate().map(|(i, state)| {
-            let mass = MassProperties::new(Vector::ZERO, model.mass_kg, to_engine(inertia_kg_m2));
-            let body = RigidBodyBuilder::dynamic()
-                .translation(to_engine(state.position_m - origin_m))
-                .linvel(to_engine(state.velocity_m_s))
-                .additional_mass_properties(mass)
-                .gyroscopic_forces_enabled(false)
-                .allow_fast_rotation(true)
-                .can_sleep(false);
-            let handle = world.bodies.insert(body);
-            world.bodies[handle].set_rotation(rotation(&state.attitude), true);
-            let hull = hull(model.hull_radius_m, i).density(0.0).friction(HULL_FRICTION);
-            for collider in [hull, keep_out(scenario.metric().shortest_m(scenario.delta_m), i)] {
-                world.colliders.insert_with_parent(collider, handle, &mut world.bodies);
-            }
-            world.bodies[handle].recompute_mass_properties_from_colliders(&world.colliders);
-            handle
+        let (origin_m, count) = (mean_row(&scenario.start.positions_m), scenario.count());
+        let model = fleet.dynamics.model();
+        let mass = MassProperties::new(Vector::ZERO, model.mass_kg, to_engine(fleet.dynamics.inertia_kg_m2()));
+        let (hull_radius_m, keep_out_m) = (model.hull_radius_m, scenario.metric().shortest_m(scenario.delta_m));
+        let starts = fleet.states.iter().map(|state| Body {
+            position: to_engine(state.position_m - origin_m),
+            rotation: rotation(&state.attitude),
+            linear: to_engine(state.velocity_m_s),
+            angular: Vector::ZERO,
         });
-        let (handles, count): (Vec<_>, _) = (handles.collect(), scenario.count());
-        let bodies = handles.iter().map(|&handle| Body::of(&world.bodies[handle])).collect();
-        scenario.obstacles.iter().for_each(|obstacle| insert_obstacle(&mut world, obstacle, origin_m));
+        let (starts, obstacles): (Vec<_>, _) = (starts.collect(), scenario.obstacles.clone());
+        let bodies = starts.clone();
+        let create = move || {
+            let mut world = empty_world();
+            for (i, start) in starts.iter().enumerate() {
+                let body = RigidBodyBuilder::dynamic()
+                    .translation(start.position)
+                    .linvel(start.linear)
+                    .additional_mass_properties(mass)
+                    .gyroscopic_forces_enabled(false)
+                    .allow_fast_rotation(true)
+                    .can_sleep(false);
+                let handle = world.bodies.insert(body);
+                world.bodies[handle].set_rotation(start.rotation, true);
+                let hull = hull(hull_radius_m, i).density(0.0).friction(HULL_FRICTION);
+                for collider in [hull, keep_out(keep_out_m, i)] {
+                    world.colliders.insert_with_parent(collider, handle, &mut world.bodies);
+                }
+                world.bodies[handle].recompute_mass_properties_from_colliders(&world.colliders);
+            }
+            for obstacle in &obstacles {
+                insert_obstacle(&mut world, obstacle, origin_m);
+            }
+            world
+        };
         let (drift_m_s, began_m) = (Rows::zeros(count), Rows::zeros(count));
         Self {
-            engine: Engine::new(world, Proximity::may_have_free_steps(scenario)),
-            handles,
+            engine: Engine::new(create, Proximity::may_have_free_steps(scenario)),
             bodies,
             proximity: Proximity::of(scenario),
             was_free: false,
@@ -119,7 +128,7 @@ impl Fliers {
             began_m,
             origin_m,
             airframe: Duration::ZERO,
-            stopwatch: Stopwatch { is_on: true },
+            stopwatch: Stopwatch { is_on: false },
         }
     }
 
@@ -152,24 +161,21 @@ impl Fliers {
 
     /// Moves and turns the bodies with the engine.
     fn drift_in_engine(&mut self, dt_s: f64) -> Result<(), PlantError> {
-        let Self { handles, bodies, .. } = self;
-        self.engine.step(dt_s, |world| {
-            for (&handle, state) in handles.iter().zip(&*bodies) {
-                let body = &mut world.bodies[handle];
-                if (body.translation(), *body.rotation()) != (state.position, state.rotation) {
-                    body.set_translation(state.position, true);
-                    body.set_rotation(state.rotation, true);
-                }
-                body.set_linvel(state.linear, true);
-                body.set_angvel(state.angular, true);
+        let Self { bodies, .. } = self;
+        let world = self.engine.step(dt_s, |i, body| {
+            let state = &bodies[i];
+            if (body.translation(), *body.rotation()) != (state.position, state.rotation) {
+                body.set_translation(state.position, true);
+                body.set_rotation(state.rotation, true);
             }
+            body.set_linvel(state.linear, true);
+            body.set_angvel(state.angular, true);
         });
-        if let Some(lost) = self.engine.world.quarantine().bodies().first() {
-            let vehicle = self.handles.iter().position(|handle| handle == lost).unwrap_or_default();
+        if let Some(vehicle) = first_not_finite(world) {
             return Err(PlantError::NotFinite { vehicle });
         }
-        for (&handle, state) in self.handles.iter().zip(&mut self.bodies) {
-            *state = Body::of(&self.engine.world.bodies[handle]);
+        for ((_, body), state) in world.bodies.iter().zip(bodies) {
+            *state = Body::of(body);
         }
         self.proximity.forget();
         Ok(())
@@ -186,7 +192,7 @@ impl Fliers {
         if let Some(vehicle) = both.position(|(engine, free)| engine.bits() != free.bits()) {
             return Err(PlantError::EngineDiffers { vehicle });
         }
-        if let Some(vehicle) = first_in_contact(&self.engine.world) {
+        if let Some(vehicle) = self.engine.world().and_then(first_in_contact) {
             return Err(PlantError::EngineDiffers { vehicle });
         }
         self.proximity = proximity;
@@ -227,7 +233,6 @@ impl Clone for Fliers {
     fn clone(&self) -> Self {
         Self {
             engine: self.engine.clone(),
-            handles: self.handles.clone(),
             bodies: self.bodies.clone(),
             proximity: self.proximity.clone(),
             was_free: self.was_free,
@@ -251,7 +256,7 @@ impl Quadrotors for Fliers {
 
 impl Plant for Fliers {
     fn count(&self) -> usize {
-        self.handles.len()
+        self.bodies.len()
     }
 
     fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut StepPath) -> Result<(), PlantError> {
@@ -264,7 +269,12 @@ impl Plant for Fliers {
         self.was_free = maker == Maker::FreeStep;
         match maker {
             Maker::Engine => self.drift_in_engine(dt_s)?,
-            Maker::FreeStep => self.drift_freely(dt_s)?,
+            Maker::FreeStep => {
+                if self.proximity.trusts_free_steps() {
+                    self.engine.discard();
+                }
+                self.drift_freely(dt_s)?;
+            }
             Maker::Both => self.drift_in_both(dt_s)?,
         }
         let began = self.stopwatch.start();
@@ -302,14 +312,16 @@ impl Plant for Fliers {
     }
 
     fn keep_out_contacts(&self, pairs: &mut Vec<Pair>) {
-        if !self.was_free {
-            keep_out_contacts(&self.engine.world, pairs);
+        if self.was_free {
+            pairs.extend_from_slice(self.proximity.overlaps());
+        } else if let Some(world) = self.engine.world() {
+            keep_out_contacts(world, pairs);
         }
     }
 
     fn hull_contacts(&self, contacts: &mut Vec<HullContact>) {
-        if !self.was_free {
-            hull_contacts(&self.engine.world, &self.began_m, &self.drift_m_s, contacts);
+        if let Some(world) = self.engine.world().filter(|_| !self.was_free) {
+            hull_contacts(world, &self.began_m, &self.drift_m_s, contacts);
         }
     }
 
@@ -317,8 +329,8 @@ impl Plant for Fliers {
         self.airframe
     }
 
-    fn stop_measuring_time(&mut self) {
-        self.stopwatch.is_on = false;
+    fn measure_time(&mut self, is_on: bool) {
+        self.stopwatch.is_on = is_on;
     }
 
     fn channels(&self) -> Vec<Channel> {

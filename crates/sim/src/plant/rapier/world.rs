@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 use rapier3d::prelude::{
-    ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, PhysicsWorld, Real, SharedShape,
-    Vector,
+    ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, PhysicsWorld, Real, RigidBody,
+    SharedShape, Vector,
 };
 
 use crate::plant::HullContact;
@@ -25,44 +25,66 @@ const HULL_RESTITUTION: Real = 0.5;
 /// The engine solves contacts of several hulls one after the other, in an order that depends on its earlier steps. A
 /// step that brings hulls into contact, after a step without contacts, is therefore repeated by a new engine. So a
 /// flight with free steps, which the engine does not make, has the same contacts (`super::proximity`).
+///
+/// The engine is created for its first step: a world without contacts never needs it.
 pub(super) struct Engine {
-    pub(super) world: PhysicsWorld,
-    /// Engine before its first step; `None` if no flight of this scenario has free steps.
-    new: Option<Arc<PhysicsWorld>>,
+    /// Creates an engine that has made no step. The body of vehicle i has the index i.
+    create: Arc<dyn Fn() -> PhysicsWorld + Send + Sync>,
+    /// The engine after its last step.
+    world: Option<Box<PhysicsWorld>>,
+    /// Whether any flight of this scenario has free steps.
+    may_have_free_steps: bool,
     /// Whether the last step had contacts of hulls.
     had_contacts: bool,
 }
 
 impl Engine {
-    /// Takes an engine that has made no step.
-    pub(super) fn new(world: PhysicsWorld, may_have_free_steps: bool) -> Self {
-        let new = may_have_free_steps.then(|| Arc::new(copied(&world)));
-        Self { world, new, had_contacts: false }
+    /// `create` creates an engine that has made no step, with the body of vehicle i at the index i.
+    pub(super) fn new(create: impl Fn() -> PhysicsWorld + Send + Sync + 'static, may_have_free_steps: bool) -> Self {
+        Self { create: Arc::new(create), world: None, may_have_free_steps, had_contacts: false }
     }
 
-    /// Makes a step of this length \[s\]. `set` sets poses, velocities and forces of all bodies at its beginning.
-    pub(super) fn step(&mut self, dt_s: f64, set: impl Fn(&mut PhysicsWorld)) {
+    /// Makes a step of this length \[s\], and returns the engine after it. `set` sets pose, velocity and force of the
+    /// body of a vehicle at its beginning.
+    pub(super) fn step(&mut self, dt_s: f64, set: impl Fn(usize, &mut RigidBody)) -> &PhysicsWorld {
         let step = |world: &mut PhysicsWorld| {
             world.integration_parameters.dt = dt_s;
-            set(world);
+            world.bodies.iter_mut().enumerate().for_each(|(i, (_, body))| set(i, body));
             world.step();
         };
-        step(&mut self.world);
-        let has_contacts = has_hull_contacts(&self.world);
-        if has_contacts
-            && !self.had_contacts
-            && let Some(new) = &self.new
-        {
-            self.world = copied(new);
-            step(&mut self.world);
+        let is_new = self.world.is_none();
+        let world = self.world.get_or_insert_with(|| Box::new((self.create)()));
+        step(world);
+        let has_contacts = has_hull_contacts(world);
+        if has_contacts && !self.had_contacts && !is_new && self.may_have_free_steps {
+            **world = (self.create)();
+            step(world);
         }
         self.had_contacts = has_contacts;
+        world
     }
+
+    /// Returns the engine after its last step; `None` before its first step and after [`Engine::discard`].
+    pub(super) fn world(&self) -> Option<&PhysicsWorld> {
+        self.world.as_deref()
+    }
+
+    /// Frees the memory of the engine, whose last step had no contacts of hulls. A new engine makes the next step.
+    pub(super) fn discard(&mut self) {
+        debug_assert!(!self.had_contacts, "contacts of hulls depend on earlier steps");
+        self.world = None;
+    }
+}
+
+/// Returns the first vehicle whose state is no longer finite after a step of the engine.
+pub(super) fn first_not_finite(world: &PhysicsWorld) -> Option<usize> {
+    world.quarantine().bodies().first().map(|body| body.into_raw_parts().0 as usize)
 }
 
 impl Clone for Engine {
     fn clone(&self) -> Self {
-        Self { world: copied(&self.world), new: self.new.clone(), had_contacts: self.had_contacts }
+        let world = self.world.as_ref().map(|world| Box::new(copied(world)));
+        Self { create: Arc::clone(&self.create), world, ..*self }
     }
 }
 
