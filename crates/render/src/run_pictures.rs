@@ -55,7 +55,7 @@ impl RunPictures {
             return Err(RenderError::Empty(timeline.name));
         }
         let mut renderer = Renderer::open(&self.adapter.as_str().into())?;
-        let view = View { theme: Theme::Light, size_px: SIZE_PX, text_scale: TEXT_SCALE, ..View::default() };
+        let view = View { theme: Theme::Light, size_px: SIZE_PX, text_scale: TEXT_SCALE, ..View::of(&timeline) };
         snapshots_of_run(&mut renderer, &timeline, &view)
     }
 }

@@ -35,6 +35,8 @@ const FOLLOWED_TIMES: usize = 2000;
 const NEAREST: f64 = 1e-6;
 /// Distance around the flight up to which obstacles are framed, in units of its extent.
 const OBSTACLE_ROOM: f64 = 0.2;
+/// Largest size of a swarm that the camera `Auto` follows, relative to the extent of its flight.
+const TRAVELLING: f64 = 0.4;
 /// Smallest z of the unit normal of an obstacle that is the ground.
 const LEVEL: f64 = 0.999;
 
@@ -58,6 +60,8 @@ pub struct Extent {
     oblique: Direction,
     /// Boxes around all vehicles, smoothed over time.
     swarm: Vec<SwarmBox>,
+    /// Whether the swarm travels so far that the camera `Auto` follows it.
+    travels: bool,
     /// Last computed framing; it is the same for all pictures of a film.
     framed: Mutex<Option<(Direction, Area, Camera)>>,
     /// Largest speed of a vehicle between two samples \[m/s\].
@@ -118,6 +122,7 @@ impl Extent {
         let mut largest = balls.iter().fold(0.0_f64, |largest, (_, radius)| largest.max(*radius));
         let [lowest, highest] = bounds(&balls).unwrap_or([Vector3::zeros(); 2]);
         let (mut low, mut high) = (lowest, highest);
+        let flown_m = (highest / 2.0 - lowest / 2.0).norm();
         let obstacles: Vec<&Obstacle> =
             timelines.iter().flat_map(|timeline| &timeline.plan).flat_map(|plan| &plan.obstacles).collect();
         if balls.is_empty() {
@@ -160,12 +165,16 @@ impl Extent {
         let ground_m = [corner(low - margin, f64::floor), corner(high + margin, f64::ceil)];
         let (lowest, highest) = (ground_m[0].inf(&low), ground_m[1].sup(&high));
         let reach = ((lowest + highest) / 2.0, (highest - lowest).norm() / 2.0 + largest + grid_m);
+        let swarm = smoothed(&swarm);
+        let largest_m = swarm.iter().map(|around| around.half.norm()).fold(0.0, f64::max);
+        let travels = largest_m < TRAVELLING * flown_m;
         Self {
             origin_m,
             balls,
             auto,
             oblique,
-            swarm: smoothed(&swarm),
+            swarm,
+            travels,
             framed: Mutex::new(None),
             max_speed_m_s,
             has_violations: timelines.iter().any(|timeline| timeline.has_violations()),
@@ -200,7 +209,10 @@ impl Extent {
     pub fn camera(&self, timeline: &Timeline, frame: &Frame, view: &View) -> Result<Camera, RenderError> {
         let area = view.area(self.has_violations);
         let camera = match &view.camera {
-            CameraSpec::Auto => self.framing(self.auto, area),
+            CameraSpec::Auto => match self.swarm_at(frame.time_s).filter(|_| self.travels) {
+                Some(corners) => Camera::framing(self.auto, &corners, area),
+                None => self.framing(self.auto, area),
+            },
             CameraSpec::Perspective => self.framing(self.oblique, area),
             CameraSpec::Top => self.framing(Direction::TOP, area),
             CameraSpec::Front => self.framing(Direction::FRONT, area),

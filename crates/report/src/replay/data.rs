@@ -18,6 +18,7 @@ use crate::flight_log::FlightLog;
 use tautline_audit::MovingObstacle;
 use tautline_core::obstacle::Shape;
 use tautline_core::swarm::{Rows, row};
+use tautline_sim::plan::Plan;
 
 /// Largest number of findings.
 const MOST_MOMENTS: usize = 200;
@@ -79,8 +80,9 @@ struct Data<'a> {
     /// Origin of all drawn positions, and half of the box around everything \[m\].
     origin_m: [f64; 3],
     half_m: [f64; 3],
-    /// First view.
+    /// First view, and whether it shows vehicles as lights.
     viewpoint: Viewpoint,
+    lights: bool,
     /// Side of the squares on the ground, and their lines relative to the origin, in single precision.
     square_m: f64,
     ground: String,
@@ -188,6 +190,7 @@ impl Replay {
             origin_m: origin_m.into(),
             half_m: extent.half_m().into(),
             viewpoint: stage.viewpoint(log),
+            lights: plan.as_ref().is_some_and(Plan::is_show),
             square_m,
             ground: singles(&lines.iter().map(|at| at - origin_m).collect::<Vec<_>>()),
             middle_m: [0.0; 3],
