@@ -174,8 +174,6 @@ const play = (root, data) => {
     Object.assign(make("button", { type: "button", ...keys && { "aria-keyshortcuts": keys, title: "key " + keys } },
       text), { onclick: act });
   const start = Object.assign(button("Play", "Space", () => toggle()), { className: "replay-play" });
-  const poster = Object.assign(make("button", { type: "button", class: "replay-poster", "aria-label": "Play" }),
-    { onclick: () => { toggle(); canvas.focus(); } });
   const scrub = make("input", { type: "range", min: `${first}`, max: `${last}`, step: "any", "aria-label": "Time" });
   scrub.oninput = () => go(+scrub.value);
   /**
@@ -245,7 +243,7 @@ const play = (root, data) => {
   question.setAttribute("aria-label", "Keys");
   const graph = /** @type {HTMLElement | null} */ (root.querySelector(".replay-graph"));
   const track = make("div", { class: "replay-track" }, ...graph ? [graph] : [], head, scrub);
-  const stage = make("div", { class: "replay-stage" }, canvas, names, state, chosen, said, scale, rate, poster, help);
+  const stage = make("div", { class: "replay-stage" }, canvas, names, state, chosen, said, scale, rate, help);
   const panel = make("div",
     { class: "replay-panel", role: "group", "aria-label": "Replay of " + (root.dataset.label ?? "a flight") },
     stage, make("div", { class: "replay-time" }, start, track, clock, question),
@@ -268,7 +266,6 @@ const play = (root, data) => {
   /** Plays or pauses. */
   const toggle = () => {
     playing = !playing;
-    poster.hidden = true;
     if (playing && t >= last) t = first;
     write(start, playing ? "Pause" : "Play");
     before = frames = passed = spent = 0;
@@ -278,7 +275,6 @@ const play = (root, data) => {
   /** Pauses and shows a time [s]. @param {number} to */
   const go = to => {
     if (playing) toggle();
-    poster.hidden = true;
     t = clamp(to, first, last);
     announce(null);
     ask();
@@ -366,6 +362,20 @@ const play = (root, data) => {
       target = target.map((x, k) => x + right[k] * middle[0] + up[k] * middle[1]);
     }
     fitted = { yaw, pitch, distance, target };
+  };
+  /** Distance at which a camera that follows the swarm always shows all of it [m]. */
+  const close = () => {
+    const { right, up } = axes(), room = TANGENT * (canvas.clientWidth / canvas.clientHeight || 1) * 0.94;
+    let need = 0;
+    for (let row = 0, by = Math.ceil(times.length * count / SAMPLES); row < times.length; row += by) {
+      const there = [...radius.keys()].map(k => (row * wide + k) * 4).filter(at => path[at + 3]);
+      for (const [axis, half] of /** @type {[number[], number][]} */ ([[right, room], [up, 0.84 * TANGENT]])) {
+        const at = there.map(k => path[k] * axis[0] + path[k + 1] * axis[1] + path[k + 2] * axis[2]);
+        const mean = at.reduce((sum, x) => sum + x, 0) / at.length;
+        for (const x of at) need = Math.max(need, (Math.abs(x - mean) + Math.max(shell, outer[0])) / half);
+      }
+    }
+    return need;
   };
   /** Shows everything in perspective (0), from the top (1), the front (2) or the side (3). @param {number} k */
   const look = k => { [yaw, pitch, parallel] = VIEWS[k]; fit(); ask(); };
@@ -895,7 +905,7 @@ const play = (root, data) => {
         least: 4 * ratio, stroke: 0.8 * ratio, tint: [0, 0, 0, count < 200 ? 0.85 : 0.45] });
       quads(slots);
     }
-    if (data.reference !== null) {
+    if (data.reference !== null && !lit) {
       use(mark, { axis: data.reference, mark: 1, least: 7 * ratio, stroke: 0.8 * ratio, tint: rgba(colours.ink) });
       quads(null, 1);
     }
@@ -993,6 +1003,9 @@ const play = (root, data) => {
   }
   themed();
   look(from.across === null ? 0 : 3 - from.across);
+  // The camera follows lights, and a swarm that travels far.
+  const apart = close();
+  if (data.lights || apart < 0.5 * distance) [follow.value, distance] = ["swarm", 1.05 * apart];
   return {
     root, draw,
     /** What is drawn, for tests: camera, places [CSS px], boxes around names [px], picked vehicle, arm [m]. */

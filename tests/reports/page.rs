@@ -16,7 +16,7 @@ const HOSTILE: &str = "</title></pre><script>alert(\"x\")</script>&amp;<img src=
 fn hostile_page() -> Page {
     let text = || HOSTILE.to_owned();
     let figure = figures::paths(&FlightLog::default(), &[], HOSTILE);
-    let picture = Picture { description: text(), data_uri: text(), file: text() };
+    let picture = Picture { description: text(), data_uri: text(), file: text(), is_light: true };
     let badge = Badge { word: HOSTILE.to_owned(), ..Badge::judged(false) };
     let content = [
         page::list(&[HOSTILE]),

@@ -65,12 +65,18 @@ impl WorstFlight {
             blocks.push(page::list(&["None."]));
         }
         blocks.push(page::pictures(&pictures));
-        for flight in flights {
+        for (k, flight) in flights.iter().enumerate() {
             let recording = flight.recording.as_ref().map(|path| format!("Its recording: {path}"));
-            blocks.push(page::list(&std::iter::once(flight.description.clone()).chain(recording).collect::<Vec<_>>()));
             let replay = flight.replay.as_ref();
-            blocks.extend(replay.map(|replay| page::replay(&flight.description, replay, Start::OnDemand)));
-            blocks.push(page::command(&flight.command));
+            let replay = replay.map(|replay| page::replay(&flight.description, replay, Start::OnDemand));
+            let recording = recording.map(|recording| page::list(&[recording]));
+            let own: Vec<_> = recording.into_iter().chain(replay).chain([page::command(&flight.command)]).collect();
+            if k == 0 {
+                blocks.push(page::list(&[flight.description.clone()]));
+                blocks.extend(own);
+            } else {
+                blocks.push(page::folded(&flight.description, &own));
+            }
         }
         Section::new(
             "The worst flights",
@@ -346,6 +352,7 @@ fn shown(flight: FlightId<'_>, campaign: &Campaign, worst: &Worst, left: &RunFil
         description: description.clone(),
         data_uri: picture.data_uri.clone(),
         file: format!("worst/{}/{}", flight.name(), picture.file),
+        is_light: picture.is_light,
     });
     WorstFlight {
         run: flight.run,
