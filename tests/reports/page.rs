@@ -178,7 +178,7 @@ fn the_page_of_an_audit_shows_the_smallest_distance_and_an_inset() {
         let all = lines.filter(|line| line.contains(colour)).map(corners);
         all.max_by(|one, other| width(one).total_cmp(&width(other))).expect("a line")
     };
-    let corners = corners_of("#0072B2");
+    let corners = corners_of("#332288");
     let lowest = corners.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).expect("corners");
     let [first, last] = [corners[0], corners[corners.len() - 1]];
     // Steps from the first instant to the last: each line is level or upright.
