@@ -60,17 +60,16 @@ impl WorstFlight {
     /// Returns the section of a page on the worst flights.
     pub(super) fn section(flights: &[Self]) -> Section {
         let mut blocks = Vec::new();
-        let pictures: Vec<_> = flights.iter().filter_map(|flight| flight.picture.clone()).collect();
         if flights.is_empty() {
             blocks.push(page::list(&["None."]));
         }
-        blocks.push(page::pictures(&pictures));
         for (k, flight) in flights.iter().enumerate() {
             let recording = flight.recording.as_ref().map(|path| format!("Its recording: {path}"));
             let replay = flight.replay.as_ref();
             let replay = replay.map(|replay| page::replay(&flight.description, replay, Start::OnDemand));
             let recording = recording.map(|recording| page::list(&[recording]));
-            let own: Vec<_> = recording.into_iter().chain(replay).chain([page::command(&flight.command)]).collect();
+            let picture = flight.picture.iter().map(|picture| page::pictures(std::slice::from_ref(picture)));
+            let own: Vec<_> = picture.chain(recording).chain(replay).chain([page::command(&flight.command)]).collect();
             if k == 0 {
                 blocks.push(page::list(&[flight.description.clone()]));
                 blocks.extend(own);
