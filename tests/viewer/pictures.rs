@@ -399,6 +399,16 @@ fn pictures_without_an_adapter_look_like_those_of_an_adapter() {
         assert!(difference < MAX_FLIP_OF_SOFTWARE, "{camera}: {difference}");
         assert!(without == software.shoot(&timeline, 2.5, &view).expect("a picture"), "{camera}: the same bytes");
     }
+    let scenario = Scenario::read(&Source::Builtin("obstacles".to_owned()), &[]).expect("built in");
+    let mut houses = Timeline::of(&scenario);
+    houses.take(&Sample::new(0.0, 0, &Swarm::at_rest(scenario.start.positions_m.clone()), &Rows::zeros(8)));
+    let front = View { camera: "-40,20,40".parse().expect("a camera"), ..medium() };
+    for (what, timeline, view) in [("houses", &houses, front), ("lights", &timeline, medium().with_lights())] {
+        let [with, without] =
+            [&mut renderer, &mut software].map(|renderer| renderer.shoot(timeline, 2.5, &view).expect("a picture"));
+        let (difference, _) = flip(&with, &without);
+        assert!(difference < MAX_FLIP_OF_SOFTWARE, "{what}: {difference}");
+    }
     let refused = software.check_size([0, 10]).expect_err("too small").to_string();
     assert!(refused.contains("pixels a side"), "{refused}");
 }

@@ -167,6 +167,15 @@ mod tests {
     }
 
     #[test]
+    fn values_on_an_axis_are_short_and_differ() {
+        let thirds: Vec<_> = (0..4).map(|k| f64::from(k) / 6.0).collect();
+        assert_eq!(tick_labels(&thirds), ["0", "0.167", "0.333", "0.5"]);
+        assert_eq!(tick_labels(&[0.001, 0.01, 100.0]), ["0.001", "0.01", "100"]);
+        assert_eq!(tick_labels(&[1234.5, 1234.5001]), ["1234.5", "1234.5001"]);
+        assert_eq!(tick_labels(&[1.0 / 3.0]), [(1.0_f64 / 3.0).to_string()], "one value has no distance");
+    }
+
+    #[test]
     fn grids_of_any_size_and_impossible_numbers_are_drawn() {
         let values: Vec<_> = (0..50).map(|k| f64::from(k) / 7.0).collect();
         let axis = GridAxis { key: "law.alpha", values: &values };
