@@ -27,6 +27,7 @@ fn hostile_page() -> Page {
         page::command(HOSTILE),
     ];
     Page {
+        setup: text(),
         title: text(),
         kind: HOSTILE,
         replay: None,

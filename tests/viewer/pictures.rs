@@ -366,14 +366,16 @@ fn pictures_of_the_readme_are_those_of_the_program() {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/gallery");
     let mut renderer = Renderer::open(&AdapterChoice::None).expect("no adapter needed");
     for (name, scenario, time_s, camera) in [
-        ("violation", "pentagon-laplacian", 2.2, CameraSpec::Closest),
-        ("obstacles", "obstacles", 10.0, CameraSpec::Auto),
-        ("show", "show", 23.8, CameraSpec::Follow(None)),
+        // The closest approach.
+        ("violation", "pentagon-laplacian", None, CameraSpec::Closest),
+        ("obstacles", "obstacles", Some(10.0), CameraSpec::Auto),
+        ("show", "show", Some(23.8), CameraSpec::Follow(None)),
     ] {
         let scenario = Scenario::read(&Source::Builtin(scenario.to_owned()), &[]).expect("built in");
         let mut log = FlightLog::of(&scenario);
         let report = run(&scenario, &mut log).expect("flown");
         let timeline = Timeline::flown(&scenario, Arc::new(log)).judged(report.answer.status);
+        let time_s = time_s.or(timeline.log.closest().map(|closest| closest.time_s)).expect("two vehicles");
         let view = View { camera, size_px: [960, 540], ..View::of(&timeline) };
         let shoot = |renderer: &mut Renderer, time_s: f64| renderer.shoot(&timeline, time_s, &view).expect("a picture");
         let picture = shoot(&mut renderer, time_s);
@@ -402,7 +404,8 @@ fn pictures_without_an_adapter_look_like_those_of_an_adapter() {
     let scenario = Scenario::read(&Source::Builtin("obstacles".to_owned()), &[]).expect("built in");
     let mut houses = Timeline::of(&scenario);
     houses.take(&Sample::new(0.0, 0, &Swarm::at_rest(scenario.start.positions_m.clone()), &Rows::zeros(8)));
-    let front = View { camera: "-40,20,40".parse().expect("a camera"), ..medium() };
+    let camera = "-40,20,40".parse().expect("a camera");
+    let front = View { camera, layers: Layers::NONE, ..medium() };
     for (what, timeline, view) in [("houses", &houses, front), ("lights", &timeline, medium().with_lights())] {
         let [with, without] =
             [&mut renderer, &mut software].map(|renderer| renderer.shoot(timeline, 2.5, &view).expect("a picture"));

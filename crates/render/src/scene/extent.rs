@@ -76,6 +76,8 @@ pub struct Extent {
     pub(super) grid_m: f64,
     /// Bounding ball of everything: centre and radius \[m\].
     reach: (Vector3<f64>, f64),
+    /// Corners around the boxes among the obstacles, which may be beyond \[m\].
+    boxes_m: Vec<Vector3<f64>>,
 }
 
 impl Extent {
@@ -165,6 +167,7 @@ impl Extent {
         let ground_m = [corner(low - margin, f64::floor), corner(high + margin, f64::ceil)];
         let (lowest, highest) = (ground_m[0].inf(&low), ground_m[1].sup(&high));
         let reach = ((lowest + highest) / 2.0, (highest - lowest).norm() / 2.0 + largest + grid_m);
+        let boxes = obstacles.iter().copied().filter(|obstacle| matches!(obstacle.shape, Shape::Box { .. }));
         let swarm = smoothed(&swarm);
         let largest_m = swarm.iter().map(|around| around.half.norm()).fold(0.0, f64::max);
         let travels = largest_m < TRAVELLING * flown_m;
@@ -182,6 +185,7 @@ impl Extent {
             ground_m,
             grid_m,
             reach,
+            boxes_m: boxes.flat_map(corners).map(|corner| corner - origin_m).collect(),
         }
     }
 
@@ -280,8 +284,9 @@ impl Extent {
     pub(super) fn depth_m(&self, camera: &Camera) -> [f64; 2] {
         let (centre, radius) = self.reach;
         let middle = -camera.in_camera_frame(centre).z;
-        let far = (middle + radius).max(1e-2);
-        [(middle - radius).max(NEAREST * far), far]
+        let boxes = || self.boxes_m.iter().map(|corner| -camera.in_camera_frame(*corner).z);
+        let far = boxes().fold(middle + radius, f64::max).max(1e-2);
+        [boxes().fold(middle - radius, f64::min).max(NEAREST * far), far]
     }
 }
 
