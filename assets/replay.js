@@ -52,7 +52,7 @@ const WHOLE = new Set(["path", "paint", "value", "turn", "row", "next", "points"
 const COLOURS = ["sky", "ink", "floor", "shell", "thing", "alarm", "push", "rest", "pull", "c1", "c2", "c3", "c4", "c5",
   "c6", "c7", "c8"];
 // Colours of lights from the left to the right of the swarm, and of the sky behind them.
-const LIGHTS = [[255, 194, 61], [111, 227, 154], [79, 184, 255], [176, 148, 255]], NIGHT = [6, 10, 22];
+const LIGHTS = [[255, 194, 61], [111, 227, 154], [79, 184, 255], [176, 148, 255]], NIGHT = [6, 10, 24];
 // Layers in the order of their keys 1 to 8.
 const LAYERS = ["shells", "links", "trails", "slots", "ground", "names", "closest", "caption"];
 // An entry with a third word is there if the flight has such a moment or layer.

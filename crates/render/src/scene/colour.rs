@@ -90,7 +90,7 @@ const RAMP_ON_LIGHT: [u32; 4] = [0x2A_4C_C8, 0x8F_2F_B5, 0xC8_3B_6B, 0xC2_5A_00]
 const RAMP_ON_DARK: [u32; 4] = [0x5B_8D_EF, 0xB9_7A_E0, 0xF0_72_8F, 0xFF_C2_3D];
 /// Colours of lights from the left to the right of a swarm, and of the sky.
 const LIGHTS: [u32; 4] = [0xFF_C2_3D, 0x6F_E3_9A, 0x4F_B8_FF, 0xB0_94_FF];
-const NIGHT: Colour = Colour::hex(0x06_0A_16);
+const NIGHT: Colour = Colour::hex(0x06_0A_18);
 
 /// Number of vehicles from which on all have one colour.
 const ONE_COLOUR: usize = 200;

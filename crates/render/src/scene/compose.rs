@@ -110,8 +110,8 @@ impl View {
     #[must_use]
     pub fn of(timeline: &Timeline) -> Self {
         let trail_s = match timeline.count() {
-            ..=WHOLE_TRAILS => None,
-            ..=LONG_TRAILS => Some(5.0),
+            count if count <= WHOLE_TRAILS => None,
+            count if count <= LONG_TRAILS => Some(5.0),
             _ => Some(1.0),
         };
         let view = Self { layers: Layers::of(timeline), trail_s, ..Self::default() };

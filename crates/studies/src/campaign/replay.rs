@@ -71,7 +71,7 @@ impl WorstFlight {
             let picture = flight.picture.iter().map(|picture| page::pictures(std::slice::from_ref(picture)));
             let own: Vec<_> = picture.chain(recording).chain(replay).chain([page::command(&flight.command)]).collect();
             if k == 0 {
-                blocks.push(page::list(&[flight.description.clone()]));
+                blocks.push(page::list(std::slice::from_ref(&flight.description)));
                 blocks.extend(own);
             } else {
                 blocks.push(page::folded(&flight.description, &own));
