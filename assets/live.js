@@ -88,8 +88,6 @@ const restart = () => {
     axis_m: 1, axes: null, reference: null,
   });
   start();
-  // The present is the end of the shown time.
-  root.querySelector(".replay-poster")?.remove();
   // A live view has no other time to play or to choose.
   for (const one of root.querySelectorAll(".replay-play, .replay-track, .replay-clock, [aria-label=Speed]"))
     one.style.display = "none";

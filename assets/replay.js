@@ -33,7 +33,7 @@
  *   steps: Packed, breaks: Packed, near_s: Packed, near_who: Packed, holds: boolean, nearest: [number, string][],
  *   verdicts: Verdict[], decimals: number, moments: Moment[], things: Thing[], ground: Packed, square_m: number,
  *   rotors: {at_m: number[][], radius_m: number} | null, turns: Packed, links: Packed, tension: boolean,
- *   delta_m: number, formations: {from_s: number, slots: Packed}[], axis_m: number,
+ *   delta_m: number, lights: boolean, formations: {from_s: number, slots: Packed}[], axis_m: number,
  *   axes: number | null, reference: number | null}} Data
  */
 /** @typedef {{vao: WebGLVertexArrayObject | null, count: number, buffer: WebGLBuffer | null}} Mesh */
@@ -48,9 +48,11 @@ const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8, 16, 32, 64];
 // Uniforms that are integers.
 const WHOLE = new Set(["path", "paint", "value", "turn", "row", "next", "points", "kind", "stride", "newest", "axis",
   "mark"]);
-// Names of the page's colours (crates/report/src/report/page/style.css); `c1` to `c6` are those of the vehicles.
+// Names of the page's colours (crates/report/src/report/page/style.css); `c1` to `c8` are those of the vehicles.
 const COLOURS = ["sky", "ink", "floor", "shell", "thing", "alarm", "push", "rest", "pull", "c1", "c2", "c3", "c4", "c5",
-  "c6"];
+  "c6", "c7", "c8"];
+// Colours of lights from the left to the right of the swarm, and of the sky behind them.
+const LIGHTS = [[255, 194, 61], [111, 227, 154], [79, 184, 255], [176, 148, 255]], NIGHT = [6, 10, 24];
 // Layers in the order of their keys 1 to 8.
 const LAYERS = ["shells", "links", "trails", "slots", "ground", "names", "closest", "caption"];
 // An entry with a third word is there if the flight has such a moment or layer.
@@ -60,7 +62,7 @@ const HELP = [["Space", "play, pause"], ["Left, Right", "previous, next instant;
   ["1, 2, 3", "perspective, top, front"],
   ["F", "follow the picked vehicle or the swarm; again: the whole flight"],
   ["T", "trails: whole, short, none", "trails"],
-  ["C", "colour by vehicle, speed, clearance"], ["L", "labels"], ["W, A, S, D or drag", "turn the camera"],
+  ["C", "colour by vehicle, speed, clearance, lights"], ["L", "labels"], ["W, A, S, D or drag", "turn the camera"],
   ["right drag", "move the camera"], ["Page Up, Page Down or wheel", "zoom"],
   ["click, V", "pick a vehicle, the next vehicle"], ["M", "dark or light background"], ["P", "save a picture"],
   ["H", "help"]];
@@ -172,8 +174,6 @@ const play = (root, data) => {
     Object.assign(make("button", { type: "button", ...keys && { "aria-keyshortcuts": keys, title: "key " + keys } },
       text), { onclick: act });
   const start = Object.assign(button("Play", "Space", () => toggle()), { className: "replay-play" });
-  const poster = Object.assign(make("button", { type: "button", class: "replay-poster", "aria-label": "Play" }),
-    { onclick: () => { toggle(); canvas.focus(); } });
   const scrub = make("input", { type: "range", min: `${first}`, max: `${last}`, step: "any", "aria-label": "Time" });
   scrub.oninput = () => go(+scrub.value);
   /**
@@ -185,13 +185,18 @@ const play = (root, data) => {
   const speeds = select("Speed", SPEEDS.map(x => [`${x}`, "× " + x]), () => {});
   // Real time unless the flight would then take more than 30 s.
   speeds.value = SPEEDS.find(x => (last - first) / x <= 30) ?? 64;
-  const span = last - first, tails = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000].filter(x => x < span).slice(-4);
+  // Trails of many vehicles would hide them.
+  const usual = count < 25 ? Infinity : count < 100 ? 5 : 1;
+  const span = last - first, tails = [1, 2, 5, 10, 20, 50, 100, 200, 500, 1000].filter(x => x < span)
+    .filter((x, k, all) => x === usual || k > all.length - 5);
   const tail = select("Length of trails", [["Infinity", "whole trails"],
     .../** @type {[string, string][]} */ (tails.map(x => [`${x}`, `trails of ${x} s`]))], () => {});
+  if (tails.includes(usual)) tail.value = `${usual}`;
   const follow = select("Camera", [["", "free camera"], ["swarm", "follow the swarm"],
     ["picked", "follow picked"]], () => approach());
   const kinds = /** @type {[string, string][]} */ ([["", "colour: vehicle"],
-    ...data.holds ? [] : [["speed", "colour: speed"]], ...count > 1 ? [["clearance", "colour: clearance"]] : []]);
+    ...data.holds ? [] : [["speed", "colour: speed"]], ...count > 1 ? [["clearance", "colour: clearance"]] : [],
+    ["lights", "colour: lights"]]);
   const colouring = select("Colour", kinds, () => recolour());
   const jumps = /** @type {[string, string, string, number][]} */ ([
     ["Closest approach", "N", "closest", 1], ["Previous violation", "Shift+B", "violation", -1],
@@ -214,8 +219,12 @@ const play = (root, data) => {
     slots: "slots", ground: `squares of ${data.square_m} m`, closest: "closest two" };
   const swatch = (/** @type {string} */ background) =>
     make("i", { class: "replay-swatch", style: "background:" + background });
+  // Layers that would hide the formation, or outshine lights, are off at first.
+  const off = new Set(data.lights ? LAYERS.filter(name => name !== "caption")
+    : [...bytes(data.links).byteLength > 4 * 40 ? ["links"] : [], ...count > 60 ? ["slots"] : []]);
   const boxes = new Map(LAYERS.filter(name => shows[name]).map(name => {
-    const box = make("input", { type: "checkbox", checked: "" });
+    shows[name] = !off.has(name);
+    const box = make("input", { type: "checkbox", ...shows[name] && { checked: "" } });
     box.onchange = () => { shows[name] = box.checked; ask(); };
     return [name, box];
   }));
@@ -234,7 +243,7 @@ const play = (root, data) => {
   question.setAttribute("aria-label", "Keys");
   const graph = /** @type {HTMLElement | null} */ (root.querySelector(".replay-graph"));
   const track = make("div", { class: "replay-track" }, ...graph ? [graph] : [], head, scrub);
-  const stage = make("div", { class: "replay-stage" }, canvas, names, state, chosen, said, scale, rate, poster, help);
+  const stage = make("div", { class: "replay-stage" }, canvas, names, state, chosen, said, scale, rate, help);
   const panel = make("div",
     { class: "replay-panel", role: "group", "aria-label": "Replay of " + (root.dataset.label ?? "a flight") },
     stage, make("div", { class: "replay-time" }, start, track, clock, question),
@@ -257,7 +266,6 @@ const play = (root, data) => {
   /** Plays or pauses. */
   const toggle = () => {
     playing = !playing;
-    poster.hidden = true;
     if (playing && t >= last) t = first;
     write(start, playing ? "Pause" : "Play");
     before = frames = passed = spent = 0;
@@ -267,7 +275,6 @@ const play = (root, data) => {
   /** Pauses and shows a time [s]. @param {number} to */
   const go = to => {
     if (playing) toggle();
-    poster.hidden = true;
     t = clamp(to, first, last);
     announce(null);
     ask();
@@ -355,6 +362,20 @@ const play = (root, data) => {
       target = target.map((x, k) => x + right[k] * middle[0] + up[k] * middle[1]);
     }
     fitted = { yaw, pitch, distance, target };
+  };
+  /** Distance at which a camera that follows the swarm always shows all of it [m]. */
+  const close = () => {
+    const { right, up } = axes(), room = TANGENT * (canvas.clientWidth / canvas.clientHeight || 1) * 0.94;
+    let need = 0;
+    for (let row = 0, by = Math.ceil(times.length * count / SAMPLES); row < times.length; row += by) {
+      const there = [...radius.keys()].map(k => (row * wide + k) * 4).filter(at => path[at + 3]);
+      for (const [axis, half] of /** @type {[number[], number][]} */ ([[right, room], [up, 0.84 * TANGENT]])) {
+        const at = there.map(k => path[k] * axis[0] + path[k + 1] * axis[1] + path[k + 2] * axis[2]);
+        const mean = at.reduce((sum, x) => sum + x, 0) / at.length;
+        for (const x of at) need = Math.max(need, (Math.abs(x - mean) + Math.max(shell, outer[0])) / half);
+      }
+    }
+    return need;
   };
   /** Shows everything in perspective (0), from the top (1), the front (2) or the side (3). @param {number} k */
   const look = k => { [yaw, pitch, parallel] = VIEWS[k]; fit(); ask(); };
@@ -601,7 +622,7 @@ const play = (root, data) => {
   // Drawing. The time lies between the instants `row` and `next`, at the share `part` of the interval. `painted` lists
   // the vehicles in red, `shape` is the number of the formation in the meshes.
   const dark = matchMedia("(prefers-color-scheme: dark)");
-  let painted = "", shape = -1, row = 0, next = 0, part = 0, near = /** @type {number[]} */ ([]);
+  let painted = "", shape = -1, lit = false, row = 0, next = 0, part = 0, near = /** @type {number[]} */ ([]);
   /** Colours by name. @type {Object<string, number[]>} */
   let colours = {};
   /** Smallest and largest number of the colour scale; equal where vehicles have colours of their own. */
@@ -645,7 +666,10 @@ const play = (root, data) => {
     const kind = colouring.value, at = kind === "speed" ? speedsAt : clearances;
     spanned = [0, 0];
     scale.replaceChildren();
-    if (!kind) return;
+    lit = kind === "lights";
+    stage.style.colorScheme = lit ? "dark" : "";
+    themed();
+    if (!kind || lit) return;
     const numbers = new Float32Array(times.length * count);
     let low = Infinity, high = -Infinity;
     for (let row = 0; row < times.length; row++) {
@@ -736,6 +760,11 @@ const play = (root, data) => {
     refill(filled, Float32Array.from(numbers));
     filled.count = numbers.length / 6;
   };
+  /** Colour of a light at a part of the width of the swarm. @param {number} at */
+  const light = at => {
+    const part = clamp(at, 0, 1) * 2.999, k = Math.floor(part);
+    return LIGHTS[k].map((from, channel) => Math.round(from + (LIGHTS[k + 1][channel] - from) * (part - k)));
+  };
   const draw = () => {
     const ratio = sizeOf(canvas);
     if (!ratio || ended) return;
@@ -749,10 +778,12 @@ const play = (root, data) => {
     const wrong = [...moments.filter(of => of.kind === "violation" && of.from_s <= t && t <= of.to_s),
       { who: named, thing }];
     const who = new Set(wrong.flatMap(of => of.who));
-    if ([...who].join() !== painted) {
-      painted = [...who].join();
+    if (lit || [...who].join() !== painted) {
+      painted = lit ? "?" : [...who].join();
+      const across = lit ? [...radius.keys()].map(k => project(k)[0]) : [], low = Math.min(...across);
+      const reach = Math.max(...across) - low || 1;
       for (let k = 0; k < count; k++) {
-        const own = colours[`c${count < 200 ? k % 6 + 1 : 1}`];
+        const own = lit ? light((across[k] - low) / reach) : colours[`c${count < 200 ? k % 8 + 1 : 1}`];
         paint.set(who.has(k) ? [...colours.alarm, 0] : [...own, 255], 4 * k);
         paint.set([...own, 255], 4 * (count + k));
       }
@@ -761,7 +792,7 @@ const play = (root, data) => {
     }
     reform();
     gl.viewport(0, 0, size[0], size[1]);
-    gl.clearColor(...(/** @type {[number, number, number, number]} */ (rgba(colours.sky))));
+    gl.clearColor(...(/** @type {[number, number, number, number]} */ (rgba(lit ? NIGHT : colours.sky))));
     gl.enable(gl.DEPTH_TEST);
     gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
     gl.blendFunc(gl.SRC_ALPHA, gl.ONE_MINUS_SRC_ALPHA);
@@ -786,7 +817,7 @@ const play = (root, data) => {
       const ends = [colours.pull, colours.push].map(colour => rgba(colour).slice(0, 3));
       if (colouring.value === "clearance") ends.reverse();
       set({ right, up, back, eye, lens, size, parallel: parallel ? distance : 0, path: 0, paint: 1, value: 2, turn: 3,
-        row, next, part, points: count, spanned, low: ends[0], mid: rgba(colours.rest).slice(0, 3),
+        row, next, part, level: squares[2], points: count, spanned, low: ends[0], mid: rgba(colours.rest).slice(0, 3),
         high: ends[1], arm, armLeast: 8 * ratio,
         "arms[0]": arms, shell: [0, 0, 0], offset: [0, 0, 0], fixedAt: [0, 0, 0, 0], fixedPaint: [0, 0, 0, 0],
         ...values });
@@ -798,15 +829,21 @@ const play = (root, data) => {
     };
     const hit = new Set(wrong.map(of => of.thing));
     const solids = (/** @type {boolean} */ opaque) => things.forEach((thing, k) => {
-      const colour = hit.has(k) ? colours.alarm : colours.thing, offset = thingAt(thing.path);
+      const plane = thing.opacity < 1, offset = thingAt(thing.path);
+      const colour = hit.has(k) ? colours.alarm : plane ? colours.floor : colours.thing;
       if (thing.radius_m !== null && opaque) {
         use(ball, { fixedAt: [...offset, thing.radius_m], fixedPaint: rgba(colour) });
         quads(null, 1);
       } else if (thing.opacity === 1 === opaque) {
         use(solid, { offset, tint: rgba(colour, thing.opacity) });
         gl.bindVertexArray(thing.solid.vao);
+        // Rims are in front of the sides.
+        gl.enable(gl.POLYGON_OFFSET_FILL);
+        gl.polygonOffset(1, 2);
         gl.drawArrays(gl.TRIANGLES, 0, thing.solid.count);
-        use(line, { offset, kind: 0, width: 1.4 * ratio, tint: rgba(colour, Math.min(2 * thing.opacity, 1)) });
+        gl.disable(gl.POLYGON_OFFSET_FILL);
+        const rim = plane ? rgba(colour, 2 * thing.opacity) : rgba(colour.map(part => 0.4 * part));
+        use(line, { offset, kind: 0, width: 1.4 * ratio, tint: rim });
         quads(thing.rims);
       }
     });
@@ -824,6 +861,14 @@ const play = (root, data) => {
     use(line, { kind: 0, width: ratio, tint: rgba(colours.floor) });
     if (parallel) fill(right, up, size[0] / size[1]);
     if (shows.ground) quads(parallel ? filled : ground);
+    // Lines down to the ground and marks there, unless the vehicles hide them.
+    const drops = shows.ground && pitch < 1.3 && count <= 300 ? count : 0;
+    if (drops) {
+      use(mark, { mark: 2, size_m: least_m, least: 3 * ratio, tint: [0, 0, 0, 0.6] });
+      quads(null, drops);
+      use(line, { kind: 5, width: 1.1 * ratio, tint: rgba(colours.rest, 0.55) });
+      quads(null, drops);
+    }
     if (shows.trails) {
       const tailed = +tail.value;
       let stride = 1;
@@ -853,11 +898,14 @@ const play = (root, data) => {
       const from = (row * wide + data.axes + 1) * 4, to = (next * wide + data.axes + 1) * 4;
       const jumps = [...path.subarray(from, from + 12)].some((x, at) =>
         Math.abs(x - path[to + at]) > 0.4 * data.axis_m);
-      use(mark, { axis: data.axes, mark: 0, part: jumps ? 0 : part, length_m: data.axis_m, size_m: 1.45 * least_m,
+      const laid = { axis: data.axes, part: jumps ? 0 : part, length_m: data.axis_m };
+      use(line, { ...laid, kind: 6, width: 1.1 * ratio });
+      quads(slots);
+      use(mark, { ...laid, mark: 0, size_m: 1.45 * least_m,
         least: 4 * ratio, stroke: 0.8 * ratio, tint: [0, 0, 0, count < 200 ? 0.85 : 0.45] });
       quads(slots);
     }
-    if (data.reference !== null) {
+    if (data.reference !== null && !lit) {
       use(mark, { axis: data.reference, mark: 1, least: 7 * ratio, stroke: 0.8 * ratio, tint: rgba(colours.ink) });
       quads(null, 1);
     }
@@ -866,6 +914,11 @@ const play = (root, data) => {
       quads(null, 5 * count);
       use(rotor, { rotor: rotors?.radius_m ?? 0 });
       quads(null, 4 * count);
+    }
+    if (lit) for (const [kind, size_m, least] of [[3, Math.max(4 * least_m, 1.9 * shell), Math.min(15, canvas.clientWidth / 50)],
+      [4, 0.6 * Math.max(4 * least_m, 1.9 * shell), Math.min(9, canvas.clientWidth / 80)]]) {
+      use(mark, { mark: kind, size_m, least: least * ratio, lift: 1.1 * least_m, tint: [...rgba(colours.ink)] });
+      quads(null, count);
     }
     if (picked !== null) {
       const at = place(picked);
@@ -944,8 +997,15 @@ const play = (root, data) => {
     draw();
   });
   sized.observe(stage);
+  if (data.lights) {
+    colouring.value = "lights";
+    recolour();
+  }
   themed();
   look(from.across === null ? 0 : 3 - from.across);
+  // The camera follows lights, and a swarm that travels far.
+  const apart = close();
+  if (data.lights || apart < 0.5 * distance) [follow.value, distance] = ["swarm", 1.05 * apart];
   return {
     root, draw,
     /** What is drawn, for tests: camera, places [CSS px], boxes around names [px], picked vehicle, arm [m]. */

@@ -50,6 +50,16 @@ vec3 rotated(int k, vec3 v) {
   return v + 2. * cross(q.xyz, cross(q.xyz, v) + q.w * v);
 }
 float enlarged(vec3 at) { return max(1., armLeast * 2. * lens.y / size.y * max(depth(view(at)), 0.) / arm); }
+// Points from `axis` on: the middle of the slots and the ends of their three axes of `length_m`.
+uniform int axis; uniform float length_m;
+// Position of a slot relative to their middle.
+vec4 slot(vec3 at) {
+  vec4 c = place(axis);
+  return vec4(c.xyz + ((place(axis + 1).xyz - c.xyz) * at.x + (place(axis + 2).xyz - c.xyz) * at.y
+    + (place(axis + 3).xyz - c.xyz) * at.z) / length_m, c.w);
+}
+// Height of the ground.
+uniform float level;
 // Outside of the picture.
 const vec4 NOWHERE = vec4(2, 2, 2, 1);
 @ BALL VERTEX
@@ -111,7 +121,7 @@ void main() {
 }
 @ LINE VERTEX
 // A straight line of a width in pixels. `kind` 0 joins two positions, 1 a pair of vehicles, 2 is a piece of a trail,
-// 3 a piece of a trail between two times, 4 an arm of a quadrotor.
+// 3 a piece of a trail between two times, 4 an arm of a quadrotor, 5 a line from a vehicle to the ground, 6 to its slot.
 in vec3 from, to; in vec3 pair; uniform int kind, stride, newest;
 uniform float width, delta, fading, now, tail; uniform vec3 offset;
 uniform vec4 tint, push, rest, pull; out vec4 colour;
@@ -147,6 +157,10 @@ void main() {
     a = place(k);
     b = vec4(a.xyz + rotated(k, arms[j]) * enlarged(a.xyz), a.w);
     if (j < 4) colour = vec4(hueNow(k), 1);
+  } else if (kind >= 5) {
+    a = place(gl_InstanceID);
+    b = kind == 5 ? vec4(a.xy, level, a.w) : slot(from);
+    colour = kind == 5 ? tint : vec4(hueNow(gl_InstanceID), .4);
   }
   vec3 p = view(a.xyz), q = view(b.xyz);
   float n = lens.z;
@@ -183,29 +197,32 @@ void main() {
 @ FLAT_PIXEL COMMON
 in vec4 colour; out vec4 pixel; void main() { pixel = colour; }
 @ MARK VERTEX
-// A ring around a slot (`mark` 0) or the diamond of the reference (1), in the plane of the picture.
-// The points from `axis` on are the middle of the slots and the ends of their three axes of `length_m`.
-in vec3 from; uniform int axis, mark; uniform float length_m, size_m, least; uniform vec4 tint;
+// A ring around a slot (`mark` 0) or the diamond of the reference (1), in the plane of the picture, the mark on the
+// ground below a vehicle (2), the glow of a light (3) or its white centre (4), `lift` ahead of the vehicle.
+in vec3 from; uniform int mark; uniform float size_m, least, lift; uniform vec4 tint;
 out vec4 colour; out vec2 at; flat out float thin;
 void main() {
-  vec4 c = place(axis);
-  vec3 p = c.xyz;
+  vec4 c = mark == 0 ? slot(from) : place(mark == 1 ? axis : gl_InstanceID);
   colour = tint;
-  if (mark == 0) {
-    p += ((place(axis + 1).xyz - c.xyz) * from.x + (place(axis + 2).xyz - c.xyz) * from.y
-      + (place(axis + 3).xyz - c.xyz) * from.z) / length_m;
-    colour = vec4(texelFetch(paint, ivec2(gl_InstanceID, 1), 0).rgb, tint.a);
-  }
-  vec3 s = view(p);
-  float pixel = 2. * lens.y / size.y * depth(s), r = mark == 0 ? max(size_m, least * pixel) : least * pixel;
+  if (mark == 0) colour = vec4(texelFetch(paint, ivec2(gl_InstanceID, 1), 0).rgb, tint.a);
+  if (mark == 2) c.z = level;
+  if (mark == 2 || mark == 3) colour = vec4(hueNow(gl_InstanceID), tint.a);
+  vec3 s = view(c.xyz);
+  if (mark > 2) s.z += lift;
+  float pixel = 2. * lens.y / size.y * depth(s), r = mark == 1 ? least * pixel : max(size_m, least * pixel);
   at = (vec2(gl_VertexID & 1, gl_VertexID >> 1) * 2. - 1.) * (1. + 2. * pixel / r);
   thin = r / pixel;
-  gl_Position = c.w < .5 || -s.z < lens.z ? NOWHERE : toClip(s + vec3(at * r, 0));
+  gl_Position = c.w < .5 || -s.z < lens.z ? NOWHERE : toClip(mark == 2 ? view(c.xyz + vec3(at * r, 0)) : s + vec3(at * r, 0));
 }
 @ MARK_PIXEL COMMON
 in vec4 colour; in vec2 at; flat in float thin; uniform int mark; uniform float stroke; out vec4 pixel;
 void main() {
-  float d = abs((mark == 0 ? length(at) : abs(at.x) + abs(at.y)) - 1.) * thin;
+  float away = length(at);
+  if (mark > 1) {
+    pixel = vec4(colour.rgb, colour.a * (mark == 2 ? clamp((1. - away) * thin + .5, 0., 1.) : pow(max(1. - away, 0.), 2.)));
+    return;
+  }
+  float d = abs((mark == 0 ? away : abs(at.x) + abs(at.y)) - 1.) * thin;
   float a = clamp(stroke - d + .5, 0., 1.);
   if (a <= 0.) discard;
   pixel = vec4(colour.rgb, colour.a * a);

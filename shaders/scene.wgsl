@@ -1,4 +1,4 @@
-// Shaders of the scene: balls, shells, lines and discs.
+// Shaders of the scene: balls, faces, shells, lines and discs.
 //
 // View space has the camera's axes: right, up, towards the camera [m].
 
@@ -259,13 +259,31 @@ fn stroke(corner: LineCorner) -> @location(0) vec4<f32> {
     return corner.colour;
 }
 
-// Discs: quads with a smooth rim.
+// Faces: solid parallelograms.
+
+struct Face {
+    @location(0) centre: vec3<f32>,
+    @location(1) first: vec3<f32>,
+    @location(2) second: vec3<f32>,
+    @location(3) colour: vec4<f32>,
+}
+
+@vertex
+fn face_corner(@builtin(vertex_index) index: u32, face: Face) -> LineCorner {
+    let at = vec2(f32(index & 1u), f32(index >> 1u)) * 2.0 - 1.0;
+    let corner = face.centre + face.first * at.x + face.second * at.y;
+    return LineCorner(to_clip(to_view(corner)), to_linear(face.colour));
+}
+
+// Discs: quads with a smooth rim, or a glow.
 
 struct Disc {
     @location(0) centre: vec3<f32>,
     @location(1) radius: f32,
     @location(2) normal: vec3<f32>,
-    @location(3) colour: vec4<f32>,
+    // 0 for a disc with a rim, 1 for a glow.
+    @location(3) glow: f32,
+    @location(4) colour: vec4<f32>,
 }
 
 struct DiscCorner {
@@ -273,6 +291,7 @@ struct DiscCorner {
     // Offset from the centre, in units of the radius.
     @location(0) at: vec2<f32>,
     @location(1) @interpolate(flat) colour: vec4<f32>,
+    @location(2) @interpolate(flat) glow: f32,
 }
 
 // Half the side of the quad, in units of the radius: room for the smooth rim.
@@ -288,7 +307,7 @@ fn disc_corner(@builtin(vertex_index) index: u32, disc: Disc) -> DiscCorner {
     let across = normalize(cross(disc.normal, helper));
     let along = cross(disc.normal, across);
     let corner = disc.centre + (across * at.x + along * at.y) * disc.radius;
-    return DiscCorner(to_clip(to_view(corner)), at, to_linear(disc.colour));
+    return DiscCorner(to_clip(to_view(corner)), at, to_linear(disc.colour), disc.glow);
 }
 
 @fragment
@@ -297,5 +316,7 @@ fn disc(corner: DiscCorner) -> @location(0) vec4<f32> {
     let pixel = max(fwidth(out), 1e-6);
     let covered = clamp((1.0 - out) / pixel + 0.5, 0.0, 1.0);
     let rim = smoothstep(1.0 - max(0.14, 2.0 * pixel), 1.0 - 0.5 * pixel, out);
-    return vec4(corner.colour.rgb, corner.colour.a * covered * (0.45 + 0.55 * rim));
+    let inner = max(1.0 - out, 0.0);
+    let opacity = mix(covered * (0.45 + 0.55 * rim), inner * inner, corner.glow);
+    return vec4(corner.colour.rgb, corner.colour.a * opacity);
 }

@@ -12,8 +12,8 @@ use super::reading::ReadArguments;
 use super::{Exit, completions, drawing};
 use tautline_core::files::{write_atomically, write_atomically_with};
 use tautline_render::{
-    CameraSpec, Colouring, Extent, Film, FilmFormat, Picture, RenderError, Renderer, Scene, Theme, Timeline, View,
-    contact_sheet,
+    CameraSpec, Colouring, Extent, Film, FilmFormat, Layers, Picture, RenderError, Renderer, Scene, Theme, Timeline,
+    View, contact_sheet,
 };
 use tautline_report::request::audit::recording_in;
 use tautline_report::request::outputs::{self, NamedPath};
@@ -71,13 +71,13 @@ pub(super) struct RenderArguments {
     #[arg(long, value_name = "X", allow_negative_numbers = true, requires = "film")]
     speed: Option<f64>,
     /// Camera: auto, perspective, top, front, side, follow, follow:ID, closest, or AZIMUTH,ELEVATION,DISTANCE in
-    /// degrees and metres.
-    #[arg(long, default_value = "auto", allow_hyphen_values = true, add = completions::camera())]
-    camera: String,
-    /// Colour of vehicles and trails.
-    #[arg(long, default_value = "vehicle", value_parser = drawing::colouring())]
-    colour: Colouring,
-    /// Length of trails [s] [default: from the start].
+    /// degrees and metres [default: auto, which follows a swarm that travels far].
+    #[arg(long, allow_hyphen_values = true, add = completions::camera())]
+    camera: Option<String>,
+    /// Colour of vehicles and trails [default: vehicle; lights for sixty vehicles or more in several flat formations].
+    #[arg(long, value_parser = drawing::colouring())]
+    colour: Option<Colouring>,
+    /// Length of trails [s] [default: from the start, 5 from 25 vehicles on, 1 from 100 on].
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     trail: Option<f64>,
     /// Theme.
@@ -140,7 +140,7 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
             help,
         ));
     }
-    let camera: CameraSpec = arguments.camera.parse()?;
+    let camera: Option<CameraSpec> = arguments.camera.as_ref().map(|camera| camera.parse()).transpose()?;
     let film = arguments.film.as_deref().map(|path| Ok::<_, Failure>((path, FilmFormat::of(path)?))).transpose()?;
     let fps = arguments.film_fps.unwrap_or(FPS);
     let reading = arguments.reading.options();
@@ -166,11 +166,18 @@ pub(super) fn render(arguments: &RenderArguments) -> Result<Exit, Failure> {
     let inputs: Vec<NamedPath<'_>> = paths.iter().map(|path| ("the recording".to_owned(), *path)).collect();
     outputs::check(&inputs, &outputs)?;
     let trail_s = arguments.trail.map(|trail_s| positive(trail_s, "--trail")).transpose()?;
-    let (theme, colouring, [width, height]) = (arguments.theme, arguments.colour, arguments.size);
+    let [width, height] = arguments.size;
     // Pictures side by side have the same width.
     let columns = u32::try_from(flights.len()).unwrap_or(1);
     let size_px = [(width / columns).max(1) * columns, height];
-    let view = View { camera, theme, colouring, size_px, trail_s, ..View::default() };
+    let usual = View::of(timeline);
+    let usual = match arguments.colour {
+        Some(Colouring::Lights) => usual.with_lights(),
+        Some(colouring) => View { colouring, layers: Layers::of(timeline), camera: CameraSpec::Auto, ..usual },
+        None => usual,
+    };
+    let (camera, trail_s) = (camera.unwrap_or(usual.camera.clone()), trail_s.or(usual.trail_s));
+    let view = View { camera, theme: arguments.theme, size_px, trail_s, ..usual };
     if let Some((path, format)) = film {
         if path.is_dir() {
             let message = format!("--film: {} is a folder", path.display());

@@ -145,6 +145,7 @@ fn fly(arguments: &RunArguments, force: bool, opens: bool, terminal: &Terminal) 
     let free_steps = arguments.free_steps.then_some("--free-steps");
     let words: Vec<_> = ["run", &what.argument].into_iter().chain(sets).chain(plant).chain(free_steps).collect();
     let request = RunRequest {
+        changes: flown.overrides.clone(),
         out: arguments.out.clone(),
         force,
         figures: !arguments.no_figures,

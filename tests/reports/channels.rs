@@ -66,7 +66,7 @@ fn every_channel_has_a_figure_with_a_line_per_vehicle() {
     for ((figure, label), third) in figures.iter().zip(labels).zip([20.0, 0.08, 10.0, 0.1]) {
         let drawing = Drawing::of(figure);
         assert!(drawing.words().iter().any(|word| word == label), "{label}: {:?}", drawing.words());
-        let lines = drawing.polylines(("#00936C", "1.5"));
+        let lines = drawing.polylines(("#3F9E8E", "1.5"));
         let (line, [first, last]) = (&lines[0], [third, 0.5 * third].map(|number| drawing.place(true, number)));
         assert!((line[0].1 - first).abs() <= TOLERANCE_PX, "{}: {line:?}", figure.name);
         assert!((line[line.len() - 1].1 - last).abs() <= TOLERANCE_PX, "{}: {line:?}", figure.name);

@@ -17,7 +17,7 @@ const DELTA_M: f64 = 2.0;
 const CERTIFIED_M: f64 = 2.5;
 /// Stroke and width of the line at delta.
 const DELTA_LINE: (&str, &str) = ("#1B1F24", "2");
-const CERTIFIED_LINE: (&str, &str) = ("#00936C", "1.6");
+const CERTIFIED_LINE: (&str, &str) = ("#3F9E8E", "1.6");
 
 /// Parsed figure.
 pub(crate) struct Drawing<'a>(Document<'a>);
@@ -180,7 +180,7 @@ fn every_pair_of_a_small_swarm_has_a_line_and_the_closest_approach_is_marked() {
     let figure = figures::distances(&history(4), DELTA_M, Some(CERTIFIED_M), "Distances");
     let drawing = Drawing::of(&figure);
     // The legend has six entries: delta, certified, closest, two pairs, and the other pairs in grey.
-    let colors = ["#0072B2", "#D55E00"];
+    let colors = ["#332288", "#CC6677"];
     for color in colors {
         let lines = drawing.polylines((color, "1.5"));
         assert_eq!(lines.iter().filter(|line| length(line) > 100.0).count(), 1, "{color}");
@@ -262,7 +262,7 @@ fn paths_have_a_cross_at_each_start_a_ring_at_each_end_and_equal_axes() {
             "({x}, {y}), not {expected:?}"
         );
     }
-    for (i, color) in ["#0072B2", "#D55E00", "#00936C"].into_iter().enumerate() {
+    for (i, color) in ["#332288", "#CC6677", "#3F9E8E"].into_iter().enumerate() {
         let paths = drawing.polylines((color, "1.5"));
         let [path] = &paths[..] else { panic!("{} paths", paths.len()) };
         let start = (drawing.place(false, 3.0 * i as f64), drawing.place(true, 0.0));
@@ -497,7 +497,7 @@ fn the_tension_curve_has_the_right_barrier_and_minimum() {
         (x - drawing.place(false, rest_m)).abs() <= TOLERANCE_PX
             && (y - drawing.place(true, 0.0)).abs() <= TOLERANCE_PX
     );
-    let curves = drawing.polylines(("#0072B2", "1.8"));
+    let curves = drawing.polylines(("#332288", "1.8"));
     let curve = curves.iter().max_by(|a, b| length(a).total_cmp(&length(b))).expect("a curve");
     let lowest = curve.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).expect("a point");
     // The curve is flat near its minimum: a tenth of a pixel of height is several pixels of width.

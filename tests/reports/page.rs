@@ -16,7 +16,7 @@ const HOSTILE: &str = "</title></pre><script>alert(\"x\")</script>&amp;<img src=
 fn hostile_page() -> Page {
     let text = || HOSTILE.to_owned();
     let figure = figures::paths(&FlightLog::default(), &[], HOSTILE);
-    let picture = Picture { description: text(), data_uri: text(), file: text() };
+    let picture = Picture { description: text(), data_uri: text(), file: text(), is_light: true };
     let badge = Badge { word: HOSTILE.to_owned(), ..Badge::judged(false) };
     let content = [
         page::list(&[HOSTILE]),
@@ -27,6 +27,7 @@ fn hostile_page() -> Page {
         page::command(HOSTILE),
     ];
     Page {
+        setup: text(),
         title: text(),
         kind: HOSTILE,
         replay: None,
@@ -178,7 +179,7 @@ fn the_page_of_an_audit_shows_the_smallest_distance_and_an_inset() {
         let all = lines.filter(|line| line.contains(colour)).map(corners);
         all.max_by(|one, other| width(one).total_cmp(&width(other))).expect("a line")
     };
-    let corners = corners_of("#0072B2");
+    let corners = corners_of("#332288");
     let lowest = corners.iter().copied().max_by(|a, b| a.1.total_cmp(&b.1)).expect("corners");
     let [first, last] = [corners[0], corners[corners.len() - 1]];
     // Steps from the first instant to the last: each line is level or upright.

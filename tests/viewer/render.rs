@@ -378,7 +378,8 @@ fn trails_have_the_requested_length() {
     let table: String = (0..=10).map(side_by_side).collect();
     fs::write(folder.path().join("ahead.csv"), format!("t,id,x,y,z\n{table}")).expect("written");
     let picture = |name: &str, more: &[&str]| {
-        let render = [&["render", "ahead.csv", "--at", "end", "--size", "320x180", "--out", name], more].concat();
+        let render = ["render", "ahead.csv", "--at", "end", "--camera", "top", "--size", "320x180", "--out", name];
+        let render = [&render[..], more].concat();
         let Ran { exit, err, .. } = ran(folder.path(), &render);
         assert_eq!(exit, GOOD, "{err}");
         pixels(&folder.path().join(name).join("end.png"))

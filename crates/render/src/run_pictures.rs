@@ -15,6 +15,7 @@ use tautline_recordings::mcap::ExtraTopic;
 use tautline_report::flight_log::{FlightLog, PICTURED};
 use tautline_report::report::{Report, page};
 use tautline_report::request::{NamedPicture, PICTURES_BYTES, Pictures, write_files};
+use tautline_sim::plan::Plan;
 use tautline_sim::scenario::Scenario;
 
 /// Size of the pictures of a run \[pixels\]. A page shows them at less than half of it.
@@ -55,7 +56,7 @@ impl RunPictures {
             return Err(RenderError::Empty(timeline.name));
         }
         let mut renderer = Renderer::open(&self.adapter.as_str().into())?;
-        let view = View { theme: Theme::Light, size_px: SIZE_PX, text_scale: TEXT_SCALE, ..View::default() };
+        let view = View { theme: Theme::Light, size_px: SIZE_PX, text_scale: TEXT_SCALE, ..View::of(&timeline) };
         snapshots_of_run(&mut renderer, &timeline, &view)
     }
 }
@@ -79,12 +80,17 @@ impl Pictures for RunPictures {
         let max_bytes = PICTURES_BYTES / snapshots.len().max(1);
         let encoded: Vec<_> =
             snapshots.par_iter().map(|snapshot| encode(&snapshot.picture, max_bytes)).collect::<Result<_, _>>()?;
+        let is_light = !Plan::of(scenario).is_show();
         let names: Vec<_> = snapshot_names().iter().map(|name| file(name)).collect();
         let (files, on_page): (Vec<_>, Vec<_>) = std::iter::zip(snapshots, encoded)
             .map(|(Snapshot { name, description, .. }, [png, small])| {
                 let file = file(&name);
-                let picture =
-                    page::Picture { description, data_uri: data_uri(&small), file: format!("snapshots/{file}") };
+                let picture = page::Picture {
+                    description,
+                    data_uri: data_uri(&small),
+                    file: format!("snapshots/{file}"),
+                    is_light,
+                };
                 ((file, png), (name, picture))
             })
             .unzip();

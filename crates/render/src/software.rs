@@ -14,7 +14,7 @@ use rayon::slice::ParallelSliceMut as _;
 use super::error::RenderError;
 use super::gpu::paint;
 use super::picture::Picture;
-use super::scene::{Ball, Camera, Colour, Disc, Lens, Line, Scene};
+use super::scene::{Ball, Camera, Colour, Disc, Face, Lens, Line, Scene};
 
 /// Largest side of a picture \[pixels\].
 const LARGEST_PX: u32 = 16_384;
@@ -67,6 +67,9 @@ impl Software {
             let mut band = Band::new(&view, rows_px, scene.background);
             for ball in &scene.balls {
                 band.ball(ball);
+            }
+            for face in &scene.faces {
+                band.face(face);
             }
             for line in &lines {
                 band.line(line);
@@ -389,6 +392,28 @@ impl<'a> Band<'a> {
         });
     }
 
+    fn face(&mut self, face: &Face) {
+        let (view, centre) = (self.view, self.view.at(face.centre_m));
+        let half = face.half_m.map(|side| {
+            let end = std::array::from_fn(|axis| face.centre_m[axis] + side[axis]);
+            view.at(end) - centre
+        });
+        let squared = half.map(|side| side.norm_squared());
+        let normal = half[0].cross(&half[1]);
+        let Some(around) = view.around(centre, (squared[0] + squared[1]).sqrt()) else { return };
+        let [red, green, blue, _] = face.colour.linear();
+        self.visit(around, |band, sample, [x, y]| {
+            let [origin, direction] = view.ray(x, y);
+            let point = origin + direction * ((centre - origin).dot(&normal) / direction.dot(&normal));
+            let offset = point - centre;
+            let is_inside = (0..2).all(|k| offset.dot(&half[k]).abs() <= squared[k]);
+            if is_inside && -point.z < band.depths_m[sample] && (!view.is_perspective || point.z < 0.0) {
+                band.depths_m[sample] = -point.z;
+                band.colours[sample] = [red, green, blue];
+            }
+        });
+    }
+
     fn shell(&mut self, shell: &Ball, ratio: f32) {
         let (view, centre) = (self.view, self.view.at(shell.centre_m));
         let Some(around) = view.around(centre, shell.radius_m * ratio.max(1.0)) else { return };
@@ -415,7 +440,9 @@ impl<'a> Band<'a> {
             if out <= 1.0 && -point.z < band.depths_m[sample] && (!view.is_perspective || point.z < 0.0) {
                 let rim = ((out - 0.86) / 0.14).clamp(0.0, 1.0);
                 let rim = rim * rim * (3.0 - 2.0 * rim);
-                band.blend(sample, [red, green, blue, opacity * (0.45 + 0.55 * rim)]);
+                let faded = (1.0 - out) * (1.0 - out);
+                let share = if disc.glow > 0.5 { faded } else { 0.45 + 0.55 * rim };
+                band.blend(sample, [red, green, blue, opacity * share]);
             }
         });
     }

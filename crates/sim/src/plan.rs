@@ -15,6 +15,9 @@ use tautline_laws::law::LawSpec;
 use tautline_laws::law::{EdgeTension, EdgeTensionKeys};
 use tautline_laws::target::{Guidance, LegHistory};
 
+/// Smallest number of vehicles of a show.
+const SHOW: usize = 60;
+
 /// Formations, graph and edge tensions of a flight.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -53,6 +56,14 @@ impl Plan {
     #[must_use]
     pub fn leg_at(&self, time_s: f64) -> (usize, usize) {
         (self.course.leg_at(time_s), self.course.count())
+    }
+
+    /// Returns whether many vehicles fly through several flat formations, such as words. Pictures draw them as lights.
+    #[must_use]
+    pub fn is_show(&self) -> bool {
+        let slots_m = &self.formation_at(f64::NEG_INFINITY).slots_m;
+        let is_flat = slots_m.column(2).iter().all(|&z| z == slots_m[(0, 2)]);
+        self.graph.count() >= SHOW && self.course.count() > 1 && slots_m.nrows() > 0 && is_flat
     }
 
     /// Returns the target slots at a time \[s\].

@@ -413,7 +413,10 @@ impl Comparison {
                 let share = pick(law);
                 row(law, share.share.map(percent), [share.low, share.high].map(percent).map(Some))
             });
-            by_law(name, title, "share of the flights [%]", &rows.collect::<Vec<_>>(), Some([0.0, 100.0]), None)
+            // Laws that need more acceleration violate under such a limit.
+            let limit = self.about.max_accel_m_s2.map(|limit| format!(", commands limited to {limit} m/s^2"));
+            let title = format!("{title}{}", limit.unwrap_or_default());
+            by_law(name, &title, "share of the flights [%]", &rows.collect::<Vec<_>>(), Some([0.0, 100.0]), None)
         };
         let measured = |name: &str, title: &str, label: &str, pick: &dyn Fn(&LawRow) -> Estimate, limit| {
             let rows = self.laws.iter().map(|law| {

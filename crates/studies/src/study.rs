@@ -383,6 +383,9 @@ pub struct About {
     pub delta_m: f64,
     /// Name of the external law that flew in place of the scenario's own law.
     pub external_law: Option<String>,
+    /// Limit of commands \[m/s^2\], for figures.
+    #[serde(skip)]
+    pub max_accel_m_s2: Option<f64>,
 }
 
 impl About {
@@ -392,6 +395,7 @@ impl About {
             scenario: ScenarioIdentity { name: scenario.name.clone(), sha256: scenario.resolved().sha256 },
             tool: Tool { name: tautline_core::PROGRAM.to_owned(), version: tautline_core::VERSION.to_owned() },
             delta_m: scenario.delta_m,
+            max_accel_m_s2: scenario.actuation.max_accel_m_s2,
             external_law: scenario.external_law.as_ref().map(|law| law.name().to_owned()),
         }
     }

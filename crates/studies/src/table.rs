@@ -245,6 +245,9 @@ impl<R> Builder<'_, R> {
     }
 }
 
+/// Largest strength of the background of a share below one whose goal is one.
+const PARTIAL: f64 = 0.4;
+
 impl Table {
     /// Returns a table with a row for each element.
     pub fn of<R>(caption: impl Into<String>, rows: &[R]) -> Builder<'_, R> {
@@ -337,6 +340,9 @@ impl Table {
             match (cell, column.tone()) {
                 (Cell::Share(share), Some(Tone::Good)) if column.kind == Kind::OneFlight && share.count == 0 => {
                     tinted(&shown, Tone::Bad, share.of as f64)
+                }
+                (Cell::Share(share), Some(Tone::Good)) if share.count < share.of => {
+                    tinted(&shown, Tone::Good, PARTIAL * share.share.unwrap_or(0.0))
                 }
                 (Cell::Share(share), Some(tone)) => tinted(&shown, tone, share.share.unwrap_or(0.0)),
                 _ => shown,

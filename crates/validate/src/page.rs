@@ -158,6 +158,7 @@ impl Validation {
             section("Command", "This command measures everything again.", &[page::command("tautline validate")]),
         ]);
         Page {
+            setup: String::new(),
             title: "Validation".to_owned(),
             kind: "Measurement of every claim of tautline and of its source paper",
             badge: Badge::judged(self.pass),

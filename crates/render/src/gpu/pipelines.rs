@@ -1,4 +1,4 @@
-//! Render pipelines of balls, discs, shells and lines as instances.
+//! Render pipelines of balls, faces, discs, shells and lines as instances.
 
 use bytemuck::Pod;
 use nalgebra::Vector3;
@@ -6,7 +6,7 @@ use wgpu::util::{BufferInitDescriptor, DeviceExt as _};
 
 use super::adapter::Gpu;
 use super::{DEPTH_FORMAT, LIGHT_FORMAT, SAMPLES, Target};
-use crate::scene::{Ball, Disc, Lens, Line, Scene};
+use crate::scene::{Ball, Disc, Face, Lens, Line, Scene};
 
 /// Uniform `Camera` of shaders/scene.wgsl: right, up, back, eye, lens and range.
 type CameraUniform = [[f32; 4]; 6];
@@ -51,6 +51,7 @@ impl DrawCall {
 pub(super) struct Pipelines {
     camera: wgpu::Buffer,
     balls: DrawCall,
+    faces: DrawCall,
     lines: DrawCall,
     discs: DrawCall,
     shells: DrawCall,
@@ -117,10 +118,12 @@ impl Pipelines {
             DrawCall { pipeline, camera }
         };
         let ball = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32, 2 => Unorm8x4];
-        let disc = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32, 2 => Float32x3, 3 => Unorm8x4];
+        let disc = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32, 2 => Float32x3, 3 => Float32, 4 => Unorm8x4];
+        let face = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Float32x3, 3 => Unorm8x4];
         let line = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 2 => Unorm8x4, 3 => Unorm8x4, 4 => Float32];
         Self {
             balls: call("ball_corner", "solid", &ball, size_of::<Ball>(), true),
+            faces: call("face_corner", "stroke", &face, size_of::<Face>(), true),
             discs: call("disc_corner", "disc", &disc, size_of::<Disc>(), false),
             lines: call("line_corner", "stroke", &line, size_of::<Line>(), false),
             shells: call("shell_corner", "shell", &ball, size_of::<Ball>(), false),
@@ -151,6 +154,7 @@ impl Pipelines {
             ..wgpu::RenderPassDescriptor::default()
         });
         self.balls.draw(gpu, &mut pass, &scene.balls);
+        self.faces.draw(gpu, &mut pass, &scene.faces);
         self.lines.draw(gpu, &mut pass, &scene.lines);
         self.discs.draw(gpu, &mut pass, &scene.discs);
         self.shells.draw(gpu, &mut pass, &scene.shells);

@@ -263,7 +263,7 @@ impl SceneBuilder<'_> {
             x + width_px + 2.0 * size_px
         };
         match self.view.colouring {
-            Colouring::Vehicle => {}
+            Colouring::Vehicle | Colouring::Lights => {}
             Colouring::Speed => {
                 let most = format!("{:.2} m/s", self.extent.max_speed_m_s);
                 x = scale(labels, x, ["0", "speed", &most], &|part| theme.ramp(f32::midpoint(1.0, part)));
@@ -380,16 +380,22 @@ impl SceneBuilder<'_> {
     pub(super) fn names(&self, labels: &mut LabelLayout) {
         let (theme, size_px) = (self.view.theme, self.view.text_px(0.85));
         let labelled = self.labelled_vehicles();
+        let closest = self.closest_clear_pair().filter(|_| self.view.layers.closest);
+        let closest = closest.map_or([usize::MAX; 2], |(pair, _)| [pair.first(), pair.second()]);
         let depths = || labelled.iter().map(|(_, projection)| projection.depth_m);
         let [near, far] = [depths().fold(f64::INFINITY, f64::min), depths().fold(0.0, f64::max)];
         for &(k, projection) in &labelled {
             #[expect(clippy::cast_possible_truncation, reason = "an opacity")]
             let part = ((projection.depth_m - near) / far.max(1e-9)).clamp(0.0, 1.0) as f32;
-            let strength =
-                if self.alarmed[k] || self.view.picked == Some(k) { 1.0 } else { 1.0 - (1.0 - FAINT) * part };
-            // A vehicle too close to another is often hidden by it, and is named anyway.
+            let strength = if self.alarmed[k] || closest.contains(&k) || self.view.picked == Some(k) {
+                1.0
+            } else {
+                1.0 - (1.0 - FAINT) * part
+            };
+            // A vehicle of the closest pair is often hidden by the other one, and is named anyway.
             let is_hidden = self.is_hidden(k, projection);
-            if is_hidden && !self.alarmed[k] {
+            let is_urgent = self.alarmed[k] || closest.contains(&k);
+            if is_hidden && !is_urgent {
                 continue;
             }
             let leads = self.timeline.plan.as_ref().and_then(Plan::leader) == Some(k);
@@ -404,16 +410,17 @@ impl SceneBuilder<'_> {
             }
             let offset = f64::from(radius.max(self.view.text_px(LEAST_ROOM)) + 0.2 * size_px);
             let colour = if self.alarmed[k] { theme.alarm() } else { self.colour(k).at(strength) };
-            // First free position of: above right, above left, below right, below left.
-            for [left, above] in [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0], [1.0, 0.0]] {
+            // First free position of: above right, above left, below right, below left. Names of the closest pair are
+            // farther away if there is no room near by.
+            let distances = if is_urgent { [1.0, 2.0, 3.5].as_slice() } else { &[1.0] };
+            let corners = [[0.0, 1.0], [1.0, 1.0], [0.0, 0.0], [1.0, 0.0]];
+            distances.iter().flat_map(|far| corners.map(|corner| (far, corner))).any(|(far, [left, above])| {
                 let beside = [
-                    projection.at_px[0] + offset * (1.0 - 2.0 * f64::from(left)),
-                    projection.at_px[1] + offset * (1.0 - 2.0 * f64::from(above)),
+                    projection.at_px[0] + far * offset * (1.0 - 2.0 * f64::from(left)),
+                    projection.at_px[1] + far * offset * (1.0 - 2.0 * f64::from(above)),
                 ];
-                if labels.put_if_free(beside, [left, above], 0.85 * size_px, colour, &name) {
-                    break;
-                }
-            }
+                labels.put_if_free(beside, [left, above], 0.85 * size_px, colour, &name)
+            });
         }
     }
 
@@ -429,7 +436,7 @@ impl SceneBuilder<'_> {
         })
     }
 
-    /// Returns whether a round obstacle is between the camera and a vehicle; only these are drawn solid.
+    /// Returns whether a solid obstacle is between the camera and a vehicle.
     fn is_behind_obstacle(&self, k: usize) -> bool {
         let Some(place) = self.vehicle(k) else { return false };
         let distance_m = self.camera.project(place).map_or(0.0, |projection| projection.depth_m);
@@ -437,11 +444,11 @@ impl SceneBuilder<'_> {
             Lens::Perspective(_) => self.camera.eye_m - place,
             Lens::Parallel(_) => self.camera.back * distance_m,
         };
-        let is_round = |shape: &Shape| matches!(shape, Shape::Ball { .. } | Shape::Capsule { .. });
+        let is_solid = |shape: &Shape| !matches!(shape, Shape::HalfSpace { .. });
         let (from_m, obstacles) =
             (place + self.extent.origin_m(), self.timeline.plan.iter().flat_map(|plan| &plan.obstacles));
         obstacles
-            .filter(|obstacle| is_round(&obstacle.shape))
+            .filter(|obstacle| is_solid(&obstacle.shape))
             .any(|obstacle| is_between(&obstacle.shape, obstacle.place_m, from_m, from_m + towards))
     }
 

@@ -75,23 +75,32 @@ pub enum Colouring {
     Speed,
     /// The distance to the nearest vehicle, less delta.
     Clearance,
+    /// The place across the swarm: vehicles are lights on a night sky, in any theme.
+    Lights,
 }
 
 impl Colouring {
     /// All choices with their names.
-    pub const ALL: [(&'static str, Self); 3] =
-        [("vehicle", Self::Vehicle), ("speed", Self::Speed), ("clearance", Self::Clearance)];
+    pub const ALL: [(&'static str, Self); 4] =
+        [("vehicle", Self::Vehicle), ("speed", Self::Speed), ("clearance", Self::Clearance), ("lights", Self::Lights)];
 }
 
 /// Colours of a quantity from small to large.
 const RAMP_ON_LIGHT: [u32; 4] = [0x2A_4C_C8, 0x8F_2F_B5, 0xC8_3B_6B, 0xC2_5A_00];
 const RAMP_ON_DARK: [u32; 4] = [0x5B_8D_EF, 0xB9_7A_E0, 0xF0_72_8F, 0xFF_C2_3D];
+/// Colours of lights from the left to the right of a swarm, and of the sky.
+const LIGHTS: [u32; 4] = [0xFF_C2_3D, 0x6F_E3_9A, 0x4F_B8_FF, 0xB0_94_FF];
+const NIGHT: Colour = Colour::hex(0x06_0A_18);
 
 /// Number of vehicles from which on all have one colour.
 const ONE_COLOUR: usize = 200;
-/// Colours of vehicles in order, as in the charts; colour-blind readers can tell them apart.
-const ON_LIGHT: [u32; 6] = [0x00_72_B2, 0xD5_5E_00, 0x00_93_6C, 0xB8_5F_95, 0x9A_76_00, 0x7D_85_8E];
-const ON_DARK: [u32; 6] = [0x56_A8_E0, 0xF0_7F_2E, 0x2F_BF_94, 0xDB_8D_BB, 0xCB_A4_2B, 0xA5_AD_B6];
+/// Colours of vehicles in order, as in the charts. They are those of Paul Tol's colour-blind safe schemes (technical
+/// note SRON/EPS/TN/09-002, issue 3.2): on dark the scheme "light" without grey; on light the scheme "muted", whose cyan
+/// and sand are replaced by the light blue of "medium-contrast" and whose teal is darker, for a contrast of 3 on white.
+const ON_LIGHT: [u32; 8] =
+    [0x33_22_88, 0xCC_66_77, 0x3F_9E_8E, 0xAA_44_99, 0x99_99_33, 0x66_99_CC, 0x11_77_33, 0x88_22_55];
+const ON_DARK: [u32; 8] =
+    [0x77_AA_DD, 0xEE_88_66, 0x44_BB_99, 0xFF_AA_BB, 0xEE_DD_88, 0x99_DD_FF, 0xBB_CC_33, 0xAA_AA_00];
 
 impl Theme {
     /// All themes with their names.
@@ -170,16 +179,39 @@ impl Theme {
 impl Theme {
     /// Returns the colour of a quantity relative to its range, from 0 to 1.
     pub(crate) fn ramp(self, part: f32) -> Colour {
-        let ramp = if self == Self::Dark { RAMP_ON_DARK } else { RAMP_ON_LIGHT };
-        let position = part.clamp(0.0, 1.0) * (ramp.len() - 1) as f32;
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the ramp")]
-        let from = (position as usize).min(ramp.len() - 2);
-        Colour::hex(ramp[from]).towards(Colour::hex(ramp[from + 1]), position - from as f32)
+        mixed(if self == Self::Dark { RAMP_ON_DARK } else { RAMP_ON_LIGHT }, part)
     }
+}
+
+impl Colour {
+    /// Returns the colour of a light at a part of the width of the swarm, from 0 to 1.
+    pub(crate) fn light(part: f32) -> Self {
+        mixed(LIGHTS, part)
+    }
+
+    /// Returns the night sky behind lights.
+    pub(crate) fn night() -> Self {
+        NIGHT
+    }
+
+    /// Returns the colour of a surface that receives this part of the light.
+    pub(super) fn lit(self, light: f32) -> Self {
+        Self::hex(0).towards(self.at(1.0), light)
+    }
+}
+
+/// Interpolates between even colours; `part` is from 0 to 1.
+fn mixed(ramp: [u32; 4], part: f32) -> Colour {
+    let position = part.clamp(0.0, 1.0) * (ramp.len() - 1) as f32;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "within the ramp")]
+    let from = (position as usize).min(ramp.len() - 2);
+    Colour::hex(ramp[from]).towards(Colour::hex(ramp[from + 1]), position - from as f32)
 }
 
 #[cfg(test)]
 mod tests {
+    use nalgebra::Vector3;
+
     use super::*;
 
     /// Relative luminance, WCAG 2.2.
@@ -219,6 +251,47 @@ mod tests {
         let [red, green, blue, _] = colour.linear();
         let yellow = 0.112_38 * red + 0.887_62 * green;
         [yellow, yellow, 0.004_01 * red - 0.004_01 * green + blue]
+    }
+
+    /// Returns the colour that people without medium-wave cones see: Viénot, Brettel and Mollon 1999.
+    fn deuteranope(colour: Colour) -> [f32; 3] {
+        let [red, green, blue, _] = colour.linear();
+        let yellow = 0.292_75 * red + 0.707_25 * green;
+        [yellow, yellow, -0.022_34 * red + 0.022_34 * green + blue]
+    }
+
+    /// Returns lightness and the two colour axes of Oklab (Ottosson 2020).
+    fn oklab([red, green, blue]: [f32; 3]) -> Vector3<f32> {
+        let cone = |r: f32, g: f32, b: f32| (r * red + g * green + b * blue).max(0.0).cbrt();
+        let long = cone(0.412_221_47, 0.536_332_55, 0.051_445_995);
+        let medium = cone(0.211_903_5, 0.680_699_5, 0.107_396_96);
+        let short = cone(0.088_302_46, 0.281_718_85, 0.629_978_7);
+        Vector3::new(
+            0.210_454_26 * long + 0.793_617_8 * medium - 0.004_072_047 * short,
+            1.977_998_5 * long - 2.428_592_2 * medium + 0.450_593_7 * short,
+            0.025_904_037 * long + 0.782_771_77 * medium - 0.808_675_77 * short,
+        )
+    }
+
+    /// Returns the smallest distance of two colours for normal, protanopic and deuteranopic vision.
+    fn distance(a: u32, b: u32) -> f32 {
+        let normal = |colour: Colour| [0, 1, 2].map(|k| colour.linear()[k]);
+        let seen = [normal, protanope, deuteranope].map(|see| (oklab(see(Colour::hex(a))), oklab(see(Colour::hex(b)))));
+        seen.iter().map(|(a, b)| (a - b).norm()).fold(f32::INFINITY, f32::min)
+    }
+
+    #[test]
+    fn colour_blind_readers_can_tell_vehicles_apart() {
+        for (palette, theme) in [(ON_DARK, Theme::Dark), (ON_LIGHT, Theme::Light)] {
+            for (k, &a) in palette.iter().enumerate() {
+                assert!(contrast(Colour::hex(a), theme.background()) >= 3.0, "{a:x}");
+                for &b in &palette[..k] {
+                    assert!(distance(a, b) > 0.04, "{a:x} and {b:x}: {}", distance(a, b));
+                }
+            }
+        }
+        // Orange and olive of the scheme by Okabe and Ito, darkened for white paper, are one colour to protanopes.
+        assert!(distance(0xD5_5E_00, 0x9A_76_00) < 0.03);
     }
 
     #[test]

@@ -12,9 +12,17 @@ use rayon::iter::{IntoParallelIterator as _, ParallelIterator as _};
 use tautline_audit::Violation;
 use tautline_core::swarm::{Pair, Rows, row};
 use tautline_report::flight_log::Frame;
+use tautline_sim::plan::Plan;
 
 /// Largest width, and largest height, of a picture without a legend \[pixels\].
 const NO_LEGEND_PX: [u32; 2] = [420, 260];
+/// Largest number of vehicles with whole trails, and with trails of five seconds. A larger swarm has one second.
+const WHOLE_TRAILS: usize = 24;
+const LONG_TRAILS: usize = 99;
+/// Largest number of vehicles with start marks and goal slots, and of edges, in the view of a flight. More would hide
+/// the formation.
+const MARKED: usize = 60;
+const LINKED: usize = 40;
 
 /// Layers of a picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -46,6 +54,15 @@ impl Layers {
 
     const fn all(on: bool) -> Self {
         Self { shells: on, edges: on, trails: on, marks: on, ground: on, labels: on, closest: on, caption: on }
+    }
+}
+
+impl Layers {
+    /// Returns the layers that do not hide the formation of a flight.
+    #[must_use]
+    pub fn of(timeline: &Timeline) -> Self {
+        let edges = timeline.plan.as_ref().map_or(0, |plan| plan.graph.edge_count()) <= LINKED;
+        Self { edges, marks: timeline.count() <= MARKED, ..Self::ALL }
     }
 }
 
@@ -89,6 +106,30 @@ impl Default for View {
 }
 
 impl View {
+    /// Returns the view of a flight: layers and trails by the number of vehicles and edges. A show is drawn with lights.
+    #[must_use]
+    pub fn of(timeline: &Timeline) -> Self {
+        let trail_s = match timeline.count() {
+            count if count <= WHOLE_TRAILS => None,
+            count if count <= LONG_TRAILS => Some(5.0),
+            _ => Some(1.0),
+        };
+        let view = Self { layers: Layers::of(timeline), trail_s, ..Self::default() };
+        if timeline.plan.as_ref().is_some_and(Plan::is_show) { view.with_lights() } else { view }
+    }
+
+    /// Returns the view with vehicles as lights, without the layers that outshine them.
+    #[must_use]
+    pub fn with_lights(self) -> Self {
+        let layers = Layers { caption: self.layers.caption, ..Layers::NONE };
+        Self { colouring: Colouring::Lights, camera: CameraSpec::Follow(None), layers, ..self }
+    }
+
+    /// Returns whether vehicles are lights.
+    pub(super) fn has_lights(&self) -> bool {
+        self.colouring == Colouring::Lights
+    }
+
     /// Returns the length in pixels of one pixel in a picture 720 pixels high with the usual size of texts.
     pub(super) fn unit_px(&self) -> f32 {
         let [width, height] = self.size_px.map(|size| size as f32);
@@ -138,18 +179,27 @@ impl Scene {
     /// balls in scaled lengths, and are ordered there.
     #[must_use]
     pub fn compose(timeline: &Timeline, extent: &Extent, frame: &Frame, view: &View, camera: Camera) -> Self {
+        let night = View { theme: Theme::Dark, ..view.clone() };
+        let view = if view.has_lights() { &night } else { view };
         let builder = SceneBuilder::new(timeline, extent, frame, view, camera);
-        let mut scene = Self::empty(camera, extent.depth_m(&camera), view.theme.background());
+        let background = if view.has_lights() { Colour::night() } else { view.theme.background() };
+        let mut scene = Self::empty(camera, extent.depth_m(&camera), background);
         #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
         let shell_ratio = timeline.log.metric().ratio() as f32;
         scene.shell_ratio = shell_ratio;
-        builder.vehicles(&mut scene);
-        builder.rotors(&mut scene.discs);
-        builder.round_obstacles(&mut scene);
         let layers = view.layers;
+        builder.vehicles(&mut scene);
+        if layers.ground {
+            builder.ground_marks(&mut scene.discs);
+        }
+        builder.rotors(&mut scene.discs);
+        builder.glows(&mut scene.discs);
+        builder.round_obstacles(&mut scene);
+        builder.walls(&mut scene.faces);
         // In drawing order: later ones cover earlier ones, and earlier texts take the room of later ones.
-        let lines: [Part<'_, Vec<Line>>; 7] = [
+        let lines: [Part<'_, Vec<Line>>; 8] = [
             (layers.ground, SceneBuilder::ground),
+            (layers.ground, SceneBuilder::drop_lines),
             (true, SceneBuilder::flat_obstacles),
             (layers.trails, SceneBuilder::trails),
             (layers.marks, SceneBuilder::starts_and_goals),
@@ -254,9 +304,20 @@ impl<'a> SceneBuilder<'a> {
                 .map(|k| self.speed_part(k, [&from.positions_m, &to.positions_m], to.time_s - from.time_s))
                 .collect(),
             Colouring::Clearance => self.clearance_parts(&frame.positions_m),
+            Colouring::Lights => return self.lights(count),
             _ => return (0..count).map(|k| self.view.theme.vehicle_among(k, count)).collect(),
         };
         quantities.into_iter().map(|part| self.view.theme.ramp(part)).collect()
+    }
+
+    /// Returns the colours of lights, by their places across the swarm.
+    fn lights(&self, count: usize) -> Vec<Colour> {
+        let across_px: Vec<_> = (0..count).map(|k| self.projected(k).map(|projected| projected.at_px[0])).collect();
+        let known = || across_px.iter().flatten().copied();
+        let [left, right] = [known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max)];
+        #[expect(clippy::cast_possible_truncation, reason = "a colour")]
+        let part = |x_px: f64| ((x_px - left) / (right - left).max(1e-9)) as f32;
+        across_px.into_iter().map(|x_px| Colour::light(x_px.map_or(0.0, part))).collect()
     }
 
     /// Returns the speed of a vehicle between two instants, relative to the largest one of the flight.

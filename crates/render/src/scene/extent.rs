@@ -35,6 +35,8 @@ const FOLLOWED_TIMES: usize = 2000;
 const NEAREST: f64 = 1e-6;
 /// Distance around the flight up to which obstacles are framed, in units of its extent.
 const OBSTACLE_ROOM: f64 = 0.2;
+/// Largest size of a swarm that the camera `Auto` follows, relative to the extent of its flight.
+const TRAVELLING: f64 = 0.4;
 /// Smallest z of the unit normal of an obstacle that is the ground.
 const LEVEL: f64 = 0.999;
 
@@ -58,6 +60,8 @@ pub struct Extent {
     oblique: Direction,
     /// Boxes around all vehicles, smoothed over time.
     swarm: Vec<SwarmBox>,
+    /// Whether the swarm travels so far that the camera `Auto` follows it.
+    travels: bool,
     /// Last computed framing; it is the same for all pictures of a film.
     framed: Mutex<Option<(Direction, Area, Camera)>>,
     /// Largest speed of a vehicle between two samples \[m/s\].
@@ -72,6 +76,8 @@ pub struct Extent {
     pub(super) grid_m: f64,
     /// Bounding ball of everything: centre and radius \[m\].
     reach: (Vector3<f64>, f64),
+    /// Corners around the boxes among the obstacles, which may be beyond \[m\].
+    boxes_m: Vec<Vector3<f64>>,
 }
 
 impl Extent {
@@ -118,6 +124,7 @@ impl Extent {
         let mut largest = balls.iter().fold(0.0_f64, |largest, (_, radius)| largest.max(*radius));
         let [lowest, highest] = bounds(&balls).unwrap_or([Vector3::zeros(); 2]);
         let (mut low, mut high) = (lowest, highest);
+        let flown_m = (highest / 2.0 - lowest / 2.0).norm();
         let obstacles: Vec<&Obstacle> =
             timelines.iter().flat_map(|timeline| &timeline.plan).flat_map(|plan| &plan.obstacles).collect();
         if balls.is_empty() {
@@ -160,12 +167,17 @@ impl Extent {
         let ground_m = [corner(low - margin, f64::floor), corner(high + margin, f64::ceil)];
         let (lowest, highest) = (ground_m[0].inf(&low), ground_m[1].sup(&high));
         let reach = ((lowest + highest) / 2.0, (highest - lowest).norm() / 2.0 + largest + grid_m);
+        let boxes = obstacles.iter().copied().filter(|obstacle| matches!(obstacle.shape, Shape::Box { .. }));
+        let swarm = smoothed(&swarm);
+        let largest_m = swarm.iter().map(|around| around.half.norm()).fold(0.0, f64::max);
+        let travels = largest_m < TRAVELLING * flown_m;
         Self {
             origin_m,
             balls,
             auto,
             oblique,
-            swarm: smoothed(&swarm),
+            swarm,
+            travels,
             framed: Mutex::new(None),
             max_speed_m_s,
             has_violations: timelines.iter().any(|timeline| timeline.has_violations()),
@@ -173,6 +185,7 @@ impl Extent {
             ground_m,
             grid_m,
             reach,
+            boxes_m: boxes.flat_map(corners).map(|corner| corner - origin_m).collect(),
         }
     }
 
@@ -200,7 +213,10 @@ impl Extent {
     pub fn camera(&self, timeline: &Timeline, frame: &Frame, view: &View) -> Result<Camera, RenderError> {
         let area = view.area(self.has_violations);
         let camera = match &view.camera {
-            CameraSpec::Auto => self.framing(self.auto, area),
+            CameraSpec::Auto => match self.swarm_at(frame.time_s).filter(|_| self.travels) {
+                Some(corners) => Camera::framing(self.auto, &corners, area),
+                None => self.framing(self.auto, area),
+            },
             CameraSpec::Perspective => self.framing(self.oblique, area),
             CameraSpec::Top => self.framing(Direction::TOP, area),
             CameraSpec::Front => self.framing(Direction::FRONT, area),
@@ -268,8 +284,9 @@ impl Extent {
     pub(super) fn depth_m(&self, camera: &Camera) -> [f64; 2] {
         let (centre, radius) = self.reach;
         let middle = -camera.in_camera_frame(centre).z;
-        let far = (middle + radius).max(1e-2);
-        [(middle - radius).max(NEAREST * far), far]
+        let boxes = || self.boxes_m.iter().map(|corner| -camera.in_camera_frame(*corner).z);
+        let far = boxes().fold(middle + radius, f64::max).max(1e-2);
+        [boxes().fold(middle - radius, f64::min).max(NEAREST * far), far]
     }
 }
 

@@ -1,6 +1,6 @@
 //! Geometry of a scene: vehicles, shells, edges, trails, start marks, goal slots and obstacles.
 //!
-//! Balls are solid, capsules are made of balls, boxes and planes are drawn with lines.
+//! Balls and boxes are solid, capsules are made of balls, planes are drawn with lines.
 
 use nalgebra::{Rotation3, UnitQuaternion, Vector3};
 
@@ -8,7 +8,7 @@ use super::camera::Lens;
 use super::colour::{Colour, Colouring, Theme};
 use super::compose::SceneBuilder;
 use super::extent::is_level;
-use super::{Ball, Disc, Line, Scene, single};
+use super::{Ball, Disc, Face, Line, Scene, single};
 use crate::timeline::QuadrotorShape;
 use tautline_core::obstacle::{Obstacle, Shape};
 use tautline_core::swarm::Pair;
@@ -33,6 +33,24 @@ const RING: u32 = 28;
 const SLOT: f64 = 1.45;
 /// Largest number of vehicles with start marks and goal slots.
 const MAX_MARKS: usize = 2000;
+/// Opacity of the line from a vehicle to its slot, relative to that of the slot.
+const JOIN: f32 = 0.5;
+/// Distance of a start mark from a goal slot below which it is not drawn, in radii of the slot.
+const APART: f64 = 1.5;
+/// Opacity of the line from a vehicle to the ground, and of the mark there.
+const DROP: f32 = 0.4;
+const GROUND_MARK: f32 = 0.6;
+/// Largest number of vehicles with these lines and marks.
+const MAX_DROPS: usize = 300;
+/// Sine of the elevation above which the ground below a vehicle is hidden by it.
+const STRAIGHT_DOWN: f64 = 0.97;
+/// Smallest radius of a ground mark and of a glow in a picture 720 pixels high \[pixels\].
+const MIN_MARK_PX: f32 = 3.0;
+const MIN_GLOW_PX: f32 = 17.0;
+/// Radius of a glow in units of delta, or of the hull without delta, and that of its white centre relative to it.
+const GLOW_DELTAS: f64 = 0.95;
+const GLOW_RADII: f64 = 4.0;
+const WHITE: f64 = 0.6;
 /// Half the diagonal of the reference's diamond in a picture 720 pixels high \[pixels\].
 const REFERENCE_PX: f32 = 7.0;
 /// Smallest radius of a vehicle, of its start mark and of its goal slot in a picture 720 pixels high \[pixels\].
@@ -178,6 +196,51 @@ impl SceneBuilder<'_> {
         }
     }
 
+    /// Returns the vehicles with lines to the ground, with their positions and the points on the ground below.
+    fn drops(&self) -> impl Iterator<Item = (usize, [Vector3<f64>; 2])> {
+        let (count, ground_m) = (self.timeline.count(), self.extent.ground_m[0].z);
+        let shown = if count <= MAX_DROPS && self.camera.back.z < STRAIGHT_DOWN { count } else { 0 };
+        (0..shown).filter_map(move |k| {
+            let place = self.vehicle(k)?;
+            Some((k, [place, Vector3::new(place.x, place.y, ground_m)]))
+        })
+    }
+
+    /// Draws a line from each vehicle to the ground.
+    pub(super) fn drop_lines(&self, lines: &mut Vec<Line>) {
+        let width_px = 1.1 * self.view.unit_px();
+        let line = |(_, ends_m)| Line::new(ends_m, self.view.theme.soft_ink().at(DROP), width_px);
+        lines.extend(self.drops().map(line));
+    }
+
+    /// Draws a mark on the ground below each vehicle.
+    pub(super) fn ground_marks(&self, discs: &mut Vec<Disc>) {
+        let mark = |(k, [_, foot]): (usize, [Vector3<f64>; 2])| {
+            #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
+            let radius_m = self.at_least(foot, self.timeline.radius_m[k], MIN_MARK_PX) as f32;
+            let colour = self.body_colour(k).at(GROUND_MARK);
+            Disc { centre_m: single(foot), radius_m, normal: [0.0, 0.0, 1.0], glow: 0.0, colour }
+        };
+        discs.extend(self.drops().map(mark));
+    }
+
+    /// Draws the glow of each light, with a white centre, in front of its hull.
+    pub(super) fn glows(&self, discs: &mut Vec<Disc>) {
+        let count = if self.view.has_lights() { self.timeline.count() } else { 0 };
+        for k in 0..count {
+            let (Some(place), hull_m) = (self.vehicle(k), self.timeline.radius_m[k]) else { continue };
+            let around_m = self.timeline.delta_m.map_or(GLOW_RADII * hull_m, |delta_m| GLOW_DELTAS * delta_m);
+            let radius_m = self.at_least(place, around_m, MIN_GLOW_PX);
+            let towards = self.camera.back * (1.1 * self.at_least(place, hull_m, MIN_RADIUS_PX[0]));
+            for (radius_m, colour) in [(radius_m, self.body_colour(k)), (WHITE * radius_m, self.view.theme.ink())] {
+                #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
+                let radius_m = radius_m as f32;
+                let (centre_m, normal) = (single(place + towards), single(self.camera.back));
+                discs.push(Disc { centre_m, radius_m, normal, glow: 1.0, colour });
+            }
+        }
+    }
+
     /// Returns the start positions of vehicles that have left them, with the half sizes of their marks \[m\].
     pub(super) fn starts(&self) -> Vec<(usize, Vector3<f64>, f64)> {
         let count = self.timeline.count();
@@ -212,12 +275,21 @@ impl SceneBuilder<'_> {
         let width_px = 1.8 * self.view.unit_px();
         // Many opaque marks would hide the vehicles.
         let opacity = (40.0 / count.max(1) as f32).clamp(0.05, 0.9);
+        let slots = self.slots().unwrap_or_default();
         for (k, place, arm) in self.starts() {
+            // A cross within a slot would look like an arrival.
+            if slots.iter().any(|slot| (slot - place).norm() < APART * SLOT * self.timeline.radius_m[k]) {
+                continue;
+            }
             for across in [(right + up) * arm, (right - up) * arm] {
                 lines.push(Line::new([place - across, place + across], self.colour(k).at(opacity), width_px));
             }
         }
-        for (k, centre) in self.slots().into_iter().flatten().enumerate().take(count) {
+        for (k, centre) in slots.into_iter().enumerate().take(count) {
+            if let Some(place) = self.vehicle(k) {
+                let colour = self.colour(k).at(JOIN * opacity);
+                lines.push(Line::new([place, centre], colour, 1.1 * self.view.unit_px()));
+            }
             let radius = self.at_least(centre, self.timeline.radius_m[k] * SLOT, MIN_RADIUS_PX[2]);
             let corner = |n: u32| {
                 let (sin, cos) = (f64::from(n % RING) / f64::from(RING) * std::f64::consts::TAU).sin_cos();
@@ -255,11 +327,16 @@ fn cut([from_s, to_s]: [f64; 2], violating_s: &[[f64; 2]]) -> Vec<([f64; 2], boo
 /// Number of balls of a capsule per radius of length, and largest number in all.
 const BALLS_PER_RADIUS: f64 = 24.0;
 const MAX_BALLS: f64 = 3000.0;
-/// Number of intervals between the lines across each side of a box, and across a plane.
+/// Number of intervals between the lines across a plane.
 const HATCHES: u32 = 12;
-/// Opacity of lines across a side, of its rims, and of lines of a plane.
-const HATCH: f32 = 0.35;
-const RIM: f32 = 0.95;
+/// Direction of the light in the axes of the camera, as in shaders/scene.wgsl.
+const LIGHT: [f64; 3] = [-0.408, 0.577, 0.707];
+/// Light on a side that faces away from the light, and on the rims of a box.
+const DARKEST: f64 = 0.45;
+const RIM: f32 = 0.35;
+/// Size of the rims of a box relative to its sides.
+const RIM_SCALE: f64 = 1.003;
+/// Opacity of lines of a plane.
 const PLANE: f32 = 0.18;
 
 impl SceneBuilder<'_> {
@@ -288,20 +365,49 @@ impl SceneBuilder<'_> {
         }
     }
 
-    /// Draws boxes and planes.
+    /// Returns the sides of all boxes: the centre and the half sides, the first along the normal \[m\].
+    fn sides(&self) -> impl Iterator<Item = (Vector3<f64>, [Vector3<f64>; 3])> {
+        let boxes = self.obstacles().iter().filter_map(|obstacle| match obstacle.shape {
+            Shape::Box { half_m, yaw_deg } => Some((obstacle.place_m - self.extent.origin_m(), half_m, yaw_deg)),
+            _ => None,
+        });
+        boxes.flat_map(|(place, half_m, yaw_deg)| {
+            let turned = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_deg.to_radians());
+            (0..6).map(move |side| {
+                let axis = side / 2;
+                let half = [0, 1, 2].map(|k| turned * Vector3::ith((axis + k) % 3, half_m[(axis + k) % 3]));
+                (place, if side % 2 == 0 { half } else { half.map(|half| -half) })
+            })
+        })
+    }
+
+    /// Draws the solid sides of boxes, lit from above the camera's left shoulder.
+    pub(super) fn walls(&self, faces: &mut Vec<Face>) {
+        let colour = self.view.theme.obstacle();
+        let light =
+            (self.camera.right * LIGHT[0] + self.camera.up * LIGHT[1] + self.camera.back * LIGHT[2]).normalize();
+        faces.extend(self.sides().map(|(place, [normal, u, v])| {
+            let up = normal.try_normalize(0.0).map_or(0.0, |normal| normal.dot(&light).max(0.0));
+            #[expect(clippy::cast_possible_truncation, reason = "a colour")]
+            let colour = colour.lit((DARKEST + (1.0 - DARKEST) * up) as f32);
+            Face { centre_m: single(place + normal), half_m: [single(u), single(v)], colour }
+        }));
+    }
+
+    /// Draws the rims of boxes, and planes.
     pub(super) fn flat_obstacles(&self, lines: &mut Vec<Line>) {
+        let width_px = 1.4 * self.view.unit_px();
+        for (place, half) in self.sides() {
+            // Slightly outside, so that the sides do not hide them.
+            let [normal, u, v] = half.map(|half| half * RIM_SCALE);
+            for (along, across) in [(u, v), (v, u)] {
+                let ends_m = [place + normal + across - along, place + normal + across + along];
+                lines.push(Line::new(ends_m, self.view.theme.obstacle().lit(RIM), width_px));
+            }
+        }
         for obstacle in self.obstacles() {
             let place = obstacle.place_m - self.extent.origin_m();
             match obstacle.shape {
-                Shape::Box { half_m, yaw_deg } => {
-                    let turned = Rotation3::from_axis_angle(&Vector3::z_axis(), yaw_deg.to_radians());
-                    for side in 0..6 {
-                        let (axis, sign) = (side / 2, if side % 2 == 0 { 1.0 } else { -1.0 });
-                        let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
-                        let offset = |k: usize, share: f64| turned * Vector3::ith(k, half_m[k] * share);
-                        self.hatched([RIM, HATCH], place + offset(axis, sign), offset(u, 1.0), offset(v, 1.0), lines);
-                    }
-                }
                 // The grid of the ground shows a level plane.
                 Shape::HalfSpace { normal } if is_level(normal) => {}
                 Shape::HalfSpace { normal } => {
@@ -310,28 +416,20 @@ impl SceneBuilder<'_> {
                     let foot = centre - normal * (centre - place).dot(&normal);
                     let least = normal.iamin();
                     let u = normal.cross(&Vector3::ith(least, 1.0)).normalize() * reach_m;
-                    self.hatched([PLANE; 2], foot, u, normal.cross(&u), lines);
+                    self.hatched(foot, u, normal.cross(&u), lines);
                 }
-                Shape::Ball { .. } | Shape::Capsule { .. } => {}
+                Shape::Ball { .. } | Shape::Capsule { .. } | Shape::Box { .. } => {}
             }
         }
     }
 
     /// Draws a hatched parallelogram with this centre and half sides `u` and `v`.
-    fn hatched(
-        &self,
-        [rim, hatch]: [f32; 2],
-        middle: Vector3<f64>,
-        u: Vector3<f64>,
-        v: Vector3<f64>,
-        lines: &mut Vec<Line>,
-    ) {
-        let (colour, width_px) = (self.view.theme.obstacle(), 1.4 * self.view.unit_px());
+    fn hatched(&self, middle: Vector3<f64>, u: Vector3<f64>, v: Vector3<f64>, lines: &mut Vec<Line>) {
+        let (colour, width_px) = (self.view.theme.obstacle().at(PLANE), 1.4 * self.view.unit_px());
         for k in 0..=HATCHES {
             let share = 2.0 * f64::from(k) / f64::from(HATCHES) - 1.0;
             let is_rim = k == 0 || k == HATCHES;
-            let strength = if is_rim { rim } else { hatch };
-            let mut line = |from, to| lines.push(Line::new([from, to], colour.at(strength), width_px));
+            let mut line = |from, to| lines.push(Line::new([from, to], colour, width_px));
             line(middle + u * share - v, middle + u * share + v);
             if is_rim {
                 line(middle + v * share - u, middle + v * share + u);
@@ -427,7 +525,7 @@ impl SceneBuilder<'_> {
             let (normal, colour) = (single(quadrotor.up()), colour.at(DISC));
             #[expect(clippy::cast_possible_truncation, reason = "the draw list is in single precision")]
             let radius_m = quadrotor.shape.rotor_radius_m as f32;
-            let disc = |centre| Disc { centre_m: single(centre), radius_m, normal, colour };
+            let disc = |centre| Disc { centre_m: single(centre), radius_m, normal, glow: 0.0, colour };
             ordered.extend(quadrotor.rotors().map(|centre| (self.camera.in_camera_frame(centre).z, disc(centre))));
         }
         ordered.sort_by(|a, b| a.0.total_cmp(&b.0));

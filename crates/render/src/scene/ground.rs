@@ -11,8 +11,8 @@ use tautline_core::text::decimals_of;
 
 /// Largest number of ground lines in each direction.
 const MAX_LINES: u32 = 60;
-/// Opacity of the lines of a ground that is an obstacle.
-const HARD: f32 = 0.45;
+/// Width of the lines of a ground that is an obstacle, relative to the usual width.
+const HARD: f32 = 2.0;
 /// Sine of the elevation below which the ground is seen edge-on.
 const EDGE_ON: f64 = 0.05;
 /// Distance of numbers from the ground in units of the line distance.
@@ -56,9 +56,8 @@ impl SceneBuilder<'_> {
 
     pub(super) fn ground(&self, lines: &mut Vec<Line>) {
         let ([low, high], step) = (self.ground_m(), self.extent.grid_m);
-        let width_px = self.view.unit_px().max(0.7);
-        let theme = self.view.theme;
-        let colour = if self.extent.has_hard_ground { theme.obstacle().at(HARD) } else { theme.grid() };
+        let width_px = self.view.unit_px().max(0.7) * if self.extent.has_hard_ground { HARD } else { 1.0 };
+        let colour = self.view.theme.grid();
         for (along, across) in [(0, 1), (1, 0)] {
             for k in 0..=steps(high[along] - low[along], step) {
                 let mut ends_m = [low, low];

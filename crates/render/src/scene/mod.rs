@@ -1,6 +1,6 @@
 //! Scenes: draw lists composed from frames of a flight.
 //!
-//! A [`Scene`] is plain data, independent of the renderer: balls, discs, shells and lines in metres, and
+//! A [`Scene`] is plain data, independent of the renderer: balls, faces, discs, shells and lines in metres, and
 //! [`Annotation`]s (text, boxes, colour scales) in pixels. Lengths are in scene coordinates. Their origin lies in the
 //! middle of the flight, so that single precision is enough for swarms far from the recording's origin.
 
@@ -36,7 +36,19 @@ pub struct Ball {
     pub colour: Colour,
 }
 
-/// A flat disc that lets light through, such as what a rotor sweeps.
+/// A flat solid parallelogram, such as a wall. Its colour holds the light that it receives.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+pub struct Face {
+    /// Centre \[m\].
+    pub centre_m: [f32; 3],
+    /// Half sides, which are perpendicular \[m\].
+    pub half_m: [[f32; 3]; 2],
+    /// Colour.
+    pub colour: Colour,
+}
+
+/// A flat disc that lets light through: what a rotor sweeps, a mark on the ground, or the glow of a light.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 pub struct Disc {
@@ -46,7 +58,9 @@ pub struct Disc {
     pub radius_m: f32,
     /// Unit vector across it.
     pub normal: [f32; 3],
-    /// Colour; the opacity is that of its rim.
+    /// 0 for a disc with a rim, 1 for a glow that fades from the centre.
+    pub glow: f32,
+    /// Colour; the opacity is that of the rim, or of the centre of a glow.
     pub colour: Colour,
 }
 
@@ -143,13 +157,15 @@ pub struct Scene {
     pub background: Colour,
     /// Vehicles.
     pub balls: Vec<Ball>,
-    /// Rotors of those that are quadrotors, farthest first.
+    /// Sides of boxes.
+    pub faces: Vec<Face>,
+    /// Marks below vehicles, then rotors of quadrotors, farthest first, then glows.
     pub discs: Vec<Disc>,
     /// Keep-out shells, in the order in which they must be drawn: see [`Scene::compose`].
     pub shells: Vec<Ball>,
     /// Height of shells over their width.
     pub shell_ratio: f32,
-    /// Ground, trails, start marks, goal slots, edges, pairs, arms of quadrotors; each is drawn over the previous ones.
+    /// Ground, drop lines, trails, start marks, goal slots, edges, pairs, arms of quadrotors; each is drawn over the previous ones.
     pub lines: Vec<Line>,
     /// Words and legends.
     pub annotations: Vec<Annotation>,
@@ -158,9 +174,9 @@ pub struct Scene {
 impl Scene {
     /// Nothing, seen by this camera.
     fn empty(camera: Camera, depth_m: [f64; 2], background: Colour) -> Self {
-        let (balls, discs, shells, lines) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-        let (shell_ratio, annotations) = (1.0, Vec::new());
-        Self { camera, depth_m, background, balls, discs, shells, shell_ratio, lines, annotations }
+        let (balls, faces, discs, shells) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let (shell_ratio, lines, annotations) = (1.0, Vec::new(), Vec::new());
+        Self { camera, depth_m, background, balls, faces, discs, shells, shell_ratio, lines, annotations }
     }
 
     /// A picture of nothing.

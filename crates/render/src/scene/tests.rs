@@ -317,15 +317,123 @@ fn goals_fit_the_formation_and_starts_are_at_the_first_positions() {
     let only = View { layers: Layers { marks: true, ..Layers::NONE }, ..camera("top") };
     let scene = scene(&timeline, 10.0, &only);
     let extent = Extent::of(&timeline);
-    // Two strokes of a cross for each start, then rings.
-    assert_eq!(scene.lines.len(), 4 * 2 + 4 * 28);
+    // Two strokes of a cross for each start, then for each slot the line from its vehicle and a ring.
+    assert_eq!(scene.lines.len(), 4 * 2 + 4 * (1 + 28));
     let middle = |line: &Line| {
         let [a, b] = line.ends_m.map(|end| Vector3::from(end.map(f64::from)));
         (a + b) / 2.0 + extent.origin_m()
     };
     assert!((middle(&scene.lines[0]) - Vector3::new(0.0, 0.0, 1.0)).norm() < 1e-6);
-    let ring: Vector3<f64> = scene.lines[8..36].iter().map(middle).sum::<Vector3<f64>>() / 28.0;
+    let ring: Vector3<f64> = scene.lines[9..37].iter().map(middle).sum::<Vector3<f64>>() / 28.0;
     assert!((ring - Vector3::new(10.0, 0.0, 1.0)).norm() < 1e-6, "{ring}");
+}
+
+/// A cross within a slot would look like an arrival.
+#[test]
+fn a_start_within_a_slot_has_no_cross() {
+    let scenario = Scenario::read(&Source::Builtin("swap".to_owned()), &[]).expect("built in");
+    let mut timeline = Timeline::of(&scenario);
+    for (step, turned) in [1.0, -1.0].into_iter().enumerate() {
+        let swarm = Swarm::at_rest(&scenario.start.positions_m * turned);
+        timeline.take(&Sample::new(step as f64, step as u64, &swarm, &Rows::zeros(12)));
+    }
+    let only = View { layers: Layers { marks: true, ..Layers::NONE }, ..camera("top") };
+    assert_eq!(scene(&timeline, 1.0, &only).lines.len(), 12 * (1 + 28));
+}
+
+#[test]
+fn heights_are_shown_unless_the_camera_looks_straight_down() {
+    let timeline = timeline();
+    let only = |text: &str, ground| View { layers: Layers { ground, ..Layers::NONE }, ..camera(text) };
+    let drawn = scene(&timeline, 0.0, &only("perspective", true));
+    let feet: Vec<_> = drawn.discs.iter().map(|disc| disc.centre_m).collect();
+    let ground_m = Extent::of(&timeline).ground_m[0].z;
+    assert_eq!(feet.len(), 4);
+    for (ball, foot) in drawn.balls.iter().zip(&feet) {
+        assert_eq!((ball.centre_m[0], ball.centre_m[1]), (foot[0], foot[1]));
+        assert!((f64::from(foot[2]) - ground_m).abs() < 1e-6, "{foot:?}");
+        assert!(drawn.lines.iter().any(|line| line.ends_m == [ball.centre_m, *foot]));
+    }
+    for view in [only("top", true), only("perspective", false)] {
+        assert!(scene(&timeline, 0.0, &view).discs.is_empty());
+    }
+}
+
+#[test]
+fn houses_are_solid() {
+    let scenario = Scenario::read(&Source::Builtin("obstacles".to_owned()), &[]).expect("built in");
+    let mut timeline = Timeline::of(&scenario);
+    let swarm = Swarm::at_rest(scenario.start.positions_m.clone());
+    timeline.take(&Sample::new(0.0, 0, &swarm, &Rows::zeros(8)));
+    let drawn = scene(&timeline, 0.0, &View::of(&timeline));
+    assert_eq!(drawn.faces.len(), 6);
+    let colours: Vec<_> = drawn.faces.iter().map(|face| face.colour.rgba).collect();
+    assert!(colours.iter().any(|colour| *colour != colours[0]), "sides differ in light: {colours:?}");
+    assert!(scene(&self::timeline(), 0.0, &View::default()).faces.is_empty());
+}
+
+#[test]
+fn a_view_leaves_out_what_would_hide_the_formation() {
+    let view = |name: &str| {
+        let scenario = Scenario::read(&Source::Builtin(name.to_owned()), &[]).expect("built in");
+        View::of(&Timeline::of(&scenario))
+    };
+    let pentagon = view("pentagon");
+    assert_eq!((pentagon.layers, pentagon.trail_s), (Layers::ALL, None));
+    let swap = view("swap");
+    assert!(!swap.layers.edges && swap.layers.marks, "a graph of 66 edges: {swap:?}");
+    let thousand = view("thousand");
+    assert!(!thousand.layers.marks && thousand.trail_s == Some(1.0) && !thousand.has_lights(), "{thousand:?}");
+    let show = view("show");
+    assert!(show.has_lights() && !show.layers.trails && show.layers.caption, "{show:?}");
+}
+
+#[test]
+fn lights_are_on_a_night_sky_in_any_theme() {
+    let timeline = timeline();
+    for theme in [Theme::Dark, Theme::Light] {
+        let view = View { theme, ..View::default() }.with_lights();
+        let [clear, violated] = [2.0, 5.0].map(|time_s| scene(&timeline, time_s, &view));
+        assert_eq!((clear.background, clear.discs.len()), (Colour::night(), 4 * 2));
+        assert!(clear.discs.iter().all(|disc| disc.glow == 1.0));
+        let alarm = Theme::Dark.alarm();
+        assert!(clear.balls.iter().all(|ball| ball.colour != alarm));
+        assert_eq!(violated.balls.iter().filter(|ball| ball.colour == alarm).count(), 2, "a violation is red");
+    }
+}
+
+#[test]
+fn both_vehicles_of_the_closest_pair_have_names() {
+    let mut timeline = Timeline::new("crowd", 49);
+    let rows: Vec<f64> = (0..49_u32).flat_map(|k| [f64::from(k % 7), f64::from(k / 7), 0.0]).collect();
+    let mut positions_m = Rows::from_row_slice(&rows);
+    positions_m[(24, 0)] += 0.4;
+    timeline.take(&Sample::new(0.0, 0, &Swarm::at_rest(positions_m), &Rows::zeros(49)));
+    let drawn = scene(&timeline, 0.0, &View::default());
+    assert!(words(&drawn).contains(&"25") && words(&drawn).contains(&"26"), "{:?}", words(&drawn));
+    let none = View { layers: Layers { closest: false, ..Layers::ALL }, ..View::default() };
+    let drawn = scene(&timeline, 0.0, &none);
+    assert!(!words(&drawn).contains(&"25"), "more than 24 vehicles have no names: {:?}", words(&drawn));
+}
+
+#[test]
+fn the_automatic_camera_follows_a_swarm_that_travels_far() {
+    let apart_px = |step_m: f64| {
+        let mut timeline = Timeline::new("two", 2);
+        for k in 0..=20_u32 {
+            let x = step_m * f64::from(k);
+            let swarm = Swarm::at_rest(Rows::from_row_slice(&[x, 0.0, 1.0, x, 2.0, 3.0]));
+            timeline.take(&Sample::new(f64::from(k), u64::from(k), &swarm, &Rows::zeros(2)));
+        }
+        let drawn = scene(&timeline, 10.0, &camera("auto"));
+        let [a, b] = [0, 1].map(|k| {
+            let place = Vector3::from(drawn.balls[k].centre_m.map(f64::from));
+            drawn.camera.project(place).expect("ahead").at_px
+        });
+        (a[0] - b[0]).hypot(a[1] - b[1])
+    };
+    let [near, far] = [0.01, 5.0].map(apart_px);
+    assert!(far > 0.5 * near, "{far} and {near} pixels");
 }
 
 #[test]

@@ -46,7 +46,8 @@ pub fn show(
 ) -> Result<(), RenderError> {
     in_library(|| {
         let events = EventLoop::new().map_err(|error| RenderError::NoDisplay(reason(&error)))?;
-        let (player, state) = (Player::new(timeline, live), WindowState::new(theme));
+        let state = WindowState::new(theme, &timeline);
+        let player = Player::new(timeline, live);
         let mut app = App { adapter, player, state, open: None, drawn: Instant::now(), failure: None };
         events.run_app(&mut app).map_err(|error| RenderError::NoWindow(error.to_string()))?;
         app.failure.map_or(Ok(()), Err)

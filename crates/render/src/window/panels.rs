@@ -273,8 +273,10 @@ const MAX_PLOT_POINTS: usize = 600;
 
 /// Draws the smallest separation over time with delta and the current time.
 fn plot(ui: &mut Ui, player: &Player) {
-    let (area, response) = ui.allocate_exact_size(vec2(ui.available_width(), 120.0), Sense::hover());
-    let painter = ui.painter_at(area);
+    let (whole, response) = ui.allocate_exact_size(vec2(ui.available_width(), 136.0), Sense::hover());
+    // Times are below the plot, where no curve and no limit is.
+    let area = whole.with_max_y(whole.bottom() - 16.0);
+    let painter = ui.painter_at(whole);
     let visuals = ui.visuals();
     painter.rect_filled(area, 3.0, visuals.extreme_bg_color);
     let [first_s, last_s] = player.timeline.log.range_s();
@@ -299,9 +301,12 @@ fn plot(ui: &mut Ui, player: &Player) {
         let stroke = Stroke::new(1.5, ALARM);
         painter.line_segment([point_at(first_s, delta_m), point_at(last_s, delta_m)], stroke);
         let font = egui::FontId::proportional(11.0);
+        // Above the line, or below a line at the top.
+        let place = point_at(last_s, delta_m);
+        let is_high = place.y - area.top() < 16.0;
         painter.text(
-            point_at(last_s, delta_m),
-            Align2::RIGHT_BOTTOM,
+            place,
+            if is_high { Align2::RIGHT_TOP } else { Align2::RIGHT_BOTTOM },
             format!("delta {delta_m} m "),
             font,
             stroke.color,
@@ -314,8 +319,9 @@ fn plot(ui: &mut Ui, player: &Player) {
         painter.text(corner, anchor, text, egui::FontId::proportional(11.0), ink);
     };
     number(area.left_top(), Align2::LEFT_TOP, format!(" {top:.1} m"));
-    number(area.left_bottom(), Align2::LEFT_BOTTOM, format!(" {bottom:.1} m, {first_s:.0} s"));
-    number(area.right_bottom(), Align2::RIGHT_BOTTOM, format!("{last_s:.0} s "));
+    number(area.left_bottom(), Align2::LEFT_BOTTOM, format!(" {bottom:.1} m"));
+    number(area.left_bottom(), Align2::LEFT_TOP, format!(" {first_s:.0} s"));
+    number(area.right_bottom(), Align2::RIGHT_TOP, format!("{last_s:.0} s "));
     let now = point_at(player.time_s, bottom).x;
     painter.vline(now, area.y_range(), Stroke::new(1.0, visuals.strong_text_color()));
     if let Some(pointer) = response.hover_pos() {

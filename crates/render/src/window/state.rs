@@ -4,6 +4,7 @@ use egui::{Key, Vec2};
 
 use super::player::Player;
 use crate::scene::{Adjustment, Camera, CameraSpec, Colouring, Layers, Theme, View};
+use crate::timeline::Timeline;
 
 /// Rotation of the camera per key press \[degrees\].
 const KEY_TURN_DEG: f64 = 5.0;
@@ -24,7 +25,7 @@ pub const WINDOW_KEYS: [(&str, &str); 19] = [
     ("1, 2, 3", "perspective, top, front"),
     ("F", "follow the picked vehicle or the swarm; again: the whole flight"),
     ("T", "trails: whole, short, none"),
-    ("C", "colour by vehicle, speed, clearance"),
+    ("C", "colour by vehicle, speed, clearance, lights"),
     ("L", "labels"),
     ("W, A, S, D or drag", "turn the camera"),
     ("right drag", "move the camera"),
@@ -50,6 +51,8 @@ pub(super) struct WindowState {
     adjustment: Adjustment,
     layers: Layers,
     trails: Trails,
+    /// Length of whole trails \[s\]; `None` from the start.
+    trail_s: Option<f64>,
     colouring: Colouring,
     pub(super) theme: Theme,
     pub(super) picked: Option<usize>,
@@ -62,13 +65,16 @@ pub(super) struct WindowState {
 }
 
 impl WindowState {
-    pub(super) fn new(theme: Theme) -> Self {
+    /// Returns the first view of a flight.
+    pub(super) fn new(theme: Theme, timeline: &Timeline) -> Self {
+        let View { camera, layers, colouring, trail_s, .. } = View::of(timeline);
         Self {
-            camera: CameraSpec::Auto,
+            camera,
             adjustment: Adjustment::NONE,
-            layers: Layers::ALL,
+            layers,
             trails: Trails::Whole,
-            colouring: Colouring::Vehicle,
+            trail_s,
+            colouring,
             theme,
             picked: None,
             help: false,
@@ -88,7 +94,7 @@ impl WindowState {
             size_px,
             text_scale: 1.0,
             layers: Layers { trails: self.layers.trails && self.trails != Trails::None, ..self.layers },
-            trail_s: (self.trails == Trails::Short).then_some(SHORT_TRAIL * duration_s),
+            trail_s: if self.trails == Trails::Short { Some(SHORT_TRAIL * duration_s) } else { self.trail_s },
             picked: self.picked,
         }
     }

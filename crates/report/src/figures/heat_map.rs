@@ -3,7 +3,7 @@
 use super::Figure;
 use super::axis::{Axis, extent};
 use super::chart::{TITLE, WIDTH};
-use tautline_core::text::{at_least, capitalised};
+use tautline_core::text::{at_least, capitalised, decimals_of};
 
 use super::svg::{Align, Canvas, Marker, SOFT_INK, Stroke, TEXT, text_px};
 
@@ -52,7 +52,7 @@ pub fn heat_map(
         Some([from, to]) => Axis::spanning(label, from, to, 5.0),
         None => Axis::linear(label, known(), false),
     };
-    let y_labels = y.values.iter().map(f64::to_string).collect::<Vec<_>>();
+    let y_labels = tick_labels(y.values);
     let left = LABEL + GAP + y_labels.iter().map(|label| text_px(label)).fold(0.0, f64::max);
     let (right, bottom) = (WIDTH - SCALE_SPACE, TITLE + HEIGHT);
     let (columns, rows) = (x.values.len().max(1), y.values.len().max(1));
@@ -78,7 +78,7 @@ pub fn heat_map(
         let most = (room / each).max(1.0) as usize;
         count.div_ceil(most)
     };
-    let x_labels = x.values.iter().map(f64::to_string).collect::<Vec<_>>();
+    let x_labels = tick_labels(x.values);
     let widest = x_labels.iter().map(|label| text_px(label)).fold(0.0, f64::max) + GAP;
     for (k, words) in x_labels.iter().enumerate().step_by(every(right - left, columns, widest)) {
         canvas.text((left + width * (k as f64 + 0.5), bottom + GAP), Align::CENTRE_ABOVE, words);
@@ -101,6 +101,20 @@ pub fn heat_map(
     }
     canvas.text_upwards((WIDTH - 5.0, TITLE + HEIGHT / 2.0), label);
     canvas.figure(name, &description(label, [x, y], &numbers))
+}
+
+/// Largest number of decimals of a value on an axis.
+const DECIMALS: u8 = 12;
+
+/// Returns the values of an axis, rounded to a hundredth of their smallest distance.
+fn tick_labels(values: &[f64]) -> Vec<String> {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let steps = sorted.windows(2).map(|pair| pair[1] - pair[0]).filter(|&step| step > 0.0);
+    let Some(step) = steps.reduce(f64::min) else { return values.iter().map(f64::to_string).collect() };
+    let decimals = decimals_of(step, DECIMALS) + 2;
+    let rounded = |value: &f64| format!("{value:.decimals$}").parse().unwrap_or(*value);
+    values.iter().map(|value| rounded(value).to_string()).collect()
 }
 
 fn description(label: &str, [x, y]: [GridAxis<'_>; 2], numbers: &[Option<f64>]) -> String {
@@ -150,6 +164,15 @@ mod tests {
             "{}",
             figure.description
         );
+    }
+
+    #[test]
+    fn values_on_an_axis_are_short_and_differ() {
+        let thirds: Vec<_> = (0..4).map(|k| f64::from(k) / 6.0).collect();
+        assert_eq!(tick_labels(&thirds), ["0", "0.167", "0.333", "0.5"]);
+        assert_eq!(tick_labels(&[0.001, 0.01, 100.0]), ["0.001", "0.01", "100"]);
+        assert_eq!(tick_labels(&[1234.5, 1234.5001]), ["1234.5", "1234.5001"]);
+        assert_eq!(tick_labels(&[1.0 / 3.0]), [(1.0_f64 / 3.0).to_string()], "one value has no distance");
     }
 
     #[test]

@@ -39,15 +39,18 @@ pub(super) const GRID: Colour = colour("#E1E4E8", "--grid");
 pub(super) const OBSTACLE: Colour = colour("#8A6D3B", "--thing");
 pub(super) const ALARM: Colour = colour("#D40014", "--alarm");
 
-/// Colours that colour-blind readers can distinguish (after Okabe and Ito), each with a contrast of at least 3 on both
-/// papers.
-pub(super) const PALETTE: [Colour; 6] = [
-    colour("#0072B2", "--c1"),
-    colour("#D55E00", "--c2"),
-    colour("#00936C", "--c3"),
-    colour("#B85F95", "--c4"),
-    colour("#9A7600", "--c5"),
-    colour("#7D858E", "--c6"),
+/// Colours that colour-blind readers can distinguish, each with a contrast of at least 3 on both papers. They are Paul
+/// Tol's scheme "muted" (technical note SRON/EPS/TN/09-002, issue 3.2), whose cyan and sand are replaced by the light
+/// blue of "medium-contrast" and whose teal is darker.
+pub(super) const PALETTE: [Colour; 8] = [
+    colour("#332288", "--c1"),
+    colour("#CC6677", "--c2"),
+    colour("#3F9E8E", "--c3"),
+    colour("#AA4499", "--c4"),
+    colour("#999933", "--c5"),
+    colour("#6699CC", "--c6"),
+    colour("#117733", "--c7"),
+    colour("#882255", "--c8"),
 ];
 
 /// Returns the rules that give the figures of a page its colours. A file has none and stays readable on white paper.

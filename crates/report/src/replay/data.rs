@@ -18,6 +18,7 @@ use crate::flight_log::FlightLog;
 use tautline_audit::MovingObstacle;
 use tautline_core::obstacle::Shape;
 use tautline_core::swarm::{Rows, row};
+use tautline_sim::plan::Plan;
 
 /// Largest number of findings.
 const MOST_MOMENTS: usize = 200;
@@ -79,8 +80,9 @@ struct Data<'a> {
     /// Origin of all drawn positions, and half of the box around everything \[m\].
     origin_m: [f64; 3],
     half_m: [f64; 3],
-    /// First view.
+    /// First view, and whether it shows vehicles as lights.
     viewpoint: Viewpoint,
+    lights: bool,
     /// Side of the squares on the ground, and their lines relative to the origin, in single precision.
     square_m: f64,
     ground: String,
@@ -164,7 +166,7 @@ impl Replay {
         let place = |vehicle: usize| shown.binary_search(&vehicle).ok();
         let plan = stage.plan_of(log);
         let (targets, guides) = targets_of(plan.as_ref(), &shown, begin_s, room_bytes / 4);
-        let (nearest, holds) = (log.nearest(), log.holds);
+        let nearest = log.nearest();
         let near = nearest.clone().finish(MOST_SLICES.min(room_bytes / 10 / base64_bytes(SLICE_BYTES)));
         let [near_s, near_who] = statements::pairs(&near, log, place);
         let extent = Extent::of(stage, log, &shown);
@@ -184,10 +186,11 @@ impl Replay {
             shell_m: stage.shell_m,
             times_s: String::new(),
             decimals: decimals(end_s - begin_s),
-            holds,
+            holds: log.holds,
             origin_m: origin_m.into(),
             half_m: extent.half_m().into(),
             viewpoint: stage.viewpoint(log),
+            lights: plan.as_ref().is_some_and(Plan::is_show),
             square_m,
             ground: singles(&lines.iter().map(|at| at - origin_m).collect::<Vec<_>>()),
             middle_m: [0.0; 3],
@@ -207,7 +210,6 @@ impl Replay {
             things,
             targets,
         };
-        let no_room = NoReplay::NoRoom { room_bytes };
         // Breaks take a bounded share of the room. Beyond it, a vehicle that was absent in between is drawn at neither
         // end.
         let most_breaks = log.gaps.len().min(room_bytes / 10 / BREAK_BYTES);
@@ -216,7 +218,7 @@ impl Replay {
         let of_an_instant = base64_bytes(8 + 6 * data.points + turns);
         let most = room_bytes.saturating_sub(fixed) / of_an_instant.max(1);
         if most < 2 {
-            return Err(no_room);
+            return Err(NoReplay::NoRoom { room_bytes });
         }
         let spans: Vec<_> = moments.iter().filter(|of| of.kind != Kind::Unseen).map(|moment| moment.span).collect();
         let kept = chosen(&times_s, &spans, most.min(MOST_INSTANTS));
@@ -233,13 +235,13 @@ impl Replay {
         data.breaks =
             base64_of(breaks.iter().flatten().flat_map(|&at| u16::try_from(at).unwrap_or(u16::MAX).to_le_bytes()));
         (data.middle_m, data.cell_m, data.rounding_m) = (motion.middle_m, motion.cell_m, rounding_m);
-        data.starts = base64_of(motion.start_bytes().into_iter());
-        data.steps = base64_of(motion.step_bytes().into_iter());
+        (data.starts, data.steps) =
+            (base64_of(motion.start_bytes().into_iter()), base64_of(motion.step_bytes().into_iter()));
         let turned = kept.iter().flat_map(|&k| turn_bytes(&log.keyframes()[k].attitudes, &shown));
         data.turns = base64_of(turned.take(turns * kept.len()));
         let json = written(&data);
         if json.len() > room_bytes {
-            return Err(no_room);
+            return Err(NoReplay::NoRoom { room_bytes });
         }
         let is_drawn =
             |of: &Moment| is_kept(log, &times_s, &kept, &of.span) && of.vehicles.iter().all(|&k| place(k).is_some());
@@ -252,7 +254,7 @@ impl Replay {
             instants: [kept.len(), log.samples()],
             vehicles: [shown.len(), present.len()],
             moments: [listed.len(), moments.len()],
-            holds,
+            holds: log.holds,
             inexact: moments.len() - moments.iter().filter(is_exact).count(),
             unknown_radius: stage.unknown_radii(&shown),
             obstacles_off_m: data.things.iter().map(|thing| thing.off_m).fold(0.0, f64::max),

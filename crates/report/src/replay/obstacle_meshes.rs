@@ -39,8 +39,7 @@ impl Thing {
         let points = kept.into_iter().map(|k| obstacle.path[k]);
         let (radius_m, opacity) = match obstacle.shape {
             Shape::Ball { radius_m } => (Some(radius_m), 1.0),
-            Shape::Capsule { .. } => (None, 1.0),
-            Shape::Box { .. } => (None, 0.5),
+            Shape::Capsule { .. } | Shape::Box { .. } => (None, 1.0),
             Shape::HalfSpace { .. } => (None, 0.14),
         };
         Self {

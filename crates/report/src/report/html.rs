@@ -36,6 +36,22 @@ pub struct RunPage<'a> {
     pub pictures: &'a [Picture],
     /// Command that repeats the run.
     pub command: &'a str,
+    /// Changes of keys of the scenario's file.
+    pub changes: &'a [String],
+}
+
+impl RunPage<'_> {
+    /// Returns the law that flew and the changed keys, in a sentence.
+    fn setup(&self) -> String {
+        let law = self.scenario.flown_law().map_or_else(|error| error.to_string(), |law| law.name().to_owned());
+        let shield = if self.scenario.shield.is_some() { ", with a shield" } else { "" };
+        let changes = if self.changes.is_empty() {
+            String::new()
+        } else {
+            format!(" Changed keys: {}.", self.changes.join(", "))
+        };
+        format!("Law: {law}{shield}.{changes}")
+    }
 }
 
 impl Report {
@@ -46,6 +62,7 @@ impl Report {
     pub fn to_html(&self, about: &RunPage<'_>) -> String {
         let badge = Badge::judged(self.verdict.pass);
         let mut page = Page::new("Flight report", self.scenario.name.clone(), badge, self.headline());
+        page.setup = about.setup();
         page.reasons = self.reasons_beside_headline();
         let warnings = about.preflight.warnings.iter();
         page.warnings = warnings.map(|of| (of.code.name().to_owned(), of.message.clone())).collect();

@@ -40,6 +40,8 @@ pub struct RunRequest<'a> {
     pub scenario: &'a Scenario,
     /// Command that repeats the flight, for the page.
     pub command: String,
+    /// Changes of keys of the scenario's file, such as `law.kind=orca`, for the page.
+    pub changes: Vec<String>,
     /// Output folder; by default `out/NAME` with the name of the scenario.
     pub out: Option<PathBuf>,
     /// Whether a finished run is overwritten.
@@ -69,6 +71,7 @@ impl<'a> RunRequest<'a> {
         Self {
             scenario,
             command,
+            changes: Vec::new(),
             out,
             force: false,
             figures: true,
@@ -150,6 +153,7 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
         figures: &figures,
         pictures: &pictures.iter().map(|(_, picture)| picture.clone()).collect::<Vec<_>>(),
         command: &request.command,
+        changes: &request.changes,
     };
     let page = write_page(folder.path(), &report, &page, &request.formats)?;
     report.write(&folder.report())?;
@@ -265,7 +269,8 @@ pub fn flight_page(
     }
     let figures = figures(scenario, &log, report);
     let replay = replay_of_run(scenario, &log, report, PAGE_BYTES);
-    let page = RunPage { scenario, preflight, replay: &replay, figures: &figures, pictures: &[], command };
+    let page =
+        RunPage { scenario, preflight, replay: &replay, figures: &figures, pictures: &[], command, changes: &[] };
     report.to_html(&page)
 }
 

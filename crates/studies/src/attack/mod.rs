@@ -227,6 +227,7 @@ impl Experiment for Options {
         let own = ScenarioRequest { overrides: study.sets.clone(), ..request.clone() };
         let scenario = own.read()?;
         let run = RunRequest::reproducible(&scenario, request.run_command(&study.sets), out.clone());
+        let run = RunRequest { changes: study.sets.clone(), ..run };
         run_into(&run, pictures, &Quiet::new(monitor))?;
         monitor.say(&format!("wrote {} and the report beside it", out.join(RECORDING).display()));
         Ok(())

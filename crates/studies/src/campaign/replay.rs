@@ -60,17 +60,22 @@ impl WorstFlight {
     /// Returns the section of a page on the worst flights.
     pub(super) fn section(flights: &[Self]) -> Section {
         let mut blocks = Vec::new();
-        let pictures: Vec<_> = flights.iter().filter_map(|flight| flight.picture.clone()).collect();
         if flights.is_empty() {
             blocks.push(page::list(&["None."]));
         }
-        blocks.push(page::pictures(&pictures));
-        for flight in flights {
+        for (k, flight) in flights.iter().enumerate() {
             let recording = flight.recording.as_ref().map(|path| format!("Its recording: {path}"));
-            blocks.push(page::list(&std::iter::once(flight.description.clone()).chain(recording).collect::<Vec<_>>()));
             let replay = flight.replay.as_ref();
-            blocks.extend(replay.map(|replay| page::replay(&flight.description, replay, Start::OnDemand)));
-            blocks.push(page::command(&flight.command));
+            let replay = replay.map(|replay| page::replay(&flight.description, replay, Start::OnDemand));
+            let recording = recording.map(|recording| page::list(&[recording]));
+            let picture = flight.picture.iter().map(|picture| page::pictures(std::slice::from_ref(picture)));
+            let own: Vec<_> = picture.chain(recording).chain(replay).chain([page::command(&flight.command)]).collect();
+            if k == 0 {
+                blocks.push(page::list(std::slice::from_ref(&flight.description)));
+                blocks.extend(own);
+            } else {
+                blocks.push(page::folded(&flight.description, &own));
+            }
         }
         Section::new(
             "The worst flights",
@@ -346,6 +351,7 @@ fn shown(flight: FlightId<'_>, campaign: &Campaign, worst: &Worst, left: &RunFil
         description: description.clone(),
         data_uri: picture.data_uri.clone(),
         file: format!("worst/{}/{}", flight.name(), picture.file),
+        is_light: picture.is_light,
     });
     WorstFlight {
         run: flight.run,

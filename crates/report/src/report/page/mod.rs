@@ -30,7 +30,7 @@ const POLICY: &str =
 
 /// Sentence below the heading of a replay.
 const ABOUT_REPLAY: &str =
-    "The flight, drawn in this page: the round button plays it, dragging turns it, and the button ? lists all keys.";
+    "The flight, drawn in this page: Play starts it, dragging turns it, and the button ? lists all keys.";
 
 /// A page.
 #[derive(Clone, Debug)]
@@ -41,6 +41,8 @@ pub struct Page {
     pub kind: &'static str,
     /// Badge beside the verdict.
     pub badge: Badge,
+    /// What was done, below the title; may be empty.
+    pub setup: String,
     /// Verdict in a sentence.
     pub verdict: String,
     /// Reasons against a better verdict, a sentence each.
@@ -82,6 +84,8 @@ pub struct Picture {
     pub data_uri: String,
     /// Path of the picture in full size, relative to the page.
     pub file: String,
+    /// Whether the picture is on white paper; a dark page inverts its lightness.
+    pub is_light: bool,
 }
 
 impl Badge {
@@ -109,7 +113,7 @@ impl Page {
     #[must_use]
     pub fn new(kind: &'static str, title: String, badge: Badge, verdict: String) -> Self {
         let (reasons, warnings, sections) = (Vec::new(), Vec::new(), Vec::new());
-        Self { title, kind, badge, verdict, reasons, replay: None, warnings, sections }
+        Self { title, kind, badge, setup: String::new(), verdict, reasons, replay: None, warnings, sections }
     }
 
     /// Adds a [`section`], unless its content is empty.
@@ -138,6 +142,7 @@ impl Page {
                         (theme_choice())
                         p.kind { (self.kind) }
                         h1 { (self.title) }
+                        @if !self.setup.is_empty() { p.setup { (self.setup) } }
                         p.verdict { (self.badge) " " (self.verdict) }
                         @if !self.reasons.is_empty() {
                             ul.reasons { @for reason in &self.reasons { li { (reason) } } }
@@ -220,8 +225,8 @@ pub fn figures(figures: &[Figure]) -> Markup {
 /// Returns pictures side by side in rows, each a link to its file in full size; empty without pictures.
 #[must_use]
 pub fn pictures(pictures: &[Picture]) -> Markup {
-    side_by_side(pictures.iter().map(|Picture { description, data_uri, file }| {
-        (html! { a href=(file) { img src=(data_uri) alt=(description); } }, description.clone())
+    side_by_side(pictures.iter().map(|Picture { description, data_uri, file, is_light }| {
+        (html! { a href=(file) { img.day[*is_light] src=(data_uri) alt=(description); } }, description.clone())
     }))
 }
 
@@ -232,6 +237,12 @@ fn side_by_side(drawn: impl Iterator<Item = (Markup, String)>) -> Markup {
             div.figures { @for (drawn, description) in drawn { figure { (drawn) figcaption { (description) } } } }
         }
     }
+}
+
+/// Returns blocks below a line that unfolds them.
+#[must_use]
+pub fn folded(summary: &str, blocks: &[Markup]) -> Markup {
+    html! { details { summary { (summary) } @for block in blocks { (block) } } }
 }
 
 /// Returns a command line to copy.
