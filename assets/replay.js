@@ -915,8 +915,9 @@ const play = (root, data) => {
       use(rotor, { rotor: rotors?.radius_m ?? 0 });
       quads(null, 4 * count);
     }
-    if (lit) for (const [kind, size_m, least] of [[3, Math.max(4 * least_m, 1.9 * shell), Math.min(15, canvas.clientWidth / 50)],
-      [4, 0.6 * Math.max(4 * least_m, 1.9 * shell), Math.min(9, canvas.clientWidth / 80)]]) {
+    const glow_m = Math.max(4 * least_m, 1.9 * shell), width_px = canvas.clientWidth;
+    if (lit) for (const [kind, size_m, least] of [[3, glow_m, Math.min(15, width_px / 50)],
+      [4, 0.6 * glow_m, Math.min(9, width_px / 80)]]) {
       use(mark, { mark: kind, size_m, least: least * ratio, lift: 1.1 * least_m, tint: [...rgba(colours.ink)] });
       quads(null, count);
     }

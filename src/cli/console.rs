@@ -200,7 +200,7 @@ impl Terminal {
         Ok(terminal)
     }
 
-    /// Opens a page in the browser; says so if it cannot.
+    /// Opens a page in the browser; warns if that fails.
     pub(super) fn open_page(&self, page: &Path) {
         if let Err(error) = open::that_detached(page) {
             self.warn(&format!("note: cannot open {} in a browser: {error}", page.display()));
@@ -327,8 +327,8 @@ impl From<Exit> for ExitCode {
 pub(super) fn show(failure: &Failure) -> Exit {
     let mut error = Group::with_title(Level::ERROR.primary_title(failure.message()));
     if let Some(place) = failure.place() {
-        let at = AnnotationKind::Primary.span(place.span.clone());
-        error = error.element(Snippet::source(&place.text).path(&place.source).annotation(at));
+        let annotation = AnnotationKind::Primary.span(place.span.clone());
+        error = error.element(Snippet::source(&place.text).path(&place.source).annotation(annotation));
     }
     if let Some(help) = failure.help() {
         error = error.element(Level::HELP.message(normalize_untrusted_str(help)));

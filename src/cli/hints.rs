@@ -32,9 +32,9 @@ pub(super) fn with_hints(mut usage: clap::Error, program: &Command, words: &[Str
                 usage.insert(ContextKind::SuggestedSubcommand, ContextValue::Strings(vec![name]));
             }
         }
-        // The word behind was taken as the scenario.
+        // The parser took the word after `--json` as the scenario.
         ErrorKind::UnknownArgument if let Some(file) = behind_json(words) => {
-            tip(&mut usage, &format!("a file of JSON follows an equals sign: --json={file}"));
+            tip(&mut usage, &format!("write an equals sign before the file of --json: --json={file}"));
         }
         ErrorKind::UnknownArgument if usage.get(ContextKind::SuggestedArg).is_none() => {
             let word = given(ContextKind::InvalidArg);
@@ -58,7 +58,7 @@ pub(super) fn with_hints(mut usage: clap::Error, program: &Command, words: &[Str
     usage
 }
 
-/// Returns the word behind `--json`, which takes its file behind an equals sign.
+/// Returns the word after `--json` if it names a JSON file; the option takes a file only after an equals sign.
 fn behind_json(words: &[String]) -> Option<&str> {
     let place = words.iter().position(|word| word == "--json")?;
     words.get(place + 1).map(String::as_str).filter(|word| word.ends_with(".json"))

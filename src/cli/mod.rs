@@ -242,7 +242,11 @@ mod tests {
 
     #[test]
     fn an_option_means_the_same_in_all_commands() {
-        fn add<'a>(command: &'a clap::Command, at: &str, seen: &mut BTreeMap<&'a str, BTreeMap<String, Vec<String>>>) {
+        fn add<'a>(
+            command: &'a clap::Command,
+            parent: &str,
+            seen: &mut BTreeMap<&'a str, BTreeMap<String, Vec<String>>>,
+        ) {
             for argument in command.get_arguments() {
                 let Some(name) = argument.get_long() else { continue };
                 let values = argument.get_value_names().unwrap_or_default().first().map_or("", |value| value.as_str());
@@ -253,7 +257,7 @@ mod tests {
                     values => values,
                 };
                 let form = format!("{:?} {value}", argument.get_short());
-                seen.entry(name).or_default().entry(form).or_default().push(format!("{at} {}", command.get_name()));
+                seen.entry(name).or_default().entry(form).or_default().push(format!("{parent} {}", command.get_name()));
             }
             command.get_subcommands().for_each(|below| add(below, command.get_name(), seen));
         }

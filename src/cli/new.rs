@@ -16,7 +16,7 @@ use tautline_sim::scenario::builtin;
 pub(super) struct NewArguments {
     /// Name of the scenario, or path of its file; `.toml` is added.
     name: PathBuf,
-    /// Repeat this built-in scenario [default: that of the same name, or else six vehicles that fly to a ring].
+    /// Built-in scenario to repeat [default: that of the same name, else six vehicles that fly to a ring].
     #[arg(long, value_name = "SCENARIO", add = completions::scenario())]
     like: Option<String>,
     /// Print no text.
@@ -66,7 +66,7 @@ fn flight(path: &Path) -> String {
 
 fn unknown(from: &str) -> Failure {
     let names: Vec<_> = builtin::all().iter().map(|builtin| builtin.name).collect();
-    let help = format!("give one of {}, or copy your own file", names.join(", "));
+    let help = format!("give one of {}; copy a file of your own without tautline new", names.join(", "));
     Failure::input("scenario/not-found", format!("--like: `{from}` is not a built-in scenario"), help)
 }
 

@@ -43,7 +43,7 @@ pub(super) struct RenderArguments {
     /// another output is given].
     #[arg(long, value_name = "TIMES", value_delimiter = ',', allow_negative_numbers = true)]
     at: Vec<String>,
-    /// Take a picture each SECONDS of the flight.
+    /// Time between two pictures of the flight [s].
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     every: Option<f64>,
     /// Write a film: .mp4 (H.264; needs ffmpeg, or a build with --features film) or .gif.
@@ -71,13 +71,13 @@ pub(super) struct RenderArguments {
     #[arg(long, value_name = "X", allow_negative_numbers = true, requires = "film")]
     speed: Option<f64>,
     /// Camera: auto, perspective, top, front, side, follow, follow:ID, closest, or AZIMUTH,ELEVATION,DISTANCE in
-    /// degrees and metres [default: auto, which follows a swarm that travels far].
+    /// degrees and metres [default: follow with lights, else auto, which follows a swarm that travels far].
     #[arg(long, allow_hyphen_values = true, add = completions::camera())]
     camera: Option<String>,
     /// Colour of vehicles and trails [default: vehicle; lights for sixty vehicles or more in several flat formations].
     #[arg(long, value_parser = drawing::colouring())]
     colour: Option<Colouring>,
-    /// Length of trails [s] [default: from the start, 5 from 25 vehicles on, 1 from 100 on].
+    /// Length of trails [s] [default: the whole flight up to 24 vehicles, 5 up to 99, else 1].
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
     trail: Option<f64>,
     /// Theme.

@@ -321,12 +321,12 @@ impl WatchArguments {
     fn recorder(&self) -> Result<Option<Record>, Failure> {
         let Some(path) = &self.record else { return Ok(None) };
         if !Record::is_written(path) {
-            let message = format!("--record: not a name of a recording ({:?})", path.display().to_string());
-            return Err(Failure::input("watch/record", message, "give a name that ends in .csv or .mcap"));
+            let message = format!("--record: must end in .csv or .mcap ({:?})", path.display().to_string());
+            return Err(Failure::input("watch/record", message, "give another name"));
         }
         // The watch writes both.
         let partial = Record::partial_of(path);
-        if let Some(there) = [path, &partial].into_iter().find(|of| of.exists() && !self.force) {
+        if let Some(there) = [path, &partial].into_iter().find(|file| file.exists() && !self.force) {
             let message = format!("--record: the file exists ({})", there.display());
             return Err(Failure::input("watch/record", message, "give another name, or --force to overwrite it"));
         }

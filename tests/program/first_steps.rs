@@ -39,7 +39,7 @@ fn a_new_scenario_flies_clear_and_reaches_its_formation() {
 }
 
 #[test]
-fn a_new_scenario_begins_with_a_built_in_one_of_its_name_or_of_the_option() {
+fn new_repeats_the_built_in_scenario_of_its_name_or_of_like() {
     let folder = folder();
     let new = |arguments: &[&str]| ran(folder.path(), &[&["new"], arguments].concat());
     let read = |file: &str| fs::read_to_string(folder.path().join(file)).expect("a scenario");
@@ -282,30 +282,31 @@ fn a_page_is_opened_on_request() {
     use std::os::unix::fs::PermissionsExt as _;
 
     let folder = folder();
-    let at = folder.path();
-    fs::write(at.join("pair.csv"), "t_s,id,x,y,z\n0,a,0,0,0\n0,b,3,0,0\n1,a,0,0,0\n1,b,3,0,0\n").expect("a file");
+    let root = folder.path();
+    fs::write(root.join("pair.csv"), "t_s,id,x,y,z\n0,a,0,0,0\n0,b,3,0,0\n1,a,0,0,0\n1,b,3,0,0\n").expect("a file");
     // A browser that notes its page.
-    let browser = at.join("xdg-open");
-    fs::write(&browser, format!("#!/bin/sh\necho \"$1\" >> '{}'\n", at.join("opened").display())).expect("a script");
+    let browser = root.join("xdg-open");
+    fs::write(&browser, format!("#!/bin/sh\necho \"$1\" >> '{}'\n", root.join("opened").display())).expect("a script");
     fs::set_permissions(&browser, fs::Permissions::from_mode(0o755)).expect("a program");
-    let path = format!("{}:{}", at.display(), std::env::var("PATH").expect("a path"));
+    let path = format!("{}:{}", root.display(), std::env::var("PATH").expect("a path"));
     let short = ["--set", "time.duration_s=1"];
     for (words, page) in [
         (vec!["audit", "pair.csv", "--delta", "1", "--html", "a.html"], "a.html"),
         ([&["sweep", "--key", "law.alpha=1,2", "--html", "s.html"][..], &short].concat(), "s.html"),
         ([&["run", "--no-snapshots"][..], &short].concat(), "out/pentagon/report.html"),
     ] {
-        let command =
-            |more: &[&str]| Command::new(TAUTLINE).args(&words).args(more).current_dir(at).env("PATH", &path).output();
+        let command = |more: &[&str]| {
+            Command::new(TAUTLINE).args(&words).args(more).current_dir(root).env("PATH", &path).output()
+        };
         command(&[]).expect("the program");
-        assert!(!at.join("opened").exists(), "{words:?}: nothing is opened without the option");
+        assert!(!root.join("opened").exists(), "{words:?}: nothing is opened without the option");
         let force: &[&str] = if words[0] == "audit" { &["--open"] } else { &["--open", "--force"] };
         let ran = command(force).expect("the program");
-        while !fs::read_to_string(at.join("opened")).is_ok_and(|text| text.ends_with('\n')) {
+        while !fs::read_to_string(root.join("opened")).is_ok_and(|text| text.ends_with('\n')) {
             std::thread::yield_now();
         }
-        let opened = fs::read_to_string(at.join("opened")).expect("the note");
+        let opened = fs::read_to_string(root.join("opened")).expect("the note");
         assert!(opened.trim_end().ends_with(page), "{opened}: {}", String::from_utf8_lossy(&ran.stderr));
-        fs::remove_file(at.join("opened")).expect("the note");
+        fs::remove_file(root.join("opened")).expect("the note");
     }
 }

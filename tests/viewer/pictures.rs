@@ -319,8 +319,8 @@ fn flip(expected: &Picture, actual: &Picture) -> (f32, Picture) {
     (mean, Picture { size_px: actual.size_px, rgba })
 }
 
-/// Compares with `NAME.png` of a folder, up to a mean FLIP. If the pictures differ, writes the actual picture and the difference to the
-/// target folder. `UPDATE_PICTURES=1` overwrites the reference.
+/// Compares a picture with `NAME.png` of a folder, up to a mean FLIP. If they differ, writes the actual picture and
+/// the difference to the target folder. `UPDATE_PICTURES=1` overwrites the reference.
 fn assert_looks_like(folder: &Path, name: &str, actual: &Picture, max_flip: f32) {
     let path = folder.join(format!("{name}.png"));
     if std::env::var_os("UPDATE_PICTURES").is_some() {
@@ -356,8 +356,8 @@ fn pictures_match_their_references() {
     shoot("vehicles", 4.0, View { layers: Layers::NONE, ..small() });
 }
 
-/// Largest mean FLIP of a picture of the README and a fresh one. The program draws both without an adapter, so they have
-/// the same bytes on one machine. Another C library may round a function of the flight or of the colours otherwise.
+/// Largest mean FLIP between a picture of the README and a fresh one. Both are drawn on the processor and have the
+/// same bytes on one machine. Another C library may round differently.
 const MAX_FLIP_OF_GALLERY: f32 = 0.0005;
 
 /// `UPDATE_PICTURES=1` draws the pictures of the README anew.

@@ -245,7 +245,7 @@ impl<R> Builder<'_, R> {
     }
 }
 
-/// Largest strength of the background of a share below one whose goal is one.
+/// Largest strength of the background of a share that misses its goal of 1.
 const PARTIAL: f64 = 0.4;
 
 impl Table {

@@ -9,8 +9,8 @@ use tautline_recordings::export::TrackRecorder;
 
 /// Recording of poses in a file `PATH.partial` until it is complete.
 ///
-/// It is written at least once per second of the recording. A file that was not completed can be read, an MCAP file
-/// with `allow_unfinished`.
+/// The file receives its poses at least once per second of the recording. An incomplete CSV file is readable; an
+/// incomplete MCAP file needs `allow_unfinished`.
 pub struct Record {
     file: Poses,
     partial: PathBuf,
@@ -44,7 +44,7 @@ impl Record {
     /// Returns whether the extension of a file is that of a recording: `csv` or `mcap`.
     #[must_use]
     pub fn is_written(path: &Path) -> bool {
-        path.extension().is_some_and(|of| of == "csv" || of == "mcap")
+        path.extension().is_some_and(|extension| extension == "csv" || extension == "mcap")
     }
 
     /// Creates the file `PATH.partial`, as MCAP if this is the extension of the path, otherwise as CSV.
@@ -54,7 +54,7 @@ impl Record {
     pub fn create(path: &Path) -> io::Result<Self> {
         let partial = Self::partial_of(path);
         let file = File::create(&partial)?;
-        let file = if path.extension().is_some_and(|of| of == "mcap") {
+        let file = if path.extension().is_some_and(|extension| extension == "mcap") {
             Poses::Mcap(Box::new(TrackRecorder::new(file)?))
         } else {
             let mut file = BufWriter::new(file);
@@ -71,11 +71,11 @@ impl Record {
     pub fn push(&mut self, time_s: f64, pose: &OwnedPose) -> io::Result<()> {
         match &mut self.file {
             Poses::Csv(file) => {
-                let at = pose.position_m;
+                let position_m = pose.position_m;
                 let id = quoted(&pose.id);
-                write!(file, "{time_s:?},{id},{:?},{:?},{:?},", at.x, at.y, at.z)?;
+                write!(file, "{time_s:?},{id},{:?},{:?},{:?},", position_m.x, position_m.y, position_m.z)?;
                 match pose.velocity_m_s {
-                    Some(of) => writeln!(file, "{:?},{:?},{:?}", of.x, of.y, of.z)?,
+                    Some(v_m_s) => writeln!(file, "{:?},{:?},{:?}", v_m_s.x, v_m_s.y, v_m_s.z)?,
                     None => writeln!(file, ",,")?,
                 }
             }

@@ -132,7 +132,7 @@ mod tests {
             ),
             (
                 Settings { until_s: Some(f64::NAN), ..delta.clone() },
-                "to_s: must be a finite number, got NaN (give to_s=NUMBER, where NUMBER is a finite number)",
+                "until_s: must be a finite number, got NaN (give until_s=NUMBER, where NUMBER is a finite number)",
             ),
             (
                 Settings { land_on, ..delta },

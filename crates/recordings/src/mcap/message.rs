@@ -383,7 +383,7 @@ impl From<&Event> for EventMessage<&'static str> {
                 "engine-contact",
                 pair.numbers(),
                 f64::NAN,
-                format!("the engine saw the keep-out balls of vehicles {pair} overlap"),
+                format!("the keep-out balls of vehicles {pair} overlap in the engine"),
             ),
             Event::HullsHit { pair, closing_m_s, .. } => (
                 "hulls-hit",

@@ -98,7 +98,7 @@ impl Convention {
         self.directed.insert(column);
     }
 
-    /// Returns the convention of one vehicle whose columns of an axis behind these prefixes are north, east and down.
+    /// Returns the convention of one vehicle whose columns with these prefixes are north, east and down.
     fn of_ned(&self, lower: &[String], starts: [&str; 2]) -> Self {
         let (mut turned, ned) = (self.clone(), Axes::from_name("ned").unwrap_or_default());
         for (column, name) in lower.iter().enumerate() {

@@ -322,8 +322,8 @@ fn next_line(lines: &mut Lines, comments: bool) -> Result<bool, ReadError> {
     }
 }
 
-/// Compares a table without a header to `TrajNet`: whole numbers for frame and vehicle, and two more numbers. Returns
-/// `None` for other numbers, else whether it is certain: some successive lines have the same frame.
+/// Returns whether a table without a header is certainly `TrajNet`: some successive lines have the same frame. `None`
+/// unless each line has whole numbers for frame and vehicle, and two more numbers.
 fn trajnet(source: &Source, separator: Separator) -> Result<Option<bool>, ReadError> {
     let mut lines = Lines::new(source)?;
     let (mut fields, mut frame, mut vehicles) = (Fields::default(), None, BTreeSet::new());

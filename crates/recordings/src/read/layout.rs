@@ -62,7 +62,7 @@ pub(super) struct Layout {
     pub(super) counts_from_boot: bool,
     /// Column of the vertical rate of a long table, and the size of its unit \[m/s\] if its name has one.
     pub(super) rate: Option<(usize, Option<f64>)>,
-    /// Positions of each vehicle in metres and on the Earth, if it has both. Empty if no vehicle has.
+    /// Positions of each vehicle in metres and on the Earth, if it has both. Empty if no vehicle has both.
     pub(super) compared: Vec<Option<Compared>>,
     /// Whether a vehicle has no height column: then no height is used.
     pub(super) is_planar: bool,

@@ -131,7 +131,7 @@ impl Arrays {
     }
 
     /// Returns the array of a role: the one that the user names, else the only one with one of these names, optionally
-    /// with a unit of time as suffix. Two such arrays are refused, and none with a fault of this kind.
+    /// with a unit of time as suffix. Refuses two such arrays; `kind` is the fault if no such array exists.
     fn of_role(&self, options: &ReadOptions, role: &str, names: &[&str], kind: ContentKind) -> Result<String, Fault> {
         let units = TimeUnit::ALL.map(|unit| format!("_{}", unit.name()));
         let ends = std::iter::once("").chain(units.iter().map(String::as_str));

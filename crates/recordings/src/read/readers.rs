@@ -90,13 +90,13 @@ static READERS: &[Reader] = &[
     },
     Reader {
         format: Format::CSV,
-        // Also a text without a line besides comments.
+        // A text of comments only is also a table.
         accepts: |head| head.text.is_some() && head.line.is_none_or(csv::has_separators),
         open: |source, options| csv::open(source, Format::CSV, options),
     },
     Reader {
         format: Format::TRAJNET,
-        // Recognised by all its lines, when it is read as text.
+        // `csv::open` recognises this format from all lines of a text.
         accepts: |_| false,
         open: |source, options| csv::open(source, Format::TRAJNET, options),
     },

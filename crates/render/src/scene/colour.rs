@@ -94,9 +94,9 @@ const NIGHT: Colour = Colour::hex(0x06_0A_18);
 
 /// Number of vehicles from which on all have one colour.
 const ONE_COLOUR: usize = 200;
-/// Colours of vehicles in order, as in the charts. They are those of Paul Tol's colour-blind safe schemes (technical
-/// note SRON/EPS/TN/09-002, issue 3.2): on dark the scheme "light" without grey; on light the scheme "muted", whose cyan
-/// and sand are replaced by the light blue of "medium-contrast" and whose teal is darker, for a contrast of 3 on white.
+/// Colours of vehicles in order, as in the charts, from Paul Tol's colour-blind safe schemes (technical note
+/// SRON/EPS/TN/09-002, issue 3.2). The dark theme has the scheme "light" without grey. The light theme has "muted".
+/// There the light blue of "medium-contrast" replaces cyan and sand, and teal is darker, for a contrast of 3 on white.
 const ON_LIGHT: [u32; 8] =
     [0x33_22_88, 0xCC_66_77, 0x3F_9E_8E, 0xAA_44_99, 0x99_99_33, 0x66_99_CC, 0x11_77_33, 0x88_22_55];
 const ON_DARK: [u32; 8] =

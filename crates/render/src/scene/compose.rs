@@ -106,7 +106,7 @@ impl Default for View {
 }
 
 impl View {
-    /// Returns the view of a flight: layers and trails by the number of vehicles and edges. A show is drawn with lights.
+    /// Returns the view of a flight. Vehicle and edge counts select layers and trails. A show has lights.
     #[must_use]
     pub fn of(timeline: &Timeline) -> Self {
         let trail_s = match timeline.count() {

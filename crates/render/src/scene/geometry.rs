@@ -40,7 +40,7 @@ const APART: f64 = 1.5;
 /// Opacity of the line from a vehicle to the ground, and of the mark there.
 const DROP: f32 = 0.4;
 const GROUND_MARK: f32 = 0.6;
-/// Largest number of vehicles with these lines and marks.
+/// Largest number of vehicles with lines to the ground and ground marks.
 const MAX_DROPS: usize = 300;
 /// Sine of the elevation above which the ground below a vehicle is hidden by it.
 const STRAIGHT_DOWN: f64 = 0.97;

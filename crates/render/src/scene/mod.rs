@@ -165,7 +165,8 @@ pub struct Scene {
     pub shells: Vec<Ball>,
     /// Height of shells over their width.
     pub shell_ratio: f32,
-    /// Ground, drop lines, trails, start marks, goal slots, edges, pairs, arms of quadrotors; each is drawn over the previous ones.
+    /// Ground, drop lines, trails, start marks, goal slots, edges, pairs, and arms of quadrotors, each drawn over the
+    /// previous ones.
     pub lines: Vec<Line>,
     /// Words and legends.
     pub annotations: Vec<Annotation>,

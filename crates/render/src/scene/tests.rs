@@ -360,7 +360,7 @@ fn heights_are_shown_unless_the_camera_looks_straight_down() {
 }
 
 #[test]
-fn houses_are_solid() {
+fn boxes_are_solid() {
     let scenario = Scenario::read(&Source::Builtin("obstacles".to_owned()), &[]).expect("built in");
     let mut timeline = Timeline::of(&scenario);
     let swarm = Swarm::at_rest(scenario.start.positions_m.clone());

@@ -518,10 +518,11 @@ impl Report {
         table(self.rows().into_iter().chain(times))
     }
 
-    /// Returns the lines of [`Report::text`] on distances and on the audit.
+    /// Returns the lines of [`Report::text`] on distances, the audit and the verification.
     #[must_use]
     pub fn brief(&self) -> String {
-        table(self.rows().into_iter().filter(|(name, _)| matches!(&**name, "separation" | "obstacles" | "audit")))
+        let is_brief = |name: &str| matches!(name, "separation" | "obstacles" | "audit" | "verified");
+        table(self.rows().into_iter().filter(|(name, _)| is_brief(name)))
     }
 
     /// Returns the name of each part of the flight and the finding on it, without wall-clock times.
@@ -594,8 +595,8 @@ impl Report {
         };
         let swept = self.answer.detectors.map_or(String::new(), |swept| {
             let contacts = swept.rapier_contact_pairs.map(|pairs| match pairs {
-                0 => ", the engine saw no contact".to_owned(),
-                _ => format!(", the engine saw {}", counted(pairs, "pair in contact", "pairs in contact")),
+                0 => ", no keep-out balls overlap in the engine".to_owned(),
+                _ => format!(", keep-out balls of {} overlap in the engine", counted(pairs, "pair", "pairs")),
             });
             format!(
                 " in {}, {} swept; {detectors}{}",

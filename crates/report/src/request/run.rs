@@ -57,7 +57,7 @@ pub struct RunRequest<'a> {
     /// Number of threads; a flight uses at most two. By default the number of cores. The recording has the same
     /// bits for any number.
     pub threads: Option<usize>,
-    /// Whether all findings are told, not only the verdict, the smallest distances and the audit.
+    /// Whether all findings are printed. Otherwise the verdict, the smallest distances and the audit are printed.
     pub verbose: bool,
     /// Whether the report contains wall-clock times. Without them equal flights give equal bytes.
     pub is_timed: bool,

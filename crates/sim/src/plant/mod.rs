@@ -94,7 +94,7 @@ pub trait Plant: DynClone + Send {
         Duration::ZERO
     }
 
-    /// Sets whether [`Plant::airframe_time`] is measured, at first not.
+    /// Sets whether [`Plant::airframe_time`] is measured. It is off by default.
     fn measure_time(&mut self, _is_on: bool) {}
 
     /// Returns the recorded channels of the plant, such as attitude, with names and columns but no values.
@@ -160,7 +160,7 @@ pub struct HullContact {
 /// Treatment of free steps: steps that need no engine, because no contact is possible.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FreeSteps {
-    /// The engine makes none of them. Pairs may be within delta; their contacts follow from their distances.
+    /// The engine makes no free step. Pairs may be within delta; their distances give their contacts.
     Trusted,
     /// The engine repeats each [`COMPARED_EACH`]th of them from the same state. A result that differs in a bit, or a
     /// contact, is [`PlantError::EngineDiffers`].

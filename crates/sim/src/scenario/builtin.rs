@@ -77,8 +77,8 @@ pub fn find(name: &str) -> Option<&'static Builtin> {
 }
 
 /// Returns the text of a new scenario file, with comments; `None` if the name is not 1 to 64 letters, digits, `-` and
-/// `_`. It repeats a built-in scenario under the new name, or has six vehicles that fly to a ring, and then lines such
-/// as `#key = value` are optional keys.
+/// `_`. With `from`, the text repeats this built-in scenario under the new name. Otherwise six vehicles fly to a ring,
+/// and lines such as `#key = value` are optional keys.
 #[must_use]
 pub fn new_scenario(name: &str, from: Option<&Builtin>) -> Option<String> {
     let is_name = (1..=MAX_NAME_CHARS).contains(&name.len()) && name.chars().all(is_name_character);

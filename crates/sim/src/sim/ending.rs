@@ -99,8 +99,8 @@ pub enum Ending {
 
 /// Wall-clock time by kind of work. Concurrent work counts in each kind.
 ///
-/// A flight of at most 64 vehicles measures each 16th step, beginning with the second. The times of law, energy,
-/// physics and audit are then those of the measured steps, scaled to all steps.
+/// A flight of at most 64 vehicles measures each 16th step, from the second on. All times except `wall` and `record`
+/// are then scaled from the measured steps to all steps.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Performance {
     /// From the first to the last step.

@@ -274,7 +274,7 @@ impl SearchSpace {
         Ok((bound, scenario))
     }
 
-    /// Returns the bounds that `--start` and `--velocity` give each coordinate, positions before velocities.
+    /// Returns the bounds of `--move-start` and `--velocity` for each coordinate, positions before velocities.
     fn start_bounds(&self) -> Vec<Bound> {
         let bounds_of = |list: &str, rows: &Rows, by: Option<f64>| {
             let Some(by) = by else { return Vec::new() };

@@ -46,7 +46,7 @@ impl Dialect {
     /// All dialects.
     pub const ALL: [Self; 5] = [Self::Crazyflie, Self::Skyb, Self::Skyc, Self::Px4Show, Self::Vviz];
 
-    /// Returns the name for `--to`.
+    /// Returns the name for `--format`.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -345,7 +345,7 @@ impl Work<'_> {
     }
 }
 
-/// Refuses a motion whose size exceeds a memory: its name, its size \[bytes\], and whether a compressed form exists.
+/// Refuses a motion larger than the memory `what` of `most` bytes. `compresses`: a compressed form exists.
 fn check_size(
     name: &str,
     [pieces, bytes]: [usize; 2],

@@ -30,7 +30,7 @@ const POLICY: &str =
 
 /// Sentence below the heading of a replay.
 const ABOUT_REPLAY: &str =
-    "The flight, drawn in this page: Play starts it, dragging turns it, and the button ? lists all keys.";
+    "Replay of the flight. Play starts the replay, dragging turns the view, and the button ? lists all keys.";
 
 /// A page.
 #[derive(Clone, Debug)]
