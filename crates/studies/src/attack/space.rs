@@ -340,8 +340,8 @@ mod tests {
         let expected = Bound::new("start.positions_m.2.x", -1.5, 0.25);
         assert_eq!(read.expect("a bound"), expected.expect("a bound"));
         for (text, why) in [
-            ("law.alpha", "is not KEY=LOW..HIGH"),
-            ("law.alpha=1", "is not KEY=LOW..HIGH"),
+            ("law.alpha", "is not KEY=FROM..TO"),
+            ("law.alpha=1", "is not KEY=FROM..TO"),
             ("law.alpha=1..", "`` is not a number"),
             ("law.alpha=a..2", "`a` is not a number"),
             ("law.alpha=2..2", "must be in increasing order"),

@@ -145,7 +145,7 @@ impl DroneExportOptions {
     /// [`Failure`] `export/unused-option` that names the first option.
     pub fn refuse(&self) -> Result<(), Failure> {
         let Some(option) = self.given() else { return Ok(()) };
-        let formats = Dialect::ALL.map(|dialect| dialect.name()).join(", ");
+        let formats = Dialect::ALL.map(Dialect::name).join(", ");
         let message = format!("{option}: has no effect without a format for drones");
         let help = format!("leave it out, or give {EXPORT_FORMAT} one of {formats}");
         Err(Failure::input("export/unused-option", message, help))
