@@ -61,7 +61,7 @@ pub(super) fn with_hints(mut usage: clap::Error, program: &Command, words: &[Str
 /// Returns the word after `--json` if it names a JSON file; the option takes a file only after an equals sign.
 fn behind_json(words: &[String]) -> Option<&str> {
     let place = words.iter().position(|word| word == "--json")?;
-    words.get(place + 1).map(String::as_str).filter(|word| word.ends_with(".json"))
+    words.get(place + 1).map(String::as_str).filter(|word| Path::new(word).extension() == Some("json".as_ref()))
 }
 
 fn names(program: &Command, word: &str) -> bool {

@@ -12,7 +12,6 @@ use tautline_validate::{ValidateRequest, validate_into};
 
 /// Arguments of `tautline validate`.
 #[derive(Debug, Args)]
-#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(super) struct ValidateArguments {
     /// Folder for `validate.json`, the page and figures.
     #[arg(long, short, value_name = "DIR", default_value = "out/validate")]

@@ -158,7 +158,10 @@ fn wrong_ranges_and_refused_values_are_refused() {
     assert!(refused("law.alpha", range(1.0, 1.0, 2, 1)).contains("both ends"));
     assert!(refused("law.alpha", range(f64::NAN, 1.0, 2, 1)).contains("NaN"));
     let logarithmic = Range { logarithmic: true, ..range(0.0, 1.0, 2, 1) };
-    assert!(refused("law.alpha", logarithmic).contains("key=law.alpha=0.0..1.0: the range is not positive, as log requires"));
+    assert!(
+        refused("law.alpha", logarithmic)
+            .contains("key=law.alpha=0.0..1.0: the range is not positive, as log requires")
+    );
     assert!(refused("law.alpha", range(-1.0, 1.0, 2, 1)).contains("with law.alpha = -1"));
     assert!(refused("law.alfa", range(0.5, 1.0, 2, 1)).contains("alfa"));
 }
