@@ -39,6 +39,7 @@ pub(super) fn audits(arguments: &AuditArguments, command: &str) -> Result<Exit, 
         let request = arguments.request(paths, command);
         // No output may replace an input of any recording, even if the settings of a recording are wrong.
         request.check_outputs(&arguments.outputs())?;
+        arguments.json.check("", true)?;
         asked.push((request.subject.name(), request.configured()));
     }
     let mut complete = asked.iter().filter_map(|(_, asked)| asked.as_ref().ok());

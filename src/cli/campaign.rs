@@ -236,7 +236,7 @@ impl AnswerOptions {
     /// Answers a request, and writes the answer as JSON if asked.
     fn run(&self, request: impl FnOnce(&Terminal) -> Result<Option<Summary>, Failure>) -> Result<Exit, Failure> {
         let console = Console { data_on_stdout: self.json.is_piped(), quiet: self.quiet };
-        self.json.check("", true)?;
+        self.json.check_new()?;
         let Some(summary) = request(&Terminal::new(console)?)? else { return Ok(Exit::Bad) };
         self.json.write(&summary, console)?;
         Ok(Exit::good_if(summary.is_good()))

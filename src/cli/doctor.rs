@@ -40,7 +40,7 @@ impl Finding {
 }
 
 pub(super) fn doctor(arguments: &DoctorArguments) -> Result<Exit, Failure> {
-    arguments.json.check("", true)?;
+    arguments.json.check_new()?;
     let findings = findings();
     let console = Console { data_on_stdout: arguments.json.is_piped(), quiet: arguments.json.is_piped() };
     for finding in &findings {

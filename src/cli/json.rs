@@ -41,6 +41,29 @@ impl JsonArgument {
         outputs::check_new(scenario, self.file().into_iter(), force)
     }
 
+    /// Rejects a file that exists, for a command that overwrites none.
+    pub(super) fn check_new(&self) -> Result<(), Failure> {
+        let there = self.file().map(|(_, file)| file).filter(|file| file.is_file());
+        if let Some(file) = there {
+            let message = format!("--json: {} exists", file.display());
+            return Err(Failure::input("files/exists", message, "remove it, or write another file"));
+        }
+        self.check("", false)
+    }
+
+    /// Rejects a file in a folder of the command, which may hold its own files.
+    pub(super) fn check_outside(&self, folder: &Path) -> Result<(), Failure> {
+        let Some((_, file)) = self.file() else { return Ok(()) };
+        let parent = file.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let places = [parent, folder].map(std::fs::canonicalize);
+        let is_inside = matches!(&places, [Ok(parent), Ok(folder)] if parent.starts_with(folder));
+        if is_inside || file.starts_with(folder) {
+            let message = format!("--json: {} is in the folder {}", file.display(), folder.display());
+            return Err(Failure::input("files/overwrites-input", message, "write into another folder"));
+        }
+        Ok(())
+    }
+
     /// Writes an answer if the option is given.
     pub(super) fn write(&self, answer: &impl Serialize, console: Console) -> Result<(), Failure> {
         self.write_text(|| console::to_json(answer), console)

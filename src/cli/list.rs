@@ -35,7 +35,7 @@ struct Listed {
 
 pub(super) fn list(arguments: &ListArguments) -> Result<Exit, Failure> {
     if arguments.json.place().is_some() {
-        arguments.json.check("", true)?;
+        arguments.json.check_new()?;
         arguments.json.write(&listed()?, Console { data_on_stdout: arguments.json.is_piped(), quiet: false })?;
         return Ok(Exit::Good);
     }

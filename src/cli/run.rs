@@ -130,6 +130,8 @@ fn fly(arguments: &RunArguments, force: bool, opens: bool, terminal: &Terminal) 
     // `--plant` is short for the last override; the command that repeats the flight keeps it as written.
     let flown = ScenarioRequest { overrides: what.overrides.iter().cloned().chain(plant).collect(), ..what.clone() };
     let scenario = flown.read()?;
+    let folder = arguments.out.clone().unwrap_or_else(|| Path::new("out").join(&scenario.name));
+    arguments.json.check_outside(&folder)?;
     let plant = arguments.plant.iter().flat_map(|kind| ["--plant", kind]);
     let sets = what.overrides.iter().flat_map(|text| ["--set", text.as_str()]);
     let repeat = |words: &[&str]| match (&*what.argument, &arguments.out) {
@@ -236,7 +238,7 @@ pub(super) struct CheckArguments {
 
 pub(super) fn check(arguments: &CheckArguments) -> Result<Exit, Failure> {
     let console = Console { data_on_stdout: arguments.json.is_piped(), quiet: arguments.quiet };
-    arguments.json.check(&arguments.what.scenario, true)?;
+    arguments.json.check_new()?;
     if arguments.identify {
         let found = identify(&arguments.what.request()?, arguments.out.as_deref())?;
         console.say(&format!("{}\n{}", found.measured, found.table.trim_end()));

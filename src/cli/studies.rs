@@ -53,8 +53,8 @@ pub(super) struct StudyArguments {
 }
 
 impl StudyArguments {
-    /// Flies a study and writes its files.
-    fn answer<E: Experiment>(&self, options: E) -> Result<Exit, Failure> {
+    /// Flies a study and writes its files. `folder` is that of a repeated flight.
+    fn answer<E: Experiment>(&self, options: E, folder: Option<&Path>) -> Result<Exit, Failure> {
         let files = StudyFiles {
             json: self.json.place().map(Path::to_owned),
             csv: self.csv.clone(),
@@ -62,6 +62,9 @@ impl StudyArguments {
             html: self.html.clone(),
             force: self.force,
         };
+        if let Some(folder) = folder {
+            self.json.check_outside(folder)?;
+        }
         let monitor = Terminal::new(Console { data_on_stdout: files.are_piped(), quiet: self.quiet })?;
         let threads = self.threads.map(usize::from);
         let request = StudyRequest { scenario: self.what.request()?, options, files, threads };
@@ -114,13 +117,16 @@ impl CompareArguments {
     pub(super) fn run(&self) -> Result<Exit, Failure> {
         let default = compare::Options::default();
         let runs = self.runs.runs.unwrap_or(default.runs);
-        self.study.answer(compare::Options {
-            laws: self.laws.clone(),
-            shield: self.shield,
-            runs,
-            seed: self.runs.seed,
-            ..compare::Options::default()
-        })
+        self.study.answer(
+            compare::Options {
+                laws: self.laws.clone(),
+                shield: self.shield,
+                runs,
+                seed: self.runs.seed,
+                ..compare::Options::default()
+            },
+            None,
+        )
     }
 }
 
@@ -165,13 +171,16 @@ impl MarginArguments {
     pub(super) fn run(&self) -> Result<Exit, Failure> {
         let (scan, halvings, logarithmic) = (self.scan.into(), self.halvings, self.log);
         let (key, [from, to]) = self.key.clone();
-        self.study.answer(margin::Options {
-            key,
-            range: Range { from, to, scan, halvings, logarithmic },
-            question: self.verdict,
-            runs: self.runs.runs.unwrap_or(1),
-            seed: self.runs.seed,
-        })
+        self.study.answer(
+            margin::Options {
+                key,
+                range: Range { from, to, scan, halvings, logarithmic },
+                question: self.verdict,
+                runs: self.runs.runs.unwrap_or(1),
+                seed: self.runs.seed,
+            },
+            None,
+        )
     }
 }
 
@@ -202,19 +211,22 @@ pub(super) struct SweepArguments {
 
 impl SweepArguments {
     pub(super) fn run(&self) -> Result<Exit, Failure> {
-        self.study.answer(sweep::Options {
-            keys: self.keys.iter().map(|text| SweptKey::parse(text)).collect::<Result<_, _>>()?,
-            question: self.verdict,
-            runs: self.runs.runs.unwrap_or(1),
-            seed: self.runs.seed,
-        })
+        self.study.answer(
+            sweep::Options {
+                keys: self.keys.iter().map(|text| SweptKey::parse(text)).collect::<Result<_, _>>()?,
+                question: self.verdict,
+                runs: self.runs.runs.unwrap_or(1),
+                seed: self.runs.seed,
+            },
+            None,
+        )
     }
 }
 
 /// Arguments of `tautline attack`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exit codes: 0 no violation found; 1 violation found, or interrupted. This is a search, not a proof: worse flights may \
+Exit codes: 0 no violation found; 1 violation found, nothing flown, or interrupted. This is a search, not a proof: worse flights may \
 exist within the bounds. See docs/studies.md.")]
 pub(super) struct AttackArguments {
     #[command(flatten)]
@@ -258,15 +270,18 @@ impl AttackArguments {
     }
 
     pub(super) fn run(&self) -> Result<Exit, Failure> {
-        self.study.answer(attack::Options {
-            vary: self.vary.iter().map(|text| Bound::parse(text)).collect::<Result<_, _>>()?,
-            start_m: self.move_start,
-            velocity_m_s: self.velocity,
-            apart_m: self.apart,
-            flights: self.flights,
-            seeds: self.seeds,
-            seed: self.seed,
-            out: self.out.clone(),
-        })
+        self.study.answer(
+            attack::Options {
+                vary: self.vary.iter().map(|text| Bound::parse(text)).collect::<Result<_, _>>()?,
+                start_m: self.move_start,
+                velocity_m_s: self.velocity,
+                apart_m: self.apart,
+                flights: self.flights,
+                seeds: self.seeds,
+                seed: self.seed,
+                out: self.out.clone(),
+            },
+            self.out.as_deref(),
+        )
     }
 }

@@ -15,7 +15,7 @@ use super::reading::origin;
 use tautline_core::track::EarthOrigin;
 use tautline_recordings::read::{self, EarthFrame, ReadError};
 use tautline_report::report::page::live_page;
-use tautline_report::request::{Failure, Monitor as _, one_of};
+use tautline_report::request::{Failure, Monitor as _, one_of, outputs};
 use tautline_watch::foxglove_server::FoxgloveServer;
 use tautline_watch::page::Page;
 use tautline_watch::source::{self, Feed, MavlinkFrame, NamingOptions, OwnedPose};
@@ -155,10 +155,11 @@ pub(super) fn watch(arguments: &WatchArguments) -> Result<Exit, Failure> {
         Failure::input("watch/setting", error.to_string(), "give a number in this range; tautline watch --help")
     })?;
     let console = Console { data_on_stdout: arguments.json.is_piped(), quiet: arguments.quiet };
+    arguments.check_outputs()?;
     let mut outputs = Outputs {
         console,
-        lines: Lines::open(&arguments.json, arguments.force)?,
         recorder: arguments.recorder()?,
+        lines: Lines::open(&arguments.json)?,
         page: None,
         foxglove: None,
     };
@@ -318,6 +319,16 @@ impl WatchArguments {
         Ok(plan)
     }
 
+    /// Rejects outputs that would overwrite the plan or each other or, without --force, any file.
+    fn check_outputs(&self) -> Result<(), Failure> {
+        self.json.check("", self.force)?;
+        let partial = self.record.as_deref().map(Record::partial_of);
+        let plan = self.plan.as_deref().map(|plan| ("the plan".to_owned(), plan));
+        let records = [self.record.as_deref(), partial.as_deref()].into_iter().flatten();
+        let outputs: Vec<_> = records.map(|path| ("--record".to_owned(), path)).chain(self.json.file()).collect();
+        outputs::check(&plan.into_iter().collect::<Vec<_>>(), &outputs)
+    }
+
     fn recorder(&self) -> Result<Option<Record>, Failure> {
         let Some(path) = &self.record else { return Ok(None) };
         if !Record::is_written(path) {
@@ -387,8 +398,7 @@ enum Lines {
 }
 
 impl Lines {
-    fn open(json: &JsonArgument, force: bool) -> Result<Self, Failure> {
-        json.check("", force)?;
+    fn open(json: &JsonArgument) -> Result<Self, Failure> {
         Ok(match json.file() {
             Some((_, path)) => Self::File(File::create(path).map_err(|error| cannot_write(path, &error))?),
             None if json.is_piped() => Self::Piped,

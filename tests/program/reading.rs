@@ -150,3 +150,39 @@ fn the_common_window_of_clocks_is_in_the_verdict() {
     let (code, text) = said(&audit(&files, &["f", "--delta", "1"]));
     assert!(code == Some(2) && text.contains("--origin 47.0,8.0,400.0"), "{text}");
 }
+
+#[test]
+fn positions_of_several_frames_are_refused() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let table = |frames: [&str; 2]| {
+        let rows = (0..3).flat_map(|t| frames.map(|frame| (t, frame)).into_iter().zip([("a", 0), ("b", 3)]));
+        let rows = rows.map(|((t, frame), (id, x))| format!("{t},{frame},{id},{x},0,5\n"));
+        "t,header.frame_id,id,pose.position.x,pose.position.y,pose.position.z\n".to_owned() + &rows.collect::<String>()
+    };
+    let audit = |frames| {
+        std::fs::write(folder.path().join("poses.csv"), table(frames)).expect("a table");
+        ran_by(TAUTLINE, folder.path(), &["audit", "poses.csv", "--delta", "0.5", "--time-unit", "s"])
+    };
+    let two = audit(["a/odom", "b/odom"]);
+    assert_eq!((two.exit, two.code()), (Some(2), "recording/several-frames"), "{}", two.err);
+    // Negative twins: one frame, and numbers of pictures.
+    for frames in [["map", "/map"], ["1", "2"]] {
+        let one = audit(frames);
+        assert_eq!(one.exit, Some(0), "{frames:?}: {}{}", one.out, one.err);
+    }
+}
+
+#[test]
+fn integers_that_a_double_does_not_hold_name_no_vehicle() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let audit = |ids: [&str; 2]| {
+        let rows = (0..4).flat_map(|t| [(t, ids[0], "0"), (t, ids[1], "0.05")]);
+        let rows = rows.map(|(t, id, x)| format!("{{\"t\":{t},\"id\":{id},\"x\":{x},\"y\":0,\"z\":5}}\n"));
+        std::fs::write(folder.path().join("ids.jsonl"), rows.collect::<String>()).expect("a table");
+        ran_by(TAUTLINE, folder.path(), &["audit", "ids.jsonl", "--delta", "0.5", "--time-unit", "s"])
+    };
+    let merged = audit(["18446744073709551616", "18446744073709551617"]);
+    assert_eq!((merged.exit, merged.code()), (Some(2), "recording/element-type"), "{}", merged.err);
+    let told_apart = audit(["18446744073709551614", "18446744073709551615"]);
+    assert_eq!(told_apart.exit, Some(1), "they are 0.05 m apart: {}{}", told_apart.out, told_apart.err);
+}

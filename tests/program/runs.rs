@@ -179,6 +179,26 @@ fn free_steps_leave_out_most_steps_of_the_engine_and_change_no_bit() {
 }
 
 #[test]
+fn a_file_of_json_replaces_no_file_of_the_run_and_none_without_force() {
+    let folder = folder();
+    let ran = |arguments: &[&str]| ran_by(TAUTLINE, folder.path(), arguments);
+    let short = ["run", "pentagon", "--set", "time.duration_s=1", "--no-snapshots", "--no-figures", "--out", "o"];
+    let inside = ran(&[&short[..], &["--json=o/run.mcap"]].concat());
+    assert_eq!((inside.exit, inside.code()), (WRONG_INPUT, "files/overwrites-input"), "{inside:?}");
+    fs::write(folder.path().join("there.json"), "mine").expect("a file");
+    for words in [&["list", "--json=there.json"][..], &["doctor", "--json=there.json"], &["check", "--json=there.json"]]
+    {
+        let refused = ran(words);
+        assert_eq!((refused.exit, refused.code()), (WRONG_INPUT, "files/exists"), "{words:?}: {refused:?}");
+    }
+    assert_eq!(fs::read_to_string(folder.path().join("there.json")).expect("the file"), "mine");
+    let beside = ran(&[&short[..], &["--json=new.json"]].concat());
+    assert!(beside.out.contains("wrote new.json"), "{beside:?}");
+    let written = fs::read_to_string(folder.path().join("new.json")).expect("the file");
+    assert_eq!(json(&written)["status"], json(&ran(&[&short[..], &["--json", "--force"]].concat()).out)["status"]);
+}
+
+#[test]
 fn with_json_text_goes_to_standard_error_unless_quiet() {
     let folder = folder();
     let talking = run(folder.path(), &[&SHORT[..], &["--json"]].concat());

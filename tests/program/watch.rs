@@ -270,6 +270,40 @@ fn a_recording_overwrites_no_other_file_and_is_not_empty() {
     assert!(folder.path().join("r.mcap").exists());
 }
 
+#[test]
+fn a_recording_of_interleaved_stamps_is_judged_as_a_table_is() {
+    let folder = tempdir().expect("a folder");
+    let mut input = String::new();
+    for k in 0..20 {
+        // The second vehicle is heard before the first, whose stamp is older.
+        let (now, late) = (f64::from(k), f64::from(k) - 0.5);
+        let _ = writeln!(input, r#"{{"t":{now},"id":"a","x":0,"y":0,"z":2}}"#);
+        let _ = writeln!(input, r#"{{"t":{late},"id":"b","x":0.3,"y":0,"z":2}}"#);
+    }
+    for file in ["o.csv", "o.mcap"] {
+        watched(folder.path(), &[&STAMPS[..], &["--record", file]].concat(), &input);
+        let audit = ran_by(TAUTLINE, folder.path(), &["audit", file, "--delta", "0.5"]);
+        assert_eq!(audit.exit, Some(1), "{file}: {audit:?}");
+        assert!(audit.out.starts_with("VIOLATION"), "{file}: {audit:?}");
+    }
+}
+
+#[test]
+fn outputs_of_a_watch_overwrite_neither_its_plan_nor_each_other() {
+    let folder = tempdir().expect("a folder");
+    fs::write(folder.path().join("plan.csv"), "time_s,id,x,y,z\n0,a,0,0,2\n0,b,5,0,2\n9,a,0,0,2\n9,b,5,0,2\n").expect("a plan");
+    for outputs in [
+        &["--plan", "plan.csv", "--json=plan.csv"][..],
+        &["--plan", "plan.csv", "--record", "plan.csv"],
+        &["--record", "r.mcap", "--json=r.mcap"],
+        &["--record", "r.mcap", "--json=r.mcap.partial"],
+    ] {
+        let refused = watched(folder.path(), &[&STAMPS[..], outputs, &["--force"]].concat(), "");
+        assert_eq!((refused.exit, refused.code()), (Some(2), "files/overwrites-input"), "{outputs:?}: {refused:?}");
+        assert_eq!(fs::read_dir(folder.path()).expect("a folder").count(), 1, "{outputs:?}: nothing is written");
+    }
+}
+
 #[cfg(unix)]
 #[test]
 fn a_recording_of_a_killed_watch_is_read_up_to_the_last_second() {

@@ -52,6 +52,9 @@ pub const THREADS: RangeInclusive<usize> = 1..=256;
 pub fn key_range(text: &str) -> Result<(String, [f64; 2]), String> {
     let parts = text.split_once('=').and_then(|(key, range)| Some((key.trim(), range.split_once("..")?)));
     let Some((key, (from, to))) = parts else { return Err("is not KEY=FROM..TO".to_owned()) };
+    if to.starts_with('.') {
+        return Err("has more than two points".to_owned());
+    }
     let number = |end: &str| end.trim().parse().map_err(|_| format!("`{}` is not a number", end.trim()));
     Ok((key.to_owned(), [number(from)?, number(to)?]))
 }

@@ -136,7 +136,7 @@ impl SweptKey {
         let Some((from, rest)) = values.split_once("..") else {
             return Self::new(key, values.split(',').map(number).collect::<Result<_, _>>()?);
         };
-        let Some((to, count)) = rest.split_once(':') else {
+        let Some((to, count)) = rest.split_once(':').filter(|_| !rest.starts_with('.')) else {
             return Err(wrong(&format!("{}: is neither KEY=FROM..TO:COUNT nor a list", SWEEP_KEY.set(text))));
         };
         let most = MOST_POINTS;

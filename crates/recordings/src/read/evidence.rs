@@ -36,6 +36,8 @@ pub(super) struct Evidence {
     climb: Option<ClimbMonitor>,
     /// Comparison with a second position on the Earth, and the axes of the first one in metres.
     agreement: Option<(FrameAgreement, Axes)>,
+    /// First name of a frame.
+    frame: Option<Box<str>>,
     /// Number of rows omitted because they lack a coordinate.
     pub(super) incomplete: u64,
     /// Number of rows without a fix, by vehicle.
@@ -53,6 +55,7 @@ impl Evidence {
             named: 0,
             climb: layout.rate.map(ClimbMonitor::new),
             agreement,
+            frame: None,
             incomplete: 0,
             no_fixes: BTreeMap::new(),
         }
@@ -111,6 +114,9 @@ impl Evidence {
             let texts = watch.columns.iter().map(|&column| Ok(cells.text(column)?.trim().to_owned()));
             watch.observe(texts.collect::<Result<_, Fault>>()?, cells.header())?;
         }
+        for &column in &layout.frames {
+            self.compare_frame(&cells.text(column)?, &cells.header()[column])?;
+        }
         let is_examined = |row: &&Row| row.place == cells.row() && row.vehicle < MOST_SUSPECTED;
         let Some(row) = last.filter(|_| !layout.suspects.is_empty()).filter(is_examined) else { return Ok(()) };
         while self.suspects.len() <= row.vehicle {
@@ -121,6 +127,25 @@ impl Evidence {
             suspect.observe(cells.text(suspect.column)?.trim(), row.stamp.approximately(), row.position);
         }
         suspects.retain(|suspect| !suspect.cleared);
+        Ok(())
+    }
+
+    /// Refuses a second frame: coordinates of two frames have no distance. Numbers are those of pictures.
+    fn compare_frame(&mut self, cell: &str, column: &str) -> Result<(), Fault> {
+        let frame = cell.trim().trim_start_matches('/');
+        if frame.is_empty() || frame.parse::<f64>().is_ok() {
+            return Ok(());
+        }
+        match &self.frame {
+            None => self.frame = Some(frame.into()),
+            Some(first) if **first == *frame => {}
+            Some(first) => {
+                let [column, first, second] = [column, first, frame].map(quoted);
+                let problem = format!("column {column} has the frames {first} and {second}");
+                let remedy = "transform all positions into one frame; remove the column if they are in one";
+                return refuse(ContentKind::SeveralFrames, problem, remedy);
+            }
+        }
         Ok(())
     }
 

@@ -28,6 +28,12 @@ const PLACES: [&str; 7] = ["home", "origin", "base", "datum", "ref", "reference"
 /// Names before the coordinates in messages of ROS.
 const POSES: [&str; 4] = ["pose", "pose.pose", "/pose", "/pose/pose"];
 
+/// Returns whether a column has this name in messages of ROS: the frame of the coordinates, not that of the vehicle.
+fn names_a_frame(column: &str) -> bool {
+    let name = column.trim().to_lowercase();
+    name.rsplit(['.', '/']).next() == Some("frame_id")
+}
+
 /// Roles of the columns of a table.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[expect(clippy::struct_excessive_bools, reason = "independent properties of the columns")]
@@ -66,6 +72,8 @@ pub(super) struct Layout {
     pub(super) compared: Vec<Option<Compared>>,
     /// Whether a vehicle has no height column: then no height is used.
     pub(super) is_planar: bool,
+    /// Unused columns with the name of the frame of a row.
+    pub(super) frames: Vec<usize>,
     /// Facts that follow from the header and the options.
     pub(super) facts: Vec<Fact>,
     /// Notes for the user about the columns.
@@ -153,6 +161,8 @@ impl Layout {
         };
         layout.refuse_other_frames(header, &columns.heights, &convention)?;
         let used = layout.columns();
+        let is_unused = |column: &usize| used.binary_search(column).is_err() && Some(*column) != layout.id;
+        layout.frames = (0..header.len()).filter(|&column| names_a_frame(&header[column])).filter(is_unused).collect();
         if !one && id.is_none() {
             let unused: Vec<_> = (0..header.len()).filter(|column| used.binary_search(column).is_err()).collect();
             layout.slots = identity::examine(header, &unused, &layout.names)?;
@@ -335,6 +345,7 @@ impl Layout {
             .into_iter()
             .chain(self.alternative_ids.iter().copied())
             .chain(self.suspects.iter().copied())
+            .chain(self.frames.iter().copied())
             .chain(self.slots.watched.iter().flatten().copied())
             .chain(self.rate.map(|(column, _)| column))
             .chain(self.compared.iter().flatten().flat_map(|compared| compared.earth).flatten())

@@ -509,6 +509,9 @@ impl<'de> Visitor<'de> for Flat<'_> {
     }
 }
 
+/// Bound below which a double holds every integer exactly.
+const EXACT: f64 = 9_007_199_254_740_992.0;
+
 impl Cells for Objects {
     fn header(&self) -> &[String] {
         &self.header
@@ -541,6 +544,18 @@ impl Cells for Objects {
 
     fn text(&self, column: usize) -> Result<Cow<'_, str>, Fault> {
         self.cells[column].text()
+    }
+
+    /// Refuses integers beyond 64 bits: several of them are one double.
+    fn name(&self, column: usize) -> Result<Cow<'_, str>, Fault> {
+        match self.cells[column] {
+            Cell::Real(real) if real.abs() >= EXACT => {
+                let problem =
+                    format!("key `{}` holds {real:e}, a number too large to name a vehicle", self.header[column]);
+                refuse(ContentKind::ElementType, problem, "write names of vehicles as text")
+            }
+            _ => self.text(column),
+        }
     }
 
     fn number(&self, column: usize) -> Option<f64> {

@@ -57,7 +57,7 @@ pub(super) fn seconds_of(name: &str) -> Option<f64> {
     match name {
         "min" | "mins" | "minute" | "minutes" => Some(60.0),
         "h" | "hr" | "hrs" | "hour" | "hours" => Some(3600.0),
-        "d" | "day" | "days" => Some(86_400.0),
+        "day" | "days" => Some(86_400.0),
         _ => TimeUnit::from_name(name).map(|unit| 1.0 / unit.per_second() as f64),
     }
 }

@@ -53,7 +53,7 @@ pub(crate) struct Instant {
 pub(super) fn open_export(source: &Source, options: &ReadOptions) -> Result<Recording, ReadError> {
     let topics = TopicReader::open(&source.path)?;
     let notes = options.accept_unfinished(topics.is_complete())?;
-    let instants = Instants { names: Names::default(), axes: None, epoch_ns: 0, count: 0 };
+    let instants = Instants { names: Names::default(), axes: None, epoch_ns: 0, is_single: None, count: 0 };
     let mut exported = Exported { path: source.path.clone(), topics, instants };
     exported.next_batch(&mut Vec::new())?;
     let is_planar = exported.instants.axes == Some(2);
@@ -77,6 +77,8 @@ struct Instants {
     /// Number of axes of all positions.
     axes: Option<usize>,
     epoch_ns: i64,
+    /// Whether the first message has one vehicle, as those of a recorder that writes each position when it is heard.
+    is_single: Option<bool>,
     count: u64,
 }
 
@@ -86,6 +88,7 @@ impl Instants {
         if message.of.schema == TRACKS.schema_name {
             self.count += 1;
             let instant: Instant = decode(message.bytes)?;
+            self.is_single.get_or_insert(instant.vehicles.len() == 1);
             let axes = if instant.positions_m.len() == 2 * instant.vehicles.len() { 2 } else { 3 };
             if !instant.vehicles.is_empty() && *self.axes.get_or_insert(axes) != axes {
                 return Err("only some of its positions have heights".to_owned());
@@ -149,6 +152,10 @@ impl Rows for Exported {
 
     fn vehicles(&self) -> &[String] {
         self.instants.names.all()
+    }
+
+    fn is_wide(&self) -> bool {
+        self.instants.is_single != Some(true)
     }
 
     fn place(&self, number: u64) -> Place {
