@@ -291,7 +291,8 @@ fn a_recording_of_interleaved_stamps_is_judged_as_a_table_is() {
 #[test]
 fn outputs_of_a_watch_overwrite_neither_its_plan_nor_each_other() {
     let folder = tempdir().expect("a folder");
-    fs::write(folder.path().join("plan.csv"), "time_s,id,x,y,z\n0,a,0,0,2\n0,b,5,0,2\n9,a,0,0,2\n9,b,5,0,2\n").expect("a plan");
+    fs::write(folder.path().join("plan.csv"), "time_s,id,x,y,z\n0,a,0,0,2\n0,b,5,0,2\n9,a,0,0,2\n9,b,5,0,2\n")
+        .expect("a plan");
     for outputs in [
         &["--plan", "plan.csv", "--json=plan.csv"][..],
         &["--plan", "plan.csv", "--record", "plan.csv"],

@@ -165,7 +165,7 @@ impl Experiment for Options {
         in_range(SCAN, &self.range.scan, &SCANS)?;
         in_range(option::HALVINGS, &self.range.halvings, &HALVINGS)?;
         let Range { from, to, logarithmic, .. } = self.range;
-        let given = MARGIN_KEY.set(self.key_range());
+        let given = format!("{} from {from:?} to {to:?}", self.key);
         let why = if !from.is_finite() || !to.is_finite() {
             format!("{given}: the range is not finite")
         } else if from == to {

@@ -148,7 +148,7 @@ macro_rules! content_kinds {
             #[must_use]
             pub fn code(self) -> &'static str {
                 match self {
-                    $(Self::$kind => concat!("recording/", $code),)+
+                    $(Self::$kind => $code,)+
                 }
             }
         }
@@ -157,133 +157,133 @@ macro_rules! content_kinds {
 
 content_kinds! {
     /// Several columns may hold a quantity.
-    AmbiguousColumn = "ambiguous-column",
+    AmbiguousColumn = "recording/ambiguous-column",
     /// The layout of the numbers is ambiguous.
-    AmbiguousLayout = "ambiguous-layout",
+    AmbiguousLayout = "recording/ambiguous-layout",
     /// Several topics may hold the positions.
-    AmbiguousTopics = "ambiguous-topics",
+    AmbiguousTopics = "recording/ambiguous-topics",
     /// Several columns may name the vehicle.
-    AmbiguousVehicle = "ambiguous-vehicle",
+    AmbiguousVehicle = "recording/ambiguous-vehicle",
     /// An entry of the archive is missing or duplicate.
-    ArchiveEntry = "archive-entry",
+    ArchiveEntry = "recording/archive-entry",
     /// An array has the wrong shape.
-    ArrayShape = "array-shape",
+    ArrayShape = "recording/array-shape",
     /// The index of a ROS 2 bag contradicts its files.
-    BagIndex = "bag-index",
+    BagIndex = "recording/bag-index",
     /// An option contradicts the file.
-    ContradictsOption = "contradicts-option",
+    ContradictsOption = "recording/contradicts-option",
     /// The content contradicts its format.
-    Damaged = "damaged",
+    Damaged = "recording/damaged",
     /// A number has a decimal comma.
-    DecimalComma = "decimal-comma",
+    DecimalComma = "recording/decimal-comma",
     /// The degree of a curve is out of range.
-    Degree = "degree",
+    Degree = "recording/degree",
     /// A vehicle has two positions at one time.
-    DuplicateRow = "duplicate-row",
+    DuplicateRow = "recording/duplicate-row",
     /// A piece of a curve has no valid duration.
-    Duration = "duration",
+    Duration = "recording/duration",
     /// The elements have a type that is not read.
-    ElementType = "element-type",
+    ElementType = "recording/element-type",
     /// There are no samples.
-    Empty = "empty",
+    Empty = "recording/empty",
     /// A cell without a value needs one.
-    EmptyCell = "empty-cell",
+    EmptyCell = "recording/empty-cell",
     /// A row has the wrong number of fields.
-    FieldCount = "field-count",
+    FieldCount = "recording/field-count",
     /// The folder has no tables, or tables in several folders.
-    Folder = "folder",
+    Folder = "recording/folder",
     /// The frame rate is invalid.
-    FrameRate = "frame-rate",
+    FrameRate = "recording/frame-rate",
     /// Times count frames of unknown duration.
-    Frames = "frames",
+    Frames = "recording/frames",
     /// Compressed data grow beyond the limit.
-    GrowsTooLarge = "grows-too-large",
+    GrowsTooLarge = "recording/grows-too-large",
     /// The knots of a B-spline have the wrong order or number.
-    Knots = "knots",
+    Knots = "recording/knots",
     /// The line ends are those of no table.
-    LineEnds = "line-ends",
+    LineEnds = "recording/line-ends",
     /// A line exceeds the limit.
-    LineTooLong = "line-too-long",
+    LineTooLong = "recording/line-too-long",
     /// A list has the wrong length.
-    ListLength = "list-length",
+    ListLength = "recording/list-length",
     /// The text has the wrong structure.
-    Malformed = "malformed",
+    Malformed = "recording/malformed",
     /// A column is missing.
-    MissingColumn = "missing-column",
+    MissingColumn = "recording/missing-column",
     /// No row has a fix.
-    NoFix = "no-fix",
+    NoFix = "recording/no-fix",
     /// The header is missing.
-    NoHeader = "no-header",
+    NoHeader = "recording/no-header",
     /// The origin of places on the Earth is missing.
-    NoOrigin = "no-origin",
+    NoOrigin = "recording/no-origin",
     /// The column of positions is missing.
-    NoPositionColumn = "no-position-column",
+    NoPositionColumn = "recording/no-position-column",
     /// No part of the file has positions.
-    NoPositions = "no-positions",
+    NoPositions = "recording/no-positions",
     /// The column of times is missing.
-    NoTimeColumn = "no-time-column",
+    NoTimeColumn = "recording/no-time-column",
     /// The column of vehicles is missing.
-    NoVehicleColumn = "no-vehicle-column",
+    NoVehicleColumn = "recording/no-vehicle-column",
     /// A pipe or device cannot be read twice.
-    NotAFile = "not-a-file",
+    NotAFile = "recording/not-a-file",
     /// A text is not a number.
-    NotANumber = "not-a-number",
+    NotANumber = "recording/not-a-number",
     /// A number is not finite.
-    NotFinite = "not-finite",
+    NotFinite = "recording/not-finite",
     /// A latitude or longitude is out of range.
-    NotOnEarth = "not-on-earth",
+    NotOnEarth = "recording/not-on-earth",
     /// The text is not UTF-8.
-    NotUtf8 = "not-utf8",
+    NotUtf8 = "recording/not-utf8",
     /// An option is out of range.
-    OptionOutOfRange = "option-out-of-range",
+    OptionOutOfRange = "recording/option-out-of-range",
     /// A number is too large.
-    Overflow = "overflow",
+    Overflow = "recording/overflow",
     /// A position jumps between two fixes.
-    PositionJump = "position-jump",
+    PositionJump = "recording/position-jump",
     /// A radius is out of range.
-    Radius = "radius",
+    Radius = "recording/radius",
     /// Times are of several clocks.
-    SeveralClocks = "several-clocks",
+    SeveralClocks = "recording/several-clocks",
     /// Positions are in several frames.
-    SeveralFrames = "several-frames",
+    SeveralFrames = "recording/several-frames",
     /// Rows of one vehicle may be of several.
-    SeveralVehicles = "several-vehicles",
+    SeveralVehicles = "recording/several-vehicles",
     /// Time runs backwards.
-    TimeBackwards = "time-backwards",
+    TimeBackwards = "recording/time-backwards",
     /// A time has an unknown format.
-    TimeFormat = "time-format",
+    TimeFormat = "recording/time-format",
     /// Transforms are no tree of rigid motions.
-    Transforms = "transforms",
+    Transforms = "recording/transforms",
     /// The file is truncated.
-    Truncated = "truncated",
+    Truncated = "recording/truncated",
     /// Two options give the unit of time.
-    TwoTimeUnits = "two-time-units",
+    TwoTimeUnits = "recording/two-time-units",
     /// Quotes are not closed.
-    UnclosedQuotes = "unclosed-quotes",
+    UnclosedQuotes = "recording/unclosed-quotes",
     /// The file was not closed, so that its end may be missing.
-    Unfinished = "unfinished",
+    Unfinished = "recording/unfinished",
     /// Units contradict each other.
-    UnitConflict = "unit-conflict",
+    UnitConflict = "recording/unit-conflict",
     /// The content has no known format.
-    UnknownFormat = "unknown-format",
+    UnknownFormat = "recording/unknown-format",
     /// A named topic does not exist.
-    UnknownTopic = "unknown-topic",
+    UnknownTopic = "recording/unknown-topic",
     /// A unit is unknown.
-    UnknownUnit = "unknown-unit",
+    UnknownUnit = "recording/unknown-unit",
     /// A named vehicle does not exist.
-    UnknownVehicle = "unknown-vehicle",
+    UnknownVehicle = "recording/unknown-vehicle",
     /// The compression is not supported.
-    UnsupportedCompression = "unsupported-compression",
+    UnsupportedCompression = "recording/unsupported-compression",
     /// The format is not supported.
-    UnsupportedFormat = "unsupported-format",
+    UnsupportedFormat = "recording/unsupported-format",
     /// A frame cannot be used.
-    UnusableFrame = "unusable-frame",
+    UnusableFrame = "recording/unusable-frame",
     /// An option has no meaning for the format.
-    UnusedOption = "unused-option",
+    UnusedOption = "recording/unused-option",
     /// Two vehicles may be the same.
-    VehicleTwice = "vehicle-twice",
+    VehicleTwice = "recording/vehicle-twice",
     /// The content does not have the requested format.
-    WrongFormat = "wrong-format",
+    WrongFormat = "recording/wrong-format",
 }
 
 impl From<io::Error> for Fault {

@@ -160,7 +160,7 @@ fn wrong_ranges_and_refused_values_are_refused() {
     let logarithmic = Range { logarithmic: true, ..range(0.0, 1.0, 2, 1) };
     assert!(
         refused("law.alpha", logarithmic)
-            .contains("key=law.alpha=0.0..1.0: the range is not positive, as log requires")
+            .contains("law.alpha from 0.0 to 1.0: the range is not positive, as log requires")
     );
     assert!(refused("law.alpha", range(-1.0, 1.0, 2, 1)).contains("with law.alpha = -1"));
     assert!(refused("law.alfa", range(0.5, 1.0, 2, 1)).contains("alfa"));
