@@ -226,8 +226,8 @@ impl SweepArguments {
 /// Arguments of `tautline attack`.
 #[derive(Debug, Args)]
 #[command(after_help = "\
-Exit codes: 0 no violation found; 1 violation found, nothing flown, or interrupted. This is a search, not a proof: worse flights may \
-exist within the bounds. See docs/studies.md.")]
+Exit codes: 0 no violation found; 1 violation found, nothing flown, or interrupted. This is a search, not a proof: \
+worse flights may exist within the bounds. See docs/studies.md.")]
 pub(super) struct AttackArguments {
     #[command(flatten)]
     study: StudyArguments,
