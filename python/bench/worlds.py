@@ -1,9 +1,9 @@
 """Measures many worlds at once: ``python python/bench/worlds.py``.
 
-Use a release build (``pip install ./python``)
-for absolute rates; a development build is enough for the ratios. Every world has five vehicles under given accelerations, and every
-step is audited. The unit is a million steps of single vehicles. Each rate is the best of several runs, measured in turn
-in one process. Another process on the same cores lowers the rates of real time, and hardly those of processor time.
+Use a release build (``pip install ./python``) for absolute rates; a development build is enough for the ratios. Every
+world has five vehicles under given accelerations, and every step is audited. The unit is a million steps of single
+vehicles. Each rate is the best of several runs, measured in turn in one process. Another process on the same cores
+lowers the rates of real time, and hardly those of processor time.
 """
 
 from __future__ import annotations

@@ -161,8 +161,7 @@ impl Layout {
         };
         layout.refuse_other_frames(header, &columns.heights, &convention)?;
         let used = layout.columns();
-        let is_unused = |column: &usize| used.binary_search(column).is_err() && Some(*column) != layout.id;
-        layout.frames = (0..header.len()).filter(|&column| names_a_frame(&header[column])).filter(is_unused).collect();
+        layout.frames = layout.unused_frames(header, &used);
         if !one && id.is_none() {
             let unused: Vec<_> = (0..header.len()).filter(|column| used.binary_search(column).is_err()).collect();
             layout.slots = identity::examine(header, &unused, &layout.names)?;
@@ -187,6 +186,12 @@ impl Layout {
             layout.names.clear();
         }
         Ok(layout)
+    }
+
+    /// Returns the columns with the frame of a row, without `used` ones.
+    fn unused_frames(&self, header: &[String], used: &[usize]) -> Vec<usize> {
+        let is_unused = |column: &usize| used.binary_search(column).is_err() && Some(*column) != self.id;
+        (0..header.len()).filter(|&column| names_a_frame(&header[column])).filter(is_unused).collect()
     }
 
     /// Returns the fact which column names the vehicles.
