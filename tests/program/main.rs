@@ -16,7 +16,6 @@ mod determinism;
 mod doors;
 mod drones;
 mod ellipsoids;
-mod examples;
 mod exports;
 mod first_steps;
 mod fixes;

@@ -343,6 +343,7 @@ mod tests {
             ("law.alpha", "is not KEY=FROM..TO"),
             ("law.alpha=1", "is not KEY=FROM..TO"),
             ("law.alpha=1..", "`` is not a number"),
+            ("law.alpha=1...2", "has more than two points"),
             ("law.alpha=a..2", "`a` is not a number"),
             ("law.alpha=2..2", "must be in increasing order"),
             ("law.alpha=3..2", "must be in increasing order"),

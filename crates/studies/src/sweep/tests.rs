@@ -38,6 +38,7 @@ fn values_are_spaced_or_listed() {
         ("law.alpha=", "`` is not a number"),
         ("law.alpha=1,x", "`x` is not a number"),
         ("law.alpha=0..1", "is neither KEY=FROM..TO:COUNT nor a list"),
+        ("law.alpha=0...1:3", "is neither KEY=FROM..TO:COUNT nor a list"),
         ("law.alpha=0..1:0", "got `0`"),
         ("law.alpha=0..1:2.5", "got `2.5`"),
         ("law.alpha=0..1:999999", "got `999999`"),
