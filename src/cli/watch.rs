@@ -335,6 +335,10 @@ impl WatchArguments {
             let message = format!("--record: must end in .csv or .mcap ({:?})", path.display().to_string());
             return Err(Failure::input("watch/record", message, "give another name"));
         }
+        if path.is_dir() {
+            let message = format!("--record: {} is a folder", path.display());
+            return Err(Failure::input("watch/record", message, "give another name"));
+        }
         // The watch writes both.
         let partial = Record::partial_of(path);
         if let Some(there) = [path, &partial].into_iter().find(|file| file.exists() && !self.force) {

@@ -418,6 +418,7 @@ fn deviations_from_the_plan_are_reported() {
 fn wrong_options_end_with_code_2() {
     let folder = tempdir().expect("a folder");
     fs::write(folder.path().join("there.csv"), "").expect("a file");
+    fs::create_dir(folder.path().join("folder.csv")).expect("a folder");
     for (arguments, code) in [
         (&["--delta", "0"][..], "watch/setting"),
         (&["--delta", "nan"], "watch/setting"),
@@ -430,6 +431,7 @@ fn wrong_options_end_with_code_2() {
         (&["foxglove:no such host", "--delta", "1"], "watch/source"),
         (&["mavlink:127.0.0.1:0", "--delta", "1", "--time", "stamps"], "watch/source"),
         (&["--delta", "1", "--record", "watch.txt"], "watch/record"),
+        (&["--delta", "1", "--record", "folder.csv", "--force"], "watch/record"),
         (&["--delta", "1", "--record", "there.csv"], "watch/record"),
         (&["--delta", "1", "--plan", "none.csv"], "recording/not-found"),
         (&["--delta", "1", "--origin", "95,0,0"], ""),

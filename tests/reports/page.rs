@@ -7,7 +7,7 @@ use std::process::Command;
 
 use tautline::figures;
 use tautline::flight_log::FlightLog;
-use tautline::report::page::{self, Badge, Page, Picture, Render as _};
+use tautline::report::page::{self, Badge, Page, Picture, Render as _, Tone};
 
 use crate::report::{closest, number};
 
@@ -17,7 +17,7 @@ fn hostile_page() -> Page {
     let text = || HOSTILE.to_owned();
     let figure = figures::paths(&FlightLog::default(), &[], HOSTILE);
     let picture = Picture { description: text(), data_uri: text(), file: text(), is_light: true };
-    let badge = Badge { word: HOSTILE.to_owned(), ..Badge::judged(false) };
+    let badge = Badge { tone: Tone::Bad, word: HOSTILE.to_owned() };
     let content = [
         page::list(&[HOSTILE]),
         page::words(HOSTILE, &[HOSTILE; 2], [[HOSTILE; 2]]),
@@ -31,7 +31,7 @@ fn hostile_page() -> Page {
         title: text(),
         kind: HOSTILE,
         replay: None,
-        badge: Badge::judged(false),
+        badge: Badge { tone: Tone::Bad, word: "violation".to_owned() },
         verdict: text(),
         reasons: vec![text()],
         warnings: vec![(text(), text())],
@@ -71,7 +71,7 @@ fn every_text_of_a_page_is_escaped() {
 fn a_table_has_headers_and_a_badge_has_words() {
     let html = hostile_page().render();
     assert!(html.contains("<th scope=\"col\"") && html.contains("<th scope=\"row\"") && html.contains("<caption>"));
-    assert!(html.contains(">fail</strong>"));
+    assert!(html.contains(">violation</strong>"));
     assert!(html.contains("<html lang=\"en\">") && html.contains("name=\"viewport\""));
 }
 

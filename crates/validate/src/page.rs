@@ -157,11 +157,12 @@ impl Validation {
             section("Assumptions", "The measurements rest on these assumptions.", &[page::list(&ASSUMED)]),
             section("Command", "This command measures everything again.", &[page::command("tautline validate")]),
         ]);
+        let (tone, word) = if self.pass { (Tone::Good, "as expected") } else { (Tone::Bad, "not as expected") };
         Page {
             setup: String::new(),
             title: "Validation".to_owned(),
             kind: "Measurement of every claim of tautline and of its source paper",
-            badge: Badge::judged(self.pass),
+            badge: Badge { tone, word: word.to_owned() },
             verdict: self.headline(),
             replay: None,
             reasons: failed.map(|claim| format!("{}: {}", claim.id, claim.measured)).collect(),

@@ -4,10 +4,11 @@ use maud::{Markup, html};
 
 use super::findings::{closest_table, lists};
 use super::flight::Report;
-use super::page::{self, Badge, Page, Picture, Start};
+use super::page::{self, Badge, Page, Picture, Start, Tone};
 use super::section::Section;
 use crate::figures::Figure;
 use crate::replay::{NoReplay, Replay};
+use tautline_audit::Status;
 use tautline_core::swarm::Bounce;
 use tautline_core::text::{seconds, significant, up_to};
 use tautline_laws::formation::Freedom;
@@ -60,8 +61,15 @@ impl Report {
     /// Two runs of one scenario give the same bytes except for the last section, the performance.
     #[must_use]
     pub fn to_html(&self, about: &RunPage<'_>) -> String {
-        let badge = Badge::judged(self.verdict.pass);
-        let mut page = Page::new("Flight report", self.scenario.name.clone(), badge, self.headline());
+        let tone = match self.answer.status {
+            _ if self.verdict.pass => Tone::Good,
+            Status::Undecided => Tone::Neutral,
+            Status::Clear | Status::Violation => Tone::Bad,
+        };
+        let headline = self.headline();
+        let (word, rest) = headline.split_once(": ").unwrap_or((&headline, ""));
+        let badge = Badge { tone, word: word.to_owned() };
+        let mut page = Page::new("Flight report", self.scenario.name.clone(), badge, rest.to_owned());
         page.setup = about.setup();
         page.reasons = self.reasons_beside_headline();
         let warnings = about.preflight.warnings.iter();

@@ -88,15 +88,6 @@ pub struct Picture {
     pub is_light: bool,
 }
 
-impl Badge {
-    /// Returns the badge `pass` or `fail`.
-    #[must_use]
-    pub fn judged(pass: bool) -> Self {
-        let (tone, word) = if pass { (Tone::Good, "pass") } else { (Tone::Bad, "fail") };
-        Self { tone, word: word.to_owned() }
-    }
-}
-
 impl Render for Badge {
     fn render(&self) -> Markup {
         let tone = match self.tone {
