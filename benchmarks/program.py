@@ -102,7 +102,7 @@ class Program:
 
     def samples(self, out: str = "flight") -> list[tuple[float, list[Point]]]:
         """Returns the recorded samples of a flight: time [s] and the position of each vehicle [m]."""
-        done, _ = self.call("export", f"{out}/run.mcap", "--output", f"{out}/run.csv", "--force", "--quiet")
+        done, _ = self.call("export", f"{out}/run.mcap", "--out", f"{out}/run.csv", "--force", "--quiet")
         if done.returncode != 0:
             raise Unusable(message(done.stderr))
         rows: list[tuple[float, list[Point]]] = []

@@ -118,7 +118,7 @@ def curves(program: Program, folder: pathlib.Path) -> Iterator[Row]:
         entry = row(folder.name, rate) | {"source": source(folder)}
         try:
             report, _ = program.audit(str(folder.resolve()), "--delta", repr(delta_m))
-            words = ["export", str(folder.resolve()), "--output", "curves.csv", "--force", "--quiet"]
+            words = ["export", str(folder.resolve()), "--out", "curves.csv", "--force", "--quiet"]
             done, _ = program.call(*words, "--sample-hz", repr(rate))
             if done.returncode != 0:
                 raise Unusable(done.stderr.strip().splitlines()[0] if done.stderr.strip() else "export failed")

@@ -248,7 +248,7 @@ def sweep(program: Program, peers: Peers, method: str, count: int, instants: int
     entry["ours"] = {"settings": settings}
     entry["peer"] = {"name": method, "settings": peer_settings}
     table(program, count, instants, "table.csv")
-    program.call("export", "table.csv", "--output", "table.npz", "--force", "--quiet")
+    program.call("export", "table.csv", "--out", "table.npz", "--force", "--quiet")
     task = {"script": "peer_tables.py", "work": work, "path": str(program.folder / "table.npz"), "rounds": 1}
     ours: list[float] = []
     theirs: list[float] = []
