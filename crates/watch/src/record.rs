@@ -164,4 +164,19 @@ mod tests {
             assert_eq!((items.len(), first.velocity_m_s), (4, Some(Vector3::new(0.0, -1.0, third))));
         }
     }
+
+    #[test]
+    fn names_that_differ_only_in_spelling_are_kept_apart() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("watch.mcap");
+        let mut record = Record::create(&path).expect("a file");
+        for (id, x_m) in [("cf1", 0.0), ("CF1", 2.0)] {
+            let position_m = Vector3::new(x_m, 0.0, 0.0);
+            let pose = OwnedPose { t_s: 0.0, id: id.to_owned(), position_m, velocity_m_s: None, accuracy_m: None };
+            record.push(0.0, &pose).expect("a row");
+        }
+        record.finish().expect("a file");
+        let tracks = open(&path, &ReadOptions::default()).expect("a recording");
+        assert_eq!(tracks.vehicles(), ["cf1", "CF1"]);
+    }
 }

@@ -1,6 +1,6 @@
 //! Names of vehicles, and detection of columns that identify vehicles, by header and by values.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, HashMap, HashSet};
 
 use nalgebra::Vector3;
 
@@ -69,6 +69,18 @@ impl Names {
         Ok(all)
     }
 
+    /// Returns these names in their order, also if some differ only in spelling.
+    ///
+    /// # Errors
+    /// If two names are equal.
+    pub(super) fn distinct(names: Vec<String>) -> Result<Self, Fault> {
+        let mut first = HashSet::new();
+        match names.iter().find(|name| !first.insert(name.as_str())) {
+            Some(twice) => refuse_twice(twice, twice),
+            None => Ok(Self::ordered(names)),
+        }
+    }
+
     /// Returns the names `1`, `2`, ... up to `count`.
     pub(super) fn numbered(count: usize) -> Self {
         Self::ordered((1..=count).map(|number| number.to_string()).collect())
@@ -85,14 +97,7 @@ impl Names {
     fn add(&mut self, name: String) -> Result<usize, Fault> {
         let index = self.in_order.len();
         if let Some(&first) = self.spellings.get(&spelling(&name)) {
-            let [first, second] = [&self.in_order[first], &name].map(|name| quoted(name));
-            let problem = if first == second {
-                format!("two vehicles have the name {first}")
-            } else {
-                format!("the vehicles {first} and {second} differ only in how they are spelled")
-            };
-            let remedy = "use one name per vehicle, and names that differ in more than spelling";
-            return refuse(ContentKind::VehicleTwice, problem, remedy);
+            return refuse_twice(&self.in_order[first], &name);
         }
         self.spellings.insert(spelling(&name), index);
         self.indices.insert(name.as_str().into(), index);
@@ -131,6 +136,17 @@ impl Names {
         order.sort_by_key(|&index| numbers[index]);
         *self = Self::ordered(order.iter().map(|&index| self.in_order[index].clone()).collect());
     }
+}
+
+fn refuse_twice<T>(first: &str, second: &str) -> Result<T, Fault> {
+    let [first, second] = [first, second].map(|name| quoted(name));
+    let problem = if first == second {
+        format!("two vehicles have the name {first}")
+    } else {
+        format!("the vehicles {first} and {second} differ only in how they are spelled")
+    };
+    let remedy = "use one name per vehicle, and names that differ in more than spelling";
+    refuse(ContentKind::VehicleTwice, problem, remedy)
 }
 
 /// Alternative vehicle column of a table, compared with the one in use.

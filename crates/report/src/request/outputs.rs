@@ -19,13 +19,14 @@ const STANDARD_OUTPUT: &str = "-";
 /// File with its name in messages: an option, or words such as `the recording`.
 pub type NamedPath<'a> = (String, &'a Path);
 
-/// Rejects outputs that would overwrite an input or each other, or become part of an input folder of CSV files.
+/// Rejects outputs that would overwrite an input or each other, or become part of an input folder of CSV files, and `-`.
 ///
 /// # Errors
 /// [`Failure`] that names both files.
 pub fn check(inputs: &[NamedPath<'_>], outputs: &[NamedPath<'_>]) -> Result<(), Failure> {
     let mut taken: BTreeMap<_, _> = inputs.iter().filter_map(|(called, path)| Some((place(path)?, called))).collect();
     for (option, path) in outputs {
+        refuse_standard_output(option, path)?;
         let Some(place) = place(path) else { continue };
         let csv = place.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("csv"));
         let within = if csv { usize::MAX } else { 1 };
@@ -84,6 +85,16 @@ pub fn check_new<'a>(scenario: &str, outputs: impl Iterator<Item = NamedPath<'a>
 #[must_use]
 pub fn is_standard_output(file: &Path) -> bool {
     file == Path::new(STANDARD_OUTPUT)
+}
+
+/// Rejects `-`: the name would be taken for standard output, which this output cannot go to.
+fn refuse_standard_output(option: &str, path: &Path) -> Result<(), Failure> {
+    if !is_standard_output(path) {
+        return Ok(());
+    }
+    let message = format!("{option}: cannot go to standard output");
+    let help = format!("name a file or folder; {STANDARD_OUTPUT} as a name is written ./{STANDARD_OUTPUT}");
+    Err(Failure::input("files/no-standard-output", message, help))
 }
 
 /// Writes a file atomically, or to standard output.
@@ -162,6 +173,7 @@ impl OutFolder {
     /// # Errors
     /// [`Failure`] if the folder holds a finished result, another process writes to it, or it is not writable.
     pub fn open(&self, force: bool) -> Result<Option<File>, Failure> {
+        refuse_standard_output(&OUT.to_string(), &self.path)?;
         let report = self.report();
         if report.exists() && !force && !was_interrupted(&report) {
             return Err(Failure::input(
@@ -251,6 +263,16 @@ mod tests {
             );
         }
         assert_eq!(clash(&[], &[("the picture", &at("new/end.png")), ("film", &at("end.png"))]), None);
+    }
+
+    #[test]
+    fn standard_output_is_refused_where_a_file_or_folder_is_written() {
+        let dash = Path::new("-");
+        assert_eq!(clash(&[], &[("--out", dash)]).as_deref(), Some("--out: cannot go to standard output"));
+        assert_eq!(clash(&[], &[("--out", Path::new("./-"))]), None);
+        let refused = OutFolder::at("-", "run", "report.json").open(true).expect_err("no folder");
+        assert_eq!(refused.message(), "--out: cannot go to standard output");
+        assert!(!dash.exists());
     }
 
     #[test]

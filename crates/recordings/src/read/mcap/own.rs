@@ -100,7 +100,8 @@ impl Instants {
             if !names.starts_with(self.names.all()) {
                 return Err("the list of vehicles contradicts an earlier one".to_owned());
             }
-            self.names = Names::from_list(names).map_err(|fault| fault.to_string())?;
+            // The file numbers its vehicles: names may differ in spelling alone.
+            self.names = Names::distinct(names).map_err(|fault| fault.to_string())?;
             self.epoch_ns = epoch_ns;
         }
         Ok(())
