@@ -4,14 +4,11 @@ use numpy::PyArray2;
 use pyo3::prelude::*;
 use tautline::preflight::Preflight;
 use tautline::request::ScenarioRequest;
-use tautline::scenario::{self, Override, Source, Template};
+use tautline::scenario::{self, Override, Source};
 
 use crate::errors::{IntoException as _, json, wrong_input};
 use crate::numbers::table;
 use crate::work::run_detached;
-
-/// Key of a part, reason, and the key and the value that turn it off.
-type IgnoredPart = (&'static str, &'static str, Option<(&'static str, &'static str)>);
 
 /// A complete and valid scenario.
 #[pyclass(frozen, module = "tautline._native")]
@@ -102,15 +99,28 @@ impl Scenario {
         self.scenario.graph.edges().collect()
     }
 
-    /// Parts that a learning environment ignores: key, reason, and the key and the value that turn the part off.
-    fn parts_ignored_by_environments(&self, py: Python<'_>) -> PyResult<Vec<IgnoredPart>> {
-        let read = || {
-            let parsed =
-                self.request.overrides.iter().map(|text| Override::parse(text)).collect::<Result<Vec<_>, _>>()?;
-            Template::read(&self.request.source, &parsed)
-        };
-        let template = run_detached(py, read)?.map_err(scenario::ScenarioError::into_exception)?;
-        Ok(template.parts_ignored_by_environments().iter().map(|part| (part.key, part.what, part.off)).collect())
+    /// The part that a learning environment ignores: key and reason.
+    #[getter]
+    fn part_ignored_by_environments(&self) -> Option<(&'static str, &'static str)> {
+        self.scenario.part_ignored_by_environments().map(|part| (part.key, part.what))
+    }
+
+    /// Whether the vehicles stay in the plane z = 0.
+    #[getter]
+    fn is_plane(&self) -> bool {
+        self.scenario.space == scenario::Space::Plane
+    }
+
+    /// Whether vehicles know the true present states.
+    #[getter]
+    fn is_exact(&self) -> bool {
+        self.scenario.is_exact()
+    }
+
+    /// Number of obstacles.
+    #[getter]
+    fn obstacles(&self) -> usize {
+        self.scenario.obstacles.len()
     }
 
     #[getter]

@@ -134,7 +134,7 @@ impl Simulation {
                 Some(law) => Components::with_law(scenario, Box::new(law)),
                 None => Components::of(scenario)?,
             };
-            sim::Simulation::with(scenario, parts)
+            sim::Simulation::awaiting_commands(scenario, parts)
         };
         let ((made, calls), raised) = run_detached(py, || catch_exception(|| record_calls(begin)))?;
         let mut history = History::default();

@@ -2,14 +2,17 @@
 
 use std::sync::{Mutex, TryLockError};
 
-use numpy::ndarray::{ArrayView3, Ix3};
+use numpy::ndarray::{ArrayView3, Dimension, IntoDimension, Ix3};
 use numpy::{
-    BorrowError, Element, PyArray, PyArray1, PyArray3, PyArrayDescrMethods as _, PyArrayMethods as _, PyReadonlyArray1,
-    PyUntypedArray, PyUntypedArrayMethods as _, dtype,
+    BorrowError, Element, PyArray, PyArray1, PyArray3, PyArray4, PyArrayDescrMethods as _, PyArrayMethods as _,
+    PyReadonlyArray1, PyReadonlyArray3, PyUntypedArray, PyUntypedArrayMethods as _, dtype,
 };
 use pyo3::prelude::*;
-use tautline::scenario::{Override, Template};
-use tautline::sim::{self, SeedChoice, StatesMut, Threads, VectorError};
+use tautline::law::{Law, LawError};
+use tautline::observation::Observation;
+use tautline::scenario::{ExternalLaw, Override, Template};
+use tautline::sim::{self, GivenStarts, SeedChoice, StatesMut, Threads, VectorError};
+use tautline::swarm::Rows;
 
 use crate::errors::{IntoException as _, internal_error, wrong_input, wrong_input_with_code, wrong_type};
 use crate::numbers::shape_text;
@@ -129,6 +132,35 @@ impl VectorSimulation {
         if is_single { copied::<f32>(given) } else { copied::<f64>(given) }
     }
 
+    fn of(py: Python<'_>, worlds: sim::VectorSimulation, threads: Workers) -> PyResult<Self> {
+        let shape = [worlds.count(), worlds.vehicles()];
+        let [count, vehicles] = shape;
+        let made = Self {
+            shape,
+            worlds: Mutex::new(worlds),
+            threads,
+            positions: PyArray3::zeros(py, [count, vehicles, 3], false).unbind(),
+            velocities: PyArray3::zeros(py, [count, vehicles, 3], false).unbind(),
+            least_clearance_m: PyArray1::zeros(py, count, false).unbind(),
+            is_over: PyArray1::from_vec(py, vec![false; count]).unbind(),
+        };
+        made.with(py, sim::VectorSimulation::write)?.map_err(raised)?;
+        Ok(made)
+    }
+
+    /// Returns a new array that `write` fills.
+    fn written<'py, D: Dimension>(
+        &self,
+        py: Python<'py>,
+        shape: impl IntoDimension<Dim = D>,
+        write: impl FnOnce(&mut sim::VectorSimulation, &mut [f64]) -> Result<(), VectorError> + Send,
+    ) -> PyResult<Bound<'py, PyArray<f64, D>>> {
+        let shape = shape.into_dimension();
+        let mut numbers = vec![0.0; shape.size()];
+        self.with(py, |worlds, _| write(worlds, &mut numbers))?.map_err(raised)?;
+        PyArray1::from_vec(py, numbers).reshape(shape)
+    }
+
     fn filled<T: Element + Copy>(py: Python<'_>, numbers: impl Iterator<Item = T>) -> Bound<'_, PyArray1<T>> {
         PyArray1::from_iter(py, numbers)
     }
@@ -136,8 +168,8 @@ impl VectorSimulation {
 
 #[pymethods]
 impl VectorSimulation {
-    /// Creates one world for each seed, at its start. `threads` is 0 for all. `searches` goes on to later seeds where a
-    /// seed has no valid start.
+    /// Creates one world for each seed, at its start. `threads` is 0 for all. The worlds of an environment fly a policy
+    /// in the place of the scenario's law, and go on to later seeds where a seed has no valid start.
     #[new]
     fn new(
         py: Python<'_>,
@@ -145,11 +177,10 @@ impl VectorSimulation {
         seeds: Vec<u64>,
         threads: usize,
         autoreset: bool,
-        searches: bool,
+        is_environment: bool,
     ) -> PyResult<Self> {
         let request = &scenario.request;
-        let choice = if searches { SeedChoice::From } else { SeedChoice::Exactly };
-        let seeds: Vec<_> = seeds.into_iter().map(choice).collect();
+        let seeds: Vec<_> = seeds.into_iter().map(seed_choice(is_environment)).collect();
         let workers = Workers::of(threads);
         let now = workers.now()?;
         let mut signals = Signals::new();
@@ -163,26 +194,25 @@ impl VectorSimulation {
                     request.argument
                 )));
             }
+            let policy = is_environment.then(|| ExternalLaw::new(Policy));
+            let template = if policy.is_some() { template.with_external_law(policy) } else { template };
             let made = sim::VectorSimulation::with_seeds_while(template, &seeds, now, &mut || signals.are_silent());
             let mut worlds = made.map_err(raised)?;
             worlds.set_autoreset(autoreset);
             Ok(worlds)
         };
         let worlds = run_detached(py, begin)?;
-        let worlds = signals.raised.map_or(worlds, Err)?;
-        let shape = [worlds.count(), worlds.vehicles()];
-        let [count, vehicles] = shape;
-        let made = Self {
-            shape,
-            worlds: Mutex::new(worlds),
-            threads: workers,
-            positions: PyArray3::zeros(py, [count, vehicles, 3], false).unbind(),
-            velocities: PyArray3::zeros(py, [count, vehicles, 3], false).unbind(),
-            least_clearance_m: PyArray1::zeros(py, count, false).unbind(),
-            is_over: PyArray1::from_vec(py, vec![false; count]).unbind(),
+        Self::of(py, signals.raised.map_or(worlds, Err)?, workers)
+    }
+
+    /// Returns an independent copy.
+    fn copy(&self, py: Python<'_>) -> PyResult<Self> {
+        let threads = match &self.threads {
+            Workers::Shared => Workers::Shared,
+            Workers::One => Workers::One,
+            Workers::Own(pool) => Workers::Own(ProcessPool::new(pool.threads())),
         };
-        made.with(py, sim::VectorSimulation::write)?.map_err(raised)?;
-        Ok(made)
+        Self::of(py, self.with(py, |worlds, _| worlds.copied())?, threads)
     }
 
     /// Largest number of worlds of a scenario.
@@ -203,23 +233,25 @@ impl VectorSimulation {
         raised_by_signal.map_or_else(|| flown.map_err(raised), Err)
     }
 
-    /// Resets the chosen worlds, to these seeds if given, else to the next seed of each. With `first`, world e takes
-    /// `first` + e as its next seed.
+    /// Resets the chosen worlds, to these seeds if given, else to the next seed of each, and to the given positions and
+    /// velocities, (E, N, 3). The worlds of an environment go on to later seeds where a seed has no valid start.
     fn reset(
         &self,
         py: Python<'_>,
         chosen: PyReadonlyArray1<'_, bool>,
         seeds: Option<Vec<Option<u64>>>,
-        first: Option<u64>,
+        given: Option<(PyReadonlyArray3<'_, f64>, PyReadonlyArray3<'_, f64>)>,
+        is_environment: bool,
     ) -> PyResult<()> {
         let chosen = copied_mask(chosen);
-        let next = |k: usize| first.map_or(SeedChoice::Next, |first| SeedChoice::From(first.saturating_add(k as u64)));
-        let given = |k: usize| seeds.as_ref().and_then(|seeds| seeds.get(k).copied().flatten());
+        let seed = |k: usize| seeds.as_ref().and_then(|seeds| seeds.get(k).copied().flatten());
         let choices: Vec<_> =
-            (0..chosen.len()).map(|k| given(k).map_or_else(|| next(k), SeedChoice::Exactly)).collect();
+            (0..chosen.len()).map(|k| seed(k).map_or(SeedChoice::Next, seed_choice(is_environment))).collect();
+        let given = given.map(|(p, v)| [p, v].map(|rows| rows.as_array().iter().copied().collect::<Vec<_>>()));
+        let starts = given.as_ref().map(|[p, v]| GivenStarts { positions_m: p, velocities_m_s: v });
         let reset = |worlds: &mut sim::VectorSimulation, states: &mut StatesMut<'_>| {
             let mut signals = Signals::new();
-            let reset = worlds.reset_while(&chosen, Some(&choices), states, &mut || signals.are_silent());
+            let reset = worlds.reset_while(&chosen, Some(&choices), starts, states, &mut || signals.are_silent());
             (reset, signals.raised)
         };
         let (reset, raised_by_signal) = self.with(py, reset)?;
@@ -236,6 +268,41 @@ impl VectorSimulation {
     #[getter]
     fn velocities<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray3<f64>> {
         self.velocities.bind(py).clone()
+    }
+
+    /// (E, N, 3) present slots [m].
+    fn slots<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray3<f64>>> {
+        let [worlds, vehicles] = self.shape;
+        self.written(py, [worlds, vehicles, 3], |worlds, slots_m| worlds.write_slots(slots_m))
+    }
+
+    /// Two arrays (E, N, 3): positions [m] and velocities [m/s] that the vehicles measure of themselves.
+    fn measured<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray4<f64>>> {
+        let [worlds, vehicles] = self.shape;
+        self.written(py, [2, worlds, vehicles, 3], |worlds, states| {
+            let (positions_m, velocities_m_s) = states.split_at_mut(states.len() / 2);
+            worlds.write_measured(positions_m, velocities_m_s)
+        })
+    }
+
+    /// (E, N, N, 3) positions [m] of vehicle j that vehicle i last received; NaN without a link.
+    fn received<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray4<f64>>> {
+        let [worlds, vehicles] = self.shape;
+        self.written(py, [worlds, vehicles, vehicles, 3], |worlds, received_m| worlds.write_received(received_m))
+    }
+
+    /// (E, N, K, 3) vectors from each vehicle to the nearest point of each of K obstacles [m].
+    fn obstacles<'py>(&self, py: Python<'py>, count: usize) -> PyResult<Bound<'py, PyArray4<f64>>> {
+        let [worlds, vehicles] = self.shape;
+        self.written(py, [worlds, vehicles, count, 3], |worlds, vectors_m| worlds.write_obstacles(vectors_m))
+    }
+
+    /// Numbers of the commands of each world under its shield, and of those that the shield changed; zeros without one.
+    fn shield_counts(&self, py: Python<'_>) -> PyResult<Vec<(u64, u64)>> {
+        self.each(py, |world| {
+            let report = world.shield_report();
+            report.map_or((0, 0), |report| (report.counters.commands, report.counters.changed))
+        })
     }
 
     /// (E,) smallest clearances so far [m].
@@ -305,6 +372,25 @@ impl VectorSimulation {
     fn each<T: Send>(&self, py: Python<'_>, of: impl Fn(&sim::Simulation) -> T + Send + Sync) -> PyResult<Vec<T>> {
         self.with(py, |worlds, _| (0..worlds.count()).map(|k| of(worlds.world(k))).collect())
     }
+}
+
+/// Law of the worlds of an environment, which give all commands themselves.
+#[derive(Clone)]
+struct Policy;
+
+impl Law for Policy {
+    fn name(&self) -> &'static str {
+        "policy"
+    }
+
+    fn command(&mut self, _at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        command.fill(0.0);
+        Ok(())
+    }
+}
+
+fn seed_choice(is_environment: bool) -> fn(u64) -> SeedChoice {
+    if is_environment { SeedChoice::From } else { SeedChoice::Exactly }
 }
 
 /// Returns a copy of a mask, and ends the loan of its array: the mask may be `is_over` itself.

@@ -36,6 +36,11 @@ impl ProcessPool {
         Self { threads, pool: Mutex::new(None) }
     }
 
+    /// Returns the number of threads.
+    pub(crate) fn threads(&self) -> usize {
+        self.threads
+    }
+
     /// Returns the pool of this process.
     pub(crate) fn get(&self) -> Result<Arc<ThreadPool>, ThreadPoolBuildError> {
         let mut pools = self.pool.lock().unwrap_or_else(PoisonError::into_inner);

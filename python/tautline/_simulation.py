@@ -44,8 +44,8 @@ class Simulation:
     def step(self, u: ArrayLike | None = None, steps: int = 1) -> None:
         """Flies steps of ``scenario.dt_s``, fewer where the flight ends.
 
-        ``u`` (N, 3) or (N, 2) are accelerations [m/s^2] that replace those of the law. Without ``u`` a step
-        that is too long for the law is flown in parts.
+        ``u`` (N, 3) or (N, 2) are accelerations [m/s^2] that replace those of the law. They pass through the shield and
+        the actuators of the scenario. Without ``u`` a step that is too long for the law is flown in parts.
 
         Raises :class:`Error` where the flight has already ended, or where ``u`` has a wrong shape or is not finite;
         ``TypeError`` for numbers that are no float64. An exception of the law ends the flight and is raised again.
@@ -92,7 +92,7 @@ class Simulation:
 
     @property
     def commands(self) -> NDArray[np.float64]:
-        """(N, 3) current commands [m/s^2]; (0, 3) where the law failed."""
+        """(N, 3) current commands [m/s^2]; (0, 3) where the law failed, and 0 under a shield before the first step."""
         return self._native.commands
 
     @property

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
@@ -38,8 +39,8 @@ class VectorSimulation:
     Raises :class:`Error` for a wrong scenario or a seed without a valid start.
     """
 
-    #: Whether a new world passes over seeds without a valid start.
-    _searches: ClassVar[bool] = False
+    #: Whether the worlds fly a policy, and a new world passes over seeds without a valid start.
+    _is_environment: ClassVar[bool] = False
 
     def __init__(
         self,
@@ -64,7 +65,7 @@ class VectorSimulation:
             raise Error(f"threads: must be from 1 to 1024, got {threads}; None uses one for each core")
         numbered = list(range(self.num_envs)) if seeds is None else self._seeds(seeds)
         self._native = _native.VectorSimulation(
-            self.scenario._native, numbered, workers, boolean(autoreset, "autoreset"), self._searches
+            self.scenario._native, numbered, workers, boolean(autoreset, "autoreset"), self._is_environment
         )
         #: Whether a step resets the worlds that have ended.
         self.autoreset = bool(autoreset)
@@ -78,8 +79,8 @@ class VectorSimulation:
         """Flies steps of ``scenario.dt_s`` in every world, fewer where a world ends.
 
         ``u`` (E, N, 3) or (E, N, 2) are accelerations [m/s^2] that replace those of the law and are held over all of
-        these steps. Arrays of float32 and float64 are fastest. No step is divided for the law then. Those of ended
-        worlds are ignored. Without ``u`` the scenario's law flies. ``out`` (E, N, 6) of float32 or float64 receives
+        these steps. They pass through the shield and the actuators of the scenario. Arrays of float32 and float64 are
+        fastest. No step is divided for the law then. Those of ended worlds are ignored. Without ``u`` the scenario's law flies. ``out`` (E, N, 6) of float32 or float64 receives
         positions and velocities.
 
         Raises :class:`Error` for a wrong shape, or with the place of a number that is not finite; ``TypeError`` for
@@ -105,26 +106,38 @@ class VectorSimulation:
         self,
         mask: NDArray[np.bool_] | Sequence[bool] | None = None,
         seeds: Sequence[int | None] | NDArray[np.integer[Any]] | None = None,
+        *,
+        positions: ArrayLike | None = None,
+        velocities: ArrayLike | None = None,
     ) -> None:
         """Resets the worlds with ``mask`` (E,), by default all, to their starts.
 
         ``seeds`` (E,) are the new seeds; those outside of the mask are ignored. Without seeds, or with None in their
         list, a world takes its next seed.
 
-        Raises :class:`Error` for a wrong shape or a seed without a valid start. No world is reset then.
-        """
-        self._reset(mask, seeds)
+        ``positions`` [m] and ``velocities`` [m/s], (E, N, 3), (E, N, 2) or those of one world, replace the starts; the
+        vehicles are at rest without ``velocities``. Slots and random numbers are still those of the seed.
 
-    def _reset(
-        self,
-        mask: NDArray[np.bool_] | Sequence[bool] | None = None,
-        seeds: Sequence[int | None] | NDArray[np.integer[Any]] | None = None,
-        first: int | None = None,
-    ) -> None:
-        """Resets worlds. With ``first``, world e has ``first + e`` as its next seed."""
+        Raises :class:`Error` for a wrong shape or no valid start. No world is reset then.
+        """
         chosen = self._mask(mask)
         given = None if seeds is None else self._seeds_or_none(seeds, chosen)
-        self._native.reset(chosen, given, first)
+        if positions is None and velocities is not None:
+            raise Error("velocities: need positions beside them")
+        starts = None
+        if positions is not None:
+            p = self._rows(positions, "positions")
+            starts = p, np.zeros_like(p) if velocities is None else self._rows(velocities, "velocities")
+        self._native.reset(chosen, given, starts, self._is_environment)
+
+    def _rows(self, given: ArrayLike, name: str) -> NDArray[np.float64]:
+        """Returns a vector of three numbers for each vehicle of each world, with z = 0 where two are given."""
+        rows, vehicles = exact_array(given, name), len(self.scenario)
+        if rows.shape[-2:] not in ((vehicles, 2), (vehicles, 3)) or rows.shape[:-2] not in ((), (self.num_envs,)):
+            wanted = f"({self.num_envs}, {vehicles}, 3)"
+            raise Error(f"{name}: an array of shape {wanted} is needed, not of shape {rows.shape}")
+        rows = np.concatenate([rows, np.zeros((*rows.shape[:-1], 3 - rows.shape[-1]))], axis=-1)
+        return np.ascontiguousarray(np.broadcast_to(rows, (self.num_envs, vehicles, 3)))
 
     @property
     def positions(self) -> NDArray[np.float64]:
@@ -143,6 +156,25 @@ class VectorSimulation:
         distance to an obstacle less its clearance. It is below 0 exactly where there is a violation, and NaN for one
         vehicle without obstacles."""
         return self._native.least_clearance_m
+
+    @property
+    def slots_m(self) -> NDArray[np.float64]:
+        """(E, N, 3) present slots [m], a copy: those of the leg, moved by the reference."""
+        return self._native.slots()
+
+    def measured(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Returns the positions [m] and velocities [m/s] (E, N, 3) that the vehicles measure of themselves."""
+        positions, velocities = self._native.measured()
+        return positions, velocities
+
+    def received(self) -> NDArray[np.float64]:
+        """Returns positions [m] (E, N, N, 3): ``[e, i, j]`` is the last one that vehicle i received from vehicle j, and
+        its own measured one for i = j. It is NaN without a link."""
+        return self._native.received()
+
+    def to_obstacles(self) -> NDArray[np.float64]:
+        """Returns the vectors (E, N, K, 3) from each vehicle to the nearest point of each of K obstacles [m]."""
+        return self._native.obstacles(self.scenario._native.obstacles)
 
     @property
     def is_over(self) -> NDArray[np.bool_]:
@@ -239,10 +271,17 @@ class VectorSimulation:
             raise Error("out: the array is read-only; give a copy")
 
     def __copy__(self) -> VectorSimulation:
-        raise TypeError("a VectorSimulation cannot be copied; world(k) returns a copy of a world")
+        """Returns an independent copy, which continues with the same bits."""
+        copied = object.__new__(type(self))
+        copied.__dict__.update(self.__dict__)
+        copied._native = self._native.copy()
+        return copied
 
     def __deepcopy__(self, memo: dict[int, Any]) -> VectorSimulation:
-        return self.__copy__()
+        copied = copy.copy(self)
+        state = {name: value for name, value in self.__dict__.items() if name not in ("_native", "scenario")}
+        copied.__dict__.update(copy.deepcopy(state, memo))
+        return copied
 
     def __len__(self) -> int:
         return self.num_envs

@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._arguments import PathLike
-from ._formation import VIOLATION, FormationTask, Worlds
 from ._native import Error
+from ._picture import Picture
 from ._scenario import Scenario
+from .learning import VIOLATION, Actions, Observes, Reward, Rewards, Worlds, checked, observations_of
 
 try:
     import gymnasium
@@ -32,18 +33,25 @@ __all__ = ["VIOLATION", "FormationEnv", "FormationVectorEnv"]
 Observations = NDArray[np.float32]
 Info = dict[str, Any]
 
+RENDER_MODES = ["rgb_array", "human"]
+
 
 class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[Any]]):
     """Worlds of a scenario in which vehicles fly to their slots, stepped together.
 
     Actions are (E, N, D), from -1 to 1 along each axis, a share of ``max_accel_m_s2``, held for ``1 / hz`` seconds.
-    Observations are (E, N, D (N + 1)): of each vehicle its velocity [m/s] and the vectors to its slot and to all others
-    [m]. D is 2 in the plane z = 0, else 3. The reward is the mean distance to the slots [m], negative, less
-    ``VIOLATION`` for a violation.
+    They pass through the shield and the actuators of the scenario; ``shield`` adds or removes its shield. D is 2 in the
+    plane z = 0, else 3.
+
+    Observations are (E, N, ...), by default :class:`tautline.learning.Observation`; the reward of a world is the mean
+    over its vehicles, by default of :class:`tautline.learning.Reward`. ``observe`` and ``reward`` replace them.
 
     A violation, at or between steps, and a failed motion terminate an episode. The end of the scenario truncates it.
-    ``info["clearance_m"]`` has the smallest clearance of each episode so far [m], and ``info["verdict"]`` the verdict
-    of each episode that is over. All modes of autoreset are supported.
+    ``info["clearance_m"]`` has the smallest clearance of each episode so far [m]. For each episode that is over,
+    ``info["verdict"]`` has the verdict and, with a shield, ``info["shielded"]`` the share of commands that it changed.
+    All modes of autoreset are supported.
+
+    ``render_mode`` is ``rgb_array`` or ``human``, which shows the first world in a window; both need matplotlib.
     """
 
     sim: Worlds
@@ -55,41 +63,54 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         *,
         hz: float = 20.0,
         max_accel_m_s2: float = 5.0,
+        observe: Observes | None = None,
+        reward: Rewards | None = None,
+        shield: bool | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
         threads: int | None = None,
         set: Mapping[str, Any] | None = None,
+        render_mode: str | None = None,
     ) -> None:
-        self.sim = Worlds(scenario, num_envs, threads=threads, set=set)
-        self.task = FormationTask(self.sim.scenario, hz, max_accel_m_s2)
+        self.sim = Worlds(scenario, num_envs, threads=threads, shield=shield, set=set)
+        self.actions = Actions(self.sim, hz, max_accel_m_s2)
+        self.observe, observed = observations_of(observe, self.sim)
+        self.reward: Rewards = Reward() if reward is None else reward
         self.num_envs = self.sim.num_envs
         self.autoreset_mode = AutoresetMode(autoreset_mode)
-        self.metadata = {"render_modes": [], "autoreset_mode": self.autoreset_mode}
-        self.single_observation_space, self.single_action_space = _spaces(self.task)
+        self.metadata = {
+            "render_modes": RENDER_MODES,
+            "render_fps": max(1, round(self.actions.hz)),
+            "autoreset_mode": self.autoreset_mode,
+        }
+        self.render_mode = _render_mode(render_mode)
+        count, axes = len(self.sim.scenario), self.sim.axes
+        self._shape = (self.num_envs, count, axes)
+        self.single_observation_space = Box(-np.inf, np.inf, shape=(count, observed), dtype=np.float32)
+        self.single_action_space = Box(-1.0, 1.0, shape=(count, axes), dtype=np.float32)
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._done = np.zeros(self.num_envs, dtype=np.bool_)
-        self._is_seeded = False
+        self._is_begun = False
+        self._pictures: list[Picture] = []
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, Info]:
         """Resets all episodes, or those with ``options["reset_mask"]`` (E,).
 
-        World e takes ``seed + e`` or ``seed[e]`` as the seed of its start and flight. Without a seed, or with None in
-        the list, a world takes its next seed; the first ones are random. Seeds without a valid start are passed over
-        then, and are an error where they are given.
+        With ``seed``, world e begins the episodes of ``(seed, e)`` anew, with ``seed[e]`` those of ``(seed[e], 0)``.
+        Without a seed, or with None in the list, a world begins its next episode; the first seed is random.
+        ``options["positions_m"]`` and ``options["velocities_m_s"]`` are starts (E, N, 3), or of one world.
         """
         mask = np.ones(self.num_envs, dtype=np.bool_)
         if options is not None and options.get("reset_mask") is not None:
             mask = options["reset_mask"]
-        first = None
         if isinstance(seed, (int, np.integer)):
             super().reset(seed=int(seed))
-            seed = [int(seed) + e for e in range(self.num_envs)]
-        elif not self._is_seeded:
-            first = int(self.np_random.integers(2**31))
-        self.sim._reset(mask, seed, first)
-        self._is_seeded = True
+        if seed is not None:
+            self.sim.seed(seed)
+        self.sim.begin(mask, options)
+        self._is_begun = True
         self._done[mask] = False
         return self._observe(), self._info(np.zeros_like(self._done))
 
@@ -98,8 +119,8 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
     ) -> tuple[Observations, NDArray[np.float64], NDArray[np.bool_], NDArray[np.bool_], Info]:
         """Flies ``1 / hz`` seconds in every world. In the mode ``NEXT_STEP``, worlds whose episode was over are reset
         instead."""
-        u = self.task.commands(actions, (self.num_envs, self.task.count, self.task.axes))
-        if not self._is_seeded:
+        u = self.actions.commands(actions, self._shape)
+        if not self._is_begun:
             raise Error("step: the environment has no episode; call reset first")
         before = self._done.copy()
         if before.any():
@@ -107,11 +128,11 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
                 places = np.flatnonzero(before).tolist()
                 raise Error(f"step: the episodes of the worlds {places} are over; reset them with reset_mask")
             u[before] = 0.0
-        self.sim.step(u, steps=self.task.steps)
+        self.sim.step(u, steps=self.actions.steps)
         if before.any():
-            self.sim.reset(before)
-        terminated, truncated = _ends(self.sim)
-        rewards = self.task.rewards(self.sim.positions, self.sim.least_clearance_m < 0).mean(axis=1)
+            self.sim.begin(before)
+        terminated, truncated = self.sim.ends()
+        rewards = checked(self.reward(self.sim), self._shape[:2], "reward", np.float64).mean(axis=1)
         rewards[before] = 0.0
         self._done = terminated | truncated
         observations, info = self._observe(), self._info(self._done)
@@ -125,28 +146,41 @@ class FormationVectorEnv(VectorEnv[Observations, NDArray[np.float32], NDArray[An
         last = np.full(self.num_envs, None, dtype=object)
         for place in np.flatnonzero(done):
             last[place] = final[place]
-        self.sim.reset(done)
+        self.sim.begin(done)
         self._done = np.zeros_like(done)
         info = self._info(self._done)
         ended = {"final_obs": last, "_final_obs": done, "final_info": final_info, "_final_info": done.copy()}
         return self._observe(), {**info, **ended}
 
     def _observe(self) -> Observations:
-        return self.task.observe(self.sim.positions, self.sim.velocities)
+        return checked(self.observe(self.sim), self.observation_space.shape or (), "observe", np.float32)
 
     def _info(self, done: NDArray[np.bool_]) -> Info:
-        everywhere = np.ones(self.num_envs, dtype=np.bool_)
-        info: Info = {"clearance_m": self.sim.least_clearance_m.copy(), "_clearance_m": everywhere}
-        if done.any():
-            info["verdict"] = np.array(self.sim.statuses(done), dtype=object)
-            info["_verdict"] = done.copy()
-        return info
+        found = self.sim.info(done)
+        masks = {f"_{name}": np.ones_like(done) if name == "clearance_m" else done.copy() for name in found}
+        return {**found, **masks}
+
+    def render(self) -> tuple[NDArray[np.uint8], ...] | None:
+        """Returns a picture (height, width, 3) of each world, or shows the first world in a window."""
+        if self.render_mode is None:
+            return None
+        if not self._pictures:
+            shown = self.render_mode == "human"
+            self._pictures = [Picture(self.sim, shown) for _ in range(1 if shown else self.num_envs)]
+        drawn = [picture.draw(self.sim, world) for world, picture in enumerate(self._pictures)]
+        return None if self.render_mode == "human" else tuple(picture for picture in drawn if picture is not None)
+
+    def close_extras(self, **kwargs: Any) -> None:
+        """Closes the window."""
+        for picture in self._pictures:
+            picture.close()
+        self._pictures = []
 
 
 class FormationEnv(gymnasium.Env[Observations, NDArray[np.float32]]):
     """One world of :class:`FormationVectorEnv`, for programs that take a single environment. Actions are (N, D)."""
 
-    metadata: dict[str, Any] = {"render_modes": []}
+    metadata: dict[str, Any] = {"render_modes": RENDER_MODES, "render_fps": 20}
 
     def __init__(
         self,
@@ -154,49 +188,77 @@ class FormationEnv(gymnasium.Env[Observations, NDArray[np.float32]]):
         *,
         hz: float = 20.0,
         max_accel_m_s2: float = 5.0,
+        observe: Observes | None = None,
+        reward: Rewards | None = None,
+        shield: bool | None = None,
         set: Mapping[str, Any] | None = None,
+        render_mode: str | None = None,
     ) -> None:
-        self.sim = Worlds(scenario, 1, threads=1, set=set)
-        self.task = FormationTask(self.sim.scenario, hz, max_accel_m_s2)
-        self.observation_space, self.action_space = _spaces(self.task)
+        self.sim = Worlds(scenario, 1, threads=1, shield=shield, set=set)
+        self.actions = Actions(self.sim, hz, max_accel_m_s2)
+        self.observe, observed = observations_of(observe, self.sim)
+        self.reward: Rewards = Reward() if reward is None else reward
+        self.metadata = {**self.metadata, "render_fps": max(1, round(self.actions.hz))}
+        self.render_mode = _render_mode(render_mode)
+        self._shape = (len(self.sim.scenario), self.sim.axes)
+        self.observation_space = Box(-np.inf, np.inf, shape=(self._shape[0], observed), dtype=np.float32)
+        self.action_space = Box(-1.0, 1.0, shape=self._shape, dtype=np.float32)
+        self._picture: Picture | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observations, Info]:
-        """Starts an episode. ``seed`` determines it and, without further seeds, those after it. A seed without a valid
-        start is an error where it is given, and is passed over without ``seed``."""
+        """Begins the episodes of ``seed`` anew or, without a seed, the next episode; the first seed is random.
+
+        ``options["positions_m"]`` and ``options["velocities_m_s"]`` are a start (N, 3).
+        """
         super().reset(seed=seed)
-        self.sim.start(int(self.np_random.integers(2**31)), is_given=seed is not None)
+        if seed is not None:
+            self.sim.seed([seed])
+        self.sim.begin(np.ones(1, dtype=np.bool_), options)
+        self._show()
         return self._observe(), self._info(False)
 
     def step(self, action: NDArray[np.float32]) -> tuple[Observations, float, bool, bool, Info]:
         """Flies ``1 / hz`` seconds."""
-        u = self.task.commands(action, (self.task.count, self.task.axes))
-        self.sim.step(u[None], steps=self.task.steps)
-        terminated, truncated = (bool(end[0]) for end in _ends(self.sim))
-        reward = float(self.task.rewards(self.sim.positions, self.sim.least_clearance_m < 0).mean())
+        u = self.actions.commands(action, self._shape)
+        self.sim.step(u[None], steps=self.actions.steps)
+        terminated, truncated = (bool(end[0]) for end in self.sim.ends())
+        reward = float(checked(self.reward(self.sim), (1, self._shape[0]), "reward", np.float64).mean())
+        self._show()
         return self._observe(), reward, terminated, truncated, self._info(terminated or truncated)
 
     def _observe(self) -> Observations:
-        return np.asarray(self.task.observe(self.sim.positions, self.sim.velocities)[0])
+        shape = (1, *(self.observation_space.shape or ()))
+        return np.asarray(checked(self.observe(self.sim), shape, "observe", np.float32)[0])
 
     def _info(self, is_over: bool) -> Info:
-        info: Info = {"clearance_m": float(self.sim.least_clearance_m[0])}
-        return {**info, "verdict": self.sim.statuses()[0]} if is_over else info
+        found = self.sim.info(np.array([is_over]))
+        return {name: values[0].item() if isinstance(values[0], np.generic) else values[0] for name, values in found.items()}
+
+    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+        """Returns a picture (height, width, 3), or shows it in a window."""
+        if self.render_mode is None:
+            return None
+        self._picture = self._picture or Picture(self.sim, self.render_mode == "human")
+        return self._picture.draw(self.sim, 0)
+
+    def _show(self) -> None:
+        if self.render_mode == "human":
+            self.render()
+
+    def close(self) -> None:
+        """Closes the window."""
+        if self._picture is not None:
+            self._picture.close()
+        self._picture = None
 
 
-def _spaces(task: FormationTask) -> tuple[Any, Any]:
-    """Returns the spaces of observations and actions of one world."""
-    observations = Box(-np.inf, np.inf, shape=(task.count, task.observed), dtype=np.float32)
-    return observations, Box(-1.0, 1.0, shape=(task.count, task.axes), dtype=np.float32)
-
-
-def _ends(sim: Worlds) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Returns whether each episode is terminated, and whether it is truncated."""
-    terminated, over = sim.least_clearance_m < 0, sim.is_over
-    if over.any():
-        terminated |= np.array([ending not in (None, "completed") for ending in sim.endings])
-    return terminated, over & ~terminated
+def _render_mode(given: str | None) -> str | None:
+    """Returns a known mode."""
+    if given is not None and given not in RENDER_MODES:
+        raise Error(f"render_mode: must be {' or '.join(RENDER_MODES)}, got {given!r}")
+    return given
 
 
 if "tautline/Formation-v0" not in gymnasium.registry:
@@ -204,4 +266,6 @@ if "tautline/Formation-v0" not in gymnasium.registry:
         "tautline/Formation-v0",
         entry_point="tautline.gymnasium:FormationEnv",
         vector_entry_point="tautline.gymnasium:FormationVectorEnv",
+        # Without other starts, a policy learns one flight.
+        kwargs={"set": {"start.jitter_m": 0.1}},
     )

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ._arguments import PathLike
-from ._formation import VIOLATION, FormationTask, Worlds
 from ._native import Error
+from ._picture import Picture
 from ._scenario import Scenario
+from .learning import VIOLATION, Actions, Observes, Reward, Rewards, Worlds, checked, observations_of
 
 try:
     from gymnasium.spaces import Box
-    from gymnasium.utils import seeding
     from pettingzoo import ParallelEnv
 except ModuleNotFoundError as missing:
     package = str(missing.name).partition(".")[0]
@@ -29,19 +29,21 @@ __all__ = ["VIOLATION", "FormationEnv"]
 Arrays = dict[str, NDArray[np.float32]]
 
 
+RENDER_MODES = ["rgb_array", "human"]
+
+
 class FormationEnv(ParallelEnv):  # type: ignore[misc]
     """A world of a scenario in which each vehicle flies to its slot.
 
-    An agent observes its velocity [m/s] and the vectors to its slot and to all others [m], D (N + 1) numbers. D is 2 in
-    the plane z = 0, else 3. Its action (D,), from -1 to 1 along each axis, is a share of ``max_accel_m_s2``, held for
-    ``1 / hz`` seconds. Its reward is its distance to the slot [m], negative, less ``VIOLATION`` for a violation.
+    The action of an agent (D,), from -1 to 1 along each axis, is a share of ``max_accel_m_s2``, held for ``1 / hz``
+    seconds. It passes through the shield and the actuators of the scenario; ``shield`` adds or removes its shield. D is
+    2 in the plane z = 0, else 3. Observations are by default :class:`tautline.learning.Observation`, rewards
+    :class:`tautline.learning.Reward`; ``observe`` and ``reward`` replace them. :meth:`state` is for central critics.
 
     A violation, at or between steps, and a failed motion terminate the episode of all agents. The end of the scenario
-    truncates it. The info has ``clearance_m``, the smallest clearance so far [m], and at the end the ``verdict``.
+    truncates it. The info has ``clearance_m``, the smallest clearance so far [m]. At the end it has the ``verdict`` and,
+    with a shield, ``shielded``, the share of commands that the shield changed.
     """
-
-    metadata: dict[str, Any] = {"name": "tautline_formation_v1", "render_modes": []}
-    render_mode = None
 
     def __init__(
         self,
@@ -49,17 +51,35 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
         *,
         hz: float = 20.0,
         max_accel_m_s2: float = 5.0,
+        observe: Observes | None = None,
+        reward: Rewards | None = None,
+        shield: bool | None = None,
         set: Mapping[str, Any] | None = None,
+        render_mode: str | None = None,
     ) -> None:
-        self.sim = Worlds(scenario, 1, threads=1, set=set)
-        self.task = FormationTask(self.sim.scenario, hz, max_accel_m_s2)
-        self.possible_agents = [f"vehicle_{number}" for number in range(1, self.task.count + 1)]
+        if render_mode is not None and render_mode not in RENDER_MODES:
+            raise Error(f"render_mode: must be {' or '.join(RENDER_MODES)}, got {render_mode!r}")
+        self.sim = Worlds(scenario, 1, threads=1, shield=shield, set=set)
+        self._actions = Actions(self.sim, hz, max_accel_m_s2)
+        self.observe, observed = observations_of(observe, self.sim)
+        self.reward: Rewards = Reward() if reward is None else reward
+        self.metadata: dict[str, Any] = {
+            "name": "tautline_formation_v2",
+            "render_modes": RENDER_MODES,
+            "render_fps": max(1, round(self._actions.hz)),
+        }
+        self.render_mode = render_mode
+        self._shape = (len(self.sim.scenario), self.sim.axes)
+        self.possible_agents = [f"vehicle_{number}" for number in range(1, self._shape[0] + 1)]
         self.agents: list[str] = []
-        self.np_random, _ = seeding.np_random(None)
-        space = Box(-np.inf, np.inf, shape=(self.task.observed,), dtype=np.float32)
+        space = Box(-np.inf, np.inf, shape=(observed,), dtype=np.float32)
         self.observation_spaces = {agent: space for agent in self.possible_agents}
         # Samples of each agent come from a generator of its own.
-        self.action_spaces = {agent: Box(-1.0, 1.0, (self.task.axes,), np.float32) for agent in self.possible_agents}
+        self.action_spaces = {agent: Box(-1.0, 1.0, self._shape[1:], np.float32) for agent in self.possible_agents}
+        #: Space of :meth:`state`.
+        self.state_space = Box(-np.inf, np.inf, shape=(self._shape[0], 3 * self._shape[1]), dtype=np.float32)
+        self._observed = observed
+        self._picture: Picture | None = None
 
     def observation_space(self, agent: str) -> Box:
         """Returns the space of an agent's observations."""
@@ -69,15 +89,24 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
         """Returns the space of an agent's actions."""
         return self.action_spaces[agent]
 
+    def state(self) -> NDArray[np.float32]:
+        """Returns the true positions [m], velocities [m/s] and present slots [m] of all vehicles (N, 3 D)."""
+        sim = self.sim
+        parts = [rows[0, :, : sim.axes] for rows in (sim.positions, sim.velocities, sim.slots_m)]
+        return np.concatenate(parts, axis=-1, dtype=np.float32)
+
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Arrays, dict[str, dict[str, Any]]]:
-        """Starts an episode. ``seed`` determines it and, without further seeds, those after it. A seed without a valid
-        start is an error where it is given, and is passed over without ``seed``."""
+        """Begins the episodes of ``seed`` anew or, without a seed, the next episode; the first seed is random.
+
+        ``options["positions_m"]`` and ``options["velocities_m_s"]`` are a start (N, 3).
+        """
         if seed is not None:
-            self.np_random, _ = seeding.np_random(seed)
-        self.sim.start(int(self.np_random.integers(2**31)), is_given=seed is not None)
+            self.sim.seed([seed])
+        self.sim.begin(np.ones(1, dtype=np.bool_), options)
         self.agents = list(self.possible_agents)
+        self._show()
         return self._observe(), self._infos(False)
 
     def step(
@@ -88,16 +117,13 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
             raise Error("step: no episode is in progress; call reset first")
         if missing := [agent for agent in self.agents if agent not in actions]:
             raise Error(f"actions: that of {missing[0]} is missing; give one for each of {len(self.agents)} agents")
-        given = [np.asarray(actions[agent]) for agent in self.possible_agents]
-        if wrong := [a for a, x in zip(self.possible_agents, given, strict=True) if x.shape != (self.task.axes,)]:
-            raise Error(f"actions: that of {wrong[0]} must have the shape ({self.task.axes},)")
-        u = self.task.commands(given, (self.task.count, self.task.axes))
-        self.sim.step(u[None], steps=self.task.steps)
-        violated = self.sim.least_clearance_m < 0
-        ending = self.sim.endings[0]
-        is_terminated = bool(violated[0]) or ending not in (None, "completed")
-        is_truncated = ending == "completed" and not is_terminated
-        rewards = self.task.rewards(self.sim.positions, violated)[0]
+        given, each = [np.asarray(actions[agent]) for agent in self.possible_agents], self._shape[1:]
+        if wrong := [a for a, x in zip(self.possible_agents, given, strict=True) if x.shape != each]:
+            raise Error(f"actions: that of {wrong[0]} must have the shape {each}")
+        self.sim.step(self._actions.commands(given, self._shape)[None], steps=self._actions.steps)
+        is_terminated, is_truncated = (bool(end[0]) for end in self.sim.ends())
+        rewards = checked(self.reward(self.sim), (1, self._shape[0]), "reward", np.float64)[0]
+        self._show()
         result = (
             self._observe(),
             {agent: float(reward) for agent, reward in zip(self.possible_agents, rewards, strict=True)},
@@ -110,11 +136,29 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
         return result
 
     def _observe(self) -> Arrays:
-        observations = self.task.observe(self.sim.positions, self.sim.velocities)[0]
+        shape = (1, self._shape[0], self._observed)
+        observations = checked(self.observe(self.sim), shape, "observe", np.float32)[0]
         return dict(zip(self.possible_agents, observations, strict=True))
 
     def _infos(self, is_over: bool) -> dict[str, dict[str, Any]]:
-        info: dict[str, Any] = {"clearance_m": float(self.sim.least_clearance_m[0])}
-        if is_over:
-            info["verdict"] = self.sim.statuses()[0]
+        found = self.sim.info(np.array([is_over]))
+        info = {name: np.asarray(values)[0] for name, values in found.items()}
+        info = {name: value.item() if isinstance(value, np.generic) else value for name, value in info.items()}
         return {agent: dict(info) for agent in self.possible_agents}
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Returns a picture (height, width, 3), or shows it in a window. It needs matplotlib."""
+        if self.render_mode is None:
+            return None
+        self._picture = self._picture or Picture(self.sim, self.render_mode == "human")
+        return self._picture.draw(self.sim, 0)
+
+    def _show(self) -> None:
+        if self.render_mode == "human":
+            self.render()
+
+    def close(self) -> None:
+        """Closes the window."""
+        if self._picture is not None:
+            self._picture.close()
+        self._picture = None

@@ -1,5 +1,6 @@
 """Tests of the environments for Gymnasium and PettingZoo, with the API tests of these packages."""
 
+import copy
 import subprocess
 import sys
 import unittest
@@ -13,6 +14,7 @@ from gymnasium.vector import AutoresetMode
 from pettingzoo.test import parallel_api_test, parallel_seed_test
 from shared import ROOT, Case
 from tautline.gymnasium import FormationEnv, FormationVectorEnv
+from tautline.learning import Observation, Reward, Worlds, episode_seed
 from tautline.pettingzoo import FormationEnv as ParallelFormationEnv
 
 SHORT = {"start.jitter_m": 0.1, "time.duration_s": 2.0}
@@ -29,13 +31,14 @@ def crash(env: FormationVectorEnv, world: int) -> np.ndarray:
 
 class Gymnasium(Case):
     def test_one_world_passes_the_check_of_gymnasium(self) -> None:
-        for scenario, more in ("pentagon", {}), ("crazyflies", {}), ("swap", {"deadlock.mode": "off"}):
+        for scenario in "pentagon", "crazyflies", "swap", "obstacles", "shielded-crazyflies":
             with warnings.catch_warnings():
                 warnings.simplefilter("error")
                 # The spaces of velocities and distances have no limit.
                 warnings.filterwarnings("ignore", message=".*observation space (minimum|maximum) value is.*infinity")
                 warnings.filterwarnings("ignore", message=".*not within the.*|.*render.*|.*the reward.*")
-                env = gymnasium.make("tautline/Formation-v0", scenario=scenario, set={"time.duration_s": 2.0, **more})
+                sets = {"time.duration_s": 2.0, "leg": []}
+                env = gymnasium.make("tautline/Formation-v0", scenario=scenario, hz=10, set=sets)
                 check_env(env.unwrapped, skip_render_check=True)
 
     def test_the_vector_environment_has_the_spaces_and_types_that_it_declares(self) -> None:
@@ -55,17 +58,50 @@ class Gymnasium(Case):
             self.assertEqual((terminated.dtype, truncated.dtype), (bool, bool))
             self.assertFalse((terminated & truncated).any())
 
-    def test_worlds_of_the_vector_environment_have_the_seeds_of_gymnasium(self) -> None:
+    def test_seeds_worlds_and_episodes_determine_the_starts_in_all_environments(self) -> None:
         env = FormationVectorEnv("pentagon", 3, set=SHORT)
         first, _ = env.reset(seed=7)
-        self.assertEqual(env.sim.seeds.tolist(), [7, 8, 9])
-        again, _ = env.reset(seed=[7, 8, 9])
+        self.assertEqual(env.sim.seeds.tolist(), [episode_seed(7, world, 0) for world in range(3)])
+        again, _ = env.reset(seed=7)
         np.testing.assert_array_equal(first, again)
-        other, _ = env.reset()
-        self.assertEqual(env.sim.seeds.tolist(), [10, 11, 12])
-        self.assertFalse((first == other).all())
+        later, _ = env.reset()
+        self.assertEqual(env.sim.seeds.tolist(), [episode_seed(7, world, 1) for world in range(3)])
+        self.assertFalse((first == later).all())
+        env.reset(seed=[None, 9, 9])
+        self.assertEqual(env.sim.seeds.tolist(), [episode_seed(*of) for of in ((7, 0, 2), (9, 0, 0), (9, 0, 0))])
+        for make in FormationEnv, ParallelFormationEnv:
+            one = make("pentagon", set=SHORT)
+            one.reset(seed=9)
+            self.assertEqual(one.sim.seeds.tolist(), [episode_seed(9, 0, 0)])
+            one.reset()
+            self.assertEqual(one.sim.seeds.tolist(), [episode_seed(9, 0, 1)])
         unseeded = [FormationVectorEnv("pentagon", 1, set=SHORT).reset()[0] for _ in range(2)]
         self.assertFalse((unseeded[0] == unseeded[1]).all())
+
+    def test_episodes_of_other_seeds_do_not_overlap(self) -> None:
+        def flown(seed: int) -> set[int]:
+            return {episode_seed(seed, world, episode) for world in range(16) for episode in range(70)}
+
+        training, evaluation = flown(0), flown(1)
+        self.assertEqual((len(training), len(training & evaluation)), (16 * 70, 0))
+        self.assertTrue(all(0 <= seed < 2**63 for seed in training))
+
+    def test_options_give_starts(self) -> None:
+        positions = np.array([[3.0 * i, 1.0] for i in range(5)])
+        velocities = np.full((5, 2), 0.25)
+        options = {"positions_m": positions, "velocities_m_s": velocities}
+        for make in FormationEnv, FormationVectorEnv, ParallelFormationEnv:
+            env = make("pentagon", set=SHORT)
+            env.reset(seed=1, options=options)
+            np.testing.assert_array_equal(env.sim.positions[0, :, :2], positions)
+            np.testing.assert_array_equal(env.sim.velocities[0, :, :2], velocities)
+            env.reset(options={"positions_m": positions})
+            np.testing.assert_array_equal(env.sim.velocities, np.zeros((1, 5, 3)))
+            crossed = {"positions_m": np.zeros((5, 2))}
+            self.refuses(tl.Error, "gives no valid scenario", lambda env=env, crossed=crossed: env.reset(options=crossed))
+            self.refuses(tl.Error, "unknown option position", lambda env=env: env.reset(options={"position": 1}))
+            short = {"positions_m": np.zeros((4, 2))}
+            self.refuses(tl.Error, "positions: an array of shape", lambda env=env, short=short: env.reset(options=short))
 
     def test_episodes_of_the_next_step_mode_restart_one_step_later(self) -> None:
         env = FormationVectorEnv("pentagon", 2, set=LONG)
@@ -85,7 +121,7 @@ class Gymnasium(Case):
         observations, rewards, terminated, truncated, _ = env.step(actions)
         self.assertEqual((terminated.any(), truncated.any(), rewards[0]), (False, False, 0.0))
         self.assertEqual(env.sim.steps.tolist(), [0, steps + 12])
-        self.assertEqual(env.sim.seeds.tolist(), [2, 1])
+        self.assertEqual(env.sim.seeds.tolist(), [episode_seed(0, 0, 1), episode_seed(0, 1, 0)])
         np.testing.assert_array_equal(observations[0, :, :2], np.zeros((5, 2)))
 
     def test_the_same_step_mode_returns_the_last_observation_in_the_info(self) -> None:
@@ -150,51 +186,174 @@ class Gymnasium(Case):
                 pass
             self.assertEqual(ends[3].tolist(), [True, True])
             env.step(still)
-            self.assertEqual(env.sim.seeds.tolist(), [77, 76])
-            env.reset(seed=[None, 80])
-            self.assertEqual(env.sim.seeds.tolist(), [79, 80])
-            self.refuses(tl.Error, "seed 75", lambda env=env: env.reset(seed=75))
+            first = [episode_seed(73, world, 1) for world in range(2)]
+            self.assertTrue(all((seed - start) % 2 == 0 for seed, start in zip(env.sim.seeds.tolist(), first)))
         # Of many random first seeds some have no valid start.
         FormationVectorEnv("pentagon", 300, set=sets).reset()
         for make in (FormationEnv, ParallelFormationEnv):
-            env, refused = make("pentagon", set=sets), 0
+            env, passed = make("pentagon", set=sets), 0
             for seed in range(60):
-                try:
-                    env.reset(seed=seed)
-                except tl.Error:
-                    refused += 1
-                env.reset()
-            self.assertGreater(refused, 0)
+                env.reset(seed=seed)
+                passed += int(env.sim.seeds[0]) != episode_seed(seed, 0, 0)
+            self.assertGreater(passed, 0)
 
-    def test_scenarios_with_parts_that_an_environment_ignores_are_refused(self) -> None:
-        accepted = []
+    def test_all_scenarios_but_those_of_a_leader_are_flown(self) -> None:
         for name in tl.scenarios():
-            try:
-                env = FormationVectorEnv(name, 1, hz=tl.Scenario(name).dt_s ** -1)
-            except tl.Error as error:
-                self.assertIn(f"scenario: an environment ignores parts of {name}: ", str(error))
-                for make in (FormationEnv, ParallelFormationEnv):
-                    self.refuses(tl.Error, str(error), lambda make=make, name=name: make(name))
+            hz = tl.Scenario(name).dt_s ** -1
+            if name in ("leader-lossy", "pentagon-leader"):
+                message = f"scenario: an environment ignores reference.leader of {name}"
+                for make in (FormationEnv, FormationVectorEnv, ParallelFormationEnv):
+                    self.refuses(tl.Error, message, lambda make=make, name=name: make(name))
                 continue
-            # The slots that the environment pays for are those to which the scenario flies.
-            accepted.append(name)
-            np.testing.assert_array_equal(env.task._slots_m, tl.Scenario(name).slots_m[:, : env.task.axes])
-        static = ["circle", "crazyflies", "hexagon", "pentagon", "pentagon-collinear", "pentagon-laplacian"]
-        self.assertEqual(sorted(accepted), static)
+            env = FormationVectorEnv(name, 1, hz=hz)
+            observations, _ = env.reset(seed=0)
+            axes, slots = env.sim.axes, env.sim.slots_m
+            to_slot = observations[:, :, axes : 2 * axes]
+            known = env.sim.measured()[0] if name != "thousand" else env.sim.positions
+            np.testing.assert_allclose(to_slot, (slots - known)[..., :axes], atol=1e-5)
 
-    def test_a_refusal_names_each_part_and_a_remedy(self) -> None:
-        message = (
-            "scenario: an environment ignores parts of shielded-crazyflies: network (observations are the true states),"
-            " shield (it replaces actions); give set={'network': {}, 'shield.enabled': False}"
+    def test_slots_of_later_legs_and_of_a_reference_are_observed(self) -> None:
+        sets = {
+            "time.duration_s": 5.0,
+            "leg": [{"shape": "circle", "radius_m": 6.0, "start_s": 1.0}],
+            "reference": {"kind": "velocity", "velocity_m_s": [1.0, 0.0]},
+        }
+        env = FormationVectorEnv("pentagon", 1, set=sets)
+        observations, _ = env.reset(seed=0)
+        before = env.sim.slots_m
+        for _ in range(30):
+            observations, rewards, *_ = env.step(np.zeros((1, 5, 2)))
+        after = env.sim.slots_m
+        self.assertGreater(np.linalg.norm(after - before, axis=-1).min(), 0.5)
+        np.testing.assert_allclose(after[0, :, :2].mean(0), [1.5, 0.0], atol=1e-9)
+        expected = -np.linalg.norm(after - env.sim.positions, axis=-1).mean()
+        self.assertAlmostEqual(rewards[0], expected)
+        np.testing.assert_allclose(observations[0, :, 2:4], (after - env.sim.positions)[0, :, :2], atol=1e-5)
+
+    def test_vehicles_observe_what_they_know_or_the_truth(self) -> None:
+        noisy = {**SHORT, "sensing": {"position_noise_m": 0.1, "rate_hz": 100.0}}
+        known, true = FormationVectorEnv("pentagon", 1, set=noisy), FormationVectorEnv(
+            "pentagon", 1, observe=Observation(true_states=True), set=noisy
         )
-        self.refuses(tl.Error, message, lambda: FormationEnv("shielded-crazyflies"))
-        FormationVectorEnv("shielded-crazyflies", 2, set={"network": {}, "shield.enabled": False})
-        message = (
-            "scenario: an environment ignores parts of leader-lossy: reference (it moves the slots), reference.leader"
-            " (the other vehicles follow the leader), deadlock (it spreads the slots), network (observations are the"
-            " true states); give a scenario without [reference], and give set={'deadlock.mode': 'off', 'network': {}}"
+        for env, is_true in (known, False), (true, True):
+            observations, _ = env.reset(seed=0)
+            to_slot = (env.sim.slots_m - env.sim.positions)[..., :2]
+            off_m = np.abs(observations[..., 2:4] - to_slot).max()
+            self.assertEqual(off_m < 1e-5, is_true, off_m)
+            self.assertLess(off_m, 1.0)
+        late = FormationVectorEnv("pentagon", 1, set={**LONG, "network": {"rate_hz": 20.0, "latency_s": 0.5}})
+        late.reset(seed=0)
+        push = np.zeros((1, 5, 2), dtype=np.float32)
+        push[..., 0] = 0.2
+        for _ in range(40):
+            observations, *_ = late.step(push)
+        received, p = late.sim.received(), late.sim.positions
+        lag_m = p[:, None] - received
+        behind_m = lag_m[0, 0, 1:, 0]
+        self.assertTrue((behind_m > 0.1).all(), behind_m)
+        np.testing.assert_allclose(observations[0, 0, 4:6], (received[0, 0, 1] - p[0, 0])[:2], atol=1e-5)
+
+    def test_obstacles_are_observed(self) -> None:
+        env = FormationVectorEnv("obstacles", 1, set={"leg": []})
+        observations, _ = env.reset(seed=0)
+        nearest = env.sim.to_obstacles()
+        self.assertEqual(observations.shape[2], 2 * (len(env.sim.scenario) + 1) + 2 * nearest.shape[2])
+        np.testing.assert_allclose(observations[0, :, -2:], nearest[0, :, -1, :2], atol=1e-5)
+        least_m = np.linalg.norm(nearest, axis=-1).min()
+        self.assertGreater(least_m, env.sim.least_clearance_m[0] - 1e-9)
+
+    def test_observations_and_rewards_are_replaced(self) -> None:
+        class Slow(Reward):
+            def __call__(self, worlds: Worlds) -> np.ndarray:
+                return super().__call__(worlds) - np.linalg.norm(worlds.velocities, axis=-1)
+
+        class Own(Observation):
+            def size(self, worlds: Worlds) -> int:
+                return 2
+
+            def __call__(self, worlds: Worlds) -> np.ndarray:
+                return worlds.velocities[..., :2].astype(np.float32)
+
+        for make in FormationEnv, ParallelFormationEnv:
+            env = make("pentagon", observe=Own(), reward=Slow(violation=7.0), set=SHORT)
+            env.reset(seed=0)
+        vector = FormationVectorEnv("pentagon", 2, observe=Own(), reward=Slow(violation=7.0), set=LONG)
+        self.assertEqual(vector.observation_space.shape, (2, 5, 2))
+        vector.reset(seed=0)
+        while True:
+            _, rewards, terminated, *_ = vector.step(crash(vector, 0))
+            if terminated.any():
+                break
+        self.assertTrue(-20 < rewards[0] < -7, rewards)
+
+        class Wrong(Own):
+            def size(self, worlds: Worlds) -> int:
+                return 3
+
+        self.refuses(
+            tl.Error, "observe: must return an array of shape (1, 5, 3)",
+            lambda: FormationEnv("pentagon", observe=Wrong()).reset(seed=0),
         )
-        self.refuses(tl.Error, message, lambda: FormationEnv("leader-lossy"))
+
+    def test_a_shield_keeps_every_policy_clear(self) -> None:
+        for shield, verdict in (True, "clear"), (False, "violation"):
+            sets = {"start.jitter_m": 0.1, "time.duration_s": 10.0}
+            env = FormationVectorEnv("hexagon", 4, shield=shield, autoreset_mode="Disabled", set=sets)
+            env.reset(seed=0)
+            ended: dict[int, dict[str, object]] = {}
+            while len(ended) < 4:
+                p = env.sim.positions[..., : env.sim.axes]
+                actions = np.clip(p.mean(axis=1, keepdims=True) - p, -1, 1)
+                env._done[:] = False
+                _, _, terminated, truncated, info = env.step(actions)
+                for e in np.flatnonzero(terminated | truncated):
+                    ended.setdefault(int(e), {name: values[e] for name, values in info.items()})
+            self.assertEqual({info["verdict"] for info in ended.values()}, {verdict})
+            for info in ended.values():
+                self.assertEqual("shielded" in info, shield)
+                self.assertGreater(info.get("shielded", 1.0), 0.0)
+
+    def test_actuators_limit_actions(self) -> None:
+        envs = [FormationVectorEnv("pentagon", 1, set={**SHORT, **more})
+                for more in ({}, {"actuation": {"max_accel_m_s2": 0.5}})]
+        for env in envs:
+            env.reset(seed=0)
+            env.step(np.ones((1, 5, 2)))
+        speeds = [float(np.abs(env.sim.velocities).max()) for env in envs]
+        self.assertGreater(speeds[0], 5 * speeds[1])
+
+    def test_copies_continue_with_the_same_bits(self) -> None:
+        env = FormationVectorEnv("pentagon", 2, set=LONG)
+        env.reset(seed=0)
+        env.step(np.full((2, 5, 2), 0.2))
+        twin = copy.deepcopy(env)
+        for _ in range(5):
+            for one in env, twin:
+                one.step(np.full((2, 5, 2), -0.1))
+        np.testing.assert_array_equal(env.sim.positions, twin.sim.positions)
+        twin.step(np.full((2, 5, 2), 0.3))
+        self.assertTrue((env.sim.positions != twin.sim.positions).any())
+        np.testing.assert_array_equal(env.reset()[0], twin.reset()[0])
+
+    def test_pictures_show_the_vehicles(self) -> None:
+        for make in FormationEnv, ParallelFormationEnv:
+            env = make("obstacles", render_mode="rgb_array", set={"leg": []})
+            env.reset(seed=0)
+            first = env.render()
+            self.assertEqual((first.shape, first.dtype), ((480, 480, 3), np.uint8))
+            self.assertGreater((first != 255).any(axis=-1).sum(), 1000)
+            env.sim.step(np.ones((1, len(env.sim.scenario), 3)), steps=400)
+            self.assertTrue((env.render() != first).any())
+            env.close()
+            self.refuses(tl.Error, "render_mode: must be rgb_array or human", lambda make=make: make(render_mode="x"))
+        vector = FormationVectorEnv("pentagon", 2, render_mode="rgb_array")
+        vector.reset(seed=0)
+        self.assertEqual([picture.shape for picture in vector.render()], [(480, 480, 3)] * 2)
+        self.assertIsNone(FormationEnv("pentagon").render())
+        frames = gymnasium.wrappers.RenderCollection(FormationEnv("pentagon", render_mode="rgb_array"))
+        frames.reset(seed=0)
+        frames.step(np.zeros((5, 2)))
+        self.assertEqual(len(frames.render()), 2)
 
 
 class PettingZoo(Case):
@@ -230,6 +389,9 @@ class PettingZoo(Case):
         env, joint = ParallelFormationEnv(set=SHORT), FormationEnv(set=SHORT)
         observations, _ = env.reset(seed=3)
         np.testing.assert_array_equal(np.stack(list(observations.values())), joint.reset(seed=3)[0])
+        expected = [rows[0, :, :2] for rows in (env.sim.positions, env.sim.velocities, env.sim.slots_m)]
+        np.testing.assert_allclose(env.state(), np.concatenate(expected, axis=-1), atol=1e-5)
+        self.assertEqual(env.state().shape, env.state_space.shape)
         self.refuses(tl.Error, "that of vehicle_1 is missing", lambda: env.step({}))
 
 

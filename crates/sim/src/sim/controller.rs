@@ -27,7 +27,7 @@ pub(super) struct Controller {
     metric: Metric,
     near: VerletList,
     pub(super) shield: Option<ShieldStage>,
-    /// Last command of the law, as the shield changed it, N x 3 \[m/s^2\].
+    /// Last command of the law or from outside, as the shield changed it, N x 3 \[m/s^2\].
     commanded: Rows,
 }
 
@@ -96,7 +96,25 @@ impl Controller {
         Ok(())
     }
 
-    /// Writes the accelerations at a time \[s\] that result from the law's last command.
+    /// Takes accelerations from outside as the command of this instant, after the shield, and writes those that reach
+    /// the vehicles.
+    pub(super) fn filter(&mut self, time_s: f64, truth: &Swarm, given: &Rows, command: &mut Rows) {
+        self.commanded.copy_from(given);
+        let own = self.link.sense(time_s, truth).own;
+        if let Some(shield) = &mut self.shield {
+            shield.filter(time_s, truth, own, &mut self.commanded);
+        }
+        self.actuate(time_s, command);
+    }
+
+    /// Returns what the vehicles know at an instant, without the pairs in sensing range.
+    pub(super) fn observation<'a>(&'a mut self, time_s: f64, truth: &'a Swarm) -> Observation<'a> {
+        let sensed = self.link.sense(time_s, truth);
+        let (own, others, target) = (sensed.own, sensed.others, self.target.view());
+        Observation { time_s, own, others, target, links: &self.links, near: &[], obstacles: &self.obstacles }
+    }
+
+    /// Writes the accelerations at a time \[s\] that result from the last command.
     pub(super) fn actuate(&mut self, time_s: f64, command: &mut Rows) {
         command.copy_from(&self.commanded);
         self.link.actuate(time_s, command);

@@ -260,12 +260,6 @@ pub enum SimError {
     /// The scenario does not fit its shield.
     #[error(transparent)]
     Shield(#[from] ScenarioError),
-    /// Accelerations are given to a scenario with a shield.
-    #[error(
-        "the shield filters the commands of a law at its own instants, not accelerations of a step; write a law, or \
-         use the shield outside of the simulation"
-    )]
-    ShieldedCommands,
     /// An external law failed or commanded numbers that are not finite.
     #[error("the law {law}: {reason}")]
     ExternalLaw {
@@ -324,8 +318,7 @@ impl From<SimError> for Failure {
             | SimError::Obstacle(_)
             | SimError::Vehicles { .. }
             | SimError::Commands { .. }
-            | SimError::EngineDiffers(_)
-            | SimError::ShieldedCommands => Self::new("simulation/inconsistent", false, error.to_string()),
+            | SimError::EngineDiffers(_) => Self::new("simulation/inconsistent", false, error.to_string()),
             SimError::Shield(error) => error.into(),
             SimError::ExternalLaw { .. } => Self::input(
                 "simulation/law-failed",

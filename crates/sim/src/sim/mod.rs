@@ -16,7 +16,7 @@ pub use ending::{Breakdown, Ending, Flight, Performance, SimError};
 pub(crate) use ending::{MAX_BEND, Stopwatch};
 pub(crate) use judge::check_judge;
 pub use simulation::{Components, SavedState, Simulation};
-pub use vector::{SeedChoice, States, StatesMut, Threads, VectorError, VectorSimulation};
+pub use vector::{GivenStarts, SeedChoice, States, StatesMut, Threads, VectorError, VectorSimulation};
 
 use std::ops::ControlFlow;
 use std::time::Instant;

@@ -2,6 +2,8 @@
 
 mod step;
 
+use std::time::Duration;
+
 use super::controller::Controller;
 use super::ending::{Breakdown, Ending, Flight, MAX_COMMAND_M_S2, Performance, SimError, Stopwatch};
 use super::judge::{AuditResults, Judge};
@@ -10,11 +12,12 @@ use super::monitors::{IntegrationError, RoundingBound};
 use crate::link::{self, Imperfections};
 use crate::plant::{self, FreeSteps, Plant, StepPath};
 use crate::scenario::Scenario;
-use crate::shield::ShieldStage;
+use crate::shield::{ShieldReport, ShieldStage};
 use tautline_core::record::{Channel, Event, Peaks, Sample};
 use tautline_core::swarm::{ClosestApproach, Rows, Swarm, first_row_beyond};
 use tautline_laws::law::{Certificate, Law, VoidReason};
-use tautline_laws::target::{Schedule, Supervisor};
+use tautline_laws::observation::Observation;
+use tautline_laws::target::{Schedule, Supervisor, Target};
 
 /// Flight in progress: law, link, supervisor, vehicles and audit, with all of their memory.
 ///
@@ -49,6 +52,8 @@ pub struct Simulation {
     control: Rows,
     /// Whether `control` is from outside and the law has not been evaluated for the present state.
     overruled: bool,
+    /// Whether a shield has no command at the present instant of command yet.
+    awaits_command: bool,
     time_s: f64,
     steps: u64,
     events: Vec<Event>,
@@ -95,6 +100,19 @@ impl Simulation {
     /// # Errors
     /// [`SimError`] if the audit does not support the scenario.
     pub fn with(scenario: &Scenario, parts: Components) -> Result<Self, SimError> {
+        Self::at_start(scenario, parts, false)
+    }
+
+    /// Creates a flight at its start whose first commands may come from outside ([`Simulation::step_with`]): under a
+    /// shield, the law is not evaluated before the first step.
+    ///
+    /// # Errors
+    /// As [`Simulation::new`].
+    pub fn awaiting_commands(scenario: &Scenario, parts: Components) -> Result<Self, SimError> {
+        Self::at_start(scenario, parts, scenario.shield.is_some())
+    }
+
+    fn at_start(scenario: &Scenario, parts: Components, awaits_command: bool) -> Result<Self, SimError> {
         let Components { law, plant, link, supervisor } = parts;
         let count = scenario.count();
         if plant.count() != count {
@@ -120,7 +138,8 @@ impl Simulation {
             next: state.clone(),
             path: StepPath::default(),
             control: Rows::zeros(count),
-            overruled: false,
+            overruled: awaits_command,
+            awaits_command,
             state,
             time_s: 0.0,
             steps: 0,
@@ -165,36 +184,51 @@ impl Simulation {
     /// ([`Flight::overlong_steps`]), and the certificate is void.
     pub fn step(&mut self) {
         if self.ending.is_none() && std::mem::take(&mut self.overruled) {
-            let asked = self.evaluate_law();
-            self.end_if_over(asked);
+            // A shield keeps its command until its next instant.
+            if std::mem::take(&mut self.awaits_command) || self.controller.shield.is_none() {
+                let asked = self.evaluate_law();
+                self.end_if_over(asked);
+            }
         }
         self.step_or_end();
     }
 
-    /// Flies one step with given accelerations \[m/s^2\], N x 3, instead of those of the law. The step is not divided
-    /// for the barrier or the rate of the law, and the law's energy is not computed.
+    /// Flies one step with given accelerations \[m/s^2\], N x 3, instead of those of the law. They pass through the
+    /// shield and the actuators. The step is not divided for the barrier or the rate of the law, and the law's energy
+    /// is not computed. Without a shield, the certificate is void from then on.
+    ///
+    /// A shield changes its commands at its own instants only and holds them in between. It takes given accelerations
+    /// from its next instant on, which is the present one if it has no command there yet
+    /// ([`Simulation::awaiting_commands`]).
     ///
     /// # Errors
-    /// [`SimError::Commands`] unless each vehicle has a finite row, and [`SimError::ShieldedCommands`] under a shield;
-    /// then nothing is flown. Does nothing after the end of the flight. The law's certificate is void from then on.
+    /// [`SimError::Commands`] unless each vehicle has a finite row; then nothing is flown. Does nothing after the end
+    /// of the flight.
     pub fn step_with(&mut self, commands: &Rows) -> Result<(), SimError> {
         let count = self.state.count();
-        if self.controller.shield.is_some() {
-            return Err(SimError::ShieldedCommands);
-        }
         if commands.nrows() != count || first_row_beyond(commands, MAX_COMMAND_M_S2).is_some() {
             return Err(SimError::Commands { expected: count, found: commands.nrows() });
         }
         if self.ending.is_none() {
             self.overruled = true;
-            if !self.certificate.void.contains(&VoidReason::ExternalCommands) {
-                self.certificate = self.certificate.clone().void_where(true, VoidReason::ExternalCommands);
-            }
-            self.control.copy_from(commands);
-            self.plant.apply(commands, &mut self.state);
+            let took = self.take_commands(commands);
+            self.end_if_over(took);
         }
         self.step_or_end();
         Ok(())
+    }
+
+    /// Applies accelerations from outside at the present instant, after the shield if there is one.
+    fn take_commands(&mut self, commands: &Rows) -> Result<(), Ending> {
+        let is_shielded = self.controller.shield.is_some();
+        if is_shielded && !std::mem::take(&mut self.awaits_command) {
+            return Ok(());
+        }
+        if !is_shielded && !self.certificate.void.contains(&VoidReason::ExternalCommands) {
+            self.certificate = self.certificate.clone().void_where(true, VoidReason::ExternalCommands);
+        }
+        self.controller.filter(self.time_s, &self.state, commands, &mut self.control);
+        self.apply_command(self.steps, Ok(()), Duration::ZERO)
     }
 
     fn step_or_end(&mut self) {
@@ -257,6 +291,17 @@ impl Simulation {
     #[must_use]
     pub fn state(&self) -> &Swarm {
         &self.state
+    }
+
+    /// Returns the present target of the law.
+    #[must_use]
+    pub fn target(&self) -> Target<'_> {
+        self.controller.target.view()
+    }
+
+    /// Returns what the vehicles know at present, without the pairs in sensing range.
+    pub fn observation(&mut self) -> Observation<'_> {
+        self.controller.observation(self.time_s, &self.state)
     }
 
     /// Returns the accelerations \[m/s^2\], N x 3, that are held from now on; no rows if the law is undefined.
@@ -342,10 +387,16 @@ impl Simulation {
         }
     }
 
+    /// Returns the numbers of the shield so far, if there is one.
+    #[must_use]
+    pub fn shield_report(&self) -> Option<ShieldReport> {
+        self.controller.shield.as_ref().map(ShieldStage::report)
+    }
+
     /// Returns the result of the flight. A flight in progress counts as interrupted.
     #[must_use]
     pub fn finish(self) -> Flight {
-        let shield = self.controller.shield.as_ref().map(ShieldStage::report);
+        let shield = self.shield_report();
         let is_exceeded = shield.as_ref().is_some_and(|shield| shield.breach.is_some());
         let certificate = self.certificate.void_where(is_exceeded, VoidReason::ShieldExceeded);
         let AuditResults { audit, in_metres, clearance, engine_contacts, bounces } = self.judge.finish();

@@ -3,15 +3,18 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use nalgebra::Vector3;
 use rayon::{Scope, ThreadPool};
 
 use super::ending::{MAX_COMMAND_M_S2, SimError};
-use super::simulation::Simulation;
+use super::simulation::{Components, Simulation};
 use crate::plant::FreeSteps;
 use crate::scenario::{
     BYTES_PER_EDGE, BYTES_PER_VEHICLE, Draw, MAX_MEMORY_BYTES, NamedLaw, Scenario, ScenarioError, Template,
 };
-use tautline_core::swarm::Rows;
+use tautline_core::swarm::{Rows, Swarm, row};
+use tautline_laws::observation::OtherStates;
+use tautline_laws::space::signed_distance_m;
 
 /// Number of chunks of worlds for each thread. A thread takes the next chunk when it is done with one.
 const CHUNKS_PER_THREAD: usize = 8;
@@ -183,18 +186,38 @@ struct World {
 }
 
 /// Source of new simulations.
+#[derive(Clone)]
 struct Starts {
     template: Template,
     law: NamedLaw,
     /// The start of all worlds, if neither start nor flight depends on a seed.
-    common: Option<Mutex<Simulation>>,
+    common: Option<Arc<Mutex<Simulation>>>,
     /// Number of worlds E.
     worlds: u64,
 }
 
+/// States of all worlds at the start of a flight, E x N x 3, in the place of those of the scenario.
+#[derive(Clone, Copy, Debug)]
+pub struct GivenStarts<'a> {
+    /// Positions \[m\].
+    pub positions_m: &'a [f64],
+    /// Velocities \[m/s\].
+    pub velocities_m_s: &'a [f64],
+}
+
+impl GivenStarts<'_> {
+    /// Returns the state of a world of `vehicles`.
+    fn of(self, world: usize, vehicles: usize) -> Swarm {
+        let rows = |numbers: &[f64]| Rows::from_row_slice(&numbers[3 * vehicles * world..][..3 * vehicles]);
+        Swarm { positions_m: rows(self.positions_m), velocities_m_s: rows(self.velocities_m_s) }
+    }
+}
+
 /// Search for a seed with a valid start.
 #[derive(Clone, Copy)]
-struct Search {
+struct Search<'a> {
+    /// States of all worlds at the start, if they are given.
+    given: Option<GivenStarts<'a>>,
     /// The world, from 0.
     world: usize,
     /// First seed.
@@ -207,8 +230,8 @@ struct Search {
 type Started = Result<(u64, Simulation), VectorError>;
 
 /// Search in progress.
-struct Attempt {
-    search: Search,
+struct Attempt<'a> {
+    search: Search<'a>,
     /// Next seed to try.
     seed: u64,
     /// Number of tried seeds.
@@ -217,14 +240,20 @@ struct Attempt {
     made: Option<Started>,
 }
 
-impl Search {
+impl<'a> Search<'a> {
     /// Returns the search of a choice. `next` is the seed after the present one of the world.
     const fn of(choice: SeedChoice, world: usize, next: u64) -> Self {
-        match choice {
-            SeedChoice::Next => Self { world, first: next, goes_on: true },
-            SeedChoice::From(first) => Self { world, first, goes_on: true },
-            SeedChoice::Exactly(first) => Self { world, first, goes_on: false },
-        }
+        let (first, goes_on) = match choice {
+            SeedChoice::Next => (next, true),
+            SeedChoice::From(first) => (first, true),
+            SeedChoice::Exactly(first) => (first, false),
+        };
+        Self { given: None, world, first, goes_on }
+    }
+
+    /// Returns the search with given states, which no other seed changes.
+    const fn with(self, given: Option<GivenStarts<'a>>) -> Self {
+        Self { given, goes_on: self.goes_on && given.is_none(), ..self }
     }
 }
 
@@ -268,7 +297,7 @@ impl VectorSimulation {
         let vehicles = template.own().count();
         let is_random = template.start_is_random() || template.flight_is_random();
         let law = template.own_law();
-        let common = (!is_random).then(|| Simulation::new(template.own()).map(prepared)).transpose()?.map(Mutex::new);
+        let common = (!is_random).then(|| started(template.own())).transpose()?.map(|start| Arc::new(Mutex::new(start)));
         let starts = Starts { template, law, common, worlds: seeds.len() as u64 };
         let searches: Vec<_> = seeds.iter().zip(0..).map(|(&choice, k)| Search::of(choice, k, k as u64)).collect();
         let world = |(seed, simulation)| World {
@@ -325,6 +354,26 @@ impl VectorSimulation {
         &self.worlds[world].simulation
     }
 
+    /// Returns an independent copy, which continues with the same bits.
+    #[must_use]
+    pub fn copied(&self) -> Self {
+        let Self { starts, worlds, vehicles, resets_ended, threads } = self;
+        let copied = |world: &World| World {
+            seed: world.seed,
+            simulation: world.simulation.clone(),
+            commands: world.commands.clone(),
+            rests: world.rests,
+            failure: None,
+        };
+        Self {
+            starts: starts.clone(),
+            worlds: worlds.iter().map(copied).collect(),
+            vehicles: *vehicles,
+            resets_ended: *resets_ended,
+            threads: threads.clone(),
+        }
+    }
+
     /// Returns the present seed of each world.
     pub fn seeds(&self) -> impl Iterator<Item = u64> + '_ {
         self.worlds.iter().map(|world| world.seed)
@@ -338,8 +387,8 @@ impl VectorSimulation {
     /// ([`SeedChoice::Next`]). The call returns early when all worlds have ended.
     ///
     /// # Errors
-    /// [`VectorError`]: a wrong length; a command that is not finite; commands under a shield. For
-    /// [`VectorError::NoSeed`] the world stays ended, and the others fly all steps.
+    /// [`VectorError`]: a wrong length; a command that is not finite. For [`VectorError::NoSeed`] the world stays ended,
+    /// and the others fly all steps.
     pub fn step(
         &mut self,
         commands: Option<&[f64]>,
@@ -422,11 +471,11 @@ impl VectorSimulation {
         seeds: Option<&[SeedChoice]>,
         states: &mut StatesMut<'_>,
     ) -> Result<(), VectorError> {
-        self.reset_while(chosen, seeds, states, &mut || true)
+        self.reset_while(chosen, seeds, None, states, &mut || true)
     }
 
-    /// Resets worlds like [`VectorSimulation::reset`], and calls `carries_on` every few hundredths of a second. Stops
-    /// if it returns false.
+    /// Resets worlds like [`VectorSimulation::reset`], to given states if there are any, and calls `carries_on` every
+    /// few hundredths of a second. Stops if it returns false. Slots and random numbers are those of the seeds.
     ///
     /// # Errors
     /// As [`VectorSimulation::reset`], and [`VectorError::Interrupted`]. No world is reset then.
@@ -434,6 +483,7 @@ impl VectorSimulation {
         &mut self,
         chosen: &[bool],
         seeds: Option<&[SeedChoice]>,
+        given: Option<GivenStarts<'_>>,
         states: &mut StatesMut<'_>,
         carries_on: &mut dyn FnMut() -> bool,
     ) -> Result<(), VectorError> {
@@ -441,8 +491,14 @@ impl VectorSimulation {
         self.check_lengths(states)?;
         check("mask", count, chosen.len())?;
         seeds.map_or(Ok(()), |seeds| check("seeds", count, seeds.len()))?;
+        if let Some(given) = given {
+            let numbers = 3 * self.vehicles * count;
+            check("given positions_m", numbers, given.positions_m.len())?;
+            check("given velocities_m_s", numbers, given.velocities_m_s.len())?;
+        }
         let choice = |k| seeds.map_or(SeedChoice::Next, |seeds: &[SeedChoice]| seeds[k]);
-        let next = |(k, world): (usize, &World)| Search::of(choice(k), k, self.starts.later(world.seed));
+        let next =
+            |(k, world): (usize, &World)| Search::of(choice(k), k, self.starts.later(world.seed)).with(given);
         let searches: Vec<_> = self.worlds.iter().enumerate().filter(|(k, _)| chosen[*k]).map(next).collect();
         let made = self.starts.simulations(&searches, &self.threads, carries_on)?;
         let made = made.into_iter().collect::<Result<Vec<_>, _>>()?;
@@ -450,6 +506,81 @@ impl VectorSimulation {
             (self.worlds[search.world].seed, self.worlds[search.world].simulation) = (seed, simulation);
         }
         for_each(&mut self.worlds, (&Threads::One, 0), states, |_| ());
+        Ok(())
+    }
+
+    /// Writes the present slots of all vehicles \[m\], E x N x 3: those of the leg, moved by the reference.
+    ///
+    /// # Errors
+    /// [`VectorError::Length`].
+    pub fn write_slots(&self, slots_m: &mut [f64]) -> Result<(), VectorError> {
+        check("slots_m", 3 * self.vehicles * self.count(), slots_m.len())?;
+        for (world, slots_m) in self.worlds.iter().zip(slots_m.chunks_exact_mut(3 * self.vehicles)) {
+            let target = world.simulation.target();
+            for (i, slot_m) in slots_m.chunks_exact_mut(3).enumerate() {
+                let place_m = row(&target.formation.slots_m, i) + target.reference.position_m;
+                slot_m.copy_from_slice(place_m.as_slice());
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the states that the vehicles measure of themselves at present, E x N x 3 positions \[m\] and velocities
+    /// \[m/s\].
+    ///
+    /// # Errors
+    /// [`VectorError::Length`].
+    pub fn write_measured(&mut self, positions_m: &mut [f64], velocities_m_s: &mut [f64]) -> Result<(), VectorError> {
+        let (numbers, width) = (3 * self.vehicles * self.count(), 3 * self.vehicles);
+        check("positions_m", numbers, positions_m.len())?;
+        check("velocities_m_s", numbers, velocities_m_s.len())?;
+        let states = positions_m.chunks_exact_mut(width).zip(velocities_m_s.chunks_exact_mut(width));
+        for (world, (positions_m, velocities_m_s)) in self.worlds.iter_mut().zip(states) {
+            write_rows(world.simulation.observation().own, positions_m, velocities_m_s);
+        }
+        Ok(())
+    }
+
+    /// Writes the positions \[m\] that vehicle i last received from vehicle j, E x N x N x 3. They are NaN without a
+    /// link, and that of a vehicle itself is measured.
+    ///
+    /// # Errors
+    /// [`VectorError::Length`].
+    pub fn write_received(&mut self, positions_m: &mut [f64]) -> Result<(), VectorError> {
+        let of_world = 3 * self.vehicles * self.vehicles;
+        check("positions_m", of_world * self.count(), positions_m.len())?;
+        for (world, positions_m) in self.worlds.iter_mut().zip(positions_m.chunks_exact_mut(of_world)) {
+            let known = world.simulation.observation();
+            let pairs = (0..self.vehicles).flat_map(|i| (0..self.vehicles).map(move |j| (i, j)));
+            for ((i, j), position_m) in pairs.zip(positions_m.chunks_exact_mut(3)) {
+                let is_linked = matches!(known.others, OtherStates::Shared) || known.links.has_edge(i, j);
+                let received_m = match (i == j, is_linked) {
+                    (true, _) => row(&known.own.positions_m, i),
+                    (false, true) => known.received(i, j).position_m,
+                    (false, false) => Vector3::from_element(f64::NAN),
+                };
+                position_m.copy_from_slice(received_m.as_slice());
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the vectors from each vehicle to the nearest point of the surface of each obstacle \[m\], E x N x K x 3.
+    ///
+    /// # Errors
+    /// [`VectorError::Length`].
+    pub fn write_obstacles(&self, vectors_m: &mut [f64]) -> Result<(), VectorError> {
+        let obstacles = &self.starts.template.own().obstacles;
+        check("vectors_m", 3 * self.vehicles * self.count() * obstacles.len(), vectors_m.len())?;
+        let vehicles = self.worlds.iter().flat_map(|world| {
+            let positions_m = &world.simulation.state().positions_m;
+            (0..self.vehicles).map(move |i| row(positions_m, i))
+        });
+        let pairs = vehicles.flat_map(|position_m| obstacles.iter().map(move |obstacle| (position_m, obstacle)));
+        for ((position_m, obstacle), vector_m) in pairs.zip(vectors_m.chunks_exact_mut(3)) {
+            let (distance_m, away) = signed_distance_m(&obstacle.shape, position_m);
+            vector_m.copy_from_slice((-distance_m * away).as_slice());
+        }
         Ok(())
     }
 
@@ -472,9 +603,6 @@ impl VectorSimulation {
     }
 
     fn check_commands(&self, commands: &[f64]) -> Result<(), VectorError> {
-        if self.starts.template.own().shield.as_ref().is_some_and(|shield| shield.enabled) {
-            return Err(SimError::ShieldedCommands.into());
-        }
         let width = 3 * self.vehicles;
         check("u", width * self.count(), commands.len())?;
         // A fold without branches lets the compiler vectorize the comparison.
@@ -515,14 +643,18 @@ impl World {
         &self,
         (positions_m, velocities_m_s, clearance_m, is_over): (&mut [f64], &mut [f64], &mut f64, &mut bool),
     ) {
-        let state = self.simulation.state();
-        for (rows, numbers) in [(&state.positions_m, positions_m), (&state.velocities_m_s, velocities_m_s)] {
-            for (i, number) in numbers.chunks_exact_mut(3).enumerate() {
-                (0..3).for_each(|axis| number[axis] = rows[(i, axis)]);
-            }
-        }
+        write_rows(self.simulation.state(), positions_m, velocities_m_s);
         *clearance_m = self.simulation.least_clearance_m().unwrap_or(f64::NAN);
         *is_over = self.simulation.ending().is_some();
+    }
+}
+
+/// Writes a state vehicle by vehicle.
+fn write_rows(state: &Swarm, positions_m: &mut [f64], velocities_m_s: &mut [f64]) {
+    for (rows, numbers) in [(&state.positions_m, positions_m), (&state.velocities_m_s, velocities_m_s)] {
+        for (i, number) in numbers.chunks_exact_mut(3).enumerate() {
+            (0..3).for_each(|axis| number[axis] = rows[(i, axis)]);
+        }
     }
 }
 
@@ -534,11 +666,11 @@ impl Starts {
     /// [`VectorError::Interrupted`] if `carries_on` returns false.
     fn simulations(
         &self,
-        searches: &[Search],
+        searches: &[Search<'_>],
         threads: &Threads,
         carries_on: &mut dyn FnMut() -> bool,
     ) -> Result<Vec<Started>, VectorError> {
-        let begin = |&search: &Search| Attempt { search, seed: search.first, tried: 0, made: None };
+        let begin = |&search: &Search<'_>| Attempt { search, seed: search.first, tried: 0, made: None };
         let mut attempts: Vec<_> = searches.iter().map(begin).collect();
         let helpers = threads.helpers(LOAD_OF_A_START * searches.len() as u64);
         while attempts.iter().any(|attempt| attempt.made.is_none()) {
@@ -561,30 +693,45 @@ impl Starts {
         seed.wrapping_add(self.worlds) & i64::MAX.cast_unsigned()
     }
 
-    /// Returns a simulation at the start of a seed.
-    fn simulation(&self, world: usize, seed: u64) -> Result<Simulation, VectorError> {
-        if let Some(common) = &self.common {
-            return Ok(common.lock().unwrap_or_else(PoisonError::into_inner).clone());
+    /// Returns a simulation at the start of a seed, or at a given one.
+    fn simulation(&self, world: usize, seed: u64, given: Option<Swarm>) -> Result<Simulation, VectorError> {
+        let refused = |why| VectorError::Seed { world, seed, why };
+        match (&self.common, given) {
+            (Some(common), None) => Ok(common.lock().unwrap_or_else(PoisonError::into_inner).clone()),
+            (Some(_), Some(start)) => started(&starting_at(self.template.own().clone(), start).map_err(refused)?),
+            (None, given) => {
+                let drawn = self.template.scenario(&self.law, Draw { seed, jitter_m: None }).map_err(refused)?;
+                match given {
+                    None => started(&drawn),
+                    Some(start) => started(&starting_at(drawn, start).map_err(refused)?),
+                }
+            }
         }
-        let drawn = self.template.scenario(&self.law, Draw { seed, jitter_m: None });
-        let drawn = drawn.map_err(|why| VectorError::Seed { world, seed, why })?;
-        Ok(prepared(Simulation::new(&drawn)?))
     }
 }
 
-/// Returns a simulation as a world flies it: its time is not measured, and free steps are trusted.
-fn prepared(mut simulation: Simulation) -> Simulation {
-    simulation.stop_measuring_time();
-    simulation.allow_free_steps(FreeSteps::Trusted);
-    simulation
+fn starting_at(scenario: Scenario, start: Swarm) -> Result<Scenario, ScenarioError> {
+    let scenario = Scenario { start, ..scenario };
+    scenario.validate()?;
+    Ok(scenario)
 }
 
-impl Attempt {
+/// Returns a world at its start: its first commands may come from outside, its time is not measured, and free steps are
+/// trusted.
+fn started(scenario: &Scenario) -> Result<Simulation, VectorError> {
+    let mut simulation = Simulation::awaiting_commands(scenario, Components::of(scenario)?)?;
+    simulation.stop_measuring_time();
+    simulation.allow_free_steps(FreeSteps::Trusted);
+    Ok(simulation)
+}
+
+impl Attempt<'_> {
     /// Tries the next seed.
     fn try_next(&mut self, starts: &Starts) {
-        let Search { world, first, goes_on } = self.search;
+        let Search { given, world, first, goes_on } = self.search;
         self.tried += 1;
-        self.made = match starts.simulation(world, self.seed) {
+        let given = given.map(|given| given.of(world, starts.template.own().count()));
+        self.made = match starts.simulation(world, self.seed, given) {
             Err(VectorError::Seed { .. }) if goes_on && self.tried < MOST_SEEDS => None,
             Err(VectorError::Seed { why, .. }) if goes_on => Some(Err(VectorError::NoSeed { world, first, why })),
             made => Some(made.map(|simulation| (self.seed, simulation))),

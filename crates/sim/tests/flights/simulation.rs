@@ -8,14 +8,14 @@ use tautline_core::record::{Event, Sink, StateHash};
 use tautline_core::swarm::{Rows, Swarm};
 use tautline_laws::formation::{Formation, largest_edge_error_m};
 use tautline_laws::graph::Graph;
-use tautline_laws::law::{EdgeTensionKeys, LaplacianKeys, LawSpec, PotentialKeys, VoidReason};
-use tautline_laws::observation::{OtherStates, StateTables};
+use tautline_laws::law::{EdgeTensionKeys, LaplacianKeys, Law, LawError, LawSpec, PotentialKeys, VoidReason};
+use tautline_laws::observation::{Observation, OtherStates, StateTables};
 use tautline_laws::target::{CurrentTarget, Leg, LegTrigger, Supervisor};
 use tautline_sim::continuous::{self, Tolerances};
-use tautline_sim::link::{Imperfections, StateEstimates};
+use tautline_sim::link::{ActuationSpec, Imperfections, StateEstimates};
 use tautline_sim::metrics::Metrics;
 use tautline_sim::scenario::{PlantSpec, Scenario};
-use tautline_sim::sim::{self, Components, Ending, SimError, Simulation};
+use tautline_sim::sim::{self, Components, Ending, Flight, SimError, Simulation};
 
 use crate::flight::{Log, builtin, fly};
 
@@ -147,6 +147,66 @@ fn commands_from_outside_replace_those_of_the_law() {
         assert!(matches!(still.step_with(&wrong), Err(SimError::Commands { expected: 5, .. })));
     }
     assert_eq!(still.steps(), 1, "a refused step is not flown");
+}
+
+/// Law with constant commands.
+#[derive(Clone)]
+struct Constant(Rows);
+
+impl Law for Constant {
+    fn name(&self) -> &'static str {
+        "constant"
+    }
+
+    fn command(&mut self, _at: &Observation<'_>, command: &mut Rows) -> Result<(), LawError> {
+        command.copy_from(&self.0);
+        Ok(())
+    }
+}
+
+#[test]
+fn commands_from_outside_pass_through_shield_and_actuators() {
+    let shielded = builtin("shielded-crazyflies", &["time.duration_s=5"]);
+    let limited = builtin("pentagon", &["time={duration_s=5, control_hz=240}", "actuation={max_accel_m_s2=0.5, lag_s=0.2}"]);
+    for scenario in [shielded, limited] {
+        let commands = -&scenario.start.positions_m;
+        let parts = || Components::with_law(&scenario, Box::new(Constant(commands.clone())));
+        let mut by_law = Simulation::with(&scenario, parts()).expect("a simulation");
+        let mut by_hand = Simulation::awaiting_commands(&scenario, Components::of(&scenario).expect("a law")).expect("one");
+        let mut exact = Simulation::new(&Scenario { actuation: ActuationSpec::default(), shield: None, ..scenario.clone() }).expect("one");
+        for _ in 0..900 {
+            by_law.step();
+            by_hand.step_with(&commands).expect("finite commands");
+            exact.step_with(&commands).expect("finite commands");
+            assert_eq!(by_hand.state(), by_law.state());
+        }
+        assert_ne!(by_hand.state(), exact.state(), "shield and actuators change commands");
+        let (by_law, by_hand) = (by_law.finish(), by_hand.finish());
+        assert_eq!(by_law.shield, by_hand.shield);
+        assert_eq!(by_hand.certificate.certified_m.is_some(), scenario.shield.is_some());
+    }
+}
+
+#[test]
+fn a_shield_takes_commands_at_its_own_instants_only() {
+    let scenario = builtin("shielded-crazyflies", &["time.duration_s=5"]);
+    let mut mixed = Simulation::new(&scenario).expect("a simulation");
+    let mut by_law = mixed.clone();
+    let commands = -&scenario.start.positions_m;
+    // The law has commanded at the start. Its command is held up to the next instant.
+    mixed.step_with(&commands).expect("finite commands");
+    by_law.step();
+    assert_eq!(mixed.state(), by_law.state());
+    for _ in 0..40 {
+        mixed.step_with(&commands).expect("finite commands");
+        mixed.step();
+        by_law.step();
+        by_law.step();
+    }
+    assert_ne!(mixed.state(), by_law.state());
+    let (mixed, by_law) = (mixed.finish(), by_law.finish());
+    let periods = |flight: &Flight| flight.shield.as_ref().map(|shield| shield.counters.commands);
+    assert_eq!(periods(&mixed), periods(&by_law), "one command each period");
 }
 
 /// Returns a flight to the pentagon and then to a larger one.

@@ -2,7 +2,9 @@
 
 use tautline_core::swarm::Rows;
 use tautline_sim::scenario::{Draw, Override, Source, Template};
-use tautline_sim::sim::{Ending, SeedChoice, SimError, Simulation, States, Threads, VectorError, VectorSimulation};
+use tautline_sim::sim::{
+    Ending, GivenStarts, SeedChoice, Simulation, States, Threads, VectorError, VectorSimulation,
+};
 
 /// Steps of a call: enough for two helping threads.
 const STEPS_OF_A_CALL: u64 = 80;
@@ -151,13 +153,6 @@ fn wrong_input_is_refused_before_anything_is_flown() {
         refused.to_string(),
         format!("seeds: at most {most} worlds of this scenario fit into 8 GiB, got 200000")
     );
-
-    let shielded = template("shielded-crazyflies", &[]);
-    let mut worlds = VectorSimulation::new(shielded, &[0], Threads::Current).expect("worlds");
-    let mut states = States::of(&worlds);
-    let zeros = vec![0.0; 3 * worlds.vehicles()];
-    let refused = worlds.step(Some(&zeros), 1, &mut states.borrow()).expect_err("a shield");
-    assert!(matches!(refused, VectorError::Sim(SimError::ShieldedCommands)));
 }
 
 #[test]
@@ -233,9 +228,89 @@ fn an_interrupted_search_makes_and_resets_no_world() {
     let mut worlds = make(&mut || true).expect("worlds");
     let mut states = States::of(&worlds);
     let all = vec![true; worlds.count()];
-    let refused = worlds.reset_while(&all, None, &mut states.borrow(), &mut || false);
+    let refused = worlds.reset_while(&all, None, None, &mut states.borrow(), &mut || false);
     assert!(matches!(refused, Err(VectorError::Interrupted)));
     assert_eq!(worlds.seeds().collect::<Vec<_>>(), (0..40).collect::<Vec<_>>());
-    worlds.reset_while(&all, None, &mut states.borrow(), &mut || true).expect("reset");
+    worlds.reset_while(&all, None, None, &mut states.borrow(), &mut || true).expect("reset");
     assert_eq!(worlds.seeds().collect::<Vec<_>>(), (40..80).collect::<Vec<_>>());
+}
+
+/// Returns the accelerations that push each vehicle of the worlds through the centre.
+fn to_the_centre(states: &States) -> Vec<f64> {
+    states.positions_m.iter().zip(&states.velocities_m_s).map(|(p_m, v_m_s)| -p_m - 0.5 * v_m_s).collect()
+}
+
+#[test]
+fn a_shield_filters_commands_from_outside() {
+    for (sets, is_safe) in [(&["time.duration_s=20"][..], true), (&["time.duration_s=20", "shield.enabled=false"], false)] {
+        let template = template("shielded-crazyflies", sets);
+        let mut worlds = VectorSimulation::new(template, &[5, 6], Threads::Current).expect("worlds");
+        let mut states = States::of(&worlds);
+        worlds.write(&mut states.borrow()).expect("states");
+        let mut least_m = f64::INFINITY;
+        while states.is_over.contains(&false) {
+            let commands = to_the_centre(&states);
+            worlds.step(Some(&commands), 12, &mut states.borrow()).expect("flown");
+            least_m = states.least_clearance_m.iter().copied().fold(least_m, f64::min);
+        }
+        assert_eq!(least_m > 0.0, is_safe, "{sets:?}: {least_m}");
+        let flight = worlds.world(0).clone().finish();
+        let shield = flight.shield;
+        assert_eq!(shield.is_some(), is_safe);
+        if let Some(shield) = shield {
+            assert!(shield.counters.changed > 0 && shield.breach.is_none(), "{shield:?}");
+            assert!(flight.certificate.certified_m.is_some() && flight.certificate.void.is_empty());
+        }
+    }
+}
+
+#[test]
+fn given_states_are_starts() {
+    for sets in [&[][..], &["start.jitter_m=0.1"]] {
+        let mut worlds = VectorSimulation::new(template("pentagon", sets), &[1, 2], Threads::Current).expect("worlds");
+        let mut states = States::of(&worlds);
+        worlds.write(&mut states.borrow()).expect("states");
+        let drawn = states.clone();
+        let mut positions_m = vec![0.0; 30];
+        (0..10).for_each(|k| positions_m[3 * k] = 3.0 * k as f64);
+        let velocities_m_s: Vec<_> = (0..30).map(|k| 0.01 * f64::from(k)).collect();
+        let given = GivenStarts { positions_m: &positions_m, velocities_m_s: &velocities_m_s };
+        let mut reset = |given, states: &mut States| {
+            worlds.reset_while(&[false, true], None, Some(given), &mut states.borrow(), &mut || true)
+        };
+        reset(given, &mut states).expect("a start");
+        assert_eq!((&states.positions_m[..15], &states.positions_m[15..]), (&drawn.positions_m[..15], &positions_m[15..]));
+        assert_eq!(states.velocities_m_s[15..], velocities_m_s[15..]);
+        positions_m[15] = positions_m[18];
+        let before = states.clone();
+        let given = GivenStarts { positions_m: &positions_m, velocities_m_s: &velocities_m_s };
+        let refused = reset(given, &mut states).expect_err("two vehicles in one place");
+        assert!(matches!(refused, VectorError::Seed { world: 1, .. }), "{refused}");
+        positions_m[15] = f64::NAN;
+        let given = GivenStarts { positions_m: &positions_m, velocities_m_s: &velocities_m_s };
+        assert!(reset(given, &mut states).is_err());
+        let given = GivenStarts { positions_m: &positions_m[..29], velocities_m_s: &velocities_m_s };
+        assert!(matches!(reset(given, &mut states), Err(VectorError::Length { expected: 30, found: 29, .. })));
+        assert_eq!(states, before, "a refused reset changes nothing");
+    }
+}
+
+#[test]
+fn slots_follow_the_reference_and_measurements_have_noise() {
+    let sets = ["sensing={position_noise_m=0.1, rate_hz=100}", "start.jitter_m=0.1"];
+    let mut worlds = VectorSimulation::new(template("pentagon-leader", &sets), &[1, 2], Threads::One).expect("worlds");
+    let mut states = States::of(&worlds);
+    let numbers = states.positions_m.len();
+    let [mut first, mut later, mut measured_m, mut measured_m_s] = [(); 4].map(|()| vec![0.0; numbers]);
+    worlds.write_slots(&mut first).expect("slots");
+    worlds.step(Some(&vec![0.0; numbers]), 240, &mut states.borrow()).expect("flown");
+    worlds.write_slots(&mut later).expect("slots");
+    let moved: Vec<_> = later.iter().zip(&first).map(|(later, first)| later - first).collect();
+    let velocity = worlds.world(0).target().reference.position_m;
+    assert!(velocity.norm() > 0.01 && moved.chunks(3).all(|d| (nalgebra::Vector3::from_row_slice(d) - velocity).norm() < 1e-9), "{moved:?}");
+    worlds.write_measured(&mut measured_m, &mut measured_m_s).expect("measured");
+    let off_m = measured_m.iter().zip(&states.positions_m).map(|(found, truth)| (found - truth).abs());
+    let (least, most) = off_m.fold((f64::INFINITY, 0.0_f64), |(least, most), off| (least.min(off), most.max(off)));
+    assert!(least > 0.0 && most < 1.0, "{least} {most}");
+    assert!(worlds.write_slots(&mut first[1..]).is_err() && worlds.write_measured(&mut first, &mut later[1..]).is_err());
 }

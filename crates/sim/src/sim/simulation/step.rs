@@ -211,9 +211,11 @@ impl Simulation {
             shield.observe(self.time_s, &self.state);
         }
         let time = &self.scenario.time;
-        let is_asked = !self.overruled && (time.control_hz.is_none() || (is_whole && time.commands(number)));
-        if time.control_hz.is_some() {
-            if !self.overruled && step.is_some() {
+        let is_instant = time.control_hz.is_none() || (is_whole && time.commands(number));
+        let is_asked = !self.overruled && is_instant;
+        self.awaits_command = self.overruled && is_instant && self.controller.shield.is_some();
+        if time.control_hz.is_some() || (self.overruled && !self.controller.link.is_exact()) {
+            if step.is_some() {
                 self.controller.actuate(self.time_s, &mut self.control);
             }
             self.plant.apply(&self.control, &mut self.state);
