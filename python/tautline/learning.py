@@ -108,7 +108,8 @@ class Worlds(VectorSimulation):
         info: dict[str, NDArray[Any]] = {"clearance_m": self.least_clearance_m.copy()}
         if done.any():
             info["verdict"] = np.array(self.statuses(done), dtype=object)
-            if any(commands for commands, _ in (counts := self._native.shield_counts())):
+            counts = self._native.shield_counts()
+            if any(commands for commands, _ in counts):
                 info["shielded"] = np.array([changed / max(commands, 1) for commands, changed in counts])
         return info
 

@@ -297,7 +297,8 @@ impl VectorSimulation {
         let vehicles = template.own().count();
         let is_random = template.start_is_random() || template.flight_is_random();
         let law = template.own_law();
-        let common = (!is_random).then(|| started(template.own())).transpose()?.map(|start| Arc::new(Mutex::new(start)));
+        let common =
+            (!is_random).then(|| started(template.own())).transpose()?.map(|start| Arc::new(Mutex::new(start)));
         let starts = Starts { template, law, common, worlds: seeds.len() as u64 };
         let searches: Vec<_> = seeds.iter().zip(0..).map(|(&choice, k)| Search::of(choice, k, k as u64)).collect();
         let world = |(seed, simulation)| World {
@@ -497,8 +498,7 @@ impl VectorSimulation {
             check("given velocities_m_s", numbers, given.velocities_m_s.len())?;
         }
         let choice = |k| seeds.map_or(SeedChoice::Next, |seeds: &[SeedChoice]| seeds[k]);
-        let next =
-            |(k, world): (usize, &World)| Search::of(choice(k), k, self.starts.later(world.seed)).with(given);
+        let next = |(k, world): (usize, &World)| Search::of(choice(k), k, self.starts.later(world.seed)).with(given);
         let searches: Vec<_> = self.worlds.iter().enumerate().filter(|(k, _)| chosen[*k]).map(next).collect();
         let made = self.starts.simulations(&searches, &self.threads, carries_on)?;
         let made = made.into_iter().collect::<Result<Vec<_>, _>>()?;

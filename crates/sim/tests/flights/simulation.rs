@@ -167,13 +167,17 @@ impl Law for Constant {
 #[test]
 fn commands_from_outside_pass_through_shield_and_actuators() {
     let shielded = builtin("shielded-crazyflies", &["time.duration_s=5"]);
-    let limited = builtin("pentagon", &["time={duration_s=5, control_hz=240}", "actuation={max_accel_m_s2=0.5, lag_s=0.2}"]);
+    let limited =
+        builtin("pentagon", &["time={duration_s=5, control_hz=240}", "actuation={max_accel_m_s2=0.5, lag_s=0.2}"]);
     for scenario in [shielded, limited] {
         let commands = -&scenario.start.positions_m;
         let parts = || Components::with_law(&scenario, Box::new(Constant(commands.clone())));
         let mut by_law = Simulation::with(&scenario, parts()).expect("a simulation");
-        let mut by_hand = Simulation::awaiting_commands(&scenario, Components::of(&scenario).expect("a law")).expect("one");
-        let mut exact = Simulation::new(&Scenario { actuation: ActuationSpec::default(), shield: None, ..scenario.clone() }).expect("one");
+        let mut by_hand =
+            Simulation::awaiting_commands(&scenario, Components::of(&scenario).expect("a law")).expect("one");
+        let mut exact =
+            Simulation::new(&Scenario { actuation: ActuationSpec::default(), shield: None, ..scenario.clone() })
+                .expect("one");
         for _ in 0..900 {
             by_law.step();
             by_hand.step_with(&commands).expect("finite commands");

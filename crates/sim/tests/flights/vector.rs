@@ -2,9 +2,7 @@
 
 use tautline_core::swarm::Rows;
 use tautline_sim::scenario::{Draw, Override, Source, Template};
-use tautline_sim::sim::{
-    Ending, GivenStarts, SeedChoice, Simulation, States, Threads, VectorError, VectorSimulation,
-};
+use tautline_sim::sim::{Ending, GivenStarts, SeedChoice, Simulation, States, Threads, VectorError, VectorSimulation};
 
 /// Steps of a call: enough for two helping threads.
 const STEPS_OF_A_CALL: u64 = 80;
@@ -242,7 +240,9 @@ fn to_the_centre(states: &States) -> Vec<f64> {
 
 #[test]
 fn a_shield_filters_commands_from_outside() {
-    for (sets, is_safe) in [(&["time.duration_s=20"][..], true), (&["time.duration_s=20", "shield.enabled=false"], false)] {
+    for (sets, is_safe) in
+        [(&["time.duration_s=20"][..], true), (&["time.duration_s=20", "shield.enabled=false"], false)]
+    {
         let template = template("shielded-crazyflies", sets);
         let mut worlds = VectorSimulation::new(template, &[5, 6], Threads::Current).expect("worlds");
         let mut states = States::of(&worlds);
@@ -279,7 +279,10 @@ fn given_states_are_starts() {
             worlds.reset_while(&[false, true], None, Some(given), &mut states.borrow(), &mut || true)
         };
         reset(given, &mut states).expect("a start");
-        assert_eq!((&states.positions_m[..15], &states.positions_m[15..]), (&drawn.positions_m[..15], &positions_m[15..]));
+        assert_eq!(
+            (&states.positions_m[..15], &states.positions_m[15..]),
+            (&drawn.positions_m[..15], &positions_m[15..])
+        );
         assert_eq!(states.velocities_m_s[15..], velocities_m_s[15..]);
         positions_m[15] = positions_m[18];
         let before = states.clone();
@@ -307,10 +310,16 @@ fn slots_follow_the_reference_and_measurements_have_noise() {
     worlds.write_slots(&mut later).expect("slots");
     let moved: Vec<_> = later.iter().zip(&first).map(|(later, first)| later - first).collect();
     let velocity = worlds.world(0).target().reference.position_m;
-    assert!(velocity.norm() > 0.01 && moved.chunks(3).all(|d| (nalgebra::Vector3::from_row_slice(d) - velocity).norm() < 1e-9), "{moved:?}");
+    assert!(
+        velocity.norm() > 0.01
+            && moved.chunks(3).all(|d| (nalgebra::Vector3::from_row_slice(d) - velocity).norm() < 1e-9),
+        "{moved:?}"
+    );
     worlds.write_measured(&mut measured_m, &mut measured_m_s).expect("measured");
     let off_m = measured_m.iter().zip(&states.positions_m).map(|(found, truth)| (found - truth).abs());
     let (least, most) = off_m.fold((f64::INFINITY, 0.0_f64), |(least, most), off| (least.min(off), most.max(off)));
     assert!(least > 0.0 && most < 1.0, "{least} {most}");
-    assert!(worlds.write_slots(&mut first[1..]).is_err() && worlds.write_measured(&mut first, &mut later[1..]).is_err());
+    assert!(
+        worlds.write_slots(&mut first[1..]).is_err() && worlds.write_measured(&mut first, &mut later[1..]).is_err()
+    );
 }
