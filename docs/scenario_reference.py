@@ -20,12 +20,9 @@ NOTES = Path(__file__).resolve().parent / "scenario"
 HEAD = """\
 # Scenario reference
 
-This page lists every key of a scenario file. `tautline list --show pentagon` prints a file to start from;
-[ten-minutes.md](ten-minutes.md) explains one.
-
-An unknown key or a value out of range is refused with its line and column; an unknown key also with the nearest name.
-`docs/scenario_reference.py` generates this page from the JSON Schema that `tautline schema` prints. An editor with this
-schema completes and checks keys as you type.
+Which keys does a scenario have? `tautline list --show pentagon` prints a file to start from;
+[ten-minutes.md](ten-minutes.md) explains one. An editor with the JSON Schema of `tautline schema` completes and checks
+keys as you type.
 
 `tautline run`, `check`, `margin`, `sweep`, `attack` and `compare` set any key for one run: `--set time.duration_s=20`,
 `--set 'start={shape="grid", spacing_m=2}'`, `--set start.positions_m.4.x=-1`. Lists count from 1.
