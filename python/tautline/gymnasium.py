@@ -15,7 +15,7 @@ from ._arguments import PathLike
 from ._native import Error
 from ._picture import Picture
 from ._scenario import Scenario
-from .learning import VIOLATION, Actions, Observes, Reward, Rewards, Worlds, checked, observations_of
+from .learning import VIOLATION, Actions, Observes, Reward, Rewards, Worlds, checked, first_of, observations_of
 
 try:
     import gymnasium
@@ -233,8 +233,7 @@ class FormationEnv(gymnasium.Env[Observations, NDArray[np.float32]]):
         return np.asarray(checked(self.observe(self.sim), shape, "observe", np.float32)[0])
 
     def _info(self, is_over: bool) -> Info:
-        found = self.sim.info(np.array([is_over]))
-        return {name: values[0].item() if isinstance(values[0], np.generic) else values[0] for name, values in found.items()}
+        return first_of(self.sim.info(np.array([is_over])))
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
         """Returns a picture (height, width, 3), or shows it in a window."""

@@ -231,6 +231,12 @@ def observations_of(observe: Observes | None, worlds: Worlds) -> tuple[Observes,
     return chosen, whole_number(chosen.size(worlds), "observe.size")
 
 
+def first_of(info: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+    """Returns the numbers of the first world."""
+    firsts = {name: values[0] for name, values in info.items()}
+    return {name: first.item() if isinstance(first, np.generic) else first for name, first in firsts.items()}
+
+
 def checked(values: object, shape: tuple[int, ...], name: str, dtype: type[Any]) -> NDArray[Any]:
     """Returns the result of an observation or reward, which must have this shape."""
     found = np.asarray(values, dtype=dtype)

@@ -12,7 +12,7 @@ from ._arguments import PathLike
 from ._native import Error
 from ._picture import Picture
 from ._scenario import Scenario
-from .learning import VIOLATION, Actions, Observes, Reward, Rewards, Worlds, checked, observations_of
+from .learning import VIOLATION, Actions, Observes, Reward, Rewards, Worlds, checked, first_of, observations_of
 
 try:
     from gymnasium.spaces import Box
@@ -41,8 +41,8 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
     :class:`tautline.learning.Reward`; ``observe`` and ``reward`` replace them. :meth:`state` is for central critics.
 
     A violation, at or between steps, and a failed motion terminate the episode of all agents. The end of the scenario
-    truncates it. The info has ``clearance_m``, the smallest clearance so far [m]. At the end it has the ``verdict`` and,
-    with a shield, ``shielded``, the share of commands that the shield changed.
+    truncates it. The info has ``clearance_m``, the smallest clearance so far [m]. At the end it has the ``verdict``
+    and, with a shield, ``shielded``, the share of commands that the shield changed.
     """
 
     def __init__(
@@ -141,9 +141,7 @@ class FormationEnv(ParallelEnv):  # type: ignore[misc]
         return dict(zip(self.possible_agents, observations, strict=True))
 
     def _infos(self, is_over: bool) -> dict[str, dict[str, Any]]:
-        found = self.sim.info(np.array([is_over]))
-        info = {name: np.asarray(values)[0] for name, values in found.items()}
-        info = {name: value.item() if isinstance(value, np.generic) else value for name, value in info.items()}
+        info = first_of(self.sim.info(np.array([is_over])))
         return {agent: dict(info) for agent in self.possible_agents}
 
     def render(self) -> NDArray[np.uint8] | None:

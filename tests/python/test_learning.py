@@ -98,10 +98,13 @@ class Gymnasium(Case):
             env.reset(options={"positions_m": positions})
             np.testing.assert_array_equal(env.sim.velocities, np.zeros((1, 5, 3)))
             crossed = {"positions_m": np.zeros((5, 2))}
-            self.refuses(tl.Error, "gives no valid scenario", lambda env=env, crossed=crossed: env.reset(options=crossed))
-            self.refuses(tl.Error, "unknown option position", lambda env=env: env.reset(options={"position": 1}))
-            short = {"positions_m": np.zeros((4, 2))}
-            self.refuses(tl.Error, "positions: an array of shape", lambda env=env, short=short: env.reset(options=short))
+            short, unknown = {"positions_m": np.zeros((4, 2))}, {"position": 1}
+            for wrong, message in (
+                (crossed, "gives no valid scenario"),
+                (short, "positions: an array of shape"),
+                (unknown, "unknown option position"),
+            ):
+                self.refuses(tl.Error, message, lambda env=env, wrong=wrong: env.reset(options=wrong))
 
     def test_episodes_of_the_next_step_mode_restart_one_step_later(self) -> None:
         env = FormationVectorEnv("pentagon", 2, set=LONG)

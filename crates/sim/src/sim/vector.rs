@@ -388,8 +388,8 @@ impl VectorSimulation {
     /// ([`SeedChoice::Next`]). The call returns early when all worlds have ended.
     ///
     /// # Errors
-    /// [`VectorError`]: a wrong length; a command that is not finite. For [`VectorError::NoSeed`] the world stays ended,
-    /// and the others fly all steps.
+    /// [`VectorError`]: a wrong length; a command that is not finite. For [`VectorError::NoSeed`] the world stays
+    /// ended, and the others fly all steps.
     pub fn step(
         &mut self,
         commands: Option<&[f64]>,
@@ -670,8 +670,7 @@ impl Starts {
         threads: &Threads,
         carries_on: &mut dyn FnMut() -> bool,
     ) -> Result<Vec<Started>, VectorError> {
-        let begin = |&search: &Search<'_>| Attempt { search, seed: search.first, tried: 0, made: None };
-        let mut attempts: Vec<_> = searches.iter().map(begin).collect();
+        let mut attempts: Vec<_> = searches.iter().copied().map(Attempt::at_first).collect();
         let helpers = threads.helpers(LOAD_OF_A_START * searches.len() as u64);
         while attempts.iter().any(|attempt| attempt.made.is_none()) {
             let began = Instant::now();
@@ -725,7 +724,11 @@ fn started(scenario: &Scenario) -> Result<Simulation, VectorError> {
     Ok(simulation)
 }
 
-impl Attempt<'_> {
+impl<'a> Attempt<'a> {
+    const fn at_first(search: Search<'a>) -> Self {
+        Self { search, seed: search.first, tried: 0, made: None }
+    }
+
     /// Tries the next seed.
     fn try_next(&mut self, starts: &Starts) {
         let Search { given, world, first, goes_on } = self.search;

@@ -260,7 +260,12 @@ impl Simulation {
     }
 
     /// Applies the command to the plant, if the law has one.
-    fn apply_command(&mut self, step: u64, commanded: Result<(), Ending>, took: Duration) -> Result<(), Ending> {
+    pub(super) fn apply_command(
+        &mut self,
+        step: u64,
+        commanded: Result<(), Ending>,
+        took: Duration,
+    ) -> Result<(), Ending> {
         self.performance.law += took;
         let checked = commanded.and_then(|()| match first_row_beyond(&self.control, MAX_COMMAND_M_S2) {
             Some(vehicle) if self.control.row(vehicle).iter().all(|x| x.is_finite()) => {
