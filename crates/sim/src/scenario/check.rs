@@ -9,7 +9,7 @@ use std::fmt::Display;
 use std::ops::Range;
 
 use toml::de::{DeTable, DeValue};
-use toml::{Spanned, Value};
+use toml::Spanned;
 
 use super::error::{ErrorKind, Field, ScenarioError, suggest};
 use super::limits::{LARGEST, SMALLEST};
@@ -69,38 +69,11 @@ pub(super) fn check_value(key: &str, value: &mut Spanned<DeValue<'_>>, node: Nod
     Check { overridden_from: usize::MAX, file: node.whole_file() }.value(value, node, key, None)
 }
 
-/// Checks the bounds of a value of a scenario built in code, whose keys and types are those of the schema. Choices are
-/// nested as serde writes them.
-pub(super) fn check_bounds(value: &Value, node: Node, name: &str) -> Result<(), SchemaError> {
-    let alternatives = node.alternatives();
-    if let Value::Table(table) = value {
-        return table.iter().try_for_each(|(key, value)| {
-            let choice = value.as_table().and_then(|choice| {
-                let is_chosen = |tag: (&str, &str)| tag.0 == key && choice.contains_key(tag.1);
-                Some((alternatives.iter().find(|part| part.tag().is_some_and(is_chosen))?, choice))
-            });
-            if let Some((part, choice)) = choice {
-                return choice.values().try_for_each(|keys| check_bounds(keys, *part, name));
-            }
-            let of_choice = || alternatives.iter().find_map(|part| part.property(key));
-            node.property(key)
-                .or_else(of_choice)
-                .map_or(Ok(()), |part| check_bounds(value, part, key).map_err(|schema_error| schema_error.child(key)))
-        });
-    }
-    let node = alternatives.into_iter().find(|part| admits(*part, value.type_str())).unwrap_or(node);
-    match *value {
-        Value::Array(ref list) => {
-            check_length(name, node, list.len(), 0..0)?;
-            let Some(node) = node.items() else { return Ok(()) };
-            list.iter().enumerate().try_for_each(|(entry, value)| {
-                check_bounds(value, node, name).map_err(|schema_error| schema_error.child(entry + 1))
-            })
-        }
-        Value::Integer(number) => in_range(name, node, number as f64, || number.to_string(), 0..0),
-        Value::Float(number) => in_range(name, node, number, || shortest(number).to_lowercase(), 0..0),
-        _ => Ok(()),
-    }
+/// Checks the TOML of a scenario that no file holds, such as one built in code.
+pub(super) fn check_written(toml: &str) -> Result<(), SchemaError> {
+    let table = DeTable::parse(toml)
+        .map_err(|error| SchemaError::new(ErrorKind::Syntax, error.message(), "give values that TOML can hold", 0..0))?;
+    check_schema(&mut Spanned::new(0..0, DeValue::Table(table.into_inner())), usize::MAX)
 }
 
 struct Check {

@@ -2,14 +2,13 @@
 
 use nalgebra::Vector3;
 
-use super::check::{SchemaError, check_bounds};
+use super::check::{SchemaError, check_written};
 use super::document::Document;
 use super::error::{ErrorKind, ScenarioError};
 use super::limits::{
     CONTACT_PREDICTION_M, MAX_NAME_CHARS, MAX_STEPS, SLOT_MARGIN, check_count, check_lengths, check_memory,
     first_pair_within, is_name_character, require_finite,
 };
-use super::schema::Node;
 use super::spec::{Safety, Scenario, Space};
 use super::time::TimeSpec;
 use crate::sim::{self, SimError};
@@ -45,7 +44,7 @@ impl Scenario {
     pub fn validate(&self) -> Result<(), ScenarioError> {
         self.check_noise()?;
         self.check_lengths()?;
-        check_bounds(&Document::from(self).value(), Node::root(), "scenario").map_err(SchemaError::without_text)?;
+        check_written(&Document::from(self).toml()).map_err(SchemaError::without_text)?;
         self.check()
     }
 
@@ -53,8 +52,7 @@ impl Scenario {
     pub(super) fn check_built(&self) -> Result<(), ScenarioError> {
         self.check()?;
         // The reader of a recording checks these values. Points and edges have no other limits than the checked ones.
-        let filled = Document::from(self).without_lists().value();
-        check_bounds(&filled, Node::root(), "scenario").map_err(SchemaError::of_filled_value)
+        check_written(&Document::from(self).without_lists().toml()).map_err(SchemaError::of_filled_value)
     }
 
     /// Checks conditions on several keys; the schema checks single keys.
