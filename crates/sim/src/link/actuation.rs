@@ -3,9 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::ImperfectionSpec;
 use super::sensing::SAME_S;
-use super::{ImperfectionSpec, is_off};
-use crate::scenario::{ErrorKind, Scenario, ScenarioError};
+use crate::scenario::{ErrorKind, Scenario, ScenarioError, is_default};
 use tautline_core::swarm::{Rows, row, set_row};
 use tautline_laws::law::VoidReason;
 
@@ -18,7 +18,7 @@ pub struct ActuationSpec {
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_accel_m_s2: Option<f64>,
     /// Time constant in s of the lag of motors, lag a' = u - a, with a = 0 at the start; 0 unless given.
-    #[serde(skip_serializing_if = "is_off")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub lag_s: f64,
 }

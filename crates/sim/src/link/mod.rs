@@ -204,16 +204,6 @@ fn latency(key: &'static str, what: &str, latency_s: f64, duration_s: f64) -> Re
     Err(ScenarioError::new(said).with_kind(kind).with_help(help).at(key).at("time.duration_s"))
 }
 
-/// Returns whether a number is 0, which turns its imperfection off.
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-fn is_off(number: &f64) -> bool {
-    *number == 0.0
-}
-
-fn is_default<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
-}
-
 /// Solver steps of continuous time within the shortest delay, so that the past is interpolated finely enough.
 const STEPS_PER_DELAY: f64 = 8.0;
 

@@ -7,8 +7,8 @@ use super::failure::Failure;
 use super::history::History;
 use super::messages::Messages;
 use super::sensing::StateSensor;
-use super::{ImperfectionSpec, Traffic, is_default, is_off, latency};
-use crate::scenario::{ErrorKind, MAX_MEMORY_BYTES, Scenario, ScenarioError};
+use super::{ImperfectionSpec, Traffic, latency};
+use crate::scenario::{ErrorKind, MAX_MEMORY_BYTES, Scenario, ScenarioError, is_default};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::law::VoidReason;
@@ -19,15 +19,15 @@ use tautline_laws::observation::NeighbourState;
 #[serde(deny_unknown_fields, default)]
 pub struct NetworkSpec {
     /// Delay of each message in s. A vehicle knows its own state without this delay.
-    #[serde(skip_serializing_if = "is_off")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub latency_s: f64,
     /// Extra delay of each message in s, uniform from 0 to `jitter_s`. Needs `rate_hz`.
-    #[serde(skip_serializing_if = "is_off")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub jitter_s: f64,
     /// Share of messages that are lost, from 0 to 1. Needs `rate_hz`.
-    #[serde(skip_serializing_if = "is_off")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = 0.0, "minimum" = 0, "maximum" = 1))]
     pub loss: f64,
     /// Mean number of messages lost in a row, at least 1. Model of Gilbert and Elliott: a link loses all messages while

@@ -36,6 +36,7 @@ pub use crate::link::{
     ActuationSpec, Failure, FailureKind, LinkFailure, NearStates, NetworkSpec, SensingSpec, StalePolicy,
 };
 pub use crate::shield::ShieldSpec;
+pub(crate) use document::is_default;
 pub use environment::IgnoredPart;
 pub use error::{ErrorKind, Field, ScenarioError, edit_distance};
 pub use external::ExternalLaw;

@@ -5,8 +5,8 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::error::suggest;
-use super::error::{ErrorKind, ScenarioError};
+use super::document::is_default;
+use super::error::{ErrorKind, ScenarioError, suggest};
 use super::files;
 use super::spec::{PlantSpec, Scenario, Space};
 use crate::vehicle::{
@@ -65,14 +65,9 @@ pub(super) struct VehicleTable {
     max_accel_m_s2: Option<f64>,
     /// Drag of points over mass in 1/s, linear in the velocity relative to the air; 0 unless given. In a wind W,
     /// p'' = a22 v + u + drag (W - v). The drag of quadrotors is part of their model.
-    #[serde(skip_serializing_if = "is_none")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("minimum" = 0))]
     pub(super) drag_per_s: f64,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
-fn is_none(drag_per_s: &f64) -> bool {
-    *drag_per_s == 0.0
 }
 
 /// Model by name, by file, or with all of its keys.

@@ -32,7 +32,7 @@ use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::scenario::{ErrorKind, MAX_MEMORY_BYTES, Scenario, ScenarioError, Space};
+use crate::scenario::{ErrorKind, MAX_MEMORY_BYTES, Scenario, ScenarioError, Space, is_default};
 use crate::sim::MAX_BEND;
 use tautline_core::obstacle;
 use tautline_core::swarm::row;
@@ -80,11 +80,11 @@ pub struct ShieldSpec {
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_speed_m_s: Option<f64>,
     /// Bound in m on the error of the measured own position.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub position_error_m: f64,
     /// Bound in m/s on the error of the measured own velocity.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub velocity_error_m_s: f64,
     /// Bound in m/s^2 on the push of wind and model errors, at least `vehicle.drag_per_s` times the fastest wind; 0
@@ -132,11 +132,6 @@ impl Default for ShieldSpec {
             turn: 1.0,
         }
     }
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-fn is_zero(number: &f64) -> bool {
-    *number == 0.0
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
