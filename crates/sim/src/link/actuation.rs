@@ -32,10 +32,9 @@ impl ImperfectionSpec for ActuationSpec {
         if self.lag_s == 0.0 || scenario.plant.holds_commands() {
             return Ok(());
         }
-        Err(ScenarioError::new("the ideal plant supports no lag")
-            .with_kind(ErrorKind::UnsupportedByPlant)
-            .with_help("leave out actuation.lag_s, or set plant.kind to \"rapier\"")
-            .at_keys(["actuation.lag_s", "plant.kind"]))
+        let problem = "the ideal plant supports no lag";
+        let help = "leave out actuation.lag_s, or set plant.kind to \"rapier\"";
+        Err(ScenarioError::new(ErrorKind::UnsupportedByPlant, problem, help).at_keys(["actuation.lag_s", "plant.kind"]))
     }
 
     fn voids(&self) -> Vec<VoidReason> {

@@ -81,12 +81,9 @@ impl Scenario {
         if self.plant.holds_commands() || self.time.control_hz.is_some() {
             return Ok(());
         }
-        Err(ScenarioError::new(format!(
-            "{key} samples the state, but the ideal plant evaluates the law in continuous time"
-        ))
-        .with_kind(ErrorKind::UnsupportedByPlant)
-        .with_help("set time.control_hz, the rate of held commands, or set plant.kind to \"rapier\"")
-        .at_keys([key, "plant.kind"]))
+        let problem = format!("{key} samples the state, but the ideal plant evaluates the law in continuous time");
+        let help = "set time.control_hz, the rate of held commands, or set plant.kind to \"rapier\"";
+        Err(ScenarioError::new(ErrorKind::UnsupportedByPlant, problem, help).at_keys([key, "plant.kind"]))
     }
 }
 
@@ -201,7 +198,7 @@ fn latency(key: &'static str, what: &str, latency_s: f64, duration_s: f64) -> Re
             "reduce the latency, or increase time.duration_s",
         )
     };
-    Err(ScenarioError::new(said).with_kind(kind).with_help(help).at(key).at("time.duration_s"))
+    Err(ScenarioError::new(kind, said, help).at(key).at("time.duration_s"))
 }
 
 /// Solver steps of continuous time within the shortest delay, so that the past is interpolated finely enough.

@@ -75,10 +75,9 @@ impl ImperfectionSpec for SensingSpec {
         ];
         for (key, what, noise) in noises {
             if noise > 0.0 && rate_hz.is_none() {
-                return Err(ScenarioError::new(format!("{what} needs a rate of measurements"))
-                    .with_kind(ErrorKind::MissingKey)
-                    .with_help("set sensing.rate_hz, such as 100")
-                    .at(key));
+                let problem = format!("{what} needs a rate of measurements");
+                let help = "set sensing.rate_hz, such as 100";
+                return Err(ScenarioError::new(ErrorKind::MissingKey, problem, help).at(key));
             }
         }
         if rate_hz.is_some() {

@@ -8,10 +8,10 @@ use std::borrow::Cow;
 use std::fmt::Display;
 use std::ops::Range;
 
-use toml::de::{DeTable, DeValue};
 use toml::Spanned;
+use toml::de::{DeTable, DeValue};
 
-use super::error::{ErrorKind, Field, ScenarioError, suggest};
+use super::error::{ErrorKind, ScenarioError, suggest};
 use super::limits::{LARGEST, SMALLEST};
 use super::schema::{Node, tables_with};
 use tautline_core::text::shortest;
@@ -28,9 +28,8 @@ pub(super) struct SchemaError {
 }
 
 impl SchemaError {
-    fn new(kind: ErrorKind, message: impl AsRef<str>, help: impl AsRef<str>, span: Range<usize>) -> Self {
-        let error = ScenarioError::new(message).with_kind(kind).with_help(help);
-        Self { error, span, path: "".into() }
+    fn new(kind: ErrorKind, problem: impl AsRef<str>, help: impl AsRef<str>, span: Range<usize>) -> Self {
+        Self { error: ScenarioError::new(kind, problem, help), span, path: "".into() }
     }
 
     /// Returns the error of the value below a key or entry.
@@ -41,13 +40,11 @@ impl SchemaError {
 
     /// Returns the error about a value that the scenario does not give, with its dotted path as its key.
     pub(super) fn of_filled_value(self) -> ScenarioError {
-        let error = self.without_text();
-        let path = error.fields.first().map_or_else(String::new, Field::to_string);
-        let message = format!("{path}, which follows from other keys: {}", error.message);
-        ScenarioError::new(message)
-            .with_kind(error.kind)
-            .with_help(format!("give {path} another value, or change the keys that it follows from"))
-            .at(path)
+        let ScenarioError { kind, message, .. } = self.error;
+        let path = String::from(self.path);
+        let problem = format!("{path}, which follows from other keys: {message}");
+        let help = format!("give {path} another value, or change the keys that it follows from");
+        ScenarioError::new(kind, problem, help).at(path)
     }
 
     /// Returns the error with its dotted path as its key, for a scenario without a text.
@@ -71,8 +68,9 @@ pub(super) fn check_value(key: &str, value: &mut Spanned<DeValue<'_>>, node: Nod
 
 /// Checks the TOML of a scenario that no file holds, such as one built in code.
 pub(super) fn check_written(toml: &str) -> Result<(), SchemaError> {
-    let table = DeTable::parse(toml)
-        .map_err(|error| SchemaError::new(ErrorKind::Syntax, error.message(), "give values that TOML can hold", 0..0))?;
+    let table = DeTable::parse(toml).map_err(|error| {
+        SchemaError::new(ErrorKind::Syntax, error.message(), "give values that TOML can hold", 0..0)
+    })?;
     check_schema(&mut Spanned::new(0..0, DeValue::Table(table.into_inner())), usize::MAX)
 }
 
@@ -269,11 +267,8 @@ impl Check {
         let Some(&chosen) = alternatives.iter().find(|part| part.tag().is_some_and(|(_, known)| known == name)) else {
             let mut schema_error = unknown_choice(&name, &names, tag_span);
             if own_name.is_some() && !table.contains_key(tag) {
-                let help = format!(
-                    "the name of a law is its kind unless the table [laws.NAME] has a `kind`: {}",
-                    schema_error.error.help.as_deref().unwrap_or_default()
-                );
-                schema_error.error = schema_error.error.with_help(help);
+                let unless = "the name of a law is its kind unless the table [laws.NAME] has a `kind`: ";
+                schema_error.error.help.insert_str(0, unless);
             }
             return Err(schema_error.child(tag));
         };

@@ -17,7 +17,7 @@ pub struct ScenarioError {
     /// The problem with its value, one sentence.
     pub message: String,
     /// The remedy.
-    pub help: Option<String>,
+    pub help: String,
     /// Keys that are part of the problem. The error is placed at the first one, unless an override set another one.
     pub fields: Vec<Field>,
     /// Place in the text; `None` for a scenario built in code, and for a file that could not be read.
@@ -163,23 +163,9 @@ pub struct Field {
 }
 
 impl ScenarioError {
-    pub(crate) fn new(message: impl AsRef<str>) -> Self {
-        let message = printable(message.as_ref());
-        Self { kind: ErrorKind::Inconsistent, message, help: None, fields: Vec::new(), place: None }
-    }
-
-    /// Returns an error about a value out of its range.
-    pub(crate) fn out_of_range(message: impl AsRef<str>) -> Self {
-        Self::new(message).with_kind(ErrorKind::OutOfRange)
-    }
-
-    /// Replaces the default kind [`ErrorKind::Inconsistent`].
-    pub(crate) fn with_kind(self, kind: ErrorKind) -> Self {
-        Self { kind, ..self }
-    }
-
-    pub(crate) fn with_help(self, help: impl AsRef<str>) -> Self {
-        Self { help: Some(printable(help.as_ref())), ..self }
+    pub(crate) fn new(kind: ErrorKind, problem: impl AsRef<str>, help: impl AsRef<str>) -> Self {
+        let [message, help] = [problem.as_ref(), help.as_ref()].map(printable);
+        Self { kind, message, help, fields: Vec::new(), place: None }
     }
 
     /// Adds a key that is part of the problem. The error is placed at the first key, unless an override set another
@@ -225,7 +211,7 @@ impl ScenarioError {
             return self;
         }
         self.message = format!("{}; start.jitter_m moved each coordinate by up to {jitter_m} m", self.message);
-        self.help = Some("reduce start.jitter_m, move one of the vehicles away, or reduce law.delta_m".to_owned());
+        self.help = "reduce start.jitter_m, move one of the vehicles away, or reduce law.delta_m".to_owned();
         self.fields.insert(0, Field { key: "start.jitter_m".into(), entry: None, leg: 0 });
         self
     }
@@ -253,7 +239,7 @@ impl fmt::Display for ScenarioError {
             (None, Some(field)) => write!(f, "{field}: {}", self.message)?,
             (None, None) => f.write_str(&self.message)?,
         }
-        self.help.as_ref().map_or(Ok(()), |help| write!(f, "\n  help: {help}"))
+        write!(f, "\n  help: {}", self.help)
     }
 }
 
@@ -320,8 +306,7 @@ impl From<ScenarioError> for Failure {
             Some(field) => format!("{field}: {}", error.message),
             None => error.message.clone(),
         };
-        let failure = Self::new(error.code(), false, message);
-        let failure = error.help.iter().fold(failure, Self::with_help);
+        let failure = Self::input(error.code(), message, &error.help);
         error.place.iter().fold(failure, |failure, place| failure.at(place))
     }
 }
@@ -333,20 +318,24 @@ mod tests {
     #[test]
     fn an_error_shows_place_and_remedy_in_plain_text() {
         let text = "name = \"a\"\nside_m = 2.0\n";
-        let error =
-            ScenarioError::new("too small").with_help("enlarge it").with_place(Place::new("f.toml", text, 20..23));
+        let error = ScenarioError::new(ErrorKind::OutOfRange, "too small", "enlarge it");
+        let error = error.with_place(Place::new("f.toml", text, 20..23));
         assert_eq!(error.to_string(), "f.toml:2:10: too small\n  help: enlarge it");
     }
 
     #[test]
     fn without_a_text_the_key_is_the_place() {
-        let error = ScenarioError::new("is zero").at_entry("swarm.mass_kg", 1);
-        assert_eq!(error.to_string(), "swarm.mass_kg.2: is zero");
+        let error = ScenarioError::new(ErrorKind::OutOfRange, "is zero", "enlarge it").at_entry("swarm.mass_kg", 1);
+        assert_eq!(error.to_string(), "swarm.mass_kg.2: is zero\n  help: enlarge it");
     }
 
     #[test]
     fn control_characters_of_the_input_do_not_reach_the_terminal() {
-        let error = ScenarioError::new("key \u{1b}[2J").with_place(Place::new("f", "\u{1b}[2J", 0..1));
+        let error = ScenarioError::new(ErrorKind::UnknownKey, "key \u{1b}[2J", "\u{1b}[2J").with_place(Place::new(
+            "f",
+            "\u{1b}[2J",
+            0..1,
+        ));
         assert!(!error.to_string().contains('\u{1b}'));
     }
 

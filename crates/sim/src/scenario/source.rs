@@ -142,9 +142,9 @@ fn unknown_builtin(name: &str) -> ScenarioError {
     let names: Vec<_> = builtin::all().iter().map(|builtin| builtin.name).collect();
     let file = format!("{name}.toml");
     let is_file = Path::new(&file).is_file();
-    ScenarioError::new(format!("`{name}` is neither a built-in scenario nor a file"))
-        .with_kind(ErrorKind::NotFound)
-        .with_help(if is_file { format!("did you mean the file `{file}`?") } else { suggest(name, &names) })
+    let problem = format!("`{name}` is neither a built-in scenario nor a file");
+    let help = if is_file { format!("did you mean the file `{file}`?") } else { suggest(name, &names) };
+    ScenarioError::new(ErrorKind::NotFound, problem, help)
 }
 
 /// Replaces characters that a name may not contain by `-`.
@@ -156,18 +156,17 @@ fn as_name(text: &str) -> String {
 fn read_file(path: &Path) -> Result<String, ScenarioError> {
     let shown = path.display().to_string();
     if path.is_dir() {
-        return Err(ScenarioError::new(format!("{shown} is a directory"))
-            .with_kind(ErrorKind::CannotRead)
-            .with_help("give the path of a scenario file within it"));
+        let problem = format!("{shown} is a directory");
+        return Err(ScenarioError::new(ErrorKind::CannotRead, problem, "give the path of a scenario file within it"));
     }
     read(&shown, File::open(path).map_err(|error| unreadable(&shown, &error))?)
 }
 
 fn unreadable(shown: &str, error: &std::io::Error) -> ScenarioError {
     let is_missing = error.kind() == std::io::ErrorKind::NotFound;
-    ScenarioError::new(format!("cannot read {shown}: {error}"))
-        .with_kind(if is_missing { ErrorKind::NotFound } else { ErrorKind::CannotRead })
-        .with_help("give the path of a scenario file, or the name of a built-in scenario such as `pentagon`")
+    let problem = format!("cannot read {shown}: {error}");
+    let help = "give the path of a scenario file, or the name of a built-in scenario such as `pentagon`";
+    ScenarioError::new(if is_missing { ErrorKind::NotFound } else { ErrorKind::CannotRead }, problem, help)
 }
 
 /// Reads a source to its end, as UTF-8 of at most [`MAX_FILE_BYTES`]; `shown` is its name in messages.
@@ -176,17 +175,19 @@ fn read(shown: &str, source: impl Read) -> Result<String, ScenarioError> {
     // The size of a device or a pipe is unknown in advance.
     source.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(|error| unreadable(shown, &error))?;
     if bytes.len() as u64 > MAX_FILE_BYTES {
-        return Err(ScenarioError::new(format!("{shown} has more than {} MiB", MAX_FILE_BYTES >> 20))
-            .with_kind(ErrorKind::TooLarge)
-            .with_help("name a smaller file"));
+        let problem = format!("{shown} has more than {} MiB", MAX_FILE_BYTES >> 20);
+        return Err(ScenarioError::new(ErrorKind::TooLarge, problem, "name a smaller file"));
     }
     String::from_utf8(bytes).map_err(|error| {
         let valid = error.utf8_error().valid_up_to();
         let bytes = error.into_bytes();
         let text = String::from_utf8_lossy(&bytes[..bytes.len().min(valid + 64)]);
-        ScenarioError::new(format!("byte {valid} (from 0) is not UTF-8"))
-            .with_kind(ErrorKind::NotUtf8)
-            .with_help("save the file as UTF-8 text")
-            .with_place(Place::new(shown, &text, valid..valid + '\u{fffd}'.len_utf8()))
+        let problem = format!("byte {valid} (from 0) is not UTF-8");
+        let help = "save the file as UTF-8 text";
+        ScenarioError::new(ErrorKind::NotUtf8, problem, help).with_place(Place::new(
+            shown,
+            &text,
+            valid..valid + '\u{fffd}'.len_utf8(),
+        ))
     })
 }
