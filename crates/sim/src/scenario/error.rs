@@ -24,130 +24,100 @@ pub struct ScenarioError {
     pub place: Option<Box<Place>>,
 }
 
-/// Kind of a [`ScenarioError`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum ErrorKind {
-    /// The source cannot be read.
-    CannotRead,
-    /// A list has another length than the number of vehicles.
-    CountMismatch,
-    /// The graph is not connected.
-    Disconnected,
-    /// An edge of the graph does not join two vehicles.
-    Edge,
-    /// The text has no keys.
-    Empty,
-    /// Two keys exclude each other.
-    ExclusiveKeys,
-    /// A file that the scenario names cannot be used.
-    File,
-    /// Two hulls do not fit within the safety distance.
-    HullsTouch,
-    /// Keys contradict each other.
-    Inconsistent,
-    /// The law cannot be built with its parameters.
-    LawParameter,
-    /// The flight needs too much memory.
-    Memory,
-    /// A required key is missing.
-    MissingKey,
-    /// A name has other characters than letters, digits, `-` and `_`.
-    Name,
-    /// A vehicle or a slot is within the clearance of an obstacle.
-    NearObstacle,
-    /// The vehicles do not fit into the space of the start.
-    NoRoom,
-    /// The file or the built-in scenario does not exist.
-    NotFound,
-    /// The text is not UTF-8.
-    NotUtf8,
-    /// An obstacle cannot be judged.
-    Obstacle,
-    /// A number is out of its range.
-    OutOfRange,
-    /// A time or a duration is outside the flight.
-    OutsideFlight,
-    /// An override cannot be applied.
-    Override,
-    /// A vector leaves the plane of the swarm.
-    Plane,
-    /// The reference cannot be followed.
-    Reference,
-    /// A shape gives no formation.
-    Shape,
-    /// The shield has no certificate.
-    Shield,
-    /// The step is too long for a rate or a duration.
-    StepTooLong,
-    /// The text is not TOML.
-    Syntax,
-    /// The file is too large.
-    TooLarge,
-    /// The flight has too many steps.
-    TooManySteps,
-    /// A word is none of the choices.
-    UnknownChoice,
-    /// The key does not exist.
-    UnknownKey,
-    /// The vehicle does not exist.
-    UnknownVehicle,
-    /// The law does not support a setting.
-    UnsupportedByLaw,
-    /// The plant does not support a setting.
-    UnsupportedByPlant,
-    /// The vehicle does not support a setting.
-    UnsupportedByVehicle,
-    /// Two starts or two slots are within the safety distance.
-    WithinDelta,
-    /// A value has the wrong type.
-    WrongType,
+macro_rules! kinds {
+    ($(#[doc = $doc:literal] $kind:ident = $code:literal,)+) => {
+        /// Kind of a [`ScenarioError`].
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[non_exhaustive]
+        pub enum ErrorKind {
+            $(#[doc = $doc] $kind,)+
+        }
+
+        impl ErrorKind {
+            /// Returns the stable code, such as `scenario/out-of-range`.
+            #[must_use]
+            pub fn code(self) -> &'static str {
+                match self { $(Self::$kind => $code,)+ }
+            }
+        }
+    };
 }
 
-impl ErrorKind {
-    /// Returns the stable code, such as `scenario/out-of-range`.
-    #[must_use]
-    pub fn code(self) -> &'static str {
-        match self {
-            Self::CannotRead => "scenario/cannot-read",
-            Self::CountMismatch => "scenario/count-mismatch",
-            Self::Disconnected => "scenario/disconnected",
-            Self::Edge => "scenario/edge",
-            Self::Empty => "scenario/empty",
-            Self::ExclusiveKeys => "scenario/exclusive-keys",
-            Self::File => "scenario/file",
-            Self::HullsTouch => "scenario/hulls-touch",
-            Self::Inconsistent => "scenario/inconsistent",
-            Self::LawParameter => "law/parameter",
-            Self::Memory => "scenario/memory",
-            Self::MissingKey => "scenario/missing-key",
-            Self::Name => "scenario/name",
-            Self::NearObstacle => "scenario/near-obstacle",
-            Self::NoRoom => "scenario/no-room",
-            Self::NotFound => "scenario/not-found",
-            Self::NotUtf8 => "scenario/not-utf8",
-            Self::Obstacle => "scenario/obstacle",
-            Self::OutOfRange => "scenario/out-of-range",
-            Self::OutsideFlight => "scenario/outside-flight",
-            Self::Override => "scenario/override",
-            Self::Plane => "scenario/plane",
-            Self::Reference => "scenario/reference",
-            Self::Shape => "scenario/shape",
-            Self::Shield => "scenario/shield",
-            Self::StepTooLong => "scenario/step-too-long",
-            Self::Syntax => "scenario/syntax",
-            Self::TooLarge => "scenario/too-large",
-            Self::TooManySteps => "scenario/too-many-steps",
-            Self::UnknownChoice => "scenario/unknown-choice",
-            Self::UnknownKey => "scenario/unknown-key",
-            Self::UnknownVehicle => "scenario/unknown-vehicle",
-            Self::UnsupportedByLaw => "scenario/unsupported-by-law",
-            Self::UnsupportedByPlant => "scenario/unsupported-by-plant",
-            Self::UnsupportedByVehicle => "scenario/unsupported-by-vehicle",
-            Self::WithinDelta => "scenario/within-delta",
-            Self::WrongType => "scenario/wrong-type",
-        }
-    }
+kinds! {
+    /// The source cannot be read.
+    CannotRead = "scenario/cannot-read",
+    /// A list has another length than the number of vehicles.
+    CountMismatch = "scenario/count-mismatch",
+    /// The graph is not connected.
+    Disconnected = "scenario/disconnected",
+    /// An edge of the graph does not join two vehicles.
+    Edge = "scenario/edge",
+    /// The text has no keys.
+    Empty = "scenario/empty",
+    /// Two keys exclude each other.
+    ExclusiveKeys = "scenario/exclusive-keys",
+    /// A file that the scenario names cannot be used.
+    File = "scenario/file",
+    /// Two hulls do not fit within the safety distance.
+    HullsTouch = "scenario/hulls-touch",
+    /// Keys contradict each other.
+    Inconsistent = "scenario/inconsistent",
+    /// The law cannot be built with its parameters.
+    LawParameter = "law/parameter",
+    /// The flight needs too much memory.
+    Memory = "scenario/memory",
+    /// A required key is missing.
+    MissingKey = "scenario/missing-key",
+    /// A name has other characters than letters, digits, `-` and `_`.
+    Name = "scenario/name",
+    /// A vehicle or a slot is within the clearance of an obstacle.
+    NearObstacle = "scenario/near-obstacle",
+    /// The vehicles do not fit into the space of the start.
+    NoRoom = "scenario/no-room",
+    /// The file or the built-in scenario does not exist.
+    NotFound = "scenario/not-found",
+    /// The text is not UTF-8.
+    NotUtf8 = "scenario/not-utf8",
+    /// An obstacle cannot be judged.
+    Obstacle = "scenario/obstacle",
+    /// A number is out of its range.
+    OutOfRange = "scenario/out-of-range",
+    /// A time or a duration is outside the flight.
+    OutsideFlight = "scenario/outside-flight",
+    /// An override cannot be applied.
+    Override = "scenario/override",
+    /// A vector leaves the plane of the swarm.
+    Plane = "scenario/plane",
+    /// The reference cannot be followed.
+    Reference = "scenario/reference",
+    /// A shape gives no formation.
+    Shape = "scenario/shape",
+    /// The shield has no certificate.
+    Shield = "scenario/shield",
+    /// The step is too long for a rate or a duration.
+    StepTooLong = "scenario/step-too-long",
+    /// The text is not TOML.
+    Syntax = "scenario/syntax",
+    /// The file is too large.
+    TooLarge = "scenario/too-large",
+    /// The flight has too many steps.
+    TooManySteps = "scenario/too-many-steps",
+    /// A word is none of the choices.
+    UnknownChoice = "scenario/unknown-choice",
+    /// The key does not exist.
+    UnknownKey = "scenario/unknown-key",
+    /// The vehicle does not exist.
+    UnknownVehicle = "scenario/unknown-vehicle",
+    /// The law does not support a setting.
+    UnsupportedByLaw = "scenario/unsupported-by-law",
+    /// The plant does not support a setting.
+    UnsupportedByPlant = "scenario/unsupported-by-plant",
+    /// The vehicle does not support a setting.
+    UnsupportedByVehicle = "scenario/unsupported-by-vehicle",
+    /// Two starts or two slots are within the safety distance.
+    WithinDelta = "scenario/within-delta",
+    /// A value has the wrong type.
+    WrongType = "scenario/wrong-type",
 }
 
 /// Key of the scenario file, or an entry of the list that it holds. Displayed as an override names it:
