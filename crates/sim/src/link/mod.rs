@@ -15,13 +15,14 @@ mod history;
 mod messages;
 mod network;
 mod noise;
+mod radio;
 mod sensing;
 
 pub use actuation::ActuationSpec;
 pub use failure::{Failure, FailureKind};
 pub use history::History;
-pub(crate) use messages::{Radio, RadioUse};
 pub use network::{LinkFailure, NearStates, NetworkSpec, StalePolicy};
+pub(crate) use radio::{Radio, RadioUse, Round};
 pub use sensing::SensingSpec;
 pub(crate) use sensing::period;
 
