@@ -93,8 +93,7 @@ impl Messages {
     fn send(&mut self, sent_s: f64, sensing: &StateSensor, history: &History) {
         let Self { links, radio, received, ages, .. } = self;
         let at_rest = || Swarm::at_rest(Rows::zeros(links.count()));
-        let mut round = radio.spare(|| Measurements { measured_s: 0.0, states: at_rest() });
-        radio.begin(&mut round, sent_s);
+        let mut round = radio.round(|| Measurements { measured_s: 0.0, states: at_rest() });
         round.content.measured_s = sensing.measured_s(sent_s);
         sensing.measure(history, sent_s, None, &mut round.content.states);
         for sender in 0..links.count() {
@@ -104,7 +103,7 @@ impl Messages {
             radio.send((sender, sent_s), &round.content.states.positions_m, (over, most), &mut round.arrives_s);
         }
         received.iter().for_each(|received| ages.take(sent_s - received.measured_s));
-        radio.end(round);
+        radio.end(round, sent_s);
     }
 
     /// Delivers messages that have arrived; an older message never replaces a newer one.

@@ -126,22 +126,16 @@ impl<T> Radio<T> {
         (self.sent, self.lost)
     }
 
-    /// Returns the memory of an earlier round, or else a new round.
-    pub(crate) fn spare(&mut self, new: impl FnOnce() -> T) -> Round<T> {
+    /// Returns a round to fill, with the memory of an earlier one.
+    pub(crate) fn round(&mut self, new: impl FnOnce() -> T) -> Round<T> {
         let links = self.lost_before.len();
         self.spare.pop().unwrap_or_else(|| Round { sent_s: 0.0, content: new(), arrives_s: Vec::with_capacity(links) })
     }
 
-    /// Keeps the memory of a round that is not sent.
-    pub(crate) fn keep(&mut self, round: Round<T>) {
-        self.spare.push(round);
-    }
-
-    /// Begins a round at a time \[s\]. [`Radio::send`] sends its messages, [`Radio::end`] ends it.
-    pub(crate) fn begin(&mut self, round: &mut Round<T>, sent_s: f64) {
-        self.rounds += 1;
-        round.sent_s = sent_s;
+    /// Keeps the memory of a round for reuse.
+    pub(crate) fn recycle(&mut self, mut round: Round<T>) {
         round.arrives_s.clear();
+        self.spare.push(round);
     }
 
     /// Adds the arrival times \[s\] of the messages of a sender over these links of at most `most`, each with its
@@ -158,7 +152,8 @@ impl<T> Radio<T> {
             return;
         }
         let is_random = self.loss.is_some() || self.jitter_s > 0.0;
-        let mut draw = is_random.then(|| self.noise.draw(sender, self.used_for as usize, self.rounds, DRAWS * most));
+        let mut draw =
+            is_random.then(|| self.noise.draw(sender, self.used_for as usize, self.rounds + 1, DRAWS * most));
         for (link, receiver) in links {
             let [unit, jitter] = draw.as_mut().map_or([0.0; DRAWS], |draw| [draw.unit(), draw.unit()]);
             let by_chance = self.loss.is_some_and(|loss| {
@@ -176,8 +171,10 @@ impl<T> Radio<T> {
         }
     }
 
-    pub(crate) fn end(&mut self, round: Round<T>) {
-        self.under_way.push_back(round);
+    /// Ends a round, whose messages were sent at a time \[s\].
+    pub(crate) fn end(&mut self, round: Round<T>, sent_s: f64) {
+        self.rounds += 1;
+        self.under_way.push_back(Round { sent_s, ..round });
     }
 
     /// Delivers the messages that arrived since the last call, up to a time \[s\]. `deliver` gets each round under way,
@@ -189,8 +186,8 @@ impl<T> Radio<T> {
         }
         self.delivered_s = to_s;
         let longest_s = (self.latency_s + self.jitter_s).max(self.used_for.shortest_s());
-        while self.under_way.front().is_some_and(|first| first.sent_s + longest_s <= to_s) {
-            self.spare.extend(self.under_way.pop_front());
+        while let Some(round) = self.under_way.pop_front_if(|first| first.sent_s + longest_s <= to_s) {
+            self.recycle(round);
         }
     }
 }

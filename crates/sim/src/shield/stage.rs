@@ -140,7 +140,7 @@ impl ShieldStage {
         self.observe_measurements(time_s, truth);
         let sends = self.has_round(time_s);
         let count = command.nrows();
-        let mut round = self.radio.spare(|| (0..count).map(|_| Broadcast::for_swarm(count)).collect());
+        let mut round = self.radio.round(|| (0..count).map(|_| Broadcast::for_swarm(count)).collect());
         let Self { fleet, measured, wanted, commands, .. } = self;
         each(fleet.shields_mut(), commands, &mut round.content, |i, shield, command, broadcast| {
             *command = shield.filter(measured[i], wanted[i]);
@@ -154,7 +154,7 @@ impl ShieldStage {
         if sends {
             self.send(round, time_s, truth);
         } else {
-            self.radio.keep(round);
+            self.radio.recycle(round);
         }
     }
 
@@ -212,7 +212,6 @@ impl ShieldStage {
     /// Sends the messages of an instant.
     fn send(&mut self, mut round: Round<Vec<Broadcast>>, time_s: f64, truth: &Swarm) {
         let count = self.commands.len();
-        self.radio.begin(&mut round, time_s);
         for (sender, broadcast) in round.content.iter().enumerate() {
             let links = broadcast.entries.iter().map(|entry| {
                 let receiver = entry.to as usize;
@@ -220,7 +219,7 @@ impl ShieldStage {
             });
             self.radio.send((sender, time_s), &truth.positions_m, (links, count - 1), &mut round.arrives_s);
         }
-        self.radio.end(round);
+        self.radio.end(round, time_s);
     }
 
     /// Changes the seed of later messages.
