@@ -138,6 +138,18 @@ fn find_files(document: &mut Document, folder: &Path) -> Result<(), ScenarioErro
     Ok(())
 }
 
+/// Returns whether a key of a scenario takes integers only; `false` for a key that does not exist.
+#[must_use]
+pub fn takes_integers_only(source: &Source, overrides: &[Override], key: &str) -> bool {
+    let Ok((name, toml)) = source.text() else { return false };
+    let is_of_wrong_type = |number: &str| {
+        let overrides = &[overrides, &[Override::parse(&format!("{key}={number}")).ok()?]].concat();
+        let read = Text { name: &name, toml: &toml, overrides }.decode();
+        Some(read.is_err_and(|error| error.kind == ErrorKind::WrongType))
+    };
+    is_of_wrong_type("0.5") == Some(true) && is_of_wrong_type("1") == Some(false)
+}
+
 fn unknown_builtin(name: &str) -> ScenarioError {
     let names: Vec<_> = builtin::all().iter().map(|builtin| builtin.name).collect();
     let file = format!("{name}.toml");
@@ -190,4 +202,51 @@ fn read(shown: &str, source: impl Read) -> Result<String, ScenarioError> {
             valid..valid + '\u{fffd}'.len_utf8(),
         ))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn takes_integers(builtin: &str, sets: &[&str], key: &str) -> bool {
+        let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect("an override")).collect();
+        takes_integers_only(&Source::Builtin(builtin.to_owned()), &overrides, key)
+    }
+
+    #[test]
+    fn keys_that_count_take_integers_only() {
+        for (key, sets) in [
+            ("start.seed", &[][..]),
+            ("noise.seed", &[]),
+            ("time.max_halvings", &[]),
+            ("swarm.count", &[]),
+            ("law.neighbours_max", &["law.kind=orca"]),
+            ("failure.1.vehicle", &["failure=[{vehicle=1, kind=\"silent\", at_s=1}]"]),
+            ("failure.1.rotor", &["failure=[{vehicle=1, kind=\"rotor\", rotor=1, at_s=1}]"]),
+            ("graph.edges.1.2", &["graph={kind=\"edges\", edges=[[1, 2], [2, 3], [3, 4], [4, 5]]}"]),
+            ("reference.known_by.1", &["reference={known_by=[1, 2]}"]),
+        ] {
+            assert!(takes_integers("pentagon", sets, key), "{key}");
+        }
+    }
+
+    #[test]
+    fn keys_that_measure_take_any_number() {
+        for (builtin, key) in [
+            ("crazyflies", "sensing.latency_s"),
+            ("crazyflies", "time.control_hz"),
+            ("pentagon", "time.record_hz"),
+            ("pentagon", "time.dt_s"),
+            ("pentagon", "law.alpha"),
+            ("pentagon", "start.positions_m.2.x"),
+            ("pentagon", "wind.mean_m_s"),
+            ("gusts", "wind.mean_m_s.1"),
+            ("pentagon", "law.kind"),
+            ("pentagon", "law.alfa"),
+            ("pentagon", "law..alpha"),
+            ("pentagon", "law.neighbours_max"),
+        ] {
+            assert!(!takes_integers(builtin, &[], key), "{builtin} {key}");
+        }
+    }
 }
