@@ -1,7 +1,5 @@
 //! Limits of the numbers, the size and the memory of a scenario.
 
-use std::fmt::Display;
-
 use super::error::{ErrorKind, ScenarioError};
 use tautline_core::swarm::{Pair, Rows, row};
 use tautline_laws::space::SpacedPoints;
@@ -114,23 +112,4 @@ pub(super) fn rounded_up(number: f64) -> f64 {
 pub(super) fn first_pair_within(rows: &Rows, distance_m: f64) -> Option<(Pair, f64)> {
     let mut spaced = SpacedPoints::new(distance_m);
     (0..rows.nrows()).find_map(|j| spaced.insert(row(rows, j)).err().map(|(i, apart_m)| (Pair::new(i, j), apart_m)))
-}
-
-/// Refuses a number that is not finite, or larger in magnitude than [`LARGEST`].
-pub(super) fn require_finite(what: impl Display, number: f64) -> Result<f64, ScenarioError> {
-    if number.abs() <= LARGEST {
-        return Ok(number);
-    }
-    Err(match not_finite(number) {
-        Some(shown) => ScenarioError::new(ErrorKind::OutOfRange, format!("{what} is {shown}"), "give a finite number"),
-        None => ScenarioError::new(
-            ErrorKind::OutOfRange,
-            format!("{what} must be at most {LARGEST:e} in magnitude, got {number:e}"),
-            "give a smaller number",
-        ),
-    })
-}
-
-fn not_finite(number: f64) -> Option<&'static str> {
-    (!number.is_finite()).then_some(if number.is_nan() { "not a number" } else { "infinite" })
 }

@@ -6,8 +6,8 @@ use super::check::{SchemaError, check_written};
 use super::document::Document;
 use super::error::{ErrorKind, ScenarioError};
 use super::limits::{
-    CONTACT_PREDICTION_M, MAX_NAME_CHARS, MAX_STEPS, SLOT_MARGIN, check_count, check_lengths, check_memory,
-    first_pair_within, is_name_character, require_finite,
+    CONTACT_PREDICTION_M, LARGEST, MAX_NAME_CHARS, MAX_STEPS, SLOT_MARGIN, check_count, check_lengths, check_memory,
+    first_pair_within, is_name_character,
 };
 use super::spec::{Safety, Scenario, Space};
 use super::time::TimeSpec;
@@ -23,8 +23,11 @@ use tautline_laws::wind::Gust;
 /// Relative rounding of the position \[m\] and velocity \[m/s\] of a leader on the reference.
 const LEADER_ROUNDING: f64 = 1e-9;
 
-/// Smallest number of steps of a turn of the reference, which is followed step by step.
-const STEPS_A_TURN: f64 = 10.0;
+/// Smallest number of steps of a turn of the reference, and of the rise or fall of a gust.
+const STEPS_A_CHANGE: f64 = 10.0;
+
+/// Relative difference below which two safety distances are equal.
+const ROUNDING: f64 = 1e-9;
 
 /// Number of vehicles that a message names before it counts the rest.
 const NAMED_VEHICLES: usize = 8;
@@ -56,7 +59,7 @@ impl Scenario {
     }
 
     /// Checks conditions on several keys; the schema checks single keys.
-    pub(super) fn check(&self) -> Result<(), ScenarioError> {
+    fn check(&self) -> Result<(), ScenarioError> {
         check_name(&self.name)?;
         check_count(self.count())?;
         self.check_legs()?;
@@ -166,7 +169,7 @@ impl Scenario {
         let Some(guidance) = &self.reference else { return Ok(()) };
         self.check_followed(guidance)?;
         let start = guidance.motion.at(0.0);
-        let shortest_s = STEPS_A_TURN * self.time.dt_s;
+        let shortest_s = STEPS_A_CHANGE * self.time.dt_s;
         if guidance.motion.shortest_s() < shortest_s {
             let problem = format!(
                 "the reference turns within {} s, too fast for steps of {} s",
@@ -266,7 +269,7 @@ impl Scenario {
             for i in 0..rows.nrows() {
                 for axis in 0..3 {
                     let name = ["x", "y", "z"][axis];
-                    require_finite(format_args!("{name} of {what} of vehicle {}", i + 1), rows[(i, axis)])
+                    check_size(&format!("{name} of {what} of vehicle {}", i + 1), rows[(i, axis)])
                         .map_err(|error| error.at_leg_entry(leg, key, i))?;
                 }
                 if self.space == Space::Plane && rows[(i, 2)] != 0.0 {
@@ -396,68 +399,8 @@ impl Scenario {
         }
         Ok(())
     }
-}
 
-/// Returns an error of the parameters of a law at its key.
-fn of_law(error: &ParameterError) -> ScenarioError {
-    let refuse =
-        |help: &str| ScenarioError::new(ErrorKind::LawParameter, format!("no law has these parameters: {error}"), help);
-    match *error {
-        ParameterError::Tension { pair, .. } => refuse("enlarge the formation, or change law.delta_m")
-            .at_entry("formation.points_m", pair.second())
-            .at_entry("formation.points_m", pair.first())
-            .at("law.delta_m"),
-        ParameterError::ObstacleOverSlot { vehicle, obstacle, .. } => {
-            refuse("move one of them away, or reduce the clearance_m of the obstacle")
-                .at_entry("formation.points_m", vehicle)
-                .at_entry("obstacle", obstacle)
-        }
-        ParameterError::Slot { vehicle } => refuse("give finite numbers").at_entry("formation.points_m", vehicle),
-        ParameterError::Counts { .. } | ParameterError::Disconnected { .. } => {
-            refuse("add edges until every vehicle can be reached from every other").at("graph.edges")
-        }
-        ParameterError::ReferenceUnknown | ParameterError::ReferenceNotHeard => {
-            refuse("leave it out: then all vehicles know the reference; or add edges to the graph").at_keys([
-                "reference.known_by",
-                "reference.leader",
-                "graph.edges",
-            ])
-        }
-        ParameterError::NotFinite { .. } => refuse("give finite numbers").at("law.kind"),
-        ParameterError::Memory { .. } => {
-            refuse("use fewer vehicles, or a graph of fewer edges").at_keys(["swarm.count", "graph.kind"])
-        }
-    }
-}
-
-fn check_name(name: &str) -> Result<(), ScenarioError> {
-    let said = if name.is_empty() {
-        "the name is empty".to_owned()
-    } else if name.chars().count() > MAX_NAME_CHARS {
-        format!("the name has more than {MAX_NAME_CHARS} characters")
-    } else if let Some(bad) = name.chars().find(|&c| !is_name_character(c)) {
-        format!("the name contains {bad:?}")
-    } else {
-        return Ok(());
-    };
-    Err(ScenarioError::new(ErrorKind::Name, said, "it names a folder: use letters, digits, `-` and `_`").at("name"))
-}
-
-/// Refuses a graph in which some vehicle cannot be reached from vehicle 1.
-fn check_connected(graph: &Graph) -> Result<(), ScenarioError> {
-    let apart = graph.unreachable();
-    if apart.is_empty() {
-        return Ok(());
-    }
-    let named: Vec<_> = apart.iter().take(NAMED_VEHICLES).map(|i| (i + 1).to_string()).collect();
-    let more = if apart.len() > NAMED_VEHICLES { " and more" } else { "" };
-    let problem = format!("the graph is not connected: no path joins vehicle 1 to {}{more}", named.join(", "));
-    let help = "add edges until every vehicle can be reached from every other";
-    Err(ScenarioError::new(ErrorKind::Disconnected, problem, help).at("graph.edges"))
-}
-
-impl Scenario {
-    pub(super) fn check_deadlock(&self) -> Result<(), ScenarioError> {
+    fn check_deadlock(&self) -> Result<(), ScenarioError> {
         let hold_s = self.deadlock.hold_s;
         if hold_s >= self.time.duration_s {
             let duration_s = self.time.duration_s;
@@ -479,14 +422,9 @@ impl Scenario {
         }
         Ok(())
     }
-}
 
-/// Relative difference below which two safety distances are equal.
-const ROUNDING: f64 = 1e-9;
-
-impl Scenario {
     /// Checks that the ellipsoid is one of revolution, as wide as delta, and that the law keeps ellipsoids apart.
-    pub(super) fn check_safety(&self) -> Result<(), ScenarioError> {
+    fn check_safety(&self) -> Result<(), ScenarioError> {
         let Safety::Ellipsoid { half_axes_m: [a_m, b_m, _] } = self.safety else { return Ok(()) };
         let key = "safety.half_axes_m";
         if a_m != b_m {
@@ -510,14 +448,9 @@ impl Scenario {
         let help = "set law.kind to \"displacement\", or safety.shape to \"ball\"";
         Err(ScenarioError::new(ErrorKind::UnsupportedByLaw, problem, help).at_keys(["safety.shape", "law.kind"]))
     }
-}
 
-/// Smallest number of steps of the rise or fall of a gust, which is followed step by step.
-const STEPS_A_SLOPE: f64 = 10.0;
-
-impl Scenario {
     /// Checks that the wind acts on the vehicles, and its velocities and gusts.
-    pub(super) fn check_wind(&self) -> Result<(), ScenarioError> {
+    fn check_wind(&self) -> Result<(), ScenarioError> {
         let drag_per_s = self.drag_per_s;
         if drag_per_s * self.time.dt_s > 1.0 {
             let problem = format!(
@@ -559,7 +492,7 @@ impl Scenario {
     fn check_gust(&self, gust: &Gust) -> Result<(), ScenarioError> {
         let Gust { at_s, rise_s, velocity_m_s, ref vehicles, .. } = *gust;
         self.check_air("wind.gust", "a gust", velocity_m_s)?;
-        let shortest_s = STEPS_A_SLOPE * self.time.dt_s;
+        let shortest_s = STEPS_A_CHANGE * self.time.dt_s;
         for (what, slope_s) in [("the rise of a gust", rise_s), ("the fall of a gust", gust.fall_s())] {
             if slope_s < shortest_s {
                 let problem = format!("{what} takes {slope_s} s, too short for steps of {} s", self.time.dt_s);
@@ -593,4 +526,75 @@ impl Scenario {
             },
         }
     }
+}
+
+/// Returns an error of the parameters of a law at its key.
+fn of_law(error: &ParameterError) -> ScenarioError {
+    let refuse =
+        |help: &str| ScenarioError::new(ErrorKind::LawParameter, format!("no law has these parameters: {error}"), help);
+    match *error {
+        ParameterError::Tension { pair, .. } => refuse("enlarge the formation, or change law.delta_m")
+            .at_entry("formation.points_m", pair.second())
+            .at_entry("formation.points_m", pair.first())
+            .at("law.delta_m"),
+        ParameterError::ObstacleOverSlot { vehicle, obstacle, .. } => {
+            refuse("move one of them away, or reduce the clearance_m of the obstacle")
+                .at_entry("formation.points_m", vehicle)
+                .at_entry("obstacle", obstacle)
+        }
+        ParameterError::Slot { vehicle } => refuse("give finite numbers").at_entry("formation.points_m", vehicle),
+        ParameterError::Counts { .. } | ParameterError::Disconnected { .. } => {
+            refuse("add edges until every vehicle can be reached from every other").at("graph.edges")
+        }
+        ParameterError::ReferenceUnknown | ParameterError::ReferenceNotHeard => {
+            refuse("leave it out: then all vehicles know the reference; or add edges to the graph").at_keys([
+                "reference.known_by",
+                "reference.leader",
+                "graph.edges",
+            ])
+        }
+        ParameterError::NotFinite { .. } => refuse("give finite numbers").at("law.kind"),
+        ParameterError::Memory { .. } => {
+            refuse("use fewer vehicles, or a graph of fewer edges").at_keys(["swarm.count", "graph.kind"])
+        }
+    }
+}
+
+/// Refuses a number that is not finite, or larger in magnitude than [`LARGEST`].
+fn check_size(what: &str, number: f64) -> Result<(), ScenarioError> {
+    if number.abs() <= LARGEST {
+        return Ok(());
+    }
+    let (problem, help) = match number {
+        _ if number.is_nan() => (format!("{what} is not a number"), "give a finite number"),
+        _ if number.is_infinite() => (format!("{what} is infinite"), "give a finite number"),
+        _ => (format!("{what} must be at most {LARGEST:e} in magnitude, got {number:e}"), "give a smaller number"),
+    };
+    Err(ScenarioError::new(ErrorKind::OutOfRange, problem, help))
+}
+
+fn check_name(name: &str) -> Result<(), ScenarioError> {
+    let said = if name.is_empty() {
+        "the name is empty".to_owned()
+    } else if name.chars().count() > MAX_NAME_CHARS {
+        format!("the name has more than {MAX_NAME_CHARS} characters")
+    } else if let Some(bad) = name.chars().find(|&c| !is_name_character(c)) {
+        format!("the name contains {bad:?}")
+    } else {
+        return Ok(());
+    };
+    Err(ScenarioError::new(ErrorKind::Name, said, "it names a folder: use letters, digits, `-` and `_`").at("name"))
+}
+
+/// Refuses a graph in which some vehicle cannot be reached from vehicle 1.
+fn check_connected(graph: &Graph) -> Result<(), ScenarioError> {
+    let apart = graph.unreachable();
+    if apart.is_empty() {
+        return Ok(());
+    }
+    let named: Vec<_> = apart.iter().take(NAMED_VEHICLES).map(|i| (i + 1).to_string()).collect();
+    let more = if apart.len() > NAMED_VEHICLES { " and more" } else { "" };
+    let problem = format!("the graph is not connected: no path joins vehicle 1 to {}{more}", named.join(", "));
+    let help = "add edges until every vehicle can be reached from every other";
+    Err(ScenarioError::new(ErrorKind::Disconnected, problem, help).at("graph.edges"))
 }
