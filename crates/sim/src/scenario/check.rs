@@ -4,7 +4,6 @@
 //! holds its choice (`kind`, `shape`) and the keys of this choice side by side. serde reads the choice as
 //! `kind = { NAME = { keys } }`.
 
-use std::borrow::Cow;
 use std::fmt::Display;
 use std::ops::Range;
 
@@ -195,10 +194,11 @@ impl Check {
         own_name: Option<&(&str, Range<usize>)>,
     ) -> Result<(), SchemaError> {
         let alternatives: Vec<_> = node.alternatives().into_iter().filter(|part| part.tag().is_some()).collect();
-        let chosen = match alternatives.first().and_then(|part| part.tag()) {
-            Some((tag, _)) => self.chosen(table, tag, &alternatives, span, own_name, node)?,
+        let choice = match alternatives.first().and_then(|part| part.tag()) {
+            Some((tag, _)) => self.choice(table, tag, &alternatives, span, own_name, node)?,
             None => None,
         };
+        let chosen = choice.as_ref().map(|(chosen, _)| *chosen);
         let known = |key: &str| node.property(key).or_else(|| chosen?.property(key));
         for (key, value) in table.iter_mut() {
             let name = key.get_ref();
@@ -210,7 +210,7 @@ impl Check {
                 let known: Vec<_> = node.keys().chain(chosen.into_iter().flat_map(Node::keys)).collect();
                 return Err(self.unknown_key(name, known, place));
             };
-            // `chosen` has checked the tag.
+            // `choice` has checked the tag.
             if node.keyword("const").is_null() {
                 self.value(value, node, name, None).map_err(|schema_error| schema_error.child(name))?;
             }
@@ -222,14 +222,14 @@ impl Check {
                 SchemaError::new(ErrorKind::MissingKey, format!("missing key `{missing}`"), help, span.clone());
             return Err(schema_error);
         }
-        if let Some((chosen, (tag, _))) = chosen.and_then(|chosen| Some((chosen, chosen.tag()?))) {
-            nest_choice(table, node, chosen, tag);
+        if let Some((chosen, tag_span)) = choice {
+            nest_choice(table, node, chosen, tag_span);
         }
         Ok(())
     }
 
-    /// Returns the alternative that the tag of a table selects. Inserts a missing tag from its default.
-    fn chosen(
+    /// Returns the alternative that the tag of a table or its default selects, and the span of the tag.
+    fn choice(
         &self,
         table: &mut DeTable<'_>,
         tag: &'static str,
@@ -237,7 +237,7 @@ impl Check {
         span: &Range<usize>,
         own_name: Option<&(&str, Range<usize>)>,
         node: Node,
-    ) -> Result<Option<Node>, SchemaError> {
+    ) -> Result<Option<(Node, Range<usize>)>, SchemaError> {
         let names: Vec<_> = alternatives.iter().filter_map(|part| part.tag()).map(|(_, name)| name).collect();
         let default = alternatives.iter().find(|part| !part.requires(tag)).and_then(|part| part.tag());
         let (name, tag_span) = match (table.get(tag), own_name, default) {
@@ -248,10 +248,10 @@ impl Check {
                         SchemaError::new(ErrorKind::WrongType, message, description(node), value.span()).child(tag)
                     );
                 };
-                (name.to_owned(), value.span())
+                (name, value.span())
             }
-            (None, Some((own, own_span)), _) => ((*own).to_owned(), own_span.clone()),
-            (None, None, Some((_, default))) => (default.to_owned(), span.clone()),
+            (None, Some((own, own_span)), _) => (*own, own_span.clone()),
+            (None, None, Some((_, default))) => (default, span.clone()),
             // Some tables, such as `[[leg]]`, need no tag.
             (None, None, None) if node.keyword("anyOf").is_array() => return Ok(None),
             (None, None, None) => {
@@ -265,7 +265,7 @@ impl Check {
             }
         };
         let Some(&chosen) = alternatives.iter().find(|part| part.tag().is_some_and(|(_, known)| known == name)) else {
-            let mut schema_error = unknown_choice(&name, &names, tag_span);
+            let mut schema_error = unknown_choice(name, &names, tag_span);
             if own_name.is_some() && !table.contains_key(tag) {
                 let unless = "the name of a law is its kind unless the table [laws.NAME] has a `kind`: ";
                 schema_error.error.help.insert_str(0, unless);
@@ -285,26 +285,20 @@ impl Check {
                 table.remove(&*key);
             }
         }
-        let name = DeValue::String(Cow::Owned(name));
-        table.entry(Spanned::new(tag_span.clone(), tag.into())).or_insert(Spanned::new(tag_span, name));
-        Ok(Some(chosen))
+        Ok(Some((chosen, tag_span)))
     }
 }
 
 /// Moves the keys of a choice into a table below the tag, named as the choice.
-fn nest_choice(table: &mut DeTable<'_>, node: Node, chosen: Node, tag: &'static str) {
-    let Some((tag_key, name)) = table.remove_entry(tag) else { return };
-    let span = name.span();
-    let DeValue::String(name) = name.into_inner() else { return };
-    let mut keys = DeTable::new();
-    for key in chosen.keys().filter(|key| node.property(key).is_none()) {
-        if let Some((key, value)) = table.remove_entry(key) {
-            keys.insert(key, value);
-        }
-    }
-    let mut choice = DeTable::new();
-    choice.insert(Spanned::new(span.clone(), name), Spanned::new(span.clone(), DeValue::Table(keys)));
-    table.insert(tag_key, Spanned::new(span, DeValue::Table(choice)));
+fn nest_choice(table: &mut DeTable<'_>, node: Node, chosen: Node, span: Range<usize>) {
+    let Some((tag, name)) = chosen.tag() else { return };
+    table.remove(tag);
+    let own = chosen.keys().filter(|key| node.property(key).is_none());
+    let keys = own.filter_map(|key| table.remove_entry(key)).collect();
+    let named = |name: &'static str, table| {
+        (Spanned::new(span.clone(), name.into()), Spanned::new(span.clone(), DeValue::Table(table)))
+    };
+    table.extend([named(tag, DeTable::from_iter([named(name, keys)]))]);
 }
 
 /// Returns whether a part of the schema has a type of TOML.
