@@ -21,8 +21,33 @@ pub struct IgnoredPart {
     pub off: Option<(&'static str, &'static str)>,
 }
 
-/// Key of the assignment of slots, and the value that keeps the assignment.
-const ASSIGNMENT: (&str, &str) = ("formation.assignment", "\"given\"");
+/// Parts in the order of their check.
+const REFERENCE: IgnoredPart = IgnoredPart { key: "reference", what: "it moves the slots", off: None };
+const LEADER: IgnoredPart =
+    IgnoredPart { key: "reference.leader", what: "the other vehicles follow the leader", off: None };
+const LEGS: IgnoredPart = IgnoredPart { key: "leg", what: "it has further slots", off: Some(("leg", "[]")) };
+const REASSIGNMENT: IgnoredPart = IgnoredPart {
+    key: "formation.assignment",
+    what: "it gives a stalled vehicle another slot",
+    off: Some(("formation.assignment", "\"given\"")),
+};
+const RANDOM_SLOTS: IgnoredPart = IgnoredPart {
+    key: "formation.assignment",
+    what: "each random start has its own assignment of slots",
+    off: Some(("formation.assignment", "\"given\"")),
+};
+const RECOVERY: IgnoredPart =
+    IgnoredPart { key: "deadlock", what: "it spreads the slots", off: Some(("deadlock.mode", "\"off\"")) };
+const SENSING: IgnoredPart =
+    IgnoredPart { key: "sensing", what: "observations are the true states", off: Some(("sensing", "{}")) };
+const NETWORK: IgnoredPart =
+    IgnoredPart { key: "network", what: "observations are the true states", off: Some(("network", "{}")) };
+const ACTUATION: IgnoredPart =
+    IgnoredPart { key: "actuation", what: "actions are exact accelerations", off: Some(("actuation", "{}")) };
+const FAILURES: IgnoredPart =
+    IgnoredPart { key: "failure", what: "actions are exact accelerations", off: Some(("failure", "[]")) };
+const SHIELD: IgnoredPart =
+    IgnoredPart { key: "shield", what: "it replaces actions", off: Some(("shield.enabled", "false")) };
 
 impl Template {
     /// Returns the parts of the scenario that a learning environment ignores, in a fixed order.
@@ -30,12 +55,8 @@ impl Template {
     pub fn parts_ignored_by_environments(&self) -> Vec<IgnoredPart> {
         let mut parts = self.own().parts_ignored_by_environments();
         // An assignment to the nearest slots depends on the start.
-        if self.start_is_random()
-            && self.assignment() == Assignment::Optimal
-            && !parts.iter().any(|part| part.key == ASSIGNMENT.0)
-        {
-            let what = "each random start has its own assignment of slots";
-            parts.push(IgnoredPart { key: ASSIGNMENT.0, what, off: Some(ASSIGNMENT) });
+        if self.start_is_random() && self.assignment() == Assignment::Optimal && !parts.contains(&REASSIGNMENT) {
+            parts.push(RANDOM_SLOTS);
         }
         parts
     }
@@ -82,22 +103,20 @@ impl Scenario {
         };
         let has_recovery = deadlock.is_on() && self.law().is_ok_and(|law| law.capabilities().settling.is_some());
         let is_led = reference.as_ref().is_some_and(|guidance| guidance.known_by.leader().is_some());
-        let is_reassigned = legs.iter().any(|leg| leg.interchangeable);
-        let is_shielded = shield.is_some_and(|shield| shield.enabled);
         [
-            (reference.as_ref().is_some_and(is_moving), "reference", "it moves the slots", None),
-            (is_led, "reference.leader", "the other vehicles follow the leader", None),
-            (legs.len() > 1, "leg", "it has further slots", Some(("leg", "[]"))),
-            (is_reassigned, ASSIGNMENT.0, "it gives a stalled vehicle another slot", Some(ASSIGNMENT)),
-            (has_recovery, "deadlock", "it spreads the slots", Some(("deadlock.mode", "\"off\""))),
-            (!sensing.is_exact(), "sensing", "observations are the true states", Some(("sensing", "{}"))),
-            (!network.is_exact(), "network", "observations are the true states", Some(("network", "{}"))),
-            (!actuation.is_exact(), "actuation", "actions are exact accelerations", Some(("actuation", "{}"))),
-            (!failures.is_exact(), "failure", "actions are exact accelerations", Some(("failure", "[]"))),
-            (is_shielded, "shield", "it replaces actions", Some(("shield.enabled", "false"))),
+            (reference.as_ref().is_some_and(is_moving), REFERENCE),
+            (is_led, LEADER),
+            (legs.len() > 1, LEGS),
+            (legs.iter().any(|leg| leg.interchangeable), REASSIGNMENT),
+            (has_recovery, RECOVERY),
+            (!sensing.is_exact(), SENSING),
+            (!network.is_exact(), NETWORK),
+            (!actuation.is_exact(), ACTUATION),
+            (!failures.is_exact(), FAILURES),
+            (shield.is_some_and(|shield| shield.enabled), SHIELD),
         ]
         .into_iter()
-        .filter_map(|(is_ignored, key, what, off)| is_ignored.then_some(IgnoredPart { key, what, off }))
+        .filter_map(|(is_ignored, part)| is_ignored.then_some(part))
         .collect()
     }
 }

@@ -47,15 +47,19 @@ impl Scenario {
     pub fn validate(&self) -> Result<(), ScenarioError> {
         self.check_noise()?;
         self.check_lengths()?;
-        check_written(&Document::from(self).toml()).map_err(SchemaError::without_text)?;
+        self.check_keys().map_err(SchemaError::without_text)?;
         self.check()
     }
 
     /// Checks a scenario that was read: conditions on several keys, and the values that the program filled in.
     pub(super) fn check_built(&self) -> Result<(), ScenarioError> {
         self.check()?;
-        // The reader of a recording checks these values. Points and edges have no other limits than the checked ones.
-        check_written(&Document::from(self).without_lists().toml()).map_err(SchemaError::of_filled_value)
+        self.check_keys().map_err(SchemaError::of_filled_value)
+    }
+
+    /// Checks single keys as the reader of a recording does. [`Scenario::check`] checks all limits of points and edges.
+    fn check_keys(&self) -> Result<(), SchemaError> {
+        check_written(&Document::from(self).without_lists().toml())
     }
 
     /// Checks conditions on several keys; the schema checks single keys.
