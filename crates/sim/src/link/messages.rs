@@ -102,7 +102,9 @@ impl Messages {
             // Links are numbered by sender.
             radio.send((sender, sent_s), &round.content.states.positions_m, (over, most), &mut round.arrives_s);
         }
-        received.iter().for_each(|received| ages.take(sent_s - received.measured_s));
+        for received in received.iter() {
+            ages.take(sent_s - received.measured_s);
+        }
         radio.end(round, sent_s);
     }
 

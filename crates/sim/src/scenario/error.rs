@@ -181,7 +181,7 @@ impl ScenarioError {
             return self;
         }
         self.message = format!("{}; start.jitter_m moved each coordinate by up to {jitter_m} m", self.message);
-        self.help = "reduce start.jitter_m, move one of the vehicles away, or reduce law.delta_m".to_owned();
+        self.help = String::from("reduce start.jitter_m, move one of the vehicles away, or reduce law.delta_m");
         self.fields.insert(0, Field { key: "start.jitter_m".into(), entry: None, leg: 0 });
         self
     }

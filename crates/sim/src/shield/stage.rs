@@ -192,9 +192,9 @@ impl ShieldStage {
         let Self { fleet, radio, .. } = self;
         radio.deliver(time_s, |round, has_arrived| {
             let messages = round.content.iter().flat_map(Broadcast::messages);
-            messages.zip(has_arrived).filter(|(_, has_arrived)| *has_arrived).for_each(|(message, _)| {
+            for (message, _) in messages.zip(has_arrived).filter(|(_, has_arrived)| *has_arrived) {
                 fleet.hear(&message);
-            });
+            }
         });
     }
 
