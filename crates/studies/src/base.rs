@@ -199,9 +199,9 @@ pub(crate) fn check_runs(runs: u64, seed: u64) -> Result<(), Failure> {
 /// Returns why a scenario cannot be flown, with its remedy, in a line. The message of a number out of range names the
 /// bound, and its help describes the key.
 pub(crate) fn refusal(error: ScenarioError) -> String {
-    match error.help {
-        Some(help) if error.kind != ErrorKind::OutOfRange => format!("{}; {help}", error.message),
-        _ => error.message,
+    match error.kind {
+        ErrorKind::OutOfRange => error.message,
+        _ => format!("{}; {}", error.message, error.help),
     }
 }
 

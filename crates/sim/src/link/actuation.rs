@@ -3,9 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::ImperfectionSpec;
 use super::sensing::SAME_S;
-use super::{ImperfectionSpec, is_off};
-use crate::scenario::{ErrorKind, Scenario, ScenarioError};
+use crate::scenario::{ErrorKind, Scenario, ScenarioError, is_default};
 use tautline_core::swarm::{Rows, row, set_row};
 use tautline_laws::law::VoidReason;
 
@@ -18,7 +18,7 @@ pub struct ActuationSpec {
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_accel_m_s2: Option<f64>,
     /// Time constant in s of the lag of motors, lag a' = u - a, with a = 0 at the start; 0 unless given.
-    #[serde(skip_serializing_if = "is_off")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub lag_s: f64,
 }
@@ -32,10 +32,9 @@ impl ImperfectionSpec for ActuationSpec {
         if self.lag_s == 0.0 || scenario.plant.holds_commands() {
             return Ok(());
         }
-        Err(ScenarioError::new("the ideal plant supports no lag")
-            .with_kind(ErrorKind::UnsupportedByPlant)
-            .with_help("leave out actuation.lag_s, or set plant.kind to \"rapier\"")
-            .at_keys(["actuation.lag_s", "plant.kind"]))
+        let problem = "the ideal plant supports no lag";
+        let help = "leave out actuation.lag_s, or set plant.kind to \"rapier\"";
+        Err(ScenarioError::new(ErrorKind::UnsupportedByPlant, problem, help).at_keys(["actuation.lag_s", "plant.kind"]))
     }
 
     fn voids(&self) -> Vec<VoidReason> {

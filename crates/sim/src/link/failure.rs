@@ -71,23 +71,17 @@ impl ImperfectionSpec for Vec<Failure> {
         for (entry, failure) in self.iter().enumerate() {
             let &Failure { vehicle, at_s, kind } = failure;
             if vehicle == 0 || failure.index() >= scenario.count() {
-                return Err(ScenarioError::new(format!(
-                    "the vehicle must be from 1 to {}, got {vehicle}",
-                    scenario.count()
-                ))
-                .with_kind(ErrorKind::UnknownVehicle)
-                .with_help("vehicles are counted from 1")
-                .at_entry("failure", entry));
+                let problem = format!("the vehicle must be from 1 to {}, got {vehicle}", scenario.count());
+                let help = "vehicles are counted from 1";
+                return Err(ScenarioError::new(ErrorKind::UnknownVehicle, problem, help).at_entry("failure", entry));
             }
             if !(0.0..scenario.time.duration_s).contains(&at_s) {
-                return Err(ScenarioError::new(format!(
-                    "at_s must be from 0 s to less than {} s, got {at_s} s",
-                    scenario.time.duration_s
-                ))
-                .with_kind(ErrorKind::OutsideFlight)
-                .with_help("give a time within the flight")
-                .at_entry("failure", entry)
-                .at("time.duration_s"));
+                let problem =
+                    format!("at_s must be from 0 s to less than {} s, got {at_s} s", scenario.time.duration_s);
+                let help = "give a time within the flight";
+                return Err(ScenarioError::new(ErrorKind::OutsideFlight, problem, help)
+                    .at_entry("failure", entry)
+                    .at("time.duration_s"));
             }
             match kind {
                 FailureKind::Dead {} => {}
@@ -123,16 +117,16 @@ impl Scenario {
         } else {
             return Ok(());
         };
-        Err(ScenarioError::new(said).with_kind(kind).with_help(help).at_entry("failure", entry))
+        Err(ScenarioError::new(kind, said, help).at_entry("failure", entry))
     }
 
     fn check_frozen(&self, entry: usize) -> Result<(), ScenarioError> {
         if self.plant.holds_commands() || self.time.control_hz.is_some() {
             return Ok(());
         }
-        Err(ScenarioError::new("vehicles of the ideal plant hold no command in continuous time")
-            .with_kind(ErrorKind::UnsupportedByPlant)
-            .with_help("set time.control_hz, or plant.kind to \"rapier\"")
+        let problem = "vehicles of the ideal plant hold no command in continuous time";
+        let help = "set time.control_hz, or plant.kind to \"rapier\"";
+        Err(ScenarioError::new(ErrorKind::UnsupportedByPlant, problem, help)
             .at_entry("failure", entry)
             .at("plant.kind"))
     }
@@ -141,10 +135,9 @@ impl Scenario {
         if self.message_hz().is_some() {
             return Ok(());
         }
-        Err(ScenarioError::new("a vehicle cannot fall silent without a rate of messages")
-            .with_kind(ErrorKind::MissingKey)
-            .with_help("set network.rate_hz, such as 50")
-            .at_entry("failure", entry))
+        let problem = "a vehicle cannot fall silent without a rate of messages";
+        let help = "set network.rate_hz, such as 50";
+        Err(ScenarioError::new(ErrorKind::MissingKey, problem, help).at_entry("failure", entry))
     }
 
     /// Returns the failures of rotors.

@@ -15,13 +15,14 @@ mod history;
 mod messages;
 mod network;
 mod noise;
+mod radio;
 mod sensing;
 
 pub use actuation::ActuationSpec;
 pub use failure::{Failure, FailureKind};
 pub use history::History;
-pub(crate) use messages::{Radio, RadioUse};
 pub use network::{LinkFailure, NearStates, NetworkSpec, StalePolicy};
+pub(crate) use radio::{Radio, RadioUse, Round};
 pub use sensing::SensingSpec;
 pub(crate) use sensing::period;
 
@@ -81,12 +82,9 @@ impl Scenario {
         if self.plant.holds_commands() || self.time.control_hz.is_some() {
             return Ok(());
         }
-        Err(ScenarioError::new(format!(
-            "{key} samples the state, but the ideal plant evaluates the law in continuous time"
-        ))
-        .with_kind(ErrorKind::UnsupportedByPlant)
-        .with_help("set time.control_hz, the rate of held commands, or set plant.kind to \"rapier\"")
-        .at_keys([key, "plant.kind"]))
+        let problem = format!("{key} samples the state, but the ideal plant evaluates the law in continuous time");
+        let help = "set time.control_hz, the rate of held commands, or set plant.kind to \"rapier\"";
+        Err(ScenarioError::new(ErrorKind::UnsupportedByPlant, problem, help).at_keys([key, "plant.kind"]))
     }
 }
 
@@ -201,17 +199,7 @@ fn latency(key: &'static str, what: &str, latency_s: f64, duration_s: f64) -> Re
             "reduce the latency, or increase time.duration_s",
         )
     };
-    Err(ScenarioError::new(said).with_kind(kind).with_help(help).at(key).at("time.duration_s"))
-}
-
-/// Returns whether a number is 0, which turns its imperfection off.
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-fn is_off(number: &f64) -> bool {
-    *number == 0.0
-}
-
-fn is_default<T: Default + PartialEq>(value: &T) -> bool {
-    *value == T::default()
+    Err(ScenarioError::new(kind, said, help).at(key).at("time.duration_s"))
 }
 
 /// Solver steps of continuous time within the shortest delay, so that the past is interpolated finely enough.

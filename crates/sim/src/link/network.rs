@@ -7,8 +7,8 @@ use super::failure::Failure;
 use super::history::History;
 use super::messages::Messages;
 use super::sensing::StateSensor;
-use super::{ImperfectionSpec, Traffic, is_default, is_off, latency};
-use crate::scenario::{ErrorKind, MAX_MEMORY_BYTES, Scenario, ScenarioError};
+use super::{ImperfectionSpec, Traffic, latency};
+use crate::scenario::{ErrorKind, MAX_MEMORY_BYTES, Scenario, ScenarioError, is_default};
 use tautline_core::record::Channel;
 use tautline_core::swarm::{Rows, Swarm, row};
 use tautline_laws::law::VoidReason;
@@ -19,15 +19,15 @@ use tautline_laws::observation::NeighbourState;
 #[serde(deny_unknown_fields, default)]
 pub struct NetworkSpec {
     /// Delay of each message in s. A vehicle knows its own state without this delay.
-    #[serde(skip_serializing_if = "is_off")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub latency_s: f64,
     /// Extra delay of each message in s, uniform from 0 to `jitter_s`. Needs `rate_hz`.
-    #[serde(skip_serializing_if = "is_off")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub jitter_s: f64,
     /// Share of messages that are lost, from 0 to 1. Needs `rate_hz`.
-    #[serde(skip_serializing_if = "is_off")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = 0.0, "minimum" = 0, "maximum" = 1))]
     pub loss: f64,
     /// Mean number of messages lost in a row, at least 1. Model of Gilbert and Elliott: a link loses all messages while
@@ -159,16 +159,14 @@ impl Scenario {
         if self.message_hz().is_some() {
             return Ok(());
         }
-        Err(ScenarioError::new(format!("{key} needs a rate of messages"))
-            .with_kind(ErrorKind::MissingKey)
-            .with_help("set network.rate_hz, such as 50")
-            .at(key))
+        let problem = format!("{key} needs a rate of messages");
+        Err(ScenarioError::new(ErrorKind::MissingKey, problem, "set network.rate_hz, such as 50").at(key))
     }
 
     fn check_link(&self, entry: usize, failure: &LinkFailure) -> Result<(), ScenarioError> {
         let &LinkFailure { link: [a, b], from_s, to_s } = failure;
         let refuse = |kind, said: String, help: &str| {
-            Err(ScenarioError::new(said).with_kind(kind).with_help(help).at_entry("network.failure", entry))
+            Err(ScenarioError::new(kind, said, help).at_entry("network.failure", entry))
         };
         let index = |number: u64| usize::try_from(number).unwrap_or(usize::MAX).checked_sub(1);
         let is_link = match (index(a), index(b)) {
@@ -201,13 +199,13 @@ impl Scenario {
             return Ok(());
         }
         if rate_hz * self.time.dt_s > MESSAGES_A_STEP {
-            return Err(ScenarioError::new(format!(
+            let problem = format!(
                 "{rate_hz} messages a second are more than {MESSAGES_A_STEP} messages in a step of {} s",
                 self.time.dt_s
-            ))
-            .with_kind(ErrorKind::StepTooLong)
-            .with_help(format!("send at most {} a second, or reduce time.dt_s", MESSAGES_A_STEP / self.time.dt_s))
-            .at_keys(["network.rate_hz", "sensing.rate_hz"]));
+            );
+            let help = format!("send at most {} a second, or reduce time.dt_s", MESSAGES_A_STEP / self.time.dt_s);
+            return Err(ScenarioError::new(ErrorKind::StepTooLong, problem, help)
+                .at_keys(["network.rate_hz", "sensing.rate_hz"]));
         }
         let count = self.count() as u128;
         let pairs = count * count.saturating_sub(1);
@@ -220,13 +218,12 @@ impl Scenario {
             return Ok(());
         }
         let gib = MAX_MEMORY_BYTES >> 30;
-        Err(ScenarioError::new(format!(
+        let problem = format!(
             "messages over {received} links need {} GiB of memory, more than the limit of {gib} GiB",
             bytes >> 30
-        ))
-        .with_kind(ErrorKind::Memory)
-        .with_help("choose a graph of fewer edges, such as [graph] kind = \"ring\", or send less often")
-        .at_keys(["network.rate_hz", "graph.kind"]))
+        );
+        let help = "choose a graph of fewer edges, such as [graph] kind = \"ring\", or send less often";
+        Err(ScenarioError::new(ErrorKind::Memory, problem, help).at_keys(["network.rate_hz", "graph.kind"]))
     }
 }
 
@@ -238,9 +235,9 @@ fn check_loss(loss: f64, burst: Option<f64>) -> Result<(), ScenarioError> {
     if burst >= least {
         return Ok(());
     }
-    Err(ScenarioError::new(format!("bursts of {burst} lost messages in the mean cannot lose a share of {loss}"))
-        .with_help(format!("give at least {least}, or leave network.loss_burst out for independent losses"))
-        .at_keys(["network.loss_burst", "network.loss"]))
+    let problem = format!("bursts of {burst} lost messages in the mean cannot lose a share of {loss}");
+    let help = format!("give at least {least}, or leave network.loss_burst out for independent losses");
+    Err(ScenarioError::new(ErrorKind::Inconsistent, problem, help).at_keys(["network.loss_burst", "network.loss"]))
 }
 
 /// Communication between the vehicles of a flight.

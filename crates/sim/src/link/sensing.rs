@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 
 use super::history::History;
 use super::noise::{Noise, NoiseSource};
-use super::{ImperfectionSpec, is_off, latency};
-use crate::scenario::{ErrorKind, Scenario, ScenarioError, Space};
+use super::{ImperfectionSpec, latency};
+use crate::scenario::{ErrorKind, Scenario, ScenarioError, Space, is_default};
 use tautline_core::swarm::{Rows, Swarm, row, set_row};
 use tautline_laws::law::VoidReason;
 use tautline_laws::observation::NeighbourState;
@@ -18,16 +18,16 @@ use tautline_laws::observation::NeighbourState;
 pub struct SensingSpec {
     /// Standard deviation in m, along each axis, of the error of a measured position, drawn for each measurement
     /// (motion capture 0.001, ultra-wide band 0.1, satellites 1). Needs `rate_hz`.
-    #[serde(skip_serializing_if = "is_off")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub position_noise_m: f64,
     /// Standard deviation in m, along each axis, of a constant error of the own position, drawn once a flight.
-    #[serde(skip_serializing_if = "is_off")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub position_bias_m: f64,
     /// Standard deviation in m/s, along each axis, of the error of a measured velocity, drawn for each measurement.
     /// Needs `rate_hz`.
-    #[serde(skip_serializing_if = "is_off")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub velocity_noise_m_s: f64,
     /// Measurements a second in Hz, held in between; continuous unless given.
@@ -35,7 +35,7 @@ pub struct SensingSpec {
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub rate_hz: Option<f64>,
     /// Delay of each measurement in s, of the own state and of other vehicles.
-    #[serde(skip_serializing_if = "is_off")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub latency_s: f64,
     /// Delay of measurements of near vehicles by a sensor on board in s; `latency_s` unless given.
@@ -75,10 +75,9 @@ impl ImperfectionSpec for SensingSpec {
         ];
         for (key, what, noise) in noises {
             if noise > 0.0 && rate_hz.is_none() {
-                return Err(ScenarioError::new(format!("{what} needs a rate of measurements"))
-                    .with_kind(ErrorKind::MissingKey)
-                    .with_help("set sensing.rate_hz, such as 100")
-                    .at(key));
+                let problem = format!("{what} needs a rate of measurements");
+                let help = "set sensing.rate_hz, such as 100";
+                return Err(ScenarioError::new(ErrorKind::MissingKey, problem, help).at(key));
             }
         }
         if rate_hz.is_some() {

@@ -4,14 +4,13 @@
 //! holds its choice (`kind`, `shape`) and the keys of this choice side by side. serde reads the choice as
 //! `kind = { NAME = { keys } }`.
 
-use std::borrow::Cow;
 use std::fmt::Display;
 use std::ops::Range;
 
+use toml::Spanned;
 use toml::de::{DeTable, DeValue};
-use toml::{Spanned, Value};
 
-use super::error::{ErrorKind, Field, ScenarioError, suggest};
+use super::error::{ErrorKind, ScenarioError, suggest};
 use super::limits::{LARGEST, SMALLEST};
 use super::schema::{Node, tables_with};
 use tautline_core::text::shortest;
@@ -28,9 +27,8 @@ pub(super) struct SchemaError {
 }
 
 impl SchemaError {
-    fn new(kind: ErrorKind, message: impl AsRef<str>, help: impl AsRef<str>, span: Range<usize>) -> Self {
-        let error = ScenarioError::new(message).with_kind(kind).with_help(help);
-        Self { error, span, path: "".into() }
+    fn new(kind: ErrorKind, problem: impl AsRef<str>, help: impl AsRef<str>, span: Range<usize>) -> Self {
+        Self { error: ScenarioError::new(kind, problem, help), span, path: "".into() }
     }
 
     /// Returns the error of the value below a key or entry.
@@ -41,13 +39,11 @@ impl SchemaError {
 
     /// Returns the error about a value that the scenario does not give, with its dotted path as its key.
     pub(super) fn of_filled_value(self) -> ScenarioError {
-        let error = self.without_text();
-        let path = error.fields.first().map_or_else(String::new, Field::to_string);
-        let message = format!("{path}, which follows from other keys: {}", error.message);
-        ScenarioError::new(message)
-            .with_kind(error.kind)
-            .with_help(format!("give {path} another value, or change the keys that it follows from"))
-            .at(path)
+        let ScenarioError { kind, message, .. } = self.error;
+        let path = String::from(self.path);
+        let problem = format!("{path}, which follows from other keys: {message}");
+        let help = format!("give {path} another value, or change the keys that it follows from");
+        ScenarioError::new(kind, problem, help).at(path)
     }
 
     /// Returns the error with its dotted path as its key, for a scenario without a text.
@@ -69,38 +65,12 @@ pub(super) fn check_value(key: &str, value: &mut Spanned<DeValue<'_>>, node: Nod
     Check { overridden_from: usize::MAX, file: node.whole_file() }.value(value, node, key, None)
 }
 
-/// Checks the bounds of a value of a scenario built in code, whose keys and types are those of the schema. Choices are
-/// nested as serde writes them.
-pub(super) fn check_bounds(value: &Value, node: Node, name: &str) -> Result<(), SchemaError> {
-    let alternatives = node.alternatives();
-    if let Value::Table(table) = value {
-        return table.iter().try_for_each(|(key, value)| {
-            let choice = value.as_table().and_then(|choice| {
-                let is_chosen = |tag: (&str, &str)| tag.0 == key && choice.contains_key(tag.1);
-                Some((alternatives.iter().find(|part| part.tag().is_some_and(is_chosen))?, choice))
-            });
-            if let Some((part, choice)) = choice {
-                return choice.values().try_for_each(|keys| check_bounds(keys, *part, name));
-            }
-            let of_choice = || alternatives.iter().find_map(|part| part.property(key));
-            node.property(key)
-                .or_else(of_choice)
-                .map_or(Ok(()), |part| check_bounds(value, part, key).map_err(|schema_error| schema_error.child(key)))
-        });
-    }
-    let node = alternatives.into_iter().find(|part| admits(*part, value.type_str())).unwrap_or(node);
-    match *value {
-        Value::Array(ref list) => {
-            check_length(name, node, list.len(), 0..0)?;
-            let Some(node) = node.items() else { return Ok(()) };
-            list.iter().enumerate().try_for_each(|(entry, value)| {
-                check_bounds(value, node, name).map_err(|schema_error| schema_error.child(entry + 1))
-            })
-        }
-        Value::Integer(number) => in_range(name, node, number as f64, || number.to_string(), 0..0),
-        Value::Float(number) => in_range(name, node, number, || shortest(number).to_lowercase(), 0..0),
-        _ => Ok(()),
-    }
+/// Checks the TOML of a scenario that no file holds, such as one built in code.
+pub(super) fn check_written(toml: &str) -> Result<(), SchemaError> {
+    let table = DeTable::parse(toml).map_err(|error| {
+        SchemaError::new(ErrorKind::Syntax, error.message(), "give values that TOML can hold", 0..0)
+    })?;
+    check_schema(&mut Spanned::new(0..0, DeValue::Table(table.into_inner())), usize::MAX)
 }
 
 struct Check {
@@ -224,10 +194,11 @@ impl Check {
         own_name: Option<&(&str, Range<usize>)>,
     ) -> Result<(), SchemaError> {
         let alternatives: Vec<_> = node.alternatives().into_iter().filter(|part| part.tag().is_some()).collect();
-        let chosen = match alternatives.first().and_then(|part| part.tag()) {
-            Some((tag, _)) => self.chosen(table, tag, &alternatives, span, own_name, node)?,
+        let choice = match alternatives.first().and_then(|part| part.tag()) {
+            Some((tag, _)) => self.choice(table, tag, &alternatives, span, own_name, node)?,
             None => None,
         };
+        let chosen = choice.as_ref().map(|(chosen, _)| *chosen);
         let known = |key: &str| node.property(key).or_else(|| chosen?.property(key));
         for (key, value) in table.iter_mut() {
             let name = key.get_ref();
@@ -239,7 +210,7 @@ impl Check {
                 let known: Vec<_> = node.keys().chain(chosen.into_iter().flat_map(Node::keys)).collect();
                 return Err(self.unknown_key(name, known, place));
             };
-            // `chosen` has checked the tag.
+            // `choice` has checked the tag.
             if node.keyword("const").is_null() {
                 self.value(value, node, name, None).map_err(|schema_error| schema_error.child(name))?;
             }
@@ -251,14 +222,14 @@ impl Check {
                 SchemaError::new(ErrorKind::MissingKey, format!("missing key `{missing}`"), help, span.clone());
             return Err(schema_error);
         }
-        if let Some((chosen, (tag, _))) = chosen.and_then(|chosen| Some((chosen, chosen.tag()?))) {
-            nest_choice(table, node, chosen, tag);
+        if let Some((chosen, tag_span)) = choice {
+            nest_choice(table, node, chosen, tag_span);
         }
         Ok(())
     }
 
-    /// Returns the alternative that the tag of a table selects. Inserts a missing tag from its default.
-    fn chosen(
+    /// Returns the alternative that the tag of a table or its default selects, and the span of the tag.
+    fn choice(
         &self,
         table: &mut DeTable<'_>,
         tag: &'static str,
@@ -266,7 +237,7 @@ impl Check {
         span: &Range<usize>,
         own_name: Option<&(&str, Range<usize>)>,
         node: Node,
-    ) -> Result<Option<Node>, SchemaError> {
+    ) -> Result<Option<(Node, Range<usize>)>, SchemaError> {
         let names: Vec<_> = alternatives.iter().filter_map(|part| part.tag()).map(|(_, name)| name).collect();
         let default = alternatives.iter().find(|part| !part.requires(tag)).and_then(|part| part.tag());
         let (name, tag_span) = match (table.get(tag), own_name, default) {
@@ -277,10 +248,10 @@ impl Check {
                         SchemaError::new(ErrorKind::WrongType, message, description(node), value.span()).child(tag)
                     );
                 };
-                (name.to_owned(), value.span())
+                (name, value.span())
             }
-            (None, Some((own, own_span)), _) => ((*own).to_owned(), own_span.clone()),
-            (None, None, Some((_, default))) => (default.to_owned(), span.clone()),
+            (None, Some((own, own_span)), _) => (*own, own_span.clone()),
+            (None, None, Some((_, default))) => (default, span.clone()),
             // Some tables, such as `[[leg]]`, need no tag.
             (None, None, None) if node.keyword("anyOf").is_array() => return Ok(None),
             (None, None, None) => {
@@ -294,13 +265,10 @@ impl Check {
             }
         };
         let Some(&chosen) = alternatives.iter().find(|part| part.tag().is_some_and(|(_, known)| known == name)) else {
-            let mut schema_error = unknown_choice(&name, &names, tag_span);
+            let mut schema_error = unknown_choice(name, &names, tag_span);
             if own_name.is_some() && !table.contains_key(tag) {
-                let help = format!(
-                    "the name of a law is its kind unless the table [laws.NAME] has a `kind`: {}",
-                    schema_error.error.help.as_deref().unwrap_or_default()
-                );
-                schema_error.error = schema_error.error.with_help(help);
+                let unless = "the name of a law is its kind unless the table [laws.NAME] has a `kind`: ";
+                schema_error.error.help.insert_str(0, unless);
             }
             return Err(schema_error.child(tag));
         };
@@ -317,26 +285,20 @@ impl Check {
                 table.remove(&*key);
             }
         }
-        let name = DeValue::String(Cow::Owned(name));
-        table.entry(Spanned::new(tag_span.clone(), tag.into())).or_insert(Spanned::new(tag_span, name));
-        Ok(Some(chosen))
+        Ok(Some((chosen, tag_span)))
     }
 }
 
 /// Moves the keys of a choice into a table below the tag, named as the choice.
-fn nest_choice(table: &mut DeTable<'_>, node: Node, chosen: Node, tag: &'static str) {
-    let Some((tag_key, name)) = table.remove_entry(tag) else { return };
-    let span = name.span();
-    let DeValue::String(name) = name.into_inner() else { return };
-    let mut keys = DeTable::new();
-    for key in chosen.keys().filter(|key| node.property(key).is_none()) {
-        if let Some((key, value)) = table.remove_entry(key) {
-            keys.insert(key, value);
-        }
-    }
-    let mut choice = DeTable::new();
-    choice.insert(Spanned::new(span.clone(), name), Spanned::new(span.clone(), DeValue::Table(keys)));
-    table.insert(tag_key, Spanned::new(span, DeValue::Table(choice)));
+fn nest_choice(table: &mut DeTable<'_>, node: Node, chosen: Node, span: Range<usize>) {
+    let Some((tag, name)) = chosen.tag() else { return };
+    table.remove(tag);
+    let own = chosen.keys().filter(|key| node.property(key).is_none());
+    let keys = own.filter_map(|key| table.remove_entry(key)).collect();
+    let named = |name: &'static str, table| {
+        (Spanned::new(span.clone(), name.into()), Spanned::new(span.clone(), DeValue::Table(table)))
+    };
+    table.extend([named(tag, DeTable::from_iter([named(name, keys)]))]);
 }
 
 /// Returns whether a part of the schema has a type of TOML.

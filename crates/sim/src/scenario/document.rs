@@ -396,7 +396,8 @@ fn is_unscaled(scale: &f64) -> bool {
     *scale == 1.0
 }
 
-fn is_default<T: Default + PartialEq>(value: &T) -> bool {
+/// Returns whether a key has its default, which is not written.
+pub(crate) fn is_default<T: Default + PartialEq>(value: &T) -> bool {
     *value == T::default()
 }
 

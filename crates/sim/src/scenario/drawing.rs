@@ -44,9 +44,9 @@ impl DrawingSize {
             (None, None, None) => Ok(Size::Spacing(DEFAULT_SPACING * delta_m)),
             (height_m, width_m, spacing_m) => {
                 let given = [(HEIGHT.key, height_m), (WIDTH.key, width_m), (SPACING, spacing_m)];
-                let error = ScenarioError::new("more than one of `height_m`, `width_m` and `spacing_m` are given")
-                    .with_kind(ErrorKind::ExclusiveKeys)
-                    .with_help("keep one of them: each sets the size of the drawing");
+                let problem = "more than one of `height_m`, `width_m` and `spacing_m` are given";
+                let help = "keep one of them: each sets the size of the drawing";
+                let error = ScenarioError::new(ErrorKind::ExclusiveKeys, problem, help);
                 Err(given.into_iter().filter(|(_, given)| given.is_some()).fold(error, |error, (key, _)| error.at(key)))
             }
         }
@@ -75,10 +75,8 @@ pub(super) fn svg(keys: &SvgKeys, count: usize, delta_m: f64) -> Result<Formatio
             } else {
                 (ErrorKind::MissingKey, "neither `path` nor `file` is given")
             };
-            return Err(ScenarioError::new(said)
-                .with_kind(kind)
-                .with_help("give path = \"M 0 0 L ...\", or file = \"drawing.svg\"")
-                .at_keys([PATH, files::KEY]));
+            let help = "give path = \"M 0 0 L ...\", or file = \"drawing.svg\"";
+            return Err(ScenarioError::new(kind, said, help).at_keys([PATH, files::KEY]));
         }
     };
     sized(&drawing, size, count, delta_m, key)
@@ -103,10 +101,9 @@ fn sized(
     let mut formation = drawing.slots(count).map_err(|error| refused(&error, key, None))?;
     let (pair, nearest) = formation.min_distance().unwrap_or((Pair::new(0, 1), f64::INFINITY));
     if nearest == 0.0 {
-        return Err(ScenarioError::new(format!("slots {pair} of the drawing are the same point"))
-            .with_kind(ErrorKind::WithinDelta)
-            .with_help("draw longer lines or larger areas, or fly fewer vehicles")
-            .at_keys([key, "swarm.count"]));
+        let problem = format!("slots {pair} of the drawing are the same point");
+        let help = "draw longer lines or larger areas, or fly fewer vehicles";
+        return Err(ScenarioError::new(ErrorKind::WithinDelta, problem, help).at_keys([key, "swarm.count"]));
     }
     let scale = match size {
         Size::Spacing(spacing_m) => spacing_m / nearest,
@@ -130,12 +127,9 @@ impl Dimension {
         let Self { key, name, axis } = self;
         let drawn = drawing.size()[axis];
         if drawn == 0.0 {
-            return Err(ScenarioError::new(format!(
-                "the drawing is a straight line, which cannot be {asked_m} m {name}"
-            ))
-            .with_kind(ErrorKind::Shape)
-            .with_help("give its other dimension, or spacing_m")
-            .at(key));
+            let problem = format!("the drawing is a straight line, which cannot be {asked_m} m {name}");
+            let help = "give its other dimension, or spacing_m";
+            return Err(ScenarioError::new(ErrorKind::Shape, problem, help).at(key));
         }
         let scale = asked_m / drawn;
         let nearest_m = scale * nearest;
@@ -143,16 +137,15 @@ impl Dimension {
             return Ok(scale);
         }
         let enough_m = rounded_up(delta_m * (1.0 + SLOT_MARGIN) / nearest * drawn);
-        Err(ScenarioError::new(format!(
+        let problem = format!(
             "in a drawing {asked_m} m {name}, {count} vehicles come as near as {} m, not more than delta = {delta_m} m",
             beside_limit(nearest_m, delta_m, 3)
-        ))
-        .with_kind(ErrorKind::WithinDelta)
-        .with_help(format!(
+        );
+        let help = format!(
             "set {key} to at least {enough_m} for {count} vehicles at this delta, reduce law.delta_m, or fly fewer \
              vehicles"
-        ))
-        .at_keys([key, "swarm.count", "law.delta_m"]))
+        );
+        Err(ScenarioError::new(ErrorKind::WithinDelta, problem, help).at_keys([key, "swarm.count", "law.delta_m"]))
     }
 }
 
@@ -179,7 +172,7 @@ fn refused(error: &DrawingError, key: &'static str, file: Option<&Path>) -> Scen
         DrawingError::Slots(_) => format!("fly at most {MAX_DRAWN_SLOTS} vehicles"),
     };
     let shown = file.map_or_else(String::new, |file| format!("{}: ", file.display()));
-    let refused = ScenarioError::new(format!("{shown}{error}")).with_kind(ErrorKind::Shape).with_help(help).at(key);
+    let refused = ScenarioError::new(ErrorKind::Shape, format!("{shown}{error}"), help).at(key);
     if matches!(error, DrawingError::Letters { .. } | DrawingError::Slots(_)) {
         refused.at("swarm.count")
     } else {

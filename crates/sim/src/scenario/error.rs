@@ -17,137 +17,107 @@ pub struct ScenarioError {
     /// The problem with its value, one sentence.
     pub message: String,
     /// The remedy.
-    pub help: Option<String>,
+    pub help: String,
     /// Keys that are part of the problem. The error is placed at the first one, unless an override set another one.
     pub fields: Vec<Field>,
     /// Place in the text; `None` for a scenario built in code, and for a file that could not be read.
     pub place: Option<Box<Place>>,
 }
 
-/// Kind of a [`ScenarioError`].
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum ErrorKind {
-    /// The source cannot be read.
-    CannotRead,
-    /// A list has another length than the number of vehicles.
-    CountMismatch,
-    /// The graph is not connected.
-    Disconnected,
-    /// An edge of the graph does not join two vehicles.
-    Edge,
-    /// The text has no keys.
-    Empty,
-    /// Two keys exclude each other.
-    ExclusiveKeys,
-    /// A file that the scenario names cannot be used.
-    File,
-    /// Two hulls do not fit within the safety distance.
-    HullsTouch,
-    /// Keys contradict each other.
-    Inconsistent,
-    /// The law cannot be built with its parameters.
-    LawParameter,
-    /// The flight needs too much memory.
-    Memory,
-    /// A required key is missing.
-    MissingKey,
-    /// A name has other characters than letters, digits, `-` and `_`.
-    Name,
-    /// A vehicle or a slot is within the clearance of an obstacle.
-    NearObstacle,
-    /// The vehicles do not fit into the space of the start.
-    NoRoom,
-    /// The file or the built-in scenario does not exist.
-    NotFound,
-    /// The text is not UTF-8.
-    NotUtf8,
-    /// An obstacle cannot be judged.
-    Obstacle,
-    /// A number is out of its range.
-    OutOfRange,
-    /// A time or a duration is outside the flight.
-    OutsideFlight,
-    /// An override cannot be applied.
-    Override,
-    /// A vector leaves the plane of the swarm.
-    Plane,
-    /// The reference cannot be followed.
-    Reference,
-    /// A shape gives no formation.
-    Shape,
-    /// The shield has no certificate.
-    Shield,
-    /// The step is too long for a rate or a duration.
-    StepTooLong,
-    /// The text is not TOML.
-    Syntax,
-    /// The file is too large.
-    TooLarge,
-    /// The flight has too many steps.
-    TooManySteps,
-    /// A word is none of the choices.
-    UnknownChoice,
-    /// The key does not exist.
-    UnknownKey,
-    /// The vehicle does not exist.
-    UnknownVehicle,
-    /// The law does not support a setting.
-    UnsupportedByLaw,
-    /// The plant does not support a setting.
-    UnsupportedByPlant,
-    /// The vehicle does not support a setting.
-    UnsupportedByVehicle,
-    /// Two starts or two slots are within the safety distance.
-    WithinDelta,
-    /// A value has the wrong type.
-    WrongType,
+macro_rules! kinds {
+    ($(#[doc = $doc:literal] $kind:ident = $code:literal,)+) => {
+        /// Kind of a [`ScenarioError`].
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[non_exhaustive]
+        pub enum ErrorKind {
+            $(#[doc = $doc] $kind,)+
+        }
+
+        impl ErrorKind {
+            /// Returns the stable code, such as `scenario/out-of-range`.
+            #[must_use]
+            pub fn code(self) -> &'static str {
+                match self { $(Self::$kind => $code,)+ }
+            }
+        }
+    };
 }
 
-impl ErrorKind {
-    /// Returns the stable code, such as `scenario/out-of-range`.
-    #[must_use]
-    pub fn code(self) -> &'static str {
-        match self {
-            Self::CannotRead => "scenario/cannot-read",
-            Self::CountMismatch => "scenario/count-mismatch",
-            Self::Disconnected => "scenario/disconnected",
-            Self::Edge => "scenario/edge",
-            Self::Empty => "scenario/empty",
-            Self::ExclusiveKeys => "scenario/exclusive-keys",
-            Self::File => "scenario/file",
-            Self::HullsTouch => "scenario/hulls-touch",
-            Self::Inconsistent => "scenario/inconsistent",
-            Self::LawParameter => "law/parameter",
-            Self::Memory => "scenario/memory",
-            Self::MissingKey => "scenario/missing-key",
-            Self::Name => "scenario/name",
-            Self::NearObstacle => "scenario/near-obstacle",
-            Self::NoRoom => "scenario/no-room",
-            Self::NotFound => "scenario/not-found",
-            Self::NotUtf8 => "scenario/not-utf8",
-            Self::Obstacle => "scenario/obstacle",
-            Self::OutOfRange => "scenario/out-of-range",
-            Self::OutsideFlight => "scenario/outside-flight",
-            Self::Override => "scenario/override",
-            Self::Plane => "scenario/plane",
-            Self::Reference => "scenario/reference",
-            Self::Shape => "scenario/shape",
-            Self::Shield => "scenario/shield",
-            Self::StepTooLong => "scenario/step-too-long",
-            Self::Syntax => "scenario/syntax",
-            Self::TooLarge => "scenario/too-large",
-            Self::TooManySteps => "scenario/too-many-steps",
-            Self::UnknownChoice => "scenario/unknown-choice",
-            Self::UnknownKey => "scenario/unknown-key",
-            Self::UnknownVehicle => "scenario/unknown-vehicle",
-            Self::UnsupportedByLaw => "scenario/unsupported-by-law",
-            Self::UnsupportedByPlant => "scenario/unsupported-by-plant",
-            Self::UnsupportedByVehicle => "scenario/unsupported-by-vehicle",
-            Self::WithinDelta => "scenario/within-delta",
-            Self::WrongType => "scenario/wrong-type",
-        }
-    }
+kinds! {
+    /// The source cannot be read.
+    CannotRead = "scenario/cannot-read",
+    /// A list has another length than the number of vehicles.
+    CountMismatch = "scenario/count-mismatch",
+    /// The graph is not connected.
+    Disconnected = "scenario/disconnected",
+    /// An edge of the graph does not join two vehicles.
+    Edge = "scenario/edge",
+    /// The text has no keys.
+    Empty = "scenario/empty",
+    /// Two keys exclude each other.
+    ExclusiveKeys = "scenario/exclusive-keys",
+    /// A file that the scenario names cannot be used.
+    File = "scenario/file",
+    /// Two hulls do not fit within the safety distance.
+    HullsTouch = "scenario/hulls-touch",
+    /// Keys contradict each other.
+    Inconsistent = "scenario/inconsistent",
+    /// The law cannot be built with its parameters.
+    LawParameter = "law/parameter",
+    /// The flight needs too much memory.
+    Memory = "scenario/memory",
+    /// A required key is missing.
+    MissingKey = "scenario/missing-key",
+    /// A name has other characters than letters, digits, `-` and `_`.
+    Name = "scenario/name",
+    /// A vehicle or a slot is within the clearance of an obstacle.
+    NearObstacle = "scenario/near-obstacle",
+    /// The vehicles do not fit into the space of the start.
+    NoRoom = "scenario/no-room",
+    /// The file or the built-in scenario does not exist.
+    NotFound = "scenario/not-found",
+    /// The text is not UTF-8.
+    NotUtf8 = "scenario/not-utf8",
+    /// An obstacle cannot be judged.
+    Obstacle = "scenario/obstacle",
+    /// A number is out of its range.
+    OutOfRange = "scenario/out-of-range",
+    /// A time or a duration is outside the flight.
+    OutsideFlight = "scenario/outside-flight",
+    /// An override cannot be applied.
+    Override = "scenario/override",
+    /// A vector leaves the plane of the swarm.
+    Plane = "scenario/plane",
+    /// The reference cannot be followed.
+    Reference = "scenario/reference",
+    /// A shape gives no formation.
+    Shape = "scenario/shape",
+    /// The shield has no certificate.
+    Shield = "scenario/shield",
+    /// The step is too long for a rate or a duration.
+    StepTooLong = "scenario/step-too-long",
+    /// The text is not TOML.
+    Syntax = "scenario/syntax",
+    /// The file is too large.
+    TooLarge = "scenario/too-large",
+    /// The flight has too many steps.
+    TooManySteps = "scenario/too-many-steps",
+    /// A word is none of the choices.
+    UnknownChoice = "scenario/unknown-choice",
+    /// The key does not exist.
+    UnknownKey = "scenario/unknown-key",
+    /// The vehicle does not exist.
+    UnknownVehicle = "scenario/unknown-vehicle",
+    /// The law does not support a setting.
+    UnsupportedByLaw = "scenario/unsupported-by-law",
+    /// The plant does not support a setting.
+    UnsupportedByPlant = "scenario/unsupported-by-plant",
+    /// The vehicle does not support a setting.
+    UnsupportedByVehicle = "scenario/unsupported-by-vehicle",
+    /// Two starts or two slots are within the safety distance.
+    WithinDelta = "scenario/within-delta",
+    /// A value has the wrong type.
+    WrongType = "scenario/wrong-type",
 }
 
 /// Key of the scenario file, or an entry of the list that it holds. Displayed as an override names it:
@@ -163,23 +133,9 @@ pub struct Field {
 }
 
 impl ScenarioError {
-    pub(crate) fn new(message: impl AsRef<str>) -> Self {
-        let message = printable(message.as_ref());
-        Self { kind: ErrorKind::Inconsistent, message, help: None, fields: Vec::new(), place: None }
-    }
-
-    /// Returns an error about a value out of its range.
-    pub(crate) fn out_of_range(message: impl AsRef<str>) -> Self {
-        Self::new(message).with_kind(ErrorKind::OutOfRange)
-    }
-
-    /// Replaces the default kind [`ErrorKind::Inconsistent`].
-    pub(crate) fn with_kind(self, kind: ErrorKind) -> Self {
-        Self { kind, ..self }
-    }
-
-    pub(crate) fn with_help(self, help: impl AsRef<str>) -> Self {
-        Self { help: Some(printable(help.as_ref())), ..self }
+    pub(crate) fn new(kind: ErrorKind, problem: impl AsRef<str>, help: impl AsRef<str>) -> Self {
+        let [message, help] = [problem.as_ref(), help.as_ref()].map(printable);
+        Self { kind, message, help, fields: Vec::new(), place: None }
     }
 
     /// Adds a key that is part of the problem. The error is placed at the first key, unless an override set another
@@ -225,7 +181,7 @@ impl ScenarioError {
             return self;
         }
         self.message = format!("{}; start.jitter_m moved each coordinate by up to {jitter_m} m", self.message);
-        self.help = Some("reduce start.jitter_m, move one of the vehicles away, or reduce law.delta_m".to_owned());
+        self.help = String::from("reduce start.jitter_m, move one of the vehicles away, or reduce law.delta_m");
         self.fields.insert(0, Field { key: "start.jitter_m".into(), entry: None, leg: 0 });
         self
     }
@@ -253,7 +209,7 @@ impl fmt::Display for ScenarioError {
             (None, Some(field)) => write!(f, "{field}: {}", self.message)?,
             (None, None) => f.write_str(&self.message)?,
         }
-        self.help.as_ref().map_or(Ok(()), |help| write!(f, "\n  help: {help}"))
+        write!(f, "\n  help: {}", self.help)
     }
 }
 
@@ -320,8 +276,7 @@ impl From<ScenarioError> for Failure {
             Some(field) => format!("{field}: {}", error.message),
             None => error.message.clone(),
         };
-        let failure = Self::new(error.code(), false, message);
-        let failure = error.help.iter().fold(failure, Self::with_help);
+        let failure = Self::input(error.code(), message, &error.help);
         error.place.iter().fold(failure, |failure, place| failure.at(place))
     }
 }
@@ -333,20 +288,24 @@ mod tests {
     #[test]
     fn an_error_shows_place_and_remedy_in_plain_text() {
         let text = "name = \"a\"\nside_m = 2.0\n";
-        let error =
-            ScenarioError::new("too small").with_help("enlarge it").with_place(Place::new("f.toml", text, 20..23));
+        let error = ScenarioError::new(ErrorKind::OutOfRange, "too small", "enlarge it");
+        let error = error.with_place(Place::new("f.toml", text, 20..23));
         assert_eq!(error.to_string(), "f.toml:2:10: too small\n  help: enlarge it");
     }
 
     #[test]
     fn without_a_text_the_key_is_the_place() {
-        let error = ScenarioError::new("is zero").at_entry("swarm.mass_kg", 1);
-        assert_eq!(error.to_string(), "swarm.mass_kg.2: is zero");
+        let error = ScenarioError::new(ErrorKind::OutOfRange, "is zero", "enlarge it").at_entry("swarm.mass_kg", 1);
+        assert_eq!(error.to_string(), "swarm.mass_kg.2: is zero\n  help: enlarge it");
     }
 
     #[test]
     fn control_characters_of_the_input_do_not_reach_the_terminal() {
-        let error = ScenarioError::new("key \u{1b}[2J").with_place(Place::new("f", "\u{1b}[2J", 0..1));
+        let error = ScenarioError::new(ErrorKind::UnknownKey, "key \u{1b}[2J", "\u{1b}[2J").with_place(Place::new(
+            "f",
+            "\u{1b}[2J",
+            0..1,
+        ));
         assert!(!error.to_string().contains('\u{1b}'));
     }
 

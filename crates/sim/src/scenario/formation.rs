@@ -49,13 +49,11 @@ fn freedom(scenario: &Scenario) -> Result<Option<Freedom>, ScenarioError> {
     let freedom = if leads { Freedom::Translation } else { law.capabilities().controls.freedom() };
     let most = most_assigned(freedom);
     if scenario.count() > most {
-        return Err(ScenarioError::new(format!(
-            "an assignment needs at most {most} vehicles, got {}",
-            scenario.count()
-        ))
-        .with_kind(ErrorKind::OutOfRange)
-        .with_help("set assignment to \"given\", or reduce swarm.count")
-        .at_keys(["formation.assignment", "swarm.count"]));
+        let problem = format!("an assignment needs at most {most} vehicles, got {}", scenario.count());
+        let help = "set assignment to \"given\", or reduce swarm.count";
+        return Err(
+            ScenarioError::new(ErrorKind::OutOfRange, problem, help).at_keys(["formation.assignment", "swarm.count"])
+        );
     }
     Ok(Some(freedom))
 }
@@ -75,11 +73,9 @@ fn interchangeable(scenario: &Scenario, leg: usize, assignment: Assignment) -> R
     if assignment != Assignment::WhenStalled {
         return Ok(false);
     }
-    Err(ScenarioError::new(why)
-        .with_kind(ErrorKind::UnsupportedByLaw)
-        .with_help(
-            "set assignment to \"given\" or \"optimal\", or law.kind to \"displacement\" and deadlock.mode to \"auto\"",
-        )
+    let help =
+        "set assignment to \"given\" or \"optimal\", or law.kind to \"displacement\" and deadlock.mode to \"auto\"";
+    Err(ScenarioError::new(ErrorKind::UnsupportedByLaw, why, help)
         .at_leg(leg, "formation.assignment")
         .at_keys(["law.kind", "deadlock.mode"]))
 }
@@ -141,9 +137,9 @@ pub(super) fn check_slots(legs: &[LegTable], count: usize) -> Result<(), Scenari
     let listed = legs.iter().map(|leg| leg.shape.as_ref().and_then(listed_slots));
     for (number, slots) in listed.enumerate() {
         if let Some(slots) = slots.filter(|&slots| slots != count) {
-            return Err(ScenarioError::new(format!("leg {} has {slots} slots for {count} vehicles", number + 2))
-                .with_kind(ErrorKind::CountMismatch)
-                .with_help("every leg needs a slot for each vehicle")
+            let problem = format!("leg {} has {slots} slots for {count} vehicles", number + 2);
+            let help = "every leg needs a slot for each vehicle";
+            return Err(ScenarioError::new(ErrorKind::CountMismatch, problem, help)
                 .at_leg(number + 1, "formation.points_m")
                 .at("swarm.count"));
         }
@@ -180,10 +176,9 @@ pub(super) fn formation(shape: &FormationShape, count: usize, delta_m: f64) -> R
 /// Returns the error of a drawing in a build without the feature `drawn`.
 #[cfg(not(feature = "drawn"))]
 fn without_drawings() -> ScenarioError {
-    ScenarioError::new("a drawing needs the feature `drawn`, which this build lacks")
-        .with_kind(ErrorKind::Shape)
-        .with_help("build tautline-sim with the feature `drawn`, or list the slots: shape = \"points\" or \"file\"")
-        .at("formation.shape")
+    let problem = "a drawing needs the feature `drawn`, which this build lacks";
+    let help = "build tautline-sim with the feature `drawn`, or list the slots: shape = \"points\" or \"file\"";
+    ScenarioError::new(ErrorKind::Shape, problem, help).at("formation.shape")
 }
 
 /// Resolves the file of a shape relative to a folder, and replaces a file of points by a list.
@@ -222,9 +217,9 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
     let HelixKeys { radius_m, pitch_m, .. } = *keys;
     if let Some(turns) = keys.turns {
         if keys.spacing_m.is_some() {
-            return Err(ScenarioError::new("both `spacing_m` and `turns` are given")
-                .with_kind(ErrorKind::ExclusiveKeys)
-                .with_help("keep one of them")
+            let problem = "both `spacing_m` and `turns` are given";
+            let help = "keep one of them";
+            return Err(ScenarioError::new(ErrorKind::ExclusiveKeys, problem, help)
                 .at_keys(["formation.turns", "formation.spacing_m"]));
         }
         let step_rad = std::f64::consts::TAU * turns / count.saturating_sub(1).max(1) as f64;
@@ -232,10 +227,11 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
     }
     let spacing_m = spacing(keys.spacing_m, delta_m);
     let Some(step_rad) = Formation::helix_step_rad(radius_m, pitch_m, spacing_m) else {
-        return Err(ScenarioError::new(format!("slots {spacing_m} m apart do not fit a helix of radius {radius_m} m"))
-            .with_kind(ErrorKind::Shape)
-            .with_help(format!("enlarge formation.radius_m to at least {}", 0.5 * spacing_m))
-            .at_keys(["formation.radius_m", "formation.spacing_m"]));
+        let problem = format!("slots {spacing_m} m apart do not fit a helix of radius {radius_m} m");
+        let help = format!("enlarge formation.radius_m to at least {}", 0.5 * spacing_m);
+        return Err(
+            ScenarioError::new(ErrorKind::Shape, problem, help).at_keys(["formation.radius_m", "formation.spacing_m"])
+        );
     };
     let keeps = |pitch_m: f64, step_rad: f64| {
         Formation::helix_nearest_m(count, radius_m, pitch_m, step_rad) >= spacing_m * (1.0 - ROUNDING)
@@ -249,12 +245,11 @@ fn helix(keys: &HelixKeys, count: usize, delta_m: f64) -> Result<Formation, Scen
             Formation::helix_step_rad(radius_m, pitch_m, spacing_m).is_some_and(|step_rad| keeps(pitch_m, step_rad))
         };
         let enough_m = steeper.skip(1).find(enough).unwrap_or(2.0 * spacing_m);
-        return Err(ScenarioError::new(format!(
-            "turns {pitch_m} m above each other do not keep a spacing of {spacing_m} m"
-        ))
-        .with_kind(ErrorKind::Shape)
-        .with_help(format!("enlarge formation.pitch_m to {}, or reduce formation.spacing_m", rounded_up(enough_m)))
-        .at_keys(["formation.pitch_m", "formation.spacing_m"]));
+        let problem = format!("turns {pitch_m} m above each other do not keep a spacing of {spacing_m} m");
+        let help = format!("enlarge formation.pitch_m to {}, or reduce formation.spacing_m", rounded_up(enough_m));
+        return Err(
+            ScenarioError::new(ErrorKind::Shape, problem, help).at_keys(["formation.pitch_m", "formation.spacing_m"])
+        );
     }
     Ok(Formation::helix(count, radius_m, pitch_m, step_rad))
 }

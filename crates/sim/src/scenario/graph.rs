@@ -101,10 +101,8 @@ fn index(number: u64) -> Option<usize> {
 
 fn star(hub: u64, count: usize) -> Result<Graph, ScenarioError> {
     index(hub).filter(|&hub| hub < count).map(|hub| Graph::star_about(count, hub)).ok_or_else(|| {
-        ScenarioError::new(format!("the hub must be a vehicle from 1 to {count}, got {hub}"))
-            .with_kind(ErrorKind::UnknownVehicle)
-            .with_help("vehicles are counted from 1")
-            .at("graph.hub")
+        let problem = format!("the hub must be a vehicle from 1 to {count}, got {hub}");
+        ScenarioError::new(ErrorKind::UnknownVehicle, problem, "vehicles are counted from 1").at("graph.hub")
     })
 }
 
@@ -112,10 +110,9 @@ fn drawn(degree: Option<u64>, seed: u64, count: usize) -> Result<Graph, Scenario
     let most = count.saturating_sub(1).max(1) as u64;
     let degree = degree.unwrap_or(DEFAULT_DEGREE.min(most));
     if !(1..=most).contains(&degree) {
-        return Err(ScenarioError::new(format!("the mean number of links must be from 1 to {most}, got {degree}"))
-            .with_kind(ErrorKind::OutOfRange)
-            .with_help("a connected graph has a mean degree of about 2 or more")
-            .at("graph.degree"));
+        let problem = format!("the mean number of links must be from 1 to {most}, got {degree}");
+        let help = "a connected graph has a mean degree of about 2 or more";
+        return Err(ScenarioError::new(ErrorKind::OutOfRange, problem, help).at("graph.degree"));
     }
     let edges = usize::try_from(random_edge_count(degree, count)).unwrap_or(usize::MAX);
     let mut numbers = super::start::random(seed);
@@ -125,10 +122,8 @@ fn drawn(degree: Option<u64>, seed: u64, count: usize) -> Result<Graph, Scenario
 fn listed(edges: &[Edge], count: usize) -> Result<Graph, ScenarioError> {
     let indices = edges.iter().enumerate().map(|(entry, Edge([a, b]))| {
         index(*a).zip(index(*b)).ok_or_else(|| {
-            ScenarioError::new(format!("edge {} names vehicle 0", entry + 1))
-                .with_kind(ErrorKind::Edge)
-                .with_help("vehicles are counted from 1")
-                .at_entry("graph.edges", entry)
+            let problem = format!("edge {} names vehicle 0", entry + 1);
+            ScenarioError::new(ErrorKind::Edge, problem, "vehicles are counted from 1").at_entry("graph.edges", entry)
         })
     });
     let indices = indices.collect::<Result<Vec<_>, _>>()?;
@@ -136,9 +131,8 @@ fn listed(edges: &[Edge], count: usize) -> Result<Graph, ScenarioError> {
         let (GraphError::SelfLoop { edge, .. }
         | GraphError::OutOfRange { edge, .. }
         | GraphError::Duplicate { edge, .. }) = error;
-        ScenarioError::new(error.to_string())
-            .with_kind(ErrorKind::Edge)
-            .with_help("list each pair of different vehicles once, in either order")
-            .at_entry("graph.edges", edge)
+        let problem = error.to_string();
+        let help = "list each pair of different vehicles once, in either order";
+        ScenarioError::new(ErrorKind::Edge, problem, help).at_entry("graph.edges", edge)
     })
 }

@@ -1,7 +1,5 @@
 //! Limits of the numbers, the size and the memory of a scenario.
 
-use std::fmt::Display;
-
 use super::error::{ErrorKind, ScenarioError};
 use tautline_core::swarm::{Pair, Rows, row};
 use tautline_laws::space::SpacedPoints;
@@ -57,9 +55,8 @@ pub(super) fn check_count(count: usize) -> Result<(), ScenarioError> {
     if count >= 2 {
         return Ok(());
     }
-    Err(ScenarioError::out_of_range(format!("a swarm needs at least 2 vehicles, got {count}"))
-        .with_help("add vehicles")
-        .at("swarm.count"))
+    let problem = format!("a swarm needs at least 2 vehicles, got {count}");
+    Err(ScenarioError::new(ErrorKind::OutOfRange, problem, "add vehicles").at("swarm.count"))
 }
 
 /// Refuses lists whose length is not the number of vehicles. Each list has a key, a description and a length.
@@ -68,10 +65,12 @@ pub(super) fn check_lengths<const N: usize>(
     lists: [(&'static str, &str, Option<usize>); N],
 ) -> Result<(), ScenarioError> {
     match lists.into_iter().find(|&(.., length)| length.is_some_and(|length| length != count)) {
-        Some((key, what, Some(length))) => Err(ScenarioError::new(format!("{length} {what} for {count} vehicles"))
-            .with_kind(ErrorKind::CountMismatch)
-            .with_help("the number of vehicles is swarm.count if given, or else the number of start positions")
-            .at_keys([key, "swarm.count"])),
+        Some((key, what, Some(length))) => Err(ScenarioError::new(
+            ErrorKind::CountMismatch,
+            format!("{length} {what} for {count} vehicles"),
+            "the number of vehicles is swarm.count if given, or else the number of start positions",
+        )
+        .at_keys([key, "swarm.count"])),
         _ => Ok(()),
     }
 }
@@ -82,15 +81,14 @@ pub(super) fn check_memory(count: usize, edges: u128) -> Result<(), ScenarioErro
     if bytes <= MAX_MEMORY_BYTES {
         return Ok(());
     }
-    Err(ScenarioError::new(format!(
+    let problem = format!(
         "{count} vehicles with {edges} edges would take {:.1} GiB of memory ({BYTES_PER_VEHICLE} bytes a vehicle, \
          {BYTES_PER_EDGE} bytes an edge); at most {} GiB are used",
         bytes as f64 / GIB,
         MAX_MEMORY_BYTES >> 30
-    ))
-    .with_kind(ErrorKind::Memory)
-    .with_help("fly fewer vehicles, or choose a graph of fewer edges, such as [graph] kind = \"ring\"")
-    .at_keys(["swarm.count", "graph.kind"]))
+    );
+    let help = "fly fewer vehicles, or choose a graph of fewer edges, such as [graph] kind = \"ring\"";
+    Err(ScenarioError::new(ErrorKind::Memory, problem, help).at_keys(["swarm.count", "graph.kind"]))
 }
 
 /// Returns the number of pairs of `count` vehicles.
@@ -114,20 +112,4 @@ pub(super) fn rounded_up(number: f64) -> f64 {
 pub(super) fn first_pair_within(rows: &Rows, distance_m: f64) -> Option<(Pair, f64)> {
     let mut spaced = SpacedPoints::new(distance_m);
     (0..rows.nrows()).find_map(|j| spaced.insert(row(rows, j)).err().map(|(i, apart_m)| (Pair::new(i, j), apart_m)))
-}
-
-/// Refuses a number that is not finite, or larger in magnitude than [`LARGEST`].
-pub(super) fn require_finite(what: impl Display, number: f64) -> Result<f64, ScenarioError> {
-    if number.abs() <= LARGEST {
-        return Ok(number);
-    }
-    Err(match not_finite(number) {
-        Some(shown) => ScenarioError::out_of_range(format!("{what} is {shown}")).with_help("give a finite number"),
-        None => ScenarioError::out_of_range(format!("{what} must be at most {LARGEST:e} in magnitude, got {number:e}"))
-            .with_help("give a smaller number"),
-    })
-}
-
-fn not_finite(number: f64) -> Option<&'static str> {
-    (!number.is_finite()).then_some(if number.is_nan() { "not a number" } else { "infinite" })
 }

@@ -36,6 +36,7 @@ pub use crate::link::{
     ActuationSpec, Failure, FailureKind, LinkFailure, NearStates, NetworkSpec, SensingSpec, StalePolicy,
 };
 pub use crate::shield::ShieldSpec;
+pub(crate) use document::is_default;
 pub use environment::IgnoredPart;
 pub use error::{ErrorKind, Field, ScenarioError, edit_distance};
 pub use external::ExternalLaw;
@@ -46,8 +47,8 @@ pub use limits::{
 pub use obstacles::{OBSTACLE_HELP, ObstacleTable};
 pub use resolution::Drift;
 pub use resolved::Resolved;
-pub use schema::{TomlSchema, key_choices, key_paths, schema, takes_integers_only};
-pub use source::{MAX_FILE_BYTES, Source};
+pub use schema::{TomlSchema, key_choices, key_paths, schema};
+pub use source::{MAX_FILE_BYTES, Source, takes_integers_only};
 pub use spec::{DEFAULT_HULL_RADIUS_M, DEFAULT_MASS_KG, PlantSpec, Safety, Scenario, Space};
 pub use start::{offset, random, scatter};
 pub use template::{Draw, NamedLaw, Template};

@@ -151,13 +151,15 @@ impl ObstacleTable {
 
     /// Returns the obstacle at rest, with a default clearance \[m\].
     pub(super) fn obstacle(&self, number: usize, clearance_m: f64) -> Result<Obstacle, ScenarioError> {
-        let wrong = |said: String| ScenarioError::new(said).with_kind(ErrorKind::Obstacle).at_entry("obstacle", number);
+        let wrong = |problem: String, help: &str| {
+            ScenarioError::new(ErrorKind::Obstacle, problem, help).at_entry("obstacle", number)
+        };
         let MovingObstacle { name, shape, clearance_m: own_m, path } =
-            self.clone().into_moving().map_err(|said| wrong(said).with_help(OBSTACLE_HELP))?;
+            self.clone().into_moving().map_err(|problem| wrong(problem, OBSTACLE_HELP))?;
         let [(_, place_m)] = path[..] else {
             let command = format!("tautline audit {}", OBSTACLES.argument());
-            return Err(wrong(format!("obstacle `{name}` moves"))
-                .with_help(format!("give at_m = [x, y, z]; only `{command}` takes obstacles that move")));
+            let help = format!("give at_m = [x, y, z]; only `{command}` takes obstacles that move");
+            return Err(wrong(format!("obstacle `{name}` moves"), &help));
         };
         Ok(Obstacle { name, place_m, shape, clearance_m: own_m.unwrap_or(clearance_m) })
     }
@@ -194,10 +196,9 @@ impl Scenario {
         for (number, obstacle) in self.obstacles.iter().enumerate() {
             check_solid(obstacle).map_err(|error| error.at_entry("obstacle", number))?;
             if self.obstacles[..number].iter().any(|before| before.name == obstacle.name) {
-                return Err(ScenarioError::new(format!("two obstacles have the name `{}`", obstacle.name))
-                    .with_kind(ErrorKind::Name)
-                    .with_help("give each obstacle its own name")
-                    .at_entry("obstacle", number));
+                let problem = format!("two obstacles have the name `{}`", obstacle.name);
+                let help = "give each obstacle its own name";
+                return Err(ScenarioError::new(ErrorKind::Name, problem, help).at_entry("obstacle", number));
             }
             self.check_hulls_beside(number, obstacle)?;
         }
@@ -252,9 +253,8 @@ impl Scenario {
             let distance = beside_limit(distance_m, *clearance_m, 3);
             format!("{subject} {distance} m from obstacle `{name}`, not more than its clearance of {clearance_m} m")
         };
-        ScenarioError::new(said)
-            .with_kind(ErrorKind::NearObstacle)
-            .with_help("move one of them away, or reduce the clearance_m of the obstacle")
+        let help = "move one of them away, or reduce the clearance_m of the obstacle";
+        ScenarioError::new(ErrorKind::NearObstacle, said, help)
     }
 
     fn check_hulls_beside(&self, number: usize, obstacle: &Obstacle) -> Result<(), ScenarioError> {
@@ -263,17 +263,17 @@ impl Scenario {
         if radius_m + CONTACT_PREDICTION_M <= obstacle.clearance_m {
             return Ok(());
         }
-        Err(ScenarioError::new(format!(
+        let problem = format!(
             "the hull of vehicle {} touches obstacle `{}` at {radius_m} m, less than {CONTACT_PREDICTION_M} m before \
              its clearance of {} m",
             vehicle + 1,
             obstacle.name,
             obstacle.clearance_m
-        ))
-        .with_kind(ErrorKind::HullsTouch)
-        .with_help("enlarge the clearance_m of the obstacle, or reduce swarm.hull_radius_m")
-        .at_entry("obstacle", number)
-        .at_entry("swarm.hull_radius_m", vehicle))
+        );
+        let help = "enlarge the clearance_m of the obstacle, or reduce swarm.hull_radius_m";
+        Err(ScenarioError::new(ErrorKind::HullsTouch, problem, help)
+            .at_entry("obstacle", number)
+            .at_entry("swarm.hull_radius_m", vehicle))
     }
 }
 
@@ -281,20 +281,17 @@ impl Scenario {
 fn check_solid(obstacle: &Obstacle) -> Result<(), ScenarioError> {
     let Obstacle { name, shape, .. } = obstacle;
     if name.trim().is_empty() {
-        return Err(ScenarioError::new("the name of an obstacle is empty")
-            .with_kind(ErrorKind::Name)
-            .with_help("name the obstacle"));
+        return Err(ScenarioError::new(ErrorKind::Name, "the name of an obstacle is empty", "name the obstacle"));
     }
     if name.trim().parse::<u64>().is_ok() {
-        return Err(ScenarioError::new(format!("the name of an obstacle must not be a number, got `{name}`"))
-            .with_kind(ErrorKind::Name)
-            .with_help("add a letter: numbers are names of vehicles"));
+        let problem = format!("the name of an obstacle must not be a number, got `{name}`");
+        return Err(ScenarioError::new(ErrorKind::Name, problem, "add a letter: numbers are names of vehicles"));
     }
     match shape {
         Shape::HalfSpace { normal } if normal.norm() < SMALLEST => {
-            Err(ScenarioError::new(format!("the normal of obstacle `{name}` has the length {}", normal.norm()))
-                .with_kind(ErrorKind::OutOfRange)
-                .with_help("give the direction that points out of the half-space, such as [0, 0, 1]"))
+            let problem = format!("the normal of obstacle `{name}` has the length {}", normal.norm());
+            let help = "give the direction that points out of the half-space, such as [0, 0, 1]";
+            Err(ScenarioError::new(ErrorKind::OutOfRange, problem, help))
         }
         _ => Ok(()),
     }

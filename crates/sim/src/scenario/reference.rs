@@ -135,17 +135,17 @@ impl ReferenceTable {
         let index = |number: u64, key: &'static str| {
             let index = usize::try_from(number).ok().and_then(|number| number.checked_sub(1));
             index.filter(|&index| index < count).ok_or_else(|| {
-                ScenarioError::new(format!("the vehicle must be from 1 to {count}, got {number}"))
-                    .with_kind(ErrorKind::UnknownVehicle)
-                    .with_help("vehicles are counted from 1")
-                    .at(key)
+                let problem = format!("the vehicle must be from 1 to {count}, got {number}");
+                ScenarioError::new(ErrorKind::UnknownVehicle, problem, "vehicles are counted from 1").at(key)
             })
         };
         match (&self.known_by, self.leader) {
-            (Some(_), Some(_)) => Err(ScenarioError::new("both `known_by` and `leader` are given")
-                .with_kind(ErrorKind::ExclusiveKeys)
-                .with_help("keep one of them: only the leader knows its reference")
-                .at_keys(["reference.leader", "reference.known_by"])),
+            (Some(_), Some(_)) => Err(ScenarioError::new(
+                ErrorKind::ExclusiveKeys,
+                "both `known_by` and `leader` are given",
+                "keep one of them: only the leader knows its reference",
+            )
+            .at_keys(["reference.leader", "reference.known_by"])),
             (None, Some(leader)) => Ok(Pinning::Leader(index(leader, "reference.leader")?)),
             (None | Some(Vehicles::All(All::All)), None) => Ok(Pinning::All),
             (Some(Vehicles::Listed(listed)), None) => {
@@ -154,9 +154,9 @@ impl ReferenceTable {
                 listed.sort_unstable();
                 listed.dedup();
                 if listed.is_empty() {
-                    return Err(ScenarioError::new("no vehicle knows the reference")
-                        .with_help("list at least one vehicle, or leave out `known_by`: then all vehicles know it")
-                        .at("reference.known_by"));
+                    let problem = "no vehicle knows the reference";
+                    let help = "list at least one vehicle, or leave out `known_by`: then all vehicles know it";
+                    return Err(ScenarioError::new(ErrorKind::Inconsistent, problem, help).at("reference.known_by"));
                 }
                 Ok(if listed.len() == count { Pinning::All } else { Pinning::Listed(listed) })
             }
@@ -180,10 +180,8 @@ impl ReferenceKind {
             &Self::Circle { centre_m, radius_m, period_s } => {
                 if period_s.abs() < SMALLEST {
                     let message = format!("the period must be at least {SMALLEST:e} s in magnitude, got {period_s} s");
-                    return Err(ScenarioError::new(message)
-                        .with_kind(ErrorKind::OutOfRange)
-                        .with_help("give a longer period; a negative one turns clockwise")
-                        .at("reference.period_s"));
+                    let help = "give a longer period; a negative one turns clockwise";
+                    return Err(ScenarioError::new(ErrorKind::OutOfRange, message, help).at("reference.period_s"));
                 }
                 ReferenceMotion::Circle { centre_m: centre_m.coordinates().into(), radius_m, period_s }
             }
@@ -197,10 +195,13 @@ impl ReferenceKind {
                     (Some(times_s), None) => times_s.clone(),
                     (None, Some(speed_m_s)) => timed(&points_m, *speed_m_s),
                     _ => {
-                        return Err(ScenarioError::new("way points need either `times_s` or `speed_m_s`")
-                            .with_kind(ErrorKind::MissingKey)
-                            .with_help("give the time at each point, or the largest speed between them")
-                            .at_keys(["reference.times_s", "reference.speed_m_s", "reference.points_m"]));
+                        let problem = "way points need either `times_s` or `speed_m_s`";
+                        let help = "give the time at each point, or the largest speed between them";
+                        return Err(ScenarioError::new(ErrorKind::MissingKey, problem, help).at_keys([
+                            "reference.times_s",
+                            "reference.speed_m_s",
+                            "reference.points_m",
+                        ]));
                     }
                 };
                 ReferenceMotion::WayPoints { points: in_time(&points_m, &times_s)? }
@@ -210,8 +211,8 @@ impl ReferenceKind {
                 check_span(&points, duration_s)?;
                 check_steady(&points)?;
                 let spline = Spline::through(&points).ok_or_else(|| {
-                    ScenarioError::new("no curve goes through the points")
-                        .with_kind(ErrorKind::Reference)
+                    let problem = "no curve goes through the points";
+                    ScenarioError::new(ErrorKind::Reference, problem, "give finite points, and times that increase")
                         .at("reference.points_m")
                 })?;
                 ReferenceMotion::Table(spline)
@@ -223,10 +224,9 @@ impl ReferenceKind {
 
 fn places(points_m: &[Point]) -> Result<Vec<Vector3<f64>>, ScenarioError> {
     if points_m.is_empty() {
-        return Err(ScenarioError::new("the reference has no points")
-            .with_kind(ErrorKind::MissingKey)
-            .with_help("give points_m = [[x, y], ...]")
-            .at("reference.points_m"));
+        let problem = "the reference has no points";
+        let help = "give points_m = [[x, y], ...]";
+        return Err(ScenarioError::new(ErrorKind::MissingKey, problem, help).at("reference.points_m"));
     }
     Ok(points_m.iter().map(|point| point.coordinates().into()).collect())
 }
@@ -246,9 +246,9 @@ fn timed(points_m: &[Vector3<f64>], speed_m_s: f64) -> Vec<f64> {
 /// Pairs points with their times, which must increase.
 fn in_time(points_m: &[Vector3<f64>], times_s: &[f64]) -> Result<Vec<(f64, Vector3<f64>)>, ScenarioError> {
     if points_m.len() != times_s.len() {
-        return Err(ScenarioError::new(format!("{} points and {} times", points_m.len(), times_s.len()))
-            .with_kind(ErrorKind::CountMismatch)
-            .with_help("give a time for each point")
+        let problem = format!("{} points and {} times", points_m.len(), times_s.len());
+        let help = "give a time for each point";
+        return Err(ScenarioError::new(ErrorKind::CountMismatch, problem, help)
             .at_keys(["reference.times_s", "reference.points_m"]));
     }
     for (k, &time_s) in times_s.iter().enumerate() {
@@ -259,10 +259,8 @@ fn in_time(points_m: &[Vector3<f64>], times_s: &[f64]) -> Result<Vec<(f64, Vecto
             } else {
                 format!("time {} of the reference must be more than {before_s} s, got {time_s} s", k + 1)
             };
-            return Err(ScenarioError::new(said)
-                .with_kind(ErrorKind::Reference)
-                .with_help("times must increase; for a jump of the formation use a [[leg]]")
-                .at_entry("reference.times_s", k));
+            let help = "times must increase; for a jump of the formation use a [[leg]]";
+            return Err(ScenarioError::new(ErrorKind::Reference, said, help).at_entry("reference.times_s", k));
         }
     }
     Ok(times_s.iter().copied().zip(points_m.iter().copied()).collect())
@@ -272,13 +270,11 @@ fn in_time(points_m: &[Vector3<f64>], times_s: &[f64]) -> Result<Vec<(f64, Vecto
 fn check_span(points: &[(f64, Vector3<f64>)], duration_s: f64) -> Result<(), ScenarioError> {
     let (Some(first), Some(last)) = (points.first(), points.last()) else { return Ok(()) };
     if first.0 > 0.0 || last.0 < duration_s {
-        return Err(ScenarioError::new(format!(
-            "the reference must cover the flight from 0 to {duration_s} s, got {} to {} s",
-            first.0, last.0
-        ))
-        .with_kind(ErrorKind::OutsideFlight)
-        .with_help("give points from time 0 to the end of the flight, or shorten time.duration_s")
-        .at_keys(["reference.times_s", "time.duration_s"]));
+        let problem =
+            format!("the reference must cover the flight from 0 to {duration_s} s, got {} to {} s", first.0, last.0);
+        let help = "give points from time 0 to the end of the flight, or shorten time.duration_s";
+        return Err(ScenarioError::new(ErrorKind::OutsideFlight, problem, help)
+            .at_keys(["reference.times_s", "time.duration_s"]));
     }
     Ok(())
 }
@@ -293,16 +289,15 @@ fn check_steady(points: &[(f64, Vector3<f64>)]) -> Result<(), ScenarioError> {
         around.is_some_and(|around| speeds_m_s[*k] > JUMP * around)
     };
     let Some(k) = (0..speeds_m_s.len()).find(is_jump) else { return Ok(()) };
-    Err(ScenarioError::new(format!(
+    let problem = format!(
         "the reference jumps between {} and {} s: its speed of {:.3e} m/s is more than {JUMP} times the speeds before \
          and after",
         points[k].0,
         points[k + 1].0,
         speeds_m_s[k]
-    ))
-    .with_kind(ErrorKind::Reference)
-    .with_help("add points in between, or set reference.kind to \"way-points\", which rests at each point")
-    .at_entry("reference.points_m", k + 1))
+    );
+    let help = "add points in between, or set reference.kind to \"way-points\", which rests at each point";
+    Err(ScenarioError::new(ErrorKind::Reference, problem, help).at_entry("reference.points_m", k + 1))
 }
 
 impl From<&Guidance> for ReferenceTable {

@@ -37,7 +37,7 @@ impl Scenario {
     /// Writes the scenario with every default.
     #[must_use]
     pub fn resolved(&self) -> Resolved {
-        let toml = written(&Document::from(self));
+        let toml = Document::from(self).toml();
         let sha256 = sha256_hex(&toml);
         Resolved { toml, sha256 }
     }
@@ -74,10 +74,12 @@ impl Scenario {
 }
 
 impl Document {
-    /// Returns the document as a value of TOML.
-    pub(super) fn value(&self) -> Value {
-        // Every key of the document can be written as TOML.
-        Value::try_from(self).unwrap_or(Value::Table(Table::new()))
+    /// Returns the document as TOML.
+    pub(super) fn toml(&self) -> String {
+        let mut out = String::new();
+        // Every key of the document can be written as TOML, and writing to a string cannot fail.
+        let _ = Table::try_from(self).map(|tables| write_document(&mut out, &tables));
+        out
     }
 
     /// Returns the document without its lists of points and edges.
@@ -159,16 +161,6 @@ fn per_vehicle(numbers: &[f64]) -> PerVehicle {
         [first, rest @ ..] if rest.iter().all(|other| other.to_bits() == first.to_bits()) => PerVehicle::All(*first),
         _ => PerVehicle::Each(numbers.to_vec()),
     }
-}
-
-/// Returns a document as TOML.
-fn written(document: &Document) -> String {
-    let mut out = String::new();
-    if let Value::Table(tables) = document.value() {
-        // Writing to a string cannot fail.
-        let _ = write_document(&mut out, &tables);
-    }
-    out
 }
 
 fn write_document(out: &mut String, document: &Table) -> fmt::Result {

@@ -14,9 +14,6 @@ use toml::de::DeValue;
 
 use super::document::Document;
 use super::error::ScenarioError;
-use super::source::Source;
-use super::text::Override;
-use super::text::Text;
 
 /// Tables with their default kind.
 const DEFAULT_KINDS: [(&str, &str); 3] =
@@ -215,45 +212,6 @@ impl Node {
         let keys = self.schema["properties"].as_object()?;
         keys.iter().find_map(|(key, value)| Some((key.as_str(), value["const"].as_str()?)))
     }
-
-    /// Returns the alternative that the tag of a table of the file selects.
-    pub(super) fn alternative_of(self, table: &DeValue<'_>) -> Option<Self> {
-        self.alternatives().into_iter().find(|part| {
-            part.tag().is_some_and(|(key, name)| match table.get(key) {
-                Some(value) => value.get_ref().as_str() == Some(name),
-                None => !part.requires(key),
-            })
-        })
-    }
-
-    /// Returns the child part for a key or the number of an entry, in a value of the file.
-    fn child(self, value: Option<&Spanned<DeValue<'_>>>, key: &str) -> Option<Self> {
-        if let Some(part) = self.property(key).or_else(|| self.values()).or_else(|| self.items()) {
-            return Some(part);
-        }
-        let chosen = value.and_then(|value| self.alternative_of(value.get_ref()));
-        let of_lists = || self.alternatives().into_iter().find_map(Self::items);
-        chosen.and_then(|chosen| chosen.property(key)).or_else(of_lists)
-    }
-}
-
-/// Returns whether the type of a key of a scenario is an integer; `false` for a key that does not exist.
-#[must_use]
-pub fn takes_integers_only(source: &Source, overrides: &[Override], key: &str) -> bool {
-    let Ok((name, toml)) = source.text() else { return false };
-    let Ok(tree) = (Text { name: &name, toml: &toml, overrides }).tree() else { return false };
-    let mut current = (Some(Node::root()), Some(&tree));
-    for part in key.split('.') {
-        let (node, value) = current;
-        let node = node.and_then(|node| node.child(value, part));
-        let entry = || part.parse::<usize>().ok()?.checked_sub(1);
-        let value = value.and_then(|value| match value.get_ref() {
-            DeValue::Array(list) => list.get(entry()?),
-            table => table.get(part),
-        });
-        current = (node, value);
-    }
-    current.0.is_some_and(|node| node.kind() == "integer")
 }
 
 /// Returns the paths of all keys of the scenario file, such as `law.delta_m`. Entries of lists of tables have the
@@ -351,48 +309,6 @@ mod tests {
         assert_eq!(key_choices("start.shuffle"), ["true", "false"]);
         for path in ["law.alpha", "law", "nowhere", "name", ""] {
             assert_eq!(key_choices(path), [] as [&str; 0], "{path}");
-        }
-    }
-
-    fn takes_integers(builtin: &str, sets: &[&str], key: &str) -> bool {
-        let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect("an override")).collect();
-        takes_integers_only(&Source::Builtin(builtin.to_owned()), &overrides, key)
-    }
-
-    #[test]
-    fn keys_that_count_take_integers_only() {
-        for (key, sets) in [
-            ("start.seed", &[][..]),
-            ("noise.seed", &[]),
-            ("time.max_halvings", &[]),
-            ("swarm.count", &[]),
-            ("law.neighbours_max", &["law.kind=orca"]),
-            ("failure.1.vehicle", &["failure=[{vehicle=1, kind=\"silent\", at_s=1}]"]),
-            ("failure.1.rotor", &["failure=[{vehicle=1, kind=\"rotor\", rotor=1, at_s=1}]"]),
-            ("graph.edges.1.2", &["graph={kind=\"edges\", edges=[[1, 2], [2, 3], [3, 4], [4, 5]]}"]),
-            ("reference.known_by.1", &["reference={known_by=[1, 2]}"]),
-        ] {
-            assert!(takes_integers("pentagon", sets, key), "{key}");
-        }
-    }
-
-    #[test]
-    fn keys_that_measure_take_any_number() {
-        for (builtin, key) in [
-            ("crazyflies", "sensing.latency_s"),
-            ("crazyflies", "time.control_hz"),
-            ("pentagon", "time.record_hz"),
-            ("pentagon", "time.dt_s"),
-            ("pentagon", "law.alpha"),
-            ("pentagon", "start.positions_m.2.x"),
-            ("pentagon", "wind.mean_m_s"),
-            ("gusts", "wind.mean_m_s.1"),
-            ("pentagon", "law.kind"),
-            ("pentagon", "law.alfa"),
-            ("pentagon", "law..alpha"),
-            ("pentagon", "law.neighbours_max"),
-        ] {
-            assert!(!takes_integers(builtin, &[], key), "{builtin} {key}");
         }
     }
 }

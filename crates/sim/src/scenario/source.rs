@@ -138,13 +138,25 @@ fn find_files(document: &mut Document, folder: &Path) -> Result<(), ScenarioErro
     Ok(())
 }
 
+/// Returns whether a key of a scenario takes integers only; `false` for a key that does not exist.
+#[must_use]
+pub fn takes_integers_only(source: &Source, overrides: &[Override], key: &str) -> bool {
+    let Ok((name, toml)) = source.text() else { return false };
+    let is_of_wrong_type = |number: &str| {
+        let overrides = &[overrides, &[Override::parse(&format!("{key}={number}")).ok()?]].concat();
+        let read = Text { name: &name, toml: &toml, overrides }.decode();
+        Some(read.is_err_and(|error| error.kind == ErrorKind::WrongType))
+    };
+    is_of_wrong_type("0.5") == Some(true) && is_of_wrong_type("1") == Some(false)
+}
+
 fn unknown_builtin(name: &str) -> ScenarioError {
     let names: Vec<_> = builtin::all().iter().map(|builtin| builtin.name).collect();
     let file = format!("{name}.toml");
     let is_file = Path::new(&file).is_file();
-    ScenarioError::new(format!("`{name}` is neither a built-in scenario nor a file"))
-        .with_kind(ErrorKind::NotFound)
-        .with_help(if is_file { format!("did you mean the file `{file}`?") } else { suggest(name, &names) })
+    let problem = format!("`{name}` is neither a built-in scenario nor a file");
+    let help = if is_file { format!("did you mean the file `{file}`?") } else { suggest(name, &names) };
+    ScenarioError::new(ErrorKind::NotFound, problem, help)
 }
 
 /// Replaces characters that a name may not contain by `-`.
@@ -156,18 +168,17 @@ fn as_name(text: &str) -> String {
 fn read_file(path: &Path) -> Result<String, ScenarioError> {
     let shown = path.display().to_string();
     if path.is_dir() {
-        return Err(ScenarioError::new(format!("{shown} is a directory"))
-            .with_kind(ErrorKind::CannotRead)
-            .with_help("give the path of a scenario file within it"));
+        let problem = format!("{shown} is a directory");
+        return Err(ScenarioError::new(ErrorKind::CannotRead, problem, "give the path of a scenario file within it"));
     }
     read(&shown, File::open(path).map_err(|error| unreadable(&shown, &error))?)
 }
 
 fn unreadable(shown: &str, error: &std::io::Error) -> ScenarioError {
     let is_missing = error.kind() == std::io::ErrorKind::NotFound;
-    ScenarioError::new(format!("cannot read {shown}: {error}"))
-        .with_kind(if is_missing { ErrorKind::NotFound } else { ErrorKind::CannotRead })
-        .with_help("give the path of a scenario file, or the name of a built-in scenario such as `pentagon`")
+    let problem = format!("cannot read {shown}: {error}");
+    let help = "give the path of a scenario file, or the name of a built-in scenario such as `pentagon`";
+    ScenarioError::new(if is_missing { ErrorKind::NotFound } else { ErrorKind::CannotRead }, problem, help)
 }
 
 /// Reads a source to its end, as UTF-8 of at most [`MAX_FILE_BYTES`]; `shown` is its name in messages.
@@ -176,17 +187,66 @@ fn read(shown: &str, source: impl Read) -> Result<String, ScenarioError> {
     // The size of a device or a pipe is unknown in advance.
     source.take(MAX_FILE_BYTES + 1).read_to_end(&mut bytes).map_err(|error| unreadable(shown, &error))?;
     if bytes.len() as u64 > MAX_FILE_BYTES {
-        return Err(ScenarioError::new(format!("{shown} has more than {} MiB", MAX_FILE_BYTES >> 20))
-            .with_kind(ErrorKind::TooLarge)
-            .with_help("name a smaller file"));
+        let problem = format!("{shown} has more than {} MiB", MAX_FILE_BYTES >> 20);
+        return Err(ScenarioError::new(ErrorKind::TooLarge, problem, "name a smaller file"));
     }
     String::from_utf8(bytes).map_err(|error| {
         let valid = error.utf8_error().valid_up_to();
         let bytes = error.into_bytes();
         let text = String::from_utf8_lossy(&bytes[..bytes.len().min(valid + 64)]);
-        ScenarioError::new(format!("byte {valid} (from 0) is not UTF-8"))
-            .with_kind(ErrorKind::NotUtf8)
-            .with_help("save the file as UTF-8 text")
-            .with_place(Place::new(shown, &text, valid..valid + '\u{fffd}'.len_utf8()))
+        let problem = format!("byte {valid} (from 0) is not UTF-8");
+        let help = "save the file as UTF-8 text";
+        ScenarioError::new(ErrorKind::NotUtf8, problem, help).with_place(Place::new(
+            shown,
+            &text,
+            valid..valid + '\u{fffd}'.len_utf8(),
+        ))
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn takes_integers(builtin: &str, sets: &[&str], key: &str) -> bool {
+        let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect("an override")).collect();
+        takes_integers_only(&Source::Builtin(builtin.to_owned()), &overrides, key)
+    }
+
+    #[test]
+    fn keys_that_count_take_integers_only() {
+        for (key, sets) in [
+            ("start.seed", &[][..]),
+            ("noise.seed", &[]),
+            ("time.max_halvings", &[]),
+            ("swarm.count", &[]),
+            ("law.neighbours_max", &["law.kind=orca"]),
+            ("failure.1.vehicle", &["failure=[{vehicle=1, kind=\"silent\", at_s=1}]"]),
+            ("failure.1.rotor", &["failure=[{vehicle=1, kind=\"rotor\", rotor=1, at_s=1}]"]),
+            ("graph.edges.1.2", &["graph={kind=\"edges\", edges=[[1, 2], [2, 3], [3, 4], [4, 5]]}"]),
+            ("reference.known_by.1", &["reference={known_by=[1, 2]}"]),
+        ] {
+            assert!(takes_integers("pentagon", sets, key), "{key}");
+        }
+    }
+
+    #[test]
+    fn keys_that_measure_take_any_number() {
+        for (builtin, key) in [
+            ("crazyflies", "sensing.latency_s"),
+            ("crazyflies", "time.control_hz"),
+            ("pentagon", "time.record_hz"),
+            ("pentagon", "time.dt_s"),
+            ("pentagon", "law.alpha"),
+            ("pentagon", "start.positions_m.2.x"),
+            ("pentagon", "wind.mean_m_s"),
+            ("gusts", "wind.mean_m_s.1"),
+            ("pentagon", "law.kind"),
+            ("pentagon", "law.alfa"),
+            ("pentagon", "law..alpha"),
+            ("pentagon", "law.neighbours_max"),
+        ] {
+            assert!(!takes_integers(builtin, &[], key), "{builtin} {key}");
+        }
+    }
 }

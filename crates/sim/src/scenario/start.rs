@@ -33,12 +33,11 @@ pub(super) fn positions(
         StartShape::Random { half_extent_m, min_separation_m } => {
             let min_separation_m = min_separation_m.unwrap_or(DEFAULT_SEPARATION * delta_m);
             if min_separation_m <= delta_m {
-                return Err(ScenarioError::new(format!(
-                    "the smallest separation must be more than delta = {delta_m} m, got {min_separation_m} m"
-                ))
-                .with_kind(ErrorKind::WithinDelta)
-                .with_help("enlarge start.min_separation_m or reduce law.delta_m")
-                .at_keys(["start.min_separation_m", "law.delta_m"]));
+                let problem =
+                    format!("the smallest separation must be more than delta = {delta_m} m, got {min_separation_m} m");
+                let help = "enlarge start.min_separation_m or reduce law.delta_m";
+                return Err(ScenarioError::new(ErrorKind::WithinDelta, problem, help)
+                    .at_keys(["start.min_separation_m", "law.delta_m"]));
             }
             return scatter(count, space, half_extent_m, min_separation_m, random);
         }
@@ -83,14 +82,17 @@ pub fn scatter(
     for i in 0..count {
         let free = (0..TRIES).map(|_| offset(half_extent_m, space, random)).find(|&p| placed.insert(p).is_ok());
         let Some(position) = free else {
-            return Err(ScenarioError::new(format!(
+            let problem = format!(
                 "there is no room for vehicle {} of {count}: {TRIES} random positions were all within \
                  {min_separation_m} m of another",
                 i + 1
-            ))
-            .with_kind(ErrorKind::NoRoom)
-            .with_help("enlarge start.half_extent_m, reduce start.min_separation_m or fly fewer vehicles")
-            .at_keys(["start.half_extent_m", "start.min_separation_m", "swarm.count"]));
+            );
+            let help = "enlarge start.half_extent_m, reduce start.min_separation_m or fly fewer vehicles";
+            return Err(ScenarioError::new(ErrorKind::NoRoom, problem, help).at_keys([
+                "start.half_extent_m",
+                "start.min_separation_m",
+                "swarm.count",
+            ]));
         };
         set_row(&mut positions_m, i, position);
     }

@@ -172,7 +172,7 @@ impl Template {
             } else {
                 format!("no law has the name `{name}`")
             };
-            return Err(ScenarioError::new(problem).with_kind(ErrorKind::UnknownChoice).with_help(help));
+            return Err(ScenarioError::new(ErrorKind::UnknownChoice, problem, help));
         };
         let law = law.complete(self.own.velocity_coefficient_per_s());
         Ok(NamedLaw { name: name.to_owned(), law, shield: None })
@@ -243,10 +243,9 @@ pub(super) fn check_laws(laws: &Laws) -> Result<(), (&str, ScenarioError)> {
         check_name(name).map_err(|error| (&**name, error))?;
         let kind = kind(law);
         if *name != kind && kinds.contains(name) {
-            let error = ScenarioError::new(format!("the law {name} has the name of a kind, but is of the kind {kind}"))
-                .with_kind(ErrorKind::Name)
-                .with_help("give it a name that is not a kind of law")
-                .at("law.kind");
+            let problem = format!("the law {name} has the name of a kind, but is of the kind {kind}");
+            let help = "give it a name that is not a kind of law";
+            let error = ScenarioError::new(ErrorKind::Name, problem, help).at("law.kind");
             return Err((name, error));
         }
     }
@@ -261,5 +260,5 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
         None if name.len() > MAX_NAME_CHARS => format!("the name of a law has {} characters", name.len()),
         None => return Ok(()),
     };
-    Err(ScenarioError::new(said).with_kind(ErrorKind::Name).with_help(help))
+    Err(ScenarioError::new(ErrorKind::Name, said, help))
 }

@@ -76,10 +76,13 @@ impl<'a> Text<'a> {
     pub(super) fn decode(&self) -> Result<Document, ScenarioError> {
         let mut root = self.tree()?;
         if root.get_ref().as_table().is_some_and(Map::is_empty) {
-            return Err(ScenarioError::new("the scenario is empty")
-                .with_kind(ErrorKind::Empty)
-                .with_help("start from a built-in scenario, such as `pentagon`")
-                .with_place(Place::new(self.name, self.toml, 0..0)));
+            let problem = "the scenario is empty";
+            let help = "start from a built-in scenario, such as `pentagon`";
+            return Err(ScenarioError::new(ErrorKind::Empty, problem, help).with_place(Place::new(
+                self.name,
+                self.toml,
+                0..0,
+            )));
         }
         let time = root.get_ref().get("time");
         let gives = |key: &str| time.is_some_and(|time| time.get_ref().get(key).is_some());
@@ -89,9 +92,9 @@ impl<'a> Text<'a> {
             .map_err(|schema_error| schema_error.error.with_place(self.locate(schema_error.span)))?;
         // `check_schema` accepts only what serde reads. An error of serde is a defect of the schema.
         let document = Document::deserialize(ValueDeserializer::from(root)).map_err(|error| {
-            ScenarioError::new(error.message())
-                .with_kind(ErrorKind::WrongType)
-                .with_help("`tautline schema` describes every key")
+            let problem = error.message();
+            let help = "`tautline schema` describes every key";
+            ScenarioError::new(ErrorKind::WrongType, problem, help)
                 .with_place(self.locate(error.span().unwrap_or(0..0)))
         })?;
         Ok(Document { given, ..document })
@@ -126,10 +129,9 @@ impl<'a> Text<'a> {
     /// Returns the text as a tree with its overrides applied.
     pub(super) fn tree(&self) -> Result<Spanned<DeValue<'a>>, ScenarioError> {
         let parsed = DeTable::parse(self.toml).map_err(|error| {
-            ScenarioError::new(format!("the text is not TOML: {}", error.message()))
-                .with_kind(ErrorKind::Syntax)
-                .with_help("a scenario is `key = value` lines below `[table]` headers")
-                .with_place(self.locate(error.span().unwrap_or(0..0)))
+            let problem = format!("the text is not TOML: {}", error.message());
+            let help = "a scenario is `key = value` lines below `[table]` headers";
+            ScenarioError::new(ErrorKind::Syntax, problem, help).with_place(self.locate(error.span().unwrap_or(0..0)))
         })?;
         let mut root = Spanned::new(0..0, DeValue::Table(parsed.into_inner()));
         let mut base = self.toml.len() + 1;
@@ -216,29 +218,28 @@ impl Override {
     pub fn parse(text: &str) -> Result<Self, ScenarioError> {
         let place = |span: Range<usize>| Place::new(&SET.to_string(), text, span);
         let Some(equals) = text.find('=') else {
-            return Err(ScenarioError::new("an override has no `=`")
-                .with_kind(ErrorKind::Override)
-                .with_help("write it as key.path=value, for example time.dt_s=0.001")
-                .with_place(place(0..text.len())));
+            let problem = "an override has no `=`";
+            let help = "write it as key.path=value, for example time.dt_s=0.001";
+            return Err(ScenarioError::new(ErrorKind::Override, problem, help).with_place(place(0..text.len())));
         };
         let mut path = Vec::new();
         let mut start = 0;
         for part in text[..equals].split('.') {
             let key = trimmed(text, start..start + part.len());
             if key.is_empty() || !text[key.clone()].chars().all(is_word) {
-                return Err(ScenarioError::new(format!("`{part}` is not a key of an override"))
-                    .with_kind(ErrorKind::Override)
-                    .with_help("a path is keys and entry numbers with dots between them, such as start.positions_m.2.x")
-                    .with_place(place(start..start + part.len())));
+                let problem = format!("`{part}` is not a key of an override");
+                let help = "a path is keys and entry numbers with dots between them, such as start.positions_m.2.x";
+                return Err(
+                    ScenarioError::new(ErrorKind::Override, problem, help).with_place(place(start..start + part.len()))
+                );
             }
             path.push(key);
             start += part.len() + 1;
         }
         if path.len() > MAX_DEPTH {
-            return Err(ScenarioError::new(format!("a path must have at most {MAX_DEPTH} parts, got {}", path.len()))
-                .with_kind(ErrorKind::Override)
-                .with_help("`tautline schema` lists the keys of a scenario")
-                .with_place(place(0..equals)));
+            let problem = format!("a path must have at most {MAX_DEPTH} parts, got {}", path.len());
+            let help = "`tautline schema` lists the keys of a scenario";
+            return Err(ScenarioError::new(ErrorKind::Override, problem, help).with_place(place(0..equals)));
         }
         let value = trimmed(text, equals + 1..text.len());
         let parsed = Self { text: text.to_owned(), path, value };
@@ -247,10 +248,9 @@ impl Override {
             Err(error) => {
                 let base = parsed.value.start;
                 let span = error.span().map_or(parsed.value.clone(), |span| base + span.start..base + span.end);
-                Err(ScenarioError::new(format!("the value is not TOML: {}", error.message()))
-                    .with_kind(ErrorKind::Override)
-                    .with_help("numbers, true, false, [lists], {tables} and \"strings\" are; a bare word is a string")
-                    .with_place(place(span)))
+                let problem = format!("the value is not TOML: {}", error.message());
+                let help = "numbers, true, false, [lists], {tables} and \"strings\" are; a bare word is a string";
+                Err(ScenarioError::new(ErrorKind::Override, problem, help).with_place(place(span)))
             }
         }
     }
@@ -318,10 +318,8 @@ impl Override {
     }
 
     fn refuse(&self, span: &Range<usize>, message: &str) -> ScenarioError {
-        ScenarioError::new(message)
-            .with_kind(ErrorKind::Override)
-            .with_help("entries of lists are counted from 1, as vehicles are; x, y, z name the axes of a point")
-            .with_place(self.place(span.clone()))
+        let help = "entries of lists are counted from 1, as vehicles are; x, y, z name the axes of a point";
+        ScenarioError::new(ErrorKind::Override, message, help).with_place(self.place(span.clone()))
     }
 }
 

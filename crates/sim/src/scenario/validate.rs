@@ -2,14 +2,13 @@
 
 use nalgebra::Vector3;
 
-use super::check::{SchemaError, check_bounds};
+use super::check::{SchemaError, check_written};
 use super::document::Document;
 use super::error::{ErrorKind, ScenarioError};
 use super::limits::{
-    CONTACT_PREDICTION_M, MAX_NAME_CHARS, MAX_STEPS, SLOT_MARGIN, check_count, check_lengths, check_memory,
-    first_pair_within, is_name_character, require_finite,
+    CONTACT_PREDICTION_M, LARGEST, MAX_NAME_CHARS, MAX_STEPS, SLOT_MARGIN, check_count, check_lengths, check_memory,
+    first_pair_within, is_name_character,
 };
-use super::schema::Node;
 use super::spec::{Safety, Scenario, Space};
 use super::time::TimeSpec;
 use crate::sim::{self, SimError};
@@ -24,8 +23,11 @@ use tautline_laws::wind::Gust;
 /// Relative rounding of the position \[m\] and velocity \[m/s\] of a leader on the reference.
 const LEADER_ROUNDING: f64 = 1e-9;
 
-/// Smallest number of steps of a turn of the reference, which is followed step by step.
-const STEPS_A_TURN: f64 = 10.0;
+/// Smallest number of steps of a turn of the reference, and of the rise or fall of a gust.
+const STEPS_A_CHANGE: f64 = 10.0;
+
+/// Relative difference below which two safety distances are equal.
+const ROUNDING: f64 = 1e-9;
 
 /// Number of vehicles that a message names before it counts the rest.
 const NAMED_VEHICLES: usize = 8;
@@ -45,20 +47,23 @@ impl Scenario {
     pub fn validate(&self) -> Result<(), ScenarioError> {
         self.check_noise()?;
         self.check_lengths()?;
-        check_bounds(&Document::from(self).value(), Node::root(), "scenario").map_err(SchemaError::without_text)?;
+        self.check_keys().map_err(SchemaError::without_text)?;
         self.check()
     }
 
     /// Checks a scenario that was read: conditions on several keys, and the values that the program filled in.
     pub(super) fn check_built(&self) -> Result<(), ScenarioError> {
         self.check()?;
-        // The reader of a recording checks these values. Points and edges have no other limits than the checked ones.
-        let filled = Document::from(self).without_lists().value();
-        check_bounds(&filled, Node::root(), "scenario").map_err(SchemaError::of_filled_value)
+        self.check_keys().map_err(SchemaError::of_filled_value)
+    }
+
+    /// Checks single keys as the reader of a recording does. [`Scenario::check`] checks all limits of points and edges.
+    fn check_keys(&self) -> Result<(), SchemaError> {
+        check_written(&Document::from(self).without_lists().toml())
     }
 
     /// Checks conditions on several keys; the schema checks single keys.
-    pub(super) fn check(&self) -> Result<(), ScenarioError> {
+    fn check(&self) -> Result<(), ScenarioError> {
         check_name(&self.name)?;
         check_count(self.count())?;
         self.check_legs()?;
@@ -92,17 +97,20 @@ impl Scenario {
     fn of_judge(&self, error: &SimError) -> ScenarioError {
         match error {
             SimError::Obstacle(ObstacleError { name, .. }) => {
-                let found = ScenarioError::new(error.to_string())
-                    .with_kind(ErrorKind::Obstacle)
-                    .with_help("correct the shape, the position or the clearance_m of the obstacle");
+                let problem = error.to_string();
+                let help = "correct the shape, the position or the clearance_m of the obstacle";
+                let found = ScenarioError::new(ErrorKind::Obstacle, problem, help);
                 match self.obstacles.iter().position(|obstacle| obstacle.name == *name) {
                     Some(number) => found.at_entry("obstacle", number),
                     None => found.at("obstacle"),
                 }
             }
-            _ => ScenarioError::out_of_range(error.to_string())
-                .with_help("choose a safety distance and a number of vehicles that can be judged")
-                .at_keys(["law.delta_m", "safety.half_axes_m", "swarm.hull_radius_m", "swarm.count"]),
+            _ => ScenarioError::new(
+                ErrorKind::OutOfRange,
+                error.to_string(),
+                "choose a safety distance and a number of vehicles that can be judged",
+            )
+            .at_keys(["law.delta_m", "safety.half_axes_m", "swarm.hull_radius_m", "swarm.count"]),
         }
     }
 
@@ -110,54 +118,48 @@ impl Scenario {
         if i64::try_from(self.noise_seed).is_ok() {
             return Ok(());
         }
-        Err(ScenarioError::new(format!("noise.seed is too large for a scenario file, got {}", self.noise_seed))
-            .with_kind(ErrorKind::OutOfRange)
-            .with_help(format!("give a seed of at most {}", i64::MAX))
-            .at("noise.seed"))
+        let problem = format!("noise.seed is too large for a scenario file, got {}", self.noise_seed);
+        let help = format!("give a seed of at most {}", i64::MAX);
+        Err(ScenarioError::new(ErrorKind::OutOfRange, problem, help).at("noise.seed"))
     }
 
     fn check_arrival(&self) -> Result<(), ScenarioError> {
         let (arrival, time) = (self.arrival, self.time);
         if arrival.hold_s > time.duration_s {
-            return Err(ScenarioError::new(format!(
+            let problem = format!(
                 "the formation must be held for {} s, longer than the flight of {} s",
                 arrival.hold_s, time.duration_s
-            ))
-            .with_kind(ErrorKind::OutsideFlight)
-            .with_help("enlarge time.duration_s or reduce arrival.hold_s")
-            .at_keys(["arrival.hold_s", "time.duration_s"]));
+            );
+            let help = "enlarge time.duration_s or reduce arrival.hold_s";
+            return Err(ScenarioError::new(ErrorKind::OutsideFlight, problem, help)
+                .at_keys(["arrival.hold_s", "time.duration_s"]));
         }
         Ok(())
     }
 
     fn check_legs(&self) -> Result<(), ScenarioError> {
         if self.legs.is_empty() {
-            return Err(ScenarioError::new("the scenario has no formation")
-                .with_kind(ErrorKind::MissingKey)
-                .with_help("give one")
-                .at("formation"));
+            let problem = "the scenario has no formation";
+            return Err(ScenarioError::new(ErrorKind::MissingKey, problem, "give one").at("formation"));
         }
         let mut from_s = 0.0;
         for (number, leg) in self.legs.iter().enumerate().skip(1) {
             let slots = leg.formation.count();
             if slots != self.count() {
-                return Err(ScenarioError::new(format!(
-                    "leg {} has {slots} slots for {} vehicles",
-                    number + 1,
-                    self.count()
-                ))
-                .with_kind(ErrorKind::CountMismatch)
-                .with_help("every leg needs a slot for each vehicle")
-                .at_leg(number, "formation.points_m"));
+                let problem = format!("leg {} has {slots} slots for {} vehicles", number + 1, self.count());
+                let help = "every leg needs a slot for each vehicle";
+                return Err(
+                    ScenarioError::new(ErrorKind::CountMismatch, problem, help).at_leg(number, "formation.points_m")
+                );
             }
             let LegTrigger::At(start_s) = leg.begins else { continue };
             if !(start_s >= from_s && start_s < self.time.duration_s) {
-                return Err(ScenarioError::new(format!("leg {} begins at {start_s} s", number + 1))
-                    .with_kind(ErrorKind::OutsideFlight)
-                    .with_help(format!(
-                        "legs must begin in order, at {from_s} s or later and before the end of the flight at {} s",
-                        self.time.duration_s
-                    ))
+                let problem = format!("leg {} begins at {start_s} s", number + 1);
+                let help = format!(
+                    "legs must begin in order, at {from_s} s or later and before the end of the flight at {} s",
+                    self.time.duration_s
+                );
+                return Err(ScenarioError::new(ErrorKind::OutsideFlight, problem, help)
                     .at_leg(number, "formation.start_s")
                     .at("time.duration_s"));
             }
@@ -171,22 +173,24 @@ impl Scenario {
         let Some(guidance) = &self.reference else { return Ok(()) };
         self.check_followed(guidance)?;
         let start = guidance.motion.at(0.0);
-        let shortest_s = STEPS_A_TURN * self.time.dt_s;
+        let shortest_s = STEPS_A_CHANGE * self.time.dt_s;
         if guidance.motion.shortest_s() < shortest_s {
-            return Err(ScenarioError::new(format!(
+            let problem = format!(
                 "the reference turns within {} s, too fast for steps of {} s",
                 guidance.motion.shortest_s(),
                 self.time.dt_s
-            ))
-            .with_kind(ErrorKind::StepTooLong)
-            .with_help(format!("give each of its ways or turns at least {shortest_s} s, or reduce time.dt_s"))
-            .at_keys(["reference.kind", "time.dt_s"]));
+            );
+            let help = format!("give each of its ways or turns at least {shortest_s} s, or reduce time.dt_s");
+            return Err(
+                ScenarioError::new(ErrorKind::StepTooLong, problem, help).at_keys(["reference.kind", "time.dt_s"])
+            );
         }
         if self.space == Space::Plane && !guidance.motion.is_level() {
-            return Err(ScenarioError::new("the reference leaves the plane z = 0 of the swarm")
-                .with_kind(ErrorKind::Plane)
-                .with_help("set its z to 0, or swarm.dimensions to 3")
-                .at_keys(["reference.kind", "swarm.dimensions"]));
+            let problem = "the reference leaves the plane z = 0 of the swarm";
+            let help = "set its z to 0, or swarm.dimensions to 3";
+            return Err(
+                ScenarioError::new(ErrorKind::Plane, problem, help).at_keys(["reference.kind", "swarm.dimensions"])
+            );
         }
         let Some(leader) = guidance.known_by.leader() else { return Ok(()) };
         let off_m_s = row(&self.start.velocities_m_s, leader) - start.velocity_m_s;
@@ -200,22 +204,22 @@ impl Scenario {
         if off_m_s.norm() <= rounding && off_m <= rounding {
             return Ok(());
         }
-        Err(ScenarioError::new(format!(
+        let problem = format!(
             "the leader {} must start on the reference, got an offset of {} m and {} m/s",
             leader + 1,
             metres(off_m),
             metres(off_m_s.norm())
-        ))
-        .with_kind(ErrorKind::Reference)
-        .with_help("leave out its start velocity: the default is that of the reference")
-        .at_entry("start.velocities_m_s", leader)
-        .at("reference.leader"))
+        );
+        let help = "leave out its start velocity: the default is that of the reference";
+        Err(ScenarioError::new(ErrorKind::Reference, problem, help)
+            .at_entry("start.velocities_m_s", leader)
+            .at("reference.leader"))
     }
 
     /// Checks that the law follows a reference that these vehicles know.
     fn check_followed(&self, guidance: &Guidance) -> Result<(), ScenarioError> {
         let refuse = |said: String, help: &str, key: &'static str| {
-            Err(ScenarioError::new(said).with_kind(ErrorKind::UnsupportedByLaw).with_help(help).at(key).at("law.kind"))
+            Err(ScenarioError::new(ErrorKind::UnsupportedByLaw, said, help).at(key).at("law.kind"))
         };
         match self.law() {
             Ok(law) if law.capabilities().controls != Controls::Places => {
@@ -269,19 +273,16 @@ impl Scenario {
             for i in 0..rows.nrows() {
                 for axis in 0..3 {
                     let name = ["x", "y", "z"][axis];
-                    require_finite(format_args!("{name} of {what} of vehicle {}", i + 1), rows[(i, axis)])
+                    check_size(&format!("{name} of {what} of vehicle {}", i + 1), rows[(i, axis)])
                         .map_err(|error| error.at_leg_entry(leg, key, i))?;
                 }
                 if self.space == Space::Plane && rows[(i, 2)] != 0.0 {
                     let z = rows[(i, 2)];
-                    return Err(ScenarioError::new(format!(
-                        "z of {what} of vehicle {} must be 0 in the plane, got {z}",
-                        i + 1
-                    ))
-                    .with_kind(ErrorKind::Plane)
-                    .with_help("set z to 0, or swarm.dimensions to 3")
-                    .at_leg_entry(leg, key, i)
-                    .at("swarm.dimensions"));
+                    let problem = format!("z of {what} of vehicle {} must be 0 in the plane, got {z}", i + 1);
+                    let help = "set z to 0, or swarm.dimensions to 3";
+                    return Err(ScenarioError::new(ErrorKind::Plane, problem, help)
+                        .at_leg_entry(leg, key, i)
+                        .at("swarm.dimensions"));
                 }
             }
         }
@@ -291,9 +292,7 @@ impl Scenario {
     fn check_separations(&self) -> Result<(), ScenarioError> {
         let delta_m = self.delta_m;
         let refuse = |said: String, help: &str, (leg, key): (usize, &'static str), pair: Pair| {
-            Err(ScenarioError::new(said)
-                .with_kind(ErrorKind::WithinDelta)
-                .with_help(help)
+            Err(ScenarioError::new(ErrorKind::WithinDelta, said, help)
                 .at_leg_entry(leg, key, pair.second())
                 .at_leg_entry(leg, key, pair.first())
                 .at("law.delta_m"))
@@ -340,15 +339,14 @@ impl Scenario {
         if touching_m + CONTACT_PREDICTION_M <= least_m {
             return Ok(());
         }
-        Err(ScenarioError::new(format!(
+        let problem = format!(
             "the hulls of vehicles {} touch at {} m, less than {CONTACT_PREDICTION_M} m before the safety distance \
              delta = {} m",
             Pair::new(i, j),
             exact(touching_m),
             self.delta_m
-        ))
-        .with_kind(ErrorKind::HullsTouch)
-        .with_help(match 0.5 * (least_m - CONTACT_PREDICTION_M) {
+        );
+        let help = match 0.5 * (least_m - CONTACT_PREDICTION_M) {
             _ if self.airframe.quadrotor().is_some() => {
                 format!(
                     "enlarge law.delta_m to at least {}: the hulls are those of the model",
@@ -359,81 +357,224 @@ impl Scenario {
                 format!("set swarm.hull_radius_m to at most {largest_m}, or enlarge law.delta_m")
             }
             _ => format!("law.delta_m must be more than {CONTACT_PREDICTION_M} m"),
-        })
-        .at_entry("swarm.hull_radius_m", i)
-        .at_entry("swarm.hull_radius_m", j)
-        .at("law.delta_m"))
+        };
+        Err(ScenarioError::new(ErrorKind::HullsTouch, problem, help)
+            .at_entry("swarm.hull_radius_m", i)
+            .at_entry("swarm.hull_radius_m", j)
+            .at("law.delta_m"))
     }
 
     fn check_time(&self) -> Result<(), ScenarioError> {
         let TimeSpec { duration_s, dt_s, control_hz, .. } = self.time;
         if dt_s > duration_s {
-            return Err(ScenarioError::new(format!(
-                "one step of {dt_s} s is longer than the flight of {duration_s} s"
-            ))
-            .with_kind(ErrorKind::StepTooLong)
-            .with_help("enlarge time.duration_s or reduce time.dt_s")
-            .at("time.duration_s"));
+            let problem = format!("one step of {dt_s} s is longer than the flight of {duration_s} s");
+            let help = "enlarge time.duration_s or reduce time.dt_s";
+            return Err(ScenarioError::new(ErrorKind::StepTooLong, problem, help).at("time.duration_s"));
         }
         let steps = duration_s / dt_s;
         if steps > MAX_STEPS {
-            return Err(ScenarioError::new(format!(
+            let problem = format!(
                 "a flight has at most {MAX_STEPS:e} steps, got {steps:.2e} ({duration_s} s in steps of {dt_s} s)"
-            ))
-            .with_kind(ErrorKind::TooManySteps)
-            .with_help(format!("at this step a flight may last {} s", (MAX_STEPS * dt_s).floor()))
-            .at_keys(["time.duration_s", "time.dt_s"]));
+            );
+            let help = format!("at this step a flight may last {} s", (MAX_STEPS * dt_s).floor());
+            return Err(
+                ScenarioError::new(ErrorKind::TooManySteps, problem, help).at_keys(["time.duration_s", "time.dt_s"])
+            );
         }
         if self.a22_per_s.abs() * dt_s > 1.0 {
-            return Err(ScenarioError::new(format!(
+            let problem = format!(
                 "one step of {dt_s} s is longer than the time 1/|a22| = {} s in which velocities change by themselves",
                 1.0 / self.a22_per_s.abs()
-            ))
-            .with_kind(ErrorKind::StepTooLong)
-            .with_help("reduce time.dt_s or swarm.a22_per_s")
-            .at_keys(["swarm.a22_per_s", "time.dt_s"]));
+            );
+            let help = "reduce time.dt_s or swarm.a22_per_s";
+            return Err(
+                ScenarioError::new(ErrorKind::StepTooLong, problem, help).at_keys(["swarm.a22_per_s", "time.dt_s"])
+            );
         }
         if let Some(control_hz) = control_hz
             && control_hz * dt_s > 1.0 + 1e-6
         {
-            return Err(ScenarioError::new(format!(
-                "a control rate of {control_hz} Hz evaluates the law more than once in a step of {dt_s} s"
-            ))
-            .with_kind(ErrorKind::StepTooLong)
-            .with_help(format!("reduce time.control_hz to at most {}, or reduce time.dt_s", 1.0 / dt_s))
-            .at_keys(["time.control_hz", "time.dt_s"]));
+            let problem =
+                format!("a control rate of {control_hz} Hz evaluates the law more than once in a step of {dt_s} s");
+            let help = format!("reduce time.control_hz to at most {}, or reduce time.dt_s", 1.0 / dt_s);
+            return Err(
+                ScenarioError::new(ErrorKind::StepTooLong, problem, help).at_keys(["time.control_hz", "time.dt_s"])
+            );
         }
         Ok(())
+    }
+
+    fn check_deadlock(&self) -> Result<(), ScenarioError> {
+        let hold_s = self.deadlock.hold_s;
+        if hold_s >= self.time.duration_s {
+            let duration_s = self.time.duration_s;
+            let problem =
+                format!("spread slots must be held for less than the flight of {duration_s} s, got {hold_s} s");
+            let help = "reduce deadlock.hold_s or increase time.duration_s: the slots must come together again";
+            return Err(ScenarioError::new(ErrorKind::OutsideFlight, problem, help)
+                .at_keys(["deadlock.hold_s", "time.duration_s"]));
+        }
+        if self.deadlock.mode == DeadlockMode::Start
+            && let Ok(law) = self.law()
+            && law.capabilities().settling.is_none()
+        {
+            let problem = format!("the law `{}` does not support deadlock recovery", law.name());
+            let help = "leave out deadlock.mode, or set law.kind to \"displacement\"";
+            return Err(
+                ScenarioError::new(ErrorKind::UnsupportedByLaw, problem, help).at_keys(["deadlock.mode", "law.kind"])
+            );
+        }
+        Ok(())
+    }
+
+    /// Checks that the ellipsoid is one of revolution, as wide as delta, and that the law keeps ellipsoids apart.
+    fn check_safety(&self) -> Result<(), ScenarioError> {
+        let Safety::Ellipsoid { half_axes_m: [a_m, b_m, _] } = self.safety else { return Ok(()) };
+        let key = "safety.half_axes_m";
+        if a_m != b_m {
+            let problem = format!("the horizontal half axes must be equal, got {a_m} m and {b_m} m");
+            let help = "vehicles turn: set both to the larger one";
+            return Err(ScenarioError::new(ErrorKind::Inconsistent, problem, help).at(key));
+        }
+        let (delta_m, width_m) = (self.delta_m, 2.0 * a_m);
+        if (delta_m - width_m).abs() > ROUNDING * width_m {
+            let problem =
+                format!("the safety distance must be the width of the ellipsoid, {width_m} m, got {delta_m} m");
+            let help = "leave out law.delta_m: it is twice the horizontal half axes";
+            return Err(ScenarioError::new(ErrorKind::Inconsistent, problem, help).at_keys(["law.delta_m", key]));
+        }
+        let Ok(law) = self.law() else { return Ok(()) };
+        // A shield keeps the ellipsoids apart under any law.
+        if law.capabilities().uses_ellipsoid_metric || self.shield.is_some() {
+            return Ok(());
+        }
+        let problem = format!("the law `{}` does not support ellipsoids", law.name());
+        let help = "set law.kind to \"displacement\", or safety.shape to \"ball\"";
+        Err(ScenarioError::new(ErrorKind::UnsupportedByLaw, problem, help).at_keys(["safety.shape", "law.kind"]))
+    }
+
+    /// Checks that the wind acts on the vehicles, and its velocities and gusts.
+    fn check_wind(&self) -> Result<(), ScenarioError> {
+        let drag_per_s = self.drag_per_s;
+        if drag_per_s * self.time.dt_s > 1.0 {
+            let problem = format!(
+                "one step of {} s is longer than the time 1/drag = {} s in which the air brakes a vehicle",
+                self.time.dt_s,
+                1.0 / drag_per_s
+            );
+            let help = "reduce time.dt_s or vehicle.drag_per_s";
+            return Err(
+                ScenarioError::new(ErrorKind::StepTooLong, problem, help).at_keys(["vehicle.drag_per_s", "time.dt_s"])
+            );
+        }
+        if self.airframe.quadrotor().is_some() && drag_per_s != 0.0 {
+            let problem = format!("only points have vehicle.drag_per_s, got {drag_per_s} 1/s");
+            let help = "leave it out: the drag of a quadrotor is part of its model";
+            return Err(ScenarioError::new(ErrorKind::UnsupportedByVehicle, problem, help)
+                .at_keys(["vehicle.drag_per_s", "vehicle.model"]));
+        }
+        if self.airframe.quadrotor().is_none() && !self.wind.is_still() && drag_per_s == 0.0 {
+            let problem = "the wind has no effect on points without drag";
+            let help = "set vehicle.drag_per_s, for example to 0.3";
+            return Err(ScenarioError::new(ErrorKind::UnsupportedByVehicle, problem, help)
+                .at_keys(["wind", "vehicle.drag_per_s"]));
+        }
+        self.check_air("wind.mean_m_s", "the mean wind", self.wind.mean_m_s)?;
+        self.wind.gusts.iter().try_for_each(|gust| self.check_gust(gust))
+    }
+
+    /// Checks a velocity of the air \[m/s\], which must be horizontal in the plane.
+    fn check_air(&self, key: &'static str, what: &str, air_m_s: Vector3<f64>) -> Result<(), ScenarioError> {
+        if self.space == Space::Plane && air_m_s.z != 0.0 {
+            let problem = format!("{what} blows at {} m/s along z, out of the plane z = 0", air_m_s.z);
+            let help = "set its z to 0, or swarm.dimensions to 3";
+            return Err(ScenarioError::new(ErrorKind::Plane, problem, help).at_keys([key, "swarm.dimensions"]));
+        }
+        Ok(())
+    }
+
+    fn check_gust(&self, gust: &Gust) -> Result<(), ScenarioError> {
+        let Gust { at_s, rise_s, velocity_m_s, ref vehicles, .. } = *gust;
+        self.check_air("wind.gust", "a gust", velocity_m_s)?;
+        let shortest_s = STEPS_A_CHANGE * self.time.dt_s;
+        for (what, slope_s) in [("the rise of a gust", rise_s), ("the fall of a gust", gust.fall_s())] {
+            if slope_s < shortest_s {
+                let problem = format!("{what} takes {slope_s} s, too short for steps of {} s", self.time.dt_s);
+                let help = format!("give it at least {shortest_s} s, or reduce time.dt_s");
+                return Err(
+                    ScenarioError::new(ErrorKind::StepTooLong, problem, help).at_keys(["wind.gust", "time.dt_s"])
+                );
+            }
+        }
+        if at_s >= self.time.duration_s {
+            let problem = format!("a gust must begin within the flight of {} s, got {at_s} s", self.time.duration_s);
+            let help = "let it begin earlier, or enlarge time.duration_s";
+            return Err(
+                ScenarioError::new(ErrorKind::OutsideFlight, problem, help).at_keys(["wind.gust", "time.duration_s"])
+            );
+        }
+        match vehicles.as_deref() {
+            Some([]) => Err(ScenarioError::new(
+                ErrorKind::Inconsistent,
+                "the list of vehicles of a gust is empty",
+                "leave out `vehicles`: the gust then acts on all vehicles",
+            )
+            .at("wind.gust")),
+            met => match met.unwrap_or_default().iter().find(|&&vehicle| vehicle >= self.count()) {
+                Some(vehicle) => {
+                    let problem = format!("a gust acts on vehicle {}, but the swarm has {}", vehicle + 1, self.count());
+                    let help = format!("give numbers from 1 to {}", self.count());
+                    Err(ScenarioError::new(ErrorKind::UnknownVehicle, problem, help).at("wind.gust"))
+                }
+                None => Ok(()),
+            },
+        }
     }
 }
 
 /// Returns an error of the parameters of a law at its key.
 fn of_law(error: &ParameterError) -> ScenarioError {
-    let found = ScenarioError::new(format!("no law has these parameters: {error}")).with_kind(ErrorKind::LawParameter);
+    let refuse =
+        |help: &str| ScenarioError::new(ErrorKind::LawParameter, format!("no law has these parameters: {error}"), help);
     match *error {
-        ParameterError::Tension { pair, .. } => found
-            .with_help("enlarge the formation, or change law.delta_m")
+        ParameterError::Tension { pair, .. } => refuse("enlarge the formation, or change law.delta_m")
             .at_entry("formation.points_m", pair.second())
             .at_entry("formation.points_m", pair.first())
             .at("law.delta_m"),
-        ParameterError::ObstacleOverSlot { vehicle, obstacle, .. } => found
-            .with_help("move one of them away, or reduce the clearance_m of the obstacle")
-            .at_entry("formation.points_m", vehicle)
-            .at_entry("obstacle", obstacle),
-        ParameterError::Slot { vehicle } => {
-            found.with_help("give finite numbers").at_entry("formation.points_m", vehicle)
+        ParameterError::ObstacleOverSlot { vehicle, obstacle, .. } => {
+            refuse("move one of them away, or reduce the clearance_m of the obstacle")
+                .at_entry("formation.points_m", vehicle)
+                .at_entry("obstacle", obstacle)
         }
+        ParameterError::Slot { vehicle } => refuse("give finite numbers").at_entry("formation.points_m", vehicle),
         ParameterError::Counts { .. } | ParameterError::Disconnected { .. } => {
-            found.with_help("add edges until every vehicle can be reached from every other").at("graph.edges")
+            refuse("add edges until every vehicle can be reached from every other").at("graph.edges")
         }
-        ParameterError::ReferenceUnknown | ParameterError::ReferenceNotHeard => found
-            .with_help("leave it out: then all vehicles know the reference; or add edges to the graph")
-            .at_keys(["reference.known_by", "reference.leader", "graph.edges"]),
-        ParameterError::NotFinite { .. } => found.with_help("give finite numbers").at("law.kind"),
+        ParameterError::ReferenceUnknown | ParameterError::ReferenceNotHeard => {
+            refuse("leave it out: then all vehicles know the reference; or add edges to the graph").at_keys([
+                "reference.known_by",
+                "reference.leader",
+                "graph.edges",
+            ])
+        }
+        ParameterError::NotFinite { .. } => refuse("give finite numbers").at("law.kind"),
         ParameterError::Memory { .. } => {
-            found.with_help("use fewer vehicles, or a graph of fewer edges").at_keys(["swarm.count", "graph.kind"])
+            refuse("use fewer vehicles, or a graph of fewer edges").at_keys(["swarm.count", "graph.kind"])
         }
     }
+}
+
+/// Refuses a number that is not finite, or larger in magnitude than [`LARGEST`].
+fn check_size(what: &str, number: f64) -> Result<(), ScenarioError> {
+    if number.abs() <= LARGEST {
+        return Ok(());
+    }
+    let (problem, help) = match number {
+        _ if number.is_nan() => (format!("{what} is not a number"), "give a finite number"),
+        _ if number.is_infinite() => (format!("{what} is infinite"), "give a finite number"),
+        _ => (format!("{what} must be at most {LARGEST:e} in magnitude, got {number:e}"), "give a smaller number"),
+    };
+    Err(ScenarioError::new(ErrorKind::OutOfRange, problem, help))
 }
 
 fn check_name(name: &str) -> Result<(), ScenarioError> {
@@ -446,10 +587,7 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
     } else {
         return Ok(());
     };
-    Err(ScenarioError::new(said)
-        .with_kind(ErrorKind::Name)
-        .with_help("it names a folder: use letters, digits, `-` and `_`")
-        .at("name"))
+    Err(ScenarioError::new(ErrorKind::Name, said, "it names a folder: use letters, digits, `-` and `_`").at("name"))
 }
 
 /// Refuses a graph in which some vehicle cannot be reached from vehicle 1.
@@ -460,158 +598,7 @@ fn check_connected(graph: &Graph) -> Result<(), ScenarioError> {
     }
     let named: Vec<_> = apart.iter().take(NAMED_VEHICLES).map(|i| (i + 1).to_string()).collect();
     let more = if apart.len() > NAMED_VEHICLES { " and more" } else { "" };
-    Err(ScenarioError::new(format!(
-        "the graph is not connected: no path joins vehicle 1 to {}{more}",
-        named.join(", ")
-    ))
-    .with_kind(ErrorKind::Disconnected)
-    .with_help("add edges until every vehicle can be reached from every other")
-    .at("graph.edges"))
-}
-
-impl Scenario {
-    pub(super) fn check_deadlock(&self) -> Result<(), ScenarioError> {
-        let hold_s = self.deadlock.hold_s;
-        if hold_s >= self.time.duration_s {
-            let duration_s = self.time.duration_s;
-            return Err(ScenarioError::new(format!(
-                "spread slots must be held for less than the flight of {duration_s} s, got {hold_s} s"
-            ))
-            .with_kind(ErrorKind::OutsideFlight)
-            .with_help("reduce deadlock.hold_s or increase time.duration_s: the slots must come together again")
-            .at_keys(["deadlock.hold_s", "time.duration_s"]));
-        }
-        if self.deadlock.mode == DeadlockMode::Start
-            && let Ok(law) = self.law()
-            && law.capabilities().settling.is_none()
-        {
-            return Err(ScenarioError::new(format!("the law `{}` does not support deadlock recovery", law.name()))
-                .with_kind(ErrorKind::UnsupportedByLaw)
-                .with_help("leave out deadlock.mode, or set law.kind to \"displacement\"")
-                .at_keys(["deadlock.mode", "law.kind"]));
-        }
-        Ok(())
-    }
-}
-
-/// Relative difference below which two safety distances are equal.
-const ROUNDING: f64 = 1e-9;
-
-impl Scenario {
-    /// Checks that the ellipsoid is one of revolution, as wide as delta, and that the law keeps ellipsoids apart.
-    pub(super) fn check_safety(&self) -> Result<(), ScenarioError> {
-        let Safety::Ellipsoid { half_axes_m: [a_m, b_m, _] } = self.safety else { return Ok(()) };
-        let key = "safety.half_axes_m";
-        if a_m != b_m {
-            return Err(ScenarioError::new(format!("the horizontal half axes must be equal, got {a_m} m and {b_m} m"))
-                .with_help("vehicles turn: set both to the larger one")
-                .at(key));
-        }
-        let (delta_m, width_m) = (self.delta_m, 2.0 * a_m);
-        if (delta_m - width_m).abs() > ROUNDING * width_m {
-            return Err(ScenarioError::new(format!(
-                "the safety distance must be the width of the ellipsoid, {width_m} m, got {delta_m} m"
-            ))
-            .with_help("leave out law.delta_m: it is twice the horizontal half axes")
-            .at_keys(["law.delta_m", key]));
-        }
-        let Ok(law) = self.law() else { return Ok(()) };
-        // A shield keeps the ellipsoids apart under any law.
-        if law.capabilities().uses_ellipsoid_metric || self.shield.is_some() {
-            return Ok(());
-        }
-        Err(ScenarioError::new(format!("the law `{}` does not support ellipsoids", law.name()))
-            .with_kind(ErrorKind::UnsupportedByLaw)
-            .with_help("set law.kind to \"displacement\", or safety.shape to \"ball\"")
-            .at_keys(["safety.shape", "law.kind"]))
-    }
-}
-
-/// Smallest number of steps of the rise or fall of a gust, which is followed step by step.
-const STEPS_A_SLOPE: f64 = 10.0;
-
-impl Scenario {
-    /// Checks that the wind acts on the vehicles, and its velocities and gusts.
-    pub(super) fn check_wind(&self) -> Result<(), ScenarioError> {
-        let drag_per_s = self.drag_per_s;
-        if drag_per_s * self.time.dt_s > 1.0 {
-            return Err(ScenarioError::new(format!(
-                "one step of {} s is longer than the time 1/drag = {} s in which the air brakes a vehicle",
-                self.time.dt_s,
-                1.0 / drag_per_s
-            ))
-            .with_kind(ErrorKind::StepTooLong)
-            .with_help("reduce time.dt_s or vehicle.drag_per_s")
-            .at_keys(["vehicle.drag_per_s", "time.dt_s"]));
-        }
-        if self.airframe.quadrotor().is_some() && drag_per_s != 0.0 {
-            return Err(ScenarioError::new(format!("only points have vehicle.drag_per_s, got {drag_per_s} 1/s"))
-                .with_kind(ErrorKind::UnsupportedByVehicle)
-                .with_help("leave it out: the drag of a quadrotor is part of its model")
-                .at_keys(["vehicle.drag_per_s", "vehicle.model"]));
-        }
-        if self.airframe.quadrotor().is_none() && !self.wind.is_still() && drag_per_s == 0.0 {
-            return Err(ScenarioError::new("the wind has no effect on points without drag")
-                .with_kind(ErrorKind::UnsupportedByVehicle)
-                .with_help("set vehicle.drag_per_s, for example to 0.3")
-                .at_keys(["wind", "vehicle.drag_per_s"]));
-        }
-        self.check_air("wind.mean_m_s", "the mean wind", self.wind.mean_m_s)?;
-        self.wind.gusts.iter().try_for_each(|gust| self.check_gust(gust))
-    }
-
-    /// Checks a velocity of the air \[m/s\], which must be horizontal in the plane.
-    fn check_air(&self, key: &'static str, what: &str, air_m_s: Vector3<f64>) -> Result<(), ScenarioError> {
-        if self.space == Space::Plane && air_m_s.z != 0.0 {
-            return Err(ScenarioError::new(format!(
-                "{what} blows at {} m/s along z, out of the plane z = 0",
-                air_m_s.z
-            ))
-            .with_kind(ErrorKind::Plane)
-            .with_help("set its z to 0, or swarm.dimensions to 3")
-            .at_keys([key, "swarm.dimensions"]));
-        }
-        Ok(())
-    }
-
-    fn check_gust(&self, gust: &Gust) -> Result<(), ScenarioError> {
-        let Gust { at_s, rise_s, velocity_m_s, ref vehicles, .. } = *gust;
-        self.check_air("wind.gust", "a gust", velocity_m_s)?;
-        let shortest_s = STEPS_A_SLOPE * self.time.dt_s;
-        for (what, slope_s) in [("the rise of a gust", rise_s), ("the fall of a gust", gust.fall_s())] {
-            if slope_s < shortest_s {
-                return Err(ScenarioError::new(format!(
-                    "{what} takes {slope_s} s, too short for steps of {} s",
-                    self.time.dt_s
-                ))
-                .with_kind(ErrorKind::StepTooLong)
-                .with_help(format!("give it at least {shortest_s} s, or reduce time.dt_s"))
-                .at_keys(["wind.gust", "time.dt_s"]));
-            }
-        }
-        if at_s >= self.time.duration_s {
-            return Err(ScenarioError::new(format!(
-                "a gust must begin within the flight of {} s, got {at_s} s",
-                self.time.duration_s
-            ))
-            .with_kind(ErrorKind::OutsideFlight)
-            .with_help("let it begin earlier, or enlarge time.duration_s")
-            .at_keys(["wind.gust", "time.duration_s"]));
-        }
-        match vehicles.as_deref() {
-            Some([]) => Err(ScenarioError::new("the list of vehicles of a gust is empty")
-                .with_help("leave out `vehicles`: the gust then acts on all vehicles")
-                .at("wind.gust")),
-            met => match met.unwrap_or_default().iter().find(|&&vehicle| vehicle >= self.count()) {
-                Some(vehicle) => {
-                    let problem = format!("a gust acts on vehicle {}, but the swarm has {}", vehicle + 1, self.count());
-                    Err(ScenarioError::new(problem)
-                        .with_kind(ErrorKind::UnknownVehicle)
-                        .with_help(format!("give numbers from 1 to {}", self.count()))
-                        .at("wind.gust"))
-                }
-                None => Ok(()),
-            },
-        }
-    }
+    let problem = format!("the graph is not connected: no path joins vehicle 1 to {}{more}", named.join(", "));
+    let help = "add edges until every vehicle can be reached from every other";
+    Err(ScenarioError::new(ErrorKind::Disconnected, problem, help).at("graph.edges"))
 }

@@ -5,8 +5,8 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::error::suggest;
-use super::error::{ErrorKind, ScenarioError};
+use super::document::is_default;
+use super::error::{ErrorKind, ScenarioError, suggest};
 use super::files;
 use super::spec::{PlantSpec, Scenario, Space};
 use crate::vehicle::{
@@ -65,14 +65,9 @@ pub(super) struct VehicleTable {
     max_accel_m_s2: Option<f64>,
     /// Drag of points over mass in 1/s, linear in the velocity relative to the air; 0 unless given. In a wind W,
     /// p'' = a22 v + u + drag (W - v). The drag of quadrotors is part of their model.
-    #[serde(skip_serializing_if = "is_none")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("minimum" = 0))]
     pub(super) drag_per_s: f64,
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde asks for a reference")]
-fn is_none(drag_per_s: &f64) -> bool {
-    *drag_per_s == 0.0
 }
 
 /// Model by name, by file, or with all of its keys.
@@ -146,10 +141,8 @@ impl VehicleTable {
                 found.ok_or_else(|| {
                     let known: Vec<_> = [POINT, UNICYCLE].into_iter().chain(known).collect();
                     let help = format!("{}; for another model give the path of a TOML file", suggest(name, &known));
-                    ScenarioError::new(format!("no model has the name `{name}`"))
-                        .with_kind(ErrorKind::UnknownChoice)
-                        .with_help(help)
-                        .at(MODEL)
+                    let problem = format!("no model has the name `{name}`");
+                    ScenarioError::new(ErrorKind::UnknownChoice, problem, help).at(MODEL)
                 })?
             }
         };
@@ -199,10 +192,8 @@ fn refuse_given<const N: usize>(
     other_model: &str,
 ) -> Result<(), ScenarioError> {
     let Some((key, _)) = keys.into_iter().find(|(_, is_given)| *is_given) else { return Ok(()) };
-    Err(ScenarioError::new(said)
-        .with_kind(ErrorKind::UnsupportedByVehicle)
-        .with_help(format!("leave this key out, or set vehicle.model to {other_model}"))
-        .at_keys([key, MODEL]))
+    let help = format!("leave this key out, or set vehicle.model to {other_model}");
+    Err(ScenarioError::new(ErrorKind::UnsupportedByVehicle, said, help).at_keys([key, MODEL]))
 }
 
 /// Converts the airframe back: a built-in model to its name, any other model to its keys.
@@ -254,16 +245,10 @@ impl From<&Unicycle> for VehicleTable {
 fn read(path: &Path) -> Result<Model, ScenarioError> {
     let shown = path.display().to_string();
     let text = String::from_utf8(files::bytes(path, MODEL)?).map_err(|_| {
-        ScenarioError::new(format!("{shown} is not UTF-8"))
-            .with_kind(ErrorKind::File)
-            .with_help("save the file as UTF-8 text")
-            .at(MODEL)
+        ScenarioError::new(ErrorKind::File, format!("{shown} is not UTF-8"), "save the file as UTF-8 text").at(MODEL)
     })?;
     vehicle::read(&text).map_err(|ModelParseError { message, help, span }| {
-        ScenarioError::new(message)
-            .with_kind(ErrorKind::File)
-            .with_help(help)
-            .with_place(Place::new(&shown, &text, span))
+        ScenarioError::new(ErrorKind::File, message, help).with_place(Place::new(&shown, &text, span))
     })
 }
 
@@ -314,21 +299,23 @@ impl Scenario {
                 "attitude_damping" => "vehicle.attitude_damping",
                 _ => "vehicle.model",
             };
-            ScenarioError::new(message).with_help(help).at(key).at("vehicle.attitude_damping").at("vehicle.model")
+            ScenarioError::new(ErrorKind::Inconsistent, message, help)
+                .at(key)
+                .at("vehicle.attitude_damping")
+                .at("vehicle.model")
         };
         model.check().map_err(refuse)?;
         if attitude_hz * self.time.dt_s > 1.0 + ROUNDING {
-            return Err(ScenarioError::new(format!(
-                "an attitude loop of {attitude_hz} Hz runs more than once in a step of {} s",
-                self.time.dt_s
-            ))
-            .with_kind(ErrorKind::StepTooLong)
-            .with_help(format!(
+            let problem =
+                format!("an attitude loop of {attitude_hz} Hz runs more than once in a step of {} s", self.time.dt_s);
+            let help = format!(
                 "reduce vehicle.attitude_hz to at most {}, or time.dt_s to at most {}",
                 1.0 / self.time.dt_s,
                 1.0 / attitude_hz
-            ))
-            .at_keys(["vehicle.attitude_hz", "time.dt_s"]));
+            );
+            return Err(
+                ScenarioError::new(ErrorKind::StepTooLong, problem, help).at_keys(["vehicle.attitude_hz", "time.dt_s"])
+            );
         }
         model.check_attitude(0.5 / attitude_hz).map_err(|error| refuse(error).at("vehicle.attitude_hz"))
     }
@@ -343,49 +330,51 @@ impl Scenario {
         let Some(unicycle) = self.airframe.unicycle() else { return Ok(()) };
         let Unicycle { min_speed_m_s, max_speed_m_s, .. } = *unicycle;
         if min_speed_m_s > max_speed_m_s {
-            return Err(ScenarioError::new(format!(
-                "the smallest speed must be at most the largest, {max_speed_m_s} m/s, got {min_speed_m_s} m/s"
-            ))
-            .with_help("reduce vehicle.min_speed_m_s, or enlarge vehicle.max_speed_m_s")
-            .at_keys(["vehicle.min_speed_m_s", "vehicle.max_speed_m_s"]));
+            let problem =
+                format!("the smallest speed must be at most the largest, {max_speed_m_s} m/s, got {min_speed_m_s} m/s");
+            let help = "reduce vehicle.min_speed_m_s, or enlarge vehicle.max_speed_m_s";
+            return Err(ScenarioError::new(ErrorKind::Inconsistent, problem, help)
+                .at_keys(["vehicle.min_speed_m_s", "vehicle.max_speed_m_s"]));
         }
         if self.space != Space::Plane {
-            return Err(ScenarioError::new("unicycles need the plane z = 0, but the swarm has three dimensions")
-                .with_kind(ErrorKind::Plane)
-                .with_help("set every z to 0 and swarm.dimensions to 2, or fly another vehicle.model")
-                .at_keys(["vehicle.model", "swarm.dimensions"]));
+            let problem = "unicycles need the plane z = 0, but the swarm has three dimensions";
+            let help = "set every z to 0 and swarm.dimensions to 2, or fly another vehicle.model";
+            return Err(
+                ScenarioError::new(ErrorKind::Plane, problem, help).at_keys(["vehicle.model", "swarm.dimensions"])
+            );
         }
         if !matches!(self.plant, PlantSpec::Rapier) {
-            return Err(ScenarioError::new("the ideal plant does not support unicycles")
-                .with_kind(ErrorKind::UnsupportedByPlant)
-                .with_help("leave out plant.kind: the motion of a unicycle is solved in closed form")
+            let problem = "the ideal plant does not support unicycles";
+            let help = "leave out plant.kind: the motion of a unicycle is solved in closed form";
+            return Err(ScenarioError::new(ErrorKind::UnsupportedByPlant, problem, help)
                 .at_keys(["plant.kind", "vehicle.model"]));
         }
         if self.a22_per_s != 0.0 {
-            return Err(ScenarioError::new("a unicycle has no velocity coefficient a22")
-                .with_kind(ErrorKind::UnsupportedByVehicle)
-                .with_help("leave out swarm.a22_per_s")
+            let problem = "a unicycle has no velocity coefficient a22";
+            let help = "leave out swarm.a22_per_s";
+            return Err(ScenarioError::new(ErrorKind::UnsupportedByVehicle, problem, help)
                 .at_keys(["swarm.a22_per_s", "vehicle.model"]));
         }
         if self.drag_per_s != 0.0 || !self.wind.is_still() {
             let key = if self.drag_per_s == 0.0 { "wind" } else { "vehicle.drag_per_s" };
-            return Err(ScenarioError::new("wind and drag do not act on unicycles")
-                .with_kind(ErrorKind::UnsupportedByVehicle)
-                .with_help("leave out [wind] and vehicle.drag_per_s, or fly another vehicle.model")
-                .at_keys([key, "vehicle.model"]));
+            let problem = "wind and drag do not act on unicycles";
+            let help = "leave out [wind] and vehicle.drag_per_s, or fly another vehicle.model";
+            return Err(
+                ScenarioError::new(ErrorKind::UnsupportedByVehicle, problem, help).at_keys([key, "vehicle.model"])
+            );
         }
         for i in 0..self.count() {
             let speed_m_s = Heading::of(row(&self.start.velocities_m_s, i)).speed_m_s;
             let (least, most) = (min_speed_m_s * (1.0 - SPEED_ROUNDING), max_speed_m_s * (1.0 + SPEED_ROUNDING));
             if !(least..=most).contains(&speed_m_s) {
-                return Err(ScenarioError::new(format!(
+                let problem = format!(
                     "the start speed of vehicle {} must be {min_speed_m_s} to {max_speed_m_s} m/s, got {speed_m_s} m/s",
                     i + 1
-                ))
-                .with_kind(ErrorKind::OutOfRange)
-                .with_help("give start.velocities_m_s, a velocity for each vehicle, or change the limits of its speed")
-                .at_entry("start.velocities_m_s", i)
-                .at_keys(["vehicle.min_speed_m_s", "vehicle.model"]));
+                );
+                let help = "give start.velocities_m_s, a velocity for each vehicle, or change the limits of its speed";
+                return Err(ScenarioError::new(ErrorKind::OutOfRange, problem, help)
+                    .at_entry("start.velocities_m_s", i)
+                    .at_keys(["vehicle.min_speed_m_s", "vehicle.model"]));
             }
         }
         Ok(())

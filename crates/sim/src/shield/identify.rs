@@ -197,8 +197,8 @@ impl Scenario {
         };
         let settings = limits.settings();
         if flown.command_m_s2 > settings.accel_m_s2 {
-            return Err(refused("the tracker commands more than shield.accel_m_s2, up to", flown.command_m_s2)
-                .with_help("raise shield.disturbance_m_s2, or leave it out")
+            let help = "raise shield.disturbance_m_s2, or leave it out";
+            return Err(refused("the tracker commands more than shield.accel_m_s2, up to", flown.command_m_s2, help)
                 .at_keys(["shield.disturbance_m_s2", "shield.accel_m_s2"]));
         }
         let largest_error_m = (flown.worst.error_m * 1e4).ceil() / 1e4;

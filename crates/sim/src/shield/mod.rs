@@ -32,7 +32,7 @@ use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::scenario::{ErrorKind, MAX_MEMORY_BYTES, Scenario, ScenarioError, Space};
+use crate::scenario::{ErrorKind, MAX_MEMORY_BYTES, Scenario, ScenarioError, Space, is_default};
 use crate::sim::MAX_BEND;
 use tautline_core::obstacle;
 use tautline_core::swarm::row;
@@ -80,11 +80,11 @@ pub struct ShieldSpec {
     #[schemars(extend("exclusiveMinimum" = 0))]
     pub max_speed_m_s: Option<f64>,
     /// Bound in m on the error of the measured own position.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub position_error_m: f64,
     /// Bound in m/s on the error of the measured own velocity.
-    #[serde(skip_serializing_if = "is_zero")]
+    #[serde(skip_serializing_if = "is_default")]
     #[schemars(extend("default" = 0.0, "minimum" = 0))]
     pub velocity_error_m_s: f64,
     /// Bound in m/s^2 on the push of wind and model errors, at least `vehicle.drag_per_s` times the fastest wind; 0
@@ -135,11 +135,6 @@ impl Default for ShieldSpec {
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
-fn is_zero(number: &f64) -> bool {
-    *number == 0.0
-}
-
-#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde passes a reference")]
 fn is_true(value: &bool) -> bool {
     *value
 }
@@ -152,18 +147,21 @@ impl Scenario {
     pub fn shield_limits(&self) -> Result<Option<Limits>, ScenarioError> {
         let Some(spec) = &self.shield_keys() else { return Ok(None) };
         let Some(control_hz) = self.time.control_hz else {
-            return Err(ScenarioError::new("the shield holds commands over periods, but no rate of commands is given")
-                .with_kind(ErrorKind::MissingKey)
-                .with_help(format!("set time.control_hz, such as {SHIELD_CONTROL_HZ}"))
-                .at("shield"));
+            let problem = "the shield holds commands over periods, but no rate of commands is given";
+            let help = format!("set time.control_hz, such as {SHIELD_CONTROL_HZ}");
+            return Err(ScenarioError::new(ErrorKind::MissingKey, problem, help).at("shield"));
         };
         let most_m_s2 = self.actuation.max_accel_m_s2;
         let settings = self.shield_settings(spec, control_hz)?;
         let accel_m_s2 = settings.accel_m_s2;
         if most_m_s2.is_some_and(|most_m_s2| accel_m_s2 > most_m_s2) {
-            return Err(refused("shield.accel_m_s2 is more than actuation.max_accel_m_s2 carries out", accel_m_s2)
-                .with_help(format!("reduce it to at most {}", most_m_s2.unwrap_or_default()))
-                .at_keys(["shield.accel_m_s2", "actuation.max_accel_m_s2"]));
+            let help = format!("reduce it to at most {}", most_m_s2.unwrap_or_default());
+            return Err(refused(
+                "shield.accel_m_s2 is more than actuation.max_accel_m_s2 carries out",
+                accel_m_s2,
+                &help,
+            )
+            .at_keys(["shield.accel_m_s2", "actuation.max_accel_m_s2"]));
         }
         settings.limits().map(Some).map_err(|error| self.of_shield(&error))
     }
@@ -223,17 +221,20 @@ impl Scenario {
         let age_s = rate_hz.map_or(latency_s, |rate_hz| (latency_s * rate_hz - SAME).ceil().max(0.0) / rate_hz);
         let periods = age_s * control_hz;
         if !is_whole(per_period) || per_period < 0.5 {
-            return Err(refused("the number of measurements per control period must be whole", per_period)
-                .with_help(format!("set sensing.rate_hz to {control_hz} or a multiple of it"))
+            let help = format!("set sensing.rate_hz to {control_hz} or a multiple of it");
+            return Err(refused("the number of measurements per control period must be whole", per_period, &help)
                 .at_keys(["sensing.rate_hz", "time.control_hz"]));
         }
         if is_whole(periods) {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "at least 0; more saturates")]
             return Ok(periods.round() as usize);
         }
-        Err(refused("the age of measurements must be a whole number of control periods", periods)
-            .with_help(format!("set sensing.rate_hz to {control_hz}, or a latency of whole periods"))
-            .at_keys(["sensing.rate_hz", "sensing.latency_s", "time.control_hz"]))
+        let help = format!("set sensing.rate_hz to {control_hz}, or a latency of whole periods");
+        Err(refused("the age of measurements must be a whole number of control periods", periods, &help).at_keys([
+            "sensing.rate_hz",
+            "sensing.latency_s",
+            "time.control_hz",
+        ]))
     }
 
     /// Returns the starts of all vehicles under a shield.
@@ -288,8 +289,8 @@ impl Scenario {
         if let Some(control_hz) = self.time.control_hz {
             let steps = 1.0 / (control_hz * self.time.dt_s);
             if !is_whole(steps) {
-                return Err(refused("a control period must be a whole number of steps", steps)
-                    .with_help("change time.control_hz or time.dt_s")
+                let help = "change time.control_hz or time.dt_s";
+                return Err(refused("a control period must be a whole number of steps", steps, help)
                     .at_keys(["time.control_hz", "time.dt_s"]));
             }
         }
@@ -307,26 +308,19 @@ impl Scenario {
         ];
         for (key, what, noise, bound) in noises {
             if noise > 0.0 && noise >= bound {
-                return Err(refused(
-                    &format!("{key} must be more than {what}, the standard deviation of an unbounded error"),
-                    bound,
-                )
-                .with_help(format!("raise it to {}, six deviations", 6.0 * noise))
-                .at_keys([key, what]));
+                let problem = format!("{key} must be more than {what}, the standard deviation of an unbounded error");
+                let help = format!("raise it to {}, six deviations", 6.0 * noise);
+                return Err(refused(&problem, bound, &help).at_keys([key, what]));
             }
         }
         let push_m_s2 = self.drag_per_s * self.fastest_wind_m_s();
         let disturbance_m_s2 = spec.disturbance_m_s2.unwrap_or(0.0);
         if push_m_s2 > disturbance_m_s2 * (1.0 + SAME) && self.airframe.is_point() {
-            return Err(refused(
-                &format!(
-                    "shield.disturbance_m_s2 must be at least {}, which is drag times the fastest wind",
-                    shortest(push_m_s2)
-                ),
-                disturbance_m_s2,
-            )
-            .with_help("raise it, or reduce the wind")
-            .at_keys(["shield.disturbance_m_s2", "vehicle.drag_per_s"]));
+            let least = shortest(push_m_s2);
+            let problem =
+                format!("shield.disturbance_m_s2 must be at least {least}, which is drag times the fastest wind");
+            return Err(refused(&problem, disturbance_m_s2, "raise it, or reduce the wind")
+                .at_keys(["shield.disturbance_m_s2", "vehicle.drag_per_s"]));
         }
         self.check_shield_memory()?;
         let Some(limits) = self.shield_limits()? else { return Ok(()) };
@@ -365,7 +359,7 @@ impl Scenario {
             "path_error_m" | "integration_error_m_s2" => "time.dt_s",
             _ => "shield",
         };
-        let found = refused(&error.problem, error.value).with_help(error.remedy);
+        let found = refused(&error.problem, error.value, error.remedy);
         if error.place == "start" { found } else { found.at(key) }
     }
 
@@ -379,14 +373,13 @@ impl Scenario {
             return Ok(());
         }
         let gib = MAX_MEMORY_BYTES >> 30;
-        Err(ScenarioError::new(format!(
+        let problem = format!(
             "contracts of {} vehicles need {} GiB of memory, more than the limit of {gib} GiB",
             self.count(),
             bytes >> 30
-        ))
-        .with_kind(ErrorKind::Memory)
-        .with_help("use fewer vehicles or a shorter network.latency_s")
-        .at_keys(["shield", "network.latency_s"]))
+        );
+        let help = "use fewer vehicles or a shorter network.latency_s";
+        Err(ScenarioError::new(ErrorKind::Memory, problem, help).at_keys(["shield", "network.latency_s"]))
     }
 }
 
@@ -406,10 +399,10 @@ fn is_whole(number: f64) -> bool {
 }
 
 /// Returns an error about a value: `PROBLEM (VALUE)`.
-fn refused(problem: &str, value: f64) -> ScenarioError {
-    ScenarioError::new(format!("{problem} ({})", shortest(value))).with_kind(ErrorKind::Shield)
+fn refused(problem: &str, value: f64, help: &str) -> ScenarioError {
+    refused_with(&format!("{problem} ({})", shortest(value)), help)
 }
 
 fn refused_with(problem: &str, help: &str) -> ScenarioError {
-    ScenarioError::new(problem).with_kind(ErrorKind::Shield).with_help(help)
+    ScenarioError::new(ErrorKind::Shield, problem, help)
 }

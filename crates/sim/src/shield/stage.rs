@@ -6,16 +6,13 @@ use nalgebra::Vector3;
 use rayon::prelude::*;
 
 use super::TrackingBasis;
-use crate::link::{Radio, RadioUse, period};
+use crate::link::{Radio, RadioUse, Round, period};
 use crate::scenario::{Scenario, ScenarioError, Space};
 use tautline_core::fact::Fact;
 use tautline_core::swarm::{Rows, Swarm, first_row_not_finite, row, set_row};
 use tautline_laws::law::LawError;
 use tautline_shield::report::Exceeded;
 use tautline_shield::{Broadcast, Counters, Fleet, Shield, State};
-
-/// Tolerance of equal instants \[s\].
-const SAME_S: f64 = 1e-9;
 
 /// Numbers of a shielded flight.
 #[derive(Clone, Debug, PartialEq)]
@@ -61,17 +58,12 @@ pub(crate) struct ShieldStage {
     /// Whether references stay in the plane z = 0. Quadrotors there hold their height by themselves, up to the sag of
     /// a tilt, and ignore commands along z.
     is_plane: bool,
-    radio: Radio,
+    /// Messages of each sender.
+    radio: Radio<Vec<Broadcast>>,
     /// Rate of messages \[Hz\]; each period unless given.
     rate_hz: Option<f64>,
-    /// Number of rounds of messages so far.
-    rounds: u64,
     /// Next period of the rate of messages.
     next_period: u64,
-    under_way: VecDeque<Round>,
-    spare: Vec<Round>,
-    /// Time up to which arrived messages have been heard \[s\].
-    heard_s: f64,
     /// Time of the last instant of command \[s\].
     begun_s: f64,
     /// True states at the last instants, oldest first, for measurements of that age.
@@ -85,25 +77,6 @@ pub(crate) struct ShieldStage {
     undefined: u64,
     /// Number of those instants at which the law failed or commanded numbers that are not finite.
     failed: u64,
-}
-
-/// Messages of all vehicles at one instant.
-#[derive(Clone, Debug)]
-struct Round {
-    /// Messages of each sender.
-    broadcasts: Vec<Broadcast>,
-    /// Arrivals \[s\] of the messages, in their order; infinite for a lost message.
-    arrives_s: Vec<f64>,
-    /// Time from which none of them arrives any more \[s\].
-    over_s: f64,
-}
-
-impl Round {
-    fn of(vehicles: usize) -> Self {
-        let broadcasts: Vec<_> = (0..vehicles).map(|_| Broadcast::for_swarm(vehicles)).collect();
-        let arrives_s = Vec::with_capacity(broadcasts.iter().map(|broadcast| broadcast.entries.capacity()).sum());
-        Self { broadcasts, arrives_s, over_s: 0.0 }
-    }
 }
 
 impl ShieldStage {
@@ -125,11 +98,7 @@ impl ShieldStage {
             is_plane: scenario.space == Space::Plane,
             radio: Radio::new(scenario, count * (count - 1), RadioUse::Contracts),
             rate_hz: scenario.network.rate_hz,
-            rounds: 0,
             next_period: 0,
-            under_way: VecDeque::new(),
-            spare: Vec::new(),
-            heard_s: f64::NEG_INFINITY,
             begun_s: 0.0,
             truths: VecDeque::new(),
             failed_from_s,
@@ -170,9 +139,10 @@ impl ShieldStage {
         }
         self.observe_measurements(time_s, truth);
         let sends = self.has_round(time_s);
-        let mut round = self.spare.pop().unwrap_or_else(|| Round::of(command.nrows()));
+        let count = command.nrows();
+        let mut round = self.radio.round(|| (0..count).map(|_| Broadcast::for_swarm(count)).collect());
         let Self { fleet, measured, wanted, commands, .. } = self;
-        each(fleet.shields_mut(), commands, &mut round.broadcasts, |i, shield, command, broadcast| {
+        each(fleet.shields_mut(), commands, &mut round.content, |i, shield, command, broadcast| {
             *command = shield.filter(measured[i], wanted[i]);
             if sends {
                 shield.write_broadcast(broadcast);
@@ -184,7 +154,7 @@ impl ShieldStage {
         if sends {
             self.send(round, time_s, truth);
         } else {
-            self.spare.push(round);
+            self.radio.recycle(round);
         }
     }
 
@@ -219,20 +189,13 @@ impl ShieldStage {
     }
 
     fn deliver(&mut self, time_s: f64) {
-        let Self { fleet, under_way, heard_s, .. } = self;
-        let (from_s, to_s) = (*heard_s, time_s + SAME_S);
-        for round in &*under_way {
-            let messages = round.broadcasts.iter().flat_map(Broadcast::messages);
-            for (message, arrives_s) in messages.zip(&round.arrives_s) {
-                if *arrives_s > from_s && *arrives_s <= to_s {
-                    fleet.hear(&message);
-                }
+        let Self { fleet, radio, .. } = self;
+        radio.deliver(time_s, |round, has_arrived| {
+            let messages = round.content.iter().flat_map(Broadcast::messages);
+            for (message, _) in messages.zip(has_arrived).filter(|(_, has_arrived)| *has_arrived) {
+                fleet.hear(&message);
             }
-        }
-        *heard_s = to_s;
-        while self.under_way.front().is_some_and(|first| first.over_s <= time_s + SAME_S) {
-            self.spare.extend(self.under_way.pop_front());
-        }
+        });
     }
 
     /// Whether messages are sent at an instant.
@@ -243,33 +206,25 @@ impl ShieldStage {
         }
         // A rate above that of the instants sends one round an instant.
         self.next_period = period + 1;
-        self.rounds += 1;
         true
     }
 
     /// Sends the messages of an instant.
-    fn send(&mut self, mut round: Round, time_s: f64, truth: &Swarm) {
+    fn send(&mut self, mut round: Round<Vec<Broadcast>>, time_s: f64, truth: &Swarm) {
         let count = self.commands.len();
-        round.arrives_s.clear();
-        round.over_s = time_s + self.radio.longest_s();
-        for (sender, broadcast) in round.broadcasts.iter().enumerate() {
+        for (sender, broadcast) in round.content.iter().enumerate() {
             let links = broadcast.entries.iter().map(|entry| {
                 let receiver = entry.to as usize;
                 (sender * (count - 1) + receiver - usize::from(receiver > sender), receiver)
             });
-            let sent = (sender, self.rounds, time_s);
-            self.radio.send(sent, &truth.positions_m, (links, count - 1), &mut round.arrives_s);
+            self.radio.send((sender, time_s), &truth.positions_m, (links, count - 1), &mut round.arrives_s);
         }
-        // A message is heard at a later instant.
-        let soonest_s = time_s + 2.0 * SAME_S;
-        round.arrives_s.iter_mut().for_each(|arrives_s| *arrives_s = arrives_s.max(soonest_s));
-        round.over_s = round.over_s.max(soonest_s);
-        self.under_way.push_back(round);
+        self.radio.end(round, time_s);
     }
 
     /// Changes the seed of later messages.
     pub(crate) fn reseed(&mut self, seed: u64) {
-        self.radio.reseed(seed, self.rounds);
+        self.radio.reseed(seed);
     }
 
     /// Returns the numbers of the flight so far.

@@ -177,8 +177,7 @@ impl Scenario {
         if let Some(accel_m_s2) = spec.accel_m_s2.filter(|accel_m_s2| *accel_m_s2 > most_m_s2) {
             let most = shortest(most_m_s2);
             let problem = format!("shield.accel_m_s2 must be at most {most}, which thrust and lift allow");
-            return Err(refused(&problem, accel_m_s2)
-                .with_help("reduce it; the default is that of the model")
+            return Err(refused(&problem, accel_m_s2, "reduce it; the default is that of the model")
                 .at_keys(["shield.accel_m_s2", "vehicle.model"]));
         }
         if spec.tracking_error_m.is_some() {

@@ -346,7 +346,7 @@ fn a_wrong_imperfection_is_refused_at_its_place() {
         let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect(set)).collect();
         let error = Scenario::read(&Source::Builtin("pentagon".to_owned()), &overrides).expect_err(code);
         assert_eq!(error.code(), code, "{sets:?}: {error}");
-        assert!(error.help.is_some(), "{sets:?}: {error}");
+        assert!(!error.help.is_empty(), "{sets:?}: {error}");
         assert!(error.place.as_ref().is_some_and(|place| place.source == "set"), "{sets:?}: {error}");
     }
 }

@@ -305,6 +305,6 @@ fn a_wrong_obstacle_is_refused_at_its_place() {
         let source = Source::Text { name: "test".to_owned(), text };
         let error = Scenario::read(&source, &[]).expect_err(code);
         assert_eq!(error.code(), code, "{error}");
-        assert!(error.help.is_some() && error.place.is_some(), "{error}");
+        assert!(!error.help.is_empty() && error.place.is_some(), "{error}");
     }
 }

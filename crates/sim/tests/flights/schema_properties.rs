@@ -211,7 +211,7 @@ fn fault_of_refusal(error: &ScenarioError, paths: &[String]) -> Option<String> {
     if let Some(field) = unknown {
         return Some(format!("the key {field} does not exist: {shown}"));
     }
-    if error.help.as_deref().is_none_or(str::is_empty) {
+    if error.help.is_empty() {
         return Some(format!("without a remedy: {shown}"));
     }
     let is_long =

@@ -88,7 +88,7 @@ fn the_least_height_of_a_refusal_is_sufficient_and_tight() {
     let error = of(3.0).expect_err("too small");
     assert!(error.message.starts_with("in a drawing 3 m high, 50 vehicles come as near as 0."), "{error}");
     assert_eq!(error.place.as_ref().map(|place| place.line), Some(LINE + 2));
-    let help = error.help.as_deref().expect("a remedy");
+    let help = &error.help;
     let named = help.strip_prefix("set formation.height_m to at least ").and_then(|rest| rest.split(' ').next());
     let least_m: f64 = named.expect(help).parse().expect(help);
     assert!((2.0..2.01).contains(&nearest_m(&of(least_m).expect("enough"))), "{help}");
@@ -124,7 +124,7 @@ fn files_are_relative_to_the_scenario() {
         .expect("a ring");
     assert!((nearest_m(&set) - 7.0).abs() < SPACING_ROUNDING);
     let elsewhere = read("shape = \"file\"\nfile = \"../points.csv\"", &[]).expect_err("it is below");
-    assert!(elsewhere.code() == "scenario/file" && elsewhere.help.is_some(), "{elsewhere}");
+    assert!(elsewhere.code() == "scenario/file" && !elsewhere.help.is_empty(), "{elsewhere}");
     assert_eq!(elsewhere.place.as_ref().map(|place| (place.line, place.column)), Some((LINE + 1, 8)));
     let absolute = format!("shape = \"file\"\nfile = '{}'", below.join("points.csv").display());
     assert_eq!(self::read(&absolute).expect("points").legs, high.legs);
@@ -162,7 +162,7 @@ fn a_file_of_points_may_name_its_columns_and_gives_the_number_of_vehicles() {
     ] {
         let error = read(wrong).expect_err(wrong);
         assert_eq!(error.code(), code, "{error}");
-        assert!(error.help.is_some(), "{wrong:?}: {error}");
+        assert!(!error.help.is_empty(), "{wrong:?}: {error}");
         assert!(error.to_string().contains(&format!("test.toml:{}:8", LINE + 1)), "{error}");
     }
 }
@@ -194,7 +194,7 @@ fn a_wrong_shape_is_refused_at_its_key() {
     ] {
         let error = read(formation).expect_err(formation);
         assert_eq!(error.code(), code, "{error}");
-        assert!(error.help.is_some(), "{formation}: {error}");
+        assert!(!error.help.is_empty(), "{formation}: {error}");
         assert_eq!(error.place.as_ref().map(|place| (place.line, place.column)), Some(place), "{error}");
     }
     let few = FRAME.replace("count = 50", "count = 4") + "shape = \"text\"\ntext = \"HELLO\"";
@@ -206,7 +206,7 @@ fn a_wrong_shape_is_refused_at_its_key() {
 fn the_pitch_of_a_refusal_is_sufficient() {
     let of = |pitch: &str| read(&format!("shape = \"helix\"\nradius_m = 9\npitch_m = {pitch}"));
     for flat in ["1", "1e-9", "2.5"] {
-        let help = of(flat).expect_err("too flat").help.expect("a remedy");
+        let help = of(flat).expect_err("too flat").help;
         let named = help.strip_prefix("enlarge formation.pitch_m to ").and_then(|rest| rest.split(',').next());
         let enough = of(named.expect(&help)).expect(&help);
         assert!((nearest_m(&enough) - 3.0).abs() < SPACING_ROUNDING, "{help}");

@@ -104,17 +104,15 @@ impl Spec {
     /// # Errors
     /// [`Failure`] `campaign/specification` or `campaign/variation`, with its place.
     pub fn read(name: &str, text: &str) -> Result<Self, Failure> {
-        let failed = |code, problem: &str, remedy: Option<&str>, span: Range<usize>| {
-            let remedy = remedy.unwrap_or("docs/campaigns.md shows every key of a specification");
+        let failed = |code, problem: &str, remedy: &str, span: Range<usize>| {
             Failure::input(code, problem, remedy).at(&Place::new(name, text, span))
         };
         let not_toml = |error: toml::de::Error| {
             let problem = format!("the text is not TOML: {}", error.message());
             let remedy = "a specification is `key = value` lines below `[table]` headers";
-            failed("campaign/specification", &problem, Some(remedy), error.span().unwrap_or_default())
+            failed("campaign/specification", &problem, remedy, error.span().unwrap_or_default())
         };
-        let misfit =
-            |code| move |(error, span): (ScenarioError, _)| failed(code, &error.message, error.help.as_deref(), span);
+        let misfit = |code| move |(error, span): (ScenarioError, _)| failed(code, &error.message, &error.help, span);
         let table = DeTable::parse(text).map_err(not_toml)?.into_inner();
         let mut file = Spanned::new(0..0, DeValue::Table(table));
         SPEC.check("specification", &mut file).map_err(misfit("campaign/specification"))?;

@@ -76,7 +76,7 @@ fn conditions_of_a_measured_table_are_checked() {
         ("vehicle.attitude_damping=0.8", "vehicle.attitude_damping must be"),
     ] {
         let error = refused(&[set]);
-        let help = error.help.as_deref().unwrap_or_default();
+        let help = &error.help;
         assert!(error.to_string().contains(says) && help.contains("--identify"), "{set}: {error}");
     }
     let error = refused(&["shield.accel_m_s2=9"]);
