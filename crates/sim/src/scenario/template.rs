@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
-use super::document::{Assignment, Document, StartShape, StartTable};
+use super::document::{Document, StartShape, StartTable};
 use super::error::suggest;
 use super::error::{ErrorKind, ScenarioError};
 use super::external::ExternalLaw;
@@ -29,8 +29,6 @@ pub struct Template {
     document: Document,
     own: Scenario,
     start_is_random: bool,
-    /// Assignment of vehicles to the slots of the first leg.
-    assignment: Assignment,
     laws: Vec<(String, LawSpec)>,
 }
 
@@ -81,16 +79,15 @@ impl Template {
     /// As [`Scenario::read`].
     pub fn read(source: &Source, overrides: &[Override]) -> Result<Self, ScenarioError> {
         let (name, toml) = source.text()?;
-        let (document, own, start_is_random, assignment, laws) =
-            Text { name: &name, toml: &toml, overrides }.read(|text| {
-                let document = decoded(text, source.folder())?;
-                let a22_per_s = document.velocity_coefficient_per_s();
-                let named = document.laws.iter();
-                let laws = named.map(|(name, other)| (name.clone(), other.kind.clone().complete(a22_per_s))).collect();
-                let (start_is_random, assignment) = (is_random(&document), document.formation.placement.assignment);
-                Ok((document.clone(), finish(document, text)?, start_is_random, assignment, laws))
-            })?;
-        Ok(Self { document, own, start_is_random, assignment, laws, overrides: overrides.to_vec(), name, toml })
+        let (document, own, start_is_random, laws) = Text { name: &name, toml: &toml, overrides }.read(|text| {
+            let document = decoded(text, source.folder())?;
+            let a22_per_s = document.velocity_coefficient_per_s();
+            let named = document.laws.iter();
+            let laws = named.map(|(name, other)| (name.clone(), other.kind.clone().complete(a22_per_s))).collect();
+            let start_is_random = is_random(&document);
+            Ok((document.clone(), finish(document, text)?, start_is_random, laws))
+        })?;
+        Ok(Self { document, own, start_is_random, laws, overrides: overrides.to_vec(), name, toml })
     }
 
     /// Returns the template with an external law, which all its scenarios fly.
@@ -110,11 +107,6 @@ impl Template {
     #[must_use]
     pub fn start_is_random(&self) -> bool {
         self.start_is_random
-    }
-
-    /// Returns the assignment of vehicles to the slots of the first leg.
-    pub(super) fn assignment(&self) -> Assignment {
-        self.assignment
     }
 
     /// Returns whether the flight depends on the seed of noise.
