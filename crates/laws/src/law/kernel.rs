@@ -112,7 +112,7 @@ impl WithSimd for AddRows<'_> {
     type Output = Result<f64, OutOfDomain>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
         let Self { kernel, count, rows, axes: [x, y, z], sums: [of_x, of_y, of_z] } = self;
         let mut block = Block::<ROW_BLOCK>::new(kernel.delta_m);
         let start = rows.start;
@@ -131,9 +131,9 @@ impl WithSimd for AddRows<'_> {
                     positions_m: [&x[j..j + lanes], &y[j..j + lanes], &z[j..j + lanes]],
                     sums: [&mut of_x[from..to], &mut of_y[from..to], &mut of_z[from..to]],
                 };
-                let pulls = block.pull(simd, own, ends);
+                let pulls = block.pull(own, ends);
                 for axis in 0..3 {
-                    add_lanes(simd, &mut of_own[axis], pulls[axis]);
+                    add_lanes(&mut of_own[axis], pulls[axis]);
                 }
                 edge += edges;
                 j += edges;
@@ -157,7 +157,7 @@ impl WithSimd for AddList<'_> {
     type Output = Result<f64, OutOfDomain>;
 
     #[inline(always)]
-    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
         let Self { kernel, axes, sums } = self;
         let mut block = Block::<LIST_BLOCK>::new(kernel.delta_m);
         let mut first = 0;
@@ -178,7 +178,7 @@ impl WithSimd for AddList<'_> {
                 positions_m: [&x[..lanes], &y[..lanes], &z[..lanes]],
                 sums: [&mut of_x[..lanes], &mut of_y[..lanes], &mut of_z[..lanes]],
             };
-            let pulls = block.pull(simd, [0.0; 3], ends);
+            let pulls = block.pull([0.0; 3], ends);
             for axis in 0..3 {
                 for k in 0..list.len() {
                     sums[axis][list[k][0]] += pulls[axis][k];

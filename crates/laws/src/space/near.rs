@@ -1,6 +1,6 @@
 //! Search of pairs within a range, by sorted cells.
 
-use std::ops::Range;
+use std::ops::{ControlFlow, Range};
 
 use nalgebra::Vector3;
 
@@ -45,9 +45,26 @@ impl CellList {
     /// Finds every pair of rows whose [separation](tautline_core::swarm::separation) is at most `range_m` \[m\]. A row
     /// that is not finite is in no pair.
     pub fn update(&mut self, positions_m: &Rows, range_m: f64) {
-        self.sort(positions_m, range_m);
-        self.sweep(range_m);
+        let mut found = std::mem::take(&mut self.found);
+        found.clear();
+        let _ = self.search(positions_m, range_m, |i, j, _| {
+            found.push((i, j));
+            ControlFlow::Continue(())
+        });
+        self.found = found;
         self.order(positions_m.nrows());
+    }
+
+    /// Calls `visit` for each pair of [`CellList::update`], in any order, until it breaks. Returns whether it did. The
+    /// arguments are i < j and the square of the distance \[m^2\]. [`CellList::pairs`] remains unchanged.
+    pub fn search(
+        &mut self,
+        positions_m: &Rows,
+        range_m: f64,
+        visit: impl FnMut(usize, usize, f64) -> ControlFlow<()>,
+    ) -> ControlFlow<()> {
+        self.sort(positions_m, range_m);
+        self.sweep(range_m, visit)
     }
 
     /// Sorts the finite points by cell, and within a cell by index.
@@ -70,11 +87,10 @@ impl CellList {
     }
 
     /// Compares each point with later points in its own row of cells and in the four later rows that touch its cell.
-    fn sweep(&mut self, range_m: f64) {
-        let Self { cells, points, found, .. } = self;
+    fn sweep(&self, range_m: f64, mut visit: impl FnMut(usize, usize, f64) -> ControlFlow<()>) -> ControlFlow<()> {
+        let Self { cells, points, .. } = self;
         let squared = range_m * range_m * SQUARE_MARGIN;
         let mut starts = [0; LATER_ROWS.len()];
-        found.clear();
         for (place, (&(cell, i), &point)) in cells.iter().zip(points.iter()).enumerate() {
             let mut compare = |from: usize, last_cell: u64| {
                 for (&(other, j), &position) in cells[from..].iter().zip(&points[from..]) {
@@ -83,17 +99,19 @@ impl CellList {
                     }
                     let apart = (position - point).norm_squared();
                     if apart <= squared && apart.sqrt() <= range_m {
-                        found.push((i.min(j), i.max(j)));
+                        visit(i.min(j), i.max(j), apart)?;
                     }
                 }
+                ControlFlow::Continue(())
             };
-            compare(place + 1, cell + 1);
+            compare(place + 1, cell + 1)?;
             for (start, row) in starts.iter_mut().zip(LATER_ROWS) {
                 let first_cell = cell + row - 1;
                 *start += cells[*start..].iter().take_while(|(other, _)| *other < first_cell).count();
-                compare(*start, first_cell + 2);
+                compare(*start, first_cell + 2)?;
             }
         }
+        ControlFlow::Continue(())
     }
 
     /// Sorts the found pairs by counting.

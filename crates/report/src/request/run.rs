@@ -165,10 +165,7 @@ pub fn run_into(request: &RunRequest<'_>, pictures: &dyn Pictures, monitor: &dyn
     }
     monitor.say(&format!("wrote {} with a replay, report.json and {RECORDING}", page.display()));
     if request.free_steps && report.run.engine_steps.is_none_or(|made| made >= report.run.steps) {
-        monitor.warn(
-            "note: no step left out the engine: that needs the plant rapier, no obstacles, at most 128 vehicles, and \
-             vehicles out of contact",
-        );
+        monitor.warn("note: no step left out the engine: that needs the plant rapier and vehicles out of contact");
     }
     if report.run.is_interrupted() {
         let at = seconds(report.run.duration_s);

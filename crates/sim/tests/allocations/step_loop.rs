@@ -146,11 +146,12 @@ pub(crate) fn the_loop_allocates_nothing_per_step() {
 }
 
 /// Returns the number of allocations of a call of some steps in three worlds, with given commands or under the law.
-fn allocations_of_worlds(steps: u64, is_given: bool) -> usize {
-    let template = Template::read(&Source::Builtin("pentagon".to_owned()), &[]).expect("a scenario");
+fn allocations_of_worlds(name: &str, sets: &[&str], steps: u64, is_given: bool) -> usize {
+    let overrides: Vec<_> = sets.iter().map(|set| Override::parse(set).expect(set)).collect();
+    let template = Template::read(&Source::Builtin(name.to_owned()), &overrides).expect("a scenario");
     let mut worlds = VectorSimulation::new(template, &[0, 1, 2], Threads::One).expect("worlds");
     let mut states = States::of(&worlds);
-    let commands = vec![0.01; states.positions_m.len()];
+    let commands = vec![1.0; states.positions_m.len()];
     let mut fly = |steps| worlds.step(is_given.then_some(&commands[..]), steps, &mut states.borrow()).expect("flown");
     fly(5);
     let region = Region::new(ALLOCATOR);
@@ -160,9 +161,11 @@ fn allocations_of_worlds(steps: u64, is_given: bool) -> usize {
 }
 
 pub(crate) fn worlds_allocate_nothing_per_step() {
-    for is_given in [true, false] {
+    // The crowd searches near pairs by cells.
+    let crowd = &["swarm.count=200"][..];
+    for (name, sets, is_given) in [("pentagon", &[][..], true), ("pentagon", &[], false), ("thousand", crowd, true)] {
         // Idle threads of other tests allocate now and then.
-        let allocates_nothing = |_| allocations_of_worlds(300, is_given) == 0;
-        assert!((0..ATTEMPTS).any(allocates_nothing), "given commands: {is_given}");
+        let allocates_nothing = |_| allocations_of_worlds(name, sets, 300, is_given) == 0;
+        assert!((0..ATTEMPTS).any(allocates_nothing), "{name}, given commands: {is_given}");
     }
 }

@@ -274,11 +274,11 @@ fn given_states_are_starts() {
         let mut positions_m = vec![0.0; 30];
         (0..10).for_each(|k| positions_m[3 * k] = 3.0 * k as f64);
         let velocities_m_s: Vec<_> = (0..30).map(|k| 0.01 * f64::from(k)).collect();
-        let given = GivenStarts { positions_m: &positions_m, velocities_m_s: &velocities_m_s };
-        let mut reset = |given, states: &mut States| {
+        let mut reset = |positions_m: &[f64], states: &mut States| {
+            let given = GivenStarts { positions_m, velocities_m_s: &velocities_m_s };
             worlds.reset_while(&[false, true], None, Some(given), &mut states.borrow(), &mut || true)
         };
-        reset(given, &mut states).expect("a start");
+        reset(&positions_m, &mut states).expect("a start");
         assert_eq!(
             (&states.positions_m[..15], &states.positions_m[15..]),
             (&drawn.positions_m[..15], &positions_m[15..])
@@ -286,14 +286,11 @@ fn given_states_are_starts() {
         assert_eq!(states.velocities_m_s[15..], velocities_m_s[15..]);
         positions_m[15] = positions_m[18];
         let before = states.clone();
-        let given = GivenStarts { positions_m: &positions_m, velocities_m_s: &velocities_m_s };
-        let refused = reset(given, &mut states).expect_err("two vehicles in one place");
+        let refused = reset(&positions_m, &mut states).expect_err("two vehicles in one place");
         assert!(matches!(refused, VectorError::Seed { world: 1, .. }), "{refused}");
         positions_m[15] = f64::NAN;
-        let given = GivenStarts { positions_m: &positions_m, velocities_m_s: &velocities_m_s };
-        assert!(reset(given, &mut states).is_err());
-        let given = GivenStarts { positions_m: &positions_m[..29], velocities_m_s: &velocities_m_s };
-        assert!(matches!(reset(given, &mut states), Err(VectorError::Length { expected: 30, found: 29, .. })));
+        assert!(reset(&positions_m, &mut states).is_err());
+        assert!(matches!(reset(&positions_m[..29], &mut states), Err(VectorError::Length { expected: 30, found: 29, .. })));
         assert_eq!(states, before, "a refused reset changes nothing");
     }
 }

@@ -4,8 +4,6 @@
 //! for all edges of a block, so the processor overlaps the operations of many edges.
 #![expect(clippy::inline_always, reason = "only inlined code is compiled for the instructions detected at run time")]
 
-use pulp::Simd;
-
 use crate::law::tension::{self, OutOfDomain};
 
 /// Number of partial sums of a long sum, independent of the machine's vector width. Edges are processed in groups of
@@ -54,7 +52,7 @@ impl<const B: usize> Block<B> {
     /// Subtracts the pull of each edge on a vehicle at `own` \[m\] from the sums of its other end. The pull is
     /// `w_ij/alpha` times the edge, with `w_ij = V'/l`. Returns the pulls along each axis, in whole lanes.
     #[inline(always)]
-    pub(super) fn pull<S: Simd>(&mut self, simd: S, own: [f64; 3], to: Ends<'_>) -> [&[f64]; 3] {
+    pub(super) fn pull(&mut self, own: [f64; 3], to: Ends<'_>) -> [&[f64]; 3] {
         let lanes = to.inverse_k_per_m.len();
         let Self { delta_m, edges: [x, y, z], lengths_m, scaled, decays, .. } = self;
         let edges = [&mut x[..lanes], &mut y[..lanes], &mut z[..lanes]];
@@ -66,7 +64,7 @@ impl<const B: usize> Block<B> {
         }
         let edges = [&mut x[..lanes], &mut y[..lanes], &mut z[..lanes]];
         weigh(to.count, to.inverse_k_per_m, lengths_m, decays, edges, scaled, to.sums);
-        add_lanes(simd, &mut self.potential, scaled);
+        add_lanes(&mut self.potential, scaled);
         [&x[..lanes], &y[..lanes], &z[..lanes]]
     }
 
@@ -133,19 +131,22 @@ fn weigh(
         of_x[k] -= x[k];
         of_y[k] -= y[k];
         of_z[k] -= z[k];
-        scaled[k] = if k < count { value } else { 0.0 };
+        scaled[k] = value;
     }
+    scaled[count..].fill(0.0);
 }
 
 /// Adds each term to the sum of its lane. `terms` has whole lanes.
 #[inline(always)]
-pub(super) fn add_lanes<S: Simd>(simd: S, sums: &mut Lanes, terms: &[f64]) {
-    let (sums, terms) = (S::as_mut_simd_f64s(sums).0, S::as_simd_f64s(terms).0);
-    for first in 0..terms.len() / sums.len() {
-        for k in 0..sums.len() {
-            sums[k] = simd.add_f64s(sums[k], terms[first * sums.len() + k]);
+pub(super) fn add_lanes(sums: &mut Lanes, terms: &[f64]) {
+    // A copy stays in registers.
+    let mut added = *sums;
+    for terms in terms.as_chunks::<LANES>().0 {
+        for k in 0..LANES {
+            added[k] += terms[k];
         }
     }
+    *sums = added;
 }
 
 #[inline(always)]

@@ -1,12 +1,14 @@
 //! Points: rigid bodies without rotation that execute commanded accelerations.
 
+use std::sync::Arc;
+
 use nalgebra::Vector3;
 use rapier3d::prelude::{ColliderSet, LockedAxes, RigidBodyBuilder, RigidBodyHandle, RigidBodySet, Vector};
 
 use super::proximity::{Maker, Proximity};
 use super::world::{
-    Engine, empty_world, first_in_contact, first_not_finite, from_engine, hull, hull_contacts, insert_obstacle,
-    keep_out, keep_out_contacts, to_engine,
+    Engine, empty_world, first_in_contact, first_not_finite, from_engine, hull, hull_contacts, keep_out,
+    keep_out_contacts, obstacle, to_engine,
 };
 use crate::plant::{Air, FreeSteps, HullContact, Plant, PlantError, StepPath};
 use crate::scenario::{Scenario, Space};
@@ -61,23 +63,24 @@ impl Bodies {
         };
         let (positions, velocities) = (vehicles.positions.clone(), vehicles.velocities.clone());
         let inverse_masses = vehicles.inverse_masses();
-        let obstacles = scenario.obstacles.clone();
+        let obstacles: Arc<[_]> = scenario.obstacles.iter().map(|solid| obstacle(solid, origin_m)).collect();
+        let solids = Arc::clone(&obstacles);
         let create = move || {
             let mut world = empty_world();
             for i in 0..vehicles.positions.len() {
                 vehicles.insert(i, &mut world.bodies, &mut world.colliders);
             }
-            for obstacle in &obstacles {
-                insert_obstacle(&mut world, obstacle, origin_m);
+            for obstacle in &*solids {
+                world.colliders.insert(obstacle.clone());
             }
             world
         };
         Self {
-            engine: Engine::new(create, Proximity::may_have_free_steps(scenario)),
+            engine: Engine::new(create),
             positions,
             velocities,
             inverse_masses,
-            proximity: Proximity::of(scenario),
+            proximity: Proximity::new(scenario, obstacles),
             was_free: false,
             compared: (Vec::new(), Vec::new()),
             held: Rows::zeros(scenario.count()),
@@ -154,7 +157,6 @@ impl Bodies {
         for ((_, body), (position, velocity)) in world.bodies.iter().zip(positions.iter_mut().zip(velocities)) {
             (*position, *velocity) = (body.translation(), body.linvel());
         }
-        self.proximity.forget();
         Ok(())
     }
 
@@ -165,7 +167,6 @@ impl Bodies {
         self.drift_freely(dt_s)?;
         std::mem::swap(&mut self.positions, &mut self.compared.0);
         std::mem::swap(&mut self.velocities, &mut self.compared.1);
-        let proximity = self.proximity.clone();
         self.drift_in_engine(dt_s)?;
         let is_same = |(engine, free): (&Vector, &Vector)| bits(*engine) == bits(*free);
         let differs = |i: &usize| {
@@ -178,7 +179,6 @@ impl Bodies {
         if let Some(vehicle) = self.engine.world().and_then(first_in_contact) {
             return Err(PlantError::EngineDiffers { vehicle });
         }
-        self.proximity = proximity;
         Ok(())
     }
 
@@ -235,7 +235,7 @@ impl Plant for Bodies {
 
     fn advance(&mut self, dt_s: f64, predicted: &mut Swarm, _path: &mut StepPath) -> Result<(), PlantError> {
         self.begin_drift(dt_s);
-        let maker = self.proximity.begin_step(self.positions.iter().copied());
+        let maker = self.proximity.begin_step(&self.began_m);
         self.was_free = maker == Maker::FreeStep;
         match maker {
             Maker::Engine => self.drift_in_engine(dt_s)?,

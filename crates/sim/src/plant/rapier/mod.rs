@@ -48,10 +48,10 @@
 //! it: they are evidence that comes one step late, not the verdict.
 //!
 //! # Free steps
-//! While every pair is farther apart than the contacts of the engine reach, the plants can do the operations of the
-//! engine for a body without contacts. Vector simulations, studies and `tautline run --free-steps` leave the engine
-//! out of these steps, for up to 128 vehicles without obstacles. Except in vector simulations, the engine repeats each
-//! eighth of them, and any difference is an error. In all other flights the engine makes every step.
+//! While every pair, and every vehicle and obstacle, is farther apart than the contacts of the engine reach, the plants
+//! can do the operations of the engine for a body without contacts. Vector simulations, studies and `tautline run
+//! --free-steps` leave the engine out of these steps. Except in vector simulations, the engine repeats each eighth of
+//! them, and any difference is an error. In all other flights the engine makes every step.
 //!
 //! In vector simulations keep-out balls may overlap in a free step: they change no motion, and the plants report the
 //! overlaps from the distances of the pairs. The engine is created for its first step, and dropped after contacts.

@@ -1,9 +1,10 @@
 //! Decides which steps are free of the engine, where a caller allows that: vector simulations, studies, `--free-steps`.
 //!
 //! Bodies of the engine act on each other only through contacts of hulls. The engine solves such contacts only for
-//! pairs within a reach: two hulls within the contact prediction. While every pair is farther apart at the beginning of
-//! a step, the engine moves each body by its own velocity alone. The plants then do the same operations without the
-//! engine's step (a *free* step). The bits are the same: the tests of this module fly with and without free steps.
+//! pairs within a reach: two hulls, or a hull and an obstacle, within the contact prediction. While every pair is
+//! farther apart at the beginning of a step, the engine moves each body by its own velocity alone. The plants then do
+//! the same operations without the engine's step (a *free* step). The bits are the same: the tests of this module fly
+//! with and without free steps.
 //!
 //! The engine also reports overlaps of keep-out balls, which change no motion. Where its free steps are compared, every
 //! pair must be beyond this reach too, so that all overlaps are those of the engine. In trusted free steps the overlaps
@@ -14,14 +15,21 @@
 //! all contact points, so that no old impulse waits for the next contact. A new engine solves the next contacts
 //! (`super::world::Engine`).
 
-use rapier3d::prelude::Vector;
+use std::ops::ControlFlow;
+use std::sync::Arc;
 
+use rapier3d::prelude::Collider;
+
+use super::world::to_engine;
 use crate::plant::{COMPARED_EACH, FreeSteps};
 use crate::scenario::{CONTACT_PREDICTION_M, Scenario};
-use tautline_core::swarm::Pair;
+use tautline_core::swarm::{Pair, Rows, row};
+use tautline_laws::space::CellList;
 
-/// Largest number of vehicles with free steps: the search of the nearest pair is quadratic.
-const MAX_COUNT: usize = 128;
+/// Up to this number of vehicles every pair is compared, which is faster than a list of cells.
+const ALL_PAIRS_UP_TO: usize = 64;
+/// Range of a search by cells, relative to the reach. A longer range finds more pairs, but is valid for more steps.
+const RANGE_FACTOR: f64 = 2.0;
 /// Distance beyond the engine's reach from which a step is free, and distance from touching at which the engine decides
 /// whether two keep-out balls overlap \[m\]. It exceeds any rounding.
 const MARGIN_M: f64 = 1e-3;
@@ -39,11 +47,16 @@ pub(super) enum Maker {
 /// Distance of the nearest pair from the engine's reach, with the memory that bounds it from step to step.
 #[derive(Clone, Debug)]
 pub(super) struct Proximity {
-    /// Distance of two centres below which the engine may report contacts; infinite where that is not known \[m\].
+    /// Distance of two centres below which the engine may report contacts \[m\].
     reach_m: f64,
-    /// Distance of two centres below which the engine may solve a contact of hulls; infinite where that is not known
-    /// \[m\].
+    /// Distance of two centres below which the engine may solve a contact of hulls \[m\].
     hull_reach_m: f64,
+    /// Distance of a centre from an obstacle below which the engine may solve a contact with its hull \[m\].
+    obstacle_reach_m: f64,
+    /// Obstacles of the engine.
+    obstacles: Arc<[Collider]>,
+    /// Search of near pairs of many vehicles.
+    cells: CellList,
     /// Distance of two centres whose keep-out balls touch \[m\].
     keep_out_m: f64,
     /// Pairs whose keep-out balls overlapped at the beginning of the last step, if it was free, in index order.
@@ -61,16 +74,16 @@ pub(super) struct Proximity {
 }
 
 impl Proximity {
-    pub(super) fn of(scenario: &Scenario) -> Self {
+    pub(super) fn new(scenario: &Scenario, obstacles: Arc<[Collider]>) -> Self {
         let hull_m = scenario.hull_radius_m.iter().copied().fold(0.0, f64::max);
         let keep_out_m = scenario.metric().shortest_m(scenario.delta_m);
-        let may_have_free_steps = Self::may_have_free_steps(scenario);
-        let reach = |touching_m: f64| {
-            if may_have_free_steps { touching_m + 2.0 * CONTACT_PREDICTION_M + MARGIN_M } else { f64::INFINITY }
-        };
+        let reach = |touching_m: f64| touching_m + 2.0 * CONTACT_PREDICTION_M + MARGIN_M;
         Self {
             reach_m: reach(keep_out_m.max(2.0 * hull_m)),
             hull_reach_m: reach(2.0 * hull_m),
+            obstacle_reach_m: reach(hull_m),
+            obstacles,
+            cells: CellList::default(),
             keep_out_m,
             overlaps: Vec::new(),
             free: None,
@@ -80,11 +93,6 @@ impl Proximity {
             // A new engine has no contacts.
             began_beyond: true,
         }
-    }
-
-    /// Returns whether flights of a scenario may have free steps. Hulls also touch obstacles.
-    pub(super) fn may_have_free_steps(scenario: &Scenario) -> bool {
-        scenario.obstacles.is_empty() && scenario.count() <= MAX_COUNT
     }
 
     /// Allows free steps.
@@ -109,59 +117,88 @@ impl Proximity {
         &self.overlaps
     }
 
-    /// Returns what makes the step from these positions, relative to the engine's origin.
-    pub(super) fn begin_step(&mut self, positions: impl Iterator<Item = Vector> + Clone) -> Maker {
+    /// Returns what makes the step from these positions, relative to the engine's origin \[m\].
+    pub(super) fn begin_step(&mut self, positions_m: &Rows) -> Maker {
         let allowed = self.free;
-        let free = allowed.filter(|_| self.is_free(positions));
+        let free = allowed.filter(|_| self.is_free(positions_m));
         let maker = match free {
             Some(free) => {
                 self.unseen = (self.unseen + 1) % COMPARED_EACH;
                 if free == FreeSteps::Compared && self.unseen == 0 { Maker::Both } else { Maker::FreeStep }
             }
-            None => Maker::Engine,
+            None => {
+                // Contacts may move vehicles farther than their velocities do.
+                self.forget();
+                Maker::Engine
+            }
         };
         self.engine_steps += u64::from(maker != Maker::FreeStep);
         maker
     }
 
     /// Returns whether the step from these positions is free.
-    fn is_free(&mut self, positions: impl Iterator<Item = Vector> + Clone) -> bool {
-        if self.reach_m == f64::INFINITY {
-            return false;
-        }
+    fn is_free(&mut self, positions_m: &Rows) -> bool {
         self.overlaps.clear();
         let (mut is_beyond, mut is_decided) = (true, true);
         if self.beyond_m <= 0.0 || self.beyond_m.is_nan() {
-            (is_beyond, is_decided) = self.search(positions);
+            (is_beyond, is_decided) = self.search(positions_m, positions_m.nrows() <= ALL_PAIRS_UP_TO);
         }
         std::mem::replace(&mut self.began_beyond, is_beyond) && is_beyond && is_decided
     }
 
-    /// Searches all pairs: updates the distance of the nearest pair beyond the reach, and the overlaps. Returns whether
-    /// every pair is beyond the reach of contacts that prevent free steps, and whether the overlaps are certain.
-    fn search(&mut self, mut positions: impl Iterator<Item = Vector> + Clone) -> (bool, bool) {
+    /// Searches near pairs and obstacles, over all pairs or by cells: updates the distance of the nearest pair beyond
+    /// the reach, and the overlaps. Returns whether every pair is beyond the reach of contacts that prevent free steps,
+    /// and whether the overlaps are certain.
+    fn search(&mut self, positions_m: &Rows, over_all_pairs: bool) -> (bool, bool) {
         self.beyond_m = 0.0;
+        let beyond_obstacles_m = self.beyond_obstacles_m(positions_m);
+        if beyond_obstacles_m <= 0.0 || !positions_m.iter().all(|x| x.is_finite()) {
+            return (false, false);
+        }
         let reach_m = if self.trusts_free_steps() { self.hull_reach_m } else { self.reach_m };
         let [reach, may_overlap, overlaps] = [reach_m, self.keep_out_m + MARGIN_M, self.keep_out_m - MARGIN_M]
             .map(|distance_m| distance_m.max(0.0) * distance_m.max(0.0));
-        let (mut least, mut is_decided, mut first) = (f64::INFINITY, true, 0);
-        while let Some(from) = positions.next() {
-            for (second, to) in (first + 1..).zip(positions.clone()) {
-                let squared = (to - from).length_squared();
-                if squared <= reach || squared.is_nan() {
-                    return (false, false);
-                }
-                least = squared.min(least);
-                if squared < overlaps {
-                    self.overlaps.push(Pair::new(first, second));
-                } else {
-                    is_decided &= squared > may_overlap;
-                }
+        let (mut least, mut is_decided) = (f64::INFINITY, true);
+        let visit = |first, second, squared: f64| {
+            if squared <= reach {
+                return ControlFlow::Break(());
             }
-            first += 1;
+            least = squared.min(least);
+            if squared < overlaps {
+                self.overlaps.push(Pair::new(first, second));
+            } else {
+                is_decided &= squared > may_overlap;
+            }
+            ControlFlow::Continue(())
+        };
+        let range_m = if over_all_pairs { f64::INFINITY } else { RANGE_FACTOR * self.reach_m };
+        let searched = if over_all_pairs {
+            search_all_pairs(positions_m, visit)
+        } else {
+            self.cells.search(positions_m, range_m, visit)
+        };
+        if searched.is_break() {
+            return (false, false);
         }
-        self.beyond_m = least.sqrt() - self.reach_m;
+        self.overlaps.sort_unstable();
+        self.beyond_m = (least.sqrt().min(range_m) - self.reach_m).min(beyond_obstacles_m);
         (true, is_decided)
+    }
+
+    /// Returns the distance of the nearest vehicle beyond the reach of obstacles \[m\]; 0 if some vehicle is within it.
+    fn beyond_obstacles_m(&self, positions_m: &Rows) -> f64 {
+        let mut least_m = f64::INFINITY;
+        for obstacle in &*self.obstacles {
+            for vehicle in 0..positions_m.nrows() {
+                let centre = to_engine(row(positions_m, vehicle));
+                let distance_m = obstacle.shape().distance_to_point(obstacle.position(), centre, true);
+                if distance_m.is_nan() || distance_m <= self.obstacle_reach_m {
+                    return 0.0;
+                }
+                least_m = least_m.min(distance_m - self.obstacle_reach_m);
+            }
+        }
+        least_m
     }
 
     /// Takes into account that no vehicle moved farther than given \[m\].
@@ -177,10 +214,24 @@ impl Proximity {
     /// Makes every step free, whatever the distances.
     #[cfg(test)]
     pub(super) fn with_free_steps_only(&mut self) {
-        (self.reach_m, self.hull_reach_m, self.keep_out_m) = (0.0, 0.0, -MARGIN_M);
+        (self.reach_m, self.hull_reach_m, self.keep_out_m, self.obstacles) = (0.0, 0.0, -MARGIN_M, Arc::new([]));
         (self.beyond_m, self.began_beyond) = (f64::INFINITY, true);
         self.allow_free_steps(FreeSteps::Trusted);
     }
+}
+
+/// Calls `visit` for every pair in index order with the square of its distance until it breaks. Returns whether it did.
+fn search_all_pairs(
+    positions_m: &Rows,
+    mut visit: impl FnMut(usize, usize, f64) -> ControlFlow<()>,
+) -> ControlFlow<()> {
+    for first in 0..positions_m.nrows() {
+        let from_m = row(positions_m, first);
+        for second in first + 1..positions_m.nrows() {
+            visit(first, second, (row(positions_m, second) - from_m).norm_squared())?;
+        }
+    }
+    ControlFlow::Continue(())
 }
 
 #[cfg(test)]
@@ -190,7 +241,10 @@ mod tests {
     use super::*;
     use crate::plant::{HullContact, Plant, StepPath};
     use crate::scenario::{Override, Source};
-    use tautline_core::swarm::{Pair, Rows, Swarm};
+    use nalgebra::Vector3;
+    use proptest::prelude::*;
+    use tautline_core::obstacle::{Obstacle, Shape};
+    use tautline_core::swarm::Swarm;
 
     /// Number of random flights with collisions.
     const FLIGHTS: usize = 200;
@@ -367,10 +421,10 @@ mod tests {
     fn the_engine_decides_whether_balls_that_touch_overlap() {
         let scenario = scenario("pentagon", &[]);
         let maker = |distance_m: f64, free: FreeSteps| {
-            let mut proximity = Proximity::of(&scenario);
+            let mut proximity = Proximity::new(&scenario, Arc::new([]));
             proximity.allow_free_steps(free);
-            let positions = [0.0, 10.0, 10.0 + distance_m].map(|x| Vector::new(x, 0.0, 0.0));
-            (proximity.begin_step(positions.into_iter()), proximity.overlaps().to_vec())
+            let positions_m = Rows::from_row_slice(&[0.0, 0.0, 0.0, 10.0, 0.0, 0.0, 10.0 + distance_m, 0.0, 0.0]);
+            (proximity.begin_step(&positions_m), proximity.overlaps().to_vec())
         };
         let (delta_m, hulls_m) = (scenario.delta_m, 2.0 * scenario.hull_radius_m[0]);
         let pair = vec![Pair::new(1, 2)];
@@ -386,6 +440,80 @@ mod tests {
             assert_eq!(maker(distance_m, FreeSteps::Trusted), trusted, "{distance_m} m apart");
             let is_free = maker(distance_m, FreeSteps::Compared).0 == Maker::FreeStep;
             assert_eq!(is_free, distance_m > delta_m + 0.01, "{distance_m} m apart");
+        }
+    }
+
+    /// Coordinate in units of the range of a search: anywhere, on borders of cells, and at extremes.
+    fn coordinate() -> impl Strategy<Value = f64> {
+        prop_oneof![
+            8 => -3.0..3.0,
+            4 => (-3..4_i32).prop_map(f64::from),
+            2 => (-3..4_i32).prop_map(|k| f64::from(k).next_up()),
+            1 => prop::sample::select(vec![0.0, -0.0, 1e6, -1e9, 1e300, -1e300, f64::MAX, f64::NAN, f64::INFINITY]),
+        ]
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(512))]
+
+        #[test]
+        fn cells_decide_like_all_pairs(
+            points in prop::collection::vec([coordinate(), coordinate(), coordinate()], 2..40),
+            scale in prop_oneof![Just(1.0), 0.0..1.0, 1.0..30.0],
+            free in prop::sample::select(vec![FreeSteps::Trusted, FreeSteps::Compared]),
+        ) {
+            let scenario = scenario("pentagon", &[]);
+            let mut of_all = Proximity::new(&scenario, Arc::new([]));
+            of_all.allow_free_steps(free);
+            let range_m = RANGE_FACTOR * of_all.reach_m;
+            let points: Vec<f64> = points.into_iter().flatten().map(|x| scale * range_m * x).collect();
+            let positions_m = Rows::from_row_slice(&points);
+            let mut of_cells = of_all.clone();
+            let decided = of_all.search(&positions_m, true);
+            prop_assert_eq!(of_cells.search(&positions_m, false), decided);
+            if decided.0 {
+                prop_assert_eq!(of_cells.overlaps(), of_all.overlaps());
+                prop_assert_eq!(of_cells.beyond_m, of_all.beyond_m.min(range_m - of_all.reach_m));
+            }
+        }
+    }
+
+    #[test]
+    fn cells_decide_like_all_pairs_in_large_swarms() {
+        let scenario = scenario("pentagon", &[]);
+        for free in [FreeSteps::Trusted, FreeSteps::Compared] {
+            let mut decisions = Vec::new();
+            for share in [0.02, 0.3, 0.6, 0.9, 0.999, 1.0, 1.001, 1.2, 2.0, 2.001, 9.0] {
+                for far_m in [0.0, 1e7] {
+                    let mut of_all = Proximity::new(&scenario, Arc::new([]));
+                    of_all.allow_free_steps(free);
+                    let spacing_m = share * of_all.reach_m;
+                    // A cubic lattice, moved a little, so that pairs differ in length.
+                    let positions_m = Rows::from_fn(600, |i, axis| {
+                        let place = [i % 9, i / 9 % 9, i / 81][axis] as f64;
+                        far_m + spacing_m * (place + 1e-3 * ((7 * i + 3 * axis) % 11) as f64)
+                    });
+                    let mut of_cells = of_all.clone();
+                    let decided = of_all.search(&positions_m, true);
+                    assert_eq!(of_cells.search(&positions_m, false), decided, "{share} of the reach");
+                    decisions.push(decided);
+                    if decided.0 {
+                        assert_eq!(of_cells.overlaps(), of_all.overlaps());
+                        let longest_m = (RANGE_FACTOR - 1.0) * of_all.reach_m;
+                        assert!((of_cells.beyond_m - of_all.beyond_m.min(longest_m)).abs() < 1e-9);
+                    }
+                }
+            }
+            assert!(decisions.contains(&(false, false)) && decisions.contains(&(true, true)));
+        }
+    }
+
+    #[test]
+    fn free_steps_of_large_swarms_have_the_bits_of_the_engine() {
+        for (count, steps) in [(100, 200), (1000, 40)] {
+            let scenario = scenario("thousand", &[&format!("swarm.count={count}")]);
+            let seen = assert_same(|| Box::new(points(&scenario)), scenario.time.dt_s, steps, shaken);
+            assert!(seen.free_steps > steps / 2, "{count} vehicles: {} free steps", seen.free_steps);
         }
     }
 
@@ -452,6 +580,52 @@ mod tests {
             collisions += usize::from(!seen.hulls.is_empty());
         }
         assert!(collisions > FLIGHTS / 2, "{collisions} flights with collisions");
+    }
+
+    #[test]
+    fn collisions_in_a_large_swarm_have_the_bits_of_the_engine() {
+        let scenario = scenario("thousand", &["swarm.count=150"]);
+        let rushing = |step: usize, state: &Swarm| 20.0 * colliding(15 * step, state);
+        let seen = assert_same(|| Box::new(points(&scenario)), scenario.time.dt_s, 160, rushing);
+        assert!(!seen.hulls.is_empty() && seen.free_steps > 10, "{} free steps", seen.free_steps);
+    }
+
+    #[test]
+    fn collisions_with_obstacles_between_free_steps_have_the_bits_of_the_engine() {
+        let along = Vector3::new(0.0, 1.0, 0.3);
+        for (shape, place_m) in [
+            (Shape::Ball { radius_m: 2.0 }, [4.0, 1.0, 0.5]),
+            (Shape::Box { half_m: Vector3::new(1.0, 4.0, 2.0), yaw_deg: 30.0 }, [5.0, 0.0, 1.0]),
+            (Shape::Capsule { from_m: -9.0 * along, to_m: 9.0 * along, radius_m: 1.0 }, [5.0, 0.0, 1.0]),
+            (Shape::HalfSpace { normal: Vector3::new(-1.0, 0.2, 0.3) }, [4.0, 0.0, 0.0]),
+        ] {
+            for (name, make, further_m) in [
+                ("obstacles", (|scenario| Box::new(points(scenario))) as fn(&Scenario) -> Box<dyn Free>, 6.0),
+                ("crazyflies", |scenario| Box::new(fliers(scenario)), 3.0),
+            ] {
+                let mut scenario = scenario(name, &[]);
+                let place_m = Vector3::from(place_m) + Vector3::x() * further_m;
+                let solid = Obstacle { name: "solid".to_owned(), place_m, shape, clearance_m: 0.1 };
+                scenario.obstacles = vec![solid];
+                // The swarm is pulled from its start through the obstacle and back, within 2 pi seconds.
+                let (dt_s, start_m) = (scenario.time.dt_s, scenario.start.positions_m.clone());
+                let steps = 1600;
+                let way_m = 1.3 * (place_m.transpose() - start_m.row_mean());
+                let pulled = |step: usize, state: &Swarm| {
+                    let share = 0.5 - 0.5 * libm::cos(dt_s * step as f64);
+                    Rows::from_fn(state.count(), |i, axis| {
+                        let goal_m = start_m[(i, axis)] + share * way_m[axis];
+                        8.0 * (goal_m - state.positions_m[(i, axis)]) - 4.0 * state.velocities_m_s[(i, axis)]
+                    })
+                };
+                let seen = assert_same(|| make(&scenario), scenario.time.dt_s, steps, pulled);
+                let free_steps = seen.free_steps;
+                assert!(free_steps > steps / 8 && free_steps < steps, "{name}, {shape:?}: {free_steps} free steps");
+                scenario.obstacles.clear();
+                let without = assert_same(|| make(&scenario), scenario.time.dt_s, steps, pulled);
+                assert!(without.bits != seen.bits, "{name}, {shape:?}: no collision");
+            }
+        }
     }
 
     #[test]

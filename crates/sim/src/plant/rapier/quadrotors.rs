@@ -1,5 +1,6 @@
 //! Quadrotors: rotating rigid bodies lifted by rotors.
 
+use std::sync::Arc;
 use std::time::Duration;
 
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
@@ -7,8 +8,8 @@ use rapier3d::prelude::{MassProperties, Real, RigidBody, RigidBodyBuilder, Rotat
 
 use super::proximity::{Maker, Proximity};
 use super::world::{
-    Engine, empty_world, first_in_contact, first_not_finite, from_engine, hull, hull_contacts, insert_obstacle,
-    keep_out, keep_out_contacts, to_engine,
+    Engine, empty_world, first_in_contact, first_not_finite, from_engine, hull, hull_contacts, keep_out,
+    keep_out_contacts, obstacle, to_engine,
 };
 use crate::plant::{FreeSteps, HullContact, Plant, PlantError, Quadrotors, StepPath};
 use crate::scenario::Scenario;
@@ -90,8 +91,10 @@ impl Fliers {
             linear: to_engine(state.velocity_m_s),
             angular: Vector::ZERO,
         });
-        let (starts, obstacles): (Vec<_>, _) = (starts.collect(), scenario.obstacles.clone());
+        let starts: Vec<_> = starts.collect();
         let bodies = starts.clone();
+        let obstacles: Arc<[_]> = scenario.obstacles.iter().map(|solid| obstacle(solid, origin_m)).collect();
+        let solids = Arc::clone(&obstacles);
         let create = move || {
             let mut world = empty_world();
             for (i, start) in starts.iter().enumerate() {
@@ -110,16 +113,16 @@ impl Fliers {
                 }
                 world.bodies[handle].recompute_mass_properties_from_colliders(&world.colliders);
             }
-            for obstacle in &obstacles {
-                insert_obstacle(&mut world, obstacle, origin_m);
+            for obstacle in &*solids {
+                world.colliders.insert(obstacle.clone());
             }
             world
         };
         let (drift_m_s, began_m) = (Rows::zeros(count), Rows::zeros(count));
         Self {
-            engine: Engine::new(create, Proximity::may_have_free_steps(scenario)),
+            engine: Engine::new(create),
             bodies,
-            proximity: Proximity::of(scenario),
+            proximity: Proximity::new(scenario, obstacles),
             was_free: false,
             compared: Vec::new(),
             fleet,
@@ -177,7 +180,6 @@ impl Fliers {
         for ((_, body), state) in world.bodies.iter().zip(bodies) {
             *state = Body::of(body);
         }
-        self.proximity.forget();
         Ok(())
     }
 
@@ -186,7 +188,6 @@ impl Fliers {
         self.compared.clone_from(&self.bodies);
         self.drift_freely(dt_s)?;
         std::mem::swap(&mut self.bodies, &mut self.compared);
-        let proximity = self.proximity.clone();
         self.drift_in_engine(dt_s)?;
         let mut both = self.bodies.iter().zip(&self.compared);
         if let Some(vehicle) = both.position(|(engine, free)| engine.bits() != free.bits()) {
@@ -195,7 +196,6 @@ impl Fliers {
         if let Some(vehicle) = self.engine.world().and_then(first_in_contact) {
             return Err(PlantError::EngineDiffers { vehicle });
         }
-        self.proximity = proximity;
         Ok(())
     }
 
@@ -265,7 +265,7 @@ impl Plant for Fliers {
         self.fleet.run_attitude();
         self.begin(dt_s);
         self.airframe += began.elapsed();
-        let maker = self.proximity.begin_step(self.bodies.iter().map(|body| body.position));
+        let maker = self.proximity.begin_step(&self.began_m);
         self.was_free = maker == Maker::FreeStep;
         match maker {
             Maker::Engine => self.drift_in_engine(dt_s)?,

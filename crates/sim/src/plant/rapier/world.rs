@@ -4,8 +4,8 @@ use std::sync::Arc;
 
 use nalgebra::Vector3;
 use rapier3d::prelude::{
-    ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, PhysicsWorld, Real, RigidBody,
-    SharedShape, Vector,
+    Collider, ColliderBuilder, ColliderHandle, Group, InteractionGroups, InteractionTestMode, PhysicsWorld, Real,
+    RigidBody, SharedShape, Vector,
 };
 
 use crate::plant::HullContact;
@@ -32,16 +32,14 @@ pub(super) struct Engine {
     create: Arc<dyn Fn() -> PhysicsWorld + Send + Sync>,
     /// The engine after its last step.
     world: Option<Box<PhysicsWorld>>,
-    /// Whether any flight of this scenario has free steps.
-    may_have_free_steps: bool,
     /// Whether the last step had contacts of hulls.
     had_contacts: bool,
 }
 
 impl Engine {
     /// `create` creates an engine that has made no step, with the body of vehicle i at the index i.
-    pub(super) fn new(create: impl Fn() -> PhysicsWorld + Send + Sync + 'static, may_have_free_steps: bool) -> Self {
-        Self { create: Arc::new(create), world: None, may_have_free_steps, had_contacts: false }
+    pub(super) fn new(create: impl Fn() -> PhysicsWorld + Send + Sync + 'static) -> Self {
+        Self { create: Arc::new(create), world: None, had_contacts: false }
     }
 
     /// Makes a step of this length \[s\], and returns the engine after it. `set` sets pose, velocity and force of the
@@ -52,16 +50,18 @@ impl Engine {
             world.bodies.iter_mut().enumerate().for_each(|(i, (_, body))| set(i, body));
             world.step();
         };
+        let create = || Box::new((self.create)());
         let is_new = self.world.is_none();
-        let world = self.world.get_or_insert_with(|| Box::new((self.create)()));
-        step(world);
-        let has_contacts = has_hull_contacts(world);
-        if has_contacts && !self.had_contacts && !is_new && self.may_have_free_steps {
-            **world = (self.create)();
-            step(world);
+        let mut world = self.world.take().unwrap_or_else(create);
+        step(&mut world);
+        let has_contacts = has_hull_contacts(&world);
+        if has_contacts && !self.had_contacts && !is_new {
+            drop(world);
+            world = create();
+            step(&mut world);
         }
         self.had_contacts = has_contacts;
-        world
+        self.world.insert(world)
     }
 
     /// Returns the engine after its last step; `None` before its first step and after [`Engine::discard`].
@@ -192,8 +192,8 @@ pub(super) fn keep_out(delta_m: f64, vehicle: usize) -> ColliderBuilder {
         .user_data(vehicle as u128)
 }
 
-/// Adds a fixed solid that hulls collide with. It has the index of no vehicle.
-pub(super) fn insert_obstacle(world: &mut PhysicsWorld, obstacle: &Obstacle, origin_m: Vector3<f64>) {
+/// Returns a fixed solid that hulls collide with. It has the index of no vehicle.
+pub(super) fn obstacle(obstacle: &Obstacle, origin_m: Vector3<f64>) -> Collider {
     let place_m = obstacle.place_m - origin_m;
     let collider = match obstacle.shape {
         Shape::Ball { radius_m } => ColliderBuilder::ball(radius_m),
@@ -206,7 +206,7 @@ pub(super) fn insert_obstacle(world: &mut PhysicsWorld, obstacle: &Obstacle, ori
     };
     let hulls = InteractionGroups::new(HULL, HULL, InteractionTestMode::And);
     let collider = collider.translation(to_engine(place_m)).restitution(HULL_RESTITUTION).friction(0.0);
-    world.colliders.insert(collider.collision_groups(hulls).user_data(u128::MAX));
+    collider.collision_groups(hulls).user_data(u128::MAX).build()
 }
 
 /// Converts a vector to the engine's type.
