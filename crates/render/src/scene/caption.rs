@@ -10,12 +10,9 @@ use tautline_audit::{Status, Violation};
 use tautline_core::obstacle::Shape;
 use tautline_core::swarm::{Bounce, Pair};
 use tautline_core::text::{at_least, beside_limit, exact};
-use tautline_report::replay::is_between;
+use tautline_report::replay::{LIMITS, is_between};
 use tautline_sim::plan::Plan;
 
-/// Number of vehicles up to which all names are drawn. A larger swarm has only those of the picked vehicle, of the
-/// closest pair and of the worst violations.
-const MAX_NAMED: usize = 24;
 /// Largest number of pairs closer than delta whose separation is drawn; the closest pairs are chosen.
 const MAX_LABELLED: usize = 3;
 /// Number of colours on each side of the legend's scale.
@@ -368,7 +365,7 @@ impl SceneBuilder<'_> {
         let violated = self.violated.iter().take(MAX_LABELLED).map(|(violation, _)| violation.pair);
         let nearest = self.closest_clear_pair().filter(|_| self.view.layers.closest).map(|(pair, _)| pair);
         labelled.extend(violated.chain(nearest).flat_map(|pair| [pair.first(), pair.second()]));
-        if self.timeline.count() <= MAX_NAMED {
+        if self.timeline.count() <= LIMITS.named {
             labelled.extend(0..self.timeline.count());
         }
         let mut seen = vec![false; self.timeline.count()];

@@ -11,7 +11,7 @@ use crate::timeline::Timeline;
 use tautline_core::obstacle::{Obstacle, Shape};
 use tautline_core::swarm::{Pair, Rows, row};
 use tautline_report::flight_log::{Frame, Keyframe};
-use tautline_report::replay::Viewpoint;
+use tautline_report::replay::{Viewpoint, round_step};
 
 /// Largest number of vehicle positions that framing uses.
 const FRAMED_PLACES: usize = 200_000;
@@ -347,15 +347,6 @@ fn find(timeline: &Timeline, name: &str) -> Result<usize, RenderError> {
     })
 }
 
-/// Returns the smallest of 1, 2 and 5 times a power of ten at or above a length; 1 for an invalid length.
-fn round_step(length_m: f64) -> f64 {
-    if !(length_m > 0.0 && length_m.is_finite()) {
-        return 1.0;
-    }
-    let power = 10.0_f64.powf(length_m.log10().floor());
-    [1.0, 2.0, 5.0, 10.0].into_iter().map(|digit| digit * power).find(|&step| step >= length_m).unwrap_or(power)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -372,12 +363,5 @@ mod tests {
             let beyond = (around.centre - smooth.centre).abs() + around.half - smooth.half;
             assert!(beyond.max() <= 1e-12, "{around:?} {smooth:?}");
         }
-    }
-
-    #[test]
-    fn ground_steps_are_round_numbers() {
-        let steps = [0.9, 1.0, 1.1, 3.0, 7.0, 0.03, 1234.0].map(round_step);
-        assert_eq!(steps, [1.0, 1.0, 2.0, 5.0, 10.0, 0.05, 2000.0]);
-        assert_eq!([0.0, -1.0, f64::NAN, f64::INFINITY].map(round_step), [1.0; 4]);
     }
 }

@@ -671,9 +671,10 @@ mod quadrotors {
     use nalgebra::{UnitQuaternion, Vector3};
 
     use super::super::*;
-    use crate::timeline::{QuadrotorShape, Timeline};
+    use crate::timeline::Timeline;
     use tautline_core::record::{Channel, Sample};
     use tautline_core::swarm::{Rows, Swarm};
+    use tautline_report::replay::Rotors;
 
     const ABOVE: f64 = 0.18;
     const PLACES_M: [f64; 6] = [0.0, 0.0, 1.0, 3.0, 0.0, 1.0];
@@ -703,12 +704,12 @@ mod quadrotors {
 
     /// Returns the largest distance of discs from the rotors of both vehicles at an attitude \[m\].
     fn off_m(timeline: &Timeline, attitude: UnitQuaternion<f64>) -> f64 {
-        let (shape, origin_m) = (QuadrotorShape::within(0.25), Extent::of(timeline).origin_m());
+        let (rotors, origin_m) = (Rotors::within(0.25), Extent::of(timeline).origin_m());
         let scene = scene(timeline, [1280, 720]);
         assert_eq!(scene.discs.len(), 8);
         let expected = PLACES_M.chunks_exact(3).flat_map(|place| {
             let place = Vector3::new(place[0], place[1], place[2]) - origin_m;
-            shape.rotors_m.map(|rotor_m| place + attitude * (rotor_m + Vector3::z() * (ABOVE * shape.arm_m())))
+            rotors.places_m(ABOVE * rotors.arm_m()).map(|rotor_m| place + attitude * rotor_m)
         });
         let nearest = |rotor: Vector3<f64>| {
             let off = |disc: &Disc| {

@@ -19,7 +19,8 @@ mod viewpoint;
 pub use chart::Chart;
 pub use data::{JudgementContext, Replay};
 pub use decimate::{MOST_INSTANTS, MOST_VEHICLES, Span, chosen};
-pub use stage::{Rotors, Stage};
+pub use obstacle_meshes::round_step;
+pub use stage::{LIMITS, Limits, MOST_LINKS, Rotors, Stage};
 pub use viewpoint::{Viewpoint, is_between};
 
 use base64::Engine as _;

@@ -31,7 +31,7 @@ const HALF_TURN: f64 = 0.1;
 const EYE: f64 = 3.0;
 
 /// Direction from which a flight is seen first.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Viewpoint {
     /// Azimuth of the oblique view, from the x axis towards the y axis \[degrees\].
     pub azimuth_deg: f64,
