@@ -1,16 +1,15 @@
 //! Text of a picture: caption, verdict, legend, names of vehicles, and separations of pairs.
 
-use super::camera::{Lens, Projected};
+use super::camera::Projected;
 use super::colour::{Colour, Colouring};
 use super::compose::SceneBuilder;
 use super::geometry::has_few_edges;
 use super::labels::{LabelLayout, width};
 use super::{Annotation, pixels};
 use tautline_audit::{Status, Violation};
-use tautline_core::obstacle::Shape;
 use tautline_core::swarm::{Bounce, Pair};
 use tautline_core::text::{at_least, beside_limit, exact};
-use tautline_report::replay::{LIMITS, is_between};
+use tautline_report::replay::LIMITS;
 use tautline_sim::plan::Plan;
 
 /// Largest number of pairs closer than delta whose separation is drawn; the closest pairs are chosen.
@@ -423,7 +422,7 @@ impl SceneBuilder<'_> {
 
     /// Returns whether another vehicle or an obstacle covers the centre of this one.
     fn is_hidden(&self, k: usize, own: Projected) -> bool {
-        if self.is_behind_obstacle(k) {
+        if self.vehicle(k).is_some_and(|place| self.extent.is_behind_obstacle(self.timeline, &self.camera, place)) {
             return true;
         }
         let others = (0..self.timeline.count()).filter(|&other| other != k);
@@ -431,22 +430,6 @@ impl SceneBuilder<'_> {
             let apart = (projection.at_px[0] - own.at_px[0]).hypot(projection.at_px[1] - own.at_px[1]);
             projection.depth_m < own.depth_m && apart < self.timeline.radius_m[other] * projection.px_per_m
         })
-    }
-
-    /// Returns whether a solid obstacle is between the camera and a vehicle.
-    fn is_behind_obstacle(&self, k: usize) -> bool {
-        let Some(place) = self.vehicle(k) else { return false };
-        let distance_m = self.camera.project(place).map_or(0.0, |projection| projection.depth_m);
-        let towards = match self.camera.lens {
-            Lens::Perspective(_) => self.camera.eye_m - place,
-            Lens::Parallel(_) => self.camera.back * distance_m,
-        };
-        let is_solid = |shape: &Shape| !matches!(shape, Shape::HalfSpace { .. });
-        let (from_m, obstacles) =
-            (place + self.extent.origin_m(), self.timeline.plan.iter().flat_map(|plan| &plan.obstacles));
-        obstacles
-            .filter(|obstacle| is_solid(&obstacle.shape))
-            .any(|obstacle| is_between(&obstacle.shape, obstacle.place_m, from_m, from_m + towards))
     }
 
     /// Returns the names of the two vehicles of a pair, in words and in short.

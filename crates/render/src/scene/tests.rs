@@ -5,6 +5,7 @@ use nalgebra::Vector3;
 use super::*;
 use crate::timeline::Timeline;
 use tautline_audit::Status;
+use tautline_core::obstacle::{Obstacle, Shape};
 use tautline_core::record::{Event, Sample};
 use tautline_core::swarm::{ClosestApproach, Pair, Rows, Swarm, row};
 use tautline_laws::formation::Formation;
@@ -309,6 +310,30 @@ fn the_automatic_camera_shows_every_vehicle_at_the_start_among_obstacles() {
     let named = |text: &str| words(&scene(&timeline, 0.0, &View { layers, ..camera(text) })).len();
     assert_eq!(named("auto"), 8);
     assert!(named("-66,28,40") < 8, "a pillar hides vehicles from the usual direction");
+}
+
+#[test]
+fn the_automatic_camera_turns_until_no_obstacle_hides_the_pair() {
+    let scenario = Scenario::read(&Source::Builtin("obstacles".to_owned()), &[]).expect("built in");
+    let mut timeline = Timeline::of(&scenario);
+    timeline.take(&Sample::new(0.0, 0, &scenario.start, &Rows::zeros(scenario.count())));
+    let (extent, frame) = (Extent::of(&timeline), timeline.log.at(0.0).expect("a frame"));
+    let pair = Pair::new(0, 1);
+    let cameras = |timeline: &Timeline, view: &View| {
+        let usual = extent.camera(timeline, &frame, view).expect("a camera");
+        (usual, extent.camera_on(timeline, &frame, view, pair).expect("a camera"))
+    };
+    let (usual, shown) = cameras(&timeline, &camera("auto"));
+    assert_eq!(usual, shown, "nothing is hidden");
+    let place = |k: usize| extent.place(&frame.positions_m, k).expect("present");
+    let plan = timeline.plan.as_mut().expect("a plan");
+    let place_m = usual.eye_m.lerp(&place(1), 0.7) + extent.origin_m();
+    plan.obstacles.push(Obstacle { shape: Shape::Ball { radius_m: 0.3 }, place_m, ..plan.obstacles[0].clone() });
+    let (usual, shown) = cameras(&timeline, &camera("auto"));
+    let hides = |camera: &Camera| [0, 1].map(|k| extent.is_behind_obstacle(&timeline, camera, place(k)));
+    assert_eq!((hides(&usual), hides(&shown)), ([false, true], [false; 2]));
+    let (usual, shown) = cameras(&timeline, &camera("perspective"));
+    assert_eq!(usual, shown, "a camera of choice stays");
 }
 
 #[test]
